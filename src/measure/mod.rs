@@ -1,0 +1,3 @@
+//! Measuring: the gate, the timing protocol, image metrics, statistics, records.
+
+pub mod record;

@@ -1,0 +1,467 @@
+//! Records: one JSON line per thing measured, schema `raystone/1`. Every table, plot and export
+//! derives from these lines alone; an absent value is absent, never 0.
+
+use crate::config::Variant;
+use crate::scene::{Camera, LoadReport};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Version tag of every line; bumped together with any change of a field's meaning.
+pub const SCHEMA: &str = "raystone/1";
+
+/// One line of `records.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    /// Always [`SCHEMA`].
+    pub schema: String,
+    /// Content hash of the cell that this line belongs to (hex), see [`crate::config`].
+    pub hash: String,
+    /// What was measured.
+    pub record: Record,
+}
+
+/// What a line holds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Record {
+    /// First line: what is run, where, and how many runs the plan saves.
+    Run(RunRecord),
+    /// A scene was loaded.
+    Scene(SceneRecord),
+    /// A structure was built, gated and traced with the recorded rays.
+    Structure(StructureRecord),
+    /// A reference image was rendered.
+    Reference(ReferenceRecord),
+    /// Error of one replicate of a sampler against the reference, per spp.
+    Error(ErrorRecord),
+    /// Verdict on the bias of a sampler over all its replicates.
+    Bias(BiasRecord),
+    /// Time of a full cell (structure × sampler × integrator).
+    Time(TimeRecord),
+    /// Star discrepancy of the stream that a dimension pair of the path really consumed.
+    Stream(StreamRecord),
+    /// A cell that was not run, with the reason.
+    Skipped(SkippedRecord),
+    /// Last line: where the wall time went, how many cells failed.
+    Finished(FinishedRecord),
+}
+
+/// A figure with its 95 % bootstrap interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Interval {
+    /// The estimate (median for times and rates, mean for errors).
+    pub value: f64,
+    /// Lower end of the 95 % interval.
+    pub low: f64,
+    /// Upper end of the 95 % interval.
+    pub high: f64,
+}
+
+impl Interval {
+    /// Whether two intervals have no point in common: only then is a winner named.
+    pub fn is_apart_from(&self, other: &Interval) -> bool {
+        self.low > other.high || other.low > self.high
+    }
+}
+
+/// Machine, adapter, driver and program that produced a result.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Environment {
+    /// Adapter name as the driver gives it.
+    pub adapter: String,
+    /// `vulkan`, `gl`, `metal`, `dx12`.
+    pub backend: String,
+    /// Driver name.
+    pub driver: String,
+    /// Driver version text.
+    pub driver_info: String,
+    /// `discrete-gpu`, `integrated-gpu`, `virtual-gpu`, `cpu`, `other`.
+    pub device_type: String,
+    /// Whether the adapter is a software rasteriser: its times compare structures on it only.
+    pub software: bool,
+    /// Whether GPU timestamps are available; wall clock is used, and marked, where not.
+    pub timestamps: bool,
+    /// Operating system and architecture.
+    pub os: String,
+    /// Processor model.
+    pub cpu: String,
+    /// Hardware threads of the host.
+    pub cpu_threads: usize,
+    /// Version of this program.
+    pub version: String,
+    /// Commit the program was built from, when known.
+    pub commit: Option<String>,
+    /// Whether the working tree had uncommitted changes when it was built.
+    pub dirty: Option<bool>,
+}
+
+/// First line of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunRecord {
+    /// `run.name` of the experiment.
+    pub name: String,
+    /// The experiment file as given.
+    pub experiment: String,
+    /// The whole experiment text with overrides appended as comments, so that it can be repeated.
+    pub experiment_text: String,
+    /// Seconds since 1970-01-01 UTC.
+    pub started_unix_s: u64,
+    /// Where it ran.
+    pub environment: Environment,
+    /// Renders (image × replicate) that the full product of all axes would need.
+    pub renders_full_product: usize,
+    /// Renders that this plan needs, since images are equal across structures.
+    pub renders_planned: usize,
+}
+
+/// A loaded scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SceneRecord {
+    /// Name or path as given.
+    pub scene: String,
+    /// Number of triangles.
+    pub triangles: usize,
+    /// Minimum corner of the bounding box.
+    pub bounds_min: [f32; 3],
+    /// Maximum corner of the bounding box.
+    pub bounds_max: [f32; 3],
+    /// Parse and prepare, milliseconds (structures not included).
+    pub load_ms: f64,
+    /// Bytes of the scene's arrays on the host.
+    pub bytes: u64,
+    /// Number of materials.
+    pub materials: usize,
+    /// Number of textures.
+    pub textures: usize,
+    /// Number of emissive triangles.
+    pub emitters: usize,
+    /// The camera in use.
+    pub camera: Camera,
+    /// Dropped and approximated things.
+    pub report: LoadReport,
+    /// BLAKE3 of the content.
+    pub scene_hash: String,
+}
+
+/// A timed phase of a build.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Phase {
+    /// For instance `bounds`, `binned-sah`, `layout`.
+    pub name: String,
+    /// Milliseconds of wall time.
+    pub ms: f64,
+}
+
+/// Static figures of a built structure.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct StructureStats {
+    /// Nodes (inner and leaf) or cells.
+    pub nodes: u64,
+    /// Leaves or non-empty cells.
+    pub leaves: u64,
+    /// Triangle references held by leaves or cells.
+    pub references: u64,
+    /// Deepest leaf (root = 0); absent for flat structures.
+    pub depth: Option<u32>,
+    /// SAH cost with traversal and intersection constants both 1; absent where not defined.
+    pub sah_cost: Option<f64>,
+    /// Bytes of the structure's GPU buffers (the canonical triangle buffer is not counted).
+    pub bytes: u64,
+}
+
+/// Ray classes of the recorded ray sets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RayClass {
+    /// Camera rays through pixel centres, 8×8 tiles; closest hit.
+    Primary,
+    /// Rays from first hits towards emitters (or towards points of the bounding sphere); any hit.
+    Shadow,
+    /// Cosine-distributed rays of limited length from first hits; any hit.
+    Ao,
+    /// Cosine-distributed rays from first hits; closest hit.
+    Bounce,
+    /// Rays between random points of the bounding box; closest hit.
+    Chord,
+}
+
+/// Gate result for one ray class.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ClassVerdict {
+    /// Which rays.
+    pub class: RayClass,
+    /// Rays compared to the bit (id, t, u, v; hit or miss for any-hit queries).
+    pub rays: usize,
+    /// Rays whose answer differs and is not a tie.
+    pub wrong: usize,
+    /// Rays whose id or t differs but both triangles lie within 4 ulp of the same distance.
+    pub ties: usize,
+    /// The first wrong ray, replayable, with both answers.
+    pub first_wrong: Option<String>,
+}
+
+/// Comparison of the judge with a slower, simpler judge.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct JudgeCheck {
+    /// Rays compared.
+    pub rays: usize,
+    /// Rays that differ.
+    pub wrong: usize,
+    /// Rays that pass within rounding error of an edge or of another surface (oracle only).
+    pub ambiguous: usize,
+}
+
+/// The verdict of the gate on one structure and scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GateVerdict {
+    /// Nothing wrong, no fuse blown, judge itself sound.
+    pub passed: bool,
+    /// Per ray class.
+    pub classes: Vec<ClassVerdict>,
+    /// The judge (scalar plain BVH) against brute force.
+    pub brute_force: JudgeCheck,
+    /// The judge against the f64 oracle.
+    pub oracle: JudgeCheck,
+    /// Error words raised by kernels (step fuse, stack overflow), in words.
+    pub kernel_errors: Vec<String>,
+    /// Structural faults found by `validate`.
+    pub structural: Option<String>,
+}
+
+/// Work counted per ray, means over a class.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct CountersPerRay {
+    /// Nodes or cells visited.
+    pub nodes: f64,
+    /// Ray–box tests.
+    pub box_tests: f64,
+    /// Ray–triangle tests.
+    pub triangle_tests: f64,
+    /// Deepest stack seen in the class (entries).
+    pub stack_high_water: u32,
+}
+
+/// Speed of one ray class through one structure.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ClassTiming {
+    /// Which rays.
+    pub class: RayClass,
+    /// Rays per dispatch.
+    pub rays: usize,
+    /// Fraction of the rays that hit something.
+    pub hit_fraction: f64,
+    /// Every kept sample, milliseconds, an empty dispatch already subtracted.
+    pub ms: Vec<f64>,
+    /// The same dispatches by the wall clock, milliseconds.
+    pub wall_ms: Vec<f64>,
+    /// Million rays per second, median with interval.
+    pub mrays_s: Interval,
+    /// Counted work, from a separate run.
+    pub counters: CountersPerRay,
+}
+
+/// A structure on a scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StructureRecord {
+    /// Scene name.
+    pub scene: String,
+    /// Structure with parameters.
+    pub accel: Variant,
+    /// Feature flags of the composed kernel.
+    pub features: Vec<String>,
+    /// Whether the driver's bounds checks and loop bounds were on.
+    pub runtime_checks: bool,
+    /// Timed build phases.
+    pub build: Vec<Phase>,
+    /// Sum of the phases, milliseconds.
+    pub build_ms: f64,
+    /// Static figures.
+    pub stats: StructureStats,
+    /// Verdict; `None` only if the build failed.
+    pub gate: Option<GateVerdict>,
+    /// Speeds; empty unless the gate passed.
+    pub timings: Vec<ClassTiming>,
+    /// Heat map of traversal cost of primary rays, a PNG relative to the run's folder.
+    pub heat_map: Option<String>,
+    /// Cost (nodes + triangle tests) at the top of the heat map's colour scale.
+    pub heat_map_max: Option<f64>,
+    /// Why there are no figures.
+    pub failure: Option<String>,
+}
+
+/// A reference image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ReferenceRecord {
+    /// Scene name.
+    pub scene: String,
+    /// Integrator with parameters.
+    pub integrator: Variant,
+    /// Samples per pixel of both halves together.
+    pub spp: u32,
+    /// Sampler, as `sequence × decorrelation`.
+    pub sampler: String,
+    /// Seconds it took.
+    pub seconds: f64,
+    /// Estimated mean squared error of the reference itself, from its two halves.
+    pub mse: f64,
+    /// Tone-mapped PNG relative to the run's folder.
+    pub image: String,
+    /// Mean radiance over pixels and channels.
+    pub mean: f64,
+}
+
+/// Error at one number of samples.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ErrorAtSpp {
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Metric id with version → value, for instance `rmse/v1`, `relmse/eps=1e-2/v1`.
+    pub metrics: BTreeMap<String, f64>,
+}
+
+/// Error of one replicate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ErrorRecord {
+    /// Scene name.
+    pub scene: String,
+    /// Integrator with parameters.
+    pub integrator: Variant,
+    /// Sequence with parameters.
+    pub sequence: Variant,
+    /// Decorrelation with parameters.
+    pub decorrelation: Variant,
+    /// Whether the pair is randomised by its seed; a deterministic pair has one replicate.
+    pub randomised: bool,
+    /// Number of this replicate, from 0.
+    pub replicate: u32,
+    /// Its seed.
+    pub seed: u32,
+    /// Image size in pixels.
+    pub resolution: [u32; 2],
+    /// Error at 1, 2, 4, … samples per pixel.
+    pub errors: Vec<ErrorAtSpp>,
+    /// Pixels that were NaN or infinite (any is a failure).
+    pub non_finite_pixels: usize,
+    /// BLAKE3 of the f32 image at the highest spp.
+    pub image_hash: String,
+    /// Tone-mapped image at the highest spp (first replicate only).
+    pub image: Option<String>,
+    /// Error map at the highest spp (first replicate only).
+    pub error_map: Option<String>,
+}
+
+/// Bias check of one sampler: Welch t per tile of the replicate mean against the reference.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BiasRecord {
+    /// Scene name.
+    pub scene: String,
+    /// Integrator with parameters.
+    pub integrator: Variant,
+    /// Sequence with parameters.
+    pub sequence: Variant,
+    /// Decorrelation with parameters.
+    pub decorrelation: Variant,
+    /// Tiles tested.
+    pub tiles: usize,
+    /// Tiles rejected after Benjamini–Hochberg at `alpha`.
+    pub rejected: usize,
+    /// False-discovery rate.
+    pub alpha: f64,
+    /// Smallest p-value.
+    pub min_p: f64,
+    /// Histogram of the p-values in ten equal bins: flat when there is no bias.
+    pub p_histogram: Vec<usize>,
+    /// `no-bias-found`, `biased`, or `not-testable` with the reason.
+    pub verdict: String,
+}
+
+/// Time of a full cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TimeRecord {
+    /// Scene name.
+    pub scene: String,
+    /// Structure with parameters.
+    pub accel: Variant,
+    /// Sequence with parameters.
+    pub sequence: Variant,
+    /// Decorrelation with parameters.
+    pub decorrelation: Variant,
+    /// Integrator with parameters.
+    pub integrator: Variant,
+    /// Image size in pixels.
+    pub resolution: [u32; 2],
+    /// Samples per pixel of each timed render.
+    pub spp: u32,
+    /// Every kept sample, milliseconds per render on the GPU clock.
+    pub ms: Vec<f64>,
+    /// The same renders by the wall clock, milliseconds.
+    pub wall_ms: Vec<f64>,
+    /// Milliseconds per sample per pixel for the whole image, median with interval.
+    pub ms_per_spp: Interval,
+    /// Rays of each class in one render, from a separate counting run of the same seed.
+    pub rays: BTreeMap<String, u64>,
+    /// All rays over time, million per second.
+    pub mrays_s: Interval,
+    /// BLAKE3 of the image.
+    pub image_hash: String,
+    /// Whether the image equals to the bit that of the scene's first gated structure.
+    pub image_equal: bool,
+    /// Whether the driver's bounds checks and loop bounds were on.
+    pub runtime_checks: bool,
+    /// Feature flags of the composed kernel.
+    pub features: Vec<String>,
+    /// Why there are no figures.
+    pub failure: Option<String>,
+}
+
+/// Star discrepancy of a dumped stream.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StreamRecord {
+    /// Sequence with parameters.
+    pub sequence: Variant,
+    /// Decorrelation with parameters.
+    pub decorrelation: Variant,
+    /// The two dimensions of the path's table.
+    pub dimensions: [u32; 2],
+    /// What the path uses them for, for instance `bounce 0: direction`.
+    pub purpose: String,
+    /// Whether each seed gives another point set.
+    pub randomised: bool,
+    /// Seeds measured (one for a deterministic stream).
+    pub seeds: usize,
+    /// `(N, D*)` for the first N points: mean over seeds with interval.
+    pub star: Vec<StarAtCount>,
+}
+
+/// Star discrepancy at one number of points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StarAtCount {
+    /// Number of points.
+    pub n: usize,
+    /// Exact 2-D star discrepancy.
+    pub star: Interval,
+}
+
+/// A cell left out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SkippedRecord {
+    /// The cell, in words.
+    pub cell: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// Last line of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FinishedRecord {
+    /// Whole wall time, seconds.
+    pub wall_s: f64,
+    /// Named parts of it, seconds: `load`, `build`, `gate`, `gpu`, `judge`, `report`, …
+    pub parts_s: BTreeMap<String, f64>,
+    /// Wall time that is neither GPU work nor building, judging or loading.
+    pub overhead_s: f64,
+    /// Cells that failed.
+    pub failed: usize,
+    /// Cells that were skipped.
+    pub skipped: usize,
+}

@@ -1,0 +1,130 @@
+//! Scenes: what is traced. Loaders for OBJ, glTF and PLY, built-in procedural scenes, cameras,
+//! materials and emitters.
+//!
+//! A scene is one flat triangle soup in world space with per-triangle material indices. Structures
+//! see only [`Triangle`]s; shading sees the rest.
+
+use glam::{Vec2, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// One triangle in world space, vertices in the order of the file (f32, scene units).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Triangle {
+    /// The three corners.
+    pub vertices: [Vec3; 3],
+}
+
+/// A pinhole camera. Rays start at `eye`; pixel (0, 0) is the top left one.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Camera {
+    /// Position of the pinhole, scene units.
+    pub eye: Vec3,
+    /// Point that projects to the centre of the image.
+    pub target: Vec3,
+    /// Up direction; need not be normalised or orthogonal to the viewing direction.
+    pub up: Vec3,
+    /// Vertical field of view, degrees, in (0, 180).
+    pub vertical_fov_degrees: f32,
+}
+
+/// How light leaves a surface, as far as the kernels render it today.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MaterialKind {
+    /// Lambertian reflection of the (possibly textured) base colour.
+    Diffuse,
+    /// Perfect mirror tinted by the base colour.
+    Mirror,
+}
+
+/// What the file said of a material beyond what [`MaterialKind`] renders: kept, because more of it
+/// will be rendered later. Absent values are `None`, never a default.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct MaterialSource {
+    /// Linear roughness in [0, 1] (glTF), or derived from the Phong exponent (MTL).
+    pub roughness: Option<f32>,
+    /// Metalness in [0, 1] (glTF).
+    pub metallic: Option<f32>,
+    /// Specular colour (MTL `Ks`, glTF specular-glossiness).
+    pub specular: Option<[f32; 3]>,
+    /// Phong exponent (MTL `Ns`).
+    pub shininess: Option<f32>,
+    /// Index of refraction (MTL `Ni`, glTF `KHR_materials_ior`).
+    pub ior: Option<f32>,
+    /// Fraction of light transmitted, in [0, 1].
+    pub transmission: Option<f32>,
+    /// Opacity in [0, 1] (MTL `d`, glTF alpha).
+    pub opacity: Option<f32>,
+    /// glTF alpha mode, as in the file (`OPAQUE`, `MASK`, `BLEND`).
+    pub alpha_mode: Option<String>,
+    /// MTL illumination model.
+    pub illum: Option<u8>,
+}
+
+/// A surface material.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Material {
+    /// Name in the file, or a made-up one.
+    pub name: String,
+    /// What the kernels render.
+    pub kind: MaterialKind,
+    /// Linear RGB reflectance, each in [0, 1]; multiplied by the texture if there is one.
+    pub base_color: Vec3,
+    /// Index into [`SceneData::textures`] of the base-colour texture.
+    pub base_color_texture: Option<u32>,
+    /// Emitted radiance, linear RGB, both sides of the triangle.
+    pub emission: Vec3,
+    /// What else the file said.
+    pub source: MaterialSource,
+}
+
+/// An 8-bit sRGB texture, row by row from the top; wraps in both directions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Texture {
+    /// File or embedded name, for messages.
+    pub name: String,
+    /// Texels in x.
+    pub width: u32,
+    /// Texels in y.
+    pub height: u32,
+    /// `width * height` texels, sRGB-encoded RGBA8.
+    pub texels: Vec<[u8; 4]>,
+}
+
+/// What went wrong or was approximated while a scene was loaded: counted, shown, kept in the record.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct LoadReport {
+    /// Triangles dropped because a vertex was NaN or infinite.
+    pub dropped_non_finite: usize,
+    /// Triangles of zero area: kept, they can never be hit.
+    pub zero_area: usize,
+    /// Everything else worth a line (missing texture, material approximated as diffuse, …).
+    pub warnings: Vec<String>,
+}
+
+/// A loaded scene: flat world-space triangles and what shading needs.
+///
+/// `triangles`, `uvs` and `material_ids` are parallel; `uvs` is empty when no material is textured.
+#[derive(Debug, Clone)]
+pub struct SceneData {
+    /// Name as the user typed it.
+    pub name: String,
+    /// The triangle soup.
+    pub triangles: Vec<Triangle>,
+    /// Texture coordinates per corner, `v` pointing down (glTF convention); empty if unused.
+    pub uvs: Vec<[Vec2; 3]>,
+    /// Index into `materials` for each triangle.
+    pub material_ids: Vec<u32>,
+    /// Materials; never empty.
+    pub materials: Vec<Material>,
+    /// Base-colour textures.
+    pub textures: Vec<Texture>,
+    /// The camera of the file or of the built-in scene; `None` means "frame automatically".
+    pub camera: Option<Camera>,
+    /// Constant radiance of the environment, linear RGB; zero is a black sky.
+    pub environment: Vec3,
+    /// BLAKE3 of the scene's content (hex), part of every cell's hash.
+    pub hash: String,
+    /// What was dropped or approximated.
+    pub report: LoadReport,
+}
