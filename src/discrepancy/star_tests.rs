@@ -81,8 +81,8 @@ fn known_sets_have_their_published_discrepancy() {
     assert_star(&sobol(1024), 0.004299163818359375);
     assert_star(&halton(0, 1024), 0.0068359375);
     assert_star(&hammersley(64), 0.0537109375);
-    assert_star(&sobol(4096), 0.001_329_183_578_491_210_9);
-    assert_star(&halton(0, 4096), 0.001_863_483_974_908_541_9);
+    assert_star(&sobol(4096), 0.001_329_183_578_491_211);
+    assert_star(&halton(0, 4096), 0.001_863_483_974_908_542);
     // Tabled to ten or so digits only.
     for (points, expected) in [
         (halton(0, 64), 0.0520833333),

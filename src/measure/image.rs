@@ -1,10 +1,8 @@
-//! Images and their error: linear RGB images, the versioned metrics, tone mapping and PNG files.
+//! Linear RGB images and their error by versioned metrics.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::io;
+use std::path::PathBuf;
 use thiserror::Error;
 
 /// Added to the squared reference in relative metrics, so that dark pixels do not rule the mean.
@@ -12,9 +10,6 @@ pub const RELATIVE_EPSILON: f64 = 1e-2;
 
 /// Weights of linear RGB (Rec. 709 primaries) in luminance.
 pub const LUMINANCE: [f64; 3] = [0.212671, 0.715160, 0.072169];
-
-/// Colour of a pixel that is NaN or infinite, in every picture.
-pub const NON_FINITE_COLOUR: [u8; 3] = [255, 0, 255];
 
 /// What can be wrong with an image.
 #[derive(Debug, Error)]
@@ -216,7 +211,7 @@ impl Reference {
 }
 
 /// One channel of one pixel, all that a metric sees.
-struct Sample {
+pub(super) struct Sample {
     value: f64,
     reference: f64,
     half_a: f64,
@@ -262,7 +257,7 @@ pub const METRICS: &[Metric] = &[
         id: "relmse/eps=1e-2/v1",
         description: "mean (v − r)² / (r² + 0.01)",
         needs_halves: false,
-        term: |s| (s.value - s.reference).powi(2) / relative_scale(s),
+        term: Sample::relative_squared_error,
         finish: |mean| mean,
     },
     Metric {
@@ -276,13 +271,20 @@ pub const METRICS: &[Metric] = &[
         id: "relmse-unbiased/eps=1e-2/v1",
         description: "mean (v − A)(v − B) / (((A + B) / 2)² + 0.01), may be negative",
         needs_halves: true,
-        term: |s| (s.value - s.half_a) * (s.value - s.half_b) / relative_scale(s),
+        term: |s| (s.value - s.half_a) * (s.value - s.half_b) / s.relative_scale(),
         finish: |mean| mean,
     },
 ];
 
-fn relative_scale(s: &Sample) -> f64 {
-    s.reference * s.reference + RELATIVE_EPSILON
+impl Sample {
+    /// (v − r)² / (r² + ε).
+    pub(super) fn relative_squared_error(&self) -> f64 {
+        (self.value - self.reference).powi(2) / self.relative_scale()
+    }
+
+    fn relative_scale(&self) -> f64 {
+        self.reference * self.reference + RELATIVE_EPSILON
+    }
 }
 
 /// Error of one image.
@@ -307,8 +309,8 @@ pub fn measure(image: &Image, reference: &Reference) -> Result<ErrorReport, Imag
             continue;
         }
         finite += 1;
-        for c in 0..3 {
-            let sample = reference.sample(i, c, pixel[c]);
+        for (c, &value) in pixel.iter().enumerate() {
+            let sample = reference.sample(i, c, value);
             for (sum, metric) in sums.iter_mut().zip(METRICS) {
                 *sum += (metric.term)(&sample);
             }
@@ -328,7 +330,7 @@ pub fn measure(image: &Image, reference: &Reference) -> Result<ErrorReport, Imag
 }
 
 impl Reference {
-    fn sample(&self, pixel: usize, channel: usize, value: f32) -> Sample {
+    pub(super) fn sample(&self, pixel: usize, channel: usize, value: f32) -> Sample {
         let at = |image: &Image| f64::from(image.pixels[pixel][channel]);
         let reference = at(&self.mean);
         let (half_a, half_b) = match &self.halves {
@@ -344,136 +346,7 @@ impl Reference {
     }
 }
 
-/// A picture to look at: sRGB, 8 bits, row by row from the top left pixel.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Picture {
-    /// Pixels in x.
-    pub width: u32,
-    /// Pixels in y.
-    pub height: u32,
-    /// `width * height` pixels.
-    pub pixels: Vec<[u8; 3]>,
-}
-
-/// Exposure that brings the log-average luminance of the finite, non-black pixels to 0.18
-/// (Reinhard et al. 2002, equation 2); 1 for an image without such pixels. Take it from the
-/// reference and use it for all images of a scene, so that they can be compared by eye.
-pub fn automatic_exposure(image: &Image) -> f32 {
-    let lit = |p: &&[f32; 3]| is_finite(p) && luminance(p) > 1e-6;
-    let (sum, count) = image
-        .pixels
-        .iter()
-        .filter(lit)
-        .fold((0.0, 0usize), |(sum, n), p| {
-            (sum + luminance(p).ln(), n + 1)
-        });
-    match count {
-        0 => 1.0,
-        _ => (0.18 / (sum / count as f64).exp()) as f32,
-    }
-}
-
-/// Tone-mapped picture: exposure, then the luminance curve L (1 + L / 16) / (1 + L) that maps 4 to
-/// white and keeps the hue (Reinhard et al. 2002, equation 4), clamp, sRGB encoding. Pixels that are
-/// not finite get [`NON_FINITE_COLOUR`].
-pub fn tone_map(image: &Image, exposure: f32) -> Picture {
-    let map = |pixel: &[f32; 3]| {
-        if !is_finite(pixel) {
-            return NON_FINITE_COLOUR;
-        }
-        let bright = luminance(pixel).max(0.0) * f64::from(exposure);
-        let scale = f64::from(exposure) * (1.0 + bright / 16.0) / (1.0 + bright);
-        pixel.map(|v| encode_srgb(f64::from(v) * scale))
-    };
-    Picture {
-        width: image.width,
-        height: image.height,
-        pixels: image.pixels.iter().map(map).collect(),
-    }
-}
-
-/// Picture of the error: per pixel √ of the mean over channels of (v − r)² / (r² + 0.01), over
-/// `full_scale`, clamped to `[0, 1]` and coloured by `colour`.
-///
-/// # Errors
-/// [`ImageError::SizeMismatch`].
-pub fn error_map(
-    image: &Image,
-    reference: &Reference,
-    full_scale: f32,
-    colour: impl Fn(f32) -> [u8; 3],
-) -> Result<Picture, ImageError> {
-    reference.mean.check_size(image, "the measured image")?;
-    let map = |(i, pixel): (usize, &[f32; 3])| {
-        let term = |c: usize| {
-            let s = reference.sample(i, c, pixel[c]);
-            (s.value - s.reference).powi(2) / relative_scale(&s)
-        };
-        let error = ((term(0) + term(1) + term(2)) / 3.0).sqrt() as f32;
-        match error.is_finite() {
-            true => colour((error / full_scale).clamp(0.0, 1.0)),
-            false => NON_FINITE_COLOUR,
-        }
-    };
-    Ok(Picture {
-        width: image.width,
-        height: image.height,
-        pixels: image.pixels.iter().enumerate().map(map).collect(),
-    })
-}
-
-/// Writes a picture as PNG, whole or not at all.
-///
-/// # Errors
-/// [`ImageError::Write`], [`ImageError::Encode`].
-pub fn write_png(path: &Path, picture: &Picture) -> Result<(), ImageError> {
-    let mut bytes = io::Cursor::new(Vec::new());
-    image::write_buffer_with_format(
-        &mut bytes,
-        picture.pixels.as_flattened(),
-        picture.width,
-        picture.height,
-        image::ExtendedColorType::Rgb8,
-        image::ImageFormat::Png,
-    )
-    .map_err(|source| ImageError::Encode {
-        path: path.to_owned(),
-        source,
-    })?;
-    write_atomic(path, bytes.get_ref()).map_err(|source| ImageError::Write {
-        path: path.to_owned(),
-        source,
-    })
-}
-
-/// Writes a file whole or not at all: temporary file in the same folder, sync, rename. A file that
-/// was there keeps its content if anything fails.
-///
-/// # Errors
-/// Those of the file system; the temporary file is removed.
-pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    static COUNTER: AtomicU32 = AtomicU32::new(0);
-    let name = path.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
-    let unique = format!(
-        ".{}.{}.{}.tmp",
-        name.to_string_lossy(),
-        std::process::id(),
-        COUNTER.fetch_add(1, Ordering::Relaxed)
-    );
-    let temporary = path.with_file_name(unique);
-    let write = || {
-        let mut file = File::create(&temporary)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        fs::rename(&temporary, path)
-    };
-    write().inspect_err(|_| {
-        // The first error is the one to tell; a leftover is only litter.
-        let _ = fs::remove_file(&temporary);
-    })
-}
-
-fn is_finite(pixel: &[f32; 3]) -> bool {
+pub(super) fn is_finite(pixel: &[f32; 3]) -> bool {
     pixel.iter().all(|v| v.is_finite())
 }
 
@@ -481,16 +354,6 @@ fn is_finite(pixel: &[f32; 3]) -> bool {
 pub fn luminance(pixel: &[f32; 3]) -> f64 {
     let terms = pixel.iter().zip(LUMINANCE);
     terms.map(|(&v, weight)| f64::from(v) * weight).sum()
-}
-
-/// Clamp and encode (IEC 61966-2-1).
-fn encode_srgb(linear: f64) -> u8 {
-    let v = linear.clamp(0.0, 1.0);
-    let encoded = match v <= 0.0031308 {
-        true => 12.92 * v,
-        false => 1.055 * v.powf(1.0 / 2.4) - 0.055,
-    };
-    (encoded * 255.0).round() as u8
 }
 
 #[cfg(test)]
