@@ -2,7 +2,7 @@
 //!
 //! It is slow, uses no acceleration structure and shares no code with the structures, so it can judge
 //! them. A verdict is [`Verdict::Wrong`] only if no f32 test of the Möller–Trumbore kind could have
-//! given the answer (see [`triangle`] for the bounds), and [`Verdict::Agrees`] only if every such
+//! given the answer (the bounds are derived in `triangle.rs`), and [`Verdict::Agrees`] only if every such
 //! test gives it; [`Verdict::Ambiguous`] is the small rest: near edges, at grazing angles, between
 //! surfaces closer than rounding.
 
