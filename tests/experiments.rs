@@ -656,3 +656,21 @@ fn every_default_is_accepted_by_the_parser() {
     }
     assert_eq!(Axis::ALL.len(), 5);
 }
+
+#[test]
+fn committed_experiments_parse_and_plan() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
+    let mut seen = 0;
+    for file in std::fs::read_dir(&folder).expect("experiments/") {
+        let path = file.expect("a directory entry").path();
+        if path.extension().is_none_or(|extension| extension != "toml") {
+            continue;
+        }
+        let experiment =
+            Experiment::load(&path, &[], &catalogue()).unwrap_or_else(|error| panic!("{error}"));
+        let plan = plan(&experiment, &[]).unwrap_or_else(|error| panic!("{error}"));
+        assert!(plan.renders_planned < plan.renders_full_product);
+        seen += 1;
+    }
+    assert!(seen >= 3, "only {seen} experiments found");
+}
