@@ -101,7 +101,7 @@ impl SceneBuilder {
         self.push([a, c, d], material);
     }
 
-    /// Checks the whole and hashes it.
+    /// Checks the whole, puts a white sky over a scene without any light, and hashes it.
     ///
     /// # Errors
     /// [`SceneError::NoTriangles`], [`SceneError::TooLarge`], and [`SceneError::Camera`] if the
@@ -142,6 +142,11 @@ impl SceneBuilder {
             hash: String::new(),
             report: self.report,
         };
+        if scene.environment == Vec3::ZERO && scene.emitters().is_empty() {
+            scene.environment = Vec3::ONE;
+            let warning = "the scene has no light: lit by a white sky of radiance 1".to_owned();
+            scene.report.warnings.push(warning);
+        }
         scene.hash = scene.content_hash();
         Ok(scene)
     }

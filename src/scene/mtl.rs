@@ -200,13 +200,14 @@ fn readable_lines(bytes: &[u8], path: &Path, warnings: &mut Vec<String>) -> Stri
     let text = String::from_utf8_lossy(bytes);
     let mut out = String::with_capacity(text.len());
     for (number, line) in (1..).zip(text.lines()) {
-        let mut words = line.split_whitespace();
+        let mut words = line.split('#').next().unwrap_or("").split_whitespace();
         let keyword = words.next().unwrap_or("");
         let argument = words.clone().next();
+        let count = words.clone().count();
         let numbers = words.take_while(|w| w.parse::<f32>().is_ok()).count();
         let broken = match keyword {
             "Ka" | "Kd" | "Ks" | "Ke" => {
-                if let (1, Some(grey)) = (numbers, argument) {
+                if let (1, 1, Some(grey)) = (count, numbers, argument) {
                     out.push_str(&format!("{keyword} {grey} {grey} {grey}\n"));
                     continue;
                 }

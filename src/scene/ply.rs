@@ -306,7 +306,10 @@ mod tests {
                 ascii("0 0 1\n2 0 1\n2 2 1\n0 2 1\n7 3 0 1 -1\n"),
                 "vertex -1",
             ),
-            (binary(false)[..200].to_vec(), "face 0 of 1"),
+            (
+                binary(false)[..binary(false).len() - 3].to_vec(),
+                "face 0 of 1",
+            ),
             (
                 b"ply\nformat ascii 1.0\nelement vertex 3\n".to_vec(),
                 "header",

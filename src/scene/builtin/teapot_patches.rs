@@ -4,11 +4,11 @@
 //! around four quarters) and the mirrored halves of handle and spout; the tables hold exactly
 //! that. Newell's coordinates have z up; the bottom was added later (Blinn).
 
-use glam::{Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 /// Control points (radius, height) of the swept parts, top to bottom: rim, upper body, lower body,
 /// knob, lid, bottom.
-const PROFILES: [[[f32; 2]; 4]; 6] = [
+const PROFILES: [[[f64; 2]; 4]; 6] = [
     [[1.4, 2.4], [1.3375, 2.53125], [1.4375, 2.53125], [1.5, 2.4]],
     [[1.5, 2.4], [1.75, 1.875], [2.0, 1.35], [2.0, 0.9]],
     [[2.0, 0.9], [2.0, 0.45], [1.5, 0.225], [1.5, 0.15]],
@@ -18,11 +18,11 @@ const PROFILES: [[[f32; 2]; 4]; 6] = [
 ];
 
 /// Control points of a quarter circle of radius 1 as Newell drew it.
-const QUARTER: [[f32; 2]; 4] = [[1.0, 0.0], [1.0, 0.56], [0.56, 1.0], [0.0, 1.0]];
+const QUARTER: [[f64; 2]; 4] = [[1.0, 0.0], [1.0, 0.56], [0.56, 1.0], [0.0, 1.0]];
 
 /// Half patches of handle (two) and spout (two): per row the inner and the outer curve (x, z) in
 /// the plane of symmetry, and the half width of the row.
-const HALVES: [[([f32; 2], [f32; 2], f32); 4]; 4] = [
+const HALVES: [[([f64; 2], [f64; 2], f64); 4]; 4] = [
     [
         ([-1.6, 2.025], [-1.5, 2.25], 0.3),
         ([-2.3, 2.025], [-2.5, 2.25], 0.3),
@@ -49,17 +49,18 @@ const HALVES: [[([f32; 2], [f32; 2], f32); 4]; 4] = [
     ],
 ];
 
-type Patch = [[Vec3; 4]; 4];
+type Patch = [[DVec3; 4]; 4];
 
 /// The triangles of the teapot, y up, standing on y = 0, about 6.4 units long: `subdivision`
-/// squared quadrilaterals per patch, those at the poles as single triangles.
+/// squared quadrilaterals per patch, those at the poles as single triangles. Below 2, handle and
+/// spout are flat.
 pub(super) fn tessellate(subdivision: usize) -> Vec<[Vec3; 3]> {
     let n = subdivision.max(1);
     let mut triangles = Vec::new();
     for patch in patches() {
         let grid: Vec<Vec3> = (0..=n)
             .flat_map(|i| (0..=n).map(move |j| (i, j)))
-            .map(|(i, j)| evaluate(&patch, i as f32 / n as f32, j as f32 / n as f32))
+            .map(|(i, j)| evaluate(&patch, i as f64 / n as f64, j as f64 / n as f64))
             .collect();
         for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
             let at = |i: usize, j: usize| grid[i * (n + 1) + j];
@@ -81,11 +82,11 @@ fn patches() -> Vec<Patch> {
         for quarter in 0..4 {
             patches.push(profile.map(|[radius, height]| {
                 QUARTER.map(|[x, z]| {
-                    let mut ring = Vec2::new(radius * x, radius * z);
+                    let mut ring = DVec2::new(radius * x, radius * z);
                     for _ in 0..quarter {
-                        ring = Vec2::new(-ring.y, ring.x);
+                        ring = DVec2::new(-ring.y, ring.x);
                     }
-                    Vec3::new(ring.x, height, ring.y)
+                    DVec3::new(ring.x, height, ring.y)
                 })
             }));
         }
@@ -95,10 +96,10 @@ fn patches() -> Vec<Patch> {
             patches.push(half.map(|([x0, y0], [x1, y1], width)| {
                 let z = side * width;
                 [
-                    Vec3::new(x0, y0, 0.0),
-                    Vec3::new(x0, y0, z),
-                    Vec3::new(x1, y1, z),
-                    Vec3::new(x1, y1, 0.0),
+                    DVec3::new(x0, y0, 0.0),
+                    DVec3::new(x0, y0, z),
+                    DVec3::new(x1, y1, z),
+                    DVec3::new(x1, y1, 0.0),
                 ]
             }));
         }
@@ -106,11 +107,13 @@ fn patches() -> Vec<Patch> {
     patches
 }
 
-fn evaluate(patch: &Patch, u: f32, v: f32) -> Vec3 {
-    bezier(&patch.map(|row| bezier(&row, v)), u)
+fn evaluate(patch: &Patch, u: f64, v: f64) -> Vec3 {
+    de_casteljau(patch.map(|row| de_casteljau(row, v)), u).as_vec3()
 }
 
-fn bezier(p: &[Vec3; 4], t: f32) -> Vec3 {
-    let s = 1.0 - t;
-    s * s * s * p[0] + 3.0 * s * s * t * p[1] + 3.0 * s * t * t * p[2] + t * t * t * p[3]
+/// In f64 and by interpolation, so that patches meet in equal f32 points and equal control points
+/// give that very point.
+fn de_casteljau([a, b, c, d]: [DVec3; 4], t: f64) -> DVec3 {
+    let [ab, bc, cd] = [a.lerp(b, t), b.lerp(c, t), c.lerp(d, t)];
+    ab.lerp(bc, t).lerp(bc.lerp(cd, t), t)
 }
