@@ -46,7 +46,8 @@ impl BuiltAccel for Built {
     }
 
     fn buffers(&self) -> GpuBuffers {
-        GpuBuffers { constants: vec![("STEP_FUSE", self.triangles), ("TRIANGLES", self.triangles)], ..Default::default() }
+        let triangles = self.triangles as usize;
+        GpuBuffers { uniforms: vec![super::limits(triangles, triangles)], ..Default::default() }
     }
 
     fn stats(&self) -> StructureStats {

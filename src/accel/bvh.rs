@@ -227,12 +227,9 @@ impl BuiltAccel for BvhTwin {
                     element_bytes: 48,
                 },
             ],
-            uniforms: Vec::new(),
-            constants: vec![
-                ("STEP_FUSE", self.nodes.len() as u32),
-                // A multiple of eight, so that scenes of like depth share a kernel.
-                ("STACK_ENTRIES", self.stack_entries.next_multiple_of(8)),
-            ],
+            uniforms: vec![super::limits(self.nodes.len(), self.nodes.len())],
+            // A multiple of 16, so that scenes of like depth share a kernel.
+            constants: vec![("STACK_ENTRIES", self.stack_entries.next_multiple_of(16))],
         }
     }
 

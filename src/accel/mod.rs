@@ -20,6 +20,7 @@ pub use roped_bvh::RopedBvh;
 pub use uniform_grid::UniformGrid;
 
 use crate::config::{ParameterSchema, Params};
+use crate::gpu::UniformValues;
 use crate::measure::record::{Phase, StructureStats};
 use crate::scene::SceneData;
 use std::time::Instant;
@@ -109,10 +110,16 @@ pub struct GpuBuffers {
     /// Storage arrays, at most two (a path-tracing kernel has eight in all).
     pub arrays: Vec<NamedWords>,
     /// Uniform structs by variable name.
-    pub uniforms: Vec<(&'static str, crate::gpu::UniformValues)>,
-    /// Constants of `package::active::constants`; `STEP_FUSE`, the greatest number of steps that a
-    /// traversal of this structure can take, must be among them.
+    pub uniforms: Vec<(&'static str, UniformValues)>,
+    /// Constants of `package::active::constants`: kernels with other constants are other kernels, so
+    /// numbers that differ from scene to scene belong into a uniform.
     pub constants: Vec<(&'static str, u32)>,
+}
+
+/// The uniform `limits` of `kernels/common/limits.wesl`: the greatest number of steps that a
+/// traversal can take, and the number of nodes or triangles where it ends at the last one.
+pub fn limits(step_fuse: usize, elements: usize) -> (&'static str, UniformValues) {
+    ("limits", UniformValues::new().u32("step_fuse", step_fuse as u32).u32("elements", elements as u32))
 }
 
 impl GpuBuffers {

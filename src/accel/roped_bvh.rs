@@ -117,8 +117,8 @@ impl BuiltAccel for Built {
                     element_bytes: 48,
                 },
             ],
-            uniforms: Vec::new(),
-            constants: vec![("STEP_FUSE", self.nodes.len() as u32 + 1), ("NODES", self.nodes.len() as u32)],
+            uniforms: vec![super::limits(self.nodes.len() + 1, self.nodes.len())],
+            constants: Vec::new(),
         }
     }
 

@@ -274,8 +274,8 @@ impl BuiltAccel for Built {
                 NamedWords { name: "cells", words: self.starts.clone(), element_bytes: 4 },
                 NamedWords { name: "references", words: self.references.clone(), element_bytes: 4 },
             ],
-            uniforms: vec![("grid", grid)],
-            constants: vec![("STEP_FUSE", x + y + z + 1)],
+            uniforms: vec![("grid", grid), super::limits((x + y + z + 1) as usize, self.references.len())],
+            constants: Vec::new(),
         }
     }
 
