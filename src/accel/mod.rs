@@ -12,7 +12,7 @@ pub mod tree;
 pub mod triangle;
 mod uniform_grid;
 
-pub use brute_force::BruteForce;
+pub use brute_force::{brute_force_hits, BruteForce};
 pub use bvh::{Bvh, BvhTwin};
 pub use ray::{Hit, Ray, NO_HIT};
 pub use registry::AccelRegistry;
