@@ -46,7 +46,7 @@ impl BuiltAccel for Built {
         }
     }
 
-    fn buffers(&self) -> GpuBuffers {
+    fn buffers(&self) -> GpuBuffers<'_> {
         let triangles = self.triangles as usize;
         GpuBuffers { uniforms: vec![super::limits(triangles, triangles)], ..Default::default() }
     }
