@@ -79,7 +79,9 @@ mod tests {
 
     #[test]
     fn viridis_grows_brighter_all_the_way() {
-        let luma = |[r, g, b]: [u8; 3]| 0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b);
+        let luma = |[r, g, b]: [u8; 3]| {
+            0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
+        };
         let steps: Vec<f64> = (0..=64).map(|i| luma(viridis(i as f32 / 64.0))).collect();
         assert!(steps.windows(2).all(|pair| pair[1] > pair[0]));
     }

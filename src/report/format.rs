@@ -15,7 +15,10 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
     // Let the formatter round first, so that 9.999 counts as 10.0.
     let text = format!("{value:.*e}", digits.saturating_sub(1));
-    let exponent: i32 = text.split_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0);
+    let exponent: i32 = text
+        .split_once('e')
+        .and_then(|(_, e)| e.parse().ok())
+        .unwrap_or(0);
     if (-3..6).contains(&exponent) {
         let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
         format!("{value:.decimals$}")
@@ -50,7 +53,12 @@ pub fn slope(interval: &Interval) -> String {
     if interval.low == interval.high {
         text(interval.value)
     } else {
-        format!("{} [{}, {}]", text(interval.value), text(interval.low), text(interval.high))
+        format!(
+            "{} [{}, {}]",
+            text(interval.value),
+            text(interval.low),
+            text(interval.high)
+        )
     }
 }
 
@@ -85,12 +93,20 @@ pub fn bytes(value: u64) -> String {
 /// A share as whole percent, one decimal below ten.
 pub fn percent(share: f64) -> String {
     let value = share * 100.0;
-    if value.abs() < 10.0 { format!("{value:.1} %") } else { format!("{value:.0} %") }
+    if value.abs() < 10.0 {
+        format!("{value:.1} %")
+    } else {
+        format!("{value:.0} %")
+    }
 }
 
 /// `1 sampler`, `3 samplers`.
 pub fn plural(n: usize, noun: &str) -> String {
-    if n == 1 { format!("1 {noun}") } else { format!("{} {noun}s", count(n as u64)) }
+    if n == 1 {
+        format!("1 {noun}")
+    } else {
+        format!("{} {noun}s", count(n as u64))
+    }
 }
 
 /// Name of a ray class in tables and plots.
@@ -110,13 +126,22 @@ pub fn utc(unix_s: u64) -> String {
     let shifted = days + 719_468;
     let era = shifted / 146_097;
     let day_of_era = shifted % 146_097;
-    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let year_of_era =
+        (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
     let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
     let shifted_month = (5 * day_of_year + 2) / 153;
     let day = day_of_year - (153 * shifted_month + 2) / 5 + 1;
-    let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
+    let month = if shifted_month < 10 {
+        shifted_month + 3
+    } else {
+        shifted_month - 9
+    };
     let year = year_of_era + era * 400 + u64::from(month <= 2);
-    format!("{year:04}-{month:02}-{day:02} {:02}:{:02} UTC", second / 3600, second / 60 % 60)
+    format!(
+        "{year:04}-{month:02}-{day:02} {:02}:{:02} UTC",
+        second / 3600,
+        second / 60 % 60
+    )
 }
 
 #[cfg(test)]

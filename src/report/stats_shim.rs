@@ -66,7 +66,11 @@ fn percentile_interval(value: f64, mut estimates: Vec<f64>) -> Interval {
         let index = (share * (estimates.len() as f64 - 1.0)).round() as usize;
         estimates.get(index).copied().unwrap_or(value)
     };
-    Interval { value, low: at(0.025), high: at(0.975) }
+    Interval {
+        value,
+        low: at(0.025),
+        high: at(0.975),
+    }
 }
 
 fn mean(samples: &[f64]) -> f64 {
@@ -89,7 +93,10 @@ struct Pcg32(u64);
 
 impl Pcg32 {
     fn below(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         let word = ((((self.0 >> 18) ^ self.0) >> 27) as u32).rotate_right((self.0 >> 59) as u32);
         ((u64::from(word) * n as u64) >> 32) as usize
     }
@@ -101,7 +108,9 @@ mod tests {
 
     #[test]
     fn the_slope_of_a_power_law_is_its_exponent() {
-        let curve: Vec<(f64, f64)> = (0..6).map(|i| (2f64.powi(i), 3.0 * 2f64.powi(i).powf(-0.9))).collect();
+        let curve: Vec<(f64, f64)> = (0..6)
+            .map(|i| (2f64.powi(i), 3.0 * 2f64.powi(i).powf(-0.9)))
+            .collect();
         let slope = log_log_slope(&[curve]).unwrap();
         assert!((slope.value + 0.9).abs() < 1e-12);
         assert_eq!(slope.low, slope.high);
@@ -115,7 +124,10 @@ mod tests {
         let interval = bootstrap_mean(&samples);
         assert_eq!(interval.value, 49.5);
         // 1.96 standard errors: 28.87 / 10 × 1.96 = 5.66 on each side.
-        assert!((interval.high - interval.low - 11.3).abs() < 1.5, "{interval:?}");
+        assert!(
+            (interval.high - interval.low - 11.3).abs() < 1.5,
+            "{interval:?}"
+        );
         assert_eq!(bootstrap_median(&[3.0, 1.0, 2.0]).value, 2.0);
     }
 }

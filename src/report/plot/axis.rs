@@ -33,13 +33,26 @@ impl Axis {
         let max = if max > 0.0 { max } else { 1.0 };
         let rough = max / 5.0;
         let power = 10f64.powf(rough.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0].iter().map(|m| m * power).find(|s| *s >= rough).unwrap_or(rough);
+        let step = [1.0, 2.0, 5.0, 10.0]
+            .iter()
+            .map(|m| m * power)
+            .find(|s| *s >= rough)
+            .unwrap_or(rough);
         let decimals = (-step.log10().floor()).max(0.0) as usize;
         let ticks = (0..=(max / step).ceil() as usize)
-            .map(|i| Tick { value: i as f64 * step, label: format!("{:.decimals$}", i as f64 * step) })
+            .map(|i| Tick {
+                value: i as f64 * step,
+                label: format!("{:.decimals$}", i as f64 * step),
+            })
             .filter(|tick| tick.value <= max * 1.001)
             .collect();
-        Self { scale: Scale::Linear, min: 0.0, max, ticks, title: title.into() }
+        Self {
+            scale: Scale::Linear,
+            min: 0.0,
+            max,
+            ticks,
+            title: title.into(),
+        }
     }
 
     /// Logarithmic over the values, ticks at powers of two, at most nine of them labelled; `None`
@@ -51,10 +64,19 @@ impl Axis {
         let ticks = (first..=last)
             .step_by(stride)
             .map(|e| 2f64.powi(e))
-            .map(|value| Tick { value, label: plain(value) })
+            .map(|value| Tick {
+                value,
+                label: plain(value),
+            })
             .collect();
         let (min, max) = (low / 1.12, high * 1.12);
-        Some(Self { scale: Scale::Log, min, max, ticks, title: title.into() })
+        Some(Self {
+            scale: Scale::Log,
+            min,
+            max,
+            ticks,
+            title: title.into(),
+        })
     }
 
     /// Logarithmic over the values, ticks at powers of ten, with 2 and 5 between them where there is
@@ -62,7 +84,9 @@ impl Axis {
     pub fn log10(values: impl Iterator<Item = f64>, title: &str) -> Option<Self> {
         let (low, high) = positive_range(values)?;
         // Some air, and at least a factor of three so that there are ticks.
-        let air = ((high / low).powf(0.05)).max(1.1).max((3.0 * low / high).sqrt());
+        let air = ((high / low).powf(0.05))
+            .max(1.1)
+            .max((3.0 * low / high).sqrt());
         let (min, max) = (low / air, high * air);
         let decades = (max / min).log10();
         let labelled: &[u32] = if decades < 1.2 {
@@ -78,13 +102,23 @@ impl Axis {
             for mantissa in 1..10 {
                 let value = f64::from(mantissa) * 10f64.powi(exponent);
                 let shown = labelled.contains(&mantissa) && exponent.rem_euclid(stride) == 0;
-                let label = if shown { decimal_or_power(mantissa, exponent) } else { String::new() };
+                let label = if shown {
+                    decimal_or_power(mantissa, exponent)
+                } else {
+                    String::new()
+                };
                 if (min..=max).contains(&value) && (shown || decades < 4.0) {
                     ticks.push(Tick { value, label });
                 }
             }
         }
-        Some(Self { scale: Scale::Log, min, max, ticks, title: title.into() })
+        Some(Self {
+            scale: Scale::Log,
+            min,
+            max,
+            ticks,
+            title: title.into(),
+        })
     }
 
     /// Largest value shown.
@@ -103,7 +137,11 @@ impl Axis {
             Scale::Linear => (value - self.min) / (self.max - self.min),
             Scale::Log => (value / self.min).ln() / (self.max / self.min).ln(),
         };
-        if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) }
+        if share.is_nan() {
+            0.0
+        } else {
+            share.clamp(0.0, 1.0)
+        }
     }
 
     /// Draws it as the only axis of a plot: gridlines from `top` to `bottom`, labels below.
@@ -114,23 +152,39 @@ impl Axis {
             drawing.text((x, bottom + 14.0), &tick.label, INK, Anchor::Middle);
         }
         drawing.line(vec![(left, top), (left, bottom), (right, bottom)], DIM, 1.0);
-        drawing.text(((left + right) / 2.0, bottom + 38.0), &self.title, INK, Anchor::Middle);
+        drawing.text(
+            ((left + right) / 2.0, bottom + 38.0),
+            &self.title,
+            INK,
+            Anchor::Middle,
+        );
     }
 
     /// Width of the widest tick label in pixels.
     fn label_width(&self) -> f64 {
-        self.ticks.iter().map(|tick| text_width(&tick.label)).fold(0.0, f64::max)
+        self.ticks
+            .iter()
+            .map(|tick| text_width(&tick.label))
+            .fold(0.0, f64::max)
     }
 }
 
 fn positive_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     values
         .filter(|v| v.is_finite() && *v > 0.0)
-        .fold(None, |range, v| range.map_or(Some((v, v)), |(a, b): (f64, f64)| Some((a.min(v), b.max(v)))))
+        .fold(None, |range, v| {
+            range.map_or(Some((v, v)), |(a, b): (f64, f64)| {
+                Some((a.min(v), b.max(v)))
+            })
+        })
 }
 
 fn plain(value: f64) -> String {
-    if value >= 1.0 { format!("{value}") } else { format::significant(value, 2) }
+    if value >= 1.0 {
+        format!("{value}")
+    } else {
+        format::significant(value, 2)
+    }
 }
 
 /// `0.02`, `1000`, or `2·10⁻⁵` where that is shorter.
@@ -144,10 +198,16 @@ fn decimal_or_power(mantissa: u32, exponent: i32) -> String {
         .chars()
         .map(|c| match c {
             '-' => '⁻',
-            digit => ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][digit as usize - '0' as usize],
+            digit => {
+                ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][digit as usize - '0' as usize]
+            }
         })
         .collect();
-    if mantissa == 1 { format!("10{power}") } else { format!("{mantissa}·10{power}") }
+    if mantissa == 1 {
+        format!("10{power}")
+    } else {
+        format!("{mantissa}·10{power}")
+    }
 }
 
 /// The rectangle that two axes span.
@@ -167,7 +227,14 @@ impl Frame {
     /// Axes in the upper `height` pixels of a drawing `width` pixels wide; room is left for labels.
     pub fn new(x: Axis, y: Axis, width: f64, height: f64) -> Self {
         let left = (y.label_width() + 44.0).max(60.0);
-        Self { x, y, left, top: 14.0, right: width - 18.0, bottom: height - 52.0 }
+        Self {
+            x,
+            y,
+            left,
+            top: 14.0,
+            right: width - 18.0,
+            bottom: height - 52.0,
+        }
     }
 
     /// Pixel of a point.
@@ -182,13 +249,25 @@ impl Frame {
     pub fn draw(&self, drawing: &mut Drawing) {
         for tick in &self.x.ticks {
             let x = self.at(tick.value, self.y.min).0;
-            drawing.line(vec![(x, self.top), (x, self.bottom)], GRID, grid_width(tick));
+            drawing.line(
+                vec![(x, self.top), (x, self.bottom)],
+                GRID,
+                grid_width(tick),
+            );
         }
         for tick in &self.y.ticks {
             let y = self.at(self.x.min, tick.value).1;
-            drawing.line(vec![(self.left, y), (self.right, y)], GRID, grid_width(tick));
+            drawing.line(
+                vec![(self.left, y), (self.right, y)],
+                GRID,
+                grid_width(tick),
+            );
         }
-        let corners = vec![(self.left, self.top), (self.left, self.bottom), (self.right, self.bottom)];
+        let corners = vec![
+            (self.left, self.top),
+            (self.left, self.bottom),
+            (self.right, self.bottom),
+        ];
         drawing.line(corners, DIM, 1.0);
         let mut free_from = 0.0;
         for tick in self.x.ticks.iter().filter(|tick| !tick.label.is_empty()) {
@@ -208,7 +287,12 @@ impl Frame {
             }
         }
         let middle = (self.left + self.right) / 2.0;
-        drawing.text((middle, self.bottom + 38.0), &self.x.title, INK, Anchor::Middle);
+        drawing.text(
+            (middle, self.bottom + 38.0),
+            &self.x.title,
+            INK,
+            Anchor::Middle,
+        );
         drawing.upward_text((14.0, (self.top + self.bottom) / 2.0), &self.y.title, INK);
     }
 }
@@ -222,7 +306,11 @@ mod tests {
     use super::*;
 
     fn labels(axis: &Axis) -> Vec<&str> {
-        axis.ticks.iter().map(|t| t.label.as_str()).filter(|l| !l.is_empty()).collect()
+        axis.ticks
+            .iter()
+            .map(|t| t.label.as_str())
+            .filter(|l| !l.is_empty())
+            .collect()
     }
 
     #[test]
@@ -238,7 +326,11 @@ mod tests {
         let short = Axis::log10([0.02, 0.05].into_iter(), "error").unwrap();
         assert!(labels(&short).contains(&"0.03"), "{:?}", labels(&short));
         let long = Axis::log10([2e-6, 3.0].into_iter(), "error").unwrap();
-        assert!(labels(&long).contains(&"10⁻⁵") && labels(&long).contains(&"1"), "{:?}", labels(&long));
+        assert!(
+            labels(&long).contains(&"10⁻⁵") && labels(&long).contains(&"1"),
+            "{:?}",
+            labels(&long)
+        );
         let single = Axis::log10([0.5].into_iter(), "error").unwrap();
         assert!(labels(&single).len() >= 2, "{:?}", labels(&single));
     }

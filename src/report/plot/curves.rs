@@ -72,15 +72,26 @@ const LEGEND_ROW: f64 = 21.0;
 impl CurvePlot {
     /// The picture; `None` when no curve has a point with positive coordinates.
     pub fn draw(&self) -> Option<Drawing> {
-        let points = || self.curves.iter().flat_map(|curve| &curve.points).filter(|p| drawable(p));
+        let points = || {
+            self.curves
+                .iter()
+                .flat_map(|curve| &curve.points)
+                .filter(|p| drawable(p))
+        };
         let xs = points().map(|p| p.x);
         let x = match self.x_ticks {
             Ticks::PowersOfTwo => Axis::log2(xs, &self.x_title)?,
             Ticks::PowersOfTen => Axis::log10(xs, &self.x_title)?,
         };
         let ends = [x.min() * 1.05, x.max() / 1.05];
-        let guide_ys = self.guides.iter().flat_map(|guide| ends.map(|x| guide.at(x)));
-        let y = Axis::log10(points().flat_map(|p| [p.y, p.low, p.high]).chain(guide_ys), &self.y_title)?;
+        let guide_ys = self
+            .guides
+            .iter()
+            .flat_map(|guide| ends.map(|x| guide.at(x)));
+        let y = Axis::log10(
+            points().flat_map(|p| [p.y, p.low, p.high]).chain(guide_ys),
+            &self.y_title,
+        )?;
         let rows = self.curves.len() + self.guides.len();
         let mut drawing = Drawing::new(WIDTH, PLOT_HEIGHT + rows as f64 * LEGEND_ROW + 8.0);
         let frame = Frame::new(x, y, WIDTH, PLOT_HEIGHT);
@@ -102,12 +113,22 @@ impl CurvePlot {
             let ink = marker::ink(curve.look);
             curve_line(drawing, &[(16.0, y), (50.0, y)], ink, curve.exact);
             marker::draw(drawing, curve.look, (33.0, y), 4.5, ink);
-            drawing.text((60.0, y), fit_text(&curve.label, WIDTH - 66.0), INK, Anchor::Start);
+            drawing.text(
+                (60.0, y),
+                fit_text(&curve.label, WIDTH - 66.0),
+                INK,
+                Anchor::Start,
+            );
             y += LEGEND_ROW;
         }
         for guide in &self.guides {
             drawing.dashed_line(&[(16.0, y), (50.0, y)], DIM, 1.0, 3.0, 3.0);
-            drawing.text((60.0, y), fit_text(&guide.label, WIDTH - 66.0), DIM, Anchor::Start);
+            drawing.text(
+                (60.0, y),
+                fit_text(&guide.label, WIDTH - 66.0),
+                DIM,
+                Anchor::Start,
+            );
             y += LEGEND_ROW;
         }
     }
@@ -125,7 +146,10 @@ impl Curve {
         let points: Vec<&CurvePoint> = self.points.iter().filter(|p| drawable(p)).collect();
         // An interval that reaches 0 ends at the bottom of the axis.
         let upper = points.iter().map(|p| frame.at(p.x, p.high));
-        let lower = points.iter().rev().map(|p| frame.at(p.x, p.low.max(frame.y.min())));
+        let lower = points
+            .iter()
+            .rev()
+            .map(|p| frame.at(p.x, p.low.max(frame.y.min())));
         if points.iter().any(|p| p.low < p.high) {
             drawing.area(upper.chain(lower).collect(), ink.with_alpha(0.16));
         }
@@ -160,28 +184,61 @@ mod tests {
             x_title: "samples per pixel".into(),
             x_ticks: Ticks::PowersOfTwo,
             y_title: "relMSE".into(),
-            curves: vec![Curve { label: "sobol".into(), look: 0, exact: false, points }],
-            guides: vec![Guide { label: "2.5/√N".into(), factor: 2.5, exponent: -0.5 }],
+            curves: vec![Curve {
+                label: "sobol".into(),
+                look: 0,
+                exact: false,
+                points,
+            }],
+            guides: vec![Guide {
+                label: "2.5/√N".into(),
+                factor: 2.5,
+                exponent: -0.5,
+            }],
         }
     }
 
     #[test]
     fn a_plot_names_axes_curves_and_guides() {
         let points = vec![
-            CurvePoint { x: 1.0, y: 0.5, low: 0.4, high: 0.6 },
-            CurvePoint { x: 2.0, y: 0.25, low: 0.2, high: 0.3 },
+            CurvePoint {
+                x: 1.0,
+                y: 0.5,
+                low: 0.4,
+                high: 0.6,
+            },
+            CurvePoint {
+                x: 2.0,
+                y: 0.25,
+                low: 0.2,
+                high: 0.3,
+            },
         ];
         let drawing = plot(points).draw().unwrap();
         for text in ["samples per pixel", "relMSE", "sobol", "2.5/√N", "1", "2"] {
-            assert!(drawing.texts().contains(&text), "{text} in {:?}", drawing.texts());
+            assert!(
+                drawing.texts().contains(&text),
+                "{text} in {:?}",
+                drawing.texts()
+            );
         }
     }
 
     #[test]
     fn a_single_point_is_drawn_and_zero_errors_are_not() {
-        let one = CurvePoint { x: 4.0, y: 0.5, low: 0.5, high: 0.5 };
+        let one = CurvePoint {
+            x: 4.0,
+            y: 0.5,
+            low: 0.5,
+            high: 0.5,
+        };
         assert!(plot(vec![one]).draw().is_some());
-        let zero = CurvePoint { x: 4.0, y: 0.0, low: 0.0, high: 0.0 };
+        let zero = CurvePoint {
+            x: 4.0,
+            y: 0.0,
+            low: 0.0,
+            high: 0.0,
+        };
         assert!(plot(vec![zero]).draw().is_none());
         assert!(plot(vec![]).draw().is_none());
     }

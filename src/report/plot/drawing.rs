@@ -26,7 +26,10 @@ impl Ink {
 
     /// The same colour with this opacity.
     pub const fn with_alpha(self, alpha: f64) -> Self {
-        Self { rgb: self.rgb, alpha }
+        Self {
+            rgb: self.rgb,
+            alpha,
+        }
     }
 
     fn color(self) -> RGBAColor {
@@ -107,7 +110,11 @@ pub struct Drawing {
 impl Drawing {
     /// An empty picture.
     pub fn new(width: f64, height: f64) -> Self {
-        Self { width, height, shapes: Vec::new() }
+        Self {
+            width,
+            height,
+            shapes: Vec::new(),
+        }
     }
 
     /// Adds a polyline.
@@ -134,13 +141,25 @@ impl Drawing {
 
     /// Adds a line of text.
     pub fn text(&mut self, at: Point, text: impl Into<String>, ink: Ink, anchor: Anchor) {
-        self.shapes.push(Shape::Text { at, text: text.into(), ink, anchor, upwards: false });
+        self.shapes.push(Shape::Text {
+            at,
+            text: text.into(),
+            ink,
+            anchor,
+            upwards: false,
+        });
     }
 
     /// Adds a line of text that reads upwards.
     pub fn upward_text(&mut self, at: Point, text: impl Into<String>, ink: Ink) {
         let anchor = Anchor::Middle;
-        self.shapes.push(Shape::Text { at, text: text.into(), ink, anchor, upwards: true });
+        self.shapes.push(Shape::Text {
+            at,
+            text: text.into(),
+            ink,
+            anchor,
+            upwards: true,
+        });
     }
 
     /// Every text in it, for tests.
@@ -187,7 +206,9 @@ fn dashes(points: &[Point], dash: f64, gap: f64) -> Vec<Vec<Point>> {
 pub fn text_width(text: &str) -> f64 {
     register_fonts();
     // Measured large, because plotters answers in whole pixels.
-    font(8.0).box_size(text).map_or(0.0, |(width, _)| f64::from(width) / 8.0)
+    font(8.0)
+        .box_size(text)
+        .map_or(0.0, |(width, _)| f64::from(width) / 8.0)
 }
 
 /// The text, shortened with `…` to fit into `width` pixels.
@@ -204,7 +225,11 @@ pub fn fit_text(text: &str, width: f64) -> String {
 
 /// The embedded sans-serif font; plotters' sizes are 1.24 × the em.
 fn font(scale: f64) -> FontDesc<'static> {
-    FontDesc::new(FontFamily::SansSerif, FONT_PX * 1.24 * scale, FontStyle::Normal)
+    FontDesc::new(
+        FontFamily::SansSerif,
+        FONT_PX * 1.24 * scale,
+        FontStyle::Normal,
+    )
 }
 
 fn register_fonts() {
@@ -222,7 +247,11 @@ pub fn to_svg(drawing: &Drawing) -> Result<String, ReportError> {
     const SCALE: f64 = 8.0;
     let (width, height) = scaled_size(drawing, SCALE);
     let mut svg = String::new();
-    paint(drawing, SVGBackend::with_string(&mut svg, (width, height)), SCALE)?;
+    paint(
+        drawing,
+        SVGBackend::with_string(&mut svg, (width, height)),
+        SCALE,
+    )?;
     Ok(svg.replacen(
         &format!(r#"width="{width}" height="{height}""#),
         &format!(r#"width="{}" height="{}""#, drawing.width, drawing.height),
@@ -235,7 +264,11 @@ pub fn to_png(drawing: &Drawing) -> Result<Vec<u8>, ReportError> {
     const SCALE: f64 = 4.0;
     let (width, height) = scaled_size(drawing, SCALE);
     let mut pixels = vec![0u8; width as usize * height as usize * 3];
-    paint(drawing, BitMapBackend::with_buffer(&mut pixels, (width, height)), SCALE)?;
+    paint(
+        drawing,
+        BitMapBackend::with_buffer(&mut pixels, (width, height)),
+        SCALE,
+    )?;
     let large = image::RgbImage::from_raw(width, height, pixels)
         .ok_or_else(|| ReportError::Draw("the picture's buffer has the wrong size".into()))?;
     let smooth = image::imageops::thumbnail(&large, width / 2, height / 2);
@@ -247,7 +280,10 @@ pub fn to_png(drawing: &Drawing) -> Result<Vec<u8>, ReportError> {
 }
 
 fn scaled_size(drawing: &Drawing, scale: f64) -> (u32, u32) {
-    ((drawing.width * scale) as u32, (drawing.height * scale) as u32)
+    (
+        (drawing.width * scale) as u32,
+        (drawing.height * scale) as u32,
+    )
 }
 
 /// Paints every shape, `scale` backend pixels to a pixel.
@@ -260,22 +296,38 @@ fn paint<B: DrawingBackend>(drawing: &Drawing, backend: B, scale: f64) -> Result
     for shape in &drawing.shapes {
         let drawn = match shape {
             Shape::Line { points, ink, width } => {
-                let style = ink.color().stroke_width((width * scale).round().max(1.0) as u32);
-                area.draw(&PathElement::new(points.iter().map(to_pixel).collect::<Vec<_>>(), style))
+                let style = ink
+                    .color()
+                    .stroke_width((width * scale).round().max(1.0) as u32);
+                area.draw(&PathElement::new(
+                    points.iter().map(to_pixel).collect::<Vec<_>>(),
+                    style,
+                ))
             }
             Shape::Area { points, ink } => {
                 let corners: Vec<_> = points.iter().map(to_pixel).collect();
                 area.draw(&Polygon::new(corners, ink.color().filled()))
             }
-            Shape::Text { at, text, ink, anchor, upwards } => {
-                let turn = if *upwards { FontTransform::Rotate270 } else { FontTransform::None };
+            Shape::Text {
+                at,
+                text,
+                ink,
+                anchor,
+                upwards,
+            } => {
+                let turn = if *upwards {
+                    FontTransform::Rotate270
+                } else {
+                    FontTransform::None
+                };
                 let h_pos = match anchor {
                     Anchor::Start => HPos::Left,
                     Anchor::Middle => HPos::Center,
                     Anchor::End => HPos::Right,
                 };
+                let color = ink.color();
                 let style = TextStyle::from(font(scale).transform(turn))
-                    .color(&ink.color())
+                    .color(&color)
                     .pos(Pos::new(h_pos, VPos::Center));
                 area.draw(&Text::new(text.clone(), to_pixel(at), style))
             }
@@ -299,7 +351,10 @@ mod tests {
     #[test]
     fn svg_keeps_the_size_and_escapes_text() {
         let svg = to_svg(&sample()).unwrap();
-        assert!(svg.starts_with(r#"<svg width="120" height="40" viewBox="0 0 960 320""#), "{svg}");
+        assert!(
+            svg.starts_with(r#"<svg width="120" height="40" viewBox="0 0 960 320""#),
+            "{svg}"
+        );
         assert!(svg.contains("a&lt;b &amp; δ"));
         assert!(!svg.contains("a<b"));
     }
@@ -316,7 +371,11 @@ mod tests {
     #[test]
     fn dashes_cover_their_share_of_the_line() {
         let pieces = dashes(&[(0.0, 0.0), (50.0, 0.0), (100.0, 0.0)], 6.0, 4.0);
-        let drawn: f64 = pieces.iter().flat_map(|p| p.windows(2)).map(|w| w[1].0 - w[0].0).sum();
+        let drawn: f64 = pieces
+            .iter()
+            .flat_map(|p| p.windows(2))
+            .map(|w| w[1].0 - w[0].0)
+            .sum();
         assert_eq!(pieces.len(), 10);
         assert!((drawn - 60.0).abs() < 1e-9);
     }

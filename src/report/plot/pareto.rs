@@ -25,10 +25,10 @@ pub struct ParetoPlot {
     pub x_title: String,
     /// Title of the y axis.
     pub y_title: String,
-    /// Names of the structures.
-    pub structures: Vec<String>,
-    /// Names of the samplers.
-    pub samplers: Vec<String>,
+    /// Names and looks of the structures.
+    pub structures: Vec<(String, usize)>,
+    /// Names and looks of the samplers.
+    pub samplers: Vec<(String, usize)>,
     /// The cells.
     pub points: Vec<CellPoint>,
 }
@@ -65,19 +65,32 @@ pub fn letter(index: usize) -> String {
 impl ParetoPlot {
     /// Indices of the points of the front, by growing time.
     pub fn front(&self) -> Vec<usize> {
-        let points: Vec<_> = self.points.iter().map(|p| (p.seconds.value, p.error.value)).collect();
+        let points: Vec<_> = self
+            .points
+            .iter()
+            .map(|p| (p.seconds.value, p.error.value))
+            .collect();
         pareto_front(&points)
     }
 
     /// Name of a point: structure · sampler.
     pub fn name(&self, point: &CellPoint) -> String {
-        format!("{} · {}", self.structures[point.structure], self.samplers[point.sampler])
+        format!(
+            "{} · {}",
+            self.structures[point.structure].0, self.samplers[point.sampler].0
+        )
     }
 
     /// The picture; `None` without a point with positive time and error.
     pub fn draw(&self) -> Option<Drawing> {
-        let times = self.points.iter().flat_map(|p| [p.seconds.value, p.seconds.low, p.seconds.high]);
-        let errors = self.points.iter().flat_map(|p| [p.error.value, p.error.low, p.error.high]);
+        let times = self
+            .points
+            .iter()
+            .flat_map(|p| [p.seconds.value, p.seconds.low, p.seconds.high]);
+        let errors = self
+            .points
+            .iter()
+            .flat_map(|p| [p.error.value, p.error.low, p.error.high]);
         let x = Axis::log10(times, &self.x_title)?;
         let y = Axis::log10(errors, &self.y_title)?;
         let front = self.front();
@@ -87,11 +100,16 @@ impl ParetoPlot {
         frame.draw(&mut drawing);
         self.draw_front(&frame, &front, &mut drawing);
         for point in &self.points {
-            draw_point(point, &frame, &mut drawing);
+            self.draw_point(point, &frame, &mut drawing);
         }
         for (rank, &i) in front.iter().enumerate() {
             let (x, y) = frame.at(self.points[i].seconds.value, self.points[i].error.value);
-            drawing.text((x - 9.0, y + 10.0), (rank + 1).to_string(), INK, Anchor::End);
+            drawing.text(
+                (x - 9.0, y + 10.0),
+                (rank + 1).to_string(),
+                INK,
+                Anchor::End,
+            );
         }
         self.draw_legend(&front, &mut drawing);
         Some(drawing)
@@ -102,7 +120,9 @@ impl ParetoPlot {
         let mut stairs: Vec<(f64, f64)> = Vec::new();
         for &i in front {
             let (x, y) = frame.at(self.points[i].seconds.value, self.points[i].error.value);
-            let from = stairs.last().map_or(frame.at(frame.x.min(), frame.y.max()).1, |last| last.1);
+            let from = stairs
+                .last()
+                .map_or(frame.at(frame.x.min(), frame.y.max()).1, |last| last.1);
             stairs.extend([(x, from), (x, y)]);
         }
         if let Some(&(_, y)) = stairs.last() {
@@ -111,48 +131,79 @@ impl ParetoPlot {
         drawing.dashed_line(&stairs, DIM, 1.4, 6.0, 4.0);
     }
 
+    fn draw_point(&self, point: &CellPoint, frame: &Frame, drawing: &mut Drawing) {
+        let ink = marker::ink(self.structures[point.structure].1);
+        let (seconds, error) = (point.seconds, point.error);
+        let whiskers = [
+            [
+                frame.at(seconds.low, error.value),
+                frame.at(seconds.high, error.value),
+            ],
+            [
+                frame.at(seconds.value, error.low.max(frame.y.min())),
+                frame.at(seconds.value, error.high),
+            ],
+        ];
+        for ends in whiskers {
+            drawing.line(ends.to_vec(), ink.with_alpha(0.5), 1.2);
+        }
+        let at = frame.at(seconds.value, error.value);
+        marker::draw(drawing, self.samplers[point.sampler].1, at, 5.5, ink);
+        let label = letter(point.structure);
+        let offset = 9.0 + text_width(&label) / 2.0;
+        drawing.text(
+            (at.0 + offset, at.1 - FONT_PX * 0.6),
+            label,
+            DIM,
+            Anchor::Middle,
+        );
+    }
+
     fn draw_legend(&self, front: &[usize], drawing: &mut Drawing) {
         let top = PLOT_HEIGHT + LEGEND_ROW / 2.0;
         let middle = WIDTH * 0.5;
-        drawing.text((16.0, top), "structure (colour, letter)", DIM, Anchor::Start);
+        drawing.text(
+            (16.0, top),
+            "structure (colour, letter)",
+            DIM,
+            Anchor::Start,
+        );
         drawing.text((middle, top), "sampler (marker)", DIM, Anchor::Start);
-        for (i, name) in self.structures.iter().enumerate() {
+        for (i, (name, look)) in self.structures.iter().enumerate() {
             let y = top + (i + 1) as f64 * LEGEND_ROW;
-            drawing.bar((18.0, y - 5.0), (34.0, y + 5.0), marker::ink(i));
+            drawing.bar((18.0, y - 5.0), (34.0, y + 5.0), marker::ink(*look));
             drawing.text((44.0, y), letter(i), INK, Anchor::Start);
             drawing.text((66.0, y), fit_text(name, middle - 80.0), INK, Anchor::Start);
         }
-        for (i, name) in self.samplers.iter().enumerate() {
+        for (i, (name, look)) in self.samplers.iter().enumerate() {
             let y = top + (i + 1) as f64 * LEGEND_ROW;
-            marker::draw(drawing, i, (middle + 8.0, y), 5.0, DIM);
-            drawing.text((middle + 26.0, y), fit_text(name, middle - 40.0), INK, Anchor::Start);
+            marker::draw(drawing, *look, (middle + 8.0, y), 5.0, DIM);
+            drawing.text(
+                (middle + 26.0, y),
+                fit_text(name, middle - 40.0),
+                INK,
+                Anchor::Start,
+            );
         }
         let rows = self.structures.len().max(self.samplers.len()) + 1;
         let mut y = top + rows as f64 * LEGEND_ROW;
-        drawing.text((16.0, y), "Pareto front: no cell is both faster and better", DIM, Anchor::Start);
+        drawing.text(
+            (16.0, y),
+            "Pareto front: no cell is both faster and better",
+            DIM,
+            Anchor::Start,
+        );
         for (rank, &i) in front.iter().enumerate() {
             y += LEGEND_ROW;
             drawing.text((34.0, y), (rank + 1).to_string(), INK, Anchor::End);
-            drawing.text((44.0, y), fit_text(&self.name(&self.points[i]), WIDTH - 60.0), INK, Anchor::Start);
+            drawing.text(
+                (44.0, y),
+                fit_text(&self.name(&self.points[i]), WIDTH - 60.0),
+                INK,
+                Anchor::Start,
+            );
         }
     }
-}
-
-fn draw_point(point: &CellPoint, frame: &Frame, drawing: &mut Drawing) {
-    let ink = marker::ink(point.structure);
-    let (seconds, error) = (point.seconds, point.error);
-    let whiskers = [
-        [frame.at(seconds.low, error.value), frame.at(seconds.high, error.value)],
-        [frame.at(seconds.value, error.low.max(frame.y.min())), frame.at(seconds.value, error.high)],
-    ];
-    for ends in whiskers {
-        drawing.line(ends.to_vec(), ink.with_alpha(0.5), 1.2);
-    }
-    let at = frame.at(seconds.value, error.value);
-    marker::draw(drawing, point.sampler, at, 5.5, ink);
-    let label = letter(point.structure);
-    let offset = 9.0 + text_width(&label) / 2.0;
-    drawing.text((at.0 + offset, at.1 - FONT_PX * 0.6), label, DIM, Anchor::Middle);
 }
 
 #[cfg(test)]
@@ -161,14 +212,25 @@ mod tests {
 
     #[test]
     fn the_front_holds_what_nothing_beats() {
-        let points = [(1.0, 9.0), (2.0, 4.0), (2.0, 5.0), (3.0, 4.0), (4.0, 1.0), (1.0, 9.0)];
+        let points = [
+            (1.0, 9.0),
+            (2.0, 4.0),
+            (2.0, 5.0),
+            (3.0, 4.0),
+            (4.0, 1.0),
+            (1.0, 9.0),
+        ];
         assert_eq!(pareto_front(&points), [0, 1, 4]);
         assert!(pareto_front(&[]).is_empty());
     }
 
     #[test]
     fn the_picture_names_the_front() {
-        let exact = |value| Interval { value, low: value, high: value };
+        let exact = |value| Interval {
+            value,
+            low: value,
+            high: value,
+        };
         let point = |structure, seconds, error| CellPoint {
             structure,
             sampler: 0,
@@ -178,8 +240,8 @@ mod tests {
         let plot = ParetoPlot {
             x_title: "seconds".into(),
             y_title: "relMSE".into(),
-            structures: vec!["bvh".into(), "brute-force".into()],
-            samplers: vec!["sobol × none".into()],
+            structures: vec![("bvh".into(), 0), ("brute-force".into(), 1)],
+            samplers: vec![("sobol × none".into(), 0)],
             points: vec![point(0, 1.0, 0.1), point(1, 9.0, 0.1)],
         };
         let drawing = plot.draw().unwrap();

@@ -35,10 +35,17 @@ impl RatePlot {
     pub fn draw(&self) -> Option<Drawing> {
         let bars = || self.groups.iter().flat_map(|(_, bars)| bars);
         let widest = bars().map(|bar| text_width(&bar.label)).reduce(f64::max)?;
-        let max = bars().filter_map(|bar| bar.rate).map(|rate| rate.high.max(rate.value)).fold(0.0, f64::max);
+        let max = bars()
+            .filter_map(|bar| bar.rate)
+            .map(|rate| rate.high.max(rate.value))
+            .fold(0.0, f64::max);
         let left = widest.min(300.0) + 40.0;
         let right = WIDTH - 170.0;
-        let height: f64 = self.groups.iter().map(|(_, bars)| HEADER + bars.len() as f64 * ROW).sum();
+        let height: f64 = self
+            .groups
+            .iter()
+            .map(|(_, bars)| HEADER + bars.len() as f64 * ROW)
+            .sum();
         let bottom = height + 12.0;
         let mut drawing = Drawing::new(WIDTH, bottom + 56.0);
         let axis = Axis::linear(max, "million rays per second (median, 95 % interval)");
@@ -71,7 +78,11 @@ impl Bar {
             return;
         };
         let half = FONT_PX * 0.5;
-        drawing.bar((left, y - half), (x_at(rate.value), y + half), ink.with_alpha(0.85));
+        drawing.bar(
+            (left, y - half),
+            (x_at(rate.value), y + half),
+            ink.with_alpha(0.85),
+        );
         let (low, high) = (x_at(rate.low), x_at(rate.high));
         drawing.line(vec![(low, y), (high, y)], INK, 1.4);
         for end in [low, high] {
@@ -81,7 +92,12 @@ impl Bar {
         let value = format::number(rate.value);
         let value_width = text_width(&value) + 7.0;
         drawing.text((text_left, y), value, INK, Anchor::Start);
-        drawing.text((text_left + value_width, y), format::bounds(&rate), DIM, Anchor::Start);
+        drawing.text(
+            (text_left + value_width, y),
+            format::bounds(&rate),
+            DIM,
+            Anchor::Start,
+        );
     }
 }
 
@@ -91,8 +107,17 @@ mod tests {
     use super::*;
 
     fn bar(rate: Option<f64>) -> Bar {
-        let rate = rate.map(|value| Interval { value, low: value * 0.9, high: value * 1.1 });
-        Bar { label: "bvh".into(), look: 0, rate, instead: "FAILED".into() }
+        let rate = rate.map(|value| Interval {
+            value,
+            low: value * 0.9,
+            high: value * 1.1,
+        });
+        Bar {
+            label: "bvh".into(),
+            look: 0,
+            rate,
+            instead: "FAILED".into(),
+        }
     }
 
     fn filled(drawing: &Drawing) -> usize {
@@ -102,18 +127,26 @@ mod tests {
 
     #[test]
     fn a_failed_structure_has_a_word_and_no_bar() {
-        let plot = RatePlot { groups: vec![("primary".into(), vec![bar(Some(5.0)), bar(None)])] };
+        let plot = RatePlot {
+            groups: vec![("primary".into(), vec![bar(Some(5.0)), bar(None)])],
+        };
         let drawing = plot.draw().unwrap();
         assert_eq!(filled(&drawing), 1);
         assert!(drawing.texts().contains(&"FAILED"));
-        let all_good = RatePlot { groups: vec![("primary".into(), vec![bar(Some(5.0)); 2])] }.draw().unwrap();
+        let all_good = RatePlot {
+            groups: vec![("primary".into(), vec![bar(Some(5.0)); 2])],
+        }
+        .draw()
+        .unwrap();
         assert_eq!(filled(&all_good), 2);
         assert!(!all_good.texts().contains(&"FAILED"));
     }
 
     #[test]
     fn all_failed_still_draws_and_nothing_does_not() {
-        let failed = RatePlot { groups: vec![("primary".into(), vec![bar(None)])] };
+        let failed = RatePlot {
+            groups: vec![("primary".into(), vec![bar(None)])],
+        };
         assert_eq!(filled(&failed.draw().unwrap()), 0);
         assert!(RatePlot { groups: vec![] }.draw().is_none());
     }
