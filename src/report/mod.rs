@@ -108,7 +108,8 @@ pub struct ReportPaths {
 pub fn write_report(dir: &Path) -> Result<ReportPaths, ReportError> {
     let records = read_records(dir)?;
     let data = RunData::new(&records.lines);
-    let document = sections::document(dir, &data, &records.warnings)?;
+    let mut document = sections::document(dir, &data, &records.warnings);
+    document.paint()?;
     let plots = write_plots(dir, &document)?;
     let html = dir.join("index.html");
     files::write_atomically(&html, html::page(&document)?.as_bytes())?;

@@ -210,7 +210,7 @@ fn errors(scene: &str, integrator: &str, replicates: u32) -> Vec<Record> {
     for (sequence, decorrelation, start, exponent, randomised, _) in SAMPLERS {
         for replicate in 0..if randomised { replicates } else { 1 } {
             let at = |spp: u32, noise: &mut Noise| {
-                let relmse = start * f64::from(spp).powf(exponent) * (1.0 + 0.06 * noise.next());
+                let relmse = start * f64::from(spp).powf(exponent) * (1.0 + 0.25 * noise.next());
                 ErrorAtSpp {
                     spp,
                     metrics: BTreeMap::from([
@@ -470,7 +470,7 @@ fn a_full_run_names_winners_failures_and_reasons() {
         "times compare structures on this adapter only",
         "152 (73 % saved)",
         "fit of Dufay 2017 for Halton",
-        "images/heat-displaced-sphere-bvh.png is missing",
+        "heat-displaced-sphere-bvh.png is missing",
     ] {
         assert!(html.contains(text), "{text}");
     }
@@ -704,4 +704,42 @@ fn the_terminal_shows_tables_and_checks() {
         assert!(text.contains(part), "{part} in\n{text}");
     }
     assert!(!terminal_tables(&[]).contains("NaN"));
+}
+#[test]
+fn zz_time() {
+    let lines = full_run();
+    let dir = folder(&lines);
+    let t = std::time::Instant::now();
+    let records = read_records(dir.path()).unwrap();
+    let data = RunData::new(&records.lines);
+    eprintln!("read {:?}", t.elapsed());
+    let t = std::time::Instant::now();
+    sections::verdict::section(&data);
+    sections::belief::section(&data);
+    eprintln!("verdict {:?}", t.elapsed());
+    let t = std::time::Instant::now();
+    let mut document = sections::document(dir.path(), &data, &[]);
+    eprintln!("layout {:?}", t.elapsed());
+    let t = std::time::Instant::now();
+    document.paint().unwrap();
+    eprintln!("paint {:?}", t.elapsed());
+    let t = std::time::Instant::now();
+    html::page(&document).unwrap();
+    eprintln!("html {:?}", t.elapsed());
+    let t = std::time::Instant::now();
+    write_report(dir.path()).unwrap();
+    eprintln!("all {:?}", t.elapsed());
+    let mut d = plot::drawing::Drawing::new(900.0, 600.0);
+    d.text(
+        (50.0, 50.0),
+        "hello",
+        plot::drawing::INK,
+        plot::drawing::Anchor::Start,
+    );
+    let t = std::time::Instant::now();
+    plot::drawing::to_svg(&d).unwrap();
+    eprintln!("svg {:?}", t.elapsed());
+    let t = std::time::Instant::now();
+    plot::drawing::to_png(&d).unwrap();
+    eprintln!("png {:?}", t.elapsed());
 }

@@ -151,7 +151,7 @@ impl Curve {
             .rev()
             .map(|p| frame.at(p.x, p.low.max(frame.y.min())));
         if points.iter().any(|p| p.low < p.high) {
-            drawing.area(upper.chain(lower).collect(), ink.with_alpha(0.16));
+            drawing.area(upper.chain(lower).collect(), ink.with_alpha(0.22));
         }
         let line: Vec<_> = points.iter().map(|p| frame.at(p.x, p.y)).collect();
         if line.len() > 1 {

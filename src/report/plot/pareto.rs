@@ -1,7 +1,7 @@
 //! Run time against error: one point per cell, the Pareto front drawn and named.
 
 use super::axis::{Axis, Frame};
-use super::drawing::{Anchor, DIM, Drawing, FONT_PX, INK, fit_text, text_width};
+use super::drawing::{Anchor, DIM, Drawing, INK, Point, fit_text};
 use super::marker;
 use crate::measure::record::Interval;
 
@@ -102,15 +102,7 @@ impl ParetoPlot {
         for point in &self.points {
             self.draw_point(point, &frame, &mut drawing);
         }
-        for (rank, &i) in front.iter().enumerate() {
-            let (x, y) = frame.at(self.points[i].seconds.value, self.points[i].error.value);
-            drawing.text(
-                (x - 9.0, y + 10.0),
-                (rank + 1).to_string(),
-                INK,
-                Anchor::End,
-            );
-        }
+        self.draw_labels(&frame, &front, &mut drawing);
         self.draw_legend(&front, &mut drawing);
         Some(drawing)
     }
@@ -149,14 +141,39 @@ impl ParetoPlot {
         }
         let at = frame.at(seconds.value, error.value);
         marker::draw(drawing, self.samplers[point.sampler].1, at, 5.5, ink);
-        let label = letter(point.structure);
-        let offset = 9.0 + text_width(&label) / 2.0;
-        drawing.text(
-            (at.0 + offset, at.1 - FONT_PX * 0.6),
-            label,
-            DIM,
-            Anchor::Middle,
-        );
+    }
+
+    /// Ranks of the front and letters of the structures, each where it covers no marker and no other
+    /// label; in a crowd a letter is left out rather than made unreadable.
+    fn draw_labels(&self, frame: &Frame, front: &[usize], drawing: &mut Drawing) {
+        const CLEAR: f64 = 12.0;
+        let at = |i: usize| {
+            let point: &CellPoint = &self.points[i];
+            frame.at(point.seconds.value, point.error.value)
+        };
+        let mut taken: Vec<Point> = (0..self.points.len()).map(at).collect();
+        let ranks = front
+            .iter()
+            .enumerate()
+            .map(|(rank, &i)| (i, (rank + 1).to_string(), INK));
+        let letters = (0..self.points.len()).map(|i| (i, letter(self.points[i].structure), DIM));
+        for (i, text, ink) in ranks.chain(letters) {
+            let (x, y) = at(i);
+            let is_rank = ink == INK;
+            let side = if is_rank { -1.0 } else { 1.0 };
+            let places = [(1.0, -1.0), (1.0, 1.0), (-1.0, -1.0), (-1.0, 1.0)]
+                .map(|(dx, dy)| (x + 12.0 * dx * side, y - 9.0 * dy * side));
+            let is_free = |place: &&Point| {
+                let far = |other: &Point| (other.0 - place.0).hypot(other.1 - place.1) >= CLEAR;
+                taken.iter().all(far)
+            };
+            let free = places.iter().find(is_free).copied();
+            // The front must be named even in a crowd.
+            if let Some(place) = free.or(is_rank.then_some(places[0])) {
+                drawing.text(place, text, ink, Anchor::Middle);
+                taken.push(place);
+            }
+        }
     }
 
     fn draw_legend(&self, front: &[usize], drawing: &mut Drawing) {

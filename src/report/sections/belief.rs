@@ -187,7 +187,7 @@ fn finite_pixels(data: &RunData) -> Check {
         .sum();
     let detail = format!(
         "{} in {}.",
-        plural(bad, "NaN or infinite pixel"),
+        plural(bad, "non-finite pixel"),
         plural(replicates.len(), "image")
     );
     check(
