@@ -1,5 +1,6 @@
 //! Records sorted by what they speak of: scene, integrator, sampler.
 
+use super::format;
 use super::samplers::Sampler;
 use crate::config::Variant;
 use crate::measure::record::*;
@@ -262,7 +263,11 @@ impl StructureRecord {
         let rays: usize = gate.classes.iter().map(|class| class.rays).sum();
         let mut faults = Vec::new();
         if wrong > 0 {
-            faults.push(format!("{wrong} of {rays} rays differ"));
+            faults.push(format!(
+                "{} of {} rays differ",
+                format::count(wrong as u64),
+                format::count(rays as u64)
+            ));
         }
         if gate.brute_force.wrong + gate.oracle.wrong > 0 {
             faults.push("the judge itself is wrong".into());

@@ -463,7 +463,7 @@ fn a_full_run_names_winners_failures_and_reasons() {
     let (html, summary) = report("full", &full_run());
     for text in [
         "no clear winner: bvh, roped-bvh",
-        "FAILED: 41 of 131072 rays differ",
+        "FAILED: 41 of 131,072 rays differ",
         "first wrong bounce ray: ray 17",
         "more than brute-force takes",
         "biased: 57 of 432 tiles rejected",
@@ -660,7 +660,7 @@ fn a_run_where_everything_failed_shows_it_and_no_figure() {
         }
     }
     let (html, _) = report("failed", &lines);
-    assert!(html.contains("device lost") && html.contains("9 of 131072 rays differ"));
+    assert!(html.contains("device lost") && html.contains("9 of 131,072 rays differ"));
     assert!(!html.contains("5.02"));
 }
 
@@ -704,42 +704,4 @@ fn the_terminal_shows_tables_and_checks() {
         assert!(text.contains(part), "{part} in\n{text}");
     }
     assert!(!terminal_tables(&[]).contains("NaN"));
-}
-#[test]
-fn zz_time() {
-    let lines = full_run();
-    let dir = folder(&lines);
-    let t = std::time::Instant::now();
-    let records = read_records(dir.path()).unwrap();
-    let data = RunData::new(&records.lines);
-    eprintln!("read {:?}", t.elapsed());
-    let t = std::time::Instant::now();
-    sections::verdict::section(&data);
-    sections::belief::section(&data);
-    eprintln!("verdict {:?}", t.elapsed());
-    let t = std::time::Instant::now();
-    let mut document = sections::document(dir.path(), &data, &[]);
-    eprintln!("layout {:?}", t.elapsed());
-    let t = std::time::Instant::now();
-    document.paint().unwrap();
-    eprintln!("paint {:?}", t.elapsed());
-    let t = std::time::Instant::now();
-    html::page(&document).unwrap();
-    eprintln!("html {:?}", t.elapsed());
-    let t = std::time::Instant::now();
-    write_report(dir.path()).unwrap();
-    eprintln!("all {:?}", t.elapsed());
-    let mut d = plot::drawing::Drawing::new(900.0, 600.0);
-    d.text(
-        (50.0, 50.0),
-        "hello",
-        plot::drawing::INK,
-        plot::drawing::Anchor::Start,
-    );
-    let t = std::time::Instant::now();
-    plot::drawing::to_svg(&d).unwrap();
-    eprintln!("svg {:?}", t.elapsed());
-    let t = std::time::Instant::now();
-    plot::drawing::to_png(&d).unwrap();
-    eprintln!("png {:?}", t.elapsed());
 }

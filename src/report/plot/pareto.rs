@@ -95,7 +95,10 @@ impl ParetoPlot {
         let y = Axis::log10(errors, &self.y_title)?;
         let front = self.front();
         let legend = self.structures.len().max(self.samplers.len()) + front.len() + 2;
-        let mut drawing = Drawing::new(WIDTH, PLOT_HEIGHT + legend as f64 * LEGEND_ROW + 12.0);
+        let mut drawing = Drawing::new(
+            WIDTH,
+            PLOT_HEIGHT + (legend as f64 + 0.4) * LEGEND_ROW + 12.0,
+        );
         let frame = Frame::new(x, y, WIDTH, PLOT_HEIGHT);
         frame.draw(&mut drawing);
         self.draw_front(&frame, &front, &mut drawing);
@@ -203,7 +206,7 @@ impl ParetoPlot {
             );
         }
         let rows = self.structures.len().max(self.samplers.len()) + 1;
-        let mut y = top + rows as f64 * LEGEND_ROW;
+        let mut y = top + (rows as f64 + 0.4) * LEGEND_ROW;
         drawing.text(
             (16.0, y),
             "Pareto front: no cell is both faster and better",

@@ -63,7 +63,9 @@ fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
         let bars = scene.structures.iter().map(|s| bar(s, class)).collect();
         (format::ray_class(class).to_owned(), bars)
     };
+    let stamped = data.run.is_none_or(|run| run.environment.timestamps);
     RatePlot {
+        clock: if stamped { "GPU clock" } else { "wall clock" },
         groups: classes.into_iter().map(group).collect(),
     }
 }
