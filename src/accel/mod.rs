@@ -1,1 +1,190 @@
-//! placeholder
+//! Acceleration structures: one trait, one file per structure, one registry line each.
+//!
+//! To add one, see `docs/adding-a-structure.md`.
+
+pub mod bounds;
+mod brute_force;
+mod bvh;
+pub mod ray;
+mod registry;
+mod roped_bvh;
+pub mod tree;
+pub mod triangle;
+mod uniform_grid;
+
+pub use brute_force::{brute_force_hits, BruteForce};
+pub use bvh::{Bvh, BvhTwin};
+pub use ray::{Hit, Ray, NO_HIT};
+pub use registry::AccelRegistry;
+pub use roped_bvh::RopedBvh;
+pub use uniform_grid::UniformGrid;
+
+use crate::config::{ParameterSchema, Params};
+use crate::gpu::UniformValues;
+use crate::measure::record::{Phase, StructureStats};
+use crate::scene::SceneData;
+use std::time::Instant;
+use thiserror::Error;
+use triangle::TriangleRecord;
+
+/// Why a structure cannot be built.
+#[derive(Debug, Clone, Error, PartialEq)]
+pub enum AccelError {
+    /// A hard limit of the structure, with both numbers.
+    #[error("{what}: needs {needed}, the limit is {limit}")]
+    Limit {
+        /// Which limit.
+        what: String,
+        /// What the scene needs.
+        needed: u64,
+        /// What the structure allows.
+        limit: u64,
+    },
+    /// A structural invariant is violated.
+    #[error("{0}")]
+    Invalid(String),
+}
+
+/// The triangles of a scene as structures see them: the canonical records.
+#[derive(Debug, Clone, Default)]
+pub struct TriangleSoup {
+    /// Record `i` is triangle `i` of the scene.
+    pub records: Vec<TriangleRecord>,
+}
+
+impl TriangleSoup {
+    /// The records of a scene.
+    pub fn new(scene: &SceneData) -> Self {
+        let records = scene
+            .triangles
+            .iter()
+            .zip(&scene.material_ids)
+            .enumerate()
+            .map(|(id, (triangle, material))| TriangleRecord::new(triangle, id as u32, *material))
+            .collect();
+        Self { records }
+    }
+
+    /// Box around all triangles; [`bounds::Bounds::EMPTY`] if there are none.
+    pub fn bounds(&self) -> bounds::Bounds {
+        self.records.iter().fold(bounds::Bounds::EMPTY, |b, r| b.union(&r.bounds()))
+    }
+}
+
+/// Timed phases of a build.
+#[derive(Debug, Clone, Default)]
+pub struct BuildLog {
+    /// What was timed so far.
+    pub phases: Vec<Phase>,
+}
+
+impl BuildLog {
+    /// Runs `work` and notes how long it took.
+    pub fn phase<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let result = work();
+        self.phases.push(Phase { name: name.to_owned(), ms: start.elapsed().as_secs_f64() * 1e3 });
+        result
+    }
+
+    /// Sum of all phases, milliseconds.
+    pub fn total_ms(&self) -> f64 {
+        self.phases.iter().map(|p| p.ms).sum()
+    }
+}
+
+/// One array of words for the GPU.
+#[derive(Debug, Clone)]
+pub struct NamedWords {
+    /// Name of the variable in the kernel that binds it.
+    pub name: &'static str,
+    /// Content.
+    pub words: Vec<u32>,
+    /// Bytes of one element, for the record.
+    pub element_bytes: u32,
+}
+
+/// What a structure hands to the GPU.
+#[derive(Debug, Clone, Default)]
+pub struct GpuBuffers {
+    /// Storage arrays, at most two (a path-tracing kernel has eight in all).
+    pub arrays: Vec<NamedWords>,
+    /// Uniform structs by variable name.
+    pub uniforms: Vec<(&'static str, UniformValues)>,
+    /// Constants of `package::active::constants`: kernels with other constants are other kernels, so
+    /// numbers that differ from scene to scene belong into a uniform.
+    pub constants: Vec<(&'static str, u32)>,
+}
+
+/// The uniform `limits` of `kernels/common/limits.wesl`: the greatest number of steps that a
+/// traversal can take, and the number of nodes or triangles where it ends at the last one.
+pub fn limits(step_fuse: usize, elements: usize) -> (&'static str, UniformValues) {
+    ("limits", UniformValues::new().u32("step_fuse", step_fuse as u32).u32("elements", elements as u32))
+}
+
+impl GpuBuffers {
+    /// Bytes of all arrays.
+    pub fn bytes(&self) -> u64 {
+        self.arrays.iter().map(|a| a.words.len() as u64 * 4).sum()
+    }
+}
+
+/// Counted work of one ray. Twin of `kernels/common/counters.wesl`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Nodes or cells visited.
+    pub nodes: u32,
+    /// Ray–box tests.
+    pub box_tests: u32,
+    /// Ray–triangle tests.
+    pub triangle_tests: u32,
+    /// Deepest stack, entries.
+    pub stack_high_water: u32,
+}
+
+/// The traversal of a kernel in scalar Rust: the same hits, the same counters.
+pub trait CpuTwin: Sync {
+    /// Nearest hit, ties decided for the lowest triangle index.
+    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit;
+    /// Whether anything is hit.
+    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool;
+}
+
+/// A kind of structure: one static per structure, one line in the registry.
+pub trait AccelKind: Sync {
+    /// Name as a user types it.
+    fn name(&self) -> &'static str;
+    /// One line: what it is and where it comes from.
+    fn description(&self) -> &'static str;
+    /// Module of the kernel, relative to the kernel folder.
+    fn kernel(&self) -> &'static str;
+    /// Parameters.
+    fn parameters(&self) -> ParameterSchema;
+    /// Builds the structure.
+    ///
+    /// # Errors
+    /// A limit of the structure is exceeded.
+    fn build(
+        &self,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Box<dyn BuiltAccel>, AccelError>;
+}
+
+/// A built structure.
+pub trait BuiltAccel: Sync {
+    /// Checks structural invariants: reachability, containment, depth, ranges.
+    ///
+    /// # Errors
+    /// The first violated invariant, with the node.
+    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError>;
+    /// Arrays, uniforms and constants for the kernel.
+    fn buffers(&self) -> GpuBuffers;
+    /// Static figures.
+    fn stats(&self) -> StructureStats;
+    /// The traversal on the host, if it has one.
+    fn cpu_twin<'a>(&'a self, _soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        None
+    }
+}

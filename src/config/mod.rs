@@ -1,4 +1,30 @@
 //! Experiment files: parse, validate, expand axes into cells.
+//!
+//! [`Experiment::load`] reads a file, lays the defaults under it and the overrides of the command
+//! line over it, and checks every key against [`keys::KEYS`] and every name against a
+//! [`Catalogue`]. [`Plan::new`] turns the axes into the cells that have to be run, and
+//! [`cell_hash`] gives each its content hash.
+
+mod cells;
+mod check;
+mod error;
+mod experiment;
+mod hash;
+pub mod keys;
+mod parse;
+mod pattern;
+mod plan;
+mod section;
+mod tree;
+mod variants;
+
+pub use cells::{SamplerCell, StreamCell, StructureCell, TimeCell};
+pub use error::{ConfigError, Place, nearest};
+pub use experiment::{Axes, Discrepancy, Exclude, Experiment, Gate, Reference, SppRange, Timing};
+pub use hash::cell_hash;
+pub use keys::Axis;
+pub use pattern::Pattern;
+pub use plan::{Plan, Skipped};
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -162,4 +188,17 @@ pub struct Catalogue {
     pub decorrelation: Vec<Entry>,
     /// Integrators.
     pub integrator: Vec<Entry>,
+}
+
+impl Catalogue {
+    /// The known entries of one axis.
+    pub fn entries(&self, axis: Axis) -> &[Entry] {
+        match axis {
+            Axis::Scene => &self.scene,
+            Axis::Accel => &self.accel,
+            Axis::Sequence => &self.sequence,
+            Axis::Decorrelation => &self.decorrelation,
+            Axis::Integrator => &self.integrator,
+        }
+    }
 }

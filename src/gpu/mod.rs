@@ -1,1 +1,80 @@
-//! placeholder
+//! The GPU: adapter choice, device, kernel composition, pipelines, buffers, timestamps.
+//!
+//! Everything is bound *by name*: the composed kernel is reflected by naga, and a buffer is attached
+//! to the variable of the same name, so that no binding number, struct offset or size is typed twice.
+
+mod adapter;
+mod compose;
+mod diagnose;
+mod dispatch;
+mod pipeline;
+mod probe;
+mod uniform;
+
+pub use adapter::{adapters, open, AdapterChoice, AdapterSummary, Gpu};
+pub use compose::{ComposedKernel, Composition, KernelLibrary};
+pub use dispatch::{groups_for, Dispatch, Elapsed};
+pub use pipeline::{Bindings, Pipeline, WORKGROUP_SIZE};
+pub use probe::{probe_arithmetic, ArithmeticProbe};
+pub use uniform::UniformValues;
+
+use thiserror::Error;
+
+/// What can go wrong between a kernel's text and a result on the host.
+#[derive(Debug, Error)]
+pub enum GpuError {
+    /// No adapter answers at all.
+    #[error("no GPU adapter answers on this machine. Install a driver (Debian: `scripts/install-driver`) or set WGPU_BACKEND=gl; `raystone doctor` tells what was tried")]
+    NoAdapter,
+    /// The adapter asked for does not exist.
+    #[error("no adapter matches `{asked}`; there are: {known}")]
+    UnknownAdapter {
+        /// What the user typed.
+        asked: String,
+        /// What exists.
+        known: String,
+    },
+    /// The adapter would not give a device with the limits asked for.
+    #[error("adapter `{adapter}` gives no device: {cause}")]
+    NoDevice {
+        /// Adapter name.
+        adapter: String,
+        /// The driver's words.
+        cause: String,
+    },
+    /// A kernel does not compose, parse or validate; the text names file and line.
+    #[error("{0}")]
+    Kernel(String),
+    /// A kernel wants a buffer that the caller did not give.
+    #[error("kernel `{kernel}` binds `{binding}`, but no buffer of that name was given; there are: {known}")]
+    Unbound {
+        /// Entry module.
+        kernel: String,
+        /// Variable name in the kernel.
+        binding: String,
+        /// Names that were given.
+        known: String,
+    },
+    /// A buffer is larger than the adapter can bind.
+    #[error("buffer `{name}` needs {needed} bytes, but this adapter binds at most {limit}")]
+    TooLarge {
+        /// Buffer name.
+        name: String,
+        /// Bytes needed.
+        needed: u64,
+        /// The adapter's limit.
+        limit: u64,
+    },
+    /// Validation or out-of-memory error from the driver.
+    #[error("the driver refused: {0}")]
+    Driver(String),
+    /// The device is gone.
+    #[error("the device was lost: {0}")]
+    Lost(String),
+    /// Work did not end in time.
+    #[error("the device did not finish within {seconds} s")]
+    Timeout {
+        /// How long was waited.
+        seconds: u64,
+    },
+}

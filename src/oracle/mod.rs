@@ -1,1 +1,270 @@
-//! placeholder
+//! The oracle: the answer to a ray in f64, over every triangle, with the rounding of f32 allowed for.
+//!
+//! It is slow, uses no acceleration structure and shares no code with the structures, so it can judge
+//! them. A verdict is [`Verdict::Wrong`] only if no f32 test of the Möller–Trumbore kind could have
+//! given the answer (the bounds are derived in `triangle.rs`), and [`Verdict::Agrees`] only if every such
+//! test gives it; [`Verdict::Ambiguous`] is the small rest: near edges, at grazing angles, between
+//! surfaces closer than rounding.
+
+mod brute_force;
+mod triangle;
+
+use crate::scene::Triangle;
+use rayon::prelude::*;
+use std::fmt;
+use thiserror::Error;
+use triangle::Crossing;
+
+/// A ray as a kernel sees it: points `origin + t·direction`, `t_min ≤ t ≤ t_max`; the direction need
+/// not be of unit length, `t_max` may be infinite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OracleRay {
+    /// Start, scene units.
+    pub origin: [f32; 3],
+    /// Nearest distance that counts.
+    pub t_min: f32,
+    /// Direction; `t` is measured in its length.
+    pub direction: [f32; 3],
+    /// Farthest distance that counts.
+    pub t_max: f32,
+}
+
+/// The nearest hit that a structure found: triangle index and distance; `None` for a miss.
+pub type ClosestHit = Option<(u32, f32)>;
+
+/// The oracle's opinion of an answer.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Verdict {
+    /// The only answer that rounding leaves open.
+    Agrees,
+    /// One of several answers that rounding leaves open.
+    Ambiguous,
+    /// Not to be explained by rounding.
+    Wrong(Fault),
+}
+
+/// What is wrong with an answer.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum Fault {
+    /// The triangle index is not one of the scene.
+    #[error("triangle {id} does not exist: the scene has {triangles}")]
+    NoSuchTriangle {
+        /// Index answered.
+        id: u32,
+        /// Triangles of the scene.
+        triangles: usize,
+    },
+    /// The distance is not within the ray's interval, or NaN.
+    #[error("triangle {id} at t = {t} is outside the ray's interval [{t_min}, {t_max}]")]
+    OutOfInterval {
+        /// Index answered.
+        id: u32,
+        /// Distance answered.
+        t: f32,
+        /// Start of the interval.
+        t_min: f32,
+        /// End of the interval.
+        t_max: f32,
+    },
+    /// The ray does not pass through the triangle.
+    #[error("triangle {id}, answered at t = {t}, is not hit by the ray")]
+    FalseHit {
+        /// Index answered.
+        id: u32,
+        /// Distance answered.
+        t: f32,
+    },
+    /// The triangle is hit elsewhere.
+    #[error("triangle {id} is hit at {expected}, not at t = {t}")]
+    Distance {
+        /// Index answered.
+        id: u32,
+        /// Distance answered.
+        t: f32,
+        /// Where it is hit.
+        expected: Distance,
+    },
+    /// A nearer triangle was overlooked.
+    #[error("triangle {nearer} at {distance} is nearer than the answer, triangle {id} at t = {t}")]
+    NotNearest {
+        /// Index answered.
+        id: u32,
+        /// Distance answered.
+        t: f32,
+        /// The nearest triangle that is hit for certain.
+        nearer: u32,
+        /// Where it is hit.
+        distance: Distance,
+    },
+    /// A triangle was overlooked and a miss answered.
+    #[error("the answer is a miss, but triangle {id} is hit at {distance}")]
+    FalseMiss {
+        /// The nearest triangle that is hit for certain.
+        id: u32,
+        /// Where it is hit.
+        distance: Distance,
+    },
+    /// A segment was called blocked, but nothing blocks it.
+    #[error("the answer is that the ray is blocked, but no triangle is hit")]
+    FalseBlock,
+}
+
+/// A distance in f64 with the error that an f32 test may make; NaN if the ray grazes the triangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Distance {
+    /// Distance along the ray, in units of its direction.
+    pub t: f64,
+    /// Bound on the error of an f32 test.
+    pub bound: f64,
+}
+
+impl fmt::Display for Distance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "t = {:.9} ± {:.1e}", self.t, self.bound)
+    }
+}
+
+/// Judges one closest-hit answer over all `triangles`.
+pub fn judge(triangles: &[Triangle], ray: OracleRay, answer: ClosestHit) -> Verdict {
+    let candidates = brute_force::candidates(triangles, &[ray]);
+    Scene::new(triangles, &ray, &candidates[0]).judge_closest(answer)
+}
+
+/// Judges many closest-hit answers, in the order of `queries`, on all cores.
+pub fn judge_closest_hits(
+    triangles: &[Triangle],
+    queries: &[(OracleRay, ClosestHit)],
+) -> Vec<Verdict> {
+    judge_all(triangles, queries, |scene, answer| {
+        scene.judge_closest(answer)
+    })
+}
+
+/// Judges many any-hit answers (`true`: something lies in the ray's interval), on all cores.
+pub fn judge_any_hits(triangles: &[Triangle], queries: &[(OracleRay, bool)]) -> Vec<Verdict> {
+    judge_all(triangles, queries, |scene, answer| scene.judge_any(answer))
+}
+
+fn judge_all<A: Copy + Sync>(
+    triangles: &[Triangle],
+    queries: &[(OracleRay, A)],
+    judge: impl Fn(&Scene, A) -> Verdict + Sync,
+) -> Vec<Verdict> {
+    let rays: Vec<OracleRay> = queries.iter().map(|q| q.0).collect();
+    let candidates = brute_force::candidates(triangles, &rays);
+    (queries.par_iter().zip(&candidates))
+        .map(|((ray, answer), found)| judge(&Scene::new(triangles, ray, found), *answer))
+        .collect()
+}
+
+/// One ray with every triangle that it may hit.
+struct Scene<'a> {
+    triangles: &'a [Triangle],
+    ray: &'a OracleRay,
+    possible: Vec<(u32, Crossing)>,
+}
+
+impl<'a> Scene<'a> {
+    fn new(triangles: &'a [Triangle], ray: &'a OracleRay, candidates: &[u32]) -> Self {
+        let possible = candidates
+            .iter()
+            .map(|&id| (id, Crossing::new(&triangles[id as usize], ray)))
+            .filter(|(_, crossing)| crossing.is_possible(ray))
+            .collect();
+        Self {
+            triangles,
+            ray,
+            possible,
+        }
+    }
+
+    fn judge_any(&self, blocked: bool) -> Verdict {
+        match (blocked, self.nearest_definite()) {
+            (true, Some(_)) => Verdict::Agrees,
+            (false, Some((id, distance))) => Verdict::Wrong(Fault::FalseMiss { id, distance }),
+            (_, None) if !self.possible.is_empty() => Verdict::Ambiguous,
+            (true, None) => Verdict::Wrong(Fault::FalseBlock),
+            (false, None) => Verdict::Agrees,
+        }
+    }
+
+    fn judge_closest(&self, answer: ClosestHit) -> Verdict {
+        match answer {
+            None => self.judge_any(false),
+            Some((id, t)) => match self.find_fault(id, t) {
+                Some(fault) => Verdict::Wrong(fault),
+                None if self.is_only_answer(id, t) => Verdict::Agrees,
+                None => Verdict::Ambiguous,
+            },
+        }
+    }
+
+    fn find_fault(&self, id: u32, t: f32) -> Option<Fault> {
+        let (t_min, t_max) = (self.ray.t_min, self.ray.t_max);
+        let triangles = self.triangles.len();
+        if id as usize >= triangles {
+            return Some(Fault::NoSuchTriangle { id, triangles });
+        }
+        if !(t_min..=t_max).contains(&t) {
+            return Some(Fault::OutOfInterval {
+                id,
+                t,
+                t_min,
+                t_max,
+            });
+        }
+        let Some(crossing) = self.possible(id) else {
+            return Some(Fault::FalseHit { id, t });
+        };
+        if !crossing.accepts(t) {
+            let expected = Distance::of(crossing);
+            return Some(Fault::Distance { id, t, expected });
+        }
+        // The f32 distance of a definite hit is at most its upper bound, so a structure that looked
+        // at that triangle cannot have kept a greater t.
+        let (nearer, distance) = self.nearest_definite()?;
+        (distance.t + distance.bound < f64::from(t)).then_some(Fault::NotNearest {
+            id,
+            t,
+            nearer,
+            distance,
+        })
+    }
+
+    /// Whether the triangle is hit for certain and nothing else may lie at its distance or before.
+    fn is_only_answer(&self, id: u32, t: f32) -> bool {
+        let behind = |crossing: &Crossing| {
+            (crossing.distance()).is_some_and(|other| other.value - other.error > f64::from(t))
+        };
+        self.possible
+            .iter()
+            .all(|(other, crossing)| match *other == id {
+                true => crossing.is_definite(self.ray),
+                false => behind(crossing),
+            })
+    }
+
+    fn possible(&self, id: u32) -> Option<&Crossing> {
+        let at = self.possible.binary_search_by_key(&id, |p| p.0).ok()?;
+        Some(&self.possible[at].1)
+    }
+
+    /// The definite hit of which the upper bound of the distance is least.
+    fn nearest_definite(&self) -> Option<(u32, Distance)> {
+        let upper = |d: &Distance| d.t + d.bound;
+        (self.possible.iter())
+            .filter(|(_, crossing)| crossing.is_definite(self.ray))
+            .map(|(id, crossing)| (*id, Distance::of(crossing)))
+            .min_by(|a, b| upper(&a.1).total_cmp(&upper(&b.1)))
+    }
+}
+
+impl Distance {
+    fn of(crossing: &Crossing) -> Self {
+        let (t, bound) = (crossing.distance()).map_or((f64::NAN, f64::NAN), |d| (d.value, d.error));
+        Self { t, bound }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -4,11 +4,33 @@
 //! A scene is one flat triangle soup in world space with per-triangle material indices. Structures
 //! see only [`Triangle`]s; shading sees the rest.
 
+mod builder;
+pub mod builtin;
+mod camera;
+mod content;
+mod error;
+mod gltf;
+mod gltf_material;
+mod mtl;
+mod obj;
+mod ply;
+#[cfg(test)]
+mod tests;
+mod texture;
+
+pub use builder::{DEFAULT_ALBEDO, MAX_COORDINATE};
+pub use builtin::builtin_scenes;
+pub use camera::Bounds;
+pub use error::SceneError;
+
+use crate::config::Variant;
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// One triangle in world space, vertices in the order of the file (f32, scene units).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub struct Triangle {
     /// The three corners.
     pub vertices: [Vec3; 3],
@@ -127,4 +149,74 @@ pub struct SceneData {
     pub hash: String,
     /// What was dropped or approximated.
     pub report: LoadReport,
+}
+
+/// How a scene is loaded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LoadOptions {
+    /// Whether base-colour textures are decoded. Without them textured surfaces show their
+    /// constant colour, and no texture coordinates are kept.
+    pub textures: bool,
+    /// Largest width and height of a texture, texels; larger ones are reduced, with a warning.
+    pub max_texture_size: u32,
+}
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        Self {
+            textures: true,
+            max_texture_size: 1024,
+        }
+    }
+}
+
+/// Loads the scene that `variant` names: a built-in one, or the path of an OBJ, glTF, GLB or PLY
+/// file (relative to the working directory, extension in any case).
+///
+/// # Errors
+/// [`SceneError`]: unknown name, unreadable or malformed file, no triangles, coordinates too large.
+pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, SceneError> {
+    if let Some(scene) = builtin::build(variant) {
+        return scene;
+    }
+    let name = variant.name.as_str();
+    let path = Path::new(name);
+    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    match extension.to_str().unwrap_or_default() {
+        "obj" => obj::load(path, name, options),
+        "gltf" | "glb" => gltf::load(path, name, options),
+        "ply" => ply::load(path, name),
+        _ if path.exists() => Err(SceneError::UnknownFormat {
+            path: path.to_owned(),
+        }),
+        _ => Err(SceneError::Unknown {
+            name: name.to_owned(),
+            hint: builtin::hint(name),
+        }),
+    }
+}
+
+/// How many materials a warning names.
+const NAMES_IN_WARNING: usize = 4;
+
+/// One line for all materials that are `what` but drawn as diffuse; nothing if there are none.
+fn approximation_warning(what: &str, names: Vec<&str>) -> Option<String> {
+    if names.is_empty() {
+        return None;
+    }
+    let shown = names[..names.len().min(NAMES_IN_WARNING)].join(", ");
+    let more = if names.len() > NAMES_IN_WARNING {
+        ", …"
+    } else {
+        ""
+    };
+    let count = names.len();
+    let are = if count == 1 {
+        "material is"
+    } else {
+        "materials are"
+    };
+    Some(format!(
+        "{count} {are} {what}, which is not rendered yet; drawn as diffuse: {shown}{more}"
+    ))
 }

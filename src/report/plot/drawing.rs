@@ -167,11 +167,11 @@ impl Drawing {
     /// Every text in it, for tests.
     #[cfg(test)]
     pub fn texts(&self) -> Vec<&str> {
-        let text = |shape| match shape {
-            &Shape::Text { ref text, .. } => Some(text.as_str()),
+        let texts = self.shapes.iter().filter_map(|shape| match shape {
+            Shape::Text { text, .. } => Some(text.as_str()),
             _ => None,
-        };
-        self.shapes.iter().filter_map(text).collect()
+        });
+        texts.collect()
     }
 }
 

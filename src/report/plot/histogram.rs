@@ -97,7 +97,7 @@ mod tests {
             counts: vec![0; 10],
             biased: false,
         };
-        assert!(draw(&[empty.clone()]).is_none());
+        assert!(draw(std::slice::from_ref(&empty)).is_none());
         let full = Histogram {
             counts: vec![3; 10],
             ..empty

@@ -4,6 +4,7 @@ use super::axis::{Axis, Frame};
 use super::drawing::{Anchor, DIM, Drawing, INK, Point, fit_text};
 use super::marker;
 use crate::measure::record::Interval;
+use crate::measure::statistics::pareto_front;
 
 /// One cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,23 +37,6 @@ pub struct ParetoPlot {
 const WIDTH: f64 = 900.0;
 const PLOT_HEIGHT: f64 = 480.0;
 const LEGEND_ROW: f64 = 21.0;
-
-/// Indices of the points that no other point beats in both coordinates (smaller is better), by
-/// growing x. Of equal points the first is kept.
-pub fn pareto_front(points: &[(f64, f64)]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..points.len()).collect();
-    order.sort_by(|&a, &b| {
-        let ((ax, ay), (bx, by)) = (points[a], points[b]);
-        ax.total_cmp(&bx).then(ay.total_cmp(&by))
-    });
-    let mut best = f64::INFINITY;
-    order.retain(|&i| {
-        let better = points[i].1 < best;
-        best = best.min(points[i].1);
-        better
-    });
-    order
-}
 
 /// Letter of a structure: a, b, …, z, then a number.
 pub fn letter(index: usize) -> String {
@@ -229,20 +213,6 @@ impl ParetoPlot {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_front_holds_what_nothing_beats() {
-        let points = [
-            (1.0, 9.0),
-            (2.0, 4.0),
-            (2.0, 5.0),
-            (3.0, 4.0),
-            (4.0, 1.0),
-            (1.0, 9.0),
-        ];
-        assert_eq!(pareto_front(&points), [0, 1, 4]);
-        assert!(pareto_front(&[]).is_empty());
-    }
 
     #[test]
     fn the_picture_names_the_front() {

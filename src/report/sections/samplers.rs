@@ -22,15 +22,16 @@ pub fn blocks(dir: &Path, data: &RunData, stem: &str, view: &View) -> Vec<Block>
     blocks.extend(error_table(view, Metric::Rmse).into_block());
     blocks.extend(efficiency_table(view).into_block());
     if let Some(pareto) = pareto_plot(data, view)
-        && let Some(drawing) = pareto.draw() {
-            let caption = "Run time against error, one point per cell without a fault; lines: 95 % intervals. \
+        && let Some(drawing) = pareto.draw()
+    {
+        let caption = "Run time against error, one point per cell without a fault; lines: 95 % intervals. \
                            Images are equal across structures, so a structure moves a sampler only sideways.";
-            blocks.push(Block::Figures(vec![Figure::new(
-                format!("{stem}-pareto"),
-                caption,
-                drawing,
-            )]));
-        }
+        blocks.push(Block::Figures(vec![Figure::new(
+            format!("{stem}-pareto"),
+            caption,
+            drawing,
+        )]));
+    }
     blocks.extend(time_table(view).into_block());
     blocks.extend(bias_table(view).into_block());
     if let Some(drawing) = histogram::draw(&histograms(view)) {

@@ -132,11 +132,7 @@ pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
         })
     };
     judge(
-        scene
-            .structures
-            .iter()
-            .filter_map(|s| contender(s))
-            .collect(),
+        scene.structures.iter().filter_map(contender).collect(),
         Better::Higher,
     )
 }

@@ -1,0 +1,71 @@
+//! Axis-aligned bounds and the slab test. Twin of `kernels/accel/bounds.wesl`.
+
+use super::ray::Ray;
+
+/// A box is entered if `enter <= exit * BOX_PAD`: 1 + 2⁻¹⁹, more than twice the triangle's own pad
+/// ([`super::triangle::TRIANGLE_PAD`]), so that no accepted hit is culled.
+pub const BOX_PAD: f32 = 1.000_001_9;
+
+/// An axis-aligned box, scene units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// Minimum corner.
+    pub min: [f32; 3],
+    /// Maximum corner.
+    pub max: [f32; 3],
+}
+
+impl Bounds {
+    /// The neutral element of [`Bounds::union`].
+    pub const EMPTY: Bounds = Bounds { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
+
+    /// The smallest box around both.
+    pub fn union(&self, other: &Bounds) -> Bounds {
+        let mut out = *self;
+        for axis in 0..3 {
+            out.min[axis] = out.min[axis].min(other.min[axis]);
+            out.max[axis] = out.max[axis].max(other.max[axis]);
+        }
+        out
+    }
+
+    /// Whether `other` lies inside.
+    pub fn contains(&self, other: &Bounds) -> bool {
+        (0..3).all(|axis| self.min[axis] <= other.min[axis] && self.max[axis] >= other.max[axis])
+    }
+
+    /// Side lengths; negative for the empty box.
+    pub fn extent(&self) -> [f32; 3] {
+        std::array::from_fn(|axis| self.max[axis] - self.min[axis])
+    }
+
+    /// Twice the centre: enough to sort and bin by, without the division.
+    pub fn doubled_centre(&self) -> [f32; 3] {
+        std::array::from_fn(|axis| self.min[axis] + self.max[axis])
+    }
+
+    /// Half the surface area; 0 for the empty box.
+    pub fn half_area(&self) -> f32 {
+        let [x, y, z] = self.extent();
+        if x < 0.0 { 0.0 } else { x * y + y * z + z * x }
+    }
+}
+
+/// Distances at which the ray's line enters and leaves the box (enter > exit: it misses).
+pub fn slab(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> (f32, f32) {
+    let near = |axis: usize| (bounds.min[axis] - ray.origin[axis]) * inverse[axis];
+    let far = |axis: usize| (bounds.max[axis] - ray.origin[axis]) * inverse[axis];
+    let (x1, x2) = (near(0), far(0));
+    let (y1, y2) = (near(1), far(1));
+    let (z1, z2) = (near(2), far(2));
+    let enter = x1.min(x2).max(y1.min(y2)).max(z1.min(z2));
+    let exit = x1.max(x2).min(y1.max(y2)).min(z1.max(z2));
+    (enter, exit)
+}
+
+/// Distance at which the segment `[t_min, t_best]` enters the padded box, or `None`.
+pub fn enter_box(bounds: &Bounds, ray: &Ray, inverse: [f32; 3], t_best: f32) -> Option<f32> {
+    let (enter, exit) = slab(bounds, ray, inverse);
+    let enter = enter.max(ray.t_min);
+    (enter <= exit.min(t_best) * BOX_PAD).then_some(enter)
+}

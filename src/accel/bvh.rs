@@ -1,0 +1,263 @@
+//! `bvh`: binary BVH with the boxes of both children in a 64-byte node, traversed near child first
+//! with a stack. Twin of `kernels/accel/bvh.wesl`.
+//!
+//! Source: T. Aila, S. Laine, "Understanding the efficiency of ray traversal on GPUs", HPG 2009.
+
+use super::bounds::{enter_box, Bounds};
+use super::ray::{safe_inverse, Hit, Ray, NO_HIT};
+use super::tree::{tree_parameters, NodeKind, Tree};
+use super::triangle::{intersect_triangle, TriangleRecord};
+use super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords, TriangleSoup,
+};
+use crate::config::{ParameterSchema, Params};
+use crate::measure::record::StructureStats;
+use bytemuck::{Pod, Zeroable};
+
+/// Marks a reference to a leaf; bits 26–30 hold its count, bits 0–25 its first triangle.
+const LEAF: u32 = 0x8000_0000;
+const COUNT_SHIFT: u32 = 26;
+const FIRST_MASK: u32 = (1 << COUNT_SHIFT) - 1;
+/// Root of an empty scene and missing second child of a one-leaf tree: a leaf without triangles.
+const EMPTY_LEAF: u32 = LEAF;
+
+/// The registry entry.
+pub struct Bvh;
+
+impl AccelKind for Bvh {
+    fn name(&self) -> &'static str {
+        "bvh"
+    }
+
+    fn description(&self) -> &'static str {
+        "binary BVH, binned SAH (Wald 2007), stack, near child first (Aila & Laine 2009)"
+    }
+
+    fn kernel(&self) -> &'static str {
+        "accel/bvh"
+    }
+
+    fn parameters(&self) -> ParameterSchema {
+        tree_parameters()
+    }
+
+    fn build(
+        &self,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        Ok(Box::new(BvhTwin::build(soup, params, log)?))
+    }
+}
+
+/// Boxes of both children with what they refer to: four `vec4<u32>`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+struct Node {
+    left_min: [f32; 3],
+    left: u32,
+    left_max: [f32; 3],
+    unused_left: u32,
+    right_min: [f32; 3],
+    right: u32,
+    right_max: [f32; 3],
+    unused_right: u32,
+}
+
+impl Node {
+    const NOTHING: Node = Node {
+        left_min: [0.0; 3],
+        left: EMPTY_LEAF,
+        left_max: [0.0; 3],
+        unused_left: 0,
+        right_min: [0.0; 3],
+        right: EMPTY_LEAF,
+        right_max: [0.0; 3],
+        unused_right: 0,
+    };
+
+    fn left_bounds(&self) -> Bounds {
+        Bounds { min: self.left_min, max: self.left_max }
+    }
+
+    fn right_bounds(&self) -> Bounds {
+        Bounds { min: self.right_min, max: self.right_max }
+    }
+}
+
+/// The built structure; it is its own CPU twin, and the judge of the gate.
+pub struct BvhTwin {
+    tree: Tree,
+    nodes: Vec<Node>,
+    /// Triangle records leaf by leaf, so that a leaf is one run of memory.
+    leaf_triangles: Vec<TriangleRecord>,
+    stack_entries: u32,
+}
+
+impl BvhTwin {
+    /// Builds tree and layout.
+    ///
+    /// # Errors
+    /// More triangles than a leaf reference can address.
+    pub fn build(soup: &TriangleSoup, params: &Params, log: &mut BuildLog) -> Result<Self, AccelError> {
+        let count = soup.records.len() as u64;
+        if count > u64::from(FIRST_MASK) {
+            return Err(AccelError::Limit { what: "triangles of a bvh".into(), needed: count, limit: FIRST_MASK.into() });
+        }
+        let tree = log.phase("binned-sah", || Tree::build(soup, params));
+        let (nodes, leaf_triangles) = log.phase("layout", || {
+            (layout(&tree), tree.order.iter().map(|&id| soup.records[id as usize]).collect())
+        });
+        // One entry is pushed for each level at most.
+        let stack_entries = tree.depth().max(1);
+        Ok(Self { tree, nodes, leaf_triangles, stack_entries })
+    }
+
+    fn leaf(&self, reference: u32, ray: &Ray, inverse: [f32; 3], hit: &mut Hit, counters: &mut Counters) {
+        let first = (reference & FIRST_MASK) as usize;
+        let count = ((reference & !LEAF) >> COUNT_SHIFT) as usize;
+        for triangle in &self.leaf_triangles[first..first + count] {
+            counters.triangle_tests += 1;
+            intersect_triangle(triangle, ray, inverse, hit);
+        }
+    }
+
+    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
+        let inverse = safe_inverse(ray.direction);
+        let mut hit = Hit::miss(ray);
+        let mut stack = Vec::with_capacity(self.stack_entries as usize);
+        let mut current = 0_u32;
+        loop {
+            counters.nodes += 1;
+            counters.box_tests += 2;
+            let node = &self.nodes[current as usize];
+            let left = enter_box(&node.left_bounds(), ray, inverse, hit.t);
+            let right = enter_box(&node.right_bounds(), ray, inverse, hit.t);
+            let (mut near, mut far) = ((left, node.left), (right, node.right));
+            if right.is_some_and(|r| left.is_none_or(|l| r < l)) {
+                std::mem::swap(&mut near, &mut far);
+            }
+            let mut next = None;
+            for (enter, reference) in [near, far] {
+                // The far child is looked at again: the near one may have brought a nearer hit.
+                if !enter.is_some_and(|e| e <= hit.t * super::bounds::BOX_PAD) {
+                    continue;
+                }
+                if reference & LEAF != 0 {
+                    self.leaf(reference, ray, inverse, &mut hit, counters);
+                    if any && hit.triangle != NO_HIT {
+                        return hit;
+                    }
+                } else if next.is_none() {
+                    next = Some(reference);
+                } else {
+                    stack.push(reference);
+                    counters.stack_high_water = counters.stack_high_water.max(stack.len() as u32);
+                }
+            }
+            match next.or_else(|| stack.pop()) {
+                Some(reference) => current = reference,
+                None => return hit,
+            }
+        }
+    }
+}
+
+/// Nodes with the boxes of their children, in the tree's depth-first order, leaves folded into
+/// references.
+fn layout(tree: &Tree) -> Vec<Node> {
+    let mut inner_index = vec![u32::MAX; tree.nodes.len()];
+    let mut inner_count = 0;
+    for (index, node) in tree.nodes.iter().enumerate() {
+        if matches!(node.kind, NodeKind::Inner { .. }) {
+            inner_index[index] = inner_count;
+            inner_count += 1;
+        }
+    }
+    let reference = |index: u32| match tree.nodes[index as usize].kind {
+        NodeKind::Inner { .. } => inner_index[index as usize],
+        NodeKind::Leaf { first, count } => LEAF | count << COUNT_SHIFT | first,
+    };
+    let mut nodes = Vec::with_capacity(inner_count as usize);
+    for node in &tree.nodes {
+        if let NodeKind::Inner { left, right } = node.kind {
+            let (l, r) = (&tree.nodes[left as usize].bounds, &tree.nodes[right as usize].bounds);
+            nodes.push(Node {
+                left_min: l.min,
+                left: reference(left),
+                left_max: l.max,
+                right_min: r.min,
+                right: reference(right),
+                right_max: r.max,
+                ..Node::NOTHING
+            });
+        }
+    }
+    if nodes.is_empty() {
+        let mut root = Node::NOTHING;
+        if let Some(only) = tree.nodes.first() {
+            (root.left_min, root.left_max, root.left) = (only.bounds.min, only.bounds.max, reference(0));
+        }
+        nodes.push(root);
+    }
+    nodes
+}
+
+impl BuiltAccel for BvhTwin {
+    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
+        self.tree.validate(soup)?;
+        if self.tree.depth() > self.stack_entries {
+            return Err(AccelError::Invalid(format!(
+                "depth {} exceeds the stack of {} entries",
+                self.tree.depth(),
+                self.stack_entries
+            )));
+        }
+        Ok(())
+    }
+
+    fn buffers(&self) -> GpuBuffers {
+        GpuBuffers {
+            arrays: vec![
+                NamedWords { name: "nodes", words: bytemuck::cast_slice(&self.nodes).to_vec(), element_bytes: 64 },
+                NamedWords {
+                    name: "leaf_triangles",
+                    words: bytemuck::cast_slice(&self.leaf_triangles).to_vec(),
+                    element_bytes: 48,
+                },
+            ],
+            uniforms: vec![super::limits(self.nodes.len(), self.nodes.len())],
+            // A multiple of 16, so that scenes of like depth share a kernel.
+            constants: vec![("STACK_ENTRIES", self.stack_entries.next_multiple_of(16))],
+        }
+    }
+
+    fn stats(&self) -> StructureStats {
+        StructureStats { bytes: self.buffers().bytes(), ..self.tree.stats() }
+    }
+
+    fn cpu_twin<'a>(&'a self, _: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(self))
+    }
+}
+
+impl CpuTwin for BvhTwin {
+    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
+        self.trace(ray, false, counters)
+    }
+
+    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        self.trace(ray, true, counters).triangle != NO_HIT
+    }
+}
+
+impl CpuTwin for &BvhTwin {
+    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
+        (**self).closest_hit(ray, counters)
+    }
+
+    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        (**self).any_hit(ray, counters)
+    }
+}

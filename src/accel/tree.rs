@@ -1,0 +1,336 @@
+//! The binary tree under `bvh` and `roped-bvh`: binned SAH on both cores, the same tree for any
+//! number of threads.
+//!
+//! Source: I. Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007.
+
+use super::bounds::Bounds;
+use super::{AccelError, TriangleSoup};
+use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::measure::record::StructureStats;
+
+const BINS: usize = 16;
+/// Below this depth splits are by SAH, beyond it by the median, so that depth stays below
+/// `SAH_DEPTH + log2(n)` whatever the input.
+const SAH_DEPTH: u32 = 48;
+/// Subtrees of fewer triangles are built by one thread.
+const PARALLEL_GRAIN: usize = 4096;
+
+/// A node; children of an inner node lie at `left` and `right`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TreeNode {
+    /// Box around everything below.
+    pub bounds: Bounds,
+    /// What is below.
+    pub kind: NodeKind,
+}
+
+/// What a node holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NodeKind {
+    /// Two children, by node index.
+    Inner {
+        /// First child.
+        left: u32,
+        /// Second child.
+        right: u32,
+    },
+    /// A range of [`Tree::order`].
+    Leaf {
+        /// First entry.
+        first: u32,
+        /// Number of entries.
+        count: u32,
+    },
+}
+
+/// A binary tree over triangles; node 0 is the root, nodes are in depth-first order.
+#[derive(Debug, Clone, Default)]
+pub struct Tree {
+    /// Nodes; empty for an empty scene.
+    pub nodes: Vec<TreeNode>,
+    /// Triangle indices, leaf by leaf.
+    pub order: Vec<u32>,
+}
+
+/// Parameters that all structures over this tree share.
+pub fn tree_parameters() -> ParameterSchema {
+    let number = |name, description, default| Parameter {
+        name,
+        description,
+        default: ParamValue::Number(default),
+        range: ParamRange::Number { min: 0.01, max: 100.0 },
+    };
+    vec![
+        Parameter {
+            name: "leaf_size",
+            description: "most triangles in a leaf",
+            default: ParamValue::Integer(4),
+            range: ParamRange::Integer { min: 1, max: 31 },
+        },
+        number("traversal_cost", "SAH cost of visiting an inner node", 1.0),
+        number("intersection_cost", "SAH cost of testing a triangle", 1.0),
+    ]
+}
+
+#[derive(Clone, Copy)]
+struct Primitive {
+    bounds: Bounds,
+    id: u32,
+}
+
+struct Settings {
+    leaf_size: usize,
+    traversal_cost: f32,
+    intersection_cost: f32,
+}
+
+impl Tree {
+    /// Builds the tree.
+    pub fn build(soup: &TriangleSoup, params: &Params) -> Tree {
+        let settings = Settings {
+            leaf_size: params.integer("leaf_size") as usize,
+            traversal_cost: params.number("traversal_cost") as f32,
+            intersection_cost: params.number("intersection_cost") as f32,
+        };
+        let mut primitives: Vec<Primitive> =
+            soup.records.iter().map(|r| Primitive { bounds: r.bounds(), id: r.id }).collect();
+        if primitives.is_empty() {
+            return Tree::default();
+        }
+        let count = primitives.len();
+        let mut nodes = build_subtree(&mut primitives, 0, &settings, 0);
+        nodes.shrink_to_fit();
+        let order = primitives.iter().map(|p| p.id).collect();
+        debug_assert!(nodes.len() < 2 * count);
+        Tree { nodes, order }
+    }
+
+    /// Deepest leaf; the root has depth 0.
+    pub fn depth(&self) -> u32 {
+        let mut depths = vec![0u32; self.nodes.len()];
+        let mut deepest = 0;
+        for (index, node) in self.nodes.iter().enumerate() {
+            deepest = deepest.max(depths[index]);
+            if let NodeKind::Inner { left, right } = node.kind {
+                depths[left as usize] = depths[index] + 1;
+                depths[right as usize] = depths[index] + 1;
+            }
+        }
+        deepest
+    }
+
+    /// Figures of the tree; `bytes` is left 0. SAH with both constants 1: sum over inner nodes of
+    /// A(node) / A(root) plus sum over leaves of A(leaf) · triangles / A(root).
+    pub fn stats(&self) -> StructureStats {
+        let mut stats = StructureStats {
+            nodes: self.nodes.len() as u64,
+            references: self.order.len() as u64,
+            ..Default::default()
+        };
+        let Some(root) = self.nodes.first() else { return stats };
+        let mut cost = 0.0_f64;
+        for node in &self.nodes {
+            let weight = match node.kind {
+                NodeKind::Inner { .. } => 1,
+                NodeKind::Leaf { count, .. } => {
+                    stats.leaves += 1;
+                    count
+                }
+            };
+            cost += f64::from(node.bounds.half_area()) * f64::from(weight);
+        }
+        let root_area = f64::from(root.bounds.half_area());
+        stats.sah_cost = (root_area > 0.0).then(|| cost / root_area);
+        stats.depth = Some(self.depth());
+        stats
+    }
+
+    /// Checks that every triangle is in exactly one leaf, every box contains what is below it, and
+    /// every node has one parent.
+    ///
+    /// # Errors
+    /// The first violated invariant, with the node.
+    pub fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
+        let wrong = |text: String| Err(AccelError::Invalid(text));
+        let mut seen = vec![false; soup.records.len()];
+        let mut has_parent = vec![false; self.nodes.len()];
+        for (index, node) in self.nodes.iter().enumerate() {
+            match node.kind {
+                NodeKind::Inner { left, right } => {
+                    for child in [left, right] {
+                        let Some(below) = self.nodes.get(child as usize) else {
+                            return wrong(format!("node {index}: child {child} does not exist"));
+                        };
+                        if child as usize <= index || std::mem::replace(&mut has_parent[child as usize], true) {
+                            return wrong(format!("node {index}: child {child} is reached twice or upwards"));
+                        }
+                        if !node.bounds.contains(&below.bounds) {
+                            return wrong(format!("node {index}: its box does not contain child {child}"));
+                        }
+                    }
+                }
+                NodeKind::Leaf { first, count } => {
+                    for &id in &self.order[first as usize..(first + count) as usize] {
+                        let record = &soup.records[id as usize];
+                        if std::mem::replace(&mut seen[id as usize], true) {
+                            return wrong(format!("leaf {index}: triangle {id} is in two leaves"));
+                        }
+                        if !node.bounds.contains(&record.bounds()) {
+                            return wrong(format!("leaf {index}: its box does not contain triangle {id}"));
+                        }
+                    }
+                }
+            }
+        }
+        if let Some(lost) = seen.iter().position(|s| !s) {
+            return wrong(format!("triangle {lost} is in no leaf"));
+        }
+        if let Some(orphan) = has_parent.iter().skip(1).position(|p| !p) {
+            return wrong(format!("node {} has no parent", orphan + 1));
+        }
+        Ok(())
+    }
+}
+
+/// Nodes of the subtree over `primitives`, root first, indices relative to the returned vector;
+/// `first` is the position of `primitives` in the whole order.
+fn build_subtree(primitives: &mut [Primitive], first: u32, settings: &Settings, depth: u32) -> Vec<TreeNode> {
+    let bounds = primitives.iter().fold(Bounds::EMPTY, |b, p| b.union(&p.bounds));
+    let Some(middle) = split(primitives, &bounds, settings, depth) else {
+        let kind = NodeKind::Leaf { first, count: primitives.len() as u32 };
+        return vec![TreeNode { bounds, kind }];
+    };
+    let parallel = primitives.len() > PARALLEL_GRAIN;
+    let (low, high) = primitives.split_at_mut(middle);
+    let build_low = |low: &mut [Primitive]| build_subtree(low, first, settings, depth + 1);
+    let build_high = |high: &mut [Primitive]| build_subtree(high, first + middle as u32, settings, depth + 1);
+    let (left, right) = if parallel {
+        rayon::join(|| build_low(low), || build_high(high))
+    } else {
+        (build_low(low), build_high(high))
+    };
+    let mut nodes = Vec::with_capacity(1 + left.len() + right.len());
+    let right_root = 1 + left.len() as u32;
+    nodes.push(TreeNode { bounds, kind: NodeKind::Inner { left: 1, right: right_root } });
+    nodes.extend(left.into_iter().map(|n| shifted(n, 1)));
+    nodes.extend(right.into_iter().map(|n| shifted(n, right_root)));
+    nodes
+}
+
+fn shifted(mut node: TreeNode, by: u32) -> TreeNode {
+    if let NodeKind::Inner { left, right } = &mut node.kind {
+        *left += by;
+        *right += by;
+    }
+    node
+}
+
+/// Partitions `primitives` and returns where the second half starts; `None` makes a leaf.
+fn split(primitives: &mut [Primitive], bounds: &Bounds, settings: &Settings, depth: u32) -> Option<usize> {
+    let count = primitives.len();
+    if count <= 1 {
+        return None;
+    }
+    let best = (depth < SAH_DEPTH).then(|| best_bin_split(primitives)).flatten();
+    let leaf_cost = settings.intersection_cost * count as f32;
+    match best {
+        Some(plan) => {
+            let area = bounds.half_area().max(f32::MIN_POSITIVE);
+            let cost = settings.traversal_cost + settings.intersection_cost * plan.cost / area;
+            if count <= settings.leaf_size && leaf_cost <= cost {
+                return None;
+            }
+            Some(partition(primitives, |p| plan.side(p)))
+        }
+        None if count <= settings.leaf_size => None,
+        // All centres coincide, or the tree is already deep: halves, in an order that depends on
+        // the input alone.
+        None => {
+            let axis = longest_axis(bounds);
+            primitives.sort_unstable_by(|a, b| {
+                let key = |p: &Primitive| p.bounds.doubled_centre()[axis];
+                key(a).total_cmp(&key(b)).then(a.id.cmp(&b.id))
+            });
+            Some(count / 2)
+        }
+    }
+}
+
+fn longest_axis(bounds: &Bounds) -> usize {
+    let extent = bounds.extent();
+    (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0)
+}
+
+struct BinSplit {
+    axis: usize,
+    origin: f32,
+    scale: f32,
+    bin: usize,
+    /// Sum over both sides of half area times count.
+    cost: f32,
+}
+
+impl BinSplit {
+    fn side(&self, primitive: &Primitive) -> bool {
+        bin_of(primitive.bounds.doubled_centre()[self.axis], self.origin, self.scale) < self.bin
+    }
+}
+
+fn bin_of(centre: f32, origin: f32, scale: f32) -> usize {
+    (((centre - origin) * scale) as usize).min(BINS - 1)
+}
+
+/// The best of the 3 × 15 bin borders; `None` if all centres coincide.
+fn best_bin_split(primitives: &[Primitive]) -> Option<BinSplit> {
+    let mut centres = Bounds::EMPTY;
+    for p in primitives {
+        let c = p.bounds.doubled_centre();
+        centres = centres.union(&Bounds { min: c, max: c });
+    }
+    let extent = centres.extent();
+    let scale = extent.map(|e| if e > 0.0 { BINS as f32 * (1.0 - 1e-6) / e } else { 0.0 });
+    let mut bins = [[(Bounds::EMPTY, 0u32); BINS]; 3];
+    for p in primitives {
+        let c = p.bounds.doubled_centre();
+        for axis in 0..3 {
+            let bin = &mut bins[axis][bin_of(c[axis], centres.min[axis], scale[axis])];
+            bin.0 = bin.0.union(&p.bounds);
+            bin.1 += 1;
+        }
+    }
+    let mut best: Option<BinSplit> = None;
+    for axis in 0..3 {
+        if !(scale[axis] > 0.0 && scale[axis].is_finite()) {
+            continue;
+        }
+        let mut right_cost = [0.0_f32; BINS];
+        let (mut bounds, mut count) = (Bounds::EMPTY, 0u32);
+        for bin in (1..BINS).rev() {
+            bounds = bounds.union(&bins[axis][bin].0);
+            count += bins[axis][bin].1;
+            right_cost[bin] = if count == 0 { f32::INFINITY } else { bounds.half_area() * count as f32 };
+        }
+        let (mut bounds, mut count) = (Bounds::EMPTY, 0u32);
+        for bin in 1..BINS {
+            bounds = bounds.union(&bins[axis][bin - 1].0);
+            count += bins[axis][bin - 1].1;
+            let cost = bounds.half_area() * count as f32 + right_cost[bin];
+            if count > 0 && cost.is_finite() && best.as_ref().is_none_or(|b| cost < b.cost) {
+                best = Some(BinSplit { axis, origin: centres.min[axis], scale: scale[axis], bin, cost });
+            }
+        }
+    }
+    best
+}
+
+/// Moves the elements of the first side to the front; returns how many there are.
+fn partition(primitives: &mut [Primitive], is_first: impl Fn(&Primitive) -> bool) -> usize {
+    let mut boundary = 0;
+    for i in 0..primitives.len() {
+        if is_first(&primitives[i]) {
+            primitives.swap(i, boundary);
+            boundary += 1;
+        }
+    }
+    boundary
+}

@@ -1,0 +1,228 @@
+//! What can be wrong with an experiment, said with the key, the place and what to do.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// Where a value was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Place {
+    /// In the experiment file.
+    File {
+        /// The file as the user named it.
+        file: Arc<str>,
+        /// Line, counted from 1.
+        line: usize,
+    },
+    /// On the command line, as `--set TEXT`.
+    Override(Arc<str>),
+    /// Nowhere: the value is the default of its key.
+    Default,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File { file, line } => write!(f, "{file}:{line}"),
+            Self::Override(text) => write!(f, "--set {text}"),
+            Self::Default => f.write_str("built-in default"),
+        }
+    }
+}
+
+/// What can be wrong with an experiment file, its overrides, or a filter of its cells.
+#[derive(Debug, Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("cannot read the experiment file {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The text is not TOML (a key written twice is one such fault).
+    #[error("{at}: not valid TOML: {message}")]
+    Syntax {
+        /// Where.
+        at: Place,
+        /// The TOML parser's words.
+        message: String,
+    },
+    /// A section, key or name that nobody knows.
+    #[error("{at}: unknown {what} `{name}`{}", suggestion(name, known))]
+    Unknown {
+        /// Where.
+        at: Place,
+        /// What was expected: `section`, `key in [run]`, `accel`, …
+        what: String,
+        /// What was written.
+        name: String,
+        /// Everything that could have been written.
+        known: Vec<String>,
+    },
+    /// A value of the wrong type.
+    #[error("{at}: `{key}` must be {expected}, not {found}")]
+    WrongType {
+        /// Where.
+        at: Place,
+        /// Full key.
+        key: String,
+        /// The type and range of the key.
+        expected: String,
+        /// What was written.
+        found: String,
+    },
+    /// A value of the right type that is not allowed.
+    #[error("{at}: `{key}` = {value} is not allowed; it must be {expected}")]
+    OutOfRange {
+        /// Where.
+        at: Place,
+        /// Full key.
+        key: String,
+        /// What was written.
+        value: String,
+        /// What is allowed.
+        expected: String,
+    },
+    /// A key without a default is absent.
+    #[error("{at}: `{key}` is missing; add it, as {expected}")]
+    Missing {
+        /// The file or section.
+        at: Place,
+        /// Full key.
+        key: String,
+        /// The type and range of the key.
+        expected: String,
+    },
+    /// An axis or a list of parameter values without an element.
+    #[error("{at}: `{key}` is empty; list at least one value, or leave the key out")]
+    Empty {
+        /// Where.
+        at: Place,
+        /// Full key.
+        key: String,
+    },
+    /// The same value twice in one list.
+    #[error("{at}: `{key}` lists {value} twice; remove one")]
+    Duplicate {
+        /// Where.
+        at: Place,
+        /// Full key.
+        key: String,
+        /// The repeated value.
+        value: String,
+    },
+    /// Parameters for an entry that the experiment does not use.
+    #[error(
+        "{at}: [{axis}.{name}] sets parameters, but `{name}` is not in axes.{axis} ({}); \
+         add it there or remove the section",
+        quoted(used)
+    )]
+    NotOnAxis {
+        /// Where.
+        at: Place,
+        /// The axis.
+        axis: &'static str,
+        /// The entry.
+        name: String,
+        /// The names that are on the axis.
+        used: Vec<String>,
+    },
+    /// An override that is not of the form `key=value`.
+    #[error("--set {text}: {problem}; write --set section.key=value")]
+    Override {
+        /// The argument.
+        text: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A filter that is not of the form `axis=pattern`.
+    #[error("--only {text}: {problem}; write --only axis=pattern, for instance accel=bvh*")]
+    Only {
+        /// The argument.
+        text: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A pattern of an exclude or a filter that fits no variant of its axis.
+    #[error("{at}: no {axis} fits `{pattern}`{}", suggestion(pattern, known))]
+    NoMatch {
+        /// Where: a place in the file, or the filter.
+        at: String,
+        /// The axis.
+        axis: &'static str,
+        /// The pattern.
+        pattern: String,
+        /// Labels of the variants on the axis.
+        known: Vec<String>,
+    },
+    /// An exclude whose patterns all fit something, but never the same cell.
+    #[error("{at}: this [[exclude]] ({exclude}) fits no cell; correct or remove it")]
+    UselessExclude {
+        /// Where.
+        at: Place,
+        /// Its patterns.
+        exclude: String,
+    },
+    /// Excludes and filters leave nothing.
+    #[error("nothing is left to run: {reason}")]
+    NothingLeft {
+        /// What removed the last cell.
+        reason: String,
+    },
+}
+
+/// The known name nearest to `name`, if any are known.
+///
+/// Nearness is the normalised Damerau–Levenshtein similarity; a name that contains the other one
+/// counts as a near one, so that `grid` finds `uniform-grid`.
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let name = name.to_lowercase();
+    let score = |candidate: &str| {
+        let contained = name.len() >= 3 && (candidate.contains(&name) || name.contains(candidate));
+        strsim::normalized_damerau_levenshtein(&name, candidate) + if contained { 0.5 } else { 0.0 }
+    };
+    known
+        .into_iter()
+        .max_by(|a, b| score(a).total_cmp(&score(b)))
+}
+
+/// Longest list of known names that an error message spells out.
+const LIST_LIMIT: usize = 16;
+
+fn suggestion(name: &str, known: &[String]) -> String {
+    match nearest(name, known.iter().map(String::as_str)) {
+        None => "; nothing is known here".to_owned(),
+        Some(near) if known.len() > LIST_LIMIT => format!("; did you mean `{near}`?"),
+        Some(near) => format!("; did you mean `{near}`? Known: {}", quoted(known)),
+    }
+}
+
+fn quoted(names: &[String]) -> String {
+    let names: Vec<_> = names.iter().map(|name| format!("`{name}`")).collect();
+    names.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nearest_prefers_a_transposition_and_finds_a_part_of_a_name() {
+        let known = ["brute-force", "bvh", "roped-bvh", "uniform-grid"];
+        assert_eq!(nearest("bhv", known), Some("bvh"));
+        assert_eq!(nearest("grid", known), Some("uniform-grid"));
+        assert_eq!(nearest("Roped_BVH", known), Some("roped-bvh"));
+        assert_eq!(nearest("bvh", []), None);
+    }
+
+    #[test]
+    fn a_long_list_of_known_names_is_not_spelled_out() {
+        let known: Vec<String> = (0..40).map(|i| format!("name-{i}")).collect();
+        let text = suggestion("name-3x", &known);
+        assert!(text.contains("`name-3"), "{text}");
+        assert!(!text.contains("Known"), "{text}");
+    }
+}

@@ -1,0 +1,206 @@
+//! A checked experiment: every value in range, every name known, axes expanded into variants.
+
+use super::error::Place;
+use super::keys::Axis;
+use super::pattern::Pattern;
+use super::{Catalogue, ConfigError, Variant, parse};
+use crate::scene::Camera;
+use std::fmt;
+use std::path::Path;
+
+/// What is run. Keys, ranges and defaults stand in [`super::keys::KEYS`] and
+/// `docs/experiments.md`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Experiment {
+    /// Name of the run.
+    pub name: String,
+    /// The file as the user named it.
+    pub source: String,
+    /// The file's text, with the overrides appended as comments.
+    pub text: String,
+    /// Independent seeds per randomised sampler.
+    pub replicates: u32,
+    /// Seed of the first replicate.
+    pub seed: u32,
+    /// Width and height of every image, pixels.
+    pub resolution: [u32; 2],
+    /// Samples per pixel at which errors are taken.
+    pub spp: SppRange,
+    /// Whether kernels keep the bounds checks and loop bounds of the driver layer.
+    pub runtime_checks: bool,
+    /// Camera for all scenes; `None` leaves it to each scene.
+    pub camera: Option<Camera>,
+    /// What is varied.
+    pub axes: Axes,
+    /// Cells left out.
+    pub excludes: Vec<Exclude>,
+    /// The image that errors are taken against.
+    pub reference: Reference,
+    /// The timing protocol.
+    pub timing: Timing,
+    /// The gate.
+    pub gate: Gate,
+    /// Star discrepancy of the streams.
+    pub discrepancy: Discrepancy,
+}
+
+/// The powers of two from `2^first` to `2^last`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SppRange {
+    /// Least exponent.
+    pub first: u32,
+    /// Greatest exponent, at most 16.
+    pub last: u32,
+}
+
+impl SppRange {
+    /// The numbers of samples per pixel, ascending.
+    pub fn counts(self) -> impl Iterator<Item = u32> {
+        (self.first..=self.last).map(|exponent| 1 << exponent)
+    }
+
+    /// The greatest number of samples per pixel: what one render takes.
+    pub fn max(self) -> u32 {
+        1 << self.last
+    }
+}
+
+/// The axes of the product, each with at least one variant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axes {
+    /// What is traced.
+    pub scene: Vec<Variant>,
+    /// Acceleration structures.
+    pub accel: Vec<Variant>,
+    /// Sample sequences.
+    pub sequence: Vec<Variant>,
+    /// Decorrelations.
+    pub decorrelation: Vec<Variant>,
+    /// Integrators.
+    pub integrator: Vec<Variant>,
+}
+
+impl Axes {
+    /// The variants of one axis.
+    pub fn variants(&self, axis: Axis) -> &[Variant] {
+        match axis {
+            Axis::Scene => &self.scene,
+            Axis::Accel => &self.accel,
+            Axis::Sequence => &self.sequence,
+            Axis::Decorrelation => &self.decorrelation,
+            Axis::Integrator => &self.integrator,
+        }
+    }
+}
+
+/// Cells left out: those that fit a pattern on every axis named.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exclude {
+    /// Where it was written.
+    pub at: Place,
+    /// Patterns by axis: any one of an axis' patterns has to fit. Never empty.
+    pub patterns: Vec<(Axis, Vec<Pattern>)>,
+    /// Whether it may fit nothing without being a mistake: an axis that it names was replaced on
+    /// the command line.
+    pub lenient: bool,
+}
+
+impl fmt::Display for Exclude {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, (axis, patterns)) in self.patterns.iter().enumerate() {
+            let separator = if i == 0 { "" } else { ", " };
+            let patterns: Vec<_> = patterns.iter().map(Pattern::to_string).collect();
+            write!(f, "{separator}{axis} = {}", patterns.join(" or "))?;
+        }
+        Ok(())
+    }
+}
+
+/// How the reference image is rendered.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reference {
+    /// Samples per pixel of both halves together.
+    pub spp: u32,
+    /// Its sequence, with default parameters.
+    pub sequence: Variant,
+    /// Its decorrelation, with default parameters.
+    pub decorrelation: Variant,
+    /// Its seed; the second half has the next one.
+    pub seed: u32,
+}
+
+/// How long and how often things are timed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Timing {
+    /// Timed rounds.
+    pub rounds: u32,
+    /// Samples per pixel of each timed render.
+    pub spp: u32,
+    /// Least warm-up, milliseconds.
+    pub min_warmup_ms: u32,
+    /// Greatest warm-up, milliseconds; not less than the least.
+    pub max_warmup_ms: u32,
+    /// Rays per class and dispatch.
+    pub rays: u32,
+}
+
+/// How much the gate checks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Gate {
+    /// Rays per class.
+    pub rays: u32,
+    /// Ray–triangle tests spent on checking the judge against brute force.
+    pub brute_force_tests: u64,
+    /// Rays of the judge decided again in double precision.
+    pub oracle_rays: u32,
+}
+
+/// Which star discrepancies are taken.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Discrepancy {
+    /// Greatest number of points, a power of two.
+    pub points: u32,
+    /// Pairs of dimensions of the path's table.
+    pub pairs: Vec<[u32; 2]>,
+    /// Seeds measured where the stream is randomised.
+    pub seeds: u32,
+}
+
+impl Experiment {
+    /// Reads the file at `path`, applies `overrides` (each `section.key=value`, the last one of a
+    /// key wins) and checks the result against `catalogue`.
+    ///
+    /// # Errors
+    /// Everything that [`ConfigError`] lists; messages name the key, the file and line or the
+    /// override, and for unknown names the nearest known one.
+    pub fn load(
+        path: &Path,
+        overrides: &[String],
+        catalogue: &Catalogue,
+    ) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::parse(&text, &path.display().to_string(), overrides, catalogue)
+    }
+
+    /// The same as [`Experiment::load`] for a text; `file` is what messages call it.
+    ///
+    /// # Errors
+    /// As [`Experiment::load`].
+    pub fn parse(
+        text: &str,
+        file: &str,
+        overrides: &[String],
+        catalogue: &Catalogue,
+    ) -> Result<Self, ConfigError> {
+        parse::parse(text, file, overrides, catalogue)
+    }
+
+    /// Seeds of the replicates: consecutive integers from `run.seed` on (modulo 2³²).
+    pub fn replicate_seeds(&self) -> impl Iterator<Item = u32> {
+        let first = self.seed;
+        (0..self.replicates).map(move |replicate| first.wrapping_add(replicate))
+    }
+}

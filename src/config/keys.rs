@@ -1,0 +1,288 @@
+//! Every key of an experiment file: the one table that the parser, its messages, the defaults and
+//! `docs/experiments.md` are made from.
+
+use std::fmt;
+
+/// An axis of the product of cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Axis {
+    /// What is traced.
+    Scene,
+    /// The acceleration structure.
+    Accel,
+    /// The sample sequence.
+    Sequence,
+    /// How pixels are decorrelated.
+    Decorrelation,
+    /// What is computed from the hits.
+    Integrator,
+}
+
+impl Axis {
+    /// All axes, in the order of tables and plans.
+    pub const ALL: [Axis; 5] = [
+        Axis::Scene,
+        Axis::Accel,
+        Axis::Sequence,
+        Axis::Decorrelation,
+        Axis::Integrator,
+    ];
+
+    /// The key under `[axes]`, and the name of the section with parameters.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Axis::Scene => "scene",
+            Axis::Accel => "accel",
+            Axis::Sequence => "sequence",
+            Axis::Decorrelation => "decorrelation",
+            Axis::Integrator => "integrator",
+        }
+    }
+
+    /// The axis of this name.
+    pub fn from_name(name: &str) -> Option<Axis> {
+        Self::ALL.into_iter().find(|axis| axis.name() == name)
+    }
+}
+
+impl fmt::Display for Axis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// What values a key takes. Ranges include both ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// Any text but the empty one.
+    Text,
+    /// `true` or `false`.
+    Flag,
+    /// An integer.
+    Integer {
+        /// Least value.
+        min: i64,
+        /// Greatest value.
+        max: i64,
+    },
+    /// A power of two.
+    PowerOfTwo {
+        /// Least value.
+        min: i64,
+        /// Greatest value.
+        max: i64,
+    },
+    /// Two integers.
+    IntegerPair {
+        /// Least value of each.
+        min: i64,
+        /// Greatest value of each.
+        max: i64,
+    },
+    /// A table `{ pow2 = [lo, hi] }`: all powers of two from 2^lo to 2^hi.
+    Exponents {
+        /// Greatest exponent.
+        max: i64,
+    },
+    /// Pairs of different dimensions.
+    DimensionPairs {
+        /// Greatest dimension.
+        max: i64,
+    },
+    /// A real number.
+    Number {
+        /// Least value.
+        min: f64,
+        /// Greatest value.
+        max: f64,
+    },
+    /// Three finite numbers.
+    Vector,
+    /// A name of this axis.
+    Name(Axis),
+    /// One name or a list of names of this axis.
+    Names(Axis),
+    /// One pattern or a list of patterns for this axis.
+    Patterns(Axis),
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Text => write!(f, "a text that is not empty"),
+            Self::Flag => write!(f, "true or false"),
+            Self::Integer { min, max } => write!(f, "an integer in [{min}, {max}]"),
+            Self::PowerOfTwo { min, max } => write!(f, "a power of two in [{min}, {max}]"),
+            Self::IntegerPair { min, max } => {
+                write!(f, "a list of two integers in [{min}, {max}]")
+            }
+            Self::Exponents { max } => {
+                write!(
+                    f,
+                    "a table {{ pow2 = [lo, hi] }} with 0 <= lo <= hi <= {max}"
+                )
+            }
+            Self::DimensionPairs { max } => {
+                write!(f, "a list of pairs of different dimensions in [0, {max}]")
+            }
+            Self::Number { min, max } => write!(f, "a number in [{min}, {max}]"),
+            Self::Vector => write!(f, "a list of three finite numbers"),
+            Self::Name(axis) => write!(f, "the name of one {axis}"),
+            Self::Names(Axis::Scene) => {
+                write!(f, "a list of built-in scenes and paths of models")
+            }
+            Self::Names(axis) => write!(f, "a list of {axis} names"),
+            Self::Patterns(axis) => write!(f, "one {axis} pattern or a list of them"),
+        }
+    }
+}
+
+/// One key of an experiment file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Key {
+    /// Section that the key stands in.
+    pub section: &'static str,
+    /// Name of the key.
+    pub name: &'static str,
+    /// Allowed values.
+    pub kind: Kind,
+    /// Default as TOML text; a key without one must be given where its section is used.
+    pub default: Option<&'static str>,
+    /// What it means, with its unit.
+    pub meaning: &'static str,
+}
+
+impl Key {
+    /// The dotted path, as messages and `--set` write it.
+    pub fn path(&self) -> String {
+        format!("{}.{}", self.section, self.name)
+    }
+}
+
+const fn key(
+    section: &'static str,
+    name: &'static str,
+    kind: Kind,
+    default: Option<&'static str>,
+    meaning: &'static str,
+) -> Key {
+    Key {
+        section,
+        name,
+        kind,
+        default,
+        meaning,
+    }
+}
+
+const fn integer(min: i64, max: i64) -> Kind {
+    Kind::Integer { min, max }
+}
+
+const SEED: Kind = integer(0, u32::MAX as i64);
+
+/// All keys, in the order of the documentation. Parameters of registry entries (`[accel.NAME]` and
+/// so on) are not here: they come from the registries.
+#[rustfmt::skip]
+pub const KEYS: &[Key] = &[
+    key("run", "name", Kind::Text, None, "Name of the run in the report; without it, the name of the file."),
+    key("run", "replicates", integer(1, 1024), Some("8"), "Independent seeds per randomised sampler; the unit of every interval of an error."),
+    key("run", "seed", SEED, Some("1"), "Seed of the first replicate."),
+    key("run", "resolution", Kind::IntegerPair { min: 16, max: 8192 }, Some("[192, 144]"), "Width and height of every image, pixels."),
+    key("run", "spp", Kind::Exponents { max: 16 }, Some("{ pow2 = [0, 5] }"), "Samples per pixel at which the error is taken: 2^lo, …, 2^hi."),
+    key("run", "runtime_checks", Kind::Flag, Some("true"), "Keep the bounds checks and loop bounds that the driver layer adds to kernels."),
+    key("axes", "scene", Kind::Names(Axis::Scene), None, "Scenes: built-in names, or paths of .obj, .gltf, .glb or .ply files, relative to the current directory."),
+    key("axes", "accel", Kind::Names(Axis::Accel), None, "Acceleration structures."),
+    key("axes", "sequence", Kind::Names(Axis::Sequence), None, "Sample sequences."),
+    key("axes", "decorrelation", Kind::Names(Axis::Decorrelation), Some("[\"none\"]"), "How the pixels' sample points are made different."),
+    key("axes", "integrator", Kind::Names(Axis::Integrator), Some("[\"path\"]"), "What is computed from the hits."),
+    key("camera", "eye", Kind::Vector, None, "Position of the pinhole, scene units."),
+    key("camera", "target", Kind::Vector, None, "Point that projects to the centre of the image, scene units."),
+    key("camera", "up", Kind::Vector, Some("[0, 1, 0]"), "Up direction; not parallel to the viewing direction."),
+    key("camera", "fov", Kind::Number { min: 1.0, max: 179.0 }, Some("40"), "Vertical field of view, degrees."),
+    key("exclude", "scene", Kind::Patterns(Axis::Scene), None, "Cells of these scenes …"),
+    key("exclude", "accel", Kind::Patterns(Axis::Accel), None, "… with these structures …"),
+    key("exclude", "sequence", Kind::Patterns(Axis::Sequence), None, "… these sequences …"),
+    key("exclude", "decorrelation", Kind::Patterns(Axis::Decorrelation), None, "… these decorrelations …"),
+    key("exclude", "integrator", Kind::Patterns(Axis::Integrator), None, "… and these integrators are left out."),
+    key("reference", "spp", integer(2, 1 << 24), Some("4096"), "Samples per pixel of the reference image, both halves together."),
+    key("reference", "sequence", Kind::Name(Axis::Sequence), Some("\"pixel-hash\""), "Sequence of the reference, with its default parameters."),
+    key("reference", "decorrelation", Kind::Name(Axis::Decorrelation), Some("\"none\""), "Decorrelation of the reference, with its default parameters."),
+    key("reference", "seed", SEED, Some("9001"), "Seed of the reference; no replicate may share it."),
+    key("timing", "rounds", integer(3, 1000), Some("9"), "Timed rounds; each times every cell of a scene once, in random order."),
+    key("timing", "spp", integer(1, 1024), Some("1"), "Samples per pixel of each timed render."),
+    key("timing", "min_warmup_ms", integer(0, 60_000), Some("100"), "Least warm-up of a kernel before it is timed, milliseconds."),
+    key("timing", "max_warmup_ms", integer(0, 600_000), Some("2000"), "Warm-up ends here even if the rate is not stable yet, milliseconds."),
+    key("timing", "rays", integer(1024, 1 << 24), Some("65536"), "Rays per class and dispatch."),
+    key("gate", "rays", integer(256, 1 << 24), Some("32768"), "Rays per class that every structure must answer as the judge does."),
+    key("gate", "brute_force_tests", integer(0, 1_000_000_000_000), Some("2_000_000_000"), "Ray-triangle tests spent on checking the judge itself against brute force (at least 2,000 rays are)."),
+    key("gate", "oracle_rays", integer(0, 1 << 20), Some("2048"), "Rays of the judge that the double-precision oracle decides again."),
+    key("discrepancy", "points", Kind::PowerOfTwo { min: 2, max: 65_536 }, Some("4096"), "Star discrepancy is taken at N = 2, 4, 8, … up to this many points."),
+    key("discrepancy", "pairs", Kind::DimensionPairs { max: 255 }, Some("[[0, 1], [2, 3], [4, 5]]"), "Pairs of dimensions of the path's table."),
+    key("discrepancy", "seeds", integer(1, 1024), Some("8"), "Seeds measured where the stream is randomised."),
+];
+
+/// Sections that may be absent altogether; their defaults apply only when they are used.
+pub const OPTIONAL_SECTIONS: &[&str] = &["camera", "exclude"];
+
+/// The row of a key, if there is one.
+pub fn find(section: &str, name: &str) -> Option<&'static Key> {
+    KEYS.iter()
+        .find(|key| key.section == section && key.name == name)
+}
+
+/// Names of all sections: those of [`KEYS`], and one per axis with the parameters of its entries.
+pub fn sections() -> Vec<&'static str> {
+    let mut sections: Vec<_> = KEYS.iter().map(|key| key.section).collect();
+    sections.dedup();
+    sections.extend(Axis::ALL.map(Axis::name));
+    sections
+}
+
+/// Names of the keys of one section.
+pub fn names_in(section: &str) -> Vec<&'static str> {
+    KEYS.iter()
+        .filter(|key| key.section == section)
+        .map(|key| key.name)
+        .collect()
+}
+
+/// The table of all keys in Markdown, as `docs/experiments.md` holds it.
+pub fn reference_table() -> String {
+    let mut text = String::from("| Key | Value | Default | Meaning |\n|---|---|---|---|\n");
+    for key in KEYS {
+        let default = key.default.map_or("–".to_owned(), |d| format!("`{d}`"));
+        text += &format!(
+            "| `{}` | {} | {default} | {} |\n",
+            key.path(),
+            key.kind,
+            key.meaning
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn no_key_stands_twice_and_sections_are_contiguous() {
+        let paths: BTreeSet<_> = KEYS.iter().map(Key::path).collect();
+        assert_eq!(paths.len(), KEYS.len());
+        let sections = sections();
+        let distinct: BTreeSet<_> = sections.iter().collect();
+        assert_eq!(distinct.len(), sections.len());
+    }
+
+    #[test]
+    fn axes_are_found_by_name() {
+        for axis in Axis::ALL {
+            assert_eq!(Axis::from_name(axis.name()), Some(axis));
+            assert!(find("axes", axis.name()).is_some());
+            assert!(find("exclude", axis.name()).is_some());
+        }
+        assert_eq!(Axis::from_name("sampler"), None);
+    }
+}

@@ -1,0 +1,302 @@
+//! The walk from the merged tree to a checked [`Experiment`].
+
+use super::check::{as_table, check_on_axis, check_sections, exclude_tables, pattern_list};
+use super::error::{ConfigError, Place};
+use super::experiment::{Axes, Discrepancy, Exclude, Experiment, Gate, Reference, Timing};
+use super::keys::{Axis, KEYS, OPTIONAL_SECTIONS};
+use super::section::{Section, texts};
+use super::tree::{self, Item, Table, Value};
+use super::{Catalogue, Variant, variants};
+use crate::scene::Camera;
+use std::path::Path;
+
+/// Parses and checks an experiment; see [`Experiment::parse`].
+pub(super) fn parse(
+    text: &str,
+    file: &str,
+    overrides: &[String],
+    catalogue: &Catalogue,
+) -> Result<Experiment, ConfigError> {
+    let tree = layers(text, file, overrides)?;
+    check_sections(&tree, catalogue)?;
+    let reader = Reader {
+        tree: &tree,
+        file,
+        catalogue,
+    };
+    let run = reader.section("run")?;
+    let name = match run.has("name") {
+        true => run.text("name")?.to_owned(),
+        false => file_stem(file),
+    };
+    let axes = reader.axes()?;
+    let experiment = Experiment {
+        name,
+        source: file.to_owned(),
+        text: with_overrides(text, overrides),
+        replicates: run.unsigned("replicates")?,
+        seed: run.unsigned("seed")?,
+        resolution: run.unsigned_pair("resolution")?,
+        spp: run.exponents("spp")?,
+        runtime_checks: run.flag("runtime_checks")?,
+        camera: reader.camera()?,
+        excludes: reader.excludes(&axes)?,
+        axes,
+        reference: reader.reference()?,
+        timing: reader.timing()?,
+        gate: reader.gate()?,
+        discrepancy: reader.discrepancy()?,
+    };
+    check_reference_seed(&experiment, &reader)?;
+    Ok(experiment)
+}
+
+/// Defaults, file and overrides in one tree.
+fn layers(text: &str, file: &str, overrides: &[String]) -> Result<Table, ConfigError> {
+    let mut user = tree::parse_file(text, file)?;
+    for text in overrides {
+        tree::merge(&mut user, tree::parse_override(text)?);
+    }
+    let mut tree = Table::new();
+    for key in KEYS {
+        if OPTIONAL_SECTIONS.contains(&key.section) && !user.contains_key(key.section) {
+            continue;
+        }
+        let Some(default) = key.default else { continue };
+        let leaf = Item {
+            at: Place::Default,
+            value: tree::default_value(default),
+        };
+        let section = Item {
+            at: Place::Default,
+            value: Value::Table([(key.name.to_owned(), leaf)].into()),
+        };
+        tree::merge(&mut tree, [(key.section.to_owned(), section)].into());
+    }
+    tree::merge(&mut tree, user);
+    Ok(tree)
+}
+
+fn with_overrides(text: &str, overrides: &[String]) -> String {
+    let mut text = text.to_owned();
+    if !overrides.is_empty() && !text.ends_with('\n') {
+        text.push('\n');
+    }
+    for line in overrides {
+        text += &format!("# --set {line}\n");
+    }
+    text
+}
+
+fn file_stem(file: &str) -> String {
+    let stem = Path::new(file).file_stem();
+    stem.map_or_else(|| file.to_owned(), |stem| stem.to_string_lossy().into())
+}
+
+/// No replicate may share its seed with either half of the reference: their errors would be
+/// correlated, and a hash sampler would compare an image with itself.
+fn check_reference_seed(experiment: &Experiment, reader: &Reader) -> Result<(), ConfigError> {
+    let first = experiment.reference.seed;
+    let halves = [first, first.wrapping_add(1)];
+    if !experiment
+        .replicate_seeds()
+        .any(|seed| halves.contains(&seed))
+    {
+        return Ok(());
+    }
+    Err(ConfigError::OutOfRange {
+        at: reader.section("reference")?.place("seed"),
+        key: "reference.seed".to_owned(),
+        value: first.to_string(),
+        expected: format!(
+            "such that it and the next integer are none of the replicates' seeds ({} from {} on)",
+            experiment.replicates, experiment.seed
+        ),
+    })
+}
+
+/// Reads sections of the merged tree.
+struct Reader<'t> {
+    tree: &'t Table,
+    file: &'t str,
+    catalogue: &'t Catalogue,
+}
+
+impl<'t> Reader<'t> {
+    fn section(&self, name: &'static str) -> Result<Section<'t>, ConfigError> {
+        match self.tree.get(name) {
+            Some(item) => Ok(Section {
+                name,
+                at: item.at.clone(),
+                table: as_table(item, name, "a section")?,
+                file: self.file,
+            }),
+            None => Err(ConfigError::Missing {
+                at: Place::File {
+                    file: self.file.into(),
+                    line: 1,
+                },
+                key: name.to_owned(),
+                expected: "a section".to_owned(),
+            }),
+        }
+    }
+
+    fn axes(&self) -> Result<Axes, ConfigError> {
+        Ok(Axes {
+            scene: self.axis(Axis::Scene)?,
+            accel: self.axis(Axis::Accel)?,
+            sequence: self.axis(Axis::Sequence)?,
+            decorrelation: self.axis(Axis::Decorrelation)?,
+            integrator: self.axis(Axis::Integrator)?,
+        })
+    }
+
+    /// The variants of one axis, in the order of the file.
+    fn axis(&self, axis: Axis) -> Result<Vec<Variant>, ConfigError> {
+        let axes = self.section("axes")?;
+        let key = format!("axes.{axis}");
+        let names = texts(&key, axes.item(axis.name())?)?;
+        let empty = Table::new();
+        let parameters = match self.tree.get(axis.name()) {
+            Some(item) => as_table(item, axis.name(), "sections")?,
+            None => &empty,
+        };
+        let mut variants = Vec::new();
+        let mut used: Vec<String> = Vec::new();
+        for (item, name) in names {
+            if used.iter().any(|other| other == name) {
+                return Err(ConfigError::Duplicate {
+                    at: item.at.clone(),
+                    key,
+                    value: format!("\"{name}\""),
+                });
+            }
+            used.push(name.to_owned());
+            let entry = variants::resolve(axis, item, name, self.catalogue)?;
+            let section = match parameters.get(name) {
+                Some(item) => Some(as_table(item, name, "a section of parameters")?),
+                None => None,
+            };
+            variants.extend(variants::expand(axis, &entry, section)?);
+        }
+        let replaced = matches!(axes.place(axis.name()), Place::Override(_));
+        check_on_axis(axis, parameters, &used, replaced)?;
+        if axis == Axis::Scene {
+            variants::shorten_labels(&mut variants);
+        }
+        Ok(variants)
+    }
+
+    fn camera(&self) -> Result<Option<Camera>, ConfigError> {
+        if !self.tree.contains_key("camera") {
+            return Ok(None);
+        }
+        let section = self.section("camera")?;
+        let camera = Camera {
+            eye: section.vector("eye")?,
+            target: section.vector("target")?,
+            up: section.vector("up")?,
+            vertical_fov_degrees: section.number("fov")? as f32,
+        };
+        // `try_normalize` also refuses lengths that overflow.
+        let Some(view) = (camera.target - camera.eye).try_normalize() else {
+            let expected = "another point than `camera.eye`, at a finite distance";
+            return Err(section.not_allowed("target", expected));
+        };
+        let up = camera.up.try_normalize();
+        if up.is_none_or(|up| view.cross(up).length() < 1e-4) {
+            let expected = "a direction that is neither zero nor parallel to the view";
+            return Err(section.not_allowed("up", expected));
+        }
+        Ok(Some(camera))
+    }
+
+    fn excludes(&self, axes: &Axes) -> Result<Vec<Exclude>, ConfigError> {
+        let Some(item) = self.tree.get("exclude") else {
+            return Ok(Vec::new());
+        };
+        let tables = exclude_tables(item)?;
+        let excludes = tables.into_iter().map(|(at, table)| {
+            let mut patterns = Vec::new();
+            let mut lenient = false;
+            for axis in Axis::ALL {
+                let Some(item) = table.get(axis.name()) else {
+                    continue;
+                };
+                let texts = texts(&format!("exclude.{axis}"), item)?;
+                let changed = self.is_overridden(axis)?;
+                lenient |= changed;
+                patterns.push((axis, pattern_list(axis, &texts, axes, changed)?));
+            }
+            if patterns.is_empty() {
+                return Err(ConfigError::Empty {
+                    at: at.clone(),
+                    key: "exclude".to_owned(),
+                });
+            }
+            Ok(Exclude {
+                at: at.clone(),
+                patterns,
+                lenient,
+            })
+        });
+        excludes.collect()
+    }
+
+    /// Whether the command line changed the names or the parameters of an axis.
+    fn is_overridden(&self, axis: Axis) -> Result<bool, ConfigError> {
+        let names = self.section("axes")?.place(axis.name());
+        let parameters = self.tree.get(axis.name());
+        Ok(matches!(names, Place::Override(_)) || parameters.is_some_and(Item::has_override))
+    }
+
+    fn reference(&self) -> Result<Reference, ConfigError> {
+        let section = self.section("reference")?;
+        let entry = |axis: Axis| {
+            let item = section.item(axis.name())?;
+            let name = section.text(axis.name())?;
+            variants::resolve(axis, item, name, self.catalogue)
+        };
+        Ok(Reference {
+            spp: section.unsigned("spp")?,
+            sequence: entry(Axis::Sequence)?.default_variant(),
+            decorrelation: entry(Axis::Decorrelation)?.default_variant(),
+            seed: section.unsigned("seed")?,
+        })
+    }
+
+    fn timing(&self) -> Result<Timing, ConfigError> {
+        let section = self.section("timing")?;
+        let timing = Timing {
+            rounds: section.unsigned("rounds")?,
+            spp: section.unsigned("spp")?,
+            min_warmup_ms: section.unsigned("min_warmup_ms")?,
+            max_warmup_ms: section.unsigned("max_warmup_ms")?,
+            rays: section.unsigned("rays")?,
+        };
+        if timing.max_warmup_ms < timing.min_warmup_ms {
+            let expected = "at least `timing.min_warmup_ms`";
+            return Err(section.not_allowed("max_warmup_ms", expected));
+        }
+        Ok(timing)
+    }
+
+    fn gate(&self) -> Result<Gate, ConfigError> {
+        let section = self.section("gate")?;
+        Ok(Gate {
+            rays: section.unsigned("rays")?,
+            brute_force_tests: section.integer("brute_force_tests")?.unsigned_abs(),
+            oracle_rays: section.unsigned("oracle_rays")?,
+        })
+    }
+
+    fn discrepancy(&self) -> Result<Discrepancy, ConfigError> {
+        let section = self.section("discrepancy")?;
+        Ok(Discrepancy {
+            points: section.unsigned("points")?,
+            pairs: section.dimension_pairs("pairs")?,
+            seeds: section.unsigned("seeds")?,
+        })
+    }
+}

@@ -1,0 +1,381 @@
+//! From axes to the cells that have to be run.
+//!
+//! Hits are equal to the bit in every structure, so an image does not depend on the structure: its
+//! error is measured once per scene, integrator and sampler, with all replicates. Time is measured
+//! for every full cell, at few samples per pixel. The plan counts what this saves.
+
+use super::cells::{SamplerCell, StreamCell, StructureCell, TimeCell};
+use super::experiment::{Axes, Exclude, Experiment};
+use super::keys::Axis;
+use super::pattern::Pattern;
+use super::{ConfigError, Variant, nearest};
+use std::fmt::{self, Write as _};
+
+/// Cells left out, with the reason.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Skipped {
+    /// The cells, in words.
+    pub cell: String,
+    /// Why they are left out.
+    pub reason: String,
+    /// How many they are (full cells for an exclude).
+    pub cells: usize,
+}
+
+/// What has to be run, in the order of the axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Scenes that at least one cell needs.
+    pub scenes: Vec<Variant>,
+    /// Structures to build, gate and trace.
+    pub structures: Vec<StructureCell>,
+    /// Samplers whose error is measured.
+    pub samplers: Vec<SamplerCell>,
+    /// Full cells whose time is measured.
+    pub times: Vec<TimeCell>,
+    /// Streams whose discrepancy is measured.
+    pub streams: Vec<StreamCell>,
+    /// What is left out.
+    pub skipped: Vec<Skipped>,
+    /// Renders (image × replicate) that measuring the error of every full cell would need.
+    pub renders_full_product: usize,
+    /// Renders that measuring the error once per sampler needs.
+    pub renders_planned: usize,
+}
+
+impl Plan {
+    /// Expands the axes of `experiment` into cells, without its excludes.
+    ///
+    /// `only` holds filters `axis=pattern`, several of them in one text behind commas; patterns of
+    /// one axis are alternatives, different axes must all fit. `is_randomised` says of a sequence
+    /// and a decorrelation whether each seed gives another image: only then are replicates needed.
+    ///
+    /// # Errors
+    /// A filter of an unknown axis or without `=`, a filter or an exclude that fits nothing, and
+    /// filters that leave nothing to run.
+    pub fn new(
+        experiment: &Experiment,
+        only: &[String],
+        is_randomised: impl Fn(&Variant, &Variant) -> bool,
+    ) -> Result<Self, ConfigError> {
+        let axes = &experiment.axes;
+        let filter = Filter::parse(only, axes)?;
+        let full: Vec<_> = product(axes, &Axis::ALL);
+        let mut skipped = Vec::new();
+        for exclude in &experiment.excludes {
+            skipped.extend(excluded(exclude, &full, &filter)?);
+        }
+        let points = |which: &[Axis]| {
+            let mut points = product(axes, which);
+            points.retain(|point| {
+                filter.fits(point) && !experiment.excludes.iter().any(|e| e.covers(point))
+            });
+            points
+        };
+        let structures = points(&[Axis::Scene, Axis::Accel]);
+        let structures: Vec<_> = structures.iter().map(Point::structure).collect();
+        let replicates = |cell: &SamplerCell| match cell.randomised {
+            true => experiment.replicates,
+            false => 1,
+        };
+        let mut samplers = Vec::new();
+        for point in points(&SAMPLER_AXES) {
+            let mut cell = point.sampler(&is_randomised);
+            cell.replicates = replicates(&cell);
+            match structures.iter().any(|s| s.scene == cell.scene) {
+                true => samplers.push(cell),
+                false => skipped.push(untraceable(&cell)),
+            }
+        }
+        let times: Vec<_> = points(&Axis::ALL).iter().map(Point::time).collect();
+        let streams = points(&[Axis::Sequence, Axis::Decorrelation]);
+        let streams = streams.iter().map(|point| point.stream(&is_randomised));
+        let mut plan = Self {
+            scenes: axes.scene.clone(),
+            renders_full_product: full_product(&times, experiment.replicates, &is_randomised),
+            renders_planned: samplers.iter().map(|s| s.replicates as usize).sum(),
+            structures,
+            samplers,
+            times,
+            streams: streams.collect(),
+            skipped,
+        };
+        plan.scenes
+            .retain(|scene| plan.structures.iter().any(|cell| cell.scene == *scene));
+        if plan.structures.is_empty() {
+            return Err(ConfigError::NothingLeft {
+                reason: format!(
+                    "the excludes{} leave no scene with a structure",
+                    if only.is_empty() { "" } else { " and --only" }
+                ),
+            });
+        }
+        Ok(plan)
+    }
+
+    /// The plan in words, for `--dry-run`.
+    pub fn describe(&self) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let _ = self.write_description(&mut text);
+        text
+    }
+
+    fn write_description(&self, text: &mut String) -> fmt::Result {
+        let labels = |labels: Vec<String>| labels.join(", ");
+        writeln!(
+            text,
+            "{} structures to build, gate and time:",
+            self.structures.len()
+        )?;
+        for scene in &self.scenes {
+            let cells = self.structures.iter().filter(|cell| cell.scene == *scene);
+            let accels = labels(cells.map(|cell| cell.accel.label.clone()).collect());
+            writeln!(text, "  {scene}: {accels}")?;
+        }
+        writeln!(
+            text,
+            "{} samplers whose error is measured:",
+            self.samplers.len()
+        )?;
+        for cell in &self.samplers {
+            writeln!(text, "  {cell}, replicates: {}", cell.replicates)?;
+        }
+        writeln!(text, "{} full cells to time", self.times.len())?;
+        writeln!(
+            text,
+            "{} streams whose star discrepancy is measured:",
+            self.streams.len()
+        )?;
+        for cell in &self.streams {
+            writeln!(text, "  {cell}")?;
+        }
+        for skipped in &self.skipped {
+            let Skipped {
+                cell,
+                reason,
+                cells,
+            } = skipped;
+            writeln!(text, "left out: {cell} ({cells} cells): {reason}")?;
+        }
+        writeln!(
+            text,
+            "renders for the error: {} (measured for every full cell it would be {})",
+            self.renders_planned, self.renders_full_product
+        )
+    }
+}
+
+const SAMPLER_AXES: [Axis; 4] = [
+    Axis::Scene,
+    Axis::Integrator,
+    Axis::Sequence,
+    Axis::Decorrelation,
+];
+
+/// A sampler that stays visible although no structure is left for its scene.
+fn untraceable(cell: &SamplerCell) -> Skipped {
+    Skipped {
+        cell: cell.to_string(),
+        reason: "no structure is left that could trace this scene".to_owned(),
+        cells: 1,
+    }
+}
+
+/// Renders needed if the error of every full cell were measured.
+fn full_product(
+    times: &[TimeCell],
+    replicates: u32,
+    is_randomised: &impl Fn(&Variant, &Variant) -> bool,
+) -> usize {
+    let renders = times.iter().map(|cell| {
+        let randomised = is_randomised(&cell.sequence, &cell.decorrelation);
+        if randomised { replicates as usize } else { 1 }
+    });
+    renders.sum()
+}
+
+/// What one exclude takes out of the filtered product.
+fn excluded(
+    exclude: &Exclude,
+    full: &[Point],
+    filter: &Filter,
+) -> Result<Option<Skipped>, ConfigError> {
+    let covered: Vec<_> = full.iter().filter(|point| exclude.covers(point)).collect();
+    if covered.is_empty() && !exclude.lenient {
+        return Err(ConfigError::UselessExclude {
+            at: exclude.at.clone(),
+            exclude: exclude.to_string(),
+        });
+    }
+    let cells = covered.iter().filter(|point| filter.fits(point)).count();
+    Ok((cells > 0).then(|| Skipped {
+        cell: exclude.to_string(),
+        reason: format!("excluded by {}", exclude.at),
+        cells,
+    }))
+}
+
+/// A point of the product of some axes.
+#[derive(Clone, Copy)]
+struct Point<'a>([Option<&'a Variant>; 5]);
+
+impl Point<'_> {
+    fn get(&self, axis: Axis) -> Option<&Variant> {
+        self.0[axis as usize]
+    }
+
+    /// The variant on an axis that the point has.
+    fn variant(&self, axis: Axis) -> Variant {
+        match self.get(axis) {
+            Some(variant) => variant.clone(),
+            None => unreachable!("cells are made from products of their own axes"),
+        }
+    }
+
+    fn structure(&self) -> StructureCell {
+        StructureCell {
+            scene: self.variant(Axis::Scene),
+            accel: self.variant(Axis::Accel),
+        }
+    }
+
+    fn sampler(&self, is_randomised: &impl Fn(&Variant, &Variant) -> bool) -> SamplerCell {
+        let StreamCell {
+            sequence,
+            decorrelation,
+            randomised,
+        } = self.stream(is_randomised);
+        SamplerCell {
+            scene: self.variant(Axis::Scene),
+            integrator: self.variant(Axis::Integrator),
+            sequence,
+            decorrelation,
+            randomised,
+            replicates: 1,
+        }
+    }
+
+    fn time(&self) -> TimeCell {
+        TimeCell {
+            scene: self.variant(Axis::Scene),
+            accel: self.variant(Axis::Accel),
+            sequence: self.variant(Axis::Sequence),
+            decorrelation: self.variant(Axis::Decorrelation),
+            integrator: self.variant(Axis::Integrator),
+        }
+    }
+
+    fn stream(&self, is_randomised: &impl Fn(&Variant, &Variant) -> bool) -> StreamCell {
+        let sequence = self.variant(Axis::Sequence);
+        let decorrelation = self.variant(Axis::Decorrelation);
+        StreamCell {
+            randomised: is_randomised(&sequence, &decorrelation),
+            sequence,
+            decorrelation,
+        }
+    }
+}
+
+/// All points of the product of the axes in `which`, the last one running fastest.
+fn product<'a>(axes: &'a Axes, which: &[Axis]) -> Vec<Point<'a>> {
+    let mut points = vec![Point([None; 5])];
+    for &axis in which {
+        points = points
+            .iter()
+            .flat_map(|point| {
+                axes.variants(axis).iter().map(|variant| {
+                    let mut point = *point;
+                    point.0[axis as usize] = Some(variant);
+                    point
+                })
+            })
+            .collect();
+    }
+    points
+}
+
+impl Exclude {
+    /// Whether the point has every axis that the exclude names, and fits on each.
+    fn covers(&self, point: &Point) -> bool {
+        self.patterns.iter().all(|(axis, patterns)| {
+            let variant = point.get(*axis);
+            variant.is_some_and(|variant| patterns.iter().any(|p| p.matches(variant)))
+        })
+    }
+}
+
+/// What `--only` asks for.
+struct Filter(Vec<(Axis, Vec<Pattern>)>);
+
+impl Filter {
+    fn parse(only: &[String], axes: &Axes) -> Result<Self, ConfigError> {
+        let mut filter: Vec<(Axis, Vec<Pattern>)> = Vec::new();
+        for text in only.iter().flat_map(|text| split_outside_brackets(text)) {
+            let fault = |problem: String| ConfigError::Only {
+                text: text.to_owned(),
+                problem,
+            };
+            let (name, pattern) = text
+                .split_once('=')
+                .ok_or_else(|| fault("no `=` in it".to_owned()))?;
+            let name = name.trim();
+            let axis = Axis::from_name(name).ok_or_else(|| {
+                let known = Axis::ALL.map(Axis::name);
+                let near = nearest(name, known).unwrap_or_default();
+                fault(format!(
+                    "unknown axis `{name}`; did you mean `{near}`? Known: {}",
+                    known.join(", ")
+                ))
+            })?;
+            let pattern = Pattern::new(pattern.trim());
+            let variants = axes.variants(axis);
+            if !variants.iter().any(|variant| pattern.matches(variant)) {
+                return Err(ConfigError::NoMatch {
+                    at: format!("--only {text}"),
+                    axis: axis.name(),
+                    pattern: pattern.to_string(),
+                    known: variants.iter().map(|v| v.label.clone()).collect(),
+                });
+            }
+            match filter.iter_mut().find(|(other, _)| *other == axis) {
+                Some((_, patterns)) => patterns.push(pattern),
+                None => filter.push((axis, vec![pattern])),
+            }
+        }
+        Ok(Self(filter))
+    }
+
+    /// Whether the point fits on every filtered axis that it has.
+    fn fits(&self, point: &Point) -> bool {
+        self.0.iter().all(|(axis, patterns)| {
+            let variant = point.get(*axis);
+            variant.is_none_or(|variant| patterns.iter().any(|p| p.matches(variant)))
+        })
+    }
+}
+
+/// Parts between commas, except commas in round brackets: labels such as `grid(a=1,b=2)` have them.
+fn split_outside_brackets(text: &str) -> impl Iterator<Item = &str> {
+    let mut depth = 0;
+    let parts = text.split(move |c| {
+        match c {
+            '(' => depth += 1,
+            ')' => depth -= 1,
+            _ => {}
+        }
+        c == ',' && depth == 0
+    });
+    parts.map(str::trim).filter(|part| !part.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::split_outside_brackets;
+
+    #[test]
+    fn commas_in_brackets_do_not_separate() {
+        let parts: Vec<_> = split_outside_brackets("accel=g(a=1,b=2), scene=x,,").collect();
+        assert_eq!(parts, ["accel=g(a=1,b=2)", "scene=x"]);
+    }
+}

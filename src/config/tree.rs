@@ -1,0 +1,288 @@
+//! TOML values that remember where they were written, and layers of them.
+//!
+//! An experiment is three layers merged into one tree: the defaults of [`super::keys::KEYS`], the
+//! file, and the overrides of the command line. Since every item keeps its [`Place`], one walk of
+//! the merged tree checks all three and still says where a fault was written.
+
+use super::error::{ConfigError, Place};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use toml::de::{DeTable, DeValue};
+
+/// A value and where it was written.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Item {
+    pub at: Place,
+    pub value: Value,
+}
+
+impl Item {
+    /// Whether any part of the item was written on the command line.
+    pub fn has_override(&self) -> bool {
+        let inside = match &self.value {
+            Value::Table(table) => table.values().any(Item::has_override),
+            _ => false,
+        };
+        inside || matches!(self.at, Place::Override(_))
+    }
+}
+
+/// Named items, in alphabetical order.
+pub(super) type Table = BTreeMap<String, Item>;
+
+/// A TOML value, as far as an experiment uses TOML.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Value {
+    Text(String),
+    Integer(i64),
+    Number(f64),
+    Flag(bool),
+    /// Dates and integers beyond 64 bits, as written: never what a key wants.
+    Other(String),
+    List(Vec<Item>),
+    Table(Table),
+}
+
+impl Value {
+    /// The value in words, for "must be …, not …".
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Text(text) => format!("the text \"{text}\""),
+            Self::Integer(x) => format!("the integer {x}"),
+            Self::Number(x) => format!("the number {x}"),
+            Self::Flag(x) => format!("{x}"),
+            Self::Other(text) => text.clone(),
+            Self::List(items) => format!("a list of {}", items.len()),
+            Self::Table(_) => "a table".to_owned(),
+        }
+    }
+}
+
+/// Parses a file's text; `file` is its name in messages.
+pub(super) fn parse_file(text: &str, file: &str) -> Result<Table, ConfigError> {
+    let file: Arc<str> = file.into();
+    let place = |offset: usize| Place::File {
+        file: file.clone(),
+        line: 1 + text.bytes().take(offset).filter(|&b| b == b'\n').count(),
+    };
+    let table = DeTable::parse(text).map_err(|error| ConfigError::Syntax {
+        at: place(error.span().map_or(0, |span| span.start)),
+        message: one_line(error.message()),
+    })?;
+    Ok(convert_table(table.get_ref(), &place))
+}
+
+/// Parses one `section.key=value` override into a tree with a single leaf.
+///
+/// A value that is not TOML is a text; commas in it make a list, whose elements are TOML or texts
+/// again. A value that starts as TOML structure (`[`, `{`, a quote) must be TOML.
+pub(super) fn parse_override(text: &str) -> Result<Table, ConfigError> {
+    let at = Place::Override(text.into());
+    let fault = |problem: String| ConfigError::Override {
+        text: text.to_owned(),
+        problem,
+    };
+    let (key, value) = text
+        .split_once('=')
+        .ok_or_else(|| fault("no `=` in it".into()))?;
+    // A TOML document with this one key takes care of dots and quotes.
+    let document = format!("{} = 0", key.trim());
+    let keys = DeTable::parse(&document)
+        .map_err(|error| fault(format!("bad key: {}", one_line(error.message()))))?;
+    let mut table = convert_table(keys.get_ref(), &|_| at.clone());
+    let leaf = sole_leaf(&mut table).ok_or_else(|| fault("one key is needed".into()))?;
+    leaf.value = parse_override_value(value.trim(), &at).map_err(fault)?;
+    Ok(table)
+}
+
+fn parse_override_value(text: &str, at: &Place) -> Result<Value, String> {
+    let error = match DeValue::parse(text) {
+        Ok(value) => return Ok(convert(value.get_ref(), &|_| at.clone())),
+        Err(error) => error,
+    };
+    if text.starts_with(['[', '{', '"', '\'']) {
+        return Err(format!("bad value: {}", one_line(error.message())));
+    }
+    if !text.contains(',') {
+        return Ok(Value::Text(text.to_owned()));
+    }
+    let element = |part: &str| {
+        Ok(Item {
+            at: at.clone(),
+            value: parse_override_value(part.trim(), at)?,
+        })
+    };
+    text.split(',')
+        .map(element)
+        .collect::<Result<_, _>>()
+        .map(Value::List)
+}
+
+/// The leaf of a tree that has one branch only.
+fn sole_leaf(table: &mut Table) -> Option<&mut Item> {
+    let mut item = table.values_mut().next()?;
+    loop {
+        match item {
+            Item {
+                value: Value::Table(inner),
+                ..
+            } => item = inner.values_mut().next()?,
+            leaf => return Some(leaf),
+        }
+    }
+}
+
+/// Parses the TOML text of a default.
+///
+/// # Panics
+/// If the text is not TOML: a fault of the table of keys, which tests walk.
+pub(super) fn default_value(text: &str) -> Value {
+    match DeValue::parse(text) {
+        Ok(value) => convert(value.get_ref(), &|_| Place::Default),
+        Err(error) => panic!("default {text} is not TOML: {error}"),
+    }
+}
+
+/// Lays `over` on `base`: tables merge key by key, everything else is replaced.
+pub(super) fn merge(base: &mut Table, over: Table) {
+    for (key, item) in over {
+        match (base.get_mut(&key), item) {
+            (
+                Some(Item {
+                    at,
+                    value: Value::Table(base),
+                }),
+                Item {
+                    at: over_at,
+                    value: Value::Table(over),
+                },
+            ) => {
+                if *at == Place::Default {
+                    *at = over_at;
+                }
+                merge(base, over);
+            }
+            (_, item) => {
+                base.insert(key, item);
+            }
+        }
+    }
+}
+
+fn convert_table(table: &DeTable<'_>, place: &dyn Fn(usize) -> Place) -> Table {
+    let items = table.iter().map(|(key, value)| {
+        let item = Item {
+            at: place(key.span().start),
+            value: convert(value.get_ref(), place),
+        };
+        (key.get_ref().to_string(), item)
+    });
+    items.collect()
+}
+
+fn convert(value: &DeValue<'_>, place: &dyn Fn(usize) -> Place) -> Value {
+    match value {
+        DeValue::String(text) => Value::Text(text.to_string()),
+        DeValue::Integer(x) => match i64::from_str_radix(x.as_str(), x.radix()) {
+            Ok(x) => Value::Integer(x),
+            Err(_) => Value::Other(format!("the integer {x}")),
+        },
+        DeValue::Float(x) => match x.as_str().parse() {
+            Ok(x) => Value::Number(x),
+            Err(_) => Value::Other(format!("the number {x}")),
+        },
+        DeValue::Boolean(x) => Value::Flag(*x),
+        DeValue::Datetime(x) => Value::Other(format!("the date {x}")),
+        DeValue::Array(items) => Value::List(
+            items
+                .iter()
+                .map(|item| Item {
+                    at: place(item.span().start),
+                    value: convert(item.get_ref(), place),
+                })
+                .collect(),
+        ),
+        DeValue::Table(table) => Value::Table(convert_table(table, place)),
+    }
+}
+
+/// The TOML parser's message on one line.
+fn one_line(message: &str) -> String {
+    message.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn leaf(table: &Table, path: &[&str]) -> Item {
+        let (last, first) = path.split_last().expect("a path");
+        let mut table = table;
+        for key in first {
+            let Value::Table(inner) = &table[*key].value else {
+                panic!("{key} is not a table");
+            };
+            table = inner;
+        }
+        table[*last].clone()
+    }
+
+    #[test]
+    fn items_know_their_line() {
+        let table = parse_file("[a]\nx = 1\n\n[b]\ny = [\n 'p',\n 'q']\n", "f.toml").unwrap();
+        assert_eq!(leaf(&table, &["a", "x"]).at.to_string(), "f.toml:2");
+        let Value::List(items) = leaf(&table, &["b", "y"]).value else {
+            panic!("not a list");
+        };
+        assert_eq!(items[1].at.to_string(), "f.toml:7");
+    }
+
+    #[test]
+    fn integers_in_any_notation_are_read_and_too_large_ones_are_not_mangled() {
+        let text = "a = 0x1F\nb = 2_000\nc = -5\nd = 99999999999999999999\ne = +7";
+        let table = parse_file(text, "f").unwrap();
+        for (key, value) in [("a", 31), ("b", 2000), ("c", -5), ("e", 7)] {
+            assert_eq!(table[key].value, Value::Integer(value), "{key}");
+        }
+        assert!(matches!(table["d"].value, Value::Other(_)));
+    }
+
+    #[test]
+    fn an_override_is_toml_or_text_or_a_list_by_commas() {
+        let value = |text| leaf(&parse_override(text).unwrap(), &["a", "b"]).value;
+        assert_eq!(value("a.b=3"), Value::Integer(3));
+        assert_eq!(value("a.b = true"), Value::Flag(true));
+        assert_eq!(value("a.b=x/y.obj"), Value::Text("x/y.obj".into()));
+        assert_eq!(value("a.b='x,y'"), Value::Text("x,y".into()));
+        let Value::List(items) = value("a.b=3,eight") else {
+            panic!("not a list");
+        };
+        assert_eq!(items[0].value, Value::Integer(3));
+        assert_eq!(items[1].value, Value::Text("eight".into()));
+        assert!(matches!(value("a.b=[1,2]"), Value::List(items) if items.len() == 2));
+        let quoted = parse_override("scene.\"x.obj\".n=1").unwrap();
+        assert_eq!(
+            leaf(&quoted, &["scene", "x.obj", "n"]).value,
+            Value::Integer(1)
+        );
+    }
+
+    #[test]
+    fn an_override_without_sense_is_refused_with_its_text() {
+        for text in ["run.seed", "=3", "run.=3", "run.resolution=[64", "a\nb=1"] {
+            let message = parse_override(text).unwrap_err().to_string();
+            assert!(message.contains(text), "{message}");
+        }
+    }
+
+    #[test]
+    fn merging_replaces_leaves_and_keeps_the_rest() {
+        let mut base = parse_file("[a]\nx = 1\ny = 2", "f").unwrap();
+        merge(&mut base, parse_override("a.x=5").unwrap());
+        merge(&mut base, parse_override("b.z=6").unwrap());
+        assert_eq!(leaf(&base, &["a", "x"]).value, Value::Integer(5));
+        assert_eq!(leaf(&base, &["a", "x"]).at.to_string(), "--set a.x=5");
+        assert_eq!(leaf(&base, &["a", "y"]).value, Value::Integer(2));
+        assert_eq!(leaf(&base, &["b", "z"]).value, Value::Integer(6));
+    }
+}

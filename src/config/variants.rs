@@ -1,0 +1,291 @@
+//! From names and parameter lists to the variants of an axis.
+
+use super::error::ConfigError;
+use super::keys::{Axis, Kind};
+use super::tree::{Item, Table, Value};
+use super::{Catalogue, Entry, ParamRange, ParamValue, Parameter, Params, Variant};
+use std::fmt;
+use std::path::Path;
+
+/// Ends of file names that make a scene name a path.
+const MODEL_EXTENSIONS: [&str; 4] = ["obj", "gltf", "glb", "ply"];
+
+impl fmt::Display for ParamRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number { min, max } => Kind::Number {
+                min: *min,
+                max: *max,
+            }
+            .fmt(f),
+            Self::Integer { min, max } => Kind::Integer {
+                min: *min,
+                max: *max,
+            }
+            .fmt(f),
+            Self::Flag => Kind::Flag.fmt(f),
+            Self::Choice(names) => write!(f, "one of {}", names.join(", ")),
+        }
+    }
+}
+
+impl Entry {
+    /// This entry with every parameter at its default.
+    pub fn default_variant(&self) -> Variant {
+        self.variant(Vec::new())
+    }
+
+    /// This entry with some parameters set; the label shows those that differ from the default.
+    fn variant(&self, set: Vec<(&'static str, ParamValue)>) -> Variant {
+        let value_of = |parameter: &Parameter| {
+            let set = set.iter().find(|(name, _)| *name == parameter.name);
+            set.map_or(&parameter.default, |(_, value)| value).clone()
+        };
+        let mut params = Params::default();
+        let mut shown = Vec::new();
+        for parameter in &self.schema {
+            let value = value_of(parameter);
+            if value != parameter.default {
+                shown.push(format!("{}={value}", parameter.name));
+            }
+            params.0.insert(parameter.name.to_owned(), value);
+        }
+        let label = match shown.as_slice() {
+            [] => self.name.clone(),
+            shown => format!("{}({})", self.name, shown.join(",")),
+        };
+        Variant {
+            name: self.name.clone(),
+            params,
+            label,
+        }
+    }
+}
+
+/// The entry called `name`; for scenes, also one made up for the path of a model.
+pub(super) fn resolve(
+    axis: Axis,
+    name: &Item,
+    text: &str,
+    catalogue: &Catalogue,
+) -> Result<Entry, ConfigError> {
+    let entries = catalogue.entries(axis);
+    if let Some(entry) = entries.iter().find(|entry| entry.name == text) {
+        return Ok(entry.clone());
+    }
+    if axis == Axis::Scene && is_path(text) {
+        return Ok(Entry {
+            name: text.to_owned(),
+            description: "model file".to_owned(),
+            schema: Vec::new(),
+        });
+    }
+    let what = match axis {
+        Axis::Scene => "scene (neither built in nor a path of a .obj, .gltf, .glb or .ply file)",
+        axis => axis.name(),
+    };
+    Err(ConfigError::Unknown {
+        at: name.at.clone(),
+        what: what.to_owned(),
+        name: text.to_owned(),
+        known: entries.iter().map(|entry| entry.name.clone()).collect(),
+    })
+}
+
+fn is_path(text: &str) -> bool {
+    let extension = Path::new(text).extension().and_then(|e| e.to_str());
+    text.contains(['/', '\\'])
+        || extension.is_some_and(|e| MODEL_EXTENSIONS.contains(&e.to_lowercase().as_str()))
+}
+
+/// All variants of `entry`: the product of the values that `section` (`[axis.NAME]`) lists.
+pub(super) fn expand(
+    axis: Axis,
+    entry: &Entry,
+    section: Option<&Table>,
+) -> Result<Vec<Variant>, ConfigError> {
+    let empty = Table::new();
+    let section = section.unwrap_or(&empty);
+    if let Some((name, item)) = section
+        .iter()
+        .find(|(name, _)| entry.schema.iter().all(|p| p.name != name.as_str()))
+    {
+        return Err(ConfigError::Unknown {
+            at: item.at.clone(),
+            what: format!("parameter of {axis} {}", entry.name),
+            name: name.clone(),
+            known: entry.schema.iter().map(|p| p.name.to_owned()).collect(),
+        });
+    }
+    let mut products = vec![Vec::new()];
+    for parameter in &entry.schema {
+        let Some(item) = section.get(parameter.name) else {
+            continue;
+        };
+        let key = format!("{axis}.{}.{}", entry.name, parameter.name);
+        let values = values(&key, item, parameter)?;
+        products = products
+            .iter()
+            .flat_map(|product| {
+                values.iter().map(|value| {
+                    let mut product = product.clone();
+                    product.push((parameter.name, value.clone()));
+                    product
+                })
+            })
+            .collect();
+    }
+    Ok(products.into_iter().map(|set| entry.variant(set)).collect())
+}
+
+/// The values that an experiment gives to one parameter: one, or a list of different ones.
+fn values(key: &str, item: &Item, parameter: &Parameter) -> Result<Vec<ParamValue>, ConfigError> {
+    let Value::List(items) = &item.value else {
+        return Ok(vec![value(key, item, parameter)?]);
+    };
+    if items.is_empty() {
+        return Err(ConfigError::Empty {
+            at: item.at.clone(),
+            key: key.to_owned(),
+        });
+    }
+    let mut values = Vec::with_capacity(items.len());
+    for item in items {
+        let value = value(key, item, parameter)?;
+        if values.contains(&value) {
+            return Err(ConfigError::Duplicate {
+                at: item.at.clone(),
+                key: key.to_owned(),
+                value: value.to_string(),
+            });
+        }
+        values.push(value);
+    }
+    Ok(values)
+}
+
+fn value(key: &str, item: &Item, parameter: &Parameter) -> Result<ParamValue, ConfigError> {
+    let range = &parameter.range;
+    let (value, allowed) = match (range, &item.value) {
+        (ParamRange::Number { min, max }, Value::Number(x)) => {
+            (ParamValue::Number(*x), (min..=max).contains(&x))
+        }
+        (ParamRange::Number { min, max }, Value::Integer(x)) => {
+            let x = *x as f64;
+            (ParamValue::Number(x), (*min..=*max).contains(&x))
+        }
+        (ParamRange::Integer { min, max }, Value::Integer(x)) => {
+            (ParamValue::Integer(*x), (min..=max).contains(&x))
+        }
+        (ParamRange::Flag, Value::Flag(x)) => (ParamValue::Flag(*x), true),
+        (ParamRange::Choice(names), Value::Text(x)) => {
+            if !names.contains(&x.as_str()) {
+                return Err(ConfigError::Unknown {
+                    at: item.at.clone(),
+                    what: format!("value of `{key}`"),
+                    name: x.clone(),
+                    known: names.iter().map(|name| (*name).to_owned()).collect(),
+                });
+            }
+            (ParamValue::Name(x.clone()), true)
+        }
+        (_, found) => {
+            return Err(ConfigError::WrongType {
+                at: item.at.clone(),
+                key: key.to_owned(),
+                expected: range.to_string(),
+                found: found.describe(),
+            });
+        }
+    };
+    if allowed {
+        return Ok(value);
+    }
+    Err(ConfigError::OutOfRange {
+        at: item.at.clone(),
+        key: key.to_owned(),
+        value: value.to_string(),
+        expected: range.to_string(),
+    })
+}
+
+/// Shortens the labels of scenes that are paths to the last part of the path where that part is
+/// told apart from all other labels.
+pub(super) fn shorten_labels(scenes: &mut [Variant]) {
+    let short: Vec<String> = scenes
+        .iter()
+        .map(|scene| {
+            let mut parts = scene.label.split(['/', '\\']);
+            let last = parts.rfind(|part| !part.is_empty());
+            last.unwrap_or(&scene.label).to_owned()
+        })
+        .collect();
+    for (i, scene) in scenes.iter_mut().enumerate() {
+        if short.iter().filter(|other| **other == short[i]).count() == 1 {
+            scene.label.clone_from(&short[i]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry() -> Entry {
+        let number = |name, default| Parameter {
+            name,
+            description: "",
+            default: ParamValue::Number(default),
+            range: ParamRange::Number {
+                min: 0.0,
+                max: 10.0,
+            },
+        };
+        Entry {
+            name: "grid".into(),
+            description: String::new(),
+            schema: vec![number("b", 1.0), number("a", 2.0)],
+        }
+    }
+
+    #[test]
+    fn labels_show_only_what_differs_from_the_default() {
+        let entry = entry();
+        assert_eq!(entry.default_variant().label, "grid");
+        let variant = entry.variant(vec![
+            ("a", ParamValue::Number(2.0)),
+            ("b", ParamValue::Number(0.5)),
+        ]);
+        assert_eq!(variant.label, "grid(b=0.5)");
+        assert_eq!(variant.params.number("a"), 2.0);
+    }
+
+    #[test]
+    fn short_labels_stay_distinct() {
+        let variant = |label: &str| Variant {
+            name: label.into(),
+            params: Params::default(),
+            label: label.into(),
+        };
+        let mut scenes = ["x/a.obj", "y/a.obj", "../z/b.obj", "dir/", "cornell-box"].map(variant);
+        shorten_labels(&mut scenes);
+        let labels = scenes.map(|scene| scene.label);
+        assert_eq!(
+            labels,
+            ["x/a.obj", "y/a.obj", "b.obj", "dir", "cornell-box"]
+        );
+    }
+
+    #[test]
+    fn a_separator_or_a_model_extension_makes_a_path() {
+        for (text, path) in [
+            ("a/b", true),
+            ("b.OBJ", true),
+            ("b.glb", true),
+            ("b.txt", false),
+            ("cornell-bxo", false),
+        ] {
+            assert_eq!(is_path(text), path, "{text}");
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! Adapter choice and device creation.
+
+use super::compose::KernelLibrary;
+use super::pipeline::PipelineCache;
+use super::GpuError;
+use std::sync::{Arc, Mutex};
+
+/// Which adapter to use.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum AdapterChoice {
+    /// Discrete before integrated before virtual before software; Vulkan before GL.
+    #[default]
+    Best,
+    /// Position in the list of `raystone list`.
+    Index(usize),
+    /// Part of the adapter's name, upper or lower case.
+    Name(String),
+}
+
+impl std::str::FromStr for AdapterChoice {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Ok(text.parse().map_or_else(|_| Self::Name(text.to_owned()), Self::Index))
+    }
+}
+
+/// One adapter, for lists.
+#[derive(Debug, Clone)]
+pub struct AdapterSummary {
+    /// Position in the list.
+    pub index: usize,
+    /// What wgpu says of it.
+    pub info: wgpu::AdapterInfo,
+    /// What it can do at most.
+    pub limits: wgpu::Limits,
+    /// Whether it has GPU timestamps.
+    pub timestamps: bool,
+}
+
+/// An open device with everything kernels need.
+pub struct Gpu {
+    /// The device.
+    pub device: wgpu::Device,
+    /// Its queue.
+    pub queue: wgpu::Queue,
+    /// The adapter it belongs to.
+    pub info: wgpu::AdapterInfo,
+    /// Limits that the device was opened with.
+    pub limits: wgpu::Limits,
+    /// Nanoseconds per timestamp tick; `None` where there are no timestamps.
+    pub timestamp_period: Option<f32>,
+    /// Kernel sources.
+    pub kernels: KernelLibrary,
+    pub(super) pipelines: Mutex<PipelineCache>,
+    lost: Arc<Mutex<Option<String>>>,
+}
+
+fn instance() -> wgpu::Instance {
+    wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env())
+}
+
+fn backends() -> wgpu::Backends {
+    wgpu::Backends::from_env().unwrap_or(wgpu::Backends::all())
+}
+
+/// Rank of an adapter, best first.
+fn rank(info: &wgpu::AdapterInfo) -> (u8, u8) {
+    let device = match info.device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    };
+    (device, u8::from(info.backend == wgpu::Backend::Gl))
+}
+
+fn enumerate(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
+    let mut found = pollster::block_on(instance.enumerate_adapters(backends()));
+    found.retain(|a| a.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS));
+    found.sort_by_key(|a| rank(&a.get_info()));
+    found
+}
+
+/// Every adapter with compute shaders, best first. `WGPU_BACKEND` narrows the search.
+pub fn adapters() -> Vec<AdapterSummary> {
+    enumerate(&instance())
+        .iter()
+        .enumerate()
+        .map(|(index, adapter)| AdapterSummary {
+            index,
+            info: adapter.get_info(),
+            limits: adapter.limits(),
+            timestamps: adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY),
+        })
+        .collect()
+}
+
+fn choose(found: Vec<wgpu::Adapter>, choice: &AdapterChoice) -> Result<wgpu::Adapter, GpuError> {
+    if found.is_empty() {
+        return Err(GpuError::NoAdapter);
+    }
+    let names: Vec<String> = found.iter().map(|a| a.get_info().name).collect();
+    let position = match choice {
+        AdapterChoice::Best => Some(0),
+        AdapterChoice::Index(i) => (*i < names.len()).then_some(*i),
+        AdapterChoice::Name(part) => names.iter().position(|n| n.to_lowercase().contains(&part.to_lowercase())),
+    };
+    match position.and_then(|p| found.into_iter().nth(p)) {
+        Some(adapter) => Ok(adapter),
+        None => Err(GpuError::UnknownAdapter {
+            asked: match choice {
+                AdapterChoice::Index(i) => i.to_string(),
+                AdapterChoice::Name(n) => n.clone(),
+                AdapterChoice::Best => String::new(),
+            },
+            known: names.iter().enumerate().map(|(i, n)| format!("{i}: {n}")).collect::<Vec<_>>().join(", "),
+        }),
+    }
+}
+
+/// WebGPU's defaults, and of the adapter's offer only larger buffers: kernels stay portable.
+fn limits_to_ask(offer: &wgpu::Limits) -> wgpu::Limits {
+    wgpu::Limits {
+        max_buffer_size: offer.max_buffer_size,
+        max_storage_buffer_binding_size: offer.max_storage_buffer_binding_size,
+        ..wgpu::Limits::default().using_resolution(offer.clone())
+    }
+}
+
+/// Opens the chosen adapter.
+///
+/// # Errors
+/// No adapter, no such adapter, or the driver refuses a device.
+pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuError> {
+    let instance = instance();
+    let adapter = choose(enumerate(&instance), choice)?;
+    let info = adapter.get_info();
+    let limits = limits_to_ask(&adapter.limits());
+    let features = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
+    let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+        label: Some("raystone"),
+        required_features: features,
+        required_limits: limits.clone(),
+        ..Default::default()
+    }))
+    .map_err(|e| GpuError::NoDevice { adapter: info.name.clone(), cause: e.to_string() })?;
+    let lost = Arc::new(Mutex::new(None));
+    let flag = Arc::clone(&lost);
+    device.set_device_lost_callback(move |reason, text| {
+        if let Ok(mut slot) = flag.lock() {
+            *slot = Some(format!("{reason:?}: {text}"));
+        }
+    });
+    // Validation errors outside a scope are ours to report at the next wait, not to panic on.
+    let flag = Arc::clone(&lost);
+    device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+        if let Ok(mut slot) = flag.lock() {
+            slot.get_or_insert_with(|| error.to_string());
+        }
+    }));
+    let timestamp_period =
+        features.contains(wgpu::Features::TIMESTAMP_QUERY).then(|| queue.get_timestamp_period());
+    Ok(Gpu {
+        device,
+        queue,
+        info,
+        limits,
+        timestamp_period,
+        kernels,
+        pipelines: Mutex::default(),
+        lost,
+    })
+}
+
+impl Gpu {
+    /// Whether the adapter is a software rasteriser.
+    pub fn is_software(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// The error that made the device unusable, if any.
+    pub fn lost(&self) -> Option<String> {
+        self.lost.lock().ok().and_then(|slot| slot.clone())
+    }
+}

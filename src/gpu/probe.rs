@@ -1,0 +1,55 @@
+//! What the adapter's arithmetic does, found out at start.
+
+use super::compose::Composition;
+use super::dispatch::{groups_for, Dispatch};
+use super::pipeline::Bindings;
+use super::{Gpu, GpuError};
+use serde::{Deserialize, Serialize};
+
+/// Whether the adapter computes like IEEE f32 on the host in the patterns that traversal uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ArithmeticProbe {
+    /// `a*b + c` is rounded twice, never fused.
+    pub unfused: bool,
+    /// `a / b` is correctly rounded.
+    pub exact_division: bool,
+    /// `sqrt(a)` is correctly rounded.
+    pub exact_sqrt: bool,
+}
+
+impl ArithmeticProbe {
+    /// Whether hits can be expected to equal the host's to the bit.
+    pub fn is_exact(&self) -> bool {
+        self.unfused && self.exact_division
+    }
+}
+
+const COUNT: u32 = 4096;
+
+/// Runs a small kernel on pseudo-random ordinary numbers and compares with the host.
+///
+/// # Errors
+/// The kernel does not run.
+pub fn probe_arithmetic(gpu: &Gpu) -> Result<ArithmeticProbe, GpuError> {
+    let mut state = 0x9e37_79b9_u32;
+    let mut next = || {
+        state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        // Exponents −8 … 7: no denormal or overflow in any of the patterns.
+        f32::from_bits(((state >> 28) + 119) << 23 | (state & 0x007f_ffff) | (state << 4 & 0x8000_0000))
+    };
+    let input: Vec<[f32; 4]> = (0..COUNT).map(|_| [next(), next(), next(), 0.0]).collect();
+    let pipeline = gpu.pipeline(&Composition::new("common/probe"), true)?;
+    let output = gpu.zeroed("probe_out", u64::from(COUNT) * 16)?;
+    let mut bindings = Bindings::new();
+    bindings.buffer("probe_in", &gpu.storage("probe_in", &input)?).buffer("probe_out", &output);
+    gpu.run(&Dispatch { pipeline: &pipeline, bindings: &bindings, groups: groups_for(COUNT) })?;
+    let result: Vec<[f32; 4]> = gpu.read(&output)?;
+    let all = |expected: fn(&[f32; 4]) -> f32, lane: usize| {
+        input.iter().zip(&result).all(|(i, o)| expected(i).to_bits() == o[lane].to_bits())
+    };
+    Ok(ArithmeticProbe {
+        unfused: all(|[a, b, c, _]| a * b + c, 0) && all(|[a, b, c, _]| a * b - c * a, 1),
+        exact_division: all(|[a, b, ..]| a / b, 2),
+        exact_sqrt: all(|[a, ..]| a.abs().sqrt(), 3),
+    })
+}

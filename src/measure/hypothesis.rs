@@ -1,0 +1,280 @@
+//! Tests of hypotheses: Welch's t and the Benjamini–Hochberg correction for many tests.
+
+use super::statistics::{mean, variance};
+
+/// Result of Welch's two-sided t-test.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WelchTest {
+    /// t statistic; infinite if two samples without any spread differ.
+    pub t: f64,
+    /// Welch–Satterthwaite degrees of freedom.
+    pub degrees_of_freedom: f64,
+    /// Probability of a `|t|` this large or larger if the means are equal.
+    pub p: f64,
+}
+
+/// Welch's t-test of equal means (Welch 1947): the variances need not be equal.
+///
+/// Samples without any spread are compared as they are: p = 1 if equal, p = 0 if not. `None` if
+/// either side has fewer than two samples or one that is not finite.
+pub fn welch_t_test(a: &[f64], b: &[f64]) -> Option<WelchTest> {
+    welch_t_test_beyond(a, b, 0.0)
+}
+
+/// Like [`welch_t_test`], for the hypothesis that the means differ by at most `margin ≥ 0` (in the
+/// unit of the samples): the difference is shortened by the margin first.
+pub fn welch_t_test_beyond(a: &[f64], b: &[f64], margin: f64) -> Option<WelchTest> {
+    let gap = mean(a)? - mean(b)?;
+    let gap = gap.signum() * (gap.abs() - margin).max(0.0);
+    let (va, vb) = (variance(a)? / a.len() as f64, variance(b)? / b.len() as f64);
+    let (freedom_a, freedom_b) = ((a.len() - 1) as f64, (b.len() - 1) as f64);
+    if va + vb == 0.0 {
+        let (t, p) = match gap == 0.0 {
+            true => (0.0, 1.0),
+            false => (gap * f64::INFINITY, 0.0),
+        };
+        let degrees_of_freedom = freedom_a + freedom_b;
+        return Some(WelchTest {
+            t,
+            degrees_of_freedom,
+            p,
+        });
+    }
+    let t = gap / (va + vb).sqrt();
+    // As shares of the whole variance, so that tiny variances do not underflow when squared.
+    let (share_a, share_b) = (va / (va + vb), vb / (va + vb));
+    let degrees_of_freedom = 1.0 / (share_a * share_a / freedom_a + share_b * share_b / freedom_b);
+    let p = student_t_two_sided(t, degrees_of_freedom);
+    Some(WelchTest {
+        t,
+        degrees_of_freedom,
+        p,
+    })
+}
+
+/// Probability that `|T| ≥ |t|` for Student's t with `degrees_of_freedom > 0` (not always whole).
+pub fn student_t_two_sided(t: f64, degrees_of_freedom: f64) -> f64 {
+    let (tt, n) = (t * t, degrees_of_freedom);
+    if tt.is_infinite() {
+        return 0.0;
+    }
+    beta_regularised(0.5 * n, 0.5, n / (n + tt), tt / (n + tt))
+}
+
+/// Which hypotheses to reject so that the expected share of false ones among the rejected is at most
+/// `alpha` (Benjamini and Hochberg 1995, step-up). Same order as `p_values`.
+pub fn benjamini_hochberg(p_values: &[f64], alpha: f64) -> Vec<bool> {
+    let mut sorted = p_values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let m = sorted.len() as f64;
+    let threshold = sorted
+        .iter()
+        .enumerate()
+        .rev()
+        .find(|&(k, &p)| p <= alpha * (k + 1) as f64 / m)
+        .map_or(-1.0, |(_, &p)| p);
+    p_values.iter().map(|&p| p <= threshold).collect()
+}
+
+/// Regularised incomplete beta function I_x(a, b) for a, b > 0; `y` is 1 − x, given apart because it
+/// would lose its digits near x = 1. DLMF 8.17.22 evaluated from the side where it converges fast.
+fn beta_regularised(a: f64, b: f64, x: f64, y: f64) -> f64 {
+    if x <= 0.0 || y <= 0.0 {
+        return if x <= 0.0 { 0.0 } else { 1.0 };
+    }
+    let log_front = a * x.ln() + b * y.ln() + ln_gamma(a + b) - ln_gamma(a) - ln_gamma(b);
+    let front = log_front.exp();
+    if x < (a + 1.0) / (a + b + 2.0) {
+        front * beta_fraction(a, b, x) / a
+    } else {
+        1.0 - front * beta_fraction(b, a, y) / b
+    }
+}
+
+/// The continued fraction of I_x(a, b) by the modified Lentz method (Thompson and Barnett 1986).
+fn beta_fraction(a: f64, b: f64, x: f64) -> f64 {
+    const TINY: f64 = 1e-300;
+    let away_from_zero = |v: f64| if v.abs() < TINY { TINY } else { v };
+    let mut c = 1.0;
+    let mut d = 1.0 / away_from_zero(1.0 - (a + b) * x / (a + 1.0));
+    let mut value = d;
+    for m in 1..500 {
+        let m = f64::from(m);
+        let even = m * (b - m) * x / ((a + 2.0 * m - 1.0) * (a + 2.0 * m));
+        let odd = -(a + m) * (a + b + m) * x / ((a + 2.0 * m) * (a + 2.0 * m + 1.0));
+        let before = value;
+        for term in [even, odd] {
+            d = 1.0 / away_from_zero(1.0 + term * d);
+            c = away_from_zero(1.0 + term / c);
+            value *= d * c;
+        }
+        if (value - before).abs() <= 1e-16 * value.abs() {
+            break;
+        }
+    }
+    value
+}
+
+/// ln Γ(x) for x > 0: recurrence up to x ≥ 12, then Stirling's series (DLMF 5.11.1).
+fn ln_gamma(x: f64) -> f64 {
+    let mut x = x;
+    let mut product = 1.0;
+    while x < 12.0 {
+        product *= x;
+        x += 1.0;
+    }
+    const SERIES: [f64; 6] = [
+        1.0 / 12.0,
+        -1.0 / 360.0,
+        1.0 / 1260.0,
+        -1.0 / 1680.0,
+        1.0 / 1188.0,
+        -691.0 / 360360.0,
+    ];
+    let z = 1.0 / (x * x);
+    let tail = SERIES.iter().rev().fold(0.0, |sum, c| sum * z + c) / x;
+    let half_ln_two_pi = 0.5 * std::f64::consts::TAU.ln();
+    (x - 0.5) * x.ln() - x + half_ln_two_pi + tail - product.ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::statistics::Pcg32;
+    use super::*;
+    use std::f64::consts::PI;
+
+    #[track_caller]
+    fn assert_close(actual: f64, expected: f64, relative: f64) {
+        let error = (actual - expected).abs();
+        assert!(
+            error <= relative * expected.abs(),
+            "{actual} is not {expected}"
+        );
+    }
+
+    #[test]
+    fn the_gamma_function_has_its_known_values() {
+        assert_close(ln_gamma(0.5), 0.5 * PI.ln(), 1e-14);
+        assert_close(ln_gamma(5.0), 24f64.ln(), 1e-14);
+        assert_close(ln_gamma(11.5), 11899423.083962249f64.ln(), 1e-14);
+        assert_close(ln_gamma(100.0), 359.1342053695754, 1e-14);
+        assert!(ln_gamma(1.0).abs() < 1e-14 && ln_gamma(2.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn the_incomplete_beta_function_has_its_closed_forms() {
+        let beta = |a, b, x: f64| beta_regularised(a, b, x, 1.0 - x);
+        for x in [0.01, 0.2, 0.5, 0.77, 0.999] {
+            assert_close(beta(1.0, 3.5, x), 1.0 - (1.0 - x).powf(3.5), 1e-12);
+            assert_close(beta(2.5, 1.0, x), x.powf(2.5), 1e-13);
+            // Binomial sum for a = 2, b = 3.
+            let polynomial = x * x * (6.0 - 8.0 * x + 3.0 * x * x);
+            assert_close(beta(2.0, 3.0, x), polynomial, 1e-12);
+            assert_close(beta(0.5, 0.5, x), 2.0 / PI * x.sqrt().asin(), 1e-12);
+        }
+        assert_close(beta(40.0, 40.0, 0.5), 0.5, 1e-13);
+    }
+
+    #[test]
+    fn student_t_has_its_closed_forms_and_tabled_values() {
+        for t in [1e-6, 0.1, 1.0, 2.5, 12.0, 300.0] {
+            // The complement of the arctangent keeps its digits in the tail.
+            assert_close(
+                student_t_two_sided(t, 1.0),
+                2.0 / PI * (1.0 / t).atan(),
+                1e-12,
+            );
+            let root: f64 = (2.0 + t * t).sqrt();
+            assert_close(
+                student_t_two_sided(t, 2.0),
+                2.0 / (root * (root + t)),
+                1e-12,
+            );
+        }
+        for (freedom, t, p) in [
+            (10.0, 2.228_138_851_986_3, 0.05),
+            (10.0, 3.169_272_672_616_951, 0.01),
+            (30.0, 2.042_272_456_301, 0.05),
+            (5.0, 4.032_142_983_555_227, 0.01),
+        ] {
+            assert_close(student_t_two_sided(t, freedom), p, 1e-9);
+            assert_close(student_t_two_sided(-t, freedom), p, 1e-9);
+        }
+        // Whole normal tail at many degrees of freedom.
+        assert_close(student_t_two_sided(1.959_963_984_540_05, 1e9), 0.05, 1e-6);
+    }
+
+    #[test]
+    fn welch_agrees_with_a_worked_example() {
+        let a = [
+            27.5, 21.0, 19.0, 23.6, 17.0, 17.9, 16.9, 20.1, 21.9, 22.6, 23.1, 19.6, 19.0, 21.7,
+            21.4,
+        ];
+        let b = [
+            27.1, 22.0, 20.8, 23.4, 23.4, 23.5, 25.8, 22.0, 24.8, 20.2, 21.9, 22.1, 22.9, 20.5,
+            24.4,
+        ];
+        let test = welch_t_test(&a, &b).unwrap();
+        assert_close(test.t, -2.455356398286006, 1e-9);
+        assert_close(test.degrees_of_freedom, 24.98852929023142, 1e-9);
+        assert_close(test.p, 0.02137800146286698, 1e-7);
+        let swapped = welch_t_test(&b, &a).unwrap();
+        assert_eq!((swapped.t, swapped.p), (-test.t, test.p));
+    }
+
+    #[test]
+    fn samples_without_spread_are_equal_or_not() {
+        let same = welch_t_test(&[2.0, 2.0], &[2.0, 2.0, 2.0]).unwrap();
+        assert_eq!((same.t, same.p), (0.0, 1.0));
+        let different = welch_t_test(&[2.0, 2.0], &[2.1, 2.1]).unwrap();
+        assert_eq!((different.t, different.p), (f64::NEG_INFINITY, 0.0));
+        let within = welch_t_test_beyond(&[2.0, 2.0], &[2.1, 2.1], 0.2).unwrap();
+        assert_eq!(within.p, 1.0);
+        assert_eq!(welch_t_test(&[1.0], &[1.0, 2.0]), None);
+        assert_eq!(welch_t_test(&[1.0, f64::NAN], &[1.0, 2.0]), None);
+    }
+
+    #[test]
+    fn p_values_are_uniform_when_the_means_are_equal_and_small_when_not() {
+        let mut generator = Pcg32::new(3);
+        let mut normal = |mean: f64| -> Vec<f64> {
+            let mut draw = || mean + (0..12).map(|_| generator.uniform()).sum::<f64>() - 6.0;
+            (0..8).map(|_| draw()).collect()
+        };
+        let share_below =
+            |p: &[f64], x: f64| p.iter().filter(|&&p| p < x).count() as f64 / p.len() as f64;
+        let equal: Vec<f64> = (0..2000)
+            .map(|_| welch_t_test(&normal(0.0), &normal(0.0)).unwrap().p)
+            .collect();
+        for x in [0.05, 0.25, 0.5, 0.75] {
+            let share = share_below(&equal, x);
+            let sd = (x * (1.0 - x) / 2000.0f64).sqrt();
+            assert!(
+                (share - x).abs() < 4.0 * sd,
+                "{share} of p-values below {x}"
+            );
+        }
+        let apart: Vec<f64> = (0..200)
+            .map(|_| welch_t_test(&normal(0.0), &normal(2.0)).unwrap().p)
+            .collect();
+        assert!(share_below(&apart, 0.05) > 0.9);
+    }
+
+    #[test]
+    fn benjamini_hochberg_steps_up() {
+        // The example of the paper's section 3.2: four of fifteen at 0.05.
+        let p = [
+            0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.3240, 0.4262,
+            0.5719, 0.6528, 0.7590, 1.0,
+        ];
+        let rejected = benjamini_hochberg(&p, 0.05);
+        assert_eq!(rejected, [vec![true; 4], vec![false; 11]].concat());
+        // A larger p that passes carries the smaller ones with it, in whatever order they come.
+        assert_eq!(
+            benjamini_hochberg(&[0.04, 0.9, 0.035], 0.06),
+            [true, false, true]
+        );
+        assert_eq!(benjamini_hochberg(&[0.5, 0.2], 0.05), [false, false]);
+        assert!(benjamini_hochberg(&[], 0.05).is_empty());
+    }
+}

@@ -1,0 +1,89 @@
+//! Known values of every metric, planted faults and bad input.
+
+use super::*;
+
+fn image(pixels: &[[f32; 3]]) -> Image {
+    Image::new(pixels.len() as u32, 1, pixels.to_vec()).unwrap()
+}
+
+fn grey(values: &[f32]) -> Image {
+    image(&values.iter().map(|&v| [v; 3]).collect::<Vec<_>>())
+}
+
+#[test]
+fn every_metric_has_its_value_worked_by_hand() {
+    // r = 2, 0; v = 3, 0.5; halves 1.5 and 2.5, -0.5 and 0.5.
+    let reference = Reference::from_parts(&[grey(&[1.5, -0.5]), grey(&[2.5, 0.5])]).unwrap();
+    let report = measure(&grey(&[3.0, 0.5]), &reference).unwrap();
+    let expected = [
+        ("mse/v1", (1.0 + 0.25) / 2.0),
+        ("rmse/v1", 0.625f64.sqrt()),
+        ("mae/v1", 0.75),
+        ("relmse/eps=1e-2/v1", (1.0 / 4.01 + 0.25 / 0.01) / 2.0),
+        ("mse-unbiased/v1", (1.5 * 0.5 + 0.0) / 2.0),
+        ("relmse-unbiased/eps=1e-2/v1", 0.75 / 4.01 / 2.0),
+    ];
+    assert_eq!(report.metrics.len(), METRICS.len());
+    assert_eq!(expected.len(), METRICS.len());
+    for (id, value) in expected {
+        let error = (report.metrics[id] - value).abs();
+        assert!(error < 1e-12, "{id}: {} is not {value}", report.metrics[id]);
+    }
+    assert_eq!(report.non_finite_pixels, 0);
+    assert_eq!(reference.own_mse(), Some(0.25));
+}
+
+#[test]
+fn channels_count_apart() {
+    let reference = Reference::single(image(&[[1.0, 2.0, 4.0]])).unwrap();
+    let report = measure(&image(&[[1.0, 2.0, 1.0]]), &reference).unwrap();
+    assert_eq!(report.metrics["mse/v1"], 3.0);
+    assert_eq!(report.metrics["mae/v1"], 1.0);
+}
+
+#[test]
+fn metric_ids_are_unique_and_carry_a_version() {
+    assert!(!METRICS.is_empty());
+    for (i, metric) in METRICS.iter().enumerate() {
+        assert!(metric.id.ends_with("/v1"), "{}", metric.id);
+        assert!(!metric.description.is_empty());
+        assert!(METRICS[..i].iter().all(|m| m.id != metric.id));
+    }
+}
+
+#[test]
+fn an_equal_image_has_no_error_and_one_changed_pixel_shows() {
+    let picture = grey(&[0.1, 0.2, 0.3]);
+    let reference = Reference::single(picture.clone()).unwrap();
+    let same = measure(&picture, &reference).unwrap();
+    assert!(same.metrics.values().all(|&v| v == 0.0));
+    assert!(!same.metrics.contains_key("mse-unbiased/v1"), "no halves");
+    let changed = measure(&grey(&[0.1, 0.2, 0.3001]), &reference).unwrap();
+    assert!(changed.metrics.values().all(|&v| v > 0.0));
+}
+
+#[test]
+fn pixels_that_are_not_finite_are_counted_and_in_no_mean() {
+    let reference = Reference::single(grey(&[1.0, 1.0, 1.0])).unwrap();
+    let spoiled = image(&[[2.0; 3], [f32::NAN, 1.0, 1.0], [1.0, 1.0, f32::INFINITY]]);
+    let report = measure(&spoiled, &reference).unwrap();
+    assert_eq!(report.non_finite_pixels, 2);
+    assert_eq!(report.metrics["mse/v1"], 1.0);
+    let nothing_left = measure(&grey(&[f32::NAN; 3]), &reference).unwrap();
+    assert_eq!(nothing_left.non_finite_pixels, 3);
+    assert!(nothing_left.metrics.is_empty());
+    let error = Reference::single(grey(&[1.0, f32::NAN])).unwrap_err();
+    assert!(error.to_string().contains("(1, 0)"), "{error}");
+}
+
+#[test]
+fn sizes_that_do_not_fit_are_errors() {
+    assert!(Image::new(2, 2, vec![[0.0; 3]; 3]).is_err());
+    assert!(Image::new(0, 0, vec![]).is_err());
+    assert!(Image::mean_of(&[]).is_err());
+    let reference = Reference::single(grey(&[1.0, 1.0])).unwrap();
+    let error = measure(&grey(&[1.0]), &reference).unwrap_err();
+    assert!(error.to_string().contains("1×1"), "{error}");
+    assert!(Reference::from_parts(&[grey(&[1.0])]).is_err());
+    assert!(Reference::from_parts(&[grey(&[1.0]), grey(&[1.0, 2.0])]).is_err());
+}

@@ -1,0 +1,378 @@
+//! Known answers, planted faults, and agreement with two straightforward f32 tests.
+
+use super::*;
+use glam::Vec3;
+
+/// SplitMix64: where random rays and triangles come from.
+struct Random(u64);
+
+impl Random {
+    fn signed(&mut self) -> f32 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 40) as f32 / (1u32 << 23) as f32 - 1.0
+    }
+
+    fn vector(&mut self) -> Vec3 {
+        Vec3::new(self.signed(), self.signed(), self.signed())
+    }
+
+    fn ray(&mut self) -> OracleRay {
+        ray(self.vector() * 1.5, self.vector())
+    }
+
+    fn soup(&mut self, count: usize, size: f32) -> Vec<Triangle> {
+        let mut one = |_| {
+            let centre = self.vector();
+            triangle([0; 3].map(|_| centre + size * self.vector()))
+        };
+        (0..count).map(&mut one).collect()
+    }
+}
+
+fn triangle(vertices: [Vec3; 3]) -> Triangle {
+    Triangle { vertices }
+}
+
+fn ray(origin: Vec3, direction: Vec3) -> OracleRay {
+    OracleRay {
+        origin: origin.to_array(),
+        t_min: 0.0,
+        direction: direction.to_array(),
+        t_max: f32::INFINITY,
+    }
+}
+
+/// (0, 0, z), (1, 0, z), (0, 1, z).
+fn corner(z: f32) -> Triangle {
+    triangle([Vec3::ZERO, Vec3::X, Vec3::Y].map(|v| v + z * Vec3::Z))
+}
+
+fn towards(x: f32, y: f32) -> OracleRay {
+    ray(Vec3::new(x, y, -1.0), Vec3::Z)
+}
+
+/// One triangle, one ray, in f32.
+type Test32 = fn(&Triangle, &OracleRay) -> Option<f32>;
+
+/// Normal first: det = d·n, t = c·n / det, u and v from d×c.
+fn normal_first(triangle: &Triangle, ray: &OracleRay) -> Option<f32> {
+    let [v0, v1, v2] = triangle.vertices;
+    let direction = Vec3::from(ray.direction);
+    let (e1, e2) = (v1 - v0, v2 - v0);
+    let c = v0 - Vec3::from(ray.origin);
+    let normal = e1.cross(e2);
+    let inverse = 1.0 / normal.dot(direction);
+    let r = direction.cross(c);
+    let u = -r.dot(e2) * inverse;
+    let v = r.dot(e1) * inverse;
+    let t = normal.dot(c) * inverse;
+    let inside = u >= 0.0 && v >= 0.0 && 1.0 - u - v >= 0.0;
+    (inside && t > ray.t_min && t < ray.t_max).then_some(t)
+}
+
+/// As in Möller and Trumbore 1997, with divisions.
+fn moeller_trumbore(triangle: &Triangle, ray: &OracleRay) -> Option<f32> {
+    let [v0, v1, v2] = triangle.vertices;
+    let direction = Vec3::from(ray.direction);
+    let (e1, e2) = (v1 - v0, v2 - v0);
+    let p = direction.cross(e2);
+    let det = p.dot(e1);
+    let s = Vec3::from(ray.origin) - v0;
+    let u = s.dot(p) / det;
+    let q = s.cross(e1);
+    let v = direction.dot(q) / det;
+    let t = e2.dot(q) / det;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > ray.t_min && t < ray.t_max).then_some(t)
+}
+
+fn closest(test: Test32, triangles: &[Triangle], ray: &OracleRay) -> ClosestHit {
+    let mut best: ClosestHit = None;
+    for (id, triangle) in (0..).zip(triangles) {
+        if let Some(t) = test(triangle, ray) {
+            best = best.filter(|b| b.1 <= t).or(Some((id, t)));
+        }
+    }
+    best
+}
+
+#[track_caller]
+fn assert_wrong(verdict: Verdict, expected: fn(&Fault) -> bool) {
+    match verdict {
+        Verdict::Wrong(fault) if expected(&fault) => assert!(!fault.to_string().is_empty()),
+        other => panic!("unexpected verdict {other:?}"),
+    }
+}
+
+#[test]
+fn known_hits_and_misses_agree() {
+    let scene = [corner(3.0), corner(1.0), corner(-2.0)];
+    assert_eq!(
+        judge(&scene, towards(0.25, 0.3), Some((1, 2.0))),
+        Verdict::Agrees
+    );
+    assert_eq!(judge(&scene, towards(0.75, 0.75), None), Verdict::Agrees);
+    // The direction's length is the unit of t, and both sides of a triangle count.
+    let back = ray(Vec3::new(0.2, 0.2, 5.0), Vec3::new(0.0, 0.0, -0.5));
+    assert_eq!(judge(&scene, back, Some((0, 4.0))), Verdict::Agrees);
+    assert_eq!(judge(&[], towards(0.0, 0.0), None), Verdict::Agrees);
+}
+
+#[test]
+fn planted_faults_are_wrong_each_for_its_own_reason() {
+    let scene = [corner(3.0), corner(1.0), corner(-2.0)];
+    let through = towards(0.25, 0.3);
+    let judged = |answer| judge(&scene, through, answer);
+    assert_wrong(judged(None), |f| {
+        matches!(f, Fault::FalseMiss { id: 1, .. })
+    });
+    assert_wrong(judged(Some((0, 4.0))), |f| {
+        matches!(f, Fault::NotNearest { nearer: 1, .. })
+    });
+    assert_wrong(judged(Some((0, 2.0))), |f| {
+        matches!(f, Fault::Distance { id: 0, .. })
+    });
+    assert_wrong(judged(Some((1, 2.00001))), |f| {
+        matches!(f, Fault::Distance { .. })
+    });
+    assert_wrong(judged(Some((1, f32::NAN))), |f| {
+        matches!(f, Fault::OutOfInterval { .. })
+    });
+    assert_wrong(judged(Some((2, -1.0))), |f| {
+        matches!(f, Fault::OutOfInterval { .. })
+    });
+    assert_wrong(judged(Some((3, 2.0))), |f| {
+        matches!(f, Fault::NoSuchTriangle { .. })
+    });
+    let beside = judge(&scene, towards(0.75, 0.75), Some((1, 2.0)));
+    assert_wrong(beside, |f| matches!(f, Fault::FalseHit { id: 1, .. }));
+}
+
+#[test]
+fn the_interval_of_the_ray_decides_what_counts() {
+    let scene = [corner(3.0), corner(1.0)];
+    let mut short = towards(0.25, 0.3);
+    short.t_max = 1.9;
+    assert_eq!(judge(&scene, short, None), Verdict::Agrees);
+    short.t_max = 2.0;
+    assert_eq!(judge(&scene, short, None), Verdict::Ambiguous);
+    assert_eq!(judge(&scene, short, Some((1, 2.0))), Verdict::Ambiguous);
+    let mut late = towards(0.25, 0.3);
+    late.t_min = 2.5;
+    assert_eq!(judge(&scene, late, Some((0, 4.0))), Verdict::Agrees);
+}
+
+#[test]
+fn edges_and_coincident_surfaces_are_ambiguous_but_only_there() {
+    let scene = [corner(1.0)];
+    for (x, y) in [(0.5, 0.5), (0.0, 0.3), (0.3, 0.0), (0.0, 0.0), (1.0, 0.0)] {
+        let edge = towards(x, y);
+        assert_eq!(
+            judge(&scene, edge, Some((0, 2.0))),
+            Verdict::Ambiguous,
+            "{x} {y}"
+        );
+        assert_eq!(judge(&scene, edge, None), Verdict::Ambiguous, "{x} {y}");
+        let (inside, outside) = (
+            towards(x + 1e-4 * (0.3 - x), y + 1e-4 * (0.3 - y)),
+            towards(x - 1e-4 * (0.3 - x), y - 1e-4 * (0.3 - y)),
+        );
+        assert_eq!(
+            judge(&scene, inside, Some((0, 2.0))),
+            Verdict::Agrees,
+            "{x} {y}"
+        );
+        assert_eq!(judge(&scene, outside, None), Verdict::Agrees, "{x} {y}");
+    }
+    let twice = [corner(1.0), corner(1.0)];
+    for id in 0..2 {
+        let verdict = judge(&twice, towards(0.25, 0.3), Some((id, 2.0)));
+        assert_eq!(verdict, Verdict::Ambiguous);
+    }
+}
+
+#[test]
+fn grazing_rays_are_ambiguous_and_degenerate_triangles_are_never_hit() {
+    let scene = [corner(0.0)];
+    // In the plane z = 0, crossing the triangle: det = 0 in exact arithmetic, known to be so.
+    let in_plane = ray(Vec3::new(-1.0, 0.25, 0.0), Vec3::X);
+    assert_eq!(judge(&scene, in_plane, None), Verdict::Agrees);
+    // Not aligned to the axes, det = 0 is not certain in f32.
+    let tilted = |v: Vec3| Vec3::new(v.x, v.y, 0.3 * v.x + 0.7 * v.y);
+    let slope = [triangle(scene[0].vertices.map(tilted))];
+    let graze = ray(tilted(Vec3::new(-1.0, 0.25, 0.0)), tilted(Vec3::X));
+    assert_eq!(judge(&slope, graze, None), Verdict::Ambiguous);
+    assert_eq!(judge(&slope, graze, Some((0, 1.5))), Verdict::Ambiguous);
+    // A little above the plane the same ray misses for certain.
+    let above = ray(Vec3::from(graze.origin) + 1e-4 * Vec3::Z, tilted(Vec3::X));
+    assert_eq!(judge(&slope, above, None), Verdict::Agrees);
+    assert_wrong(judge(&slope, above, Some((0, 1.5))), |f| {
+        matches!(f, Fault::FalseHit { .. })
+    });
+    let point = [triangle([Vec3::new(0.25, 0.25, 0.0); 3])];
+    assert_eq!(judge(&point, towards(0.25, 0.25), None), Verdict::Agrees);
+    assert_wrong(judge(&point, towards(0.25, 0.25), Some((0, 1.0))), |f| {
+        matches!(f, Fault::FalseHit { .. })
+    });
+}
+
+#[test]
+fn any_hit_answers_are_judged_by_whether_something_blocks() {
+    let scene = [corner(3.0), corner(1.0)];
+    let verdicts = judge_any_hits(
+        &scene,
+        &[
+            (towards(0.25, 0.3), true),
+            (towards(0.25, 0.3), false),
+            (towards(0.75, 0.75), true),
+            (towards(0.75, 0.75), false),
+            (towards(0.5, 0.5), true),
+            (towards(0.5, 0.5), false),
+        ],
+    );
+    assert_eq!(verdicts[0], Verdict::Agrees);
+    assert_wrong(verdicts[1].clone(), |f| {
+        matches!(f, Fault::FalseMiss { .. })
+    });
+    assert_wrong(verdicts[2].clone(), |f| matches!(f, Fault::FalseBlock));
+    assert_eq!(verdicts[3], Verdict::Agrees);
+    assert_eq!(verdicts[4..], [Verdict::Ambiguous, Verdict::Ambiguous]);
+}
+
+/// Judges the answers of `test` over a soup; returns (hits, ambiguous).
+fn judge_soup(test: Test32, triangles: &[Triangle], rays: &[OracleRay]) -> (usize, usize) {
+    let answer = |ray: &OracleRay| (*ray, closest(test, triangles, ray));
+    let queries: Vec<_> = rays.iter().map(answer).collect();
+    let verdicts = judge_closest_hits(triangles, &queries);
+    for (query, verdict) in queries.iter().zip(&verdicts) {
+        if let Verdict::Wrong(fault) = verdict {
+            panic!("{query:?}: {fault}");
+        }
+    }
+    let hits = queries.iter().filter(|q| q.1.is_some()).count();
+    let ambiguous = verdicts.iter().filter(|v| **v == Verdict::Ambiguous);
+    (hits, ambiguous.count())
+}
+
+#[test]
+fn straightforward_f32_tests_are_never_wrong_on_random_rays() {
+    let mut random = Random(1);
+    for (count, size) in [(200, 0.5), (2000, 0.1), (2000, 0.02)] {
+        let soup = random.soup(count, size);
+        let rays: Vec<_> = (0..10_000).map(|_| random.ray()).collect();
+        for test in [normal_first, moeller_trumbore] {
+            let (hits, ambiguous) = judge_soup(test, &soup, &rays);
+            println!("size {size}: {hits} hits, {ambiguous} ambiguous");
+            assert!(hits > 100, "{hits}");
+            assert!(
+                ambiguous < 100,
+                "{ambiguous} of 10000 ambiguous: bounds too wide"
+            );
+        }
+    }
+}
+
+#[test]
+fn rays_aimed_at_edges_needles_and_far_scenes_are_never_wrong() {
+    let mut random = Random(2);
+    let mut soup = random.soup(100, 0.3);
+    // Needles: two vertices almost the same.
+    for triangle in &mut soup[..50] {
+        triangle.vertices[2] = triangle.vertices[1] + 1e-5 * random.vector();
+    }
+    let far = Vec3::new(148376.0, 1234.0, -223423.0);
+    let moved: Vec<_> = soup
+        .iter()
+        .map(|t| triangle(t.vertices.map(|v| v * 50.0 + far)))
+        .collect();
+    for (triangles, offset, scale) in [(soup.clone(), Vec3::ZERO, 1.0), (moved, far, 50.0)] {
+        let aimed = |i: usize| {
+            let [a, b, _] = triangles[i % triangles.len()].vertices;
+            let target = a.lerp(b, 0.5 + 0.5 * random.signed());
+            let origin = offset + scale * random.vector();
+            ray(origin, target - origin)
+        };
+        let rays: Vec<_> = (0..10_000).map(aimed).collect();
+        for test in [normal_first, moeller_trumbore] {
+            let (_, ambiguous) = judge_soup(test, &triangles, &rays);
+            // Far from the origin the vertices' own spacing keeps most targets off the edges.
+            assert!(ambiguous > 3000 || scale > 1.0, "{ambiguous} near edges");
+        }
+    }
+}
+
+#[test]
+fn random_answers_with_a_planted_fault_are_wrong() {
+    let mut random = Random(3);
+    let soup = random.soup(500, 0.2);
+    let mut planted = 0;
+    for _ in 0..1000 {
+        let ray = random.ray();
+        let Some((id, t)) = closest(normal_first, &soup, &ray) else {
+            continue;
+        };
+        if judge(&soup, ray, Some((id, t))) != Verdict::Agrees {
+            continue;
+        }
+        planted += 1;
+        for fault in [
+            None,
+            Some(((id + 1) % 500, t)),
+            Some((id, t * 1.001)),
+            Some((id, t * 0.999)),
+        ] {
+            let verdict = judge(&soup, ray, fault);
+            assert!(
+                matches!(verdict, Verdict::Wrong(_)),
+                "{fault:?}: {verdict:?}"
+            );
+        }
+        let mut without = soup.clone();
+        without.remove(id as usize);
+        let verdict = judge(&without, ray, Some((id, t)));
+        assert!(matches!(verdict, Verdict::Wrong(_)), "{verdict:?}");
+    }
+    assert!(planted > 100, "{planted}");
+}
+
+#[test]
+fn the_coarse_test_keeps_every_triangle_that_may_be_hit() {
+    let mut random = Random(4);
+    let soup = random.soup(300, 0.2);
+    let rays: Vec<_> = (0..200).map(|_| random.ray()).collect();
+    let candidates = brute_force::candidates(&soup, &rays);
+    let mut possible = 0;
+    for (ray, found) in rays.iter().zip(&candidates) {
+        for (id, triangle) in (0u32..).zip(&soup) {
+            if Crossing::new(triangle, ray).is_possible(ray) {
+                possible += 1;
+                assert!(found.contains(&id));
+            }
+        }
+    }
+    let kept: usize = candidates.iter().map(Vec::len).sum();
+    assert!(possible > 0 && kept >= possible);
+    assert!(
+        kept < 200 * 300 / 10,
+        "{kept} kept: the coarse test rejects too little"
+    );
+}
+
+#[test]
+fn judging_a_thousand_rays_against_many_triangles_is_quick() {
+    let mut random = Random(5);
+    let soup = random.soup(262_267, 0.01);
+    let count = if cfg!(debug_assertions) { 20 } else { 1000 };
+    let queries: Vec<_> = (0..count).map(|_| (random.ray(), None)).collect();
+    let clock = std::time::Instant::now();
+    let verdicts = judge_closest_hits(&soup, &queries);
+    let seconds = clock.elapsed().as_secs_f64();
+    println!(
+        "{count} rays against {} triangles: {seconds:.3} s",
+        soup.len()
+    );
+    assert!(verdicts.iter().any(|v| *v != Verdict::Agrees));
+    assert!(seconds < 20.0, "{seconds} s");
+}

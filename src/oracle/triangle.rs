@@ -1,0 +1,200 @@
+//! One ray against one triangle in f64, with bounds on what an f32 test may get wrong.
+//!
+//! With edges e₁ = v₁ − v₀, e₂ = v₂ − v₀ and c = v₀ − o, Cramer's rule gives four triple products:
+//!
+//! ```text
+//! det = d·(e₁×e₂)   U = e₂·(c×d)   V = −e₁·(c×d)   W = det − U − V   T = c·(e₁×e₂)
+//! u = U/det   v = V/det   w = W/det   t = T/det
+//! ```
+//!
+//! # What f32 may get wrong
+//!
+//! Let ε = 2⁻²⁴. The vertices, the origin and the direction are f32 and so exact. However a
+//! Möller–Trumbore-type test groups a triple product, each of its six terms passes at most eight
+//! roundings: up to three differences (edges and c), the product of two factors, the subtraction
+//! inside the cross product, the product with the third factor, two additions. So the error is at
+//! most about 8 ε times the sum of the absolute values of the six terms, the *permanent*; fused
+//! multiply-adds only leave roundings out. A quotient may add 2.5 ulp (WGSL), one more rounding if it
+//! is taken as a reciprocal, and w = 1 − u − v two more: 8 ε of the terms again. [`ROUNDINGS`] = 10
+//! leaves room for the products of errors. f64 arithmetic itself errs 2²⁹ times less.
+//!
+//! Everything is compared in the multiplied form (U against 0, T against t·det), which stays
+//! meaningful where the ray grazes the plane and det is smaller than its own error. A test that
+//! first moves the vertices into another frame (shear, per-triangle transform) has other bounds.
+
+use super::OracleRay;
+use crate::scene::Triangle;
+
+/// Half an ulp of 1 in f32.
+const EPSILON: f64 = 1.0 / (1u32 << 24) as f64;
+
+/// Roundings of f32 allowed in any quantity.
+pub(super) const ROUNDINGS: f64 = 10.0;
+
+/// Allowed for products that f32 flushes to zero, where there are products.
+const FLUSHED: f64 = f64::from_bits((1023 - 110) << 52);
+
+/// A vector.
+pub(super) type Vector = [f64; 3];
+
+/// A number with a bound on the error of its f32 counterpart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Bounded {
+    /// Value, in f64.
+    pub value: f64,
+    /// Largest distance of the f32 result from it.
+    pub error: f64,
+}
+
+/// The triple products of a ray and a triangle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Crossing {
+    det: Bounded,
+    barycentrics: [Bounded; 3],
+    t: Bounded,
+}
+
+impl Crossing {
+    pub(super) fn new(triangle: &Triangle, ray: &OracleRay) -> Self {
+        let [v0, v1, v2] = triangle.vertices.map(|v| widen(v.to_array()));
+        let d = widen(ray.direction);
+        let (e1, e2) = (subtract(v1, v0), subtract(v2, v0));
+        let c = subtract(v0, widen(ray.origin));
+        let det = triple(d, e1, e2);
+        let u = triple(e2, c, d);
+        let v = triple(e1, d, c);
+        let terms = det.value.abs() + u.value.abs() + v.value.abs();
+        let w = Bounded {
+            value: det.value - u.value - v.value,
+            error: det.error + u.error + v.error + ROUNDINGS * EPSILON * terms,
+        };
+        Self {
+            det,
+            barycentrics: [u, v, w],
+            t: triple(c, e1, e2),
+        }
+    }
+
+    /// Whether an f32 test may find a hit in the ray's interval.
+    pub(super) fn is_possible(&self, ray: &OracleRay) -> bool {
+        let facing = |sign: f64| {
+            sign * self.det.value + self.det.error > 0.0
+                && (self.barycentrics.iter()).all(|b| sign * b.value + b.error >= 0.0)
+        };
+        let in_reach = |t: Bounded| {
+            t.value + t.error >= f64::from(ray.t_min) && t.value - t.error <= f64::from(ray.t_max)
+        };
+        (facing(1.0) || facing(-1.0)) && self.distance().is_none_or(in_reach)
+    }
+
+    /// Whether every f32 test must find a hit in the ray's interval.
+    pub(super) fn is_definite(&self, ray: &OracleRay) -> bool {
+        let sign = self.det.value.signum();
+        let inside = (self.barycentrics.iter()).all(|b| sign * b.value > b.error);
+        let in_reach = |t: Bounded| {
+            t.value - t.error > f64::from(ray.t_min) && t.value + t.error < f64::from(ray.t_max)
+        };
+        inside && self.distance().is_some_and(in_reach)
+    }
+
+    /// Distance along the ray in units of its direction; `None` if det may be zero or of either sign.
+    pub(super) fn distance(&self) -> Option<Bounded> {
+        let least_det = self.det.value.abs() - self.det.error;
+        let value = self.t.value / self.det.value;
+        let error = (self.t.error + value.abs() * self.det.error) / least_det;
+        (least_det > 0.0).then(|| Bounded {
+            value,
+            error: error + ROUNDINGS * EPSILON * value.abs(),
+        })
+    }
+
+    /// Whether an f32 test may answer the distance `t`.
+    pub(super) fn accepts(&self, t: f32) -> bool {
+        let t = f64::from(t);
+        let rounding = ROUNDINGS * EPSILON * (self.det.value.abs() + self.det.error);
+        let error = self.t.error + t.abs() * (self.det.error + rounding);
+        (self.t.value - t * self.det.value).abs() <= error
+    }
+}
+
+/// Slack for [`may_cross`], times 1-norms: see there.
+pub(super) fn coarse_slack(direction: Vector) -> f64 {
+    2.0 * ROUNDINGS * EPSILON * norm_1(direction)
+}
+
+/// A cheap condition without which no hit is possible: U, V and W all non-negative or all
+/// non-positive, to within a slack that bounds their errors from above. It needs of the triangle its
+/// edges, normal e₁×e₂ and `reach` = |e₁|₁ + |e₂|₁.
+///
+/// A permanent is at most the product of the 1-norms of its rows, so every error here is at most
+/// 2·10 ε |d|₁·reach·(|c|₁ + reach).
+#[inline(always)]
+pub(super) fn may_cross(
+    [c, e1, e2, normal]: [Vector; 4],
+    reach: f64,
+    direction: Vector,
+    slack: f64,
+) -> bool {
+    let moment = cross(c, direction);
+    let u = dot(moment, e2);
+    let v = -dot(moment, e1);
+    let w = dot(normal, direction) - u - v;
+    let slack = slack * reach * (norm_1(c) + reach) + 4.0 * FLUSHED;
+    smaller(smaller(u, v), w) >= -slack || larger(larger(u, v), w) <= slack
+}
+
+/// a·(b×c) with the bound of its f32 counterpart. A product of which every term has a zero factor is
+/// zero in f32 as well.
+fn triple(a: Vector, b: Vector, c: Vector) -> Bounded {
+    let magnitude = |v: Vector| v.map(f64::abs);
+    let (b_abs, c_abs) = (magnitude(b), magnitude(c));
+    let minors = [(1, 2), (2, 0), (0, 1)].map(|(j, k)| b_abs[j] * c_abs[k] + b_abs[k] * c_abs[j]);
+    let permanent = dot(magnitude(a), minors);
+    Bounded {
+        value: dot(a, cross(b, c)),
+        error: match permanent > 0.0 {
+            true => ROUNDINGS * EPSILON * permanent + FLUSHED,
+            false => 0.0,
+        },
+    }
+}
+
+#[inline(always)]
+pub(super) fn widen(v: [f32; 3]) -> Vector {
+    v.map(f64::from)
+}
+
+#[inline(always)]
+pub(super) fn subtract(a: Vector, b: Vector) -> Vector {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+pub(super) fn cross(a: Vector, b: Vector) -> Vector {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+#[inline(always)]
+fn dot(a: Vector, b: Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+pub(super) fn norm_1(v: Vector) -> f64 {
+    v[0].abs() + v[1].abs() + v[2].abs()
+}
+
+/// One instruction, unlike `f64::min`; the order of NaN does not matter here.
+#[inline(always)]
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}

@@ -1,0 +1,33 @@
+//! All registries together.
+
+use crate::accel::AccelRegistry;
+use crate::config::{Catalogue, Variant};
+use crate::integrator::integrator_entries;
+use crate::sampling::SamplerRegistry;
+
+/// Everything that can be named.
+#[derive(Clone, Default)]
+pub struct Registries {
+    /// Structures.
+    pub accel: AccelRegistry,
+    /// Sequences and decorrelations.
+    pub samplers: SamplerRegistry,
+}
+
+impl Registries {
+    /// Names, descriptions and parameters for the parser, lists and docs.
+    pub fn catalogue(&self) -> Catalogue {
+        Catalogue {
+            scene: crate::scene::builtin_scenes(),
+            accel: self.accel.entries(),
+            sequence: self.samplers.sequence_entries(),
+            decorrelation: self.samplers.decorrelation_entries(),
+            integrator: integrator_entries(),
+        }
+    }
+
+    /// Whether seeds change what this pair draws.
+    pub fn is_randomised(&self, sequence: &Variant, decorrelation: &Variant) -> bool {
+        self.samplers.sampler(sequence, decorrelation).is_some_and(|s| s.is_random())
+    }
+}

@@ -1,0 +1,29 @@
+//! `none`: every pixel uses the same points, the coherent path tracer of Dufay 2017. Twin of
+//! `kernels/sampling/no_decorrelation.wesl`.
+
+use super::{Coordinate, Decorrelation};
+
+/// The registry entry.
+pub struct NoDecorrelation;
+
+impl Decorrelation for NoDecorrelation {
+    fn name(&self) -> &'static str {
+        "none"
+    }
+
+    fn description(&self) -> &'static str {
+        "every pixel uses the same points: coherent rays, structured error (Dufay 2017)"
+    }
+
+    fn kernel(&self) -> &'static str {
+        "sampling/no_decorrelation"
+    }
+
+    fn is_random(&self) -> bool {
+        false
+    }
+
+    fn decorrelate(&self, x: u32, _: Coordinate) -> u32 {
+        x
+    }
+}

@@ -1,0 +1,153 @@
+//! Gathers triangles from a loader and turns them into a checked [`SceneData`].
+
+use super::{
+    Bounds, Camera, LoadReport, Material, MaterialKind, MaterialSource, SceneData, SceneError,
+    Texture, Triangle,
+};
+use glam::{Vec2, Vec3};
+
+/// Largest absolute coordinate: distances times 1e20 (the largest reciprocal of a direction
+/// component in the kernels) stay below the largest f32 with room to spare.
+pub const MAX_COORDINATE: f32 = 1e16;
+
+/// Reflectance of surfaces whose file says nothing of it.
+pub const DEFAULT_ALBEDO: f32 = 0.7;
+
+impl Triangle {
+    /// Whether no ray can hit the triangle. Differences and products of f32 are formed in f64, so
+    /// the answer does not depend on where the triangle lies.
+    pub fn has_zero_area(&self) -> bool {
+        let [a, b, c] = self.vertices.map(Vec3::as_dvec3);
+        (b - a).cross(c - a) == glam::DVec3::ZERO
+    }
+}
+
+impl Material {
+    /// A plain Lambertian material, `color` being linear RGB reflectance.
+    pub fn diffuse(name: impl Into<String>, color: Vec3) -> Self {
+        Self {
+            name: name.into(),
+            kind: MaterialKind::Diffuse,
+            base_color: color,
+            base_color_texture: None,
+            emission: Vec3::ZERO,
+            source: MaterialSource::default(),
+        }
+    }
+
+    /// The same material, emitting `radiance` (linear RGB) from both sides.
+    pub fn emitting(self, radiance: Vec3) -> Self {
+        Self {
+            emission: radiance,
+            ..self
+        }
+    }
+}
+
+/// What a loader knows of a scene besides its triangles.
+pub(super) struct Look {
+    pub materials: Vec<Material>,
+    pub textures: Vec<Texture>,
+    pub camera: Option<Camera>,
+    pub environment: Vec3,
+}
+
+/// Collects triangles: drops what cannot be traced, counts what is odd.
+#[derive(Default)]
+pub(super) struct SceneBuilder {
+    triangles: Vec<Triangle>,
+    uvs: Vec<[Vec2; 3]>,
+    material_ids: Vec<u32>,
+    keep_uvs: bool,
+    pub report: LoadReport,
+}
+
+impl SceneBuilder {
+    /// `keep_uvs` says whether texture coordinates will be of use.
+    pub fn new(keep_uvs: bool, capacity: usize) -> Self {
+        Self {
+            triangles: Vec::with_capacity(capacity),
+            uvs: Vec::with_capacity(if keep_uvs { capacity } else { 0 }),
+            material_ids: Vec::with_capacity(capacity),
+            keep_uvs,
+            report: LoadReport::default(),
+        }
+    }
+
+    /// Adds a triangle without texture coordinates.
+    pub fn push(&mut self, vertices: [Vec3; 3], material: u32) {
+        self.push_textured(vertices, [Vec2::ZERO; 3], material);
+    }
+
+    /// Adds a triangle. A non-finite vertex drops it, a zero area is counted.
+    pub fn push_textured(&mut self, vertices: [Vec3; 3], uvs: [Vec2; 3], material: u32) {
+        if !vertices.iter().all(|v| v.is_finite()) {
+            self.report.dropped_non_finite += 1;
+            return;
+        }
+        let triangle = Triangle { vertices };
+        self.report.zero_area += usize::from(triangle.has_zero_area());
+        self.triangles.push(triangle);
+        self.material_ids.push(material);
+        if self.keep_uvs {
+            let finite = |uv: Vec2| if uv.is_finite() { uv } else { Vec2::ZERO };
+            self.uvs.push(uvs.map(finite));
+        }
+    }
+
+    /// Adds the quadrilateral a, b, c, d as the triangles abc and acd.
+    pub fn push_quad(&mut self, [a, b, c, d]: [Vec3; 4], material: u32) {
+        self.push([a, b, c], material);
+        self.push([a, c, d], material);
+    }
+
+    /// Checks the whole, puts a white sky over a scene without any light, and hashes it.
+    ///
+    /// # Errors
+    /// [`SceneError::NoTriangles`], [`SceneError::TooLarge`], and [`SceneError::Camera`] if the
+    /// scene brings a camera that sees nothing.
+    pub fn finish(self, name: &str, look: Look) -> Result<SceneData, SceneError> {
+        if self.triangles.is_empty() {
+            let reason = match self.report.dropped_non_finite {
+                0 => "it lists no faces".to_owned(),
+                n => format!("all {n} have a NaN or infinite vertex"),
+            };
+            return Err(SceneError::NoTriangles {
+                name: name.to_owned(),
+                reason,
+            });
+        }
+        let bounds = Bounds::of(&self.triangles);
+        let magnitude = bounds.min.abs().max(bounds.max.abs()).max_element();
+        if magnitude > MAX_COORDINATE {
+            return Err(SceneError::TooLarge {
+                name: name.to_owned(),
+                magnitude,
+                limit: MAX_COORDINATE,
+            });
+        }
+        if let Some(camera) = &look.camera {
+            camera.validate()?;
+        }
+        let textured = !look.textures.is_empty();
+        let mut scene = SceneData {
+            name: name.to_owned(),
+            triangles: self.triangles,
+            uvs: if textured { self.uvs } else { Vec::new() },
+            material_ids: self.material_ids,
+            materials: look.materials,
+            textures: look.textures,
+            camera: look.camera,
+            environment: look.environment,
+            hash: String::new(),
+            report: self.report,
+        };
+        if scene.environment == Vec3::ZERO && scene.emitters().is_empty() {
+            scene.environment = Vec3::ONE;
+            let warning = "the scene has no light: lit by a white sky of radiance 1".to_owned();
+            scene.report.warnings.push(warning);
+        }
+        scene.hash = scene.content_hash();
+        Ok(scene)
+    }
+}

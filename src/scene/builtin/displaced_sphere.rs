@@ -1,0 +1,74 @@
+//! A bumpy closed surface of any number of triangles of about the same size.
+
+use super::super::builder::{Look, SceneBuilder};
+use super::super::{Camera, Material};
+use super::Builtin;
+use super::numeric::sin_cos_turns;
+use super::sphere::SphereGrid;
+use crate::config::{ParamRange, ParamValue, Parameter, Params};
+use glam::{DVec3, Vec3};
+
+pub(super) const SCENE: Builtin = Builtin {
+    name: "displaced-sphere",
+    description: "closed bumpy sphere of any number of triangles under a white sky",
+    schema: || {
+        vec![Parameter {
+            name: "triangles",
+            description: "number of triangles: the nearest grid that does not exceed it",
+            default: ParamValue::Integer(100_000),
+            range: ParamRange::Integer {
+                min: 8,
+                max: 50_000_000,
+            },
+        }]
+    },
+    build,
+};
+
+fn build(params: &Params) -> (SceneBuilder, Look) {
+    let wanted = usize::try_from(params.integer("triangles")).unwrap_or(8);
+    let grid = SphereGrid::with_at_most(wanted);
+    let mut builder = SceneBuilder::new(false, grid.triangles());
+    grid.push(&mut builder, 0, |direction| {
+        (radius(direction) * direction).as_vec3()
+    });
+    let look = Look {
+        materials: vec![Material::diffuse("grey", Vec3::splat(0.7))],
+        textures: Vec::new(),
+        camera: Some(Camera {
+            eye: Vec3::new(1.6, 1.3, 2.6),
+            target: Vec3::ZERO,
+            up: Vec3::Y,
+            vertical_fov_degrees: 40.0,
+        }),
+        environment: Vec3::ONE,
+    };
+    (builder, look)
+}
+
+/// Distance from the centre: three octaves of products of sines, between 0.75 and 1.25.
+fn radius(direction: DVec3) -> f64 {
+    let wave = |frequency: f64| {
+        let sin = |x: f64, phase: f64| sin_cos_turns(frequency * x + phase).0;
+        sin(direction.x, 0.1) * sin(direction.y, 0.35) * sin(direction.z, 0.6)
+    };
+    1.0 + 0.14 * wave(0.9) + 0.07 * wave(2.1) + 0.04 * wave(4.7)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{is_closed, load_with};
+    use super::*;
+
+    #[test]
+    fn the_surface_is_closed_at_every_size_and_open_without_one_triangle() {
+        for triangles in [8, 9, 1000, 20_001] {
+            let value = ParamValue::Integer(triangles);
+            let mut scene = load_with("displaced-sphere", &[("triangles", value)]);
+            assert!(scene.triangles.len() as i64 <= triangles);
+            assert!(is_closed(&scene), "{triangles}");
+            scene.triangles.pop();
+            assert!(!is_closed(&scene), "{triangles}");
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! Procedural scenes: no files, deterministic to the bit on every platform.
+//!
+//! A new scene is one file here and one line in `BUILTINS`.
+
+mod cornell_box;
+mod displaced_sphere;
+mod furnace;
+pub(super) mod numeric;
+mod sphere;
+mod teapot_in_a_stadium;
+mod teapot_patches;
+mod triangle_soup;
+
+use super::builder::{Look, SceneBuilder};
+use super::{SceneData, SceneError};
+use crate::config::{Entry, ParameterSchema, Params, Variant};
+
+/// One built-in scene.
+struct Builtin {
+    name: &'static str,
+    description: &'static str,
+    schema: fn() -> ParameterSchema,
+    build: fn(&Params) -> (SceneBuilder, Look),
+}
+
+/// The registry.
+const BUILTINS: [Builtin; 6] = [
+    cornell_box::SCENE,
+    displaced_sphere::SCENE,
+    triangle_soup::SCENE,
+    teapot_in_a_stadium::SCENE,
+    furnace::FURNACE_BOX,
+    furnace::WHITE_FURNACE,
+];
+
+/// The built-in scenes with their parameters, for the parser, lists and docs.
+pub fn builtin_scenes() -> Vec<Entry> {
+    BUILTINS
+        .iter()
+        .map(|scene| Entry {
+            name: scene.name.to_owned(),
+            description: scene.description.to_owned(),
+            schema: (scene.schema)(),
+        })
+        .collect()
+}
+
+/// The built-in scene that `variant` names, if it names one.
+pub(super) fn build(variant: &Variant) -> Option<Result<SceneData, SceneError>> {
+    let scene = BUILTINS.iter().find(|scene| scene.name == variant.name)?;
+    let (builder, look) = (scene.build)(&variant.params);
+    Some(builder.finish(&variant.name, look))
+}
+
+/// What to type instead of `name`: the nearest built-in name, else all of them.
+pub(super) fn hint(name: &str) -> String {
+    let nearest = BUILTINS
+        .iter()
+        .map(|scene| (strsim::damerau_levenshtein(scene.name, name), scene.name))
+        .min()
+        .filter(|(distance, _)| *distance <= 3);
+    match nearest {
+        Some((_, nearest)) => format!("did you mean `{nearest}`?"),
+        None => {
+            let names: Vec<_> = BUILTINS.iter().map(|scene| scene.name).collect();
+            format!(
+                "built-in scenes are {}; a file ends in .obj, .gltf, .glb or .ply",
+                names.join(", ")
+            )
+        }
+    }
+}
+
+#[cfg(test)]
+pub(in crate::scene) mod tests {
+    use super::*;
+    use crate::config::{ParamRange, ParamValue};
+    use crate::scene::{LoadOptions, load};
+    use std::collections::{BTreeMap, HashMap};
+
+    /// A built-in scene with some parameters changed from their defaults.
+    pub fn load_with(name: &str, changes: &[(&str, ParamValue)]) -> SceneData {
+        let entries = builtin_scenes();
+        let entry = entries.iter().find(|entry| entry.name == name).unwrap();
+        let defaults = entry.schema.iter();
+        let mut params: BTreeMap<_, _> = defaults
+            .map(|p| (p.name.to_owned(), p.default.clone()))
+            .collect();
+        for (key, value) in changes {
+            *params.get_mut(*key).unwrap() = value.clone();
+        }
+        let variant = Variant {
+            name: name.to_owned(),
+            params: Params(params),
+            label: name.to_owned(),
+        };
+        load(&variant, &LoadOptions::default()).unwrap()
+    }
+
+    /// A built-in scene with its default parameters.
+    pub fn load_default(name: &str) -> SceneData {
+        load_with(name, &[])
+    }
+
+    /// Whether every edge is used once in each direction: closed and consistently oriented.
+    pub fn is_closed(scene: &SceneData) -> bool {
+        let mut balance: HashMap<[[u32; 3]; 2], i32> = HashMap::new();
+        let key = |v: glam::Vec3| v.to_array().map(f32::to_bits);
+        for triangle in &scene.triangles {
+            for k in 0..3 {
+                let (a, b) = (
+                    key(triangle.vertices[k]),
+                    key(triangle.vertices[(k + 1) % 3]),
+                );
+                *balance.entry([a, b]).or_default() += 1;
+                *balance.entry([b, a]).or_default() -= 1;
+            }
+        }
+        balance.values().all(|n| *n == 0)
+    }
+
+    #[test]
+    fn every_built_in_scene_loads_with_its_defaults_and_is_deterministic() {
+        let mut hashes = Vec::new();
+        for entry in builtin_scenes() {
+            let scene = load_default(&entry.name);
+            assert_eq!(scene.hash, load_default(&entry.name).hash);
+            assert!(scene.report.warnings.is_empty(), "{}", entry.name);
+            assert_eq!(scene.report.zero_area, 0, "{}", entry.name);
+            assert_eq!(scene.triangles.len(), scene.material_ids.len());
+            let materials = scene.materials.len() as u32;
+            assert!(scene.material_ids.iter().all(|id| *id < materials));
+            hashes.push(scene.hash);
+        }
+        assert!(!hashes.is_empty());
+        hashes.sort();
+        hashes.dedup();
+        assert_eq!(hashes.len(), BUILTINS.len());
+    }
+
+    #[test]
+    fn every_numeric_parameter_changes_the_scene_and_works_at_its_least_value() {
+        let mut parameters = 0;
+        for entry in builtin_scenes() {
+            for parameter in &entry.schema {
+                let least = match parameter.range {
+                    ParamRange::Integer { min, .. } => ParamValue::Integer(min),
+                    ParamRange::Number { min, .. } => ParamValue::Number(min),
+                    _ => continue,
+                };
+                let scene = load_with(&entry.name, &[(parameter.name, least)]);
+                assert_ne!(scene.hash, load_default(&entry.name).hash);
+                parameters += 1;
+            }
+        }
+        assert!(parameters >= 5);
+    }
+
+    #[test]
+    fn an_unknown_name_is_answered_with_the_nearest_one() {
+        assert_eq!(hint("cornel-box"), "did you mean `cornell-box`?");
+        assert!(hint("something else entirely").contains("triangle-soup"));
+    }
+}

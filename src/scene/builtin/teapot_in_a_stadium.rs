@@ -1,0 +1,182 @@
+//! Teapot in a stadium: a small detailed object in a scene a thousand times larger, the case that
+//! breaks uniform grids (Haines, Ray Tracing News 1988).
+
+use super::super::builder::{Look, SceneBuilder};
+use super::super::{Camera, Material};
+use super::Builtin;
+use super::numeric::sin_cos_turns;
+use super::teapot_patches::tessellate;
+use crate::config::{ParamRange, ParamValue, Parameter, Params};
+use glam::Vec3;
+
+pub(super) const SCENE: Builtin = Builtin {
+    name: "teapot-in-a-stadium",
+    description: "the Utah teapot on the field of a stadium a thousand times its size, white sky",
+    schema: || {
+        vec![Parameter {
+            name: "subdivision",
+            description: "quadrilaterals along each edge of the teapot's 32 patches; 10 gives \
+                          6,320 triangles",
+            default: ParamValue::Integer(10),
+            range: ParamRange::Integer { min: 2, max: 500 },
+        }]
+    },
+    build,
+};
+
+const TEAPOT: u32 = 0;
+const FIELD: u32 = 1;
+const ROWS: [u32; 2] = [2, 3];
+
+/// Edge of the field, units; the teapot is about 6.4 long.
+const FIELD_EDGE: f32 = 10_000.0;
+/// Cells along an edge of the field.
+const FIELD_CELLS: usize = 96;
+/// Rows of seats, and straight pieces of each.
+const ROW_COUNT: usize = 24;
+const ROW_PIECES: usize = 128;
+/// Of the first row, and of each.
+const FIRST_RADIUS: f32 = 2500.0;
+const ROW_DEPTH: f32 = 90.0;
+const ROW_HEIGHT: f32 = 50.0;
+/// The teapot floats this far above the field, so that its flat bottom does not coincide with it.
+const LIFT: f32 = 0.01;
+
+fn build(params: &Params) -> (SceneBuilder, Look) {
+    let subdivision = usize::try_from(params.integer("subdivision")).unwrap_or(2);
+    let mut builder = SceneBuilder::default();
+    for triangle in tessellate(subdivision) {
+        builder.push(triangle.map(|v| v + LIFT * Vec3::Y), TEAPOT);
+    }
+    push_field(&mut builder);
+    push_rows(&mut builder);
+    let look = Look {
+        materials: vec![
+            Material::diffuse("teapot", Vec3::new(0.8, 0.55, 0.3)),
+            Material::diffuse("field", Vec3::new(0.3, 0.5, 0.25)),
+            Material::diffuse("row", Vec3::splat(0.6)),
+            Material::diffuse("other row", Vec3::new(0.3, 0.35, 0.55)),
+        ],
+        textures: Vec::new(),
+        camera: Some(Camera {
+            eye: Vec3::new(2.5, 3.4, 8.2),
+            target: Vec3::new(0.2, 1.9, 0.0),
+            up: Vec3::Y,
+            vertical_fov_degrees: 40.0,
+        }),
+        environment: Vec3::ONE,
+    };
+    (builder, look)
+}
+
+fn push_field(builder: &mut SceneBuilder) {
+    let at = |i: usize, k: usize| {
+        let coordinate = |i: usize| FIELD_EDGE * (i as f32 / FIELD_CELLS as f32 - 0.5);
+        Vec3::new(coordinate(i), 0.0, coordinate(k))
+    };
+    for i in 0..FIELD_CELLS {
+        for k in 0..FIELD_CELLS {
+            let quad = [at(i, k), at(i, k + 1), at(i + 1, k + 1), at(i + 1, k)];
+            builder.push_quad(quad, FIELD);
+        }
+    }
+}
+
+/// Concentric steps: an upright riser and a level tread each.
+fn push_rows(builder: &mut SceneBuilder) {
+    let at = |radius: f32, height: f32, piece: usize| {
+        let (sin, cos) = sin_cos_turns((piece % ROW_PIECES) as f64 / ROW_PIECES as f64);
+        Vec3::new(radius * cos as f32, height, radius * sin as f32)
+    };
+    for row in 0..ROW_COUNT {
+        let radius = FIRST_RADIUS + ROW_DEPTH * row as f32;
+        let outer = radius + ROW_DEPTH;
+        let bottom = ROW_HEIGHT * row as f32;
+        let top = bottom + ROW_HEIGHT;
+        for piece in 0..ROW_PIECES {
+            let pair = |radius, height| [at(radius, height, piece), at(radius, height, piece + 1)];
+            let ([a, b], [d, c], [f, e]) =
+                (pair(radius, bottom), pair(radius, top), pair(outer, top));
+            let material = ROWS[row % 2];
+            builder.push_quad([a, b, c, d], material);
+            builder.push_quad([d, c, e, f], material);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{load_default, load_with};
+    use super::*;
+    use crate::scene::{Bounds, Triangle};
+
+    fn teapot(subdivision: usize) -> Vec<Triangle> {
+        let triangles = tessellate(subdivision).into_iter();
+        triangles.map(|vertices| Triangle { vertices }).collect()
+    }
+
+    #[test]
+    fn the_teapot_has_newells_extent_and_6320_triangles() {
+        let triangles = teapot(10);
+        assert_eq!(triangles.len(), 6320);
+        let bounds = Bounds::of(&triangles);
+        let published = Bounds {
+            min: Vec3::new(-3.0, 0.0, -2.0),
+            max: Vec3::new(3.434, 3.15, 2.0),
+        };
+        assert!((bounds.min - published.min).abs().max_element() < 1e-3);
+        assert!((bounds.max - published.max).abs().max_element() < 1e-3);
+    }
+
+    #[test]
+    fn no_triangle_of_the_teapot_is_degenerate_and_finer_ones_have_more() {
+        for subdivision in [2, 3, 5, 10, 16] {
+            let triangles = teapot(subdivision);
+            assert_eq!(
+                triangles.iter().find(|t| t.has_zero_area()),
+                None,
+                "{subdivision}"
+            );
+            // 32 patches, of which 8 meet a pole and lose a triangle per cell there.
+            let n = subdivision;
+            assert_eq!(triangles.len(), 2 * 32 * n * n - 8 * n);
+        }
+    }
+
+    #[test]
+    fn the_teapot_matches_a_public_tessellation_of_it() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/scenes/utah-teapot");
+        let Ok(text) = std::fs::read_to_string(format!("{folder}/teapot.obj")) else {
+            println!("skipped: {folder} is absent");
+            return;
+        };
+        let ours: Vec<Vec3> = tessellate(10).into_iter().flatten().collect();
+        let mut compared = 0;
+        for line in text.lines().filter(|line| line.starts_with("v ")) {
+            let numbers: Vec<f32> = line[2..]
+                .split_whitespace()
+                .map(|word| word.parse().unwrap())
+                .collect();
+            let vertex = Vec3::from_slice(&numbers);
+            let distance = |p: &Vec3| p.distance(vertex);
+            let nearest = ours.iter().map(distance).fold(f32::INFINITY, f32::min);
+            assert!(nearest < 5e-3, "{vertex} is {nearest} away");
+            compared += 1;
+        }
+        assert!(compared > 3000);
+    }
+
+    #[test]
+    fn the_stadium_is_a_thousand_times_the_teapot() {
+        let scene = load_default("teapot-in-a-stadium");
+        let extent = scene.bounds().max - scene.bounds().min;
+        assert_eq!(extent.x, FIELD_EDGE);
+        let field_and_rows = 2 * FIELD_CELLS * FIELD_CELLS + 4 * ROW_COUNT * ROW_PIECES;
+        assert_eq!(scene.triangles.len(), 6320 + field_and_rows);
+        let fine = load_with(
+            "teapot-in-a-stadium",
+            &[("subdivision", ParamValue::Integer(20))],
+        );
+        assert_eq!(fine.triangles.len(), 2 * 32 * 400 - 160 + field_and_rows);
+    }
+}

@@ -1,0 +1,100 @@
+//! Random triangles: the worst case for every hierarchy, and a quick test of any structure.
+
+use super::super::builder::{Look, SceneBuilder};
+use super::super::{Camera, Material};
+use super::Builtin;
+use super::numeric::Pcg;
+use crate::config::{ParamRange, ParamValue, Parameter, Params};
+use glam::Vec3;
+
+pub(super) const SCENE: Builtin = Builtin {
+    name: "triangle-soup",
+    description: "random triangles, centres uniform in the unit cube, under a white sky",
+    schema: || {
+        vec![
+            Parameter {
+                name: "triangles",
+                description: "number of triangles",
+                default: ParamValue::Integer(10_000),
+                range: ParamRange::Integer {
+                    min: 1,
+                    max: 50_000_000,
+                },
+            },
+            Parameter {
+                name: "size",
+                description: "edge of the cube that holds a triangle, in edges of the unit cube",
+                default: ParamValue::Number(0.05),
+                range: ParamRange::Number {
+                    min: 1e-4,
+                    max: 1.0,
+                },
+            },
+            Parameter {
+                name: "seed",
+                description: "seed of the random generator (PCG, O'Neill 2014)",
+                default: ParamValue::Integer(1),
+                range: ParamRange::Integer {
+                    min: 0,
+                    max: i64::MAX,
+                },
+            },
+        ]
+    },
+    build,
+};
+
+fn build(params: &Params) -> (SceneBuilder, Look) {
+    let count = usize::try_from(params.integer("triangles")).unwrap_or(1);
+    let size = params.number("size") as f32;
+    let mut pcg = Pcg::new(params.integer("seed") as u64);
+    let mut point = || Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());
+    let mut builder = SceneBuilder::new(false, count);
+    for index in 0..count {
+        let corner = point() - 0.5 * size;
+        let vertices = [0; 3].map(|_| corner + size * point());
+        builder.push(vertices, (index % 3) as u32);
+    }
+    let colors = [(0.75, 0.35, 0.3), (0.35, 0.65, 0.4), (0.35, 0.45, 0.75)];
+    let materials = colors.map(|color| Material::diffuse("soup", color.into()));
+    let look = Look {
+        materials: materials.into(),
+        textures: Vec::new(),
+        camera: Some(Camera {
+            eye: Vec3::new(1.7, 1.3, 2.5),
+            target: Vec3::splat(0.5),
+            up: Vec3::Y,
+            vertical_fov_degrees: 40.0,
+        }),
+        environment: Vec3::ONE,
+    };
+    (builder, look)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{load_default, load_with};
+    use super::*;
+
+    #[test]
+    fn triangles_fill_the_unit_cube_and_stay_within_their_size() {
+        let scene = load_default("triangle-soup");
+        assert_eq!(scene.triangles.len(), 10_000);
+        let bounds = scene.bounds();
+        assert!(bounds.min.min_element() >= -0.025 && bounds.max.max_element() <= 1.025);
+        assert!(bounds.min.max_element() < 0.01 && bounds.max.min_element() > 0.99);
+        let mean: Vec3 = scene.triangles.iter().map(|t| t.vertices[0]).sum::<Vec3>() / 1e4;
+        assert!((mean - 0.5).abs().max_element() < 0.02, "{mean}");
+        for triangle in &scene.triangles {
+            let [a, b, c] = triangle.vertices;
+            let extent = a.max(b).max(c) - a.min(b).min(c);
+            assert!(extent.max_element() <= 0.0501);
+        }
+    }
+
+    #[test]
+    fn another_seed_gives_another_soup() {
+        let other = load_with("triangle-soup", &[("seed", ParamValue::Integer(2))]);
+        assert_ne!(other.hash, load_default("triangle-soup").hash);
+    }
+}

@@ -1,0 +1,137 @@
+//! Questions asked of a loaded scene: extent, size in bytes, emitters, content hash.
+
+use super::{Bounds, SceneData, Triangle};
+use glam::{Vec2, Vec3};
+use std::mem::size_of_val;
+
+/// Changed whenever the order or meaning of the hashed bytes changes.
+const HASH_VERSION: &[u8] = b"raystone scene 1";
+
+impl SceneData {
+    /// The box of all triangles, scene units.
+    pub fn bounds(&self) -> Bounds {
+        Bounds::of(&self.triangles)
+    }
+
+    /// Bytes of the scene's arrays: triangles, texture coordinates, material indices, texels.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.triangles[..])
+            + size_of_val(&self.uvs[..])
+            + size_of_val(&self.material_ids[..])
+            + self
+                .textures
+                .iter()
+                .map(|texture| size_of_val(&texture.texels[..]))
+                .sum::<usize>()
+    }
+
+    /// Indices of the triangles that emit light and have an area, ascending.
+    pub fn emitters(&self) -> Vec<u32> {
+        let emits: Vec<bool> = self
+            .materials
+            .iter()
+            .map(|material| material.emission.max_element() > 0.0)
+            .collect();
+        if !emits.contains(&true) {
+            return Vec::new();
+        }
+        (0u32..)
+            .zip(&self.triangles)
+            .zip(&self.material_ids)
+            .filter(|((_, triangle), id)| emits[**id as usize] && !triangle.has_zero_area())
+            .map(|((index, _), _)| index)
+            .collect()
+    }
+
+    /// BLAKE3 (hex) of vertices, texture coordinates, materials, textures, camera and environment.
+    /// Names are not part of it. Every list is preceded by its length, so that no two scenes share
+    /// their bytes.
+    pub(super) fn content_hash(&self) -> String {
+        let mut hash = Hash(blake3::Hasher::new());
+        hash.bytes(HASH_VERSION);
+        hash.bytes(bytemuck::cast_slice::<Triangle, u8>(&self.triangles));
+        hash.bytes(bytemuck::cast_slice::<[Vec2; 3], u8>(&self.uvs));
+        hash.bytes(bytemuck::cast_slice::<u32, u8>(&self.material_ids));
+        hash.bytes(&self.materials.len().to_le_bytes());
+        for material in &self.materials {
+            let texture = material.base_color_texture.map_or(-1, i64::from);
+            hash.bytes(&[material.kind as u8]);
+            hash.bytes(&texture.to_le_bytes());
+            hash.vectors(&[material.base_color, material.emission]);
+            // The derived Debug text is a total, deterministic image of the plain fields.
+            hash.bytes(format!("{:?}", material.source).as_bytes());
+        }
+        for texture in &self.textures {
+            hash.bytes(bytemuck::cast_slice(&[texture.width, texture.height]));
+            hash.bytes(texture.texels.as_flattened());
+        }
+        if let Some(camera) = &self.camera {
+            let lens = Vec3::splat(camera.vertical_fov_degrees);
+            hash.vectors(&[camera.eye, camera.target, camera.up, lens]);
+        }
+        hash.vectors(&[self.environment]);
+        hash.0.finalize().to_hex().to_string()
+    }
+}
+
+struct Hash(blake3::Hasher);
+
+impl Hash {
+    fn bytes(&mut self, bytes: &[u8]) {
+        self.0.update(&(bytes.len() as u64).to_le_bytes());
+        self.0.update(bytes);
+    }
+
+    fn vectors(&mut self, vectors: &[Vec3]) {
+        self.bytes(bytemuck::cast_slice(vectors));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scene::builtin::tests::load_default;
+
+    #[test]
+    fn the_hash_sees_every_part_of_the_scene() {
+        let scene = load_default("cornell-box");
+        type Change = fn(&mut crate::scene::SceneData);
+        let changes: [(&str, Change); 7] = [
+            ("vertex", |s| s.triangles[3].vertices[1].x += 1e-3),
+            ("material id", |s| s.material_ids[0] = 1),
+            ("reflectance", |s| s.materials[0].base_color.y += 1e-3),
+            ("emission", |s| s.materials[0].emission.z += 1e-3),
+            ("source", |s| s.materials[0].source.ior = Some(1.5)),
+            ("camera", |s| s.camera = None),
+            ("environment", |s| s.environment.x += 1e-3),
+        ];
+        for (what, change) in changes {
+            let mut changed = scene.clone();
+            change(&mut changed);
+            assert_ne!(changed.content_hash(), scene.hash, "{what}");
+        }
+        let mut renamed = scene.clone();
+        renamed.name = "another name".into();
+        renamed.materials[0].name = "another name".into();
+        assert_eq!(renamed.content_hash(), scene.hash);
+    }
+
+    #[test]
+    fn emitters_are_the_triangles_of_emitting_materials_that_have_an_area() {
+        let mut scene = load_default("cornell-box");
+        let emitters = scene.emitters();
+        assert_eq!(emitters.len(), 2);
+        for &index in &emitters {
+            let id = scene.material_ids[index as usize] as usize;
+            assert!(scene.materials[id].emission.x > 0.0);
+        }
+        let flattened = &mut scene.triangles[emitters[0] as usize].vertices;
+        flattened[2] = flattened[1];
+        assert_eq!(scene.emitters(), emitters[1..]);
+    }
+
+    #[test]
+    fn bytes_are_36_of_vertices_and_4_of_material_per_triangle() {
+        let scene = load_default("triangle-soup");
+        assert_eq!(scene.bytes(), scene.triangles.len() * 40);
+    }
+}

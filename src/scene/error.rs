@@ -1,0 +1,138 @@
+//! What can go wrong between a scene's name and its triangles.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+/// A scene could not be loaded: says which file, where in it, and what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// Neither a built-in scene nor a file.
+    #[error("unknown scene `{name}`: not a built-in scene and no such file; {hint}")]
+    Unknown {
+        /// What the user typed.
+        name: String,
+        /// The nearest built-in name, or all of them.
+        hint: String,
+    },
+    /// The file's extension names no format that can be read.
+    #[error("{}: unknown model format; give a .obj, .gltf, .glb or .ply file", path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The operating system refused the file.
+    #[error("{}: cannot read the model ({source}); check the path and its permissions", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: std::io::Error,
+    },
+    /// The file has no bytes.
+    #[error("{}: the file is empty; export or copy the model again", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The content breaks the rules of its format.
+    #[error("{}{}: {problem}; repair the file or export it again", path.display(), at(place))]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// Line or part of the file, empty if it is not known.
+        place: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The file is well formed and has no triangle to trace.
+    #[error("{name}: the scene has no triangles ({reason}); give a model with at least one face")]
+    NoTriangles {
+        /// The scene, as typed.
+        name: String,
+        /// Why there are none.
+        reason: String,
+    },
+    /// Coordinates so large that f32 arithmetic on them overflows.
+    #[error(
+        "{name}: a coordinate of {magnitude:e} is beyond the limit of {limit:e} of f32 tracing; \
+         scale the model down"
+    )]
+    TooLarge {
+        /// The scene, as typed.
+        name: String,
+        /// Largest absolute coordinate found.
+        magnitude: f32,
+        /// Largest allowed.
+        limit: f32,
+    },
+    /// A camera that sees nothing.
+    #[error("camera: {problem}; {advice}")]
+    Camera {
+        /// What is wrong.
+        problem: String,
+        /// What to write instead.
+        advice: &'static str,
+    },
+}
+
+fn at(place: &str) -> String {
+    if place.is_empty() {
+        String::new()
+    } else {
+        format!(" ({place})")
+    }
+}
+
+impl SceneError {
+    /// A [`SceneError::Malformed`].
+    pub(super) fn malformed(
+        path: &Path,
+        place: impl Into<String>,
+        problem: impl Into<String>,
+    ) -> Self {
+        Self::Malformed {
+            path: path.to_owned(),
+            place: place.into(),
+            problem: problem.into(),
+        }
+    }
+}
+
+/// Opens a model, telling a missing or empty file from a readable one.
+pub(super) fn open(path: &Path) -> Result<std::fs::File, SceneError> {
+    let read = |source| SceneError::Read {
+        path: path.to_owned(),
+        source,
+    };
+    let file = std::fs::File::open(path).map_err(read)?;
+    let meta = file.metadata().map_err(read)?;
+    if meta.is_dir() {
+        return Err(read(std::io::ErrorKind::IsADirectory.into()));
+    }
+    if meta.len() == 0 {
+        return Err(SceneError::Empty {
+            path: path.to_owned(),
+        });
+    }
+    Ok(file)
+}
+
+/// Runs a loader built on third-party parsers, which may panic on malformed files, and turns a
+/// panic into an error.
+pub(super) fn guarded<T>(
+    path: &Path,
+    load: impl FnOnce() -> Result<T, SceneError>,
+) -> Result<T, SceneError> {
+    catch_unwind(AssertUnwindSafe(load)).unwrap_or_else(|payload| {
+        let text = payload
+            .downcast_ref::<String>()
+            .map(String::as_str)
+            .or_else(|| payload.downcast_ref::<&str>().copied())
+            .unwrap_or("no message");
+        Err(SceneError::malformed(
+            path,
+            "",
+            format!("the parser gave up: {text}"),
+        ))
+    })
+}

@@ -1,0 +1,340 @@
+//! glTF 2.0 and GLB by the `gltf` crate: nodes are flattened into world space, instances included.
+
+use super::builder::{Look, SceneBuilder};
+use super::error::{guarded, open};
+use super::gltf_material::{self, TextureUse};
+use super::texture::decode_all;
+use super::{Camera, LoadOptions, SceneData, SceneError};
+use base64::Engine;
+use glam::{Mat4, Vec2, Vec3};
+use gltf::mesh::Mode;
+use std::borrow::Cow;
+use std::io::Read;
+use std::path::Path;
+
+/// Loads a glTF or GLB model: its default scene, with the first camera of it.
+///
+/// # Errors
+/// [`SceneError`] naming the mesh, node or buffer that breaks the rules.
+pub(super) fn load(
+    path: &Path,
+    name: &str,
+    options: &LoadOptions,
+) -> Result<SceneData, SceneError> {
+    let mut file = open(path)?;
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes)
+        .map_err(|source| SceneError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+    guarded(path, || {
+        let gltf = gltf::Gltf::from_slice(&bytes)
+            .map_err(|error| SceneError::malformed(path, "", error.to_string()))?;
+        drop(bytes);
+        let gltf::Gltf { document, blob } = gltf;
+        let buffers = read_buffers(path, &document, blob)?;
+        build(path, name, options, &document, &buffers)
+    })
+}
+
+fn build(
+    path: &Path,
+    name: &str,
+    options: &LoadOptions,
+    document: &gltf::Document,
+    buffers: &[Vec<u8>],
+) -> Result<SceneData, SceneError> {
+    let mut palette = gltf_material::read(path, document, buffers, options.textures);
+    let mut geometry = Geometry {
+        path,
+        buffers,
+        texture_uses: &palette.texture_uses,
+        builder: SceneBuilder::new(!palette.images.is_empty(), 0),
+        camera: None,
+        lines_or_points: 0,
+        deformed: 0,
+    };
+    geometry.read_scene(document)?;
+    geometry.report_left_out();
+    let Geometry {
+        mut builder,
+        camera,
+        ..
+    } = geometry;
+    builder.report.warnings.append(&mut palette.warnings);
+    let textures = decode_all(
+        &palette.images,
+        options.max_texture_size,
+        &mut palette.materials,
+        &mut builder.report,
+    );
+    let look = Look {
+        materials: palette.materials,
+        textures,
+        camera,
+        environment: Vec3::ZERO,
+    };
+    builder.finish(name, look)
+}
+
+/// The bytes of every buffer: the binary chunk, a data URI or a file beside the model.
+fn read_buffers(
+    path: &Path,
+    document: &gltf::Document,
+    mut blob: Option<Vec<u8>>,
+) -> Result<Vec<Vec<u8>>, SceneError> {
+    document
+        .buffers()
+        .map(|buffer| {
+            let place = format!("buffer {}", buffer.index());
+            let error = |problem: String| SceneError::malformed(path, &place, problem);
+            let data = match buffer.source() {
+                gltf::buffer::Source::Bin => blob
+                    .take()
+                    .ok_or_else(|| error("the binary chunk is missing".to_owned()))?,
+                gltf::buffer::Source::Uri(uri) => read_uri(path, uri).map_err(error)?,
+            };
+            if data.len() < buffer.length() {
+                return Err(error(format!(
+                    "{} bytes are announced, {} are there",
+                    buffer.length(),
+                    data.len()
+                )));
+            }
+            Ok(data)
+        })
+        .collect()
+}
+
+/// Bytes of a data URI or of a file relative to the model.
+pub(super) fn read_uri(model: &Path, uri: &str) -> Result<Vec<u8>, String> {
+    if let Some(data) = uri.strip_prefix("data:") {
+        let (_, encoded) = data
+            .split_once(";base64,")
+            .ok_or("the data URI is not base64")?;
+        return base64::engine::general_purpose::STANDARD
+            .decode(encoded)
+            .map_err(|error| format!("the data URI cannot be decoded: {error}"));
+    }
+    let file = uri_file(model, uri);
+    std::fs::read(&file).map_err(|error| format!("{}: {error}", file.display()))
+}
+
+/// The file a relative URI names, `%20` and the like decoded.
+pub(super) fn uri_file(model: &Path, uri: &str) -> std::path::PathBuf {
+    let mut decoded = Vec::with_capacity(uri.len());
+    let mut rest = uri.as_bytes();
+    while let Some((&byte, after)) = rest.split_first() {
+        let hex = (byte == b'%').then(|| after.get(..2)).flatten();
+        let value = hex.and_then(|h| u8::from_str_radix(std::str::from_utf8(h).ok()?, 16).ok());
+        decoded.push(value.unwrap_or(byte));
+        rest = &after[if value.is_some() { 2 } else { 0 }..];
+    }
+    let name = String::from_utf8_lossy(&decoded).into_owned();
+    model.parent().unwrap_or(Path::new("")).join(name)
+}
+
+/// Walks the nodes of a scene and gathers triangles and the first camera.
+struct Geometry<'a> {
+    path: &'a Path,
+    buffers: &'a [Vec<u8>],
+    texture_uses: &'a [TextureUse],
+    builder: SceneBuilder,
+    camera: Option<Camera>,
+    lines_or_points: usize,
+    deformed: usize,
+}
+
+impl<'a> Geometry<'a> {
+    fn read_scene(&mut self, document: &'a gltf::Document) -> Result<(), SceneError> {
+        let scene = document
+            .default_scene()
+            .or_else(|| document.scenes().next());
+        let roots = scene.ok_or_else(|| SceneError::malformed(self.path, "", "it has no scene"))?;
+        // An explicit stack and a mark per node: a cycle in a malformed file ends in an error.
+        let mut visited = vec![false; document.nodes().len()];
+        let mut stack: Vec<_> = roots.nodes().map(|node| (node, Mat4::IDENTITY)).collect();
+        stack.reverse();
+        while let Some((node, parent)) = stack.pop() {
+            if std::mem::replace(&mut visited[node.index()], true) {
+                return Err(self.error(&node, "it is reached twice, but nodes must form a tree"));
+            }
+            let world = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
+            self.read_node(&node, world)?;
+            let first_child = stack.len();
+            stack.extend(node.children().map(|child| (child, world)));
+            stack[first_child..].reverse();
+        }
+        Ok(())
+    }
+
+    fn error(&self, node: &gltf::Node<'_>, problem: impl Into<String>) -> SceneError {
+        let label = node.name().unwrap_or("unnamed");
+        let place = format!("node {} `{label}`", node.index());
+        SceneError::malformed(self.path, place, problem)
+    }
+
+    fn read_node(&mut self, node: &gltf::Node<'a>, world: Mat4) -> Result<(), SceneError> {
+        if let (None, Some(camera)) = (self.camera, node.camera()) {
+            self.camera = self.read_camera(&camera, world);
+        }
+        let Some(mesh) = node.mesh() else {
+            return Ok(());
+        };
+        self.deformed += usize::from(node.skin().is_some());
+        for primitive in mesh.primitives() {
+            self.read_primitive(&primitive, world).map_err(|problem| {
+                let label = mesh.name().unwrap_or("unnamed");
+                let place = format!(
+                    "mesh {} `{label}`, primitive {}",
+                    mesh.index(),
+                    primitive.index()
+                );
+                SceneError::malformed(self.path, place, problem)
+            })?;
+        }
+        Ok(())
+    }
+
+    fn read_camera(&mut self, camera: &gltf::Camera<'_>, world: Mat4) -> Option<Camera> {
+        let gltf::camera::Projection::Perspective(lens) = camera.projection() else {
+            let warning = "an orthographic camera was ignored".to_owned();
+            self.builder.report.warnings.push(warning);
+            return None;
+        };
+        // glTF cameras look along -z with y up.
+        let eye = world.transform_point3(Vec3::ZERO);
+        let forward = world.transform_vector3(Vec3::NEG_Z).normalize_or_zero();
+        let found = Camera {
+            eye,
+            // Far enough that rounding of the target does not turn the view.
+            target: eye + forward * eye.length().max(1.0),
+            up: world.transform_vector3(Vec3::Y).normalize_or_zero(),
+            vertical_fov_degrees: lens.yfov().to_degrees(),
+        };
+        if let Err(problem) = found.validate() {
+            let warning = format!("a camera of the file was ignored: {problem}");
+            self.builder.report.warnings.push(warning);
+            return None;
+        }
+        Some(found)
+    }
+
+    fn read_primitive(
+        &mut self,
+        primitive: &gltf::Primitive<'a>,
+        world: Mat4,
+    ) -> Result<(), String> {
+        let mode = primitive.mode();
+        if !matches!(
+            mode,
+            Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
+        ) {
+            self.lines_or_points += 1;
+            return Ok(());
+        }
+        self.deformed += usize::from(primitive.morph_targets().len() > 0);
+        let buffers = self.buffers;
+        let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
+        check_accessors(primitive)?;
+        let positions: Vec<Vec3> = reader
+            .read_positions()
+            .ok_or("its positions are missing or outside their buffer")?
+            .map(|p| world.transform_point3(Vec3::from(p)))
+            .collect();
+        let indices: Cow<'_, [u32]> = match (primitive.indices(), reader.read_indices()) {
+            (None, _) => (0..positions.len() as u32).collect(),
+            (Some(_), Some(indices)) => indices.into_u32().collect(),
+            (Some(_), None) => return Err("its indices are outside their buffer".to_owned()),
+        };
+        if let Some(index) = indices.iter().find(|i| **i as usize >= positions.len()) {
+            return Err(format!(
+                "a face refers to vertex {index}, but there are {}",
+                positions.len()
+            ));
+        }
+        // The file's materials, then one for primitives that name none.
+        let last = self.texture_uses.len() - 1;
+        let material = primitive.material().index().unwrap_or(last);
+        let uvs: Vec<Vec2> = match &self.texture_uses[material] {
+            TextureUse::None => Vec::new(),
+            TextureUse::Mapped { set, transform } => reader
+                .read_tex_coords(*set)
+                .map(|uvs| uvs.into_f32().map(|uv| transform.apply(uv)).collect())
+                .unwrap_or_default(),
+        };
+        self.push_faces(mode, &indices, &positions, &uvs, material as u32);
+        Ok(())
+    }
+
+    fn push_faces(
+        &mut self,
+        mode: Mode,
+        indices: &[u32],
+        positions: &[Vec3],
+        uvs: &[Vec2],
+        material: u32,
+    ) {
+        let mut push = |corners: [u32; 3]| {
+            let uv = |i: u32| uvs.get(i as usize).copied().unwrap_or_default();
+            let vertices = corners.map(|i| positions[i as usize]);
+            self.builder
+                .push_textured(vertices, corners.map(uv), material);
+        };
+        match mode {
+            Mode::Triangles => indices.as_chunks::<3>().0.iter().for_each(|c| push(*c)),
+            Mode::TriangleStrip => indices
+                .windows(3)
+                .enumerate()
+                .for_each(|(k, w)| push([w[0], w[1 + k % 2], w[2 - k % 2]])),
+            _ => indices
+                .get(1..)
+                .unwrap_or_default()
+                .windows(2)
+                .for_each(|w| push([indices[0], w[0], w[1]])),
+        }
+    }
+
+    fn report_left_out(&mut self) {
+        let warnings = &mut self.builder.report.warnings;
+        if self.lines_or_points > 0 {
+            let count = self.lines_or_points;
+            warnings.push(format!("{count} primitives of lines or points left out"));
+        }
+        if self.deformed > 0 {
+            let count = self.deformed;
+            warnings.push(format!(
+                "{count} meshes have a skin or morph targets: shown in their rest shape"
+            ));
+        }
+    }
+}
+
+/// What the crate's readers take for granted: types, and data behind every count.
+fn check_accessors(primitive: &gltf::Primitive<'_>) -> Result<(), String> {
+    use gltf::accessor::{DataType, Dimensions};
+    let with_data = |accessor: &gltf::Accessor<'_>, what: &str| {
+        if accessor.count() == 0 {
+            Err(format!("its {what} are empty"))
+        } else if accessor.view().is_none() {
+            Err(format!("its {what} have no buffer view"))
+        } else {
+            Ok(())
+        }
+    };
+    if let Some(positions) = primitive.get(&gltf::Semantic::Positions) {
+        with_data(&positions, "positions")?;
+        if (positions.dimensions(), positions.data_type()) != (Dimensions::Vec3, DataType::F32) {
+            return Err("its positions are not three 32-bit floats".to_owned());
+        }
+    }
+    if let Some(indices) = primitive.indices() {
+        with_data(&indices, "indices")?;
+        let integers = [DataType::U8, DataType::U16, DataType::U32];
+        if indices.dimensions() != Dimensions::Scalar || !integers.contains(&indices.data_type()) {
+            return Err("its indices are not unsigned integers".to_owned());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,240 @@
+//! Materials and images of glTF documents.
+
+use super::builder::DEFAULT_ALBEDO;
+use super::gltf::{read_uri, uri_file};
+use super::mtl::{emitted, reflectance};
+use super::texture::{Encoded, ImageSource};
+use super::{Material, MaterialKind, MaterialSource, approximation_warning};
+use glam::{Mat2, Vec2, Vec3, Vec4, Vec4Swizzles};
+use std::borrow::Cow;
+use std::path::Path;
+
+/// Metalness from which, and roughness up to which, a surface is a perfect mirror.
+const MIRROR_METALLIC: f32 = 0.99;
+const MIRROR_ROUGHNESS: f32 = 0.02;
+
+/// All materials of a document and the images that they need.
+pub(super) struct Palette<'a> {
+    /// The document's materials in order, then the default one.
+    pub materials: Vec<Material>,
+    /// How the texture of each material is mapped; parallel to `materials`.
+    pub texture_uses: Vec<TextureUse>,
+    /// Images that some material uses; materials index into it.
+    pub images: Vec<ImageSource<'a>>,
+    pub warnings: Vec<String>,
+}
+
+/// Where a material's texture coordinates come from.
+pub(super) enum TextureUse {
+    /// The material has no texture.
+    None,
+    /// Coordinates are set `set` of the mesh after `transform`.
+    Mapped {
+        set: u32,
+        transform: TextureTransform,
+    },
+}
+
+/// `KHR_texture_transform`: scale, then rotation, then offset.
+pub(super) struct TextureTransform {
+    linear: Mat2,
+    offset: Vec2,
+}
+
+impl TextureTransform {
+    pub fn apply(&self, uv: [f32; 2]) -> Vec2 {
+        self.linear * Vec2::from(uv) + self.offset
+    }
+}
+
+/// Reads all materials; images are found here and decoded later.
+pub(super) fn read<'a>(
+    path: &Path,
+    document: &gltf::Document,
+    buffers: &'a [Vec<u8>],
+    with_textures: bool,
+) -> Palette<'a> {
+    let mut palette = Palette {
+        materials: Vec::new(),
+        texture_uses: Vec::new(),
+        images: Vec::new(),
+        warnings: Vec::new(),
+    };
+    // Place of each of the document's images in `palette.images`.
+    let mut image_ids = vec![None; document.images().len()];
+    for material in document.materials() {
+        let mut found = convert(&material);
+        let info = base_color(&material).1.filter(|_| with_textures);
+        palette.texture_uses.push(match info {
+            Some(info) if found.kind == MaterialKind::Diffuse => {
+                let image = info.texture().source();
+                let id = image_ids[image.index()].get_or_insert_with(|| {
+                    palette.images.push(image_source(path, &image, buffers));
+                    palette.images.len() as u32 - 1
+                });
+                found.base_color_texture = Some(*id);
+                mapping(&info)
+            }
+            _ => TextureUse::None,
+        });
+        palette.materials.push(found);
+    }
+    palette
+        .materials
+        .push(Material::diffuse("default", Vec3::splat(DEFAULT_ALBEDO)));
+    palette.texture_uses.push(TextureUse::None);
+    palette.warnings = warnings(document, &palette.materials);
+    palette
+}
+
+/// Linear base colour and texture: the diffuse ones where `KHR_materials_pbrSpecularGlossiness`
+/// gives them.
+fn base_color<'a>(material: &gltf::Material<'a>) -> (Vec4, Option<gltf::texture::Info<'a>>) {
+    match material.pbr_specular_glossiness() {
+        Some(model) => (model.diffuse_factor().into(), model.diffuse_texture()),
+        None => {
+            let model = material.pbr_metallic_roughness();
+            (model.base_color_factor().into(), model.base_color_texture())
+        }
+    }
+}
+
+fn convert(material: &gltf::Material<'_>) -> Material {
+    let (color, _) = base_color(material);
+    let model = material.pbr_metallic_roughness();
+    let gloss = material.pbr_specular_glossiness();
+    let mirror = gloss.is_none()
+        && model.metallic_factor() >= MIRROR_METALLIC
+        && model.roughness_factor() <= MIRROR_ROUGHNESS
+        && model.metallic_roughness_texture().is_none();
+    // A texture can make any part of the surface dark: better no light than light everywhere.
+    let emission = match material.emissive_texture() {
+        Some(_) => Vec3::ZERO,
+        None => emitted(material.emissive_factor()) * material.emissive_strength().unwrap_or(1.0),
+    };
+    let index = material.index().unwrap_or(0);
+    Material {
+        name: material
+            .name()
+            .map_or_else(|| format!("material {index}"), str::to_owned),
+        kind: if mirror {
+            MaterialKind::Mirror
+        } else {
+            MaterialKind::Diffuse
+        },
+        base_color: reflectance(color.xyz()),
+        base_color_texture: None,
+        emission: emitted(emission),
+        source: MaterialSource {
+            roughness: Some(match &gloss {
+                Some(gloss) => 1.0 - gloss.glossiness_factor(),
+                None => model.roughness_factor(),
+            }),
+            metallic: gloss.is_none().then(|| model.metallic_factor()),
+            specular: gloss.map(|gloss| gloss.specular_factor()),
+            shininess: None,
+            ior: material.ior(),
+            transmission: material.transmission().map(|t| t.transmission_factor()),
+            opacity: Some(color.w),
+            alpha_mode: Some(
+                match material.alpha_mode() {
+                    gltf::material::AlphaMode::Opaque => "OPAQUE",
+                    gltf::material::AlphaMode::Mask => "MASK",
+                    gltf::material::AlphaMode::Blend => "BLEND",
+                }
+                .to_owned(),
+            ),
+            illum: None,
+        },
+    }
+}
+
+fn mapping(info: &gltf::texture::Info<'_>) -> TextureUse {
+    let Some(transform) = info.texture_transform() else {
+        return TextureUse::Mapped {
+            set: info.tex_coord(),
+            transform: TextureTransform {
+                linear: Mat2::IDENTITY,
+                offset: Vec2::ZERO,
+            },
+        };
+    };
+    let (sin, cos) = transform.rotation().sin_cos();
+    let rotation = Mat2::from_cols(Vec2::new(cos, -sin), Vec2::new(sin, cos));
+    TextureUse::Mapped {
+        set: transform.tex_coord().unwrap_or(info.tex_coord()),
+        transform: TextureTransform {
+            linear: rotation * Mat2::from_diagonal(transform.scale().into()),
+            offset: transform.offset().into(),
+        },
+    }
+}
+
+fn image_source<'a>(
+    path: &Path,
+    image: &gltf::Image<'_>,
+    buffers: &'a [Vec<u8>],
+) -> ImageSource<'a> {
+    let index = image.index();
+    let (uri_name, encoded) = match image.source() {
+        gltf::image::Source::View { view, .. } => {
+            let range = view.offset()..view.offset().saturating_add(view.length());
+            let bytes = buffers
+                .get(view.buffer().index())
+                .and_then(|data| data.get(range));
+            let encoded = match bytes {
+                Some(bytes) => Encoded::Memory(Cow::Borrowed(bytes)),
+                None => Encoded::Missing("its bytes lie outside the buffer".to_owned()),
+            };
+            (None, encoded)
+        }
+        gltf::image::Source::Uri { uri, .. } if uri.starts_with("data:") => {
+            let encoded = match read_uri(path, uri) {
+                Ok(bytes) => Encoded::Memory(Cow::Owned(bytes)),
+                Err(problem) => Encoded::Missing(problem),
+            };
+            (None, encoded)
+        }
+        gltf::image::Source::Uri { uri, .. } => (Some(uri), Encoded::File(uri_file(path, uri))),
+    };
+    ImageSource {
+        name: image
+            .name()
+            .or(uri_name)
+            .map_or_else(|| format!("image {index}"), str::to_owned),
+        encoded,
+    }
+}
+
+/// One warning per kind of appearance that is drawn otherwise than the file says.
+fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
+    // The material as converted beside the one in the file; the last, default one is not in it.
+    let of = |wanted: &dyn Fn(&Material, &gltf::Material<'_>) -> bool| -> Vec<&str> {
+        let pairs = materials.iter().zip(document.materials());
+        let chosen = pairs.filter(|(converted, original)| wanted(converted, original));
+        chosen
+            .map(|(converted, _)| converted.name.as_str())
+            .collect()
+    };
+    let transmissive = of(&|m, _| m.source.transmission.is_some_and(|t| t > 0.0));
+    let cut_out = of(&|m, _| m.source.alpha_mode.as_deref() != Some("OPAQUE"));
+    // Where a texture scales the metalness, the factor alone says nothing.
+    let metal = of(&|m, original| {
+        let model = original.pbr_metallic_roughness();
+        m.kind == MaterialKind::Diffuse
+            && m.source.metallic.is_some_and(|metal| metal > 0.5)
+            && model.metallic_roughness_texture().is_none()
+    });
+    let textured_light = of(&|_, original| {
+        original.emissive_texture().is_some() && emitted(original.emissive_factor()) != Vec3::ZERO
+    });
+    [
+        approximation_warning("transmissive", transmissive),
+        approximation_warning("cut out or blended by alpha", cut_out),
+        approximation_warning("rough metal", metal),
+        approximation_warning("lit by an emissive texture (drawn dark)", textured_light),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}

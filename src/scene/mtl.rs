@@ -1,0 +1,272 @@
+//! Material libraries (MTL) of OBJ files.
+
+use super::builder::DEFAULT_ALBEDO;
+use super::texture::{Encoded, ImageSource};
+use super::{Material, MaterialKind, MaterialSource};
+use glam::Vec3;
+use std::cell::RefCell;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+use tobj::{LoadError, MTLLoadResult};
+
+/// Illumination models of the MTL standard that mirror (3 … 9 all ray trace; 5 is a mirror with
+/// Fresnel), and those that refract.
+const ILLUM_MIRROR: [u8; 3] = [3, 5, 8];
+const ILLUM_REFRACTS: [u8; 4] = [4, 6, 7, 9];
+
+/// Gathers the materials of all `mtllib` statements while `tobj` reads the OBJ file.
+///
+/// `tobj` numbers materials in the order in which it reads them; `contents` follows that order.
+pub(super) struct Library {
+    folder: PathBuf,
+    with_textures: bool,
+    contents: RefCell<Contents>,
+}
+
+/// What the libraries defined.
+#[derive(Default)]
+pub(super) struct Contents {
+    pub materials: Vec<Material>,
+    pub textures: Vec<ImageSource<'static>>,
+    pub warnings: Vec<String>,
+}
+
+impl Library {
+    /// Libraries are looked for beside the OBJ file `obj`.
+    pub fn new(obj: &Path, with_textures: bool) -> Self {
+        Self {
+            folder: obj.parent().unwrap_or(Path::new("")).to_owned(),
+            with_textures,
+            contents: RefCell::default(),
+        }
+    }
+
+    /// Forgets everything: `tobj` starts again.
+    pub fn forget(&self) {
+        self.contents.take();
+    }
+
+    /// Loads one library for `tobj`. A missing or broken one is a warning.
+    pub fn load(&self, file: &Path) -> MTLLoadResult {
+        let path = self.folder.join(file.to_string_lossy().replace('\\', "/"));
+        let mut contents = self.contents.borrow_mut();
+        let bytes = std::fs::read(&path).map_err(|error| {
+            contents.warnings.push(format!(
+                "material library {}: {error}; its materials are drawn grey",
+                path.display()
+            ));
+            LoadError::OpenFileFailed
+        })?;
+        let text = readable_lines(&bytes, &path, &mut contents.warnings);
+        let (materials, names) =
+            tobj::load_mtl_buf(&mut Cursor::new(text)).inspect_err(|error| {
+                contents.warnings.push(format!(
+                    "material library {}: {error}; its materials are drawn grey",
+                    path.display()
+                ));
+            })?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for material in &materials {
+            contents.add(material, folder, self.with_textures);
+        }
+        Ok((materials, names))
+    }
+
+    /// All materials in `tobj`'s order, the textures they refer to, and one warning for all that
+    /// is drawn otherwise than the file says.
+    pub fn into_contents(self) -> Contents {
+        let mut contents = self.contents.into_inner();
+        let approximated = contents.materials.iter().filter(|m| {
+            let refracts = |illum| ILLUM_REFRACTS.contains(&illum);
+            m.source.illum.is_some_and(refracts) || m.source.opacity.is_some_and(|d| d < 1.0)
+        });
+        let names = approximated.map(|m| m.name.as_str()).collect();
+        let text = super::approximation_warning("transparent or refracting", names);
+        contents.warnings.extend(text);
+        contents
+    }
+}
+
+impl Contents {
+    fn add(&mut self, material: &tobj::Material, folder: &Path, with_textures: bool) {
+        let texture = material
+            .diffuse_texture
+            .as_deref()
+            .filter(|_| with_textures)
+            .map(|statement| self.texture(folder.join(texture_path(statement))));
+        // The standard's default for a surface with a texture is to show it as it is.
+        let unstated = if material.diffuse_texture.is_some() {
+            1.0
+        } else {
+            DEFAULT_ALBEDO
+        };
+        let diffuse = Vec3::from(material.diffuse.unwrap_or([unstated; 3]));
+        let specular = Vec3::from(material.specular.unwrap_or_default());
+        let mirror = is_mirror(material.illumination_model, diffuse, specular);
+        self.materials.push(Material {
+            name: material.name.clone(),
+            kind: if mirror {
+                MaterialKind::Mirror
+            } else {
+                MaterialKind::Diffuse
+            },
+            base_color: reflectance(if mirror { specular } else { diffuse }),
+            base_color_texture: if mirror { None } else { texture },
+            emission: emitted(material.emissive.unwrap_or_default()),
+            source: source(material),
+        });
+    }
+
+    /// Index of the texture in `path`, each file once.
+    fn texture(&mut self, path: PathBuf) -> u32 {
+        let name = path.display().to_string();
+        let known = self.textures.iter().position(|t| t.name == name);
+        known.unwrap_or_else(|| {
+            self.textures.push(ImageSource {
+                name,
+                encoded: Encoded::File(path),
+            });
+            self.textures.len() - 1
+        }) as u32
+    }
+}
+
+/// A mirror by its illumination model whose specular part outshines a nearly black diffuse one.
+fn is_mirror(illum: Option<u8>, diffuse: Vec3, specular: Vec3) -> bool {
+    illum.is_some_and(|illum| ILLUM_MIRROR.contains(&illum))
+        && specular.max_element() > 0.0
+        && diffuse.max_element() <= 0.1 * specular.max_element()
+}
+
+/// Finite and within [0, 1].
+pub(super) fn reflectance(color: Vec3) -> Vec3 {
+    Vec3::select(color.is_finite_mask(), color, Vec3::ZERO).clamp(Vec3::ZERO, Vec3::ONE)
+}
+
+/// Finite and not negative.
+pub(super) fn emitted(color: impl Into<Vec3>) -> Vec3 {
+    let color = color.into();
+    Vec3::select(color.is_finite_mask(), color, Vec3::ZERO).max(Vec3::ZERO)
+}
+
+fn source(material: &tobj::Material) -> MaterialSource {
+    let extra = |key: &str| -> Option<f32> {
+        let value = material.unknown_param.get(key)?;
+        value.split_whitespace().next()?.parse().ok()
+    };
+    // Beckmann roughness of a Phong lobe: alpha^2 = 2 / (n + 2) (Walter et al. 2007), and glTF's
+    // roughness is the square root of alpha.
+    let phong = |n: f32| (2.0 / (n.max(0.0) + 2.0)).powf(0.25);
+    MaterialSource {
+        roughness: extra("Pr").or(material.shininess.map(phong)),
+        metallic: extra("Pm"),
+        specular: material.specular,
+        shininess: material.shininess,
+        ior: material.optical_density,
+        transmission: None,
+        opacity: material.dissolve.or(extra("Tr").map(|t| 1.0 - t)),
+        alpha_mode: None,
+        illum: material.illumination_model,
+    }
+}
+
+/// The file of a `map_Kd` statement: what follows its options (`-s 1 1 1 file.png`), with `/`
+/// between folders.
+fn texture_path(statement: &str) -> String {
+    let mut rest = statement.trim();
+    while rest.starts_with('-') {
+        let (option, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
+        rest = after.trim_start();
+        // -o, -s, -t take one to three numbers, -mm two, the others one word.
+        let (least, most) = match option {
+            "-o" | "-s" | "-t" => (1, 3),
+            "-mm" => (2, 2),
+            _ => (1, 1),
+        };
+        for taken in 0..most {
+            let (word, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
+            if taken >= least && word.parse::<f32>().is_err() {
+                break;
+            }
+            rest = after.trim_start();
+        }
+    }
+    rest.replace('\\', "/")
+}
+
+/// The text without the lines that would make `tobj` reject (or panic on) the whole library; a
+/// colour given as one number becomes three.
+fn readable_lines(bytes: &[u8], path: &Path, warnings: &mut Vec<String>) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let mut out = String::with_capacity(text.len());
+    for (number, line) in (1..).zip(text.lines()) {
+        let mut words = line.split('#').next().unwrap_or("").split_whitespace();
+        let keyword = words.next().unwrap_or("");
+        let argument = words.clone().next();
+        let count = words.clone().count();
+        let numbers = words.take_while(|w| w.parse::<f32>().is_ok()).count();
+        let broken = match keyword {
+            "Ka" | "Kd" | "Ks" | "Ke" => {
+                if let (1, 1, Some(grey)) = (count, numbers, argument) {
+                    out.push_str(&format!("{keyword} {grey} {grey} {grey}\n"));
+                    continue;
+                }
+                numbers < 3
+            }
+            "Ns" | "Ni" | "d" => numbers < 1,
+            "illum" => argument.is_none_or(|word| word.parse::<u8>().is_err()),
+            "newmtl" | "bump" => argument.is_none(),
+            _ => keyword.starts_with("map_") && argument.is_none(),
+        };
+        if broken {
+            warnings.push(format!(
+                "{}, line {number}: `{}` ignored: the value cannot be read",
+                path.display(),
+                line.trim()
+            ));
+        } else {
+            out.push_str(line);
+            out.push('\n');
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texture_options_are_skipped() {
+        for (statement, file) in [
+            ("a b.png", "a b.png"),
+            ("-s 1 1 1 -o 0 0 a.png", "a.png"),
+            ("-s 2 a.png", "a.png"),
+            ("-clamp on -mm 0 1 dir\\a.png", "dir/a.png"),
+            ("-s", ""),
+        ] {
+            assert_eq!(texture_path(statement), file, "{statement}");
+        }
+    }
+
+    #[test]
+    fn only_a_bright_specular_part_over_black_makes_a_mirror() {
+        let (black, grey) = (Vec3::ZERO, Vec3::splat(0.5));
+        assert!(is_mirror(Some(5), black, grey));
+        assert!(!is_mirror(Some(2), black, grey));
+        assert!(!is_mirror(Some(5), grey, grey));
+        assert!(!is_mirror(Some(5), black, black));
+    }
+
+    #[test]
+    fn broken_statements_are_dropped_with_their_line_and_the_rest_is_kept() {
+        let text = b"newmtl a\nKd 0.5\nKs 1 x 1\nNs\nillum 999\nKe 1 2 3\n";
+        let mut warnings = Vec::new();
+        let kept = readable_lines(text, Path::new("m.mtl"), &mut warnings);
+        assert_eq!(kept, "newmtl a\nKd 0.5 0.5 0.5\nKe 1 2 3\n");
+        assert_eq!(warnings.len(), 3);
+        assert!(warnings[0].contains("line 3"), "{warnings:?}");
+        let (materials, _) = tobj::load_mtl_buf(&mut Cursor::new(kept)).unwrap();
+        assert_eq!(materials[0].emissive, Some([1.0, 2.0, 3.0]));
+    }
+}

@@ -1,0 +1,338 @@
+//! Stanford PLY by `ply-rs-bw`, ASCII and binary, read element by element: faces go straight into
+//! the scene's arrays.
+
+use super::builder::{DEFAULT_ALBEDO, Look, SceneBuilder};
+use super::error::{guarded, open};
+use super::{Material, SceneData, SceneError};
+use glam::Vec3;
+use ply_rs_bw::parser::{ParseError, Parser, Reader};
+use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult};
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+/// Loads a PLY model. Polygons become fans; there are no materials, every surface is grey.
+///
+/// # Errors
+/// [`SceneError`] naming the element that could not be read.
+pub(super) fn load(path: &Path, name: &str) -> Result<SceneData, SceneError> {
+    let file = open(path)?;
+    let bytes = file.metadata().map_or(0, |meta| meta.len());
+    guarded(path, || {
+        let source = BufReader::with_capacity(1 << 20, file);
+        let builder = read(path, bytes, source)?;
+        let look = Look {
+            materials: vec![Material::diffuse("default", Vec3::splat(DEFAULT_ALBEDO))],
+            textures: Vec::new(),
+            camera: None,
+            environment: Vec3::ZERO,
+        };
+        builder.finish(name, look)
+    })
+}
+
+fn read(path: &Path, bytes: u64, source: impl BufRead) -> Result<SceneBuilder, SceneError> {
+    let mut reader = Reader::new(source);
+    let header = Parser::<Skipped>::new()
+        .read_header(&mut reader)
+        .map_err(|error| header_error(path, &error))?;
+    let mut body = Body {
+        path,
+        encoding: header.encoding,
+        source: reader.into_inner(),
+        line: String::new(),
+    };
+    let mut vertices: Vec<Vec3> = Vec::new();
+    let mut builder = SceneBuilder::default();
+    let mut polygons_without_area = 0_usize;
+    for (name, definition) in &header.elements {
+        check_element(path, definition, bytes)?;
+        match name.as_str() {
+            "vertex" => {
+                vertices.reserve_exact(definition.count);
+                body.each(definition, |_, Vertex(position)| {
+                    vertices.push(position);
+                    Ok(())
+                })?;
+            }
+            "face" => {
+                builder = SceneBuilder::new(false, definition.count);
+                body.each(definition, |index, face: Face| {
+                    let corners = face.corners(&vertices).map_err(|problem| {
+                        SceneError::malformed(path, format!("face {index}"), problem)
+                    })?;
+                    polygons_without_area += usize::from(corners.len() < 3);
+                    for k in 2..corners.len() {
+                        builder.push([corners[0], corners[k - 1], corners[k]], 0);
+                    }
+                    Ok(())
+                })?;
+            }
+            _ => body.each(definition, |_, Skipped| Ok(()))?,
+        }
+    }
+    if polygons_without_area > 0 {
+        builder.report.warnings.push(format!(
+            "{polygons_without_area} faces with fewer than three corners left out"
+        ));
+    }
+    Ok(builder)
+}
+
+fn header_error(path: &Path, error: &ParseError) -> SceneError {
+    let place = error.line().map_or("header".to_owned(), |line| {
+        format!("header, line {}", line.max(1))
+    });
+    SceneError::malformed(path, place, error.to_string().trim().to_owned())
+}
+
+/// Refuses elements that cannot be in a file of `bytes` bytes (each takes at least one), before
+/// memory is reserved for them, and elements that lack what is needed.
+fn check_element(path: &Path, definition: &ElementDef, bytes: u64) -> Result<(), SceneError> {
+    let ElementDef {
+        name,
+        count,
+        properties,
+    } = definition;
+    let problem = if *count as u64 > bytes || (properties.is_empty() && *count > 0) {
+        format!("{count} elements are announced, more than the file can hold")
+    } else if name == "vertex" && !["x", "y", "z"].iter().all(|k| properties.contains_key(*k)) {
+        "the properties x, y and z are needed".to_owned()
+    } else if name == "face" && !FACE_LISTS.iter().any(|k| properties.contains_key(*k)) {
+        "the property vertex_indices is needed".to_owned()
+    } else {
+        return Ok(());
+    };
+    Err(SceneError::malformed(
+        path,
+        format!("element `{name}`"),
+        problem,
+    ))
+}
+
+/// The part after the header.
+struct Body<'a, S> {
+    path: &'a Path,
+    encoding: Encoding,
+    source: S,
+    line: String,
+}
+
+impl<S: BufRead> Body<'_, S> {
+    /// Reads all elements of one kind, handing each on with its index.
+    fn each<E: PropertyAccess>(
+        &mut self,
+        definition: &ElementDef,
+        mut consume: impl FnMut(usize, E) -> Result<(), SceneError>,
+    ) -> Result<(), SceneError> {
+        let parser = Parser::<E>::new();
+        for index in 0..definition.count {
+            let element = self.element(&parser, definition).map_err(|problem| {
+                let place = format!("{} {index} of {}", definition.name, definition.count);
+                SceneError::malformed(self.path, place, problem)
+            })?;
+            consume(index, element)?;
+        }
+        Ok(())
+    }
+
+    fn element<E: PropertyAccess>(
+        &mut self,
+        parser: &Parser<E>,
+        definition: &ElementDef,
+    ) -> Result<E, String> {
+        let source = &mut self.source;
+        let element = match self.encoding {
+            Encoding::Ascii => {
+                self.line.clear();
+                match source.read_line(&mut self.line) {
+                    Ok(0) => return Err("the file ends here".to_owned()),
+                    Ok(_) => parser.read_ascii_element(&self.line, definition),
+                    Err(error) => return Err(error.to_string()),
+                }
+            }
+            Encoding::BinaryLittleEndian => parser.read_little_endian_element(source, definition),
+            Encoding::BinaryBigEndian => parser.read_big_endian_element(source, definition),
+        };
+        element.map_err(|error| match error.kind() {
+            std::io::ErrorKind::UnexpectedEof => "the file ends here".to_owned(),
+            _ => error.to_string(),
+        })
+    }
+}
+
+struct Vertex(Vec3);
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self(Vec3::NAN)
+    }
+
+    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
+        let component = match name {
+            "x" => &mut self.0.x,
+            "y" => &mut self.0.y,
+            "z" => &mut self.0.z,
+            _ => return PropertyAccessResult::Ignored,
+        };
+        match value.to_f32_lossy() {
+            Some(value) => *component = value,
+            None => return PropertyAccessResult::UnsupportedType,
+        }
+        PropertyAccessResult::Set
+    }
+}
+
+/// Both names of the list of corners are in use.
+const FACE_LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
+
+/// The corner list, in the type of the file.
+struct Face(Option<Property>);
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self(None)
+    }
+
+    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
+        if !FACE_LISTS.contains(&name) {
+            return PropertyAccessResult::Ignored;
+        }
+        self.0 = Some(value);
+        PropertyAccessResult::Set
+    }
+}
+
+impl Face {
+    fn corners(&self, vertices: &[Vec3]) -> Result<Vec<Vec3>, String> {
+        let indices: Vec<i64> = match &self.0 {
+            Some(Property::ListInt(list)) => list.iter().map(|i| i64::from(*i)).collect(),
+            Some(list) => list
+                .to_u32_list()
+                .ok_or("the corners are not a list of vertex indices")?
+                .into_iter()
+                .map(i64::from)
+                .collect(),
+            None => return Err("no list of vertex indices".to_owned()),
+        };
+        let position = |index: i64| {
+            let vertex = usize::try_from(index).ok().and_then(|i| vertices.get(i));
+            vertex.copied().ok_or_else(|| {
+                format!(
+                    "the face refers to vertex {index}, but {} are defined before it",
+                    vertices.len()
+                )
+            })
+        };
+        indices.into_iter().map(position).collect()
+    }
+}
+
+/// An element nobody needs.
+struct Skipped;
+
+impl PropertyAccess for Skipped {
+    fn new() -> Self {
+        Self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    const HEADER: &str = "element vertex 4\nproperty float x\nproperty double y\n\
+        property short z\nelement face 1\nproperty uchar flag\n\
+        property list uchar int vertex_indices\nend_header\n";
+
+    fn load_bytes(bytes: &[u8]) -> Result<SceneData, SceneError> {
+        let mut file = tempfile::Builder::new().suffix(".ply").tempfile().unwrap();
+        file.write_all(bytes).unwrap();
+        load(file.path(), "test")
+    }
+
+    fn ascii(body: &str) -> Vec<u8> {
+        format!("ply\nformat ascii 1.0\n{HEADER}{body}").into_bytes()
+    }
+
+    fn binary(big: bool) -> Vec<u8> {
+        let order = if big { "big" } else { "little" };
+        let mut bytes = format!("ply\nformat binary_{order}_endian 1.0\n{HEADER}").into_bytes();
+        let mut put = |value: &[u8]| {
+            let mut value = value.to_vec();
+            if big {
+                value.reverse();
+            }
+            bytes.extend(value);
+        };
+        for (x, y, z) in [
+            (0.0_f32, 0.0_f64, 1_i16),
+            (2.0, 0.0, 1),
+            (2.0, 2.0, 1),
+            (0.0, 2.0, 1),
+        ] {
+            put(&x.to_le_bytes());
+            put(&y.to_le_bytes());
+            put(&z.to_le_bytes());
+        }
+        put(&[7]);
+        put(&[4]);
+        for index in 0..4_i32 {
+            put(&index.to_le_bytes());
+        }
+        bytes
+    }
+
+    #[test]
+    fn ascii_and_both_binary_orders_give_the_same_fan() {
+        let text = load_bytes(&ascii("0 0 1\n2 0 1\n2 2 1\n0 2 1\n7 4 0 1 2 3\n")).unwrap();
+        assert_eq!(text.triangles.len(), 2);
+        let corner = |x, y| Vec3::new(x, y, 1.0);
+        assert_eq!(
+            text.triangles[1].vertices,
+            [corner(0.0, 0.0), corner(2.0, 2.0), corner(0.0, 2.0)]
+        );
+        for big in [false, true] {
+            assert_eq!(load_bytes(&binary(big)).unwrap().hash, text.hash);
+        }
+    }
+
+    #[test]
+    fn broken_files_say_where() {
+        let cases = [
+            (ascii("0 0 1\n2 0 1\n"), "vertex 2 of 4"),
+            (ascii("0 0 1\n2 0 1\n2 2 1\n0 2 1\n7 3 0 1 4\n"), "vertex 4"),
+            (
+                ascii("0 0 1\n2 0 1\n2 2 1\n0 2 1\n7 3 0 1 -1\n"),
+                "vertex -1",
+            ),
+            (
+                binary(false)[..binary(false).len() - 3].to_vec(),
+                "face 0 of 1",
+            ),
+            (
+                b"ply\nformat ascii 1.0\nelement vertex 3\n".to_vec(),
+                "header",
+            ),
+            (
+                b"ply\nformat ascii 1.0\nelement vertex 9000000000\nend_header\n".to_vec(),
+                "more than the file can hold",
+            ),
+        ];
+        for (bytes, expected) in cases {
+            let error = load_bytes(&bytes).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error} lacks {expected}");
+        }
+    }
+
+    #[test]
+    fn a_list_longer_than_the_file_is_an_error_and_takes_no_memory() {
+        let header = "ply\nformat binary_little_endian 1.0\nelement vertex 0\n\
+            property float x\nproperty float y\nproperty float z\nelement face 1\n\
+            property list uint int vertex_indices\nend_header\n";
+        let mut bytes = header.as_bytes().to_vec();
+        bytes.extend([0xff; 8]);
+        let error = load_bytes(&bytes).unwrap_err().to_string();
+        assert!(error.contains("face 0 of 1"), "{error}");
+    }
+}

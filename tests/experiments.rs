@@ -1,0 +1,676 @@
+//! Experiment files, through the public interface: what is accepted, and what every kind of
+//! mistake is answered with.
+
+use raystone::config::{
+    Axis, Catalogue, ConfigError, Entry, Experiment, ParamRange, ParamValue, Parameter, Plan,
+    Variant, keys,
+};
+use std::path::Path;
+
+fn entry(name: &str, schema: Vec<Parameter>) -> Entry {
+    Entry {
+        name: name.to_owned(),
+        description: String::new(),
+        schema,
+    }
+}
+
+fn plain(names: &[&str]) -> Vec<Entry> {
+    names.iter().map(|name| entry(name, Vec::new())).collect()
+}
+
+fn parameter(name: &'static str, default: ParamValue, range: ParamRange) -> Parameter {
+    Parameter {
+        name,
+        description: "",
+        default,
+        range,
+    }
+}
+
+/// A catalogue of its own, so that these tests do not depend on what the registries hold.
+fn catalogue() -> Catalogue {
+    let lambda = ParamRange::Number {
+        min: 0.1,
+        max: 100.0,
+    };
+    let mut accel = plain(&["brute-force", "bvh", "roped-bvh"]);
+    accel.push(entry(
+        "uniform-grid",
+        vec![
+            parameter("lambda", ParamValue::Number(5.0), lambda),
+            parameter(
+                "max_cells",
+                ParamValue::Integer(4096),
+                ParamRange::Integer { min: 1, max: 65536 },
+            ),
+        ],
+    ));
+    let mut sequence = plain(&["halton", "sobol"]);
+    sequence.push(entry(
+        "pixel-hash",
+        vec![
+            parameter(
+                "hash",
+                ParamValue::Name("pcg".into()),
+                ParamRange::Choice(&["pcg", "wang"]),
+            ),
+            parameter("shuffle", ParamValue::Flag(false), ParamRange::Flag),
+        ],
+    ));
+    Catalogue {
+        scene: plain(&["cornell-box", "displaced-sphere", "teapot-in-a-stadium"]),
+        accel,
+        sequence,
+        decorrelation: plain(&["none", "cranley-patterson"]),
+        integrator: plain(&["primary", "ao", "path"]),
+    }
+}
+
+const AXES: &str = "[axes]\nscene = [\"cornell-box\"]\naccel = [\"bvh\", \"uniform-grid\"]\n\
+                    sequence = [\"pixel-hash\", \"sobol\"]\n";
+
+fn parse_with(text: &str, overrides: &[&str]) -> Result<Experiment, ConfigError> {
+    let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+    Experiment::parse(text, "dir/trial.toml", &overrides, &catalogue())
+}
+
+/// The experiment of [`AXES`] and some more lines, which start on line 5.
+fn parse(more: &str) -> Result<Experiment, ConfigError> {
+    parse_with(&format!("{AXES}{more}"), &[])
+}
+
+fn good(more: &str) -> Experiment {
+    parse(more).unwrap_or_else(|error| panic!("{more}: {error}"))
+}
+
+#[track_caller]
+fn assert_says(result: Result<impl std::fmt::Debug, ConfigError>, pieces: &[&str]) {
+    let message = result.expect_err("a mistake was accepted").to_string();
+    for piece in pieces {
+        assert!(message.contains(piece), "no `{piece}` in: {message}");
+    }
+}
+
+fn labels(variants: &[Variant]) -> Vec<&str> {
+    variants.iter().map(|v| v.label.as_str()).collect()
+}
+
+fn plan(experiment: &Experiment, only: &[&str]) -> Result<Plan, ConfigError> {
+    let only: Vec<String> = only.iter().map(|text| (*text).to_owned()).collect();
+    Plan::new(experiment, &only, |sequence, decorrelation| {
+        sequence.name == "pixel-hash" || decorrelation.name == "cranley-patterson"
+    })
+}
+
+#[test]
+fn a_minimal_file_gets_the_documented_defaults() {
+    let experiment = good("");
+    assert_eq!(experiment.name, "trial");
+    assert_eq!(experiment.replicates, 8);
+    assert_eq!(experiment.resolution, [192, 144]);
+    assert_eq!(
+        experiment.spp.counts().collect::<Vec<_>>(),
+        [1, 2, 4, 8, 16, 32]
+    );
+    assert_eq!(experiment.spp.max(), 32);
+    assert!(experiment.runtime_checks);
+    assert!(experiment.camera.is_none());
+    assert_eq!(labels(&experiment.axes.decorrelation), ["none"]);
+    assert_eq!(labels(&experiment.axes.integrator), ["path"]);
+    assert_eq!(experiment.reference.sequence.params.name("hash"), "pcg");
+    assert_eq!(experiment.timing.rounds, 9);
+    assert_eq!(experiment.gate.rays, 32768);
+    assert_eq!(experiment.discrepancy.pairs, [[0, 1], [2, 3], [4, 5]]);
+    assert_eq!(experiment.replicate_seeds().collect::<Vec<_>>().len(), 8);
+}
+
+#[test]
+fn every_section_is_read() {
+    let experiment = good(
+        "[run]\nname = \"n\"\nreplicates = 2\nseed = 7\nresolution = [64, 48]\n\
+         spp = { pow2 = [1, 3] }\nruntime_checks = false\n\
+         [camera]\neye = [0, 1, 2.5]\ntarget = [0, 0, 0]\nfov = 60\n\
+         [reference]\nspp = 64\nsequence = \"sobol\"\ndecorrelation = \"cranley-patterson\"\n\
+         seed = 3\n[timing]\nrounds = 5\nspp = 2\nmin_warmup_ms = 1\nmax_warmup_ms = 10\n\
+         rays = 2048\n[gate]\nrays = 512\nbrute_force_tests = 10\noracle_rays = 0\n\
+         [discrepancy]\npoints = 64\npairs = [[4, 9]]\nseeds = 3\n",
+    );
+    assert_eq!(experiment.name, "n");
+    assert_eq!(experiment.replicate_seeds().collect::<Vec<_>>(), [7, 8]);
+    assert_eq!(experiment.resolution, [64, 48]);
+    assert_eq!(experiment.spp.counts().collect::<Vec<_>>(), [2, 4, 8]);
+    assert!(!experiment.runtime_checks);
+    let camera = experiment.camera.expect("a camera");
+    assert_eq!(camera.eye.to_array(), [0.0, 1.0, 2.5]);
+    assert_eq!(camera.up.to_array(), [0.0, 1.0, 0.0]);
+    assert_eq!(camera.vertical_fov_degrees, 60.0);
+    assert_eq!(experiment.reference.spp, 64);
+    assert_eq!(experiment.reference.sequence.label, "sobol");
+    assert_eq!(experiment.timing.max_warmup_ms, 10);
+    assert_eq!(experiment.gate.brute_force_tests, 10);
+    assert_eq!(experiment.discrepancy.pairs, [[4, 9]]);
+    assert_eq!(experiment.discrepancy.seeds, 3);
+}
+
+#[test]
+fn lists_of_parameters_make_variants_in_the_order_of_the_schema() {
+    let experiment = good(
+        "[accel.uniform-grid]\nmax_cells = [4096, 8]\nlambda = [3, 5.0]\n\
+         [sequence.pixel-hash]\nhash = \"wang\"\nshuffle = [false, true]\n",
+    );
+    assert_eq!(
+        labels(&experiment.axes.accel),
+        [
+            "bvh",
+            "uniform-grid(lambda=3)",
+            "uniform-grid(lambda=3,max_cells=8)",
+            "uniform-grid",
+            "uniform-grid(max_cells=8)",
+        ]
+    );
+    assert_eq!(experiment.axes.accel[1].params.number("lambda"), 3.0);
+    assert_eq!(experiment.axes.accel[2].params.integer("max_cells"), 8);
+    assert_eq!(
+        labels(&experiment.axes.sequence),
+        [
+            "pixel-hash(hash=wang)",
+            "pixel-hash(hash=wang,shuffle=true)",
+            "sobol"
+        ]
+    );
+}
+
+#[test]
+fn text_that_is_not_toml_names_its_line() {
+    assert_says(
+        parse("[run]\nseed = 1\nseed = 2\n"),
+        &["dir/trial.toml:7", "duplicate key"],
+    );
+    assert_says(parse("[run\n"), &["dir/trial.toml:5", "not valid TOML"]);
+    assert_says(parse("[run]\nseed = \n"), &["dir/trial.toml:6"]);
+}
+
+#[test]
+fn unknown_names_are_answered_with_the_nearest_known_one() {
+    for (more, pieces) in [
+        (
+            "[rum]\nseed = 1\n",
+            ["dir/trial.toml:5", "section `rum`", "`run`"],
+        ),
+        (
+            "[run]\n\nsede = 1\n",
+            ["dir/trial.toml:7", "key in [run] `sede`", "`seed`"],
+        ),
+        (
+            "[run]\nspp = { pow = [0, 1] }\n",
+            [":6", "key in `run.spp` `pow`", "`pow2`"],
+        ),
+        (
+            "[camera]\neye = [0,0,0]\ntarget=[0,0,1]\nfovy = 3\n",
+            [":8", "`fovy`", "`fov`"],
+        ),
+        (
+            "[[exclude]]\naccell = \"bvh\"\n",
+            [":6", "[exclude] `accell`", "`accel`"],
+        ),
+        (
+            "[accel.uniform-gird]\nlambda = 2\n",
+            [":5", "`uniform-gird`", "`uniform-grid`"],
+        ),
+        (
+            "[accel.uniform-grid]\nlamda = 2\n",
+            [":6", "uniform-grid `lamda`", "`lambda`"],
+        ),
+        (
+            "[accel.bvh]\nlambda = 2\n",
+            [":6", "accel bvh `lambda`", "nothing is known here"],
+        ),
+        (
+            "[sequence.pixel-hash]\nhash = \"pgc\"\n",
+            [":6", "`pgc`", "Known: `pcg`, `wang`"],
+        ),
+        (
+            "[reference]\nsequence = \"soboll\"\n",
+            [":6", "`soboll`", "`sobol`"],
+        ),
+        (
+            "[accel]\nlambda = 2\n",
+            [":6", "accel `lambda`", "Known: `brute-force`"],
+        ),
+    ] {
+        assert_says(parse(more), &pieces);
+    }
+    let text = AXES.replace("cornell-box", "cornel-box");
+    assert_says(
+        parse_with(&text, &[]),
+        &["trial.toml:2", "`cornel-box`", "`cornell-box`", ".obj"],
+    );
+    let text = AXES.replace("\"bvh\"", "\"bhv\"");
+    assert_says(
+        parse_with(&text, &[]),
+        &["trial.toml:3", "accel `bhv`", "mean `bvh`"],
+    );
+    assert_says(
+        parse_with(&format!("sed = 1\n{AXES}"), &[]),
+        &["trial.toml:1", "key outside all sections `sed`"],
+    );
+}
+
+#[test]
+fn a_value_of_the_wrong_type_is_answered_with_the_right_one() {
+    for (more, pieces) in [
+        (
+            "[run]\nseed = \"one\"\n",
+            [":6", "`run.seed`", "the text \"one\""],
+        ),
+        (
+            "[run]\nseed = 1.5\n",
+            [":6", "an integer in [0, 4294967295]", "the number 1.5"],
+        ),
+        (
+            "[run]\nseed = 99999999999999999999\n",
+            [":6", "`run.seed`", "99999999999999999999"],
+        ),
+        (
+            "[run]\nresolution = [64]\n",
+            [":6", "a list of two integers", "a list of 1"],
+        ),
+        (
+            "[run]\nresolution = [64,\n 4.5]\n",
+            [":7", "a list of two integers", "4.5"],
+        ),
+        (
+            "[run]\nspp = 4\n",
+            [":6", "{ pow2 = [lo, hi] }", "the integer 4"],
+        ),
+        (
+            "[run]\nruntime_checks = 1\n",
+            [":6", "true or false", "the integer 1"],
+        ),
+        (
+            "[run]\nname = 2024-01-01\n",
+            [":6", "`run.name`", "the date 2024-01-01"],
+        ),
+        (
+            "[camera]\neye = [0, 1]\ntarget = [0, 0, 0]\n",
+            [":6", "`camera.eye`", "three"],
+        ),
+        (
+            "[accel.uniform-grid]\nlambda = \"x\"\n",
+            [":6", "`accel.uniform-grid.lambda`", "[0.1, 100]"],
+        ),
+        (
+            "[accel.uniform-grid]\nmax_cells = 2.0\n",
+            [":6", "an integer in [1, 65536]", "number 2"],
+        ),
+        (
+            "[sequence.pixel-hash]\nshuffle = 1\n",
+            [":6", "shuffle", "true or false"],
+        ),
+        (
+            "[accel]\nbvh = 2\n",
+            [":6", "`accel.bvh`", "a section of parameters"],
+        ),
+        (
+            "[exclude]\naccel = \"bvh\"\n",
+            [":5", "[[exclude]]", "a table"],
+        ),
+        (
+            "[discrepancy]\npairs = [0, 1]\n",
+            [":6", "`discrepancy.pairs`", "a list of pairs"],
+        ),
+    ] {
+        assert_says(parse(more), &pieces);
+    }
+    assert_says(
+        parse_with(&format!("timing = 1\n{AXES}"), &[]),
+        &["trial.toml:1", "`timing` must be a section"],
+    );
+    assert_says(
+        parse_with("[axes]\nscene = 3\n", &[]),
+        &["trial.toml:2", "`axes.scene`", "the integer 3"],
+    );
+}
+
+#[test]
+fn a_value_out_of_range_is_answered_with_the_range() {
+    for (more, pieces) in [
+        (
+            "[run]\nreplicates = 0\n",
+            [":6", "`run.replicates` = 0", "[1, 1024]"],
+        ),
+        ("[run]\nreplicates = 1025\n", [":6", "= 1025", "[1, 1024]"]),
+        (
+            "[run]\nresolution = [15, 64]\n",
+            [":6", "= 15", "[16, 8192]"],
+        ),
+        (
+            "[run]\nspp = { pow2 = [0, 17] }\n",
+            [":6", "`run.spp` = 17", "hi <= 16"],
+        ),
+        (
+            "[run]\nspp = { pow2 = [3, 2] }\n",
+            [":6", "[3, 2]", "lo <= hi"],
+        ),
+        ("[run]\nname = \"\"\n", [":6", "`run.name`", "not empty"]),
+        (
+            "[timing]\nmin_warmup_ms = 50\nmax_warmup_ms = 49\n",
+            [":7", "49", "min_warmup_ms"],
+        ),
+        (
+            "[discrepancy]\npoints = 100\n",
+            [":6", "= 100", "a power of two"],
+        ),
+        (
+            "[discrepancy]\npairs = [[1, 1]]\n",
+            [":6", "[1, 1]", "different dimensions"],
+        ),
+        (
+            "[camera]\neye = [0, 0, 0]\ntarget = [0, 0, 0]\n",
+            [":7", "`camera.target`", "eye"],
+        ),
+        (
+            "[camera]\neye = [0, 0, 0]\ntarget = [0, 2, 0]\n",
+            ["default", "`camera.up`", "parallel"],
+        ),
+        (
+            "[camera]\neye = [nan, 0, 0]\ntarget = [0, 2, 0]\n",
+            [":6", "`camera.eye`", "finite"],
+        ),
+        (
+            "[camera]\neye = [0, 0, 0]\ntarget = [0, 0, 1]\nfov = 180\n",
+            [":8", "fov", "[1, 179]"],
+        ),
+        (
+            "[accel.uniform-grid]\nlambda = [3, 101]\n",
+            [":6", "lambda` = 101", "[0.1, 100]"],
+        ),
+        (
+            "[accel.uniform-grid]\nlambda = nan\n",
+            [":6", "lambda` = NaN", "[0.1, 100]"],
+        ),
+        (
+            "[reference]\nseed = 8\n",
+            [":6", "`reference.seed` = 8", "replicates"],
+        ),
+    ] {
+        assert_says(parse(more), &pieces);
+    }
+    assert!(parse("[reference]\nseed = 9\n").is_ok());
+}
+
+#[test]
+fn missing_empty_and_repeated_things_are_named() {
+    assert_says(
+        parse_with("[run]\nseed = 1\n", &[]),
+        &["trial.toml:1", "`axes.scene` is missing"],
+    );
+    assert_says(
+        parse_with("[axes]\nscene = \"cornell-box\"\n", &[]),
+        &["trial.toml:1", "`axes.accel` is missing"],
+    );
+    assert_says(
+        parse("[camera]\neye = [0, 0, 0]\n"),
+        &["trial.toml:5", "`camera.target` is missing"],
+    );
+    let text = AXES.replace("[\"cornell-box\"]", "[]");
+    assert_says(
+        parse_with(&text, &[]),
+        &["trial.toml:2", "`axes.scene` is empty"],
+    );
+    assert_says(
+        parse("[accel.uniform-grid]\nlambda = []\n"),
+        &["trial.toml:6", "`accel.uniform-grid.lambda` is empty"],
+    );
+    assert_says(parse("[[exclude]]\n"), &["`exclude` is empty"]);
+    let text = AXES.replace("\"uniform-grid\"", "\"bvh\"");
+    assert_says(parse_with(&text, &[]), &["trial.toml:3", "\"bvh\" twice"]);
+    assert_says(
+        parse("[accel.uniform-grid]\nlambda = [3, 3.0]\n"),
+        &["trial.toml:6", "lists 3 twice"],
+    );
+    assert_says(
+        parse("[discrepancy]\npairs = [[0, 1], [0, 1]]\n"),
+        &["trial.toml:6", "[0, 1] twice"],
+    );
+}
+
+#[test]
+fn parameters_of_an_entry_that_is_not_used_are_a_mistake() {
+    let text = AXES.replace(", \"uniform-grid\"", "") + "[accel.uniform-grid]\nlambda = 3\n";
+    assert_says(
+        parse_with(&text, &[]),
+        &[
+            "trial.toml:5",
+            "[accel.uniform-grid]",
+            "not in axes.accel (`bvh`)",
+        ],
+    );
+    // Left over rather than wrong, when the command line replaced the axis.
+    let text = format!("{AXES}[accel.uniform-grid]\nlambda = 3\n");
+    let narrowed = parse_with(&text, &["axes.accel=bvh"]).expect("left-over parameters");
+    assert_eq!(labels(&narrowed.axes.accel), ["bvh"]);
+    assert_says(
+        parse_with(AXES, &["axes.accel=bvh", "accel.uniform-grid.lambda=4"]),
+        &["--set accel.uniform-grid.lambda=4", "not in axes.accel"],
+    );
+}
+
+#[test]
+fn overrides_replace_values_of_the_file_and_are_cited() {
+    let text = format!("{AXES}[run]\nresolution = [64, 64]\n[accel.uniform-grid]\nlambda = 3\n");
+    let overrides = [
+        "run.resolution=[32,16]",
+        "run.spp.pow2=[0,2]",
+        "run.name=other name",
+        "accel.uniform-grid.lambda=3,8",
+        "axes.scene=../models/dragon.ply,cornell-box",
+        "timing.rounds=3",
+        "timing.rounds=4",
+    ];
+    let experiment = parse_with(&text, &overrides).expect("good overrides");
+    assert_eq!(experiment.resolution, [32, 16]);
+    assert_eq!(experiment.spp.max(), 4);
+    assert_eq!(experiment.name, "other name");
+    assert_eq!(
+        labels(&experiment.axes.scene),
+        ["dragon.ply", "cornell-box"]
+    );
+    assert_eq!(experiment.axes.scene[0].name, "../models/dragon.ply");
+    assert_eq!(experiment.axes.accel.len(), 3);
+    assert_eq!(experiment.timing.rounds, 4);
+    assert!(experiment.text.starts_with(&text));
+    assert!(experiment.text.contains("# --set run.resolution=[32,16]\n"));
+    for (text, pieces) in [
+        (
+            "run.sead=1",
+            ["--set run.sead=1", "key in [run] `sead`", "`seed`"],
+        ),
+        (
+            "axes.scene=cornellbox",
+            ["--set axes.scene=cornellbox", "scene", "`cornell-box`"],
+        ),
+        (
+            "run.resolution=8,8",
+            ["--set run.resolution=8,8", "= 8", "[16, 8192]"],
+        ),
+        (
+            "run=3",
+            ["--set run=3", "`run` must be a section", "the integer 3"],
+        ),
+        ("seed", ["--set seed", "no `=`", "section.key=value"]),
+        (
+            "run.resolution=[8",
+            ["--set run.resolution=[8", "bad value", "key=value"],
+        ),
+    ] {
+        assert_says(parse_with(AXES, &[text]), &pieces);
+    }
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_named() {
+    let path = Path::new("no/such/experiment.toml");
+    assert_says(
+        Experiment::load(path, &[], &catalogue()),
+        &["no/such/experiment.toml", "cannot read"],
+    );
+}
+
+const SWEEP: &str = "[run]\nreplicates = 4\n[axes]\n\
+    scene = [\"cornell-box\", \"displaced-sphere\"]\n\
+    accel = [\"brute-force\", \"bvh\", \"uniform-grid\"]\n\
+    sequence = [\"pixel-hash\", \"sobol\"]\ndecorrelation = [\"none\", \"cranley-patterson\"]\n\
+    integrator = [\"ao\", \"path\"]\n[accel.uniform-grid]\nlambda = [3, 8]\n\
+    [[exclude]]\nsequence = \"pixel-hash\"\ndecorrelation = \"cranley-patterson\"\n\
+    [[exclude]]\naccel = \"brute-force\"\nscene = \"!cornell-box\"\n";
+
+#[test]
+fn a_plan_measures_errors_once_and_times_every_cell() {
+    let experiment = parse_with(SWEEP, &[]).expect("a good sweep");
+    let plan = plan(&experiment, &[]).expect("a plan");
+    assert_eq!(plan.scenes.len(), 2);
+    // 4 structures on the box, 3 on the sphere; 3 samplers; 2 integrators.
+    assert_eq!(plan.structures.len(), 7);
+    assert_eq!(plan.samplers.len(), 2 * 2 * 3);
+    assert_eq!(plan.times.len(), 7 * 2 * 3);
+    assert_eq!(plan.streams.len(), 3);
+    // Two samplers are randomised and need 4 renders, one is not and needs 1.
+    assert_eq!(plan.renders_planned, 2 * 2 * (4 + 4 + 1));
+    assert_eq!(plan.renders_full_product, 7 * 2 * (4 + 4 + 1));
+    let brute_force = plan
+        .structures
+        .iter()
+        .filter(|s| s.accel.name == "brute-force");
+    assert_eq!(brute_force.count(), 1);
+    let cells: Vec<usize> = plan.skipped.iter().map(|skipped| skipped.cells).collect();
+    assert_eq!(cells, [2 * 4 * 2, 2 * 4]);
+    let text = plan.describe();
+    for piece in [
+        "7 structures",
+        "cornell-box: brute-force, bvh, uniform-grid(lambda=3), uniform-grid(lambda=8)",
+        "12 samplers",
+        "displaced-sphere, path, sobol × none, replicates: 1",
+        "42 full cells",
+        "excluded by dir/trial.toml:11",
+        "for the error: 36 (measured for every full cell it would be 126)",
+    ] {
+        assert!(text.contains(piece), "no `{piece}` in:\n{text}");
+    }
+}
+
+#[test]
+fn filters_keep_what_fits_all_axes() {
+    let experiment = parse_with(SWEEP, &[]).expect("a good sweep");
+    let some = plan(
+        &experiment,
+        &["accel=uniform*,integrator=path", "scene=*sphere"],
+    )
+    .unwrap();
+    assert_eq!(some.structures.len(), 2);
+    assert_eq!(some.samplers.len(), 3);
+    assert_eq!(some.times.len(), 6);
+    assert_eq!(some.scenes.len(), 1);
+    let one = plan(
+        &experiment,
+        &["accel=uniform-grid(lambda=3),accel=bvh,sequence=sobol"],
+    );
+    let one = one.unwrap();
+    assert_eq!(one.structures.len(), 4);
+    assert_eq!(one.streams.len(), 2);
+    // A scene that the filter leaves without a structure stays visible as skipped.
+    let brute = plan(&experiment, &["accel=brute-force,integrator=ao"]).unwrap();
+    assert_eq!(brute.scenes.len(), 1);
+    assert_eq!(brute.samplers.len(), 3);
+    let left_out = brute
+        .skipped
+        .iter()
+        .filter(|s| s.reason.contains("no structure"));
+    assert_eq!(left_out.count(), 3);
+}
+
+#[test]
+fn filters_and_excludes_that_fit_nothing_are_mistakes() {
+    let experiment = parse_with(SWEEP, &[]).expect("a good sweep");
+    for (only, pieces) in [
+        ("acel=bvh", ["--only acel=bvh", "axis `acel`", "`accel`"]),
+        (
+            "accel=bhv",
+            ["--only accel=bhv", "no accel fits `bhv`", "`bvh`"],
+        ),
+        ("bvh", ["--only bvh", "no `=`", "axis=pattern"]),
+    ] {
+        assert_says(plan(&experiment, &[only]), &pieces);
+    }
+    assert_says(
+        plan(&experiment, &["accel=brute-force,scene=displaced-sphere"]),
+        &["nothing is left", "--only"],
+    );
+    assert_says(
+        parse("[[exclude]]\naccel = \"bhv\"\n"),
+        &["trial.toml:6", "no accel fits `bhv`", "`bvh`"],
+    );
+    let never = format!("{SWEEP}[[exclude]]\nscene = \"!*\"\naccel = \"bvh\"\n");
+    assert_says(
+        plan(&parse_with(&never, &[]).expect("parses"), &[]),
+        &["trial.toml:17", "scene = !*, accel = bvh", "fits no cell"],
+    );
+    let all = format!("{SWEEP}[[exclude]]\naccel = \"*\"\n");
+    assert_says(
+        plan(&parse_with(&all, &[]).expect("parses"), &[]),
+        &["nothing is left"],
+    );
+    // The same leftover exclude is no mistake where the command line replaced its axis.
+    let other = parse_with(SWEEP, &["axes.scene=a/b.obj"]).expect("a replaced axis");
+    assert_eq!(plan(&other, &[]).unwrap().structures.len(), 3);
+    let narrowed = parse_with(SWEEP, &["axes.sequence=sobol"]).expect("a replaced axis");
+    assert_eq!(plan(&narrowed, &[]).unwrap().streams.len(), 2);
+}
+
+#[test]
+fn the_documentation_holds_the_table_of_all_keys() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/experiments.md");
+    let text = std::fs::read_to_string(&path).expect("docs/experiments.md");
+    let table = keys::reference_table();
+    assert!(keys::KEYS.len() > 30);
+    assert!(
+        text.contains(&table),
+        "docs/experiments.md lacks this table; paste it there:\n{table}"
+    );
+}
+
+#[test]
+fn every_default_is_accepted_by_the_parser() {
+    for key in keys::KEYS {
+        let Some(default) = key.default else { continue };
+        let (section, name) = (key.section, key.name);
+        let mut text = String::new();
+        if section != "axes" {
+            text = format!("[{section}]\n{name} = {default}\n");
+        }
+        if section == "camera" {
+            text += "eye = [0, 0, 0]\ntarget = [0, 0, 1]\n";
+        }
+        good(&text);
+    }
+    assert_eq!(Axis::ALL.len(), 5);
+}
+
+#[test]
+fn committed_experiments_parse_and_plan() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
+    let mut seen = 0;
+    for file in std::fs::read_dir(&folder).expect("experiments/") {
+        let path = file.expect("a directory entry").path();
+        if path.extension().is_none_or(|extension| extension != "toml") {
+            continue;
+        }
+        let experiment =
+            Experiment::load(&path, &[], &catalogue()).unwrap_or_else(|error| panic!("{error}"));
+        let plan = plan(&experiment, &[]).unwrap_or_else(|error| panic!("{error}"));
+        assert!(plan.renders_planned < plan.renders_full_product);
+        seen += 1;
+    }
+    assert!(seen >= 3, "only {seen} experiments found");
+}
