@@ -18,6 +18,8 @@ pub struct RunData<'a> {
     pub streams: Vec<&'a StreamRecord>,
     /// Cells left out.
     pub skipped: Vec<&'a SkippedRecord>,
+    /// Cells that failed without a record of their own kind.
+    pub failed: Vec<&'a SkippedRecord>,
     /// Every structure of the run; the index is its look in all plots.
     pub structures: Vec<String>,
     /// Every sampler of the run; the index is its look in all plots.
@@ -73,6 +75,7 @@ impl<'a> RunData<'a> {
                 Record::Run(record) => data.run = Some(record),
                 Record::Finished(record) => data.finished = Some(record),
                 Record::Skipped(record) => data.skipped.push(record),
+                Record::Failed(record) => data.failed.push(record),
                 Record::Stream(record) => put(&mut data.streams, record, |a, b| {
                     a.sequence == b.sequence
                         && a.decorrelation == b.decorrelation

@@ -131,7 +131,7 @@ pub fn run(
         failed: session.failed,
         skipped: session.skipped,
         report: Some(report.html),
-        tables: crate::report::terminal_tables(&lines),
+        tables: crate::report::terminal_tables(&lines.lines),
     })
 }
 
@@ -180,7 +180,10 @@ pub fn verify(
                 Err(reason) => Err(reason.clone()),
                 Ok(world) => match structures::build_and_gate(&mut session, world, accel) {
                     Ok((_, record)) => record.gate.ok_or_else(|| "no verdict".to_owned()),
-                    Err(record) => record.gate.ok_or_else(|| record.failure.unwrap_or_default()),
+                    Err(record) => {
+                        let reason = record.failure.unwrap_or_default();
+                        record.gate.ok_or(reason)
+                    }
                 },
             };
             verified.push(Verified { scene: scene.clone(), accel: accel.clone(), verdict });
