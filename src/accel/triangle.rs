@@ -88,6 +88,7 @@ pub fn intersect_triangle(triangle: &TriangleRecord, ray: &Ray, inverse: [f32; 3
     let t = t.max(enter).min(exit);
     let nearer = t < hit.t || (t == hit.t && triangle.id < hit.triangle);
     if enter <= exit && t >= ray.t_min && t <= ray.t_max && nearer {
-        *hit = Hit { t, triangle: triangle.id, u: u / area, v: v / area };
+        // None of the three is negative, but any may be −0, whose sign compilers do not keep.
+        *hit = Hit { t: t.abs(), triangle: triangle.id, u: u.abs() / area, v: v.abs() / area };
     }
 }
