@@ -4,7 +4,6 @@ use super::adapters::{self, bytes, largest_binding, mesa_major};
 use super::failure::Failure;
 use super::output::print;
 use super::system::{self, System};
-use super::table::grouped;
 use clap::Args;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::gpu::{
@@ -109,7 +108,7 @@ fn examine(
     };
     let limit = largest_binding(&gpu.limits);
     let triangle = size_of::<TriangleRecord>();
-    let triangles = limit as usize / triangle;
+    let millions = limit as f64 / triangle as f64 / 1e6;
     let mut text = format!("\nAdapter in use: {number}{}; {reason}\n", gpu.info.name);
     let timestamps = match gpu.timestamp_period {
         Some(_) => "present: passes are timed by the GPU's own clock",
@@ -123,11 +122,11 @@ fn examine(
     let _ = writeln!(text, "  timestamps  {timestamps}");
     let _ = writeln!(
         text,
-        "  scene size  at most about {} triangles ({} per binding, {triangle} bytes a triangle)",
-        grouped(triangles),
+        "  scene size  at most about {millions:.1} million triangles ({} per binding, {triangle} bytes each)",
         bytes(limit),
     );
     text += &speed(gpu, system);
+    text += "\nEverything that Raystone needs works here.\n";
     Ok(text)
 }
 
