@@ -79,3 +79,33 @@ pub fn main() -> ExitCode {
     };
     done.unwrap_or_else(|failure| failure.tell())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_documentation_names_every_command_and_flag() {
+        let page = include_str!("../../docs/command-line.md");
+        let command_line = CommandLine::command();
+        assert!(command_line.get_subcommands().count() > 0);
+        for command in command_line.get_subcommands() {
+            let name = command.get_name();
+            assert!(page.contains(&format!("## `raystone {name}")), "{name}");
+            let flags: Vec<_> = command
+                .get_arguments()
+                .filter_map(|a| a.get_long())
+                .collect();
+            for flag in flags {
+                assert!(page.contains(&format!("`--{flag}")), "{name} --{flag}");
+            }
+        }
+        assert!(!page.contains("`--no-such-flag"));
+    }
+
+    #[test]
+    fn the_commands_are_consistent() {
+        CommandLine::command().debug_assert();
+    }
+}

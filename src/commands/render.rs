@@ -74,11 +74,12 @@ impl Render {
             Experiment::parse(DEFAULTS, "raystone render", &self.overrides(), &catalogue)?;
         for axis in Axis::ALL {
             let variants = experiment.axes.variants(axis);
-            if let [first, second, ..] = variants {
+            if variants.len() > 1 {
+                let labels: Vec<_> = variants.iter().map(|v| v.label.as_str()).collect();
                 return Err(Failure::input(anyhow!(
-                    "render makes one picture, but {axis} has {} values ({first}, {second}, …); \
-                     give one",
-                    variants.len()
+                    "render makes one picture, but {axis} has {} values ({}); give one",
+                    labels.len(),
+                    labels.join(", ")
                 )));
             }
         }
