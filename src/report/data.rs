@@ -1,5 +1,6 @@
 //! Records sorted by what they speak of: scene, integrator, sampler.
 
+use super::format;
 use super::samplers::Sampler;
 use crate::config::Variant;
 use crate::measure::record::*;
@@ -17,6 +18,8 @@ pub struct RunData<'a> {
     pub streams: Vec<&'a StreamRecord>,
     /// Cells left out.
     pub skipped: Vec<&'a SkippedRecord>,
+    /// Cells that failed without a record of their own kind.
+    pub failed: Vec<&'a SkippedRecord>,
     /// Every structure of the run; the index is its look in all plots.
     pub structures: Vec<String>,
     /// Every sampler of the run; the index is its look in all plots.
@@ -72,6 +75,7 @@ impl<'a> RunData<'a> {
                 Record::Run(record) => data.run = Some(record),
                 Record::Finished(record) => data.finished = Some(record),
                 Record::Skipped(record) => data.skipped.push(record),
+                Record::Failed(record) => data.failed.push(record),
                 Record::Stream(record) => put(&mut data.streams, record, |a, b| {
                     a.sequence == b.sequence
                         && a.decorrelation == b.decorrelation
@@ -262,7 +266,11 @@ impl StructureRecord {
         let rays: usize = gate.classes.iter().map(|class| class.rays).sum();
         let mut faults = Vec::new();
         if wrong > 0 {
-            faults.push(format!("{wrong} of {rays} rays differ"));
+            faults.push(format!(
+                "{} of {} rays differ",
+                format::count(wrong as u64),
+                format::count(rays as u64)
+            ));
         }
         if gate.brute_force.wrong + gate.oracle.wrong > 0 {
             faults.push("the judge itself is wrong".into());

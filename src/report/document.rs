@@ -1,5 +1,8 @@
 //! The report as a document that HTML, Markdown and the terminal show alike.
 
+use super::ReportError;
+use super::plot::drawing::{Drawing, to_png, to_svg};
+use rayon::prelude::*;
 use serde::Serialize;
 
 /// The whole report.
@@ -13,6 +16,31 @@ pub struct Document {
     pub banners: Vec<Banner>,
     /// Sections in order.
     pub sections: Vec<Section>,
+}
+
+impl Document {
+    /// Paints every figure, on all cores.
+    ///
+    /// # Errors
+    /// If the drawing backend fails.
+    pub fn paint(&mut self) -> Result<(), ReportError> {
+        let blocks = self
+            .sections
+            .iter_mut()
+            .flat_map(|section| &mut section.blocks);
+        let figures: Vec<&mut Figure> = blocks
+            .filter_map(|block| match block {
+                Block::Figures(figures) => Some(figures),
+                _ => None,
+            })
+            .flatten()
+            .collect();
+        figures.into_par_iter().try_for_each(|figure| {
+            figure.svg = to_svg(&figure.drawing)?;
+            figure.png = to_png(&figure.drawing)?;
+            Ok(())
+        })
+    }
 }
 
 /// A line across the page.
@@ -209,11 +237,28 @@ pub struct Figure {
     pub caption: String,
     /// Whether it takes the full width.
     pub wide: bool,
-    /// SVG document.
+    /// What is painted.
+    #[serde(skip)]
+    pub drawing: Drawing,
+    /// SVG document; empty until [`Document::paint`].
     pub svg: String,
-    /// PNG file.
+    /// PNG file; empty until [`Document::paint`].
     #[serde(skip)]
     pub png: Vec<u8>,
+}
+
+impl Figure {
+    /// A plot that is not painted yet; wide drawings take the full width.
+    pub fn new(name: impl Into<String>, caption: impl Into<String>, drawing: Drawing) -> Self {
+        Self {
+            name: name.into(),
+            caption: caption.into(),
+            wide: drawing.width > 600.0,
+            drawing,
+            svg: String::new(),
+            png: Vec::new(),
+        }
+    }
 }
 
 /// Pictures in a grid.

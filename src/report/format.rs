@@ -42,9 +42,14 @@ pub fn bounds(interval: &Interval) -> String {
     format!("[{}, {}]", number(interval.low), number(interval.high))
 }
 
-/// `value [low, high]`.
+/// `value [low, high]`; the interval is left out where it has no width.
 pub fn interval(interval: &Interval) -> String {
-    format!("{} {}", number(interval.value), bounds(interval))
+    let value = number(interval.value);
+    if interval.low == interval.high {
+        value
+    } else {
+        format!("{value} {}", bounds(interval))
+    }
 }
 
 /// A slope with its interval; the interval is left out where it has no width.

@@ -8,7 +8,6 @@
 pub mod color;
 pub mod data;
 pub mod document;
-mod files;
 pub mod format;
 pub mod html;
 pub mod markdown;
@@ -18,7 +17,6 @@ pub mod read;
 pub mod ruling;
 pub mod samplers;
 pub mod sections;
-mod stats_shim;
 pub mod terminal;
 #[cfg(test)]
 mod tests;
@@ -26,6 +24,7 @@ mod tests;
 pub use read::{Records, read_records};
 pub use terminal::terminal_tables;
 
+use crate::measure::atomic::write_atomic;
 use data::RunData;
 use document::{Block, Document};
 use std::path::{Path, PathBuf};
@@ -108,17 +107,25 @@ pub struct ReportPaths {
 pub fn write_report(dir: &Path) -> Result<ReportPaths, ReportError> {
     let records = read_records(dir)?;
     let data = RunData::new(&records.lines);
-    let document = sections::document(dir, &data, &records.warnings)?;
+    let mut document = sections::document(dir, &data, &records.warnings);
+    document.paint()?;
     let plots = write_plots(dir, &document)?;
     let html = dir.join("index.html");
-    files::write_atomically(&html, html::page(&document)?.as_bytes())?;
+    write_file(&html, html::page(&document)?.as_bytes())?;
     let summary = dir.join("summary.md");
-    files::write_atomically(&summary, markdown::summary(&document).as_bytes())?;
+    write_file(&summary, markdown::summary(&document).as_bytes())?;
     Ok(ReportPaths {
         html,
         summary,
         plots,
         warnings: records.warnings,
+    })
+}
+
+fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
+    write_atomic(path, bytes).map_err(|source| ReportError::Write {
+        path: path.into(),
+        source,
     })
 }
 
@@ -137,7 +144,7 @@ fn write_plots(dir: &Path, document: &Document) -> Result<Vec<PathBuf>, ReportEr
     for figure in figures.flatten() {
         for (extension, bytes) in [("svg", figure.svg.as_bytes()), ("png", &figure.png)] {
             let path = folder.join(format!("{}.{extension}", figure.name));
-            files::write_atomically(&path, bytes)?;
+            write_file(&path, bytes)?;
             written.push(path);
         }
     }

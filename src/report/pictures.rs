@@ -49,7 +49,7 @@ mod tests {
         std::fs::write(dir.path().join("b.png"), b"text").unwrap();
         let data = load(dir.path(), "a.png", "a").data.unwrap();
         assert!(
-            data.starts_with("data:image/png;base64,iVBORw0KGgo"),
+            data.starts_with("data:image/png;base64,iVBORw0KGgp"),
             "{data}"
         );
         for (path, reason) in [

@@ -1,8 +1,8 @@
 //! What the replicates of a sampler say together.
 
 use super::data::View;
-use super::stats_shim::{bootstrap_mean, log_log_slope};
 use crate::measure::record::{BiasRecord, ErrorRecord, Interval};
+use crate::measure::statistics::{bootstrap_mean, log_log_slope};
 
 /// A sampler under one scene and integrator.
 #[derive(Debug)]
@@ -109,10 +109,7 @@ impl<'a> Sampler<'a> {
                 .iter()
                 .filter_map(|r| value(r, spp, id))
                 .collect();
-            (!values.is_empty()).then(|| MeanError {
-                spp,
-                error: bootstrap_mean(&values),
-            })
+            bootstrap_mean(&values).map(|error| MeanError { spp, error })
         };
         spps.into_iter().filter_map(mean_at).collect()
     }

@@ -31,7 +31,7 @@ impl Axis {
     /// From 0 to a little over `max`, ticks at 1, 2 or 5 × 10ⁿ.
     pub fn linear(max: f64, title: &str) -> Self {
         let max = if max > 0.0 { max } else { 1.0 };
-        let rough = max / 5.0;
+        let rough = max / 6.0;
         let power = 10f64.powf(rough.log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0]
             .iter()

@@ -96,9 +96,9 @@ impl CurvePlot {
         let mut drawing = Drawing::new(WIDTH, PLOT_HEIGHT + rows as f64 * LEGEND_ROW + 8.0);
         let frame = Frame::new(x, y, WIDTH, PLOT_HEIGHT);
         frame.draw(&mut drawing);
-        for guide in &self.guides {
+        for (i, guide) in self.guides.iter().enumerate() {
             let line = ends.map(|x| frame.at(x, guide.at(x)));
-            drawing.dashed_line(&line, DIM, 1.0, 3.0, 3.0);
+            guide_line(&mut drawing, &line, i);
         }
         for curve in &self.curves {
             curve.draw(&frame, &mut drawing);
@@ -121,8 +121,8 @@ impl CurvePlot {
             );
             y += LEGEND_ROW;
         }
-        for guide in &self.guides {
-            drawing.dashed_line(&[(16.0, y), (50.0, y)], DIM, 1.0, 3.0, 3.0);
+        for (i, guide) in self.guides.iter().enumerate() {
+            guide_line(drawing, &[(16.0, y), (50.0, y)], i);
             drawing.text(
                 (60.0, y),
                 fit_text(&guide.label, WIDTH - 66.0),
@@ -151,7 +151,7 @@ impl Curve {
             .rev()
             .map(|p| frame.at(p.x, p.low.max(frame.y.min())));
         if points.iter().any(|p| p.low < p.high) {
-            drawing.area(upper.chain(lower).collect(), ink.with_alpha(0.16));
+            drawing.area(upper.chain(lower).collect(), ink.with_alpha(0.22));
         }
         let line: Vec<_> = points.iter().map(|p| frame.at(p.x, p.y)).collect();
         if line.len() > 1 {
@@ -169,6 +169,12 @@ fn curve_line(drawing: &mut Drawing, points: &[(f64, f64)], ink: Ink, exact: boo
     } else {
         drawing.line(points.to_vec(), ink, 1.8);
     }
+}
+
+/// Thin; each guide with dashes of its own length.
+fn guide_line(drawing: &mut Drawing, points: &[(f64, f64)], index: usize) {
+    let dash = 2.0 + 6.0 * index as f64;
+    drawing.dashed_line(points, DIM, 1.1, dash, 3.0);
 }
 
 fn drawable(point: &CurvePoint) -> bool {

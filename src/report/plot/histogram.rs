@@ -43,10 +43,14 @@ impl Histogram {
     fn draw(&self, drawing: &mut Drawing, (x, y): (f64, f64)) {
         let (left, right) = (x + 14.0, x + PANEL.0 - 14.0);
         let (top, bottom) = (y + 32.0, y + PANEL.1 - 28.0);
-        let ink = if self.biased { FAILED } else { INK };
+        let (ink, label) = if self.biased {
+            (FAILED, format!("biased: {}", self.label))
+        } else {
+            (INK, self.label.clone())
+        };
         drawing.text(
             (left, y + 16.0),
-            fit_text(&self.label, right - left),
+            fit_text(&label, right - left),
             ink,
             Anchor::Start,
         );
@@ -93,7 +97,7 @@ mod tests {
             counts: vec![0; 10],
             biased: false,
         };
-        assert!(draw(&[empty.clone()]).is_none());
+        assert!(draw(std::slice::from_ref(&empty)).is_none());
         let full = Histogram {
             counts: vec![3; 10],
             ..empty

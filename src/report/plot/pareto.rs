@@ -1,9 +1,10 @@
 //! Run time against error: one point per cell, the Pareto front drawn and named.
 
 use super::axis::{Axis, Frame};
-use super::drawing::{Anchor, DIM, Drawing, FONT_PX, INK, fit_text, text_width};
+use super::drawing::{Anchor, DIM, Drawing, INK, Point, fit_text};
 use super::marker;
 use crate::measure::record::Interval;
+use crate::measure::statistics::pareto_front;
 
 /// One cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,23 +37,6 @@ pub struct ParetoPlot {
 const WIDTH: f64 = 900.0;
 const PLOT_HEIGHT: f64 = 480.0;
 const LEGEND_ROW: f64 = 21.0;
-
-/// Indices of the points that no other point beats in both coordinates (smaller is better), by
-/// growing x. Of equal points the first is kept.
-pub fn pareto_front(points: &[(f64, f64)]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..points.len()).collect();
-    order.sort_by(|&a, &b| {
-        let ((ax, ay), (bx, by)) = (points[a], points[b]);
-        ax.total_cmp(&bx).then(ay.total_cmp(&by))
-    });
-    let mut best = f64::INFINITY;
-    order.retain(|&i| {
-        let better = points[i].1 < best;
-        best = best.min(points[i].1);
-        better
-    });
-    order
-}
 
 /// Letter of a structure: a, b, …, z, then a number.
 pub fn letter(index: usize) -> String {
@@ -95,22 +79,17 @@ impl ParetoPlot {
         let y = Axis::log10(errors, &self.y_title)?;
         let front = self.front();
         let legend = self.structures.len().max(self.samplers.len()) + front.len() + 2;
-        let mut drawing = Drawing::new(WIDTH, PLOT_HEIGHT + legend as f64 * LEGEND_ROW + 12.0);
+        let mut drawing = Drawing::new(
+            WIDTH,
+            PLOT_HEIGHT + (legend as f64 + 0.4) * LEGEND_ROW + 12.0,
+        );
         let frame = Frame::new(x, y, WIDTH, PLOT_HEIGHT);
         frame.draw(&mut drawing);
         self.draw_front(&frame, &front, &mut drawing);
         for point in &self.points {
             self.draw_point(point, &frame, &mut drawing);
         }
-        for (rank, &i) in front.iter().enumerate() {
-            let (x, y) = frame.at(self.points[i].seconds.value, self.points[i].error.value);
-            drawing.text(
-                (x - 9.0, y + 10.0),
-                (rank + 1).to_string(),
-                INK,
-                Anchor::End,
-            );
-        }
+        self.draw_labels(&frame, &front, &mut drawing);
         self.draw_legend(&front, &mut drawing);
         Some(drawing)
     }
@@ -149,14 +128,39 @@ impl ParetoPlot {
         }
         let at = frame.at(seconds.value, error.value);
         marker::draw(drawing, self.samplers[point.sampler].1, at, 5.5, ink);
-        let label = letter(point.structure);
-        let offset = 9.0 + text_width(&label) / 2.0;
-        drawing.text(
-            (at.0 + offset, at.1 - FONT_PX * 0.6),
-            label,
-            DIM,
-            Anchor::Middle,
-        );
+    }
+
+    /// Ranks of the front and letters of the structures, each where it covers no marker and no other
+    /// label; in a crowd a letter is left out rather than made unreadable.
+    fn draw_labels(&self, frame: &Frame, front: &[usize], drawing: &mut Drawing) {
+        const CLEAR: f64 = 12.0;
+        let at = |i: usize| {
+            let point: &CellPoint = &self.points[i];
+            frame.at(point.seconds.value, point.error.value)
+        };
+        let mut taken: Vec<Point> = (0..self.points.len()).map(at).collect();
+        let ranks = front
+            .iter()
+            .enumerate()
+            .map(|(rank, &i)| (i, (rank + 1).to_string(), INK));
+        let letters = (0..self.points.len()).map(|i| (i, letter(self.points[i].structure), DIM));
+        for (i, text, ink) in ranks.chain(letters) {
+            let (x, y) = at(i);
+            let is_rank = ink == INK;
+            let side = if is_rank { -1.0 } else { 1.0 };
+            let places = [(1.0, -1.0), (1.0, 1.0), (-1.0, -1.0), (-1.0, 1.0)]
+                .map(|(dx, dy)| (x + 12.0 * dx * side, y - 9.0 * dy * side));
+            let is_free = |place: &&Point| {
+                let far = |other: &Point| (other.0 - place.0).hypot(other.1 - place.1) >= CLEAR;
+                taken.iter().all(far)
+            };
+            let free = places.iter().find(is_free).copied();
+            // The front must be named even in a crowd.
+            if let Some(place) = free.or(is_rank.then_some(places[0])) {
+                drawing.text(place, text, ink, Anchor::Middle);
+                taken.push(place);
+            }
+        }
     }
 
     fn draw_legend(&self, front: &[usize], drawing: &mut Drawing) {
@@ -186,7 +190,7 @@ impl ParetoPlot {
             );
         }
         let rows = self.structures.len().max(self.samplers.len()) + 1;
-        let mut y = top + rows as f64 * LEGEND_ROW;
+        let mut y = top + (rows as f64 + 0.4) * LEGEND_ROW;
         drawing.text(
             (16.0, y),
             "Pareto front: no cell is both faster and better",
@@ -209,20 +213,6 @@ impl ParetoPlot {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_front_holds_what_nothing_beats() {
-        let points = [
-            (1.0, 9.0),
-            (2.0, 4.0),
-            (2.0, 5.0),
-            (3.0, 4.0),
-            (4.0, 1.0),
-            (1.0, 9.0),
-        ];
-        assert_eq!(pareto_front(&points), [0, 1, 4]);
-        assert!(pareto_front(&[]).is_empty());
-    }
 
     #[test]
     fn the_picture_names_the_front() {

@@ -22,6 +22,8 @@ pub struct Bar {
 /// Horizontal bars in groups.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RatePlot {
+    /// Which clock the times come from.
+    pub clock: &'static str,
     /// `(ray class, one bar per structure)`.
     pub groups: Vec<(String, Vec<Bar>)>,
 }
@@ -39,7 +41,7 @@ impl RatePlot {
             .filter_map(|bar| bar.rate)
             .map(|rate| rate.high.max(rate.value))
             .fold(0.0, f64::max);
-        let left = widest.min(300.0) + 40.0;
+        let left = widest.min(330.0) + 40.0;
         let right = WIDTH - 170.0;
         let height: f64 = self
             .groups
@@ -48,8 +50,14 @@ impl RatePlot {
             .sum();
         let bottom = height + 12.0;
         let mut drawing = Drawing::new(WIDTH, bottom + 56.0);
-        let axis = Axis::linear(max, "million rays per second (median, 95 % interval)");
-        axis.draw_below(&mut drawing, left, right, 8.0, bottom);
+        let title = format!(
+            "million rays per second ({}; median, 95 % interval)",
+            self.clock
+        );
+        let axis = Axis::linear(max, &title);
+        if max > 0.0 {
+            axis.draw_below(&mut drawing, left, right, 8.0, bottom);
+        }
         let mut y = 4.0;
         for (class, bars) in &self.groups {
             drawing.text((14.0, y + HEADER / 2.0), class, INK, Anchor::Start);
@@ -69,7 +77,7 @@ impl RatePlot {
 
 impl Bar {
     fn draw(&self, drawing: &mut Drawing, left: f64, y: f64, x_at: impl Fn(f64) -> f64) {
-        let label = fit_text(&self.label, left - 40.0);
+        let label = fit_text(&self.label, left - 30.0);
         drawing.text((left - 24.0, y), label, INK, Anchor::End);
         let ink = marker::ink(self.look);
         marker::draw(drawing, self.look, (left - 12.0, y), 4.5, ink);
@@ -128,12 +136,14 @@ mod tests {
     #[test]
     fn a_failed_structure_has_a_word_and_no_bar() {
         let plot = RatePlot {
+            clock: "GPU clock",
             groups: vec![("primary".into(), vec![bar(Some(5.0)), bar(None)])],
         };
         let drawing = plot.draw().unwrap();
         assert_eq!(filled(&drawing), 1);
         assert!(drawing.texts().contains(&"FAILED"));
         let all_good = RatePlot {
+            clock: "GPU clock",
             groups: vec![("primary".into(), vec![bar(Some(5.0)); 2])],
         }
         .draw()
@@ -145,9 +155,17 @@ mod tests {
     #[test]
     fn all_failed_still_draws_and_nothing_does_not() {
         let failed = RatePlot {
+            clock: "GPU clock",
             groups: vec![("primary".into(), vec![bar(None)])],
         };
         assert_eq!(filled(&failed.draw().unwrap()), 0);
-        assert!(RatePlot { groups: vec![] }.draw().is_none());
+        assert!(
+            RatePlot {
+                clock: "GPU clock",
+                groups: vec![]
+            }
+            .draw()
+            .is_none()
+        );
     }
 }

@@ -13,6 +13,9 @@ pub fn section(data: &RunData) -> Section {
     section
 }
 
+/// Detail of a check that had nothing to look at.
+const NOTHING: &str = "nothing to test.";
+
 /// Every check.
 pub fn checks(data: &RunData) -> Vec<Check> {
     let mut checks: Vec<Check> = data.scenes.iter().map(gate).collect();
@@ -32,6 +35,11 @@ pub fn checks(data: &RunData) -> Vec<Check> {
 
 /// Fails if anything was wrong; stays open if nothing was tested.
 fn check(title: impl Into<String>, tested: bool, wrong: bool, detail: String) -> Check {
+    let detail = if tested || wrong {
+        detail
+    } else {
+        NOTHING.into()
+    };
     let tone = match (wrong, tested) {
         (true, _) => Tone::Bad,
         (false, true) => Tone::Good,
@@ -67,7 +75,7 @@ fn gate(scene: &SceneGroup) -> Check {
         })
         .collect();
     if gates.is_empty() && faulty.is_empty() {
-        return check(title, false, false, "no structure was gated".into());
+        return check(title, false, false, String::new());
     }
     let mut detail = format!(
         "{} through {}: id, t, u, v; {} differ, {}.",
@@ -187,7 +195,7 @@ fn finite_pixels(data: &RunData) -> Check {
         .sum();
     let detail = format!(
         "{} in {}.",
-        plural(bad, "NaN or infinite pixel"),
+        plural(bad, "non-finite pixel"),
         plural(replicates.len(), "image")
     );
     check(
@@ -240,7 +248,7 @@ fn reference_noise(data: &RunData) -> Check {
 }
 
 fn complete(data: &RunData) -> Check {
-    let title = "Every planned cell ran";
+    let title = "Every planned cell has figures";
     let Some(finished) = data.finished else {
         return check(title, true, true, "The run did not finish.".into());
     };
@@ -254,7 +262,7 @@ fn complete(data: &RunData) -> Check {
 
 fn join(details: Vec<String>) -> String {
     if details.is_empty() {
-        "nothing to test.".into()
+        NOTHING.into()
     } else {
         details.join("; ") + "."
     }

@@ -9,24 +9,23 @@ pub mod verdict;
 
 use super::data::{RunData, SceneGroup};
 use super::document::*;
-use super::plot::drawing::{Drawing, to_png, to_svg};
-use super::{ReportError, format};
+use super::format;
 use std::path::Path;
 
 /// Builds the whole report. `dir` is where the pictures lie; `warnings` come from reading.
-pub fn document(dir: &Path, data: &RunData, warnings: &[String]) -> Result<Document, ReportError> {
+pub fn document(dir: &Path, data: &RunData, warnings: &[String]) -> Document {
     let mut sections = vec![verdict::section(data), belief::section(data)];
     for (index, scene) in data.scenes.iter().enumerate() {
-        sections.push(scene_section(dir, data, index, scene)?);
+        sections.push(scene_section(dir, data, index, scene));
     }
-    sections.extend(streams::section(data)?);
+    sections.extend(streams::section(data));
     sections.extend(run::sections(data));
-    Ok(Document {
+    Document {
         title: title(data),
         subtitle: subtitle(data),
         banners: banners(data, warnings),
         sections,
-    })
+    }
 }
 
 fn title(data: &RunData) -> String {
@@ -92,24 +91,19 @@ fn banners(data: &RunData, warnings: &[String]) -> Vec<Banner> {
     banners
 }
 
-fn scene_section(
-    dir: &Path,
-    data: &RunData,
-    index: usize,
-    scene: &SceneGroup,
-) -> Result<Section, ReportError> {
+fn scene_section(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> Section {
     let mut section = Section::new(format!("scene-{index}"), format!("Scene: {}", scene.name));
     section.blocks.extend(facts(scene));
     section
         .blocks
-        .extend(structures::blocks(dir, data, index, scene)?);
+        .extend(structures::blocks(dir, data, index, scene));
     for (number, view) in scene.views.iter().enumerate() {
         let stem = format!("scene-{index}-{}-{number}", file_stem(view.integrator));
         section
             .blocks
-            .extend(samplers::blocks(dir, data, &stem, view)?);
+            .extend(samplers::blocks(dir, data, &stem, view));
     }
-    Ok(section)
+    section
 }
 
 fn facts(scene: &SceneGroup) -> Vec<Block> {
@@ -128,7 +122,7 @@ fn facts(scene: &SceneGroup) -> Vec<Block> {
     let report = &record.report;
     if report.dropped_non_finite > 0 {
         text += &format!(
-            " {} with a vertex that is not finite dropped.",
+            " {} dropped: a vertex is not finite.",
             format::plural(report.dropped_non_finite, "triangle")
         );
     }
@@ -155,21 +149,6 @@ pub fn file_stem(name: &str) -> String {
         }
     }
     stem.trim_end_matches('-').into()
-}
-
-/// Paints a drawing as a figure; wide ones take the full width.
-pub fn figure(
-    name: String,
-    caption: impl Into<String>,
-    drawing: &Drawing,
-) -> Result<Figure, ReportError> {
-    Ok(Figure {
-        name,
-        caption: caption.into(),
-        wide: drawing.width > 600.0,
-        svg: to_svg(drawing)?,
-        png: to_png(drawing)?,
-    })
 }
 
 #[cfg(test)]

@@ -137,6 +137,9 @@ fn failures(data: &RunData) -> Option<Section> {
             );
         }
     }
+    for failed in &data.failed {
+        add(failed.cell.clone(), "FAILED", Tone::Bad, failed.reason.clone());
+    }
     for skipped in &data.skipped {
         add(
             skipped.cell.clone(),

@@ -1,60 +1,55 @@
 //! Samplers under one scene and integrator: errors, times, bias, pictures.
 
-use super::figure;
 use super::verdict::Race;
-use crate::measure::record::Interval;
-use crate::report::data::{RunData, View};
+use crate::measure::record::{BiasRecord, Interval, TimeRecord};
+use crate::report::data::{RunData, View, sampler_name, structure_name};
 use crate::report::document::*;
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::report::plot::histogram::{self, Histogram};
 use crate::report::plot::pareto::{CellPoint, ParetoPlot, letter};
 use crate::report::samplers::{Metric, Sampler};
-use crate::report::{ReportError, format, pictures};
+use crate::report::{format, pictures};
 use std::path::Path;
 
 /// Everything on the samplers of a view; `stem` starts the names of its plots.
-pub fn blocks(
-    dir: &Path,
-    data: &RunData,
-    stem: &str,
-    view: &View,
-) -> Result<Vec<Block>, ReportError> {
+pub fn blocks(dir: &Path, data: &RunData, stem: &str, view: &View) -> Vec<Block> {
     let mut blocks = vec![Block::Heading(format!("Samplers with {}", view.integrator))];
-    let figures = error_figures(data, stem, view)?;
+    let figures = error_figures(data, stem, view);
     if !figures.is_empty() {
         blocks.push(Block::Figures(figures));
     }
     blocks.extend(error_table(view, Metric::RelMse).into_block());
     blocks.extend(error_table(view, Metric::Rmse).into_block());
     blocks.extend(efficiency_table(view).into_block());
-    if let Some(pareto) = pareto_plot(data, view) {
-        if let Some(drawing) = pareto.draw() {
-            let caption = "Run time against error, one point per cell; lines: 95 % intervals. Images are equal \
-                           across structures, so a structure moves a sampler only sideways.";
-            blocks.push(Block::Figures(vec![figure(
-                format!("{stem}-pareto"),
-                caption,
-                &drawing,
-            )?]));
-        }
+    if let Some(pareto) = pareto_plot(data, view)
+        && let Some(drawing) = pareto.draw()
+    {
+        let caption = "Run time against error, one point per cell without a fault; lines: 95 % intervals. \
+                           Images are equal across structures, so a structure moves a sampler only sideways.";
+        blocks.push(Block::Figures(vec![Figure::new(
+            format!("{stem}-pareto"),
+            caption,
+            drawing,
+        )]));
     }
     blocks.extend(time_table(view).into_block());
+    blocks.extend(bias_table(view).into_block());
     if let Some(drawing) = histogram::draw(&histograms(view)) {
         let caption = "Bias check: p-values of all tiles per sampler; flat (dashed) without bias, red where biased.";
-        blocks.push(Block::Figures(vec![figure(
+        blocks.push(Block::Figures(vec![Figure::new(
             format!("{stem}-bias"),
             caption,
-            &drawing,
-        )?]));
+            drawing,
+        )]));
     }
     blocks.extend(gallery(dir, view));
     if blocks.len() == 1 {
         blocks.push(Block::Paragraph("Nothing was measured.".into()));
     }
-    Ok(blocks)
+    blocks
 }
 
-fn error_figures(data: &RunData, stem: &str, view: &View) -> Result<Vec<Figure>, ReportError> {
+fn error_figures(data: &RunData, stem: &str, view: &View) -> Vec<Figure> {
     let structure = view.fastest_structure();
     let mut figures = Vec::new();
     for metric in [Metric::RelMse, Metric::Rmse] {
@@ -75,11 +70,11 @@ fn error_figures(data: &RunData, stem: &str, view: &View) -> Result<Vec<Figure>,
             let caption = format!(
                 "{name} against samples. Bands: 95 % interval of the mean; dashed: deterministic."
             );
-            figures.push(figure(
+            figures.push(Figure::new(
                 format!("{stem}-{}-spp", name.to_lowercase()),
                 caption,
-                &drawing,
-            )?);
+                drawing,
+            ));
         }
         let Some(structure) = &structure else {
             continue;
@@ -98,19 +93,19 @@ fn error_figures(data: &RunData, stem: &str, view: &View) -> Result<Vec<Figure>,
         if let Some(drawing) = by_seconds.draw() {
             let caption =
                 format!("{name} against time: samples × measured ms per spp with {structure}.");
-            figures.push(figure(
+            figures.push(Figure::new(
                 format!("{stem}-{}-seconds", name.to_lowercase()),
                 caption,
-                &drawing,
-            )?);
+                drawing,
+            ));
         }
     }
-    Ok(figures)
+    figures
 }
 
 fn curve_by_spp(data: &RunData, sampler: &Sampler, metric: Metric) -> Option<Curve> {
     let label = match sampler.slope(metric) {
-        Some(slope) => format!("{}   slope {}", sampler.name, format::slope(&slope)),
+        Some(slope) => format!("{}: slope {}", sampler.name, format::slope(&slope)),
         None => sampler.name.clone(),
     };
     curve(data, sampler, metric, 1.0, label)
@@ -125,7 +120,7 @@ fn curve_by_time(
 ) -> Option<Curve> {
     let per_spp = view.time(structure, &sampler.name)?.ms_per_spp;
     let label = format!(
-        "{}   {} ms per spp",
+        "{}: {} ms per spp",
         sampler.name,
         format::number(per_spp.value)
     );
@@ -189,10 +184,6 @@ pub fn error_table(view: &View, metric: Metric) -> Table {
     spps.iter()
         .for_each(|spp| table.add_column(format!("{spp} spp")));
     table.add_column("slope");
-    table.columns.push(Column {
-        title: "bias check".into(),
-        text: true,
-    });
     for sampler in measured {
         let means = sampler.mean_errors(metric);
         let mut row = vec![Cell::from(sampler.name.clone()), replicates(sampler)];
@@ -203,13 +194,7 @@ pub fn error_table(view: &View, metric: Metric) -> Table {
                 |mean| error_cell(sampler, &mean.error),
             )
         }));
-        row.push(
-            sampler
-                .slope(metric)
-                .map_or(format::ABSENT.into(), |slope| format::slope(&slope))
-                .into(),
-        );
-        row.push(bias_cell(sampler));
+        row.push(slope_cell(sampler.slope(metric)));
         table.rows.push(row);
     }
     table
@@ -233,17 +218,47 @@ fn error_cell(sampler: &Sampler, error: &Interval) -> Cell {
     }
 }
 
-fn bias_cell(sampler: &Sampler) -> Cell {
+fn slope_cell(slope: Option<Interval>) -> Cell {
+    let Some(slope) = slope else {
+        return format::ABSENT.into();
+    };
+    let text = format::slope(&slope);
+    match text.split_once(' ') {
+        Some((value, bounds)) => Cell::with_detail(value, bounds),
+        None => text.into(),
+    }
+}
+
+/// Verdict on the bias of every sampler.
+pub fn bias_table(view: &View) -> Table {
+    let caption = format!("Bias check with {}", view.integrator);
+    let columns = ["sampler", ":verdict", "tiles", "rejected", "smallest p"];
+    let mut table = Table::new(caption, &columns);
+    for sampler in view.samplers.iter().filter(|s| !s.replicates.is_empty()) {
+        let name = sampler.name.clone().into();
+        let testable = |bias: &&&BiasRecord| !bias.verdict.starts_with("not-testable");
+        let bias = sampler.bias.as_ref().filter(testable);
+        let count = |n: Option<usize>| n.map_or(format::ABSENT.into(), |n| format::count(n as u64));
+        table.rows.push(vec![
+            name,
+            bias_verdict(sampler),
+            count(bias.map(|bias| bias.tiles)).into(),
+            count(bias.map(|bias| bias.rejected)).into(),
+            format::optional(bias.map(|bias| bias.min_p)).into(),
+        ]);
+    }
+    table
+}
+
+fn bias_verdict(sampler: &Sampler) -> Cell {
     if let Some(fault) = sampler.fault() {
         return Cell::from(fault).toned(Tone::Bad);
     }
     match sampler.bias {
         None => "not tested".into(),
-        Some(bias) if bias.verdict == "no-bias-found" => Cell::with_detail(
-            "none found",
-            format!("{} of {} tiles", bias.rejected, bias.tiles),
-        )
-        .toned(Tone::Good),
+        Some(bias) if bias.verdict == "no-bias-found" => {
+            Cell::from("no bias found").toned(Tone::Good)
+        }
         Some(bias) => bias.verdict.clone().into(),
     }
 }
@@ -307,8 +322,8 @@ fn time_table(view: &View) -> Table {
     table
 }
 
-fn is_of(time: &crate::measure::record::TimeRecord, sampler: &Sampler) -> bool {
-    crate::report::data::sampler_name(&time.sequence, &time.decorrelation) == sampler.name
+fn is_of(time: &TimeRecord, sampler: &Sampler) -> bool {
+    sampler_name(&time.sequence, &time.decorrelation) == sampler.name
 }
 
 fn time_cell(view: &View, structure: &str, sampler: &Sampler) -> Cell {
@@ -318,9 +333,8 @@ fn time_cell(view: &View, structure: &str, sampler: &Sampler) -> Cell {
             format::bounds(&time.ms_per_spp),
         );
     }
-    let of_structure = |time: &&&crate::measure::record::TimeRecord| {
-        crate::report::data::structure_name(&time.accel, time.runtime_checks) == structure
-            && is_of(time, sampler)
+    let of_structure = |time: &&&TimeRecord| {
+        structure_name(&time.accel, time.runtime_checks) == structure && is_of(time, sampler)
     };
     match view.times.iter().find(of_structure) {
         Some(time) if !time.image_equal && time.failure.is_none() => {

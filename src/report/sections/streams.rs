@@ -1,19 +1,19 @@
 //! Star discrepancy of what the path consumed.
 
-use super::{figure, file_stem};
+use super::file_stem;
 use crate::measure::record::StreamRecord;
 use crate::report::data::{RunData, sampler_name};
 use crate::report::document::*;
+use crate::report::format;
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
-use crate::report::{ReportError, format};
 
 /// Columns of the table at most.
 const COLUMNS: usize = 8;
 
 /// The section; `None` when no stream was measured.
-pub fn section(data: &RunData) -> Result<Option<Section>, ReportError> {
+pub fn section(data: &RunData) -> Option<Section> {
     if data.streams.is_empty() {
-        return Ok(None);
+        return None;
     }
     let mut section = Section::new("discrepancy", "Star discrepancy of the streams");
     let mut purposes: Vec<(&str, [u32; 2])> = Vec::new();
@@ -41,7 +41,7 @@ pub fn section(data: &RunData) -> Result<Option<Section>, ReportError> {
             let caption = format!(
                 "{what}: exact star discrepancy of the first N points. Bands: 95 % interval over seeds; dashed curves: deterministic."
             );
-            figures.push(figure(stem, caption, &drawing)?);
+            figures.push(Figure::new(stem, caption, drawing));
         }
         tables.extend(table(&what, &streams).into_block());
     }
@@ -49,7 +49,7 @@ pub fn section(data: &RunData) -> Result<Option<Section>, ReportError> {
         section.blocks.push(Block::Figures(figures));
     }
     section.blocks.extend(tables);
-    Ok(Some(section))
+    Some(section)
 }
 
 fn plot(data: &RunData, streams: &[&StreamRecord]) -> CurvePlot {

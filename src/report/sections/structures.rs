@@ -1,36 +1,31 @@
 //! Structures of a scene: speed, build, size, work per ray, heat maps.
 
+use super::file_stem;
 use super::verdict::ray_classes;
-use super::{figure, file_stem};
 use crate::measure::record::{RayClass, StructureRecord};
 use crate::report::color::viridis_css;
 use crate::report::data::{RunData, SceneGroup, structure_name};
 use crate::report::document::*;
 use crate::report::plot::rates::{Bar, RatePlot};
-use crate::report::{ReportError, format, pictures};
+use crate::report::{format, pictures};
 use std::path::Path;
 
 /// Everything on the structures of the scene with this index.
-pub fn blocks(
-    dir: &Path,
-    data: &RunData,
-    index: usize,
-    scene: &SceneGroup,
-) -> Result<Vec<Block>, ReportError> {
+pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> Vec<Block> {
     let mut blocks = Vec::new();
     if scene.structures.is_empty() {
-        return Ok(blocks);
+        return blocks;
     }
     blocks.push(Block::Heading("Structures".into()));
     if let Some(drawing) = rate_plot(data, scene).draw() {
         let name = format!("scene-{index}-{}-rates", file_stem(scene.name));
         let caption = "Speed per ray class. Bars: median; lines: bootstrap 95 % interval. The same rays for all.";
-        blocks.push(Block::Figures(vec![figure(name, caption, &drawing)?]));
+        blocks.push(Block::Figures(vec![Figure::new(name, caption, drawing)]));
     }
     let tables = [speed_table(scene), build_table(scene), work_table(scene)];
     blocks.extend(tables.into_iter().filter_map(Table::into_block));
     blocks.extend(heat_maps(dir, scene));
-    Ok(blocks)
+    blocks
 }
 
 fn name(structure: &StructureRecord) -> String {
@@ -68,7 +63,9 @@ fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
         let bars = scene.structures.iter().map(|s| bar(s, class)).collect();
         (format::ray_class(class).to_owned(), bars)
     };
+    let stamped = data.run.is_none_or(|run| run.environment.timestamps);
     RatePlot {
+        clock: if stamped { "GPU clock" } else { "wall clock" },
         groups: classes.into_iter().map(group).collect(),
     }
 }

@@ -11,7 +11,9 @@ use crate::report::samplers::{Metric, Sampler, error_after};
 pub fn section(data: &RunData) -> Section {
     let mut section = Section::new("verdict", "Verdict");
     for scene in &data.scenes {
-        section.blocks.extend(table(scene).into_block());
+        let verdicts = table(scene).into_block();
+        let none = || Block::Paragraph(format!("On {} nothing could be compared.", scene.name));
+        section.blocks.push(verdicts.unwrap_or_else(none));
         section.blocks.extend(left_out(scene).map(Block::Paragraph));
     }
     if section.blocks.is_empty() {
@@ -99,7 +101,13 @@ fn left_out(scene: &SceneGroup) -> Option<String> {
         view.samplers.iter().filter_map(fault)
     });
     let names: Vec<String> = structures.chain(samplers).collect();
-    (!names.is_empty()).then(|| format!("Left out of the comparison: {}.", names.join("; ")))
+    (!names.is_empty()).then(|| {
+        format!(
+            "Left out of the comparison on {}: {}.",
+            scene.name,
+            names.join("; ")
+        )
+    })
 }
 
 /// Ray classes that some structure was timed on.
@@ -124,11 +132,7 @@ pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
         })
     };
     judge(
-        scene
-            .structures
-            .iter()
-            .filter_map(|s| contender(&s))
-            .collect(),
+        scene.structures.iter().filter_map(contender).collect(),
         Better::Higher,
     )
 }
