@@ -1,11 +1,11 @@
 //! `raystone render`.
 
-use super::arguments::{DeviceArguments, check_models, list_override, text_override};
+use super::arguments::{DeviceArguments, Scratch, check_models, list_override, text_override};
 use super::failure::Failure;
 use super::output::print;
 use anyhow::anyhow;
 use clap::Args;
-use raystone::config::{Axis, Experiment};
+use raystone::config::{Axis, Experiment, Plan};
 use raystone::run::Registries;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -72,20 +72,14 @@ impl Render {
         let catalogue = registries.catalogue();
         let experiment =
             Experiment::parse(DEFAULTS, "raystone render", &self.overrides(), &catalogue)?;
-        for axis in Axis::ALL {
-            let variants = experiment.axes.variants(axis);
-            if variants.len() > 1 {
-                let labels: Vec<_> = variants.iter().map(|v| v.label.as_str()).collect();
-                return Err(Failure::input(anyhow!(
-                    "render makes one picture, but {axis} has {} values ({}); give one",
-                    labels.len(),
-                    labels.join(", ")
-                )));
-            }
-        }
+        check_is_one(&experiment)?;
+        let is_randomised =
+            |sequence: &_, decorrelation: &_| registries.is_randomised(sequence, decorrelation);
+        let plan = Plan::new(&experiment, &[], is_randomised)?;
         check_models(&experiment.axes.scene, &catalogue)?;
-        let options = self.device.options(PathBuf::new(), false);
-        raystone::run::render(&experiment, &registries, &options, &self.output)?;
+        let scratch = Scratch::new()?;
+        let options = self.device.options(scratch.path(), false);
+        raystone::run::render(&experiment, &plan, &registries, &options, &self.output)?;
         print(&format!("{}\n", self.output.display()))?;
         Ok(ExitCode::SUCCESS)
     }
@@ -121,6 +115,22 @@ impl Render {
         overrides.extend(self.set.iter().cloned());
         overrides
     }
+}
+
+/// One picture is one cell.
+fn check_is_one(experiment: &Experiment) -> Result<(), Failure> {
+    for axis in Axis::ALL {
+        let variants = experiment.axes.variants(axis);
+        if variants.len() > 1 {
+            let labels: Vec<_> = variants.iter().map(|v| v.label.as_str()).collect();
+            return Err(Failure::input(anyhow!(
+                "render makes one picture, but {axis} has {} values ({}); give one",
+                labels.len(),
+                labels.join(", ")
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// The exponent of a power of two.

@@ -1,5 +1,6 @@
 //! The machine: operating system, processor, and how a driver is installed there.
 
+use raystone::run::environment::cpu_model;
 use std::fmt::Write as _;
 
 /// Environment variables that change which adapter answers and how fast it is.
@@ -111,14 +112,11 @@ impl System {
 
 /// Processor model and hardware threads.
 pub fn processor() -> String {
-    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let mut models = info.lines().filter(|line| line.starts_with("model name"));
-    let model = models.next().and_then(|line| line.split_once(':'));
-    let model = model.map_or(std::env::consts::ARCH, |(_, model)| model.trim());
+    let model = cpu_model();
     match std::thread::available_parallelism() {
         Ok(threads) if threads.get() == 1 => format!("{model}, 1 thread"),
         Ok(threads) => format!("{model}, {threads} threads"),
-        Err(_) => model.to_owned(),
+        Err(_) => model,
     }
 }
 

@@ -1,6 +1,8 @@
 //! `raystone verify`.
 
-use super::arguments::{DeviceArguments, ExperimentArguments, check_models, list_override};
+use super::arguments::{
+    DeviceArguments, ExperimentArguments, Scratch, check_models, list_override,
+};
 use super::failure::{FAILED, Failure};
 use super::output::print;
 use super::table::{Table, grouped};
@@ -67,8 +69,9 @@ impl Verify {
         for skipped in &plan.skipped {
             eprintln!("left out: {}: {}", skipped.cell, skipped.reason);
         }
-        let options = self.device.options(PathBuf::new(), false);
-        let rays = experiment.gate.rays as usize;
+        let scratch = Scratch::new()?;
+        let options = self.device.options(scratch.path(), false);
+        let rays = experiment.gate.rays;
         let verified = raystone::run::verify(&experiment, &plan, &registries, &options, rays)?;
         print(&table(&verified))?;
         let failed = verified.iter().filter(|v| !passed(v)).count();
