@@ -266,3 +266,83 @@ fn a_reader_that_goes_away_is_no_failure_but_a_full_disk_is() {
         .expect("it starts");
     assert!(error(&output, 2).contains("standard output"));
 }
+
+#[test]
+fn verify_ends_with_0_where_hits_are_right_and_with_1_where_a_kernel_skips_a_triangle() {
+    let arguments = [
+        "verify",
+        "--scene",
+        "cornell-box",
+        "--accel",
+        "brute-force",
+        "--rays",
+        "256",
+    ];
+    let right = run(&arguments);
+    assert_eq!(right.status.code(), Some(0), "{}", stdout(&right));
+    assert!(stdout(&right).contains("1 of 1 structures passed"));
+    let kernel = include_str!("../kernels/accel/brute_force.wesl");
+    assert!(kernel.contains("var i = 0u"));
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let accel = folder.path().join("accel");
+    std::fs::create_dir(&accel).expect("a writable folder");
+    let faulty = kernel.replace("var i = 0u", "var i = 1u");
+    std::fs::write(accel.join("brute_force.wesl"), faulty).expect("a writable folder");
+    let wrong = output(program(&arguments).arg("--kernels").arg(folder.path()));
+    let words = stdout(&wrong);
+    assert_eq!(wrong.status.code(), Some(1), "{words}");
+    assert!(
+        words.contains("FAILED") && words.contains("0 of 1 structures passed"),
+        "{words}"
+    );
+}
+
+#[test]
+fn a_scene_that_fails_ends_with_1_and_the_rest_goes_on() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let model = folder.path().join("empty.obj");
+    std::fs::write(&model, "").expect("a writable folder");
+    let scenes = format!("axes.scene=['{}', 'cornell-box']", model.display());
+    let out = folder.path().join("run");
+    let output = run(&[
+        "run",
+        "tests/data/tiny.toml",
+        "--set",
+        &scenes,
+        "--set",
+        "axes.accel=bvh",
+        "--out",
+        text(&out),
+    ]);
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{words}");
+    assert!(
+        words.contains("failed: ") && words.contains("empty.obj"),
+        "{words}"
+    );
+    let records = std::fs::read_to_string(out.join("records.jsonl")).expect("records");
+    assert!(records.contains(r#""kind":"structure""#) && records.contains(r#""passed":true"#));
+    assert!(out.join("index.html").is_file());
+}
+
+#[test]
+fn render_writes_a_picture_of_the_size_asked_for() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let picture = folder.path().join("picture.png");
+    let small = ["render", "--spp", "1", "--size", "24x16", "-o"];
+    let rendered = output(program(&small).arg(&picture));
+    assert_eq!(rendered.status.code(), Some(0));
+    assert_eq!(stdout(&rendered).trim(), text(&picture));
+    let decoded = image::open(&picture)
+        .expect("a readable picture")
+        .into_rgb8();
+    assert_eq!(decoded.dimensions(), (24, 16));
+    assert!(
+        decoded
+            .pixels()
+            .any(|pixel| pixel != decoded.get_pixel(0, 0)),
+        "one colour only"
+    );
+    let nowhere = output(program(&small).arg(folder.path().join("no/such/folder.png")));
+    assert!(error(&nowhere, 2).contains("folder.png"));
+}

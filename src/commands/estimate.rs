@@ -1,6 +1,5 @@
 //! How long a plan would take, roughly.
 
-use super::table::grouped;
 use raystone::config::{Experiment, Plan, Variant};
 use raystone::integrator::integrators;
 use raystone::sampling::dimensions::{FIRST_BOUNCE, PER_BOUNCE};
@@ -13,8 +12,8 @@ const RAYS_PER_SECOND: f64 = 2e6;
 const SECONDS_PER_KERNEL: f64 = 0.3;
 /// Classes of recorded rays.
 const RAY_CLASSES: u64 = 5;
-/// Roulette leaves few paths alive after as many bounces.
-const USUAL_BOUNCES: u32 = 4;
+/// Bounces of a usual path: in a closed room paths take four to six rays, most under a sky two.
+const USUAL_BOUNCES: u32 = 2;
 
 /// Work of a plan that grows with its size.
 pub struct Estimate {
@@ -72,8 +71,8 @@ impl Estimate {
     }
 }
 
-/// Rays that one sample takes at most, but for the last bounces of long paths: one from the camera,
-/// and at each bounce one onwards and one to a light.
+/// Rays that one sample usually takes: one from the camera, and at each bounce one onwards and one
+/// to a light.
 fn rays_per_sample(integrator: &Variant) -> u64 {
     let known = integrators()
         .iter()
@@ -92,12 +91,19 @@ impl fmt::Display for Estimate {
              warm-up. These are round figures, nothing was measured here: a GPU needs a small part \
              of it. Loading, building, the judge and the report come on top.",
             duration(self.seconds()),
-            grouped((self.rays / 1_000_000) as usize),
+            millions(self.rays),
             RAYS_PER_SECOND / 1e6,
             self.kernels,
             self.warmup_s,
         )
     }
+}
+
+/// A count in millions, with a decimal where it is small.
+fn millions(count: u64) -> String {
+    let millions = count as f64 / 1e6;
+    let decimals = if millions < 10.0 { 1 } else { 0 };
+    format!("{millions:.decimals$}")
 }
 
 /// A time with the precision of an estimate.
@@ -152,5 +158,6 @@ mod tests {
         assert_eq!(duration(41.2), "42 s");
         assert_eq!(duration(121.0), "3 min");
         assert_eq!(duration(7300.0), "3 h");
+        assert_eq!([millions(450_000), millions(284_300_000)], ["0.5", "284"]);
     }
 }

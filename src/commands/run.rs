@@ -6,8 +6,10 @@ use super::failure::{FAILED, Failure};
 use super::output::print;
 use clap::Args;
 use raystone::config::{Experiment, Plan};
+use raystone::measure::record::{Line, Record};
+use raystone::report::read_records;
 use raystone::run::{Registries, RunSummary};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Run an experiment file and write its records and report
@@ -47,11 +49,11 @@ impl Run {
         let out = self.out.unwrap_or_else(|| default_folder(&experiment.name));
         let options = self.device.options(out, self.quiet);
         let summary = raystone::run::run(&experiment, &plan, &registries, &options)?;
-        tell(&summary, self.quiet)
+        tell(&summary, &options.out, self.quiet)
     }
 }
 
-fn tell(summary: &RunSummary, quiet: bool) -> Result<ExitCode, Failure> {
+fn tell(summary: &RunSummary, out: &Path, quiet: bool) -> Result<ExitCode, Failure> {
     let mut text = String::new();
     if !quiet && !summary.tables.is_empty() {
         text += summary.tables.trim_end();
@@ -67,14 +69,39 @@ fn tell(summary: &RunSummary, quiet: bool) -> Result<ExitCode, Failure> {
     if summary.failed == 0 {
         return Ok(ExitCode::SUCCESS);
     }
+    let lines = read_records(out)?.lines;
+    for failure in lines.iter().filter_map(failure) {
+        eprintln!("failed: {failure}");
+    }
     eprintln!(
-        "{} failed; the report says why",
+        "{} failed",
         match summary.failed {
             1 => "1 gate or cell".to_owned(),
             failed => format!("{failed} gates or cells"),
         }
     );
     Ok(ExitCode::from(FAILED))
+}
+
+/// The cell of a record and why it failed, if it did.
+fn failure(line: &Line) -> Option<String> {
+    match &line.record {
+        Record::Failed(failed) => Some(format!("{}: {}", failed.cell, failed.reason)),
+        Record::Structure(cell) => {
+            let reason = cell.failure.as_ref()?;
+            Some(format!("{}, {}: {reason}", cell.scene, cell.accel))
+        }
+        Record::Time(cell) => Some(format!(
+            "{}, {}, {}, {} × {}: {}",
+            cell.scene,
+            cell.accel,
+            cell.integrator,
+            cell.sequence,
+            cell.decorrelation,
+            cell.failure.as_ref()?
+        )),
+        _ => None,
+    }
 }
 
 /// `results/NAME`, where a name such as `../a b` cannot lead out of `results`.
@@ -93,7 +120,6 @@ fn default_folder(name: &str) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     #[test]
     fn the_default_folder_lies_below_results() {
