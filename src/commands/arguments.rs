@@ -1,7 +1,5 @@
 //! Arguments that several commands share.
 
-use super::failure::Failure;
-use anyhow::Context as _;
 use clap::Args;
 use raystone::config::{Catalogue, Variant};
 use raystone::gpu::AdapterChoice;
@@ -29,6 +27,7 @@ impl DeviceArguments {
             out,
             adapter: self.adapter.clone().unwrap_or_default(),
             kernels: self.kernels.clone(),
+            lose_device_at: None,
             progress: !quiet && std::io::stderr().is_terminal(),
         }
     }
@@ -55,35 +54,6 @@ pub fn text_override(key: &str, value: &str) -> String {
 /// An override `key=value` whose value is the list of these texts.
 pub fn list_override(key: &str, values: &[String]) -> String {
     format!("{key}={}", toml::Value::from(values.to_vec()))
-}
-
-/// A folder for what the library writes beside the result that was asked for; removed in the end.
-pub struct Scratch(PathBuf);
-
-impl Scratch {
-    /// A new empty folder among the system's temporary files.
-    ///
-    /// # Errors
-    /// The system has no folder for temporary files that can be written.
-    pub fn new() -> Result<Self, Failure> {
-        let path = std::env::temp_dir().join(format!("raystone-{}", std::process::id()));
-        std::fs::create_dir(&path)
-            .with_context(|| format!("cannot make the temporary folder {}", path.display()))
-            .map_err(Failure::input)?;
-        Ok(Self(path))
-    }
-
-    /// Its path.
-    pub fn path(&self) -> PathBuf {
-        self.0.clone()
-    }
-}
-
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        // What cannot be removed is the system's to clean.
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
 }
 
 /// Checks that the models among the scenes can be opened, before minutes are spent on other cells.

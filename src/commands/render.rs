@@ -1,6 +1,6 @@
 //! `raystone render`.
 
-use super::arguments::{DeviceArguments, Scratch, check_models, list_override, text_override};
+use super::arguments::{DeviceArguments, check_models, list_override, text_override};
 use super::failure::Failure;
 use super::output::print;
 use anyhow::anyhow;
@@ -77,8 +77,8 @@ impl Render {
             |sequence: &_, decorrelation: &_| registries.is_randomised(sequence, decorrelation);
         let plan = Plan::new(&experiment, &[], is_randomised)?;
         check_models(&experiment.axes.scene, &catalogue)?;
-        let scratch = Scratch::new()?;
-        let options = self.device.options(scratch.path(), false);
+        // Only the picture is written: no folder is needed.
+        let options = self.device.options(PathBuf::new(), false);
         raystone::run::render(&experiment, &plan, &registries, &options, &self.output)?;
         print(&format!("{}\n", self.output.display()))?;
         Ok(ExitCode::SUCCESS)

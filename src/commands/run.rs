@@ -2,7 +2,7 @@
 
 use super::arguments::{DeviceArguments, ExperimentArguments, check_models};
 use super::estimate::Estimate;
-use super::failure::{FAILED, Failure};
+use super::failure::{BAD_INPUT, FAILED, Failure};
 use super::output::print;
 use clap::Args;
 use raystone::config::{Experiment, Plan};
@@ -66,7 +66,7 @@ fn tell(summary: &RunSummary, out: &Path, quiet: bool) -> Result<ExitCode, Failu
         };
     }
     print(&text)?;
-    if summary.failed == 0 {
+    if summary.failed == 0 && !summary.bad_input {
         return Ok(ExitCode::SUCCESS);
     }
     let lines = read_records(out)?.lines;
@@ -80,7 +80,7 @@ fn tell(summary: &RunSummary, out: &Path, quiet: bool) -> Result<ExitCode, Failu
             failed => format!("{failed} gates or cells"),
         }
     );
-    Ok(ExitCode::from(FAILED))
+    Ok(ExitCode::from(if summary.bad_input { BAD_INPUT } else { FAILED }))
 }
 
 /// The cell of a record and why it failed, if it did.

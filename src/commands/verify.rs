@@ -1,7 +1,7 @@
 //! `raystone verify`.
 
 use super::arguments::{
-    DeviceArguments, ExperimentArguments, Scratch, check_models, list_override,
+    DeviceArguments, ExperimentArguments, check_models, list_override,
 };
 use super::failure::{FAILED, Failure};
 use super::output::print;
@@ -69,8 +69,8 @@ impl Verify {
         for skipped in &plan.skipped {
             eprintln!("left out: {}: {}", skipped.cell, skipped.reason);
         }
-        let scratch = Scratch::new()?;
-        let options = self.device.options(scratch.path(), false);
+        // Nothing is written: no folder is needed.
+        let options = self.device.options(PathBuf::new(), false);
         let rays = experiment.gate.rays;
         let verified = raystone::run::verify(&experiment, &plan, &registries, &options, rays)?;
         print(&table(&verified))?;
