@@ -1,0 +1,109 @@
+//! Scenes whose every pixel is known.
+
+use crate::support::*;
+use raystone::config::ParamValue;
+use raystone::gpu::Gpu;
+use raystone::sampling::Sampler;
+
+const SIZE: [u32; 2] = [16, 16];
+const DEPTHS: [i64; 5] = [0, 1, 3, 6, 12];
+/// Relative error allowed to a sampler that draws the same 256 points in every pixel: the high
+/// dimensions of long paths are far from uniform then.
+const DETERMINISTIC_BOUND: f64 = 0.1;
+
+fn furnace(albedo: f64) -> Stage {
+    Stage::builtin(
+        gpu(),
+        "furnace-box",
+        &[("albedo", ParamValue::Number(albedo))],
+    )
+}
+
+/// Radiance of the furnace box with this albedo after so many bounces.
+fn expected(albedo: f64, depth: i64) -> f64 {
+    1.0 - albedo.powi(depth as i32 + 1)
+}
+
+fn check(gpu: &Gpu, stage: &Stage, sampler: &Sampler, albedo: f64, depth: i64) {
+    let traced = stage.traced(gpu, structure("bvh"));
+    let renderer = stage.renderer(gpu, &traced, sampler, &path(depth), SIZE, false);
+    let (right, next) = (expected(albedo, depth), expected(albedo, depth + 1));
+    let what = format!("{}, albedo {albedo}, depth {depth}", sampler.label());
+    if !sampler.is_random() {
+        let mean = renderer.render(&[256], 1).expect("a render")[0]
+            .image
+            .mean();
+        assert!(
+            (mean / right - 1.0).abs() < DETERMINISTIC_BOUND,
+            "{what}: {mean}, not {right}"
+        );
+        return;
+    }
+    let estimate = Estimate::of(&replicate_means(&renderer, 4, 16));
+    assert!(
+        estimate.agrees_with(right),
+        "{what}: {estimate:?}, not {right}"
+    );
+    assert!(
+        estimate.error < 0.01 * right,
+        "{what}: {estimate:?} proves nothing"
+    );
+    // The radiance after one more bounce is another number, and the test tells them apart.
+    if depth <= 3 {
+        assert!(
+            !estimate.agrees_with(next),
+            "{what}: {estimate:?} is also {next}"
+        );
+    }
+}
+
+#[test]
+fn the_furnace_box_has_the_radiance_of_its_bounces_with_every_sampler() {
+    for albedo in [0.5, 0.8] {
+        let stage = furnace(albedo);
+        for sampler in samplers() {
+            for depth in DEPTHS {
+                check(gpu(), &stage, &sampler, albedo, depth);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_pixel_of_the_white_furnace_is_one_and_none_is_where_the_sphere_is_grey() {
+    let mut scene = builtin("white-furnace", &[]);
+    let white = Stage::new(gpu(), scene.clone());
+    scene.materials[0].base_color *= 0.5;
+    let grey = Stage::new(gpu(), scene);
+    let sampler = sampler("pixel-hash", "none");
+    let largest_error = |stage: &Stage, name: &str| {
+        let traced = stage.traced(gpu(), structure(name));
+        let renderer = stage.renderer(gpu(), &traced, &sampler, &path(6), [32, 32], false);
+        let image = renderer.render(&[16], 3).expect("a render").remove(0).image;
+        let errors = image.pixels.iter().flatten().map(|v| (v - 1.0).abs());
+        errors.fold(0.0, f32::max)
+    };
+    for kind in structures() {
+        let error = largest_error(&white, kind.name());
+        assert!(error < 1e-5, "{}: {error}", kind.name());
+    }
+    assert!(largest_error(&grey, "bvh") > 0.4);
+}
+
+#[test]
+fn nothing_is_occluded_before_a_convex_body_and_everything_in_a_closed_box() {
+    let mean_ao = |stage: &Stage, radius: f64| {
+        let what = integrator_variant("ao", &[("radius", ParamValue::Number(radius))]);
+        let traced = stage.traced(gpu(), structure("bvh"));
+        let sampler = sampler("pixel-hash", "none");
+        let renderer = stage.renderer(gpu(), &traced, &sampler, &what, SIZE, false);
+        let image = renderer.render(&[16], 5).expect("a render").remove(0).image;
+        image.mean()
+    };
+    let inside = furnace(0.5);
+    assert_eq!(mean_ao(&inside, 2.0), 0.0);
+    // Rays as short as the distance to most walls find some of them.
+    assert!((0.2..0.95).contains(&mean_ao(&inside, 0.1)));
+    let outside = Stage::builtin(gpu(), "white-furnace", &[]);
+    assert_eq!(mean_ao(&outside, 2.0), 1.0);
+}

@@ -1,0 +1,10 @@
+//! The integrators against images that are known: furnaces, mirrors, textures, open and closed
+//! scenes; and against themselves: seeds, slices, structures, with and without direct light.
+
+mod bits;
+mod direct_light;
+mod furnace;
+mod model;
+mod ray_counts;
+#[path = "../support/mod.rs"]
+mod support;

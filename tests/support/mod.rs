@@ -1,0 +1,270 @@
+//! What the tests of integrators, gate and recovery share: one device per test program, scenes on
+//! it, renderers, kernels with planted faults, and samples with their standard error.
+#![allow(dead_code)] // Every test program uses its own part of this.
+
+use raystone::accel::{AccelKind, AccelRegistry, BuildLog, TriangleSoup};
+use raystone::config::{Entry, ParamValue, Params, Variant};
+use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
+use raystone::integrator::{
+    Frame, RenderJob, Renderer, SceneBuffers, Traced, integrator, integrator_entries,
+};
+use raystone::measure::statistics::{mean, variance};
+use raystone::sampling::{Sampler, SamplerRegistry};
+use raystone::scene::{Camera, LoadOptions, SceneData, builtin_scenes, load};
+use std::path::Path;
+use std::sync::OnceLock;
+
+/// The device that all tests of one program share, with the embedded kernels.
+pub fn gpu() -> &'static Gpu {
+    static GPU: OnceLock<Gpu> = OnceLock::new();
+    GPU.get_or_init(|| open(KernelLibrary::default()))
+}
+
+/// A device of its own, with other kernels.
+pub fn open(kernels: KernelLibrary) -> Gpu {
+    raystone::gpu::open(&AdapterChoice::Best, kernels)
+        .unwrap_or_else(|e| panic!("no adapter: run scripts/install-driver ({e})"))
+}
+
+/// Whether the adapter computes like the host; says so if it does not.
+pub fn is_exact(gpu: &Gpu) -> bool {
+    let probe = probe_arithmetic(gpu).expect("the probe runs");
+    if !probe.is_exact() {
+        println!(
+            "skipped: {} fuses or rounds differently ({probe:?})",
+            gpu.info.name
+        );
+    }
+    probe.is_exact()
+}
+
+/// The embedded kernels with one text replaced in one of them. Panics unless `from` stands there
+/// exactly once, so that a fault is never planted beside the kernel.
+pub fn kernels_with(module: &str, changes: &[(&str, &str)]) -> KernelLibrary {
+    let library = KernelLibrary::default();
+    let mut text = library.text(module).expect("a known module").to_owned();
+    for (from, to) in changes {
+        assert_eq!(text.matches(from).count(), 1, "`{from}` in {module}");
+        text = text.replace(from, to);
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join(module).with_extension("wesl");
+    std::fs::create_dir_all(file.parent().expect("a folder")).expect("a folder");
+    std::fs::write(&file, text).expect("a kernel file");
+    library.with_folder(folder.path()).expect("the kernels")
+}
+
+/// The entry `name` with some parameters changed from their defaults.
+pub fn variant(entries: &[Entry], name: &str, changes: &[(&str, ParamValue)]) -> Variant {
+    let found = entries.iter().find(|e| e.name == name);
+    let entry = found.unwrap_or_else(|| panic!("{name} is not registered"));
+    let defaults = entry.schema.iter();
+    let mut params: Params = Params(
+        defaults
+            .map(|p| (p.name.to_owned(), p.default.clone()))
+            .collect(),
+    );
+    for (key, value) in changes {
+        let slot = params.0.get_mut(*key);
+        *slot.unwrap_or_else(|| panic!("{name} has no parameter {key}")) = value.clone();
+    }
+    Variant {
+        name: name.to_owned(),
+        params,
+        label: name.to_owned(),
+    }
+}
+
+/// A scene ready to be traced.
+pub struct Stage {
+    pub scene: SceneData,
+    pub soup: TriangleSoup,
+    pub camera: Camera,
+    pub buffers: SceneBuffers,
+}
+
+impl Stage {
+    /// `scene` as it is, seen by its own camera.
+    pub fn new(gpu: &Gpu, scene: SceneData) -> Self {
+        let soup = TriangleSoup::new(&scene);
+        let camera = scene
+            .camera
+            .unwrap_or_else(|| Camera::frame(&scene.bounds()));
+        let buffers = SceneBuffers::upload(gpu, &scene, &soup).expect("buffers that fit");
+        Self {
+            scene,
+            soup,
+            camera,
+            buffers,
+        }
+    }
+
+    /// A built-in scene.
+    pub fn builtin(gpu: &Gpu, name: &str, changes: &[(&str, ParamValue)]) -> Self {
+        Self::new(gpu, builtin(name, changes))
+    }
+
+    /// A structure with its default parameters, built on this scene.
+    pub fn traced(&self, gpu: &Gpu, kind: &dyn AccelKind) -> Traced {
+        let params = defaults(kind);
+        let built = kind
+            .build(&self.soup, &params, &mut BuildLog::default())
+            .unwrap_or_else(|e| panic!("{} does not build: {e}", kind.name()));
+        Traced::upload(gpu, kind, &*built).expect("buffers that fit")
+    }
+
+    /// A compiled image of `size` pixels. The AO radius is a fraction of the scene's diagonal, as
+    /// in a run.
+    pub fn renderer<'a>(
+        &'a self,
+        gpu: &'a Gpu,
+        traced: &Traced,
+        sampler: &Sampler,
+        what: &Variant,
+        [width, height]: [u32; 2],
+        ray_counts: bool,
+    ) -> Renderer<'a> {
+        let integrator = integrator(&what.name).expect("a known integrator");
+        let diagonal = f64::from(2.0 * self.scene.bounds().radius());
+        let ao_radius = integrator.ao_radius(&what.params).unwrap_or(0.0) * diagonal;
+        let job = RenderJob {
+            frame: Frame {
+                width,
+                height,
+                camera: self.camera,
+                ao_radius: ao_radius as f32,
+            },
+            sampler,
+            integrator,
+            params: &what.params,
+            runtime_checks: true,
+        };
+        Renderer::new(gpu, &self.buffers, traced, &job, ray_counts)
+            .unwrap_or_else(|e| panic!("{what} with {} does not compile: {e}", sampler.label()))
+    }
+}
+
+/// A built-in scene.
+pub fn builtin(name: &str, changes: &[(&str, ParamValue)]) -> SceneData {
+    let variant = variant(&builtin_scenes(), name, changes);
+    load(&variant, &LoadOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+/// A scene from a file.
+pub fn from_file(path: &Path) -> SceneData {
+    let variant = Variant {
+        name: path.display().to_string(),
+        params: Params::default(),
+        label: "file".to_owned(),
+    };
+    load(&variant, &LoadOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// Parameters of a structure at their defaults.
+pub fn defaults(kind: &dyn AccelKind) -> Params {
+    let schema = kind.parameters();
+    Params(
+        schema
+            .into_iter()
+            .map(|p| (p.name.to_owned(), p.default))
+            .collect(),
+    )
+}
+
+/// The registered structures; never none.
+pub fn structures() -> Vec<&'static dyn AccelKind> {
+    let found: Vec<_> = AccelRegistry::default().iter().collect();
+    assert!(found.len() >= 4, "{} structures", found.len());
+    found
+}
+
+/// The structure of this name.
+pub fn structure(name: &str) -> &'static dyn AccelKind {
+    AccelRegistry::default()
+        .get(name)
+        .expect("a known structure")
+}
+
+/// A sampler with default parameters.
+pub fn sampler(sequence: &str, decorrelation: &str) -> Sampler {
+    let registry = SamplerRegistry::default();
+    let sequence = variant(&registry.sequence_entries(), sequence, &[]);
+    let decorrelation = variant(&registry.decorrelation_entries(), decorrelation, &[]);
+    registry
+        .sampler(&sequence, &decorrelation)
+        .expect("a known sampler")
+}
+
+/// Every sequence with every decorrelation; never none.
+pub fn samplers() -> Vec<Sampler> {
+    let registry = SamplerRegistry::default();
+    let mut found = Vec::new();
+    for sequence in registry.sequences() {
+        for decorrelation in registry.decorrelations() {
+            found.push(sampler(sequence.name(), decorrelation.name()));
+        }
+    }
+    assert!(found.len() >= 6, "{} samplers", found.len());
+    found
+}
+
+/// An integrator with some parameters changed from their defaults.
+pub fn integrator_variant(name: &str, changes: &[(&str, ParamValue)]) -> Variant {
+    variant(&integrator_entries(), name, changes)
+}
+
+/// The path integrator with this many bounces.
+pub fn path(max_depth: i64) -> Variant {
+    integrator_variant("path", &[("max_depth", ParamValue::Integer(max_depth))])
+}
+
+/// A mean with its standard error.
+#[derive(Debug, Clone, Copy)]
+pub struct Estimate {
+    pub mean: f64,
+    pub error: f64,
+}
+
+/// More standard errors than this are no accident: below 2 · 10⁻⁴ for 16 replicates (Student's t).
+const STANDARD_ERRORS: f64 = 5.0;
+/// Relative error of f32 sums.
+const ROUNDING: f64 = 1e-5;
+
+impl Estimate {
+    /// The mean of independent replicates.
+    pub fn of(replicates: &[f64]) -> Self {
+        let spread = variance(replicates).expect("two replicates or more");
+        Self {
+            mean: mean(replicates).expect("finite values"),
+            error: (spread / replicates.len() as f64).sqrt(),
+        }
+    }
+
+    /// Whether the true mean may be `expected`.
+    pub fn agrees_with(&self, expected: f64) -> bool {
+        let rounding = ROUNDING * expected.abs();
+        (self.mean - expected).abs() <= STANDARD_ERRORS * self.error + rounding
+    }
+
+    /// The difference of two independent estimates.
+    pub fn minus(&self, other: &Self) -> Self {
+        Self {
+            mean: self.mean - other.mean,
+            error: self.error.hypot(other.error),
+        }
+    }
+}
+
+/// Mean radiance of `count` replicates with different seeds. Panics if a kernel raised its error
+/// word.
+pub fn replicate_means(renderer: &Renderer, spp: u32, count: u32) -> Vec<f64> {
+    let one = |seed| {
+        let shot = renderer
+            .render(&[spp], seed)
+            .expect("the device renders")
+            .remove(0);
+        assert_eq!(renderer.error_word().expect("a status"), 0, "error word");
+        shot.image.mean()
+    };
+    (0..count).map(|k| one(1000 + 77 * k)).collect()
+}
