@@ -83,10 +83,7 @@ vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1
 usemtl picture\nf 1/1 2/2 3/3 4/4\n";
 
 /// Rows from the top, as in the file.
-const TEXELS: [[[u8; 3]; 2]; 2] = [
-    [[255, 0, 0], [0, 255, 0]],
-    [[0, 0, 255], [188, 188, 188]],
-];
+const TEXELS: [[[u8; 3]; 2]; 2] = [[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [188, 188, 188]]];
 
 /// The sRGB transfer function, IEC 61966-2-1.
 fn linear(encoded: u8) -> f64 {
@@ -152,7 +149,10 @@ fn a_texture_lies_on_its_quad_the_right_way_up_in_linear_colours() {
     assert!(difference < 0.03, "{difference}");
     for (what, difference) in [
         ("mirrored", largest_difference(&image, |x, y| (last - x, y))),
-        ("upside down", largest_difference(&image, |x, y| (x, last - y))),
+        (
+            "upside down",
+            largest_difference(&image, |x, y| (x, last - y)),
+        ),
         ("transposed", largest_difference(&image, |x, y| (y, x))),
     ] {
         assert!(difference > 0.5, "{what}: {difference}");

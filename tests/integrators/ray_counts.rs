@@ -28,11 +28,7 @@ fn counts(stage: &Stage, what: &Variant) -> [u64; 4] {
 
 #[test]
 fn a_closed_box_has_the_rays_that_its_bounces_ask_for() {
-    let stage = Stage::builtin(
-        gpu(),
-        "furnace-box",
-        &[("albedo", ParamValue::Number(0.8))],
-    );
+    let stage = Stage::builtin(gpu(), "furnace-box", &[("albedo", ParamValue::Number(0.8))]);
     let [primary, shadow, ao, bounce] = counts(&stage, &path(3));
     assert_eq!([primary, ao, bounce], [SAMPLES, 0, 3 * SAMPLES]);
     // A point of the emitter lies on the surface's own wall once in six draws: no ray then.

@@ -3,12 +3,14 @@
 #![allow(dead_code)] // Every test program uses its own part of this.
 
 use raystone::accel::{AccelKind, AccelRegistry, BuildLog, TriangleSoup};
-use raystone::config::{Entry, ParamValue, Params, Variant};
+use raystone::config::{Entry, Experiment, ParamValue, Params, Plan, Variant};
 use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
 use raystone::integrator::{
     Frame, RenderJob, Renderer, SceneBuffers, Traced, integrator, integrator_entries,
 };
+use raystone::measure::record::{Line, Record, SCHEMA};
 use raystone::measure::statistics::{mean, variance};
+use raystone::run::{Registries, RunOptions, RunSummary};
 use raystone::sampling::{Sampler, SamplerRegistry};
 use raystone::scene::{Camera, LoadOptions, SceneData, builtin_scenes, load};
 use std::path::Path;
@@ -267,4 +269,43 @@ pub fn replicate_means(renderer: &Renderer, spp: u32, count: u32) -> Vec<f64> {
         shot.image.mean()
     };
     (0..count).map(|k| one(1000 + 77 * k)).collect()
+}
+
+/// Runs an experiment to its end and reads its records back. Panics if a line of them is broken.
+pub fn run(
+    experiment: &str,
+    registries: &Registries,
+    out: &Path,
+    lose_device_at: Option<&str>,
+) -> (RunSummary, Vec<Record>) {
+    let options = RunOptions {
+        out: out.to_owned(),
+        lose_device_at: lose_device_at.map(str::to_owned),
+        ..RunOptions::default()
+    };
+    let (experiment, plan) = plan(experiment, registries);
+    let summary = raystone::run::run(&experiment, &plan, registries, &options)
+        .unwrap_or_else(|e| panic!("the run ends early: {e}"));
+    (summary, records(out))
+}
+
+/// An experiment text and its plan.
+pub fn plan(text: &str, registries: &Registries) -> (Experiment, Plan) {
+    let experiment = Experiment::parse(text, "test", &[], &registries.catalogue());
+    let experiment = experiment.unwrap_or_else(|e| panic!("{e}"));
+    let randomised = |s: &Variant, d: &Variant| registries.is_randomised(s, d);
+    let plan = Plan::new(&experiment, &[], randomised).unwrap_or_else(|e| panic!("{e}"));
+    (experiment, plan)
+}
+
+/// Every record of a folder, none broken.
+pub fn records(out: &Path) -> Vec<Record> {
+    let text = std::fs::read_to_string(out.join("records.jsonl")).expect("records");
+    assert!(text.ends_with('\n'), "the last line is not whole");
+    let parse = |line: &str| {
+        let line: Line = serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line}"));
+        assert_eq!(line.schema, SCHEMA);
+        line.record
+    };
+    text.lines().map(parse).collect()
 }

@@ -1,0 +1,141 @@
+//! The comparison itself, on answers made by hand.
+
+use glam::Vec3;
+use raystone::accel::triangle::TriangleRecord;
+use raystone::accel::{Hit, NO_HIT, Ray, TriangleSoup};
+use raystone::measure::gate::compare;
+use raystone::measure::rays::RaySet;
+use raystone::measure::record::{ClassVerdict, RayClass};
+use raystone::scene::Triangle;
+
+/// Triangle 0 and its copy 1 in the plane z = 1, triangle 2 beside them in the same plane, and
+/// triangle 3 far behind.
+fn soup() -> TriangleSoup {
+    let triangle = |x: f32, z: f32| Triangle {
+        vertices: [
+            Vec3::new(x, -2.0, z),
+            Vec3::new(x + 4.0, -2.0, z),
+            Vec3::new(x, 6.0, z),
+        ],
+    };
+    let all = [
+        triangle(-1.0, 1.0),
+        triangle(-1.0, 1.0),
+        triangle(7.0, 1.0),
+        triangle(-1.0, 9.0),
+    ];
+    let record = |(id, t): (usize, &Triangle)| TriangleRecord::new(t, id as u32, 0);
+    TriangleSoup {
+        records: all.iter().enumerate().map(record).collect(),
+    }
+}
+
+/// A ray along z that hits triangle 0, and one that misses everything.
+fn set() -> RaySet {
+    let ray = |x: f32| Ray {
+        origin: [x, 0.0, 0.0],
+        t_min: 0.0,
+        direction: [0.0, 0.0, 1.0],
+        t_max: 1e30,
+    };
+    let rays = vec![ray(0.0), ray(-5.0)];
+    let truth = raystone::accel::brute_force_hits(&soup(), &rays);
+    assert_eq!([truth[0].triangle, truth[1].triangle], [0, NO_HIT]);
+    assert_eq!(truth[0].t, 1.0);
+    RaySet {
+        class: RayClass::Primary,
+        rays,
+        truth,
+    }
+}
+
+/// Compares with the first hit changed.
+fn with(change: impl Fn(&mut Hit), exact: bool) -> ClassVerdict {
+    let set = set();
+    let mut hits = set.truth.clone();
+    change(&mut hits[0]);
+    compare(&set, &hits, &[true, false], &soup(), exact)
+}
+
+fn wrong_and_ties(verdict: &ClassVerdict) -> [usize; 2] {
+    assert_eq!(verdict.rays, 2);
+    assert_eq!(verdict.first_wrong.is_some(), verdict.wrong > 0);
+    [verdict.wrong, verdict.ties]
+}
+
+fn ulps_up(x: f32, ulps: u32) -> f32 {
+    f32::from_bits(x.to_bits() + ulps)
+}
+
+#[test]
+fn equal_answers_are_right() {
+    for exact in [true, false] {
+        assert_eq!(wrong_and_ties(&with(|_| {}, exact)), [0, 0]);
+    }
+}
+
+#[test]
+fn any_bit_is_wrong_on_an_exact_adapter() {
+    let changes: [fn(&mut Hit); 5] = [
+        |h| h.t = ulps_up(h.t, 1),
+        |h| h.u = ulps_up(h.u, 1),
+        |h| h.v = ulps_up(h.v, 1),
+        |h| h.triangle = 1,
+        |h| h.triangle = NO_HIT,
+    ];
+    for (index, change) in changes.iter().enumerate() {
+        let verdict = with(change, true);
+        assert_eq!(wrong_and_ties(&verdict), [1, 0], "change {index}");
+    }
+}
+
+#[test]
+fn ties_are_answers_within_4_ulp_on_an_adapter_that_rounds_otherwise() {
+    let up = |ulps| move |h: &mut Hit| h.t = ulps_up(h.t, ulps);
+    assert_eq!(wrong_and_ties(&with(up(4), false)), [0, 1]);
+    assert_eq!(wrong_and_ties(&with(up(5), false)), [1, 0]);
+    assert_eq!(
+        wrong_and_ties(&with(|h| h.u = ulps_up(h.u, 1), false)),
+        [0, 1]
+    );
+    assert_eq!(wrong_and_ties(&with(|h| h.triangle = 1, false)), [0, 1]);
+    // Behind, missed, and no triangle at all.
+    for id in [3, NO_HIT, 4] {
+        assert_eq!(
+            wrong_and_ties(&with(|h| h.triangle = id, false)),
+            [1, 0],
+            "{id}"
+        );
+    }
+}
+
+#[test]
+fn a_triangle_elsewhere_in_the_same_plane_is_no_tie() {
+    assert_eq!(wrong_and_ties(&with(|h| h.triangle = 2, false)), [1, 0]);
+}
+
+#[test]
+fn a_wrong_any_hit_answer_is_wrong_on_every_adapter() {
+    let set = set();
+    for exact in [true, false] {
+        for found in [[false, false], [true, true]] {
+            let verdict = compare(&set, &set.truth, &found, &soup(), exact);
+            assert_eq!(
+                wrong_and_ties(&verdict),
+                [1, 0],
+                "{found:?}, exact: {exact}"
+            );
+            let text = verdict.first_wrong.expect("a ray");
+            assert!(text.ends_with("any-hit answer differs"), "{text}");
+        }
+    }
+}
+
+#[test]
+fn missing_answers_are_wrong() {
+    let set = set();
+    let verdict = compare(&set, &[], &[], &soup(), true);
+    assert_eq!(wrong_and_ties(&verdict), [2, 0]);
+    let verdict = compare(&set, &set.truth[..1], &[true, false], &soup(), false);
+    assert_eq!(wrong_and_ties(&verdict), [1, 0]);
+}
