@@ -12,6 +12,7 @@ use super::bounds::{slab, Bounds};
 use super::ray::{Hit, Ray};
 use crate::scene::Triangle;
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 
 /// Relative widening of a triangle's own slab interval, 2⁻²¹: four ulp or more, which covers the
 /// subtraction, the reciprocal at WGSL's 2.5 ulp, and the product.
@@ -40,6 +41,12 @@ impl TriangleRecord {
     pub fn new(triangle: &Triangle, id: u32, material: u32) -> Self {
         let [v0, v1, v2] = triangle.vertices;
         Self { v0: v0.to_array(), id, e1: (v0 - v1).to_array(), material, e2: (v2 - v0).to_array(), reserved: 0 }
+    }
+
+    /// The triangle as the kernels know it: vertices rebuilt from the rounded edges.
+    pub fn triangle(&self) -> Triangle {
+        let v0 = Vec3::from(self.v0);
+        Triangle { vertices: [v0, v0 - Vec3::from(self.e1), v0 + Vec3::from(self.e2)] }
     }
 
     /// Bounds of the triangle as the kernels know it (vertices rebuilt from the rounded edges).
