@@ -49,6 +49,6 @@ fn every_structure_passes_the_gate_in_a_triangle_soup() {
 fn every_structure_passes_the_gate_on_a_teapot_in_a_stadium() {
     every_structure_passes(
         "teapot-in-a-stadium",
-        &[("subdivision", ParamValue::Integer(5))],
+        &[("subdivision", ParamValue::Integer(4))],
     );
 }
