@@ -74,12 +74,13 @@ impl Judge {
         Ok(judge)
     }
 
-    /// Every n-th ray of all classes, so that about `count` remain.
+    /// `count` rays (all, if there are fewer), spread evenly over all classes.
     fn subset(&self, count: usize) -> Vec<(Ray, Hit)> {
         let all: usize = self.sets.iter().map(|s| s.rays.len()).sum();
-        let step = all.div_ceil(count.max(1)).max(1);
+        let count = count.min(all);
         let pairs = self.sets.iter().flat_map(|s| s.rays.iter().copied().zip(s.truth.iter().copied()));
-        pairs.step_by(step).collect()
+        let chosen = |k: usize| k * count / all < (k + 1) * count / all;
+        pairs.enumerate().filter(|(k, _)| chosen(*k)).map(|(_, pair)| pair).collect()
     }
 
     fn check_brute_force(&mut self, soup: &TriangleSoup, tests: u64) {
