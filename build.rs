@@ -37,7 +37,10 @@ fn main() {
     let out = PathBuf::from(std::env::var("OUT_DIR").expect("set by cargo")).join("embedded_kernels.rs");
     std::fs::write(&out, text).unwrap_or_else(|e| panic!("cannot write {}: {e}", out.display()));
     println!("cargo::rerun-if-changed=kernels");
-    println!("cargo::rerun-if-changed=.git/HEAD");
+    // Grows with every commit; absent outside a repository.
+    if root.join(".git/logs/HEAD").exists() {
+        println!("cargo::rerun-if-changed=.git/logs/HEAD");
+    }
     if let Some(commit) = git(&["rev-parse", "--short=12", "HEAD"]) {
         println!("cargo::rustc-env=RAYSTONE_COMMIT={commit}");
     }

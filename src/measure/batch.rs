@@ -26,8 +26,9 @@ impl Query {
 
 /// No dispatch should run longer than this.
 const SLICE_MS: f64 = 250.0;
-/// Rays of the first dispatch through an unknown structure.
-const FIRST_SLICE: u32 = 2048;
+/// Rays of the first dispatch through an unknown structure: few, it may be brute force over a million
+/// triangles.
+const FIRST_SLICE: u32 = 64;
 
 /// A structure, a query and a ray buffer, compiled.
 pub struct Batch<'a> {

@@ -74,12 +74,12 @@ impl Judge {
         Ok(judge)
     }
 
-    /// Every n-th ray of all classes, so that about `count` remain.
+    /// `count` rays (or all, if there are fewer) spread evenly over all classes.
     fn subset(&self, count: usize) -> Vec<(Ray, Hit)> {
-        let all: usize = self.sets.iter().map(|s| s.rays.len()).sum();
-        let step = all.div_ceil(count.max(1)).max(1);
         let pairs = self.sets.iter().flat_map(|s| s.rays.iter().copied().zip(s.truth.iter().copied()));
-        pairs.step_by(step).collect()
+        let all: Vec<(Ray, Hit)> = pairs.collect();
+        let count = count.min(all.len());
+        (0..count).map(|i| all[i * all.len() / count]).collect()
     }
 
     fn check_brute_force(&mut self, soup: &TriangleSoup, tests: u64) {
