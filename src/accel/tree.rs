@@ -152,6 +152,9 @@ impl Tree {
     /// The first violated invariant, with the node.
     pub fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
         let wrong = |text: String| Err(AccelError::Invalid(text));
+        if self.order.len() != soup.records.len() {
+            return wrong(format!("built for {} triangles, given {}", self.order.len(), soup.records.len()));
+        }
         let mut seen = vec![false; soup.records.len()];
         let mut has_parent = vec![false; self.nodes.len()];
         for (index, node) in self.nodes.iter().enumerate() {
