@@ -2,10 +2,11 @@
 //! `kernels/accel/brute_force.wesl`.
 
 use super::ray::{safe_inverse, Hit, Ray};
-use super::triangle::intersect_triangle;
+use super::triangle::{intersect_triangle, TriangleRecord};
 use super::{AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, TriangleSoup};
 use crate::config::{ParameterSchema, Params};
 use crate::measure::record::StructureStats;
+use rayon::prelude::*;
 
 /// The registry entry.
 pub struct BruteForce;
@@ -45,7 +46,7 @@ impl BuiltAccel for Built {
         }
     }
 
-    fn buffers(&self) -> GpuBuffers {
+    fn buffers(&self) -> GpuBuffers<'_> {
         let triangles = self.triangles as usize;
         GpuBuffers { uniforms: vec![super::limits(triangles, triangles)], ..Default::default() }
     }
@@ -86,4 +87,69 @@ impl CpuTwin for Twin<'_> {
         }
         false
     }
+}
+
+/// Triangles side by side, so that the compiler tests several at once.
+const LANES: usize = 16;
+/// Blocks of triangles that stay in the cache while a chunk of rays passes over them.
+const TILE_BLOCKS: usize = 64;
+const RAY_CHUNK: usize = 64;
+
+/// `LANES` triangles, component by component; missing ones are degenerate and never hit.
+struct Block {
+    v0: [[f32; LANES]; 3],
+    e1: [[f32; LANES]; 3],
+    e2: [[f32; LANES]; 3],
+}
+
+impl Block {
+    fn new(records: &[TriangleRecord]) -> Self {
+        let lanes = |get: fn(&TriangleRecord) -> [f32; 3]| {
+            std::array::from_fn(|axis| std::array::from_fn(|lane| records.get(lane).map_or(0.0, |r| get(r)[axis])))
+        };
+        Self { v0: lanes(|r| r.v0), e1: lanes(|r| r.e1), e2: lanes(|r| r.e2) }
+    }
+
+    /// Lanes that pass the sign tests of [`intersect_triangle`]: the same products in the same order.
+    fn candidates(&self, ray: &Ray) -> u32 {
+        let [dx, dy, dz] = ray.direction;
+        let mut inside = [0u32; LANES];
+        for lane in 0..LANES {
+            let [cx, cy, cz]: [f32; 3] = std::array::from_fn(|a| self.v0[a][lane] - ray.origin[a]);
+            let [e1x, e1y, e1z]: [f32; 3] = std::array::from_fn(|a| self.e1[a][lane]);
+            let [e2x, e2y, e2z]: [f32; 3] = std::array::from_fn(|a| self.e2[a][lane]);
+            let (nx, ny, nz) = (e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x);
+            let (rx, ry, rz) = (dy * cz - dz * cy, dz * cx - dx * cz, dx * cy - dy * cx);
+            let det = nx * dx + ny * dy + nz * dz;
+            let sign = det.to_bits() & 0x8000_0000;
+            let u = f32::from_bits((rx * e2x + ry * e2y + rz * e2z).to_bits() ^ sign);
+            let v = f32::from_bits((rx * e1x + ry * e1y + rz * e1z).to_bits() ^ sign);
+            let area = det.abs();
+            inside[lane] = u32::from(area > 0.0) & u32::from(u >= 0.0) & u32::from(v >= 0.0) & u32::from(u + v <= area);
+        }
+        inside.iter().enumerate().fold(0, |mask, (lane, bit)| mask | bit << lane)
+    }
+}
+
+/// Nearest hits of many rays by testing every triangle, on all cores: what judges are judged by.
+pub fn brute_force_hits(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
+    let blocks: Vec<Block> = soup.records.chunks(LANES).map(Block::new).collect();
+    let mut hits: Vec<Hit> = rays.iter().map(Hit::miss).collect();
+    hits.par_chunks_mut(RAY_CHUNK).zip(rays.par_chunks(RAY_CHUNK)).for_each(|(hits, rays)| {
+        for (tile, blocks) in blocks.chunks(TILE_BLOCKS).enumerate() {
+            for (ray, hit) in rays.iter().zip(hits.iter_mut()) {
+                let inverse = safe_inverse(ray.direction);
+                for (index, block) in blocks.iter().enumerate() {
+                    let mut mask = block.candidates(ray);
+                    while mask != 0 {
+                        let lane = mask.trailing_zeros() as usize;
+                        mask &= mask - 1;
+                        let id = (tile * TILE_BLOCKS + index) * LANES + lane;
+                        intersect_triangle(&soup.records[id], ray, inverse, hit);
+                    }
+                }
+            }
+        }
+    });
+    hits
 }

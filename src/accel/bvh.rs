@@ -5,7 +5,7 @@
 
 use super::bounds::{enter_box, Bounds};
 use super::ray::{safe_inverse, Hit, Ray, NO_HIT};
-use super::tree::{tree_parameters, NodeKind, Tree};
+use super::tree::{tree_parameters, Coverage, NodeKind, Tree};
 use super::triangle::{intersect_triangle, TriangleRecord};
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords, TriangleSoup,
@@ -88,7 +88,7 @@ impl Node {
 
 /// The built structure; it is its own CPU twin, and the judge of the gate.
 pub struct BvhTwin {
-    tree: Tree,
+    stats: StructureStats,
     nodes: Vec<Node>,
     /// Triangle records leaf by leaf, so that a leaf is one run of memory.
     leaf_triangles: Vec<TriangleRecord>,
@@ -106,12 +106,13 @@ impl BvhTwin {
             return Err(AccelError::Limit { what: "triangles of a bvh".into(), needed: count, limit: FIRST_MASK.into() });
         }
         let tree = log.phase("binned-sah", || Tree::build(soup, params));
-        let (nodes, leaf_triangles) = log.phase("layout", || {
+        let (nodes, leaf_triangles): (Vec<Node>, Vec<TriangleRecord>) = log.phase("layout", || {
             (layout(&tree), tree.order.iter().map(|&id| soup.records[id as usize]).collect())
         });
+        let bytes = size_of_val(&nodes[..]) + size_of_val(&leaf_triangles[..]);
         // One entry is pushed for each level at most.
         let stack_entries = tree.depth().max(1);
-        Ok(Self { tree, nodes, leaf_triangles, stack_entries })
+        Ok(Self { stats: StructureStats { bytes: bytes as u64, ..tree.stats() }, nodes, leaf_triangles, stack_entries })
     }
 
     fn leaf(&self, reference: u32, ray: &Ray, inverse: [f32; 3], hit: &mut Hit, counters: &mut Counters) {
@@ -206,24 +207,41 @@ fn layout(tree: &Tree) -> Vec<Node> {
 
 impl BuiltAccel for BvhTwin {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
-        self.tree.validate(soup)?;
-        if self.tree.depth() > self.stack_entries {
-            return Err(AccelError::Invalid(format!(
-                "depth {} exceeds the stack of {} entries",
-                self.tree.depth(),
-                self.stack_entries
-            )));
+        let mut coverage = Coverage::new(soup, self.nodes.len());
+        coverage.node(0)?;
+        let mut stack = vec![(0_u32, Bounds::EVERYTHING, 1)];
+        while let Some((index, around, depth)) = stack.pop() {
+            if depth > self.stack_entries {
+                return Err(AccelError::Invalid(format!("node {index}: deeper than the stack of {}", self.stack_entries)));
+            }
+            let node = &self.nodes[index as usize];
+            for (reference, bounds) in [(node.left, node.left_bounds()), (node.right, node.right_bounds())] {
+                if reference == EMPTY_LEAF {
+                    continue;
+                }
+                if !around.contains(&bounds) {
+                    return Err(AccelError::Invalid(format!("node {index}: a child's box leaves its own")));
+                }
+                if reference & LEAF == 0 {
+                    coverage.node(reference as usize)?;
+                    stack.push((reference, bounds, depth + 1));
+                } else {
+                    let first = (reference & FIRST_MASK) as usize;
+                    let count = ((reference & !LEAF) >> COUNT_SHIFT) as usize;
+                    coverage.leaf(self.leaf_triangles.get(first..first + count), &bounds)?;
+                }
+            }
         }
-        Ok(())
+        coverage.is_complete()
     }
 
-    fn buffers(&self) -> GpuBuffers {
+    fn buffers(&self) -> GpuBuffers<'_> {
         GpuBuffers {
             arrays: vec![
-                NamedWords { name: "nodes", words: bytemuck::cast_slice(&self.nodes).to_vec(), element_bytes: 64 },
+                NamedWords { name: "nodes", words: bytemuck::cast_slice(&self.nodes).into(), element_bytes: 64 },
                 NamedWords {
                     name: "leaf_triangles",
-                    words: bytemuck::cast_slice(&self.leaf_triangles).to_vec(),
+                    words: bytemuck::cast_slice(&self.leaf_triangles).into(),
                     element_bytes: 48,
                 },
             ],
@@ -234,7 +252,7 @@ impl BuiltAccel for BvhTwin {
     }
 
     fn stats(&self) -> StructureStats {
-        StructureStats { bytes: self.buffers().bytes(), ..self.tree.stats() }
+        self.stats.clone()
     }
 
     fn cpu_twin<'a>(&'a self, _: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {

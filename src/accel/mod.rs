@@ -12,7 +12,7 @@ pub mod tree;
 pub mod triangle;
 mod uniform_grid;
 
-pub use brute_force::BruteForce;
+pub use brute_force::{brute_force_hits, BruteForce};
 pub use bvh::{Bvh, BvhTwin};
 pub use ray::{Hit, Ray, NO_HIT};
 pub use registry::AccelRegistry;
@@ -23,6 +23,7 @@ use crate::config::{ParameterSchema, Params};
 use crate::gpu::UniformValues;
 use crate::measure::record::{Phase, StructureStats};
 use crate::scene::SceneData;
+use std::borrow::Cow;
 use std::time::Instant;
 use thiserror::Error;
 use triangle::TriangleRecord;
@@ -95,20 +96,20 @@ impl BuildLog {
 
 /// One array of words for the GPU.
 #[derive(Debug, Clone)]
-pub struct NamedWords {
+pub struct NamedWords<'a> {
     /// Name of the variable in the kernel that binds it.
     pub name: &'static str,
-    /// Content.
-    pub words: Vec<u32>,
+    /// Content, borrowed from the structure where its memory is laid out like the GPU's.
+    pub words: Cow<'a, [u32]>,
     /// Bytes of one element, for the record.
     pub element_bytes: u32,
 }
 
 /// What a structure hands to the GPU.
 #[derive(Debug, Clone, Default)]
-pub struct GpuBuffers {
+pub struct GpuBuffers<'a> {
     /// Storage arrays, at most two (a path-tracing kernel has eight in all).
-    pub arrays: Vec<NamedWords>,
+    pub arrays: Vec<NamedWords<'a>>,
     /// Uniform structs by variable name.
     pub uniforms: Vec<(&'static str, UniformValues)>,
     /// Constants of `package::active::constants`: kernels with other constants are other kernels, so
@@ -122,7 +123,7 @@ pub fn limits(step_fuse: usize, elements: usize) -> (&'static str, UniformValues
     ("limits", UniformValues::new().u32("step_fuse", step_fuse as u32).u32("elements", elements as u32))
 }
 
-impl GpuBuffers {
+impl GpuBuffers<'_> {
     /// Bytes of all arrays.
     pub fn bytes(&self) -> u64 {
         self.arrays.iter().map(|a| a.words.len() as u64 * 4).sum()
@@ -180,7 +181,7 @@ pub trait BuiltAccel: Sync {
     /// The first violated invariant, with the node.
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError>;
     /// Arrays, uniforms and constants for the kernel.
-    fn buffers(&self) -> GpuBuffers;
+    fn buffers(&self) -> GpuBuffers<'_>;
     /// Static figures.
     fn stats(&self) -> StructureStats;
     /// The traversal on the host, if it has one.

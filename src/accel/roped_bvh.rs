@@ -5,7 +5,7 @@
 
 use super::bounds::{enter_box, Bounds};
 use super::ray::{safe_inverse, Hit, Ray, NO_HIT};
-use super::tree::{tree_parameters, NodeKind, Tree};
+use super::tree::{tree_parameters, Coverage, NodeKind, Tree};
 use super::triangle::{intersect_triangle, TriangleRecord};
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords, TriangleSoup,
@@ -52,10 +52,11 @@ impl AccelKind for RopedBvh {
             });
         }
         let tree = log.phase("binned-sah", || Tree::build(soup, params));
-        let (nodes, leaf_triangles) = log.phase("ropes", || {
+        let (nodes, leaf_triangles): (Vec<Node>, Vec<TriangleRecord>) = log.phase("ropes", || {
             (ropes(&tree), tree.order.iter().map(|&id| soup.records[id as usize]).collect())
         });
-        Ok(Box::new(Built { tree, nodes, leaf_triangles }))
+        let bytes = size_of_val(&nodes[..]) + size_of_val(&leaf_triangles[..]);
+        Ok(Box::new(Built { stats: StructureStats { bytes: bytes as u64, ..tree.stats() }, nodes, leaf_triangles }))
     }
 }
 
@@ -71,7 +72,7 @@ struct Node {
 }
 
 struct Built {
-    tree: Tree,
+    stats: StructureStats,
     nodes: Vec<Node>,
     leaf_triangles: Vec<TriangleRecord>,
 }
@@ -98,22 +99,40 @@ fn ropes(tree: &Tree) -> Vec<Node> {
 
 impl BuiltAccel for Built {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
-        self.tree.validate(soup)?;
+        let mut coverage = Coverage::new(soup, self.nodes.len());
+        // Boxes of the subtrees around the present node, with where each ends.
+        let mut around = vec![(Bounds::EVERYTHING, self.nodes.len())];
         for (index, node) in self.nodes.iter().enumerate() {
-            if node.skip as usize <= index || node.skip as usize > self.nodes.len() {
-                return Err(AccelError::Invalid(format!("node {index}: its rope leads to {}", node.skip)));
+            around.retain(|(_, end)| index < *end);
+            let skip = node.skip as usize;
+            let (outer, end) = around[around.len() - 1];
+            if skip <= index || skip > end {
+                return Err(AccelError::Invalid(format!("node {index}: its rope leads to {skip}")));
+            }
+            let bounds = Bounds { min: node.min, max: node.max };
+            if !outer.contains(&bounds) {
+                return Err(AccelError::Invalid(format!("node {index}: its box leaves its parent's")));
+            }
+            coverage.node(index)?;
+            let (first, count) = ((node.leaf & FIRST_MASK) as usize, (node.leaf >> COUNT_SHIFT) as usize);
+            if count == 0 {
+                around.push((bounds, skip));
+            } else if skip == index + 1 {
+                coverage.leaf(self.leaf_triangles.get(first..first + count), &bounds)?;
+            } else {
+                return Err(AccelError::Invalid(format!("leaf {index}: its rope skips a node")));
             }
         }
-        Ok(())
+        coverage.is_complete()
     }
 
-    fn buffers(&self) -> GpuBuffers {
+    fn buffers(&self) -> GpuBuffers<'_> {
         GpuBuffers {
             arrays: vec![
-                NamedWords { name: "nodes", words: bytemuck::cast_slice(&self.nodes).to_vec(), element_bytes: 32 },
+                NamedWords { name: "nodes", words: bytemuck::cast_slice(&self.nodes).into(), element_bytes: 32 },
                 NamedWords {
                     name: "leaf_triangles",
-                    words: bytemuck::cast_slice(&self.leaf_triangles).to_vec(),
+                    words: bytemuck::cast_slice(&self.leaf_triangles).into(),
                     element_bytes: 48,
                 },
             ],
@@ -123,7 +142,7 @@ impl BuiltAccel for Built {
     }
 
     fn stats(&self) -> StructureStats {
-        StructureStats { bytes: self.buffers().bytes(), ..self.tree.stats() }
+        self.stats.clone()
     }
 
     fn cpu_twin<'a>(&'a self, _: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {

@@ -4,6 +4,7 @@
 //! Source: I. Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007.
 
 use super::bounds::Bounds;
+use super::triangle::TriangleRecord;
 use super::{AccelError, TriangleSoup};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::measure::record::StructureStats;
@@ -144,54 +145,74 @@ impl Tree {
         stats.depth = Some(self.depth());
         stats
     }
+}
 
-    /// Checks that every triangle is in exactly one leaf, every box contains what is below it, and
-    /// every node has one parent.
+/// Bookkeeping of `validate()`: every node reached once, every triangle in one leaf that contains it.
+pub struct Coverage<'a> {
+    soup: &'a TriangleSoup,
+    nodes: Vec<bool>,
+    triangles: Vec<bool>,
+}
+
+impl<'a> Coverage<'a> {
+    /// Nothing reached yet.
+    pub fn new(soup: &'a TriangleSoup, nodes: usize) -> Self {
+        Self { soup, nodes: vec![false; nodes], triangles: vec![false; soup.records.len()] }
+    }
+
+    /// Notes that a node is reached.
     ///
     /// # Errors
-    /// The first violated invariant, with the node.
-    pub fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
-        let wrong = |text: String| Err(AccelError::Invalid(text));
-        if self.order.len() != soup.records.len() {
-            return wrong(format!("built for {} triangles, given {}", self.order.len(), soup.records.len()));
-        }
-        let mut seen = vec![false; soup.records.len()];
-        let mut has_parent = vec![false; self.nodes.len()];
-        for (index, node) in self.nodes.iter().enumerate() {
-            match node.kind {
-                NodeKind::Inner { left, right } => {
-                    for child in [left, right] {
-                        let Some(below) = self.nodes.get(child as usize) else {
-                            return wrong(format!("node {index}: child {child} does not exist"));
-                        };
-                        if child as usize <= index || std::mem::replace(&mut has_parent[child as usize], true) {
-                            return wrong(format!("node {index}: child {child} is reached twice or upwards"));
-                        }
-                        if !node.bounds.contains(&below.bounds) {
-                            return wrong(format!("node {index}: its box does not contain child {child}"));
-                        }
-                    }
-                }
-                NodeKind::Leaf { first, count } => {
-                    for &id in &self.order[first as usize..(first + count) as usize] {
-                        let record = &soup.records[id as usize];
-                        if std::mem::replace(&mut seen[id as usize], true) {
-                            return wrong(format!("leaf {index}: triangle {id} is in two leaves"));
-                        }
-                        if !node.bounds.contains(&record.bounds()) {
-                            return wrong(format!("leaf {index}: its box does not contain triangle {id}"));
-                        }
-                    }
-                }
+    /// It does not exist or was reached before.
+    pub fn node(&mut self, index: usize) -> Result<(), AccelError> {
+        match self.nodes.get_mut(index) {
+            // The root of an empty scene is no node.
+            None if index == 0 => Ok(()),
+            None => Err(AccelError::Invalid(format!("node {index} does not exist"))),
+            Some(true) => Err(AccelError::Invalid(format!("node {index} is reached twice"))),
+            Some(seen) => {
+                *seen = true;
+                Ok(())
             }
         }
-        if let Some(lost) = seen.iter().position(|s| !s) {
-            return wrong(format!("triangle {lost} is in no leaf"));
-        }
-        if let Some(orphan) = has_parent.iter().skip(1).position(|p| !p) {
-            return wrong(format!("node {} has no parent", orphan + 1));
+    }
+
+    /// Notes the triangles of a leaf with these bounds; `None` is a range outside the array.
+    ///
+    /// # Errors
+    /// The range does not exist, or a triangle differs from the scene's, is in two leaves, or
+    /// sticks out of the leaf's box.
+    pub fn leaf(&mut self, triangles: Option<&[TriangleRecord]>, bounds: &Bounds) -> Result<(), AccelError> {
+        let Some(triangles) = triangles else {
+            return Err(AccelError::Invalid("a leaf lies outside the triangle array".to_owned()));
+        };
+        for triangle in triangles {
+            let id = triangle.id;
+            if self.soup.records.get(id as usize) != Some(triangle) {
+                return Err(AccelError::Invalid(format!("triangle {id} is not the scene's")));
+            }
+            if std::mem::replace(&mut self.triangles[id as usize], true) {
+                return Err(AccelError::Invalid(format!("triangle {id} is in two leaves")));
+            }
+            if !bounds.contains(&triangle.bounds()) {
+                return Err(AccelError::Invalid(format!("triangle {id} sticks out of its leaf's box")));
+            }
         }
         Ok(())
+    }
+
+    /// Checks that nothing was missed.
+    ///
+    /// # Errors
+    /// A node or triangle was not reached.
+    pub fn is_complete(&self) -> Result<(), AccelError> {
+        if let Some(lost) = self.triangles.iter().position(|seen| !seen) {
+            return Err(AccelError::Invalid(format!("triangle {lost} is in no leaf")));
+        }
+        match self.nodes.iter().position(|seen| !seen) {
+            Some(orphan) => Err(AccelError::Invalid(format!("node {orphan} is never reached"))),
+            None => Ok(()),
+        }
     }
 }
 

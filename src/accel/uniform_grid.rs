@@ -264,7 +264,7 @@ impl BuiltAccel for Built {
         }
     }
 
-    fn buffers(&self) -> GpuBuffers {
+    fn buffers(&self) -> GpuBuffers<'_> {
         let [x, y, z] = self.grid.resolution;
         let grid = UniformValues::new()
             .vec("low", &self.grid.bounds.min)
@@ -274,8 +274,8 @@ impl BuiltAccel for Built {
             .uvec("resolution", &self.grid.resolution);
         GpuBuffers {
             arrays: vec![
-                NamedWords { name: "cells", words: self.starts.clone(), element_bytes: 4 },
-                NamedWords { name: "references", words: self.references.clone(), element_bytes: 4 },
+                NamedWords { name: "cells", words: self.starts.as_slice().into(), element_bytes: 4 },
+                NamedWords { name: "references", words: self.references.as_slice().into(), element_bytes: 4 },
             ],
             uniforms: vec![("grid", grid), super::limits((x + y + z + 1) as usize, self.references.len())],
             constants: Vec::new(),

@@ -14,7 +14,7 @@ type Paths = BTreeMap<String, PathBuf>;
 
 /// Rewrites module paths in a WESL error to file names.
 pub(super) fn wesl_error(text: &str, paths: &Paths) -> String {
-    let mut out = text.to_owned();
+    let mut out = without_colours(text);
     // Longest first, so that `package::accel::bvh` does not eat part of `package::accel::bvh4`.
     let mut known: Vec<_> = paths.iter().collect();
     known.sort_by_key(|(module, _)| std::cmp::Reverse(module.len()));
@@ -22,6 +22,13 @@ pub(super) fn wesl_error(text: &str, paths: &Paths) -> String {
         out = out.replace(module.as_str(), &path.display().to_string());
     }
     out
+}
+
+/// Text without terminal escape sequences, since it goes into records too.
+fn without_colours(text: &str) -> String {
+    let mut parts = text.split('\u{1b}');
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |out, part| out + part.split_once('m').map_or(part, |(_, rest)| rest))
 }
 
 /// Parses and validates composed WGSL with the capabilities of plain WebGPU.

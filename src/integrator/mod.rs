@@ -3,10 +3,12 @@
 mod frame;
 mod render;
 mod tables;
+mod traced;
 
 pub use frame::Frame;
-pub use render::{RenderJob, Renderer, Snapshot, Traced, RAY_COUNT_CLASSES};
+pub use render::{RenderJob, Renderer, Snapshot, RAY_COUNT_CLASSES};
 pub use tables::{SceneBuffers, SceneFeatures};
+pub use traced::Traced;
 
 use crate::config::{Entry, ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::sampling::dimensions;

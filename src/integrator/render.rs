@@ -3,6 +3,7 @@
 
 use super::frame::{Frame, Slice};
 use super::tables::SceneBuffers;
+use super::traced::Traced;
 use super::Integrator;
 use crate::config::Params;
 use crate::gpu::{Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline};
@@ -18,17 +19,6 @@ pub const RAY_COUNT_CLASSES: [&str; 4] = ["primary", "shadow", "ao", "bounce"];
 const SLICE_MS: f64 = 250.0;
 /// Samples per millisecond that the first slice assumes: slow, so that it is short.
 const CAUTIOUS_RATE: f64 = 100.0;
-
-/// The structure that a renderer traces with: kernel module, constants, buffers.
-#[derive(Clone)]
-pub struct Traced {
-    /// Kernel module.
-    pub kernel: String,
-    /// Constants of the structure.
-    pub constants: Vec<(&'static str, u32)>,
-    /// Arrays and uniforms of the structure.
-    pub bindings: Bindings,
-}
 
 /// One image to render.
 pub struct RenderJob<'a> {
@@ -70,8 +60,8 @@ pub struct Renderer<'a> {
 
 /// The composition of a job's kernel.
 fn composition(traced: &Traced, scene: &SceneBuffers, job: &RenderJob, ray_counts: bool) -> Composition {
-    let mut out = Composition::new("integrator/render")
-        .with("accel", &traced.kernel)
+    let mut out = traced
+        .compose(Composition::new("integrator/render"))
         .with("sequence", job.sampler.sequence.kernel())
         .with("decorrelation", job.sampler.decorrelation.kernel())
         .with("integrator", job.integrator.kernel())
@@ -81,7 +71,7 @@ fn composition(traced: &Traced, scene: &SceneBuffers, job: &RenderJob, ray_count
     }
     let sampler = job.sampler.sequence.constants(&job.sampler.sequence_variant.params);
     let integrator = job.integrator.constants(job.params);
-    for (name, value) in traced.constants.iter().chain(&sampler).chain(&integrator) {
+    for (name, value) in sampler.iter().chain(&integrator) {
         out = out.constant(name, *value);
     }
     out

@@ -1,9 +1,13 @@
 //! Measuring: the gate, the timing protocol, image metrics, statistics, records.
 
 pub mod atomic;
+pub mod batch;
 pub mod bias;
+pub mod gate;
 pub mod hypothesis;
 pub mod image;
 pub mod picture;
+pub mod rays;
 pub mod record;
 pub mod statistics;
+pub mod timing;

@@ -42,6 +42,8 @@ pub enum Record {
     Stream(StreamRecord),
     /// A cell that was not run, with the reason.
     Skipped(SkippedRecord),
+    /// A cell that failed before it had a record of its own kind, with the reason.
+    Failed(SkippedRecord),
     /// Last line: where the wall time went, how many cells failed.
     Finished(FinishedRecord),
 }
@@ -442,7 +444,7 @@ pub struct StarAtCount {
     pub star: Interval,
 }
 
-/// A cell left out.
+/// A cell left out, or failed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SkippedRecord {
     /// The cell, in words.

@@ -1,1 +1,152 @@
-//! report
+//! Reports: plots, tables, `index.html`, `summary.md` and the terminal's tables, all derived from a
+//! run's records alone.
+//!
+//! Data flows one way: [`read`] parses the lines, [`data`] sorts them, [`samplers`] and [`ruling`]
+//! draw conclusions, [`sections`] writes them into a [`document::Document`], and [`html`],
+//! [`markdown`] and [`terminal`] show that document.
+
+pub mod color;
+pub mod data;
+pub mod document;
+pub mod format;
+pub mod html;
+pub mod markdown;
+pub mod pictures;
+pub mod plot;
+pub mod read;
+pub mod ruling;
+pub mod samplers;
+pub mod sections;
+pub mod terminal;
+#[cfg(test)]
+mod tests;
+
+pub use read::{Records, read_records};
+pub use terminal::terminal_tables;
+
+use crate::measure::atomic::write_atomic;
+use data::RunData;
+use document::{Block, Document};
+use std::path::{Path, PathBuf};
+
+/// What can go wrong while a report is written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The records cannot be read.
+    #[error("cannot read {}: {source}; give the folder that a run wrote", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file holds no record.
+    #[error("{} holds no record: the run wrote nothing before it ended", path.display())]
+    NoRecords {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The records are of another version.
+    #[error(
+        "{}:{line}: schema {found:?}, but this program reads {:?}; use the version that wrote it",
+        path.display(),
+        crate::measure::record::SCHEMA
+    )]
+    Schema {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// The schema found.
+        found: String,
+    },
+    /// A line is no record.
+    #[error("{}:{line}: not a record: {source}; remove the line to read the rest", path.display())]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Why.
+        source: serde_json::Error,
+    },
+    /// A file of the report cannot be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A plot cannot be drawn.
+    #[error("cannot draw a plot: {0}")]
+    Draw(String),
+    /// The page cannot be filled in.
+    #[error("cannot fill in the page: {0:#}")]
+    Template(#[from] minijinja::Error),
+}
+
+/// Where a report was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReportPaths {
+    /// The page.
+    pub html: PathBuf,
+    /// The summary in Markdown.
+    pub summary: PathBuf,
+    /// Every plot, SVG and PNG.
+    pub plots: Vec<PathBuf>,
+    /// What was left out while reading the records, in words.
+    pub warnings: Vec<String>,
+}
+
+/// Writes `index.html`, `summary.md` and `plots/*.{svg,png}` beside the `records.jsonl` in `dir`.
+/// Each file is whole or absent: it is written under another name and renamed.
+///
+/// # Errors
+/// Unreadable records, see [`read_records`], or a folder that cannot be written.
+pub fn write_report(dir: &Path) -> Result<ReportPaths, ReportError> {
+    let records = read_records(dir)?;
+    let data = RunData::new(&records.lines);
+    let mut document = sections::document(dir, &data, &records.warnings);
+    document.paint()?;
+    let plots = write_plots(dir, &document)?;
+    let html = dir.join("index.html");
+    write_file(&html, html::page(&document)?.as_bytes())?;
+    let summary = dir.join("summary.md");
+    write_file(&summary, markdown::summary(&document).as_bytes())?;
+    Ok(ReportPaths {
+        html,
+        summary,
+        plots,
+        warnings: records.warnings,
+    })
+}
+
+fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
+    write_atomic(path, bytes).map_err(|source| ReportError::Write {
+        path: path.into(),
+        source,
+    })
+}
+
+fn write_plots(dir: &Path, document: &Document) -> Result<Vec<PathBuf>, ReportError> {
+    let folder = dir.join("plots");
+    std::fs::create_dir_all(&folder).map_err(|source| ReportError::Write {
+        path: folder.clone(),
+        source,
+    })?;
+    let mut written = Vec::new();
+    let blocks = document.sections.iter().flat_map(|section| &section.blocks);
+    let figures = blocks.filter_map(|block| match block {
+        Block::Figures(figures) => Some(figures),
+        _ => None,
+    });
+    for figure in figures.flatten() {
+        for (extension, bytes) in [("svg", figure.svg.as_bytes()), ("png", &figure.png)] {
+            let path = folder.join(format!("{}.{extension}", figure.name));
+            write_file(&path, bytes)?;
+            written.push(path);
+        }
+    }
+    Ok(written)
+}

@@ -3,15 +3,31 @@
 //! config → scene → accel → gpu → integrator → measure → records; the report is made from the
 //! records alone.
 
+pub mod environment;
+mod errors;
 mod registries;
+mod session;
+mod streams;
+mod structures;
+mod times;
+mod world;
 
 pub use registries::Registries;
+pub use streams::dump_stream;
 
 use crate::config::{Experiment, Plan, Variant};
 use crate::gpu::{AdapterChoice, Gpu, GpuError};
+use crate::integrator::Renderer;
+use crate::measure::picture::{automatic_exposure, tone_map, write_png};
 use crate::measure::record::GateVerdict;
+use session::Session;
 use std::path::PathBuf;
 use thiserror::Error;
+use world::World;
+
+/// A reference is rendered in this many independent parts: its halves make error estimates
+/// unbiased, its parts are the other side of the bias check.
+pub(crate) const REFERENCE_PARTS: u32 = 8;
 
 /// What an experiment does not say.
 #[derive(Debug, Clone, Default)]
@@ -88,38 +104,120 @@ pub fn open_gpu(options: &RunOptions) -> Result<Gpu, RunError> {
 /// # Errors
 /// No adapter, or a folder that cannot be written.
 pub fn run(
-    _experiment: &Experiment,
-    _plan: &Plan,
-    _registries: &Registries,
-    _options: &RunOptions,
+    experiment: &Experiment,
+    plan: &Plan,
+    registries: &Registries,
+    options: &RunOptions,
 ) -> Result<RunSummary, RunError> {
-    Err(RunError::Input("not yet".to_owned()))
+    let mut gpu = open_gpu(options)?;
+    let mut session = Session::new(experiment, plan, registries, options)?;
+    session.write_start(environment::capture(&gpu))?;
+    for scene in &plan.scenes {
+        // A lost device fails the cell that lost it; the rest goes on with a fresh one. Every turn
+        // of this loop finishes at least one cell.
+        loop {
+            run_scene(&mut session, &gpu, scene)?;
+            if gpu.lost().is_none() {
+                break;
+            }
+            gpu = open_gpu(options)?;
+        }
+    }
+    streams::run(&mut session, &gpu)?;
+    session.write_end()?;
+    let report = crate::report::write_report(&options.out).map_err(|e| RunError::Input(e.to_string()))?;
+    let lines = crate::report::read_records(&options.out).map_err(|e| RunError::Input(e.to_string()))?;
+    Ok(RunSummary {
+        failed: session.failed,
+        skipped: session.skipped,
+        report: Some(report.html),
+        tables: crate::report::terminal_tables(&lines.lines),
+    })
+}
+
+fn run_scene(session: &mut Session, gpu: &Gpu, variant: &Variant) -> Result<(), RunError> {
+    let cell = format!("scene {variant}: failed");
+    if session.is_done(&cell) {
+        return Ok(());
+    }
+    let world = match World::new(session, gpu, variant)? {
+        Ok(world) => world,
+        Err(reason) => return session.write_failure(&cell, reason),
+    };
+    let gated = structures::run(session, &world)?;
+    if gpu.lost().is_none() {
+        errors::run(session, &world, &gated)?;
+    }
+    if gpu.lost().is_none() {
+        times::run(session, &world, &gated)?;
+    }
+    Ok(())
 }
 
 /// Runs the gate alone on every structure of a plan, with `rays` rays of each class.
 ///
 /// # Errors
-/// No adapter.
+/// No adapter, or a folder that cannot be written.
 pub fn verify(
-    _experiment: &Experiment,
-    _plan: &Plan,
-    _registries: &Registries,
-    _options: &RunOptions,
-    _rays: usize,
+    experiment: &Experiment,
+    plan: &Plan,
+    registries: &Registries,
+    options: &RunOptions,
+    rays: u32,
 ) -> Result<Vec<Verified>, RunError> {
-    Err(RunError::Input("not yet".to_owned()))
+    let gpu = open_gpu(options)?;
+    let mut experiment = experiment.clone();
+    experiment.gate.rays = rays;
+    experiment.timing.rays = rays;
+    let mut session = Session::new(&experiment, plan, registries, options)?;
+    session.write_start(environment::capture(&gpu))?;
+    let mut verified = Vec::new();
+    for scene in &plan.scenes {
+        let accels = plan.structures.iter().filter(|c| c.scene == *scene).map(|c| &c.accel);
+        let world = World::new(&mut session, &gpu, scene)?;
+        for accel in accels {
+            let verdict = match &world {
+                Err(reason) => Err(reason.clone()),
+                Ok(world) => match structures::build_and_gate(&mut session, world, accel) {
+                    Ok((_, record)) => record.gate.ok_or_else(|| "no verdict".to_owned()),
+                    Err(record) => {
+                        let reason = record.failure.unwrap_or_default();
+                        record.gate.ok_or(reason)
+                    }
+                },
+            };
+            verified.push(Verified { scene: scene.clone(), accel: accel.clone(), verdict });
+        }
+    }
+    session.progress.finish_and_clear();
+    Ok(verified)
 }
 
 /// One image for `raystone render`: the first scene, structure, sampler and integrator of the axes,
-/// at `experiment.spp.max()` samples; returns the tone-mapped picture written to `file`.
+/// at `experiment.spp.max()` samples, tone-mapped and written to `file`.
 ///
 /// # Errors
-/// No adapter, a scene that does not load, a structure that cannot be built.
+/// No adapter, a scene that does not load, a structure that cannot be built or fails its gate.
 pub fn render(
-    _experiment: &Experiment,
-    _registries: &Registries,
-    _options: &RunOptions,
-    _file: &std::path::Path,
+    experiment: &Experiment,
+    plan: &Plan,
+    registries: &Registries,
+    options: &RunOptions,
+    file: &std::path::Path,
 ) -> Result<(), RunError> {
-    Err(RunError::Input("not yet".to_owned()))
+    let gpu = open_gpu(options)?;
+    let mut session = Session::new(experiment, plan, registries, options)?;
+    let cell = plan.times.first().ok_or_else(|| RunError::Input("there is nothing to render".to_owned()))?;
+    let world = World::new(&mut session, &gpu, &cell.scene)?.map_err(RunError::Input)?;
+    let built = structures::build_and_gate(&mut session, &world, &cell.accel);
+    let (traced, _) = built.map_err(|record| RunError::Input(record.failure.unwrap_or_default()))?;
+    let found = registries.samplers.sampler(&cell.sequence, &cell.decorrelation);
+    let sampler = found.ok_or_else(|| RunError::Input("this sampler is not registered".to_owned()))?;
+    let job = errors::job(&session, &world, &sampler, &cell.integrator, true).map_err(RunError::Input)?;
+    let renderer = Renderer::new(&gpu, &world.buffers, &traced, &job, false)?;
+    let snapshots = renderer.render(&[experiment.spp.max()], experiment.seed)?;
+    session.progress.finish_and_clear();
+    let Some(snapshot) = snapshots.first() else { return Ok(()) };
+    let picture = tone_map(&snapshot.image, automatic_exposure(&snapshot.image));
+    write_png(file, &picture).map_err(|e| RunError::Input(e.to_string()))
 }

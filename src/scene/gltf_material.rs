@@ -208,24 +208,26 @@ fn image_source<'a>(
 
 /// One warning per kind of appearance that is drawn otherwise than the file says.
 fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
-    let of = |wanted: &dyn Fn(&Material) -> bool| -> Vec<&str> {
-        let chosen = materials.iter().filter(|m| wanted(m));
-        chosen.map(|m| m.name.as_str()).collect()
+    // The material as converted beside the one in the file; the last, default one is not in it.
+    let of = |wanted: &dyn Fn(&Material, &gltf::Material<'_>) -> bool| -> Vec<&str> {
+        let pairs = materials.iter().zip(document.materials());
+        let chosen = pairs.filter(|(converted, original)| wanted(converted, original));
+        chosen
+            .map(|(converted, _)| converted.name.as_str())
+            .collect()
     };
-    let transmissive = of(&|m| m.source.transmission.is_some_and(|t| t > 0.0));
-    let cut_out = of(&|m| {
-        let mode = m.source.alpha_mode.as_deref();
-        mode.is_some_and(|mode| mode != "OPAQUE")
+    let transmissive = of(&|m, _| m.source.transmission.is_some_and(|t| t > 0.0));
+    let cut_out = of(&|m, _| m.source.alpha_mode.as_deref() != Some("OPAQUE"));
+    // Where a texture scales the metalness, the factor alone says nothing.
+    let metal = of(&|m, original| {
+        let model = original.pbr_metallic_roughness();
+        m.kind == MaterialKind::Diffuse
+            && m.source.metallic.is_some_and(|metal| metal > 0.5)
+            && model.metallic_roughness_texture().is_none()
     });
-    let metal = of(&|m| {
-        m.kind == MaterialKind::Diffuse && m.source.metallic.is_some_and(|metal| metal > 0.5)
+    let textured_light = of(&|_, original| {
+        original.emissive_texture().is_some() && emitted(original.emissive_factor()) != Vec3::ZERO
     });
-    let textured_light: Vec<_> = document
-        .materials()
-        .filter(|m| m.emissive_texture().is_some())
-        .filter_map(|m| m.index())
-        .map(|index| materials[index].name.as_str())
-        .collect();
     [
         approximation_warning("transmissive", transmissive),
         approximation_warning("cut out or blended by alpha", cut_out),

@@ -1,6 +1,6 @@
 //! Procedural scenes: no files, deterministic to the bit on every platform.
 //!
-//! A new scene is one file here and one line in [`BUILTINS`].
+//! A new scene is one file here and one line in `BUILTINS`.
 
 mod cornell_box;
 mod displaced_sphere;

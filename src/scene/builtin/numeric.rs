@@ -3,6 +3,19 @@
 
 use std::f64::consts::TAU;
 
+/// Ratios of successive terms of the Taylor series of sine and cosine over the squared angle, up to
+/// the 19th power: 1 / ((k+2)(k+3)) and 1 / ((k+1)(k+2)) for even k.
+const SERIES: [[f64; 2]; 10] = {
+    let mut series = [[0.0; 2]; 10];
+    let mut i = 0;
+    while i < series.len() {
+        let k = 2.0 * i as f64;
+        series[i] = [1.0 / ((k + 2.0) * (k + 3.0)), 1.0 / ((k + 1.0) * (k + 2.0))];
+        i += 1;
+    }
+    series
+};
+
 /// Sine and cosine of `turns` full turns, error below 1e-15. Only IEEE additions and
 /// multiplications in a fixed order.
 pub(super) fn sin_cos_turns(turns: f64) -> (f64, f64) {
@@ -12,11 +25,9 @@ pub(super) fn sin_cos_turns(turns: f64) -> (f64, f64) {
     let angle = (turns - 0.25 * quarter) * TAU;
     let squared = angle * angle;
     let (mut sin, mut cos) = (0.0, 0.0);
-    // Taylor series by Horner: terms up to angle^19.
-    for k in (0..10).rev() {
-        let k = f64::from(2 * k);
-        sin = 1.0 - squared / ((k + 2.0) * (k + 3.0)) * sin;
-        cos = 1.0 - squared / ((k + 1.0) * (k + 2.0)) * cos;
+    for &[for_sin, for_cos] in SERIES.iter().rev() {
+        sin = 1.0 - squared * for_sin * sin;
+        cos = 1.0 - squared * for_cos * cos;
     }
     sin *= angle;
     match quarter as i64 % 4 {

@@ -59,8 +59,8 @@ fn build(params: &Params) -> (SceneBuilder, Look) {
         ],
         textures: Vec::new(),
         camera: Some(Camera {
-            eye: Vec3::new(3.0, 4.5, 8.5),
-            target: Vec3::new(0.2, 1.6, 0.0),
+            eye: Vec3::new(2.5, 3.4, 8.2),
+            target: Vec3::new(0.2, 1.9, 0.0),
             up: Vec3::Y,
             vertical_fov_degrees: 40.0,
         }),
@@ -132,7 +132,11 @@ mod tests {
     fn no_triangle_of_the_teapot_is_degenerate_and_finer_ones_have_more() {
         for subdivision in [2, 3, 5, 10, 16] {
             let triangles = teapot(subdivision);
-            assert_eq!(triangles.iter().find(|t| t.has_zero_area()), None, "{subdivision}");
+            assert_eq!(
+                triangles.iter().find(|t| t.has_zero_area()),
+                None,
+                "{subdivision}"
+            );
             // 32 patches, of which 8 meet a pole and lose a triangle per cell there.
             let n = subdivision;
             assert_eq!(triangles.len(), 2 * 32 * n * n - 8 * n);

@@ -20,9 +20,12 @@ const PROFILES: [[[f64; 2]; 4]; 6] = [
 /// Control points of a quarter circle of radius 1 as Newell drew it.
 const QUARTER: [[f64; 2]; 4] = [[1.0, 0.0], [1.0, 0.56], [0.56, 1.0], [0.0, 1.0]];
 
-/// Half patches of handle (two) and spout (two): per row the inner and the outer curve (x, z) in
-/// the plane of symmetry, and the half width of the row.
-const HALVES: [[([f64; 2], [f64; 2], f64); 4]; 4] = [
+/// One row of half a patch of handle or spout: a point (x, z) of the inner and of the outer curve
+/// in the plane of symmetry, and the half width.
+type HalfRow = ([f64; 2], [f64; 2], f64);
+
+/// The two half patches of the handle, then the two of the spout.
+const HALVES: [[HalfRow; 4]; 4] = [
     [
         ([-1.6, 2.025], [-1.5, 2.25], 0.3),
         ([-2.3, 2.025], [-2.5, 2.25], 0.3),

@@ -61,7 +61,7 @@ fn build(params: &Params) -> (SceneBuilder, Look) {
         materials: materials.into(),
         textures: Vec::new(),
         camera: Some(Camera {
-            eye: Vec3::new(1.5, 1.2, 2.2),
+            eye: Vec3::new(1.7, 1.3, 2.5),
             target: Vec3::splat(0.5),
             up: Vec3::Y,
             vertical_fov_degrees: 40.0,

@@ -1,0 +1,177 @@
+//! The batch interface that all measuring goes through: a buffer of rays in, a buffer of hits out.
+
+use super::rays::RaySet;
+use crate::accel::{Counters, Hit, Ray};
+use crate::gpu::{
+    groups_for, Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline, UniformValues,
+};
+use crate::integrator::{SceneBuffers, Traced};
+use std::sync::Arc;
+
+/// What is asked of each ray.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Query {
+    /// The nearest hit.
+    Closest,
+    /// Whether there is a hit.
+    Any,
+}
+
+impl Query {
+    /// The query that a class of rays is traced with.
+    pub fn of(set: &RaySet) -> Self {
+        if set.is_any() { Self::Any } else { Self::Closest }
+    }
+}
+
+/// No dispatch should run longer than this.
+const SLICE_MS: f64 = 250.0;
+/// Rays of the first dispatch through an unknown structure.
+const FIRST_SLICE: u32 = 2048;
+
+/// A structure, a query and a ray buffer, compiled.
+pub struct Batch<'a> {
+    gpu: &'a Gpu,
+    pipeline: Arc<Pipeline>,
+    bindings: Bindings,
+    output: wgpu::Buffer,
+    status: wgpu::Buffer,
+    rays: u32,
+    /// Rays per dispatch, grown until a dispatch takes about [`SLICE_MS`].
+    slice: std::cell::Cell<u32>,
+}
+
+impl<'a> Batch<'a> {
+    /// Compiles the query and uploads the rays.
+    ///
+    /// # Errors
+    /// The kernel does not compile or the rays exceed the adapter's binding limit.
+    pub fn new(
+        gpu: &'a Gpu,
+        scene: &SceneBuffers,
+        traced: &Traced,
+        query: Query,
+        rays: &[Ray],
+        runtime_checks: bool,
+    ) -> Result<Self, GpuError> {
+        Self::compile(gpu, scene, traced, query, rays, runtime_checks, false)
+    }
+
+    fn compile(
+        gpu: &'a Gpu,
+        scene: &SceneBuffers,
+        traced: &Traced,
+        query: Query,
+        rays: &[Ray],
+        runtime_checks: bool,
+        counters: bool,
+    ) -> Result<Self, GpuError> {
+        let composition = traced
+            .compose(Composition::new("integrator/trace_rays"))
+            .feature("any", query == Query::Any)
+            .feature("counters", counters);
+        let pipeline = gpu.pipeline(&composition, runtime_checks)?;
+        let bytes_per_ray = if counters { 32 } else { 16 };
+        let output = gpu.zeroed("hits", rays.len() as u64 * bytes_per_ray)?;
+        let status = gpu.zeroed("status", 64)?;
+        let mut bindings = scene.bindings.merged(&traced.bindings);
+        bindings.buffer("rays", &gpu.storage("rays", rays)?).buffer("status", &status);
+        bindings.buffer(if counters { "work" } else { "hits" }, &output);
+        let slice = std::cell::Cell::new(FIRST_SLICE);
+        Ok(Self { gpu, pipeline, bindings, output, status, rays: rays.len() as u32, slice })
+    }
+
+    /// Feature flags of the kernel.
+    pub fn features(&self) -> Vec<String> {
+        self.pipeline.kernel.composition.features.iter().cloned().collect()
+    }
+
+    /// Text of the composed kernel.
+    pub fn kernel_text(&self) -> &str {
+        &self.pipeline.kernel.wgsl
+    }
+
+    /// Traces all rays, in as many dispatches as needed to keep each short.
+    ///
+    /// # Errors
+    /// The device is lost, hangs, or the driver complains.
+    pub fn trace(&self) -> Result<Elapsed, GpuError> {
+        let mut total = Elapsed { gpu_ms: self.gpu.timestamp_period.map(|_| 0.0), wall_ms: 0.0 };
+        let mut first = 0;
+        while first < self.rays {
+            let count = self.slice.get().min(self.rays - first);
+            let elapsed = self.dispatch(first, count)?;
+            total.gpu_ms = total.gpu_ms.zip(elapsed.gpu_ms).map(|(a, b)| a + b);
+            total.wall_ms += elapsed.wall_ms;
+            let fitting = f64::from(count) * SLICE_MS / elapsed.wall_ms.max(0.1);
+            // The first dispatch includes the driver's compiler: growth is stepwise, shrinking is not.
+            self.slice.set((fitting as u32).clamp(64, count.saturating_mul(8).max(FIRST_SLICE)));
+            first += count;
+        }
+        Ok(total)
+    }
+
+    /// A dispatch that traces nothing: the fixed cost of a measurement.
+    ///
+    /// # Errors
+    /// The device is lost, hangs, or the driver complains.
+    pub fn trace_nothing(&self) -> Result<Elapsed, GpuError> {
+        self.dispatch(0, 0)
+    }
+
+    fn dispatch(&self, first: u32, count: u32) -> Result<Elapsed, GpuError> {
+        let mut bindings = self.bindings.clone();
+        bindings.uniform("batch", UniformValues::new().u32("first", first).u32("count", count));
+        self.gpu.run(&Dispatch { pipeline: &self.pipeline, bindings: &bindings, groups: groups_for(count) })
+    }
+
+    /// Hits of the last trace of a closest-hit query.
+    ///
+    /// # Errors
+    /// The device is lost or hangs.
+    pub fn hits(&self) -> Result<Vec<Hit>, GpuError> {
+        let mut hits: Vec<Hit> = self.gpu.read(&self.output)?;
+        hits.truncate(self.rays as usize);
+        Ok(hits)
+    }
+
+    /// Answers of the last trace of an any-hit query.
+    ///
+    /// # Errors
+    /// The device is lost or hangs.
+    pub fn found(&self) -> Result<Vec<bool>, GpuError> {
+        let words: Vec<[u32; 4]> = self.gpu.read(&self.output)?;
+        Ok(words.iter().take(self.rays as usize).map(|w| w[0] != 0).collect())
+    }
+
+    /// The error word of the kernels.
+    ///
+    /// # Errors
+    /// The device is lost or hangs.
+    pub fn error_word(&self) -> Result<u32, GpuError> {
+        Ok(self.gpu.read::<u32>(&self.status)?[0])
+    }
+}
+
+/// Counted work of every ray, from a kernel of its own.
+///
+/// # Errors
+/// The kernel does not compile, or the device is lost or hangs.
+pub fn count_work(
+    gpu: &Gpu,
+    scene: &SceneBuffers,
+    traced: &Traced,
+    query: Query,
+    rays: &[Ray],
+) -> Result<Vec<Counters>, GpuError> {
+    let batch = Batch::compile(gpu, scene, traced, query, rays, true, true)?;
+    batch.trace()?;
+    let words: Vec<[u32; 8]> = gpu.read(&batch.output)?;
+    let counters = words.iter().take(rays.len()).map(|w| Counters {
+        nodes: w[0],
+        box_tests: w[1],
+        triangle_tests: w[2],
+        stack_high_water: w[3],
+    });
+    Ok(counters.collect())
+}

@@ -1,0 +1,222 @@
+//! The gate: no figure is printed for a structure whose hits differ from the judge's.
+//!
+//! The judge is the scalar CPU twin of the plain BVH. It is itself compared with brute force and with
+//! the f64 oracle on as many rays as a budget allows. On an adapter that computes like the host,
+//! hits must be equal to the bit. On one that fuses or divides otherwise, a differing hit is a *tie*
+//! if both triangles lie within 4 ulp of the same distance in f64; ties are counted and shown.
+
+use super::batch::{Batch, Query};
+use super::rays::{record_rays, RaySet};
+use super::record::{ClassVerdict, GateVerdict, JudgeCheck};
+use crate::accel::{brute_force_hits, AccelError, BuildLog, BuiltAccel, Bvh, BvhTwin, Hit, Ray, TriangleSoup, NO_HIT};
+use crate::accel::AccelKind;
+use crate::config::{Gate, Params};
+use crate::gpu::{ArithmeticProbe, Gpu, GpuError};
+use crate::integrator::{SceneBuffers, Traced};
+use crate::oracle::{self, OracleRay, Verdict};
+use crate::scene::{Camera, SceneData};
+
+/// Meaning of the bits of the kernels' error word, as in `kernels/common/errors.wesl`.
+pub const KERNEL_ERRORS: [(u32, &str); 2] = [
+    (1, "a traversal took more steps than the structure allows (step fuse)"),
+    (2, "a traversal stack overflowed"),
+];
+
+/// The judge is compared with brute force on at least this many rays.
+const LEAST_BRUTE_FORCE_RAYS: usize = 2000;
+/// Triangle tests that the f64 oracle may spend on a scene.
+const ORACLE_TESTS: usize = 300_000_000;
+/// Two distances within this many ulp are the same on an adapter with inexact arithmetic.
+const TIE_ULPS: f64 = 4.0;
+
+/// The judge of a scene with its recorded rays.
+pub struct Judge {
+    /// The scalar BVH.
+    pub twin: BvhTwin,
+    /// Rays and true hits, per class.
+    pub sets: Vec<RaySet>,
+    /// The judge against brute force.
+    pub brute_force: JudgeCheck,
+    /// The judge against the f64 oracle.
+    pub oracle: JudgeCheck,
+    /// The first ray on which the judge itself is wrong.
+    pub first_wrong: Option<String>,
+}
+
+impl Judge {
+    /// Builds the judge, records the rays and checks the judge itself.
+    ///
+    /// # Errors
+    /// The scene has too many triangles for a BVH.
+    pub fn new(
+        scene: &SceneData,
+        soup: &TriangleSoup,
+        camera: Camera,
+        settings: &Gate,
+        seed: u64,
+    ) -> Result<Self, AccelError> {
+        let mut params = Params::default();
+        for parameter in Bvh.parameters() {
+            params.0.insert(parameter.name.to_owned(), parameter.default);
+        }
+        let twin = BvhTwin::build(soup, &params, &mut BuildLog::default())?;
+        twin.validate(soup)?;
+        let sets = record_rays(scene, soup, camera, &twin, settings.rays, seed);
+        let mut judge = Self {
+            twin,
+            sets,
+            brute_force: JudgeCheck::default(),
+            oracle: JudgeCheck::default(),
+            first_wrong: None,
+        };
+        judge.check_brute_force(soup, settings.brute_force_tests);
+        judge.check_oracle(scene, settings.oracle_rays as usize);
+        Ok(judge)
+    }
+
+    /// Every n-th ray of all classes, so that about `count` remain.
+    fn subset(&self, count: usize) -> Vec<(Ray, Hit)> {
+        let all: usize = self.sets.iter().map(|s| s.rays.len()).sum();
+        let step = all.div_ceil(count.max(1)).max(1);
+        let pairs = self.sets.iter().flat_map(|s| s.rays.iter().copied().zip(s.truth.iter().copied()));
+        pairs.step_by(step).collect()
+    }
+
+    fn check_brute_force(&mut self, soup: &TriangleSoup, tests: u64) {
+        let affordable = (tests / soup.records.len().max(1) as u64) as usize;
+        let pairs = self.subset(affordable.max(LEAST_BRUTE_FORCE_RAYS));
+        let rays: Vec<Ray> = pairs.iter().map(|(ray, _)| *ray).collect();
+        let truth = brute_force_hits(soup, &rays);
+        self.brute_force.rays = rays.len();
+        for ((ray, judged), brute) in pairs.iter().zip(&truth) {
+            if !judged.same_bits(brute) {
+                self.brute_force.wrong += 1;
+                self.first_wrong.get_or_insert_with(|| describe(ray, "judge", judged, "brute force", brute));
+            }
+        }
+    }
+
+    fn check_oracle(&mut self, scene: &SceneData, rays: usize) {
+        let affordable = (ORACLE_TESTS / scene.triangles.len().max(1)).max(64);
+        let pairs = self.subset(rays.min(affordable));
+        let questions: Vec<_> = pairs
+            .iter()
+            .map(|(ray, hit)| (oracle_ray(ray), (hit.triangle != NO_HIT).then_some((hit.triangle, hit.t))))
+            .collect();
+        self.oracle.rays = questions.len();
+        for ((ray, hit), verdict) in pairs.iter().zip(oracle::judge_closest_hits(&scene.triangles, &questions)) {
+            match verdict {
+                Verdict::Agrees => {}
+                Verdict::Ambiguous => self.oracle.ambiguous += 1,
+                Verdict::Wrong(fault) => {
+                    self.oracle.wrong += 1;
+                    self.first_wrong.get_or_insert_with(|| format!("{} | judge {} | f64: {fault}", ray_text(ray), hit_text(hit)));
+                }
+            }
+        }
+    }
+
+    /// Whether the judge agrees with brute force and with the oracle.
+    pub fn is_sound(&self) -> bool {
+        self.brute_force.wrong == 0 && self.oracle.wrong == 0
+    }
+}
+
+fn oracle_ray(ray: &Ray) -> OracleRay {
+    OracleRay { origin: ray.origin, t_min: ray.t_min, direction: ray.direction, t_max: ray.t_max }
+}
+
+/// Traces all recorded rays, closest and any hit, and compares.
+///
+/// # Errors
+/// A kernel does not compile, or the device is lost or hangs.
+pub fn gate(
+    gpu: &Gpu,
+    scene: &SceneBuffers,
+    soup: &TriangleSoup,
+    traced: &Traced,
+    judge: &Judge,
+    probe: &ArithmeticProbe,
+    runtime_checks: bool,
+) -> Result<GateVerdict, GpuError> {
+    let mut errors = 0;
+    let mut classes = Vec::new();
+    for set in &judge.sets {
+        let closest = Batch::new(gpu, scene, traced, Query::Closest, &set.rays, runtime_checks)?;
+        closest.trace()?;
+        let any = Batch::new(gpu, scene, traced, Query::Any, &set.rays, runtime_checks)?;
+        any.trace()?;
+        errors |= closest.error_word()? | any.error_word()?;
+        classes.push(compare(set, &closest.hits()?, &any.found()?, soup, probe.is_exact()));
+    }
+    let kernel_errors: Vec<String> =
+        KERNEL_ERRORS.iter().filter(|(bit, _)| errors & bit != 0).map(|(_, text)| (*text).to_owned()).collect();
+    let right = classes.iter().all(|c| c.wrong == 0);
+    Ok(GateVerdict {
+        passed: right && errors == 0 && judge.is_sound(),
+        classes,
+        brute_force: judge.brute_force.clone(),
+        oracle: judge.oracle.clone(),
+        kernel_errors,
+        structural: None,
+    })
+}
+
+/// Compares the answers of a structure with the judge's.
+pub fn compare(set: &RaySet, hits: &[Hit], found: &[bool], soup: &TriangleSoup, exact: bool) -> ClassVerdict {
+    let mut verdict =
+        ClassVerdict { class: set.class, rays: set.rays.len(), wrong: 0, ties: 0, first_wrong: None };
+    for (index, (ray, truth)) in set.rays.iter().zip(&set.truth).enumerate() {
+        let hit = hits.get(index).copied().unwrap_or(Hit { t: f32::NAN, triangle: NO_HIT, u: 0.0, v: 0.0 });
+        let any_right = found.get(index) == Some(&(truth.triangle != NO_HIT));
+        if hit.same_bits(truth) && any_right {
+            continue;
+        }
+        if !exact && is_tie(ray, &hit, truth, soup) {
+            verdict.ties += 1;
+            continue;
+        }
+        verdict.wrong += 1;
+        verdict.first_wrong.get_or_insert_with(|| {
+            let any = if any_right { "" } else { " | any-hit answer differs" };
+            describe(ray, "structure", &hit, "judge", truth) + any
+        });
+    }
+    verdict
+}
+
+/// Whether both triangles lie within 4 ulp of the same distance in f64, as does the answer.
+fn is_tie(ray: &Ray, hit: &Hit, truth: &Hit, soup: &TriangleSoup) -> bool {
+    if hit.triangle == NO_HIT || truth.triangle == NO_HIT || hit.triangle as usize >= soup.records.len() {
+        return false;
+    }
+    let ulp = |t: f64| t.abs() * f64::from(f32::EPSILON);
+    let near = |a: f64, b: f64| (a - b).abs() <= TIE_ULPS * ulp(a.abs().max(b.abs()));
+    let plane = |id: u32| plane_distance(ray, &soup.records[id as usize]);
+    near(plane(hit.triangle), plane(truth.triangle)) && near(f64::from(hit.t), f64::from(truth.t))
+}
+
+/// Distance to the triangle's plane, f64.
+fn plane_distance(ray: &Ray, record: &crate::accel::triangle::TriangleRecord) -> f64 {
+    let v = |a: [f32; 3]| glam::DVec3::from_array(a.map(f64::from));
+    let normal = v(record.e1).cross(v(record.e2));
+    normal.dot(v(record.v0) - v(ray.origin)) / normal.dot(v(ray.direction))
+}
+
+fn describe(ray: &Ray, left: &str, a: &Hit, right: &str, b: &Hit) -> String {
+    format!("{} | {left} {} | {right} {}", ray_text(ray), hit_text(a), hit_text(b))
+}
+
+/// A ray as replayable text: nine significant digits give back the same f32.
+fn ray_text(ray: &Ray) -> String {
+    let three = |[x, y, z]: [f32; 3]| format!("{x:?} {y:?} {z:?}");
+    format!("ray {} / {} / {:?} {:?}", three(ray.origin), three(ray.direction), ray.t_min, ray.t_max)
+}
+
+fn hit_text(hit: &Hit) -> String {
+    if hit.triangle == NO_HIT {
+        "misses".to_owned()
+    } else {
+        format!("hits {} at t {:?} u {:?} v {:?}", hit.triangle, hit.t, hit.u, hit.v)
+    }
+}

@@ -1,0 +1,168 @@
+//! Recorded ray sets: made once per scene on the host, traced by every structure.
+//!
+//! The classes follow common practice (Aila & Laine 2009; Meister & Bittner 2022): primary rays in
+//! 8×8 tiles, then shadow, ambient-occlusion and bounce rays from the first hits in the same order,
+//! and chords between random points of the bounding box.
+
+use super::record::RayClass;
+use super::statistics::Pcg32;
+use crate::accel::{Counters, CpuTwin, Hit, Ray, TriangleSoup, NO_HIT};
+use crate::integrator::Frame;
+use crate::scene::{Bounds, Camera, SceneData};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Longest distance of unbounded rays; a kernel multiplies it by pads without overflow.
+pub const FAR: f32 = 1e30;
+/// Origins are moved off their surface by this fraction of the scene's diagonal.
+const OFFSET: f32 = 1e-5;
+/// Length of AO rays as a fraction of the scene's diagonal.
+const AO_LENGTH: f32 = 0.1;
+const TILE: u32 = 8;
+
+/// Rays of one class with the judge's answers.
+#[derive(Debug, Clone)]
+pub struct RaySet {
+    /// What they are.
+    pub class: RayClass,
+    /// The rays.
+    pub rays: Vec<Ray>,
+    /// The judge's nearest hits.
+    pub truth: Vec<Hit>,
+}
+
+impl RaySet {
+    fn new(class: RayClass, rays: Vec<Ray>, judge: &dyn CpuTwin) -> Self {
+        let truth = rays.par_iter().map(|ray| judge.closest_hit(ray, &mut Counters::default())).collect();
+        Self { class, rays, truth }
+    }
+
+    /// Whether the class asks for any hit instead of the nearest.
+    pub fn is_any(&self) -> bool {
+        matches!(self.class, RayClass::Shadow | RayClass::Ao)
+    }
+
+    /// Fraction of the rays that hit something.
+    pub fn hit_fraction(&self) -> f64 {
+        let hits = self.truth.iter().filter(|h| h.triangle != NO_HIT).count();
+        hits as f64 / self.rays.len().max(1) as f64
+    }
+}
+
+/// Camera rays through pixel centres, 8×8 tiles row by row.
+pub fn primary_rays(camera: Camera, width: u32, height: u32) -> Vec<Ray> {
+    let [forward, right, up] = Frame { width, height, camera, ao_radius: 0.0 }.basis();
+    let mut rays = Vec::with_capacity((width * height) as usize);
+    for tile_y in (0..height).step_by(TILE as usize) {
+        for tile_x in (0..width).step_by(TILE as usize) {
+            for y in tile_y..(tile_y + TILE).min(height) {
+                for x in tile_x..(tile_x + TILE).min(width) {
+                    let s = 2.0 * (x as f32 + 0.5) / width as f32 - 1.0;
+                    let t = 1.0 - 2.0 * (y as f32 + 0.5) / height as f32;
+                    let direction = (forward + right * s + up * t).normalize();
+                    rays.push(ray(camera.eye, direction, FAR));
+                }
+            }
+        }
+    }
+    rays
+}
+
+/// Position in the image of each ray of [`primary_rays`], as `y * width + x`.
+pub fn primary_pixels(width: u32, height: u32) -> Vec<u32> {
+    let mut pixels = Vec::with_capacity((width * height) as usize);
+    for tile_y in (0..height).step_by(TILE as usize) {
+        for tile_x in (0..width).step_by(TILE as usize) {
+            for y in tile_y..(tile_y + TILE).min(height) {
+                pixels.extend((tile_x..(tile_x + TILE).min(width)).map(|x| y * width + x));
+            }
+        }
+    }
+    pixels
+}
+
+fn ray(origin: Vec3, direction: Vec3, t_max: f32) -> Ray {
+    Ray { origin: origin.to_array(), t_min: 0.0, direction: direction.to_array(), t_max }
+}
+
+/// Point and unit normal, on the side of the ray, of every primary hit.
+fn surface_points(primary: &RaySet, soup: &TriangleSoup) -> Vec<(Vec3, Vec3)> {
+    let hits = primary.rays.iter().zip(&primary.truth).filter(|(_, h)| h.triangle != NO_HIT);
+    hits.filter_map(|(ray, hit)| {
+        let record = &soup.records[hit.triangle as usize];
+        let (e1, e2) = (Vec3::from(record.e1), Vec3::from(record.e2));
+        let normal = e1.cross(e2).try_normalize()?;
+        let facing = if normal.dot(Vec3::from(ray.direction)) > 0.0 { -normal } else { normal };
+        Some((Vec3::from(record.v0) - hit.u * e1 + hit.v * e2, facing))
+    })
+    .collect()
+}
+
+/// Records all classes with about `count` rays each. Classes that start on surfaces are missing when
+/// no primary ray hits anything.
+pub fn record_rays(
+    scene: &SceneData,
+    soup: &TriangleSoup,
+    camera: Camera,
+    judge: &dyn CpuTwin,
+    count: u32,
+    seed: u64,
+) -> Vec<RaySet> {
+    let side = ((f64::from(count).sqrt() / f64::from(TILE)).round() as u32).max(1) * TILE;
+    let primary = RaySet::new(RayClass::Primary, primary_rays(camera, side, side), judge);
+    let bounds = scene.bounds();
+    let diagonal = 2.0 * bounds.radius();
+    let mut random = Pcg32::new(seed);
+    let points = surface_points(&primary, soup);
+    let emitters = scene.emitters();
+    let mut sets = vec![];
+    if !points.is_empty() {
+        let starts = || points.iter().cycle().take(primary.rays.len()).map(|&(p, n)| (p + n * (OFFSET * diagonal), n));
+        let shadow = starts().map(|(p, _)| {
+            let target = light_point(scene, &emitters, &bounds, &mut random);
+            // A little short of the emitter, which must not shadow itself.
+            ray(p, target - p, 0.9999)
+        });
+        let shadow = shadow.collect();
+        let ao = starts().map(|(p, n)| ray(p, cosine_direction(n, &mut random), AO_LENGTH * diagonal)).collect();
+        let bounce = starts().map(|(p, n)| ray(p, cosine_direction(n, &mut random), FAR)).collect();
+        sets.push(RaySet::new(RayClass::Shadow, shadow, judge));
+        sets.push(RaySet::new(RayClass::Ao, ao, judge));
+        sets.push(RaySet::new(RayClass::Bounce, bounce, judge));
+    }
+    let inside = |random: &mut Pcg32| {
+        let u = Vec3::new(random.uniform() as f32, random.uniform() as f32, random.uniform() as f32);
+        bounds.min + u * (bounds.max - bounds.min)
+    };
+    let chords = (0..primary.rays.len()).map(|_| {
+        let from = inside(&mut random);
+        let direction = (inside(&mut random) - from).try_normalize().unwrap_or(Vec3::X);
+        ray(from, direction, FAR)
+    });
+    sets.push(RaySet::new(RayClass::Chord, chords.collect(), judge));
+    sets.insert(0, primary);
+    sets
+}
+
+/// A point on a random emissive triangle, or on the bounding sphere of a scene without any.
+fn light_point(scene: &SceneData, emitters: &[u32], bounds: &Bounds, random: &mut Pcg32) -> Vec3 {
+    let (u, v) = (random.uniform() as f32, random.uniform() as f32);
+    if emitters.is_empty() {
+        let z = 1.0 - 2.0 * u;
+        let radius = (1.0 - z * z).max(0.0).sqrt();
+        let angle = std::f32::consts::TAU * v;
+        return bounds.center() + bounds.radius() * Vec3::new(radius * angle.cos(), radius * angle.sin(), z);
+    }
+    let chosen = emitters[random.below(emitters.len())];
+    let [a, b, c] = scene.triangles[chosen as usize].vertices;
+    let root = u.sqrt();
+    a + (b - a) * (root * (1.0 - v)) + (c - a) * (root * v)
+}
+
+fn cosine_direction(n: Vec3, random: &mut Pcg32) -> Vec3 {
+    let (u, v) = (random.uniform() as f32, random.uniform() as f32);
+    let (tangent, bitangent) = n.any_orthonormal_pair();
+    let radius = u.sqrt();
+    let angle = std::f32::consts::TAU * v;
+    (tangent * (radius * angle.cos()) + bitangent * (radius * angle.sin()) + n * (1.0 - u).max(0.0).sqrt()).normalize()
+}

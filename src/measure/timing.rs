@@ -1,0 +1,102 @@
+//! The timing protocol: warm-up until the rate is stable, then all measured things in rounds of
+//! random order, so that drift of the machine hits all alike.
+
+use super::statistics::{bootstrap_median, median, Pcg32};
+use super::record::Interval;
+use crate::config::Timing;
+use crate::gpu::{Elapsed, GpuError};
+use std::time::Instant;
+
+/// Two warm-up runs within this fraction of each other are stable.
+const STABLE: f64 = 0.05;
+
+/// Something that is measured again and again.
+pub trait Measured {
+    /// One measurement.
+    ///
+    /// # Errors
+    /// It failed; it is not measured again.
+    fn measure(&self) -> Result<Elapsed, GpuError>;
+}
+
+/// Samples of one measured thing.
+#[derive(Debug, Clone, Default)]
+pub struct Samples {
+    /// Milliseconds on the GPU clock (wall clock where there is none).
+    pub ms: Vec<f64>,
+    /// Milliseconds on the wall clock.
+    pub wall_ms: Vec<f64>,
+}
+
+/// Measures everything `rounds` times in rounds of random order; what fails keeps its error.
+pub fn interleave<M: Measured>(
+    measured: &[M],
+    timing: &Timing,
+    seed: u64,
+    mut tick: impl FnMut(),
+) -> Vec<Result<Samples, GpuError>> {
+    let mut results: Vec<Result<Samples, GpuError>> = measured
+        .iter()
+        .map(|m| {
+            tick();
+            warm_up(m, timing).map(|()| Samples::default())
+        })
+        .collect();
+    let mut random = Pcg32::new(seed);
+    let mut order: Vec<usize> = (0..measured.len()).collect();
+    for _ in 0..timing.rounds {
+        for i in (1..order.len()).rev() {
+            order.swap(i, random.below(i + 1));
+        }
+        for &index in &order {
+            let Ok(samples) = &mut results[index] else { continue };
+            match measured[index].measure() {
+                Ok(elapsed) => {
+                    samples.ms.push(elapsed.ms());
+                    samples.wall_ms.push(elapsed.wall_ms);
+                }
+                Err(error) => results[index] = Err(error),
+            }
+            tick();
+        }
+    }
+    results
+}
+
+/// Runs until two runs in a row agree, for at least `min_warmup_ms` and at most `max_warmup_ms`. The
+/// first run does not count: it includes the driver's compiler.
+fn warm_up(measured: &impl Measured, timing: &Timing) -> Result<(), GpuError> {
+    measured.measure()?;
+    let start = Instant::now();
+    let mut last = measured.measure()?.ms();
+    loop {
+        let spent_ms = start.elapsed().as_secs_f64() * 1e3;
+        let now = measured.measure()?.ms();
+        let stable = (now - last).abs() <= STABLE * now.max(last);
+        if (stable && spent_ms >= f64::from(timing.min_warmup_ms)) || spent_ms >= f64::from(timing.max_warmup_ms) {
+            return Ok(());
+        }
+        last = now;
+    }
+}
+
+/// `samples` with the cost of an empty measurement taken off; never below a hundredth of what was
+/// measured, so that a rate stays finite.
+pub fn without_overhead(samples: &[f64], empty: f64) -> Vec<f64> {
+    samples.iter().map(|ms| (ms - empty).max(0.01 * ms)).collect()
+}
+
+/// Median of an empty measurement.
+///
+/// # Errors
+/// It failed.
+pub fn empty_ms(mut measure: impl FnMut() -> Result<Elapsed, GpuError>) -> Result<f64, GpuError> {
+    let samples = (0..9).map(|_| measure().map(|e| e.ms())).collect::<Result<Vec<_>, _>>()?;
+    Ok(median(&samples).unwrap_or(0.0))
+}
+
+/// Rate in millions per second from milliseconds for `items`, median with interval.
+pub fn millions_per_second(ms: &[f64], items: f64) -> Option<Interval> {
+    let rates: Vec<f64> = ms.iter().map(|ms| items / ms * 1e-3).collect();
+    bootstrap_median(&rates)
+}

@@ -1,0 +1,297 @@
+//! The report as a document that HTML, Markdown and the terminal show alike.
+
+use super::ReportError;
+use super::plot::drawing::{Drawing, to_png, to_svg};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// The whole report.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Document {
+    /// Title.
+    pub title: String,
+    /// One line: when and where.
+    pub subtitle: String,
+    /// What a reader must know first.
+    pub banners: Vec<Banner>,
+    /// Sections in order.
+    pub sections: Vec<Section>,
+}
+
+impl Document {
+    /// Paints every figure, on all cores.
+    ///
+    /// # Errors
+    /// If the drawing backend fails.
+    pub fn paint(&mut self) -> Result<(), ReportError> {
+        let blocks = self
+            .sections
+            .iter_mut()
+            .flat_map(|section| &mut section.blocks);
+        let figures: Vec<&mut Figure> = blocks
+            .filter_map(|block| match block {
+                Block::Figures(figures) => Some(figures),
+                _ => None,
+            })
+            .flatten()
+            .collect();
+        figures.into_par_iter().try_for_each(|figure| {
+            figure.svg = to_svg(&figure.drawing)?;
+            figure.png = to_png(&figure.drawing)?;
+            Ok(())
+        })
+    }
+}
+
+/// A line across the page.
+#[derive(Debug, Clone, Serialize)]
+pub struct Banner {
+    /// `bad` or `note`.
+    pub tone: Tone,
+    /// The text.
+    pub text: String,
+}
+
+/// A section.
+#[derive(Debug, Clone, Serialize)]
+pub struct Section {
+    /// Anchor, unique in the document.
+    pub id: String,
+    /// Heading.
+    pub title: String,
+    /// Content.
+    pub blocks: Vec<Block>,
+}
+
+impl Section {
+    /// An empty section.
+    pub fn new(id: impl Into<String>, title: impl Into<String>) -> Self {
+        Self {
+            id: id.into(),
+            title: title.into(),
+            blocks: Vec::new(),
+        }
+    }
+}
+
+/// A piece of a section.
+#[derive(Debug, Clone, Serialize)]
+#[serde(tag = "kind", content = "value", rename_all = "kebab-case")]
+pub enum Block {
+    /// A smaller heading.
+    Heading(String),
+    /// A paragraph.
+    Paragraph(String),
+    /// Statements with a verdict.
+    Checks(Vec<Check>),
+    /// A table.
+    Table(Table),
+    /// Plots; narrow ones stand side by side.
+    Figures(Vec<Figure>),
+    /// Pictures.
+    Gallery(Gallery),
+    /// Text as typed.
+    Verbatim(String),
+}
+
+/// How a text is meant.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Tone {
+    /// As it is.
+    #[default]
+    Plain,
+    /// A pass or a win.
+    Good,
+    /// A failure.
+    Bad,
+    /// Worth knowing.
+    Note,
+}
+
+/// A statement that passes, fails, or could not be tested.
+#[derive(Debug, Clone, Serialize)]
+pub struct Check {
+    /// `Good`: pass, `Bad`: fail, else not tested.
+    pub tone: Tone,
+    /// What is claimed.
+    pub title: String,
+    /// The evidence.
+    pub detail: String,
+}
+
+impl Check {
+    /// `PASS`, `FAIL` or `OPEN`: the verdict must not depend on colour.
+    pub fn word(&self) -> &'static str {
+        match self.tone {
+            Tone::Good => "PASS",
+            Tone::Bad => "FAIL",
+            _ => "OPEN",
+        }
+    }
+}
+
+/// A table.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Table {
+    /// What it shows, with units.
+    pub caption: String,
+    /// Heads of the columns; all but the first are aligned to the right unless `text`.
+    pub columns: Vec<Column>,
+    /// Rows, as long as `columns`.
+    pub rows: Vec<Vec<Cell>>,
+}
+
+/// Head of a column.
+#[derive(Debug, Clone, Serialize)]
+pub struct Column {
+    /// Its text.
+    pub title: String,
+    /// Whether it holds text (left) and not figures (right).
+    pub text: bool,
+}
+
+/// A cell of a table.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Cell {
+    /// Main text.
+    pub text: String,
+    /// Smaller text behind it, for instance an interval.
+    pub detail: String,
+    /// How it is meant.
+    pub tone: Tone,
+}
+
+impl Cell {
+    /// A figure with its interval or another smaller text.
+    pub fn with_detail(text: impl Into<String>, detail: impl Into<String>) -> Self {
+        Self {
+            text: text.into(),
+            detail: detail.into(),
+            tone: Tone::Plain,
+        }
+    }
+
+    /// The same cell with a tone.
+    pub fn toned(mut self, tone: Tone) -> Self {
+        self.tone = tone;
+        self
+    }
+
+    /// Both texts in one line.
+    pub fn flat(&self) -> String {
+        if self.detail.is_empty() {
+            self.text.clone()
+        } else {
+            format!("{} {}", self.text, self.detail)
+        }
+    }
+}
+
+impl<T: Into<String>> From<T> for Cell {
+    fn from(text: T) -> Self {
+        Self {
+            text: text.into(),
+            ..Self::default()
+        }
+    }
+}
+
+impl Table {
+    /// A table whose first column and those named with a leading `:` hold text.
+    pub fn new(caption: impl Into<String>, columns: &[&str]) -> Self {
+        let mut table = Self {
+            caption: caption.into(),
+            ..Self::default()
+        };
+        for (i, title) in columns.iter().enumerate() {
+            let marked = title.strip_prefix(':');
+            table.columns.push(Column {
+                title: marked.unwrap_or(title).into(),
+                text: i == 0 || marked.is_some(),
+            });
+        }
+        table
+    }
+
+    /// Adds a column of figures.
+    pub fn add_column(&mut self, title: impl Into<String>) {
+        self.columns.push(Column {
+            title: title.into(),
+            text: false,
+        });
+    }
+
+    /// The table as a block, or nothing if it has no rows.
+    pub fn into_block(self) -> Option<Block> {
+        (!self.rows.is_empty()).then_some(Block::Table(self))
+    }
+}
+
+/// A plot.
+#[derive(Debug, Clone, Serialize)]
+pub struct Figure {
+    /// File stem under `plots/`, unique.
+    pub name: String,
+    /// What it shows.
+    pub caption: String,
+    /// Whether it takes the full width.
+    pub wide: bool,
+    /// What is painted.
+    #[serde(skip)]
+    pub drawing: Drawing,
+    /// SVG document; empty until [`Document::paint`].
+    pub svg: String,
+    /// PNG file; empty until [`Document::paint`].
+    #[serde(skip)]
+    pub png: Vec<u8>,
+}
+
+impl Figure {
+    /// A plot that is not painted yet; wide drawings take the full width.
+    pub fn new(name: impl Into<String>, caption: impl Into<String>, drawing: Drawing) -> Self {
+        Self {
+            name: name.into(),
+            caption: caption.into(),
+            wide: drawing.width > 600.0,
+            drawing,
+            svg: String::new(),
+            png: Vec::new(),
+        }
+    }
+}
+
+/// Pictures in a grid.
+#[derive(Debug, Clone, Serialize)]
+pub struct Gallery {
+    /// What they show.
+    pub caption: String,
+    /// The pictures.
+    pub items: Vec<Picture>,
+    /// Colour scale they share.
+    pub scale: Option<ColorScale>,
+}
+
+/// One picture.
+#[derive(Debug, Clone, Serialize)]
+pub struct Picture {
+    /// What it is.
+    pub caption: String,
+    /// File relative to the run's folder.
+    pub path: String,
+    /// `data:` address, or `None` with the reason in `missing`.
+    pub data: Option<String>,
+    /// Why there is no picture.
+    pub missing: String,
+}
+
+/// A colour bar.
+#[derive(Debug, Clone, Serialize)]
+pub struct ColorScale {
+    /// CSS gradient.
+    pub gradient: String,
+    /// What the numbers count.
+    pub title: String,
+    /// Numbers at equal distances from left to right.
+    pub labels: Vec<String>,
+}

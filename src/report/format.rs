@@ -1,0 +1,187 @@
+//! Numbers as text: three significant digits, units, and a dash for what is absent.
+
+use crate::measure::record::{Interval, RayClass};
+
+/// What stands for an absent value.
+pub const ABSENT: &str = "–";
+
+/// A number with `digits` significant digits; scientific below 10⁻³ and from 10⁶ on.
+pub fn significant(value: f64, digits: usize) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    if !value.is_finite() {
+        return value.to_string();
+    }
+    // Let the formatter round first, so that 9.999 counts as 10.0.
+    let text = format!("{value:.*e}", digits.saturating_sub(1));
+    let exponent: i32 = text
+        .split_once('e')
+        .and_then(|(_, e)| e.parse().ok())
+        .unwrap_or(0);
+    if (-3..6).contains(&exponent) {
+        let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
+        format!("{value:.decimals$}")
+    } else {
+        text
+    }
+}
+
+/// Three significant digits.
+pub fn number(value: f64) -> String {
+    significant(value, 3)
+}
+
+/// Three significant digits, or the dash.
+pub fn optional(value: Option<f64>) -> String {
+    value.map_or_else(|| ABSENT.into(), number)
+}
+
+/// `[low, high]`.
+pub fn bounds(interval: &Interval) -> String {
+    format!("[{}, {}]", number(interval.low), number(interval.high))
+}
+
+/// `value [low, high]`; the interval is left out where it has no width.
+pub fn interval(interval: &Interval) -> String {
+    let value = number(interval.value);
+    if interval.low == interval.high {
+        value
+    } else {
+        format!("{value} {}", bounds(interval))
+    }
+}
+
+/// A slope with its interval; the interval is left out where it has no width.
+pub fn slope(interval: &Interval) -> String {
+    let text = |x: f64| format!("{x:.2}").replace('-', "−");
+    if interval.low == interval.high {
+        text(interval.value)
+    } else {
+        format!(
+            "{} [{}, {}]",
+            text(interval.value),
+            text(interval.low),
+            text(interval.high)
+        )
+    }
+}
+
+/// An integer with thin groups of three: `262,267`.
+pub fn count(value: u64) -> String {
+    let digits = value.to_string();
+    let mut text = String::with_capacity(digits.len() + digits.len() / 3);
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// Bytes with a binary unit.
+pub fn bytes(value: u64) -> String {
+    const UNITS: [&str; 4] = ["KiB", "MiB", "GiB", "TiB"];
+    if value < 1024 {
+        return format!("{value} B");
+    }
+    let mut scaled = value as f64 / 1024.0;
+    let mut unit = 0;
+    while scaled >= 1024.0 && unit + 1 < UNITS.len() {
+        scaled /= 1024.0;
+        unit += 1;
+    }
+    format!("{} {}", number(scaled), UNITS[unit])
+}
+
+/// A share as whole percent, one decimal below ten.
+pub fn percent(share: f64) -> String {
+    let value = share * 100.0;
+    if value.abs() < 10.0 {
+        format!("{value:.1} %")
+    } else {
+        format!("{value:.0} %")
+    }
+}
+
+/// `1 sampler`, `3 samplers`.
+pub fn plural(n: usize, noun: &str) -> String {
+    if n == 1 {
+        format!("1 {noun}")
+    } else {
+        format!("{} {noun}s", count(n as u64))
+    }
+}
+
+/// Name of a ray class in tables and plots.
+pub fn ray_class(class: RayClass) -> &'static str {
+    match class {
+        RayClass::Primary => "primary",
+        RayClass::Shadow => "shadow",
+        RayClass::Ao => "ambient occlusion",
+        RayClass::Bounce => "bounce",
+        RayClass::Chord => "chord",
+    }
+}
+
+/// Seconds since 1970 as `YYYY-MM-DD hh:mm UTC` (days to civil date by Hinnant's algorithm).
+pub fn utc(unix_s: u64) -> String {
+    let (days, second) = (unix_s / 86_400, unix_s % 86_400);
+    let shifted = days + 719_468;
+    let era = shifted / 146_097;
+    let day_of_era = shifted % 146_097;
+    let year_of_era =
+        (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted_month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * shifted_month + 2) / 5 + 1;
+    let month = if shifted_month < 10 {
+        shifted_month + 3
+    } else {
+        shifted_month - 9
+    };
+    let year = year_of_era + era * 400 + u64::from(month <= 2);
+    format!(
+        "{year:04}-{month:02}-{day:02} {:02}:{:02} UTC",
+        second / 3600,
+        second / 60 % 60
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_three_digits_at_any_size() {
+        assert_eq!(number(9.999), "10.0");
+        assert_eq!(number(0.001234), "0.00123");
+        assert_eq!(number(0.0001234), "1.23e-4");
+        assert_eq!(number(123_456.0), "123456");
+        assert_eq!(number(1_234_567.0), "1.23e6");
+        assert_eq!(number(-0.5), "-0.500");
+    }
+
+    #[test]
+    fn absent_is_a_dash_and_never_zero() {
+        assert_eq!(optional(None), "–");
+        assert_eq!(optional(Some(0.0)), "0");
+    }
+
+    #[test]
+    fn units_and_groups_are_right() {
+        assert_eq!(count(262_267), "262,267");
+        assert_eq!(count(100), "100");
+        assert_eq!(bytes(1023), "1023 B");
+        assert_eq!(bytes(3 << 20), "3.00 MiB");
+        assert_eq!(percent(0.043), "4.3 %");
+    }
+
+    #[test]
+    fn dates_match_known_ones() {
+        assert_eq!(utc(0), "1970-01-01 00:00 UTC");
+        assert_eq!(utc(951_827_696), "2000-02-29 12:34 UTC");
+        assert_eq!(utc(1_763_700_000), "2025-11-21 04:40 UTC");
+    }
+}

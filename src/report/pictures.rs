@@ -1,0 +1,67 @@
+//! Pictures of a run, embedded into the report.
+
+use super::document::Picture;
+use base64::Engine;
+use std::path::{Component, Path};
+
+/// Loads a picture that a record names relative to the run's folder `dir`. A missing file, or a name
+/// that leads out of the folder, gives a placeholder with the reason.
+pub fn load(dir: &Path, path: &str, caption: impl Into<String>) -> Picture {
+    let (data, missing) = match read(dir, path) {
+        Ok(bytes) => {
+            let text = base64::engine::general_purpose::STANDARD.encode(bytes);
+            (Some(format!("data:image/png;base64,{text}")), String::new())
+        }
+        Err(reason) => (None, reason),
+    };
+    Picture {
+        caption: caption.into(),
+        path: path.into(),
+        data,
+        missing,
+    }
+}
+
+fn read(dir: &Path, path: &str) -> Result<Vec<u8>, String> {
+    let inside = Path::new(path)
+        .components()
+        .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    if !inside {
+        return Err(format!("{path} lies outside the run's folder"));
+    }
+    let bytes =
+        std::fs::read(dir.join(path)).map_err(|error| format!("{path} is missing: {error}"))?;
+    if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
+        Ok(bytes)
+    } else {
+        Err(format!("{path} is not a PNG file"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_is_embedded_and_a_missing_or_foreign_one_is_explained() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("a.png"), b"\x89PNG\r\n\x1a\nrest").unwrap();
+        std::fs::write(dir.path().join("b.png"), b"text").unwrap();
+        let data = load(dir.path(), "a.png", "a").data.unwrap();
+        assert!(
+            data.starts_with("data:image/png;base64,iVBORw0KGgp"),
+            "{data}"
+        );
+        for (path, reason) in [
+            ("c.png", "missing"),
+            ("b.png", "not a PNG"),
+            ("../a.png", "outside"),
+        ] {
+            let picture = load(dir.path(), path, "");
+            assert!(
+                picture.data.is_none() && picture.missing.contains(reason),
+                "{picture:?}"
+            );
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! Log–log curves with bands: error against samples or seconds, discrepancy against points.
+
+use super::axis::{Axis, Frame};
+use super::drawing::{Anchor, DIM, Drawing, INK, Ink, fit_text};
+use super::marker;
+
+/// One point of a curve, with the ends of its 95 % interval (equal to `y` where there is none).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CurvePoint {
+    /// Abscissa, positive.
+    pub x: f64,
+    /// Ordinate; points that are not positive have no place on a logarithmic axis and are left out.
+    pub y: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// One curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// Text of the legend.
+    pub label: String,
+    /// Category: the same index looks the same in every plot of a report.
+    pub look: usize,
+    /// Whether it is one exact curve without spread: drawn dashed.
+    pub exact: bool,
+    /// Points by growing x.
+    pub points: Vec<CurvePoint>,
+}
+
+/// A thin dashed line for comparison.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Guide {
+    /// Text of the legend.
+    pub label: String,
+    /// `y = factor · x^exponent`.
+    pub factor: f64,
+    /// See `factor`.
+    pub exponent: f64,
+}
+
+/// Spacing of the ticks of the x axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ticks {
+    /// 1, 2, 4, 8, …
+    PowersOfTwo,
+    /// 1, 2, 5, 10, …
+    PowersOfTen,
+}
+
+/// A log–log plot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CurvePlot {
+    /// Title of the x axis, with unit.
+    pub x_title: String,
+    /// Ticks of the x axis.
+    pub x_ticks: Ticks,
+    /// Title of the y axis, with unit.
+    pub y_title: String,
+    /// The curves.
+    pub curves: Vec<Curve>,
+    /// Lines for comparison.
+    pub guides: Vec<Guide>,
+}
+
+const WIDTH: f64 = 580.0;
+const PLOT_HEIGHT: f64 = 400.0;
+const LEGEND_ROW: f64 = 21.0;
+
+impl CurvePlot {
+    /// The picture; `None` when no curve has a point with positive coordinates.
+    pub fn draw(&self) -> Option<Drawing> {
+        let points = || {
+            self.curves
+                .iter()
+                .flat_map(|curve| &curve.points)
+                .filter(|p| drawable(p))
+        };
+        let xs = points().map(|p| p.x);
+        let x = match self.x_ticks {
+            Ticks::PowersOfTwo => Axis::log2(xs, &self.x_title)?,
+            Ticks::PowersOfTen => Axis::log10(xs, &self.x_title)?,
+        };
+        let ends = [x.min() * 1.05, x.max() / 1.05];
+        let guide_ys = self
+            .guides
+            .iter()
+            .flat_map(|guide| ends.map(|x| guide.at(x)));
+        let y = Axis::log10(
+            points().flat_map(|p| [p.y, p.low, p.high]).chain(guide_ys),
+            &self.y_title,
+        )?;
+        let rows = self.curves.len() + self.guides.len();
+        let mut drawing = Drawing::new(WIDTH, PLOT_HEIGHT + rows as f64 * LEGEND_ROW + 8.0);
+        let frame = Frame::new(x, y, WIDTH, PLOT_HEIGHT);
+        frame.draw(&mut drawing);
+        for (i, guide) in self.guides.iter().enumerate() {
+            let line = ends.map(|x| frame.at(x, guide.at(x)));
+            guide_line(&mut drawing, &line, i);
+        }
+        for curve in &self.curves {
+            curve.draw(&frame, &mut drawing);
+        }
+        self.draw_legend(&mut drawing);
+        Some(drawing)
+    }
+
+    fn draw_legend(&self, drawing: &mut Drawing) {
+        let mut y = PLOT_HEIGHT + LEGEND_ROW / 2.0;
+        for curve in &self.curves {
+            let ink = marker::ink(curve.look);
+            curve_line(drawing, &[(16.0, y), (50.0, y)], ink, curve.exact);
+            marker::draw(drawing, curve.look, (33.0, y), 4.5, ink);
+            drawing.text(
+                (60.0, y),
+                fit_text(&curve.label, WIDTH - 66.0),
+                INK,
+                Anchor::Start,
+            );
+            y += LEGEND_ROW;
+        }
+        for (i, guide) in self.guides.iter().enumerate() {
+            guide_line(drawing, &[(16.0, y), (50.0, y)], i);
+            drawing.text(
+                (60.0, y),
+                fit_text(&guide.label, WIDTH - 66.0),
+                DIM,
+                Anchor::Start,
+            );
+            y += LEGEND_ROW;
+        }
+    }
+}
+
+impl Guide {
+    fn at(&self, x: f64) -> f64 {
+        self.factor * x.powf(self.exponent)
+    }
+}
+
+impl Curve {
+    fn draw(&self, frame: &Frame, drawing: &mut Drawing) {
+        let ink = marker::ink(self.look);
+        let points: Vec<&CurvePoint> = self.points.iter().filter(|p| drawable(p)).collect();
+        // An interval that reaches 0 ends at the bottom of the axis.
+        let upper = points.iter().map(|p| frame.at(p.x, p.high));
+        let lower = points
+            .iter()
+            .rev()
+            .map(|p| frame.at(p.x, p.low.max(frame.y.min())));
+        if points.iter().any(|p| p.low < p.high) {
+            drawing.area(upper.chain(lower).collect(), ink.with_alpha(0.22));
+        }
+        let line: Vec<_> = points.iter().map(|p| frame.at(p.x, p.y)).collect();
+        if line.len() > 1 {
+            curve_line(drawing, &line, ink, self.exact);
+        }
+        for at in line {
+            marker::draw(drawing, self.look, at, 4.5, ink);
+        }
+    }
+}
+
+fn curve_line(drawing: &mut Drawing, points: &[(f64, f64)], ink: Ink, exact: bool) {
+    if exact {
+        drawing.dashed_line(points, ink, 1.8, 7.0, 4.0);
+    } else {
+        drawing.line(points.to_vec(), ink, 1.8);
+    }
+}
+
+/// Thin; each guide with dashes of its own length.
+fn guide_line(drawing: &mut Drawing, points: &[(f64, f64)], index: usize) {
+    let dash = 2.0 + 6.0 * index as f64;
+    drawing.dashed_line(points, DIM, 1.1, dash, 3.0);
+}
+
+fn drawable(point: &CurvePoint) -> bool {
+    point.x > 0.0 && point.y > 0.0 && point.x.is_finite() && point.y.is_finite()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plot(points: Vec<CurvePoint>) -> CurvePlot {
+        CurvePlot {
+            x_title: "samples per pixel".into(),
+            x_ticks: Ticks::PowersOfTwo,
+            y_title: "relMSE".into(),
+            curves: vec![Curve {
+                label: "sobol".into(),
+                look: 0,
+                exact: false,
+                points,
+            }],
+            guides: vec![Guide {
+                label: "2.5/√N".into(),
+                factor: 2.5,
+                exponent: -0.5,
+            }],
+        }
+    }
+
+    #[test]
+    fn a_plot_names_axes_curves_and_guides() {
+        let points = vec![
+            CurvePoint {
+                x: 1.0,
+                y: 0.5,
+                low: 0.4,
+                high: 0.6,
+            },
+            CurvePoint {
+                x: 2.0,
+                y: 0.25,
+                low: 0.2,
+                high: 0.3,
+            },
+        ];
+        let drawing = plot(points).draw().unwrap();
+        for text in ["samples per pixel", "relMSE", "sobol", "2.5/√N", "1", "2"] {
+            assert!(
+                drawing.texts().contains(&text),
+                "{text} in {:?}",
+                drawing.texts()
+            );
+        }
+    }
+
+    #[test]
+    fn a_single_point_is_drawn_and_zero_errors_are_not() {
+        let one = CurvePoint {
+            x: 4.0,
+            y: 0.5,
+            low: 0.5,
+            high: 0.5,
+        };
+        assert!(plot(vec![one]).draw().is_some());
+        let zero = CurvePoint {
+            x: 4.0,
+            y: 0.0,
+            low: 0.0,
+            high: 0.0,
+        };
+        assert!(plot(vec![zero]).draw().is_none());
+        assert!(plot(vec![]).draw().is_none());
+    }
+}

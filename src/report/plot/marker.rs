@@ -1,0 +1,40 @@
+//! What tells categories apart: colour and marker shape, and dashes for what is exact.
+
+use super::drawing::{Drawing, Ink, Point};
+use crate::report::color::categorical;
+use std::f64::consts::PI;
+
+/// Number of different marker shapes.
+const SHAPES: usize = 7;
+
+/// Colour of the category.
+pub fn ink(index: usize) -> Ink {
+    Ink::solid(categorical(index))
+}
+
+/// Draws the marker of a category at a point; seven shapes, so that with eight colours 56
+/// categories differ.
+pub fn draw(drawing: &mut Drawing, shape: usize, (x, y): Point, radius: f64, ink: Ink) {
+    let ring = |corners: usize, turn: f64, radius: f64| -> Vec<Point> {
+        (0..corners)
+            .map(|i| turn + 2.0 * PI * i as f64 / corners as f64)
+            .map(|angle| (x + radius * angle.sin(), y - radius * angle.cos()))
+            .collect()
+    };
+    let thick = radius * 0.62;
+    match shape % SHAPES {
+        0 => drawing.area(ring(24, 0.0, radius), ink),
+        1 => drawing.area(ring(4, PI / 4.0, radius * 1.25), ink),
+        2 => drawing.area(ring(3, 0.0, radius * 1.35), ink),
+        3 => drawing.area(ring(4, 0.0, radius * 1.4), ink),
+        4 => drawing.area(ring(3, PI, radius * 1.35), ink),
+        kind => {
+            // A plus, or the same turned to a cross.
+            let turn = if kind == 5 { PI / 4.0 } else { 0.0 };
+            for angle in [turn, turn + PI / 2.0] {
+                let (dx, dy) = (radius * 1.3 * angle.sin(), radius * 1.3 * angle.cos());
+                drawing.line(vec![(x - dx, y + dy), (x + dx, y - dy)], ink, thick);
+            }
+        }
+    }
+}

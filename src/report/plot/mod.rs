@@ -1,0 +1,9 @@
+//! Plots: laid out once as a [`drawing::Drawing`], painted as SVG and as PNG.
+
+pub mod axis;
+pub mod curves;
+pub mod drawing;
+pub mod histogram;
+pub mod marker;
+pub mod pareto;
+pub mod rates;

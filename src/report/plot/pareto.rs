@@ -1,0 +1,241 @@
+//! Run time against error: one point per cell, the Pareto front drawn and named.
+
+use super::axis::{Axis, Frame};
+use super::drawing::{Anchor, DIM, Drawing, INK, Point, fit_text};
+use super::marker;
+use crate::measure::record::Interval;
+use crate::measure::statistics::pareto_front;
+
+/// One cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellPoint {
+    /// Index into [`ParetoPlot::structures`]: the colour and the letter.
+    pub structure: usize,
+    /// Index into [`ParetoPlot::samplers`]: the marker.
+    pub sampler: usize,
+    /// Seconds per image.
+    pub seconds: Interval,
+    /// Error of the image.
+    pub error: Interval,
+}
+
+/// The plot of one scene and integrator.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParetoPlot {
+    /// Title of the x axis.
+    pub x_title: String,
+    /// Title of the y axis.
+    pub y_title: String,
+    /// Names and looks of the structures.
+    pub structures: Vec<(String, usize)>,
+    /// Names and looks of the samplers.
+    pub samplers: Vec<(String, usize)>,
+    /// The cells.
+    pub points: Vec<CellPoint>,
+}
+
+const WIDTH: f64 = 900.0;
+const PLOT_HEIGHT: f64 = 480.0;
+const LEGEND_ROW: f64 = 21.0;
+
+/// Letter of a structure: a, b, …, z, then a number.
+pub fn letter(index: usize) -> String {
+    match u8::try_from(index) {
+        Ok(i) if i < 26 => char::from(b'a' + i).to_string(),
+        _ => (index + 1).to_string(),
+    }
+}
+
+impl ParetoPlot {
+    /// Indices of the points of the front, by growing time.
+    pub fn front(&self) -> Vec<usize> {
+        let points: Vec<_> = self
+            .points
+            .iter()
+            .map(|p| (p.seconds.value, p.error.value))
+            .collect();
+        pareto_front(&points)
+    }
+
+    /// Name of a point: structure · sampler.
+    pub fn name(&self, point: &CellPoint) -> String {
+        format!(
+            "{} · {}",
+            self.structures[point.structure].0, self.samplers[point.sampler].0
+        )
+    }
+
+    /// The picture; `None` without a point with positive time and error.
+    pub fn draw(&self) -> Option<Drawing> {
+        let times = self
+            .points
+            .iter()
+            .flat_map(|p| [p.seconds.value, p.seconds.low, p.seconds.high]);
+        let errors = self
+            .points
+            .iter()
+            .flat_map(|p| [p.error.value, p.error.low, p.error.high]);
+        let x = Axis::log10(times, &self.x_title)?;
+        let y = Axis::log10(errors, &self.y_title)?;
+        let front = self.front();
+        let legend = self.structures.len().max(self.samplers.len()) + front.len() + 2;
+        let mut drawing = Drawing::new(
+            WIDTH,
+            PLOT_HEIGHT + (legend as f64 + 0.4) * LEGEND_ROW + 12.0,
+        );
+        let frame = Frame::new(x, y, WIDTH, PLOT_HEIGHT);
+        frame.draw(&mut drawing);
+        self.draw_front(&frame, &front, &mut drawing);
+        for point in &self.points {
+            self.draw_point(point, &frame, &mut drawing);
+        }
+        self.draw_labels(&frame, &front, &mut drawing);
+        self.draw_legend(&front, &mut drawing);
+        Some(drawing)
+    }
+
+    /// A staircase: what is above and right of it is beaten.
+    fn draw_front(&self, frame: &Frame, front: &[usize], drawing: &mut Drawing) {
+        let mut stairs: Vec<(f64, f64)> = Vec::new();
+        for &i in front {
+            let (x, y) = frame.at(self.points[i].seconds.value, self.points[i].error.value);
+            let from = stairs
+                .last()
+                .map_or(frame.at(frame.x.min(), frame.y.max()).1, |last| last.1);
+            stairs.extend([(x, from), (x, y)]);
+        }
+        if let Some(&(_, y)) = stairs.last() {
+            stairs.push((frame.at(frame.x.max(), frame.y.min()).0, y));
+        }
+        drawing.dashed_line(&stairs, DIM, 1.4, 6.0, 4.0);
+    }
+
+    fn draw_point(&self, point: &CellPoint, frame: &Frame, drawing: &mut Drawing) {
+        let ink = marker::ink(self.structures[point.structure].1);
+        let (seconds, error) = (point.seconds, point.error);
+        let whiskers = [
+            [
+                frame.at(seconds.low, error.value),
+                frame.at(seconds.high, error.value),
+            ],
+            [
+                frame.at(seconds.value, error.low.max(frame.y.min())),
+                frame.at(seconds.value, error.high),
+            ],
+        ];
+        for ends in whiskers {
+            drawing.line(ends.to_vec(), ink.with_alpha(0.5), 1.2);
+        }
+        let at = frame.at(seconds.value, error.value);
+        marker::draw(drawing, self.samplers[point.sampler].1, at, 5.5, ink);
+    }
+
+    /// Ranks of the front and letters of the structures, each where it covers no marker and no other
+    /// label; in a crowd a letter is left out rather than made unreadable.
+    fn draw_labels(&self, frame: &Frame, front: &[usize], drawing: &mut Drawing) {
+        const CLEAR: f64 = 12.0;
+        let at = |i: usize| {
+            let point: &CellPoint = &self.points[i];
+            frame.at(point.seconds.value, point.error.value)
+        };
+        let mut taken: Vec<Point> = (0..self.points.len()).map(at).collect();
+        let ranks = front
+            .iter()
+            .enumerate()
+            .map(|(rank, &i)| (i, (rank + 1).to_string(), INK));
+        let letters = (0..self.points.len()).map(|i| (i, letter(self.points[i].structure), DIM));
+        for (i, text, ink) in ranks.chain(letters) {
+            let (x, y) = at(i);
+            let is_rank = ink == INK;
+            let side = if is_rank { -1.0 } else { 1.0 };
+            let places = [(1.0, -1.0), (1.0, 1.0), (-1.0, -1.0), (-1.0, 1.0)]
+                .map(|(dx, dy)| (x + 12.0 * dx * side, y - 9.0 * dy * side));
+            let is_free = |place: &&Point| {
+                let far = |other: &Point| (other.0 - place.0).hypot(other.1 - place.1) >= CLEAR;
+                taken.iter().all(far)
+            };
+            let free = places.iter().find(is_free).copied();
+            // The front must be named even in a crowd.
+            if let Some(place) = free.or(is_rank.then_some(places[0])) {
+                drawing.text(place, text, ink, Anchor::Middle);
+                taken.push(place);
+            }
+        }
+    }
+
+    fn draw_legend(&self, front: &[usize], drawing: &mut Drawing) {
+        let top = PLOT_HEIGHT + LEGEND_ROW / 2.0;
+        let middle = WIDTH * 0.5;
+        drawing.text(
+            (16.0, top),
+            "structure (colour, letter)",
+            DIM,
+            Anchor::Start,
+        );
+        drawing.text((middle, top), "sampler (marker)", DIM, Anchor::Start);
+        for (i, (name, look)) in self.structures.iter().enumerate() {
+            let y = top + (i + 1) as f64 * LEGEND_ROW;
+            drawing.bar((18.0, y - 5.0), (34.0, y + 5.0), marker::ink(*look));
+            drawing.text((44.0, y), letter(i), INK, Anchor::Start);
+            drawing.text((66.0, y), fit_text(name, middle - 80.0), INK, Anchor::Start);
+        }
+        for (i, (name, look)) in self.samplers.iter().enumerate() {
+            let y = top + (i + 1) as f64 * LEGEND_ROW;
+            marker::draw(drawing, *look, (middle + 8.0, y), 5.0, DIM);
+            drawing.text(
+                (middle + 26.0, y),
+                fit_text(name, middle - 40.0),
+                INK,
+                Anchor::Start,
+            );
+        }
+        let rows = self.structures.len().max(self.samplers.len()) + 1;
+        let mut y = top + (rows as f64 + 0.4) * LEGEND_ROW;
+        drawing.text(
+            (16.0, y),
+            "Pareto front: no cell is both faster and better",
+            DIM,
+            Anchor::Start,
+        );
+        for (rank, &i) in front.iter().enumerate() {
+            y += LEGEND_ROW;
+            drawing.text((34.0, y), (rank + 1).to_string(), INK, Anchor::End);
+            drawing.text(
+                (44.0, y),
+                fit_text(&self.name(&self.points[i]), WIDTH - 60.0),
+                INK,
+                Anchor::Start,
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_picture_names_the_front() {
+        let exact = |value| Interval {
+            value,
+            low: value,
+            high: value,
+        };
+        let point = |structure, seconds, error| CellPoint {
+            structure,
+            sampler: 0,
+            seconds: exact(seconds),
+            error: exact(error),
+        };
+        let plot = ParetoPlot {
+            x_title: "seconds".into(),
+            y_title: "relMSE".into(),
+            structures: vec![("bvh".into(), 0), ("brute-force".into(), 1)],
+            samplers: vec![("sobol × none".into(), 0)],
+            points: vec![point(0, 1.0, 0.1), point(1, 9.0, 0.1)],
+        };
+        let drawing = plot.draw().unwrap();
+        assert!(drawing.texts().contains(&"bvh · sobol × none"));
+        assert!(!drawing.texts().contains(&"brute-force · sobol × none"));
+    }
+}

@@ -1,0 +1,168 @@
+//! Who wins: named only where the intervals are apart.
+
+use super::format;
+use crate::measure::record::Interval;
+
+/// One competitor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contender {
+    /// Its name.
+    pub name: String,
+    /// Its figure.
+    pub figure: Interval,
+    /// Whether the spread is known; without it nobody can be told apart from it.
+    pub has_spread: bool,
+}
+
+/// Which figures are better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Better {
+    /// Rates.
+    Higher,
+    /// Errors and times.
+    Lower,
+}
+
+/// The outcome of a comparison.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ruling {
+    /// Nothing was measured.
+    Nobody,
+    /// There was no competition.
+    Alone(Contender),
+    /// The winner and the next one, whose intervals are apart.
+    Winner(Contender, Contender),
+    /// All whose intervals overlap the best one's, best first.
+    Unclear(Vec<Contender>),
+}
+
+/// Judges the contenders.
+pub fn judge(mut contenders: Vec<Contender>, better: Better) -> Ruling {
+    contenders.retain(|c| c.figure.value.is_finite());
+    contenders.sort_by(|a, b| {
+        let by_value = a.figure.value.total_cmp(&b.figure.value);
+        if better == Better::Higher {
+            by_value.reverse()
+        } else {
+            by_value
+        }
+    });
+    let Some(best) = contenders.first().cloned() else {
+        return Ruling::Nobody;
+    };
+    let apart = |other: &Contender| {
+        best.has_spread && other.has_spread && best.figure.is_apart_from(&other.figure)
+    };
+    let close: Vec<Contender> = contenders[1..]
+        .iter()
+        .filter(|c| !apart(c))
+        .cloned()
+        .collect();
+    match contenders.get(1) {
+        None => Ruling::Alone(best),
+        Some(next) if close.is_empty() => Ruling::Winner(best, next.clone()),
+        Some(_) => Ruling::Unclear(std::iter::once(best).chain(close).collect()),
+    }
+}
+
+impl Ruling {
+    /// The answer: a name, or why there is none.
+    pub fn answer(&self) -> String {
+        match self {
+            Self::Nobody => "nothing measured".into(),
+            Self::Alone(only) => format!("{} (alone)", only.name),
+            Self::Winner(best, _) => best.name.clone(),
+            Self::Unclear(close) => {
+                let names: Vec<&str> = close.iter().map(|c| c.name.as_str()).collect();
+                format!("no clear winner: {}", names.join(", "))
+            }
+        }
+    }
+
+    /// The best figure.
+    pub fn figure(&self) -> String {
+        match self {
+            Self::Nobody => format::ABSENT.into(),
+            Self::Alone(best) | Self::Winner(best, _) => format::interval(&best.figure),
+            Self::Unclear(close) => close
+                .first()
+                .map_or(format::ABSENT.into(), |c| format::interval(&c.figure)),
+        }
+    }
+
+    /// The next one with its figure and the ratio of the two.
+    pub fn runner_up(&self) -> String {
+        let (best, next) = match self {
+            Self::Winner(best, next) => (best, next),
+            Self::Unclear(close) if close.len() > 1 => (&close[0], &close[1]),
+            _ => return format::ABSENT.into(),
+        };
+        let ratio = best.figure.value / next.figure.value;
+        let times = format::number(ratio.max(1.0 / ratio));
+        format!(
+            "{} {} ({times}×)",
+            next.name,
+            format::interval(&next.figure)
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn contender(name: &str, value: f64, half: f64) -> Contender {
+        let figure = Interval {
+            value,
+            low: value - half,
+            high: value + half,
+        };
+        Contender {
+            name: name.into(),
+            figure,
+            has_spread: true,
+        }
+    }
+
+    #[test]
+    fn a_winner_is_named_only_where_intervals_are_apart() {
+        let apart = vec![contender("slow", 3.0, 0.5), contender("fast", 5.0, 0.5)];
+        assert_eq!(judge(apart, Better::Higher).answer(), "fast");
+        let close = vec![contender("slow", 3.0, 1.5), contender("fast", 5.0, 0.6)];
+        assert_eq!(
+            judge(close, Better::Higher).answer(),
+            "no clear winner: fast, slow"
+        );
+    }
+
+    #[test]
+    fn a_third_that_overlaps_the_best_spoils_the_win() {
+        let wide = vec![
+            contender("a", 1.0, 0.1),
+            contender("b", 2.0, 0.1),
+            contender("c", 3.0, 2.5),
+        ];
+        assert_eq!(judge(wide, Better::Lower).answer(), "no clear winner: a, c");
+    }
+
+    #[test]
+    fn without_spread_nobody_wins() {
+        let mut pair = vec![contender("a", 1.0, 0.0), contender("b", 9.0, 0.0)];
+        assert_eq!(judge(pair.clone(), Better::Lower).answer(), "a");
+        pair[0].has_spread = false;
+        assert!(
+            judge(pair, Better::Lower)
+                .answer()
+                .starts_with("no clear winner")
+        );
+    }
+
+    #[test]
+    fn nobody_and_somebody_alone_are_said_so() {
+        assert_eq!(judge(vec![], Better::Lower).answer(), "nothing measured");
+        assert_eq!(
+            judge(vec![contender("a", 1.0, 0.1)], Better::Lower).answer(),
+            "a (alone)"
+        );
+    }
+}

@@ -1,0 +1,269 @@
+//! Why to believe the figures: every check of the run, with what it rests on.
+
+use crate::measure::record::{GateVerdict, JudgeCheck};
+use crate::report::data::{RunData, SceneGroup, structure_name};
+use crate::report::document::*;
+use crate::report::format::{self, count, plural};
+use crate::report::samplers::Metric;
+
+/// The section.
+pub fn section(data: &RunData) -> Section {
+    let mut section = Section::new("belief", "Why to believe it");
+    section.blocks.push(Block::Checks(checks(data)));
+    section
+}
+
+/// Detail of a check that had nothing to look at.
+const NOTHING: &str = "nothing to test.";
+
+/// Every check.
+pub fn checks(data: &RunData) -> Vec<Check> {
+    let mut checks: Vec<Check> = data.scenes.iter().map(gate).collect();
+    checks.push(judge(data, "The judge against brute force", |gate| {
+        &gate.brute_force
+    }));
+    checks.push(judge(data, "The judge against the f64 oracle", |gate| {
+        &gate.oracle
+    }));
+    checks.push(images(data));
+    checks.push(bias(data));
+    checks.push(finite_pixels(data));
+    checks.push(reference_noise(data));
+    checks.push(complete(data));
+    checks
+}
+
+/// Fails if anything was wrong; stays open if nothing was tested.
+fn check(title: impl Into<String>, tested: bool, wrong: bool, detail: String) -> Check {
+    let detail = if tested || wrong {
+        detail
+    } else {
+        NOTHING.into()
+    };
+    let tone = match (wrong, tested) {
+        (true, _) => Tone::Bad,
+        (false, true) => Tone::Good,
+        (false, false) => Tone::Note,
+    };
+    Check {
+        tone,
+        title: title.into(),
+        detail,
+    }
+}
+
+fn gate(scene: &SceneGroup) -> Check {
+    let title = format!("Hits equal to the bit: {}", scene.name);
+    let gates: Vec<&GateVerdict> = scene
+        .structures
+        .iter()
+        .filter_map(|s| s.gate.as_ref())
+        .collect();
+    let classes = || gates.iter().flat_map(|gate| &gate.classes);
+    let rays: usize = classes().map(|class| class.rays).sum();
+    let wrong: usize = classes().map(|class| class.wrong).sum();
+    let ties: usize = classes().map(|class| class.ties).sum();
+    let faulty: Vec<String> = scene
+        .structures
+        .iter()
+        .filter_map(|s| {
+            Some(format!(
+                "{} FAILED: {}",
+                structure_name(&s.accel, s.runtime_checks),
+                s.fault()?
+            ))
+        })
+        .collect();
+    if gates.is_empty() && faulty.is_empty() {
+        return check(title, false, false, String::new());
+    }
+    let mut detail = format!(
+        "{} through {}: id, t, u, v; {} differ, {}.",
+        plural(rays, "ray"),
+        plural(gates.len(), "structure"),
+        count(wrong as u64),
+        plural(ties, "tie"),
+    );
+    for fault in &faulty {
+        detail += &format!(" {fault}.");
+    }
+    check(title, rays > 0, !faulty.is_empty(), detail)
+}
+
+fn judge(data: &RunData, title: &str, pick: fn(&GateVerdict) -> &JudgeCheck) -> Check {
+    let mut details = Vec::new();
+    let (mut rays, mut wrong) = (0, 0);
+    for scene in &data.scenes {
+        // The judge is the same for all structures of a scene: its widest check counts.
+        let checks = scene
+            .structures
+            .iter()
+            .filter_map(|s| s.gate.as_ref())
+            .map(pick);
+        let worst = checks.max_by_key(|check| (check.wrong, check.rays));
+        let Some(check) = worst.filter(|check| check.rays > 0) else {
+            details.push(format!("{}: not run", scene.name));
+            continue;
+        };
+        rays += check.rays;
+        wrong += check.wrong;
+        let mut text = format!(
+            "{}: {}, {} differ",
+            scene.name,
+            plural(check.rays, "ray"),
+            count(check.wrong as u64)
+        );
+        if check.ambiguous > 0 {
+            text += &format!(
+                ", {} within rounding of an edge or another surface",
+                count(check.ambiguous as u64)
+            );
+        }
+        details.push(text);
+    }
+    check(title, rays > 0, wrong > 0, join(details))
+}
+
+fn images(data: &RunData) -> Check {
+    let times: Vec<_> = data
+        .views()
+        .flat_map(|(_, view)| &view.times)
+        .filter(|t| t.failure.is_none())
+        .collect();
+    let unequal: Vec<String> = times
+        .iter()
+        .filter(|time| !time.image_equal)
+        .map(|t| {
+            format!(
+                "{} on {} differs",
+                structure_name(&t.accel, t.runtime_checks),
+                t.scene
+            )
+        })
+        .collect();
+    let mut detail = format!(
+        "{} of {} equal to the bit",
+        times.len() - unequal.len(),
+        plural(times.len(), "image")
+    );
+    if !unequal.is_empty() {
+        detail += &format!(": {}", unequal.join(", "));
+    }
+    check(
+        "Images equal across structures",
+        !times.is_empty(),
+        !unequal.is_empty(),
+        detail + ".",
+    )
+}
+
+fn bias(data: &RunData) -> Check {
+    let records: Vec<_> = data
+        .views()
+        .flat_map(|(scene, view)| view.samplers.iter().map(move |s| (scene, view, s)))
+        .filter_map(|(scene, view, s)| Some((scene, view, s, s.bias?)))
+        .collect();
+    let with = |verdict: &str| records.iter().filter(|r| r.3.verdict == verdict).count();
+    let (clean, biased) = (with("no-bias-found"), with("biased"));
+    let mut detail = format!(
+        "{} without a bias found, {} biased, {} not testable",
+        clean,
+        biased,
+        records.len() - clean - biased
+    );
+    if let Some((.., record)) = records.first() {
+        detail += &format!(
+            " (Welch t per tile, Benjamini–Hochberg at {})",
+            record.alpha
+        );
+    }
+    for (scene, view, sampler, _) in records.iter().filter(|r| r.3.verdict == "biased") {
+        detail += &format!("; {} on {}, {}", sampler.name, scene.name, view.integrator);
+    }
+    check("Samplers without bias", clean > 0, biased > 0, detail + ".")
+}
+
+fn finite_pixels(data: &RunData) -> Check {
+    let replicates: Vec<_> = data
+        .views()
+        .flat_map(|(_, view)| &view.samplers)
+        .flat_map(|s| &s.replicates)
+        .collect();
+    let bad: usize = replicates
+        .iter()
+        .map(|replicate| replicate.non_finite_pixels)
+        .sum();
+    let detail = format!(
+        "{} in {}.",
+        plural(bad, "non-finite pixel"),
+        plural(replicates.len(), "image")
+    );
+    check(
+        "Every pixel finite",
+        !replicates.is_empty(),
+        bad > 0,
+        detail,
+    )
+}
+
+/// A reference that is itself noisy bounds from below what errors can be told apart.
+fn reference_noise(data: &RunData) -> Check {
+    const ALLOWED: f64 = 0.1;
+    let mut details = Vec::new();
+    let mut worst: Option<f64> = None;
+    for (scene, view) in data.views() {
+        let Some(reference) = view.reference else {
+            continue;
+        };
+        let errors = view
+            .samplers
+            .iter()
+            .filter_map(|s| s.mean_errors(Metric::Rmse).last().copied());
+        let least = errors
+            .map(|mean| mean.error.value.powi(2))
+            .filter(|mse| *mse > 0.0)
+            .reduce(f64::min);
+        let noise = format!(
+            "{}, {}: MSE {} at {} spp",
+            scene.name,
+            view.integrator,
+            format::number(reference.mse),
+            count(u64::from(reference.spp))
+        );
+        details.push(match least {
+            Some(least) => {
+                let share = reference.mse / least;
+                worst = Some(worst.map_or(share, |old: f64| old.max(share)));
+                format!("{noise}, {} of the least measured", format::percent(share))
+            }
+            None => noise,
+        });
+    }
+    let title = format!(
+        "Reference noise below {} of every error",
+        format::percent(ALLOWED)
+    );
+    let noisy = worst.is_some_and(|share| share > ALLOWED);
+    check(title, worst.is_some(), noisy, join(details))
+}
+
+fn complete(data: &RunData) -> Check {
+    let title = "Every planned cell has figures";
+    let Some(finished) = data.finished else {
+        return check(title, true, true, "The run did not finish.".into());
+    };
+    let skipped = plural(finished.skipped, "cell");
+    let detail = format!(
+        "{} failed, {skipped} skipped.",
+        plural(finished.failed, "cell")
+    );
+    check(title, true, finished.failed > 0, detail)
+}
+
+fn join(details: Vec<String>) -> String {
+    if details.is_empty() {
+        NOTHING.into()
+    } else {
+        details.join("; ") + "."
+    }
+}

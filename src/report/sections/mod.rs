@@ -1,0 +1,163 @@
+//! The content of the report, section by section.
+
+pub mod belief;
+pub mod run;
+pub mod samplers;
+pub mod streams;
+pub mod structures;
+pub mod verdict;
+
+use super::data::{RunData, SceneGroup};
+use super::document::*;
+use super::format;
+use std::path::Path;
+
+/// Builds the whole report. `dir` is where the pictures lie; `warnings` come from reading.
+pub fn document(dir: &Path, data: &RunData, warnings: &[String]) -> Document {
+    let mut sections = vec![verdict::section(data), belief::section(data)];
+    for (index, scene) in data.scenes.iter().enumerate() {
+        sections.push(scene_section(dir, data, index, scene));
+    }
+    sections.extend(streams::section(data));
+    sections.extend(run::sections(data));
+    Document {
+        title: title(data),
+        subtitle: subtitle(data),
+        banners: banners(data, warnings),
+        sections,
+    }
+}
+
+fn title(data: &RunData) -> String {
+    data.run.map_or_else(
+        || "Raystone report".into(),
+        |run| format!("Raystone: {}", run.name),
+    )
+}
+
+fn subtitle(data: &RunData) -> String {
+    let Some(run) = data.run else {
+        return "The record of the run itself is missing.".into();
+    };
+    let e = &run.environment;
+    format!(
+        "{} on {} ({}, {} {}), {}, {}",
+        format::utc(run.started_unix_s),
+        e.adapter,
+        e.backend,
+        e.driver,
+        e.driver_info,
+        e.cpu,
+        e.os
+    )
+}
+
+fn banners(data: &RunData, warnings: &[String]) -> Vec<Banner> {
+    let mut banners = Vec::new();
+    let mut add = |tone, text: &str| {
+        banners.push(Banner {
+            tone,
+            text: text.into(),
+        })
+    };
+    if let Some(run) = data.run {
+        if run.environment.software {
+            add(
+                Tone::Note,
+                "Software adapter: times compare structures on this adapter only.",
+            );
+        }
+        if !run.environment.timestamps {
+            add(
+                Tone::Note,
+                "This adapter has no GPU timestamps: all times are wall clock.",
+            );
+        }
+    } else {
+        add(
+            Tone::Bad,
+            "The first record of the run is missing: where and what it ran is unknown.",
+        );
+    }
+    if data.finished.is_none() {
+        add(
+            Tone::Bad,
+            "The run did not finish: this report shows what was recorded until then.",
+        );
+    }
+    for warning in warnings {
+        add(Tone::Note, warning);
+    }
+    banners
+}
+
+fn scene_section(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> Section {
+    let mut section = Section::new(format!("scene-{index}"), format!("Scene: {}", scene.name));
+    section.blocks.extend(facts(scene));
+    section
+        .blocks
+        .extend(structures::blocks(dir, data, index, scene));
+    for (number, view) in scene.views.iter().enumerate() {
+        let stem = format!("scene-{index}-{}-{number}", file_stem(view.integrator));
+        section
+            .blocks
+            .extend(samplers::blocks(dir, data, &stem, view));
+    }
+    section
+}
+
+fn facts(scene: &SceneGroup) -> Vec<Block> {
+    let Some(record) = scene.record else {
+        return vec![Block::Paragraph("No record of the scene itself.".into())];
+    };
+    let mut text = format!(
+        "{}, {}, {}, {}; {} on the host, loaded in {} ms.",
+        format::plural(record.triangles, "triangle"),
+        format::plural(record.materials, "material"),
+        format::plural(record.textures, "texture"),
+        format::plural(record.emitters, "emissive triangle"),
+        format::bytes(record.bytes),
+        format::number(record.load_ms),
+    );
+    let report = &record.report;
+    if report.dropped_non_finite > 0 {
+        text += &format!(
+            " {} dropped: a vertex is not finite.",
+            format::plural(report.dropped_non_finite, "triangle")
+        );
+    }
+    if report.zero_area > 0 {
+        text += &format!(
+            " {} of zero area kept.",
+            format::plural(report.zero_area, "triangle")
+        );
+    }
+    let warning = |w: &String| Block::Paragraph(format!("Loader: {w}"));
+    std::iter::once(Block::Paragraph(text))
+        .chain(report.warnings.iter().map(warning))
+        .collect()
+}
+
+/// A name as part of a file name: lower-case letters, digits and single dashes.
+pub fn file_stem(name: &str) -> String {
+    let mut stem = String::new();
+    for c in name.chars() {
+        if c.is_ascii_alphanumeric() {
+            stem.push(c.to_ascii_lowercase());
+        } else if !stem.ends_with('-') && !stem.is_empty() {
+            stem.push('-');
+        }
+    }
+    stem.trim_end_matches('-').into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn file_stems_are_safe() {
+        assert_eq!(file_stem("path [depth=3]"), "path-depth-3");
+        assert_eq!(file_stem("../../a<b>&c"), "a-b-c");
+    }
+}

@@ -1,0 +1,449 @@
+//! Samplers under one scene and integrator: errors, times, bias, pictures.
+
+use super::verdict::Race;
+use crate::measure::record::{BiasRecord, Interval, TimeRecord};
+use crate::report::data::{RunData, View, sampler_name, structure_name};
+use crate::report::document::*;
+use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
+use crate::report::plot::histogram::{self, Histogram};
+use crate::report::plot::pareto::{CellPoint, ParetoPlot, letter};
+use crate::report::samplers::{Metric, Sampler};
+use crate::report::{format, pictures};
+use std::path::Path;
+
+/// Everything on the samplers of a view; `stem` starts the names of its plots.
+pub fn blocks(dir: &Path, data: &RunData, stem: &str, view: &View) -> Vec<Block> {
+    let mut blocks = vec![Block::Heading(format!("Samplers with {}", view.integrator))];
+    let figures = error_figures(data, stem, view);
+    if !figures.is_empty() {
+        blocks.push(Block::Figures(figures));
+    }
+    blocks.extend(error_table(view, Metric::RelMse).into_block());
+    blocks.extend(error_table(view, Metric::Rmse).into_block());
+    blocks.extend(efficiency_table(view).into_block());
+    if let Some(pareto) = pareto_plot(data, view)
+        && let Some(drawing) = pareto.draw()
+    {
+        let caption = "Run time against error, one point per cell without a fault; lines: 95 % intervals. \
+                           Images are equal across structures, so a structure moves a sampler only sideways.";
+        blocks.push(Block::Figures(vec![Figure::new(
+            format!("{stem}-pareto"),
+            caption,
+            drawing,
+        )]));
+    }
+    blocks.extend(time_table(view).into_block());
+    blocks.extend(bias_table(view).into_block());
+    if let Some(drawing) = histogram::draw(&histograms(view)) {
+        let caption = "Bias check: p-values of all tiles per sampler; flat (dashed) without bias, red where biased.";
+        blocks.push(Block::Figures(vec![Figure::new(
+            format!("{stem}-bias"),
+            caption,
+            drawing,
+        )]));
+    }
+    blocks.extend(gallery(dir, view));
+    if blocks.len() == 1 {
+        blocks.push(Block::Paragraph("Nothing was measured.".into()));
+    }
+    blocks
+}
+
+fn error_figures(data: &RunData, stem: &str, view: &View) -> Vec<Figure> {
+    let structure = view.fastest_structure();
+    let mut figures = Vec::new();
+    for metric in [Metric::RelMse, Metric::Rmse] {
+        let name = metric.name();
+        let y_title = format!("{name} (mean over replicates)");
+        let by_spp = CurvePlot {
+            x_title: "samples per pixel".into(),
+            x_ticks: Ticks::PowersOfTwo,
+            y_title: y_title.clone(),
+            curves: view
+                .samplers
+                .iter()
+                .filter_map(|s| curve_by_spp(data, s, metric))
+                .collect(),
+            guides: Vec::new(),
+        };
+        if let Some(drawing) = by_spp.draw() {
+            let caption = format!(
+                "{name} against samples. Bands: 95 % interval of the mean; dashed: deterministic."
+            );
+            figures.push(Figure::new(
+                format!("{stem}-{}-spp", name.to_lowercase()),
+                caption,
+                drawing,
+            ));
+        }
+        let Some(structure) = &structure else {
+            continue;
+        };
+        let by_seconds = CurvePlot {
+            x_title: format!("render time with {structure}, seconds"),
+            x_ticks: Ticks::PowersOfTen,
+            y_title,
+            curves: view
+                .samplers
+                .iter()
+                .filter_map(|s| curve_by_time(data, view, s, metric, structure))
+                .collect(),
+            guides: Vec::new(),
+        };
+        if let Some(drawing) = by_seconds.draw() {
+            let caption =
+                format!("{name} against time: samples × measured ms per spp with {structure}.");
+            figures.push(Figure::new(
+                format!("{stem}-{}-seconds", name.to_lowercase()),
+                caption,
+                drawing,
+            ));
+        }
+    }
+    figures
+}
+
+fn curve_by_spp(data: &RunData, sampler: &Sampler, metric: Metric) -> Option<Curve> {
+    let label = match sampler.slope(metric) {
+        Some(slope) => format!("{}: slope {}", sampler.name, format::slope(&slope)),
+        None => sampler.name.clone(),
+    };
+    curve(data, sampler, metric, 1.0, label)
+}
+
+fn curve_by_time(
+    data: &RunData,
+    view: &View,
+    sampler: &Sampler,
+    metric: Metric,
+    structure: &str,
+) -> Option<Curve> {
+    let per_spp = view.time(structure, &sampler.name)?.ms_per_spp;
+    let label = format!(
+        "{}: {} ms per spp",
+        sampler.name,
+        format::number(per_spp.value)
+    );
+    curve(data, sampler, metric, per_spp.value / 1000.0, label)
+}
+
+fn curve(
+    data: &RunData,
+    sampler: &Sampler,
+    metric: Metric,
+    x_per_spp: f64,
+    label: String,
+) -> Option<Curve> {
+    let points: Vec<CurvePoint> = sampler
+        .mean_errors(metric)
+        .iter()
+        .map(|mean| CurvePoint {
+            x: f64::from(mean.spp) * x_per_spp,
+            y: mean.error.value,
+            low: mean.error.low,
+            high: mean.error.high,
+        })
+        .collect();
+    let (look, exact) = (data.sampler_look(&sampler.name), sampler.is_deterministic());
+    (!points.is_empty()).then_some(Curve {
+        label,
+        look,
+        exact,
+        points,
+    })
+}
+
+/// Mean error per spp, slope and bias verdict.
+pub fn error_table(view: &View, metric: Metric) -> Table {
+    let id = view
+        .samplers
+        .iter()
+        .find_map(|s| s.metric_id(metric))
+        .unwrap_or(metric.name());
+    let caption = format!(
+        "{} with {}: mean [95 % interval] at each spp; metric {id}",
+        metric.name(),
+        view.integrator
+    );
+    let mut table = Table::new(caption, &["sampler", "replicates"]);
+    let measured: Vec<&Sampler> = view
+        .samplers
+        .iter()
+        .filter(|s| !s.replicates.is_empty())
+        .collect();
+    let mut spps: Vec<u32> = measured
+        .iter()
+        .flat_map(|s| s.mean_errors(metric))
+        .map(|mean| mean.spp)
+        .collect();
+    spps.sort_unstable();
+    spps.dedup();
+    if spps.is_empty() {
+        return table;
+    }
+    spps.iter()
+        .for_each(|spp| table.add_column(format!("{spp} spp")));
+    table.add_column("slope");
+    for sampler in measured {
+        let means = sampler.mean_errors(metric);
+        let mut row = vec![Cell::from(sampler.name.clone()), replicates(sampler)];
+        row.extend(spps.iter().map(|spp| {
+            let mean = means.iter().find(|mean| mean.spp == *spp);
+            mean.map_or_else(
+                || format::ABSENT.into(),
+                |mean| error_cell(sampler, &mean.error),
+            )
+        }));
+        row.push(slope_cell(sampler.slope(metric)));
+        table.rows.push(row);
+    }
+    table
+}
+
+fn replicates(sampler: &Sampler) -> Cell {
+    let n = sampler.replicates.len().to_string();
+    if sampler.is_deterministic() {
+        Cell::with_detail(n, "deterministic")
+    } else {
+        n.into()
+    }
+}
+
+fn error_cell(sampler: &Sampler, error: &Interval) -> Cell {
+    let value = format::number(error.value);
+    if sampler.is_deterministic() || sampler.lacks_spread() {
+        value.into()
+    } else {
+        Cell::with_detail(value, format::bounds(error))
+    }
+}
+
+fn slope_cell(slope: Option<Interval>) -> Cell {
+    let Some(slope) = slope else {
+        return format::ABSENT.into();
+    };
+    let text = format::slope(&slope);
+    match text.split_once(' ') {
+        Some((value, bounds)) => Cell::with_detail(value, bounds),
+        None => text.into(),
+    }
+}
+
+/// Verdict on the bias of every sampler.
+pub fn bias_table(view: &View) -> Table {
+    let caption = format!("Bias check with {}", view.integrator);
+    let columns = ["sampler", ":verdict", "tiles", "rejected", "smallest p"];
+    let mut table = Table::new(caption, &columns);
+    for sampler in view.samplers.iter().filter(|s| !s.replicates.is_empty()) {
+        let name = sampler.name.clone().into();
+        let testable = |bias: &&&BiasRecord| !bias.verdict.starts_with("not-testable");
+        let bias = sampler.bias.as_ref().filter(testable);
+        let count = |n: Option<usize>| n.map_or(format::ABSENT.into(), |n| format::count(n as u64));
+        table.rows.push(vec![
+            name,
+            bias_verdict(sampler),
+            count(bias.map(|bias| bias.tiles)).into(),
+            count(bias.map(|bias| bias.rejected)).into(),
+            format::optional(bias.map(|bias| bias.min_p)).into(),
+        ]);
+    }
+    table
+}
+
+fn bias_verdict(sampler: &Sampler) -> Cell {
+    if let Some(fault) = sampler.fault() {
+        return Cell::from(fault).toned(Tone::Bad);
+    }
+    match sampler.bias {
+        None => "not tested".into(),
+        Some(bias) if bias.verdict == "no-bias-found" => {
+            Cell::from("no bias found").toned(Tone::Good)
+        }
+        Some(bias) => bias.verdict.clone().into(),
+    }
+}
+
+/// What a second buys: time per sample, error × time, error at equal time.
+pub fn efficiency_table(view: &View) -> Table {
+    let (Some(race), Some(spp)) = (Race::new(view), view.common_spp()) else {
+        return Table::default();
+    };
+    let caption = format!(
+        "Error per second with {}, {}",
+        view.integrator, race.structure
+    );
+    let product = format!("relMSE × seconds at {spp} spp");
+    let equal_time = format!("relMSE after {} s", format::number(race.seconds));
+    let mut table = Table::new(caption, &["sampler", "ms per spp", &product, &equal_time]);
+    for sampler in &view.samplers {
+        let Some(time) = view.time(&race.structure, &sampler.name) else {
+            continue;
+        };
+        let per_spp = time.ms_per_spp;
+        let seconds = f64::from(spp) * per_spp.value / 1000.0;
+        let product = sampler
+            .mean_error_at(Metric::RelMse, spp)
+            .map(|error| error.value * seconds);
+        table.rows.push(vec![
+            sampler.name.clone().into(),
+            Cell::with_detail(format::number(per_spp.value), format::bounds(&per_spp)),
+            format::optional(product).into(),
+            race.error_of(&sampler.name)
+                .map_or_else(|| format::ABSENT.into(), |e| error_cell(sampler, &e)),
+        ]);
+    }
+    table
+}
+
+/// Milliseconds per spp of every cell.
+fn time_table(view: &View) -> Table {
+    let caption = format!(
+        "Time of full cells with {}, ms per spp: median [95 % interval]",
+        view.integrator
+    );
+    let mut table = Table::new(caption, &["structure"]);
+    let timed = |sampler: &&Sampler| view.times.iter().any(|time| is_of(time, sampler));
+    let samplers: Vec<&Sampler> = view.samplers.iter().filter(timed).collect();
+    samplers
+        .iter()
+        .for_each(|sampler| table.add_column(sampler.name.clone()));
+    for (i, structure) in view.timed_structures().iter().enumerate() {
+        let mut row = vec![Cell::with_detail(
+            structure.clone(),
+            format!("({})", letter(i)),
+        )];
+        row.extend(
+            samplers
+                .iter()
+                .map(|sampler| time_cell(view, structure, sampler)),
+        );
+        table.rows.push(row);
+    }
+    table
+}
+
+fn is_of(time: &TimeRecord, sampler: &Sampler) -> bool {
+    sampler_name(&time.sequence, &time.decorrelation) == sampler.name
+}
+
+fn time_cell(view: &View, structure: &str, sampler: &Sampler) -> Cell {
+    if let Some(time) = view.time(structure, &sampler.name) {
+        return Cell::with_detail(
+            format::number(time.ms_per_spp.value),
+            format::bounds(&time.ms_per_spp),
+        );
+    }
+    let of_structure = |time: &&&TimeRecord| {
+        structure_name(&time.accel, time.runtime_checks) == structure && is_of(time, sampler)
+    };
+    match view.times.iter().find(of_structure) {
+        Some(time) if !time.image_equal && time.failure.is_none() => {
+            Cell::from("image differs").toned(Tone::Bad)
+        }
+        Some(_) => Cell::from("FAILED").toned(Tone::Bad),
+        None => format::ABSENT.into(),
+    }
+}
+
+fn pareto_plot(data: &RunData, view: &View) -> Option<ParetoPlot> {
+    let spp = view.common_spp()?;
+    let with_look = |names: Vec<String>, look: &dyn Fn(&str) -> usize| -> Vec<(String, usize)> {
+        names
+            .into_iter()
+            .map(|name| (name.clone(), look(&name)))
+            .collect()
+    };
+    let structures = with_look(view.timed_structures(), &|name| data.structure_look(name));
+    let fair: Vec<&Sampler> = view
+        .samplers
+        .iter()
+        .filter(|s| s.fault().is_none() && !s.replicates.is_empty())
+        .collect();
+    let names = fair.iter().map(|s| s.name.clone()).collect();
+    let samplers = with_look(names, &|name| data.sampler_look(name));
+    let mut points = Vec::new();
+    for (structure, (name, _)) in structures.iter().enumerate() {
+        for (index, sampler) in fair.iter().enumerate() {
+            let Some(time) = view.time(name, &sampler.name) else {
+                continue;
+            };
+            let Some(error) = sampler.mean_error_at(Metric::RelMse, spp) else {
+                continue;
+            };
+            let scale = f64::from(spp) / 1000.0;
+            let t = time.ms_per_spp;
+            let seconds = Interval {
+                value: t.value * scale,
+                low: t.low * scale,
+                high: t.high * scale,
+            };
+            points.push(CellPoint {
+                structure,
+                sampler: index,
+                seconds,
+                error,
+            });
+        }
+    }
+    Some(ParetoPlot {
+        x_title: format!("render time for {spp} spp, seconds"),
+        y_title: format!("relMSE at {spp} spp"),
+        structures,
+        samplers,
+        points,
+    })
+}
+
+fn histograms(view: &View) -> Vec<Histogram> {
+    let histogram = |sampler: &Sampler| {
+        let bias = sampler.bias?;
+        Some(Histogram {
+            label: sampler.name.clone(),
+            counts: bias.p_histogram.clone(),
+            biased: bias.verdict == "biased",
+        })
+    };
+    view.samplers.iter().filter_map(histogram).collect()
+}
+
+fn gallery(dir: &Path, view: &View) -> Option<Block> {
+    let mut items = Vec::new();
+    if let Some(reference) = view.reference {
+        let spp = format::count(u64::from(reference.spp));
+        let caption = format!(
+            "reference: {spp} spp of {}, {} s",
+            reference.sampler,
+            format::number(reference.seconds)
+        );
+        items.push(pictures::load(dir, &reference.image, caption));
+    }
+    for sampler in &view.samplers {
+        let Some(first) = sampler
+            .replicates
+            .iter()
+            .find(|r| r.image.is_some() || r.error_map.is_some())
+        else {
+            continue;
+        };
+        let spp = first
+            .errors
+            .last()
+            .map_or(String::new(), |error| format!(", {} spp", error.spp));
+        if let Some(path) = &first.image {
+            items.push(pictures::load(dir, path, format!("{}{spp}", sampler.name)));
+        }
+        if let Some(path) = &first.error_map {
+            items.push(pictures::load(
+                dir,
+                path,
+                format!("error of {}{spp}", sampler.name),
+            ));
+        }
+    }
+    let caption = format!("Renders and error maps with {}", view.integrator);
+    (!items.is_empty()).then_some(Block::Gallery(Gallery {
+        caption,
+        items,
+        scale: None,
+    }))
+}

@@ -1,0 +1,231 @@
+//! Structures of a scene: speed, build, size, work per ray, heat maps.
+
+use super::file_stem;
+use super::verdict::ray_classes;
+use crate::measure::record::{RayClass, StructureRecord};
+use crate::report::color::viridis_css;
+use crate::report::data::{RunData, SceneGroup, structure_name};
+use crate::report::document::*;
+use crate::report::plot::rates::{Bar, RatePlot};
+use crate::report::{format, pictures};
+use std::path::Path;
+
+/// Everything on the structures of the scene with this index.
+pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    if scene.structures.is_empty() {
+        return blocks;
+    }
+    blocks.push(Block::Heading("Structures".into()));
+    if let Some(drawing) = rate_plot(data, scene).draw() {
+        let name = format!("scene-{index}-{}-rates", file_stem(scene.name));
+        let caption = "Speed per ray class. Bars: median; lines: bootstrap 95 % interval. The same rays for all.";
+        blocks.push(Block::Figures(vec![Figure::new(name, caption, drawing)]));
+    }
+    let tables = [speed_table(scene), build_table(scene), work_table(scene)];
+    blocks.extend(tables.into_iter().filter_map(Table::into_block));
+    blocks.extend(heat_maps(dir, scene));
+    blocks
+}
+
+fn name(structure: &StructureRecord) -> String {
+    structure_name(&structure.accel, structure.runtime_checks)
+}
+
+/// What stands where a structure has no figure.
+fn word_instead(structure: &StructureRecord) -> &'static str {
+    if structure.fault().is_some() {
+        "FAILED"
+    } else {
+        "not timed"
+    }
+}
+
+fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
+    let mut classes = ray_classes(scene);
+    if classes.is_empty() {
+        // Nothing passed: one group still shows who failed.
+        classes.push(RayClass::Primary);
+    }
+    let bar = |s: &StructureRecord, class| {
+        let timing = s.timings.iter().find(|timing| timing.class == class);
+        let fault = s.fault();
+        Bar {
+            label: name(s),
+            look: data.structure_look(&name(s)),
+            rate: timing
+                .filter(|_| fault.is_none())
+                .map(|timing| timing.mrays_s),
+            instead: fault.map_or("not timed".into(), |fault| format!("FAILED: {fault}")),
+        }
+    };
+    let group = |class| {
+        let bars = scene.structures.iter().map(|s| bar(s, class)).collect();
+        (format::ray_class(class).to_owned(), bars)
+    };
+    let stamped = data.run.is_none_or(|run| run.environment.timestamps);
+    RatePlot {
+        clock: if stamped { "GPU clock" } else { "wall clock" },
+        groups: classes.into_iter().map(group).collect(),
+    }
+}
+
+/// Mrays/s, one row per structure and one column per ray class.
+pub fn speed_table(scene: &SceneGroup) -> Table {
+    let caption = format!("Speed on {}, Mrays/s: median [95 % interval]", scene.name);
+    let mut table = Table::new(caption, &["structure", ":gate"]);
+    let classes = ray_classes(scene);
+    classes
+        .iter()
+        .for_each(|&class| table.add_column(format::ray_class(class)));
+    for s in &scene.structures {
+        let fault = s.fault();
+        let verdict = if fault.is_none() { "passed" } else { "FAILED" };
+        let tone = if fault.is_none() {
+            Tone::Good
+        } else {
+            Tone::Bad
+        };
+        let mut row = vec![name(s).into(), Cell::from(verdict).toned(tone)];
+        row.extend(classes.iter().map(|&class| {
+            let timing = s
+                .timings
+                .iter()
+                .find(|t| t.class == class)
+                .filter(|_| fault.is_none());
+            timing.map_or_else(
+                || format::ABSENT.into(),
+                |t| Cell::with_detail(format::number(t.mrays_s.value), format::bounds(&t.mrays_s)),
+            )
+        }));
+        table.rows.push(row);
+    }
+    table
+}
+
+/// Build time with phases, size and shape.
+fn build_table(scene: &SceneGroup) -> Table {
+    let columns = [
+        "structure",
+        "build, ms",
+        ":of which, ms",
+        "size",
+        "bytes/triangle",
+        "nodes",
+        "leaves",
+        "references",
+        "depth",
+        "SAH cost",
+    ];
+    let mut table = Table::new(
+        "Build and shape (one build each; SAH with both constants 1)",
+        &columns,
+    );
+    let triangles = scene
+        .record
+        .map(|record| record.triangles)
+        .filter(|n| *n > 0);
+    for s in scene
+        .structures
+        .iter()
+        .filter(|s| !s.build.is_empty() || s.gate.is_some())
+    {
+        let phases: Vec<String> = s
+            .build
+            .iter()
+            .map(|phase| format!("{} {}", phase.name, format::number(phase.ms)))
+            .collect();
+        let per_triangle = triangles.map(|n| s.stats.bytes as f64 / n as f64);
+        table.rows.push(vec![
+            name(s).into(),
+            format::number(s.build_ms).into(),
+            phases.join(" + ").into(),
+            format::bytes(s.stats.bytes).into(),
+            format::optional(per_triangle).into(),
+            format::count(s.stats.nodes).into(),
+            format::count(s.stats.leaves).into(),
+            format::count(s.stats.references).into(),
+            s.stats
+                .depth
+                .map_or(format::ABSENT.into(), |depth| depth.to_string())
+                .into(),
+            format::optional(s.stats.sah_cost).into(),
+        ]);
+    }
+    table
+}
+
+/// Counted work per ray.
+fn work_table(scene: &SceneGroup) -> Table {
+    let columns = [
+        "structure",
+        ":rays",
+        "number",
+        "hit",
+        "nodes/ray",
+        "box tests/ray",
+        "triangle tests/ray",
+        "deepest stack",
+    ];
+    let mut table = Table::new(
+        "Counted work per ray (means over a class, from a separate run)",
+        &columns,
+    );
+    for s in scene.structures.iter().filter(|s| s.fault().is_none()) {
+        for timing in &s.timings {
+            let counters = &timing.counters;
+            table.rows.push(vec![
+                name(s).into(),
+                format::ray_class(timing.class).into(),
+                format::count(timing.rays as u64).into(),
+                format::percent(timing.hit_fraction).into(),
+                format::number(counters.nodes).into(),
+                format::number(counters.box_tests).into(),
+                format::number(counters.triangle_tests).into(),
+                counters.stack_high_water.to_string().into(),
+            ]);
+        }
+    }
+    table
+}
+
+fn heat_maps(dir: &Path, scene: &SceneGroup) -> Option<Block> {
+    let mapped = || {
+        scene
+            .structures
+            .iter()
+            .filter_map(|s| Some((s, s.heat_map.as_deref()?)))
+    };
+    let maxima: Vec<f64> = mapped().filter_map(|(s, _)| s.heat_map_max).collect();
+    let top = maxima.first().copied();
+    let shared = maxima.iter().all(|max| Some(*max) == top);
+    let items: Vec<Picture> = mapped()
+        .map(|(s, path)| {
+            let caption = match s.heat_map_max.filter(|_| !shared) {
+                Some(max) => format!("{} (top of scale {})", name(s), format::number(max)),
+                None => name(s),
+            };
+            let caption = if s.fault().is_some() {
+                format!("{caption}: {}", word_instead(s))
+            } else {
+                caption
+            };
+            pictures::load(dir, path, caption)
+        })
+        .collect();
+    let label = |share: f64| match top.filter(|_| shared) {
+        Some(top) => format::number(top * share),
+        None => format::percent(share),
+    };
+    let scale = (!maxima.is_empty()).then(|| ColorScale {
+        gradient: viridis_css(),
+        title: "nodes + triangle tests per primary ray".into(),
+        labels: [0.0, 0.25, 0.5, 0.75, 1.0].map(label).to_vec(),
+    });
+    let caption = "Traversal cost of primary rays".into();
+    (!items.is_empty()).then_some(Block::Gallery(Gallery {
+        caption,
+        items,
+        scale,
+    }))
+}

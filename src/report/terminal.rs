@@ -1,0 +1,97 @@
+//! The essence of a report for the end of a run.
+
+use super::data::RunData;
+use super::document::{Cell, Table};
+use super::samplers::Metric;
+use super::sections::{belief, samplers, structures, verdict};
+use crate::measure::record::Line;
+
+/// Verdicts, speeds, errors and checks as aligned plain text.
+pub fn terminal_tables(records: &[Line]) -> String {
+    let data = RunData::new(records);
+    let mut tables = Vec::new();
+    for scene in &data.scenes {
+        tables.push(structures::speed_table(scene));
+        for view in &scene.views {
+            tables.push(samplers::error_table(view, Metric::RelMse));
+            tables.push(samplers::efficiency_table(view));
+        }
+        tables.push(verdict::table(scene));
+    }
+    let mut out = String::new();
+    for table in tables.iter().filter(|table| !table.rows.is_empty()) {
+        out += &aligned(table);
+        out.push('\n');
+    }
+    if data.run.is_some_and(|run| run.environment.software) {
+        out += "Software adapter: times compare structures on this adapter only.\n";
+    }
+    for check in belief::checks(&data) {
+        out += &format!("{}  {}: {}\n", check.word(), check.title, check.detail);
+    }
+    out
+}
+
+/// The table with columns padded to equal width; of figures only the value is kept, since intervals
+/// would not fit a terminal, except in tables of text.
+fn aligned(table: &Table) -> String {
+    let wordy = table.columns.iter().filter(|column| column.text).count() > 2;
+    let shown = |cell: &Cell| {
+        if wordy {
+            cell.flat()
+        } else {
+            cell.text.clone()
+        }
+    };
+    let heads: Vec<String> = table
+        .columns
+        .iter()
+        .map(|column| column.title.clone())
+        .collect();
+    let rows: Vec<Vec<String>> = table
+        .rows
+        .iter()
+        .map(|row| row.iter().map(shown).collect())
+        .collect();
+    let width = |i: usize| {
+        let cells = rows.iter().filter_map(|row| row.get(i)).chain(heads.get(i));
+        cells.map(|text| text.chars().count()).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..heads.len()).map(width).collect();
+    let line = |cells: &[String]| {
+        let padded =
+            cells
+                .iter()
+                .zip(&table.columns)
+                .zip(&widths)
+                .map(|((text, column), &width)| {
+                    if column.text {
+                        format!("{text:<width$}")
+                    } else {
+                        format!("{text:>width$}")
+                    }
+                });
+        padded.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
+    };
+    let rule = "─".repeat(widths.iter().sum::<usize>() + 2 * widths.len().saturating_sub(1)) + "\n";
+    let body: String = rows.iter().map(|row| line(row)).collect();
+    format!("{}\n{}{rule}{body}", table.caption, line(&heads))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_line_up_and_figures_stand_right() {
+        let mut table = Table::new("speed", &["structure", "Mrays/s"]);
+        table
+            .rows
+            .push(vec!["bvh".into(), Cell::with_detail("5.02", "[4, 6]")]);
+        table.rows.push(vec!["uniform-grid λ".into(), "1".into()]);
+        let text = aligned(&table);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[3], "bvh                5.02");
+        assert_eq!(lines[4], "uniform-grid λ        1");
+    }
+}

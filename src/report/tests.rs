@@ -1,0 +1,312 @@
+//! The whole report on synthetic but realistic records.
+
+mod fixture;
+
+use super::*;
+use crate::measure::record::*;
+use fixture::*;
+
+/// Puts a fault into a record of its kind.
+type Plant = fn(&mut Record);
+
+/// Tells one kind of record.
+type IsKind = fn(&Record) -> bool;
+
+/// A run's folder; pictures for the first scene only.
+fn folder(lines: &[Line]) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::create_dir(dir.path().join("images")).unwrap();
+    let text: String = lines
+        .iter()
+        .map(|line| serde_json::to_string(line).unwrap() + "\n")
+        .collect();
+    let named = text
+        .split('"')
+        .filter(|part| part.starts_with("images/") && part.contains("cornell"));
+    for path in named.collect::<std::collections::BTreeSet<_>>() {
+        let colour = |x: u32, y: u32| image::Rgb(color::viridis((x * y) as f32 / (96.0 * 72.0)));
+        image::RgbImage::from_fn(96, 72, colour)
+            .save(dir.path().join(path))
+            .unwrap();
+    }
+    std::fs::write(dir.path().join(read::RECORDS_FILE), text).unwrap();
+    dir
+}
+
+/// Page and summary of these records. With `RAYSTONE_REPORT_DIR` set, the folder is kept there to be
+/// looked at.
+fn report(name: &str, lines: &[Line]) -> (String, String) {
+    let dir = folder(lines);
+    let paths = write_report(dir.path()).unwrap();
+    let texts = (
+        std::fs::read_to_string(&paths.html).unwrap(),
+        std::fs::read_to_string(&paths.summary).unwrap(),
+    );
+    assert!(paths.plots.iter().all(|path| path.is_file()));
+    if let Some(keep) = std::env::var_os("RAYSTONE_REPORT_DIR") {
+        let to = Path::new(&keep).join(name);
+        std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+        std::process::Command::new("cp")
+            .arg("-rT")
+            .arg(dir.path())
+            .arg(&to)
+            .status()
+            .unwrap();
+    }
+    texts
+}
+
+fn without(lines: Vec<Line>, dropped: IsKind) -> Vec<Line> {
+    lines
+        .into_iter()
+        .filter(|line| !dropped(&line.record))
+        .collect()
+}
+
+#[test]
+fn a_full_run_names_winners_failures_and_reasons() {
+    let (html, summary) = report("full", &full_run());
+    for text in [
+        "no clear winner: bvh, roped-bvh",
+        "FAILED: 41 of 131,072 rays differ",
+        "first wrong bounce ray: ray 17",
+        "more than brute-force takes",
+        "biased: 57 of 432 tiles rejected",
+        "times compare structures on this adapter only",
+        "152 (73 % saved)",
+        "fit of Dufay 2017 for Halton",
+        "heat-displaced-sphere-bvh.png is missing",
+    ] {
+        assert!(html.contains(text), "{text}");
+    }
+    assert!(
+        summary.contains("## Verdict") && summary.contains("(plots/scene-0-cornell-box-rates.png)")
+    );
+}
+
+#[test]
+fn the_page_is_self_contained_and_escapes_names() {
+    let (html, _) = report("escape", &full_run());
+    assert!(html.contains("a&lt;b&gt;&amp;c") && !html.contains("a<b>"));
+    assert!(html.contains("no texture &lt;x.png&gt;"));
+    assert!(!html.contains("<script") && !html.contains("src=\"http") && !html.contains("@import"));
+    assert!(html.contains("<svg") && html.contains("src=\"data:image/png;base64,"));
+    assert!(!html.contains("<?xml"));
+}
+
+#[test]
+fn hostile_names_stay_text_everywhere() {
+    let mut lines = full_run();
+    for line in &mut lines {
+        if let Record::Structure(record) = &mut line.record {
+            record.accel.label = format!("<b>&{}", record.accel.label);
+        }
+    }
+    let (html, summary) = report("hostile", &lines);
+    assert!(html.contains("&lt;b&gt;&amp;bvh") && !html.contains("<b>"));
+    assert!(!summary.contains(" <b>"));
+}
+
+#[test]
+fn a_biased_sampler_and_a_failed_structure_never_win() {
+    let lines = full_run();
+    let data = RunData::new(&lines);
+    let view = &data.scenes[1].views[0];
+    let mut spoiled = lines.clone();
+    let best = sections::verdict::best_per_sample(view, 32).answer();
+    assert_eq!(best, "sobol × cranley-patterson");
+    for line in &mut spoiled {
+        match &mut line.record {
+            Record::Bias(b) if b.sequence.label == "sobol" => b.verdict = "biased".into(),
+            Record::Structure(s) if s.accel.label == "bvh" => s.gate = Some(gate(1)),
+            _ => {}
+        }
+    }
+    let data = RunData::new(&spoiled);
+    let scene = &data.scenes[1];
+    assert_ne!(
+        sections::verdict::best_per_sample(&scene.views[0], 32).answer(),
+        best
+    );
+    assert_eq!(
+        sections::verdict::fastest(scene, RayClass::Primary).answer(),
+        "roped-bvh (alone)"
+    );
+}
+
+#[test]
+fn every_check_passes_on_a_clean_run_and_fails_on_its_planted_fault() {
+    let clean: Vec<Line> = full_run()
+        .into_iter()
+        .map(|mut line| {
+            match &mut line.record {
+                Record::Structure(s) => s.gate = Some(gate(0)),
+                Record::Bias(b) if b.verdict == "biased" => b.verdict = "no-bias-found".into(),
+                Record::Finished(f) => f.failed = 0,
+                _ => {}
+            }
+            line
+        })
+        .collect();
+    let failing = |lines: &[Line]| -> Vec<String> {
+        let checks = sections::belief::checks(&RunData::new(lines));
+        checks
+            .into_iter()
+            .filter(|check| check.word() != "PASS")
+            .map(|check| check.title)
+            .collect()
+    };
+    assert_eq!(failing(&clean), Vec::<String>::new());
+    let faults: [(&str, Plant); 7] = [
+        ("equal to the bit", |r| {
+            if let Record::Structure(s) = r {
+                s.gate = Some(gate(1))
+            }
+        }),
+        ("brute force", |r| {
+            if let Record::Structure(s) = r {
+                s.gate.as_mut().unwrap().brute_force.wrong = 1
+            }
+        }),
+        ("oracle", |r| {
+            if let Record::Structure(s) = r {
+                s.gate.as_mut().unwrap().oracle.wrong = 1
+            }
+        }),
+        ("across structures", |r| {
+            if let Record::Time(t) = r {
+                t.image_equal = false
+            }
+        }),
+        ("without bias", |r| {
+            if let Record::Bias(b) = r {
+                b.verdict = "biased".into()
+            }
+        }),
+        ("finite", |r| {
+            if let Record::Error(e) = r {
+                e.non_finite_pixels = 1
+            }
+        }),
+        ("Reference noise", |r| {
+            if let Record::Reference(f) = r {
+                f.mse = 1.0
+            }
+        }),
+    ];
+    for (title, plant) in faults {
+        let mut lines = clean.clone();
+        lines.iter_mut().for_each(|line| plant(&mut line.record));
+        let failed = failing(&lines);
+        assert!(
+            failed.iter().any(|name| name.contains(title)),
+            "{title} in {failed:?}"
+        );
+    }
+}
+
+#[test]
+fn a_run_without_one_kind_of_record_still_reports() {
+    let kinds: [(&str, IsKind); 9] = [
+        ("no-run", |r| matches!(r, Record::Run(_))),
+        ("no-scene", |r| matches!(r, Record::Scene(_))),
+        ("no-structure", |r| matches!(r, Record::Structure(_))),
+        ("no-reference", |r| matches!(r, Record::Reference(_))),
+        ("no-error", |r| matches!(r, Record::Error(_))),
+        ("no-bias", |r| matches!(r, Record::Bias(_))),
+        ("no-time", |r| matches!(r, Record::Time(_))),
+        ("no-stream", |r| matches!(r, Record::Stream(_))),
+        ("no-finished", |r| matches!(r, Record::Finished(_))),
+    ];
+    let small = without(
+        full_run(),
+        |r| matches!(r, Record::Reference(f) if f.scene != "cornell-box"),
+    );
+    for (name, is_kind) in kinds {
+        let (html, _) = report(name, &without(small.clone(), is_kind));
+        assert!(
+            html.contains("Why to believe it") && !html.contains("NaN") && !html.contains(">inf"),
+            "{name}"
+        );
+    }
+    let only_run = vec![line(run())];
+    let (html, _) = report("only-run", &only_run);
+    assert!(html.contains("Nothing was measured") && html.contains("did not finish"));
+}
+
+#[test]
+fn one_structure_one_sampler_and_one_spp_are_enough() {
+    let mut lines = without(full_run(), |record| match record {
+        Record::Structure(s) => s.accel.label != "bvh",
+        Record::Time(t) => t.accel.label != "bvh" || t.sequence.label != "pixel-hash",
+        Record::Error(e) => e.sequence.label != "pixel-hash",
+        Record::Bias(_) => true,
+        _ => false,
+    });
+    for line in &mut lines {
+        if let Record::Error(record) = &mut line.record {
+            record.errors.truncate(1);
+        }
+    }
+    let (html, _) = report("one", &lines);
+    assert!(html.contains("bvh (alone)") && html.contains("pixel-hash × none (alone)"));
+}
+
+#[test]
+fn a_run_where_everything_failed_shows_it_and_no_figure() {
+    let mut lines = without(full_run(), |r| {
+        matches!(r, Record::Error(_) | Record::Bias(_))
+    });
+    for line in &mut lines {
+        match &mut line.record {
+            Record::Structure(s) => *s = structure(&s.scene, &s.accel.label, 1.0, 9),
+            Record::Time(t) => t.failure = Some("device lost".into()),
+            _ => {}
+        }
+    }
+    let (html, _) = report("failed", &lines);
+    assert!(html.contains("device lost") && html.contains("9 of 131,072 rays differ"));
+    assert!(!html.contains("5.02"));
+}
+
+#[test]
+fn twelve_structures_fit_into_plots_and_tables() {
+    let mut lines = without(full_run(), |r| {
+        matches!(r, Record::Structure(_) | Record::Time(_))
+    });
+    let names: Vec<String> = (0..12)
+        .map(|i| format!("structure-{i} [leaf-size={i}, split-limit=0.25]"))
+        .collect();
+    for scene in ["cornell-box", "displaced-sphere"] {
+        for (i, name) in names.iter().enumerate() {
+            lines.push(line(
+                structure(scene, name, 6.0 / (1.0 + i as f64 * 0.3), 0).into(),
+            ));
+        }
+        let timed: Vec<(&str, f64)> = names
+            .iter()
+            .enumerate()
+            .map(|(i, name)| (name.as_str(), 1.0 + 0.3 * i as f64))
+            .collect();
+        lines.extend(times(scene, "path", &timed).into_iter().map(line));
+    }
+    let (html, _) = report("twelve", &lines);
+    assert!(names.iter().all(|name| html.contains(name)));
+}
+
+#[test]
+fn the_terminal_shows_tables_and_checks() {
+    let text = terminal_tables(&full_run());
+    if std::env::var_os("RAYSTONE_REPORT_DIR").is_some() {
+        println!("{text}");
+    }
+    for part in [
+        "Speed on cornell-box",
+        "Verdict on displaced-sphere",
+        "no clear winner",
+        "FAIL  Hits equal",
+    ] {
+        assert!(text.contains(part), "{part} in\n{text}");
+    }
+    assert!(!terminal_tables(&[]).contains("NaN"));
+}

@@ -1,0 +1,278 @@
+//! Error: once per scene, integrator and sampler, through the fastest gated structure.
+
+use super::session::Session;
+use super::structures::Gated;
+use super::world::World;
+use super::{RunError, REFERENCE_PARTS};
+use crate::config::{cell_hash, SamplerCell, Variant};
+use crate::gpu::GpuError;
+use crate::integrator::{integrator, Frame, RenderJob, Renderer, Snapshot};
+use crate::measure::bias::{check_bias, BiasOptions};
+use crate::measure::image::{measure, Image, Reference};
+use crate::measure::picture::{automatic_exposure, error_map, tone_map, write_png};
+use crate::measure::record::{BiasRecord, ErrorAtSpp, ErrorRecord, Record, ReferenceRecord};
+use crate::report::color::viridis;
+use crate::sampling::hash::pcg_hash;
+use crate::sampling::Sampler;
+use std::time::Instant;
+
+/// Relative error per pixel at the top of the colour scale of error maps.
+const ERROR_MAP_FULL_SCALE: f32 = 1.0;
+
+/// The reference of one integrator with its parts and the exposure of all its pictures.
+struct Yardstick {
+    reference: Reference,
+    parts: Vec<Image>,
+    exposure: f32,
+}
+
+/// A job for this world; `None` if a name is not registered or the sampler has too few dimensions.
+pub(super) fn job<'j>(
+    session: &Session,
+    world: &World,
+    sampler: &'j Sampler,
+    variant: &'j Variant,
+    runtime_checks: bool,
+) -> Result<RenderJob<'j>, String> {
+    let integrator = integrator(&variant.name).ok_or_else(|| format!("no integrator is called {variant}"))?;
+    let needed = integrator.dimensions(&variant.params);
+    if let Some(limit) = sampler.sequence.max_dimensions()
+        && needed > limit
+    {
+        return Err(format!(
+            "{variant} needs {needed} dimensions, {} has {limit}: lower max_depth or take pixel-hash",
+            sampler.sequence_variant
+        ));
+    }
+    let [width, height] = session.experiment.resolution;
+    let diagonal = f64::from(2.0 * world.scene.bounds().radius());
+    let ao_radius = (integrator.ao_radius(&variant.params).unwrap_or(0.0) * diagonal) as f32;
+    let frame = Frame { width, height, camera: world.camera, ao_radius };
+    Ok(RenderJob { frame, sampler, integrator, params: &variant.params, runtime_checks })
+}
+
+/// Renders and fails if a kernel raised its error word.
+fn render_checked(renderer: &Renderer, spps: &[u32], seed: u32) -> Result<Vec<Snapshot>, String> {
+    let rendered = renderer.render(spps, seed).and_then(|s| Ok((s, renderer.error_word()?)));
+    match rendered.map_err(|e: GpuError| e.to_string())? {
+        (snapshots, 0) => Ok(snapshots),
+        (_, word) => Err(format!("a kernel raised error word {word} while rendering")),
+    }
+}
+
+/// All samplers of a scene.
+pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Result<(), RunError> {
+    let Some(fastest) = gated.iter().max_by(|a, b| a.speed.total_cmp(&b.speed)) else {
+        return Ok(());
+    };
+    let cells: Vec<SamplerCell> =
+        session.plan.samplers.iter().filter(|c| c.scene == *world.variant).cloned().collect();
+    for variant in session.experiment.axes.integrator.clone() {
+        let wanted = |c: &&SamplerCell| c.integrator == variant && !session.is_done(&c.to_string());
+        let cells: Vec<SamplerCell> = cells.iter().filter(wanted).cloned().collect();
+        if cells.is_empty() {
+            continue;
+        }
+        let cell = format!("reference {}, {variant}", world.variant);
+        let yardstick = match reference(session, world, fastest, &variant)? {
+            Ok(yardstick) => yardstick,
+            Err(reason) => {
+                session.write_failure(&cell, reason)?;
+                continue;
+            }
+        };
+        for cell in cells {
+            if let Err(reason) = sampler_error(session, world, fastest, &cell, &yardstick)? {
+                session.write_failure(&cell.to_string(), reason)?;
+            }
+            if world.gpu.lost().is_some() {
+                return Ok(());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn reference(
+    session: &mut Session,
+    world: &World,
+    fastest: &Gated,
+    variant: &Variant,
+) -> Result<Result<Yardstick, String>, RunError> {
+    session.say(format!("{}, {variant}: reference", world.variant));
+    let settings = &session.experiment.reference;
+    let Some(sampler) = session.registries.samplers.sampler(&settings.sequence, &settings.decorrelation) else {
+        return Ok(Err("the reference's sampler is not registered".to_owned()));
+    };
+    let start = Instant::now();
+    let spp = (settings.spp / REFERENCE_PARTS).max(1);
+    let seed = pcg_hash(settings.seed);
+    let rendered = (|| {
+        let job = job(session, world, &sampler, variant, true)?;
+        let renderer =
+            Renderer::new(world.gpu, &world.buffers, &fastest.traced, &job, false).map_err(|e| e.to_string())?;
+        let mut parts = Vec::new();
+        for part in 0..REFERENCE_PARTS {
+            let rendered = session.clock.time("gpu", || render_checked(&renderer, &[spp], seed.wrapping_add(part)));
+            parts.extend(rendered?.into_iter().map(|s| s.image));
+            session.progress.inc(1);
+        }
+        let reference = Reference::from_parts(&parts).map_err(|e| e.to_string())?;
+        Ok::<_, String>((reference, parts))
+    })();
+    let (reference, parts) = match rendered {
+        Ok(rendered) => rendered,
+        Err(reason) => return Ok(Err(reason)),
+    };
+    let exposure = automatic_exposure(reference.image());
+    let (relative, path) = session.image_path(&["reference", &world.variant.label, &variant.label]);
+    write_png(&path, &tone_map(reference.image(), exposure)).map_err(|e| RunError::Input(e.to_string()))?;
+    let cell = format!("reference {}, {variant}: done", world.variant);
+    if !session.is_done(&cell) {
+        let record = ReferenceRecord {
+            scene: world.variant.label.clone(),
+            integrator: variant.clone(),
+            spp: spp * REFERENCE_PARTS,
+            sampler: sampler.label(),
+            seconds: start.elapsed().as_secs_f64(),
+            mse: reference.own_mse().unwrap_or(f64::NAN),
+            image: relative,
+            mean: reference.image().mean(),
+        };
+        session.write(&world.scene.hash, Record::Reference(record))?;
+        session.finish(cell);
+    }
+    Ok(Ok(Yardstick { reference, parts, exposure }))
+}
+
+/// All replicates of one sampler. The inner error concerns this cell alone.
+fn sampler_error(
+    session: &mut Session,
+    world: &World,
+    fastest: &Gated,
+    cell: &SamplerCell,
+    yardstick: &Yardstick,
+) -> Result<Result<(), String>, RunError> {
+    session.say(cell.to_string());
+    let Some(sampler) = session.registries.samplers.sampler(&cell.sequence, &cell.decorrelation) else {
+        return Ok(Err("this sampler is not registered".to_owned()));
+    };
+    let compiled = job(session, world, &sampler, &cell.integrator, true).and_then(|job| {
+        Renderer::new(world.gpu, &world.buffers, &fastest.traced, &job, false).map_err(|e| e.to_string())
+    });
+    let renderer = match compiled {
+        Ok(renderer) => renderer,
+        Err(reason) => return Ok(Err(reason)),
+    };
+    let spps: Vec<u32> = session.experiment.spp.counts().collect();
+    let hash = cell_hash(&[
+        ("scene", &world.scene.hash),
+        ("sampler", &serde_json::to_string(&(&cell.sequence, &cell.decorrelation, &cell.integrator)).unwrap_or_default()),
+        ("kernel", renderer.kernel_text()),
+        ("version", env!("CARGO_PKG_VERSION")),
+    ]);
+    let seeds: Vec<u32> = session.experiment.replicate_seeds().take(cell.replicates as usize).collect();
+    let mut finals = Vec::new();
+    for (replicate, seed) in seeds.into_iter().enumerate() {
+        let snapshots = match session.clock.time("gpu", || render_checked(&renderer, &spps, seed)) {
+            Ok(snapshots) => snapshots,
+            Err(reason) => return Ok(Err(reason)),
+        };
+        let record = match error_record(session, world, cell, yardstick, &snapshots, (replicate as u32, seed))? {
+            Ok(record) => record,
+            Err(reason) => return Ok(Err(reason)),
+        };
+        if record.non_finite_pixels > 0 {
+            return Ok(Err(format!("replicate {replicate} has {} pixels that are not finite", record.non_finite_pixels)));
+        }
+        session.write(&hash, Record::Error(record))?;
+        finals.extend(snapshots.into_iter().last().map(|s| s.image));
+        session.progress.inc(1);
+    }
+    session.finish(cell.to_string());
+    match bias_record(cell, world, &finals, yardstick) {
+        Ok(record) => session.write(&hash, Record::Bias(record)).map(Ok),
+        Err(reason) => Ok(Err(reason)),
+    }
+}
+
+fn error_record(
+    session: &Session,
+    world: &World,
+    cell: &SamplerCell,
+    yardstick: &Yardstick,
+    snapshots: &[Snapshot],
+    (replicate, seed): (u32, u32),
+) -> Result<Result<ErrorRecord, String>, RunError> {
+    let mut errors = Vec::new();
+    let mut non_finite_pixels = 0;
+    for snapshot in snapshots {
+        match measure(&snapshot.image, &yardstick.reference) {
+            Ok(report) => {
+                non_finite_pixels = non_finite_pixels.max(report.non_finite_pixels);
+                errors.push(ErrorAtSpp { spp: snapshot.spp, metrics: report.metrics });
+            }
+            Err(error) => return Ok(Err(error.to_string())),
+        }
+    }
+    let Some(last) = snapshots.last() else {
+        return Ok(Err("nothing was rendered".to_owned()));
+    };
+    let mut record = ErrorRecord {
+        scene: world.variant.label.clone(),
+        integrator: cell.integrator.clone(),
+        sequence: cell.sequence.clone(),
+        decorrelation: cell.decorrelation.clone(),
+        randomised: cell.randomised,
+        replicate,
+        seed,
+        resolution: session.experiment.resolution,
+        errors,
+        non_finite_pixels,
+        image_hash: image_hash(&last.image),
+        image: None,
+        error_map: None,
+    };
+    if replicate == 0 {
+        let name = |kind| {
+            let labels = [&world.variant.label, &cell.integrator.label, &cell.sequence.label, &cell.decorrelation.label];
+            session.image_path(&[&[kind], &labels.map(String::as_str)[..]].concat())
+        };
+        let (relative, path) = name("image");
+        write_png(&path, &tone_map(&last.image, yardstick.exposure)).map_err(|e| RunError::Input(e.to_string()))?;
+        record.image = Some(relative);
+        let (relative, path) = name("error");
+        match error_map(&last.image, &yardstick.reference, ERROR_MAP_FULL_SCALE, viridis) {
+            Ok(picture) => write_png(&path, &picture).map_err(|e| RunError::Input(e.to_string()))?,
+            Err(error) => return Ok(Err(error.to_string())),
+        }
+        record.error_map = Some(relative);
+    }
+    Ok(Ok(record))
+}
+
+fn bias_record(cell: &SamplerCell, world: &World, images: &[Image], yardstick: &Yardstick) -> Result<BiasRecord, String> {
+    let check = check_bias(images, &yardstick.parts, BiasOptions::default()).map_err(|e| e.to_string())?;
+    let verdict = if cell.randomised {
+        check.verdict.to_string()
+    } else {
+        "not-testable: the sampler is deterministic, its error is not noise".to_owned()
+    };
+    Ok(BiasRecord {
+        scene: world.variant.label.clone(),
+        integrator: cell.integrator.clone(),
+        sequence: cell.sequence.clone(),
+        decorrelation: cell.decorrelation.clone(),
+        tiles: check.tiles,
+        rejected: check.rejected.len(),
+        alpha: check.alpha,
+        min_p: check.min_p,
+        p_histogram: check.p_histogram.to_vec(),
+        verdict,
+    })
+}
+
+/// BLAKE3 of the f32 pixels.
+pub(super) fn image_hash(image: &Image) -> String {
+    blake3::hash(bytemuck::cast_slice(&image.pixels)).to_hex().to_string()
+}

@@ -1,0 +1,175 @@
+//! What lives as long as a run: records, clock, progress, cells already done.
+
+use super::{RunError, RunOptions};
+use crate::config::{Experiment, Plan};
+use crate::measure::record::{Environment, FinishedRecord, Line, Record, RunRecord, SkippedRecord, SCHEMA};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::collections::{BTreeMap, HashSet};
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::{Instant, SystemTime};
+
+/// Where the wall time goes; what no part claims is the harness's own overhead.
+pub(super) struct Clock {
+    start: Instant,
+    parts_s: BTreeMap<String, f64>,
+}
+
+impl Clock {
+    fn new() -> Self {
+        Self { start: Instant::now(), parts_s: BTreeMap::new() }
+    }
+
+    /// Runs `work` and books its time under `part`.
+    pub fn time<T>(&mut self, part: &str, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let result = work();
+        *self.parts_s.entry(part.to_owned()).or_default() += start.elapsed().as_secs_f64();
+        result
+    }
+}
+
+/// The state of a run.
+pub(super) struct Session<'a> {
+    pub experiment: &'a Experiment,
+    pub plan: &'a Plan,
+    pub registries: &'a super::Registries,
+    pub options: &'a RunOptions,
+    pub clock: Clock,
+    pub progress: ProgressBar,
+    pub failed: usize,
+    pub skipped: usize,
+    /// Cells that have their record: not run again after a lost device.
+    done: HashSet<String>,
+    records: File,
+    records_path: PathBuf,
+}
+
+impl<'a> Session<'a> {
+    /// Opens the folder for writing; fails before anything is measured if it cannot be written.
+    pub fn new(
+        experiment: &'a Experiment,
+        plan: &'a Plan,
+        registries: &'a super::Registries,
+        options: &'a RunOptions,
+    ) -> Result<Self, RunError> {
+        let unwritable = |path: &Path, e: std::io::Error| {
+            RunError::Input(format!("cannot write {}: {e}; choose another folder with --out", path.display()))
+        };
+        let images = options.out.join("images");
+        std::fs::create_dir_all(&images).map_err(|e| unwritable(&images, e))?;
+        let records_path = options.out.join("records.jsonl");
+        let records = OpenOptions::new()
+            .create(true)
+            .write(true)
+            .truncate(true)
+            .open(&records_path)
+            .map_err(|e| unwritable(&records_path, e))?;
+        let progress = if options.progress { ProgressBar::new(steps(experiment, plan)) } else { ProgressBar::hidden() };
+        let style = ProgressStyle::with_template("{bar:32} {pos}/{len} · {elapsed} · about {eta} left · {wide_msg}");
+        progress.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Ok(Self {
+            experiment,
+            plan,
+            registries,
+            options,
+            clock: Clock::new(),
+            progress,
+            failed: 0,
+            skipped: 0,
+            done: HashSet::new(),
+            records,
+            records_path,
+        })
+    }
+
+    /// Appends one record as one whole line and flushes it to the disk.
+    pub fn write(&mut self, hash: &str, record: Record) -> Result<(), RunError> {
+        let line = Line { schema: SCHEMA.to_owned(), hash: hash.to_owned(), record };
+        let mut text = serde_json::to_string(&line).map_err(|e| RunError::Input(format!("a record cannot be written: {e}")))?;
+        text.push('\n');
+        let written = self.records.write_all(text.as_bytes()).and_then(|()| self.records.sync_data());
+        written.map_err(|e| {
+            RunError::Input(format!(
+                "cannot write {}: {e}; the records before this one are kept",
+                self.records_path.display()
+            ))
+        })
+    }
+
+    /// The first record.
+    pub fn write_start(&mut self, environment: Environment) -> Result<(), RunError> {
+        let seconds = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_secs());
+        let record = RunRecord {
+            name: self.experiment.name.clone(),
+            experiment: self.experiment.source.clone(),
+            experiment_text: self.experiment.text.clone(),
+            started_unix_s: seconds,
+            environment,
+            renders_full_product: self.plan.renders_full_product,
+            renders_planned: self.plan.renders_planned,
+        };
+        self.write("", Record::Run(record))?;
+        for skipped in &self.plan.skipped {
+            let record = SkippedRecord { cell: skipped.cell.clone(), reason: skipped.reason.clone() };
+            self.write("", Record::Skipped(record))?;
+            self.skipped += skipped.cells;
+        }
+        Ok(())
+    }
+
+    /// The last record.
+    pub fn write_end(&mut self) -> Result<(), RunError> {
+        let wall_s = self.clock.start.elapsed().as_secs_f64();
+        let parts_s = self.clock.parts_s.clone();
+        let overhead_s = (wall_s - parts_s.values().sum::<f64>()).max(0.0);
+        let record = FinishedRecord { wall_s, parts_s, overhead_s, failed: self.failed, skipped: self.skipped };
+        self.progress.finish_and_clear();
+        self.write("", Record::Finished(record))
+    }
+
+    /// Whether a cell has its record.
+    pub fn is_done(&self, cell: &str) -> bool {
+        self.done.contains(cell)
+    }
+
+    /// Notes that a cell has its record.
+    pub fn finish(&mut self, cell: String) {
+        self.done.insert(cell);
+    }
+
+    /// Records a cell that failed without a record of its own kind.
+    pub fn write_failure(&mut self, cell: &str, reason: String) -> Result<(), RunError> {
+        self.failed += 1;
+        self.finish(cell.to_owned());
+        self.progress.println(format!("failed: {cell}: {reason}"));
+        self.write("", Record::Failed(SkippedRecord { cell: cell.to_owned(), reason }))
+    }
+
+    /// Shows what is being done.
+    pub fn say(&self, message: impl Into<String>) {
+        self.progress.set_message(message.into());
+    }
+
+    /// A file name under `images/` and its absolute path.
+    pub fn image_path(&self, parts: &[&str]) -> (String, PathBuf) {
+        let slug: String = parts
+            .join("-")
+            .chars()
+            .map(|c| if c.is_ascii_alphanumeric() || c == '.' { c.to_ascii_lowercase() } else { '-' })
+            .collect();
+        let relative = format!("images/{slug}.png");
+        let path = self.options.out.join(&relative);
+        (relative, path)
+    }
+}
+
+/// Rough number of progress steps: builds and gates, timed rounds, renders, streams.
+fn steps(experiment: &Experiment, plan: &Plan) -> u64 {
+    let rounds = u64::from(experiment.timing.rounds) + 1;
+    let structures = plan.structures.len() as u64 * (2 + 5 * rounds);
+    let times = plan.times.len() as u64 * rounds;
+    let references = plan.scenes.len() * experiment.axes.integrator.len() * super::REFERENCE_PARTS as usize;
+    structures + times + (plan.renders_planned + references + plan.streams.len()) as u64
+}

@@ -1,0 +1,295 @@
+//! Structures: build, validate, gate, time, count, draw.
+
+use super::session::Session;
+use super::world::World;
+use super::RunError;
+use crate::accel::{BuildLog, Counters};
+use crate::config::{cell_hash, StructureCell, Variant};
+use crate::gpu::{Elapsed, GpuError};
+use crate::integrator::Traced;
+use crate::measure::batch::{count_work, Batch, Query};
+use crate::measure::gate::gate;
+use crate::measure::picture::{write_png, Picture};
+use crate::measure::rays::{primary_pixels, primary_rays};
+use crate::measure::record::{ClassTiming, CountersPerRay, GateVerdict, Record, StructureRecord, StructureStats};
+use crate::measure::timing::{empty_ms, interleave, millions_per_second, without_overhead, Measured};
+use crate::report::color::viridis;
+
+/// A structure that passed its gate.
+pub(super) struct Gated {
+    pub cell: StructureCell,
+    pub traced: Traced,
+    /// Whether its timed kernels run with the driver's checks.
+    pub runtime_checks: bool,
+    /// Million primary and bounce rays per second, for choosing the fastest.
+    pub speed: f64,
+    record: StructureRecord,
+    hash: String,
+    /// Counted cost of every pixel's primary ray.
+    costs: Vec<f32>,
+}
+
+/// Builds, validates, uploads and gates one structure.
+pub(super) fn build_and_gate(
+    session: &mut Session,
+    world: &World,
+    accel: &Variant,
+) -> Result<(Traced, StructureRecord), Box<StructureRecord>> {
+    let mut record = empty_record(world, accel, session.experiment.runtime_checks);
+    let Some(kind) = session.registries.accel.get(&accel.name) else {
+        record.failure = Some(format!("no structure is called {accel}"));
+        return Err(Box::new(record));
+    };
+    let mut log = BuildLog::default();
+    let built = session.clock.time("build", || kind.build(&world.soup, &accel.params, &mut log));
+    record.build_ms = log.total_ms();
+    record.build = log.phases;
+    let built = match built {
+        Ok(built) => built,
+        Err(error) => {
+            record.failure = Some(error.to_string());
+            return Err(Box::new(record));
+        }
+    };
+    record.stats = built.stats();
+    let structural = session.clock.time("gate", || built.validate(&world.soup)).err().map(|e| e.to_string());
+    let traced = match Traced::upload(world.gpu, kind, &*built) {
+        Ok(traced) => traced,
+        Err(error) => {
+            record.failure = Some(error.to_string());
+            return Err(Box::new(record));
+        }
+    };
+    drop(built);
+    match session.clock.time("gate", || gate_twice(session.experiment.runtime_checks, world, &traced)) {
+        Err(error) => record.failure = Some(error.to_string()),
+        Ok(mut verdict) => {
+            verdict.passed &= structural.is_none();
+            verdict.structural = structural;
+            if !verdict.passed {
+                record.failure = Some(failure_text(&verdict, world.judge.first_wrong.as_deref()));
+            }
+            record.gate = Some(verdict);
+        }
+    }
+    if record.failure.is_some() { Err(Box::new(record)) } else { Ok((traced, record)) }
+}
+
+/// The gate with the driver's checks; without them only if that passed.
+fn gate_twice(runtime_checks: bool, world: &World, traced: &Traced) -> Result<GateVerdict, GpuError> {
+    let run = |checks| gate(world.gpu, &world.buffers, &world.soup, traced, &world.judge, &world.probe, checks);
+    let checked = run(true)?;
+    if runtime_checks || !checked.passed { Ok(checked) } else { run(false) }
+}
+
+fn failure_text(verdict: &GateVerdict, judge_fault: Option<&str>) -> String {
+    let mut parts = Vec::new();
+    let wrong: usize = verdict.classes.iter().map(|c| c.wrong).sum();
+    if wrong > 0 {
+        let rays: usize = verdict.classes.iter().map(|c| c.rays).sum();
+        let first = verdict.classes.iter().find_map(|c| c.first_wrong.as_deref()).unwrap_or_default();
+        parts.push(format!("{wrong} of {rays} rays differ from the judge; first: {first}"));
+    }
+    parts.extend(verdict.kernel_errors.iter().cloned());
+    parts.extend(verdict.structural.clone());
+    if verdict.brute_force.wrong + verdict.oracle.wrong > 0 {
+        parts.push(format!(
+            "the judge itself is wrong on {} rays against brute force and {} against f64; first: {}",
+            verdict.brute_force.wrong,
+            verdict.oracle.wrong,
+            judge_fault.unwrap_or_default()
+        ));
+    }
+    parts.join("; ")
+}
+
+fn empty_record(world: &World, accel: &Variant, runtime_checks: bool) -> StructureRecord {
+    StructureRecord {
+        scene: world.variant.label.clone(),
+        accel: accel.clone(),
+        features: Vec::new(),
+        runtime_checks,
+        build: Vec::new(),
+        build_ms: 0.0,
+        stats: StructureStats::default(),
+        gate: None,
+        timings: Vec::new(),
+        heat_map: None,
+        heat_map_max: None,
+        failure: None,
+    }
+}
+
+/// A ray class through a structure, measured.
+struct Timed<'a> {
+    structure: usize,
+    batch: Batch<'a>,
+}
+
+impl Measured for Timed<'_> {
+    fn measure(&self) -> Result<Elapsed, GpuError> {
+        self.batch.trace()
+    }
+}
+
+/// Everything about the structures of a scene; returns those that may be used further.
+pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, RunError> {
+    let cells: Vec<StructureCell> =
+        session.plan.structures.iter().filter(|c| c.scene == *world.variant).cloned().collect();
+    let mut gated = Vec::new();
+    for cell in cells {
+        if session.is_done(&cell.to_string()) && !session.is_done(&passed(&cell)) {
+            continue;
+        }
+        session.say(format!("{cell}: build and gate"));
+        match build_and_gate(session, world, &cell.accel) {
+            Ok((traced, record)) => gated.push(Gated {
+                hash: structure_hash(world, &cell),
+                runtime_checks: record.runtime_checks,
+                cell,
+                traced,
+                speed: 0.0,
+                record,
+                costs: Vec::new(),
+            }),
+            Err(record) => write_failed(session, world, &cell, *record)?,
+        }
+        session.progress.inc(2);
+    }
+    time_all(session, world, &mut gated)?;
+    draw_heat_maps(session, world, &mut gated)?;
+    for structure in &gated {
+        let cell = structure.cell.to_string();
+        if !session.is_done(&cell) {
+            session.write(&structure.hash, Record::Structure(structure.record.clone()))?;
+            session.finish(cell);
+            session.finish(passed(&structure.cell));
+        }
+    }
+    Ok(gated)
+}
+
+/// Marks a structure that passed: it is built again after a lost device.
+fn passed(cell: &StructureCell) -> String {
+    format!("{cell}: passed")
+}
+
+fn structure_hash(world: &World, cell: &StructureCell) -> String {
+    let params = serde_json::to_string(&cell.accel).unwrap_or_default();
+    cell_hash(&[("scene", &world.scene.hash), ("accel", &params), ("version", env!("CARGO_PKG_VERSION"))])
+}
+
+fn write_failed(
+    session: &mut Session,
+    world: &World,
+    cell: &StructureCell,
+    record: StructureRecord,
+) -> Result<(), RunError> {
+    let reason = record.failure.clone().unwrap_or_default();
+    session.progress.println(format!("FAILED {cell}: {reason}"));
+    session.failed += 1;
+    session.finish(cell.to_string());
+    session.write(&structure_hash(world, cell), Record::Structure(record))
+}
+
+/// Times every class through every structure in interleaved rounds, then counts the work.
+fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Result<(), RunError> {
+    session.say(format!("{}: timing structures", world.variant));
+    let mut failures: Vec<Option<String>> = vec![None; gated.len()];
+    let mut timed = Vec::new();
+    for (structure, item) in gated.iter_mut().enumerate() {
+        for set in &world.judge.sets {
+            let checks = item.runtime_checks;
+            match Batch::new(world.gpu, &world.buffers, &item.traced, Query::of(set), &set.rays, checks) {
+                Ok(batch) => timed.push(Timed { structure, batch }),
+                Err(error) => failures[structure] = Some(error.to_string()),
+            }
+        }
+    }
+    let (timing, seed) = (session.experiment.timing, u64::from(session.experiment.seed));
+    let progress = session.progress.clone();
+    let samples = session.clock.time("gpu", || interleave(&timed, &timing, seed, || progress.inc(1)));
+    for (index, (item, result)) in timed.iter().zip(samples).enumerate() {
+        let set = &world.judge.sets[index % world.judge.sets.len()];
+        let structure = &mut gated[item.structure];
+        let outcome = result.and_then(|samples| {
+            let empty = session.clock.time("gpu", || empty_ms(|| item.batch.trace_nothing()))?;
+            let work = session.clock.time("gpu", || {
+                count_work(world.gpu, &world.buffers, &structure.traced, Query::of(set), &set.rays)
+            })?;
+            let ms = without_overhead(&samples.ms, empty);
+            let rate = millions_per_second(&ms, set.rays.len() as f64);
+            Ok(rate.map(|mrays_s| ClassTiming {
+                class: set.class,
+                rays: set.rays.len(),
+                hit_fraction: set.hit_fraction(),
+                ms,
+                wall_ms: samples.wall_ms,
+                mrays_s,
+                counters: per_ray(&work),
+            }))
+        });
+        match outcome {
+            Ok(timing) => structure.record.timings.extend(timing),
+            Err(error) => failures[item.structure] = Some(error.to_string()),
+        }
+        structure.record.features = item.batch.features();
+    }
+    let mut kept = Vec::new();
+    for (mut structure, failure) in gated.drain(..).zip(failures) {
+        if let Some(failure) = failure {
+            structure.record.failure = Some(failure);
+            structure.record.timings.clear();
+            write_failed(session, world, &structure.cell.clone(), structure.record)?;
+        } else {
+            structure.speed = structure.record.timings.iter().map(|t| t.mrays_s.value.ln()).sum::<f64>();
+            kept.push(structure);
+        }
+    }
+    *gated = kept;
+    Ok(())
+}
+
+fn per_ray(work: &[Counters]) -> CountersPerRay {
+    let mean = |get: fn(&Counters) -> u32| work.iter().map(|c| f64::from(get(c))).sum::<f64>() / work.len().max(1) as f64;
+    CountersPerRay {
+        nodes: mean(|c| c.nodes),
+        box_tests: mean(|c| c.box_tests),
+        triangle_tests: mean(|c| c.triangle_tests),
+        stack_high_water: work.iter().map(|c| c.stack_high_water).max().unwrap_or(0),
+    }
+}
+
+/// Cost of every pixel's primary ray as a picture, one scale for all structures of a scene. The
+/// scale ends at the 99th percentile of the costliest structure but brute force, whose cost is the
+/// same everywhere and would leave the others black.
+fn draw_heat_maps(session: &mut Session, world: &World, gated: &mut [Gated]) -> Result<(), RunError> {
+    let [width, height] = session.experiment.resolution;
+    let rays = primary_rays(world.camera, width, height);
+    let pixels = primary_pixels(width, height);
+    for structure in gated.iter_mut() {
+        let work = session.clock.time("gpu", || {
+            count_work(world.gpu, &world.buffers, &structure.traced, Query::Closest, &rays)
+        });
+        let Ok(work) = work else { continue };
+        structure.costs = vec![0.0; rays.len()];
+        for (pixel, counters) in pixels.iter().zip(&work) {
+            structure.costs[*pixel as usize] = (counters.nodes + counters.triangle_tests) as f32;
+        }
+    }
+    let percentile = |costs: &[f32]| {
+        let mut sorted = costs.to_vec();
+        sorted.sort_unstable_by(f32::total_cmp);
+        sorted.get(sorted.len() * 99 / 100).copied().unwrap_or(0.0)
+    };
+    let others = gated.iter().filter(|g| g.cell.accel.name != "brute-force");
+    let scale = others.map(|g| percentile(&g.costs)).fold(1.0, f32::max);
+    for structure in gated.iter_mut().filter(|s| !s.costs.is_empty()) {
+        let picture = Picture { width, height, pixels: structure.costs.iter().map(|c| viridis(c / scale)).collect() };
+        let (relative, path) = session.image_path(&["heat", &world.variant.label, &structure.cell.accel.label]);
+        write_png(&path, &picture).map_err(|e| RunError::Input(e.to_string()))?;
+        structure.record.heat_map = Some(relative);
+        structure.record.heat_map_max = Some(f64::from(scale));
+    }
+    Ok(())
+}

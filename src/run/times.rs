@@ -1,0 +1,212 @@
+//! Time of full cells, at few samples per pixel, in interleaved rounds; and the proof by hash that
+//! every structure gives the same image.
+
+use super::errors::{image_hash, job};
+use super::session::Session;
+use super::structures::Gated;
+use super::world::World;
+use super::RunError;
+use crate::config::{cell_hash, TimeCell, Variant};
+use crate::gpu::{Elapsed, GpuError};
+use crate::integrator::{Renderer, RAY_COUNT_CLASSES};
+use crate::measure::record::{Interval, Record, TimeRecord};
+use crate::measure::statistics::bootstrap_median;
+use crate::measure::timing::{interleave, Measured, Samples};
+use crate::sampling::Sampler;
+use std::collections::BTreeMap;
+
+/// A full cell, compiled.
+struct Timed<'a> {
+    cell: TimeCell,
+    renderer: Renderer<'a>,
+    spp: u32,
+    seed: u32,
+    runtime_checks: bool,
+}
+
+impl Measured for Timed<'_> {
+    fn measure(&self) -> Result<Elapsed, GpuError> {
+        self.renderer.reset();
+        self.renderer.add_samples(0, self.spp, self.seed)?;
+        Ok(self.renderer.spent())
+    }
+}
+
+/// What does not depend on the structure: counted rays and the image, per sampler and integrator.
+#[derive(Default)]
+struct Shared {
+    rays: BTreeMap<String, [u64; 4]>,
+    image: BTreeMap<String, String>,
+}
+
+fn key(cell: &TimeCell) -> String {
+    format!("{}, {} × {}", cell.integrator, cell.sequence, cell.decorrelation)
+}
+
+/// All full cells of a scene.
+pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Result<(), RunError> {
+    let cells: Vec<TimeCell> = session.plan.times.iter().filter(|c| c.scene == *world.variant).cloned().collect();
+    let mut timed = Vec::new();
+    for cell in cells {
+        let text = cell.to_string();
+        if session.is_done(&text) {
+            continue;
+        }
+        let Some(structure) = gated.iter().find(|g| g.cell.accel == cell.accel) else {
+            let record = empty_record(session, world, &cell, "its structure did not pass the gate".to_owned());
+            session.failed += 1;
+            session.finish(text);
+            session.write("", Record::Time(record))?;
+            continue;
+        };
+        session.say(format!("{cell}: compiling"));
+        match compile(session, world, structure, cell.clone()) {
+            Ok(item) => timed.push(item),
+            Err(reason) => fail(session, world, &cell, reason)?,
+        }
+    }
+    session.say(format!("{}: timing full cells", world.variant));
+    let (timing, seed) = (session.experiment.timing, u64::from(session.experiment.seed));
+    let progress = session.progress.clone();
+    let samples = session.clock.time("gpu", || interleave(&timed, &timing, seed, || progress.inc(1)));
+    let mut shared = Shared::default();
+    for (item, samples) in timed.iter().zip(samples) {
+        let structure = gated.iter().find(|g| g.cell.accel == item.cell.accel);
+        let measured = samples.map_err(|e| e.to_string());
+        let record = measured.and_then(|samples| finish(session, world, structure, item, samples, &mut shared));
+        match record {
+            Ok(record) => {
+                let hash = cell_hash(&[
+                    ("scene", &world.scene.hash),
+                    ("cell", &serde_json::to_string(&(&record.accel, &record.integrator)).unwrap_or_default()),
+                    ("kernel", item.renderer.kernel_text()),
+                    ("device", &format!("{:?}", world.gpu.info)),
+                    ("version", env!("CARGO_PKG_VERSION")),
+                ]);
+                if let Some(reason) = &record.failure {
+                    session.progress.println(format!("FAILED {}: {reason}", item.cell));
+                    session.failed += 1;
+                }
+                session.finish(item.cell.to_string());
+                session.write(&hash, Record::Time(record))?;
+            }
+            Err(reason) => fail(session, world, &item.cell, reason)?,
+        }
+    }
+    Ok(())
+}
+
+fn sampler_of(session: &Session, cell: &TimeCell) -> Result<Sampler, String> {
+    let found = session.registries.samplers.sampler(&cell.sequence, &cell.decorrelation);
+    found.ok_or_else(|| "this sampler is not registered".to_owned())
+}
+
+fn compile<'a>(
+    session: &mut Session,
+    world: &'a World,
+    structure: &Gated,
+    cell: TimeCell,
+) -> Result<Timed<'a>, String> {
+    let sampler = sampler_of(session, &cell)?;
+    let checks = structure.runtime_checks;
+    let job = job(session, world, &sampler, &cell.integrator, checks)?;
+    let compiled = session
+        .clock
+        .time("gpu", || Renderer::new(world.gpu, &world.buffers, &structure.traced, &job, false));
+    let renderer = compiled.map_err(|e| e.to_string())?;
+    let (spp, seed) = (session.experiment.timing.spp, session.experiment.seed);
+    Ok(Timed { cell, renderer, spp, seed, runtime_checks: checks })
+}
+
+/// Figures of a measured cell.
+fn finish(
+    session: &mut Session,
+    world: &World,
+    structure: Option<&Gated>,
+    item: &Timed,
+    samples: Samples,
+    shared: &mut Shared,
+) -> Result<TimeRecord, String> {
+    let image = item.renderer.image().and_then(|image| Ok((image, item.renderer.error_word()?)));
+    let (image, error_word) = image.map_err(|e| e.to_string())?;
+    let hash = image_hash(&image);
+    let first = shared.image.entry(key(&item.cell)).or_insert_with(|| hash.clone()).clone();
+    let rays = match shared.rays.get(&key(&item.cell)) {
+        Some(rays) => *rays,
+        None => {
+            let structure = structure.ok_or("its structure is gone")?;
+            let rays = count_rays(session, world, structure, item)?;
+            shared.rays.insert(key(&item.cell), rays);
+            rays
+        }
+    };
+    let total: u64 = rays.iter().sum();
+    let spp = f64::from(item.spp);
+    let per_spp: Vec<f64> = samples.ms.iter().map(|ms| ms / spp).collect();
+    let rates: Vec<f64> = samples.ms.iter().map(|ms| total as f64 / ms * 1e-3).collect();
+    let equal = hash == first;
+    let failure = match (equal, error_word) {
+        (_, word) if word != 0 => Some(format!("a kernel raised error word {word}")),
+        (false, _) if world.probe.is_exact() => Some("its image differs from that of the scene's first structure".to_owned()),
+        _ => None,
+    };
+    let mut record = empty_record(session, world, &item.cell, String::new());
+    record.failure = failure;
+    if record.failure.is_none() {
+        record.ms_per_spp = bootstrap_median(&per_spp).ok_or("no sample was kept")?;
+        record.mrays_s = bootstrap_median(&rates).ok_or("no sample was kept")?;
+        record.ms = samples.ms;
+        record.wall_ms = samples.wall_ms;
+    }
+    record.rays = RAY_COUNT_CLASSES.iter().zip(rays).filter(|(_, n)| *n > 0).map(|(c, n)| ((*c).to_owned(), n)).collect();
+    record.image_hash = hash;
+    record.image_equal = equal;
+    record.runtime_checks = item.runtime_checks;
+    record.features = item.renderer.features();
+    Ok(record)
+}
+
+/// Rays per class, from a separate counting run of the same seed.
+fn count_rays(session: &mut Session, world: &World, structure: &Gated, item: &Timed) -> Result<[u64; 4], String> {
+    let sampler = sampler_of(session, &item.cell)?;
+    let job = job(session, world, &sampler, &item.cell.integrator, true)?;
+    let counted = session.clock.time("gpu", || {
+        let renderer = Renderer::new(world.gpu, &world.buffers, &structure.traced, &job, true)?;
+        renderer.reset();
+        renderer.add_samples(0, item.spp, item.seed)?;
+        renderer.ray_counts()
+    });
+    counted.map_err(|e| e.to_string())
+}
+
+fn empty_record(session: &Session, world: &World, cell: &TimeCell, failure: String) -> TimeRecord {
+    let nothing = Interval { value: 0.0, low: 0.0, high: 0.0 };
+    let label = |v: &Variant| v.clone();
+    TimeRecord {
+        scene: world.variant.label.clone(),
+        accel: label(&cell.accel),
+        sequence: label(&cell.sequence),
+        decorrelation: label(&cell.decorrelation),
+        integrator: label(&cell.integrator),
+        resolution: session.experiment.resolution,
+        spp: session.experiment.timing.spp,
+        ms: Vec::new(),
+        wall_ms: Vec::new(),
+        ms_per_spp: nothing,
+        rays: BTreeMap::new(),
+        mrays_s: nothing,
+        image_hash: String::new(),
+        image_equal: false,
+        runtime_checks: session.experiment.runtime_checks,
+        features: Vec::new(),
+        failure: Some(failure),
+    }
+}
+
+fn fail(session: &mut Session, world: &World, cell: &TimeCell, reason: String) -> Result<(), RunError> {
+    session.progress.println(format!("FAILED {cell}: {reason}"));
+    session.failed += 1;
+    session.finish(cell.to_string());
+    let record = empty_record(session, world, cell, reason);
+    session.write("", Record::Time(record))
+}

@@ -1,0 +1,86 @@
+//! A scene made ready: loaded, uploaded, judged.
+
+use super::session::Session;
+use super::RunError;
+use crate::accel::TriangleSoup;
+use crate::config::Variant;
+use crate::gpu::{ArithmeticProbe, Gpu};
+use crate::integrator::SceneBuffers;
+use crate::measure::gate::Judge;
+use crate::measure::record::{Record, SceneRecord};
+use crate::scene::{self, Camera, LoadOptions, SceneData};
+use std::time::Instant;
+
+/// A scene with everything that its cells share.
+pub(super) struct World<'a> {
+    pub gpu: &'a Gpu,
+    pub probe: ArithmeticProbe,
+    pub variant: &'a Variant,
+    pub scene: SceneData,
+    pub camera: Camera,
+    pub soup: TriangleSoup,
+    pub buffers: SceneBuffers,
+    pub judge: Judge,
+}
+
+impl<'a> World<'a> {
+    /// Loads, uploads and judges a scene. The inner error concerns this scene alone.
+    pub fn new(
+        session: &mut Session,
+        gpu: &'a Gpu,
+        variant: &'a Variant,
+    ) -> Result<Result<Self, String>, RunError> {
+        session.say(format!("{variant}: loading"));
+        let start = Instant::now();
+        let options = LoadOptions::default();
+        let loaded = session.clock.time("load", || scene::load(variant, &options));
+        let scene = match loaded {
+            Ok(scene) => scene,
+            Err(error) => return Ok(Err(error.to_string())),
+        };
+        let load_ms = start.elapsed().as_secs_f64() * 1e3;
+        let camera = session.experiment.camera.or(scene.camera).unwrap_or_else(|| Camera::frame(&scene.bounds()));
+        if let Err(error) = camera.validate() {
+            return Ok(Err(error.to_string()));
+        }
+        let cell = format!("scene {variant}");
+        if !session.is_done(&cell) {
+            session.write(&scene.hash, Record::Scene(scene_record(variant, &scene, camera, load_ms)))?;
+            session.finish(cell);
+        }
+        session.say(format!("{variant}: checking the judge"));
+        let soup = session.clock.time("load", || TriangleSoup::new(&scene));
+        let uploaded = session.clock.time("load", || SceneBuffers::upload(gpu, &scene, &soup));
+        let experiment = session.experiment;
+        let mut settings = experiment.gate;
+        settings.rays = settings.rays.max(experiment.timing.rays);
+        let judged = session
+            .clock
+            .time("judge", || Judge::new(&scene, &soup, camera, &settings, u64::from(experiment.seed)));
+        let probe = session.clock.time("gate", || crate::gpu::probe_arithmetic(gpu));
+        Ok((|| {
+            let buffers = uploaded.map_err(|e| e.to_string())?;
+            let judge = judged.map_err(|e| e.to_string())?;
+            let probe = probe.map_err(|e| e.to_string())?;
+            Ok(Self { gpu, probe, variant, scene, camera, soup, buffers, judge })
+        })())
+    }
+}
+
+fn scene_record(variant: &Variant, scene: &SceneData, camera: Camera, load_ms: f64) -> SceneRecord {
+    let bounds = scene.bounds();
+    SceneRecord {
+        scene: variant.label.clone(),
+        triangles: scene.triangles.len(),
+        bounds_min: bounds.min.to_array(),
+        bounds_max: bounds.max.to_array(),
+        load_ms,
+        bytes: scene.bytes() as u64,
+        materials: scene.materials.len(),
+        textures: scene.textures.len(),
+        emitters: scene.emitters().len(),
+        camera,
+        report: scene.report.clone(),
+        scene_hash: scene.hash.clone(),
+    }
+}

@@ -1,0 +1,118 @@
+//! glTF and GLB.
+
+use super::*;
+
+#[test]
+fn textures_are_reduced_aloud_or_left_out_as_the_options_say() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("a.glb");
+    fs::write(&path, square_glb()).unwrap();
+    let load_with = |textures, max_texture_size| {
+        let options = LoadOptions {
+            textures,
+            max_texture_size,
+        };
+        load(&variant(path.to_str().unwrap()), &options).unwrap()
+    };
+    let reduced = load_with(true, 1);
+    assert_eq!(reduced.textures[0].texels.len(), 1);
+    assert!(reduced.report.warnings[0].contains("from 2x1 to 1x1"));
+    let plain = load_with(false, 1024);
+    assert!(plain.textures.is_empty() && plain.uvs.is_empty());
+    assert_eq!(plain.materials[0].base_color_texture, None);
+    assert!(plain.report.warnings.is_empty());
+}
+
+#[test]
+fn glb_nodes_are_flattened_with_their_transforms() {
+    let scene = load_files("a.GLB", &[("a.GLB", &square_glb())]).unwrap();
+    assert_eq!(scene.triangles.len(), 4);
+    let far = scene.triangles[2].vertices[2];
+    assert_eq!(far, Vec3::new(7.0, 2.0, 0.0));
+    let camera = scene.camera.unwrap();
+    assert_eq!(camera.eye, Vec3::new(0.0, 0.0, 7.0));
+    assert!(
+        (camera.target - camera.eye)
+            .normalize()
+            .distance(Vec3::NEG_Z)
+            < 1e-6
+    );
+    assert!((camera.vertical_fov_degrees - 0.8_f32.to_degrees()).abs() < 1e-4);
+    let lamp = &scene.materials[0];
+    assert_eq!(lamp.emission, Vec3::new(4.0, 2.0, 0.0));
+    assert_eq!(lamp.base_color, Vec3::new(0.5, 0.6, 0.7));
+    assert_eq!(scene.uvs[0][1], Vec2::new(2.25, 0.0));
+    assert_eq!(scene.textures[0].width, 2);
+}
+
+#[test]
+fn gltf_buffers_and_images_may_lie_in_files_or_data_uris() {
+    use base64::Engine;
+    let image = png();
+    let bin = square_bin(&[]);
+    let encoded = base64::engine::general_purpose::STANDARD.encode(&image);
+    let json = square_json(0)
+        .replace(
+            "{\"byteLength\":92}",
+            "{\"byteLength\":92,\"uri\":\"a%20b.bin\"}",
+        )
+        .replace(
+            ",\n      {\"buffer\":0,\"byteOffset\":92,\"byteLength\":0}",
+            "",
+        )
+        .replace(
+            "{\"bufferView\":3,\"mimeType\":\"image/png\"}",
+            &format!("{{\"uri\":\"data:image/png;base64,{encoded}\"}}"),
+        );
+    let files: &[(&str, &[u8])] = &[("a.gltf", json.as_bytes()), ("a b.bin", &bin)];
+    let apart = load_files("a.gltf", files).unwrap();
+    let whole = load_files("a.glb", &[("a.glb", &square_glb())]).unwrap();
+    assert_eq!(apart.hash, whole.hash);
+    let message = failure(load_files("a.gltf", &files[..1]));
+    assert!(
+        message.contains("buffer 0") && message.contains("a b.bin"),
+        "{message}"
+    );
+}
+
+#[test]
+fn broken_gltf_files_say_which_part() {
+    let image = png();
+    let bin = square_bin(&image);
+    let json = square_json(image.len());
+    for (from, to, expected) in [
+        ("\"nodes\":[0,1,3]", "\"nodes\":[0,1,1]", "node 1"),
+        ("\"children\":[2]", "\"children\":[1]", "node 1"),
+        (
+            "\"count\":4,\"type\":\"VEC3\"",
+            "\"count\":3,\"type\":\"VEC3\"",
+            "vertex 3",
+        ),
+        ("\"count\":6", "\"count\":600", "mesh 0"),
+        (
+            "\"count\":4,\"type\":\"VEC3\"",
+            "\"count\":4,\"type\":\"VEC2\"",
+            "mesh 0",
+        ),
+        ("{\"mesh\":0}", "{}", ""),
+        (
+            "\"asset\"",
+            "\"extensionsRequired\":[\"X_none\"],\"asset\"",
+            "extensionsRequired",
+        ),
+        ("\"material\":0", "\"material\":9", "material"),
+    ] {
+        assert!(json.contains(from), "{from}");
+        let result = load_files("a.glb", &[("a.glb", &glb(&json.replace(from, to), &bin))]);
+        match result {
+            Ok(scene) => assert!(expected.is_empty() && scene.triangles.len() == 2, "{to}"),
+            Err(error) => {
+                let message = error.to_string();
+                assert!(
+                    !expected.is_empty() && message.contains(expected),
+                    "{to}: {message}"
+                );
+            }
+        }
+    }
+}

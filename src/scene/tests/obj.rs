@@ -1,0 +1,123 @@
+//! OBJ and MTL.
+
+use super::*;
+
+#[test]
+fn relative_indices_and_polygons_give_the_same_triangles_as_absolute_ones() {
+    let absolute = load_obj(&format!("{SQUARE}f 1 2 3 4\n")).unwrap();
+    let relative = load_obj(&format!("{SQUARE}f -4 -3 -2 -1\n")).unwrap();
+    let triangles = load_obj(&format!("{SQUARE}f 1 2 3\nf 1 3 4\n")).unwrap();
+    assert_eq!(absolute.triangles.len(), 2);
+    assert_eq!(absolute.hash, relative.hash);
+    assert_eq!(absolute.hash, triangles.hash);
+    let turned = load_obj(&format!("{SQUARE}f 2 3 4 1\n")).unwrap();
+    assert_ne!(absolute.hash, turned.hash);
+}
+
+#[test]
+fn obj_materials_and_textures_arrive() {
+    let mtl = b"newmtl wall\nKd 0.5 0.25 2\nmap_Kd -s 1 1 1 tex.png\nNs 10\nillum 2\n\
+        newmtl lamp\nKe 3 2 1\nnewmtl mirror\nillum 5\nKd 0 0 0\nKs 0.9 0.8 0.7\n\
+        newmtl glass\nillum 7\nNi 1.5\nd 0.1\n";
+    let obj = format!(
+        "mtllib m.mtl\n{SQUARE}vt 0 0\nvt 1 0\nvt 1 0.75\nusemtl wall\nf 1/1 2/2 3/3\n\
+         usemtl lamp\nf 1 2 3\nusemtl mirror\nf 1 2 3\nusemtl glass\nf 1 2 3\n"
+    );
+    let image = png();
+    let scene = load_files(
+        "a.obj",
+        &[
+            ("a.obj", obj.as_bytes()),
+            ("m.mtl", mtl),
+            ("tex.png", &image),
+        ],
+    )
+    .unwrap();
+    let [wall, lamp, mirror, glass] = &scene.materials[..] else {
+        panic!("{:?}", scene.materials);
+    };
+    assert_eq!(wall.base_color, Vec3::new(0.5, 0.25, 1.0));
+    assert_eq!(wall.base_color_texture, Some(0));
+    assert_eq!(
+        scene.textures[0].texels,
+        [[255, 0, 0, 255], [0, 0, 255, 255]]
+    );
+    let down = |u: f32, v: f32| Vec2::new(u, 1.0 - v);
+    assert_eq!(
+        scene.uvs[0],
+        [down(0.0, 0.0), down(1.0, 0.0), down(1.0, 0.75)]
+    );
+    assert_eq!(lamp.emission, Vec3::new(3.0, 2.0, 1.0));
+    assert_eq!(mirror.kind, MaterialKind::Mirror);
+    assert_eq!(mirror.base_color, Vec3::new(0.9, 0.8, 0.7));
+    assert_eq!(
+        (glass.kind, glass.source.ior),
+        (MaterialKind::Diffuse, Some(1.5))
+    );
+    assert_eq!(scene.report.warnings.len(), 1, "{:?}", scene.report);
+    assert!(scene.report.warnings[0].contains("glass"));
+    assert_eq!(scene.emitters(), [1]);
+}
+
+#[test]
+fn a_missing_library_or_texture_is_a_warning() {
+    let obj = format!("mtllib none.mtl\n{SQUARE}usemtl a\nf 1 2 3\n");
+    let scene = load_obj(&obj).unwrap();
+    assert!(scene.report.warnings[0].contains("none.mtl"));
+    assert_eq!(scene.materials[0].base_color, Vec3::splat(DEFAULT_ALBEDO));
+
+    let mtl = b"newmtl a\nKd 1 0 0\nmap_Kd none.png\n";
+    let obj = obj.replace("none.mtl", "m.mtl");
+    let scene = load_files("a.obj", &[("a.obj", obj.as_bytes()), ("m.mtl", mtl)]).unwrap();
+    assert!(scene.report.warnings[0].contains("none.png"));
+    assert_eq!(scene.materials[0].base_color_texture, None);
+    assert!(scene.uvs.is_empty());
+}
+
+#[test]
+fn broken_obj_files_say_the_line_and_what_is_wrong() {
+    for (body, expected) in [
+        (
+            "f 1 2 9\n",
+            "(line 5): the face refers to vertex 9, but there are 4",
+        ),
+        ("f 1 2 -5\n", "(line 5): the face refers to vertex -5"),
+        ("f 1 2 0\n", "(line 5): the face refers to vertex 0"),
+        ("f 1 2 x\n", "(line 5): `x` is not a face corner"),
+        ("f 1/7 2/7 3/7\nvt 0 0\n", "texture coordinate 7"),
+        ("v 1 2\nf 1 2 3\n", "(line 5): `v` with 2 numbers"),
+        ("v 1 2 x\nf 1 2 3\n", "(line 5): `x` is not a number"),
+        ("", "no triangles"),
+        ("p 1\nl 1 2\n", "no triangles"),
+    ] {
+        let message = failure(load_obj(&format!("{SQUARE}{body}")));
+        assert!(message.contains(expected), "{message} lacks {expected}");
+        assert!(message.contains("model.OBJ"), "{message}");
+    }
+}
+
+#[test]
+fn non_finite_triangles_are_dropped_and_flat_ones_kept_and_both_are_counted() {
+    let body = "v nan 0 0\nv inf 0 0\nf 1 2 3\nf 1 2 5\nf 1 2 6\nf 1 1 2\n";
+    let scene = load_obj(&format!("{SQUARE}{body}")).unwrap();
+    assert_eq!(scene.triangles.len(), 2);
+    assert_eq!(scene.report.dropped_non_finite, 2);
+    assert_eq!(scene.report.zero_area, 1);
+    let message = failure(load_obj("v nan 0 0\nf 1 1 1\n"));
+    assert!(message.contains("all 1 have a NaN"), "{message}");
+}
+
+#[test]
+fn coordinates_that_would_overflow_are_refused() {
+    assert!(load_obj("v 9e15 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n").is_ok());
+    let message = failure(load_obj("v 2e16 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n"));
+    assert!(message.contains("2e16"), "{message}");
+}
+
+#[test]
+fn names_in_latin_1_do_not_stop_a_model() {
+    let mut bytes = SQUARE.as_bytes().to_vec();
+    bytes.extend(b"o T\xfcr\nf 1 2 3\n");
+    let scene = load_files("a.obj", &[("a.obj", &bytes)]).unwrap();
+    assert_eq!(scene.triangles.len(), 1);
+}
