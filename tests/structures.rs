@@ -107,6 +107,8 @@ fn hard_cases(seed: u64, rays_per_kind: usize) -> Vec<(Case, Vec<Ray>, Vec<Hit>)
         let hits = brute_force(&case.soup, &rays);
         rays.extend(scenes::cut_at_hits(&rays, &hits));
         let hits = brute_force(&case.soup, &rays);
+        let library = raystone::accel::brute_force_hits(&case.soup, &rays);
+        assert_same_hits("the library's brute force", &rays, &hits, &library);
         (case, rays, hits)
     };
     cases.into_iter().map(with_rays).collect()
@@ -397,18 +399,14 @@ fn builds_do_not_depend_on_the_number_of_threads() {
                 .num_threads(threads)
                 .build()
                 .expect("a thread pool");
-            let buffers = pool.install(|| {
+            pool.install(|| {
                 let built = kind.build(&soup, &params, &mut BuildLog::default());
-                built
-                    .unwrap_or_else(|e| panic!("{}: {e}", kind.name()))
-                    .buffers()
-            });
-            let arrays: Vec<_> = buffers
-                .arrays
-                .into_iter()
-                .map(|a| (a.name, a.words))
-                .collect();
-            (arrays, buffers.uniforms, buffers.constants)
+                let built = built.unwrap_or_else(|e| panic!("{}: {e}", kind.name()));
+                let buffers = built.buffers();
+                let arrays = buffers.arrays.iter().map(|a| (a.name, a.words.to_vec()));
+                let arrays: Vec<_> = arrays.collect();
+                (arrays, buffers.uniforms, buffers.constants)
+            })
         };
         let one = words(1);
         for threads in [2, 3] {
