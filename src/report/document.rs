@@ -1,7 +1,8 @@
 //! The report as a document that HTML, Markdown and the terminal show alike.
 
 use super::ReportError;
-use super::plot::drawing::{Drawing, to_png, to_svg};
+use super::plot::drawing::Drawing;
+use super::plot::paint::{to_png, to_svg};
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -3,7 +3,7 @@
 use super::data::RunData;
 use super::document::{Cell, Table};
 use super::samplers::Metric;
-use super::sections::{belief, samplers, structures, verdict};
+use super::sections::{belief, run, samplers, structures, verdict};
 use crate::measure::record::Line;
 
 /// Verdicts, speeds, errors and checks as aligned plain text.
@@ -26,7 +26,10 @@ pub fn terminal_tables(records: &[Line]) -> String {
     if data.run.is_some_and(|run| run.environment.software) {
         out += "Software adapter: times compare structures on this adapter only.\n";
     }
-    for check in belief::checks(&data) {
+    for check in belief::checks(&data)
+        .into_iter()
+        .chain(run::overhead_check(&data))
+    {
         out += &format!("{}  {}: {}\n", check.word(), check.title, check.detail);
     }
     out

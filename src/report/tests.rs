@@ -86,7 +86,7 @@ fn a_full_run_names_winners_failures_and_reasons() {
 
 #[test]
 fn the_page_is_self_contained_and_escapes_names() {
-    let (html, _) = report("escape", &full_run());
+    let (html, _) = report("escape", &small_run());
     assert!(html.contains("a&lt;b&gt;&amp;c") && !html.contains("a<b>"));
     assert!(html.contains("no texture &lt;x.png&gt;"));
     assert!(!html.contains("<script") && !html.contains("src=\"http") && !html.contains("@import"));
@@ -96,7 +96,7 @@ fn the_page_is_self_contained_and_escapes_names() {
 
 #[test]
 fn hostile_names_stay_text_everywhere() {
-    let mut lines = full_run();
+    let mut lines = small_run();
     for line in &mut lines {
         if let Record::Structure(record) = &mut line.record {
             record.accel.label = format!("<b>&{}", record.accel.label);
@@ -218,10 +218,7 @@ fn a_run_without_one_kind_of_record_still_reports() {
         ("no-stream", |r| matches!(r, Record::Stream(_))),
         ("no-finished", |r| matches!(r, Record::Finished(_))),
     ];
-    let small = without(
-        full_run(),
-        |r| matches!(r, Record::Reference(f) if f.scene != "cornell-box"),
-    );
+    let small = small_run();
     for (name, is_kind) in kinds {
         let (html, _) = report(name, &without(small.clone(), is_kind));
         assert!(
@@ -236,7 +233,7 @@ fn a_run_without_one_kind_of_record_still_reports() {
 
 #[test]
 fn one_structure_one_sampler_and_one_spp_are_enough() {
-    let mut lines = without(full_run(), |record| match record {
+    let mut lines = without(small_run(), |record| match record {
         Record::Structure(s) => s.accel.label != "bvh",
         Record::Time(t) => t.accel.label != "bvh" || t.sequence.label != "pixel-hash",
         Record::Error(e) => e.sequence.label != "pixel-hash",
@@ -254,7 +251,7 @@ fn one_structure_one_sampler_and_one_spp_are_enough() {
 
 #[test]
 fn a_run_where_everything_failed_shows_it_and_no_figure() {
-    let mut lines = without(full_run(), |r| {
+    let mut lines = without(small_run(), |r| {
         matches!(r, Record::Error(_) | Record::Bias(_))
     });
     for line in &mut lines {
@@ -271,25 +268,24 @@ fn a_run_where_everything_failed_shows_it_and_no_figure() {
 
 #[test]
 fn twelve_structures_fit_into_plots_and_tables() {
-    let mut lines = without(full_run(), |r| {
+    let mut lines = without(small_run(), |r| {
         matches!(r, Record::Structure(_) | Record::Time(_))
     });
     let names: Vec<String> = (0..12)
         .map(|i| format!("structure-{i} [leaf-size={i}, split-limit=0.25]"))
         .collect();
-    for scene in ["cornell-box", "displaced-sphere"] {
-        for (i, name) in names.iter().enumerate() {
-            lines.push(line(
-                structure(scene, name, 6.0 / (1.0 + i as f64 * 0.3), 0).into(),
-            ));
-        }
-        let timed: Vec<(&str, f64)> = names
-            .iter()
-            .enumerate()
-            .map(|(i, name)| (name.as_str(), 1.0 + 0.3 * i as f64))
-            .collect();
-        lines.extend(times(scene, "path", &timed).into_iter().map(line));
+    let scene = "cornell-box";
+    for (i, name) in names.iter().enumerate() {
+        lines.push(line(
+            structure(scene, name, 6.0 / (1.0 + i as f64 * 0.3), 0).into(),
+        ));
     }
+    let timed: Vec<(&str, f64)> = names
+        .iter()
+        .enumerate()
+        .map(|(i, name)| (name.as_str(), 1.0 + 0.3 * i as f64))
+        .collect();
+    lines.extend(times(scene, "path", &timed).into_iter().map(line));
     let (html, _) = report("twelve", &lines);
     assert!(names.iter().all(|name| html.contains(name)));
 }

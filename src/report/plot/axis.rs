@@ -1,6 +1,7 @@
 //! Axes: where a value lies, which ticks are drawn, how they read.
 
-use super::drawing::{Anchor, DIM, Drawing, FONT_PX, GRID, INK, Point, text_width};
+use super::drawing::{Anchor, DIM, Drawing, FONT_PX, GRID, INK, Point};
+use super::paint::text_width;
 use crate::report::format;
 
 /// How values map to a length.

@@ -1,8 +1,9 @@
 //! Log–log curves with bands: error against samples or seconds, discrepancy against points.
 
 use super::axis::{Axis, Frame};
-use super::drawing::{Anchor, DIM, Drawing, INK, Ink, fit_text};
+use super::drawing::{Anchor, DIM, Drawing, INK, Ink};
 use super::marker;
+use super::paint::fit_text;
 
 /// One point of a curve, with the ends of its 95 % interval (equal to `y` where there is none).
 #[derive(Debug, Clone, Copy, PartialEq)]

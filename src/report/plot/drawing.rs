@@ -1,15 +1,6 @@
-//! A drawing as a list of shapes, painted on any `plotters` backend.
+//! A drawing as a list of shapes.
 //!
-//! Plots are laid out once, in pixels of the size shown, and painted twice: as SVG and as PNG. The
-//! only font is the embedded one, so that a machine without fonts draws the same picture.
-
-use crate::report::ReportError;
-use image::ImageEncoder;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{FontTransform, register_font};
-use std::sync::Once;
+//! Plots are laid out once, in pixels of the size shown; [`super::paint`] paints them.
 
 /// Colour with opacity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,10 +23,6 @@ impl Ink {
             rgb: self.rgb,
             alpha,
         }
-    }
-
-    fn color(self) -> RGBAColor {
-        RGBAColor(self.rgb[0], self.rgb[1], self.rgb[2], self.alpha)
     }
 }
 
@@ -204,198 +191,9 @@ fn dashes(points: &[Point], dash: f64, gap: f64) -> Vec<Vec<Point>> {
     pieces
 }
 
-/// Width of a text in pixels with the embedded font at [`FONT_PX`].
-pub fn text_width(text: &str) -> f64 {
-    register_fonts();
-    // Measured large, because plotters answers in whole pixels.
-    font(8.0)
-        .box_size(text)
-        .map_or(0.0, |(width, _)| f64::from(width) / 8.0)
-}
-
-/// The text, shortened with `…` to fit into `width` pixels.
-pub fn fit_text(text: &str, width: f64) -> String {
-    if text_width(text) <= width {
-        return text.to_owned();
-    }
-    let mut kept: String = text.to_owned();
-    while !kept.is_empty() && text_width(&kept) + text_width("…") > width {
-        kept.pop();
-    }
-    kept + "…"
-}
-
-/// The embedded sans-serif font; plotters' sizes are 1.24 × the em.
-fn font(scale: f64) -> FontDesc<'static> {
-    FontDesc::new(
-        FontFamily::SansSerif,
-        FONT_PX * 1.24 * scale,
-        FontStyle::Normal,
-    )
-}
-
-fn register_fonts() {
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        let bytes = include_bytes!("../../../assets/fonts/DejaVuSans-subset.ttf");
-        // A broken font makes every text fail to draw, which `paint` reports.
-        let _ = register_font("sans-serif", FontStyle::Normal, bytes);
-    });
-}
-
-/// The drawing as an SVG document of its own size.
-pub fn to_svg(drawing: &Drawing) -> Result<String, ReportError> {
-    // Backends round to whole pixels: laid out eight times as large, shown at its size.
-    const SCALE: f64 = 8.0;
-    let (width, height) = scaled_size(drawing, SCALE);
-    let mut svg = String::new();
-    let mut backend = SVGBackend::with_string(&mut svg, (width, height));
-    let corner = (width as i32, height as i32);
-    backend
-        .draw_rect((0, 0), corner, &WHITE, true)
-        .map_err(|error| ReportError::Draw(error.to_string()))?;
-    paint(drawing, backend, SCALE, 0.5)?;
-    Ok(svg.replacen(
-        &format!(r#"width="{width}" height="{height}""#),
-        &format!(r#"width="{}" height="{}""#, drawing.width, drawing.height),
-        1,
-    ))
-}
-
-/// The drawing as a PNG file of twice its size, smoothed by 2×2 samples a pixel.
-pub fn to_png(drawing: &Drawing) -> Result<Vec<u8>, ReportError> {
-    const SCALE: f64 = 4.0;
-    let (width, height) = scaled_size(drawing, SCALE);
-    // White already: painting it pixel by pixel would take longer than the plot.
-    let mut pixels = vec![255u8; width as usize * height as usize * 3];
-    let backend = BitMapBackend::with_buffer(&mut pixels, (width, height));
-    paint(drawing, backend, SCALE, 2.5)?;
-    let mut png = Vec::new();
-    // Flat colours compress best unfiltered.
-    PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::NoFilter)
-        .write_image(
-            &halve(&pixels, width as usize),
-            width / 2,
-            height / 2,
-            image::ExtendedColorType::Rgb8,
-        )
-        .map_err(|error| ReportError::Draw(error.to_string()))?;
-    Ok(png)
-}
-
-/// An RGB picture of half the size: means of 2×2 pixels. `width` pixels a row, even in both
-/// directions.
-fn halve(pixels: &[u8], width: usize) -> Vec<u8> {
-    let mut half = Vec::with_capacity(pixels.len() / 4);
-    for rows in pixels.chunks_exact(width * 6) {
-        let (upper, lower) = rows.split_at(width * 3);
-        for (a, b) in upper.chunks_exact(6).zip(lower.chunks_exact(6)) {
-            for c in 0..3 {
-                let sum = [a[c], a[c + 3], b[c], b[c + 3]]
-                    .map(u16::from)
-                    .iter()
-                    .sum::<u16>();
-                half.push(((sum + 2) / 4) as u8);
-            }
-        }
-    }
-    half
-}
-
-fn scaled_size(drawing: &Drawing, scale: f64) -> (u32, u32) {
-    // Even, so that it can be halved.
-    let even = |length: f64| (length * scale / 2.0).round().max(1.0) as u32 * 2;
-    (even(drawing.width), even(drawing.height))
-}
-
-/// Paints every shape, `scale` backend pixels to a pixel. Backends disagree on where the middle of a
-/// text is: `drop` is how many pixels below its position it must be put to look centred.
-fn paint<B: DrawingBackend>(
-    drawing: &Drawing,
-    backend: B,
-    scale: f64,
-    drop: f64,
-) -> Result<(), ReportError> {
-    register_fonts();
-    let area = backend.into_drawing_area();
-    let draw_error = |error: String| ReportError::Draw(error);
-    let to_pixel = |&(x, y): &Point| ((x * scale).round() as i32, (y * scale).round() as i32);
-    for shape in &drawing.shapes {
-        let drawn = match shape {
-            Shape::Line { points, ink, width } => {
-                let style = ink
-                    .color()
-                    .stroke_width((width * scale).round().max(1.0) as u32);
-                area.draw(&PathElement::new(
-                    points.iter().map(to_pixel).collect::<Vec<_>>(),
-                    style,
-                ))
-            }
-            Shape::Area { points, ink } => {
-                let corners: Vec<_> = points.iter().map(to_pixel).collect();
-                area.draw(&Polygon::new(corners, ink.color().filled()))
-            }
-            Shape::Text {
-                at,
-                text,
-                ink,
-                anchor,
-                upwards,
-            } => {
-                let turn = if *upwards {
-                    FontTransform::Rotate270
-                } else {
-                    FontTransform::None
-                };
-                let h_pos = match anchor {
-                    Anchor::Start => HPos::Left,
-                    Anchor::Middle => HPos::Center,
-                    Anchor::End => HPos::Right,
-                };
-                let color = ink.color();
-                let style = TextStyle::from(font(scale).transform(turn))
-                    .color(&color)
-                    .pos(Pos::new(h_pos, VPos::Center));
-                let (right, down) = if *upwards { (drop, 0.0) } else { (0.0, drop) };
-                let place = to_pixel(&(at.0 + right, at.1 + down));
-                area.draw(&Text::new(text.clone(), place, style))
-            }
-        };
-        drawn.map_err(|e| draw_error(e.to_string()))?;
-    }
-    area.present().map_err(|e| draw_error(e.to_string()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn sample() -> Drawing {
-        let mut drawing = Drawing::new(120.0, 40.0);
-        drawing.line(vec![(0.0, 0.0), (100.0, 30.5)], INK, 1.5);
-        drawing.text((60.0, 20.0), "a<b & δ ≤ 10⁻³", INK, Anchor::Middle);
-        drawing
-    }
-
-    #[test]
-    fn svg_keeps_the_size_and_escapes_text() {
-        let svg = to_svg(&sample()).unwrap();
-        assert!(
-            svg.starts_with(r#"<svg width="120" height="40" viewBox="0 0 960 320""#),
-            "{svg}"
-        );
-        assert!(svg.contains("a&lt;b &amp; δ"));
-        assert!(!svg.contains("a<b"));
-    }
-
-    #[test]
-    fn png_has_twice_the_size_and_both_paper_and_ink() {
-        let png = to_png(&sample()).unwrap();
-        let picture = image::load_from_memory(&png).unwrap().to_luma8();
-        assert_eq!(picture.dimensions(), (240, 80));
-        assert!(picture.pixels().any(|p| p.0[0] == 255));
-        assert!(picture.pixels().any(|p| p.0[0] < 80));
-    }
 
     #[test]
     fn dashes_cover_their_share_of_the_line() {
@@ -407,12 +205,5 @@ mod tests {
             .sum();
         assert_eq!(pieces.len(), 10);
         assert!((drawn - 60.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn long_text_is_cut_to_its_place() {
-        let cut = fit_text("a very long name of a structure", 80.0);
-        assert!(cut.ends_with('…') && text_width(&cut) <= 80.0, "{cut}");
-        assert_eq!(fit_text("bvh", 80.0), "bvh");
     }
 }

@@ -1,6 +1,7 @@
 //! Small multiples of p-value histograms.
 
-use super::drawing::{Anchor, DIM, Drawing, FAILED, GRID, INK, Ink, fit_text};
+use super::drawing::{Anchor, DIM, Drawing, FAILED, GRID, INK, Ink};
+use super::paint::fit_text;
 
 /// The p-values of one sampler's bias check.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,8 +1,9 @@
 //! Run time against error: one point per cell, the Pareto front drawn and named.
 
 use super::axis::{Axis, Frame};
-use super::drawing::{Anchor, DIM, Drawing, INK, Point, fit_text};
+use super::drawing::{Anchor, DIM, Drawing, INK, Point};
 use super::marker;
+use super::paint::fit_text;
 use crate::measure::record::Interval;
 use crate::measure::statistics::pareto_front;
 

@@ -1,8 +1,9 @@
 //! Bars of Mrays/s, grouped by ray class.
 
 use super::axis::Axis;
-use super::drawing::{Anchor, DIM, Drawing, FAILED, FONT_PX, GRID, INK, fit_text, text_width};
+use super::drawing::{Anchor, DIM, Drawing, FAILED, FONT_PX, GRID, INK};
 use super::marker;
+use super::paint::{fit_text, text_width};
 use crate::measure::record::Interval;
 use crate::report::format;
 

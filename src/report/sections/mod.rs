@@ -2,6 +2,7 @@
 
 pub mod belief;
 pub mod run;
+pub mod sampler_plots;
 pub mod samplers;
 pub mod streams;
 pub mod structures;

@@ -28,32 +28,30 @@ fn time(data: &RunData) -> Option<Section> {
         )));
     }
     if let Some(finished) = data.finished {
-        let share = finished.overhead_s / finished.wall_s;
-        section.blocks.push(Block::Checks(overhead_check(share)));
+        section
+            .blocks
+            .extend(overhead_check(data).map(|check| Block::Checks(vec![check])));
         section.blocks.extend(wall_table(finished).into_block());
     }
     (!section.blocks.is_empty()).then_some(section)
 }
 
-fn overhead_check(share: f64) -> Vec<Check> {
-    if !share.is_finite() {
-        return Vec::new();
-    }
-    let tone = if share <= OVERHEAD_TARGET {
-        Tone::Good
-    } else {
-        Tone::Bad
-    };
-    let title = format!("Harness overhead at most {}", percent(OVERHEAD_TARGET));
-    let detail = format!(
-        "{} of the wall time is neither GPU work nor building, judging or loading.",
-        percent(share)
-    );
-    vec![Check {
-        tone,
-        title,
-        detail,
-    }]
+/// Whether the harness keeps to its share of the wall time; `None` if the run did not finish.
+pub fn overhead_check(data: &RunData) -> Option<Check> {
+    let finished = data.finished.filter(|finished| finished.wall_s > 0.0)?;
+    let share = finished.overhead_s / finished.wall_s;
+    Some(Check {
+        tone: if share <= OVERHEAD_TARGET {
+            Tone::Good
+        } else {
+            Tone::Bad
+        },
+        title: format!("Harness overhead at most {}", percent(OVERHEAD_TARGET)),
+        detail: format!(
+            "{} of the wall time is neither GPU work nor building, judging or loading.",
+            percent(share)
+        ),
+    })
 }
 
 fn wall_table(finished: &crate::measure::record::FinishedRecord) -> Table {
@@ -83,7 +81,7 @@ fn wall_table(finished: &crate::measure::record::FinishedRecord) -> Table {
 }
 
 fn failures(data: &RunData) -> Option<Section> {
-    let mut table = Table::new("Cells without figures", &["cell", ":state", ":reason"]);
+    let mut table = Table::new("Failed and skipped cells", &["cell", ":state", ":reason"]);
     let mut add = |cell: String, state: &str, tone, reason: String| {
         table.rows.push(vec![
             cell.into(),

@@ -1,12 +1,12 @@
 //! Samplers under one scene and integrator: errors, times, bias, pictures.
 
+use super::sampler_plots::{error_figures, histograms, pareto_plot};
 use super::verdict::Race;
 use crate::measure::record::{BiasRecord, Interval, TimeRecord};
 use crate::report::data::{RunData, View, sampler_name, structure_name};
 use crate::report::document::*;
-use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
-use crate::report::plot::histogram::{self, Histogram};
-use crate::report::plot::pareto::{CellPoint, ParetoPlot, letter};
+use crate::report::plot::histogram;
+use crate::report::plot::pareto::letter;
 use crate::report::samplers::{Metric, Sampler};
 use crate::report::{format, pictures};
 use std::path::Path;
@@ -47,110 +47,6 @@ pub fn blocks(dir: &Path, data: &RunData, stem: &str, view: &View) -> Vec<Block>
         blocks.push(Block::Paragraph("Nothing was measured.".into()));
     }
     blocks
-}
-
-fn error_figures(data: &RunData, stem: &str, view: &View) -> Vec<Figure> {
-    let structure = view.fastest_structure();
-    let mut figures = Vec::new();
-    for metric in [Metric::RelMse, Metric::Rmse] {
-        let name = metric.name();
-        let y_title = format!("{name} (mean over replicates)");
-        let by_spp = CurvePlot {
-            x_title: "samples per pixel".into(),
-            x_ticks: Ticks::PowersOfTwo,
-            y_title: y_title.clone(),
-            curves: view
-                .samplers
-                .iter()
-                .filter_map(|s| curve_by_spp(data, s, metric))
-                .collect(),
-            guides: Vec::new(),
-        };
-        if let Some(drawing) = by_spp.draw() {
-            let caption = format!(
-                "{name} against samples. Bands: 95 % interval of the mean; dashed: deterministic."
-            );
-            figures.push(Figure::new(
-                format!("{stem}-{}-spp", name.to_lowercase()),
-                caption,
-                drawing,
-            ));
-        }
-        let Some(structure) = &structure else {
-            continue;
-        };
-        let by_seconds = CurvePlot {
-            x_title: format!("render time with {structure}, seconds"),
-            x_ticks: Ticks::PowersOfTen,
-            y_title,
-            curves: view
-                .samplers
-                .iter()
-                .filter_map(|s| curve_by_time(data, view, s, metric, structure))
-                .collect(),
-            guides: Vec::new(),
-        };
-        if let Some(drawing) = by_seconds.draw() {
-            let caption =
-                format!("{name} against time: samples × measured ms per spp with {structure}.");
-            figures.push(Figure::new(
-                format!("{stem}-{}-seconds", name.to_lowercase()),
-                caption,
-                drawing,
-            ));
-        }
-    }
-    figures
-}
-
-fn curve_by_spp(data: &RunData, sampler: &Sampler, metric: Metric) -> Option<Curve> {
-    let label = match sampler.slope(metric) {
-        Some(slope) => format!("{}: slope {}", sampler.name, format::slope(&slope)),
-        None => sampler.name.clone(),
-    };
-    curve(data, sampler, metric, 1.0, label)
-}
-
-fn curve_by_time(
-    data: &RunData,
-    view: &View,
-    sampler: &Sampler,
-    metric: Metric,
-    structure: &str,
-) -> Option<Curve> {
-    let per_spp = view.time(structure, &sampler.name)?.ms_per_spp;
-    let label = format!(
-        "{}: {} ms per spp",
-        sampler.name,
-        format::number(per_spp.value)
-    );
-    curve(data, sampler, metric, per_spp.value / 1000.0, label)
-}
-
-fn curve(
-    data: &RunData,
-    sampler: &Sampler,
-    metric: Metric,
-    x_per_spp: f64,
-    label: String,
-) -> Option<Curve> {
-    let points: Vec<CurvePoint> = sampler
-        .mean_errors(metric)
-        .iter()
-        .map(|mean| CurvePoint {
-            x: f64::from(mean.spp) * x_per_spp,
-            y: mean.error.value,
-            low: mean.error.low,
-            high: mean.error.high,
-        })
-        .collect();
-    let (look, exact) = (data.sampler_look(&sampler.name), sampler.is_deterministic());
-    (!points.is_empty()).then_some(Curve {
-        label,
-        look,
-        exact,
-        points,
-    })
 }
 
 /// Mean error per spp, slope and bias verdict.
@@ -343,67 +239,6 @@ fn time_cell(view: &View, structure: &str, sampler: &Sampler) -> Cell {
         Some(_) => Cell::from("FAILED").toned(Tone::Bad),
         None => format::ABSENT.into(),
     }
-}
-
-fn pareto_plot(data: &RunData, view: &View) -> Option<ParetoPlot> {
-    let spp = view.common_spp()?;
-    let with_look = |names: Vec<String>, look: &dyn Fn(&str) -> usize| -> Vec<(String, usize)> {
-        names
-            .into_iter()
-            .map(|name| (name.clone(), look(&name)))
-            .collect()
-    };
-    let structures = with_look(view.timed_structures(), &|name| data.structure_look(name));
-    let fair: Vec<&Sampler> = view
-        .samplers
-        .iter()
-        .filter(|s| s.fault().is_none() && !s.replicates.is_empty())
-        .collect();
-    let names = fair.iter().map(|s| s.name.clone()).collect();
-    let samplers = with_look(names, &|name| data.sampler_look(name));
-    let mut points = Vec::new();
-    for (structure, (name, _)) in structures.iter().enumerate() {
-        for (index, sampler) in fair.iter().enumerate() {
-            let Some(time) = view.time(name, &sampler.name) else {
-                continue;
-            };
-            let Some(error) = sampler.mean_error_at(Metric::RelMse, spp) else {
-                continue;
-            };
-            let scale = f64::from(spp) / 1000.0;
-            let t = time.ms_per_spp;
-            let seconds = Interval {
-                value: t.value * scale,
-                low: t.low * scale,
-                high: t.high * scale,
-            };
-            points.push(CellPoint {
-                structure,
-                sampler: index,
-                seconds,
-                error,
-            });
-        }
-    }
-    Some(ParetoPlot {
-        x_title: format!("render time for {spp} spp, seconds"),
-        y_title: format!("relMSE at {spp} spp"),
-        structures,
-        samplers,
-        points,
-    })
-}
-
-fn histograms(view: &View) -> Vec<Histogram> {
-    let histogram = |sampler: &Sampler| {
-        let bias = sampler.bias?;
-        Some(Histogram {
-            label: sampler.name.clone(),
-            counts: bias.p_histogram.clone(),
-            biased: bias.verdict == "biased",
-        })
-    };
-    view.samplers.iter().filter_map(histogram).collect()
 }
 
 fn gallery(dir: &Path, view: &View) -> Option<Block> {

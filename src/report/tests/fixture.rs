@@ -405,3 +405,18 @@ impl From<StructureRecord> for Record {
         Self::Structure(record)
     }
 }
+
+/// The first scene of [`full_run`] with one integrator: as much in kind, a quarter in plots.
+pub(super) fn small_run() -> Vec<Line> {
+    let keeps = |scene: &str, integrator: &str| scene == "cornell-box" && integrator == "path";
+    let kept = |line: &Line| match &line.record {
+        Record::Scene(r) => keeps(&r.scene, "path"),
+        Record::Structure(r) => keeps(&r.scene, "path"),
+        Record::Reference(r) => keeps(&r.scene, &r.integrator.label),
+        Record::Error(r) => keeps(&r.scene, &r.integrator.label),
+        Record::Bias(r) => keeps(&r.scene, &r.integrator.label),
+        Record::Time(r) => keeps(&r.scene, &r.integrator.label),
+        _ => true,
+    };
+    full_run().into_iter().filter(kept).collect()
+}
