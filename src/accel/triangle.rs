@@ -103,7 +103,7 @@ pub fn intersect_triangle(triangle: &TriangleRecord, ray: &Ray, inverse: [f32; 3
     let repaired = enter <= exit && (t - plane).abs() * area <= terms * DISTANCE_PAD;
     let nearer = t < hit.t || (t == hit.t && triangle.id < hit.triangle);
     if repaired && t >= ray.t_min && t <= ray.t_max && nearer {
-        // Adapters differ in the sign of a zero that min and max return.
-        *hit = Hit { t: t.abs(), triangle: triangle.id, u: u / area, v: v / area };
+        // None of the three is negative, but any may be −0, whose sign compilers do not keep.
+        *hit = Hit { t: t.abs(), triangle: triangle.id, u: u.abs() / area, v: v.abs() / area };
     }
 }

@@ -29,19 +29,24 @@ pub struct Samples {
 }
 
 /// Measures everything `rounds` times in rounds of random order; what fails keeps its error.
+///
+/// # Errors
+/// The device is gone: the index of what was being measured, and the error. The others are as yet
+/// unmeasured, not failed.
 pub fn interleave<M: Measured>(
     measured: &[M],
     timing: &Timing,
     seed: u64,
     mut tick: impl FnMut(),
-) -> Vec<Result<Samples, GpuError>> {
-    let mut results: Vec<Result<Samples, GpuError>> = measured
-        .iter()
-        .map(|m| {
-            tick();
-            warm_up(m, timing).map(|()| Samples::default())
-        })
-        .collect();
+) -> Result<Vec<Result<Samples, GpuError>>, (usize, GpuError)> {
+    let mut results: Vec<Result<Samples, GpuError>> = Vec::with_capacity(measured.len());
+    for (index, item) in measured.iter().enumerate() {
+        tick();
+        match warm_up(item, timing) {
+            Err(error @ GpuError::Lost(_)) => return Err((index, error)),
+            outcome => results.push(outcome.map(|()| Samples::default())),
+        }
+    }
     let mut random = Pcg32::new(seed);
     let mut order: Vec<usize> = (0..measured.len()).collect();
     for _ in 0..timing.rounds {
@@ -55,12 +60,13 @@ pub fn interleave<M: Measured>(
                     samples.ms.push(elapsed.ms());
                     samples.wall_ms.push(elapsed.wall_ms);
                 }
+                Err(error @ GpuError::Lost(_)) => return Err((index, error)),
                 Err(error) => results[index] = Err(error),
             }
             tick();
         }
     }
-    results
+    Ok(results)
 }
 
 /// Runs until two runs in a row agree, for at least `min_warmup_ms` and at most `max_warmup_ms`. The

@@ -73,15 +73,20 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         if cells.is_empty() {
             continue;
         }
-        let cell = format!("reference {}, {variant}", world.variant);
         let yardstick = match reference(session, world, fastest, &variant)? {
             Ok(yardstick) => yardstick,
             Err(reason) => {
-                session.write_failure(&cell, reason)?;
+                for cell in cells {
+                    session.write_failure(&cell.to_string(), format!("no reference: {reason}"))?;
+                }
+                if world.gpu.lost().is_some() {
+                    return Ok(());
+                }
                 continue;
             }
         };
         for cell in cells {
+            session.lose_device_on_request(world.gpu, &cell.to_string());
             if let Err(reason) = sampler_error(session, world, fastest, &cell, &yardstick)? {
                 session.write_failure(&cell.to_string(), reason)?;
             }
@@ -190,7 +195,7 @@ fn sampler_error(
         session.progress.inc(1);
     }
     session.finish(cell.to_string());
-    match bias_record(cell, world, &finals, yardstick) {
+    match bias_record(session, cell, world, &finals, yardstick) {
         Ok(record) => session.write(&hash, Record::Bias(record)).map(Ok),
         Err(reason) => Ok(Err(reason)),
     }
@@ -251,8 +256,19 @@ fn error_record(
     Ok(Ok(record))
 }
 
-fn bias_record(cell: &SamplerCell, world: &World, images: &[Image], yardstick: &Yardstick) -> Result<BiasRecord, String> {
-    let check = check_bias(images, &yardstick.parts, BiasOptions::default()).map_err(|e| e.to_string())?;
+/// The false-discovery rate is shared out among all randomised samplers of the run, so that a run of
+/// many sound samplers does not cry wolf.
+fn bias_record(
+    session: &Session,
+    cell: &SamplerCell,
+    world: &World,
+    images: &[Image],
+    yardstick: &Yardstick,
+) -> Result<BiasRecord, String> {
+    let tested = session.plan.samplers.iter().filter(|s| s.randomised).count().max(1);
+    let mut options = BiasOptions::default();
+    options.alpha /= tested as f64;
+    let check = check_bias(images, &yardstick.parts, options).map_err(|e| e.to_string())?;
     let verdict = if cell.randomised {
         check.verdict.to_string()
     } else {

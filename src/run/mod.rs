@@ -40,6 +40,8 @@ pub struct RunOptions {
     pub kernels: Option<PathBuf>,
     /// Whether to draw a progress bar on standard error.
     pub progress: bool,
+    /// Destroys the device when the turn of this cell comes: for tests of the recovery.
+    pub lose_device_at: Option<String>,
 }
 
 /// How a run ended.
@@ -49,6 +51,8 @@ pub struct RunSummary {
     pub failed: usize,
     /// Cells left out with a reason.
     pub skipped: usize,
+    /// Whether a scene could not be loaded (exit code 2).
+    pub bad_input: bool,
     /// The report's page.
     pub report: Option<PathBuf>,
     /// Tables for the terminal.
@@ -123,13 +127,20 @@ pub fn run(
             gpu = open_gpu(options)?;
         }
     }
-    streams::run(&mut session, &gpu)?;
+    loop {
+        streams::run(&mut session, &gpu)?;
+        if gpu.lost().is_none() {
+            break;
+        }
+        gpu = open_gpu(options)?;
+    }
     session.write_end()?;
     let report = crate::report::write_report(&options.out).map_err(|e| RunError::Input(e.to_string()))?;
     let lines = crate::report::read_records(&options.out).map_err(|e| RunError::Input(e.to_string()))?;
     Ok(RunSummary {
         failed: session.failed,
         skipped: session.skipped,
+        bad_input: session.bad_input,
         report: Some(report.html),
         tables: crate::report::terminal_tables(&lines.lines),
     })
@@ -142,7 +153,10 @@ fn run_scene(session: &mut Session, gpu: &Gpu, variant: &Variant) -> Result<(), 
     }
     let world = match World::new(session, gpu, variant)? {
         Ok(world) => world,
-        Err(reason) => return session.write_failure(&cell, reason),
+        Err(reason) => {
+            session.bad_input = true;
+            return session.write_failure(&cell, reason);
+        }
     };
     let gated = structures::run(session, &world)?;
     if gpu.lost().is_none() {
@@ -157,7 +171,7 @@ fn run_scene(session: &mut Session, gpu: &Gpu, variant: &Variant) -> Result<(), 
 /// Runs the gate alone on every structure of a plan, with `rays` rays of each class.
 ///
 /// # Errors
-/// No adapter, or a folder that cannot be written.
+/// No adapter.
 pub fn verify(
     experiment: &Experiment,
     plan: &Plan,
@@ -169,8 +183,7 @@ pub fn verify(
     let mut experiment = experiment.clone();
     experiment.gate.rays = rays;
     experiment.timing.rays = rays;
-    let mut session = Session::new(&experiment, plan, registries, options)?;
-    session.write_start(environment::capture(&gpu))?;
+    let mut session = Session::unrecorded(&experiment, plan, registries, options);
     let mut verified = Vec::new();
     for scene in &plan.scenes {
         let accels = plan.structures.iter().filter(|c| c.scene == *scene).map(|c| &c.accel);
@@ -206,7 +219,7 @@ pub fn render(
     file: &std::path::Path,
 ) -> Result<(), RunError> {
     let gpu = open_gpu(options)?;
-    let mut session = Session::new(experiment, plan, registries, options)?;
+    let mut session = Session::unrecorded(experiment, plan, registries, options);
     let cell = plan.times.first().ok_or_else(|| RunError::Input("there is nothing to render".to_owned()))?;
     let world = World::new(&mut session, &gpu, &cell.scene)?.map_err(RunError::Input)?;
     let built = structures::build_and_gate(&mut session, &world, &cell.accel);

@@ -2,6 +2,7 @@
 
 use super::{RunError, RunOptions};
 use crate::config::{Experiment, Plan};
+use crate::gpu::Gpu;
 use crate::measure::record::{Environment, FinishedRecord, Line, Record, RunRecord, SkippedRecord, SCHEMA};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::{BTreeMap, HashSet};
@@ -40,9 +41,12 @@ pub(super) struct Session<'a> {
     pub progress: ProgressBar,
     pub failed: usize,
     pub skipped: usize,
+    /// Whether a scene could not be loaded.
+    pub bad_input: bool,
     /// Cells that have their record: not run again after a lost device.
     done: HashSet<String>,
-    records: File,
+    /// `None`: nothing is written (gate alone, single images).
+    records: Option<File>,
     records_path: PathBuf,
 }
 
@@ -57,6 +61,7 @@ impl<'a> Session<'a> {
         let unwritable = |path: &Path, e: std::io::Error| {
             RunError::Input(format!("cannot write {}: {e}; choose another folder with --out", path.display()))
         };
+        let mut session = Self::unrecorded(experiment, plan, registries, options);
         let images = options.out.join("images");
         std::fs::create_dir_all(&images).map_err(|e| unwritable(&images, e))?;
         let records_path = options.out.join("records.jsonl");
@@ -66,10 +71,22 @@ impl<'a> Session<'a> {
             .truncate(true)
             .open(&records_path)
             .map_err(|e| unwritable(&records_path, e))?;
+        session.records = Some(records);
+        session.records_path = records_path;
+        Ok(session)
+    }
+
+    /// A session that writes nothing.
+    pub fn unrecorded(
+        experiment: &'a Experiment,
+        plan: &'a Plan,
+        registries: &'a super::Registries,
+        options: &'a RunOptions,
+    ) -> Self {
         let progress = if options.progress { ProgressBar::new(steps(experiment, plan)) } else { ProgressBar::hidden() };
         let style = ProgressStyle::with_template("{bar:32} {pos}/{len} · {elapsed} · about {eta} left · {wide_msg}");
         progress.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        Ok(Self {
+        Self {
             experiment,
             plan,
             registries,
@@ -78,18 +95,27 @@ impl<'a> Session<'a> {
             progress,
             failed: 0,
             skipped: 0,
+            bad_input: false,
             done: HashSet::new(),
-            records,
-            records_path,
-        })
+            records: None,
+            records_path: PathBuf::new(),
+        }
+    }
+
+    /// Destroys the device if a test asked for it at this cell.
+    pub fn lose_device_on_request(&self, gpu: &Gpu, cell: &str) {
+        if self.options.lose_device_at.as_deref() == Some(cell) {
+            gpu.device.destroy();
+        }
     }
 
     /// Appends one record as one whole line and flushes it to the disk.
     pub fn write(&mut self, hash: &str, record: Record) -> Result<(), RunError> {
+        let Some(records) = &mut self.records else { return Ok(()) };
         let line = Line { schema: SCHEMA.to_owned(), hash: hash.to_owned(), record };
         let mut text = serde_json::to_string(&line).map_err(|e| RunError::Input(format!("a record cannot be written: {e}")))?;
         text.push('\n');
-        let written = self.records.write_all(text.as_bytes()).and_then(|()| self.records.sync_data());
+        let written = records.write_all(text.as_bytes()).and_then(|()| records.sync_data());
         written.map_err(|e| {
             RunError::Input(format!(
                 "cannot write {}: {e}; the records before this one are kept",
@@ -143,7 +169,6 @@ impl<'a> Session<'a> {
     pub fn write_failure(&mut self, cell: &str, reason: String) -> Result<(), RunError> {
         self.failed += 1;
         self.finish(cell.to_owned());
-        self.progress.println(format!("failed: {cell}: {reason}"));
         self.write("", Record::Failed(SkippedRecord { cell: cell.to_owned(), reason }))
     }
 

@@ -19,6 +19,7 @@ pub(super) fn run(session: &mut Session, gpu: &Gpu) -> Result<(), RunError> {
             continue;
         }
         session.say(format!("discrepancy of {cell}"));
+        session.lose_device_on_request(gpu, &cell.to_string());
         for pair in session.experiment.discrepancy.pairs.clone() {
             match stream_record(session, gpu, &cell, pair) {
                 Ok(record) => session.write("", Record::Stream(record))?,
@@ -27,6 +28,9 @@ pub(super) fn run(session: &mut Session, gpu: &Gpu) -> Result<(), RunError> {
         }
         session.finish(cell.to_string());
         session.progress.inc(1);
+        if gpu.lost().is_some() {
+            return Ok(());
+        }
     }
     Ok(())
 }

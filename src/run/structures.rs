@@ -142,6 +142,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
             continue;
         }
         session.say(format!("{cell}: build and gate"));
+        session.lose_device_on_request(world.gpu, &cell.to_string());
         match build_and_gate(session, world, &cell.accel) {
             Ok((traced, record)) => gated.push(Gated {
                 hash: structure_hash(world, &cell),
@@ -155,6 +156,9 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
             Err(record) => write_failed(session, world, &cell, *record)?,
         }
         session.progress.inc(2);
+        if world.gpu.lost().is_some() {
+            return Ok(Vec::new());
+        }
     }
     time_all(session, world, &mut gated)?;
     draw_heat_maps(session, world, &mut gated)?;
@@ -185,8 +189,6 @@ fn write_failed(
     cell: &StructureCell,
     record: StructureRecord,
 ) -> Result<(), RunError> {
-    let reason = record.failure.clone().unwrap_or_default();
-    session.progress.println(format!("FAILED {cell}: {reason}"));
     session.failed += 1;
     session.finish(cell.to_string());
     session.write(&structure_hash(world, cell), Record::Structure(record))
@@ -208,7 +210,15 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
     }
     let (timing, seed) = (session.experiment.timing, u64::from(session.experiment.seed));
     let progress = session.progress.clone();
-    let samples = session.clock.time("gpu", || interleave(&timed, &timing, seed, || progress.inc(1)));
+    let samples = match session.clock.time("gpu", || interleave(&timed, &timing, seed, || progress.inc(1))) {
+        Ok(samples) => samples,
+        Err((index, error)) => {
+            let mut lost = gated.swap_remove(timed[index].structure);
+            lost.record.failure = Some(error.to_string());
+            gated.clear();
+            return write_failed(session, world, &lost.cell.clone(), lost.record);
+        }
+    };
     for (index, (item, result)) in timed.iter().zip(samples).enumerate() {
         let set = &world.judge.sets[index % world.judge.sets.len()];
         let structure = &mut gated[item.structure];

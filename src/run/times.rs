@@ -60,15 +60,22 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             continue;
         };
         session.say(format!("{cell}: compiling"));
+        session.lose_device_on_request(world.gpu, &text);
         match compile(session, world, structure, cell.clone()) {
             Ok(item) => timed.push(item),
             Err(reason) => fail(session, world, &cell, reason)?,
+        }
+        if world.gpu.lost().is_some() {
+            return Ok(());
         }
     }
     session.say(format!("{}: timing full cells", world.variant));
     let (timing, seed) = (session.experiment.timing, u64::from(session.experiment.seed));
     let progress = session.progress.clone();
-    let samples = session.clock.time("gpu", || interleave(&timed, &timing, seed, || progress.inc(1)));
+    let samples = match session.clock.time("gpu", || interleave(&timed, &timing, seed, || progress.inc(1))) {
+        Ok(samples) => samples,
+        Err((index, error)) => return fail(session, world, &timed[index].cell.clone(), error.to_string()),
+    };
     let mut shared = Shared::default();
     for (item, samples) in timed.iter().zip(samples) {
         let structure = gated.iter().find(|g| g.cell.accel == item.cell.accel);
@@ -83,10 +90,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
                     ("device", &format!("{:?}", world.gpu.info)),
                     ("version", env!("CARGO_PKG_VERSION")),
                 ]);
-                if let Some(reason) = &record.failure {
-                    session.progress.println(format!("FAILED {}: {reason}", item.cell));
-                    session.failed += 1;
-                }
+                session.failed += usize::from(record.failure.is_some());
                 session.finish(item.cell.to_string());
                 session.write(&hash, Record::Time(record))?;
             }
@@ -204,7 +208,6 @@ fn empty_record(session: &Session, world: &World, cell: &TimeCell, failure: Stri
 }
 
 fn fail(session: &mut Session, world: &World, cell: &TimeCell, reason: String) -> Result<(), RunError> {
-    session.progress.println(format!("FAILED {cell}: {reason}"));
     session.failed += 1;
     session.finish(cell.to_string());
     let record = empty_record(session, world, cell, reason);

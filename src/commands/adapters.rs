@@ -1,0 +1,85 @@
+//! Adapters in words.
+
+use raystone::gpu::AdapterSummary;
+
+/// What kind of device it is.
+pub fn kind(adapter: &AdapterSummary) -> &'static str {
+    match adapter.info.device_type {
+        wgpu::DeviceType::DiscreteGpu => "discrete GPU",
+        wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+        wgpu::DeviceType::VirtualGpu => "virtual GPU",
+        wgpu::DeviceType::Cpu => "software",
+        wgpu::DeviceType::Other => "unknown kind",
+    }
+}
+
+/// Driver and version; some drivers give only one of the two.
+pub fn driver(adapter: &AdapterSummary) -> String {
+    let info = &adapter.info;
+    let parts = [info.driver.as_str(), info.driver_info.as_str()];
+    let parts: Vec<_> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+    match parts.as_slice() {
+        [] => "unnamed driver".to_owned(),
+        parts => parts.join(" "),
+    }
+}
+
+/// The most bytes that a kernel can bind as one array.
+pub fn largest_binding(limits: &wgpu::Limits) -> u64 {
+    limits
+        .max_storage_buffer_binding_size
+        .min(limits.max_buffer_size)
+}
+
+/// Bytes in the unit that keeps the number short.
+pub fn bytes(count: u64) -> String {
+    let [mib, gib] = [20, 30].map(|shift| count as f64 / f64::from(1u32 << shift));
+    match gib {
+        1.0.. => format!("{gib:.3} GiB").replace(".000", ""),
+        _ => format!("{mib:.3} MiB").replace(".000", ""),
+    }
+}
+
+/// Two lines: number and name; then everything else.
+pub fn describe(adapter: &AdapterSummary) -> String {
+    let timestamps = if adapter.timestamps { "yes" } else { "no" };
+    format!(
+        "  {}  {}\n     {}, {}, {}, timestamps: {timestamps}, largest binding: {}\n",
+        adapter.index,
+        adapter.info.name,
+        kind(adapter),
+        adapter.info.backend,
+        driver(adapter),
+        bytes(largest_binding(&adapter.limits)),
+    )
+}
+
+/// Major version of the Mesa that a driver is part of, if its version text says so.
+pub fn mesa_major(driver_info: &str) -> Option<u32> {
+    let (_, version) = driver_info.split_once("Mesa ")?;
+    version.split('.').next()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mesa_is_found_in_the_version_texts_of_both_backends() {
+        for (text, major) in [
+            ("Mesa 22.3.6 (LLVM 15.0.6)", Some(22)),
+            ("4.5 (Core Profile) Mesa 25.0.7-2~bpo12+1", Some(25)),
+            ("580.65.06", None),
+            ("Mesa", None),
+        ] {
+            assert_eq!(mesa_major(text), major, "{text}");
+        }
+    }
+
+    #[test]
+    fn bytes_are_given_in_the_unit_that_fits() {
+        assert_eq!(bytes(128 << 20), "128 MiB");
+        assert_eq!(bytes(1 << 30), "1 GiB");
+        assert_eq!(bytes(3 << 29), "1.500 GiB");
+    }
+}

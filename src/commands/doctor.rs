@@ -1,0 +1,170 @@
+//! `raystone doctor`.
+
+use super::adapters::{self, bytes, largest_binding, mesa_major};
+use super::failure::Failure;
+use super::output::print;
+use super::system::{self, System};
+use clap::Args;
+use raystone::accel::triangle::TriangleRecord;
+use raystone::gpu::{
+    self, AdapterChoice, AdapterSummary, ArithmeticProbe, Gpu, KernelLibrary, probe_arithmetic,
+};
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+/// Say in words what works on this machine, and what to do where something does not
+#[derive(Args)]
+pub struct Doctor {
+    /// Adapter to examine, by its number or a part of its name [default: the one that would be used]
+    #[arg(long, value_name = "INDEX|NAME")]
+    adapter: Option<AdapterChoice>,
+}
+
+impl Doctor {
+    pub fn execute(self) -> Result<ExitCode, Failure> {
+        let system = System::this();
+        let found = gpu::adapters();
+        let mut text = machine(&system);
+        text += "\nAdapters, best first\n";
+        for adapter in &found {
+            text += &adapters::describe(adapter);
+        }
+        if found.is_empty() {
+            text += "  none\n";
+        }
+        text += "\nEnvironment\n";
+        text += &system::environment();
+        let choice = self.adapter.unwrap_or_default();
+        let examined = gpu::open(&choice, KernelLibrary::default())
+            .map_err(Failure::from)
+            .and_then(|gpu| examine(&gpu, &choice, &found, &system));
+        match examined {
+            Ok(findings) => {
+                print(&(text + &findings))?;
+                Ok(ExitCode::SUCCESS)
+            }
+            Err(failure) => {
+                if found.is_empty() {
+                    text += &remedy(&system);
+                }
+                print(&text)?;
+                Err(failure)
+            }
+        }
+    }
+}
+
+fn machine(system: &System) -> String {
+    format!(
+        "Raystone {}\n  system     {}, {}\n  processor  {}\n",
+        super::VERSION.as_str(),
+        system.name,
+        std::env::consts::ARCH,
+        system::processor(),
+    )
+}
+
+/// What to do where no adapter answers.
+fn remedy(system: &System) -> String {
+    let mut text = "\nWhat to do\n".to_owned();
+    if let Ok(backend) = std::env::var("WGPU_BACKEND") {
+        let _ = writeln!(
+            text,
+            "  WGPU_BACKEND={backend} narrows the search; try without it."
+        );
+    }
+    for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
+        if let Ok(files) = std::env::var(variable) {
+            let _ = writeln!(
+                text,
+                "  {variable}={files} hides the installed drivers; check it."
+            );
+        }
+    }
+    let _ = writeln!(
+        text,
+        "  For a software driver, which runs on any processor, type:\n    {}",
+        system.install_line()
+    );
+    text
+}
+
+/// Runs a kernel on the adapter that would be used, and says what it can do.
+fn examine(
+    gpu: &Gpu,
+    choice: &AdapterChoice,
+    found: &[AdapterSummary],
+    system: &System,
+) -> Result<String, Failure> {
+    let probe = probe_arithmetic(gpu).map_err(Failure::no_adapter)?;
+    let position = found.iter().find(|adapter| adapter.info == gpu.info);
+    let number = position.map_or(String::new(), |adapter| format!("{}, ", adapter.index));
+    let reason = match choice {
+        AdapterChoice::Best if found.len() == 1 => "it is the only one",
+        AdapterChoice::Best => {
+            "discrete goes before integrated, virtual and software, and Vulkan before GL"
+        }
+        _ => "--adapter asks for it",
+    };
+    let limit = largest_binding(&gpu.limits);
+    let triangle = size_of::<TriangleRecord>();
+    let millions = limit as f64 / triangle as f64 / 1e6;
+    let mut text = format!("\nAdapter in use: {number}{}; {reason}\n", gpu.info.name);
+    let timestamps = match gpu.timestamp_period {
+        Some(_) => "present: passes are timed by the GPU's own clock",
+        None => "absent: the wall clock is used instead, and marked in the report",
+    };
+    let _ = writeln!(
+        text,
+        "  dispatch    a kernel ran, and its results came back"
+    );
+    let _ = writeln!(text, "  arithmetic  {}", arithmetic(probe));
+    let _ = writeln!(text, "  timestamps  {timestamps}");
+    let _ = writeln!(
+        text,
+        "  scene size  at most about {millions:.1} million triangles ({} per binding, {triangle} bytes each)",
+        bytes(limit),
+    );
+    text += &speed(gpu, system);
+    text += "\nEverything that Raystone needs works here.\n";
+    Ok(text)
+}
+
+fn arithmetic(probe: ArithmeticProbe) -> String {
+    let faults: Vec<_> = [
+        (probe.unfused, "a*b + c is fused"),
+        (probe.exact_division, "division is not correctly rounded"),
+        (probe.exact_sqrt, "sqrt is not correctly rounded"),
+    ]
+    .into_iter()
+    .filter_map(|(sound, fault)| (!sound).then_some(fault))
+    .collect();
+    match (faults.is_empty(), probe.is_exact()) {
+        (true, _) => "equals the host's to the bit: hits must, too".to_owned(),
+        (false, true) => format!("{}; hits do not depend on it", faults.join(", ")),
+        (false, false) => format!(
+            "differs from the host's ({}): the double-precision oracle decides hits that differ",
+            faults.join(", ")
+        ),
+    }
+}
+
+/// What to expect of the speed, and whether a faster driver is at hand.
+fn speed(gpu: &Gpu, system: &System) -> String {
+    if !gpu.is_software() {
+        return String::new();
+    }
+    let mut text =
+        "  speed       software: times compare structures on this adapter only\n".to_owned();
+    if let Some(major @ ..=22) = mesa_major(&gpu.info.driver_info) {
+        let _ = writeln!(
+            text,
+            "              Mesa {major} takes about twice as long as Mesa 25{}",
+            match system.has_backports() {
+                true => "; to get that, type: scripts/install-driver --backports",
+                false => "",
+            }
+        );
+    }
+    text
+}

@@ -1,0 +1,101 @@
+//! `raystone list`.
+
+use super::adapters;
+use super::failure::Failure;
+use super::output::print;
+use clap::{Args, ValueEnum};
+use raystone::config::{Axis, Entry};
+use raystone::measure::image::METRICS;
+use raystone::run::Registries;
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+/// List everything that can be named: scenes, structures, samplers, integrators, metrics, adapters
+#[derive(Args)]
+pub struct List {
+    /// What to list [default: everything]
+    what: Option<Topic>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Topic {
+    #[value(alias = "scenes")]
+    Scene,
+    #[value(alias = "accels", alias = "structure", alias = "structures")]
+    Accel,
+    #[value(alias = "sequences")]
+    Sequence,
+    #[value(alias = "decorrelations")]
+    Decorrelation,
+    #[value(alias = "integrators")]
+    Integrator,
+    #[value(alias = "metrics")]
+    Metric,
+    #[value(alias = "adapters")]
+    Adapter,
+}
+
+impl List {
+    pub fn execute(self) -> Result<ExitCode, Failure> {
+        let catalogue = Registries::default().catalogue();
+        let topics = match &self.what {
+            Some(topic) => std::slice::from_ref(topic),
+            None => Topic::value_variants(),
+        };
+        let sections: Vec<String> = topics
+            .iter()
+            .map(|topic| match topic {
+                Topic::Scene => axis(Axis::Scene, &catalogue.scene),
+                Topic::Accel => axis(Axis::Accel, &catalogue.accel),
+                Topic::Sequence => axis(Axis::Sequence, &catalogue.sequence),
+                Topic::Decorrelation => axis(Axis::Decorrelation, &catalogue.decorrelation),
+                Topic::Integrator => axis(Axis::Integrator, &catalogue.integrator),
+                Topic::Metric => metrics(),
+                Topic::Adapter => adapter_list(),
+            })
+            .collect();
+        print(&sections.join("\n"))?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+fn axis(axis: Axis, entries: &[Entry]) -> String {
+    let width = entries.iter().map(|e| e.name.len()).max().unwrap_or(0);
+    let mut text = match axis {
+        Axis::Scene => "scene: built in, or the path of a .obj, .gltf, .glb or .ply file\n".into(),
+        axis => format!("{axis}\n"),
+    };
+    // Writing to a string cannot fail.
+    for entry in entries {
+        let _ = writeln!(text, "  {:width$}  {}", entry.name, entry.description);
+        for parameter in &entry.schema {
+            let _ = writeln!(
+                text,
+                "  {:width$}    {} = {}: {} ({})",
+                "", parameter.name, parameter.default, parameter.description, parameter.range,
+            );
+        }
+    }
+    text
+}
+
+fn metrics() -> String {
+    let width = METRICS.iter().map(|m| m.id.len()).max().unwrap_or(0);
+    let mut text = "metric: v the image, r the reference, A and B its halves\n".to_owned();
+    for metric in METRICS {
+        let _ = writeln!(text, "  {:width$}  {}", metric.id, metric.description);
+    }
+    text
+}
+
+fn adapter_list() -> String {
+    let found = raystone::gpu::adapters();
+    let mut text = "adapter: best first\n".to_owned();
+    if found.is_empty() {
+        text += "  none answers; `raystone doctor` says what to do\n";
+    }
+    for adapter in &found {
+        text += &adapters::describe(adapter);
+    }
+    text
+}

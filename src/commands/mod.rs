@@ -1,0 +1,111 @@
+//! Commands: what they are called, and how they end.
+
+mod adapters;
+mod arguments;
+mod doctor;
+mod estimate;
+mod failure;
+mod list;
+mod output;
+mod render;
+mod report;
+mod run;
+mod system;
+mod table;
+mod verify;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+use std::sync::LazyLock;
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  done
+  1  done, but a gate or a cell failed
+  2  bad usage or input
+  3  no usable adapter";
+
+const EXAMPLES: &str = "\
+Examples:
+  raystone doctor
+  raystone run experiments/quick.toml
+  raystone verify --accel bvh --scene path/to/model.obj
+  raystone render --scene cornell-box --spp 256 -o box.png";
+
+/// Version, commit and whether the sources differed from it.
+static VERSION: LazyLock<String> = LazyLock::new(|| {
+    let version = env!("CARGO_PKG_VERSION");
+    let dirty = option_env!("RAYSTONE_DIRTY") == Some("true");
+    match option_env!("RAYSTONE_COMMIT") {
+        Some(commit) if dirty => format!("{version} (commit {commit} with changes)"),
+        Some(commit) => format!("{version} (commit {commit})"),
+        None => version.to_owned(),
+    }
+});
+
+/// A proving ground for ray-tracing acceleration structures and samplers
+#[derive(Parser)]
+#[command(name = "raystone", version = VERSION.as_str())]
+#[command(after_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"))]
+struct CommandLine {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    #[command(after_help = EXIT_CODES)]
+    Run(run::Run),
+    #[command(after_help = EXIT_CODES)]
+    Render(render::Render),
+    #[command(after_help = EXIT_CODES)]
+    Verify(verify::Verify),
+    List(list::List),
+    #[command(after_help = EXIT_CODES)]
+    Doctor(doctor::Doctor),
+    #[command(after_help = EXIT_CODES)]
+    Report(report::Report),
+}
+
+/// Reads the command line and does what it says; clap itself ends the program with 2 on bad usage.
+pub fn main() -> ExitCode {
+    let done = match CommandLine::parse().command {
+        Command::Run(command) => command.execute(),
+        Command::Render(command) => command.execute(),
+        Command::Verify(command) => command.execute(),
+        Command::List(command) => command.execute(),
+        Command::Doctor(command) => command.execute(),
+        Command::Report(command) => command.execute(),
+    };
+    done.unwrap_or_else(|failure| failure.tell())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_documentation_names_every_command_and_flag() {
+        let page = include_str!("../../docs/command-line.md");
+        let command_line = CommandLine::command();
+        assert!(command_line.get_subcommands().count() > 0);
+        for command in command_line.get_subcommands() {
+            let name = command.get_name();
+            assert!(page.contains(&format!("## `raystone {name}")), "{name}");
+            let flags: Vec<_> = command
+                .get_arguments()
+                .filter_map(|a| a.get_long())
+                .collect();
+            for flag in flags {
+                assert!(page.contains(&format!("`--{flag}")), "{name} --{flag}");
+            }
+        }
+        assert!(!page.contains("`--no-such-flag"));
+    }
+
+    #[test]
+    fn the_commands_are_consistent() {
+        CommandLine::command().debug_assert();
+    }
+}

@@ -1,0 +1,22 @@
+//! Standard output.
+
+use super::failure::Failure;
+use anyhow::Context as _;
+use std::io::{ErrorKind, Write as _};
+
+/// Writes `text` to standard output.
+///
+/// A reader that went away (`raystone list | head`) has what it wanted: that is no failure, and the
+/// exit code still tells how the command ended.
+pub fn print(text: &str) -> Result<(), Failure> {
+    let mut output = std::io::stdout().lock();
+    match output
+        .write_all(text.as_bytes())
+        .and_then(|()| output.flush())
+    {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error),
+        _ => Ok(()),
+    }
+    .context("cannot write to standard output")
+    .map_err(Failure::input)
+}

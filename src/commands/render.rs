@@ -1,0 +1,220 @@
+//! `raystone render`.
+
+use super::arguments::{DeviceArguments, check_models, list_override, text_override};
+use super::failure::Failure;
+use super::output::print;
+use anyhow::anyhow;
+use clap::Args;
+use raystone::config::{Axis, Experiment, Plan};
+use raystone::run::Registries;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// What is rendered where the command line says nothing: an experiment of one cell, so that one
+/// parser checks files, flags and `--set` alike.
+const DEFAULTS: &str = r#"
+[run]
+name = "render"
+replicates = 1
+resolution = [512, 384]
+spp = { pow2 = [6, 6] }
+[axes]
+scene = ["cornell-box"]
+accel = ["bvh"]
+sequence = ["sobol"]
+decorrelation = ["cranley-patterson"]
+integrator = ["path"]
+"#;
+
+/// Render one picture
+///
+/// Every flag is a short form of --set: --accel bvh means --set axes.accel=bvh.
+#[derive(Args)]
+pub struct Render {
+    /// Built-in scene or path of a model [default: cornell-box]
+    #[arg(long)]
+    scene: Option<String>,
+    /// Acceleration structure [default: bvh]
+    #[arg(long)]
+    accel: Option<String>,
+    /// Sample sequence [default: sobol]
+    #[arg(long)]
+    sequence: Option<String>,
+    /// Decorrelation of the pixels [default: cranley-patterson]
+    #[arg(long)]
+    decorrelation: Option<String>,
+    /// What is computed [default: path]
+    #[arg(long)]
+    integrator: Option<String>,
+    /// Samples per pixel, a power of two [default: 64]
+    #[arg(long, value_name = "N", value_parser = exponent_of)]
+    spp: Option<u32>,
+    /// Width and height, pixels [default: 512x384]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<[u32; 2]>,
+    /// Seed [default: 1]
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
+    /// Any other value of an experiment file: `--set camera.eye=[0,1,5]`, `--set
+    /// integrator.path.max_depth=3`
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Picture to write
+    #[arg(long, short, value_name = "FILE.png", default_value = "render.png")]
+    output: PathBuf,
+    #[command(flatten)]
+    device: DeviceArguments,
+}
+
+impl Render {
+    pub fn execute(self) -> Result<ExitCode, Failure> {
+        let registries = Registries::default();
+        let catalogue = registries.catalogue();
+        let experiment =
+            Experiment::parse(DEFAULTS, "raystone render", &self.overrides(), &catalogue)?;
+        check_is_one(&experiment)?;
+        let is_randomised =
+            |sequence: &_, decorrelation: &_| registries.is_randomised(sequence, decorrelation);
+        let plan = Plan::new(&experiment, &[], is_randomised)?;
+        check_models(&experiment.axes.scene, &catalogue)?;
+        // Only the picture is written: no folder is needed.
+        let options = self.device.options(PathBuf::new(), false);
+        raystone::run::render(&experiment, &plan, &registries, &options, &self.output)?;
+        print(&format!("{}\n", self.output.display()))?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn overrides(&self) -> Vec<String> {
+        let mut overrides = Vec::new();
+        if let Some(scene) = &self.scene {
+            // A list, because a path may hold commas.
+            overrides.push(list_override("axes.scene", std::slice::from_ref(scene)));
+        }
+        for (axis, name) in [
+            (Axis::Accel, &self.accel),
+            (Axis::Sequence, &self.sequence),
+            (Axis::Decorrelation, &self.decorrelation),
+            (Axis::Integrator, &self.integrator),
+        ] {
+            overrides.extend(
+                name.iter()
+                    .map(|name| text_override(&format!("axes.{axis}"), name)),
+            );
+        }
+        if let Some(exponent) = self.spp {
+            overrides.push(format!("run.spp={{ pow2 = [{exponent}, {exponent}] }}"));
+        }
+        if let Some([width, height]) = self.size {
+            overrides.push(format!("run.resolution=[{width}, {height}]"));
+        }
+        if let Some(seed) = self.seed {
+            overrides.push(format!("run.seed={seed}"));
+            // There is no reference image here, but its seeds have to differ all the same.
+            overrides.push(format!("reference.seed={}", seed.wrapping_add(1)));
+        }
+        overrides.extend(self.set.iter().cloned());
+        overrides
+    }
+}
+
+/// One picture is one cell.
+fn check_is_one(experiment: &Experiment) -> Result<(), Failure> {
+    for axis in Axis::ALL {
+        let variants = experiment.axes.variants(axis);
+        if variants.len() > 1 {
+            let labels: Vec<_> = variants.iter().map(|v| v.label.as_str()).collect();
+            return Err(Failure::input(anyhow!(
+                "render makes one picture, but {axis} has {} values ({}); give one",
+                labels.len(),
+                labels.join(", ")
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// The exponent of a power of two.
+fn exponent_of(text: &str) -> Result<u32, String> {
+    let spp: u32 = text.parse().map_err(|e| format!("{e}"))?;
+    if spp.is_power_of_two() && spp <= 1 << 16 {
+        return Ok(spp.ilog2());
+    }
+    let below = 1 << spp.clamp(1, 1 << 16).ilog2();
+    Err(format!(
+        "must be a power of two from 1 to 65536, for instance {below}"
+    ))
+}
+
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let parsed = text
+        .split_once(['x', 'X', '×'])
+        .and_then(|(width, height)| {
+            Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
+        });
+    parsed.ok_or_else(|| "must be width x height in pixels, for instance 512x384".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Shell {
+        #[command(flatten)]
+        render: Render,
+    }
+
+    fn experiment(arguments: &[&str]) -> Result<Experiment, String> {
+        let arguments = std::iter::once(&"render").chain(arguments);
+        let shell = Shell::try_parse_from(arguments).map_err(|e| e.to_string())?;
+        let catalogue = Registries::default().catalogue();
+        let overrides = shell.render.overrides();
+        Experiment::parse(DEFAULTS, "render", &overrides, &catalogue).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn flags_reach_the_experiment_and_set_has_the_last_word() {
+        let flags = [
+            "--spp",
+            "8",
+            "--size",
+            "64x48",
+            "--seed",
+            "9001",
+            "--accel",
+            "roped-bvh",
+        ];
+        let experiment = experiment(&[&flags[..], &["--set", "run.resolution=[32,24]"]].concat());
+        let experiment = experiment.unwrap();
+        assert_eq!(experiment.spp.max(), 8);
+        assert_eq!(experiment.resolution, [32, 24]);
+        assert_eq!(experiment.seed, 9001);
+        assert_eq!(experiment.axes.accel[0].name, "roped-bvh");
+        assert_eq!(experiment.axes.scene[0].name, "cornell-box");
+    }
+
+    #[test]
+    fn a_scene_path_may_hold_commas_and_quotes() {
+        let experiment = experiment(&["--scene", r#"my "a,b".obj"#]).unwrap();
+        assert_eq!(experiment.axes.scene.len(), 1);
+        assert_eq!(experiment.axes.scene[0].name, r#"my "a,b".obj"#);
+    }
+
+    #[test]
+    fn samples_that_are_no_power_of_two_are_refused_with_one_that_is() {
+        for (text, near) in [("12", "8"), ("0", "1"), ("70000", "65536")] {
+            let error = experiment(&["--spp", text]).unwrap_err();
+            assert!(
+                error.contains(&format!("for instance {near}")),
+                "{text}: {error}"
+            );
+        }
+        assert!(experiment(&["--size", "64"]).is_err());
+        assert!(
+            experiment(&["--size", "64x4"])
+                .unwrap_err()
+                .contains("run.resolution")
+        );
+    }
+}

@@ -1,0 +1,347 @@
+//! `raystone verify`.
+
+use super::arguments::{
+    DeviceArguments, ExperimentArguments, check_models, list_override,
+};
+use super::failure::{FAILED, Failure};
+use super::output::print;
+use super::table::{Table, grouped};
+use clap::Args;
+use raystone::config::{Catalogue, Experiment, Plan, Skipped};
+use raystone::measure::record::{ClassVerdict, GateVerdict, JudgeCheck, RayClass};
+use raystone::run::{Registries, Verified};
+use raystone::scene::{LoadOptions, load};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Scenes of the gate without an experiment file.
+const SCENES: [&str; 2] = ["cornell-box", "displaced-sphere"];
+/// The structure that tests every triangle.
+const BRUTE_FORCE: &str = "brute-force";
+/// Scenes from this size on are left to the other structures, unless brute force is asked for.
+const BRUTE_FORCE_TRIANGLES: usize = 5_000;
+
+/// Run the gate alone: does every structure answer every ray as the judge does?
+///
+/// Without a file: every structure (brute force only where a scene has fewer than 5,000 triangles),
+/// on `cornell-box` and `displaced-sphere`.
+#[derive(Args)]
+pub struct Verify {
+    /// Experiment file whose scenes and structures to check
+    file: Option<PathBuf>,
+    /// Built-in scene or path of a model; may be given many times
+    #[arg(long)]
+    scene: Vec<String>,
+    /// Structure; may be given many times
+    #[arg(long)]
+    accel: Vec<String>,
+    /// Rays of each class [default: gate.rays of the experiment]
+    #[arg(long, value_name = "N")]
+    rays: Option<u32>,
+    #[command(flatten)]
+    experiment: ExperimentArguments,
+    #[command(flatten)]
+    device: DeviceArguments,
+}
+
+impl Verify {
+    pub fn execute(self) -> Result<ExitCode, Failure> {
+        let registries = Registries::default();
+        let catalogue = registries.catalogue();
+        let overrides = self.overrides();
+        let experiment = match &self.file {
+            Some(file) => Experiment::load(file, &overrides, &catalogue)?,
+            None => Experiment::parse(
+                &defaults(&catalogue),
+                "raystone verify",
+                &overrides,
+                &catalogue,
+            )?,
+        };
+        let is_randomised =
+            |sequence: &_, decorrelation: &_| registries.is_randomised(sequence, decorrelation);
+        let mut plan = Plan::new(&experiment, &self.experiment.only, is_randomised)?;
+        check_models(&plan.scenes, &catalogue)?;
+        if self.file.is_none() {
+            spare_brute_force(&mut plan)?;
+        }
+        for skipped in &plan.skipped {
+            eprintln!("left out: {}: {}", skipped.cell, skipped.reason);
+        }
+        // Nothing is written: no folder is needed.
+        let options = self.device.options(PathBuf::new(), false);
+        let rays = experiment.gate.rays;
+        let verified = raystone::run::verify(&experiment, &plan, &registries, &options, rays)?;
+        print(&table(&verified))?;
+        let failed = verified.iter().filter(|v| !passed(v)).count();
+        let all = verified.len();
+        print(&format!("{} of {all} structures passed\n", all - failed))?;
+        Ok(match failed {
+            0 => ExitCode::SUCCESS,
+            _ => ExitCode::from(FAILED),
+        })
+    }
+
+    fn overrides(&self) -> Vec<String> {
+        let mut overrides = Vec::new();
+        for (key, names) in [("axes.scene", &self.scene), ("axes.accel", &self.accel)] {
+            if !names.is_empty() {
+                overrides.push(list_override(key, names));
+            }
+        }
+        overrides.extend(self.rays.map(|rays| format!("gate.rays={rays}")));
+        overrides.extend(self.experiment.set.iter().cloned());
+        overrides
+    }
+}
+
+/// An experiment of every structure on the scenes of the gate.
+fn defaults(catalogue: &Catalogue) -> String {
+    let accel: Vec<_> = catalogue
+        .accel
+        .iter()
+        .map(|entry| entry.name.clone())
+        .collect();
+    let sequence = catalogue.sequence.first().map(|entry| entry.name.as_str());
+    format!(
+        "[run]\nname = \"verify\"\n[axes]\nscene = {}\naccel = {}\nsequence = {}\n",
+        toml::Value::from(SCENES.to_vec()),
+        toml::Value::from(accel),
+        toml::Value::from(sequence.unwrap_or_default()),
+    )
+}
+
+/// Leaves out brute force on scenes with many triangles, where other structures are checked.
+fn spare_brute_force(plan: &mut Plan) -> Result<(), Failure> {
+    let mut large = Vec::new();
+    for scene in &plan.scenes {
+        let cells = || plan.structures.iter().filter(|cell| cell.scene == *scene);
+        let tries_all = cells().any(|cell| cell.accel.name == BRUTE_FORCE);
+        if !tries_all || cells().all(|cell| cell.accel.name == BRUTE_FORCE) {
+            continue;
+        }
+        let options = LoadOptions {
+            textures: false,
+            ..LoadOptions::default()
+        };
+        let triangles = load(scene, &options)?.triangles.len();
+        if triangles >= BRUTE_FORCE_TRIANGLES {
+            large.push((scene.clone(), triangles));
+        }
+    }
+    for (scene, triangles) in large {
+        plan.structures
+            .retain(|cell| cell.scene != scene || cell.accel.name != BRUTE_FORCE);
+        plan.skipped.push(Skipped {
+            cell: format!("{scene}, {BRUTE_FORCE}"),
+            reason: format!(
+                "{} triangles, which takes long; --accel {BRUTE_FORCE} alone asks for it",
+                grouped(triangles)
+            ),
+            cells: 1,
+        });
+    }
+    Ok(())
+}
+
+fn passed(verified: &Verified) -> bool {
+    verified
+        .verdict
+        .as_ref()
+        .is_ok_and(|verdict| verdict.passed)
+}
+
+/// A row per ray class, and what else went wrong below the table.
+fn table(verified: &[Verified]) -> String {
+    let mut table = Table::new(&[
+        "scene",
+        "structure",
+        "verdict",
+        "class",
+        "#rays",
+        "#wrong",
+        "#ties",
+        "brute force",
+        "oracle",
+    ]);
+    let mut details = String::new();
+    for one in verified {
+        let names = [one.scene.label.clone(), one.accel.label.clone()];
+        let word = match (&one.verdict, passed(one)) {
+            (Err(_), _) => "not run",
+            (Ok(_), true) => "passed",
+            (Ok(_), false) => "FAILED",
+        };
+        let head = names.into_iter().chain([word.to_owned()]);
+        match &one.verdict {
+            Ok(verdict) => rows(&mut table, head.collect(), verdict),
+            Err(_) => table.row(head),
+        }
+        for detail in faults(&one.verdict) {
+            // Writing to a string cannot fail.
+            let _ = writeln!(details, "{}, {}: {detail}", one.scene, one.accel);
+        }
+    }
+    let legend = "brute force: the judge against it, wrong of rays; \
+                  oracle: the judge against double precision, agree / ambiguous / wrong\n";
+    format!("{}{legend}{details}", table.text())
+}
+
+/// The rows of one structure; names and the judge's own checks stand in the first.
+fn rows(table: &mut Table, head: Vec<String>, verdict: &GateVerdict) {
+    let brute_force = &verdict.brute_force;
+    let judge = [
+        format!("{} of {}", brute_force.wrong, grouped(brute_force.rays)),
+        oracle(&verdict.oracle),
+    ];
+    for (i, class) in verdict.classes.iter().enumerate() {
+        let (head, judge) = match i {
+            0 => (head.clone(), judge.to_vec()),
+            _ => (vec![String::new(); head.len()], Vec::new()),
+        };
+        table.row(head.into_iter().chain(counts(class)).chain(judge));
+    }
+    if verdict.classes.is_empty() {
+        table.row(head);
+    }
+}
+
+fn counts(class: &ClassVerdict) -> [String; 4] {
+    let name = match class.class {
+        RayClass::Primary => "primary",
+        RayClass::Shadow => "shadow",
+        RayClass::Ao => "ao",
+        RayClass::Bounce => "bounce",
+        RayClass::Chord => "chord",
+    };
+    let [rays, wrong, ties] = [class.rays, class.wrong, class.ties].map(grouped);
+    [name.to_owned(), rays, wrong, ties]
+}
+
+fn oracle(check: &JudgeCheck) -> String {
+    let agree = check.rays.saturating_sub(check.wrong + check.ambiguous);
+    format!("{} / {} / {}", grouped(agree), check.ambiguous, check.wrong)
+}
+
+/// Everything that went wrong, in words.
+fn faults(verdict: &Result<GateVerdict, String>) -> Vec<String> {
+    let verdict = match verdict {
+        Ok(verdict) => verdict,
+        Err(reason) => return vec![reason.clone()],
+    };
+    let wrong = verdict.classes.iter().filter_map(|class| {
+        let first = class.first_wrong.as_ref()?;
+        Some(format!("first wrong {} ray: {first}", counts(class)[0]))
+    });
+    let structural = verdict
+        .structural
+        .iter()
+        .map(|fault| format!("structure: {fault}"));
+    let kernel = verdict
+        .kernel_errors
+        .iter()
+        .map(|error| format!("kernel: {error}"));
+    wrong.chain(structural).chain(kernel).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raystone::config::{Params, Variant};
+
+    fn variant(name: &str) -> Variant {
+        Variant {
+            name: name.into(),
+            params: Params::default(),
+            label: name.into(),
+        }
+    }
+
+    fn verdict(wrong: usize) -> GateVerdict {
+        let first_wrong = (wrong > 0).then(|| "ray 17".to_owned());
+        GateVerdict {
+            passed: wrong == 0,
+            classes: vec![ClassVerdict {
+                class: RayClass::Primary,
+                rays: 32_768,
+                wrong,
+                ties: 2,
+                first_wrong,
+            }],
+            brute_force: JudgeCheck {
+                rays: 2000,
+                wrong: 0,
+                ambiguous: 0,
+            },
+            oracle: JudgeCheck {
+                rays: 2048,
+                wrong: 1,
+                ambiguous: 7,
+            },
+            kernel_errors: Vec::new(),
+            structural: None,
+        }
+    }
+
+    #[test]
+    fn a_wrong_ray_is_counted_shown_and_fails_the_structure() {
+        let one = |verdict| Verified {
+            scene: variant("cornell-box"),
+            accel: variant("bvh"),
+            verdict,
+        };
+        let good = one(Ok(verdict(0)));
+        let text = table(std::slice::from_ref(&good));
+        assert!(
+            passed(&good) && text.contains("passed") && text.contains("32,768"),
+            "{text}"
+        );
+        assert!(
+            text.contains("2,040 / 7 / 1") && !text.contains("FAILED"),
+            "{text}"
+        );
+        let bad = one(Ok(verdict(3)));
+        let text = table(std::slice::from_ref(&bad));
+        assert!(
+            !passed(&bad) && text.contains("FAILED") && text.contains("ray 17"),
+            "{text}"
+        );
+        let broken = one(Err("too deep".into()));
+        let text = table(std::slice::from_ref(&broken));
+        assert!(
+            !passed(&broken) && text.contains("not run") && text.contains("too deep"),
+            "{text}"
+        );
+    }
+
+    fn plan(scene: &str, accel: &str) -> Plan {
+        let registries = Registries::default();
+        let catalogue = registries.catalogue();
+        let overrides = [format!("axes.scene={scene}"), format!("axes.accel={accel}")];
+        let experiment =
+            Experiment::parse(&defaults(&catalogue), "test", &overrides, &catalogue).unwrap();
+        let mut plan = Plan::new(&experiment, &[], |_, _| true).unwrap();
+        assert!(spare_brute_force(&mut plan).is_ok());
+        plan
+    }
+
+    #[test]
+    fn brute_force_is_spared_large_scenes_unless_it_is_all_there_is() {
+        let large = "displaced-sphere";
+        let plan_of = |accel| plan(large, accel);
+        let spared = plan_of("brute-force,bvh");
+        assert_eq!((spared.structures.len(), spared.skipped.len()), (1, 1));
+        assert!(spared.skipped[0].cell.contains(BRUTE_FORCE));
+        assert_eq!(plan_of("brute-force").structures.len(), 1);
+        assert_eq!(plan("cornell-box", "brute-force,bvh").structures.len(), 2);
+    }
+
+    #[test]
+    fn without_a_file_every_structure_is_checked() {
+        let catalogue = Registries::default().catalogue();
+        let experiment = Experiment::parse(&defaults(&catalogue), "test", &[], &catalogue).unwrap();
+        assert_eq!(experiment.axes.accel.len(), catalogue.accel.len());
+        assert_eq!(experiment.axes.scene.len(), SCENES.len());
+    }
+}
