@@ -255,8 +255,11 @@ impl BuiltAccel for Built {
                 }
             }
         }
-        match seen.iter().position(|s| !s) {
-            Some(lost) => wrong(format!("triangle {lost} is in no cell")),
+        if let Some(lost) = seen.iter().position(|s| !s) {
+            return wrong(format!("triangle {lost} is in no cell"));
+        }
+        match soup.records.iter().find(|r| !self.grid.bounds.contains(&r.bounds())) {
+            Some(record) => wrong(format!("triangle {} lies outside the grid", record.id)),
             None => Ok(()),
         }
     }

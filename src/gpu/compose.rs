@@ -108,7 +108,10 @@ impl KernelLibrary {
         }
         let result = compiler
             .compile(&module_path(&composition.entry)?)
-            .map_err(|e| GpuError::Kernel(diagnose::wesl_error(&e.to_string(), &paths)))?;
+            .map_err(|e| {
+                let sources = self.files.values().map(|(path, text)| (path.as_path(), text.as_str()));
+                GpuError::Kernel(diagnose::wesl_error(&e.to_string(), &paths, sources))
+            })?;
         let wgsl = result.to_string();
         let map = result.sourcemap.unwrap_or_default();
         let (module, info) = diagnose::parse_and_validate(&wgsl, &map, &paths)?;
