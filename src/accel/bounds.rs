@@ -17,10 +17,16 @@ pub struct Bounds {
 
 impl Bounds {
     /// The neutral element of [`Bounds::union`].
-    pub const EMPTY: Bounds = Bounds { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
+    pub const EMPTY: Bounds = Bounds {
+        min: [f32::INFINITY; 3],
+        max: [f32::NEG_INFINITY; 3],
+    };
 
     /// Contains every box.
-    pub const EVERYTHING: Bounds = Bounds { min: [f32::NEG_INFINITY; 3], max: [f32::INFINITY; 3] };
+    pub const EVERYTHING: Bounds = Bounds {
+        min: [f32::NEG_INFINITY; 3],
+        max: [f32::INFINITY; 3],
+    };
 
     /// The smallest box around both.
     pub fn union(&self, other: &Bounds) -> Bounds {

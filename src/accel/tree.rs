@@ -59,7 +59,10 @@ pub fn tree_parameters() -> ParameterSchema {
         name,
         description,
         default: ParamValue::Number(default),
-        range: ParamRange::Number { min: 0.01, max: 100.0 },
+        range: ParamRange::Number {
+            min: 0.01,
+            max: 100.0,
+        },
     };
     vec![
         Parameter {
@@ -93,8 +96,14 @@ impl Tree {
             traversal_cost: params.number("traversal_cost") as f32,
             intersection_cost: params.number("intersection_cost") as f32,
         };
-        let mut primitives: Vec<Primitive> =
-            soup.records.iter().map(|r| Primitive { bounds: r.bounds(), id: r.id }).collect();
+        let mut primitives: Vec<Primitive> = soup
+            .records
+            .iter()
+            .map(|r| Primitive {
+                bounds: r.bounds(),
+                id: r.id,
+            })
+            .collect();
         if primitives.is_empty() {
             return Tree::default();
         }
@@ -128,7 +137,9 @@ impl Tree {
             references: self.order.len() as u64,
             ..Default::default()
         };
-        let Some(root) = self.nodes.first() else { return stats };
+        let Some(root) = self.nodes.first() else {
+            return stats;
+        };
         let mut cost = 0.0_f64;
         for node in &self.nodes {
             let weight = match node.kind {
@@ -157,7 +168,11 @@ pub struct Coverage<'a> {
 impl<'a> Coverage<'a> {
     /// Nothing reached yet.
     pub fn new(soup: &'a TriangleSoup, nodes: usize) -> Self {
-        Self { soup, nodes: vec![false; nodes], triangles: vec![false; soup.records.len()] }
+        Self {
+            soup,
+            nodes: vec![false; nodes],
+            triangles: vec![false; soup.records.len()],
+        }
     }
 
     /// Notes that a node is reached.
@@ -169,7 +184,9 @@ impl<'a> Coverage<'a> {
             // The root of an empty scene is no node.
             None if index == 0 => Ok(()),
             None => Err(AccelError::Invalid(format!("node {index} does not exist"))),
-            Some(true) => Err(AccelError::Invalid(format!("node {index} is reached twice"))),
+            Some(true) => Err(AccelError::Invalid(format!(
+                "node {index} is reached twice"
+            ))),
             Some(seen) => {
                 *seen = true;
                 Ok(())
@@ -182,20 +199,32 @@ impl<'a> Coverage<'a> {
     /// # Errors
     /// The range does not exist, or a triangle differs from the scene's, is in two leaves, or
     /// sticks out of the leaf's box.
-    pub fn leaf(&mut self, triangles: Option<&[TriangleRecord]>, bounds: &Bounds) -> Result<(), AccelError> {
+    pub fn leaf(
+        &mut self,
+        triangles: Option<&[TriangleRecord]>,
+        bounds: &Bounds,
+    ) -> Result<(), AccelError> {
         let Some(triangles) = triangles else {
-            return Err(AccelError::Invalid("a leaf lies outside the triangle array".to_owned()));
+            return Err(AccelError::Invalid(
+                "a leaf lies outside the triangle array".to_owned(),
+            ));
         };
         for triangle in triangles {
             let id = triangle.id;
             if self.soup.records.get(id as usize) != Some(triangle) {
-                return Err(AccelError::Invalid(format!("triangle {id} is not the scene's")));
+                return Err(AccelError::Invalid(format!(
+                    "triangle {id} is not the scene's"
+                )));
             }
             if std::mem::replace(&mut self.triangles[id as usize], true) {
-                return Err(AccelError::Invalid(format!("triangle {id} is in two leaves")));
+                return Err(AccelError::Invalid(format!(
+                    "triangle {id} is in two leaves"
+                )));
             }
             if !bounds.contains(&triangle.bounds()) {
-                return Err(AccelError::Invalid(format!("triangle {id} sticks out of its leaf's box")));
+                return Err(AccelError::Invalid(format!(
+                    "triangle {id} sticks out of its leaf's box"
+                )));
             }
         }
         Ok(())
@@ -207,10 +236,14 @@ impl<'a> Coverage<'a> {
     /// A node or triangle was not reached.
     pub fn is_complete(&self) -> Result<(), AccelError> {
         if let Some(lost) = self.triangles.iter().position(|seen| !seen) {
-            return Err(AccelError::Invalid(format!("triangle {lost} is in no leaf")));
+            return Err(AccelError::Invalid(format!(
+                "triangle {lost} is in no leaf"
+            )));
         }
         match self.nodes.iter().position(|seen| !seen) {
-            Some(orphan) => Err(AccelError::Invalid(format!("node {orphan} is never reached"))),
+            Some(orphan) => Err(AccelError::Invalid(format!(
+                "node {orphan} is never reached"
+            ))),
             None => Ok(()),
         }
     }
@@ -218,16 +251,27 @@ impl<'a> Coverage<'a> {
 
 /// Nodes of the subtree over `primitives`, root first, indices relative to the returned vector;
 /// `first` is the position of `primitives` in the whole order.
-fn build_subtree(primitives: &mut [Primitive], first: u32, settings: &Settings, depth: u32) -> Vec<TreeNode> {
-    let bounds = primitives.iter().fold(Bounds::EMPTY, |b, p| b.union(&p.bounds));
+fn build_subtree(
+    primitives: &mut [Primitive],
+    first: u32,
+    settings: &Settings,
+    depth: u32,
+) -> Vec<TreeNode> {
+    let bounds = primitives
+        .iter()
+        .fold(Bounds::EMPTY, |b, p| b.union(&p.bounds));
     let Some(middle) = split(primitives, &bounds, settings, depth) else {
-        let kind = NodeKind::Leaf { first, count: primitives.len() as u32 };
+        let kind = NodeKind::Leaf {
+            first,
+            count: primitives.len() as u32,
+        };
         return vec![TreeNode { bounds, kind }];
     };
     let parallel = primitives.len() > PARALLEL_GRAIN;
     let (low, high) = primitives.split_at_mut(middle);
     let build_low = |low: &mut [Primitive]| build_subtree(low, first, settings, depth + 1);
-    let build_high = |high: &mut [Primitive]| build_subtree(high, first + middle as u32, settings, depth + 1);
+    let build_high =
+        |high: &mut [Primitive]| build_subtree(high, first + middle as u32, settings, depth + 1);
     let (left, right) = if parallel {
         rayon::join(|| build_low(low), || build_high(high))
     } else {
@@ -235,7 +279,13 @@ fn build_subtree(primitives: &mut [Primitive], first: u32, settings: &Settings, 
     };
     let mut nodes = Vec::with_capacity(1 + left.len() + right.len());
     let right_root = 1 + left.len() as u32;
-    nodes.push(TreeNode { bounds, kind: NodeKind::Inner { left: 1, right: right_root } });
+    nodes.push(TreeNode {
+        bounds,
+        kind: NodeKind::Inner {
+            left: 1,
+            right: right_root,
+        },
+    });
     nodes.extend(left.into_iter().map(|n| shifted(n, 1)));
     nodes.extend(right.into_iter().map(|n| shifted(n, right_root)));
     nodes
@@ -250,12 +300,19 @@ fn shifted(mut node: TreeNode, by: u32) -> TreeNode {
 }
 
 /// Partitions `primitives` and returns where the second half starts; `None` makes a leaf.
-fn split(primitives: &mut [Primitive], bounds: &Bounds, settings: &Settings, depth: u32) -> Option<usize> {
+fn split(
+    primitives: &mut [Primitive],
+    bounds: &Bounds,
+    settings: &Settings,
+    depth: u32,
+) -> Option<usize> {
     let count = primitives.len();
     if count <= 1 {
         return None;
     }
-    let best = (depth < SAH_DEPTH).then(|| best_bin_split(primitives)).flatten();
+    let best = (depth < SAH_DEPTH)
+        .then(|| best_bin_split(primitives))
+        .flatten();
     let leaf_cost = settings.intersection_cost * count as f32;
     match best {
         Some(plan) => {
@@ -282,7 +339,9 @@ fn split(primitives: &mut [Primitive], bounds: &Bounds, settings: &Settings, dep
 
 fn longest_axis(bounds: &Bounds) -> usize {
     let extent = bounds.extent();
-    (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0)
+    (0..3)
+        .max_by(|&a, &b| extent[a].total_cmp(&extent[b]))
+        .unwrap_or(0)
 }
 
 struct BinSplit {
@@ -296,7 +355,11 @@ struct BinSplit {
 
 impl BinSplit {
     fn side(&self, primitive: &Primitive) -> bool {
-        bin_of(primitive.bounds.doubled_centre()[self.axis], self.origin, self.scale) < self.bin
+        bin_of(
+            primitive.bounds.doubled_centre()[self.axis],
+            self.origin,
+            self.scale,
+        ) < self.bin
     }
 }
 
@@ -312,7 +375,13 @@ fn best_bin_split(primitives: &[Primitive]) -> Option<BinSplit> {
         centres = centres.union(&Bounds { min: c, max: c });
     }
     let extent = centres.extent();
-    let scale = extent.map(|e| if e > 0.0 { BINS as f32 * (1.0 - 1e-6) / e } else { 0.0 });
+    let scale = extent.map(|e| {
+        if e > 0.0 {
+            BINS as f32 * (1.0 - 1e-6) / e
+        } else {
+            0.0
+        }
+    });
     let mut bins = [[(Bounds::EMPTY, 0u32); BINS]; 3];
     for p in primitives {
         let c = p.bounds.doubled_centre();
@@ -332,7 +401,11 @@ fn best_bin_split(primitives: &[Primitive]) -> Option<BinSplit> {
         for bin in (1..BINS).rev() {
             bounds = bounds.union(&bins[axis][bin].0);
             count += bins[axis][bin].1;
-            right_cost[bin] = if count == 0 { f32::INFINITY } else { bounds.half_area() * count as f32 };
+            right_cost[bin] = if count == 0 {
+                f32::INFINITY
+            } else {
+                bounds.half_area() * count as f32
+            };
         }
         let (mut bounds, mut count) = (Bounds::EMPTY, 0u32);
         for bin in 1..BINS {
@@ -340,7 +413,13 @@ fn best_bin_split(primitives: &[Primitive]) -> Option<BinSplit> {
             count += bins[axis][bin - 1].1;
             let cost = bounds.half_area() * count as f32 + right_cost[bin];
             if count > 0 && cost.is_finite() && best.as_ref().is_none_or(|b| cost < b.cost) {
-                best = Some(BinSplit { axis, origin: centres.min[axis], scale: scale[axis], bin, cost });
+                best = Some(BinSplit {
+                    axis,
+                    origin: centres.min[axis],
+                    scale: scale[axis],
+                    bin,
+                    cost,
+                });
             }
         }
     }

@@ -13,7 +13,7 @@
 //! an origin in the face it begins or ends at distance 0). If the clamp moves the distance by more
 //! than rounding can ([`DISTANCE_PAD`]), the ray only grazed an edge of the triangle: no hit.
 
-use super::bounds::{slab, Bounds};
+use super::bounds::{Bounds, slab};
 use super::ray::{Hit, Ray};
 use crate::scene::Triangle;
 use bytemuck::{Pod, Zeroable};
@@ -49,7 +49,14 @@ impl TriangleRecord {
     /// The record of triangle `id`.
     pub fn new(triangle: &Triangle, id: u32, material: u32) -> Self {
         let [v0, v1, v2] = triangle.vertices;
-        Self { v0: v0.to_array(), id, e1: (v0 - v1).to_array(), material, e2: (v2 - v0).to_array(), reserved: 0 }
+        Self {
+            v0: v0.to_array(),
+            id,
+            e1: (v0 - v1).to_array(),
+            material,
+            e2: (v2 - v0).to_array(),
+            reserved: 0,
+        }
     }
 
     /// Bounds of the triangle as the kernels know it (vertices rebuilt from the rounded edges).
@@ -107,6 +114,11 @@ pub fn intersect_triangle(triangle: &TriangleRecord, ray: &Ray, inverse: [f32; 3
     let nearer = t < hit.t || (t == hit.t && triangle.id < hit.triangle);
     if repaired && t >= ray.t_min && t <= ray.t_max && nearer {
         // None of the three is negative, but any may be −0, whose sign compilers do not keep.
-        *hit = Hit { t: t.abs(), triangle: triangle.id, u: u.abs() / area, v: v.abs() / area };
+        *hit = Hit {
+            t: t.abs(),
+            triangle: triangle.id,
+            u: u.abs() / area,
+            v: v.abs() / area,
+        };
     }
 }

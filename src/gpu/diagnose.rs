@@ -29,7 +29,10 @@ pub(super) fn wesl_error<'a>(
         out = out.replace(module.as_str(), &path.display().to_string());
     }
     let place = place.or_else(|| {
-        let (file_and_line, _column) = out.lines().find_map(|l| l.trim().strip_prefix("--> "))?.rsplit_once(':')?;
+        let (file_and_line, _column) = out
+            .lines()
+            .find_map(|l| l.trim().strip_prefix("--> "))?
+            .rsplit_once(':')?;
         Some(file_and_line.to_owned())
     });
     match place {
@@ -44,7 +47,11 @@ fn import_of_missing_module<'a>(
     paths: &Paths,
     mut sources: impl Iterator<Item = (&'a Path, &'a str)>,
 ) -> Option<String> {
-    let missing = text.split_once("module not found: `")?.1.split('`').next()?;
+    let missing = text
+        .split_once("module not found: `")?
+        .1
+        .split('`')
+        .next()?;
     let importer = text.split_once("= note: in ")?.1.lines().next()?.trim();
     let path = paths.get(importer)?;
     let (_, source) = sources.find(|(file, _)| file == path)?;
@@ -57,7 +64,9 @@ fn import_of_missing_module<'a>(
 fn without_colours(text: &str) -> String {
     let mut parts = text.split('\u{1b}');
     let first = parts.next().unwrap_or_default().to_owned();
-    parts.fold(first, |out, part| out + part.split_once('m').map_or(part, |(_, rest)| rest))
+    parts.fold(first, |out, part| {
+        out + part.split_once('m').map_or(part, |(_, rest)| rest)
+    })
 }
 
 /// Parses and validates composed WGSL with the capabilities of plain WebGPU.
@@ -70,8 +79,10 @@ pub(super) fn parse_and_validate(
         let line = e.location(wgsl).map(|l| l.line_number as usize);
         GpuError::Kernel(describe(wgsl, line, e.message(), map, paths))
     })?;
-    let mut validator =
-        naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::default());
+    let mut validator = naga::valid::Validator::new(
+        naga::valid::ValidationFlags::all(),
+        naga::valid::Capabilities::default(),
+    );
     let info = validator.validate(&module).map_err(|e| {
         // The outer spans are the function and the block around the fault.
         let width = |span: &naga::Span| span.to_range().map_or(usize::MAX, |r| r.len());
@@ -89,20 +100,33 @@ pub(super) fn parse_and_validate(
 }
 
 /// One message: file and line of the source, the error, and the offending line.
-fn describe(wgsl: &str, line: Option<usize>, message: &str, map: &BasicSourceMap, paths: &Paths) -> String {
+fn describe(
+    wgsl: &str,
+    line: Option<usize>,
+    message: &str,
+    map: &BasicSourceMap,
+    paths: &Paths,
+) -> String {
     let message = readable(message, map);
     let Some(line) = line else {
         return format!("kernel error: {message}");
     };
     let offending = wgsl.lines().nth(line - 1).unwrap_or("").trim();
     match source_position(wgsl, line, map, paths) {
-        Some((file, source_line, text)) => format!("{file}:{source_line}: {message}\n    {}", text.trim()),
+        Some((file, source_line, text)) => {
+            format!("{file}:{source_line}: {message}\n    {}", text.trim())
+        }
         None => format!("composed kernel, line {line}: {message}\n    {offending}"),
     }
 }
 
 /// Source file, line and text for a line of the composed kernel.
-fn source_position(wgsl: &str, line: usize, map: &BasicSourceMap, paths: &Paths) -> Option<(String, usize, String)> {
+fn source_position(
+    wgsl: &str,
+    line: usize,
+    map: &BasicSourceMap,
+    paths: &Paths,
+) -> Option<(String, usize, String)> {
     let lines: Vec<&str> = wgsl.lines().collect();
     let mangled = (0..line).rev().find_map(|i| declared_name(lines.get(i)?))?;
     let (module, item) = match map.get_decl(mangled) {
@@ -119,20 +143,34 @@ fn source_position(wgsl: &str, line: usize, map: &BasicSourceMap, paths: &Paths)
         None => {
             let source = map.get_default_source()?;
             let path = paths.iter().find(|(module, _)| {
-                module.parse().ok().and_then(|m| map.get_source(&m)).is_some_and(|s| s == source)
+                module
+                    .parse()
+                    .ok()
+                    .and_then(|m| map.get_source(&m))
+                    .is_some_and(|s| s == source)
             })?;
             (source, path.1.display().to_string())
         }
     };
     let end_of = |lines: &[&str], start: usize| {
-        lines.iter().skip(start + 1).position(|l| declared_name(l).is_some()).map_or(lines.len(), |n| start + 1 + n)
+        lines
+            .iter()
+            .skip(start + 1)
+            .position(|l| declared_name(l).is_some())
+            .map_or(lines.len(), |n| start + 1 + n)
     };
-    let composed_start = (0..line).rev().find(|&i| declared_name(lines[i]).is_some())?;
+    let composed_start = (0..line)
+        .rev()
+        .find(|&i| declared_name(lines[i]).is_some())?;
     let composed = statements(&lines[composed_start..end_of(&lines, composed_start)], map);
     let source_lines: Vec<&str> = source.lines().collect();
-    let start = source_lines.iter().position(|l| declared_name(l) == Some(item.as_str()))?;
+    let start = source_lines
+        .iter()
+        .position(|l| declared_name(l) == Some(item.as_str()))?;
     let written = statements(&source_lines[start..end_of(&source_lines, start)], map);
-    let offending = composed.iter().rposition(|s| s.line <= line - 1 - composed_start)?;
+    let offending = composed
+        .iter()
+        .rposition(|s| s.line <= line - 1 - composed_start)?;
     let found = start + written.get(aligned(&composed, &written, offending))?.line;
     Some((file, found + 1, source_lines[found].to_owned()))
 }
@@ -158,7 +196,11 @@ fn statements(lines: &[&str], map: &BasicSourceMap) -> Vec<Statement> {
                 _ => out.push(Statement { line, words }),
             }
         }
-        is_open = if code.is_empty() { is_open } else { !code.ends_with([';', '{', '}']) };
+        is_open = if code.is_empty() {
+            is_open
+        } else {
+            !code.ends_with([';', '{', '}'])
+        };
     }
     out
 }
@@ -177,7 +219,9 @@ fn aligned(composed: &[Statement], written: &[Statement], offending: usize) -> u
     for i in (0..rows).rev() {
         for j in (0..columns).rev() {
             pair[i][j] = likeness(i, j);
-            gain[i][j] = (pair[i][j] + gain[i + 1][j + 1]).max(gain[i + 1][j]).max(gain[i][j + 1]);
+            gain[i][j] = (pair[i][j] + gain[i + 1][j + 1])
+                .max(gain[i + 1][j])
+                .max(gain[i][j + 1]);
         }
     }
     let (mut i, mut j) = (0, 0);
@@ -206,7 +250,13 @@ fn declared_name(line: &str) -> Option<&str> {
     }
     let mut rest = line.trim_start();
     while let Some(after) = rest.strip_prefix('@') {
-        let end = after.find([' ', ')']).map_or(after.len(), |i| if after[i..].starts_with(')') { i + 1 } else { i });
+        let end = after.find([' ', ')']).map_or(after.len(), |i| {
+            if after[i..].starts_with(')') {
+                i + 1
+            } else {
+                i
+            }
+        });
         rest = after[end..].trim_start();
     }
     for keyword in ["fn ", "struct ", "const ", "override ", "alias ", "var"] {
@@ -216,7 +266,9 @@ fn declared_name(line: &str) -> Option<&str> {
                 None => after,
             };
             let name = after.trim_start();
-            let end = name.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(name.len());
+            let end = name
+                .find(|c: char| !c.is_alphanumeric() && c != '_')
+                .unwrap_or(name.len());
             return (end > 0).then(|| &name[..end]);
         }
     }
@@ -229,7 +281,9 @@ fn readable(message: &str, map: &BasicSourceMap) -> String {
     let mut rest = message;
     while let Some(start) = rest.find("package_") {
         let (before, tail) = rest.split_at(start);
-        let end = tail.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(tail.len());
+        let end = tail
+            .find(|c: char| !c.is_alphanumeric() && c != '_')
+            .unwrap_or(tail.len());
         let (word, after) = tail.split_at(end);
         out.push_str(before);
         out.push_str(map.get_decl(word).map_or(word, |(_, item)| item));
@@ -241,7 +295,10 @@ fn readable(message: &str, map: &BasicSourceMap) -> String {
 /// The words of a line as the author wrote them, each followed by a space.
 fn normalise(line: &str, map: &BasicSourceMap) -> String {
     let mut out = String::new();
-    for word in line.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|w| !w.is_empty()) {
+    for word in line
+        .split(|c: char| !c.is_alphanumeric() && c != '_')
+        .filter(|w| !w.is_empty())
+    {
         out.push_str(map.get_decl(word).map_or(word, |(_, item)| item));
         out.push(' ');
     }
@@ -254,8 +311,14 @@ mod tests {
 
     #[test]
     fn declared_names_are_found_behind_attributes() {
-        assert_eq!(declared_name("fn closest_hit(ray: Ray) -> Hit {"), Some("closest_hit"));
-        assert_eq!(declared_name("@group(0) @binding(1) var<storage, read> nodes: array<u32>;"), Some("nodes"));
+        assert_eq!(
+            declared_name("fn closest_hit(ray: Ray) -> Hit {"),
+            Some("closest_hit")
+        );
+        assert_eq!(
+            declared_name("@group(0) @binding(1) var<storage, read> nodes: array<u32>;"),
+            Some("nodes")
+        );
         assert_eq!(declared_name("    let x = 1;"), None);
         assert_eq!(declared_name("@compute @workgroup_size(64)"), None);
     }

@@ -6,10 +6,13 @@
 //! if both triangles lie within 4 ulp of the same distance in f64; ties are counted and shown.
 
 use super::batch::{Batch, Query};
-use super::rays::{record_rays, RaySet};
+use super::rays::{RaySet, record_rays};
 use super::record::{ClassVerdict, GateVerdict, JudgeCheck};
-use crate::accel::{brute_force_hits, AccelError, BuildLog, BuiltAccel, Bvh, BvhTwin, Hit, Ray, TriangleSoup, NO_HIT};
 use crate::accel::AccelKind;
+use crate::accel::{
+    AccelError, BuildLog, BuiltAccel, Bvh, BvhTwin, Hit, NO_HIT, Ray, TriangleSoup,
+    brute_force_hits,
+};
 use crate::config::{Gate, Params};
 use crate::gpu::{ArithmeticProbe, Gpu, GpuError};
 use crate::integrator::{SceneBuffers, Traced};
@@ -18,7 +21,10 @@ use crate::scene::{Camera, SceneData};
 
 /// Meaning of the bits of the kernels' error word, as in `kernels/common/errors.wesl`.
 pub const KERNEL_ERRORS: [(u32, &str); 2] = [
-    (1, "a traversal took more steps than the structure allows (step fuse)"),
+    (
+        1,
+        "a traversal took more steps than the structure allows (step fuse)",
+    ),
     (2, "a traversal stack overflowed"),
 ];
 
@@ -57,7 +63,9 @@ impl Judge {
     ) -> Result<Self, AccelError> {
         let mut params = Params::default();
         for parameter in Bvh.parameters() {
-            params.0.insert(parameter.name.to_owned(), parameter.default);
+            params
+                .0
+                .insert(parameter.name.to_owned(), parameter.default);
         }
         let twin = BvhTwin::build(soup, &params, &mut BuildLog::default())?;
         twin.validate(soup)?;
@@ -74,12 +82,15 @@ impl Judge {
         Ok(judge)
     }
 
-    /// Every n-th ray of all classes, so that about `count` remain.
+    /// `count` rays (or all, if there are fewer) spread evenly over all classes.
     fn subset(&self, count: usize) -> Vec<(Ray, Hit)> {
-        let all: usize = self.sets.iter().map(|s| s.rays.len()).sum();
-        let step = all.div_ceil(count.max(1)).max(1);
-        let pairs = self.sets.iter().flat_map(|s| s.rays.iter().copied().zip(s.truth.iter().copied()));
-        pairs.step_by(step).collect()
+        let pairs = self
+            .sets
+            .iter()
+            .flat_map(|s| s.rays.iter().copied().zip(s.truth.iter().copied()));
+        let all: Vec<(Ray, Hit)> = pairs.collect();
+        let count = count.min(all.len());
+        (0..count).map(|i| all[i * all.len() / count]).collect()
     }
 
     fn check_brute_force(&mut self, soup: &TriangleSoup, tests: u64) {
@@ -91,7 +102,8 @@ impl Judge {
         for ((ray, judged), brute) in pairs.iter().zip(&truth) {
             if !judged.same_bits(brute) {
                 self.brute_force.wrong += 1;
-                self.first_wrong.get_or_insert_with(|| describe(ray, "judge", judged, "brute force", brute));
+                self.first_wrong
+                    .get_or_insert_with(|| describe(ray, "judge", judged, "brute force", brute));
             }
         }
     }
@@ -101,16 +113,26 @@ impl Judge {
         let pairs = self.subset(rays.min(affordable));
         let questions: Vec<_> = pairs
             .iter()
-            .map(|(ray, hit)| (oracle_ray(ray), (hit.triangle != NO_HIT).then_some((hit.triangle, hit.t))))
+            .map(|(ray, hit)| {
+                (
+                    oracle_ray(ray),
+                    (hit.triangle != NO_HIT).then_some((hit.triangle, hit.t)),
+                )
+            })
             .collect();
         self.oracle.rays = questions.len();
-        for ((ray, hit), verdict) in pairs.iter().zip(oracle::judge_closest_hits(&scene.triangles, &questions)) {
+        for ((ray, hit), verdict) in pairs
+            .iter()
+            .zip(oracle::judge_closest_hits(&scene.triangles, &questions))
+        {
             match verdict {
                 Verdict::Agrees => {}
                 Verdict::Ambiguous => self.oracle.ambiguous += 1,
                 Verdict::Wrong(fault) => {
                     self.oracle.wrong += 1;
-                    self.first_wrong.get_or_insert_with(|| format!("{} | judge {} | f64: {fault}", ray_text(ray), hit_text(hit)));
+                    self.first_wrong.get_or_insert_with(|| {
+                        format!("{} | judge {} | f64: {fault}", ray_text(ray), hit_text(hit))
+                    });
                 }
             }
         }
@@ -123,7 +145,12 @@ impl Judge {
 }
 
 fn oracle_ray(ray: &Ray) -> OracleRay {
-    OracleRay { origin: ray.origin, t_min: ray.t_min, direction: ray.direction, t_max: ray.t_max }
+    OracleRay {
+        origin: ray.origin,
+        t_min: ray.t_min,
+        direction: ray.direction,
+        t_max: ray.t_max,
+    }
 }
 
 /// Traces all recorded rays, closest and any hit, and compares.
@@ -142,15 +169,31 @@ pub fn gate(
     let mut errors = 0;
     let mut classes = Vec::new();
     for set in &judge.sets {
-        let closest = Batch::new(gpu, scene, traced, Query::Closest, &set.rays, runtime_checks)?;
+        let closest = Batch::new(
+            gpu,
+            scene,
+            traced,
+            Query::Closest,
+            &set.rays,
+            runtime_checks,
+        )?;
         closest.trace()?;
         let any = Batch::new(gpu, scene, traced, Query::Any, &set.rays, runtime_checks)?;
         any.trace()?;
         errors |= closest.error_word()? | any.error_word()?;
-        classes.push(compare(set, &closest.hits()?, &any.found()?, soup, probe.is_exact()));
+        classes.push(compare(
+            set,
+            &closest.hits()?,
+            &any.found()?,
+            soup,
+            probe.is_exact(),
+        ));
     }
-    let kernel_errors: Vec<String> =
-        KERNEL_ERRORS.iter().filter(|(bit, _)| errors & bit != 0).map(|(_, text)| (*text).to_owned()).collect();
+    let kernel_errors: Vec<String> = KERNEL_ERRORS
+        .iter()
+        .filter(|(bit, _)| errors & bit != 0)
+        .map(|(_, text)| (*text).to_owned())
+        .collect();
     let right = classes.iter().all(|c| c.wrong == 0);
     Ok(GateVerdict {
         passed: right && errors == 0 && judge.is_sound(),
@@ -163,11 +206,27 @@ pub fn gate(
 }
 
 /// Compares the answers of a structure with the judge's.
-pub fn compare(set: &RaySet, hits: &[Hit], found: &[bool], soup: &TriangleSoup, exact: bool) -> ClassVerdict {
-    let mut verdict =
-        ClassVerdict { class: set.class, rays: set.rays.len(), wrong: 0, ties: 0, first_wrong: None };
+pub fn compare(
+    set: &RaySet,
+    hits: &[Hit],
+    found: &[bool],
+    soup: &TriangleSoup,
+    exact: bool,
+) -> ClassVerdict {
+    let mut verdict = ClassVerdict {
+        class: set.class,
+        rays: set.rays.len(),
+        wrong: 0,
+        ties: 0,
+        first_wrong: None,
+    };
     for (index, (ray, truth)) in set.rays.iter().zip(&set.truth).enumerate() {
-        let hit = hits.get(index).copied().unwrap_or(Hit { t: f32::NAN, triangle: NO_HIT, u: 0.0, v: 0.0 });
+        let hit = hits.get(index).copied().unwrap_or(Hit {
+            t: f32::NAN,
+            triangle: NO_HIT,
+            u: 0.0,
+            v: 0.0,
+        });
         let any_right = found.get(index) == Some(&(truth.triangle != NO_HIT));
         if hit.same_bits(truth) && any_right {
             continue;
@@ -178,7 +237,11 @@ pub fn compare(set: &RaySet, hits: &[Hit], found: &[bool], soup: &TriangleSoup, 
         }
         verdict.wrong += 1;
         verdict.first_wrong.get_or_insert_with(|| {
-            let any = if any_right { "" } else { " | any-hit answer differs" };
+            let any = if any_right {
+                ""
+            } else {
+                " | any-hit answer differs"
+            };
             describe(ray, "structure", &hit, "judge", truth) + any
         });
     }
@@ -187,7 +250,10 @@ pub fn compare(set: &RaySet, hits: &[Hit], found: &[bool], soup: &TriangleSoup, 
 
 /// Whether both triangles lie within 4 ulp of the same distance in f64, as does the answer.
 fn is_tie(ray: &Ray, hit: &Hit, truth: &Hit, soup: &TriangleSoup) -> bool {
-    if hit.triangle == NO_HIT || truth.triangle == NO_HIT || hit.triangle as usize >= soup.records.len() {
+    if hit.triangle == NO_HIT
+        || truth.triangle == NO_HIT
+        || hit.triangle as usize >= soup.records.len()
+    {
         return false;
     }
     let ulp = |t: f64| t.abs() * f64::from(f32::EPSILON);
@@ -204,19 +270,33 @@ fn plane_distance(ray: &Ray, record: &crate::accel::triangle::TriangleRecord) ->
 }
 
 fn describe(ray: &Ray, left: &str, a: &Hit, right: &str, b: &Hit) -> String {
-    format!("{} | {left} {} | {right} {}", ray_text(ray), hit_text(a), hit_text(b))
+    format!(
+        "{} | {left} {} | {right} {}",
+        ray_text(ray),
+        hit_text(a),
+        hit_text(b)
+    )
 }
 
 /// A ray as replayable text: nine significant digits give back the same f32.
 fn ray_text(ray: &Ray) -> String {
     let three = |[x, y, z]: [f32; 3]| format!("{x:?} {y:?} {z:?}");
-    format!("ray {} / {} / {:?} {:?}", three(ray.origin), three(ray.direction), ray.t_min, ray.t_max)
+    format!(
+        "ray {} / {} / {:?} {:?}",
+        three(ray.origin),
+        three(ray.direction),
+        ray.t_min,
+        ray.t_max
+    )
 }
 
 fn hit_text(hit: &Hit) -> String {
     if hit.triangle == NO_HIT {
         "misses".to_owned()
     } else {
-        format!("hits {} at t {:?} u {:?} v {:?}", hit.triangle, hit.t, hit.u, hit.v)
+        format!(
+            "hits {} at t {:?} u {:?} v {:?}",
+            hit.triangle, hit.t, hit.u, hit.v
+        )
     }
 }
