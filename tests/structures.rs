@@ -145,6 +145,25 @@ fn twins_equal_brute_force_on_random_lattice_scenes() {
 }
 
 #[test]
+fn twins_equal_brute_force_from_far_outside_the_scene() {
+    let mut rng = Pcg::new(77);
+    for case in scenes::degenerate_cases() {
+        let mut rays = scenes::aimed_rays(&mut rng, &case.soup, 600);
+        let extent = glam::Vec3::from(scenes::box_of(&case.soup).extent());
+        for ray in &mut rays {
+            let back = glam::Vec3::from(ray.direction).normalize_or_zero() * 15.0 * extent.length();
+            ray.origin = (glam::Vec3::from(ray.origin) - back).to_array();
+            ray.t_max = scenes::FAR;
+        }
+        let expected = brute_force(&case.soup, &rays);
+        for kind in kinds() {
+            let params = default_params(&kind.parameters());
+            check_twin(case.name, kind, &params, &case.soup, &rays, &expected);
+        }
+    }
+}
+
+#[test]
 fn twins_equal_brute_force_on_hard_scenes_with_every_parameter() {
     for (case, rays, expected) in hard_cases(5, 300) {
         for kind in kinds() {
