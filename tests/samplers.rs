@@ -6,7 +6,7 @@ mod common;
 use common::{Pcg, param_variants};
 use raystone::config::Variant;
 use raystone::discrepancy::star_2d;
-use raystone::gpu::{Bindings, Composition, Dispatch, UniformValues, groups_for};
+use raystone::run::dump_stream;
 use raystone::sampling::{
     Coordinate, Sampler, SamplerRegistry, TABLE_DIMENSIONS, dimensions, to_unit,
 };
@@ -72,40 +72,8 @@ fn coordinates(sampler: &Sampler, seed: u64) -> Vec<Coordinate> {
 
 /// The kernel's words.
 fn dump(sampler: &Sampler, coordinates: &[Coordinate]) -> Vec<u32> {
-    let gpu = common::gpu();
-    let mut composition = Composition::new("sampling/dump_stream")
-        .with("sequence", sampler.sequence.kernel())
-        .with("decorrelation", sampler.decorrelation.kernel());
-    let params = &sampler.sequence_variant.params;
-    for (name, value) in sampler.sequence.constants(params) {
-        composition = composition.constant(name, value);
-    }
-    let words: Vec<[u32; 4]> = coordinates
-        .iter()
-        .map(|c| [c.pixel, c.sample, c.dimension, c.seed])
-        .collect();
-    let run = || -> Result<Vec<u32>, raystone::gpu::GpuError> {
-        let count = words.len() as u32;
-        let stream = gpu.zeroed("stream", u64::from(count) * 4)?;
-        let mut bindings = Bindings::new();
-        bindings
-            .buffer("coordinates", &gpu.storage("coordinates", &words)?)
-            .buffer(
-                "sampler_table",
-                &gpu.storage("sampler_table", &sampler.table)?,
-            )
-            .buffer("stream", &stream)
-            .uniform("dump", UniformValues::new().u32("count", count));
-        gpu.run(&Dispatch {
-            pipeline: &*gpu.pipeline(&composition, true)?,
-            bindings: &bindings,
-            groups: groups_for(count),
-        })?;
-        gpu.read(&stream)
-    };
-    let mut out = run().unwrap_or_else(|e| panic!("{}: {e}", sampler.label()));
-    out.truncate(coordinates.len());
-    out
+    dump_stream(common::gpu(), sampler, coordinates)
+        .unwrap_or_else(|e| panic!("{}: {e}", sampler.label()))
 }
 
 fn first_difference(
@@ -232,6 +200,13 @@ fn the_first_two_dimensions_of_sobol_are_nets() {
     }
     // Not every pair is one: the test can tell.
     assert!(!is_net(&points(&sobol, 1 << 8, [4, 5]), 8));
+}
+
+#[test]
+fn a_dimension_beyond_the_table_is_refused() {
+    let beyond = [at(0, TABLE_DIMENSIONS)];
+    assert!(dump_stream(common::gpu(), &sampler("sobol", "none"), &beyond).is_err());
+    assert!(dump_stream(common::gpu(), &sampler("pixel-hash", "none"), &beyond).is_ok());
 }
 
 /// Direction numbers of one line "d s a m_1 … m_s" of Joe and Kuo's file, most significant first.

@@ -103,11 +103,14 @@ pub fn intersect_triangle(triangle: &TriangleRecord, ray: &Ray, inverse: [f32; 3
     let enter = enter - enter.abs() * TRIANGLE_PAD;
     let exit = exit + exit.abs() * TRIANGLE_PAD;
     let t = plane.max(enter).min(exit);
-    let reach = |c: f32, d: f32| c.abs() + plane.abs() * d.abs();
-    let terms = ((e1y * e2z).abs() + (e1z * e2y).abs()) * reach(cx, dx)
-        + ((e1z * e2x).abs() + (e1x * e2z).abs()) * reach(cy, dy)
-        + ((e1x * e2y).abs() + (e1y * e2x).abs()) * reach(cz, dz);
-    let repaired = enter <= exit && (t - plane).abs() * area <= terms * DISTANCE_PAD;
+    let mut repaired = enter <= exit;
+    if t != plane {
+        let reach = |c: f32, d: f32| c.abs() + plane.abs() * d.abs();
+        let terms = ((e1y * e2z).abs() + (e1z * e2y).abs()) * reach(cx, dx)
+            + ((e1z * e2x).abs() + (e1x * e2z).abs()) * reach(cy, dy)
+            + ((e1x * e2y).abs() + (e1y * e2x).abs()) * reach(cz, dz);
+        repaired = repaired && (t - plane).abs() * area <= terms * DISTANCE_PAD;
+    }
     let nearer = t < hit.t || (t == hit.t && triangle.id < hit.triangle);
     if repaired && t >= ray.t_min && t <= ray.t_max && nearer {
         // None of the three is negative, but any may be −0, whose sign compilers do not keep.

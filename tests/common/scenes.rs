@@ -254,7 +254,7 @@ pub fn lattice_plane_rays(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> V
         .fold(0.0, f32::max);
     let margin = ((diagonal + far) * 2.0_f32.powi(-18)).max(1e-18);
     let ray = |i: usize| {
-        let pad = if i % 2 == 0 { margin } else { 0.0 };
+        let pad = if i.is_multiple_of(2) { margin } else { 0.0 };
         let divisions = 1 + rng.below(8);
         let origin = std::array::from_fn(|axis| {
             let [low, high] = [tight.min[axis] - pad, tight.max[axis] + pad];
