@@ -35,10 +35,8 @@ const ORACLE_TESTS: usize = 300_000_000;
 /// Two distances within this many ulp are the same on an adapter with inexact arithmetic.
 const TIE_ULPS: f64 = 4.0;
 
-/// The judge of a scene with its recorded rays.
+/// The judge of a scene: recorded rays with its answers. The scalar BVH that gave them is not kept.
 pub struct Judge {
-    /// The scalar BVH.
-    pub twin: BvhTwin,
     /// Rays and true hits, per class.
     pub sets: Vec<RaySet>,
     /// The judge against brute force.
@@ -71,7 +69,6 @@ impl Judge {
         twin.validate(soup)?;
         let sets = record_rays(scene, soup, camera, &twin, settings.rays, seed);
         let mut judge = Self {
-            twin,
             sets,
             brute_force: JudgeCheck::default(),
             oracle: JudgeCheck::default(),
