@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn collect(folder: &Path, out: &mut Vec<PathBuf>) {
-    let entries = std::fs::read_dir(folder).unwrap_or_else(|e| panic!("cannot read {}: {e}", folder.display()));
+    let entries = std::fs::read_dir(folder)
+        .unwrap_or_else(|e| panic!("cannot read {}: {e}", folder.display()));
     for entry in entries {
         let path = entry.expect("a readable directory entry").path();
         if path.is_dir() {
@@ -18,7 +19,10 @@ fn collect(folder: &Path, out: &mut Vec<PathBuf>) {
 
 fn git(arguments: &[&str]) -> Option<String> {
     let output = Command::new("git").args(arguments).output().ok()?;
-    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    output
+        .status
+        .success()
+        .then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
 
 fn main() {
@@ -29,15 +33,31 @@ fn main() {
     files.sort();
     let mut text = String::from("pub(crate) const EMBEDDED: &[(&str, &str)] = &[\n");
     for file in &files {
-        let name = file.strip_prefix(&kernels).expect("under kernels/").with_extension("");
-        let name = name.components().map(|c| c.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/");
-        writeln!(text, "    ({name:?}, include_str!({:?})),", file.display().to_string()).expect("writing to a String");
+        let name = file
+            .strip_prefix(&kernels)
+            .expect("under kernels/")
+            .with_extension("");
+        let name = name
+            .components()
+            .map(|c| c.as_os_str().to_string_lossy())
+            .collect::<Vec<_>>()
+            .join("/");
+        writeln!(
+            text,
+            "    ({name:?}, include_str!({:?})),",
+            file.display().to_string()
+        )
+        .expect("writing to a String");
     }
     text.push_str("];\n");
-    let out = PathBuf::from(std::env::var("OUT_DIR").expect("set by cargo")).join("embedded_kernels.rs");
+    let out =
+        PathBuf::from(std::env::var("OUT_DIR").expect("set by cargo")).join("embedded_kernels.rs");
     std::fs::write(&out, text).unwrap_or_else(|e| panic!("cannot write {}: {e}", out.display()));
     println!("cargo::rerun-if-changed=kernels");
-    println!("cargo::rerun-if-changed=.git/HEAD");
+    // Grows with every commit; absent outside a repository.
+    if root.join(".git/logs/HEAD").exists() {
+        println!("cargo::rerun-if-changed=.git/logs/HEAD");
+    }
     if let Some(commit) = git(&["rev-parse", "--short=12", "HEAD"]) {
         println!("cargo::rustc-env=RAYSTONE_COMMIT={commit}");
     }

@@ -298,7 +298,7 @@ fn verify_ends_with_0_where_hits_are_right_and_with_1_where_a_kernel_skips_a_tri
 }
 
 #[test]
-fn a_scene_that_fails_ends_with_1_and_the_rest_goes_on() {
+fn a_scene_that_cannot_be_loaded_ends_with_2_and_the_rest_goes_on() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let model = folder.path().join("empty.obj");
     std::fs::write(&model, "").expect("a writable folder");
@@ -315,7 +315,7 @@ fn a_scene_that_fails_ends_with_1_and_the_rest_goes_on() {
         text(&out),
     ]);
     let words = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{words}");
+    assert_eq!(output.status.code(), Some(2), "{words}");
     assert!(
         words.contains("failed: ") && words.contains("empty.obj"),
         "{words}"

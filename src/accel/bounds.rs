@@ -17,17 +17,32 @@ pub struct Bounds {
 
 impl Bounds {
     /// The neutral element of [`Bounds::union`].
-    pub const EMPTY: Bounds = Bounds { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
+    pub const EMPTY: Bounds = Bounds {
+        min: [f32::INFINITY; 3],
+        max: [f32::NEG_INFINITY; 3],
+    };
 
     /// Contains every box.
-    pub const EVERYTHING: Bounds = Bounds { min: [f32::NEG_INFINITY; 3], max: [f32::INFINITY; 3] };
+    pub const EVERYTHING: Bounds = Bounds {
+        min: [f32::NEG_INFINITY; 3],
+        max: [f32::INFINITY; 3],
+    };
 
     /// The smallest box around both.
     pub fn union(&self, other: &Bounds) -> Bounds {
         let mut out = *self;
         for axis in 0..3 {
-            out.min[axis] = out.min[axis].min(other.min[axis]);
-            out.max[axis] = out.max[axis].max(other.max[axis]);
+            // One instruction each, unlike f32::min; bounds hold no NaN.
+            out.min[axis] = if other.min[axis] < out.min[axis] {
+                other.min[axis]
+            } else {
+                out.min[axis]
+            };
+            out.max[axis] = if other.max[axis] > out.max[axis] {
+                other.max[axis]
+            } else {
+                out.max[axis]
+            };
         }
         out
     }

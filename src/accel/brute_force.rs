@@ -1,9 +1,11 @@
 //! No structure: every ray is tested against every triangle. Twin of
 //! `kernels/accel/brute_force.wesl`.
 
-use super::ray::{safe_inverse, Hit, Ray};
-use super::triangle::{intersect_triangle, TriangleRecord};
-use super::{AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, TriangleSoup};
+use super::ray::{Hit, Ray, safe_inverse};
+use super::triangle::{TriangleRecord, intersect_triangle};
+use super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, TriangleSoup,
+};
 use crate::config::{ParameterSchema, Params};
 use crate::measure::record::StructureStats;
 use rayon::prelude::*;
@@ -28,8 +30,15 @@ impl AccelKind for BruteForce {
         Vec::new()
     }
 
-    fn build(&self, soup: &TriangleSoup, _: &Params, _: &mut BuildLog) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        Ok(Box::new(Built { triangles: soup.records.len() as u32 }))
+    fn build(
+        &self,
+        soup: &TriangleSoup,
+        _: &Params,
+        _: &mut BuildLog,
+    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        Ok(Box::new(Built {
+            triangles: soup.records.len() as u32,
+        }))
     }
 }
 
@@ -42,17 +51,27 @@ impl BuiltAccel for Built {
         if soup.records.len() == self.triangles as usize {
             Ok(())
         } else {
-            Err(AccelError::Invalid(format!("built for {} triangles, given {}", self.triangles, soup.records.len())))
+            Err(AccelError::Invalid(format!(
+                "built for {} triangles, given {}",
+                self.triangles,
+                soup.records.len()
+            )))
         }
     }
 
     fn buffers(&self) -> GpuBuffers<'_> {
         let triangles = self.triangles as usize;
-        GpuBuffers { uniforms: vec![super::limits(triangles, triangles)], ..Default::default() }
+        GpuBuffers {
+            uniforms: vec![super::limits(triangles, triangles)],
+            ..Default::default()
+        }
     }
 
     fn stats(&self) -> StructureStats {
-        StructureStats { references: u64::from(self.triangles), ..Default::default() }
+        StructureStats {
+            references: u64::from(self.triangles),
+            ..Default::default()
+        }
     }
 
     fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
@@ -105,29 +124,45 @@ struct Block {
 impl Block {
     fn new(records: &[TriangleRecord]) -> Self {
         let lanes = |get: fn(&TriangleRecord) -> [f32; 3]| {
-            std::array::from_fn(|axis| std::array::from_fn(|lane| records.get(lane).map_or(0.0, |r| get(r)[axis])))
+            std::array::from_fn(|axis| {
+                std::array::from_fn(|lane| records.get(lane).map_or(0.0, |r| get(r)[axis]))
+            })
         };
-        Self { v0: lanes(|r| r.v0), e1: lanes(|r| r.e1), e2: lanes(|r| r.e2) }
+        Self {
+            v0: lanes(|r| r.v0),
+            e1: lanes(|r| r.e1),
+            e2: lanes(|r| r.e2),
+        }
     }
 
     /// Lanes that pass the sign tests of [`intersect_triangle`]: the same products in the same order.
     fn candidates(&self, ray: &Ray) -> u32 {
         let [dx, dy, dz] = ray.direction;
         let mut inside = [0u32; LANES];
-        for lane in 0..LANES {
+        for (lane, inside) in inside.iter_mut().enumerate() {
             let [cx, cy, cz]: [f32; 3] = std::array::from_fn(|a| self.v0[a][lane] - ray.origin[a]);
             let [e1x, e1y, e1z]: [f32; 3] = std::array::from_fn(|a| self.e1[a][lane]);
             let [e2x, e2y, e2z]: [f32; 3] = std::array::from_fn(|a| self.e2[a][lane]);
-            let (nx, ny, nz) = (e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x);
+            let (nx, ny, nz) = (
+                e1y * e2z - e1z * e2y,
+                e1z * e2x - e1x * e2z,
+                e1x * e2y - e1y * e2x,
+            );
             let (rx, ry, rz) = (dy * cz - dz * cy, dz * cx - dx * cz, dx * cy - dy * cx);
             let det = nx * dx + ny * dy + nz * dz;
             let sign = det.to_bits() & 0x8000_0000;
             let u = f32::from_bits((rx * e2x + ry * e2y + rz * e2z).to_bits() ^ sign);
             let v = f32::from_bits((rx * e1x + ry * e1y + rz * e1z).to_bits() ^ sign);
             let area = det.abs();
-            inside[lane] = u32::from(area > 0.0) & u32::from(u >= 0.0) & u32::from(v >= 0.0) & u32::from(u + v <= area);
+            *inside = u32::from(area > 0.0)
+                & u32::from(u >= 0.0)
+                & u32::from(v >= 0.0)
+                & u32::from(u + v <= area);
         }
-        inside.iter().enumerate().fold(0, |mask, (lane, bit)| mask | bit << lane)
+        inside
+            .iter()
+            .enumerate()
+            .fold(0, |mask, (lane, bit)| mask | bit << lane)
     }
 }
 
@@ -135,21 +170,23 @@ impl Block {
 pub fn brute_force_hits(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
     let blocks: Vec<Block> = soup.records.chunks(LANES).map(Block::new).collect();
     let mut hits: Vec<Hit> = rays.iter().map(Hit::miss).collect();
-    hits.par_chunks_mut(RAY_CHUNK).zip(rays.par_chunks(RAY_CHUNK)).for_each(|(hits, rays)| {
-        for (tile, blocks) in blocks.chunks(TILE_BLOCKS).enumerate() {
-            for (ray, hit) in rays.iter().zip(hits.iter_mut()) {
-                let inverse = safe_inverse(ray.direction);
-                for (index, block) in blocks.iter().enumerate() {
-                    let mut mask = block.candidates(ray);
-                    while mask != 0 {
-                        let lane = mask.trailing_zeros() as usize;
-                        mask &= mask - 1;
-                        let id = (tile * TILE_BLOCKS + index) * LANES + lane;
-                        intersect_triangle(&soup.records[id], ray, inverse, hit);
+    hits.par_chunks_mut(RAY_CHUNK)
+        .zip(rays.par_chunks(RAY_CHUNK))
+        .for_each(|(hits, rays)| {
+            for (tile, blocks) in blocks.chunks(TILE_BLOCKS).enumerate() {
+                for (ray, hit) in rays.iter().zip(hits.iter_mut()) {
+                    let inverse = safe_inverse(ray.direction);
+                    for (index, block) in blocks.iter().enumerate() {
+                        let mut mask = block.candidates(ray);
+                        while mask != 0 {
+                            let lane = mask.trailing_zeros() as usize;
+                            mask &= mask - 1;
+                            let id = (tile * TILE_BLOCKS + index) * LANES + lane;
+                            intersect_triangle(&soup.records[id], ray, inverse, hit);
+                        }
                     }
                 }
             }
-        }
-    });
+        });
     hits
 }

@@ -3,12 +3,13 @@
 //!
 //! Source: T. Aila, S. Laine, "Understanding the efficiency of ray traversal on GPUs", HPG 2009.
 
-use super::bounds::{enter_box, Bounds};
-use super::ray::{safe_inverse, Hit, Ray, NO_HIT};
-use super::tree::{tree_parameters, Coverage, NodeKind, Tree};
-use super::triangle::{intersect_triangle, TriangleRecord};
+use super::bounds::{Bounds, enter_box};
+use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::tree::{Coverage, NodeKind, Tree, tree_parameters};
+use super::triangle::{TriangleRecord, intersect_triangle};
 use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords, TriangleSoup,
+    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
+    TriangleSoup,
 };
 use crate::config::{ParameterSchema, Params};
 use crate::measure::record::StructureStats;
@@ -78,11 +79,17 @@ impl Node {
     };
 
     fn left_bounds(&self) -> Bounds {
-        Bounds { min: self.left_min, max: self.left_max }
+        Bounds {
+            min: self.left_min,
+            max: self.left_max,
+        }
     }
 
     fn right_bounds(&self) -> Bounds {
-        Bounds { min: self.right_min, max: self.right_max }
+        Bounds {
+            min: self.right_min,
+            max: self.right_max,
+        }
     }
 }
 
@@ -100,22 +107,51 @@ impl BvhTwin {
     ///
     /// # Errors
     /// More triangles than a leaf reference can address.
-    pub fn build(soup: &TriangleSoup, params: &Params, log: &mut BuildLog) -> Result<Self, AccelError> {
+    pub fn build(
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Self, AccelError> {
         let count = soup.records.len() as u64;
         if count > u64::from(FIRST_MASK) {
-            return Err(AccelError::Limit { what: "triangles of a bvh".into(), needed: count, limit: FIRST_MASK.into() });
+            return Err(AccelError::Limit {
+                what: "triangles of a bvh".into(),
+                needed: count,
+                limit: FIRST_MASK.into(),
+            });
         }
         let tree = log.phase("binned-sah", || Tree::build(soup, params));
         let (nodes, leaf_triangles): (Vec<Node>, Vec<TriangleRecord>) = log.phase("layout", || {
-            (layout(&tree), tree.order.iter().map(|&id| soup.records[id as usize]).collect())
+            (
+                layout(&tree),
+                tree.order
+                    .iter()
+                    .map(|&id| soup.records[id as usize])
+                    .collect(),
+            )
         });
         let bytes = size_of_val(&nodes[..]) + size_of_val(&leaf_triangles[..]);
         // One entry is pushed for each level at most.
         let stack_entries = tree.depth().max(1);
-        Ok(Self { stats: StructureStats { bytes: bytes as u64, ..tree.stats() }, nodes, leaf_triangles, stack_entries })
+        Ok(Self {
+            stats: StructureStats {
+                bytes: bytes as u64,
+                ..tree.stats()
+            },
+            nodes,
+            leaf_triangles,
+            stack_entries,
+        })
     }
 
-    fn leaf(&self, reference: u32, ray: &Ray, inverse: [f32; 3], hit: &mut Hit, counters: &mut Counters) {
+    fn leaf(
+        &self,
+        reference: u32,
+        ray: &Ray,
+        inverse: [f32; 3],
+        hit: &mut Hit,
+        counters: &mut Counters,
+    ) {
         let first = (reference & FIRST_MASK) as usize;
         let count = ((reference & !LEAF) >> COUNT_SHIFT) as usize;
         for triangle in &self.leaf_triangles[first..first + count] {
@@ -183,7 +219,10 @@ fn layout(tree: &Tree) -> Vec<Node> {
     let mut nodes = Vec::with_capacity(inner_count as usize);
     for node in &tree.nodes {
         if let NodeKind::Inner { left, right } = node.kind {
-            let (l, r) = (&tree.nodes[left as usize].bounds, &tree.nodes[right as usize].bounds);
+            let (l, r) = (
+                &tree.nodes[left as usize].bounds,
+                &tree.nodes[right as usize].bounds,
+            );
             nodes.push(Node {
                 left_min: l.min,
                 left: reference(left),
@@ -198,7 +237,8 @@ fn layout(tree: &Tree) -> Vec<Node> {
     if nodes.is_empty() {
         let mut root = Node::NOTHING;
         if let Some(only) = tree.nodes.first() {
-            (root.left_min, root.left_max, root.left) = (only.bounds.min, only.bounds.max, reference(0));
+            (root.left_min, root.left_max, root.left) =
+                (only.bounds.min, only.bounds.max, reference(0));
         }
         nodes.push(root);
     }
@@ -212,15 +252,23 @@ impl BuiltAccel for BvhTwin {
         let mut stack = vec![(0_u32, Bounds::EVERYTHING, 1)];
         while let Some((index, around, depth)) = stack.pop() {
             if depth > self.stack_entries {
-                return Err(AccelError::Invalid(format!("node {index}: deeper than the stack of {}", self.stack_entries)));
+                return Err(AccelError::Invalid(format!(
+                    "node {index}: deeper than the stack of {}",
+                    self.stack_entries
+                )));
             }
             let node = &self.nodes[index as usize];
-            for (reference, bounds) in [(node.left, node.left_bounds()), (node.right, node.right_bounds())] {
+            for (reference, bounds) in [
+                (node.left, node.left_bounds()),
+                (node.right, node.right_bounds()),
+            ] {
                 if reference == EMPTY_LEAF {
                     continue;
                 }
                 if !around.contains(&bounds) {
-                    return Err(AccelError::Invalid(format!("node {index}: a child's box leaves its own")));
+                    return Err(AccelError::Invalid(format!(
+                        "node {index}: a child's box leaves its own"
+                    )));
                 }
                 if reference & LEAF == 0 {
                     coverage.node(reference as usize)?;
@@ -238,7 +286,11 @@ impl BuiltAccel for BvhTwin {
     fn buffers(&self) -> GpuBuffers<'_> {
         GpuBuffers {
             arrays: vec![
-                NamedWords { name: "nodes", words: bytemuck::cast_slice(&self.nodes).into(), element_bytes: 64 },
+                NamedWords {
+                    name: "nodes",
+                    words: bytemuck::cast_slice(&self.nodes).into(),
+                    element_bytes: 64,
+                },
                 NamedWords {
                     name: "leaf_triangles",
                     words: bytemuck::cast_slice(&self.leaf_triangles).into(),

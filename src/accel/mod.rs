@@ -12,9 +12,9 @@ pub mod tree;
 pub mod triangle;
 mod uniform_grid;
 
-pub use brute_force::{brute_force_hits, BruteForce};
+pub use brute_force::{BruteForce, brute_force_hits};
 pub use bvh::{Bvh, BvhTwin};
-pub use ray::{Hit, Ray, NO_HIT};
+pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::AccelRegistry;
 pub use roped_bvh::RopedBvh;
 pub use uniform_grid::UniformGrid;
@@ -68,7 +68,9 @@ impl TriangleSoup {
 
     /// Box around all triangles; [`bounds::Bounds::EMPTY`] if there are none.
     pub fn bounds(&self) -> bounds::Bounds {
-        self.records.iter().fold(bounds::Bounds::EMPTY, |b, r| b.union(&r.bounds()))
+        self.records
+            .iter()
+            .fold(bounds::Bounds::EMPTY, |b, r| b.union(&r.bounds()))
     }
 }
 
@@ -84,7 +86,10 @@ impl BuildLog {
     pub fn phase<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();
         let result = work();
-        self.phases.push(Phase { name: name.to_owned(), ms: start.elapsed().as_secs_f64() * 1e3 });
+        self.phases.push(Phase {
+            name: name.to_owned(),
+            ms: start.elapsed().as_secs_f64() * 1e3,
+        });
         result
     }
 
@@ -120,7 +125,12 @@ pub struct GpuBuffers<'a> {
 /// The uniform `limits` of `kernels/common/limits.wesl`: the greatest number of steps that a
 /// traversal can take, and the number of nodes or triangles where it ends at the last one.
 pub fn limits(step_fuse: usize, elements: usize) -> (&'static str, UniformValues) {
-    ("limits", UniformValues::new().u32("step_fuse", step_fuse as u32).u32("elements", elements as u32))
+    (
+        "limits",
+        UniformValues::new()
+            .u32("step_fuse", step_fuse as u32)
+            .u32("elements", elements as u32),
+    )
 }
 
 impl GpuBuffers<'_> {

@@ -41,7 +41,12 @@ pub struct Hit {
 impl Hit {
     /// The answer before anything was hit.
     pub fn miss(ray: &Ray) -> Self {
-        Self { t: ray.t_max, triangle: NO_HIT, u: 0.0, v: 0.0 }
+        Self {
+            t: ray.t_max,
+            triangle: NO_HIT,
+            u: 0.0,
+            v: 0.0,
+        }
     }
 
     /// Equality to the bit.

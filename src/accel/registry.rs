@@ -11,7 +11,9 @@ pub struct AccelRegistry {
 
 impl Default for AccelRegistry {
     fn default() -> Self {
-        Self { kinds: vec![&BruteForce, &super::Bvh, &RopedBvh, &UniformGrid] }
+        Self {
+            kinds: vec![&BruteForce, &super::Bvh, &RopedBvh, &UniformGrid],
+        }
     }
 }
 

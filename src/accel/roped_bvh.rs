@@ -3,12 +3,13 @@
 //!
 //! Source: B. Smits, "Efficiency issues for ray tracing", 1998; Dufay 2017, Algorithm 4.4.
 
-use super::bounds::{enter_box, Bounds};
-use super::ray::{safe_inverse, Hit, Ray, NO_HIT};
-use super::tree::{tree_parameters, Coverage, NodeKind, Tree};
-use super::triangle::{intersect_triangle, TriangleRecord};
+use super::bounds::{Bounds, enter_box};
+use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::tree::{Coverage, NodeKind, Tree, tree_parameters};
+use super::triangle::{TriangleRecord, intersect_triangle};
 use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords, TriangleSoup,
+    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
+    TriangleSoup,
 };
 use crate::config::{ParameterSchema, Params};
 use crate::measure::record::StructureStats;
@@ -53,10 +54,23 @@ impl AccelKind for RopedBvh {
         }
         let tree = log.phase("binned-sah", || Tree::build(soup, params));
         let (nodes, leaf_triangles): (Vec<Node>, Vec<TriangleRecord>) = log.phase("ropes", || {
-            (ropes(&tree), tree.order.iter().map(|&id| soup.records[id as usize]).collect())
+            (
+                ropes(&tree),
+                tree.order
+                    .iter()
+                    .map(|&id| soup.records[id as usize])
+                    .collect(),
+            )
         });
         let bytes = size_of_val(&nodes[..]) + size_of_val(&leaf_triangles[..]);
-        Ok(Box::new(Built { stats: StructureStats { bytes: bytes as u64, ..tree.stats() }, nodes, leaf_triangles }))
+        Ok(Box::new(Built {
+            stats: StructureStats {
+                bytes: bytes as u64,
+                ..tree.stats()
+            },
+            nodes,
+            leaf_triangles,
+        }))
     }
 }
 
@@ -107,20 +121,32 @@ impl BuiltAccel for Built {
             let skip = node.skip as usize;
             let (outer, end) = around[around.len() - 1];
             if skip <= index || skip > end {
-                return Err(AccelError::Invalid(format!("node {index}: its rope leads to {skip}")));
+                return Err(AccelError::Invalid(format!(
+                    "node {index}: its rope leads to {skip}"
+                )));
             }
-            let bounds = Bounds { min: node.min, max: node.max };
+            let bounds = Bounds {
+                min: node.min,
+                max: node.max,
+            };
             if !outer.contains(&bounds) {
-                return Err(AccelError::Invalid(format!("node {index}: its box leaves its parent's")));
+                return Err(AccelError::Invalid(format!(
+                    "node {index}: its box leaves its parent's"
+                )));
             }
             coverage.node(index)?;
-            let (first, count) = ((node.leaf & FIRST_MASK) as usize, (node.leaf >> COUNT_SHIFT) as usize);
+            let (first, count) = (
+                (node.leaf & FIRST_MASK) as usize,
+                (node.leaf >> COUNT_SHIFT) as usize,
+            );
             if count == 0 {
                 around.push((bounds, skip));
             } else if skip == index + 1 {
                 coverage.leaf(self.leaf_triangles.get(first..first + count), &bounds)?;
             } else {
-                return Err(AccelError::Invalid(format!("leaf {index}: its rope skips a node")));
+                return Err(AccelError::Invalid(format!(
+                    "leaf {index}: its rope skips a node"
+                )));
             }
         }
         coverage.is_complete()
@@ -129,7 +155,11 @@ impl BuiltAccel for Built {
     fn buffers(&self) -> GpuBuffers<'_> {
         GpuBuffers {
             arrays: vec![
-                NamedWords { name: "nodes", words: bytemuck::cast_slice(&self.nodes).into(), element_bytes: 32 },
+                NamedWords {
+                    name: "nodes",
+                    words: bytemuck::cast_slice(&self.nodes).into(),
+                    element_bytes: 32,
+                },
                 NamedWords {
                     name: "leaf_triangles",
                     words: bytemuck::cast_slice(&self.leaf_triangles).into(),
@@ -160,7 +190,10 @@ impl Twin<'_> {
         while let Some(node) = self.0.nodes.get(current) {
             counters.nodes += 1;
             counters.box_tests += 1;
-            let bounds = Bounds { min: node.min, max: node.max };
+            let bounds = Bounds {
+                min: node.min,
+                max: node.max,
+            };
             if enter_box(&bounds, ray, inverse, hit.t).is_none() {
                 current = node.skip as usize;
                 continue;

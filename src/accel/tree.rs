@@ -59,7 +59,10 @@ pub fn tree_parameters() -> ParameterSchema {
         name,
         description,
         default: ParamValue::Number(default),
-        range: ParamRange::Number { min: 0.01, max: 100.0 },
+        range: ParamRange::Number {
+            min: 0.01,
+            max: 100.0,
+        },
     };
     vec![
         Parameter {
@@ -93,16 +96,24 @@ impl Tree {
             traversal_cost: params.number("traversal_cost") as f32,
             intersection_cost: params.number("intersection_cost") as f32,
         };
-        let mut primitives: Vec<Primitive> =
-            soup.records.iter().map(|r| Primitive { bounds: r.bounds(), id: r.id }).collect();
+        let mut primitives: Vec<Primitive> = soup
+            .records
+            .iter()
+            .map(|r| Primitive {
+                bounds: r.bounds(),
+                id: r.id,
+            })
+            .collect();
         if primitives.is_empty() {
             return Tree::default();
         }
-        let count = primitives.len();
-        let mut nodes = build_subtree(&mut primitives, 0, &settings, 0);
-        nodes.shrink_to_fit();
+        let bounds = bounds_of(&primitives);
+        let subtree = build_subtree(&mut primitives, bounds, 0, &settings, 0);
         let order = primitives.iter().map(|p| p.id).collect();
-        debug_assert!(nodes.len() < 2 * count);
+        drop(primitives);
+        let mut nodes = Vec::new();
+        lay_out(subtree, &mut nodes);
+        nodes.shrink_to_fit();
         Tree { nodes, order }
     }
 
@@ -128,7 +139,9 @@ impl Tree {
             references: self.order.len() as u64,
             ..Default::default()
         };
-        let Some(root) = self.nodes.first() else { return stats };
+        let Some(root) = self.nodes.first() else {
+            return stats;
+        };
         let mut cost = 0.0_f64;
         for node in &self.nodes {
             let weight = match node.kind {
@@ -157,7 +170,11 @@ pub struct Coverage<'a> {
 impl<'a> Coverage<'a> {
     /// Nothing reached yet.
     pub fn new(soup: &'a TriangleSoup, nodes: usize) -> Self {
-        Self { soup, nodes: vec![false; nodes], triangles: vec![false; soup.records.len()] }
+        Self {
+            soup,
+            nodes: vec![false; nodes],
+            triangles: vec![false; soup.records.len()],
+        }
     }
 
     /// Notes that a node is reached.
@@ -169,7 +186,9 @@ impl<'a> Coverage<'a> {
             // The root of an empty scene is no node.
             None if index == 0 => Ok(()),
             None => Err(AccelError::Invalid(format!("node {index} does not exist"))),
-            Some(true) => Err(AccelError::Invalid(format!("node {index} is reached twice"))),
+            Some(true) => Err(AccelError::Invalid(format!(
+                "node {index} is reached twice"
+            ))),
             Some(seen) => {
                 *seen = true;
                 Ok(())
@@ -182,20 +201,32 @@ impl<'a> Coverage<'a> {
     /// # Errors
     /// The range does not exist, or a triangle differs from the scene's, is in two leaves, or
     /// sticks out of the leaf's box.
-    pub fn leaf(&mut self, triangles: Option<&[TriangleRecord]>, bounds: &Bounds) -> Result<(), AccelError> {
+    pub fn leaf(
+        &mut self,
+        triangles: Option<&[TriangleRecord]>,
+        bounds: &Bounds,
+    ) -> Result<(), AccelError> {
         let Some(triangles) = triangles else {
-            return Err(AccelError::Invalid("a leaf lies outside the triangle array".to_owned()));
+            return Err(AccelError::Invalid(
+                "a leaf lies outside the triangle array".to_owned(),
+            ));
         };
         for triangle in triangles {
             let id = triangle.id;
             if self.soup.records.get(id as usize) != Some(triangle) {
-                return Err(AccelError::Invalid(format!("triangle {id} is not the scene's")));
+                return Err(AccelError::Invalid(format!(
+                    "triangle {id} is not the scene's"
+                )));
             }
             if std::mem::replace(&mut self.triangles[id as usize], true) {
-                return Err(AccelError::Invalid(format!("triangle {id} is in two leaves")));
+                return Err(AccelError::Invalid(format!(
+                    "triangle {id} is in two leaves"
+                )));
             }
             if !bounds.contains(&triangle.bounds()) {
-                return Err(AccelError::Invalid(format!("triangle {id} sticks out of its leaf's box")));
+                return Err(AccelError::Invalid(format!(
+                    "triangle {id} sticks out of its leaf's box"
+                )));
             }
         }
         Ok(())
@@ -207,55 +238,144 @@ impl<'a> Coverage<'a> {
     /// A node or triangle was not reached.
     pub fn is_complete(&self) -> Result<(), AccelError> {
         if let Some(lost) = self.triangles.iter().position(|seen| !seen) {
-            return Err(AccelError::Invalid(format!("triangle {lost} is in no leaf")));
+            return Err(AccelError::Invalid(format!(
+                "triangle {lost} is in no leaf"
+            )));
         }
         match self.nodes.iter().position(|seen| !seen) {
-            Some(orphan) => Err(AccelError::Invalid(format!("node {orphan} is never reached"))),
+            Some(orphan) => Err(AccelError::Invalid(format!(
+                "node {orphan} is never reached"
+            ))),
             None => Ok(()),
         }
     }
 }
 
-/// Nodes of the subtree over `primitives`, root first, indices relative to the returned vector;
-/// `first` is the position of `primitives` in the whole order.
-fn build_subtree(primitives: &mut [Primitive], first: u32, settings: &Settings, depth: u32) -> Vec<TreeNode> {
-    let bounds = primitives.iter().fold(Bounds::EMPTY, |b, p| b.union(&p.bounds));
-    let Some(middle) = split(primitives, &bounds, settings, depth) else {
-        let kind = NodeKind::Leaf { first, count: primitives.len() as u32 };
-        return vec![TreeNode { bounds, kind }];
-    };
-    let parallel = primitives.len() > PARALLEL_GRAIN;
-    let (low, high) = primitives.split_at_mut(middle);
-    let build_low = |low: &mut [Primitive]| build_subtree(low, first, settings, depth + 1);
-    let build_high = |high: &mut [Primitive]| build_subtree(high, first + middle as u32, settings, depth + 1);
-    let (left, right) = if parallel {
-        rayon::join(|| build_low(low), || build_high(high))
-    } else {
-        (build_low(low), build_high(high))
-    };
-    let mut nodes = Vec::with_capacity(1 + left.len() + right.len());
-    let right_root = 1 + left.len() as u32;
-    nodes.push(TreeNode { bounds, kind: NodeKind::Inner { left: 1, right: right_root } });
-    nodes.extend(left.into_iter().map(|n| shifted(n, 1)));
-    nodes.extend(right.into_iter().map(|n| shifted(n, right_root)));
-    nodes
+/// A subtree under construction. Subtrees above the parallel grain are joined by reference and laid
+/// out once in the end: copying them at every level would cost O(n log n).
+enum Subtree {
+    /// Nodes in depth-first order, children relative to the first.
+    Whole(Vec<TreeNode>),
+    Inner(Bounds, Box<(Subtree, Subtree)>),
 }
 
-fn shifted(mut node: TreeNode, by: u32) -> TreeNode {
-    if let NodeKind::Inner { left, right } = &mut node.kind {
-        *left += by;
-        *right += by;
+/// Builds the subtree over `primitives`, which begin at `first` in the whole order.
+fn build_subtree(
+    primitives: &mut [Primitive],
+    bounds: Bounds,
+    first: u32,
+    settings: &Settings,
+    depth: u32,
+) -> Subtree {
+    if primitives.len() <= PARALLEL_GRAIN {
+        let mut nodes = Vec::new();
+        append_subtree(primitives, bounds, first, settings, depth, &mut nodes);
+        return Subtree::Whole(nodes);
     }
-    node
+    let Some((middle, [low_bounds, high_bounds])) = split(primitives, &bounds, settings, depth)
+    else {
+        return Subtree::Whole(vec![leaf(primitives, bounds, first)]);
+    };
+    let (low, high) = primitives.split_at_mut(middle);
+    let second = first + middle as u32;
+    Subtree::Inner(
+        bounds,
+        Box::new(rayon::join(
+            || build_subtree(low, low_bounds, first, settings, depth + 1),
+            || build_subtree(high, high_bounds, second, settings, depth + 1),
+        )),
+    )
 }
 
-/// Partitions `primitives` and returns where the second half starts; `None` makes a leaf.
-fn split(primitives: &mut [Primitive], bounds: &Bounds, settings: &Settings, depth: u32) -> Option<usize> {
+/// The same on one thread, straight into `nodes`.
+fn append_subtree(
+    primitives: &mut [Primitive],
+    bounds: Bounds,
+    first: u32,
+    settings: &Settings,
+    depth: u32,
+    nodes: &mut Vec<TreeNode>,
+) {
+    let here = nodes.len();
+    nodes.push(leaf(primitives, bounds, first));
+    let Some((middle, [low_bounds, high_bounds])) = split(primitives, &bounds, settings, depth)
+    else {
+        return;
+    };
+    let (low, high) = primitives.split_at_mut(middle);
+    append_subtree(low, low_bounds, first, settings, depth + 1, nodes);
+    let right = nodes.len() as u32;
+    nodes[here].kind = NodeKind::Inner {
+        left: here as u32 + 1,
+        right,
+    };
+    append_subtree(
+        high,
+        high_bounds,
+        first + middle as u32,
+        settings,
+        depth + 1,
+        nodes,
+    );
+}
+
+fn leaf(primitives: &[Primitive], bounds: Bounds, first: u32) -> TreeNode {
+    let count = primitives.len() as u32;
+    TreeNode {
+        bounds,
+        kind: NodeKind::Leaf { first, count },
+    }
+}
+
+/// Appends a subtree to the final nodes and frees it.
+fn lay_out(subtree: Subtree, nodes: &mut Vec<TreeNode>) {
+    let here = nodes.len() as u32;
+    match subtree {
+        Subtree::Whole(part) => nodes.extend(part.into_iter().map(|mut node| {
+            if let NodeKind::Inner { left, right } = &mut node.kind {
+                *left += here;
+                *right += here;
+            }
+            node
+        })),
+        Subtree::Inner(bounds, children) => {
+            nodes.push(TreeNode {
+                bounds,
+                kind: NodeKind::Leaf { first: 0, count: 0 },
+            });
+            let (low, high) = *children;
+            lay_out(low, nodes);
+            let right = nodes.len() as u32;
+            nodes[here as usize].kind = NodeKind::Inner {
+                left: here + 1,
+                right,
+            };
+            lay_out(high, nodes);
+        }
+    }
+}
+
+fn bounds_of(primitives: &[Primitive]) -> Bounds {
+    primitives
+        .iter()
+        .fold(Bounds::EMPTY, |b, p| b.union(&p.bounds))
+}
+
+/// Partitions `primitives`; returns where the second half starts and the bounds of both. `None`
+/// makes a leaf.
+fn split(
+    primitives: &mut [Primitive],
+    bounds: &Bounds,
+    settings: &Settings,
+    depth: u32,
+) -> Option<(usize, [Bounds; 2])> {
     let count = primitives.len();
     if count <= 1 {
         return None;
     }
-    let best = (depth < SAH_DEPTH).then(|| best_bin_split(primitives)).flatten();
+    let best = (depth < SAH_DEPTH)
+        .then(|| best_bin_split(primitives))
+        .flatten();
     let leaf_cost = settings.intersection_cost * count as f32;
     match best {
         Some(plan) => {
@@ -264,7 +384,7 @@ fn split(primitives: &mut [Primitive], bounds: &Bounds, settings: &Settings, dep
             if count <= settings.leaf_size && leaf_cost <= cost {
                 return None;
             }
-            Some(partition(primitives, |p| plan.side(p)))
+            Some((partition(primitives, |p| plan.side(p)), plan.bounds))
         }
         None if count <= settings.leaf_size => None,
         // All centres coincide, or the tree is already deep: halves, in an order that depends on
@@ -275,14 +395,17 @@ fn split(primitives: &mut [Primitive], bounds: &Bounds, settings: &Settings, dep
                 let key = |p: &Primitive| p.bounds.doubled_centre()[axis];
                 key(a).total_cmp(&key(b)).then(a.id.cmp(&b.id))
             });
-            Some(count / 2)
+            let (low, high) = primitives.split_at(count / 2);
+            Some((count / 2, [bounds_of(low), bounds_of(high)]))
         }
     }
 }
 
 fn longest_axis(bounds: &Bounds) -> usize {
     let extent = bounds.extent();
-    (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0)
+    (0..3)
+        .max_by(|&a, &b| extent[a].total_cmp(&extent[b]))
+        .unwrap_or(0)
 }
 
 struct BinSplit {
@@ -292,11 +415,17 @@ struct BinSplit {
     bin: usize,
     /// Sum over both sides of half area times count.
     cost: f32,
+    /// Bounds of both sides.
+    bounds: [Bounds; 2],
 }
 
 impl BinSplit {
     fn side(&self, primitive: &Primitive) -> bool {
-        bin_of(primitive.bounds.doubled_centre()[self.axis], self.origin, self.scale) < self.bin
+        bin_of(
+            primitive.bounds.doubled_centre()[self.axis],
+            self.origin,
+            self.scale,
+        ) < self.bin
     }
 }
 
@@ -312,7 +441,13 @@ fn best_bin_split(primitives: &[Primitive]) -> Option<BinSplit> {
         centres = centres.union(&Bounds { min: c, max: c });
     }
     let extent = centres.extent();
-    let scale = extent.map(|e| if e > 0.0 { BINS as f32 * (1.0 - 1e-6) / e } else { 0.0 });
+    let scale = extent.map(|e| {
+        if e > 0.0 {
+            BINS as f32 * (1.0 - 1e-6) / e
+        } else {
+            0.0
+        }
+    });
     let mut bins = [[(Bounds::EMPTY, 0u32); BINS]; 3];
     for p in primitives {
         let c = p.bounds.doubled_centre();
@@ -327,20 +462,34 @@ fn best_bin_split(primitives: &[Primitive]) -> Option<BinSplit> {
         if !(scale[axis] > 0.0 && scale[axis].is_finite()) {
             continue;
         }
-        let mut right_cost = [0.0_f32; BINS];
+        // Bounds and count of all bins from this one on.
+        let mut right = [(Bounds::EMPTY, 0u32); BINS];
         let (mut bounds, mut count) = (Bounds::EMPTY, 0u32);
         for bin in (1..BINS).rev() {
             bounds = bounds.union(&bins[axis][bin].0);
             count += bins[axis][bin].1;
-            right_cost[bin] = if count == 0 { f32::INFINITY } else { bounds.half_area() * count as f32 };
+            right[bin] = (bounds, count);
         }
         let (mut bounds, mut count) = (Bounds::EMPTY, 0u32);
         for bin in 1..BINS {
             bounds = bounds.union(&bins[axis][bin - 1].0);
             count += bins[axis][bin - 1].1;
-            let cost = bounds.half_area() * count as f32 + right_cost[bin];
-            if count > 0 && cost.is_finite() && best.as_ref().is_none_or(|b| cost < b.cost) {
-                best = Some(BinSplit { axis, origin: centres.min[axis], scale: scale[axis], bin, cost });
+            let (right_bounds, right_count) = right[bin];
+            if count == 0 || right_count == 0 {
+                continue;
+            }
+            let cost =
+                bounds.half_area() * count as f32 + right_bounds.half_area() * right_count as f32;
+            if best.as_ref().is_none_or(|b| cost < b.cost) {
+                let (origin, scale) = (centres.min[axis], scale[axis]);
+                best = Some(BinSplit {
+                    axis,
+                    origin,
+                    scale,
+                    bin,
+                    cost,
+                    bounds: [bounds, right_bounds],
+                });
             }
         }
     }

@@ -7,8 +7,13 @@
 //! even after rounding, so every box that contains the triangle's bounds yields an interval that
 //! contains the clamped distance, whatever the rounding errors of the triangle test were. A
 //! hierarchy of such boxes therefore returns to the bit what brute force returns.
+//!
+//! The clamp may repair rounding, but not invent a distance: a ray that slides along a face of the
+//! bounds is inside them for a stretch that need not hold the point where it meets the plane (from
+//! an origin in the face it begins or ends at distance 0). If the clamp moves the distance by more
+//! than rounding can ([`DISTANCE_PAD`]), the ray only grazed an edge of the triangle: no hit.
 
-use super::bounds::{slab, Bounds};
+use super::bounds::{Bounds, slab};
 use super::ray::{Hit, Ray};
 use crate::scene::Triangle;
 use bytemuck::{Pod, Zeroable};
@@ -17,6 +22,11 @@ use glam::Vec3;
 /// Relative widening of a triangle's own slab interval, 2⁻²¹: four ulp or more, which covers the
 /// subtraction, the reciprocal at WGSL's 2.5 ulp, and the product.
 pub const TRIANGLE_PAD: f32 = 4.768_371_6e-7;
+
+/// Bound on the relative rounding error of the distance to the plane, 2⁻²⁰, in units of the sum of
+/// the magnitudes of all terms that it is made of: twice the seven roundings of 2⁻²⁴ on the longest
+/// way from an edge to numerator or denominator, and the division.
+pub const DISTANCE_PAD: f32 = 9.536_743e-7;
 
 /// A triangle as kernels read it: three `vec4<u32>`, 48 bytes.
 #[repr(C)]
@@ -40,13 +50,22 @@ impl TriangleRecord {
     /// The record of triangle `id`.
     pub fn new(triangle: &Triangle, id: u32, material: u32) -> Self {
         let [v0, v1, v2] = triangle.vertices;
-        Self { v0: v0.to_array(), id, e1: (v0 - v1).to_array(), material, e2: (v2 - v0).to_array(), reserved: 0 }
+        Self {
+            v0: v0.to_array(),
+            id,
+            e1: (v0 - v1).to_array(),
+            material,
+            e2: (v2 - v0).to_array(),
+            reserved: 0,
+        }
     }
 
     /// The triangle as the kernels know it: vertices rebuilt from the rounded edges.
     pub fn triangle(&self) -> Triangle {
         let v0 = Vec3::from(self.v0);
-        Triangle { vertices: [v0, v0 - Vec3::from(self.e1), v0 + Vec3::from(self.e2)] }
+        Triangle {
+            vertices: [v0, v0 - Vec3::from(self.e1), v0 + Vec3::from(self.e2)],
+        }
     }
 
     /// Bounds of the triangle as the kernels know it (vertices rebuilt from the rounded edges).
@@ -88,14 +107,27 @@ pub fn intersect_triangle(triangle: &TriangleRecord, ray: &Ray, inverse: [f32; 3
     if !(area > 0.0 && u >= 0.0 && v >= 0.0 && u + v <= area) {
         return;
     }
-    let t = flip(nx * cx + ny * cy + nz * cz) / area;
+    let plane = flip(nx * cx + ny * cy + nz * cz) / area;
     let (enter, exit) = slab(&triangle.bounds(), ray, inverse);
     let enter = enter - enter.abs() * TRIANGLE_PAD;
     let exit = exit + exit.abs() * TRIANGLE_PAD;
-    let t = t.max(enter).min(exit);
+    let t = plane.max(enter).min(exit);
+    let mut repaired = enter <= exit;
+    if t != plane {
+        let reach = |c: f32, d: f32| c.abs() + plane.abs() * d.abs();
+        let terms = ((e1y * e2z).abs() + (e1z * e2y).abs()) * reach(cx, dx)
+            + ((e1z * e2x).abs() + (e1x * e2z).abs()) * reach(cy, dy)
+            + ((e1x * e2y).abs() + (e1y * e2x).abs()) * reach(cz, dz);
+        repaired = repaired && (t - plane).abs() * area <= terms * DISTANCE_PAD;
+    }
     let nearer = t < hit.t || (t == hit.t && triangle.id < hit.triangle);
-    if enter <= exit && t >= ray.t_min && t <= ray.t_max && nearer {
+    if repaired && t >= ray.t_min && t <= ray.t_max && nearer {
         // None of the three is negative, but any may be −0, whose sign compilers do not keep.
-        *hit = Hit { t: t.abs(), triangle: triangle.id, u: u.abs() / area, v: v.abs() / area };
+        *hit = Hit {
+            t: t.abs(),
+            triangle: triangle.id,
+            u: u.abs() / area,
+            v: v.abs() / area,
+        };
     }
 }

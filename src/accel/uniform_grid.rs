@@ -9,11 +9,12 @@
 //! which is larger than what rounding can move the walk; a hit beyond the present cell is kept and
 //! the walk goes on until the cell's exit lies behind the nearest hit.
 
-use super::bounds::{slab, Bounds, BOX_PAD};
-use super::ray::{safe_inverse, Hit, Ray, NO_HIT};
-use super::triangle::{intersect_triangle, TriangleRecord};
+use super::bounds::{BOX_PAD, Bounds, slab};
+use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::triangle::{TriangleRecord, intersect_triangle};
 use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords, TriangleSoup,
+    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
+    TriangleSoup,
 };
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
@@ -44,7 +45,10 @@ impl AccelKind for UniformGrid {
             name: "lambda",
             description: "cells per triangle: resolution = extent · cbrt(λ · triangles / volume)",
             default: ParamValue::Number(5.0),
-            range: ParamRange::Number { min: 0.01, max: 1000.0 },
+            range: ParamRange::Number {
+                min: 0.01,
+                max: 1000.0,
+            },
         }]
     }
 
@@ -65,7 +69,11 @@ impl AccelKind for UniformGrid {
             });
         }
         let (starts, references) = log.phase("sort", || sort_by_cell(&grid, &pairs));
-        Ok(Box::new(Built { grid, starts, references }))
+        Ok(Box::new(Built {
+            grid,
+            starts,
+            references,
+        }))
     }
 }
 
@@ -84,11 +92,16 @@ impl Grid {
     fn new(soup: &TriangleSoup, lambda: f64) -> Result<Self, AccelError> {
         let mut bounds = soup.bounds();
         if soup.records.is_empty() {
-            bounds = Bounds { min: [0.0; 3], max: [1.0; 3] };
+            bounds = Bounds {
+                min: [0.0; 3],
+                max: [1.0; 3],
+            };
         }
         let extent = bounds.extent();
         let diagonal = extent.iter().map(|e| e * e).sum::<f32>().sqrt();
-        let far = (0..3).map(|a| bounds.min[a].abs().max(bounds.max[a].abs())).fold(0.0, f32::max);
+        let far = (0..3)
+            .map(|a| bounds.min[a].abs().max(bounds.max[a].abs()))
+            .fold(0.0, f32::max);
         // Positions along a ray that starts within 16 diagonals are wrong by less than this.
         let margin = ((diagonal + far) * 2.0_f32.powi(-18)).max(1e-18);
         for axis in 0..3 {
@@ -96,16 +109,29 @@ impl Grid {
             bounds.max[axis] += margin;
         }
         // A flat scene still needs a volume for Cleary's rule.
-        let side = bounds.extent().map(|e| f64::from(e.max(1e-3 * diagonal).max(margin)));
-        let density = (lambda * soup.records.len().max(1) as f64 / side.iter().product::<f64>()).cbrt();
+        let side = bounds
+            .extent()
+            .map(|e| f64::from(e.max(1e-3 * diagonal).max(margin)));
+        let density =
+            (lambda * soup.records.len().max(1) as f64 / side.iter().product::<f64>()).cbrt();
         let resolution = side.map(|e| (e * density).round().clamp(1.0, 4096.0) as u32);
         let cells = resolution.iter().map(|&r| u64::from(r)).product::<u64>();
         if cells > MAX_CELLS {
-            return Err(AccelError::Limit { what: "cells of a uniform-grid".into(), needed: cells, limit: MAX_CELLS });
+            return Err(AccelError::Limit {
+                what: "cells of a uniform-grid".into(),
+                needed: cells,
+                limit: MAX_CELLS,
+            });
         }
         let extent = bounds.extent();
         let cell = std::array::from_fn(|a| extent[a] / resolution[a] as f32);
-        Ok(Self { bounds, resolution, cell, inverse_cell: cell.map(|c| 1.0 / c), margin })
+        Ok(Self {
+            bounds,
+            resolution,
+            cell,
+            inverse_cell: cell.map(|c| 1.0 / c),
+            margin,
+        })
     }
 
     fn cells(&self) -> usize {
@@ -174,9 +200,14 @@ impl OverlapTest {
         let v1: [f64; 3] = std::array::from_fn(|a| v0[a] - f64::from(triangle.e1[a]));
         let v2: [f64; 3] = std::array::from_fn(|a| v0[a] + f64::from(triangle.e2[a]));
         let vertices = [v0, v1, v2];
-        let edge = |i: usize| -> [f64; 3] { std::array::from_fn(|a| vertices[(i + 1) % 3][a] - vertices[i][a]) };
-        let unit = |axis: usize| -> [f64; 3] { std::array::from_fn(|a| f64::from(u8::from(a == axis))) };
-        let half: [f64; 3] = std::array::from_fn(|a| 0.5 * f64::from(grid.cell[a]) * (1.0 + 1e-4) + f64::from(grid.margin));
+        let edge = |i: usize| -> [f64; 3] {
+            std::array::from_fn(|a| vertices[(i + 1) % 3][a] - vertices[i][a])
+        };
+        let unit =
+            |axis: usize| -> [f64; 3] { std::array::from_fn(|a| f64::from(u8::from(a == axis))) };
+        let half: [f64; 3] = std::array::from_fn(|a| {
+            0.5 * f64::from(grid.cell[a]) * (1.0 + 1e-4) + f64::from(grid.margin)
+        });
         let mut axes = Vec::with_capacity(13);
         let mut add = |axis: [f64; 3]| {
             let on_axis = vertices.map(|v| dot(v, axis));
@@ -209,7 +240,11 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }
 
 /// Counting sort: cell `c` owns `references[starts[c]..starts[c + 1]]`, triangles ascending.
@@ -240,7 +275,9 @@ struct Built {
 impl BuiltAccel for Built {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
         let wrong = |text: String| Err(AccelError::Invalid(text));
-        if self.starts.len() != self.grid.cells() + 1 || self.starts.last() != Some(&(self.references.len() as u32)) {
+        if self.starts.len() != self.grid.cells() + 1
+            || self.starts.last() != Some(&(self.references.len() as u32))
+        {
             return wrong("cell starts do not cover the references".to_owned());
         }
         let mut seen = vec![false; soup.records.len()];
@@ -255,8 +292,15 @@ impl BuiltAccel for Built {
                 }
             }
         }
-        match seen.iter().position(|s| !s) {
-            Some(lost) => wrong(format!("triangle {lost} is in no cell")),
+        if let Some(lost) = seen.iter().position(|s| !s) {
+            return wrong(format!("triangle {lost} is in no cell"));
+        }
+        match soup
+            .records
+            .iter()
+            .find(|r| !self.grid.bounds.contains(&r.bounds()))
+        {
+            Some(record) => wrong(format!("triangle {} lies outside the grid", record.id)),
             None => Ok(()),
         }
     }
@@ -271,10 +315,21 @@ impl BuiltAccel for Built {
             .uvec("resolution", &self.grid.resolution);
         GpuBuffers {
             arrays: vec![
-                NamedWords { name: "cells", words: self.starts.as_slice().into(), element_bytes: 4 },
-                NamedWords { name: "references", words: self.references.as_slice().into(), element_bytes: 4 },
+                NamedWords {
+                    name: "cells",
+                    words: self.starts.as_slice().into(),
+                    element_bytes: 4,
+                },
+                NamedWords {
+                    name: "references",
+                    words: self.references.as_slice().into(),
+                    element_bytes: 4,
+                },
             ],
-            uniforms: vec![("grid", grid), super::limits((x + y + z + 1) as usize, self.references.len())],
+            uniforms: vec![
+                ("grid", grid),
+                super::limits((x + y + z + 1) as usize, self.references.len()),
+            ],
             constants: Vec::new(),
         }
     }
@@ -332,8 +387,18 @@ impl Twin<'_> {
             if hit.t * BOX_PAD < leave {
                 return hit;
             }
-            let axis = if next[0] == leave { 0 } else if next[1] == leave { 1 } else { 2 };
-            cell[axis] = if forward[axis] { cell[axis] + 1 } else { cell[axis].wrapping_sub(1) };
+            let axis = if next[0] == leave {
+                0
+            } else if next[1] == leave {
+                1
+            } else {
+                2
+            };
+            cell[axis] = if forward[axis] {
+                cell[axis] + 1
+            } else {
+                cell[axis].wrapping_sub(1)
+            };
             if cell[axis] >= grid.resolution[axis] {
                 return hit;
             }

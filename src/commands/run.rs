@@ -80,7 +80,11 @@ fn tell(summary: &RunSummary, out: &Path, quiet: bool) -> Result<ExitCode, Failu
             failed => format!("{failed} gates or cells"),
         }
     );
-    Ok(ExitCode::from(if summary.bad_input { BAD_INPUT } else { FAILED }))
+    Ok(ExitCode::from(if summary.bad_input {
+        BAD_INPUT
+    } else {
+        FAILED
+    }))
 }
 
 /// The cell of a record and why it failed, if it did.

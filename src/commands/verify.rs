@@ -1,8 +1,6 @@
 //! `raystone verify`.
 
-use super::arguments::{
-    DeviceArguments, ExperimentArguments, check_models, list_override,
-};
+use super::arguments::{DeviceArguments, ExperimentArguments, check_models, list_override};
 use super::failure::{FAILED, Failure};
 use super::output::print;
 use super::table::{Table, grouped};

@@ -9,6 +9,13 @@ use super::DiscrepancyError;
 ///
 /// Cost: O(N²) time with a vectorised inner loop, O(N) memory.
 ///
+/// ```
+/// # use raystone::discrepancy::star_2d;
+/// // One point in the middle: the closed box up to it holds everything on a quarter of the area.
+/// assert_eq!(star_2d(&[[0.5, 0.5]])?, 0.75);
+/// # Ok::<(), raystone::discrepancy::DiscrepancyError>(())
+/// ```
+///
 /// # Errors
 /// [`DiscrepancyError::Empty`] and [`DiscrepancyError::OutsideUnitSquare`] (NaN included).
 pub fn star_2d(points: &[[f64; 2]]) -> Result<f64, DiscrepancyError> {

@@ -1,8 +1,8 @@
 //! Adapter choice and device creation.
 
+use super::GpuError;
 use super::compose::KernelLibrary;
 use super::pipeline::PipelineCache;
-use super::GpuError;
 use std::sync::{Arc, Mutex};
 
 /// Which adapter to use.
@@ -21,7 +21,9 @@ impl std::str::FromStr for AdapterChoice {
     type Err = std::convert::Infallible;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Ok(text.parse().map_or_else(|_| Self::Name(text.to_owned()), Self::Index))
+        Ok(text
+            .parse()
+            .map_or_else(|_| Self::Name(text.to_owned()), Self::Index))
     }
 }
 
@@ -78,7 +80,11 @@ fn rank(info: &wgpu::AdapterInfo) -> (u8, u8) {
 
 fn enumerate(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
     let mut found = pollster::block_on(instance.enumerate_adapters(backends()));
-    found.retain(|a| a.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS));
+    found.retain(|a| {
+        a.get_downlevel_capabilities()
+            .flags
+            .contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
+    });
     found.sort_by_key(|a| rank(&a.get_info()));
     found
 }
@@ -105,7 +111,9 @@ fn choose(found: Vec<wgpu::Adapter>, choice: &AdapterChoice) -> Result<wgpu::Ada
     let position = match choice {
         AdapterChoice::Best => Some(0),
         AdapterChoice::Index(i) => (*i < names.len()).then_some(*i),
-        AdapterChoice::Name(part) => names.iter().position(|n| n.to_lowercase().contains(&part.to_lowercase())),
+        AdapterChoice::Name(part) => names
+            .iter()
+            .position(|n| n.to_lowercase().contains(&part.to_lowercase())),
     };
     match position.and_then(|p| found.into_iter().nth(p)) {
         Some(adapter) => Ok(adapter),
@@ -115,7 +123,12 @@ fn choose(found: Vec<wgpu::Adapter>, choice: &AdapterChoice) -> Result<wgpu::Ada
                 AdapterChoice::Name(n) => n.clone(),
                 AdapterChoice::Best => String::new(),
             },
-            known: names.iter().enumerate().map(|(i, n)| format!("{i}: {n}")).collect::<Vec<_>>().join(", "),
+            known: names
+                .iter()
+                .enumerate()
+                .map(|(i, n)| format!("{i}: {n}"))
+                .collect::<Vec<_>>()
+                .join(", "),
         }),
     }
 }
@@ -145,7 +158,10 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
         required_limits: limits.clone(),
         ..Default::default()
     }))
-    .map_err(|e| GpuError::NoDevice { adapter: info.name.clone(), cause: e.to_string() })?;
+    .map_err(|e| GpuError::NoDevice {
+        adapter: info.name.clone(),
+        cause: e.to_string(),
+    })?;
     let lost = Arc::new(Mutex::new(None));
     let flag = Arc::clone(&lost);
     device.set_device_lost_callback(move |reason, text| {
@@ -160,8 +176,9 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
             slot.get_or_insert_with(|| error.to_string());
         }
     }));
-    let timestamp_period =
-        features.contains(wgpu::Features::TIMESTAMP_QUERY).then(|| queue.get_timestamp_period());
+    let timestamp_period = features
+        .contains(wgpu::Features::TIMESTAMP_QUERY)
+        .then(|| queue.get_timestamp_period());
     Ok(Gpu {
         device,
         queue,

@@ -4,8 +4,8 @@
 //! chosen file; features switch `@if(...)` parts on; numbers that the structure decides become
 //! constants of the virtual module `package::active::constants`.
 
-use super::diagnose;
 use super::GpuError;
+use super::diagnose;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use wesl::{BasicSourceMap, ModulePath, SourceMap, VirtualResolver, Wesl};
@@ -24,9 +24,20 @@ impl Default for KernelLibrary {
     fn default() -> Self {
         let files = EMBEDDED
             .iter()
-            .map(|(name, text)| ((*name).to_owned(), (PathBuf::from(format!("kernels/{name}.wesl")), (*text).to_owned())))
+            .map(|(name, text)| {
+                (
+                    (*name).to_owned(),
+                    (
+                        PathBuf::from(format!("kernels/{name}.wesl")),
+                        (*text).to_owned(),
+                    ),
+                )
+            })
             .collect();
-        Self { files, overridden: Vec::new() }
+        Self {
+            files,
+            overridden: Vec::new(),
+        }
     }
 }
 
@@ -39,7 +50,10 @@ impl KernelLibrary {
         let before = self.overridden.len();
         self.add_folder(folder, folder)?;
         if self.overridden.len() == before {
-            return Err(GpuError::Kernel(format!("{}: no *.wesl file in this kernel folder", folder.display())));
+            return Err(GpuError::Kernel(format!(
+                "{}: no *.wesl file in this kernel folder",
+                folder.display()
+            )));
         }
         Ok(self)
     }
@@ -54,7 +68,10 @@ impl KernelLibrary {
                 let text = std::fs::read_to_string(&path)
                     .map_err(|e| GpuError::Kernel(format!("{}: {e}", path.display())))?;
                 let relative = path.strip_prefix(root).unwrap_or(&path).with_extension("");
-                let name: Vec<_> = relative.components().map(|c| c.as_os_str().to_string_lossy()).collect();
+                let name: Vec<_> = relative
+                    .components()
+                    .map(|c| c.as_os_str().to_string_lossy())
+                    .collect();
                 let name = name.join("/");
                 self.overridden.push(name.clone());
                 self.files.insert(name, (path, text));
@@ -94,32 +111,59 @@ impl KernelLibrary {
             let (path, text) = self.files.get(name).ok_or_else(|| {
                 GpuError::Kernel(format!("there is no kernel `{name}.wesl` (wanted as the active {active}); add it under kernels/ or to the folder given by --kernels"))
             })?;
-            resolver.add_module(module_path(&format!("active/{active}"))?, text.as_str().into());
-            paths.insert(module_path(&format!("active/{active}"))?.to_string(), path.clone());
+            resolver.add_module(
+                module_path(&format!("active/{active}"))?,
+                text.as_str().into(),
+            );
+            paths.insert(
+                module_path(&format!("active/{active}"))?.to_string(),
+                path.clone(),
+            );
         }
-        let constants: String =
-            composition.constants.iter().map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).collect();
+        let constants: String = composition
+            .constants
+            .iter()
+            .map(|(name, value)| format!("const {name}: u32 = {value}u;\n"))
+            .collect();
         resolver.add_module(module_path("active/constants")?, constants.into());
 
         let mut compiler = Wesl::new("kernels").set_custom_resolver(resolver);
-        compiler.use_sourcemap(true).set_missing_feature_behavior(false);
+        compiler
+            .use_sourcemap(true)
+            .set_missing_feature_behavior(false);
         for feature in &composition.features {
             compiler.set_feature(feature, true);
         }
         let result = compiler
             .compile(&module_path(&composition.entry)?)
-            .map_err(|e| GpuError::Kernel(diagnose::wesl_error(&e.to_string(), &paths)))?;
+            .map_err(|e| {
+                let sources = self
+                    .files
+                    .values()
+                    .map(|(path, text)| (path.as_path(), text.as_str()));
+                GpuError::Kernel(diagnose::wesl_error(&e.to_string(), &paths, sources))
+            })?;
         let wgsl = result.to_string();
         let map = result.sourcemap.unwrap_or_default();
         let (module, info) = diagnose::parse_and_validate(&wgsl, &map, &paths)?;
-        Ok(ComposedKernel { composition: composition.clone(), wgsl, module, info, map })
+        Ok(ComposedKernel {
+            composition: composition.clone(),
+            wgsl,
+            module,
+            info,
+            map,
+        })
     }
 }
 
 fn module_path(name: &str) -> Result<ModulePath, GpuError> {
     format!("package::{}", name.replace('/', "::"))
         .parse()
-        .map_err(|e| GpuError::Kernel(format!("`{name}` is no module name ({e}); use letters, digits and _")))
+        .map_err(|e| {
+            GpuError::Kernel(format!(
+                "`{name}` is no module name ({e}); use letters, digits and _"
+            ))
+        })
 }
 
 /// What goes into one kernel.
@@ -138,7 +182,10 @@ pub struct Composition {
 impl Composition {
     /// A kernel with this entry module and nothing else chosen.
     pub fn new(entry: &str) -> Self {
-        Self { entry: entry.to_owned(), ..Self::default() }
+        Self {
+            entry: entry.to_owned(),
+            ..Self::default()
+        }
     }
 
     /// Puts `module` in the place of `package::active::<role>`.

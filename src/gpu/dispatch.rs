@@ -1,8 +1,8 @@
 //! Dispatches, read-back and clocks.
 
+use super::GpuError;
 use super::adapter::Gpu;
 use super::pipeline::{Bindings, Pipeline, WORKGROUP_SIZE};
-use super::GpuError;
 use bytemuck::Pod;
 use std::time::{Duration, Instant};
 use wgpu::util::DeviceExt;
@@ -42,7 +42,11 @@ pub struct Dispatch<'a> {
 /// `x + y * WORKGROUP_SIZE * num_workgroups.x`.
 pub fn groups_for(items: u32) -> [u32; 3] {
     let groups = items.div_ceil(WORKGROUP_SIZE).max(1);
-    if groups <= MAX_GROUPS { [groups, 1, 1] } else { [MAX_GROUPS, groups.div_ceil(MAX_GROUPS), 1] }
+    if groups <= MAX_GROUPS {
+        [groups, 1, 1]
+    } else {
+        [MAX_GROUPS, groups.div_ceil(MAX_GROUPS), 1]
+    }
 }
 
 impl Gpu {
@@ -60,11 +64,15 @@ impl Gpu {
         } else {
             bytes
         };
-        Ok(self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(name),
-            contents,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
-        }))
+        Ok(self
+            .device
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(name),
+                contents,
+                usage: wgpu::BufferUsages::STORAGE
+                    | wgpu::BufferUsages::COPY_SRC
+                    | wgpu::BufferUsages::COPY_DST,
+            }))
     }
 
     /// A zeroed storage buffer of `bytes` (rounded up to 16).
@@ -76,7 +84,9 @@ impl Gpu {
         Ok(self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(name),
             size: bytes.max(16).next_multiple_of(16),
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
+            usage: wgpu::BufferUsages::STORAGE
+                | wgpu::BufferUsages::COPY_SRC
+                | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         }))
     }
@@ -84,7 +94,11 @@ impl Gpu {
     fn check_size(&self, name: &str, needed: u64) -> Result<(), GpuError> {
         let limit = self.limits.max_storage_buffer_binding_size;
         if needed > limit {
-            return Err(GpuError::TooLarge { name: name.to_owned(), needed, limit });
+            return Err(GpuError::TooLarge {
+                name: name.to_owned(),
+                needed,
+                limit,
+            });
         }
         Ok(())
     }
@@ -95,17 +109,23 @@ impl Gpu {
     /// A binding is missing, the driver complains, the device is lost or does not finish.
     pub fn run(&self, dispatch: &Dispatch) -> Result<Elapsed, GpuError> {
         let groups = self.bind(dispatch.pipeline, dispatch.bindings)?;
-        let clock = self.timestamp_period.map(|period| (Timestamps::new(&self.device), period));
+        let clock = self
+            .timestamp_period
+            .map(|period| (Timestamps::new(&self.device), period));
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = self
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                 label: None,
-                timestamp_writes: clock.as_ref().map(|(t, _)| wgpu::ComputePassTimestampWrites {
-                    query_set: &t.queries,
-                    beginning_of_pass_write_index: Some(0),
-                    end_of_pass_write_index: Some(1),
-                }),
+                timestamp_writes: clock
+                    .as_ref()
+                    .map(|(t, _)| wgpu::ComputePassTimestampWrites {
+                        query_set: &t.queries,
+                        beginning_of_pass_write_index: Some(0),
+                        end_of_pass_write_index: Some(1),
+                    }),
             });
             pass.set_pipeline(&dispatch.pipeline.compute);
             for (index, group) in groups.iter().enumerate() {
@@ -130,7 +150,9 @@ impl Gpu {
             Some((t, period)) => {
                 let ticks: Vec<u64> = self.map(&t.mapped)?;
                 // A negative span is a driver fault, not a measurement.
-                ticks[1].checked_sub(ticks[0]).map(|span| span as f64 * f64::from(*period) * 1e-6)
+                ticks[1]
+                    .checked_sub(ticks[0])
+                    .map(|span| span as f64 * f64::from(*period) * 1e-6)
             }
             None => None,
         };
@@ -142,11 +164,16 @@ impl Gpu {
     /// # Errors
     /// The device is lost or does not finish in time.
     pub fn wait(&self) -> Result<(), GpuError> {
-        let waited = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) });
+        let waited = self.device.poll(wgpu::PollType::Wait {
+            submission_index: None,
+            timeout: Some(PATIENCE),
+        });
         if let Some(cause) = self.lost() {
             return Err(GpuError::Lost(cause));
         }
-        waited.map(|_| ()).map_err(|_| GpuError::Timeout { seconds: PATIENCE.as_secs() })
+        waited.map(|_| ()).map_err(|_| GpuError::Timeout {
+            seconds: PATIENCE.as_secs(),
+        })
     }
 
     /// Copies a buffer to the host.
@@ -160,7 +187,9 @@ impl Gpu {
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = self
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
         self.queue.submit([encoder.finish()]);
         self.map(&staging)
@@ -168,13 +197,20 @@ impl Gpu {
 
     fn map<T: Pod>(&self, staging: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
         let (sender, receiver) = std::sync::mpsc::channel();
-        staging.slice(..).map_async(wgpu::MapMode::Read, move |result| {
-            let _ = sender.send(result);
-        });
+        staging
+            .slice(..)
+            .map_async(wgpu::MapMode::Read, move |result| {
+                let _ = sender.send(result);
+            });
         self.wait()?;
-        let mapped = receiver.recv().map_err(|_| GpuError::Driver("a buffer was never mapped".to_owned()))?;
+        let mapped = receiver
+            .recv()
+            .map_err(|_| GpuError::Driver("a buffer was never mapped".to_owned()))?;
         mapped.map_err(|e| GpuError::Driver(e.to_string()))?;
-        let view = staging.slice(..).get_mapped_range().map_err(|e| GpuError::Driver(e.to_string()))?;
+        let view = staging
+            .slice(..)
+            .get_mapped_range()
+            .map_err(|e| GpuError::Driver(e.to_string()))?;
         let out = bytemuck::pod_collect_to_vec(&view);
         drop(view);
         staging.unmap();

@@ -11,11 +11,11 @@ mod pipeline;
 mod probe;
 mod uniform;
 
-pub use adapter::{adapters, open, AdapterChoice, AdapterSummary, Gpu};
+pub use adapter::{AdapterChoice, AdapterSummary, Gpu, adapters, open};
 pub use compose::{ComposedKernel, Composition, KernelLibrary};
-pub use dispatch::{groups_for, Dispatch, Elapsed};
+pub use dispatch::{Dispatch, Elapsed, groups_for};
 pub use pipeline::{Bindings, Pipeline, WORKGROUP_SIZE};
-pub use probe::{probe_arithmetic, ArithmeticProbe};
+pub use probe::{ArithmeticProbe, probe_arithmetic};
 pub use uniform::UniformValues;
 
 use thiserror::Error;
@@ -24,7 +24,9 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum GpuError {
     /// No adapter answers at all.
-    #[error("no GPU adapter answers on this machine. Install a driver (Debian: `scripts/install-driver`) or set WGPU_BACKEND=gl; `raystone doctor` tells what was tried")]
+    #[error(
+        "no GPU adapter answers on this machine. Install a driver (Debian: `scripts/install-driver`) or set WGPU_BACKEND=gl; `raystone doctor` tells what was tried"
+    )]
     NoAdapter,
     /// The adapter asked for does not exist.
     #[error("no adapter matches `{asked}`; there are: {known}")]
@@ -46,7 +48,9 @@ pub enum GpuError {
     #[error("{0}")]
     Kernel(String),
     /// A kernel wants a buffer that the caller did not give.
-    #[error("kernel `{kernel}` binds `{binding}`, but no buffer of that name was given; there are: {known}")]
+    #[error(
+        "kernel `{kernel}` binds `{binding}`, but no buffer of that name was given; there are: {known}"
+    )]
     Unbound {
         /// Entry module.
         kernel: String,

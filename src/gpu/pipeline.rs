@@ -1,9 +1,9 @@
 //! Pipelines and bind groups, by reflection of the composed kernel.
 
+use super::GpuError;
 use super::adapter::Gpu;
 use super::compose::{ComposedKernel, Composition};
 use super::uniform::UniformValues;
-use super::GpuError;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use wgpu::util::DeviceExt;
@@ -16,8 +16,13 @@ pub(super) type PipelineCache = HashMap<(Composition, bool), Arc<Pipeline>>;
 
 #[derive(Debug, Clone, PartialEq)]
 enum BindingKind {
-    Storage { writable: bool },
-    Uniform { size: u32, members: Vec<(String, u32)> },
+    Storage {
+        writable: bool,
+    },
+    Uniform {
+        size: u32,
+        members: Vec<(String, u32)>,
+    },
 }
 
 #[derive(Debug, Clone)]
@@ -66,8 +71,10 @@ impl Bindings {
     #[must_use]
     pub fn merged(&self, other: &Bindings) -> Bindings {
         let mut out = self.clone();
-        out.buffers.extend(other.buffers.iter().map(|(k, v)| (k.clone(), v.clone())));
-        out.uniforms.extend(other.uniforms.iter().map(|(k, v)| (k.clone(), v.clone())));
+        out.buffers
+            .extend(other.buffers.iter().map(|(k, v)| (k.clone(), v.clone())));
+        out.uniforms
+            .extend(other.uniforms.iter().map(|(k, v)| (k.clone(), v.clone())));
         out
     }
 }
@@ -77,37 +84,60 @@ fn reflect(kernel: &ComposedKernel) -> Vec<Binding> {
     let entry = kernel.info.get_entry_point(0);
     let mut bindings = Vec::new();
     for (handle, variable) in module.global_variables.iter() {
-        let Some(at) = &variable.binding else { continue };
+        let Some(at) = &variable.binding else {
+            continue;
+        };
         if entry[handle].is_empty() {
             continue;
         }
-        let name = kernel.author_name(variable.name.as_deref().unwrap_or("")).to_owned();
+        let name = kernel
+            .author_name(variable.name.as_deref().unwrap_or(""))
+            .to_owned();
         let kind = match variable.space {
             naga::AddressSpace::Uniform => {
                 let inner = &module.types[variable.ty].inner;
-                let naga::TypeInner::Struct { members, span } = inner else { continue };
-                let members = members.iter().map(|m| (m.name.clone().unwrap_or_default(), m.offset)).collect();
-                BindingKind::Uniform { size: span.next_multiple_of(16), members }
+                let naga::TypeInner::Struct { members, span } = inner else {
+                    continue;
+                };
+                let members = members
+                    .iter()
+                    .map(|m| (m.name.clone().unwrap_or_default(), m.offset))
+                    .collect();
+                BindingKind::Uniform {
+                    size: span.next_multiple_of(16),
+                    members,
+                }
             }
-            naga::AddressSpace::Storage { access } => {
-                BindingKind::Storage { writable: access.contains(naga::StorageAccess::STORE) }
-            }
+            naga::AddressSpace::Storage { access } => BindingKind::Storage {
+                writable: access.contains(naga::StorageAccess::STORE),
+            },
             _ => continue,
         };
-        bindings.push(Binding { group: at.group, binding: at.binding, name, kind });
+        bindings.push(Binding {
+            group: at.group,
+            binding: at.binding,
+            name,
+            kind,
+        });
     }
     bindings
 }
 
 fn layout_entry(binding: &Binding) -> wgpu::BindGroupLayoutEntry {
     let ty = match &binding.kind {
-        BindingKind::Storage { writable } => wgpu::BufferBindingType::Storage { read_only: !writable },
+        BindingKind::Storage { writable } => wgpu::BufferBindingType::Storage {
+            read_only: !writable,
+        },
         BindingKind::Uniform { .. } => wgpu::BufferBindingType::Uniform,
     };
     wgpu::BindGroupLayoutEntry {
         binding: binding.binding,
         visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
+        ty: wgpu::BindingType::Buffer {
+            ty,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
         count: None,
     }
 }
@@ -117,9 +147,18 @@ impl Gpu {
     ///
     /// # Errors
     /// The kernel does not compose or validate, or the driver refuses it.
-    pub fn pipeline(&self, composition: &Composition, runtime_checks: bool) -> Result<Arc<Pipeline>, GpuError> {
+    pub fn pipeline(
+        &self,
+        composition: &Composition,
+        runtime_checks: bool,
+    ) -> Result<Arc<Pipeline>, GpuError> {
         let key = (composition.clone(), runtime_checks);
-        if let Some(known) = self.pipelines.lock().ok().and_then(|cache| cache.get(&key).cloned()) {
+        if let Some(known) = self
+            .pipelines
+            .lock()
+            .ok()
+            .and_then(|cache| cache.get(&key).cloned())
+        {
             return Ok(known);
         }
         let kernel = self.kernels.compose(composition)?;
@@ -136,17 +175,27 @@ impl Gpu {
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let layouts: Vec<_> = (0..groups)
             .map(|group| {
-                let mut entries: Vec<_> = bindings.iter().filter(|b| b.group == group).map(layout_entry).collect();
+                let mut entries: Vec<_> = bindings
+                    .iter()
+                    .filter(|b| b.group == group)
+                    .map(layout_entry)
+                    .collect();
                 entries.sort_by_key(|e| e.binding);
-                self.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries })
+                self.device
+                    .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                        label: None,
+                        entries: &entries,
+                    })
             })
             .collect();
         let references: Vec<_> = layouts.iter().map(Some).collect();
-        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: None,
-            bind_group_layouts: &references,
-            immediate_size: 0,
-        });
+        let layout = self
+            .device
+            .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: None,
+                bind_group_layouts: &references,
+                immediate_size: 0,
+            });
         let label = kernel.composition.entry.clone();
         let descriptor = wgpu::ShaderModuleDescriptor {
             label: Some(&label),
@@ -157,62 +206,100 @@ impl Gpu {
         } else {
             // SAFETY: reached only for kernels whose checked module passed the gate on this scene
             // and adapter: no access out of bounds was needed and every loop has a fuse.
-            unsafe { self.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) }
+            unsafe {
+                self.device.create_shader_module_trusted(
+                    descriptor,
+                    wgpu::ShaderRuntimeChecks::unchecked(),
+                )
+            }
         };
-        let compute = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(&label),
-            layout: Some(&layout),
-            module: &module,
-            entry_point: None,
-            compilation_options: wgpu::PipelineCompilationOptions {
-                // Kernels write workgroup memory before they read it.
-                zero_initialize_workgroup_memory: false,
-                ..Default::default()
-            },
-            cache: None,
-        });
+        let compute = self
+            .device
+            .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(&label),
+                layout: Some(&layout),
+                module: &module,
+                entry_point: None,
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    // Kernels write workgroup memory before they read it.
+                    zero_initialize_workgroup_memory: false,
+                    ..Default::default()
+                },
+                cache: None,
+            });
         if let Some(error) = pollster::block_on(scope.pop()) {
             return Err(GpuError::Driver(format!("kernel `{label}`: {error}")));
         }
-        Ok(Pipeline { kernel, compute, layouts, bindings })
+        Ok(Pipeline {
+            kernel,
+            compute,
+            layouts,
+            bindings,
+        })
     }
 
     /// Bind groups of `pipeline` with the buffers and values of `given`.
     ///
     /// # Errors
     /// The kernel wants a name that was not given, or a buffer exceeds the adapter's limit.
-    pub(super) fn bind(&self, pipeline: &Pipeline, given: &Bindings) -> Result<Vec<wgpu::BindGroup>, GpuError> {
+    pub(super) fn bind(
+        &self,
+        pipeline: &Pipeline,
+        given: &Bindings,
+    ) -> Result<Vec<wgpu::BindGroup>, GpuError> {
         let mut uniforms = BTreeMap::new();
         for binding in &pipeline.bindings {
             if let BindingKind::Uniform { size, members } = &binding.kind {
                 let unbound = |what: String| pipeline.unbound(&what, given.uniforms.keys());
-                let values = given.uniforms.get(&binding.name).ok_or_else(|| unbound(binding.name.clone()))?;
-                let bytes =
-                    values.pack(*size, members).map_err(|member| unbound(format!("{}.{member}", binding.name)))?;
-                let buffer = self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                    label: Some(&binding.name),
-                    contents: &bytes,
-                    usage: wgpu::BufferUsages::UNIFORM,
-                });
+                let values = given
+                    .uniforms
+                    .get(&binding.name)
+                    .ok_or_else(|| unbound(binding.name.clone()))?;
+                let bytes = values
+                    .pack(*size, members)
+                    .map_err(|member| unbound(format!("{}.{member}", binding.name)))?;
+                let buffer = self
+                    .device
+                    .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                        label: Some(&binding.name),
+                        contents: &bytes,
+                        usage: wgpu::BufferUsages::UNIFORM,
+                    });
                 uniforms.insert(binding.name.clone(), buffer);
             }
         }
         let mut groups = Vec::new();
         for (group, layout) in pipeline.layouts.iter().enumerate() {
             let mut entries = Vec::new();
-            for binding in pipeline.bindings.iter().filter(|b| b.group as usize == group) {
+            for binding in pipeline
+                .bindings
+                .iter()
+                .filter(|b| b.group as usize == group)
+            {
                 let buffer = match binding.kind {
                     BindingKind::Uniform { .. } => uniforms.get(&binding.name),
                     BindingKind::Storage { .. } => given.buffers.get(&binding.name),
                 };
-                let buffer = buffer.ok_or_else(|| pipeline.unbound(&binding.name, given.buffers.keys()))?;
+                let buffer =
+                    buffer.ok_or_else(|| pipeline.unbound(&binding.name, given.buffers.keys()))?;
                 let limit = self.limits.max_storage_buffer_binding_size;
                 if buffer.size() > limit {
-                    return Err(GpuError::TooLarge { name: binding.name.clone(), needed: buffer.size(), limit });
+                    return Err(GpuError::TooLarge {
+                        name: binding.name.clone(),
+                        needed: buffer.size(),
+                        limit,
+                    });
                 }
-                entries.push(wgpu::BindGroupEntry { binding: binding.binding, resource: buffer.as_entire_binding() });
+                entries.push(wgpu::BindGroupEntry {
+                    binding: binding.binding,
+                    resource: buffer.as_entire_binding(),
+                });
             }
-            groups.push(self.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries }));
+            groups.push(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout,
+                entries: &entries,
+            }));
         }
         Ok(groups)
     }
@@ -234,9 +321,12 @@ impl Pipeline {
 
     /// Offsets of the members of a uniform struct, as reflected from the composed kernel.
     pub fn uniform_members(&self, name: &str) -> Option<&[(String, u32)]> {
-        self.bindings.iter().find(|b| b.name == name).and_then(|b| match &b.kind {
-            BindingKind::Uniform { members, .. } => Some(members.as_slice()),
-            BindingKind::Storage { .. } => None,
-        })
+        self.bindings
+            .iter()
+            .find(|b| b.name == name)
+            .and_then(|b| match &b.kind {
+                BindingKind::Uniform { members, .. } => Some(members.as_slice()),
+                BindingKind::Storage { .. } => None,
+            })
     }
 }

@@ -1,7 +1,7 @@
 //! What the adapter's arithmetic does, found out at start.
 
 use super::compose::Composition;
-use super::dispatch::{groups_for, Dispatch};
+use super::dispatch::{Dispatch, groups_for};
 use super::pipeline::Bindings;
 use super::{Gpu, GpuError};
 use serde::{Deserialize, Serialize};
@@ -35,17 +35,28 @@ pub fn probe_arithmetic(gpu: &Gpu) -> Result<ArithmeticProbe, GpuError> {
     let mut next = || {
         state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
         // Exponents −8 … 7: no denormal or overflow in any of the patterns.
-        f32::from_bits(((state >> 28) + 119) << 23 | (state & 0x007f_ffff) | (state << 4 & 0x8000_0000))
+        f32::from_bits(
+            ((state >> 28) + 119) << 23 | (state & 0x007f_ffff) | (state << 4 & 0x8000_0000),
+        )
     };
     let input: Vec<[f32; 4]> = (0..COUNT).map(|_| [next(), next(), next(), 0.0]).collect();
     let pipeline = gpu.pipeline(&Composition::new("common/probe"), true)?;
     let output = gpu.zeroed("probe_out", u64::from(COUNT) * 16)?;
     let mut bindings = Bindings::new();
-    bindings.buffer("probe_in", &gpu.storage("probe_in", &input)?).buffer("probe_out", &output);
-    gpu.run(&Dispatch { pipeline: &pipeline, bindings: &bindings, groups: groups_for(COUNT) })?;
+    bindings
+        .buffer("probe_in", &gpu.storage("probe_in", &input)?)
+        .buffer("probe_out", &output);
+    gpu.run(&Dispatch {
+        pipeline: &pipeline,
+        bindings: &bindings,
+        groups: groups_for(COUNT),
+    })?;
     let result: Vec<[f32; 4]> = gpu.read(&output)?;
     let all = |expected: fn(&[f32; 4]) -> f32, lane: usize| {
-        input.iter().zip(&result).all(|(i, o)| expected(i).to_bits() == o[lane].to_bits())
+        input
+            .iter()
+            .zip(&result)
+            .all(|(i, o)| expected(i).to_bits() == o[lane].to_bits())
     };
     Ok(ArithmeticProbe {
         unfused: all(|[a, b, c, _]| a * b + c, 0) && all(|[a, b, c, _]| a * b - c * a, 1),

@@ -29,7 +29,8 @@ impl UniformValues {
     /// Sets a vector of `f32`.
     #[must_use]
     pub fn vec(mut self, name: &str, value: &[f32]) -> Self {
-        self.0.insert(name.to_owned(), value.iter().map(|x| x.to_bits()).collect());
+        self.0
+            .insert(name.to_owned(), value.iter().map(|x| x.to_bits()).collect());
         self
     }
 

@@ -6,7 +6,7 @@ mod tables;
 mod traced;
 
 pub use frame::Frame;
-pub use render::{RenderJob, Renderer, Snapshot, RAY_COUNT_CLASSES};
+pub use render::{RAY_COUNT_CLASSES, RenderJob, Renderer, Snapshot};
 pub use tables::{SceneBuffers, SceneFeatures};
 pub use traced::Traced;
 
@@ -83,7 +83,10 @@ impl Integrator for AmbientOcclusion {
             name: "radius",
             description: "length of AO rays as a fraction of the scene's diagonal",
             default: ParamValue::Number(0.1),
-            range: ParamRange::Number { min: 1e-6, max: 10.0 },
+            range: ParamRange::Number {
+                min: 1e-6,
+                max: 10.0,
+            },
         }]
     }
 

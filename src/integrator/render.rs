@@ -1,10 +1,10 @@
 //! The renderer: runs an image kernel in slices of about a quarter of a second and keeps the sum at
 //! every power of two of samples, so that one run yields the error at spp = 1, 2, 4, ….
 
+use super::Integrator;
 use super::frame::{Frame, Slice};
 use super::tables::SceneBuffers;
 use super::traced::Traced;
-use super::Integrator;
 use crate::config::Params;
 use crate::gpu::{Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline};
 use crate::measure::image::Image;
@@ -59,7 +59,12 @@ pub struct Renderer<'a> {
 }
 
 /// The composition of a job's kernel.
-fn composition(traced: &Traced, scene: &SceneBuffers, job: &RenderJob, ray_counts: bool) -> Composition {
+fn composition(
+    traced: &Traced,
+    scene: &SceneBuffers,
+    job: &RenderJob,
+    ray_counts: bool,
+) -> Composition {
     let mut out = traced
         .compose(Composition::new("integrator/render"))
         .with("sequence", job.sampler.sequence.kernel())
@@ -69,7 +74,10 @@ fn composition(traced: &Traced, scene: &SceneBuffers, job: &RenderJob, ray_count
     for (name, on) in scene.features.flags() {
         out = out.feature(name, on);
     }
-    let sampler = job.sampler.sequence.constants(&job.sampler.sequence_variant.params);
+    let sampler = job
+        .sampler
+        .sequence
+        .constants(&job.sampler.sequence_variant.params);
     let integrator = job.integrator.constants(job.params);
     for (name, value) in sampler.iter().chain(&integrator) {
         out = out.constant(name, *value);
@@ -89,13 +97,21 @@ impl<'a> Renderer<'a> {
         job: &RenderJob,
         ray_counts: bool,
     ) -> Result<Self, GpuError> {
-        let pipeline = gpu.pipeline(&composition(traced, scene, job, ray_counts), job.runtime_checks)?;
+        let pipeline = gpu.pipeline(
+            &composition(traced, scene, job, ray_counts),
+            job.runtime_checks,
+        )?;
         let pixels = u64::from(job.frame.width) * u64::from(job.frame.height);
         let accumulation = gpu.zeroed("accumulation", pixels * 16)?;
         let status = gpu.zeroed("status", 64)?;
         let mut bindings = scene.bindings.merged(&traced.bindings);
-        bindings.buffer("accumulation", &accumulation).buffer("status", &status);
-        bindings.buffer("sampler_table", &gpu.storage("sampler_table", &job.sampler.table)?);
+        bindings
+            .buffer("accumulation", &accumulation)
+            .buffer("status", &status);
+        bindings.buffer(
+            "sampler_table",
+            &gpu.storage("sampler_table", &job.sampler.table)?,
+        );
         Ok(Self {
             gpu,
             scene,
@@ -111,7 +127,13 @@ impl<'a> Renderer<'a> {
 
     /// Feature flags of the kernel.
     pub fn features(&self) -> Vec<String> {
-        self.pipeline.kernel.composition.features.iter().cloned().collect()
+        self.pipeline
+            .kernel
+            .composition
+            .features
+            .iter()
+            .cloned()
+            .collect()
     }
 
     /// Text of the composed kernel.
@@ -121,11 +143,17 @@ impl<'a> Renderer<'a> {
 
     /// Clears the sum, the error word, the ray counts and the clock.
     pub fn reset(&self) {
-        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = self
+            .gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.clear_buffer(&self.accumulation, 0, None);
         encoder.clear_buffer(&self.status, 0, None);
         self.gpu.queue.submit([encoder.finish()]);
-        self.spent.set(Elapsed { gpu_ms: self.gpu.timestamp_period.map(|_| 0.0), wall_ms: 0.0 });
+        self.spent.set(Elapsed {
+            gpu_ms: self.gpu.timestamp_period.map(|_| 0.0),
+            wall_ms: 0.0,
+        });
     }
 
     /// Adds samples `first … first + count - 1` to every pixel, in slices.
@@ -142,9 +170,16 @@ impl<'a> Renderer<'a> {
             let samples = ((budget / whole) as u32).clamp(1, first + count - sample);
             while row < self.frame.height {
                 let budget = (self.rate.get() * SLICE_MS / row_samples).max(8.0);
-                let rows = ((budget / f64::from(samples)) as u32 / 8 * 8).clamp(8, self.frame.height.max(8));
+                let rows = ((budget / f64::from(samples)) as u32 / 8 * 8)
+                    .clamp(8, self.frame.height.max(8));
                 let rows = rows.min(self.frame.height - row);
-                self.run_slice(&Slice { first_row: row, rows, first_sample: sample, samples, seed })?;
+                self.run_slice(&Slice {
+                    first_row: row,
+                    rows,
+                    first_sample: sample,
+                    samples,
+                    seed,
+                })?;
                 row += rows;
             }
             sample += samples;
@@ -156,7 +191,11 @@ impl<'a> Renderer<'a> {
         let mut bindings = self.bindings.clone();
         bindings.uniform("frame", self.frame.uniform(self.scene, slice));
         let groups = [self.frame.width.div_ceil(8), slice.rows.div_ceil(8), 1];
-        let elapsed = self.gpu.run(&Dispatch { pipeline: &self.pipeline, bindings: &bindings, groups })?;
+        let elapsed = self.gpu.run(&Dispatch {
+            pipeline: &self.pipeline,
+            bindings: &bindings,
+            groups,
+        })?;
         let work = f64::from(self.frame.width) * f64::from(slice.rows) * f64::from(slice.samples);
         self.rate.set(work / elapsed.ms().max(1e-3));
         let spent = self.spent.get();
@@ -183,7 +222,10 @@ impl<'a> Renderer<'a> {
         for &spp in spps {
             self.add_samples(done, spp - done, seed)?;
             done = spp;
-            out.push(Snapshot { spp, image: self.image()? });
+            out.push(Snapshot {
+                spp,
+                image: self.image()?,
+            });
         }
         Ok(out)
     }
@@ -199,7 +241,11 @@ impl<'a> Renderer<'a> {
             .take((self.frame.width * self.frame.height) as usize)
             .map(|[r, g, b, n]| [r / n, g / n, b / n])
             .collect();
-        Ok(Image { width: self.frame.width, height: self.frame.height, pixels })
+        Ok(Image {
+            width: self.frame.width,
+            height: self.frame.height,
+            pixels,
+        })
     }
 
     /// The error word of the kernels since the last reset.
@@ -217,6 +263,8 @@ impl<'a> Renderer<'a> {
     /// The device is lost or hangs.
     pub fn ray_counts(&self) -> Result<[u64; 4], GpuError> {
         let words: Vec<u32> = self.gpu.read(&self.status)?;
-        Ok(std::array::from_fn(|c| u64::from(words[1 + 2 * c]) | u64::from(words[2 + 2 * c]) << 32))
+        Ok(std::array::from_fn(|c| {
+            u64::from(words[1 + 2 * c]) | u64::from(words[2 + 2 * c]) << 32
+        }))
     }
 }

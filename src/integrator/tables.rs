@@ -58,8 +58,15 @@ impl SceneBuffers {
     /// A buffer exceeds the adapter's limit.
     pub fn upload(gpu: &Gpu, scene: &SceneData, soup: &TriangleSoup) -> Result<Self, GpuError> {
         let textured = scene.uvs.len() == scene.triangles.len()
-            && scene.materials.iter().any(|m| m.base_color_texture.is_some());
-        let (texture_data, first_texels) = if textured { texture_words(scene) } else { (Vec::new(), Vec::new()) };
+            && scene
+                .materials
+                .iter()
+                .any(|m| m.base_color_texture.is_some());
+        let (texture_data, first_texels) = if textured {
+            texture_words(scene)
+        } else {
+            (Vec::new(), Vec::new())
+        };
         let mut tables = material_words(scene, &first_texels);
         let first_light = tables.len() as u32;
         let (lights, light_power) = light_words(scene);
@@ -75,7 +82,10 @@ impl SceneBuffers {
             features: SceneFeatures {
                 textures: textured,
                 emitters: !lights.is_empty(),
-                mirrors: scene.materials.iter().any(|m| m.kind == MaterialKind::Mirror),
+                mirrors: scene
+                    .materials
+                    .iter()
+                    .any(|m| m.kind == MaterialKind::Mirror),
                 environment: scene.environment != Vec3::ZERO,
             },
             environment: scene.environment.to_array(),
@@ -91,7 +101,11 @@ fn texture_words(scene: &SceneData) -> (Vec<u32>, Vec<u32>) {
     let texels: usize = scene.textures.iter().map(|t| t.texels.len()).sum();
     let mut words = Vec::with_capacity(6 * scene.uvs.len() + texels);
     for corners in &scene.uvs {
-        words.extend(corners.iter().flat_map(|uv| [uv.x.to_bits(), uv.y.to_bits()]));
+        words.extend(
+            corners
+                .iter()
+                .flat_map(|uv| [uv.x.to_bits(), uv.y.to_bits()]),
+        );
     }
     let mut first = Vec::with_capacity(scene.textures.len());
     for texture in &scene.textures {

@@ -17,7 +17,11 @@ impl Traced {
     ///
     /// # Errors
     /// An array exceeds what the adapter can bind.
-    pub fn upload(gpu: &Gpu, kind: &dyn AccelKind, built: &dyn BuiltAccel) -> Result<Self, GpuError> {
+    pub fn upload(
+        gpu: &Gpu,
+        kind: &dyn AccelKind,
+        built: &dyn BuiltAccel,
+    ) -> Result<Self, GpuError> {
         let buffers = built.buffers();
         let mut bindings = Bindings::new();
         for array in &buffers.arrays {
@@ -26,13 +30,19 @@ impl Traced {
         for (name, values) in buffers.uniforms {
             bindings.uniform(name, values);
         }
-        Ok(Self { kernel: kind.kernel().to_owned(), constants: buffers.constants, bindings })
+        Ok(Self {
+            kernel: kind.kernel().to_owned(),
+            constants: buffers.constants,
+            bindings,
+        })
     }
 
     /// `composition` with this structure as the active one.
     #[must_use]
     pub fn compose(&self, composition: Composition) -> Composition {
         let with_kernel = composition.with("accel", &self.kernel);
-        self.constants.iter().fold(with_kernel, |c, (name, value)| c.constant(name, *value))
+        self.constants
+            .iter()
+            .fold(with_kernel, |c, (name, value)| c.constant(name, *value))
     }
 }

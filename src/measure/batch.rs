@@ -3,7 +3,7 @@
 use super::rays::RaySet;
 use crate::accel::{Counters, Hit, Ray};
 use crate::gpu::{
-    groups_for, Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline, UniformValues,
+    Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline, UniformValues, groups_for,
 };
 use crate::integrator::{SceneBuffers, Traced};
 use std::sync::Arc;
@@ -20,14 +20,19 @@ pub enum Query {
 impl Query {
     /// The query that a class of rays is traced with.
     pub fn of(set: &RaySet) -> Self {
-        if set.is_any() { Self::Any } else { Self::Closest }
+        if set.is_any() {
+            Self::Any
+        } else {
+            Self::Closest
+        }
     }
 }
 
 /// No dispatch should run longer than this.
 const SLICE_MS: f64 = 250.0;
-/// Rays of the first dispatch through an unknown structure.
-const FIRST_SLICE: u32 = 2048;
+/// Rays of the first dispatch through an unknown structure: few, it may be brute force over a million
+/// triangles.
+const FIRST_SLICE: u32 = 64;
 
 /// A structure, a query and a ray buffer, compiled.
 pub struct Batch<'a> {
@@ -75,15 +80,31 @@ impl<'a> Batch<'a> {
         let output = gpu.zeroed("hits", rays.len() as u64 * bytes_per_ray)?;
         let status = gpu.zeroed("status", 64)?;
         let mut bindings = scene.bindings.merged(&traced.bindings);
-        bindings.buffer("rays", &gpu.storage("rays", rays)?).buffer("status", &status);
+        bindings
+            .buffer("rays", &gpu.storage("rays", rays)?)
+            .buffer("status", &status);
         bindings.buffer(if counters { "work" } else { "hits" }, &output);
         let slice = std::cell::Cell::new(FIRST_SLICE);
-        Ok(Self { gpu, pipeline, bindings, output, status, rays: rays.len() as u32, slice })
+        Ok(Self {
+            gpu,
+            pipeline,
+            bindings,
+            output,
+            status,
+            rays: rays.len() as u32,
+            slice,
+        })
     }
 
     /// Feature flags of the kernel.
     pub fn features(&self) -> Vec<String> {
-        self.pipeline.kernel.composition.features.iter().cloned().collect()
+        self.pipeline
+            .kernel
+            .composition
+            .features
+            .iter()
+            .cloned()
+            .collect()
     }
 
     /// Text of the composed kernel.
@@ -96,7 +117,10 @@ impl<'a> Batch<'a> {
     /// # Errors
     /// The device is lost, hangs, or the driver complains.
     pub fn trace(&self) -> Result<Elapsed, GpuError> {
-        let mut total = Elapsed { gpu_ms: self.gpu.timestamp_period.map(|_| 0.0), wall_ms: 0.0 };
+        let mut total = Elapsed {
+            gpu_ms: self.gpu.timestamp_period.map(|_| 0.0),
+            wall_ms: 0.0,
+        };
         let mut first = 0;
         while first < self.rays {
             let count = self.slice.get().min(self.rays - first);
@@ -105,7 +129,8 @@ impl<'a> Batch<'a> {
             total.wall_ms += elapsed.wall_ms;
             let fitting = f64::from(count) * SLICE_MS / elapsed.wall_ms.max(0.1);
             // The first dispatch includes the driver's compiler: growth is stepwise, shrinking is not.
-            self.slice.set((fitting as u32).clamp(64, count.saturating_mul(8).max(FIRST_SLICE)));
+            self.slice
+                .set((fitting as u32).clamp(64, count.saturating_mul(8).max(FIRST_SLICE)));
             first += count;
         }
         Ok(total)
@@ -121,8 +146,15 @@ impl<'a> Batch<'a> {
 
     fn dispatch(&self, first: u32, count: u32) -> Result<Elapsed, GpuError> {
         let mut bindings = self.bindings.clone();
-        bindings.uniform("batch", UniformValues::new().u32("first", first).u32("count", count));
-        self.gpu.run(&Dispatch { pipeline: &self.pipeline, bindings: &bindings, groups: groups_for(count) })
+        bindings.uniform(
+            "batch",
+            UniformValues::new().u32("first", first).u32("count", count),
+        );
+        self.gpu.run(&Dispatch {
+            pipeline: &self.pipeline,
+            bindings: &bindings,
+            groups: groups_for(count),
+        })
     }
 
     /// Hits of the last trace of a closest-hit query.
@@ -141,7 +173,11 @@ impl<'a> Batch<'a> {
     /// The device is lost or hangs.
     pub fn found(&self) -> Result<Vec<bool>, GpuError> {
         let words: Vec<[u32; 4]> = self.gpu.read(&self.output)?;
-        Ok(words.iter().take(self.rays as usize).map(|w| w[0] != 0).collect())
+        Ok(words
+            .iter()
+            .take(self.rays as usize)
+            .map(|w| w[0] != 0)
+            .collect())
     }
 
     /// The error word of the kernels.

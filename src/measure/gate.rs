@@ -6,10 +6,13 @@
 //! if both triangles lie within 4 ulp of the same distance in f64; ties are counted and shown.
 
 use super::batch::{Batch, Query};
-use super::rays::{record_rays, RaySet};
+use super::rays::{RaySet, record_rays};
 use super::record::{ClassVerdict, GateVerdict, JudgeCheck};
-use crate::accel::{brute_force_hits, AccelError, BuildLog, BuiltAccel, Bvh, BvhTwin, Hit, Ray, TriangleSoup, NO_HIT};
 use crate::accel::AccelKind;
+use crate::accel::{
+    AccelError, BuildLog, BuiltAccel, Bvh, BvhTwin, Hit, NO_HIT, Ray, TriangleSoup,
+    brute_force_hits,
+};
 use crate::config::{Gate, Params};
 use crate::gpu::{ArithmeticProbe, Gpu, GpuError};
 use crate::integrator::{SceneBuffers, Traced};
@@ -18,7 +21,10 @@ use crate::scene::{Camera, SceneData};
 
 /// Meaning of the bits of the kernels' error word, as in `kernels/common/errors.wesl`.
 pub const KERNEL_ERRORS: [(u32, &str); 2] = [
-    (1, "a traversal took more steps than the structure allows (step fuse)"),
+    (
+        1,
+        "a traversal took more steps than the structure allows (step fuse)",
+    ),
     (2, "a traversal stack overflowed"),
 ];
 
@@ -29,10 +35,8 @@ const ORACLE_TESTS: usize = 300_000_000;
 /// Two distances within this many ulp are the same on an adapter with inexact arithmetic.
 const TIE_ULPS: f64 = 4.0;
 
-/// The judge of a scene with its recorded rays.
+/// The judge of a scene: recorded rays with its answers. The scalar BVH that gave them is not kept.
 pub struct Judge {
-    /// The scalar BVH.
-    pub twin: BvhTwin,
     /// Rays and true hits, per class.
     pub sets: Vec<RaySet>,
     /// The judge against brute force.
@@ -57,13 +61,14 @@ impl Judge {
     ) -> Result<Self, AccelError> {
         let mut params = Params::default();
         for parameter in Bvh.parameters() {
-            params.0.insert(parameter.name.to_owned(), parameter.default);
+            params
+                .0
+                .insert(parameter.name.to_owned(), parameter.default);
         }
         let twin = BvhTwin::build(soup, &params, &mut BuildLog::default())?;
         twin.validate(soup)?;
         let sets = record_rays(scene, soup, camera, &twin, settings.rays, seed);
         let mut judge = Self {
-            twin,
             sets,
             brute_force: JudgeCheck::default(),
             oracle: JudgeCheck::default(),
@@ -74,13 +79,15 @@ impl Judge {
         Ok(judge)
     }
 
-    /// `count` rays (all, if there are fewer), spread evenly over all classes.
+    /// `count` rays (or all, if there are fewer) spread evenly over all classes.
     fn subset(&self, count: usize) -> Vec<(Ray, Hit)> {
-        let all: usize = self.sets.iter().map(|s| s.rays.len()).sum();
-        let count = count.min(all);
-        let pairs = self.sets.iter().flat_map(|s| s.rays.iter().copied().zip(s.truth.iter().copied()));
-        let chosen = |k: usize| k * count / all < (k + 1) * count / all;
-        pairs.enumerate().filter(|(k, _)| chosen(*k)).map(|(_, pair)| pair).collect()
+        let pairs = self
+            .sets
+            .iter()
+            .flat_map(|s| s.rays.iter().copied().zip(s.truth.iter().copied()));
+        let all: Vec<(Ray, Hit)> = pairs.collect();
+        let count = count.min(all.len());
+        (0..count).map(|i| all[i * all.len() / count]).collect()
     }
 
     fn check_brute_force(&mut self, soup: &TriangleSoup, tests: u64) {
@@ -92,7 +99,8 @@ impl Judge {
         for ((ray, judged), brute) in pairs.iter().zip(&truth) {
             if !judged.same_bits(brute) {
                 self.brute_force.wrong += 1;
-                self.first_wrong.get_or_insert_with(|| describe(ray, "judge", judged, "brute force", brute));
+                self.first_wrong
+                    .get_or_insert_with(|| describe(ray, "judge", judged, "brute force", brute));
             }
         }
     }
@@ -102,16 +110,26 @@ impl Judge {
         let pairs = self.subset(rays.min(affordable));
         let questions: Vec<_> = pairs
             .iter()
-            .map(|(ray, hit)| (oracle_ray(ray), (hit.triangle != NO_HIT).then_some((hit.triangle, hit.t))))
+            .map(|(ray, hit)| {
+                (
+                    oracle_ray(ray),
+                    (hit.triangle != NO_HIT).then_some((hit.triangle, hit.t)),
+                )
+            })
             .collect();
         self.oracle.rays = questions.len();
-        for ((ray, hit), verdict) in pairs.iter().zip(oracle::judge_closest_hits(&scene.triangles, &questions)) {
+        for ((ray, hit), verdict) in pairs
+            .iter()
+            .zip(oracle::judge_closest_hits(&scene.triangles, &questions))
+        {
             match verdict {
                 Verdict::Agrees => {}
                 Verdict::Ambiguous => self.oracle.ambiguous += 1,
                 Verdict::Wrong(fault) => {
                     self.oracle.wrong += 1;
-                    self.first_wrong.get_or_insert_with(|| format!("{} | judge {} | f64: {fault}", ray_text(ray), hit_text(hit)));
+                    self.first_wrong.get_or_insert_with(|| {
+                        format!("{} | judge {} | f64: {fault}", ray_text(ray), hit_text(hit))
+                    });
                 }
             }
         }
@@ -124,7 +142,12 @@ impl Judge {
 }
 
 fn oracle_ray(ray: &Ray) -> OracleRay {
-    OracleRay { origin: ray.origin, t_min: ray.t_min, direction: ray.direction, t_max: ray.t_max }
+    OracleRay {
+        origin: ray.origin,
+        t_min: ray.t_min,
+        direction: ray.direction,
+        t_max: ray.t_max,
+    }
 }
 
 /// Traces all recorded rays, closest and any hit, and compares.
@@ -143,15 +166,31 @@ pub fn gate(
     let mut errors = 0;
     let mut classes = Vec::new();
     for set in &judge.sets {
-        let closest = Batch::new(gpu, scene, traced, Query::Closest, &set.rays, runtime_checks)?;
+        let closest = Batch::new(
+            gpu,
+            scene,
+            traced,
+            Query::Closest,
+            &set.rays,
+            runtime_checks,
+        )?;
         closest.trace()?;
         let any = Batch::new(gpu, scene, traced, Query::Any, &set.rays, runtime_checks)?;
         any.trace()?;
         errors |= closest.error_word()? | any.error_word()?;
-        classes.push(compare(set, &closest.hits()?, &any.found()?, soup, probe.is_exact()));
+        classes.push(compare(
+            set,
+            &closest.hits()?,
+            &any.found()?,
+            soup,
+            probe.is_exact(),
+        ));
     }
-    let kernel_errors: Vec<String> =
-        KERNEL_ERRORS.iter().filter(|(bit, _)| errors & bit != 0).map(|(_, text)| (*text).to_owned()).collect();
+    let kernel_errors: Vec<String> = KERNEL_ERRORS
+        .iter()
+        .filter(|(bit, _)| errors & bit != 0)
+        .map(|(_, text)| (*text).to_owned())
+        .collect();
     let right = classes.iter().all(|c| c.wrong == 0);
     Ok(GateVerdict {
         passed: right && errors == 0 && judge.is_sound(),
@@ -164,11 +203,27 @@ pub fn gate(
 }
 
 /// Compares the answers of a structure with the judge's.
-pub fn compare(set: &RaySet, hits: &[Hit], found: &[bool], soup: &TriangleSoup, exact: bool) -> ClassVerdict {
-    let mut verdict =
-        ClassVerdict { class: set.class, rays: set.rays.len(), wrong: 0, ties: 0, first_wrong: None };
+pub fn compare(
+    set: &RaySet,
+    hits: &[Hit],
+    found: &[bool],
+    soup: &TriangleSoup,
+    exact: bool,
+) -> ClassVerdict {
+    let mut verdict = ClassVerdict {
+        class: set.class,
+        rays: set.rays.len(),
+        wrong: 0,
+        ties: 0,
+        first_wrong: None,
+    };
     for (index, (ray, truth)) in set.rays.iter().zip(&set.truth).enumerate() {
-        let hit = hits.get(index).copied().unwrap_or(Hit { t: f32::NAN, triangle: NO_HIT, u: 0.0, v: 0.0 });
+        let hit = hits.get(index).copied().unwrap_or(Hit {
+            t: f32::NAN,
+            triangle: NO_HIT,
+            u: 0.0,
+            v: 0.0,
+        });
         let any_right = found.get(index) == Some(&(truth.triangle != NO_HIT));
         if hit.same_bits(truth) && any_right {
             continue;
@@ -179,7 +234,11 @@ pub fn compare(set: &RaySet, hits: &[Hit], found: &[bool], soup: &TriangleSoup, 
         }
         verdict.wrong += 1;
         verdict.first_wrong.get_or_insert_with(|| {
-            let any = if any_right { "" } else { " | any-hit answer differs" };
+            let any = if any_right {
+                ""
+            } else {
+                " | any-hit answer differs"
+            };
             describe(ray, "structure", &hit, "judge", truth) + any
         });
     }
@@ -189,7 +248,10 @@ pub fn compare(set: &RaySet, hits: &[Hit], found: &[bool], soup: &TriangleSoup, 
 /// Whether both triangles lie within 4 ulp of the same distance in f64, as does the answer, and the
 /// ray may hit the other one there: a plane goes on beyond its triangle.
 fn is_tie(ray: &Ray, hit: &Hit, truth: &Hit, soup: &TriangleSoup) -> bool {
-    if hit.triangle == NO_HIT || truth.triangle == NO_HIT || hit.triangle as usize >= soup.records.len() {
+    if hit.triangle == NO_HIT
+        || truth.triangle == NO_HIT
+        || hit.triangle as usize >= soup.records.len()
+    {
         return false;
     }
     let ulp = |t: f64| t.abs() * f64::from(f32::EPSILON);
@@ -203,7 +265,10 @@ fn is_tie(ray: &Ray, hit: &Hit, truth: &Hit, soup: &TriangleSoup) -> bool {
 /// Whether rounding alone can explain that the triangle was found there.
 fn may_hit(ray: &Ray, hit: &Hit, soup: &TriangleSoup) -> bool {
     let triangle = soup.records[hit.triangle as usize].triangle();
-    !matches!(oracle::judge(&[triangle], oracle_ray(ray), Some((0, hit.t))), Verdict::Wrong(_))
+    !matches!(
+        oracle::judge(&[triangle], oracle_ray(ray), Some((0, hit.t))),
+        Verdict::Wrong(_)
+    )
 }
 
 /// Distance to the triangle's plane, f64.
@@ -214,19 +279,33 @@ fn plane_distance(ray: &Ray, record: &crate::accel::triangle::TriangleRecord) ->
 }
 
 fn describe(ray: &Ray, left: &str, a: &Hit, right: &str, b: &Hit) -> String {
-    format!("{} | {left} {} | {right} {}", ray_text(ray), hit_text(a), hit_text(b))
+    format!(
+        "{} | {left} {} | {right} {}",
+        ray_text(ray),
+        hit_text(a),
+        hit_text(b)
+    )
 }
 
 /// A ray as replayable text: nine significant digits give back the same f32.
 fn ray_text(ray: &Ray) -> String {
     let three = |[x, y, z]: [f32; 3]| format!("{x:?} {y:?} {z:?}");
-    format!("ray {} / {} / {:?} {:?}", three(ray.origin), three(ray.direction), ray.t_min, ray.t_max)
+    format!(
+        "ray {} / {} / {:?} {:?}",
+        three(ray.origin),
+        three(ray.direction),
+        ray.t_min,
+        ray.t_max
+    )
 }
 
 fn hit_text(hit: &Hit) -> String {
     if hit.triangle == NO_HIT {
         "misses".to_owned()
     } else {
-        format!("hits {} at t {:?} u {:?} v {:?}", hit.triangle, hit.t, hit.u, hit.v)
+        format!(
+            "hits {} at t {:?} u {:?} v {:?}",
+            hit.triangle, hit.t, hit.u, hit.v
+        )
     }
 }

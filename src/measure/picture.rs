@@ -19,8 +19,8 @@ pub struct Picture {
     pub pixels: Vec<[u8; 3]>,
 }
 
-/// Exposure that brings the log-average luminance of the finite, non-black pixels to 0.18
-/// (Reinhard et al. 2002, equation 2); 1 for an image without such pixels. Take it from the
+/// Exposure that brings the log-average luminance of the finite, non-black pixels to 0.36
+/// (Reinhard et al. 2002, equation 2, with twice their key: white skies look dull at 0.18); 1 for an image without such pixels. Take it from the
 /// reference and use it for all images of a scene, so that they can be compared by eye.
 pub fn automatic_exposure(image: &Image) -> f32 {
     let lit = |p: &&[f32; 3]| is_finite(p) && luminance(p) > 1e-6;
@@ -33,7 +33,7 @@ pub fn automatic_exposure(image: &Image) -> f32 {
         });
     match count {
         0 => 1.0,
-        _ => (0.18 / (sum / count as f64).exp()) as f32,
+        _ => (0.36 / (sum / count as f64).exp()) as f32,
     }
 }
 
@@ -140,7 +140,7 @@ mod tests {
         assert!(mapped.pixels[1..5].is_sorted_by(|a, b| a[0] < b[0]));
         // 17/32 of linear light is 0.7556 encoded.
         assert_eq!(mapped.pixels[3], [193; 3]);
-        let exposure = automatic_exposure(&grey(&[0.09, 0.36, 0.0, f32::NAN]));
+        let exposure = automatic_exposure(&grey(&[0.18, 0.72, 0.0, f32::NAN]));
         assert!((exposure - 1.0).abs() < 1e-5, "{exposure}");
         assert_eq!(automatic_exposure(&grey(&[0.0])), 1.0);
     }

@@ -6,7 +6,7 @@
 
 use super::record::RayClass;
 use super::statistics::Pcg32;
-use crate::accel::{Counters, CpuTwin, Hit, Ray, TriangleSoup, NO_HIT};
+use crate::accel::{Counters, CpuTwin, Hit, NO_HIT, Ray, TriangleSoup};
 use crate::integrator::Frame;
 use crate::scene::{Bounds, Camera, SceneData};
 use glam::Vec3;
@@ -33,7 +33,10 @@ pub struct RaySet {
 
 impl RaySet {
     fn new(class: RayClass, rays: Vec<Ray>, judge: &dyn CpuTwin) -> Self {
-        let truth = rays.par_iter().map(|ray| judge.closest_hit(ray, &mut Counters::default())).collect();
+        let truth = rays
+            .par_iter()
+            .map(|ray| judge.closest_hit(ray, &mut Counters::default()))
+            .collect();
         Self { class, rays, truth }
     }
 
@@ -51,7 +54,13 @@ impl RaySet {
 
 /// Camera rays through pixel centres, 8×8 tiles row by row.
 pub fn primary_rays(camera: Camera, width: u32, height: u32) -> Vec<Ray> {
-    let [forward, right, up] = Frame { width, height, camera, ao_radius: 0.0 }.basis();
+    let [forward, right, up] = Frame {
+        width,
+        height,
+        camera,
+        ao_radius: 0.0,
+    }
+    .basis();
     let mut rays = Vec::with_capacity((width * height) as usize);
     for tile_y in (0..height).step_by(TILE as usize) {
         for tile_x in (0..width).step_by(TILE as usize) {
@@ -82,17 +91,30 @@ pub fn primary_pixels(width: u32, height: u32) -> Vec<u32> {
 }
 
 fn ray(origin: Vec3, direction: Vec3, t_max: f32) -> Ray {
-    Ray { origin: origin.to_array(), t_min: 0.0, direction: direction.to_array(), t_max }
+    Ray {
+        origin: origin.to_array(),
+        t_min: 0.0,
+        direction: direction.to_array(),
+        t_max,
+    }
 }
 
 /// Point and unit normal, on the side of the ray, of every primary hit.
 fn surface_points(primary: &RaySet, soup: &TriangleSoup) -> Vec<(Vec3, Vec3)> {
-    let hits = primary.rays.iter().zip(&primary.truth).filter(|(_, h)| h.triangle != NO_HIT);
+    let hits = primary
+        .rays
+        .iter()
+        .zip(&primary.truth)
+        .filter(|(_, h)| h.triangle != NO_HIT);
     hits.filter_map(|(ray, hit)| {
         let record = &soup.records[hit.triangle as usize];
         let (e1, e2) = (Vec3::from(record.e1), Vec3::from(record.e2));
         let normal = e1.cross(e2).try_normalize()?;
-        let facing = if normal.dot(Vec3::from(ray.direction)) > 0.0 { -normal } else { normal };
+        let facing = if normal.dot(Vec3::from(ray.direction)) > 0.0 {
+            -normal
+        } else {
+            normal
+        };
         Some((Vec3::from(record.v0) - hit.u * e1 + hit.v * e2, facing))
     })
     .collect()
@@ -117,26 +139,42 @@ pub fn record_rays(
     let emitters = scene.emitters();
     let mut sets = vec![];
     if !points.is_empty() {
-        let starts = || points.iter().cycle().take(primary.rays.len()).map(|&(p, n)| (p + n * (OFFSET * diagonal), n));
+        let starts = || {
+            points
+                .iter()
+                .cycle()
+                .take(primary.rays.len())
+                .map(|&(p, n)| (p + n * (OFFSET * diagonal), n))
+        };
         let shadow = starts().map(|(p, _)| {
             let target = light_point(scene, &emitters, &bounds, &mut random);
             // A little short of the emitter, which must not shadow itself.
             ray(p, target - p, 0.9999)
         });
         let shadow = shadow.collect();
-        let ao = starts().map(|(p, n)| ray(p, cosine_direction(n, &mut random), AO_LENGTH * diagonal)).collect();
-        let bounce = starts().map(|(p, n)| ray(p, cosine_direction(n, &mut random), FAR)).collect();
+        let ao = starts()
+            .map(|(p, n)| ray(p, cosine_direction(n, &mut random), AO_LENGTH * diagonal))
+            .collect();
+        let bounce = starts()
+            .map(|(p, n)| ray(p, cosine_direction(n, &mut random), FAR))
+            .collect();
         sets.push(RaySet::new(RayClass::Shadow, shadow, judge));
         sets.push(RaySet::new(RayClass::Ao, ao, judge));
         sets.push(RaySet::new(RayClass::Bounce, bounce, judge));
     }
     let inside = |random: &mut Pcg32| {
-        let u = Vec3::new(random.uniform() as f32, random.uniform() as f32, random.uniform() as f32);
+        let u = Vec3::new(
+            random.uniform() as f32,
+            random.uniform() as f32,
+            random.uniform() as f32,
+        );
         bounds.min + u * (bounds.max - bounds.min)
     };
     let chords = (0..primary.rays.len()).map(|_| {
         let from = inside(&mut random);
-        let direction = (inside(&mut random) - from).try_normalize().unwrap_or(Vec3::X);
+        let direction = (inside(&mut random) - from)
+            .try_normalize()
+            .unwrap_or(Vec3::X);
         ray(from, direction, FAR)
     });
     sets.push(RaySet::new(RayClass::Chord, chords.collect(), judge));
@@ -151,7 +189,8 @@ fn light_point(scene: &SceneData, emitters: &[u32], bounds: &Bounds, random: &mu
         let z = 1.0 - 2.0 * u;
         let radius = (1.0 - z * z).max(0.0).sqrt();
         let angle = std::f32::consts::TAU * v;
-        return bounds.center() + bounds.radius() * Vec3::new(radius * angle.cos(), radius * angle.sin(), z);
+        return bounds.center()
+            + bounds.radius() * Vec3::new(radius * angle.cos(), radius * angle.sin(), z);
     }
     let chosen = emitters[random.below(emitters.len())];
     let [a, b, c] = scene.triangles[chosen as usize].vertices;
@@ -164,5 +203,8 @@ fn cosine_direction(n: Vec3, random: &mut Pcg32) -> Vec3 {
     let (tangent, bitangent) = n.any_orthonormal_pair();
     let radius = u.sqrt();
     let angle = std::f32::consts::TAU * v;
-    (tangent * (radius * angle.cos()) + bitangent * (radius * angle.sin()) + n * (1.0 - u).max(0.0).sqrt()).normalize()
+    (tangent * (radius * angle.cos())
+        + bitangent * (radius * angle.sin())
+        + n * (1.0 - u).max(0.0).sqrt())
+    .normalize()
 }

@@ -1,8 +1,8 @@
 //! The timing protocol: warm-up until the rate is stable, then all measured things in rounds of
 //! random order, so that drift of the machine hits all alike.
 
-use super::statistics::{bootstrap_median, median, Pcg32};
 use super::record::Interval;
+use super::statistics::{Pcg32, bootstrap_median, median};
 use crate::config::Timing;
 use crate::gpu::{Elapsed, GpuError};
 use std::time::Instant;
@@ -54,7 +54,9 @@ pub fn interleave<M: Measured>(
             order.swap(i, random.below(i + 1));
         }
         for &index in &order {
-            let Ok(samples) = &mut results[index] else { continue };
+            let Ok(samples) = &mut results[index] else {
+                continue;
+            };
             match measured[index].measure() {
                 Ok(elapsed) => {
                     samples.ms.push(elapsed.ms());
@@ -79,7 +81,9 @@ fn warm_up(measured: &impl Measured, timing: &Timing) -> Result<(), GpuError> {
         let spent_ms = start.elapsed().as_secs_f64() * 1e3;
         let now = measured.measure()?.ms();
         let stable = (now - last).abs() <= STABLE * now.max(last);
-        if (stable && spent_ms >= f64::from(timing.min_warmup_ms)) || spent_ms >= f64::from(timing.max_warmup_ms) {
+        if (stable && spent_ms >= f64::from(timing.min_warmup_ms))
+            || spent_ms >= f64::from(timing.max_warmup_ms)
+        {
             return Ok(());
         }
         last = now;
@@ -89,7 +93,10 @@ fn warm_up(measured: &impl Measured, timing: &Timing) -> Result<(), GpuError> {
 /// `samples` with the cost of an empty measurement taken off; never below a hundredth of what was
 /// measured, so that a rate stays finite.
 pub fn without_overhead(samples: &[f64], empty: f64) -> Vec<f64> {
-    samples.iter().map(|ms| (ms - empty).max(0.01 * ms)).collect()
+    samples
+        .iter()
+        .map(|ms| (ms - empty).max(0.01 * ms))
+        .collect()
 }
 
 /// Median of an empty measurement.
@@ -97,7 +104,9 @@ pub fn without_overhead(samples: &[f64], empty: f64) -> Vec<f64> {
 /// # Errors
 /// It failed.
 pub fn empty_ms(mut measure: impl FnMut() -> Result<Elapsed, GpuError>) -> Result<f64, GpuError> {
-    let samples = (0..9).map(|_| measure().map(|e| e.ms())).collect::<Result<Vec<_>, _>>()?;
+    let samples = (0..9)
+        .map(|_| measure().map(|e| e.ms()))
+        .collect::<Result<Vec<_>, _>>()?;
     Ok(median(&samples).unwrap_or(0.0))
 }
 

@@ -36,6 +36,10 @@ pub fn device_type(kind: wgpu::DeviceType) -> &'static str {
 /// The processor's model name where the system tells, else its architecture.
 pub fn cpu_model() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = text.lines().find_map(|l| l.strip_prefix("model name")?.split_once(':').map(|(_, name)| name.trim()));
+    let model = text.lines().find_map(|l| {
+        l.strip_prefix("model name")?
+            .split_once(':')
+            .map(|(_, name)| name.trim())
+    });
     model.unwrap_or(std::env::consts::ARCH).to_owned()
 }

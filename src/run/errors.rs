@@ -3,17 +3,17 @@
 use super::session::Session;
 use super::structures::Gated;
 use super::world::World;
-use super::{RunError, REFERENCE_PARTS};
-use crate::config::{cell_hash, SamplerCell, Variant};
+use super::{REFERENCE_PARTS, RunError};
+use crate::config::{SamplerCell, Variant, cell_hash};
 use crate::gpu::GpuError;
-use crate::integrator::{integrator, Frame, RenderJob, Renderer, Snapshot};
-use crate::measure::bias::{check_bias, BiasOptions};
-use crate::measure::image::{measure, Image, Reference};
+use crate::integrator::{Frame, RenderJob, Renderer, Snapshot, integrator};
+use crate::measure::bias::{BiasOptions, check_bias};
+use crate::measure::image::{Image, Reference, measure};
 use crate::measure::picture::{automatic_exposure, error_map, tone_map, write_png};
 use crate::measure::record::{BiasRecord, ErrorAtSpp, ErrorRecord, Record, ReferenceRecord};
 use crate::report::color::viridis;
-use crate::sampling::hash::pcg_hash;
 use crate::sampling::Sampler;
+use crate::sampling::hash::pcg_hash;
 use std::time::Instant;
 
 /// Relative error per pixel at the top of the colour scale of error maps.
@@ -34,7 +34,8 @@ pub(super) fn job<'j>(
     variant: &'j Variant,
     runtime_checks: bool,
 ) -> Result<RenderJob<'j>, String> {
-    let integrator = integrator(&variant.name).ok_or_else(|| format!("no integrator is called {variant}"))?;
+    let integrator =
+        integrator(&variant.name).ok_or_else(|| format!("no integrator is called {variant}"))?;
     let needed = integrator.dimensions(&variant.params);
     if let Some(limit) = sampler.sequence.max_dimensions()
         && needed > limit
@@ -47,13 +48,26 @@ pub(super) fn job<'j>(
     let [width, height] = session.experiment.resolution;
     let diagonal = f64::from(2.0 * world.scene.bounds().radius());
     let ao_radius = (integrator.ao_radius(&variant.params).unwrap_or(0.0) * diagonal) as f32;
-    let frame = Frame { width, height, camera: world.camera, ao_radius };
-    Ok(RenderJob { frame, sampler, integrator, params: &variant.params, runtime_checks })
+    let frame = Frame {
+        width,
+        height,
+        camera: world.camera,
+        ao_radius,
+    };
+    Ok(RenderJob {
+        frame,
+        sampler,
+        integrator,
+        params: &variant.params,
+        runtime_checks,
+    })
 }
 
 /// Renders and fails if a kernel raised its error word.
 fn render_checked(renderer: &Renderer, spps: &[u32], seed: u32) -> Result<Vec<Snapshot>, String> {
-    let rendered = renderer.render(spps, seed).and_then(|s| Ok((s, renderer.error_word()?)));
+    let rendered = renderer
+        .render(spps, seed)
+        .and_then(|s| Ok((s, renderer.error_word()?)));
     match rendered.map_err(|e: GpuError| e.to_string())? {
         (snapshots, 0) => Ok(snapshots),
         (_, word) => Err(format!("a kernel raised error word {word} while rendering")),
@@ -65,8 +79,13 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     let Some(fastest) = gated.iter().max_by(|a, b| a.speed.total_cmp(&b.speed)) else {
         return Ok(());
     };
-    let cells: Vec<SamplerCell> =
-        session.plan.samplers.iter().filter(|c| c.scene == *world.variant).cloned().collect();
+    let cells: Vec<SamplerCell> = session
+        .plan
+        .samplers
+        .iter()
+        .filter(|c| c.scene == *world.variant)
+        .cloned()
+        .collect();
     for variant in session.experiment.axes.integrator.clone() {
         let wanted = |c: &&SamplerCell| c.integrator == variant && !session.is_done(&c.to_string());
         let cells: Vec<SamplerCell> = cells.iter().filter(wanted).cloned().collect();
@@ -106,7 +125,11 @@ fn reference(
 ) -> Result<Result<Yardstick, String>, RunError> {
     session.say(format!("{}, {variant}: reference", world.variant));
     let settings = &session.experiment.reference;
-    let Some(sampler) = session.registries.samplers.sampler(&settings.sequence, &settings.decorrelation) else {
+    let Some(sampler) = session
+        .registries
+        .samplers
+        .sampler(&settings.sequence, &settings.decorrelation)
+    else {
         return Ok(Err("the reference's sampler is not registered".to_owned()));
     };
     let start = Instant::now();
@@ -114,11 +137,13 @@ fn reference(
     let seed = pcg_hash(settings.seed);
     let rendered = (|| {
         let job = job(session, world, &sampler, variant, true)?;
-        let renderer =
-            Renderer::new(world.gpu, &world.buffers, &fastest.traced, &job, false).map_err(|e| e.to_string())?;
+        let renderer = Renderer::new(world.gpu, &world.buffers, &fastest.traced, &job, false)
+            .map_err(|e| e.to_string())?;
         let mut parts = Vec::new();
         for part in 0..REFERENCE_PARTS {
-            let rendered = session.clock.time("gpu", || render_checked(&renderer, &[spp], seed.wrapping_add(part)));
+            let rendered = session.clock.time("gpu", || {
+                render_checked(&renderer, &[spp], seed.wrapping_add(part))
+            });
             parts.extend(rendered?.into_iter().map(|s| s.image));
             session.progress.inc(1);
         }
@@ -131,7 +156,8 @@ fn reference(
     };
     let exposure = automatic_exposure(reference.image());
     let (relative, path) = session.image_path(&["reference", &world.variant.label, &variant.label]);
-    write_png(&path, &tone_map(reference.image(), exposure)).map_err(|e| RunError::Input(e.to_string()))?;
+    write_png(&path, &tone_map(reference.image(), exposure))
+        .map_err(|e| RunError::Input(e.to_string()))?;
     let cell = format!("reference {}, {variant}: done", world.variant);
     if !session.is_done(&cell) {
         let record = ReferenceRecord {
@@ -147,7 +173,11 @@ fn reference(
         session.write(&world.scene.hash, Record::Reference(record))?;
         session.finish(cell);
     }
-    Ok(Ok(Yardstick { reference, parts, exposure }))
+    Ok(Ok(Yardstick {
+        reference,
+        parts,
+        exposure,
+    }))
 }
 
 /// All replicates of one sampler. The inner error concerns this cell alone.
@@ -159,11 +189,16 @@ fn sampler_error(
     yardstick: &Yardstick,
 ) -> Result<Result<(), String>, RunError> {
     session.say(cell.to_string());
-    let Some(sampler) = session.registries.samplers.sampler(&cell.sequence, &cell.decorrelation) else {
+    let Some(sampler) = session
+        .registries
+        .samplers
+        .sampler(&cell.sequence, &cell.decorrelation)
+    else {
         return Ok(Err("this sampler is not registered".to_owned()));
     };
     let compiled = job(session, world, &sampler, &cell.integrator, true).and_then(|job| {
-        Renderer::new(world.gpu, &world.buffers, &fastest.traced, &job, false).map_err(|e| e.to_string())
+        Renderer::new(world.gpu, &world.buffers, &fastest.traced, &job, false)
+            .map_err(|e| e.to_string())
     });
     let renderer = match compiled {
         Ok(renderer) => renderer,
@@ -172,23 +207,44 @@ fn sampler_error(
     let spps: Vec<u32> = session.experiment.spp.counts().collect();
     let hash = cell_hash(&[
         ("scene", &world.scene.hash),
-        ("sampler", &serde_json::to_string(&(&cell.sequence, &cell.decorrelation, &cell.integrator)).unwrap_or_default()),
+        (
+            "sampler",
+            &serde_json::to_string(&(&cell.sequence, &cell.decorrelation, &cell.integrator))
+                .unwrap_or_default(),
+        ),
         ("kernel", renderer.kernel_text()),
         ("version", env!("CARGO_PKG_VERSION")),
     ]);
-    let seeds: Vec<u32> = session.experiment.replicate_seeds().take(cell.replicates as usize).collect();
+    let seeds: Vec<u32> = session
+        .experiment
+        .replicate_seeds()
+        .take(cell.replicates as usize)
+        .collect();
     let mut finals = Vec::new();
     for (replicate, seed) in seeds.into_iter().enumerate() {
-        let snapshots = match session.clock.time("gpu", || render_checked(&renderer, &spps, seed)) {
+        let snapshots = match session
+            .clock
+            .time("gpu", || render_checked(&renderer, &spps, seed))
+        {
             Ok(snapshots) => snapshots,
             Err(reason) => return Ok(Err(reason)),
         };
-        let record = match error_record(session, world, cell, yardstick, &snapshots, (replicate as u32, seed))? {
+        let record = match error_record(
+            session,
+            world,
+            cell,
+            yardstick,
+            &snapshots,
+            (replicate as u32, seed),
+        )? {
             Ok(record) => record,
             Err(reason) => return Ok(Err(reason)),
         };
         if record.non_finite_pixels > 0 {
-            return Ok(Err(format!("replicate {replicate} has {} pixels that are not finite", record.non_finite_pixels)));
+            return Ok(Err(format!(
+                "replicate {replicate} has {} pixels that are not finite",
+                record.non_finite_pixels
+            )));
         }
         session.write(&hash, Record::Error(record))?;
         finals.extend(snapshots.into_iter().last().map(|s| s.image));
@@ -215,7 +271,10 @@ fn error_record(
         match measure(&snapshot.image, &yardstick.reference) {
             Ok(report) => {
                 non_finite_pixels = non_finite_pixels.max(report.non_finite_pixels);
-                errors.push(ErrorAtSpp { spp: snapshot.spp, metrics: report.metrics });
+                errors.push(ErrorAtSpp {
+                    spp: snapshot.spp,
+                    metrics: report.metrics,
+                });
             }
             Err(error) => return Ok(Err(error.to_string())),
         }
@@ -240,15 +299,28 @@ fn error_record(
     };
     if replicate == 0 {
         let name = |kind| {
-            let labels = [&world.variant.label, &cell.integrator.label, &cell.sequence.label, &cell.decorrelation.label];
+            let labels = [
+                &world.variant.label,
+                &cell.integrator.label,
+                &cell.sequence.label,
+                &cell.decorrelation.label,
+            ];
             session.image_path(&[&[kind], &labels.map(String::as_str)[..]].concat())
         };
         let (relative, path) = name("image");
-        write_png(&path, &tone_map(&last.image, yardstick.exposure)).map_err(|e| RunError::Input(e.to_string()))?;
+        write_png(&path, &tone_map(&last.image, yardstick.exposure))
+            .map_err(|e| RunError::Input(e.to_string()))?;
         record.image = Some(relative);
         let (relative, path) = name("error");
-        match error_map(&last.image, &yardstick.reference, ERROR_MAP_FULL_SCALE, viridis) {
-            Ok(picture) => write_png(&path, &picture).map_err(|e| RunError::Input(e.to_string()))?,
+        match error_map(
+            &last.image,
+            &yardstick.reference,
+            ERROR_MAP_FULL_SCALE,
+            viridis,
+        ) {
+            Ok(picture) => {
+                write_png(&path, &picture).map_err(|e| RunError::Input(e.to_string()))?
+            }
             Err(error) => return Ok(Err(error.to_string())),
         }
         record.error_map = Some(relative);
@@ -265,7 +337,13 @@ fn bias_record(
     images: &[Image],
     yardstick: &Yardstick,
 ) -> Result<BiasRecord, String> {
-    let tested = session.plan.samplers.iter().filter(|s| s.randomised).count().max(1);
+    let tested = session
+        .plan
+        .samplers
+        .iter()
+        .filter(|s| s.randomised)
+        .count()
+        .max(1);
     let mut options = BiasOptions::default();
     options.alpha /= tested as f64;
     let check = check_bias(images, &yardstick.parts, options).map_err(|e| e.to_string())?;
@@ -290,5 +368,7 @@ fn bias_record(
 
 /// BLAKE3 of the f32 pixels.
 pub(super) fn image_hash(image: &Image) -> String {
-    blake3::hash(bytemuck::cast_slice(&image.pixels)).to_hex().to_string()
+    blake3::hash(bytemuck::cast_slice(&image.pixels))
+        .to_hex()
+        .to_string()
 }

@@ -74,7 +74,9 @@ impl RunError {
     /// The exit code of the program: 2 bad usage or input, 3 no usable adapter.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Gpu(GpuError::NoAdapter | GpuError::UnknownAdapter { .. } | GpuError::NoDevice { .. }) => 3,
+            Self::Gpu(
+                GpuError::NoAdapter | GpuError::UnknownAdapter { .. } | GpuError::NoDevice { .. },
+            ) => 3,
             _ => 2,
         }
     }
@@ -98,7 +100,9 @@ pub struct Verified {
 pub fn open_gpu(options: &RunOptions) -> Result<Gpu, RunError> {
     let mut kernels = crate::gpu::KernelLibrary::default();
     if let Some(folder) = &options.kernels {
-        kernels = kernels.with_folder(folder).map_err(|e| RunError::Input(e.to_string()))?;
+        kernels = kernels
+            .with_folder(folder)
+            .map_err(|e| RunError::Input(e.to_string()))?;
     }
     Ok(crate::gpu::open(&options.adapter, kernels)?)
 }
@@ -135,8 +139,10 @@ pub fn run(
         gpu = open_gpu(options)?;
     }
     session.write_end()?;
-    let report = crate::report::write_report(&options.out).map_err(|e| RunError::Input(e.to_string()))?;
-    let lines = crate::report::read_records(&options.out).map_err(|e| RunError::Input(e.to_string()))?;
+    let report =
+        crate::report::write_report(&options.out).map_err(|e| RunError::Input(e.to_string()))?;
+    let lines =
+        crate::report::read_records(&options.out).map_err(|e| RunError::Input(e.to_string()))?;
     Ok(RunSummary {
         failed: session.failed,
         skipped: session.skipped,
@@ -186,7 +192,11 @@ pub fn verify(
     let mut session = Session::unrecorded(&experiment, plan, registries, options);
     let mut verified = Vec::new();
     for scene in &plan.scenes {
-        let accels = plan.structures.iter().filter(|c| c.scene == *scene).map(|c| &c.accel);
+        let accels = plan
+            .structures
+            .iter()
+            .filter(|c| c.scene == *scene)
+            .map(|c| &c.accel);
         let world = World::new(&mut session, &gpu, scene)?;
         for accel in accels {
             let verdict = match &world {
@@ -199,7 +209,11 @@ pub fn verify(
                     }
                 },
             };
-            verified.push(Verified { scene: scene.clone(), accel: accel.clone(), verdict });
+            verified.push(Verified {
+                scene: scene.clone(),
+                accel: accel.clone(),
+                verdict,
+            });
         }
     }
     session.progress.finish_and_clear();
@@ -220,17 +234,27 @@ pub fn render(
 ) -> Result<(), RunError> {
     let gpu = open_gpu(options)?;
     let mut session = Session::unrecorded(experiment, plan, registries, options);
-    let cell = plan.times.first().ok_or_else(|| RunError::Input("there is nothing to render".to_owned()))?;
+    let cell = plan
+        .times
+        .first()
+        .ok_or_else(|| RunError::Input("there is nothing to render".to_owned()))?;
     let world = World::new(&mut session, &gpu, &cell.scene)?.map_err(RunError::Input)?;
     let built = structures::build_and_gate(&mut session, &world, &cell.accel);
-    let (traced, _) = built.map_err(|record| RunError::Input(record.failure.unwrap_or_default()))?;
-    let found = registries.samplers.sampler(&cell.sequence, &cell.decorrelation);
-    let sampler = found.ok_or_else(|| RunError::Input("this sampler is not registered".to_owned()))?;
-    let job = errors::job(&session, &world, &sampler, &cell.integrator, true).map_err(RunError::Input)?;
+    let (traced, _) =
+        built.map_err(|record| RunError::Input(record.failure.unwrap_or_default()))?;
+    let found = registries
+        .samplers
+        .sampler(&cell.sequence, &cell.decorrelation);
+    let sampler =
+        found.ok_or_else(|| RunError::Input("this sampler is not registered".to_owned()))?;
+    let job =
+        errors::job(&session, &world, &sampler, &cell.integrator, true).map_err(RunError::Input)?;
     let renderer = Renderer::new(&gpu, &world.buffers, &traced, &job, false)?;
     let snapshots = renderer.render(&[experiment.spp.max()], experiment.seed)?;
     session.progress.finish_and_clear();
-    let Some(snapshot) = snapshots.first() else { return Ok(()) };
+    let Some(snapshot) = snapshots.first() else {
+        return Ok(());
+    };
     let picture = tone_map(&snapshot.image, automatic_exposure(&snapshot.image));
     write_png(file, &picture).map_err(|e| RunError::Input(e.to_string()))
 }

@@ -28,6 +28,8 @@ impl Registries {
 
     /// Whether seeds change what this pair draws.
     pub fn is_randomised(&self, sequence: &Variant, decorrelation: &Variant) -> bool {
-        self.samplers.sampler(sequence, decorrelation).is_some_and(|s| s.is_random())
+        self.samplers
+            .sampler(sequence, decorrelation)
+            .is_some_and(|s| s.is_random())
     }
 }

@@ -3,7 +3,9 @@
 use super::{RunError, RunOptions};
 use crate::config::{Experiment, Plan};
 use crate::gpu::Gpu;
-use crate::measure::record::{Environment, FinishedRecord, Line, Record, RunRecord, SkippedRecord, SCHEMA};
+use crate::measure::record::{
+    Environment, FinishedRecord, Line, Record, RunRecord, SCHEMA, SkippedRecord,
+};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::{BTreeMap, HashSet};
 use std::fs::{File, OpenOptions};
@@ -19,7 +21,10 @@ pub(super) struct Clock {
 
 impl Clock {
     fn new() -> Self {
-        Self { start: Instant::now(), parts_s: BTreeMap::new() }
+        Self {
+            start: Instant::now(),
+            parts_s: BTreeMap::new(),
+        }
     }
 
     /// Runs `work` and books its time under `part`.
@@ -59,7 +64,10 @@ impl<'a> Session<'a> {
         options: &'a RunOptions,
     ) -> Result<Self, RunError> {
         let unwritable = |path: &Path, e: std::io::Error| {
-            RunError::Input(format!("cannot write {}: {e}; choose another folder with --out", path.display()))
+            RunError::Input(format!(
+                "cannot write {}: {e}; choose another folder with --out",
+                path.display()
+            ))
         };
         let mut session = Self::unrecorded(experiment, plan, registries, options);
         let images = options.out.join("images");
@@ -83,8 +91,14 @@ impl<'a> Session<'a> {
         registries: &'a super::Registries,
         options: &'a RunOptions,
     ) -> Self {
-        let progress = if options.progress { ProgressBar::new(steps(experiment, plan)) } else { ProgressBar::hidden() };
-        let style = ProgressStyle::with_template("{bar:32} {pos}/{len} · {elapsed} · about {eta} left · {wide_msg}");
+        let progress = if options.progress {
+            ProgressBar::new(steps(experiment, plan))
+        } else {
+            ProgressBar::hidden()
+        };
+        let style = ProgressStyle::with_template(
+            "{bar:32} {pos}/{len} · {elapsed} · about {eta} left · {wide_msg}",
+        );
         progress.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         Self {
             experiment,
@@ -111,11 +125,20 @@ impl<'a> Session<'a> {
 
     /// Appends one record as one whole line and flushes it to the disk.
     pub fn write(&mut self, hash: &str, record: Record) -> Result<(), RunError> {
-        let Some(records) = &mut self.records else { return Ok(()) };
-        let line = Line { schema: SCHEMA.to_owned(), hash: hash.to_owned(), record };
-        let mut text = serde_json::to_string(&line).map_err(|e| RunError::Input(format!("a record cannot be written: {e}")))?;
+        let Some(records) = &mut self.records else {
+            return Ok(());
+        };
+        let line = Line {
+            schema: SCHEMA.to_owned(),
+            hash: hash.to_owned(),
+            record,
+        };
+        let mut text = serde_json::to_string(&line)
+            .map_err(|e| RunError::Input(format!("a record cannot be written: {e}")))?;
         text.push('\n');
-        let written = records.write_all(text.as_bytes()).and_then(|()| records.sync_data());
+        let written = records
+            .write_all(text.as_bytes())
+            .and_then(|()| records.sync_data());
         written.map_err(|e| {
             RunError::Input(format!(
                 "cannot write {}: {e}; the records before this one are kept",
@@ -126,7 +149,9 @@ impl<'a> Session<'a> {
 
     /// The first record.
     pub fn write_start(&mut self, environment: Environment) -> Result<(), RunError> {
-        let seconds = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_secs());
+        let seconds = SystemTime::now()
+            .duration_since(SystemTime::UNIX_EPOCH)
+            .map_or(0, |d| d.as_secs());
         let record = RunRecord {
             name: self.experiment.name.clone(),
             experiment: self.experiment.source.clone(),
@@ -138,7 +163,10 @@ impl<'a> Session<'a> {
         };
         self.write("", Record::Run(record))?;
         for skipped in &self.plan.skipped {
-            let record = SkippedRecord { cell: skipped.cell.clone(), reason: skipped.reason.clone() };
+            let record = SkippedRecord {
+                cell: skipped.cell.clone(),
+                reason: skipped.reason.clone(),
+            };
             self.write("", Record::Skipped(record))?;
             self.skipped += skipped.cells;
         }
@@ -150,7 +178,13 @@ impl<'a> Session<'a> {
         let wall_s = self.clock.start.elapsed().as_secs_f64();
         let parts_s = self.clock.parts_s.clone();
         let overhead_s = (wall_s - parts_s.values().sum::<f64>()).max(0.0);
-        let record = FinishedRecord { wall_s, parts_s, overhead_s, failed: self.failed, skipped: self.skipped };
+        let record = FinishedRecord {
+            wall_s,
+            parts_s,
+            overhead_s,
+            failed: self.failed,
+            skipped: self.skipped,
+        };
         self.progress.finish_and_clear();
         self.write("", Record::Finished(record))
     }
@@ -169,7 +203,13 @@ impl<'a> Session<'a> {
     pub fn write_failure(&mut self, cell: &str, reason: String) -> Result<(), RunError> {
         self.failed += 1;
         self.finish(cell.to_owned());
-        self.write("", Record::Failed(SkippedRecord { cell: cell.to_owned(), reason }))
+        self.write(
+            "",
+            Record::Failed(SkippedRecord {
+                cell: cell.to_owned(),
+                reason,
+            }),
+        )
     }
 
     /// Shows what is being done.
@@ -182,7 +222,13 @@ impl<'a> Session<'a> {
         let slug: String = parts
             .join("-")
             .chars()
-            .map(|c| if c.is_ascii_alphanumeric() || c == '.' { c.to_ascii_lowercase() } else { '-' })
+            .map(|c| {
+                if c.is_ascii_alphanumeric() || c == '.' {
+                    c.to_ascii_lowercase()
+                } else {
+                    '-'
+                }
+            })
             .collect();
         let relative = format!("images/{slug}.png");
         let path = self.options.out.join(&relative);
@@ -195,6 +241,7 @@ fn steps(experiment: &Experiment, plan: &Plan) -> u64 {
     let rounds = u64::from(experiment.timing.rounds) + 1;
     let structures = plan.structures.len() as u64 * (2 + 5 * rounds);
     let times = plan.times.len() as u64 * rounds;
-    let references = plan.scenes.len() * experiment.axes.integrator.len() * super::REFERENCE_PARTS as usize;
+    let references =
+        plan.scenes.len() * experiment.axes.integrator.len() * super::REFERENCE_PARTS as usize;
     structures + times + (plan.renders_planned + references + plan.streams.len()) as u64
 }

@@ -1,13 +1,13 @@
 //! Star discrepancy of the streams that the path really consumes, dumped from the kernel.
 
-use super::session::Session;
 use super::RunError;
+use super::session::Session;
 use crate::config::StreamCell;
 use crate::discrepancy::star_2d_prefixes;
-use crate::gpu::{groups_for, Bindings, Composition, Dispatch, Gpu, UniformValues};
+use crate::gpu::{Bindings, Composition, Dispatch, Gpu, UniformValues, groups_for};
 use crate::measure::record::{Interval, Record, StarAtCount, StreamRecord};
 use crate::measure::statistics::bootstrap_mean;
-use crate::sampling::{dimensions::pair_purpose, to_unit, Coordinate, Sampler};
+use crate::sampling::{Coordinate, Sampler, dimensions::pair_purpose, to_unit};
 
 /// Fewest points whose discrepancy is taken.
 const FEWEST_POINTS: u32 = 16;
@@ -23,7 +23,9 @@ pub(super) fn run(session: &mut Session, gpu: &Gpu) -> Result<(), RunError> {
         for pair in session.experiment.discrepancy.pairs.clone() {
             match stream_record(session, gpu, &cell, pair) {
                 Ok(record) => session.write("", Record::Stream(record))?,
-                Err(reason) => session.write_failure(&format!("stream {cell}, {pair:?}"), reason)?,
+                Err(reason) => {
+                    session.write_failure(&format!("stream {cell}, {pair:?}"), reason)?
+                }
             }
         }
         session.finish(cell.to_string());
@@ -35,27 +37,53 @@ pub(super) fn run(session: &mut Session, gpu: &Gpu) -> Result<(), RunError> {
     Ok(())
 }
 
-fn stream_record(session: &mut Session, gpu: &Gpu, cell: &StreamCell, pair: [u32; 2]) -> Result<StreamRecord, String> {
-    let found = session.registries.samplers.sampler(&cell.sequence, &cell.decorrelation);
+fn stream_record(
+    session: &mut Session,
+    gpu: &Gpu,
+    cell: &StreamCell,
+    pair: [u32; 2],
+) -> Result<StreamRecord, String> {
+    let found = session
+        .registries
+        .samplers
+        .sampler(&cell.sequence, &cell.decorrelation);
     let sampler = found.ok_or("this sampler is not registered")?;
     let settings = session.experiment.discrepancy.clone();
     let seeds: Vec<u32> = if cell.randomised {
-        session.experiment.replicate_seeds().take(settings.seeds as usize).collect()
+        session
+            .experiment
+            .replicate_seeds()
+            .take(settings.seeds as usize)
+            .collect()
     } else {
         vec![session.experiment.seed]
     };
     let smallest = FEWEST_POINTS.min(settings.points).trailing_zeros();
-    let counts: Vec<usize> = (smallest..=settings.points.trailing_zeros()).map(|k| 1 << k).collect();
+    let counts: Vec<usize> = (smallest..=settings.points.trailing_zeros())
+        .map(|k| 1 << k)
+        .collect();
     let mut per_seed = Vec::new();
     for &seed in &seeds {
-        let points = session.clock.time("gpu", || dump_points(gpu, &sampler, settings.points, pair, seed))?;
-        let stars = session.clock.time("discrepancy", || star_2d_prefixes(&points, &counts));
+        let points = session.clock.time("gpu", || {
+            dump_points(gpu, &sampler, settings.points, pair, seed)
+        })?;
+        let stars = session
+            .clock
+            .time("discrepancy", || star_2d_prefixes(&points, &counts));
         per_seed.push(stars.map_err(|e| e.to_string())?);
     }
     let star = counts.iter().enumerate().filter_map(|(i, &n)| {
         let values: Vec<f64> = per_seed.iter().map(|stars| stars[i]).collect();
-        let alone = Interval { value: values[0], low: values[0], high: values[0] };
-        let star = if values.len() == 1 { alone } else { bootstrap_mean(&values)? };
+        let alone = Interval {
+            value: values[0],
+            low: values[0],
+            high: values[0],
+        };
+        let star = if values.len() == 1 {
+            alone
+        } else {
+            bootstrap_mean(&values)?
+        };
         Some(StarAtCount { n, star })
     });
     Ok(StreamRecord {
@@ -70,24 +98,47 @@ fn stream_record(session: &mut Session, gpu: &Gpu, cell: &StreamCell, pair: [u32
 }
 
 /// The first `count` points of one pixel, as the kernel draws them.
-fn dump_points(gpu: &Gpu, sampler: &Sampler, count: u32, pair: [u32; 2], seed: u32) -> Result<Vec<[f64; 2]>, String> {
+fn dump_points(
+    gpu: &Gpu,
+    sampler: &Sampler,
+    count: u32,
+    pair: [u32; 2],
+    seed: u32,
+) -> Result<Vec<[f64; 2]>, String> {
     let coordinates: Vec<Coordinate> = (0..count)
-        .flat_map(|sample| pair.map(|dimension| Coordinate { pixel: 0, sample, dimension, seed }))
+        .flat_map(|sample| {
+            pair.map(|dimension| Coordinate {
+                pixel: 0,
+                sample,
+                dimension,
+                seed,
+            })
+        })
         .collect();
     let words = dump_stream(gpu, sampler, &coordinates)?;
-    Ok(words.chunks_exact(2).map(|p| [f64::from(to_unit(p[0])), f64::from(to_unit(p[1]))]).collect())
+    Ok(words
+        .chunks_exact(2)
+        .map(|p| [f64::from(to_unit(p[0])), f64::from(to_unit(p[1]))])
+        .collect())
 }
 
 /// The u32 of every coordinate, as the kernel computes it.
 ///
 /// # Errors
 /// A dimension beyond the sequence's table, or the kernel does not run.
-pub fn dump_stream(gpu: &Gpu, sampler: &Sampler, coordinates: &[Coordinate]) -> Result<Vec<u32>, String> {
+pub fn dump_stream(
+    gpu: &Gpu,
+    sampler: &Sampler,
+    coordinates: &[Coordinate],
+) -> Result<Vec<u32>, String> {
     let highest = coordinates.iter().map(|c| c.dimension).max().unwrap_or(0);
     if let Some(limit) = sampler.sequence.max_dimensions()
         && highest >= limit
     {
-        return Err(format!("dimension {highest} is asked for, {} has {limit}", sampler.sequence_variant));
+        return Err(format!(
+            "dimension {highest} is asked for, {} has {limit}",
+            sampler.sequence_variant
+        ));
     }
     let mut composition = Composition::new("sampling/dump_stream")
         .with("sequence", sampler.sequence.kernel())
@@ -95,17 +146,30 @@ pub fn dump_stream(gpu: &Gpu, sampler: &Sampler, coordinates: &[Coordinate]) -> 
     for (name, value) in sampler.sequence.constants(&sampler.sequence_variant.params) {
         composition = composition.constant(name, value);
     }
-    let words: Vec<[u32; 4]> = coordinates.iter().map(|c| [c.pixel, c.sample, c.dimension, c.seed]).collect();
+    let words: Vec<[u32; 4]> = coordinates
+        .iter()
+        .map(|c| [c.pixel, c.sample, c.dimension, c.seed])
+        .collect();
     let run = || {
         let pipeline = gpu.pipeline(&composition, true)?;
         let stream = gpu.zeroed("stream", words.len() as u64 * 4)?;
         let mut bindings = Bindings::new();
         bindings
             .buffer("coordinates", &gpu.storage("coordinates", &words)?)
-            .buffer("sampler_table", &gpu.storage("sampler_table", &sampler.table)?)
+            .buffer(
+                "sampler_table",
+                &gpu.storage("sampler_table", &sampler.table)?,
+            )
             .buffer("stream", &stream)
-            .uniform("dump", UniformValues::new().u32("count", words.len() as u32));
-        gpu.run(&Dispatch { pipeline: &pipeline, bindings: &bindings, groups: groups_for(words.len() as u32) })?;
+            .uniform(
+                "dump",
+                UniformValues::new().u32("count", words.len() as u32),
+            );
+        gpu.run(&Dispatch {
+            pipeline: &pipeline,
+            bindings: &bindings,
+            groups: groups_for(words.len() as u32),
+        })?;
         let mut out: Vec<u32> = gpu.read(&stream)?;
         out.truncate(words.len());
         Ok::<_, crate::gpu::GpuError>(out)

@@ -1,18 +1,22 @@
 //! Structures: build, validate, gate, time, count, draw.
 
+use super::RunError;
 use super::session::Session;
 use super::world::World;
-use super::RunError;
 use crate::accel::{BuildLog, Counters};
-use crate::config::{cell_hash, StructureCell, Variant};
+use crate::config::{StructureCell, Variant, cell_hash};
 use crate::gpu::{Elapsed, GpuError};
 use crate::integrator::Traced;
-use crate::measure::batch::{count_work, Batch, Query};
+use crate::measure::batch::{Batch, Query, count_work};
 use crate::measure::gate::gate;
-use crate::measure::picture::{write_png, Picture};
+use crate::measure::picture::{Picture, write_png};
 use crate::measure::rays::{primary_pixels, primary_rays};
-use crate::measure::record::{ClassTiming, CountersPerRay, GateVerdict, Record, StructureRecord, StructureStats};
-use crate::measure::timing::{empty_ms, interleave, millions_per_second, without_overhead, Measured};
+use crate::measure::record::{
+    ClassTiming, CountersPerRay, GateVerdict, Record, StructureRecord, StructureStats,
+};
+use crate::measure::timing::{
+    Measured, empty_ms, interleave, millions_per_second, without_overhead,
+};
 use crate::report::color::viridis;
 
 /// A structure that passed its gate.
@@ -41,7 +45,9 @@ pub(super) fn build_and_gate(
         return Err(Box::new(record));
     };
     let mut log = BuildLog::default();
-    let built = session.clock.time("build", || kind.build(&world.soup, &accel.params, &mut log));
+    let built = session
+        .clock
+        .time("build", || kind.build(&world.soup, &accel.params, &mut log));
     record.build_ms = log.total_ms();
     record.build = log.phases;
     let built = match built {
@@ -52,7 +58,11 @@ pub(super) fn build_and_gate(
         }
     };
     record.stats = built.stats();
-    let structural = session.clock.time("gate", || built.validate(&world.soup)).err().map(|e| e.to_string());
+    let structural = session
+        .clock
+        .time("gate", || built.validate(&world.soup))
+        .err()
+        .map(|e| e.to_string());
     let traced = match Traced::upload(world.gpu, kind, &*built) {
         Ok(traced) => traced,
         Err(error) => {
@@ -61,7 +71,9 @@ pub(super) fn build_and_gate(
         }
     };
     drop(built);
-    match session.clock.time("gate", || gate_twice(session.experiment.runtime_checks, world, &traced)) {
+    match session.clock.time("gate", || {
+        gate_twice(session.experiment.runtime_checks, world, &traced)
+    }) {
         Err(error) => record.failure = Some(error.to_string()),
         Ok(mut verdict) => {
             verdict.passed &= structural.is_none();
@@ -72,14 +84,36 @@ pub(super) fn build_and_gate(
             record.gate = Some(verdict);
         }
     }
-    if record.failure.is_some() { Err(Box::new(record)) } else { Ok((traced, record)) }
+    if record.failure.is_some() {
+        Err(Box::new(record))
+    } else {
+        Ok((traced, record))
+    }
 }
 
 /// The gate with the driver's checks; without them only if that passed.
-fn gate_twice(runtime_checks: bool, world: &World, traced: &Traced) -> Result<GateVerdict, GpuError> {
-    let run = |checks| gate(world.gpu, &world.buffers, &world.soup, traced, &world.judge, &world.probe, checks);
+fn gate_twice(
+    runtime_checks: bool,
+    world: &World,
+    traced: &Traced,
+) -> Result<GateVerdict, GpuError> {
+    let run = |checks| {
+        gate(
+            world.gpu,
+            &world.buffers,
+            &world.soup,
+            traced,
+            &world.judge,
+            &world.probe,
+            checks,
+        )
+    };
     let checked = run(true)?;
-    if runtime_checks || !checked.passed { Ok(checked) } else { run(false) }
+    if runtime_checks || !checked.passed {
+        Ok(checked)
+    } else {
+        run(false)
+    }
 }
 
 fn failure_text(verdict: &GateVerdict, judge_fault: Option<&str>) -> String {
@@ -87,8 +121,14 @@ fn failure_text(verdict: &GateVerdict, judge_fault: Option<&str>) -> String {
     let wrong: usize = verdict.classes.iter().map(|c| c.wrong).sum();
     if wrong > 0 {
         let rays: usize = verdict.classes.iter().map(|c| c.rays).sum();
-        let first = verdict.classes.iter().find_map(|c| c.first_wrong.as_deref()).unwrap_or_default();
-        parts.push(format!("{wrong} of {rays} rays differ from the judge; first: {first}"));
+        let first = verdict
+            .classes
+            .iter()
+            .find_map(|c| c.first_wrong.as_deref())
+            .unwrap_or_default();
+        parts.push(format!(
+            "{wrong} of {rays} rays differ from the judge; first: {first}"
+        ));
     }
     parts.extend(verdict.kernel_errors.iter().cloned());
     parts.extend(verdict.structural.clone());
@@ -134,8 +174,13 @@ impl Measured for Timed<'_> {
 
 /// Everything about the structures of a scene; returns those that may be used further.
 pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, RunError> {
-    let cells: Vec<StructureCell> =
-        session.plan.structures.iter().filter(|c| c.scene == *world.variant).cloned().collect();
+    let cells: Vec<StructureCell> = session
+        .plan
+        .structures
+        .iter()
+        .filter(|c| c.scene == *world.variant)
+        .cloned()
+        .collect();
     let mut gated = Vec::new();
     for cell in cells {
         if session.is_done(&cell.to_string()) && !session.is_done(&passed(&cell)) {
@@ -180,7 +225,11 @@ fn passed(cell: &StructureCell) -> String {
 
 fn structure_hash(world: &World, cell: &StructureCell) -> String {
     let params = serde_json::to_string(&cell.accel).unwrap_or_default();
-    cell_hash(&[("scene", &world.scene.hash), ("accel", &params), ("version", env!("CARGO_PKG_VERSION"))])
+    cell_hash(&[
+        ("scene", &world.scene.hash),
+        ("accel", &params),
+        ("version", env!("CARGO_PKG_VERSION")),
+    ])
 }
 
 fn write_failed(
@@ -202,15 +251,27 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
     for (structure, item) in gated.iter_mut().enumerate() {
         for set in &world.judge.sets {
             let checks = item.runtime_checks;
-            match Batch::new(world.gpu, &world.buffers, &item.traced, Query::of(set), &set.rays, checks) {
+            match Batch::new(
+                world.gpu,
+                &world.buffers,
+                &item.traced,
+                Query::of(set),
+                &set.rays,
+                checks,
+            ) {
                 Ok(batch) => timed.push(Timed { structure, batch }),
                 Err(error) => failures[structure] = Some(error.to_string()),
             }
         }
     }
-    let (timing, seed) = (session.experiment.timing, u64::from(session.experiment.seed));
+    let (timing, seed) = (
+        session.experiment.timing,
+        u64::from(session.experiment.seed),
+    );
     let progress = session.progress.clone();
-    let samples = match session.clock.time("gpu", || interleave(&timed, &timing, seed, || progress.inc(1))) {
+    let samples = match session.clock.time("gpu", || {
+        interleave(&timed, &timing, seed, || progress.inc(1))
+    }) {
         Ok(samples) => samples,
         Err((index, error)) => {
             let mut lost = gated.swap_remove(timed[index].structure);
@@ -223,9 +284,17 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
         let set = &world.judge.sets[index % world.judge.sets.len()];
         let structure = &mut gated[item.structure];
         let outcome = result.and_then(|samples| {
-            let empty = session.clock.time("gpu", || empty_ms(|| item.batch.trace_nothing()))?;
+            let empty = session
+                .clock
+                .time("gpu", || empty_ms(|| item.batch.trace_nothing()))?;
             let work = session.clock.time("gpu", || {
-                count_work(world.gpu, &world.buffers, &structure.traced, Query::of(set), &set.rays)
+                count_work(
+                    world.gpu,
+                    &world.buffers,
+                    &structure.traced,
+                    Query::of(set),
+                    &set.rays,
+                )
             })?;
             let ms = without_overhead(&samples.ms, empty);
             let rate = millions_per_second(&ms, set.rays.len() as f64);
@@ -252,7 +321,12 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
             structure.record.timings.clear();
             write_failed(session, world, &structure.cell.clone(), structure.record)?;
         } else {
-            structure.speed = structure.record.timings.iter().map(|t| t.mrays_s.value.ln()).sum::<f64>();
+            structure.speed = structure
+                .record
+                .timings
+                .iter()
+                .map(|t| t.mrays_s.value.ln())
+                .sum::<f64>();
             kept.push(structure);
         }
     }
@@ -261,7 +335,9 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
 }
 
 fn per_ray(work: &[Counters]) -> CountersPerRay {
-    let mean = |get: fn(&Counters) -> u32| work.iter().map(|c| f64::from(get(c))).sum::<f64>() / work.len().max(1) as f64;
+    let mean = |get: fn(&Counters) -> u32| {
+        work.iter().map(|c| f64::from(get(c))).sum::<f64>() / work.len().max(1) as f64
+    };
     CountersPerRay {
         nodes: mean(|c| c.nodes),
         box_tests: mean(|c| c.box_tests),
@@ -273,13 +349,23 @@ fn per_ray(work: &[Counters]) -> CountersPerRay {
 /// Cost of every pixel's primary ray as a picture, one scale for all structures of a scene. The
 /// scale ends at the 99th percentile of the costliest structure but brute force, whose cost is the
 /// same everywhere and would leave the others black.
-fn draw_heat_maps(session: &mut Session, world: &World, gated: &mut [Gated]) -> Result<(), RunError> {
+fn draw_heat_maps(
+    session: &mut Session,
+    world: &World,
+    gated: &mut [Gated],
+) -> Result<(), RunError> {
     let [width, height] = session.experiment.resolution;
     let rays = primary_rays(world.camera, width, height);
     let pixels = primary_pixels(width, height);
     for structure in gated.iter_mut() {
         let work = session.clock.time("gpu", || {
-            count_work(world.gpu, &world.buffers, &structure.traced, Query::Closest, &rays)
+            count_work(
+                world.gpu,
+                &world.buffers,
+                &structure.traced,
+                Query::Closest,
+                &rays,
+            )
         });
         let Ok(work) = work else { continue };
         structure.costs = vec![0.0; rays.len()];
@@ -295,8 +381,13 @@ fn draw_heat_maps(session: &mut Session, world: &World, gated: &mut [Gated]) -> 
     let others = gated.iter().filter(|g| g.cell.accel.name != "brute-force");
     let scale = others.map(|g| percentile(&g.costs)).fold(1.0, f32::max);
     for structure in gated.iter_mut().filter(|s| !s.costs.is_empty()) {
-        let picture = Picture { width, height, pixels: structure.costs.iter().map(|c| viridis(c / scale)).collect() };
-        let (relative, path) = session.image_path(&["heat", &world.variant.label, &structure.cell.accel.label]);
+        let picture = Picture {
+            width,
+            height,
+            pixels: structure.costs.iter().map(|c| viridis(c / scale)).collect(),
+        };
+        let (relative, path) =
+            session.image_path(&["heat", &world.variant.label, &structure.cell.accel.label]);
         write_png(&path, &picture).map_err(|e| RunError::Input(e.to_string()))?;
         structure.record.heat_map = Some(relative);
         structure.record.heat_map_max = Some(f64::from(scale));

@@ -1,17 +1,17 @@
 //! Time of full cells, at few samples per pixel, in interleaved rounds; and the proof by hash that
 //! every structure gives the same image.
 
+use super::RunError;
 use super::errors::{image_hash, job};
 use super::session::Session;
 use super::structures::Gated;
 use super::world::World;
-use super::RunError;
-use crate::config::{cell_hash, TimeCell, Variant};
+use crate::config::{TimeCell, Variant, cell_hash};
 use crate::gpu::{Elapsed, GpuError};
-use crate::integrator::{Renderer, RAY_COUNT_CLASSES};
+use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
 use crate::measure::record::{Interval, Record, TimeRecord};
 use crate::measure::statistics::bootstrap_median;
-use crate::measure::timing::{interleave, Measured, Samples};
+use crate::measure::timing::{Measured, Samples, interleave};
 use crate::sampling::Sampler;
 use std::collections::BTreeMap;
 
@@ -40,12 +40,21 @@ struct Shared {
 }
 
 fn key(cell: &TimeCell) -> String {
-    format!("{}, {} × {}", cell.integrator, cell.sequence, cell.decorrelation)
+    format!(
+        "{}, {} × {}",
+        cell.integrator, cell.sequence, cell.decorrelation
+    )
 }
 
 /// All full cells of a scene.
 pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Result<(), RunError> {
-    let cells: Vec<TimeCell> = session.plan.times.iter().filter(|c| c.scene == *world.variant).cloned().collect();
+    let cells: Vec<TimeCell> = session
+        .plan
+        .times
+        .iter()
+        .filter(|c| c.scene == *world.variant)
+        .cloned()
+        .collect();
     let mut timed = Vec::new();
     for cell in cells {
         let text = cell.to_string();
@@ -53,7 +62,12 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             continue;
         }
         let Some(structure) = gated.iter().find(|g| g.cell.accel == cell.accel) else {
-            let record = empty_record(session, world, &cell, "its structure did not pass the gate".to_owned());
+            let record = empty_record(
+                session,
+                world,
+                &cell,
+                "its structure did not pass the gate".to_owned(),
+            );
             session.failed += 1;
             session.finish(text);
             session.write("", Record::Time(record))?;
@@ -70,22 +84,39 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         }
     }
     session.say(format!("{}: timing full cells", world.variant));
-    let (timing, seed) = (session.experiment.timing, u64::from(session.experiment.seed));
+    let (timing, seed) = (
+        session.experiment.timing,
+        u64::from(session.experiment.seed),
+    );
     let progress = session.progress.clone();
-    let samples = match session.clock.time("gpu", || interleave(&timed, &timing, seed, || progress.inc(1))) {
+    let samples = match session.clock.time("gpu", || {
+        interleave(&timed, &timing, seed, || progress.inc(1))
+    }) {
         Ok(samples) => samples,
-        Err((index, error)) => return fail(session, world, &timed[index].cell.clone(), error.to_string()),
+        Err((index, error)) => {
+            return fail(
+                session,
+                world,
+                &timed[index].cell.clone(),
+                error.to_string(),
+            );
+        }
     };
     let mut shared = Shared::default();
     for (item, samples) in timed.iter().zip(samples) {
         let structure = gated.iter().find(|g| g.cell.accel == item.cell.accel);
         let measured = samples.map_err(|e| e.to_string());
-        let record = measured.and_then(|samples| finish(session, world, structure, item, samples, &mut shared));
+        let record = measured
+            .and_then(|samples| finish(session, world, structure, item, samples, &mut shared));
         match record {
             Ok(record) => {
                 let hash = cell_hash(&[
                     ("scene", &world.scene.hash),
-                    ("cell", &serde_json::to_string(&(&record.accel, &record.integrator)).unwrap_or_default()),
+                    (
+                        "cell",
+                        &serde_json::to_string(&(&record.accel, &record.integrator))
+                            .unwrap_or_default(),
+                    ),
                     ("kernel", item.renderer.kernel_text()),
                     ("device", &format!("{:?}", world.gpu.info)),
                     ("version", env!("CARGO_PKG_VERSION")),
@@ -101,7 +132,10 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
 }
 
 fn sampler_of(session: &Session, cell: &TimeCell) -> Result<Sampler, String> {
-    let found = session.registries.samplers.sampler(&cell.sequence, &cell.decorrelation);
+    let found = session
+        .registries
+        .samplers
+        .sampler(&cell.sequence, &cell.decorrelation);
     found.ok_or_else(|| "this sampler is not registered".to_owned())
 }
 
@@ -114,12 +148,18 @@ fn compile<'a>(
     let sampler = sampler_of(session, &cell)?;
     let checks = structure.runtime_checks;
     let job = job(session, world, &sampler, &cell.integrator, checks)?;
-    let compiled = session
-        .clock
-        .time("gpu", || Renderer::new(world.gpu, &world.buffers, &structure.traced, &job, false));
+    let compiled = session.clock.time("gpu", || {
+        Renderer::new(world.gpu, &world.buffers, &structure.traced, &job, false)
+    });
     let renderer = compiled.map_err(|e| e.to_string())?;
     let (spp, seed) = (session.experiment.timing.spp, session.experiment.seed);
-    Ok(Timed { cell, renderer, spp, seed, runtime_checks: checks })
+    Ok(Timed {
+        cell,
+        renderer,
+        spp,
+        seed,
+        runtime_checks: checks,
+    })
 }
 
 /// Figures of a measured cell.
@@ -131,10 +171,17 @@ fn finish(
     samples: Samples,
     shared: &mut Shared,
 ) -> Result<TimeRecord, String> {
-    let image = item.renderer.image().and_then(|image| Ok((image, item.renderer.error_word()?)));
+    let image = item
+        .renderer
+        .image()
+        .and_then(|image| Ok((image, item.renderer.error_word()?)));
     let (image, error_word) = image.map_err(|e| e.to_string())?;
     let hash = image_hash(&image);
-    let first = shared.image.entry(key(&item.cell)).or_insert_with(|| hash.clone()).clone();
+    let first = shared
+        .image
+        .entry(key(&item.cell))
+        .or_insert_with(|| hash.clone())
+        .clone();
     let rays = match shared.rays.get(&key(&item.cell)) {
         Some(rays) => *rays,
         None => {
@@ -147,11 +194,17 @@ fn finish(
     let total: u64 = rays.iter().sum();
     let spp = f64::from(item.spp);
     let per_spp: Vec<f64> = samples.ms.iter().map(|ms| ms / spp).collect();
-    let rates: Vec<f64> = samples.ms.iter().map(|ms| total as f64 / ms * 1e-3).collect();
+    let rates: Vec<f64> = samples
+        .ms
+        .iter()
+        .map(|ms| total as f64 / ms * 1e-3)
+        .collect();
     let equal = hash == first;
     let failure = match (equal, error_word) {
         (_, word) if word != 0 => Some(format!("a kernel raised error word {word}")),
-        (false, _) if world.probe.is_exact() => Some("its image differs from that of the scene's first structure".to_owned()),
+        (false, _) if world.probe.is_exact() => {
+            Some("its image differs from that of the scene's first structure".to_owned())
+        }
         _ => None,
     };
     let mut record = empty_record(session, world, &item.cell, String::new());
@@ -162,7 +215,12 @@ fn finish(
         record.ms = samples.ms;
         record.wall_ms = samples.wall_ms;
     }
-    record.rays = RAY_COUNT_CLASSES.iter().zip(rays).filter(|(_, n)| *n > 0).map(|(c, n)| ((*c).to_owned(), n)).collect();
+    record.rays = RAY_COUNT_CLASSES
+        .iter()
+        .zip(rays)
+        .filter(|(_, n)| *n > 0)
+        .map(|(c, n)| ((*c).to_owned(), n))
+        .collect();
     record.image_hash = hash;
     record.image_equal = equal;
     record.runtime_checks = item.runtime_checks;
@@ -171,7 +229,12 @@ fn finish(
 }
 
 /// Rays per class, from a separate counting run of the same seed.
-fn count_rays(session: &mut Session, world: &World, structure: &Gated, item: &Timed) -> Result<[u64; 4], String> {
+fn count_rays(
+    session: &mut Session,
+    world: &World,
+    structure: &Gated,
+    item: &Timed,
+) -> Result<[u64; 4], String> {
     let sampler = sampler_of(session, &item.cell)?;
     let job = job(session, world, &sampler, &item.cell.integrator, true)?;
     let counted = session.clock.time("gpu", || {
@@ -184,7 +247,11 @@ fn count_rays(session: &mut Session, world: &World, structure: &Gated, item: &Ti
 }
 
 fn empty_record(session: &Session, world: &World, cell: &TimeCell, failure: String) -> TimeRecord {
-    let nothing = Interval { value: 0.0, low: 0.0, high: 0.0 };
+    let nothing = Interval {
+        value: 0.0,
+        low: 0.0,
+        high: 0.0,
+    };
     let label = |v: &Variant| v.clone();
     TimeRecord {
         scene: world.variant.label.clone(),
@@ -207,7 +274,12 @@ fn empty_record(session: &Session, world: &World, cell: &TimeCell, failure: Stri
     }
 }
 
-fn fail(session: &mut Session, world: &World, cell: &TimeCell, reason: String) -> Result<(), RunError> {
+fn fail(
+    session: &mut Session,
+    world: &World,
+    cell: &TimeCell,
+    reason: String,
+) -> Result<(), RunError> {
     session.failed += 1;
     session.finish(cell.to_string());
     let record = empty_record(session, world, cell, reason);

@@ -1,7 +1,7 @@
 //! A scene made ready: loaded, uploaded, judged.
 
-use super::session::Session;
 use super::RunError;
+use super::session::Session;
 use crate::accel::TriangleSoup;
 use crate::config::Variant;
 use crate::gpu::{ArithmeticProbe, Gpu};
@@ -33,36 +33,58 @@ impl<'a> World<'a> {
         session.say(format!("{variant}: loading"));
         let start = Instant::now();
         let options = LoadOptions::default();
-        let loaded = session.clock.time("load", || scene::load(variant, &options));
+        let loaded = session
+            .clock
+            .time("load", || scene::load(variant, &options));
         let scene = match loaded {
             Ok(scene) => scene,
             Err(error) => return Ok(Err(error.to_string())),
         };
         let load_ms = start.elapsed().as_secs_f64() * 1e3;
-        let camera = session.experiment.camera.or(scene.camera).unwrap_or_else(|| Camera::frame(&scene.bounds()));
+        let camera = session
+            .experiment
+            .camera
+            .or(scene.camera)
+            .unwrap_or_else(|| Camera::frame(&scene.bounds()));
         if let Err(error) = camera.validate() {
             return Ok(Err(error.to_string()));
         }
         let cell = format!("scene {variant}");
         if !session.is_done(&cell) {
-            session.write(&scene.hash, Record::Scene(scene_record(variant, &scene, camera, load_ms)))?;
+            session.write(
+                &scene.hash,
+                Record::Scene(scene_record(variant, &scene, camera, load_ms)),
+            )?;
             session.finish(cell);
         }
         session.say(format!("{variant}: checking the judge"));
         let soup = session.clock.time("load", || TriangleSoup::new(&scene));
-        let uploaded = session.clock.time("load", || SceneBuffers::upload(gpu, &scene, &soup));
+        let uploaded = session
+            .clock
+            .time("load", || SceneBuffers::upload(gpu, &scene, &soup));
         let experiment = session.experiment;
         let mut settings = experiment.gate;
         settings.rays = settings.rays.max(experiment.timing.rays);
-        let judged = session
+        let judged = session.clock.time("judge", || {
+            Judge::new(&scene, &soup, camera, &settings, u64::from(experiment.seed))
+        });
+        let probe = session
             .clock
-            .time("judge", || Judge::new(&scene, &soup, camera, &settings, u64::from(experiment.seed)));
-        let probe = session.clock.time("gate", || crate::gpu::probe_arithmetic(gpu));
+            .time("gate", || crate::gpu::probe_arithmetic(gpu));
         Ok((|| {
             let buffers = uploaded.map_err(|e| e.to_string())?;
             let judge = judged.map_err(|e| e.to_string())?;
             let probe = probe.map_err(|e| e.to_string())?;
-            Ok(Self { gpu, probe, variant, scene, camera, soup, buffers, judge })
+            Ok(Self {
+                gpu,
+                probe,
+                variant,
+                scene,
+                camera,
+                soup,
+                buffers,
+                judge,
+            })
         })())
     }
 }

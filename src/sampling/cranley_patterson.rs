@@ -28,7 +28,10 @@ impl Decorrelation for CranleyPatterson {
     }
 
     fn decorrelate(&self, x: u32, at: Coordinate) -> u32 {
-        let shift = pcg_hash(at.dimension.wrapping_add(pcg_hash(at.pixel.wrapping_add(pcg_hash(at.seed)))));
+        let shift = pcg_hash(
+            at.dimension
+                .wrapping_add(pcg_hash(at.pixel.wrapping_add(pcg_hash(at.seed)))),
+        );
         x.wrapping_add(shift)
     }
 }

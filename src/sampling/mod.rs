@@ -108,12 +108,17 @@ impl Sampler {
 
     /// `sequence × decorrelation`, for people.
     pub fn label(&self) -> String {
-        format!("{} × {}", self.sequence_variant.label, self.decorrelation_variant.label)
+        format!(
+            "{} × {}",
+            self.sequence_variant.label, self.decorrelation_variant.label
+        )
     }
 
     /// The u32 that the kernel computes for this coordinate.
     pub fn sample_u32(&self, at: Coordinate) -> u32 {
-        let x = self.sequence.sequence(&self.sequence_variant.params, &self.table, at);
+        let x = self
+            .sequence
+            .sequence(&self.sequence_variant.params, &self.table, at);
         self.decorrelation.decorrelate(x, at)
     }
 }

@@ -45,8 +45,15 @@ impl Sequence for PixelHash {
     }
 
     fn sequence(&self, params: &Params, _: &[u32], at: Coordinate) -> u32 {
-        let hash = if params.name("hash") == "wang" { wang_hash } else { pcg_hash };
-        let inner = hash(at.sample.wrapping_add(hash(at.pixel.wrapping_add(hash(at.seed)))));
+        let hash = if params.name("hash") == "wang" {
+            wang_hash
+        } else {
+            pcg_hash
+        };
+        let inner = hash(
+            at.sample
+                .wrapping_add(hash(at.pixel.wrapping_add(hash(at.seed)))),
+        );
         hash(at.dimension.wrapping_add(inner))
     }
 }

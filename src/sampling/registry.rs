@@ -39,7 +39,9 @@ impl SamplerRegistry {
             sequence: found,
             table: found.table(&sequence.params),
             sequence_variant: sequence.clone(),
-            decorrelation: self.decorrelations().find(|d| d.name() == decorrelation.name)?,
+            decorrelation: self
+                .decorrelations()
+                .find(|d| d.name() == decorrelation.name)?,
             decorrelation_variant: decorrelation.clone(),
         })
     }

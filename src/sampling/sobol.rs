@@ -29,8 +29,11 @@ impl Sequence for Sobol {
     /// 32 direction numbers a dimension, most significant digit of the sample's bit 0 first.
     fn table(&self, _: &Params) -> Vec<u32> {
         let parameters = JoeKuoD6::standard();
-        let directions =
-            ::sobol::Sobol::<u32>::init_direction_vals::<u32>(TABLE_DIMENSIONS as usize, BITS, &parameters);
+        let directions = ::sobol::Sobol::<u32>::init_direction_vals::<u32>(
+            TABLE_DIMENSIONS as usize,
+            BITS,
+            &parameters,
+        );
         directions.into_iter().flatten().collect()
     }
 

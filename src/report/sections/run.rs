@@ -136,7 +136,12 @@ fn failures(data: &RunData) -> Option<Section> {
         }
     }
     for failed in &data.failed {
-        add(failed.cell.clone(), "FAILED", Tone::Bad, failed.reason.clone());
+        add(
+            failed.cell.clone(),
+            "FAILED",
+            Tone::Bad,
+            failed.reason.clone(),
+        );
     }
     for skipped in &data.skipped {
         add(

@@ -1,0 +1,180 @@
+//! `sorted-slabs`: triangles sorted along x, cut into runs of equal length, one box a run; a ray
+//! tests every box. The example of `docs/adding-a-structure.md`.
+
+use raystone::accel::bounds::{Bounds, enter_box};
+use raystone::accel::ray::safe_inverse;
+use raystone::accel::triangle::intersect_triangle;
+use raystone::accel::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, Hit, NO_HIT,
+    NamedWords, Ray, TriangleSoup, limits,
+};
+use raystone::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use raystone::measure::record::StructureStats;
+
+/// The registry entry.
+pub struct SortedSlabs;
+
+impl AccelKind for SortedSlabs {
+    fn name(&self) -> &'static str {
+        "sorted-slabs"
+    }
+
+    fn description(&self) -> &'static str {
+        "triangles sorted along x in runs with one box each (an example)"
+    }
+
+    fn kernel(&self) -> &'static str {
+        "accel/sorted_slabs"
+    }
+
+    fn parameters(&self) -> ParameterSchema {
+        vec![Parameter {
+            name: "run_length",
+            description: "triangles in a run",
+            default: ParamValue::Integer(16),
+            range: ParamRange::Integer { min: 1, max: 1024 },
+        }]
+    }
+
+    fn build(
+        &self,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        let length = params.integer("run_length") as usize;
+        let order = log.phase("sort", || {
+            let centre = |id: u32| soup.records[id as usize].bounds().doubled_centre()[0];
+            let mut order: Vec<u32> = (0..soup.records.len() as u32).collect();
+            order.sort_by(|&a, &b| centre(a).total_cmp(&centre(b)).then(a.cmp(&b)));
+            order
+        });
+        let runs = log.phase("boxes", || {
+            let run = |(index, ids): (usize, &[u32])| {
+                let bounds = ids.iter().map(|&id| soup.records[id as usize].bounds());
+                let bounds = bounds.fold(Bounds::EMPTY, |all, b| all.union(&b));
+                let first = (index * length) as u32;
+                Run {
+                    bounds,
+                    first,
+                    end: first + ids.len() as u32,
+                }
+            };
+            order.chunks(length).enumerate().map(run).collect()
+        });
+        Ok(Box::new(Built { runs, order }))
+    }
+}
+
+struct Run {
+    bounds: Bounds,
+    first: u32,
+    end: u32,
+}
+
+struct Built {
+    runs: Vec<Run>,
+    order: Vec<u32>,
+}
+
+impl BuiltAccel for Built {
+    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
+        let wrong = |text: String| Err(AccelError::Invalid(text));
+        let mut seen = vec![false; soup.records.len()];
+        for (index, run) in self.runs.iter().enumerate() {
+            let Some(ids) = self.order.get(run.first as usize..run.end as usize) else {
+                return wrong(format!("run {index} leaves the order"));
+            };
+            for &id in ids {
+                let Some(record) = soup.records.get(id as usize) else {
+                    return wrong(format!("run {index}: triangle {id} does not exist"));
+                };
+                if !run.bounds.contains(&record.bounds()) {
+                    return wrong(format!("run {index}: triangle {id} sticks out of its box"));
+                }
+                seen[id as usize] = true;
+            }
+        }
+        match seen.iter().position(|seen| !seen) {
+            Some(lost) => wrong(format!("triangle {lost} is in no run")),
+            None => Ok(()),
+        }
+    }
+
+    fn buffers(&self) -> GpuBuffers<'_> {
+        let words = |run: &Run| {
+            let [low, high] = [run.bounds.min, run.bounds.max].map(|v| v.map(f32::to_bits));
+            [
+                low[0], low[1], low[2], run.first, high[0], high[1], high[2], run.end,
+            ]
+        };
+        let runs: Vec<u32> = self.runs.iter().flat_map(words).collect();
+        GpuBuffers {
+            arrays: vec![
+                NamedWords {
+                    name: "runs",
+                    words: runs.into(),
+                    element_bytes: 32,
+                },
+                NamedWords {
+                    name: "order",
+                    words: self.order.as_slice().into(),
+                    element_bytes: 4,
+                },
+            ],
+            uniforms: vec![limits(self.runs.len(), self.runs.len())],
+            constants: Vec::new(),
+        }
+    }
+
+    fn stats(&self) -> StructureStats {
+        StructureStats {
+            nodes: self.runs.len() as u64,
+            leaves: self.runs.len() as u64,
+            references: self.order.len() as u64,
+            bytes: self.buffers().bytes(),
+            ..Default::default()
+        }
+    }
+
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(Twin { built: self, soup }))
+    }
+}
+
+struct Twin<'a> {
+    built: &'a Built,
+    soup: &'a TriangleSoup,
+}
+
+impl Twin<'_> {
+    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
+        let inverse = safe_inverse(ray.direction);
+        let mut hit = Hit::miss(ray);
+        for run in &self.built.runs {
+            counters.nodes += 1;
+            counters.box_tests += 1;
+            if enter_box(&run.bounds, ray, inverse, hit.t).is_none() {
+                continue;
+            }
+            for &id in &self.built.order[run.first as usize..run.end as usize] {
+                counters.triangle_tests += 1;
+                intersect_triangle(&self.soup.records[id as usize], ray, inverse, &mut hit);
+            }
+            if any && hit.triangle != NO_HIT {
+                return hit;
+            }
+        }
+        hit
+    }
+}
+
+impl CpuTwin for Twin<'_> {
+    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
+        self.trace(ray, false, counters)
+    }
+
+    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        self.trace(ray, true, counters).triangle != NO_HIT
+    }
+}

@@ -1,0 +1,267 @@
+//! What the conformance tests share: one device per test program, batches of rays through a
+//! structure's kernel, brute force on the host, and comparisons to the bit.
+#![allow(dead_code)] // Every test program uses its own part of this.
+
+pub mod scenes;
+
+use raystone::accel::ray::safe_inverse;
+use raystone::accel::triangle::intersect_triangle;
+use raystone::accel::{
+    AccelKind, BuildLog, BuiltAccel, Counters, GpuBuffers, Hit, Ray, TriangleSoup,
+};
+use raystone::config::{ParamRange, ParamValue, ParameterSchema, Params};
+use raystone::gpu::{
+    AdapterChoice, Bindings, Composition, Dispatch, Gpu, KernelLibrary, groups_for,
+    probe_arithmetic,
+};
+use std::sync::OnceLock;
+
+/// The device that all tests of one program share, with the embedded kernels.
+pub fn gpu() -> &'static Gpu {
+    static GPU: OnceLock<Gpu> = OnceLock::new();
+    GPU.get_or_init(|| open(KernelLibrary::default()))
+}
+
+/// A device of its own, with other kernels.
+pub fn open(kernels: KernelLibrary) -> Gpu {
+    raystone::gpu::open(&AdapterChoice::Best, kernels)
+        .unwrap_or_else(|e| panic!("no adapter: run scripts/install-driver ({e})"))
+}
+
+/// Whether the adapter computes like the host; says so if it does not.
+pub fn is_exact(gpu: &Gpu) -> bool {
+    let probe = probe_arithmetic(gpu).expect("the probe runs");
+    if !probe.is_exact() {
+        println!(
+            "skipped: {} fuses or rounds differently ({probe:?})",
+            gpu.info.name
+        );
+    }
+    probe.is_exact()
+}
+
+/// A small deterministic generator (PCG-RXS-M-XS with 64 bits of state; O'Neill 2014).
+pub struct Pcg(u64);
+
+impl Pcg {
+    pub fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x853c_49e6_748f_ea9b)
+    }
+
+    pub fn next_u32(&mut self) -> u32 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        let word = ((self.0 >> ((self.0 >> 59) + 5)) ^ self.0)
+            .wrapping_mul(12_605_985_483_714_917_081)
+            .rotate_left(17);
+        (word >> 32) as u32 ^ word as u32
+    }
+
+    /// An integer in `0..n`.
+    pub fn below(&mut self, n: u32) -> u32 {
+        ((u64::from(self.next_u32()) * u64::from(n)) >> 32) as u32
+    }
+
+    /// An integer in `low..=high`.
+    pub fn between(&mut self, low: i32, high: i32) -> i32 {
+        low + self.below((high - low + 1) as u32) as i32
+    }
+
+    /// A number in [0, 1).
+    pub fn unit(&mut self) -> f32 {
+        (self.next_u32() >> 8) as f32 * 2.0_f32.powi(-24)
+    }
+
+    /// A number in [-1, 1).
+    pub fn signed(&mut self) -> f32 {
+        2.0 * self.unit() - 1.0
+    }
+}
+
+/// Every parameter at its default.
+pub fn default_params(schema: &ParameterSchema) -> Params {
+    let value = |p: &raystone::config::Parameter| (p.name.to_owned(), p.default.clone());
+    Params(schema.iter().map(value).collect())
+}
+
+/// The defaults, and each parameter in turn at other values: the ends of an integer's range, an
+/// eighth and eight times a number, every choice.
+pub fn param_variants(schema: &ParameterSchema) -> Vec<Params> {
+    let mut out = vec![default_params(schema)];
+    for parameter in schema {
+        let values: Vec<ParamValue> = match (&parameter.range, &parameter.default) {
+            (ParamRange::Integer { min, max }, _) => {
+                vec![ParamValue::Integer(*min), ParamValue::Integer(*max)]
+            }
+            (ParamRange::Number { min, max }, ParamValue::Number(x)) => [x / 8.0, x * 8.0]
+                .map(|x| ParamValue::Number(x.clamp(*min, *max)))
+                .to_vec(),
+            (ParamRange::Flag, _) => [false, true].map(ParamValue::Flag).to_vec(),
+            (ParamRange::Choice(names), _) => {
+                let name = |n: &&str| ParamValue::Name((*n).to_owned());
+                names.iter().map(name).collect()
+            }
+            (range, default) => panic!("{}: default {default} of {range}", parameter.name),
+        };
+        for value in values.into_iter().filter(|v| *v != parameter.default) {
+            let mut params = default_params(schema);
+            params.0.insert(parameter.name.to_owned(), value);
+            out.push(params);
+        }
+    }
+    out
+}
+
+/// Builds a structure and checks its invariants.
+pub fn build(kind: &dyn AccelKind, soup: &TriangleSoup, params: &Params) -> Box<dyn BuiltAccel> {
+    let name = kind.name();
+    let built = kind
+        .build(soup, params, &mut BuildLog::default())
+        .unwrap_or_else(|e| panic!("{name} with {params:?} does not build: {e}"));
+    built
+        .validate(soup)
+        .unwrap_or_else(|e| panic!("{name} with {params:?} is not valid: {e}"));
+    built
+}
+
+/// The kernel that traces a batch of rays through a structure.
+pub fn batch_kernel(kernel: &str, buffers: &GpuBuffers, features: &[&str]) -> Composition {
+    let mut out = Composition::new("integrator/trace_rays").with("accel", kernel);
+    for (name, value) in &buffers.constants {
+        out = out.constant(name, *value);
+    }
+    for feature in features {
+        out = out.feature(feature, true);
+    }
+    out
+}
+
+/// What a batch brought back; `work` is empty unless the feature `counters` was on.
+pub struct Batch {
+    /// Closest hits; with the feature `any`, `t.to_bits()` is 1 or 0.
+    pub hits: Vec<Hit>,
+    /// Counted work per ray.
+    pub work: Vec<Counters>,
+}
+
+impl Batch {
+    /// Answers of a batch with the feature `any`.
+    pub fn found(&self) -> Vec<bool> {
+        self.hits.iter().map(|h| h.t.to_bits() == 1).collect()
+    }
+}
+
+/// Traces `rays` on the GPU. Features: `any` for any-hit queries, `counters` to count work.
+/// Panics with the error word if the kernel raised one.
+pub fn trace(
+    gpu: &Gpu,
+    kernel: &str,
+    built: &dyn BuiltAccel,
+    soup: &TriangleSoup,
+    rays: &[Ray],
+    features: &[&str],
+) -> Batch {
+    let counted = features.contains(&"counters");
+    let buffers = built.buffers();
+    let fail = |e: raystone::gpu::GpuError| -> ! { panic!("{kernel} {features:?}: {e}") };
+    let pipeline = gpu
+        .pipeline(&batch_kernel(kernel, &buffers, features), true)
+        .unwrap_or_else(|e| fail(e));
+    let storage = |name: &str, words: &[u32]| gpu.storage(name, words).unwrap_or_else(|e| fail(e));
+    let answer = gpu
+        .zeroed("hits", rays.len() as u64 * if counted { 32 } else { 16 })
+        .unwrap_or_else(|e| fail(e));
+    let status = gpu.zeroed("status", 16).unwrap_or_else(|e| fail(e));
+    let mut bindings = Bindings::new();
+    for array in &buffers.arrays {
+        bindings.buffer(array.name, &storage(array.name, &array.words));
+    }
+    for (name, values) in &buffers.uniforms {
+        bindings.uniform(name, values.clone());
+    }
+    let count = rays.len() as u32;
+    bindings
+        .buffer(
+            "triangles",
+            &storage("triangles", bytemuck::cast_slice(&soup.records)),
+        )
+        .buffer("rays", &storage("rays", bytemuck::cast_slice(rays)))
+        .buffer("status", &status)
+        .buffer(if counted { "work" } else { "hits" }, &answer)
+        .uniform(
+            "batch",
+            raystone::gpu::UniformValues::new()
+                .u32("first", 0)
+                .u32("count", count),
+        );
+    let dispatch = Dispatch {
+        pipeline: &pipeline,
+        bindings: &bindings,
+        groups: groups_for(count),
+    };
+    gpu.run(&dispatch).unwrap_or_else(|e| fail(e));
+    let errors = gpu.read::<u32>(&status).unwrap_or_else(|e| fail(e))[0];
+    assert_eq!(
+        errors, 0,
+        "{kernel} {features:?}: the kernel raised its error word"
+    );
+    let words: Vec<[u32; 4]> = gpu.read(&answer).unwrap_or_else(|e| fail(e));
+    unpack(&words[..rays.len() * if counted { 2 } else { 1 }], counted)
+}
+
+fn unpack(words: &[[u32; 4]], counted: bool) -> Batch {
+    let hit = |w: &[u32; 4]| -> Hit { bytemuck::cast(*w) };
+    if !counted {
+        let hits = words.iter().map(hit).collect();
+        let work = Vec::new();
+        return Batch { hits, work };
+    }
+    let counters = |&[nodes, box_tests, triangle_tests, stack_high_water]: &[u32; 4]| Counters {
+        nodes,
+        box_tests,
+        triangle_tests,
+        stack_high_water,
+    };
+    let pairs = words.chunks_exact(2);
+    Batch {
+        hits: pairs.clone().map(|p| hit(&p[1])).collect(),
+        work: pairs.map(|p| counters(&p[0])).collect(),
+    }
+}
+
+/// The judge: every triangle for every ray.
+pub fn brute_force(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
+    let closest = |ray: &Ray| {
+        let inverse = safe_inverse(ray.direction);
+        let mut hit = Hit::miss(ray);
+        for triangle in &soup.records {
+            intersect_triangle(triangle, ray, inverse, &mut hit);
+        }
+        hit
+    };
+    rays.iter().map(closest).collect()
+}
+
+/// Indices of the rays whose hits differ in any bit.
+pub fn differences(expected: &[Hit], found: &[Hit]) -> Vec<usize> {
+    assert_eq!(expected.len(), found.len());
+    let differs = |i: &usize| !expected[*i].same_bits(&found[*i]);
+    (0..expected.len()).filter(differs).collect()
+}
+
+/// Panics with the first difference and how many there are.
+pub fn assert_same_hits(what: &str, rays: &[Ray], expected: &[Hit], found: &[Hit]) {
+    let different = differences(expected, found);
+    if let Some(&first) = different.first() {
+        panic!(
+            "{what}: {} of {} rays differ; ray {first} {:?}: expected {:?}, found {:?}",
+            different.len(),
+            rays.len(),
+            rays[first],
+            expected[first],
+            found[first]
+        );
+    }
+}

@@ -1,0 +1,143 @@
+//! Faults planted in kernels must turn the comparison with brute force red: what the tests of
+//! structures would otherwise prove nothing about.
+
+mod common;
+
+use common::{Pcg, brute_force, build, default_params, differences, scenes, trace};
+use raystone::accel::{AccelRegistry, Hit, Ray, TriangleSoup};
+use raystone::gpu::{Gpu, KernelLibrary};
+
+/// One fault: replace `from` by `to` in the kernel `file`; structures whose answers must go wrong.
+struct Fault {
+    what: &'static str,
+    file: &'static str,
+    from: &'static str,
+    to: &'static str,
+    structures: &'static [&'static str],
+}
+
+const FAULTS: &[Fault] = &[
+    Fault {
+        what: "a ray along a face of a triangle's box hits what lies behind it",
+        file: "accel/triangle",
+        from: "abs(t - plane) * area <= terms * DISTANCE_PAD",
+        to: "true",
+        structures: &["brute-force"],
+    },
+    Fault {
+        what: "ties go to whichever triangle comes first",
+        file: "accel/triangle",
+        from: "t < (*hit).t || (t == (*hit).t && triangle.v0.w < (*hit).triangle)",
+        to: "t < (*hit).t",
+        structures: &["bvh", "roped-bvh"],
+    },
+    Fault {
+        what: "boxes are missed where the ray only touches them, and not padded",
+        file: "accel/bounds",
+        from: "enter <= min(span.y, t_best) * BOX_PAD",
+        to: "enter < min(span.y, t_best)",
+        structures: &["bvh", "roped-bvh"],
+    },
+    Fault {
+        what: "the far child is culled as near as the hit",
+        file: "accel/bvh",
+        from: "far_enter <= hit.t * BOX_PAD",
+        to: "far_enter < hit.t",
+        structures: &["bvh"],
+    },
+    Fault {
+        what: "the far child is dropped",
+        file: "accel/bvh",
+        from: "entries++;",
+        to: "",
+        structures: &["bvh"],
+    },
+    Fault {
+        what: "ropes skip one node too many",
+        file: "accel/roped_bvh",
+        from: "current = high.w;",
+        to: "current = high.w + 1u;",
+        structures: &["roped-bvh"],
+    },
+    Fault {
+        what: "the walk stops at the first cell with a hit",
+        file: "accel/uniform_grid",
+        from: "if (hit.t * BOX_PAD < leave)",
+        to: "if (hit.triangle != NO_HIT || hit.t < leave)",
+        structures: &["uniform-grid"],
+    },
+    Fault {
+        what: "the last triangle is forgotten",
+        file: "accel/brute_force",
+        from: "i < limits.elements; i++",
+        to: "i + 1u < limits.elements; i++",
+        structures: &["brute-force"],
+    },
+];
+
+/// Scenes full of ties and touching boxes.
+fn cases() -> Vec<(TriangleSoup, Vec<Ray>, Vec<Hit>)> {
+    let case = |seed| {
+        let mut rng = Pcg::new(seed);
+        let soup = scenes::lattice_soup(&mut rng, 200, 6);
+        let mut rays = scenes::lattice_rays(&mut rng, 2048, 6);
+        rays.extend(scenes::aimed_rays(&mut rng, &soup, 2048));
+        let hits = brute_force(&soup, &rays);
+        (soup, rays, hits)
+    };
+    (40..44).map(case).collect()
+}
+
+/// Rays that differ from brute force, over all cases.
+fn wrong_rays(gpu: &Gpu, structure: &str, cases: &[(TriangleSoup, Vec<Ray>, Vec<Hit>)]) -> usize {
+    let registry = AccelRegistry::default();
+    let kind = registry
+        .get(structure)
+        .unwrap_or_else(|| panic!("no structure {structure}"));
+    let wrong = |(soup, rays, expected): &(TriangleSoup, Vec<Ray>, Vec<Hit>)| {
+        let built = build(kind, soup, &default_params(&kind.parameters()));
+        let found = trace(gpu, kind.kernel(), &*built, soup, rays, &[]);
+        differences(expected, &found.hits).len()
+    };
+    cases.iter().map(wrong).sum()
+}
+
+/// A library whose kernel `file` comes from an override folder, with `change` applied.
+fn with_override(file: &str, change: impl Fn(&str) -> String) -> KernelLibrary {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join(format!("{file}.wesl"));
+    let library = KernelLibrary::default();
+    let text = change(library.text(file).expect("an embedded kernel"));
+    std::fs::create_dir_all(path.parent().expect("a parent")).expect("a folder");
+    std::fs::write(&path, text).expect("a written kernel");
+    let library = library.with_folder(folder.path()).expect("the folder");
+    assert_eq!(library.overridden(), [file]);
+    library
+}
+
+#[test]
+fn planted_faults_turn_the_comparison_red_and_unchanged_overrides_do_not() {
+    if !common::is_exact(common::gpu()) {
+        return;
+    }
+    let cases = cases();
+    for fault in FAULTS {
+        let sound = common::open(with_override(fault.file, str::to_owned));
+        let faulty = common::open(with_override(fault.file, |text| {
+            let times = text.matches(fault.from).count();
+            assert_eq!(
+                times, 1,
+                "{}: `{}` is there {times} times",
+                fault.file, fault.from
+            );
+            text.replace(fault.from, fault.to)
+        }));
+        for structure in fault.structures {
+            let before = wrong_rays(&sound, structure, &cases);
+            assert_eq!(before, 0, "{structure} without a fault");
+            let after = wrong_rays(&faulty, structure, &cases);
+            println!("{structure}: {}: {after} rays differ", fault.what);
+            assert!(after > 0, "{structure}: not seen: {}", fault.what);
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! Kernels broken on purpose: the message names the author's file and the exact line.
+
+use raystone::gpu::{Composition, KernelLibrary};
+
+/// A traversal kernel of the path tracer, with everything that a kernel file may be part of.
+fn composition(structure: &str) -> Composition {
+    let mut out = Composition::new("integrator/render")
+        .with("accel", structure)
+        .with("sequence", "sampling/sobol")
+        .with("decorrelation", "sampling/cranley_patterson")
+        .with("integrator", "integrator/path")
+        .constant("STACK_ENTRIES", 32)
+        .constant("MAX_DEPTH", 4);
+    for feature in ["textures", "emitters", "mirrors", "environment"] {
+        out = out.feature(feature, true);
+    }
+    out
+}
+
+/// Composes with `text` in the place of the kernel `file`; the message names `place` for it.
+fn message(file: &str, text: &str, structure: &str) -> Result<(), String> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join(format!("{file}.wesl"));
+    std::fs::create_dir_all(path.parent().expect("a parent")).expect("a folder");
+    std::fs::write(&path, text).expect("a written kernel");
+    let library = KernelLibrary::default().with_folder(folder.path());
+    let composed = library
+        .expect("the folder")
+        .compose(&composition(structure));
+    composed
+        .map(|_| ())
+        .map_err(|e| e.to_string().replace(&path.display().to_string(), "FILE"))
+}
+
+fn embedded(file: &str) -> String {
+    let library = KernelLibrary::default();
+    library.text(file).expect("an embedded kernel").to_owned()
+}
+
+/// Replaces the only occurrence of `from`; returns the text and the line of the change, from 1.
+fn broken(file: &str, from: &str, to: &str) -> (String, usize) {
+    let text = embedded(file);
+    assert_eq!(text.matches(from).count(), 1, "`{from}` in {file}");
+    let at = text.find(from).expect("counted above");
+    (
+        text.replacen(from, to, 1),
+        text[..at].matches('\n').count() + 1,
+    )
+}
+
+#[test]
+fn faults_of_all_kinds_are_told_with_file_and_line() {
+    let bvh = "accel/bvh";
+    for (what, file, from, to, tells) in [
+        (
+            "a type error in the middle of a function",
+            bvh,
+            "nodes[4u * current + 2u]",
+            "nodes[4u * current + 2.5]",
+            "invalid",
+        ),
+        (
+            "a wrong type in an assignment",
+            bvh,
+            "stack[entries] = far",
+            "stack[entries] = 1.5",
+            "u32",
+        ),
+        (
+            "an unknown identifier",
+            bvh,
+            "let swap = right < left",
+            "let swap = rigth < left",
+            "rigth",
+        ),
+        (
+            "an unknown member",
+            bvh,
+            "trace(ray, true).triangle",
+            "trace(ray, true).triangel",
+            "triangel",
+        ),
+        (
+            "a syntax error",
+            bvh,
+            "let far_enter = max(",
+            "let far_enter = = max(",
+            "unexpected token",
+        ),
+        (
+            "a module that does not exist",
+            bvh,
+            "import package::common::limits::limits",
+            "import package::common::limitz::limits",
+            "common::limitz",
+        ),
+        (
+            "a constant of the wrong type",
+            bvh,
+            "COUNT_MASK: u32 = 31u",
+            "COUNT_MASK: u32 = 31.5",
+            "COUNT_MASK",
+        ),
+        (
+            "a fault in a shared file",
+            "accel/triangle",
+            "let c = v0 - ray.origin",
+            "let c = v0 - ray.direction.x.x",
+            "",
+        ),
+        (
+            "a fault in a shader",
+            "shading/light",
+            "let root = sqrt(point.x)",
+            "let root = sqrt(point.w)",
+            "",
+        ),
+    ] {
+        let (text, line) = broken(file, from, to);
+        let told = message(file, &text, bvh).expect_err(what);
+        println!("{what}: {told}\n");
+        assert!(
+            told.starts_with(&format!("FILE:{line}: ")),
+            "{what}: line {line}, told {told}"
+        );
+        assert!(told.contains(tells), "{what}: told {told}");
+        assert!(!told.contains("package_"), "{what}: mangled names: {told}");
+    }
+}
+
+#[test]
+fn sound_kernels_give_no_message() {
+    for structure in ["accel/bvh", "accel/roped_bvh", "accel/uniform_grid"] {
+        assert_eq!(
+            message(structure, &embedded(structure), structure),
+            Ok(()),
+            "{structure}"
+        );
+    }
+}
+
+#[test]
+fn an_unknown_word_is_found_on_every_line_that_assigns() {
+    let mut checked = 0;
+    for (file, structure) in [
+        ("accel/bvh", "accel/bvh"),
+        ("accel/roped_bvh", "accel/roped_bvh"),
+        ("accel/uniform_grid", "accel/uniform_grid"),
+        ("accel/brute_force", "accel/brute_force"),
+        ("accel/triangle", "accel/bvh"),
+        ("accel/bounds", "accel/bvh"),
+        ("integrator/path", "accel/bvh"),
+        ("integrator/frame", "accel/bvh"),
+        ("shading/texture", "accel/bvh"),
+        ("sampling/sobol", "accel/bvh"),
+    ] {
+        let text = embedded(file);
+        for (index, line) in text.lines().enumerate() {
+            let indented = line.starts_with("    ") && !line.trim_start().starts_with(['@', '/']);
+            if !indented || !line.contains(" = ") || !line.ends_with(';') {
+                continue;
+            }
+            let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+            lines[index] = line.replacen(" = ", " = unknown_word + ", 1);
+            let told = message(file, &lines.join("\n"), structure);
+            let told = told.expect_err("an unknown word is an error");
+            assert!(
+                told.starts_with(&format!("FILE:{}: ", index + 1)),
+                "{file}:{}: `{line}`, told {told}",
+                index + 1
+            );
+            checked += 1;
+        }
+    }
+    assert!(checked > 80, "only {checked} lines were broken");
+}

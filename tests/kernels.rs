@@ -1,0 +1,266 @@
+//! Every kernel that an experiment can ask for composes and validates, stays within WebGPU's
+//! default limits, carries no counters unless asked, and has structs laid out like Rust's. No
+//! adapter is needed.
+
+mod common;
+
+use common::{Pcg, batch_kernel, build, default_params, param_variants, scenes};
+use rayon::prelude::*;
+use raystone::accel::triangle::TriangleRecord;
+use raystone::accel::{AccelRegistry, Counters, Hit, Ray};
+use raystone::gpu::{Composition, KernelLibrary};
+use raystone::integrator::{SceneFeatures, integrators};
+use raystone::sampling::SamplerRegistry;
+use std::mem::{offset_of, size_of};
+
+/// Names of the scene's feature flags, and the flag of the counting run.
+fn render_features() -> Vec<&'static str> {
+    let mut names: Vec<_> = SceneFeatures::default().flags().map(|(n, _)| n).to_vec();
+    names.push("ray_counts");
+    names
+}
+
+/// Kernel and constants of each registered structure.
+fn structures() -> Vec<(String, Vec<(&'static str, u32)>)> {
+    let soup = scenes::lattice_soup(&mut Pcg::new(1), 50, 5);
+    let structure = |kind: &'static dyn raystone::accel::AccelKind| {
+        let built = build(kind, &soup, &default_params(&kind.parameters()));
+        (kind.kernel().to_owned(), built.buffers().constants)
+    };
+    AccelRegistry::default().iter().map(structure).collect()
+}
+
+/// Every structure, integrator, sequence with its parameters, and decorrelation.
+fn renderers() -> Vec<Composition> {
+    let samplers = SamplerRegistry::default();
+    let mut out = Vec::new();
+    for (accel, constants) in structures() {
+        for integrator in integrators() {
+            for sequence in samplers.sequences() {
+                for params in param_variants(&sequence.parameters()) {
+                    for decorrelation in samplers.decorrelations() {
+                        let mut kernel = Composition::new("integrator/render")
+                            .with("accel", &accel)
+                            .with("integrator", integrator.kernel())
+                            .with("sequence", sequence.kernel())
+                            .with("decorrelation", decorrelation.kernel());
+                        let defaults = default_params(&integrator.parameters());
+                        let more = [integrator.constants(&defaults), sequence.constants(&params)];
+                        for (name, value) in constants.iter().chain(more.iter().flatten()) {
+                            kernel = kernel.constant(name, *value);
+                        }
+                        out.push(kernel);
+                    }
+                }
+            }
+        }
+    }
+    assert!(out.len() >= 4 * 3 * 4 * 2, "only {} renderers", out.len());
+    out
+}
+
+/// The batch kernels of every structure: closest and any hit, counting or not.
+fn batches() -> Vec<Composition> {
+    let soup = scenes::lattice_soup(&mut Pcg::new(1), 50, 5);
+    let mut out = Vec::new();
+    for kind in AccelRegistry::default().iter() {
+        let built = build(kind, &soup, &default_params(&kind.parameters()));
+        let feature_sets: [&[&str]; 4] = [&[], &["any"], &["counters"], &["any", "counters"]];
+        for features in feature_sets {
+            out.push(batch_kernel(kind.kernel(), &built.buffers(), features));
+        }
+    }
+    out
+}
+
+fn with_features(mut kernel: Composition, names: &[&str], mask: usize) -> Composition {
+    for (bit, name) in names.iter().enumerate() {
+        kernel = kernel.feature(name, mask >> bit & 1 == 1);
+    }
+    kernel
+}
+
+/// Why the kernel breaks WebGPU's default limits, if it does.
+fn broken_limit(wgsl: &str) -> Option<String> {
+    let count = |what: &str| wgsl.matches(what).count();
+    let storage = count("var<storage");
+    if storage > 8 {
+        return Some(format!("{storage} storage buffers"));
+    }
+    let group = |rest: &str| -> u32 {
+        let digits = rest.split(')').next().unwrap_or("");
+        digits.parse().expect("a group number")
+    };
+    if let Some(high) = wgsl
+        .split("@group(")
+        .skip(1)
+        .map(group)
+        .find(|group| *group >= 4)
+    {
+        return Some(format!("bind group {high}"));
+    }
+    let size = wgsl
+        .split("@workgroup_size(")
+        .nth(1)
+        .and_then(|r| r.split(')').next());
+    let numbers = size.expect("an entry point").split(',');
+    let invocations: u32 = numbers
+        .map(|n| {
+            n.trim()
+                .trim_end_matches('u')
+                .parse::<u32>()
+                .expect("a size")
+        })
+        .product();
+    (invocations > 256).then(|| format!("{invocations} invocations"))
+}
+
+fn compose_within_limits(library: &KernelLibrary, kernel: &Composition) -> String {
+    let composed = library.compose(kernel);
+    let wgsl = composed.unwrap_or_else(|e| panic!("{kernel:?}: {e}")).wgsl;
+    assert_eq!(broken_limit(&wgsl), None, "{kernel:?}");
+    wgsl
+}
+
+#[test]
+fn every_combination_composes_validates_and_stays_within_the_limits() {
+    let library = KernelLibrary::default();
+    let names = render_features();
+    let all = (1 << names.len()) - 1;
+    // Features against integrators and structures; samplers with no feature and with all.
+    let kernels: Vec<Composition> = renderers()
+        .into_iter()
+        .enumerate()
+        .flat_map(|(index, kernel)| {
+            let is_plain = kernel.active["sequence"] == "sampling/sobol"
+                && kernel.active["decorrelation"] == "sampling/cranley_patterson";
+            let masks: Vec<usize> = if is_plain {
+                (0..=all).collect()
+            } else {
+                vec![0, all, index % (all + 1)]
+            };
+            let names = names.clone();
+            masks
+                .into_iter()
+                .map(move |mask| with_features(kernel.clone(), &names, mask))
+        })
+        .chain(batches())
+        .collect();
+    assert!(kernels.len() > 500, "only {} kernels", kernels.len());
+    kernels.par_iter().for_each(|kernel| {
+        compose_within_limits(&library, kernel);
+    });
+}
+
+#[test]
+fn a_kernel_over_a_limit_is_seen() {
+    let buffers = |n: usize| "@group(0) @binding(0) var<storage, read> a: array<u32>;\n".repeat(n);
+    let entry = |size: &str| format!("@compute @workgroup_size({size}) fn main() {{}}");
+    assert_eq!(broken_limit(&(buffers(8) + &entry("16, 16"))), None);
+    assert!(broken_limit(&(buffers(9) + &entry("64"))).is_some());
+    assert!(broken_limit(&entry("16, 17")).is_some());
+    let far = "@group(4) @binding(0) var<uniform> a: vec4<u32>;\n";
+    assert!(broken_limit(&(far.to_owned() + &entry("64"))).is_some());
+}
+
+#[test]
+fn timed_kernels_carry_no_counters() {
+    let library = KernelLibrary::default();
+    let counts = |wgsl: &str| {
+        wgsl.contains("count_") || wgsl.contains("counters") || wgsl.contains("ray_counts")
+    };
+    let mut counting = 0;
+    for kernel in batches() {
+        let wgsl = compose_within_limits(&library, &kernel);
+        let asked = kernel.features.contains("counters");
+        assert_eq!(counts(&wgsl), asked, "{kernel:?}");
+        counting += usize::from(asked);
+    }
+    assert!(counting > 0);
+    let names = render_features();
+    let all = (1 << names.len()) - 1;
+    let without_counts = all
+        & !(1
+            << names
+                .iter()
+                .position(|n| *n == "ray_counts")
+                .expect("a flag"));
+    for kernel in renderers().into_iter().step_by(7) {
+        let timed = with_features(kernel.clone(), &names, without_counts);
+        assert!(
+            !counts(&compose_within_limits(&library, &timed)),
+            "{timed:?}"
+        );
+        let counted = with_features(kernel, &names, all);
+        assert!(
+            counts(&compose_within_limits(&library, &counted)),
+            "{counted:?}"
+        );
+    }
+}
+
+/// Span and member offsets of a struct of the composed kernel, by the author's name.
+fn layout(module: &naga::Module, name: &str) -> (u32, Vec<(String, u32)>) {
+    let found = module.types.iter().find_map(|(_, ty)| {
+        let full = ty.name.as_deref()?;
+        let is_it = full == name || full.ends_with(&format!("_{name}"));
+        match &ty.inner {
+            naga::TypeInner::Struct { members, span } if is_it => Some((members, *span)),
+            _ => None,
+        }
+    });
+    let (members, span) = found.unwrap_or_else(|| panic!("no struct {name} in the kernel"));
+    let member = |m: &naga::StructMember| (m.name.clone().unwrap_or_default(), m.offset);
+    (span, members.iter().map(member).collect())
+}
+
+fn offsets(members: &[(&str, usize)]) -> Vec<(String, u32)> {
+    let member = |(name, offset): &(&str, usize)| ((*name).to_owned(), *offset as u32);
+    members.iter().map(member).collect()
+}
+
+#[test]
+fn structs_of_kernels_are_laid_out_like_those_of_rust() {
+    let library = KernelLibrary::default();
+    let kernel = Composition::new("integrator/trace_rays")
+        .with("accel", "accel/brute_force")
+        .feature("counters", true);
+    let wgsl = compose_within_limits(&library, &kernel);
+    let module = naga::front::wgsl::parse_str(&wgsl).expect("validated before");
+
+    let ray = offsets(&[
+        ("origin", offset_of!(Ray, origin)),
+        ("t_min", offset_of!(Ray, t_min)),
+        ("direction", offset_of!(Ray, direction)),
+        ("t_max", offset_of!(Ray, t_max)),
+    ]);
+    assert_eq!(layout(&module, "Ray"), (size_of::<Ray>() as u32, ray));
+    let hit = offsets(&[
+        ("t", offset_of!(Hit, t)),
+        ("triangle", offset_of!(Hit, triangle)),
+        ("u", offset_of!(Hit, u)),
+        ("v", offset_of!(Hit, v)),
+    ]);
+    assert_eq!(layout(&module, "Hit"), (size_of::<Hit>() as u32, hit));
+    let record = offsets(&[
+        ("v0", offset_of!(TriangleRecord, v0)),
+        ("e1", offset_of!(TriangleRecord, e1)),
+        ("e2", offset_of!(TriangleRecord, e2)),
+    ]);
+    let record_size = size_of::<TriangleRecord>() as u32;
+    assert_eq!(layout(&module, "TriangleRecord"), (record_size, record));
+    // Rust may order the fields of Counters as it likes: names and number are what counts.
+    let (span, members) = layout(&module, "Counters");
+    assert_eq!(span as usize, size_of::<Counters>());
+    let Counters {
+        nodes: _,
+        box_tests: _,
+        triangle_tests: _,
+        stack_high_water: _,
+    } = Counters::default();
+    let names: Vec<_> = members.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(
+        names,
+        ["nodes", "box_tests", "triangle_tests", "stack_high_water"]
+    );
+}

@@ -1,0 +1,326 @@
+//! Kernels and their Rust twins: same file stem in mirrored folders, same function names, same
+//! constants. Whatever has no twin is listed here with the reason.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Kernel file → Rust file, where the stem differs.
+const OTHER_FILE: &[(&str, &str)] = &[
+    ("sampling/sampler", "src/sampling/mod.rs"),
+    ("sampling/state", "src/sampling/mod.rs"),
+];
+
+/// Kernel files without a twin, with the reason.
+const NO_TWIN: &[(&str, &str)] = &[
+    (
+        "common/counters",
+        "fields of Counters; the tests of structures compare counted work per ray",
+    ),
+    ("common/errors", "writes the error word on the device"),
+    ("common/limits", "a uniform, filled by name"),
+    ("common/probe", "compared with the host in src/gpu/probe.rs"),
+    (
+        "common/ray_counts",
+        "counts on the device, read by the renderer",
+    ),
+    ("common/scene", "a binding"),
+    ("integrator/ao", "judged by images, not by a twin"),
+    ("integrator/frame", "judged by images, not by a twin"),
+    ("integrator/path", "judged by images, not by a twin"),
+    ("integrator/primary", "judged by images, not by a twin"),
+    ("integrator/render", "the loop over samples"),
+    ("integrator/trace_rays", "the loop over rays"),
+    ("sampling/dump_stream", "the loop over coordinates"),
+    ("shading/hemisphere", "judged by images, not by a twin"),
+    ("shading/light", "judged by images, not by a twin"),
+    ("shading/material", "judged by images, not by a twin"),
+    ("shading/surface", "judged by images, not by a twin"),
+    ("shading/texture", "judged by images, not by a twin"),
+];
+
+/// Functions and constants of a kernel that its twin writes in another way, with the reason.
+const KERNEL_ONLY: &[(&str, &str, &str)] = &[
+    (
+        "accel/ray",
+        "safe_inverse_1",
+        "one component; the twin maps a closure",
+    ),
+    ("accel/bounds", "MISSED", "the twin returns an Option"),
+    (
+        "accel/bvh",
+        "COUNT_MASK",
+        "the twin clears the leaf bit before it shifts",
+    ),
+    ("sampling/pixel_hash", "hash", "the twin picks a function"),
+    (
+        "sampling/sampler",
+        "sample_1d",
+        "draws; the twin asks for coordinates",
+    ),
+    (
+        "sampling/sampler",
+        "sample_2d",
+        "draws; the twin asks for coordinates",
+    ),
+];
+
+/// Free functions of a twin that no kernel needs, with the reason.
+const RUST_ONLY: &[(&str, &str, &str)] = &[
+    (
+        "accel/brute_force",
+        "brute_force_hits",
+        "the judge, in batches",
+    ),
+    ("accel/bvh", "layout", "build"),
+    ("accel/roped_bvh", "ropes", "build"),
+    ("accel/uniform_grid", "insert", "build"),
+    ("accel/uniform_grid", "insert_triangle", "build"),
+    ("accel/uniform_grid", "sort_by_cell", "build"),
+    ("accel/uniform_grid", "dot", "build, f64"),
+    ("accel/uniform_grid", "cross", "build, f64"),
+    ("sampling/dimensions", "needed", "planning"),
+    ("sampling/dimensions", "purpose", "words for the report"),
+    (
+        "sampling/dimensions",
+        "pair_purpose",
+        "words for the report",
+    ),
+];
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn read(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// Names of all kernels in `kernels/`, without the extension.
+fn kernels() -> Vec<String> {
+    let mut out = Vec::new();
+    for folder in ["accel", "common", "integrator", "sampling", "shading"] {
+        let path = root().join("kernels").join(folder);
+        let entries =
+            std::fs::read_dir(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        for entry in entries {
+            let file = entry.expect("a readable entry").path();
+            let stem = file.file_stem().expect("a file name").to_string_lossy();
+            out.push(format!("{folder}/{stem}"));
+        }
+    }
+    let folders = std::fs::read_dir(root().join("kernels")).expect("kernels/");
+    assert_eq!(folders.count(), 5, "a folder of kernels is not walked");
+    out.sort();
+    out
+}
+
+fn kernel_text(kernel: &str) -> String {
+    read(&root().join(format!("kernels/{kernel}.wesl")))
+}
+
+fn twin_path(kernel: &str) -> PathBuf {
+    let other = OTHER_FILE.iter().find(|(name, _)| *name == kernel);
+    root().join(other.map_or(format!("src/{kernel}.rs"), |(_, path)| (*path).to_owned()))
+}
+
+/// Text of a twin without its unit tests.
+fn twin_text(kernel: &str) -> String {
+    let text = read(&twin_path(kernel));
+    let end = text.find("#[cfg(test)]").unwrap_or(text.len());
+    text[..end].to_owned()
+}
+
+fn twinned() -> Vec<String> {
+    let listed = |kernel: &String| NO_TWIN.iter().any(|(name, _)| name == kernel);
+    let out: Vec<_> = kernels().into_iter().filter(|k| !listed(k)).collect();
+    assert!(out.len() >= 12, "only {} kernels have twins", out.len());
+    out
+}
+
+/// Names behind `fn `; of Rust, only free functions if `free`.
+fn functions(text: &str, free: bool) -> BTreeSet<String> {
+    let mut out = BTreeSet::new();
+    for line in text.lines() {
+        if free && line.starts_with(' ') {
+            continue;
+        }
+        let line = line.trim_start();
+        let line = line.strip_prefix("pub ").unwrap_or(line);
+        let line = line.strip_prefix("pub(super) ").unwrap_or(line);
+        if let Some(rest) = line.strip_prefix("fn ") {
+            let name = rest.split(|c: char| !c.is_alphanumeric() && c != '_');
+            out.extend(name.take(1).map(str::to_owned));
+        }
+    }
+    out
+}
+
+/// `const NAME: type = value;` lines of either language with 32-bit types: name → declaration.
+fn constants(text: &str) -> BTreeMap<String, String> {
+    let mut out = BTreeMap::new();
+    for line in text.lines() {
+        let line = line.trim_start();
+        let line = line.strip_prefix("pub ").unwrap_or(line);
+        let Some(declaration) = line.strip_prefix("const ") else {
+            continue;
+        };
+        let Some((name, rest)) = declaration.split_once(':') else {
+            continue;
+        };
+        if rest.trim_start().starts_with("u32") || rest.trim_start().starts_with("f32") {
+            out.insert(name.to_owned(), declaration.to_owned());
+        }
+    }
+    out
+}
+
+/// Values of constants as bits, evaluated by naga; Rust's spelling is turned into WGSL's.
+fn values(constants: &BTreeMap<String, String>) -> BTreeMap<String, u32> {
+    let wgsl = |declaration: &String| {
+        let (left, value) = declaration.split_once('=').expect("a value");
+        let mut previous = ' ';
+        let digits_apart = |c: char| {
+            let separator = c == '_' && previous.is_ascii_digit();
+            previous = if separator { previous } else { c };
+            (!separator).then_some(c)
+        };
+        let value = value.replace("u32::MAX", "0xffffffffu");
+        let is_hex = value.contains("0x");
+        let value: String = if is_hex {
+            value.replace('_', "")
+        } else {
+            value.chars().filter_map(digits_apart).collect()
+        };
+        format!("const {left}={value}\n")
+    };
+    let text: String = constants.values().map(wgsl).collect();
+    let module = naga::front::wgsl::parse_str(&text)
+        .unwrap_or_else(|e| panic!("{}\n{text}", e.emit_to_string(&text)));
+    let bits = |(_, constant): (_, &naga::Constant)| {
+        let value = match module.global_expressions[constant.init] {
+            naga::Expression::Literal(naga::Literal::U32(x)) => x,
+            naga::Expression::Literal(naga::Literal::F32(x)) => x.to_bits(),
+            ref other => panic!("{:?} is {other:?}", constant.name),
+        };
+        (constant.name.clone().expect("constants have names"), value)
+    };
+    module.constants.iter().map(bits).collect()
+}
+
+#[test]
+fn lists_name_only_what_exists() {
+    let known = kernels();
+    for (kernel, reason) in NO_TWIN {
+        assert!(known.iter().any(|k| k == kernel), "{kernel} does not exist");
+        assert!(!reason.is_empty());
+    }
+    for (kernel, name, _) in KERNEL_ONLY {
+        let text = kernel_text(kernel);
+        let exists =
+            functions(&text, false).contains(*name) || constants(&text).contains_key(*name);
+        assert!(exists, "{kernel} has no {name}");
+    }
+    for (kernel, name, _) in RUST_ONLY {
+        let exists = functions(&twin_text(kernel), true).contains(*name);
+        assert!(exists, "the twin of {kernel} has no {name}");
+    }
+}
+
+#[test]
+fn every_function_of_a_kernel_has_a_twin_of_the_same_name_and_the_other_way_round() {
+    let mut compared = 0;
+    for kernel in twinned() {
+        let here = functions(&kernel_text(&kernel), false);
+        let there = twin_text(&kernel);
+        for name in here.difference(&functions(&there, false)) {
+            let listed = KERNEL_ONLY
+                .iter()
+                .any(|(k, n, _)| *k == kernel && n == name);
+            assert!(
+                listed,
+                "{kernel}: fn {name} is not in {}",
+                twin_path(&kernel).display()
+            );
+        }
+        if OTHER_FILE.iter().all(|(name, _)| *name != kernel) {
+            for name in functions(&there, true).difference(&here) {
+                let listed = RUST_ONLY.iter().any(|(k, n, _)| *k == kernel && n == name);
+                assert!(
+                    listed,
+                    "{}: fn {name} is not in {kernel}",
+                    twin_path(&kernel).display()
+                );
+            }
+        }
+        compared += here.len();
+    }
+    assert!(compared >= 25, "only {compared} functions were compared");
+}
+
+#[test]
+fn constants_of_the_same_name_have_the_same_value() {
+    let mut compared = BTreeSet::new();
+    for kernel in twinned() {
+        let here = values(&constants(&kernel_text(&kernel)));
+        let there = values(&constants(&twin_text(&kernel)));
+        for (name, value) in here {
+            match there.get(&name) {
+                Some(other) => {
+                    assert_eq!(value, *other, "{kernel}: {name}");
+                    compared.insert(name);
+                }
+                None => assert!(
+                    KERNEL_ONLY
+                        .iter()
+                        .any(|(k, n, _)| *k == kernel && *n == name),
+                    "{kernel}: {name} is not in {}",
+                    twin_path(&kernel).display()
+                ),
+            }
+        }
+    }
+    for needed in [
+        "BOX_PAD",
+        "TRIANGLE_PAD",
+        "DISTANCE_PAD",
+        "SMALLEST_DIRECTION",
+        "NO_HIT",
+        "COUNT_SHIFT",
+        "FIRST_MASK",
+        "LEAF",
+        "PER_BOUNCE",
+        "ROULETTE",
+    ] {
+        assert!(compared.contains(needed), "{needed} was not compared");
+    }
+}
+
+#[test]
+fn a_function_or_constant_that_is_missing_or_different_is_seen() {
+    let rust =
+        "pub fn a() {\n    fn b() {}\n}\nconst X: u32 = (1 << 3) - 1;\nconst Y: f32 = 1.000_001_9;";
+    let kernel = "fn a() {}\nconst X: u32 = 7u;\nconst Y: f32 = 1.0000018;";
+    let names: Vec<_> = functions(rust, false).into_iter().collect();
+    assert_eq!(names, ["a", "b"]);
+    assert_eq!(functions(rust, true).len(), 1);
+    let [here, there] = [kernel, rust].map(|text| values(&constants(text)));
+    assert_eq!(here["X"], there["X"]);
+    assert_eq!(there["Y"], 1.000_001_9_f32.to_bits());
+    assert_ne!(here["Y"], there["Y"]);
+}
+
+#[test]
+fn the_error_word_and_the_ray_classes_mean_the_same_on_both_sides() {
+    let errors = values(&constants(&kernel_text("common/errors")));
+    let known = raystone::measure::gate::KERNEL_ERRORS.map(|(bit, _)| bit);
+    assert_eq!(errors.len(), known.len());
+    assert!(errors.values().all(|bit| known.contains(bit)));
+
+    let classes = values(&constants(&kernel_text("common/ray_counts")));
+    let names = raystone::integrator::RAY_COUNT_CLASSES;
+    assert_eq!(classes.len(), names.len());
+    for (index, name) in names.iter().enumerate() {
+        let constant = format!("RAY_{}", name.to_uppercase());
+        assert_eq!(classes.get(&constant), Some(&(index as u32)), "{constant}");
+    }
+}
