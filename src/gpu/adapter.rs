@@ -199,6 +199,8 @@ impl Gpu {
 
     /// The error that made the device unusable, if any.
     pub fn lost(&self) -> Option<String> {
+        // The driver tells of a loss only when it is polled; what else it says is told elsewhere.
+        let _ = self.device.poll(wgpu::PollType::Poll);
         self.lost.lock().ok().and_then(|slot| slot.clone())
     }
 }

@@ -5,7 +5,6 @@ use super::adapter::Gpu;
 use super::pipeline::{Bindings, Pipeline, WORKGROUP_SIZE};
 use bytemuck::Pod;
 use std::time::{Duration, Instant};
-use wgpu::util::DeviceExt;
 
 /// Work that takes longer than this is given up: the driver hangs.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -53,7 +52,7 @@ impl Gpu {
     /// A storage buffer with this content, at least 16 bytes long.
     ///
     /// # Errors
-    /// It is larger than the adapter can bind.
+    /// It is larger than the adapter can bind, or the device is lost or out of memory.
     pub fn storage<T: Pod>(&self, name: &str, content: &[T]) -> Result<wgpu::Buffer, GpuError> {
         let bytes: &[u8] = bytemuck::cast_slice(content);
         self.check_size(name, bytes.len() as u64)?;
@@ -64,15 +63,39 @@ impl Gpu {
         } else {
             bytes
         };
-        Ok(self
-            .device
-            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some(name),
-                contents,
-                usage: wgpu::BufferUsages::STORAGE
-                    | wgpu::BufferUsages::COPY_SRC
-                    | wgpu::BufferUsages::COPY_DST,
-            }))
+        let usage = wgpu::BufferUsages::STORAGE
+            | wgpu::BufferUsages::COPY_SRC
+            | wgpu::BufferUsages::COPY_DST;
+        self.filled(name, contents, usage)
+    }
+
+    /// A buffer with this content; wgpu's `create_buffer_init` panics where this fails.
+    ///
+    /// # Errors
+    /// The device is lost or out of memory.
+    pub(super) fn filled(
+        &self,
+        name: &str,
+        content: &[u8],
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer, GpuError> {
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(name),
+            size: (content.len() as u64).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
+            usage,
+            mapped_at_creation: true,
+        });
+        let failed = |e: wgpu::MapRangeError| match self.lost() {
+            Some(cause) => GpuError::Lost(cause),
+            None => GpuError::Driver(format!("buffer `{name}`: {e}")),
+        };
+        buffer
+            .get_mapped_range_mut(..)
+            .map_err(failed)?
+            .slice(..content.len())
+            .copy_from_slice(content);
+        buffer.unmap();
+        Ok(buffer)
     }
 
     /// A zeroed storage buffer of `bytes` (rounded up to 16).

@@ -6,7 +6,6 @@ use super::compose::{ComposedKernel, Composition};
 use super::uniform::UniformValues;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
-use wgpu::util::DeviceExt;
 
 /// Invocations per workgroup of every one-dimensional kernel.
 pub const WORKGROUP_SIZE: u32 = 64;
@@ -241,7 +240,8 @@ impl Gpu {
     /// Bind groups of `pipeline` with the buffers and values of `given`.
     ///
     /// # Errors
-    /// The kernel wants a name that was not given, or a buffer exceeds the adapter's limit.
+    /// The kernel wants a name that was not given, a buffer exceeds the adapter's limit, or the
+    /// device is lost.
     pub(super) fn bind(
         &self,
         pipeline: &Pipeline,
@@ -258,13 +258,7 @@ impl Gpu {
                 let bytes = values
                     .pack(*size, members)
                     .map_err(|member| unbound(format!("{}.{member}", binding.name)))?;
-                let buffer = self
-                    .device
-                    .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                        label: Some(&binding.name),
-                        contents: &bytes,
-                        usage: wgpu::BufferUsages::UNIFORM,
-                    });
+                let buffer = self.filled(&binding.name, &bytes, wgpu::BufferUsages::UNIFORM)?;
                 uniforms.insert(binding.name.clone(), buffer);
             }
         }
