@@ -1,5 +1,6 @@
 //! What must be equal to the bit: the same seed, other slices, other structures.
 
+use crate::MAX_DEPTH;
 use crate::support::*;
 use raystone::config::{ParamValue, Variant};
 use raystone::integrator::Renderer;
@@ -17,10 +18,10 @@ fn last(renderer: &Renderer, spps: &[u32], seed: u32) -> Vec<[u32; 3]> {
 
 #[test]
 fn a_seed_gives_the_same_bits_again_and_another_seed_gives_others() {
-    let stage = Stage::builtin(gpu(), "cornell-box", &[]);
+    let stage = Stage::builtin(gpu(), "furnace-box", &[]);
     let traced = stage.traced(gpu(), structure("bvh"));
     for sampler in samplers() {
-        let what = integrator_variant("primary", &[]);
+        let what = path(MAX_DEPTH);
         let renderer = stage.renderer(gpu(), &traced, &sampler, &what, [16, 16], false);
         let first = last(&renderer, &[2], 7);
         assert_eq!(first, last(&renderer, &[2], 7), "{}", sampler.label());
@@ -32,11 +33,18 @@ fn a_seed_gives_the_same_bits_again_and_another_seed_gives_others() {
 
 #[test]
 fn an_image_does_not_depend_on_how_its_samples_and_rows_are_cut() {
-    let stage = Stage::builtin(gpu(), "cornell-box", &[]);
+    let stage = Stage::builtin(gpu(), "furnace-box", &[]);
     let traced = stage.traced(gpu(), structure("bvh"));
     let sampler = sampler("sobol", "cranley-patterson");
     // The first slice of an unknown kernel is 25,000 samples: this image needs two.
-    let renderer = stage.renderer(gpu(), &traced, &sampler, &path(3), [200, 144], false);
+    let renderer = stage.renderer(
+        gpu(),
+        &traced,
+        &sampler,
+        &path(MAX_DEPTH),
+        [200, 144],
+        false,
+    );
     let whole = last(&renderer, &[4], 11);
     let sliced = |steps: &[(u32, u32)]| {
         renderer.reset();
@@ -50,16 +58,23 @@ fn an_image_does_not_depend_on_how_its_samples_and_rows_are_cut() {
     assert_ne!(whole, sliced(&[(0, 1), (1, 2)]), "a sample less");
     assert_ne!(whole, sliced(&[(1, 4)]), "other samples");
     // A renderer that begins with its cautious first slice.
-    let fresh = stage.renderer(gpu(), &traced, &sampler, &path(3), [200, 144], false);
+    let fresh = stage.renderer(
+        gpu(),
+        &traced,
+        &sampler,
+        &path(MAX_DEPTH),
+        [200, 144],
+        false,
+    );
     assert_eq!(whole, last(&fresh, &[4], 11));
 }
 
 #[test]
 fn the_images_at_powers_of_two_are_those_of_renders_of_their_own() {
-    let stage = Stage::builtin(gpu(), "cornell-box", &[]);
+    let stage = Stage::builtin(gpu(), "furnace-box", &[]);
     let traced = stage.traced(gpu(), structure("bvh"));
     let sampler = sampler("sobol", "cranley-patterson");
-    let renderer = stage.renderer(gpu(), &traced, &sampler, &path(3), [16, 16], false);
+    let renderer = stage.renderer(gpu(), &traced, &sampler, &path(MAX_DEPTH), [16, 16], false);
     let kept = renderer.render(&[1, 2, 4], 5).expect("a render");
     let spps: Vec<u32> = kept.iter().map(|shot| shot.spp).collect();
     assert_eq!(spps, [1, 2, 4]);
@@ -87,7 +102,7 @@ fn every_structure_gives_the_same_image_to_the_bit() {
         return;
     }
     let whats = [
-        path(3),
+        path(MAX_DEPTH),
         integrator_variant("ao", &[]),
         integrator_variant("primary", &[]),
     ];

@@ -1,16 +1,17 @@
 //! Next-event estimation changes the noise of an image, not its mean.
 
+use crate::MAX_DEPTH;
 use crate::support::*;
 use raystone::gpu::Gpu;
 
 const DIRECT: &str = "result += throughput * direct_light(surface, depth, sampler);";
 const WEIGHT: &str = "weight = found_weight(ray, hit.t, surface, cosine_pdf);";
 
-fn estimate(gpu: &Gpu, depth: i64, spp: u32) -> Estimate {
+fn estimate(gpu: &Gpu, spp: u32) -> Estimate {
     let stage = Stage::builtin(gpu, "cornell-box", &[]);
     let traced = stage.traced(gpu, structure("bvh"));
     let sampler = sampler("pixel-hash", "none");
-    let renderer = stage.renderer(gpu, &traced, &sampler, &path(depth), [16, 16], false);
+    let renderer = stage.renderer(gpu, &traced, &sampler, &path(MAX_DEPTH), [16, 16], false);
     Estimate::of(&replicate_means(&renderer, spp, 16))
 }
 
@@ -24,12 +25,11 @@ fn direct_light_gives_the_mean_of_plain_path_tracing_and_counted_twice_it_does_n
         "integrator/path",
         &[(WEIGHT, "weight = 1.0;")],
     ));
-    let depth = 4;
-    let plain = estimate(&plain, depth, 256);
-    let ours = estimate(gpu(), depth, 32);
+    let plain = estimate(&plain, 256);
+    let ours = estimate(gpu(), 32);
     let difference = ours.minus(&plain);
     assert!(difference.agrees_with(0.0), "{ours:?} against {plain:?}");
     assert!(difference.error < 0.02 * plain.mean, "{difference:?}");
-    let twice = estimate(&twice, depth, 32).minus(&plain);
+    let twice = estimate(&twice, 32).minus(&plain);
     assert!(!twice.agrees_with(0.0), "{twice:?} proves nothing");
 }

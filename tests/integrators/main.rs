@@ -8,3 +8,6 @@ mod model;
 mod ray_counts;
 #[path = "../support/mod.rs"]
 mod support;
+
+/// Bounces where nothing else is asked for: tests that agree on it share their kernels.
+const MAX_DEPTH: i64 = 6;

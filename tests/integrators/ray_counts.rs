@@ -1,6 +1,7 @@
 //! Counted rays against numbers that follow from the scene.
 
 use crate::support::*;
+use raystone::accel::AccelKind;
 use raystone::config::{ParamValue, Variant};
 use raystone::integrator::RAY_COUNT_CLASSES;
 
@@ -8,13 +9,13 @@ const SIZE: [u32; 2] = [16, 16];
 const SPP: u32 = 16;
 const SAMPLES: u64 = 16 * 16 * SPP as u64;
 
-/// Primary, shadow, AO and bounce rays of an image in every structure: one answer for all.
-fn counts(stage: &Stage, what: &Variant) -> [u64; 4] {
+/// Primary, shadow, AO and bounce rays of an image: one answer for all `kinds` of structures.
+fn counts(stage: &Stage, what: &Variant, kinds: &[&dyn AccelKind]) -> [u64; 4] {
     assert_eq!(RAY_COUNT_CLASSES, ["primary", "shadow", "ao", "bounce"]);
     let sampler = sampler("pixel-hash", "none");
     let mut all = Vec::new();
-    for kind in structures() {
-        let traced = stage.traced(gpu(), kind);
+    for kind in kinds {
+        let traced = stage.traced(gpu(), *kind);
         let renderer = stage.renderer(gpu(), &traced, &sampler, what, SIZE, true);
         // Twice: a reset forgets what was counted before.
         for _ in 0..2 {
@@ -29,7 +30,7 @@ fn counts(stage: &Stage, what: &Variant) -> [u64; 4] {
 #[test]
 fn a_closed_box_has_the_rays_that_its_bounces_ask_for() {
     let stage = Stage::builtin(gpu(), "furnace-box", &[("albedo", ParamValue::Number(0.8))]);
-    let [primary, shadow, ao, bounce] = counts(&stage, &path(3));
+    let [primary, shadow, ao, bounce] = counts(&stage, &path(3), &structures());
     assert_eq!([primary, ao, bounce], [SAMPLES, 0, 3 * SAMPLES]);
     // A point of the emitter lies on the surface's own wall once in six draws: no ray then.
     let fraction = shadow as f64 / (3 * SAMPLES) as f64;
@@ -39,18 +40,20 @@ fn a_closed_box_has_the_rays_that_its_bounces_ask_for() {
         (fraction - expected).abs() < 5.0 * error,
         "{fraction} of the draws cost a ray"
     );
-    let [primary, shadow, ao, bounce] = counts(&stage, &integrator_variant("ao", &[]));
+    let [primary, shadow, ao, bounce] =
+        counts(&stage, &integrator_variant("ao", &[]), &structures());
     assert_eq!([primary, shadow, ao, bounce], [SAMPLES, 0, SAMPLES, 0]);
 }
 
 #[test]
 fn an_open_scene_has_fewer_rays_after_the_first_hit() {
     let sphere = [("triangles", ParamValue::Integer(2000))];
+    let bvh = [structure("bvh")];
     let stage = Stage::builtin(gpu(), "displaced-sphere", &sphere);
-    let [primary, shadow, ao, bounce] = counts(&stage, &integrator_variant("ao", &[]));
+    let [primary, shadow, ao, bounce] = counts(&stage, &integrator_variant("ao", &[]), &bvh);
     assert_eq!([primary, shadow, bounce], [SAMPLES, 0, 0]);
     assert!(ao > SAMPLES / 10 && ao < primary, "{ao}");
-    let [primary, shadow, none, bounce] = counts(&stage, &path(1));
+    let [primary, shadow, none, bounce] = counts(&stage, &path(1), &bvh);
     assert_eq!([primary, shadow, none], [SAMPLES, 0, 0], "no emitter");
     // With one bounce, each first hit has one further ray in either integrator.
     assert_eq!(bounce, ao);
