@@ -398,12 +398,15 @@ pub struct TimeRecord {
     pub ms: Vec<f64>,
     /// The same renders by the wall clock, milliseconds.
     pub wall_ms: Vec<f64>,
-    /// Milliseconds per sample per pixel for the whole image, median with interval.
-    pub ms_per_spp: Interval,
+    /// Milliseconds per sample per pixel for the whole image, median with interval; absent if the
+    /// cell failed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ms_per_spp: Option<Interval>,
     /// Rays of each class in one render, from a separate counting run of the same seed.
     pub rays: BTreeMap<String, u64>,
-    /// All rays over time, million per second.
-    pub mrays_s: Interval,
+    /// All rays over time, million per second; absent if the cell failed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mrays_s: Option<Interval>,
     /// BLAKE3 of the image.
     pub image_hash: String,
     /// Whether the image equals to the bit that of the scene's first gated structure.

@@ -222,6 +222,11 @@ impl<'a> View<'a> {
         self.times.iter().find(matches).copied()
     }
 
+    /// Milliseconds per spp of [`View::time`].
+    pub fn ms_per_spp(&self, structure: &str, sampler: &str) -> Option<Interval> {
+        self.time(structure, sampler)?.ms_per_spp
+    }
+
     /// The structure under which samplers are compared per second: of those timed with the most
     /// samplers the one with the least geometric mean of the times.
     pub fn fastest_structure(&self) -> Option<String> {
@@ -229,8 +234,8 @@ impl<'a> View<'a> {
             let logs: Vec<f64> = self
                 .samplers
                 .iter()
-                .filter_map(|sampler| self.time(name, &sampler.name))
-                .map(|time| time.ms_per_spp.value.ln())
+                .filter_map(|sampler| self.ms_per_spp(name, &sampler.name))
+                .map(|ms| ms.value.ln())
                 .collect();
             (logs.len(), logs.iter().sum::<f64>() / logs.len() as f64)
         };
@@ -247,7 +252,7 @@ impl<'a> View<'a> {
 
 /// Whether a time may be used: the cell ran, and its image is the one all structures give.
 pub fn is_valid_time(time: &TimeRecord) -> bool {
-    time.failure.is_none() && time.image_equal && time.ms_per_spp.value > 0.0
+    time.failure.is_none() && time.image_equal && time.ms_per_spp.is_some()
 }
 
 impl StructureRecord {

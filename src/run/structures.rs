@@ -10,7 +10,7 @@ use crate::integrator::Traced;
 use crate::measure::batch::{Batch, Query, count_work};
 use crate::measure::gate::gate;
 use crate::measure::picture::{Picture, write_png};
-use crate::measure::rays::{primary_pixels, primary_rays};
+use crate::measure::rays::{RaySet, primary_pixels, primary_rays};
 use crate::measure::record::{
     ClassTiming, CountersPerRay, GateVerdict, Record, StructureRecord, StructureStats,
 };
@@ -163,6 +163,7 @@ fn empty_record(world: &World, accel: &Variant, runtime_checks: bool) -> Structu
 /// A ray class through a structure, measured.
 struct Timed<'a> {
     structure: usize,
+    set: &'a RaySet,
     batch: Batch<'a>,
 }
 
@@ -243,23 +244,42 @@ fn write_failed(
     session.write(&structure_hash(world, cell), Record::Structure(record))
 }
 
+/// Records the structure under which the device was lost; the others get their turn on a new one.
+fn fail_lost(
+    session: &mut Session,
+    world: &World,
+    gated: &mut Vec<Gated>,
+    structure: usize,
+    error: GpuError,
+) -> Result<(), RunError> {
+    let mut lost = gated.swap_remove(structure);
+    gated.clear();
+    lost.record.failure = Some(error.to_string());
+    write_failed(session, world, &lost.cell, lost.record)
+}
+
 /// Times every class through every structure in interleaved rounds, then counts the work.
 fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Result<(), RunError> {
     session.say(format!("{}: timing structures", world.variant));
     let mut failures: Vec<Option<String>> = vec![None; gated.len()];
     let mut timed = Vec::new();
-    for (structure, item) in gated.iter_mut().enumerate() {
+    for structure in 0..gated.len() {
         for set in &world.judge.sets {
-            let checks = item.runtime_checks;
-            match Batch::new(
-                world.gpu,
-                &world.buffers,
-                &item.traced,
-                Query::of(set),
-                &set.rays,
-                checks,
-            ) {
-                Ok(batch) => timed.push(Timed { structure, batch }),
+            let Gated {
+                traced,
+                runtime_checks,
+                ..
+            } = &gated[structure];
+            let (query, checks) = (Query::of(set), *runtime_checks);
+            match Batch::new(world.gpu, &world.buffers, traced, query, &set.rays, checks) {
+                Ok(batch) => timed.push(Timed {
+                    structure,
+                    set,
+                    batch,
+                }),
+                Err(error) if world.gpu.lost().is_some() => {
+                    return fail_lost(session, world, gated, structure, error);
+                }
                 Err(error) => failures[structure] = Some(error.to_string()),
             }
         }
@@ -274,14 +294,11 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
     }) {
         Ok(samples) => samples,
         Err((index, error)) => {
-            let mut lost = gated.swap_remove(timed[index].structure);
-            lost.record.failure = Some(error.to_string());
-            gated.clear();
-            return write_failed(session, world, &lost.cell.clone(), lost.record);
+            return fail_lost(session, world, gated, timed[index].structure, error);
         }
     };
-    for (index, (item, result)) in timed.iter().zip(samples).enumerate() {
-        let set = &world.judge.sets[index % world.judge.sets.len()];
+    for (item, result) in timed.iter().zip(samples) {
+        let set = item.set;
         let structure = &mut gated[item.structure];
         let outcome = result.and_then(|samples| {
             let empty = session

@@ -9,7 +9,7 @@ use super::world::World;
 use crate::config::{TimeCell, Variant, cell_hash};
 use crate::gpu::{Elapsed, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
-use crate::measure::record::{Interval, Record, TimeRecord};
+use crate::measure::record::{Record, TimeRecord};
 use crate::measure::statistics::bootstrap_median;
 use crate::measure::timing::{Measured, Samples, interleave};
 use crate::sampling::Sampler;
@@ -210,8 +210,8 @@ fn finish(
     let mut record = empty_record(session, world, &item.cell, String::new());
     record.failure = failure;
     if record.failure.is_none() {
-        record.ms_per_spp = bootstrap_median(&per_spp).ok_or("no sample was kept")?;
-        record.mrays_s = bootstrap_median(&rates).ok_or("no sample was kept")?;
+        record.ms_per_spp = bootstrap_median(&per_spp);
+        record.mrays_s = bootstrap_median(&rates);
         record.ms = samples.ms;
         record.wall_ms = samples.wall_ms;
     }
@@ -247,11 +247,6 @@ fn count_rays(
 }
 
 fn empty_record(session: &Session, world: &World, cell: &TimeCell, failure: String) -> TimeRecord {
-    let nothing = Interval {
-        value: 0.0,
-        low: 0.0,
-        high: 0.0,
-    };
     let label = |v: &Variant| v.clone();
     TimeRecord {
         scene: world.variant.label.clone(),
@@ -263,9 +258,9 @@ fn empty_record(session: &Session, world: &World, cell: &TimeCell, failure: Stri
         spp: session.experiment.timing.spp,
         ms: Vec::new(),
         wall_ms: Vec::new(),
-        ms_per_spp: nothing,
+        ms_per_spp: None,
         rays: BTreeMap::new(),
-        mrays_s: nothing,
+        mrays_s: None,
         image_hash: String::new(),
         image_equal: false,
         runtime_checks: session.experiment.runtime_checks,

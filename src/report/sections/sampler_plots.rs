@@ -79,7 +79,7 @@ fn curve_by_time(
     metric: Metric,
     structure: &str,
 ) -> Option<Curve> {
-    let per_spp = view.time(structure, &sampler.name)?.ms_per_spp;
+    let per_spp = view.ms_per_spp(structure, &sampler.name)?;
     let label = format!(
         "{}: {} ms per spp",
         sampler.name,
@@ -134,14 +134,13 @@ pub fn pareto_plot(data: &RunData, view: &View) -> Option<ParetoPlot> {
     let mut points = Vec::new();
     for (structure, (name, _)) in structures.iter().enumerate() {
         for (index, sampler) in fair.iter().enumerate() {
-            let Some(time) = view.time(name, &sampler.name) else {
+            let Some(t) = view.ms_per_spp(name, &sampler.name) else {
                 continue;
             };
             let Some(error) = sampler.mean_error_at(Metric::RelMse, spp) else {
                 continue;
             };
             let scale = f64::from(spp) / 1000.0;
-            let t = time.ms_per_spp;
             let seconds = Interval {
                 value: t.value * scale,
                 low: t.low * scale,

@@ -172,10 +172,9 @@ pub fn efficiency_table(view: &View) -> Table {
     let equal_time = format!("relMSE after {} s", format::number(race.seconds));
     let mut table = Table::new(caption, &["sampler", "ms per spp", &product, &equal_time]);
     for sampler in &view.samplers {
-        let Some(time) = view.time(&race.structure, &sampler.name) else {
+        let Some(per_spp) = view.ms_per_spp(&race.structure, &sampler.name) else {
             continue;
         };
-        let per_spp = time.ms_per_spp;
         let seconds = f64::from(spp) * per_spp.value / 1000.0;
         let product = sampler
             .mean_error_at(Metric::RelMse, spp)
@@ -223,11 +222,8 @@ fn is_of(time: &TimeRecord, sampler: &Sampler) -> bool {
 }
 
 fn time_cell(view: &View, structure: &str, sampler: &Sampler) -> Cell {
-    if let Some(time) = view.time(structure, &sampler.name) {
-        return Cell::with_detail(
-            format::number(time.ms_per_spp.value),
-            format::bounds(&time.ms_per_spp),
-        );
+    if let Some(ms) = view.ms_per_spp(structure, &sampler.name) {
+        return Cell::with_detail(format::number(ms.value), format::bounds(&ms));
     }
     let of_structure = |time: &&&TimeRecord| {
         structure_name(&time.accel, time.runtime_checks) == structure && is_of(time, sampler)

@@ -173,8 +173,7 @@ impl<'a> Race<'a> {
     pub fn new(view: &'a View<'a>) -> Option<Self> {
         let structure = view.fastest_structure()?;
         let runner = |sampler: &'a Sampler<'a>| {
-            let time = view.time(&structure, &sampler.name)?;
-            let per_spp = time.ms_per_spp.value / 1000.0;
+            let per_spp = view.ms_per_spp(&structure, &sampler.name)?.value / 1000.0;
             let means = sampler.mean_errors(Metric::RelMse);
             let curve: Vec<_> = means
                 .iter()
