@@ -95,7 +95,8 @@ impl BuildLog {
 
     /// Sum of all phases, milliseconds.
     pub fn total_ms(&self) -> f64 {
-        self.phases.iter().map(|p| p.ms).sum()
+        // Not sum(): that of nothing is −0.
+        self.phases.iter().fold(0.0, |sum, p| sum + p.ms)
     }
 }
 
