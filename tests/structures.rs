@@ -58,7 +58,7 @@ fn check_kernel(
     let gpu = common::gpu();
     let built = build(kind, soup, &default_params(&kind.parameters()));
     let what = format!("{what}: kernel of {}", kind.name());
-    let run = |features: &[&str]| trace(gpu, kind.kernel(), &*built, soup, rays, features);
+    let run = |features: &[&str]| trace(gpu, &*built, soup, rays, features);
     assert_same_hits(&what, rays, expected, &run(&[]).hits);
     let blocked: Vec<bool> = expected.iter().map(|h| h.triangle != NO_HIT).collect();
     assert_eq!(run(&["any"]).found(), blocked, "{what}: any hit");
@@ -230,8 +230,7 @@ fn hits_at_the_ends_of_a_segment_count_and_ties_go_to_the_lowest_index() {
     ];
     for kind in kinds() {
         let built = build(kind, &wall.soup, &default_params(&kind.parameters()));
-        let answers =
-            |rays: &[Ray]| trace(common::gpu(), kind.kernel(), &*built, &wall.soup, rays, &[]);
+        let answers = |rays: &[Ray]| trace(common::gpu(), &*built, &wall.soup, rays, &[]);
         for hit in answers(&rays).hits {
             assert_eq!((hit.t, hit.triangle), (2.0, id), "{}", kind.name());
         }

@@ -63,7 +63,7 @@ pub(super) fn build_and_gate(
         .time("gate", || built.validate(&world.soup))
         .err()
         .map(|e| e.to_string());
-    let traced = match Traced::upload(world.gpu, kind, &*built) {
+    let traced = match Traced::upload(world.gpu, &*built) {
         Ok(traced) => traced,
         Err(error) => {
             record.failure = Some(error.to_string());

@@ -112,7 +112,7 @@ impl Stage {
         let built = kind
             .build(&self.soup, &params, &mut BuildLog::default())
             .unwrap_or_else(|e| panic!("{} does not build: {e}", kind.name()));
-        Traced::upload(gpu, kind, &*built).expect("buffers that fit")
+        Traced::upload(gpu, &*built).expect("buffers that fit")
     }
 
     /// A compiled image of `size` pixels. The AO radius is a fraction of the scene's diagonal, as
