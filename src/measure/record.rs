@@ -281,6 +281,10 @@ pub struct StructureRecord {
     pub build: Vec<Phase>,
     /// Sum of the phases, milliseconds.
     pub build_ms: f64,
+    /// Most host memory that the build needed beyond what was in use before it, the result included,
+    /// bytes; absent where allocations are not counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub build_peak_bytes: Option<u64>,
     /// Static figures.
     pub stats: StructureStats,
     /// Verdict; `None` only if the build failed.

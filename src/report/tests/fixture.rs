@@ -174,6 +174,7 @@ pub(super) fn structure(scene: &str, accel: &str, mrays: f64, wrong: usize) -> S
             },
         ],
         build_ms: 34.0,
+        build_peak_bytes: Some(23_000_000),
         stats: StructureStats {
             nodes: 44_381,
             leaves: 22_191,
