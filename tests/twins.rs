@@ -51,6 +51,11 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
         "COUNT_MASK",
         "the twin clears the leaf bit before it shifts",
     ),
+    (
+        "integrator/integrand",
+        "radiance",
+        "draws; the twin is given the point",
+    ),
     ("sampling/pixel_hash", "hash", "the twin picks a function"),
     (
         "sampling/sampler",
@@ -78,6 +83,11 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
     ("accel/uniform_grid", "sort_by_cell", "build"),
     ("accel/uniform_grid", "dot", "build, f64"),
     ("accel/uniform_grid", "cross", "build, f64"),
+    (
+        "integrator/integrand",
+        "half_plane_area",
+        "the integral, f64",
+    ),
     ("sampling/dimensions", "needed", "planning"),
     ("sampling/dimensions", "purpose", "words for the report"),
     (

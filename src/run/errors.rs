@@ -362,6 +362,7 @@ fn bias_record(
         alpha: check.alpha,
         min_p: check.min_p,
         p_histogram: check.p_histogram.to_vec(),
+        z: check.z,
         verdict,
     })
 }

@@ -258,6 +258,7 @@ pub(super) fn bias(scene: &str, integrator: &str, index: usize, verdict: &str) -
         rejected: if biased { 57 } else { 0 },
         alpha: 0.01,
         min_p: 0.003,
+        z: Some(0.4),
         p_histogram: match (testable, biased) {
             (false, _) => vec![0; 10],
             (true, false) => vec![44, 41, 39, 47, 42, 40, 45, 46, 44, 44],
