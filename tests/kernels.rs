@@ -9,8 +9,9 @@ use rayon::prelude::*;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::accel::{AccelRegistry, Counters, Hit, Ray};
 use raystone::gpu::{Composition, KernelLibrary};
-use raystone::integrator::{SceneFeatures, integrators};
-use raystone::sampling::SamplerRegistry;
+use raystone::integrator::{SceneFeatures, integrators, with_sampler};
+use raystone::config::{Entry, Variant};
+use raystone::sampling::{Demand, Sampler, SamplerRegistry};
 use std::mem::{offset_of, size_of};
 
 /// Names of the scene's feature flags, and the flag of the counting run.
@@ -30,28 +31,49 @@ fn structures() -> Vec<(String, Vec<(&'static str, u32)>)> {
     AccelRegistry::default().iter().map(structure).collect()
 }
 
-/// Every structure, integrator, sequence with its parameters, and decorrelation.
+/// Every sequence and every decorrelation with every parameter, each with one partner.
+fn samplers() -> Vec<Sampler> {
+    let registry = SamplerRegistry::default();
+    let demand = Demand {
+        samples: Some(16),
+        dimensions: 1,
+        width: Some(16),
+    };
+    let variants = |entry: &Entry| -> Vec<Variant> {
+        let variant = |params| Variant {
+            name: entry.name.clone(),
+            label: entry.name.clone(),
+            params,
+        };
+        let params = param_variants(&entry.schema).into_iter();
+        params.map(variant).collect()
+    };
+    let sequences: Vec<_> = registry.sequence_entries().iter().flat_map(variants).collect();
+    let decorrelations = registry.decorrelation_entries();
+    let decorrelations: Vec<_> = decorrelations.iter().flat_map(variants).collect();
+    let none = decorrelations.iter().find(|d| d.name == "none").expect("none");
+    let sobol = sequences.iter().find(|s| s.name == "sobol").expect("sobol");
+    let pairs = sequences.iter().map(|s| (s, none));
+    let pairs = pairs.chain(decorrelations.iter().map(|d| (sobol, d)));
+    let sampler = |(s, d)| registry.sampler(s, d, &demand).unwrap_or_else(|e| panic!("{e}"));
+    pairs.map(sampler).collect()
+}
+
+/// Every structure, integrator and sampler.
 fn renderers() -> Vec<Composition> {
-    let samplers = SamplerRegistry::default();
+    let samplers = samplers();
     let mut out = Vec::new();
     for (accel, constants) in structures() {
         for integrator in integrators() {
-            for sequence in samplers.sequences() {
-                for params in param_variants(&sequence.parameters()) {
-                    for decorrelation in samplers.decorrelations() {
-                        let mut kernel = Composition::new("integrator/render")
-                            .with("accel", &accel)
-                            .with("integrator", integrator.kernel())
-                            .with("sequence", sequence.kernel())
-                            .with("decorrelation", decorrelation.kernel());
-                        let defaults = default_params(&integrator.parameters());
-                        let more = [integrator.constants(&defaults), sequence.constants(&params)];
-                        for (name, value) in constants.iter().chain(more.iter().flatten()) {
-                            kernel = kernel.constant(name, *value);
-                        }
-                        out.push(kernel);
-                    }
+            for sampler in &samplers {
+                let defaults = default_params(&integrator.parameters());
+                let mut kernel = with_sampler(Composition::new("integrator/render"), sampler)
+                    .with("accel", &accel)
+                    .with("integrator", integrator.kernel());
+                for (name, value) in constants.iter().chain(&integrator.constants(&defaults)) {
+                    kernel = kernel.constant(name, *value);
                 }
+                out.push(kernel);
             }
         }
     }
