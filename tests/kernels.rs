@@ -8,9 +8,9 @@ use common::{Pcg, batch_kernel, build, default_params, param_variants, scenes};
 use rayon::prelude::*;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::accel::{AccelRegistry, Counters, Hit, Ray};
+use raystone::config::{Entry, Variant};
 use raystone::gpu::{Composition, KernelLibrary};
 use raystone::integrator::{SceneFeatures, integrators, with_sampler};
-use raystone::config::{Entry, Variant};
 use raystone::sampling::{Demand, Sampler, SamplerRegistry};
 use std::mem::{offset_of, size_of};
 
@@ -48,14 +48,25 @@ fn samplers() -> Vec<Sampler> {
         let params = param_variants(&entry.schema).into_iter();
         params.map(variant).collect()
     };
-    let sequences: Vec<_> = registry.sequence_entries().iter().flat_map(variants).collect();
+    let sequences: Vec<_> = registry
+        .sequence_entries()
+        .iter()
+        .flat_map(variants)
+        .collect();
     let decorrelations = registry.decorrelation_entries();
     let decorrelations: Vec<_> = decorrelations.iter().flat_map(variants).collect();
-    let none = decorrelations.iter().find(|d| d.name == "none").expect("none");
+    let none = decorrelations
+        .iter()
+        .find(|d| d.name == "none")
+        .expect("none");
     let sobol = sequences.iter().find(|s| s.name == "sobol").expect("sobol");
     let pairs = sequences.iter().map(|s| (s, none));
     let pairs = pairs.chain(decorrelations.iter().map(|d| (sobol, d)));
-    let sampler = |(s, d)| registry.sampler(s, d, &demand).unwrap_or_else(|e| panic!("{e}"));
+    let sampler = |(s, d)| {
+        registry
+            .sampler(s, d, &demand)
+            .unwrap_or_else(|e| panic!("{e}"))
+    };
     pairs.map(sampler).collect()
 }
 

@@ -5,9 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Kernel file → Rust file, where the stem differs.
-const OTHER_FILE: &[(&str, &str)] = &[
-    ("sampling/sampler", "src/sampling/mod.rs"),
-];
+const OTHER_FILE: &[(&str, &str)] = &[("sampling/sampler", "src/sampling/mod.rs")];
 
 /// Kernel files without a twin, with the reason.
 const NO_TWIN: &[(&str, &str)] = &[

@@ -210,7 +210,11 @@ fn full_product(
 ) -> usize {
     let renders = times.iter().map(|cell| {
         let randomised = is_randomised(&cell.sequence, &cell.decorrelation);
-        if randomised == Ok(true) { replicates as usize } else { 1 }
+        if randomised == Ok(true) {
+            replicates as usize
+        } else {
+            1
+        }
     });
     renders.sum()
 }

@@ -9,5 +9,6 @@ pub mod image;
 pub mod picture;
 pub mod rays;
 pub mod record;
+pub mod sampler_cost;
 pub mod statistics;
 pub mod timing;

@@ -12,8 +12,8 @@ use crate::measure::image::{Image, Reference, measure};
 use crate::measure::picture::{automatic_exposure, error_map, tone_map, write_png};
 use crate::measure::record::{BiasRecord, ErrorAtSpp, ErrorRecord, Record, ReferenceRecord};
 use crate::report::color::viridis;
-use crate::sampling::{Demand, Sampler};
 use crate::sampling::hash::pcg_hash;
+use crate::sampling::{Demand, Sampler};
 use std::time::Instant;
 
 /// Relative error per pixel at the top of the colour scale of error maps.
@@ -224,7 +224,12 @@ fn passes<'a>(
     if !sampler.by_count() {
         return Ok(vec![pass(spps, &sampler)?]);
     }
-    let single = |spp| pass(vec![spp], &sampler_for(session, pair, &cell.integrator, spp)?);
+    let single = |spp| {
+        pass(
+            vec![spp],
+            &sampler_for(session, pair, &cell.integrator, spp)?,
+        )
+    };
     spps.into_iter().map(single).collect()
 }
 

@@ -5,9 +5,9 @@ use super::session::Session;
 use crate::config::StreamCell;
 use crate::discrepancy::star_2d_prefixes;
 use crate::gpu::{Bindings, Composition, Dispatch, Gpu, UniformValues, groups_for};
+use crate::integrator::with_sampler;
 use crate::measure::record::{Interval, Record, StarAtCount, StreamRecord};
 use crate::measure::statistics::bootstrap_mean;
-use crate::integrator::with_sampler;
 use crate::sampling::{Coordinate, Demand, Sampler, dimensions::pair_purpose, to_unit};
 
 /// Fewest points whose discrepancy is taken.

@@ -67,7 +67,9 @@ fn read_words(folder: &Path, name: &str, bytes: usize) -> Result<Vec<u32>, Strin
         ));
     }
     let words = content.chunks_exact(4);
-    Ok(words.map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+    Ok(words
+        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        .collect())
 }
 
 /// Points, ranking and scrambling for `samples` samples a pixel. There is no ranking of one sample.
@@ -81,7 +83,11 @@ fn read_tables(folder: &Path, samples: u32) -> Result<Vec<u32>, String> {
     let mut words = read_words(folder, "sobol_256spp_256d.u8", 1 << 16)?;
     words.extend(match samples {
         1 => vec![0; tile / 4],
-        _ => read_words(folder, &format!("ranking_tile_128x128x8_{samples:03}spp.u8"), tile)?,
+        _ => read_words(
+            folder,
+            &format!("ranking_tile_128x128x8_{samples:03}spp.u8"),
+            tile,
+        )?,
     });
     let scrambling = format!("scrambling_tile_128x128x8_{samples:03}spp.u8");
     words.extend(read_words(folder, &scrambling, tile)?);
@@ -125,7 +131,10 @@ impl Decorrelation for BlueNoise {
 
     fn refusal(&self, params: &Params, partner: &Partner) -> Option<String> {
         if folder(params).is_some() && partner.name != "sobol" {
-            return Some("the tables of Heitz et al. bring points of Sobol's sequence; take sobol".to_owned());
+            return Some(
+                "the tables of Heitz et al. bring points of Sobol's sequence; take sobol"
+                    .to_owned(),
+            );
         }
         partner.without_structure()
     }
@@ -133,9 +142,15 @@ impl Decorrelation for BlueNoise {
     fn table(&self, params: &Params, _: &Partner, demand: &Demand) -> Result<Vec<u32>, String> {
         let mut words = vec![demand.width.unwrap_or(1).max(1)];
         match folder(params) {
-            Some(folder) => words.extend(read_tables(Path::new(folder), demand.samples.unwrap_or(1))?),
+            Some(folder) => {
+                words.extend(read_tables(Path::new(folder), demand.samples.unwrap_or(1))?)
+            }
             // Midpoints of the 4096 steps.
-            None => words.extend(void_and_cluster::ranks().iter().map(|rank| rank << 20 | 1 << 19)),
+            None => words.extend(
+                void_and_cluster::ranks()
+                    .iter()
+                    .map(|rank| rank << 20 | 1 << 19),
+            ),
         }
         Ok(words)
     }
@@ -152,6 +167,8 @@ impl Decorrelation for BlueNoise {
         if folder(params).is_some() {
             return heitz_point(table, at);
         }
-        x.wrapping_add(table.decorrelation_word(MASK + tile_index(table, at, MASK_SIZE, at.dimension)))
+        x.wrapping_add(
+            table.decorrelation_word(MASK + tile_index(table, at, MASK_SIZE, at.dimension)),
+        )
     }
 }

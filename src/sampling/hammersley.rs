@@ -51,7 +51,10 @@ impl Sequence for Hammersley {
         if at.dimension == 0 {
             let count = table.sequence_word(0);
             let part = at.sample.wrapping_mul(table.sequence_word(2)) / count;
-            return at.sample.wrapping_mul(table.sequence_word(1)).wrapping_add(part);
+            return at
+                .sample
+                .wrapping_mul(table.sequence_word(1))
+                .wrapping_add(part);
         }
         radical_inverse(at.sample, table.sequence_word(BASES + at.dimension - 1))
     }

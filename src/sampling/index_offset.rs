@@ -34,13 +34,18 @@ impl Decorrelation for IndexOffset {
             name: "offsets",
             description: "offsets are drawn from 0 to this, excluded",
             default: ParamValue::Integer(65_536),
-            range: ParamRange::Integer { min: 2, max: 1 << 24 },
+            range: ParamRange::Integer {
+                min: 2,
+                max: 1 << 24,
+            },
         };
         vec![offsets, Seeding::parameter()]
     }
 
     fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
-        partner.without_structure().or_else(|| partner.not_extensible())
+        partner
+            .without_structure()
+            .or_else(|| partner.not_extensible())
     }
 
     fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {
@@ -48,7 +53,8 @@ impl Decorrelation for IndexOffset {
     }
 
     fn index(&self, params: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
-        at.sample.wrapping_add(mul_high(pixel_number(at), offsets(params)))
+        at.sample
+            .wrapping_add(mul_high(pixel_number(at), offsets(params)))
     }
 
     fn decorrelate(&self, x: u32, _: &Params, _: &SamplerTable, _: Coordinate) -> u32 {

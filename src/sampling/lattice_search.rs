@@ -82,11 +82,17 @@ fn extend(vector: &mut [u32], level: u32) {
         let gamma = weight(j);
         let error = |z: usize| -> f64 {
             let terms = products.iter().enumerate();
-            terms.map(|(i, p)| p * (1.0 + gamma * omega[i * z & mask])).sum()
+            terms
+                .map(|(i, p)| p * (1.0 + gamma * omega[i * z & mask]))
+                .sum()
         };
         let plain = *component as usize;
         let extended = plain | 1 << (level - 1);
-        let z = if error(extended) < error(plain) { extended } else { plain };
+        let z = if error(extended) < error(plain) {
+            extended
+        } else {
+            plain
+        };
         multiply(&mut products, &omega, gamma, z);
         *component = z as u32;
     }

@@ -53,7 +53,10 @@ impl Decorrelation for MicroJitter {
                 name: "k",
                 description: "K of the amplitude; 0 takes Dufay's: 1.5 for hammersley, 2.5 else",
                 default: ParamValue::Number(0.0),
-                range: ParamRange::Number { min: 0.0, max: 64.0 },
+                range: ParamRange::Number {
+                    min: 0.0,
+                    max: 64.0,
+                },
             },
             Parameter {
                 name: "s",
@@ -79,8 +82,17 @@ impl Decorrelation for MicroJitter {
         partner.without_structure()
     }
 
-    fn table(&self, params: &Params, partner: &Partner, demand: &Demand) -> Result<Vec<u32>, String> {
-        Ok(vec![width(params, partner.name, demand.samples.unwrap_or(1))])
+    fn table(
+        &self,
+        params: &Params,
+        partner: &Partner,
+        demand: &Demand,
+    ) -> Result<Vec<u32>, String> {
+        Ok(vec![width(
+            params,
+            partner.name,
+            demand.samples.unwrap_or(1),
+        )])
     }
 
     fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {
@@ -123,7 +135,10 @@ mod tests {
             ("halton", 1, 0.5),
         ] {
             let found = f64::from(width(&params, sequence, samples)) * 2.0_f64.powi(-33);
-            assert!((found - f64::min(mu, 0.5)).abs() < 0.031 * f64::from(samples == 8) + 1e-9, "{sequence} {samples}: {found}");
+            assert!(
+                (found - f64::min(mu, 0.5)).abs() < 0.031 * f64::from(samples == 8) + 1e-9,
+                "{sequence} {samples}: {found}"
+            );
         }
     }
 }

@@ -62,6 +62,9 @@ impl Sequence for PixelHash {
             _ => pcg_hash,
         };
         let pixel = hash(at.pixel.wrapping_add(hash(at.seed)));
-        hash(at.dimension.wrapping_add(hash(at.sample.wrapping_add(pixel))))
+        hash(
+            at.dimension
+                .wrapping_add(hash(at.sample.wrapping_add(pixel))),
+        )
     }
 }

@@ -28,7 +28,10 @@ impl Sequence for Pmj02 {
             name: "set",
             description: "seed of the generator: which of the random sets",
             default: ParamValue::Integer(1),
-            range: ParamRange::Integer { min: 0, max: 65_535 },
+            range: ParamRange::Integer {
+                min: 0,
+                max: 65_535,
+            },
         }]
     }
 

@@ -109,8 +109,17 @@ pub(super) fn pmj02_points(count: u32, seed: u32) -> Vec<[u32; 2]> {
         let mut occupied = Occupancy::new(2 * k + 2, &points);
         for i in 0..before {
             let [x, y] = points[i];
-            let turned = if random.next() >> 31 == 1 { [half, 0] } else { [0, half] };
-            let point = place(&occupied, [x ^ turned[0], y ^ turned[1]], k + 1, &mut random);
+            let turned = if random.next() >> 31 == 1 {
+                [half, 0]
+            } else {
+                [0, half]
+            };
+            let point = place(
+                &occupied,
+                [x ^ turned[0], y ^ turned[1]],
+                k + 1,
+                &mut random,
+            );
             occupied.insert(point);
             points.push(point);
         }

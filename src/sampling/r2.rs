@@ -62,7 +62,10 @@ impl Sequence for R2 {
     }
 
     fn sequence(&self, _: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
-        let multiple = at.sample.wrapping_add(1).wrapping_mul(table.sequence_word(at.dimension));
+        let multiple = at
+            .sample
+            .wrapping_add(1)
+            .wrapping_mul(table.sequence_word(at.dimension));
         multiple.wrapping_add(0x8000_0000)
     }
 }

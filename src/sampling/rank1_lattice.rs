@@ -38,6 +38,8 @@ impl Sequence for Rank1Lattice {
     }
 
     fn sequence(&self, _: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
-        at.sample.reverse_bits().wrapping_mul(table.sequence_word(at.dimension))
+        at.sample
+            .reverse_bits()
+            .wrapping_mul(table.sequence_word(at.dimension))
     }
 }

@@ -3,7 +3,8 @@
 use super::{
     BlueNoise, CranleyPatterson, Decorrelation, Demand, DigitalShift, DiscRotation, Halton,
     Hammersley, IndexOffset, MicroJitter, NoDecorrelation, OwenHash, OwenSobol, Partner, PixelHash,
-    Pmj02, R2, Rank1Lattice, Sampler, SamplerError, SamplerTable, Seeding, Sequence, Sobol, VanDerCorput,
+    Pmj02, R2, Rank1Lattice, Sampler, SamplerError, SamplerTable, Seeding, Sequence, Sobol,
+    VanDerCorput,
 };
 use crate::config::{Entry, Variant};
 

@@ -41,7 +41,11 @@ fn sine(phase: u32) -> u32 {
 
 /// `x` with the sign of the sine of `phase`, modulo 1.
 fn signed_fraction(x: u32, phase: u32) -> u32 {
-    if phase >= HALF_TURN { x.wrapping_neg() } else { x }
+    if phase >= HALF_TURN {
+        x.wrapping_neg()
+    } else {
+        x
+    }
 }
 
 /// s = 0.0174532 pixel + seed; s = s sin(s), in turns.
@@ -59,9 +63,17 @@ fn start_phase(at: Coordinate) -> u32 {
 
 /// frac(sin(s + 0.1 draw) factor).
 pub fn trig_hash(at: Coordinate) -> u32 {
-    let draw = at.sample.wrapping_mul(DRAWS).wrapping_add(at.dimension).wrapping_add(1);
+    let draw = at
+        .sample
+        .wrapping_mul(DRAWS)
+        .wrapping_add(at.dimension)
+        .wrapping_add(1);
     let phase = start_phase(at).wrapping_add(draw.wrapping_mul(DRAW_STEP));
-    let factor = if at.dimension & 1 == 1 { SECOND_FACTOR } else { FIRST_FACTOR };
+    let factor = if at.dimension & 1 == 1 {
+        SECOND_FACTOR
+    } else {
+        FIRST_FACTOR
+    };
     let size = sine(phase);
     let fraction = (mul_high(size, factor) << 17) | (size.wrapping_mul(factor) >> 15);
     signed_fraction(fraction, phase)
@@ -75,21 +87,32 @@ mod tests {
     fn the_sine_is_off_by_less_than_a_ten_millionth() {
         for i in 0..=1_000_000_u32 {
             let phase = i.wrapping_mul(4295);
-            let exact = (f64::from(phase) * 2.0_f64.powi(-32) * std::f64::consts::TAU).sin().abs();
+            let exact = (f64::from(phase) * 2.0_f64.powi(-32) * std::f64::consts::TAU)
+                .sin()
+                .abs();
             let found = f64::from(sine(phase)) * 2.0_f64.powi(-31);
-            assert!((found - exact).abs() < 1e-7, "{phase}: {found} is not {exact}");
+            assert!(
+                (found - exact).abs() < 1e-7,
+                "{phase}: {found} is not {exact}"
+            );
         }
     }
 
     #[test]
     fn a_draw_follows_the_printed_formula_as_far_as_the_sine_is_exact() {
         let fraction = |x: f64| x - x.floor();
-        for (pixel, seed, dimension) in [(0, 0, 0), (1000, 7, 1), (48_000, 3, 5), (12_345, 20, 40)] {
+        for (pixel, seed, dimension) in [(0, 0, 0), (1000, 7, 1), (48_000, 3, 5), (12_345, 20, 40)]
+        {
             let mut s = 0.0174532 * f64::from(pixel) + f64::from(seed);
             s *= s.sin();
             let factor = [43758.5453123, 22578.1459123][dimension as usize % 2];
             let exact = fraction((s + 0.1 * f64::from(dimension + 1)).sin() * factor);
-            let at = Coordinate { pixel, sample: 0, dimension, seed };
+            let at = Coordinate {
+                pixel,
+                sample: 0,
+                dimension,
+                seed,
+            };
             let found = f64::from(trig_hash(at)) * 2.0_f64.powi(-32);
             let off = (found - exact).abs();
             // 43758 times the error of the sine, and of an angle of 2⁻³² turns times its size.

@@ -53,7 +53,8 @@ impl Pattern {
     /// The set pixel with the most set pixels around it; the first of several.
     fn cluster(&self) -> usize {
         let set = (0..PIXELS).filter(|&i| self.set[i]);
-        set.max_by_key(|&i| (self.energy[i], std::cmp::Reverse(i))).unwrap_or(0)
+        set.max_by_key(|&i| (self.energy[i], std::cmp::Reverse(i)))
+            .unwrap_or(0)
     }
 
     /// The empty pixel with the fewest set pixels around it; the first of several.

@@ -199,7 +199,11 @@ pub fn sampler(sequence: &str, decorrelation: &str) -> Sampler {
 pub fn sampler_of(sequence: &str, decorrelation: &str, samples: u32) -> Sampler {
     let registry = SamplerRegistry::default();
     let dimensions = ("dimensions", ParamValue::Integer(i64::from(DIMENSIONS)));
-    let changes = if sequence == "r2" { &[dimensions][..] } else { &[] };
+    let changes = if sequence == "r2" {
+        &[dimensions][..]
+    } else {
+        &[]
+    };
     let sequence = variant(&registry.sequence_entries(), sequence, changes);
     let decorrelation = variant(&registry.decorrelation_entries(), decorrelation, &[]);
     let demand = Demand {
