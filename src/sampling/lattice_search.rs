@@ -5,7 +5,8 @@
 //! component by component (I. Sloan, A. Reztsov 2002) over all odd z below 2¹⁰ and takes the least
 //! product of e² over N = 2, 4, … 2¹⁰, for the prefixes count as well. For N = 2¹¹ … 2¹⁶ each component
 //! gets one more binary digit, the better of two (as F. Hickernell, H. Niederreiter 2003 extend
-//! lattices), so earlier prefixes stay as they are.
+//! lattices), so earlier prefixes stay as they are. A lattice of N points has N / 4 different components
+//! but for the sign: late dimensions of small prefixes repeat early ones.
 
 use std::f64::consts::PI;
 use std::sync::OnceLock;

@@ -2,6 +2,7 @@
 
 use super::common::{self, Pcg};
 use super::*;
+use raystone::measure::sampler_cost::sampler_cost;
 use raystone::run::dump_stream;
 
 /// Coordinates of every sequence and of every decorrelation, with each of their parameters.
@@ -161,4 +162,27 @@ fn the_tables_of_heitz_are_read_by_kernel_and_twin_alike() {
     };
     let places = (0..128 * 128).filter(|i| agrees(i % 128, i / 128)).count();
     assert_eq!(places, 1);
+}
+
+#[test]
+fn the_cost_of_a_sampler_is_measured_without_its_loop() {
+    let cost = |sequence, decorrelation| {
+        let sampler = sampler(sequence, decorrelation, &demand(256, 8));
+        let cost = sampler_cost(common::gpu(), &sampler).unwrap_or_else(|e| panic!("{e}"));
+        println!("{}: {cost:?}", sampler.label());
+        cost.ns_per_sample
+    };
+    let registry = SamplerRegistry::default();
+    let mut costs: Vec<_> = registry
+        .sequences()
+        .filter(|s| !["van-der-corput", "r2"].contains(&s.name()))
+        .map(|s| cost(s.name(), "none"))
+        .collect();
+    let moved = registry.decorrelations().filter(|d| d.name() != "none");
+    costs.extend(moved.map(|d| cost("sobol", d.name())));
+    assert!(costs.len() >= 14);
+    // Divisions in a loop cost more than one product, whatever the adapter.
+    assert!(cost("halton", "none").low > cost("rank1-lattice", "none").value);
+    let flat = sampler("van-der-corput", "none", &demand(256, 1));
+    assert!(sampler_cost(common::gpu(), &flat).is_err());
 }
