@@ -38,7 +38,7 @@ fn merit(products: &[f64], omega: &[f64], gamma: f64, z: usize) -> f64 {
     let mut sums = [0.0; SEARCH_LEVEL as usize + 1];
     for (i, product) in products.iter().enumerate() {
         let coarsest = SEARCH_LEVEL - (i.trailing_zeros()).min(SEARCH_LEVEL);
-        sums[coarsest as usize] += product * (1.0 + gamma * omega[i * z & mask]);
+        sums[coarsest as usize] += product * (1.0 + gamma * omega[(i * z) & mask]);
     }
     let mut sum = sums[0];
     let mut merit = 0.0;
@@ -70,7 +70,7 @@ fn search() -> Vec<u32> {
 fn multiply(products: &mut [f64], omega: &[f64], gamma: f64, z: usize) {
     let mask = omega.len() - 1;
     for (i, product) in products.iter_mut().enumerate() {
-        *product *= 1.0 + gamma * omega[i * z & mask];
+        *product *= 1.0 + gamma * omega[(i * z) & mask];
     }
 }
 
@@ -84,7 +84,7 @@ fn extend(vector: &mut [u32], level: u32) {
         let error = |z: usize| -> f64 {
             let terms = products.iter().enumerate();
             terms
-                .map(|(i, p)| p * (1.0 + gamma * omega[i * z & mask]))
+                .map(|(i, p)| p * (1.0 + gamma * omega[(i * z) & mask]))
                 .sum()
         };
         let plain = *component as usize;

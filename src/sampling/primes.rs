@@ -24,7 +24,7 @@ pub fn faure_permutation(base: u32) -> Vec<u32> {
         return (0..base).collect();
     }
     let half = base / 2;
-    if base % 2 == 0 {
+    if base.is_multiple_of(2) {
         let inner = faure_permutation(half);
         let doubled = |odd: u32| inner.iter().map(move |d| 2 * d + odd);
         return doubled(0).chain(doubled(1)).collect();
@@ -41,7 +41,7 @@ pub(super) fn random_permutation(base: u32) -> Vec<u32> {
     let mut out: Vec<u32> = (0..base).collect();
     for i in (2..base).rev() {
         let random = u64::from(pcg_hash(i.wrapping_add(pcg_hash(base))));
-        let other = 1 + (random * u64::from(i) >> 32) as usize;
+        let other = 1 + ((random * u64::from(i)) >> 32) as usize;
         out.swap(i as usize, other);
     }
     out
