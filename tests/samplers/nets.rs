@@ -60,7 +60,7 @@ fn blocks_of_shuffled_indices_stay_blocks() {
         let mut indices: Vec<u32> = (0..16).map(index).collect();
         moved += usize::from(indices.is_sorted());
         indices.sort_unstable();
-        assert!(indices.windows(2).all(|w| w[1] == w[0] + 1) && indices[0] % 16 == 0);
+        assert!(indices.windows(2).all(|w| w[1] == w[0] + 1) && indices[0].is_multiple_of(16));
     }
     assert!(moved < 4, "nothing is shuffled");
 }
