@@ -5,10 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Kernel file → Rust file, where the stem differs.
-const OTHER_FILE: &[(&str, &str)] = &[
-    ("sampling/sampler", "src/sampling/mod.rs"),
-    ("sampling/state", "src/sampling/mod.rs"),
-];
+const OTHER_FILE: &[(&str, &str)] = &[("sampling/sampler", "src/sampling/mod.rs")];
 
 /// Kernel files without a twin, with the reason.
 const NO_TWIN: &[(&str, &str)] = &[
@@ -31,6 +28,10 @@ const NO_TWIN: &[(&str, &str)] = &[
     ("integrator/render", "the loop over samples"),
     ("integrator/trace_rays", "the loop over rays"),
     ("sampling/dump_stream", "the loop over coordinates"),
+    (
+        "sampling/sampler_cost",
+        "the loop over samples, for their cost",
+    ),
     ("shading/hemisphere", "judged by images, not by a twin"),
     ("shading/light", "judged by images, not by a twin"),
     ("shading/material", "judged by images, not by a twin"),

@@ -7,7 +7,7 @@ mod tables;
 mod traced;
 
 pub use frame::Frame;
-pub use render::{RAY_COUNT_CLASSES, RenderJob, Renderer, Snapshot};
+pub use render::{RAY_COUNT_CLASSES, RenderJob, Renderer, Snapshot, with_sampler};
 pub use tables::{SceneBuffers, SceneFeatures};
 pub use traced::Traced;
 
