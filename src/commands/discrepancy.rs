@@ -29,7 +29,12 @@ pub struct Discrepancy {
     dim: Option<usize>,
     /// Time that each measure may take; a star discrepancy in three dimensions or more that is not
     /// found in time is given as bounds
-    #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 60.0,
+        allow_negative_numbers = true
+    )]
     budget: f64,
 }
 
@@ -44,7 +49,7 @@ struct Results {
 impl Discrepancy {
     pub fn execute(self) -> Result<ExitCode, Failure> {
         let measures = measures(&self.measure).map_err(Failure::input)?;
-        if !(self.budget > 0.0) {
+        if self.budget.is_nan() || self.budget <= 0.0 {
             let message = "--budget: give a number of seconds above 0";
             return Err(Failure::input(anyhow!(message)));
         }

@@ -223,7 +223,8 @@ impl<const D: usize> Search<D> {
         let list = |d: usize| &self.lists[d][cell.lists[d][0]..cell.lists[d][1]];
         // Closed boxes end at points at most, open ones begin to matter at points.
         let last = std::array::from_fn(|d| list(d).last().map_or(cell.low[d], |e| e.value));
-        let first = std::array::from_fn(|d| list(d).first().map_or(cell.high[d], |e| e.value));
+        let first: [f64; D] =
+            std::array::from_fn(|d| list(d).first().map_or(cell.high[d], |e| e.value));
         let least = Plane::below(&cell.low, &last, self.n);
         let greatest = Plane::above(&first, &cell.high, self.n);
         let mut bound = Bound {
@@ -231,11 +232,11 @@ impl<const D: usize> Search<D> {
             few: greatest.base - cell.inside,
             apart: true,
         };
-        for d in 0..D {
+        for (d, &from) in first.iter().enumerate() {
             let only = 1 << d;
+            let low = cell.low[d];
             let (mut most, mut fewest) = (0.0, 0.0);
             let (mut worst_many, mut worst_few) = (0.0f64, f64::MIN);
-            let (low, from) = (cell.low[d], first[d]);
             for entry in list(d) {
                 let varying = self.varying[entry.id as usize];
                 let rise = (entry.value - from) * greatest.slope[d] - fewest;
