@@ -119,8 +119,7 @@ fn kernel_and_twin_equal_brute_force_on_hard_scenes() {
         for params in &variants {
             let what = format!("{} {params:?}", case.name);
             let built = build(&SortedSlabs, &case.soup, params);
-            let kernel = SortedSlabs.kernel();
-            let batch = trace(&gpu, kernel, &*built, &case.soup, &rays, &["counters"]);
+            let batch = trace(&gpu, &*built, &case.soup, &rays, &["counters"]);
             assert_same_hits(&what, &rays, &expected, &batch.hits);
             let twin = built.cpu_twin(&case.soup).expect("it has a twin");
             for ((ray, hit), work) in rays.iter().zip(&expected).zip(&batch.work) {

@@ -182,6 +182,27 @@ fn lists_of_parameters_make_variants_in_the_order_of_the_schema() {
 }
 
 #[test]
+fn double_brackets_make_variants_side_by_side_and_none_twice() {
+    let experiment = good(
+        "[[accel.uniform-grid]]\nlambda = [3, 5]\n\
+         [[accel.uniform-grid]]\nmax_cells = [4096, 8]\n",
+    );
+    assert_eq!(
+        labels(&experiment.axes.accel),
+        [
+            "bvh",
+            "uniform-grid(lambda=3)",
+            "uniform-grid",
+            "uniform-grid(max_cells=8)"
+        ]
+    );
+    assert_says(
+        parse("[[accel.uniform-grid]]\nlambada = 3\n"),
+        &["parameter of accel uniform-grid", "`lambada`", "`lambda`"],
+    );
+}
+
+#[test]
 fn text_that_is_not_toml_names_its_line() {
     assert_says(
         parse("[run]\nseed = 1\nseed = 2\n"),

@@ -96,7 +96,7 @@ fn wrong_rays(gpu: &Gpu, structure: &str, cases: &[(TriangleSoup, Vec<Ray>, Vec<
         .unwrap_or_else(|| panic!("no structure {structure}"));
     let wrong = |(soup, rays, expected): &(TriangleSoup, Vec<Ray>, Vec<Hit>)| {
         let built = build(kind, soup, &default_params(&kind.parameters()));
-        let found = trace(gpu, kind.kernel(), &*built, soup, rays, &[]);
+        let found = trace(gpu, &*built, soup, rays, &[]);
         differences(expected, &found.hits).len()
     };
     cases.iter().map(wrong).sum()

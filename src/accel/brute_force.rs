@@ -22,10 +22,6 @@ impl AccelKind for BruteForce {
         "every triangle for every ray: the simplest judge, for small scenes"
     }
 
-    fn kernel(&self) -> &'static str {
-        "accel/brute_force"
-    }
-
     fn parameters(&self) -> ParameterSchema {
         Vec::new()
     }
@@ -62,6 +58,8 @@ impl BuiltAccel for Built {
     fn buffers(&self) -> GpuBuffers<'_> {
         let triangles = self.triangles as usize;
         GpuBuffers {
+            kernel: "accel/brute_force",
+            features: Vec::new(),
             uniforms: vec![super::limits(triangles, triangles)],
             ..Default::default()
         }

@@ -34,10 +34,6 @@ impl AccelKind for Bvh {
         "binary BVH, binned SAH (Wald 2007), stack, near child first (Aila & Laine 2009)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "accel/bvh"
-    }
-
     fn parameters(&self) -> ParameterSchema {
         tree_parameters()
     }
@@ -285,6 +281,8 @@ impl BuiltAccel for BvhTwin {
 
     fn buffers(&self) -> GpuBuffers<'_> {
         GpuBuffers {
+            kernel: "accel/bvh",
+            features: Vec::new(),
             arrays: vec![
                 NamedWords {
                     name: "nodes",

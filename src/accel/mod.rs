@@ -20,7 +20,7 @@ pub use roped_bvh::RopedBvh;
 pub use uniform_grid::UniformGrid;
 
 use crate::config::{ParameterSchema, Params};
-use crate::gpu::UniformValues;
+use crate::gpu::{Composition, UniformValues};
 use crate::measure::record::{Phase, StructureStats};
 use crate::scene::SceneData;
 use std::borrow::Cow;
@@ -100,6 +100,21 @@ impl BuildLog {
     }
 }
 
+/// Longest entry of a leaf histogram; more references than this are counted there.
+pub const LEAF_HISTOGRAM_END: usize = 32;
+
+/// How many leaves or cells hold 0, 1, 2, … references; see [`StructureStats::leaf_histogram`].
+pub fn leaf_histogram(counts: impl Iterator<Item = usize>) -> Vec<u64> {
+    let mut histogram = Vec::new();
+    for count in counts.map(|c| c.min(LEAF_HISTOGRAM_END)) {
+        if histogram.len() <= count {
+            histogram.resize(count + 1, 0);
+        }
+        histogram[count] += 1;
+    }
+    histogram
+}
+
 /// One array of words for the GPU.
 #[derive(Debug, Clone)]
 pub struct NamedWords<'a> {
@@ -114,6 +129,10 @@ pub struct NamedWords<'a> {
 /// What a structure hands to the GPU.
 #[derive(Debug, Clone, Default)]
 pub struct GpuBuffers<'a> {
+    /// Module of the kernel that traces it, relative to the kernel folder.
+    pub kernel: &'static str,
+    /// Features (`@if(...)` in the kernel) that its parameters switch on.
+    pub features: Vec<&'static str>,
     /// Storage arrays, at most two (a path-tracing kernel has eight in all).
     pub arrays: Vec<NamedWords<'a>>,
     /// Uniform structs by variable name.
@@ -135,6 +154,19 @@ pub fn limits(step_fuse: usize, elements: usize) -> (&'static str, UniformValues
 }
 
 impl GpuBuffers<'_> {
+    /// `composition` with this structure as the active one.
+    #[must_use]
+    pub fn activate(&self, composition: Composition) -> Composition {
+        let active = composition.with("accel", self.kernel);
+        let active = self
+            .features
+            .iter()
+            .fold(active, |c, name| c.feature(name, true));
+        self.constants
+            .iter()
+            .fold(active, |c, (name, value)| c.constant(name, *value))
+    }
+
     /// Bytes of all arrays.
     pub fn bytes(&self) -> u64 {
         self.arrays.iter().map(|a| a.words.len() as u64 * 4).sum()
@@ -168,8 +200,6 @@ pub trait AccelKind: Sync {
     fn name(&self) -> &'static str;
     /// One line: what it is and where it comes from.
     fn description(&self) -> &'static str;
-    /// Module of the kernel, relative to the kernel folder.
-    fn kernel(&self) -> &'static str;
     /// Parameters.
     fn parameters(&self) -> ParameterSchema;
     /// Builds the structure.
@@ -191,7 +221,7 @@ pub trait BuiltAccel: Sync {
     /// # Errors
     /// The first violated invariant, with the node.
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError>;
-    /// Arrays, uniforms and constants for the kernel.
+    /// The kernel with its arrays, uniforms, constants and features.
     fn buffers(&self) -> GpuBuffers<'_>;
     /// Static figures.
     fn stats(&self) -> StructureStats;

@@ -30,10 +30,6 @@ impl AccelKind for RopedBvh {
         "the tree of `bvh` with skip pointers: no stack, fixed order (Smits 1998, Dufay 2017 Alg. 4.4)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "accel/roped_bvh"
-    }
-
     fn parameters(&self) -> ParameterSchema {
         tree_parameters()
     }
@@ -154,6 +150,8 @@ impl BuiltAccel for Built {
 
     fn buffers(&self) -> GpuBuffers<'_> {
         GpuBuffers {
+            kernel: "accel/roped_bvh",
+            features: Vec::new(),
             arrays: vec![
                 NamedWords {
                     name: "nodes",

@@ -142,6 +142,11 @@ impl Tree {
         let Some(root) = self.nodes.first() else {
             return stats;
         };
+        let leaves = self.nodes.iter().filter_map(|node| match node.kind {
+            NodeKind::Inner { .. } => None,
+            NodeKind::Leaf { count, .. } => Some(count as usize),
+        });
+        stats.leaf_histogram = super::leaf_histogram(leaves);
         let mut cost = 0.0_f64;
         for node in &self.nodes {
             let weight = match node.kind {

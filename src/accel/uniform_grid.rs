@@ -36,10 +36,6 @@ impl AccelKind for UniformGrid {
         "equal cells by Cleary's rule, exact triangle–box insertion, 3D-DDA (Amanatides & Woo 1987)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "accel/uniform_grid"
-    }
-
     fn parameters(&self) -> ParameterSchema {
         vec![Parameter {
             name: "lambda",
@@ -314,6 +310,8 @@ impl BuiltAccel for Built {
             .vec("inverse_cell", &self.grid.inverse_cell)
             .uvec("resolution", &self.grid.resolution);
         GpuBuffers {
+            kernel: "accel/uniform_grid",
+            features: Vec::new(),
             arrays: vec![
                 NamedWords {
                     name: "cells",

@@ -1,13 +1,14 @@
 //! A built structure on the GPU.
 
-use crate::accel::{AccelKind, BuiltAccel};
+use crate::accel::{BuiltAccel, GpuBuffers};
 use crate::gpu::{Bindings, Composition, Gpu, GpuError};
 
-/// What a kernel needs to trace with a structure: its module, constants, arrays and uniforms.
+/// What a kernel needs to trace with a structure: its module, features, constants, arrays and
+/// uniforms.
 #[derive(Clone)]
 pub struct Traced {
-    kernel: String,
-    constants: Vec<(&'static str, u32)>,
+    /// What the structure handed over, less the arrays and uniforms, which are bound.
+    active: GpuBuffers<'static>,
     /// Arrays and uniforms of the structure.
     pub bindings: Bindings,
 }
@@ -17,11 +18,7 @@ impl Traced {
     ///
     /// # Errors
     /// An array exceeds what the adapter can bind.
-    pub fn upload(
-        gpu: &Gpu,
-        kind: &dyn AccelKind,
-        built: &dyn BuiltAccel,
-    ) -> Result<Self, GpuError> {
+    pub fn upload(gpu: &Gpu, built: &dyn BuiltAccel) -> Result<Self, GpuError> {
         let buffers = built.buffers();
         let mut bindings = Bindings::new();
         for array in &buffers.arrays {
@@ -30,19 +27,18 @@ impl Traced {
         for (name, values) in buffers.uniforms {
             bindings.uniform(name, values);
         }
-        Ok(Self {
-            kernel: kind.kernel().to_owned(),
+        let active = GpuBuffers {
+            kernel: buffers.kernel,
+            features: buffers.features,
             constants: buffers.constants,
-            bindings,
-        })
+            ..Default::default()
+        };
+        Ok(Self { active, bindings })
     }
 
     /// `composition` with this structure as the active one.
     #[must_use]
     pub fn compose(&self, composition: Composition) -> Composition {
-        let with_kernel = composition.with("accel", &self.kernel);
-        self.constants
-            .iter()
-            .fold(with_kernel, |c, (name, value)| c.constant(name, *value))
+        self.active.activate(composition)
     }
 }

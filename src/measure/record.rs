@@ -163,6 +163,10 @@ pub struct StructureStats {
     pub leaves: u64,
     /// Triangle references held by leaves or cells.
     pub references: u64,
+    /// `[k]` is the number of leaves or cells that hold k references; what holds more than the last
+    /// index is counted there. Empty where not known.
+    #[serde(default)]
+    pub leaf_histogram: Vec<u64>,
     /// Deepest leaf (root = 0); absent for flat structures.
     pub depth: Option<u32>,
     /// SAH cost with traversal and intersection constants both 1; absent where not defined.
@@ -277,6 +281,10 @@ pub struct StructureRecord {
     pub build: Vec<Phase>,
     /// Sum of the phases, milliseconds.
     pub build_ms: f64,
+    /// Most host memory that the build needed beyond what was in use before it, the result included,
+    /// bytes; absent where allocations are not counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub build_peak_bytes: Option<u64>,
     /// Static figures.
     pub stats: StructureStats,
     /// Verdict; `None` only if the build failed.

@@ -23,10 +23,6 @@ impl AccelKind for SortedSlabs {
         "triangles sorted along x in runs with one box each (an example)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "accel/sorted_slabs"
-    }
-
     fn parameters(&self) -> ParameterSchema {
         vec![Parameter {
             name: "run_length",
@@ -110,6 +106,8 @@ impl BuiltAccel for Built {
         };
         let runs: Vec<u32> = self.runs.iter().flat_map(words).collect();
         GpuBuffers {
+            kernel: "accel/sorted_slabs",
+            features: Vec::new(),
             arrays: vec![
                 NamedWords {
                     name: "runs",

@@ -127,11 +127,8 @@ pub fn build(kind: &dyn AccelKind, soup: &TriangleSoup, params: &Params) -> Box<
 }
 
 /// The kernel that traces a batch of rays through a structure.
-pub fn batch_kernel(kernel: &str, buffers: &GpuBuffers, features: &[&str]) -> Composition {
-    let mut out = Composition::new("integrator/trace_rays").with("accel", kernel);
-    for (name, value) in &buffers.constants {
-        out = out.constant(name, *value);
-    }
+pub fn batch_kernel(buffers: &GpuBuffers, features: &[&str]) -> Composition {
+    let mut out = buffers.activate(Composition::new("integrator/trace_rays"));
     for feature in features {
         out = out.feature(feature, true);
     }
@@ -157,7 +154,6 @@ impl Batch {
 /// Panics with the error word if the kernel raised one.
 pub fn trace(
     gpu: &Gpu,
-    kernel: &str,
     built: &dyn BuiltAccel,
     soup: &TriangleSoup,
     rays: &[Ray],
@@ -165,9 +161,10 @@ pub fn trace(
 ) -> Batch {
     let counted = features.contains(&"counters");
     let buffers = built.buffers();
+    let kernel = buffers.kernel;
     let fail = |e: raystone::gpu::GpuError| -> ! { panic!("{kernel} {features:?}: {e}") };
     let pipeline = gpu
-        .pipeline(&batch_kernel(kernel, &buffers, features), true)
+        .pipeline(&batch_kernel(&buffers, features), true)
         .unwrap_or_else(|e| fail(e));
     let storage = |name: &str, words: &[u32]| gpu.storage(name, words).unwrap_or_else(|e| fail(e));
     let answer = gpu

@@ -64,10 +64,6 @@ impl AccelKind for Faulty {
         "a real structure with a planted fault"
     }
 
-    fn kernel(&self) -> &'static str {
-        self.inner.kernel()
-    }
-
     fn parameters(&self) -> ParameterSchema {
         self.inner.parameters()
     }

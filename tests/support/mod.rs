@@ -2,7 +2,7 @@
 //! it, renderers, kernels with planted faults, and samples with their standard error.
 #![allow(dead_code)] // Every test program uses its own part of this.
 
-use raystone::accel::{AccelKind, AccelRegistry, BuildLog, TriangleSoup};
+use raystone::accel::{AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, TriangleSoup};
 use raystone::config::{Entry, Experiment, ParamValue, Params, Plan, Variant};
 use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
 use raystone::integrator::{
@@ -107,12 +107,16 @@ impl Stage {
     }
 
     /// A structure with its default parameters, built on this scene.
+    pub fn build(&self, kind: &dyn AccelKind) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        kind.build(&self.soup, &defaults(kind), &mut BuildLog::default())
+    }
+
+    /// [`Stage::build`], on the GPU.
     pub fn traced(&self, gpu: &Gpu, kind: &dyn AccelKind) -> Traced {
-        let params = defaults(kind);
-        let built = kind
-            .build(&self.soup, &params, &mut BuildLog::default())
+        let built = self
+            .build(kind)
             .unwrap_or_else(|e| panic!("{} does not build: {e}", kind.name()));
-        Traced::upload(gpu, kind, &*built).expect("buffers that fit")
+        Traced::upload(gpu, &*built).expect("buffers that fit")
     }
 
     /// A compiled image of `size` pixels. The AO radius is a fraction of the scene's diagonal, as
