@@ -191,9 +191,6 @@ pub fn structure(name: &str) -> &'static dyn AccelKind {
         .expect("a known structure")
 }
 
-/// Dimensions of the paths here.
-const DIMENSIONS: u32 = dimensions::needed(6);
-
 /// A sampler of 64 samples with default parameters.
 pub fn sampler(sequence: &str, decorrelation: &str) -> Sampler {
     sampler_of(sequence, decorrelation, 64)
@@ -202,7 +199,8 @@ pub fn sampler(sequence: &str, decorrelation: &str) -> Sampler {
 /// A sampler with as many dimensions as a path needs, else with default parameters.
 pub fn sampler_of(sequence: &str, decorrelation: &str, samples: u32) -> Sampler {
     let registry = SamplerRegistry::default();
-    let dimensions = ("dimensions", ParamValue::Integer(i64::from(DIMENSIONS)));
+    let needed = dimensions::needed(6);
+    let dimensions = ("dimensions", ParamValue::Integer(i64::from(needed)));
     let changes = if sequence == "r2" {
         &[dimensions][..]
     } else {
@@ -212,7 +210,7 @@ pub fn sampler_of(sequence: &str, decorrelation: &str, samples: u32) -> Sampler 
     let decorrelation = variant(&registry.decorrelation_entries(), decorrelation, &[]);
     let demand = Demand {
         samples: Some(samples),
-        dimensions: DIMENSIONS,
+        dimensions: needed,
         width: Some(16),
     };
     registry
