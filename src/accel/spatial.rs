@@ -1,0 +1,189 @@
+//! What structures that divide space (`octree`, `kd-tree`) share: which cells list a triangle.
+//!
+//! A triangle may be listed *by its box* or *clipped*. By its box: a plane sends it to every side that
+//! its box reaches, to one side only if the box ends in the plane. Then the theorem of
+//! [`super::triangle`] holds for cells as it does for boxes of a BVH. Proof: `N` and `F` are the
+//! computed slab distances of the triangle's box, `t` its clamped hit, `s` the computed distance of a
+//! split plane. Going down from the root, if the box lies on one side, follow it: `s ≥ F` on the near
+//! side and `s ≤ N` on the far one, because computed distances are monotone in the plane. If it is
+//! listed on both, follow the near side if `t ≤ s`, else the far one. So the interval `[n, f]` of every
+//! cell on the way satisfies `n ≤ max(N, t)` and `f ≥ min(F, t)`, which is all that the four
+//! inequalities of that proof use: each cell passes `max(n, t_min) ≤ min(f, t_best) · BOX_PAD`, and the
+//! leaf at the end lists the triangle. ∎
+//!
+//! Clipped: a cell that the triangle itself misses by more than [`margin`] does not list it, although
+//! its box may reach in. That makes shorter lists but assumes that the computed hit is no farther from
+//! the triangle than the margin; rays that graze a triangle at less than about 1/100 rad are beyond it
+//! unless the cell of the exact hit is visited, too, which it is unless a hit ends the ray in between.
+
+use super::bounds::Bounds;
+use super::triangle::TriangleRecord;
+
+/// By how much cells are grown before a clipped triangle counts as missing them, scene units.
+/// `bounds` is the box of the scene.
+///
+/// The computed distance of a hit errs by less than 2⁻²⁰ of the scene over the sine of the angle
+/// between ray and triangle: the margin covers angles down to 2⁻⁶.
+pub(super) fn margin(bounds: &Bounds) -> f64 {
+    let extent = bounds.extent().map(f64::from);
+    let diagonal = extent.iter().map(|e| e * e).sum::<f64>().sqrt();
+    let far = (0..3)
+        .map(|a| bounds.min[a].abs().max(bounds.max[a].abs()))
+        .fold(0.0, f32::max);
+    (diagonal * 2.0_f64.powi(-14) + f64::from(far) * 2.0_f64.powi(-19)).max(1e-18)
+}
+
+/// The corners of a triangle as kernels know them.
+pub(super) type Corners = [[f64; 3]; 3];
+
+/// Corners of `record`, rebuilt from its rounded edges.
+pub(super) fn corners(record: &TriangleRecord) -> Corners {
+    record
+        .triangle()
+        .vertices
+        .map(|v| v.to_array().map(f64::from))
+}
+
+/// Separating-axis test of one triangle against boxes of one size (T. Akenine-Möller, "Fast 3D
+/// triangle–box overlap testing", 2001).
+pub(super) struct Overlap {
+    /// Axis, and the interval of the triangle on it grown by the box's half extent.
+    axes: [([f64; 3], f64, f64); 13],
+}
+
+impl Overlap {
+    /// For boxes with these half extents.
+    pub fn new(corners: &Corners, half: [f64; 3]) -> Self {
+        let edges: Corners = std::array::from_fn(|i| {
+            std::array::from_fn(|a| corners[(i + 1) % 3][a] - corners[i][a])
+        });
+        let unit =
+            |axis: usize| -> [f64; 3] { std::array::from_fn(|a| f64::from(u8::from(a == axis))) };
+        let axes = std::array::from_fn(|i| {
+            let axis = match i {
+                0 => cross(edges[0], edges[1]),
+                1..=3 => unit(i - 1),
+                _ => cross(edges[(i - 4) / 3], unit((i - 4) % 3)),
+            };
+            let on_axis = corners.map(|corner| dot(corner, axis));
+            let reach = (0..3).map(|a| half[a] * axis[a].abs()).sum::<f64>();
+            let low = on_axis[0].min(on_axis[1]).min(on_axis[2]) - reach;
+            let high = on_axis[0].max(on_axis[1]).max(on_axis[2]) + reach;
+            (axis, low, high)
+        });
+        Self { axes }
+    }
+
+    /// Whether the triangle touches the box around `centre`.
+    pub fn touches(&self, centre: [f64; 3]) -> bool {
+        self.axes.iter().all(|(axis, low, high)| {
+            let c = dot(centre, *axis);
+            *low <= c && c <= *high
+        })
+    }
+}
+
+/// Whether the triangle touches the closed box.
+pub(super) fn touches(corners: &Corners, cell: &Bounds) -> bool {
+    let side = |a: usize| (f64::from(cell.min[a]), f64::from(cell.max[a]));
+    let half = std::array::from_fn(|a| 0.5 * (side(a).1 - side(a).0));
+    let centre = std::array::from_fn(|a| 0.5 * (side(a).1 + side(a).0));
+    Overlap::new(corners, half).touches(centre)
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// Box of the part of a triangle within `cell` grown by `margin`, itself grown by `margin`; `None` if
+/// there is no such part (I. Sutherland, G. Hodgman, "Reentrant polygon clipping", 1974).
+pub(super) fn clip(corners: &Corners, cell: &Bounds, margin: f64) -> Option<Bounds> {
+    // Each of six planes adds one corner at most.
+    let mut polygon = [[0.0; 3]; 9];
+    polygon[..3].copy_from_slice(corners);
+    let mut count = 3;
+    for axis in 0..3 {
+        for (plane, sign) in [
+            (f64::from(cell.min[axis]) - margin, 1.0),
+            (f64::from(cell.max[axis]) + margin, -1.0),
+        ] {
+            let inside = |p: &[f64; 3]| (p[axis] - plane) * sign;
+            if polygon[..count].iter().all(|p| inside(p) >= 0.0) {
+                continue;
+            }
+            let old = polygon;
+            let before = count;
+            count = 0;
+            for i in 0..before {
+                let (p, q) = (&old[i], &old[(i + 1) % before]);
+                let (from, to) = (inside(p), inside(q));
+                if from >= 0.0 {
+                    polygon[count] = *p;
+                    count += 1;
+                }
+                if (from >= 0.0) != (to >= 0.0) {
+                    let along = from / (from - to);
+                    polygon[count] = std::array::from_fn(|a| p[a] + along * (q[a] - p[a]));
+                    polygon[count][axis] = plane;
+                    count += 1;
+                }
+            }
+        }
+    }
+    let mut bounds = (count > 0).then_some(Bounds::EMPTY)?;
+    for corner in &polygon[..count] {
+        bounds = bounds.union(&Bounds {
+            min: corner.map(|c| (c - margin) as f32),
+            max: corner.map(|c| (c + margin) as f32),
+        });
+    }
+    Some(bounds)
+}
+
+/// The box that two overlapping boxes share.
+pub(super) fn intersection(a: &Bounds, b: &Bounds) -> Bounds {
+    Bounds {
+        min: std::array::from_fn(|axis| a.min[axis].max(b.min[axis])),
+        max: std::array::from_fn(|axis| a.max[axis].min(b.max[axis])),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CORNER: Corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+
+    fn cell(min: [f32; 3], max: [f32; 3]) -> Bounds {
+        Bounds { min, max }
+    }
+
+    #[test]
+    fn a_triangle_touches_boxes_at_its_hypotenuse_but_not_beyond() {
+        let at = |x: f32, y: f32| touches(&CORNER, &cell([x, y, -1.0], [x + 1.0, y + 1.0, 1.0]));
+        assert!(at(1.0, 1.0) && at(2.0, 2.0) && at(3.0, 1.0));
+        assert!(!at(2.001, 2.0) && !at(3.0, 3.0) && !at(-1.001, 1.0));
+        assert!(touches(&CORNER, &cell([0.0, 0.0, 0.0], [1.0, 1.0, 0.0])));
+        assert!(!touches(&CORNER, &cell([0.0, 0.0, 0.001], [1.0, 1.0, 1.0])));
+    }
+
+    #[test]
+    fn clipping_gives_the_box_of_the_part_inside() {
+        let inside = clip(&CORNER, &cell([1.0, 1.0, -1.0], [2.5, 9.0, 1.0]), 0.0);
+        assert_eq!(inside, Some(cell([1.0, 1.0, 0.0], [2.5, 3.0, 0.0])));
+        assert_eq!(
+            clip(&CORNER, &cell([2.001, 2.0, -1.0], [3.0, 3.0, 1.0]), 0.0),
+            None
+        );
+        let grown = clip(&CORNER, &cell([2.001, 2.0, -1.0], [3.0, 3.0, 1.0]), 0.5);
+        assert_eq!(grown, Some(cell([1.001, 1.0, -0.5], [3.0, 2.999, 0.5])));
+    }
+}
