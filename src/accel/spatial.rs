@@ -11,26 +11,61 @@
 //! inequalities of that proof use: each cell passes `max(n, t_min) ≤ min(f, t_best) · BOX_PAD`, and the
 //! leaf at the end lists the triangle. ∎
 //!
-//! Clipped: a cell that the triangle itself misses by more than [`margin`] does not list it, although
-//! its box may reach in. That makes shorter lists but assumes that the computed hit is no farther from
-//! the triangle than the margin; rays that graze a triangle at less than about 1/100 rad are beyond it
-//! unless the cell of the exact hit is visited, too, which it is unless a hit ends the ray in between.
+//! Clipped: a cell that the triangle itself misses by more than its [`Margin`] does not list it,
+//! although its box may reach in. That makes shorter lists, but assumes that the computed hit lies
+//! within the margin of the triangle. It does unless the ray grazes the plane of the triangle at less
+//! than [`LEAST_COSINE`]; and then only a hit, or an end of the ray, between the computed distance and
+//! the exact one can make a difference.
 
 use super::bounds::Bounds;
-use super::triangle::TriangleRecord;
+use super::triangle::{DISTANCE_PAD, TriangleRecord};
 
-/// By how much cells are grown before a clipped triangle counts as missing them, scene units.
-/// `bounds` is the box of the scene.
+/// Cosine between ray and normal down to which margins cover the error of a hit, 2⁻⁵.
+const LEAST_COSINE: f64 = 0.03125;
+
+/// By how much cells are grown before a clipped triangle counts as missing them.
 ///
-/// The computed distance of a hit errs by less than 2⁻²⁰ of the scene over the sine of the angle
-/// between ray and triangle: the margin covers angles down to 2⁻⁶.
-pub(super) fn margin(bounds: &Bounds) -> f64 {
-    let extent = bounds.extent().map(f64::from);
-    let diagonal = extent.iter().map(|e| e * e).sum::<f64>().sqrt();
-    let far = (0..3)
-        .map(|a| bounds.min[a].abs().max(bounds.max[a].abs()))
-        .fold(0.0, f32::max);
-    (diagonal * 2.0_f64.powi(-14) + f64::from(far) * 2.0_f64.powi(-19)).max(1e-18)
+/// The distance of a hit errs by less than [`DISTANCE_PAD`] times the terms that it is made of, over
+/// the determinant (see [`super::triangle`]). With edges `e1` and `e2`, normal `n`, `m` the sum of the
+/// magnitudes of both products in each component of `n`, and a ray no longer than the scene, that is
+/// `2 · DISTANCE_PAD · diagonal · |m| / (|n| · cosine)`, a point along the ray.
+pub(super) struct Margin {
+    /// The margin of a triangle whose |m| and |n| are equal, scene units.
+    least: f64,
+}
+
+impl Margin {
+    /// Margins in a scene with this box.
+    pub fn new(bounds: &Bounds) -> Self {
+        let extent = bounds.extent().map(f64::from);
+        let diagonal = extent.iter().map(|e| e * e).sum::<f64>().sqrt();
+        let far = (0..3)
+            .map(|a| bounds.min[a].abs().max(bounds.max[a].abs()))
+            .fold(0.0, f32::max);
+        let length = diagonal + f64::from(far) * LEAST_COSINE;
+        let least = 2.0 * f64::from(DISTANCE_PAD) * length / LEAST_COSINE;
+        Self {
+            least: least.max(1e-18),
+        }
+    }
+
+    /// The margin of one triangle, scene units; beyond everything if it has no area.
+    pub fn of(&self, record: &TriangleRecord) -> f64 {
+        let [e1, e2] = [record.e1, record.e2].map(|e| e.map(f64::from));
+        let (mut products, mut normal) = (0.0, 0.0);
+        for a in 0..3 {
+            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+            products += ((e1[b] * e2[c]).abs() + (e1[c] * e2[b]).abs()).powi(2);
+            normal += (e1[b] * e2[c] - e1[c] * e2[b]).powi(2);
+        }
+        // Finite, so that its product with a zero is no NaN.
+        let beyond = f64::from(f32::MAX);
+        if normal > 0.0 {
+            (self.least * (products / normal).sqrt()).min(beyond)
+        } else {
+            beyond
+        }
+    }
 }
 
 /// The corners of a triangle as kernels know them.

@@ -6,7 +6,7 @@
 
 use super::Node;
 use crate::accel::bounds::Bounds;
-use crate::accel::spatial::{clip, corners, intersection, margin};
+use crate::accel::spatial::{Margin, clip, corners, intersection};
 use crate::accel::{AccelError, BuildLog, TriangleSoup};
 use crate::config::Params;
 use rayon::prelude::*;
@@ -52,7 +52,7 @@ pub(super) fn build(
             0 => default_depth(soup.records.len()),
             depth => depth as u32,
         },
-        margin: params.flag("clip").then(|| margin(&bounds)),
+        margin: params.flag("clip").then(|| Margin::new(&bounds)),
         soup,
         references: AtomicU64::new(0),
     };
@@ -80,7 +80,7 @@ struct Settings<'a> {
     kept_if_empty: f32,
     max_depth: u32,
     /// Set if triangles are clipped.
-    margin: Option<f64>,
+    margin: Option<Margin>,
     soup: &'a TriangleSoup,
     /// How many were listed so far; beyond the limit nothing is divided any more.
     references: AtomicU64,
@@ -302,14 +302,11 @@ const ELSEWHERE: u32 = u32::MAX;
 /// The box of an item within half a cell; `None` if the half is clearly missed.
 fn part_within(item: &Item, half: &Bounds, settings: &Settings) -> Option<Bounds> {
     let by_box = intersection(&item.bounds, half);
-    let Some(margin) = settings.margin else {
+    let Some(margin) = &settings.margin else {
         return Some(by_box);
     };
-    let part = clip(
-        &corners(&settings.soup.records[item.id as usize]),
-        half,
-        margin,
-    )?;
+    let record = &settings.soup.records[item.id as usize];
+    let part = clip(&corners(record), half, margin.of(record))?;
     let clipped = intersection(&by_box, &part);
     let overlaps = (0..3).all(|a| clipped.min[a] <= clipped.max[a]);
     Some(if overlaps { clipped } else { by_box })

@@ -2,7 +2,7 @@
 
 use super::{INNER_SHIFT, LAST, LEAF, Space};
 use crate::accel::bounds::Bounds;
-use crate::accel::spatial::{Overlap, corners, margin};
+use crate::accel::spatial::{Margin, Overlap, corners};
 use crate::accel::{AccelError, TriangleSoup};
 use crate::config::Params;
 use rayon::prelude::*;
@@ -81,7 +81,7 @@ struct Settings<'a> {
     leaf_size: usize,
     traversal_cost: f64,
     /// Set if triangles are clipped.
-    margin: Option<f64>,
+    margin: Option<Margin>,
     boxes: Vec<Bounds>,
 }
 
@@ -96,7 +96,7 @@ impl<'a> Settings<'a> {
             },
             leaf_size: params.integer("leaf_size") as usize,
             traversal_cost: params.number("traversal_cost"),
-            margin: params.flag("clip").then(|| margin(&soup.bounds())),
+            margin: params.flag("clip").then(|| Margin::new(&soup.bounds())),
             boxes: soup.records.par_iter().map(|r| r.bounds()).collect(),
         }
     }
@@ -153,12 +153,13 @@ impl<'a> Settings<'a> {
     fn octants(&self, id: u32, position: [u32; 3], depth: u32) -> u8 {
         let middle = self.space.middle(position, depth);
         let mut mask = by_box(&self.boxes[id as usize], middle);
-        let Some(margin) = self.margin.filter(|_| !mask.is_power_of_two()) else {
+        let Some(margin) = self.margin.as_ref().filter(|_| !mask.is_power_of_two()) else {
             return mask;
         };
-        let corners = corners(&self.soup.records[id as usize]);
+        let record = &self.soup.records[id as usize];
+        let margin = margin.of(record);
         let half = self.space.half(depth + 1).map(|h| h + margin);
-        let overlap = Overlap::new(&corners, half);
+        let overlap = Overlap::new(&corners(record), half);
         for octant in 0..8_u32 {
             let child = Space::child(position, octant);
             if mask >> octant & 1 == 1 && !overlap.touches(self.space.centre(child, depth + 1)) {
