@@ -5,10 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Kernel file → Rust file, where the stem differs.
-const OTHER_FILE: &[(&str, &str)] = &[
-    ("sampling/sampler", "src/sampling/mod.rs"),
-    ("sampling/state", "src/sampling/mod.rs"),
-];
+const OTHER_FILE: &[(&str, &str)] = &[("sampling/sampler", "src/sampling/mod.rs")];
 
 /// Kernel files without a twin, with the reason.
 const NO_TWIN: &[(&str, &str)] = &[
@@ -31,6 +28,10 @@ const NO_TWIN: &[(&str, &str)] = &[
     ("integrator/render", "the loop over samples"),
     ("integrator/trace_rays", "the loop over rays"),
     ("sampling/dump_stream", "the loop over coordinates"),
+    (
+        "sampling/sampler_cost",
+        "the loop over samples, for their cost",
+    ),
     ("shading/hemisphere", "judged by images, not by a twin"),
     ("shading/light", "judged by images, not by a twin"),
     ("shading/material", "judged by images, not by a twin"),
@@ -50,6 +51,11 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
         "accel/bvh",
         "COUNT_MASK",
         "the twin clears the leaf bit before it shifts",
+    ),
+    (
+        "integrator/integrand",
+        "radiance",
+        "draws; the twin is given the point",
     ),
     ("sampling/pixel_hash", "hash", "the twin picks a function"),
     (
@@ -80,6 +86,11 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
     ("accel/uniform_grid", "sort_by_cell", "build"),
     ("accel/uniform_grid", "dot", "build, f64"),
     ("accel/uniform_grid", "cross", "build, f64"),
+    (
+        "integrator/integrand",
+        "half_plane_area",
+        "the integral, f64",
+    ),
     ("sampling/dimensions", "needed", "planning"),
     ("sampling/dimensions", "purpose", "words for the report"),
     (

@@ -7,6 +7,7 @@ mod estimate;
 mod failure;
 mod list;
 mod output;
+mod points;
 mod render;
 mod report;
 mod run;
@@ -60,6 +61,8 @@ enum Command {
     Render(render::Render),
     #[command(after_help = EXIT_CODES)]
     Verify(verify::Verify),
+    #[command(after_help = EXIT_CODES)]
+    Points(points::Points),
     List(list::List),
     #[command(after_help = EXIT_CODES)]
     Doctor(doctor::Doctor),
@@ -73,6 +76,7 @@ pub fn main() -> ExitCode {
         Command::Run(command) => command.execute(),
         Command::Render(command) => command.execute(),
         Command::Verify(command) => command.execute(),
+        Command::Points(command) => command.execute(),
         Command::List(command) => command.execute(),
         Command::Doctor(command) => command.execute(),
         Command::Report(command) => command.execute(),

@@ -67,7 +67,7 @@ impl Judge {
         }
         let twin = BvhTwin::build(soup, &params, &mut BuildLog::default())?;
         twin.validate(soup)?;
-        let sets = record_rays(scene, soup, camera, &twin, settings.rays, seed);
+        let sets = record_rays(scene, soup, camera, &twin, settings, seed);
         let mut judge = Self {
             sets,
             brute_force: JudgeCheck::default(),

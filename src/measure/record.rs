@@ -281,6 +281,10 @@ pub struct StructureRecord {
     pub build: Vec<Phase>,
     /// Sum of the phases, milliseconds.
     pub build_ms: f64,
+    /// Most host memory that the build needed beyond what was in use before it, the result included,
+    /// bytes; absent where allocations are not counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub build_peak_bytes: Option<u64>,
     /// Static figures.
     pub stats: StructureStats,
     /// Verdict; `None` only if the build failed.
@@ -377,6 +381,10 @@ pub struct BiasRecord {
     pub min_p: f64,
     /// Histogram of the p-values in ten equal bins: flat when there is no bias.
     pub p_histogram: Vec<usize>,
+    /// Difference of the mean luminance of all replicates from the reference's, in standard errors;
+    /// absent where it is not testable.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub z: Option<f64>,
     /// `no-bias-found`, `biased`, or `not-testable` with the reason.
     pub verdict: String,
 }

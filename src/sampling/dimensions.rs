@@ -17,12 +17,12 @@ pub const ROULETTE: u32 = 5;
 pub const PER_BOUNCE: u32 = 6;
 
 /// Dimension of `purpose` at `bounce`.
-pub fn at_bounce(bounce: u32, purpose: u32) -> u32 {
+pub const fn at_bounce(bounce: u32, purpose: u32) -> u32 {
     FIRST_BOUNCE + bounce * PER_BOUNCE + purpose
 }
 
 /// Dimensions that a path of `max_depth` bounces consumes.
-pub fn needed(max_depth: u32) -> u32 {
+pub const fn needed(max_depth: u32) -> u32 {
     at_bounce(max_depth, 0)
 }
 
