@@ -478,3 +478,6 @@ impl CpuTwin for Twin<'_> {
         self.trace(ray, true, counters).triangle != NO_HIT
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -79,11 +79,15 @@ pub(super) fn corners(record: &TriangleRecord) -> Corners {
         .map(|v| v.to_array().map(f64::from))
 }
 
-/// Separating-axis test of one triangle against boxes of one size (T. Akenine-Möller, "Fast 3D
-/// triangle–box overlap testing", 2001).
+/// Separating-axis test of one triangle against boxes of one size whose boxes meet that of the
+/// triangle (T. Akenine-Möller, "Fast 3D triangle–box overlap testing", 2001).
 pub(super) struct Overlap {
-    /// Axis, and the interval of the triangle on it grown by the box's half extent.
-    axes: [([f64; 3], f64, f64); 13],
+    normal: [f64; 3],
+    /// Interval of the triangle on its normal, grown by the half extent of the boxes.
+    on_normal: [f64; 2],
+    /// The products of edge `i` with axis `a` at `3 i + a`: both components that are not 0, and the
+    /// grown interval on it.
+    products: [([f64; 2], [f64; 2]); 9],
 }
 
 impl Overlap {
@@ -92,38 +96,54 @@ impl Overlap {
         let edges: Corners = std::array::from_fn(|i| {
             std::array::from_fn(|a| corners[(i + 1) % 3][a] - corners[i][a])
         });
-        let unit =
-            |axis: usize| -> [f64; 3] { std::array::from_fn(|a| f64::from(u8::from(a == axis))) };
-        let axes = std::array::from_fn(|i| {
-            let axis = match i {
-                0 => cross(edges[0], edges[1]),
-                1..=3 => unit(i - 1),
-                _ => cross(edges[(i - 4) / 3], unit((i - 4) % 3)),
-            };
-            let on_axis = corners.map(|corner| dot(corner, axis));
-            let reach = (0..3).map(|a| half[a] * axis[a].abs()).sum::<f64>();
-            let low = on_axis[0].min(on_axis[1]).min(on_axis[2]) - reach;
-            let high = on_axis[0].max(on_axis[1]).max(on_axis[2]) + reach;
-            (axis, low, high)
+        let normal = cross(edges[0], edges[1]);
+        let reach: f64 = (0..3).map(|a| half[a] * normal[a].abs()).sum();
+        let height = corners.map(|corner| dot(corner, normal));
+        let products = std::array::from_fn(|k| {
+            let (i, [b, c]) = (k / 3, others(k % 3));
+            let axis = [edges[i][c], -edges[i][b]];
+            // Both ends of the edge lie at the same place.
+            let on_axis = |corner: &[f64; 3]| axis[0] * corner[b] + axis[1] * corner[c];
+            let (p, q) = (on_axis(&corners[i]), on_axis(&corners[(i + 2) % 3]));
+            let reach = half[b] * axis[0].abs() + half[c] * axis[1].abs();
+            (axis, [p.min(q) - reach, p.max(q) + reach])
         });
-        Self { axes }
+        Self {
+            normal,
+            on_normal: [
+                height[0].min(height[1]).min(height[2]) - reach,
+                height[0].max(height[1]).max(height[2]) + reach,
+            ],
+            products,
+        }
     }
 
     /// Whether the triangle touches the box around `centre`.
     pub fn touches(&self, centre: [f64; 3]) -> bool {
-        self.axes.iter().all(|(axis, low, high)| {
-            let c = dot(centre, *axis);
-            *low <= c && c <= *high
-        })
+        let within = |[low, high]: [f64; 2], x: f64| low <= x && x <= high;
+        within(self.on_normal, dot(centre, self.normal))
+            && self.products.iter().enumerate().all(|(k, (axis, interval))| {
+                let [b, c] = others(k % 3);
+                within(*interval, axis[0] * centre[b] + axis[1] * centre[c])
+            })
     }
+}
+
+/// The axes that are not `axis`.
+fn others(axis: usize) -> [usize; 2] {
+    [(axis + 1) % 3, (axis + 2) % 3]
 }
 
 /// Whether the triangle touches the closed box.
 pub(super) fn touches(corners: &Corners, cell: &Bounds) -> bool {
     let side = |a: usize| (f64::from(cell.min[a]), f64::from(cell.max[a]));
+    let meets = (0..3).all(|a| {
+        let (low, high) = side(a);
+        corners.iter().any(|c| c[a] <= high) && corners.iter().any(|c| c[a] >= low)
+    });
     let half = std::array::from_fn(|a| 0.5 * (side(a).1 - side(a).0));
     let centre = std::array::from_fn(|a| 0.5 * (side(a).1 + side(a).0));
-    Overlap::new(corners, half).touches(centre)
+    meets && Overlap::new(corners, half).touches(centre)
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
