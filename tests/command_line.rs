@@ -1,5 +1,6 @@
 //! The program as a user meets it: exit codes, messages, lists.
 
+use raystone::discrepancy::Measure;
 use raystone::measure::image::METRICS;
 use raystone::run::Registries;
 use std::path::{Path, PathBuf};
@@ -207,6 +208,9 @@ fn list_mentions_every_entry_of_every_registry() {
     }
     for metric in METRICS {
         assert!(words.contains(metric.id), "{}", metric.id);
+    }
+    for measure in Measure::ALL {
+        assert!(words.contains(measure.description()), "{measure:?}");
     }
 }
 

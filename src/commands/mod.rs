@@ -2,6 +2,7 @@
 
 mod adapters;
 mod arguments;
+mod discrepancy;
 mod doctor;
 mod estimate;
 mod failure;
@@ -31,7 +32,8 @@ Examples:
   raystone doctor
   raystone run experiments/quick.toml
   raystone verify --accel bvh --scene path/to/model.obj
-  raystone render --scene cornell-box --spp 256 -o box.png";
+  raystone render --scene cornell-box --spp 256 -o box.png
+  raystone discrepancy --measure star,l2star points.txt";
 
 /// Version, commit and whether the sources differed from it.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
@@ -67,6 +69,8 @@ enum Command {
     #[command(after_help = EXIT_CODES)]
     Doctor(doctor::Doctor),
     #[command(after_help = EXIT_CODES)]
+    Discrepancy(discrepancy::Discrepancy),
+    #[command(after_help = EXIT_CODES)]
     Report(report::Report),
 }
 
@@ -79,6 +83,7 @@ pub fn main() -> ExitCode {
         Command::Points(command) => command.execute(),
         Command::List(command) => command.execute(),
         Command::Doctor(command) => command.execute(),
+        Command::Discrepancy(command) => command.execute(),
         Command::Report(command) => command.execute(),
     };
     done.unwrap_or_else(|failure| failure.tell())
