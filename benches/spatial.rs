@@ -60,7 +60,10 @@ fn builders(criterion: &mut Criterion) {
             label += if clip { " clipped" } else { " by boxes" };
         }
         group.bench_function(label, |b| {
-            b.iter(|| kind.build(&soup, &params, &mut BuildLog::default()).map(|_| ()));
+            b.iter(|| {
+                kind.build(&soup, &params, &mut BuildLog::default())
+                    .map(|_| ())
+            });
         });
     }
     group.finish();

@@ -82,7 +82,11 @@ fn check(what: &str, soup: &TriangleSoup, rays: &[Ray], on_device: bool) -> usiz
 fn halls(rng: &mut Pcg, count: usize) -> TriangleSoup {
     let mut triangles = vec![
         [Vec3::ZERO, Vec3::X * 16.0, Vec3::Y * 16.0],
-        [Vec3::splat(16.0), Vec3::new(16.0, 16.0, 0.0), Vec3::new(0.0, 16.0, 16.0)],
+        [
+            Vec3::splat(16.0),
+            Vec3::new(16.0, 16.0, 0.0),
+            Vec3::new(0.0, 16.0, 16.0),
+        ],
     ];
     while triangles.len() < count {
         let mut at = || rng.below(17) as f32;
@@ -92,7 +96,11 @@ fn halls(rng: &mut Pcg, count: usize) -> TriangleSoup {
             let axis = rng.below(3) as usize;
             high[axis] = low[axis];
         }
-        let side = Vec3::new(low.x, high.y, if rng.below(2) == 0 { low.z } else { high.z });
+        let side = Vec3::new(
+            low.x,
+            high.y,
+            if rng.below(2) == 0 { low.z } else { high.z },
+        );
         triangles.push([low, high, side]);
     }
     scenes::soup(triangles)
@@ -162,7 +170,12 @@ fn needles_and_grazing_rays_see_what_brute_force_sees() {
         let soup = scenes::soup(needles);
         let first = brute_force(&soup, &rays);
         rays.extend(scenes::cut_at_hits(&rays, &first));
-        hits += check(&format!("needles 1e-{exponent}"), &soup, &rays, exponent == 3);
+        hits += check(
+            &format!("needles 1e-{exponent}"),
+            &soup,
+            &rays,
+            exponent == 3,
+        );
     }
     assert!(hits > 10_000, "only {hits} hits: the test is blunt");
 }
@@ -173,7 +186,10 @@ fn a_leaf_that_lost_a_triangle_is_seen_by_the_same_rays() {
     let soup = halls(&mut rng, 160);
     let rays = rays_in_planes(&mut rng, 1500);
     let expected = brute_force(&soup, &rays);
-    let struck = expected.iter().find(|h| h.triangle != NO_HIT).expect("a hit");
+    let struck = expected
+        .iter()
+        .find(|h| h.triangle != NO_HIT)
+        .expect("a hit");
     // As if every leaf had lost it: its place is taken by a copy of triangle 0.
     let mut without = soup.clone();
     let lost = &mut without.records[struck.triangle as usize];
@@ -244,18 +260,32 @@ fn one_triangle_is_a_leaf_of_known_figures() {
     let soup = scenes::soup([[Vec3::ZERO, Vec3::X, Vec3::Y]]);
     for (name, nodes) in [("octree", 1), ("kd-tree", 1)] {
         let stats = stats(name, &soup, &[]);
-        assert_eq!((stats.nodes, stats.leaves, stats.references), (nodes, 1, 1), "{name}");
+        assert_eq!(
+            (stats.nodes, stats.leaves, stats.references),
+            (nodes, 1, 1),
+            "{name}"
+        );
         assert_eq!(stats.leaf_histogram, [0, 1], "{name}");
-        assert_eq!((stats.depth, stats.sah_cost), (Some(0), Some(1.0)), "{name}");
+        assert_eq!(
+            (stats.depth, stats.sah_cost),
+            (Some(0), Some(1.0)),
+            "{name}"
+        );
     }
 }
 
 #[test]
 fn coincident_triangles_do_not_fill_the_memory() {
-    let one = [Vec3::ZERO, Vec3::new(5.0, 1.0, 0.3), Vec3::new(1.0, 4.0, 2.0)];
+    let one = [
+        Vec3::ZERO,
+        Vec3::new(5.0, 1.0, 0.3),
+        Vec3::new(1.0, 4.0, 2.0),
+    ];
     let soup = scenes::soup(vec![one; 300]);
     for (name, fine) in [("octree", "leaf_size"), ("kd-tree", "max_depth")] {
-        let finest = [ParamValue::Integer(1), ParamValue::Integer(64)][usize::from(name == "kd-tree")].clone();
+        let finest = [ParamValue::Integer(1), ParamValue::Integer(64)]
+            [usize::from(name == "kd-tree")]
+        .clone();
         let mut changes = vec![(fine, finest), ("traversal_cost", ParamValue::Number(0.01))];
         if name == "octree" {
             changes.push(("max_depth", ParamValue::Integer(20)));

@@ -122,10 +122,14 @@ impl Overlap {
     pub fn touches(&self, centre: [f64; 3]) -> bool {
         let within = |[low, high]: [f64; 2], x: f64| low <= x && x <= high;
         within(self.on_normal, dot(centre, self.normal))
-            && self.products.iter().enumerate().all(|(k, (axis, interval))| {
-                let [b, c] = others(k % 3);
-                within(*interval, axis[0] * centre[b] + axis[1] * centre[c])
-            })
+            && self
+                .products
+                .iter()
+                .enumerate()
+                .all(|(k, (axis, interval))| {
+                    let [b, c] = others(k % 3);
+                    within(*interval, axis[0] * centre[b] + axis[1] * centre[c])
+                })
     }
 }
 

@@ -8,7 +8,11 @@ use glam::Vec3;
 fn soup() -> TriangleSoup {
     let triangle = |i: usize| {
         let at = Vec3::new((i % 6) as f32, (i / 6 % 6) as f32, (i / 36) as f32);
-        let vertices = [at, at + Vec3::new(1.2, 0.1, 0.3), at + Vec3::new(0.2, 1.3, 0.1)];
+        let vertices = [
+            at,
+            at + Vec3::new(1.2, 0.1, 0.3),
+            at + Vec3::new(0.2, 1.3, 0.1),
+        ];
         super::super::triangle::TriangleRecord::new(&Triangle { vertices }, i as u32, 0)
     };
     TriangleSoup {
@@ -77,10 +81,19 @@ fn validation_finds_planted_faults() {
     plant("children that do not exist", &|b| {
         b.nodes[0] = Node::inner(0, 3.0, b.nodes.len());
     });
-    plant("nodes that nothing refers to", &|b| b.nodes.extend([Node::EMPTY; 2]));
-    plant("a plane outside its cell", &|b| b.nodes[0].word = 99.0_f32.to_bits());
+    plant("nodes that nothing refers to", &|b| {
+        b.nodes.extend([Node::EMPTY; 2])
+    });
+    plant("a plane outside its cell", &|b| {
+        b.nodes[0].word = 99.0_f32.to_bits()
+    });
     plant("a plane that was moved", &|b| {
-        let Content::Inner { axis, position, children } = b.nodes[0].content() else {
+        let Content::Inner {
+            axis,
+            position,
+            children,
+        } = b.nodes[0].content()
+        else {
             panic!("the root is a leaf")
         };
         b.nodes[0] = Node::inner(axis, position + 0.7, children);
@@ -91,13 +104,21 @@ fn validation_finds_planted_faults() {
 #[test]
 fn a_node_is_eight_bytes_and_says_what_it_was_made_of() {
     assert_eq!(size_of::<Node>(), 8);
-    let Content::Inner { axis, position, children } = Node::inner(2, -0.5, 77).content() else {
+    let Content::Inner {
+        axis,
+        position,
+        children,
+    } = Node::inner(2, -0.5, 77).content()
+    else {
         panic!("not inner")
     };
     assert_eq!((axis, position, children), (2, -0.5, 77));
     assert_eq!(first_of(Node::leaf(5, 9)), (5, 9));
     assert_eq!(first_of(Node::leaf(5, 9).moved_by(100, 20)), (25, 9));
-    assert_eq!(Node::inner(1, 2.0, 3).moved_by(100, 20), Node::inner(1, 2.0, 103));
+    assert_eq!(
+        Node::inner(1, 2.0, 3).moved_by(100, 20),
+        Node::inner(1, 2.0, 103)
+    );
 }
 
 #[test]
@@ -106,7 +127,11 @@ fn the_split_of_two_clusters_is_beside_the_greater_gap() {
     let triangle = |i: usize| {
         let x = if i < 4 { 0.0 } else { 9.0 };
         let at = Vec3::new(x, 0.0, i as f32);
-        let vertices = [at, at + Vec3::new(1.0, 0.0, 1.0), at + Vec3::new(0.0, 1.0, 0.0)];
+        let vertices = [
+            at,
+            at + Vec3::new(1.0, 0.0, 1.0),
+            at + Vec3::new(0.0, 1.0, 0.0),
+        ];
         super::super::triangle::TriangleRecord::new(&Triangle { vertices }, i as u32, 0)
     };
     let soup = TriangleSoup {

@@ -7,7 +7,11 @@ use glam::Vec3;
 fn soup() -> TriangleSoup {
     let triangle = |i: usize| {
         let at = Vec3::new((i % 6) as f32, (i / 6 % 6) as f32, (i / 36) as f32);
-        let vertices = [at, at + Vec3::new(1.2, 0.1, 0.3), at + Vec3::new(0.2, 1.3, 0.1)];
+        let vertices = [
+            at,
+            at + Vec3::new(1.2, 0.1, 0.3),
+            at + Vec3::new(0.2, 1.3, 0.1),
+        ];
         super::super::triangle::TriangleRecord::new(&Triangle { vertices }, i as u32, 0)
     };
     TriangleSoup {
@@ -19,7 +23,9 @@ fn built(soup: &TriangleSoup, clip: bool) -> Built {
     let defaults = Octree.parameters().into_iter();
     let mut params = Params(defaults.map(|p| (p.name.to_owned(), p.default)).collect());
     params.0.insert("clip".to_owned(), ParamValue::Flag(clip));
-    params.0.insert("leaf_size".to_owned(), ParamValue::Integer(4));
+    params
+        .0
+        .insert("leaf_size".to_owned(), ParamValue::Integer(4));
     let space = Space::around(soup);
     let tree = build::build(soup, &space, &params).expect("it builds");
     Built {
@@ -47,7 +53,9 @@ fn validation_finds_planted_faults() {
             assert!(built.validate(&soup).is_err(), "{what}, clip {clip}");
         }
     };
-    plant("another triangle in the place of one", &|b| b.references[0] ^= 1);
+    plant("another triangle in the place of one", &|b| {
+        b.references[0] ^= 1
+    });
     plant("a triangle that does not exist", &|b| {
         let last = b.references.last_mut().expect("references");
         *last = LAST | 216;
@@ -60,7 +68,9 @@ fn validation_finds_planted_faults() {
         let leaf = first_leaf(b);
         b.nodes[leaf] = LEAF | b.references.len() as u32;
     });
-    plant("a reference that no leaf lists", &|b| b.references.push(LAST));
+    plant("a reference that no leaf lists", &|b| {
+        b.references.push(LAST)
+    });
     plant("a child that is said to be empty", &|b| {
         b.nodes[0] &= b.nodes[0] - 1;
     });
@@ -72,7 +82,9 @@ fn validation_finds_planted_faults() {
         let root = b.nodes[0];
         b.nodes[inner.expect("an inner cell")] = root;
     });
-    plant("a block that nothing refers to", &|b| b.nodes.extend([0; 8]));
+    plant("a block that nothing refers to", &|b| {
+        b.nodes.extend([0; 8])
+    });
     plant("cells that lie elsewhere", &|b| b.space.low[0] -= 0.9);
     plant("a box that is too small", &|b| b.space.extent[1] -= 0.5);
 }
@@ -83,7 +95,11 @@ fn mirroring_exchanges_the_halves_of_the_axes_that_are_flipped() {
         for mask in 0..256 {
             let expected = (0..8).filter(|i| mask >> (i ^ flip) & 1 == 1);
             let expected: u32 = expected.map(|i| 1 << i).sum();
-            assert_eq!(mirrored(mask, flip), expected, "{mask:#b} flipped by {flip:#b}");
+            assert_eq!(
+                mirrored(mask, flip),
+                expected,
+                "{mask:#b} flipped by {flip:#b}"
+            );
         }
     }
 }
@@ -107,12 +123,19 @@ fn visited_children_are_those_whose_interval_is_not_empty() {
                 from <= to * BOX_PAD
             };
             let expected: u32 = (0..8).filter(|o| overlaps(*o)).map(|o| 1 << o).sum();
-            assert_eq!(visited(enter, exit, middle), expected, "{enter}..{exit} {middle:?}");
+            assert_eq!(
+                visited(enter, exit, middle),
+                expected,
+                "{enter}..{exit} {middle:?}"
+            );
             counts[expected.count_ones() as usize] += 1;
         }
     }
     // None, one and up to all eight come up.
-    assert!(counts[0] > 0 && counts[1] > 0 && counts[4] > 0 && counts[8] > 0, "{counts:?}");
+    assert!(
+        counts[0] > 0 && counts[1] > 0 && counts[4] > 0 && counts[8] > 0,
+        "{counts:?}"
+    );
 }
 
 #[test]
