@@ -78,6 +78,8 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
         "the judge, in batches",
     ),
     ("accel/bvh", "layout", "build"),
+    ("accel/kd_tree", "halves", "figures and validation"),
+    ("accel/kd_tree", "lacking_in_leaf", "validation"),
     ("accel/roped_bvh", "ropes", "build"),
     ("accel/uniform_grid", "insert", "build"),
     ("accel/uniform_grid", "insert_triangle", "build"),

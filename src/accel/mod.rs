@@ -5,15 +5,20 @@
 pub mod bounds;
 mod brute_force;
 mod bvh;
+mod kd_tree;
+mod octree;
 pub mod ray;
 mod registry;
 mod roped_bvh;
+mod spatial;
 pub mod tree;
 pub mod triangle;
 mod uniform_grid;
 
 pub use brute_force::{BruteForce, brute_force_hits};
 pub use bvh::{Bvh, BvhTwin};
+pub use kd_tree::KdTree;
+pub use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::AccelRegistry;
 pub use roped_bvh::RopedBvh;
