@@ -5,7 +5,7 @@
 
 use super::bounds::Bounds;
 use super::triangle::TriangleRecord;
-use super::{AccelError, TriangleSoup};
+use super::{AccelError, BuildLog, TriangleSoup};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::measure::record::StructureStats;
 
@@ -89,8 +89,19 @@ struct Settings {
 }
 
 impl Tree {
-    /// Builds the tree.
-    pub fn build(soup: &TriangleSoup, params: &Params) -> Tree {
+    /// Builds the tree with the builder that `params` name; phases are timed in `log`.
+    ///
+    /// # Errors
+    /// A limit of the builder is exceeded.
+    pub fn build(
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Tree, AccelError> {
+        Ok(log.phase("binned", || Self::build_binned(soup, params)))
+    }
+
+    fn build_binned(soup: &TriangleSoup, params: &Params) -> Tree {
         let settings = Settings {
             leaf_size: params.integer("leaf_size") as usize,
             traversal_cost: params.number("traversal_cost") as f32,
