@@ -1,5 +1,10 @@
 //! Binned SAH, in place and on all cores.
 //!
+//! Bins divide the box of a node rather than that of its centres. The cost of a split takes both
+//! sides for leaves, which overrates large sides, so among many borders the cheapest is often one that
+//! cuts a few large triangles off an end. Borders spread evenly over the box rarely do that:
+//! Sponza's SAH is 70 to 72 over the box and 74 to 81 over the centres, for 8 to 32 bins.
+//!
 //! Source: I. Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007.
 
 use super::parameters::{MAX_BINS, SAH_DEPTH, Settings};
@@ -84,7 +89,7 @@ fn split(
         return Some(exhaustive_split(references));
     }
     let plan = (depth < SAH_DEPTH)
-        .then(|| best_bin_split(references, &extent.centres, settings.bins))
+        .then(|| best_bin_split(references, extent, settings.bins))
         .flatten();
     Some(match plan {
         Some(plan) => partition(references, |r| plan.is_low(r)),
@@ -141,8 +146,8 @@ pub(super) struct BinSplit {
     bin: usize,
     /// Sum over both sides of half area times count.
     pub cost: f32,
-    /// Boxes of both sides.
-    pub bounds: [Box3; 2],
+    /// Box that both sides share.
+    pub overlap: Box3,
 }
 
 impl BinSplit {
@@ -160,15 +165,14 @@ struct BinGrid {
 }
 
 impl BinGrid {
-    /// Bins between the centres; those at the ends have half the width. `None` if all centres
-    /// coincide.
-    fn new(centres: &Box3, bins: usize) -> Option<Self> {
-        let extent = centres.max - centres.min;
+    /// Bins over a box; those at the ends have half the width. `None` if the box is a point.
+    fn new(over: &Box3, bins: usize) -> Option<Self> {
+        let extent = over.max - over.min;
         let scale = Vec3A::splat(bins as f32 - 1.0) / extent;
         // An axis without extent, or with an infinite one, puts everything into bin 0.
         let usable = extent.cmpgt(Vec3A::ZERO) & scale.cmplt(Vec3A::INFINITY);
         usable.any().then(|| Self {
-            origin: centres.min,
+            origin: over.min,
             scale: Vec3A::select(usable, scale, Vec3A::ZERO),
         })
     }
@@ -222,13 +226,25 @@ impl Bins {
 }
 
 /// The best border between bins of all axes; `None` if all centres coincide.
+///
+/// Bins divide the box of the node, not that of the centres: see the module's text. Where all
+/// centres fall into one such bin of each axis, their own box is divided.
 pub(super) fn best_bin_split(
     references: &[Reference],
-    centres: &Box3,
+    extent: &Extent,
     bins: usize,
 ) -> Option<BinSplit> {
     let bins = bins.min(references.len().max(4));
-    let grid = BinGrid::new(centres, bins)?;
+    let doubled = Box3 {
+        min: extent.bounds.min * 2.0,
+        max: extent.bounds.max * 2.0,
+    };
+    let over = |grid_box| best_border(references, BinGrid::new(grid_box, bins)?, bins);
+    over(&doubled).or_else(|| over(&extent.centres))
+}
+
+/// The best border between the bins of a grid; `None` if on every axis one bin holds everything.
+fn best_border(references: &[Reference], grid: BinGrid, bins: usize) -> Option<BinSplit> {
     let filled = if references.len() < PARALLEL_BINNING {
         Bins::of(references, grid)
     } else {
@@ -263,7 +279,7 @@ pub(super) fn best_bin_split(
                     grid,
                     bin,
                     cost,
-                    bounds: [bounds, high_bounds],
+                    overlap: bounds.intersection(high_bounds),
                 });
             }
         }

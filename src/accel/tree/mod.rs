@@ -6,10 +6,16 @@
 
 mod binned;
 mod coverage;
+mod depth;
 mod leaves;
 mod parameters;
+mod ploc;
+mod quality;
 mod reference;
+mod reinsertion;
+mod sbvh;
 mod subtree;
+mod sweep;
 
 pub use coverage::Coverage;
 pub use parameters::tree_parameters;
@@ -17,9 +23,9 @@ pub use parameters::tree_parameters;
 use super::bounds::Bounds;
 use super::{AccelError, BuildLog, TriangleSoup};
 use crate::config::Params;
-use crate::measure::record::StructureStats;
 use parameters::{Builder, Settings};
 use reference::Reference;
+use sweep::Axes;
 
 /// A node; children of an inner node lie at `left` and `right`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,7 +60,8 @@ pub enum NodeKind {
 pub struct Tree {
     /// Nodes; empty for an empty scene.
     pub nodes: Vec<TreeNode>,
-    /// Triangle indices, leaf by leaf.
+    /// Triangle indices, leaf by leaf in the order of the nodes. After spatial splits a triangle may
+    /// stand in several leaves, whose boxes cover its own only together.
     pub order: Vec<u32>,
 }
 
@@ -73,71 +80,34 @@ impl Tree {
             return Ok(Tree::default());
         }
         let references = log.phase("boxes", || reference::references(soup));
-        let tree = match settings.builder {
-            _ => log.phase("binned", || Tree::in_place(references, &settings, binned::build)),
-        };
+        let name = params.name("builder");
+        let mut tree = log.phase(name, || Tree::grow(references, &settings))?;
+        if settings.reinsertion > 0 {
+            tree = log.phase("reinsertion", || reinsertion::optimise(tree, &settings));
+        }
         Ok(log.phase("leaves", || leaves::choose_leaves(tree, &settings)))
     }
 
-    /// The tree of a builder that brings the references into the order of the leaves.
-    fn in_place(
-        mut references: Vec<Reference>,
-        settings: &Settings,
-        build: impl Fn(&mut [Reference], &Settings) -> subtree::Subtree,
-    ) -> Tree {
-        let subtree = build(&mut references, settings);
-        let order = references.iter().map(|r| r.id).collect();
-        drop(references);
-        Tree {
-            nodes: subtree.lay_out(),
-            order,
-        }
-    }
-
-    /// Deepest leaf; the root has depth 0.
-    pub fn depth(&self) -> u32 {
-        let mut depths = vec![0u32; self.nodes.len()];
-        let mut deepest = 0;
-        for (index, node) in self.nodes.iter().enumerate() {
-            deepest = deepest.max(depths[index]);
-            if let NodeKind::Inner { left, right } = node.kind {
-                depths[left as usize] = depths[index] + 1;
-                depths[right as usize] = depths[index] + 1;
+    /// The tree of the builder alone.
+    fn grow(mut references: Vec<Reference>, settings: &Settings) -> Result<Tree, AccelError> {
+        let (subtree, order) = match settings.builder {
+            Builder::Binned => {
+                let subtree = binned::build(&mut references, settings);
+                (subtree, references.iter().map(|r| r.id).collect())
             }
-        }
-        deepest
+            Builder::Sweep => sweep::build(&references, Axes::All, settings),
+            Builder::LongestAxisSweep => sweep::build(&references, Axes::Longest, settings),
+            Builder::Sbvh => sbvh::build(std::mem::take(&mut references), settings),
+            Builder::Ploc => return ploc::build(&references, settings, false),
+            Builder::PlocReinsertion => return ploc::build(&references, settings, true),
+        };
+        drop(references);
+        let nodes = subtree.lay_out();
+        Ok(Tree { nodes, order })
     }
 
-    /// Figures of the tree; `bytes` is left 0. SAH with both constants 1: sum over inner nodes of
-    /// A(node) / A(root) plus sum over leaves of A(leaf) · triangles / A(root).
-    pub fn stats(&self) -> StructureStats {
-        let mut stats = StructureStats {
-            nodes: self.nodes.len() as u64,
-            references: self.order.len() as u64,
-            ..Default::default()
-        };
-        let Some(root) = self.nodes.first() else {
-            return stats;
-        };
-        let leaves = self.nodes.iter().filter_map(|node| match node.kind {
-            NodeKind::Inner { .. } => None,
-            NodeKind::Leaf { count, .. } => Some(count as usize),
-        });
-        stats.leaf_histogram = super::leaf_histogram(leaves);
-        let mut cost = 0.0_f64;
-        for node in &self.nodes {
-            let weight = match node.kind {
-                NodeKind::Inner { .. } => 1,
-                NodeKind::Leaf { count, .. } => {
-                    stats.leaves += 1;
-                    count
-                }
-            };
-            cost += f64::from(node.bounds.half_area()) * f64::from(weight);
-        }
-        let root_area = f64::from(root.bounds.half_area());
-        stats.sah_cost = (root_area > 0.0).then(|| cost / root_area);
-        stats.depth = Some(self.depth());
-        stats
+    /// Whether some triangle is listed more than once, in leaves that only together cover it.
+    pub fn has_duplicates(&self, soup: &TriangleSoup) -> bool {
+        self.order.len() > soup.records.len()
     }
 }

@@ -152,7 +152,7 @@ pub fn tree_parameters() -> ParameterSchema {
         integer(
             "bins",
             "bins on an axis for object splits (binned, sbvh)",
-            16,
+            12,
             2,
             MAX_BINS as i64,
         ),
