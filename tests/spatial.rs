@@ -326,9 +326,9 @@ fn a_stack_that_overflows_raises_the_error_word_and_one_of_the_right_size_does_n
     for name in KINDS {
         let built = build(kind(name), &soup, &with(name, &[]));
         trace(common::gpu(), &*built, &soup, &rays, &[]);
-        let outcome = std::panic::catch_unwind(|| {
+        let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             trace(common::gpu(), &SmallStack(&*built), &soup, &rays, &[]);
-        });
+        }));
         let panic = outcome.expect_err("the error word is raised");
         let text = panic.downcast_ref::<String>().expect("a text");
         assert!(text.contains("error word"), "{name}: {text}");

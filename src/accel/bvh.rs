@@ -116,7 +116,7 @@ impl BvhTwin {
                 limit: FIRST_MASK.into(),
             });
         }
-        let tree = log.phase("binned-sah", || Tree::build(soup, params));
+        let tree = Tree::build(soup, params, log)?;
         let (nodes, leaf_triangles): (Vec<Node>, Vec<TriangleRecord>) = log.phase("layout", || {
             (
                 layout(&tree),

@@ -48,7 +48,7 @@ impl AccelKind for RopedBvh {
                 limit: FIRST_MASK.into(),
             });
         }
-        let tree = log.phase("binned-sah", || Tree::build(soup, params));
+        let tree = Tree::build(soup, params, log)?;
         let (nodes, leaf_triangles): (Vec<Node>, Vec<TriangleRecord>) = log.phase("ropes", || {
             (
                 ropes(&tree),
