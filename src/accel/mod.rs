@@ -5,18 +5,17 @@
 pub mod bounds;
 mod brute_force;
 mod bvh;
+pub mod leaf;
 pub mod ray;
 mod registry;
-mod roped_bvh;
 pub mod tree;
 pub mod triangle;
 mod uniform_grid;
 
 pub use brute_force::{BruteForce, brute_force_hits};
-pub use bvh::{Bvh, BvhTwin};
+pub use bvh::{BuiltBvh, Bvh, BvhTwin, RopedBvh};
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::AccelRegistry;
-pub use roped_bvh::RopedBvh;
 pub use uniform_grid::UniformGrid;
 
 use crate::config::{ParameterSchema, Params};
@@ -41,6 +40,9 @@ pub enum AccelError {
         /// What the structure allows.
         limit: u64,
     },
+    /// Parameters that contradict each other, with the reason.
+    #[error("{0}")]
+    Contradiction(String),
     /// A structural invariant is violated.
     #[error("{0}")]
     Invalid(String),
@@ -223,6 +225,11 @@ pub trait BuiltAccel: Sync {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError>;
     /// The kernel with its arrays, uniforms, constants and features.
     fn buffers(&self) -> GpuBuffers<'_>;
+    /// Arrays that the kernel can read in several parts, where the adapter binds less than they need:
+    /// see [`crate::gpu::Bindings::parts`].
+    fn divisible(&self) -> &'static [&'static str] {
+        &[]
+    }
     /// Static figures.
     fn stats(&self) -> StructureStats;
     /// The traversal on the host, if it has one.

@@ -79,6 +79,7 @@ fn composition(
         .sequence
         .constants(&job.sampler.sequence_variant.params);
     let integrator = job.integrator.constants(job.params);
+    out = scene.bindings.merged(&traced.bindings).compose(out);
     for (name, value) in sampler.iter().chain(&integrator) {
         out = out.constant(name, *value);
     }
