@@ -55,8 +55,8 @@ fn faults_of_all_kinds_are_told_with_file_and_line() {
         (
             "a type error in the middle of a function",
             pairs,
-            "max(left, right)",
-            "max(left, n0)",
+            "min(left, right) < MISSED",
+            "min(left, n0) < MISSED",
             "",
         ),
         (

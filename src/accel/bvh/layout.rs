@@ -1,13 +1,8 @@
 //! What traversals ask of a layout of nodes, and what they carry for one ray.
 
-use super::super::leaf::{LEAF, LeafReader};
+use super::super::leaf::LeafReader;
 use super::super::ray::{Hit, NO_HIT, Ray, safe_inverse};
 use super::super::Counters;
-
-/// The root.
-pub(super) const ROOT: u32 = 0;
-/// No node: also a leaf without triangles.
-pub(super) const NONE: u32 = LEAF;
 
 /// Inner nodes to go to from a node, in order, and which child the first is (0 or 1).
 pub(super) struct Inner {

@@ -30,6 +30,11 @@ use octant_roped::Octants;
 use options::{Options, Traversal};
 use pairs::Pairs;
 
+/// The root.
+const ROOT: u32 = 0;
+/// No node: also a leaf without triangles.
+const NONE: u32 = 0x8000_0000;
+
 /// The registry entry `bvh`.
 pub struct Bvh;
 

@@ -6,7 +6,8 @@ use super::super::leaf::{LEAF, Leaves};
 use super::super::ray::Hit;
 use super::super::{AccelError, TriangleSoup};
 use super::boxes::{AXIS_SHIFT, BoxNode, Boxes, CHILD_MASK};
-use super::layout::{NONE, Query, ROOT};
+use super::layout::Query;
+use super::{NONE, ROOT};
 use bytemuck::{Pod, Zeroable};
 
 /// Box and content of [`BoxNode`], whose link is not used, and a rope for each octant.

@@ -5,7 +5,8 @@
 //! 2017, Algorithm 4.3, which as printed ends early after a missed first child and forgets hits.
 
 use super::super::ray::Hit;
-use super::layout::{NONE, Nodes, Query, ROOT};
+use super::layout::{Nodes, Query};
+use super::{NONE, ROOT};
 
 pub(super) fn trace(nodes: &impl Nodes, mut query: Query) -> Hit {
     let mut current = ROOT;

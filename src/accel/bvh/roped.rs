@@ -6,7 +6,8 @@ use super::super::bounds::enter_box;
 use super::super::leaf::LEAF;
 use super::super::ray::Hit;
 use super::boxes::{Boxes, CHILD_MASK};
-use super::layout::{NONE, Query, ROOT};
+use super::layout::Query;
+use super::{NONE, ROOT};
 
 /// The rope of a node, from its parent's rope: the first child leads to the second, the second to
 /// where the parent leads.

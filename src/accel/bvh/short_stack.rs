@@ -6,7 +6,8 @@
 //! still to be visited. Visits are those of the full stack.
 
 use super::super::ray::Hit;
-use super::layout::{NONE, Nodes, Query, ROOT};
+use super::layout::{Nodes, Query};
+use super::{NONE, ROOT};
 use std::collections::VecDeque;
 
 pub(super) fn trace(nodes: &impl Nodes, entries: usize, mut query: Query) -> Hit {
@@ -57,6 +58,7 @@ pub(super) fn trace(nodes: &impl Nodes, entries: usize, mut query: Query) -> Hit
         level += 1;
         if let Some(node) = stack.pop_back() {
             current = node;
+            restart_end = 0;
         } else {
             restart_end = level;
             current = ROOT;

@@ -1,7 +1,8 @@
 //! Near child first, the far one on a stack. Twin of `kernels/accel/bvh/stack.wesl`.
 
 use super::super::ray::Hit;
-use super::layout::{NONE, Nodes, Query, ROOT};
+use super::layout::{Nodes, Query};
+use super::{NONE, ROOT};
 
 pub(super) fn trace(nodes: &impl Nodes, mut query: Query) -> Hit {
     let mut stack = Vec::new();
