@@ -72,6 +72,7 @@ fn composition(
     for (name, on) in scene.features.flags() {
         out = out.feature(name, on);
     }
+    out = scene.bindings.merged(&traced.bindings).compose(out);
     for (name, value) in job.integrator.constants(job.params) {
         out = out.constant(name, value);
     }
