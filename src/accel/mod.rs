@@ -5,15 +5,19 @@
 pub mod bounds;
 mod brute_force;
 mod bvh;
+mod collapse;
+mod cwbvh;
 pub mod ray;
 mod registry;
 mod roped_bvh;
 pub mod tree;
 pub mod triangle;
 mod uniform_grid;
+mod wide;
 
 pub use brute_force::{BruteForce, brute_force_hits};
 pub use bvh::{Bvh, BvhTwin};
+pub use cwbvh::Cwbvh;
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::AccelRegistry;
 pub use roped_bvh::RopedBvh;

@@ -12,7 +12,13 @@ pub struct AccelRegistry {
 impl Default for AccelRegistry {
     fn default() -> Self {
         Self {
-            kinds: vec![&BruteForce, &super::Bvh, &RopedBvh, &UniformGrid],
+            kinds: vec![
+                &BruteForce,
+                &super::Bvh,
+                &super::Cwbvh,
+                &RopedBvh,
+                &UniformGrid,
+            ],
         }
     }
 }
