@@ -21,11 +21,13 @@ use bytemuck::{Pod, Zeroable};
 const WIDTH: usize = 8;
 /// A slot counts its triangles in unary, in three bits.
 const MAX_LEAF: u32 = 3;
-const NODE_HITS: u32 = 0xff00_0000;
-const NODE_SHIFT: u32 = 24;
-const ROOT: u32 = 0x8000_0000;
-/// Meaning of an inner child in slot 0: one hit bit, place 24.
-const INNER: u8 = 1 << 5 | NODE_SHIFT as u8;
+const PLACES_SHIFT: u32 = 8;
+const SLOTS_MASK: u32 = 0xff;
+const ROOT: u32 = 0x100;
+const INDEX_MASK: u32 = 0x00ff_ffff;
+const MASK_SHIFT: u32 = 24;
+const COUNT_SHIFT: u32 = 5;
+const PLACE_MASK: u32 = 31;
 
 /// The registry entry.
 pub struct Cwbvh;
@@ -71,10 +73,11 @@ struct Node {
     low: [f32; 3],
     /// Biased exponents, and which slots are inner children in the highest byte.
     exponents: u32,
+    /// Index, and which slots are leaves in the highest byte.
     first_child: u32,
     first_triangle: u32,
-    /// What a slot holds: 0 nothing; otherwise the hit bits it sets, shifted by 5, and where.
-    meanings: [u8; WIDTH],
+    /// Leaves: how many triangles, shifted by 5, and from where after the first of the node.
+    triangles: [u8; WIDTH],
     /// Planes at the minimum on x, y, z.
     lows: [[u8; WIDTH]; 3],
     /// Planes at the maximum.
@@ -91,7 +94,23 @@ impl Node {
     }
 
     fn inner_mask(&self) -> u32 {
-        self.exponents >> NODE_SHIFT
+        self.exponents >> MASK_SHIFT
+    }
+
+    fn leaf_mask(&self) -> u32 {
+        self.first_child >> MASK_SHIFT
+    }
+
+    /// Index of the inner child in `slot`.
+    fn child(&self, slot: u32) -> u32 {
+        (self.first_child & INDEX_MASK) + (self.inner_mask() & ((1 << slot) - 1)).count_ones()
+    }
+
+    /// Places of the triangles of the leaf in `slot`.
+    fn leaf(&self, slot: usize) -> std::ops::Range<usize> {
+        let triangles = u32::from(self.triangles[slot]);
+        let first = self.first_triangle as usize + (triangles & PLACE_MASK) as usize;
+        first..first + (triangles >> COUNT_SHIFT) as usize
     }
 
     fn bounds(&self, slot: usize) -> Bounds {
@@ -145,7 +164,7 @@ fn arrange_by_octant(bounds: &Bounds, children: &mut Vec<WideChild>) {
 
 impl Built {
     fn new(soup: &TriangleSoup, wide: WideTree, stats: StructureStats, params: &Params) -> Self {
-        let nodes: Vec<Node> = wide.nodes.iter().map(|slots| node(slots)).collect();
+        let nodes: Vec<Node> = wide.nodes.iter().map(|slots| pack(slots)).collect();
         let leaf_triangles: Vec<TriangleRecord> = wide
             .order
             .iter()
@@ -168,53 +187,41 @@ impl Built {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
         let inverse = safe_inverse(ray.direction);
         let backward = inverse.map(|x| x < 0.0);
-        let octant = (0..3).fold(0, |bits, axis| bits | u32::from(!backward[axis]) << axis);
+        let octant = (0..3).fold(0, |bits, axis| bits | u32::from(backward[axis]) << axis);
         let mut hit = Hit::miss(ray);
         let mut stack = Vec::with_capacity(self.stack_entries as usize);
         let mut group = (0, ROOT);
         loop {
             counters.nodes += 1;
             counters.box_tests += WIDTH as u32;
-            let place = group.1.ilog2();
-            let slot = (place - NODE_SHIFT) ^ octant;
-            let node = group.0 + (group.1 & ((1 << slot) - 1)).count_ones();
-            group.1 ^= 1 << place;
-            if group.1 & NODE_HITS != 0 {
-                stack.push(group);
+            let places = group.1 >> PLACES_SHIFT;
+            let slot = bit_number(places & places.wrapping_neg()) ^ octant;
+            let index = group.0 + (group.1 & ((1 << slot) - 1)).count_ones();
+            let left = places & (places - 1);
+            if left != 0 {
+                stack.push((group.0, left << PLACES_SHIFT | group.1 & SLOTS_MASK));
                 counters.stack_high_water = counters.stack_high_water.max(stack.len() as u32);
             }
-            let node = &self.nodes[node as usize];
-            let planes = frame(node.low, node.exponents, ray.origin, inverse);
-            let mut hits = 0;
-            for half in 0..2 {
-                let word = |planes: &[[u8; WIDTH]; 3], axis: usize| {
-                    let q = &planes[axis][4 * half..];
-                    u32::from_le_bytes([q[0], q[1], q[2], q[3]])
-                };
-                let choose = |far: bool| {
-                    [0, 1, 2].map(|axis| {
-                        let high = backward[axis] != far;
-                        word(if high { &node.highs } else { &node.lows }, axis)
-                    })
-                };
-                let enter = enter_four(choose(false), &planes, ray.t_min);
-                let leave = leave_four(choose(true), &planes, hit.t);
-                let entered = [0, 1, 2, 3].map(|i| enter[i] <= leave[i]);
-                hits |= hit_bits(&node.meanings[4 * half..], entered, octant);
-            }
-            group = (node.first_child, hits & NODE_HITS | node.inner_mask());
-            let mut triangles = hits & !NODE_HITS;
-            while triangles != 0 {
-                let index = node.first_triangle + triangles.trailing_zeros();
-                triangles &= triangles - 1;
-                counters.triangle_tests += 1;
-                let triangle = &self.leaf_triangles[index as usize];
-                intersect_triangle(triangle, ray, inverse, &mut hit);
-                if any && hit.triangle != NO_HIT {
-                    return hit;
+            let node = &self.nodes[index as usize];
+            let slots = slot_bits(node, ray, inverse, hit.t);
+            let inner = node.inner_mask();
+            group = (
+                node.first_child & INDEX_MASK,
+                permute(slots & inner, octant) << PLACES_SHIFT | inner,
+            );
+            let mut leaves = slots & node.leaf_mask();
+            while leaves != 0 {
+                let leaf = bit_number(leaves & leaves.wrapping_neg());
+                leaves &= leaves - 1;
+                for triangle in &self.leaf_triangles[node.leaf(leaf as usize)] {
+                    counters.triangle_tests += 1;
+                    intersect_triangle(triangle, ray, inverse, &mut hit);
+                    if any && hit.triangle != NO_HIT {
+                        return hit;
+                    }
                 }
             }
-            if group.1 & NODE_HITS == 0 {
+            if group.1 < ROOT {
                 match stack.pop() {
                     Some(below) => group = below,
                     None => return hit,
@@ -224,21 +231,39 @@ impl Built {
     }
 }
 
-/// Bits of the four children with these meanings, as far as they are entered.
-fn hit_bits(meanings: &[u8], entered: [bool; 4], octant: u32) -> u32 {
+/// The number of a bit that stands alone.
+fn bit_number(bit: u32) -> u32 {
+    bit.trailing_zeros()
+}
+
+/// Slots of a node whose boxes are entered, as bits.
+fn slot_bits(node: &Node, ray: &Ray, inverse: [f32; 3], t_best: f32) -> u32 {
+    let planes = frame(node.low, node.exponents, ray.origin, inverse);
     let mut bits = 0;
-    for (meaning, entered) in meanings.iter().map(|&m| u32::from(m)).zip(entered) {
-        let is_inner = meaning & NODE_SHIFT == NODE_SHIFT;
-        let place = if is_inner { meaning ^ octant } else { meaning } & 31;
-        if entered {
-            bits |= meaning >> 5 << place;
+    for half in [0, 4] {
+        let words = |far: bool| -> [u32; 3] {
+            std::array::from_fn(|axis| {
+                let high = (inverse[axis] < 0.0) != far;
+                let q = if high { &node.highs } else { &node.lows }[axis];
+                u32::from_le_bytes([q[half], q[half + 1], q[half + 2], q[half + 3]])
+            })
+        };
+        let enter = enter_four(words(false), &planes, ray.t_min);
+        let leave = leave_four(words(true), &planes, t_best);
+        for i in 0..4 {
+            bits |= u32::from(enter[i] <= leave[i]) << (half + i);
         }
     }
     bits
 }
 
+/// Moves bit i of eight to i ^ octant.
+fn permute(bits: u32, octant: u32) -> u32 {
+    (0..8).fold(0, |out, i| out | (bits >> i & 1) << (i ^ octant))
+}
+
 /// The node with these children in its slots.
-fn node(slots: &[WideChild]) -> Node {
+fn pack(slots: &[WideChild]) -> Node {
     let bounds = slots
         .iter()
         .filter(|child| !child.is_nothing())
@@ -249,7 +274,7 @@ fn node(slots: &[WideChild]) -> Node {
     }
     let grid = Grid::new(&bounds);
     node.low = grid.low;
-    let mut inner_mask = 0;
+    let [mut inner_mask, mut leaf_mask] = [0_u8; 2];
     let mut triangles = 0;
     for (slot, child) in slots.iter().enumerate() {
         if child.is_nothing() {
@@ -260,24 +285,24 @@ fn node(slots: &[WideChild]) -> Node {
             node.lows[axis][slot] = planes.low[axis];
             node.highs[axis][slot] = planes.high[axis];
         }
-        node.meanings[slot] = match child.kind {
+        match child.kind {
             WideKind::Node(index) => {
                 if inner_mask == 0 {
                     node.first_child = index;
                 }
                 inner_mask |= 1 << slot;
-                INNER + slot as u8
             }
             WideKind::Leaf { first, count } => {
-                if triangles == 0 {
+                if leaf_mask == 0 {
                     node.first_triangle = first;
                 }
-                let place = triangles as u8;
+                leaf_mask |= 1 << slot;
+                node.triangles[slot] = (count << COUNT_SHIFT | triangles) as u8;
                 triangles += count;
-                ((1 << count) - 1) << 5 | place
             }
-        };
+        }
     }
+    node.first_child |= u32::from(leaf_mask) << MASK_SHIFT;
     node.exponents = grid.exponent_word(inner_mask);
     node
 }
@@ -296,24 +321,18 @@ impl BuiltAccel for Built {
             }
             let node = &self.nodes[index];
             for slot in 0..WIDTH {
-                let meaning = node.meanings[slot];
                 // What is below must lie in every decoded box on the way.
                 let bounds = around.intersection(&node.bounds(slot));
-                let place = usize::from(meaning & 31);
-                if meaning == 0 {
-                    continue;
-                } else if meaning == INNER + slot as u8 {
-                    let before = node.inner_mask() & ((1 << slot) - 1);
-                    let child = node.first_child as usize + before.count_ones() as usize;
-                    open.push((child, bounds, depth + 1));
-                } else if matches!(meaning >> 5, 1 | 3 | 7) && place < 3 * WIDTH {
-                    let first = node.first_triangle as usize + place;
-                    let end = first + (meaning >> 5).count_ones() as usize;
-                    coverage.leaf(self.leaf_triangles.get(first..end), &bounds)?;
-                } else {
+                let [is_inner, is_leaf] =
+                    [node.inner_mask(), node.leaf_mask()].map(|mask| mask >> slot & 1 == 1);
+                if is_inner && is_leaf {
                     return Err(AccelError::Invalid(format!(
-                        "node {index}: slot {slot} means {meaning:#x}"
+                        "node {index}: slot {slot} is a leaf and a node"
                     )));
+                } else if is_inner {
+                    open.push((node.child(slot as u32) as usize, bounds, depth + 1));
+                } else if is_leaf {
+                    coverage.leaf(self.leaf_triangles.get(node.leaf(slot)), &bounds)?;
                 }
             }
         }
@@ -341,8 +360,8 @@ impl BuiltAccel for Built {
                 },
             ],
             uniforms: vec![super::limits(self.nodes.len(), self.nodes.len())],
-            // A multiple of 8, so that scenes of like depth share a kernel.
-            constants: vec![("STACK_ENTRIES", self.stack_entries.next_multiple_of(8))],
+            // A multiple of 8, so that scenes of like depth share a kernel, and one to spare.
+            constants: vec![("STACK_ENTRIES", (self.stack_entries + 1).next_multiple_of(8))],
         }
     }
 

@@ -186,13 +186,24 @@ fn planes(word: u32, scale: f32, base: f32) -> [f32; 4] {
     bytes(word).map(|q| q * scale + base)
 }
 
+/// The later of two distances as kernels see it: by integers, so that of two negative distances it
+/// may be the earlier one.
+fn later(a: f32, b: f32) -> f32 {
+    f32::from_bits((a.to_bits() as i32).max(b.to_bits() as i32) as u32)
+}
+
+/// The earlier of two distances, of two negative ones perhaps the later.
+fn earlier(a: f32, b: f32) -> f32 {
+    f32::from_bits((a.to_bits() as i32).min(b.to_bits() as i32) as u32)
+}
+
 /// Where the segment enters four boxes, whose near planes on the three axes are these.
 pub fn enter_four(near: [u32; 3], frame: &Frame, t_min: f32) -> [f32; 4] {
     let distances: [_; 3] =
         std::array::from_fn(|axis| planes(near[axis], frame.scale[axis], frame.near[axis]));
     std::array::from_fn(|i| {
         let [x, y, z] = distances.map(|d| d[i]);
-        x.max(y).max(z).max(t_min)
+        later(later(later(x, y), z), t_min)
     })
 }
 
@@ -202,6 +213,6 @@ pub fn leave_four(far: [u32; 3], frame: &Frame, t_best: f32) -> [f32; 4] {
         std::array::from_fn(|axis| planes(far[axis], frame.scale[axis], frame.far[axis]));
     std::array::from_fn(|i| {
         let [x, y, z] = distances.map(|d| d[i]);
-        x.min(y).min(z).min(t_best) * BOX_PAD
+        earlier(earlier(earlier(x, y), z), t_best) * BOX_PAD
     })
 }
