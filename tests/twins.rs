@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 /// Kernel file → Rust file, where the stem differs.
 const OTHER_FILE: &[(&str, &str)] = &[
+    ("accel/grid", "src/accel/grid/mod.rs"),
+    ("accel/irregular_grid", "src/accel/irregular_grid/mod.rs"),
     ("sampling/sampler", "src/sampling/mod.rs"),
     ("sampling/state", "src/sampling/mod.rs"),
 ];
@@ -51,6 +53,11 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
         "COUNT_MASK",
         "the twin clears the leaf bit before it shifts",
     ),
+    (
+        "accel/two_level_grid",
+        "load_top",
+        "a method of the twin's arrays",
+    ),
     ("sampling/pixel_hash", "hash", "the twin picks a function"),
     (
         "sampling/sampler",
@@ -73,11 +80,8 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
     ),
     ("accel/bvh", "layout", "build"),
     ("accel/roped_bvh", "ropes", "build"),
-    ("accel/uniform_grid", "insert", "build"),
-    ("accel/uniform_grid", "insert_triangle", "build"),
-    ("accel/uniform_grid", "sort_by_cell", "build"),
-    ("accel/uniform_grid", "dot", "build, f64"),
-    ("accel/uniform_grid", "cross", "build, f64"),
+    ("accel/two_level_grid", "parts", "build"),
+    ("accel/two_level_grid", "cut", "build"),
     ("sampling/dimensions", "needed", "planning"),
     ("sampling/dimensions", "purpose", "words for the report"),
     (

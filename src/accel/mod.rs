@@ -5,18 +5,23 @@
 pub mod bounds;
 mod brute_force;
 mod bvh;
+mod grid;
+mod irregular_grid;
 pub mod ray;
 mod registry;
 mod roped_bvh;
 pub mod tree;
 pub mod triangle;
+mod two_level_grid;
 mod uniform_grid;
 
 pub use brute_force::{BruteForce, brute_force_hits};
 pub use bvh::{Bvh, BvhTwin};
+pub use irregular_grid::IrregularGrid;
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::AccelRegistry;
 pub use roped_bvh::RopedBvh;
+pub use two_level_grid::TwoLevelGrid;
 pub use uniform_grid::UniformGrid;
 
 use crate::config::{ParameterSchema, Params};
