@@ -8,7 +8,7 @@
 
 use super::bounds::{BOX_PAD, enter_box};
 use super::grid::lists::{Lists, PartLists, check_lists};
-use super::grid::{Frame, Grid, check_words, clamped, cleary, first_axis, outside};
+use super::grid::{Cut, Frame, Grid, areas, check_words, clamped, first_axis, outside};
 use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
 use super::triangle::intersect_triangle;
 use super::{
@@ -71,14 +71,14 @@ impl AccelKind for TwoLevelGrid {
     }
 }
 
-/// Parts along each axis of a top cell that lists `count` triangles.
-fn parts(grid: &Grid, count: usize, lambda: f64) -> [u32; 3] {
+/// Parts along each axis of a top cell that lists triangles of these areas.
+fn parts(grid: &Grid, areas: impl ExactSizeIterator<Item = f32>, lambda: f64) -> [u32; 3] {
     let side = grid.cell.map(f64::from);
-    let wanted = cleary(side, count, lambda);
+    let Cut { wanted, share } = Cut::new(side, areas, lambda);
     std::array::from_fn(|a| {
         // Smaller parts would be all margin.
         let most = (side[a] / (4.0 * f64::from(grid.margin))).clamp(1.0, f64::from(MOST_PARTS));
-        wanted[a].round().clamp(1.0, most) as u32
+        (wanted[a] * share).round().clamp(1.0, most) as u32
     })
 }
 
@@ -93,7 +93,11 @@ struct Run {
 
 fn cut(grid: Grid, soup: &TriangleSoup, top: &Lists, lambda: f64) -> Result<Built, AccelError> {
     let tops = grid.cells() as usize;
-    let resolutions = |cell: usize| parts(&grid, top.of(cell).len(), lambda);
+    let areas = areas(soup);
+    let resolutions = |cell: usize| {
+        let ids = top.of(cell).iter();
+        parts(&grid, ids.map(|&id| areas[id as usize]), lambda)
+    };
     let all_parts = |cell: usize| {
         resolutions(cell)
             .iter()
@@ -243,13 +247,14 @@ impl BuiltAccel for Built {
     }
 
     fn buffers(&self) -> GpuBuffers<'_> {
-        let parts = (0..3).map(|a| {
-            let most = (0..self.grid.cells() as u32)
-                .map(|cell| self.top(self.grid.coordinates(cell)).1[a].max(1))
-                .max();
-            self.grid.resolution[a] as usize * most.unwrap_or(1) as usize
-        });
-        let steps = parts.sum::<usize>() + 1;
+        // Along an axis a ray passes every part of a column once, and finds its part again whenever
+        // it enters another top cell.
+        let column = |a: usize| {
+            let tops = 0..self.grid.cells() as u32;
+            let parts = tops.map(|cell| self.top(self.grid.coordinates(cell)).1[a].max(1));
+            self.grid.resolution[a] as usize * (parts.max().unwrap_or(1) as usize + 2)
+        };
+        let steps = 2 * (0..3).map(column).sum::<usize>();
         let array = |name, words| NamedWords {
             name,
             words,

@@ -94,6 +94,54 @@ pub fn cleary(side: [f64; 3], triangles: usize, lambda: f64) -> [f64; 3] {
     side.map(|s| s * density)
 }
 
+/// References that a cut of a cell may make of one, on average.
+const MOST_COPIES: f64 = 8.0;
+
+/// Parts along each axis of a cell that is to be cut, before rounding.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cut {
+    /// By Cleary's rule.
+    pub wanted: [f64; 3],
+    /// At most 1: beyond this share of the wanted parts, triangles that cross the whole cell would be
+    /// listed in too many, which no number of triangles per cell makes up for.
+    pub share: f64,
+}
+
+impl Cut {
+    /// A cell with these sides, which lists triangles of these areas.
+    pub fn new(side: [f64; 3], areas: impl ExactSizeIterator<Item = f32>, lambda: f64) -> Self {
+        // A flat cell is no reason for ever smaller parts.
+        let longest = side.iter().copied().fold(0.0, f64::max);
+        let side = side.map(|s| s.max(longest / 16.0));
+        let count = areas.len();
+        let wanted = cleary(side, count, lambda);
+        let volume = side.iter().product::<f64>();
+        let section = (volume / side.iter().copied().fold(longest, f64::min)) as f32;
+        let area = areas.map(|a| f64::from(a.min(section))).sum::<f64>();
+        // A surface meets about one and a half times its area in faces of parts.
+        let face = (volume / wanted.iter().product::<f64>()).powf(2.0 / 3.0);
+        let copies = 1.5 * area / face / count as f64;
+        Self {
+            wanted,
+            share: ((MOST_COPIES - 1.0) / copies).sqrt().min(1.0),
+        }
+    }
+}
+
+/// Area of each triangle.
+pub fn areas(soup: &TriangleSoup) -> Vec<f32> {
+    let area = |record: &TriangleRecord| {
+        let (e, f) = (record.e1, record.e2);
+        let normal = [
+            e[1] * f[2] - e[2] * f[1],
+            e[2] * f[0] - e[0] * f[2],
+            e[0] * f[1] - e[1] * f[0],
+        ];
+        0.5 * normal.iter().map(|n| n * n).sum::<f32>().sqrt()
+    };
+    soup.records.par_iter().map(area).collect()
+}
+
 /// Box around the triangles as kernels know them.
 fn bounds_of(records: &[TriangleRecord]) -> Bounds {
     let around = |chunk: &[TriangleRecord]| {

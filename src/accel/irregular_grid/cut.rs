@@ -2,7 +2,7 @@
 //! triangles, and cells of one voxel; empty octants are one cell from the start.
 
 use super::super::grid::lists::{Lists, PartLists};
-use super::super::grid::{Frame, Grid, check_words, cleary};
+use super::super::grid::{Cut, Frame, Grid, areas, check_words};
 use super::super::{AccelError, TriangleSoup};
 use super::voxels::{Block, Cell, Entry, Map};
 use super::{Partition, Settings};
@@ -33,18 +33,22 @@ pub fn cut(
     let coarse = Grid::new(&frame, top);
     let fine = coarse.part([0; 3], top, top.map(|n| n << shift));
     let lists = Lists::new(name, &coarse, soup, true, log)?;
-    let tops = coarse.cells() as usize;
-    let voxels =
-        |cell: usize| 1u64 << (3 * parts_log(&fine, settings, shift, lists.of(cell).len()));
-    let needed: u64 = (0..tops).into_par_iter().map(voxels).sum();
-    check_words(&format!("voxels of an {name}"), needed)?;
-    Ok(log.phase("build", || {
+    log.phase("build", || {
+        let tops = coarse.cells() as usize;
+        let areas = areas(soup);
+        let voxels = |cell: usize| {
+            let ids = lists.of(cell).iter();
+            let areas = ids.map(|&id| areas[id as usize]);
+            1u64 << (3 * parts_log(&fine, settings, shift, areas))
+        };
+        let needed: u64 = (0..tops).into_par_iter().map(voxels).sum();
+        check_words(&format!("voxels of an {name}"), needed)?;
         let ranges: Vec<_> = (0..tops)
             .step_by(RUN)
             .map(|c| c..(c + RUN).min(tops))
             .collect();
         let cut_run = |cells: std::ops::Range<usize>| {
-            let mut run = Run::new(&fine, soup, settings);
+            let mut run = Run::new(&fine, soup, &areas, settings);
             for cell in cells {
                 let lowest = coarse.coordinates(cell as u32).map(|c| c << shift);
                 let entry = run.entry(lowest, shift, lists.of(cell), 2);
@@ -53,26 +57,38 @@ pub fn cut(
             run.result()
         };
         let runs: Vec<Pieces> = ranges.into_par_iter().map(cut_run).collect();
-        join(fine, top, shift, runs)
-    }))
+        Ok(join(fine, top, shift, runs))
+    })
 }
 
-/// Logarithm of the parts into which a cube of 2^`size` voxels with `count` triangles is cut along each
-/// axis.
-fn parts_log(fine: &Grid, settings: &Settings, size: u32, count: usize) -> u32 {
-    if count == 0 {
+/// Logarithm of the parts into which a cube of 2^`size` voxels that lists triangles of these areas is
+/// cut along each axis.
+fn parts_log(
+    fine: &Grid,
+    settings: &Settings,
+    size: u32,
+    areas: impl ExactSizeIterator<Item = f32>,
+) -> u32 {
+    if areas.len() == 0 {
         return 0;
     }
     let side = fine.cell.map(|c| f64::from(c) * f64::from(1u32 << size));
-    let longest = side.iter().copied().fold(0.0, f64::max);
-    let wanted = cleary(side, count, settings.lambda2);
-    let wanted = wanted.iter().copied().fold(1.0, f64::max);
-    // A flat cell must not be cut into a cube of ever thinner slices.
-    let even = 2.0 * (settings.lambda2 * count as f64).cbrt().max(1.0);
+    let Cut { wanted, share } = Cut::new(side, areas, settings.lambda2);
+    let most = wanted.iter().copied().fold(1.0, f64::max);
+    let by_copies = if share < 1.0 {
+        (most * share).max(1.0).log2() as u32
+    } else {
+        MOST_LOG
+    };
     // Smaller parts would be all margin.
+    let longest = side.iter().copied().fold(0.0, f64::max);
     let finest = (longest / (4.0 * f64::from(fine.margin))).max(1.0);
-    let ceiling = wanted.min(even).log2().ceil() as u32;
-    ceiling.min(finest.log2() as u32).min(size).min(MOST_LOG)
+    let ceiling = most.log2().ceil() as u32;
+    ceiling
+        .min(by_copies)
+        .min(finest.log2() as u32)
+        .min(size)
+        .min(MOST_LOG)
 }
 
 /// What a task produced; places and numbers count from its own begin.
@@ -143,6 +159,7 @@ fn join(fine: Grid, top: [u32; 3], shift: u32, runs: Vec<Pieces>) -> Partition {
 struct Run<'a> {
     fine: &'a Grid,
     soup: &'a TriangleSoup,
+    areas: &'a [f32],
     settings: &'a Settings,
     top: Vec<u32>,
     entries: Vec<u32>,
@@ -166,10 +183,16 @@ struct Open<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn new(fine: &'a Grid, soup: &'a TriangleSoup, settings: &'a Settings) -> Self {
+    fn new(
+        fine: &'a Grid,
+        soup: &'a TriangleSoup,
+        areas: &'a [f32],
+        settings: &'a Settings,
+    ) -> Self {
         Self {
             fine,
             soup,
+            areas,
             settings,
             top: Vec::new(),
             entries: Vec::new(),
@@ -192,7 +215,8 @@ impl<'a> Run<'a> {
 
     /// Word of the entry of a cube of 2^`size` voxels, with all that is below it.
     fn entry(&mut self, lowest: [u32; 3], size: u32, ids: &[u32], level: u32) -> u32 {
-        let log = parts_log(self.fine, self.settings, size, ids.len());
+        let areas = ids.iter().map(|&id| self.areas[id as usize]);
+        let log = parts_log(self.fine, self.settings, size, areas);
         if log == 0 {
             return self.cell(lowest, size, ids);
         }
