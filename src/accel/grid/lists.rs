@@ -15,6 +15,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const BUCKETS: u32 = 64;
 /// References are counted up to this number, which is too many by far.
 const ENOUGH: u64 = 16 * MAX_WORDS;
+/// References after which a run tells the others how many it found.
+const REPORT: u64 = 1 << 16;
 /// Fewest triangles of a run.
 const LEAST_RUN: usize = 2048;
 
@@ -77,25 +79,25 @@ fn insert(grid: &Grid, records: &[TriangleRecord], exact: bool, shift: u32) -> (
         let room = 2 * run.len() / buckets;
         let mut pairs: Pairs = (0..buckets).map(|_| Vec::with_capacity(room)).collect();
         let mut raster = Raster::default();
-        for some in run.chunks(256) {
-            let so_far = total.load(Ordering::Relaxed);
+        let (mut so_far, mut count) = (0, 0);
+        for triangle in run {
+            raster.rows(grid, triangle, exact, |first, cells| {
+                count += u64::from(cells);
+                if so_far <= MAX_WORDS {
+                    for cell in first..first + cells {
+                        pairs[(cell >> shift) as usize].push((cell, triangle.id));
+                    }
+                }
+            });
+            if count >= REPORT {
+                so_far = total.fetch_add(count, Ordering::Relaxed) + count;
+                count = 0;
+            }
             if so_far > ENOUGH {
                 break;
             }
-            let full = so_far > MAX_WORDS;
-            let mut count = 0;
-            for triangle in some {
-                raster.rows(grid, triangle, exact, |first, cells| {
-                    count += u64::from(cells);
-                    if !full {
-                        for cell in first..first + cells {
-                            pairs[(cell >> shift) as usize].push((cell, triangle.id));
-                        }
-                    }
-                });
-            }
-            total.fetch_add(count, Ordering::Relaxed);
         }
+        total.fetch_add(count, Ordering::Relaxed);
         pairs
     };
     let runs = records.par_chunks(run_length).map(insert_run).collect();

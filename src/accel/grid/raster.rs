@@ -41,7 +41,8 @@ pub struct Raster {
 
 impl Raster {
     /// Calls `row(first cell, number of cells)` for every row of cells along x that the triangle
-    /// overlaps once cells are grown by the margin; without `exact`, for every row of its box.
+    /// overlaps once cells are grown by the margin, more for needles ([`margin_of`]); without `exact`,
+    /// for every row of its box.
     pub fn rows(
         &mut self,
         grid: &Grid,
@@ -64,7 +65,7 @@ impl Raster {
             }
             return;
         }
-        let shape = Shape::new(grid, &corners);
+        let shape = Shape::new(grid, &corners, margin_of(record));
         let plane = (wide_axes == 3).then(|| Plane::new(&shape));
         let whole = |axis: usize| [first[axis], last[axis]];
         let along_z = (wide[0] && wide[1]).then(|| Outline::new(&shape, 1, 0));
@@ -95,6 +96,23 @@ impl Raster {
     }
 }
 
+/// By how many margins the cells inside the box of a triangle are grown for it. The distance to the
+/// plane of a needle is less exact by its length over its width, so that hits land beside it; they
+/// stay in its box.
+fn margin_of(record: &TriangleRecord) -> f64 {
+    let (e, f) = (record.e1.map(f64::from), record.e2.map(f64::from));
+    let square = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>();
+    let normal = [
+        e[1] * f[2] - e[2] * f[1],
+        e[2] * f[0] - e[0] * f[2],
+        e[0] * f[1] - e[1] * f[0],
+    ];
+    let third = std::array::from_fn(|a| e[a] + f[a]);
+    let longest = square(e).max(square(f)).max(square(third));
+    // Not clamp: a point has no width either, and max takes the number.
+    (longest / square(normal).sqrt()).max(1.0).min(1e6)
+}
+
 /// A triangle in units of cells, and by how much cells are grown.
 struct Shape {
     corners: [[f64; 3]; 3],
@@ -102,13 +120,13 @@ struct Shape {
 }
 
 impl Shape {
-    fn new(grid: &Grid, corners: &[[f32; 3]; 3]) -> Self {
+    fn new(grid: &Grid, corners: &[[f32; 3]; 3], margins: f64) -> Self {
         let low = grid.bounds.min.map(f64::from);
         let scale = grid.inverse_cell.map(f64::from);
         Self {
             corners: corners
                 .map(|c| std::array::from_fn(|a| (f64::from(c[a]) - low[a]) * scale[a])),
-            grow: scale.map(|s| f64::from(grid.margin) * s),
+            grow: scale.map(|s| f64::from(grid.margin) * margins * s),
         }
     }
 }

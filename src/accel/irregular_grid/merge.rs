@@ -8,8 +8,10 @@
 use super::Partition;
 use super::voxels::{Cell, Entry, Map, is_subset, push_union, union_length};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 const NONE: u32 = u32::MAX;
+const UNKNOWN: u32 = u32::MAX - 1;
 
 /// Merges cells, drops those that are gone, and renumbers the rest in the map.
 pub fn merge(partition: &mut Partition, alpha: f64) {
@@ -46,7 +48,9 @@ struct State<'a> {
     changed: Vec<u32>,
     /// Previous pass along each axis.
     tried: [u32; 3],
-    /// The cell that each one wants to join in this pass.
+    /// The cell at the far end of each one along each axis, once it was looked up.
+    neighbours: [Vec<AtomicU32>; 3],
+    /// The cell that each one wants to join in this pass, and whether it is wanted itself.
     next: Vec<u32>,
     is_wanted: Vec<bool>,
 }
@@ -63,18 +67,19 @@ impl<'a> State<'a> {
             owner: (0..count as u32).collect(),
             changed: vec![0; count],
             tried: [0; 3],
+            neighbours: [0; 3].map(|_| (0..count).map(|_| AtomicU32::new(UNKNOWN)).collect()),
             next: vec![NONE; count],
             is_wanted: vec![false; count],
         }
     }
 
     fn merge_along(&mut self, axis: usize, pass: u32) {
-        let wishes: Vec<u32> = self
-            .alive
-            .par_iter()
-            .map(|&id| self.wish(id, axis))
-            .collect();
+        let wish = |&id: &u32| self.wish(id, axis).map(|other| [id, other]);
+        let wishes: Vec<[u32; 2]> = self.alive.par_iter().filter_map(wish).collect();
         self.tried[axis] = pass;
+        if wishes.is_empty() {
+            return;
+        }
         let pairs = self.pairs(&wishes);
         let joined: Vec<(Vec<(u32, u32)>, Vec<u32>)> = pairs
             .par_chunks(1024)
@@ -95,6 +100,7 @@ impl<'a> State<'a> {
                 cell.count = count;
                 self.owner[right as usize] = left;
                 self.changed[left as usize] = pass;
+                self.neighbours[axis][left as usize] = AtomicU32::new(UNKNOWN);
             }
             self.pool.extend_from_slice(&new);
         }
@@ -102,30 +108,40 @@ impl<'a> State<'a> {
         self.alive.retain(|&id| owner[id as usize] == id);
     }
 
-    /// The next cell along `axis` if joining it pays, or [`NONE`].
-    fn wish(&self, id: u32, axis: usize) -> u32 {
+    /// The next cell along `axis` if joining it pays.
+    fn wish(&self, id: u32, axis: usize) -> Option<u32> {
+        let slot = &self.neighbours[axis][id as usize];
+        let mut other = slot.load(Relaxed);
+        if other == UNKNOWN {
+            other = self.neighbour(id, axis);
+            slot.store(other, Relaxed);
+        }
+        if other == NONE {
+            return None;
+        }
+        let [here, there] = [id, other].map(|c| self.changed[c as usize]);
+        if here.max(there) < self.tried[axis] || self.owner[other as usize] != other {
+            return None;
+        }
+        let [cell, next] = [id, other].map(|c| &self.cells[c as usize]);
+        let same_section = (0..3)
+            .filter(|&a| a != axis)
+            .all(|a| next.max[a] == cell.max[a]);
+        (same_section && self.pays(cell, next, axis)).then_some(other)
+    }
+
+    /// The cell that begins where this one ends, at the same low corner otherwise. It keeps the number
+    /// that the map of the first phase gives the voxel there, whatever it was joined with since.
+    fn neighbour(&self, id: u32, axis: usize) -> u32 {
         let cell = &self.cells[id as usize];
         let mut voxel = cell.min.map(u32::from);
         voxel[axis] = u32::from(cell.max[axis]);
         if voxel[axis] == self.map.top[axis] << self.map.shift {
             return NONE;
         }
-        // A cell keeps the number of the voxel at its low corner: a neighbour of equal section is
-        // found there by the map of the first phase.
         let other = self.map.cell_at(voxel);
-        let neighbour = &self.cells[other as usize];
-        let same_section = (0..3)
-            .filter(|&a| a != axis)
-            .all(|a| neighbour.max[a] == cell.max[a]);
-        let begins_here = neighbour.min.map(u32::from) == voxel;
-        let exists = self.owner[other as usize] == other;
-        let [here, there] = [id, other].map(|c| self.changed[c as usize]);
-        let is_new = here.max(there) >= self.tried[axis];
-        if same_section && begins_here && exists && is_new && self.pays(cell, neighbour, axis) {
-            other
-        } else {
-            NONE
-        }
+        let begins_here = self.cells[other as usize].min.map(u32::from) == voxel;
+        if begins_here { other } else { NONE }
     }
 
     fn pays(&self, cell: &Cell, neighbour: &Cell, axis: usize) -> bool {
@@ -146,30 +162,27 @@ impl<'a> State<'a> {
     }
 
     /// Cuts the chains of wishes into pairs.
-    fn pairs(&mut self, wishes: &[u32]) -> Vec<[u32; 2]> {
-        for (&id, &wish) in self.alive.iter().zip(wishes) {
-            self.next[id as usize] = wish;
-            if wish != NONE {
-                self.is_wanted[wish as usize] = true;
-            }
+    fn pairs(&mut self, wishes: &[[u32; 2]]) -> Vec<[u32; 2]> {
+        for &[id, other] in wishes {
+            self.next[id as usize] = other;
+            self.is_wanted[other as usize] = true;
         }
-        let mut pairs = Vec::new();
-        for (&head, &wish) in self.alive.iter().zip(wishes) {
-            if wish == NONE || self.is_wanted[head as usize] {
-                continue;
-            }
-            let mut left = head;
-            while left != NONE {
+        let mut pairs = Vec::with_capacity(wishes.len());
+        for &[head, _] in wishes {
+            let mut left = if self.is_wanted[head as usize] {
+                NONE
+            } else {
+                head
+            };
+            while left != NONE && self.next[left as usize] != NONE {
                 let right = self.next[left as usize];
-                if right == NONE {
-                    break;
-                }
                 pairs.push([left, right]);
                 left = self.next[right as usize];
             }
         }
-        for &wish in wishes.iter().filter(|&&w| w != NONE) {
-            self.is_wanted[wish as usize] = false;
+        for &[id, other] in wishes {
+            self.next[id as usize] = NONE;
+            self.is_wanted[other as usize] = false;
         }
         pairs
     }
