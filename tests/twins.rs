@@ -5,10 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Kernel file → Rust file, where the stem differs.
-const OTHER_FILE: &[(&str, &str)] = &[
-    ("sampling/sampler", "src/sampling/mod.rs"),
-    ("sampling/state", "src/sampling/mod.rs"),
-];
+const OTHER_FILE: &[(&str, &str)] = &[("sampling/sampler", "src/sampling/mod.rs")];
 
 /// Kernel files without a twin, with the reason.
 const NO_TWIN: &[(&str, &str)] = &[
@@ -37,6 +34,10 @@ const NO_TWIN: &[(&str, &str)] = &[
     ("integrator/render", "the loop over samples"),
     ("integrator/trace_rays", "the loop over rays"),
     ("sampling/dump_stream", "the loop over coordinates"),
+    (
+        "sampling/sampler_cost",
+        "the loop over samples, for their cost",
+    ),
     ("shading/hemisphere", "judged by images, not by a twin"),
     ("shading/light", "judged by images, not by a twin"),
     ("shading/material", "judged by images, not by a twin"),
@@ -68,6 +69,11 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
         "deepest",
         "the twin's words have 64 bits",
     ),
+    (
+        "integrator/integrand",
+        "radiance",
+        "draws; the twin is given the point",
+    ),
     ("sampling/pixel_hash", "hash", "the twin picks a function"),
     (
         "sampling/sampler",
@@ -88,6 +94,10 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
         "brute_force_hits",
         "the judge, in batches",
     ),
+    ("accel/bvh", "layout", "build"),
+    ("accel/kd_tree", "halves", "figures and validation"),
+    ("accel/kd_tree", "lacking_in_leaf", "validation"),
+    ("accel/roped_bvh", "ropes", "build"),
     ("accel/leaf", "leaf_reference", "build"),
     ("accel/leaf", "leaf_range", "unpacks in one place"),
     ("accel/bvh/boxes", "split_axis", "build"),
@@ -104,7 +114,20 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
     ("accel/uniform_grid", "sort_by_cell", "build"),
     ("accel/uniform_grid", "dot", "build, f64"),
     ("accel/uniform_grid", "cross", "build, f64"),
+    (
+        "integrator/integrand",
+        "half_plane_area",
+        "the integral, f64",
+    ),
+    ("sampling/blue_noise", "folder", "reads a parameter"),
+    ("sampling/blue_noise", "read_tables", "files"),
+    ("sampling/blue_noise", "read_words", "files"),
     ("sampling/dimensions", "needed", "planning"),
+    ("sampling/index_offset", "offsets", "reads a parameter"),
+    ("sampling/micro_jitter", "width", "makes the table"),
+    ("sampling/r2", "generalised_golden_ratio", "makes the table"),
+    ("sampling/sobol", "direction_numbers", "makes the table"),
+    ("sampling/van_der_corput", "base", "reads a parameter"),
     ("sampling/dimensions", "purpose", "words for the report"),
     (
         "sampling/dimensions",

@@ -5,15 +5,24 @@
 pub mod bounds;
 mod brute_force;
 mod bvh;
+mod collapse;
+mod cwbvh;
+mod kd_tree;
 pub mod leaf;
+mod octree;
 pub mod ray;
 mod registry;
+mod spatial;
 pub mod tree;
 pub mod triangle;
 mod uniform_grid;
+mod wide;
 
 pub use brute_force::{BruteForce, brute_force_hits};
 pub use bvh::{BuiltBvh, Bvh, BvhTwin, RopedBvh};
+pub use cwbvh::Cwbvh;
+pub use kd_tree::KdTree;
+pub use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::AccelRegistry;
 pub use uniform_grid::UniformGrid;

@@ -1,6 +1,6 @@
 //! The registry of structures: one line each.
 
-use super::{AccelKind, BruteForce, RopedBvh, UniformGrid};
+use super::{AccelKind, BruteForce, KdTree, Octree, RopedBvh, UniformGrid};
 use crate::config::Entry;
 
 /// Everything that can be named on the `accel` axis.
@@ -12,7 +12,15 @@ pub struct AccelRegistry {
 impl Default for AccelRegistry {
     fn default() -> Self {
         Self {
-            kinds: vec![&BruteForce, &super::Bvh, &RopedBvh, &UniformGrid],
+            kinds: vec![
+                &BruteForce,
+                &super::Bvh,
+                &RopedBvh,
+                &super::Cwbvh,
+                &UniformGrid,
+                &Octree,
+                &KdTree,
+            ],
         }
     }
 }

@@ -14,7 +14,7 @@ mod uniform;
 pub use adapter::{AdapterChoice, AdapterSummary, Gpu, adapters, open};
 pub use compose::{ComposedKernel, Composition, KernelLibrary};
 pub use dispatch::{Dispatch, Elapsed, groups_for};
-pub use pipeline::{Bindings, MAX_PARTS, Pipeline, WORKGROUP_SIZE};
+pub use pipeline::{Bindings, MAX_PARTS, Pipeline, TEXELS_PER_ROW, WORKGROUP_SIZE};
 pub use probe::{ArithmeticProbe, probe_arithmetic};
 pub use uniform::UniformValues;
 

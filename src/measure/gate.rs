@@ -68,7 +68,7 @@ impl Judge {
         let tree = BuiltBvh::build(soup, &params, &mut BuildLog::default())?;
         tree.validate(soup)?;
         let twin = tree.twin(soup);
-        let sets = record_rays(scene, soup, camera, &twin, settings.rays, seed);
+        let sets = record_rays(scene, soup, camera, &twin, settings, seed);
         drop(tree);
         let mut judge = Self {
             sets,

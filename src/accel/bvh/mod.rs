@@ -118,7 +118,7 @@ impl BuiltBvh {
         log: &mut BuildLog,
     ) -> Result<Self, AccelError> {
         let options = Options::new(params)?;
-        let tree = log.phase("binned-sah", || Tree::build(soup, params));
+        let tree = Tree::build(soup, params, log)?;
         let depth = tree.depth();
         options.check_depth(depth)?;
         check_leaves(&tree)?;
