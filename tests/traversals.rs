@@ -171,6 +171,27 @@ fn kernels_of_all_combinations_equal_brute_force_and_count_like_their_twins() {
     }
 }
 
+#[test]
+fn trees_that_list_a_triangle_in_several_leaves_are_traversed_to_the_bit_too() {
+    let mut rng = Pcg::new(12);
+    // Long thin triangles across each other: spatial splits cut them.
+    let soup = scenes::lattice_soup(&mut rng, 600, 30);
+    let rays = scenes::aimed_rays(&mut rng, &soup, 1500);
+    let expected = brute_force(&soup, &rays);
+    for builder in names_of("builder") {
+        let built = build(&Bvh, &soup, &params(&[("builder", builder)]));
+        if *builder == "sbvh" {
+            let references = built.stats().references;
+            assert!(references > 600, "only {references} references");
+        }
+        for kernel in KERNELS {
+            let params = params(&[*kernel, &[("builder", builder)]].concat());
+            let (found, _) = twin_answers(&soup, &params, &rays);
+            assert_same_hits(&format!("{params:?}"), &rays, &expected, &found);
+        }
+    }
+}
+
 /// Work of the twin over a scene with much behind much else, summed over all rays.
 fn summed_work(changes: &[(&str, &str)]) -> (Vec<Counters>, Counters) {
     let mut rng = Pcg::new(5);

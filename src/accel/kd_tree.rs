@@ -241,6 +241,7 @@ impl Built {
             depth: Some(deepest),
             sah_cost: (root_area > 0.0).then(|| cost / root_area),
             bytes: self.buffers().bytes(),
+            epo: None,
         }
     }
 

@@ -376,6 +376,7 @@ impl BuiltAccel for Built {
             depth: Some(self.depth),
             sah_cost: (!self.references.is_empty()).then_some(cost),
             bytes: self.buffers().bytes(),
+            epo: None,
         }
     }
 
