@@ -94,9 +94,9 @@ impl AccelKind for IrregularGrid {
             ),
             integer(
                 "levels",
-                "how often a cell may be cut in all; 2 as in the paper, more only where most \
-                 triangles of a top cell lie in one voxel",
-                2,
+                "levels of the grid: 2 as in the paper; more cut a voxel again where it holds most \
+                 triangles of its top cell",
+                3,
                 2,
                 4,
             ),
