@@ -97,6 +97,8 @@ fn every_structure_passes_the_gate_on_real_models() {
             rays,
             brute_force_tests: 500_000_000,
             oracle_rays: 512,
+            ao_length: 0.0,
+            offset: 0.0,
         };
         let judge = Judge::new(&stage.scene, &stage.soup, stage.camera, &settings, 1);
         let judge = judge.expect("a judge");

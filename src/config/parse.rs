@@ -297,6 +297,8 @@ impl<'t> Reader<'t> {
             rays: section.unsigned("rays")?,
             brute_force_tests: section.integer("brute_force_tests")?.unsigned_abs(),
             oracle_rays: section.unsigned("oracle_rays")?,
+            ao_length: section.number("ao_length")? as f32,
+            offset: section.number("offset")? as f32,
         })
     }
 
