@@ -5,6 +5,7 @@
 pub mod bounds;
 mod brute_force;
 mod bvh;
+mod bvh4;
 mod collapse;
 mod cwbvh;
 pub mod ray;
@@ -17,6 +18,7 @@ mod wide;
 
 pub use brute_force::{BruteForce, brute_force_hits};
 pub use bvh::{Bvh, BvhTwin};
+pub use bvh4::Bvh4;
 pub use cwbvh::Cwbvh;
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::AccelRegistry;

@@ -15,6 +15,7 @@ impl Default for AccelRegistry {
             kinds: vec![
                 &BruteForce,
                 &super::Bvh,
+                &super::Bvh4,
                 &super::Cwbvh,
                 &RopedBvh,
                 &UniformGrid,

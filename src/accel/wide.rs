@@ -20,8 +20,10 @@
 
 use super::bounds::{BOX_PAD, Bounds};
 use super::tree::{Tree, tree_parameters};
-use super::{AccelError, BuildLog, TriangleSoup};
+use super::triangle::TriangleRecord;
+use super::{AccelError, BuildLog, GpuBuffers, NamedWords, TriangleSoup};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use bytemuck::Pod;
 
 /// Relative slack of the distances to quantised planes, 2⁻²⁰.
 pub const FRAME_PAD: f32 = 9.536_743e-7;
@@ -67,6 +69,45 @@ pub fn wide_tree(
         .0
         .insert("leaf_size".to_owned(), ParamValue::Integer(1));
     Ok(log.phase("binned-sah", || Tree::build(soup, &params)))
+}
+
+/// Fails if there are more nodes than `limit`.
+///
+/// # Errors
+/// There are, with both numbers.
+pub fn node_limit(structure: &str, nodes: usize, limit: u32) -> Result<(), AccelError> {
+    if nodes as u64 > u64::from(limit) {
+        return Err(AccelError::Limit {
+            what: format!("nodes of a {structure}"),
+            needed: nodes as u64,
+            limit: limit.into(),
+        });
+    }
+    Ok(())
+}
+
+/// Nodes and triangles of a wide structure as its kernel binds them.
+pub fn wide_arrays<'a, N: Pod>(
+    nodes: &'a [N],
+    leaf_triangles: &'a [TriangleRecord],
+    texels: bool,
+) -> GpuBuffers<'a> {
+    GpuBuffers {
+        features: if texels { vec!["texels"] } else { Vec::new() },
+        arrays: vec![
+            NamedWords {
+                name: "nodes",
+                words: bytemuck::cast_slice(nodes).into(),
+                element_bytes: size_of::<N>() as u32,
+            },
+            NamedWords {
+                name: "leaf_triangles",
+                words: bytemuck::cast_slice(leaf_triangles).into(),
+                element_bytes: size_of::<TriangleRecord>() as u32,
+            },
+        ],
+        ..Default::default()
+    }
 }
 
 /// The planes of a node: where the first one lies and how far they are apart.
