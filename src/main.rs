@@ -2,6 +2,10 @@
 
 mod commands;
 
+/// Counts what is allocated, for the memory that a build needs.
+#[global_allocator]
+static ALLOCATOR: peak_alloc::PeakAlloc = peak_alloc::PeakAlloc;
+
 fn main() -> std::process::ExitCode {
     commands::main()
 }

@@ -99,7 +99,7 @@ fn labels(variants: &[Variant]) -> Vec<&str> {
 fn plan(experiment: &Experiment, only: &[&str]) -> Result<Plan, ConfigError> {
     let only: Vec<String> = only.iter().map(|text| (*text).to_owned()).collect();
     Plan::new(experiment, &only, |sequence, decorrelation| {
-        sequence.name == "pixel-hash" || decorrelation.name == "cranley-patterson"
+        Ok(sequence.name == "pixel-hash" || decorrelation.name == "cranley-patterson")
     })
 }
 
@@ -178,6 +178,27 @@ fn lists_of_parameters_make_variants_in_the_order_of_the_schema() {
             "pixel-hash(hash=wang,shuffle=true)",
             "sobol"
         ]
+    );
+}
+
+#[test]
+fn double_brackets_make_variants_side_by_side_and_none_twice() {
+    let experiment = good(
+        "[[accel.uniform-grid]]\nlambda = [3, 5]\n\
+         [[accel.uniform-grid]]\nmax_cells = [4096, 8]\n",
+    );
+    assert_eq!(
+        labels(&experiment.axes.accel),
+        [
+            "bvh",
+            "uniform-grid(lambda=3)",
+            "uniform-grid",
+            "uniform-grid(max_cells=8)"
+        ]
+    );
+    assert_says(
+        parse("[[accel.uniform-grid]]\nlambada = 3\n"),
+        &["parameter of accel uniform-grid", "`lambada`", "`lambda`"],
     );
 }
 

@@ -5,11 +5,14 @@ mod common;
 
 use common::scenes::{self, Case};
 use common::{Pcg, assert_same_hits, brute_force, build, default_params, param_variants, trace};
+
+use rayon::prelude::*;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::accel::{
     AccelKind, AccelRegistry, BuildLog, Counters, Hit, NO_HIT, Ray, TriangleSoup,
 };
 use raystone::config::Params;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 fn kinds() -> Vec<&'static dyn AccelKind> {
     let kinds: Vec<_> = AccelRegistry::default().iter().collect();
@@ -51,13 +54,14 @@ fn check_twin(
 fn check_kernel(
     what: &str,
     kind: &dyn AccelKind,
+    params: &Params,
     soup: &TriangleSoup,
     rays: &[Ray],
     expected: &[Hit],
 ) {
     let gpu = common::gpu();
-    let built = build(kind, soup, &default_params(&kind.parameters()));
-    let what = format!("{what}: kernel of {}", kind.name());
+    let built = build(kind, soup, params);
+    let what = format!("{what}: kernel of {} {params:?}", kind.name());
     let run = |features: &[&str]| trace(gpu, &*built, soup, rays, features);
     assert_same_hits(&what, rays, expected, &run(&[]).hits);
     let blocked: Vec<bool> = expected.iter().map(|h| h.triangle != NO_HIT).collect();
@@ -82,6 +86,29 @@ fn check_kernel(
             "{what}: work of any hit, ray {index} {ray:?}"
         );
     }
+}
+
+/// The defaults of a structure, and one set of parameters for each other kernel that it can choose.
+fn kernel_variants(kind: &dyn AccelKind) -> Vec<Params> {
+    let soup = scenes::lattice_soup(&mut Pcg::new(2), 40, 5);
+    let mut kernels = Vec::new();
+    let mut out = param_variants(&kind.parameters());
+    out.retain(|params| {
+        let built = build(kind, &soup, params);
+        let buffers = built.buffers();
+        let kernel = (buffers.kernel, buffers.features);
+        let is_new = !kernels.contains(&kernel);
+        kernels.push(kernel);
+        is_new
+    });
+    out
+}
+
+/// How many random scenes: RAYSTONE_FUZZ_SCENES, or 10,000.
+fn fuzz_scenes() -> u64 {
+    let set = std::env::var("RAYSTONE_FUZZ_SCENES").ok();
+    let parse = |text: String| text.parse().expect("RAYSTONE_FUZZ_SCENES is a number");
+    set.map_or(10_000, parse)
 }
 
 /// Hard scenes with rays of all sorts, and what brute force answers.
@@ -117,15 +144,16 @@ fn hard_cases(seed: u64, rays_per_kind: usize) -> Vec<(Case, Vec<Ray>, Vec<Hit>)
 #[test]
 fn twins_equal_brute_force_on_random_lattice_scenes() {
     let kinds = kinds();
-    let mut hits = 0;
-    for seed in 0..2500 {
+    let hits = AtomicUsize::new(0);
+    (0..fuzz_scenes()).into_par_iter().for_each(|seed| {
         let mut rng = Pcg::new(seed);
         let extent = rng.between(1, 8);
         let count = 1 + rng.below(48) as usize;
         let soup = scenes::lattice_soup(&mut rng, count, extent);
         let rays = scenes::lattice_rays(&mut rng, 32, extent);
         let expected = brute_force(&soup, &rays);
-        hits += expected.iter().filter(|h| h.triangle != NO_HIT).count();
+        let struck = expected.iter().filter(|h| h.triangle != NO_HIT).count();
+        hits.fetch_add(struck, Ordering::Relaxed);
         for kind in &kinds {
             let params = default_params(&kind.parameters());
             check_twin(
@@ -137,9 +165,10 @@ fn twins_equal_brute_force_on_random_lattice_scenes() {
                 &expected,
             );
         }
-    }
+    });
+    let hits = hits.into_inner();
     assert!(
-        hits > 8_000,
+        hits > 3 * fuzz_scenes() as usize,
         "only {hits} rays hit anything: the test is blunt"
     );
 }
@@ -186,14 +215,14 @@ fn kernels_equal_brute_force_and_count_like_their_twins_on_random_lattice_scenes
         let soup = scenes::lattice_soup(&mut rng, count, extent);
         let rays = scenes::lattice_rays(&mut rng, 4096, extent);
         let expected = brute_force(&soup, &rays);
+        let what = format!("seed {}", 1000 + seed);
         for kind in kinds() {
-            check_kernel(
-                &format!("seed {}", 1000 + seed),
-                kind,
-                &soup,
-                &rays,
-                &expected,
-            );
+            let variants = kernel_variants(kind);
+            // Kernels share most of their text: the defaults get all scenes, the others some.
+            let checked = if seed < 4 { variants.len() } else { 1 };
+            for params in &variants[..checked] {
+                check_kernel(&what, kind, params, &soup, &rays, &expected);
+            }
         }
     }
 }
@@ -205,7 +234,9 @@ fn kernels_equal_brute_force_and_count_like_their_twins_on_hard_scenes() {
     }
     for (case, rays, expected) in hard_cases(6, 400) {
         for kind in kinds() {
-            check_kernel(case.name, kind, &case.soup, &rays, &expected);
+            for params in kernel_variants(kind) {
+                check_kernel(case.name, kind, &params, &case.soup, &rays, &expected);
+            }
         }
     }
 }

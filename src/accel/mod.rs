@@ -8,21 +8,30 @@ mod bvh;
 mod bvh4;
 mod collapse;
 mod cwbvh;
+mod grid;
+mod irregular_grid;
+mod kd_tree;
+pub mod leaf;
+mod octree;
 pub mod ray;
 mod registry;
-mod roped_bvh;
+mod spatial;
 pub mod tree;
 pub mod triangle;
+mod two_level_grid;
 mod uniform_grid;
 mod wide;
 
 pub use brute_force::{BruteForce, brute_force_hits};
-pub use bvh::{Bvh, BvhTwin};
+pub use bvh::{BuiltBvh, Bvh, BvhTwin, RopedBvh};
 pub use bvh4::Bvh4;
 pub use cwbvh::Cwbvh;
+pub use irregular_grid::IrregularGrid;
+pub use kd_tree::KdTree;
+pub use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::AccelRegistry;
-pub use roped_bvh::RopedBvh;
+pub use two_level_grid::TwoLevelGrid;
 pub use uniform_grid::UniformGrid;
 
 use crate::config::{ParameterSchema, Params};
@@ -47,6 +56,9 @@ pub enum AccelError {
         /// What the structure allows.
         limit: u64,
     },
+    /// Parameters that contradict each other, with the reason.
+    #[error("{0}")]
+    Contradiction(String),
     /// A structural invariant is violated.
     #[error("{0}")]
     Invalid(String),
@@ -229,6 +241,11 @@ pub trait BuiltAccel: Sync {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError>;
     /// The kernel with its arrays, uniforms, constants and features.
     fn buffers(&self) -> GpuBuffers<'_>;
+    /// Arrays that the kernel can read in several parts, where the adapter binds less than they need:
+    /// see [`crate::gpu::Bindings::parts`].
+    fn divisible(&self) -> &'static [&'static str] {
+        &[]
+    }
     /// Static figures.
     fn stats(&self) -> StructureStats;
     /// The traversal on the host, if it has one.

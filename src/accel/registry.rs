@@ -1,6 +1,6 @@
 //! The registry of structures: one line each.
 
-use super::{AccelKind, BruteForce, RopedBvh, UniformGrid};
+use super::{AccelKind, BruteForce, KdTree, Octree, RopedBvh, UniformGrid};
 use crate::config::Entry;
 
 /// Everything that can be named on the `accel` axis.
@@ -15,10 +15,14 @@ impl Default for AccelRegistry {
             kinds: vec![
                 &BruteForce,
                 &super::Bvh,
+                &RopedBvh,
                 &super::Bvh4,
                 &super::Cwbvh,
-                &RopedBvh,
                 &UniformGrid,
+                &super::TwoLevelGrid,
+                &super::IrregularGrid,
+                &Octree,
+                &KdTree,
             ],
         }
     }

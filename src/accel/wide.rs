@@ -19,7 +19,7 @@
 //! also for reciprocals of 2.5 ulp, since both sides use the same one.
 
 use super::bounds::{BOX_PAD, Bounds};
-use super::tree::{Tree, tree_parameters};
+use super::tree::{NodeKind, Tree, tree_parameters};
 use super::triangle::TriangleRecord;
 use super::{AccelError, BuildLog, GpuBuffers, NamedWords, TriangleSoup};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
@@ -68,7 +68,19 @@ pub fn wide_tree(
     params
         .0
         .insert("leaf_size".to_owned(), ParamValue::Integer(1));
-    Ok(log.phase("binned-sah", || Tree::build(soup, &params)))
+    let tree = Tree::build(soup, &params, log)?;
+    let largest = tree.nodes.iter().map(|node| match node.kind {
+        NodeKind::Leaf { count, .. } => count,
+        NodeKind::Inner { .. } => 0,
+    });
+    match largest.max() {
+        Some(count) if count > 1 => Err(AccelError::Limit {
+            what: "triangles of a leaf before the collapse".into(),
+            needed: count.into(),
+            limit: 1,
+        }),
+        _ => Ok(tree),
+    }
 }
 
 /// Fails if there are more nodes than `limit`.

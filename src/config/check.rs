@@ -32,7 +32,7 @@ pub(super) fn check_sections(tree: &Table, catalogue: &Catalogue) -> Result<(), 
             let section = as_table(item, name, "sections [NAME] of parameters")?;
             for (entry, item) in section {
                 variants::resolve(axis, item, entry, catalogue)?;
-                as_table(item, &format!("{axis}.{entry}"), "a section of parameters")?;
+                parameter_tables(axis, entry, item)?;
             }
         } else if name == "exclude" {
             for (_, table) in exclude_tables(item)? {
@@ -88,6 +88,24 @@ pub(super) fn exclude_tables(item: &Item) -> Result<Vec<(&Place, &Table)>, Confi
             expected: EXPECTED.to_owned(),
             found: other.describe(),
         }),
+    }
+}
+
+/// The parameter tables of an entry: one `[axis.NAME]`, or several `[[axis.NAME]]`, each of which
+/// makes variants of its own.
+pub(super) fn parameter_tables<'t>(
+    axis: Axis,
+    entry: &str,
+    item: &'t Item,
+) -> Result<Vec<&'t Table>, ConfigError> {
+    let key = format!("{axis}.{entry}");
+    const EXPECTED: &str = "a section of parameters";
+    match &item.value {
+        Value::List(items) if !items.is_empty() => items
+            .iter()
+            .map(|item| as_table(item, &key, EXPECTED))
+            .collect(),
+        _ => Ok(vec![as_table(item, &key, EXPECTED)?]),
     }
 }
 

@@ -145,7 +145,7 @@ pub struct Timing {
 }
 
 /// How much the gate checks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gate {
     /// Rays per class.
     pub rays: u32,
@@ -153,6 +153,11 @@ pub struct Gate {
     pub brute_force_tests: u64,
     /// Rays of the judge decided again in double precision.
     pub oracle_rays: u32,
+    /// Length of recorded AO rays, scene units; 0 is a tenth of the scene's diagonal.
+    pub ao_length: f32,
+    /// Distance from their surface at which recorded rays start, scene units; 0 is 1e-5 of the
+    /// scene's diagonal.
+    pub offset: f32,
 }
 
 /// Which star discrepancies are taken.

@@ -217,6 +217,8 @@ pub const KEYS: &[Key] = &[
     key("gate", "rays", integer(256, 1 << 24), Some("32768"), "Rays per class that every structure must answer as the judge does."),
     key("gate", "brute_force_tests", integer(0, 1_000_000_000_000), Some("2_000_000_000"), "Ray-triangle tests spent on checking the judge itself against brute force (at least 2,000 rays are)."),
     key("gate", "oracle_rays", integer(0, 1 << 20), Some("2048"), "Rays of the judge that the double-precision oracle decides again."),
+    key("gate", "ao_length", Kind::Number { min: 0.0, max: 1e16 }, Some("0"), "Length of recorded AO rays, scene units; 0 is a tenth of the scene's diagonal."),
+    key("gate", "offset", Kind::Number { min: 0.0, max: 1e16 }, Some("0"), "How far rays that start on a surface are moved off it, scene units; 0 is 1e-5 of the scene's diagonal."),
     key("discrepancy", "points", Kind::PowerOfTwo { min: 2, max: 65_536 }, Some("4096"), "Star discrepancy is taken at N = 2, 4, 8, … up to this many points."),
     key("discrepancy", "pairs", Kind::DimensionPairs { max: 255 }, Some("[[0, 1], [2, 3], [4, 5]]"), "Pairs of dimensions of the path's table."),
     key("discrepancy", "seeds", integer(1, 1024), Some("8"), "Seeds measured where the stream is randomised."),

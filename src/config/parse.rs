@@ -1,6 +1,8 @@
 //! The walk from the merged tree to a checked [`Experiment`].
 
-use super::check::{as_table, check_on_axis, check_sections, exclude_tables, pattern_list};
+use super::check::{
+    as_table, check_on_axis, check_sections, exclude_tables, parameter_tables, pattern_list,
+};
 use super::error::{ConfigError, Place};
 use super::experiment::{Axes, Discrepancy, Exclude, Experiment, Gate, Reference, Timing};
 use super::keys::{Axis, KEYS, OPTIONAL_SECTIONS};
@@ -174,11 +176,18 @@ impl<'t> Reader<'t> {
             }
             used.push(name.to_owned());
             let entry = variants::resolve(axis, item, name, self.catalogue)?;
-            let section = match parameters.get(name) {
-                Some(item) => Some(as_table(item, name, "a section of parameters")?),
-                None => None,
+            let tables = match parameters.get(name) {
+                Some(item) => parameter_tables(axis, name, item)?,
+                None => vec![&empty],
             };
-            variants.extend(variants::expand(axis, &entry, section)?);
+            for table in tables {
+                for variant in variants::expand(axis, &entry, table)? {
+                    // Tables may meet, most often in the defaults.
+                    if !variants.contains(&variant) {
+                        variants.push(variant);
+                    }
+                }
+            }
         }
         let replaced = matches!(axes.place(axis.name()), Place::Override(_));
         check_on_axis(axis, parameters, &used, replaced)?;
@@ -288,6 +297,8 @@ impl<'t> Reader<'t> {
             rays: section.unsigned("rays")?,
             brute_force_tests: section.integer("brute_force_tests")?.unsigned_abs(),
             oracle_rays: section.unsigned("oracle_rays")?,
+            ao_length: section.number("ao_length")? as f32,
+            offset: section.number("offset")? as f32,
         })
     }
 

@@ -25,6 +25,7 @@ impl fmt::Display for ParamRange {
             .fmt(f),
             Self::Flag => Kind::Flag.fmt(f),
             Self::Choice(names) => write!(f, "one of {}", names.join(", ")),
+            Self::Text => f.write_str("a text"),
         }
     }
 }
@@ -98,14 +99,12 @@ fn is_path(text: &str) -> bool {
         || extension.is_some_and(|e| MODEL_EXTENSIONS.contains(&e.to_lowercase().as_str()))
 }
 
-/// All variants of `entry`: the product of the values that `section` (`[axis.NAME]`) lists.
+/// All variants of `entry`: the product of the values that `section` (one `[axis.NAME]`) lists.
 pub(super) fn expand(
     axis: Axis,
     entry: &Entry,
-    section: Option<&Table>,
+    section: &Table,
 ) -> Result<Vec<Variant>, ConfigError> {
-    let empty = Table::new();
-    let section = section.unwrap_or(&empty);
     if let Some((name, item)) = section
         .iter()
         .find(|(name, _)| entry.schema.iter().all(|p| p.name != name.as_str()))
@@ -189,6 +188,7 @@ fn value(key: &str, item: &Item, parameter: &Parameter) -> Result<ParamValue, Co
             }
             (ParamValue::Name(x.clone()), true)
         }
+        (ParamRange::Text, Value::Text(x)) => (ParamValue::Name(x.clone()), true),
         (_, found) => {
             return Err(ConfigError::WrongType {
                 at: item.at.clone(),

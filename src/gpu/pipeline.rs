@@ -60,7 +60,12 @@ struct Array {
 pub struct Bindings {
     buffers: BTreeMap<String, Array>,
     uniforms: BTreeMap<String, UniformValues>,
+    /// Arrays in several parts: how many parts, and `vec4`s in all but the last.
+    parts: BTreeMap<String, (usize, u32)>,
 }
+
+/// Parts that an array may have at most; kernels declare as many.
+pub const MAX_PARTS: usize = 4;
 
 impl Bindings {
     /// Nothing bound.
@@ -86,6 +91,31 @@ impl Bindings {
         self
     }
 
+    /// Binds an array of `vec4` in parts (see [`Gpu::storage_parts`]): the kernel variables `name`,
+    /// `name_1`, …
+    pub fn parts(&mut self, name: &str, (buffers, vec4s): &(Vec<wgpu::Buffer>, u32)) -> &mut Self {
+        for (index, buffer) in buffers.iter().enumerate() {
+            self.buffer(&part_name(name, index), buffer);
+        }
+        if buffers.len() > 1 {
+            self.parts.insert(name.to_owned(), (buffers.len(), *vec4s));
+        }
+        self
+    }
+
+    /// `composition` with what arrays in several parts ask of kernels: the features `name_1`, … and
+    /// the constant `NAME_PART`.
+    #[must_use]
+    pub fn compose(&self, mut composition: Composition) -> Composition {
+        for (name, (count, vec4s)) in &self.parts {
+            for index in 1..*count {
+                composition = composition.feature(&part_name(name, index), true);
+            }
+            composition = composition.constant(&format!("{}_PART", name.to_uppercase()), *vec4s);
+        }
+        composition
+    }
+
     /// Everything of `other` on top of this.
     #[must_use]
     pub fn merged(&self, other: &Bindings) -> Bindings {
@@ -94,7 +124,17 @@ impl Bindings {
             .extend(other.buffers.iter().map(|(k, v)| (k.clone(), v.clone())));
         out.uniforms
             .extend(other.uniforms.iter().map(|(k, v)| (k.clone(), v.clone())));
+        out.parts
+            .extend(other.parts.iter().map(|(k, v)| (k.clone(), *v)));
         out
+    }
+}
+
+/// Name of the kernel variable that binds a part of an array.
+fn part_name(name: &str, index: usize) -> String {
+    match index {
+        0 => name.to_owned(),
+        _ => format!("{name}_{index}"),
     }
 }
 
@@ -197,6 +237,16 @@ impl Gpu {
 
     fn compile(&self, kernel: ComposedKernel, runtime_checks: bool) -> Result<Pipeline, GpuError> {
         let bindings = reflect(&kernel);
+        let storage = |b: &&Binding| matches!(b.kind, BindingKind::Storage { .. });
+        let needed = bindings.iter().filter(storage).count() as u64;
+        let limit = u64::from(self.limits.max_storage_buffers_per_shader_stage);
+        if needed > limit {
+            return Err(GpuError::TooManyBuffers {
+                kernel: kernel.composition.entry,
+                needed,
+                limit,
+            });
+        }
         let groups = bindings.iter().map(|b| b.group + 1).max().unwrap_or(0);
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let layouts: Vec<_> = (0..groups)

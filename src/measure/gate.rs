@@ -10,7 +10,7 @@ use super::rays::{RaySet, record_rays};
 use super::record::{ClassVerdict, GateVerdict, JudgeCheck};
 use crate::accel::AccelKind;
 use crate::accel::{
-    AccelError, BuildLog, BuiltAccel, Bvh, BvhTwin, Hit, NO_HIT, Ray, TriangleSoup,
+    AccelError, BuildLog, BuiltAccel, BuiltBvh, Bvh, Hit, NO_HIT, Ray, TriangleSoup,
     brute_force_hits,
 };
 use crate::config::{Gate, Params};
@@ -65,9 +65,11 @@ impl Judge {
                 .0
                 .insert(parameter.name.to_owned(), parameter.default);
         }
-        let twin = BvhTwin::build(soup, &params, &mut BuildLog::default())?;
-        twin.validate(soup)?;
-        let sets = record_rays(scene, soup, camera, &twin, settings.rays, seed);
+        let tree = BuiltBvh::build(soup, &params, &mut BuildLog::default())?;
+        tree.validate(soup)?;
+        let twin = tree.twin(soup);
+        let sets = record_rays(scene, soup, camera, &twin, settings, seed);
+        drop(tree);
         let mut judge = Self {
             sets,
             brute_force: JudgeCheck::default(),

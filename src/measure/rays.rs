@@ -7,6 +7,7 @@
 use super::record::RayClass;
 use super::statistics::Pcg32;
 use crate::accel::{Counters, CpuTwin, Hit, NO_HIT, Ray, TriangleSoup};
+use crate::config::Gate;
 use crate::integrator::Frame;
 use crate::scene::{Bounds, Camera, SceneData};
 use glam::Vec3;
@@ -120,20 +121,23 @@ fn surface_points(primary: &RaySet, soup: &TriangleSoup) -> Vec<(Vec3, Vec3)> {
     .collect()
 }
 
-/// Records all classes with about `count` rays each. Classes that start on surfaces are missing when
+/// Records all classes with about `settings.rays` rays each. Classes that start on surfaces are missing when
 /// no primary ray hits anything.
 pub fn record_rays(
     scene: &SceneData,
     soup: &TriangleSoup,
     camera: Camera,
     judge: &dyn CpuTwin,
-    count: u32,
+    settings: &Gate,
     seed: u64,
 ) -> Vec<RaySet> {
-    let side = ((f64::from(count).sqrt() / f64::from(TILE)).round() as u32).max(1) * TILE;
+    let side = ((f64::from(settings.rays).sqrt() / f64::from(TILE)).round() as u32).max(1) * TILE;
     let primary = RaySet::new(RayClass::Primary, primary_rays(camera, side, side), judge);
     let bounds = scene.bounds();
     let diagonal = 2.0 * bounds.radius();
+    let or_default = |set: f32, default: f32| if set > 0.0 { set } else { default };
+    let offset = or_default(settings.offset, OFFSET * diagonal);
+    let ao_length = or_default(settings.ao_length, AO_LENGTH * diagonal);
     let mut random = Pcg32::new(seed);
     let points = surface_points(&primary, soup);
     let emitters = scene.emitters();
@@ -144,7 +148,7 @@ pub fn record_rays(
                 .iter()
                 .cycle()
                 .take(primary.rays.len())
-                .map(|&(p, n)| (p + n * (OFFSET * diagonal), n))
+                .map(|&(p, n)| (p + n * offset, n))
         };
         let shadow = starts().map(|(p, _)| {
             let target = light_point(scene, &emitters, &bounds, &mut random);
@@ -153,7 +157,7 @@ pub fn record_rays(
         });
         let shadow = shadow.collect();
         let ao = starts()
-            .map(|(p, n)| ray(p, cosine_direction(n, &mut random), AO_LENGTH * diagonal))
+            .map(|(p, n)| ray(p, cosine_direction(n, &mut random), ao_length))
             .collect();
         let bounce = starts()
             .map(|(p, n)| ray(p, cosine_direction(n, &mut random), FAR))

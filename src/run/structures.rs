@@ -9,6 +9,7 @@ use crate::gpu::{Elapsed, GpuError};
 use crate::integrator::Traced;
 use crate::measure::batch::{Batch, Query, count_work};
 use crate::measure::gate::gate;
+use crate::measure::memory::peak_bytes;
 use crate::measure::picture::{Picture, write_png};
 use crate::measure::rays::{RaySet, primary_pixels, primary_rays};
 use crate::measure::record::{
@@ -45,9 +46,10 @@ pub(super) fn build_and_gate(
         return Err(Box::new(record));
     };
     let mut log = BuildLog::default();
-    let built = session
-        .clock
-        .time("build", || kind.build(&world.soup, &accel.params, &mut log));
+    let (built, peak) = session.clock.time("build", || {
+        peak_bytes(|| kind.build(&world.soup, &accel.params, &mut log))
+    });
+    record.build_peak_bytes = peak;
     record.build_ms = log.total_ms();
     record.build = log.phases;
     let built = match built {
@@ -151,6 +153,7 @@ fn empty_record(world: &World, accel: &Variant, runtime_checks: bool) -> Structu
         runtime_checks,
         build: Vec::new(),
         build_ms: 0.0,
+        build_peak_bytes: None,
         stats: StructureStats::default(),
         gate: None,
         timings: Vec::new(),

@@ -22,6 +22,8 @@ fn judge(stage: &Stage, rays: u32) -> Judge {
         rays,
         brute_force_tests: 20_000_000,
         oracle_rays: 512,
+        ao_length: 0.0,
+        offset: 0.0,
     };
     Judge::new(&stage.scene, &stage.soup, stage.camera, &settings, 1).expect("a judge")
 }

@@ -6,6 +6,7 @@ pub mod sampler_plots;
 pub mod samplers;
 pub mod streams;
 pub mod structures;
+mod trade_off;
 pub mod verdict;
 
 use super::data::{RunData, SceneGroup};

@@ -1,6 +1,7 @@
 //! Structures of a scene: speed, build, size, work per ray, heat maps.
 
 use super::file_stem;
+use super::trade_off;
 use super::verdict::ray_classes;
 use crate::measure::record::{RayClass, StructureRecord};
 use crate::report::color::viridis_css;
@@ -22,7 +23,12 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
         let caption = "Speed per ray class. Bars: median; lines: bootstrap 95 % interval. The same rays for all.";
         blocks.push(Block::Figures(vec![Figure::new(name, caption, drawing)]));
     }
-    let tables = [speed_table(scene), build_table(scene), work_table(scene)];
+    let classes = ray_classes(scene);
+    let mut tables = vec![speed_table(scene)];
+    tables.extend(trade_off::break_even_table(scene, &classes));
+    let views = scene.views.iter();
+    tables.extend(views.filter_map(|view| trade_off::time_to_image_table(scene, view)));
+    tables.extend([build_table, shape_table, leaf_table, work_table].map(|table| table(scene)));
     blocks.extend(tables.into_iter().filter_map(Table::into_block));
     blocks.extend(heat_maps(dir, scene));
     blocks
@@ -103,54 +109,112 @@ pub fn speed_table(scene: &SceneGroup) -> Table {
     table
 }
 
-/// Build time with phases, size and shape.
+/// What the build took.
 fn build_table(scene: &SceneGroup) -> Table {
-    let columns = [
-        "structure",
-        "build, ms",
-        ":of which, ms",
-        "size",
-        "bytes/triangle",
-        "nodes",
-        "leaves",
-        "references",
-        "depth",
-        "SAH cost",
-    ];
-    let mut table = Table::new(
-        "Build and shape (one build each; SAH with both constants 1)",
-        &columns,
-    );
-    let triangles = scene
-        .record
-        .map(|record| record.triangles)
-        .filter(|n| *n > 0);
-    for s in scene
-        .structures
-        .iter()
-        .filter(|s| !s.build.is_empty() || s.gate.is_some())
-    {
+    let columns = ["structure", "build, ms", ":of which, ms", "peak memory"];
+    let mut table = Table::new("Build (one each)", &columns);
+    for s in built(scene) {
         let phases: Vec<String> = s
             .build
             .iter()
             .map(|phase| format!("{} {}", phase.name, format::number(phase.ms)))
             .collect();
-        let per_triangle = triangles.map(|n| s.stats.bytes as f64 / n as f64);
         table.rows.push(vec![
             name(s).into(),
             format::number(s.build_ms).into(),
             phases.join(" + ").into(),
-            format::bytes(s.stats.bytes).into(),
-            format::optional(per_triangle).into(),
-            format::count(s.stats.nodes).into(),
-            format::count(s.stats.leaves).into(),
-            format::count(s.stats.references).into(),
-            s.stats
+            s.build_peak_bytes
+                .map_or(format::ABSENT.into(), format::bytes)
+                .into(),
+        ]);
+    }
+    table
+}
+
+fn built<'a>(scene: &'a SceneGroup) -> impl Iterator<Item = &'a StructureRecord> {
+    let is_built = |s: &&StructureRecord| !s.build.is_empty() || s.gate.is_some();
+    scene.structures.iter().copied().filter(is_built)
+}
+
+fn triangles(scene: &SceneGroup) -> Option<f64> {
+    let triangles = scene.record?.triangles;
+    (triangles > 0).then_some(triangles as f64)
+}
+
+/// Size and quality of what was built.
+fn shape_table(scene: &SceneGroup) -> Table {
+    let columns = [
+        "structure",
+        "size",
+        "bytes/triangle",
+        "nodes",
+        "leaves",
+        "references",
+        "references/triangle",
+        "depth",
+        "SAH cost",
+    ];
+    let caption =
+        "Size and shape (nodes, leaves: cells where there are cells; SAH with both constants 1)";
+    let mut table = Table::new(caption, &columns);
+    for s in built(scene) {
+        let stats = &s.stats;
+        let per_triangle = |x: u64| format::optional(triangles(scene).map(|n| x as f64 / n));
+        table.rows.push(vec![
+            name(s).into(),
+            format::bytes(stats.bytes).into(),
+            per_triangle(stats.bytes).into(),
+            format::count(stats.nodes).into(),
+            format::count(stats.leaves).into(),
+            format::count(stats.references).into(),
+            per_triangle(stats.references).into(),
+            stats
                 .depth
                 .map_or(format::ABSENT.into(), |depth| depth.to_string())
                 .into(),
-            format::optional(s.stats.sah_cost).into(),
+            format::optional(stats.sah_cost).into(),
         ]);
+    }
+    table
+}
+
+/// Classes of leaf sizes: title, least and greatest number of references.
+const LEAF_CLASSES: [(&str, usize, usize); 8] = [
+    ("0", 0, 0),
+    ("1", 1, 1),
+    ("2", 2, 2),
+    ("3", 3, 3),
+    ("4", 4, 4),
+    ("5–8", 5, 8),
+    ("9–16", 9, 16),
+    ("17 or more", 17, usize::MAX),
+];
+
+/// Histogram of leaves by the references they hold.
+fn leaf_table(scene: &SceneGroup) -> Table {
+    let mut table = Table::new(
+        "Leaves (or cells) by the number of references they hold, share",
+        &["structure"],
+    );
+    for (title, ..) in LEAF_CLASSES {
+        table.add_column(title);
+    }
+    for s in built(scene) {
+        let histogram = &s.stats.leaf_histogram;
+        let all: u64 = histogram.iter().sum();
+        if all == 0 {
+            continue;
+        }
+        let mut row = vec![name(s).into()];
+        row.extend(LEAF_CLASSES.map(|(_, least, greatest)| {
+            let inside = |(k, n): (usize, &u64)| (least <= k && k <= greatest).then_some(*n);
+            let leaves: u64 = histogram.iter().enumerate().filter_map(inside).sum();
+            if leaves == 0 {
+                return format::ABSENT.into();
+            }
+            Cell::from(format::percent(leaves as f64 / all as f64))
+        }));
+        table.rows.push(row);
     }
     table
 }
