@@ -5,7 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Kernel file → Rust file, where the stem differs.
-const OTHER_FILE: &[(&str, &str)] = &[("sampling/sampler", "src/sampling/mod.rs")];
+const OTHER_FILE: &[(&str, &str)] = &[
+    ("accel/grid", "src/accel/grid/mod.rs"),
+    ("accel/irregular_grid", "src/accel/irregular_grid/mod.rs"),
+    ("sampling/sampler", "src/sampling/mod.rs"),
+];
 
 /// Kernel files without a twin, with the reason.
 const NO_TWIN: &[(&str, &str)] = &[
@@ -74,6 +78,11 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
         "radiance",
         "draws; the twin is given the point",
     ),
+    (
+        "accel/two_level_grid",
+        "load_top",
+        "a method of the twin's arrays",
+    ),
     ("sampling/pixel_hash", "hash", "the twin picks a function"),
     (
         "sampling/sampler",
@@ -122,6 +131,8 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
     ("sampling/blue_noise", "folder", "reads a parameter"),
     ("sampling/blue_noise", "read_tables", "files"),
     ("sampling/blue_noise", "read_words", "files"),
+    ("accel/two_level_grid", "parts", "build"),
+    ("accel/two_level_grid", "cut", "build"),
     ("sampling/dimensions", "needed", "planning"),
     ("sampling/index_offset", "offsets", "reads a parameter"),
     ("sampling/micro_jitter", "width", "makes the table"),

@@ -239,6 +239,7 @@ impl Built {
             references: self.references.len() as u64,
             leaf_histogram: super::leaf_histogram(counts.into_iter()),
             depth: Some(deepest),
+            epo: None,
             sah_cost: (root_area > 0.0).then(|| cost / root_area),
             bytes: self.buffers().bytes(),
         }

@@ -7,6 +7,8 @@ mod brute_force;
 mod bvh;
 mod collapse;
 mod cwbvh;
+mod grid;
+mod irregular_grid;
 mod kd_tree;
 pub mod leaf;
 mod octree;
@@ -15,16 +17,19 @@ mod registry;
 mod spatial;
 pub mod tree;
 pub mod triangle;
+mod two_level_grid;
 mod uniform_grid;
 mod wide;
 
 pub use brute_force::{BruteForce, brute_force_hits};
 pub use bvh::{BuiltBvh, Bvh, BvhTwin, RopedBvh};
 pub use cwbvh::Cwbvh;
+pub use irregular_grid::IrregularGrid;
 pub use kd_tree::KdTree;
 pub use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::AccelRegistry;
+pub use two_level_grid::TwoLevelGrid;
 pub use uniform_grid::UniformGrid;
 
 use crate::config::{ParameterSchema, Params};

@@ -374,6 +374,7 @@ impl BuiltAccel for Built {
             references: self.references.len() as u64,
             leaf_histogram: super::leaf_histogram(counts),
             depth: Some(self.depth),
+            epo: None,
             sah_cost: (!self.references.is_empty()).then_some(cost),
             bytes: self.buffers().bytes(),
         }

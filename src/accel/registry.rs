@@ -18,6 +18,8 @@ impl Default for AccelRegistry {
                 &RopedBvh,
                 &super::Cwbvh,
                 &UniformGrid,
+                &super::TwoLevelGrid,
+                &super::IrregularGrid,
                 &Octree,
                 &KdTree,
             ],

@@ -11,7 +11,7 @@ use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::sampling::dimensions;
 
 /// Square of the radius of the disk, so that its quarter has about the area 1/2.
-const DISK_RADIUS_SQUARED: f32 = 0.636_619_8;
+const DISK_RADIUS_SQUARED: f32 = std::f32::consts::FRAC_2_PI;
 /// Corner of the box at the origin.
 const BOX_CORNER: [f32; 2] = [std::f32::consts::FRAC_1_SQRT_2, 0.618_034];
 /// `half-plane`: x · cos + y · sin < offset.

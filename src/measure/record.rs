@@ -175,6 +175,9 @@ pub struct StructureStats {
     pub depth: Option<u32>,
     /// SAH cost with traversal and intersection constants both 1; absent where not defined.
     pub sah_cost: Option<f64>,
+    /// End-point overlap with both constants 1 (Aila, Karras, Laine 2013); absent unless asked for.
+    #[serde(default)]
+    pub epo: Option<f64>,
     /// Bytes of the structure's GPU buffers (the canonical triangle buffer is not counted).
     pub bytes: u64,
 }

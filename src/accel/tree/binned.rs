@@ -109,32 +109,30 @@ pub(super) fn median_split(references: &mut [Reference], axis: usize) -> (usize,
 /// The cheapest of all partitions of 2 to 4 references.
 fn exhaustive_split(references: &mut [Reference]) -> (usize, [Extent; 2]) {
     let count = references.len();
-    let mut best = (f32::INFINITY, 1_usize);
+    let all = (1_usize << count) - 1;
+    // Boxes and costs of all subsets, each made of a smaller one.
+    let mut subsets = [Box3::EMPTY; 1 << EXHAUSTIVE];
+    let mut costs = [0.0_f32; 1 << EXHAUSTIVE];
+    for subset in 1..=all {
+        let smaller = subset & (subset - 1);
+        let lowest = references[subset.trailing_zeros() as usize].bounds();
+        subsets[subset] = subsets[smaller].union(lowest);
+        costs[subset] = subsets[subset].half_area() * subset.count_ones() as f32;
+    }
     // The last reference stays in the second half: each partition comes up once.
-    for mask in 1..1_usize << (count - 1) {
-        let mut sides = [(Box3::EMPTY, 0.0); 2];
-        for (index, reference) in references.iter().enumerate() {
-            let side = &mut sides[usize::from(mask & (1 << index) == 0)];
-            *side = (side.0.union(reference.bounds()), side.1 + 1.0);
-        }
-        let cost: f32 = sides.iter().map(|s| s.0.half_area() * s.1).sum();
-        if cost < best.0 {
-            best = (cost, mask);
+    let mut chosen = 1;
+    for subset in 2..=all / 2 {
+        if costs[subset] + costs[all - subset] < costs[chosen] + costs[all - chosen] {
+            chosen = subset;
         }
     }
-    let mut index = 0;
-    let chosen: [bool; EXHAUSTIVE] = std::array::from_fn(|i| best.1 & (1 << i) != 0);
-    let mut sorted = [references[0]; EXHAUSTIVE];
-    for side in [true, false] {
-        for i in 0..count {
-            if chosen[i] == side {
-                sorted[index] = references[i];
-                index += 1;
-            }
+    let mut middle = 0;
+    for place in 0..count {
+        if chosen & (1 << place) != 0 {
+            references.swap(middle, place);
+            middle += 1;
         }
     }
-    references.copy_from_slice(&sorted[..count]);
-    let middle = best.1.count_ones() as usize;
     let (low, high) = references.split_at(middle);
     (middle, [Extent::of(low), Extent::of(high)])
 }
@@ -153,7 +151,9 @@ pub(super) struct BinSplit {
 impl BinSplit {
     /// Whether a reference belongs to the first side.
     pub fn is_low(&self, reference: &Reference) -> bool {
-        self.grid.bins(reference.centre())[self.axis] < self.bin
+        let (min, max) = (reference.min[self.axis], reference.max[self.axis]);
+        let (origin, scale) = (self.grid.origin[self.axis], self.grid.scale[self.axis]);
+        bin_of((min + max - origin) * scale) < self.bin
     }
 }
 
@@ -177,51 +177,66 @@ impl BinGrid {
         })
     }
 
-    /// Bins of a centre. Adding 2²³ rounds to the nearest integer and leaves it in the low bits;
-    /// whatever the input, the bins exist.
+    /// Bins of a centre.
     fn bins(&self, centre: Vec3A) -> [usize; 3] {
-        let shifted = (centre - self.origin) * self.scale + Vec3A::splat(8_388_608.0);
-        shifted
-            .to_array()
-            .map(|x| x.to_bits() as usize & (MAX_BINS - 1))
+        ((centre - self.origin) * self.scale).to_array().map(bin_of)
     }
 }
 
-/// Boxes and counts of the bins of three axes.
-struct Bins {
-    boxes: [[Box3; MAX_BINS]; 3],
-    counts: [[u32; MAX_BINS]; 3],
+/// The bin at a place in units of bins. Adding 2²³ rounds to the nearest integer and leaves it in the
+/// low bits; whatever the input, the bin exists.
+fn bin_of(place: f32) -> usize {
+    (place + 8_388_608.0).to_bits() as usize & (MAX_BINS - 1)
 }
 
-impl Bins {
-    const EMPTY: Bins = Bins {
-        boxes: [[Box3::EMPTY; MAX_BINS]; 3],
-        counts: [[0; MAX_BINS]; 3],
+/// Boxes and counts of the bins of three axes.
+struct Bins<const N: usize> {
+    boxes: [[Box3; N]; 3],
+    counts: [[u32; N]; 3],
+}
+
+impl<const N: usize> Bins<N> {
+    const EMPTY: Self = Bins {
+        boxes: [[Box3::EMPTY; N]; 3],
+        counts: [[0; N]; 3],
     };
 
-    fn of(references: &[Reference], grid: BinGrid) -> Self {
-        let mut bins = Self::EMPTY;
+    fn add(&mut self, references: &[Reference], grid: BinGrid) {
         for reference in references {
             let bounds = reference.bounds();
             let index = grid.bins(reference.centre());
             for axis in 0..3 {
-                let bin = &mut bins.boxes[axis][index[axis]];
+                let index = index[axis] % N;
+                let bin = &mut self.boxes[axis][index];
                 *bin = bin.union(bounds);
-                bins.counts[axis][index[axis]] += 1;
+                self.counts[axis][index] += 1;
             }
         }
-        bins
     }
 
     /// Boxes and counts add up without rounding, so the sum does not depend on the order.
-    fn merge(mut self, other: &Self) -> Self {
+    fn merge(&mut self, other: &Self) {
         for axis in 0..3 {
-            for bin in 0..MAX_BINS {
-                self.boxes[axis][bin] = self.boxes[axis][bin].union(other.boxes[axis][bin]);
+            for bin in 0..N {
+                let sum = &mut self.boxes[axis][bin];
+                *sum = sum.union(other.boxes[axis][bin]);
                 self.counts[axis][bin] += other.counts[axis][bin];
             }
         }
-        self
+    }
+
+    fn fill(&mut self, references: &[Reference], grid: BinGrid) {
+        if references.len() < PARALLEL_BINNING {
+            return self.add(references, grid);
+        }
+        let parts = references.par_chunks(PARALLEL_BINNING / 4).map(|part| {
+            let mut bins = Self::EMPTY;
+            bins.add(part, grid);
+            bins
+        });
+        for part in parts.collect::<Vec<_>>() {
+            self.merge(&part);
+        }
     }
 }
 
@@ -239,52 +254,58 @@ pub(super) fn best_bin_split(
         min: extent.bounds.min * 2.0,
         max: extent.bounds.max * 2.0,
     };
-    let over = |grid_box| best_border(references, BinGrid::new(grid_box, bins)?, bins);
+    let over = |grid_box| {
+        let grid = BinGrid::new(grid_box, bins)?;
+        // Small nodes are the most, and their bins cost more than their references.
+        match bins {
+            0..=8 => best_border::<8>(references, grid, bins),
+            9..=16 => best_border::<16>(references, grid, bins),
+            _ => best_border::<MAX_BINS>(references, grid, bins),
+        }
+    };
     over(&doubled).or_else(|| over(&extent.centres))
 }
 
 /// The best border between the bins of a grid; `None` if on every axis one bin holds everything.
-fn best_border(references: &[Reference], grid: BinGrid, bins: usize) -> Option<BinSplit> {
-    let filled = if references.len() < PARALLEL_BINNING {
-        Bins::of(references, grid)
-    } else {
-        let parts = references.par_chunks(PARALLEL_BINNING / 4);
-        let parts: Vec<Bins> = parts.map(|part| Bins::of(part, grid)).collect();
-        parts.iter().fold(Bins::EMPTY, Bins::merge)
-    };
-    let mut best: Option<BinSplit> = None;
+fn best_border<const N: usize>(
+    references: &[Reference],
+    grid: BinGrid,
+    bins: usize,
+) -> Option<BinSplit> {
+    let mut filled = Bins::<N>::EMPTY;
+    filled.fill(references, grid);
+    let (mut best_cost, mut best) = (f32::INFINITY, None);
     for axis in 0..3 {
         let (boxes, counts) = (&filled.boxes[axis], &filled.counts[axis]);
-        // Box and cost of all bins from this one on.
-        let mut high = [(Box3::EMPTY, 0.0); MAX_BINS];
+        // Cost of all bins from this one on.
+        let mut high = [0.0; N];
         let (mut bounds, mut count) = (Box3::EMPTY, 0);
         for bin in (1..bins).rev() {
             bounds = bounds.union(boxes[bin]);
             count += counts[bin];
-            high[bin] = (bounds, bounds.half_area() * count as f32);
+            high[bin] = bounds.half_area() * count as f32;
         }
         let total = count + counts[0];
         let (mut bounds, mut count) = (Box3::EMPTY, 0);
         for bin in 1..bins {
             bounds = bounds.union(boxes[bin - 1]);
             count += counts[bin - 1];
-            if count == 0 || count == total {
-                continue;
-            }
-            let (high_bounds, high_cost) = high[bin];
-            let cost = bounds.half_area() * count as f32 + high_cost;
-            if best.as_ref().is_none_or(|b| cost < b.cost) {
-                best = Some(BinSplit {
-                    axis,
-                    grid,
-                    bin,
-                    cost,
-                    overlap: bounds.intersection(high_bounds),
-                });
+            let cost = bounds.half_area() * count as f32 + high[bin];
+            if cost < best_cost && count > 0 && count < total {
+                (best_cost, best) = (cost, Some((axis, bin)));
             }
         }
     }
-    best
+    let (axis, bin) = best?;
+    let side = |bins: &[Box3]| bins.iter().copied().fold(Box3::EMPTY, Box3::union);
+    let boxes = &filled.boxes[axis][..bins];
+    Some(BinSplit {
+        axis,
+        grid,
+        bin,
+        cost: best_cost,
+        overlap: side(&boxes[..bin]).intersection(side(&boxes[bin..])),
+    })
 }
 
 /// Moves the references of the first side to the front; returns how many there are and the extents

@@ -35,10 +35,7 @@ pub(super) fn limit_depth(tree: Tree) -> Tree {
             NodeKind::Leaf { .. } => nodes.push(node),
         }
     }
-    Tree {
-        nodes,
-        order: tree.order,
-    }
+    Tree::new(nodes, tree.order)
 }
 
 fn leaves_below(tree: &Tree, root: u32) -> Vec<TreeNode> {
@@ -97,10 +94,7 @@ mod tests {
                 kind,
             });
         }
-        Tree {
-            nodes,
-            order: (0..leaves).collect(),
-        }
+        Tree::new(nodes, (0..leaves).collect())
     }
 
     #[test]

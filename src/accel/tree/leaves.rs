@@ -10,11 +10,10 @@ use super::{NodeKind, Tree};
 /// What is known of a subtree once all below it is decided.
 #[derive(Clone, Copy, Default)]
 struct Below {
-    /// Cost with the best choice of leaves, in areas of no particular node.
+    /// Cost with the best choice of leaves, times the area of the root.
     cost: f32,
-    /// First entry of the order.
-    first: u32,
     /// Entries of the order.
+    first: u32,
     count: u32,
     /// Whether all of it is one leaf.
     is_leaf: bool,
@@ -22,15 +21,24 @@ struct Below {
     end: u32,
 }
 
-/// Chooses the leaves of `tree`, whose leaves are consecutive runs of the order.
-pub(super) fn choose_leaves(tree: Tree, settings: &Settings) -> Tree {
+/// Chooses the leaves of `tree`, whose leaves are consecutive runs of the order; a triangle that comes
+/// twice into one leaf is listed there once.
+pub(super) fn choose_leaves(tree: Tree, has_duplicates: bool, settings: &Settings) -> Tree {
     let mut below = vec![Below::default(); tree.nodes.len()];
+    let triangles = |first: u32, count: u32| {
+        let entries = &tree.order[first as usize..(first + count) as usize];
+        if has_duplicates {
+            distinct(entries).count()
+        } else {
+            entries.len()
+        }
+    };
     for (index, node) in tree.nodes.iter().enumerate().rev() {
         let area = node.bounds.half_area();
-        let as_leaf = |count: u32| settings.intersection_cost * area * count as f32;
+        let leaf_cost = |count: usize| settings.intersection_cost * area * count as f32;
         below[index] = match node.kind {
             NodeKind::Leaf { first, count } => Below {
-                cost: as_leaf(count),
+                cost: leaf_cost(count as usize),
                 first,
                 count,
                 is_leaf: true,
@@ -38,43 +46,60 @@ pub(super) fn choose_leaves(tree: Tree, settings: &Settings) -> Tree {
             },
             NodeKind::Inner { left, right } => {
                 let (l, r) = (below[left as usize], below[right as usize]);
-                let count = l.count + r.count;
-                let cost = settings.traversal_cost * area + l.cost + r.cost;
-                let is_leaf = count as usize <= settings.leaf_size
-                    && (as_leaf(count) <= cost || count as usize <= settings.min_leaf_size);
-                Below {
-                    cost: if is_leaf { as_leaf(count) } else { cost },
+                let mut subtree = Below {
+                    cost: settings.traversal_cost * area + l.cost + r.cost,
                     first: l.first,
-                    count,
-                    is_leaf,
+                    count: l.count + r.count,
+                    is_leaf: false,
                     end: r.end,
+                };
+                if subtree.count as usize <= 2 * settings.leaf_size {
+                    let count = triangles(subtree.first, subtree.count);
+                    let pays = leaf_cost(count) <= subtree.cost || count <= settings.min_leaf_size;
+                    if count <= settings.leaf_size && pays {
+                        subtree.cost = leaf_cost(count);
+                        subtree.is_leaf = true;
+                    }
                 }
+                subtree
             }
         };
     }
-    copy_kept(tree, &below)
+    copy_kept(&tree, &below, has_duplicates)
+}
+
+/// Entries without repetition, in the order of their first places.
+fn distinct(entries: &[u32]) -> impl Iterator<Item = u32> {
+    let is_first = |(place, id): &(usize, &u32)| !entries[..*place].contains(id);
+    entries.iter().enumerate().filter(is_first).map(|(_, id)| *id)
 }
 
 /// The nodes above and at the chosen leaves, still in depth-first order.
-fn copy_kept(tree: Tree, below: &[Below]) -> Tree {
+fn copy_kept(tree: &Tree, below: &[Below], has_duplicates: bool) -> Tree {
     let mut nodes = Vec::with_capacity(tree.nodes.len());
+    let mut order = Vec::with_capacity(tree.order.len());
     let mut new_index = vec![0_u32; tree.nodes.len()];
     let mut index = 0;
-    while let Some(node) = tree.nodes.get(index) {
+    while let Some(&node) = tree.nodes.get(index) {
         new_index[index] = nodes.len() as u32;
-        let Below {
-            first,
-            count,
-            is_leaf,
-            end,
-            ..
-        } = below[index];
-        let mut kept = *node;
-        if is_leaf {
-            kept.kind = NodeKind::Leaf { first, count };
+        let subtree = below[index];
+        nodes.push(node);
+        index += 1;
+        if subtree.is_leaf {
+            let (first, count) = (subtree.first as usize, subtree.count as usize);
+            let entries = &tree.order[first..first + count];
+            let begin = order.len();
+            if has_duplicates {
+                order.extend(distinct(entries));
+            } else {
+                order.extend_from_slice(entries);
+            }
+            nodes[new_index[index - 1] as usize].kind = NodeKind::Leaf {
+                first: begin as u32,
+                count: (order.len() - begin) as u32,
+            };
+            index = subtree.end as usize;
         }
-        nodes.push(kept);
-        index = if is_leaf { end as usize } else { index + 1 };
     }
     for node in &mut nodes {
         if let NodeKind::Inner { left, right } = &mut node.kind {
@@ -83,8 +108,5 @@ fn copy_kept(tree: Tree, below: &[Below]) -> Tree {
         }
     }
     nodes.shrink_to_fit();
-    Tree {
-        nodes,
-        order: tree.order,
-    }
+    Tree::new(nodes, order)
 }

@@ -63,6 +63,8 @@ pub struct Tree {
     /// Triangle indices, leaf by leaf in the order of the nodes. After spatial splits a triangle may
     /// stand in several leaves, whose boxes cover its own only together.
     pub order: Vec<u32>,
+    /// End-point overlap, if the parameter `epo` asks for it: see [`Tree::epo`].
+    pub epo: Option<f64>,
 }
 
 impl Tree {
@@ -85,7 +87,12 @@ impl Tree {
         if settings.reinsertion > 0 {
             tree = log.phase("reinsertion", || reinsertion::optimise(tree, &settings));
         }
-        Ok(log.phase("leaves", || leaves::choose_leaves(tree, &settings)))
+        let has_duplicates = tree.has_duplicates(soup);
+        let mut tree = log.phase("leaves", || {
+            leaves::choose_leaves(tree, has_duplicates, &settings)
+        });
+        tree.epo = params.flag("epo").then(|| tree.epo(soup));
+        Ok(tree)
     }
 
     /// The tree of the builder alone.
@@ -103,7 +110,15 @@ impl Tree {
         };
         drop(references);
         let nodes = subtree.lay_out();
-        Ok(Tree { nodes, order })
+        Ok(Tree::new(nodes, order))
+    }
+
+    fn new(nodes: Vec<TreeNode>, order: Vec<u32>) -> Self {
+        Tree {
+            nodes,
+            order,
+            epo: None,
+        }
     }
 
     /// Whether some triangle is listed more than once, in leaves that only together cover it.

@@ -42,6 +42,7 @@ pub(super) struct Settings {
     pub traversal_cost: f32,
     pub intersection_cost: f32,
     pub bins: usize,
+    pub sweep_bins_from: usize,
     pub spatial_alpha: f32,
     pub spatial_bins: usize,
     /// Index into the presets of obvhs.
@@ -72,6 +73,7 @@ impl Settings {
             traversal_cost: params.number("traversal_cost") as f32,
             intersection_cost: params.number("intersection_cost") as f32,
             bins: params.integer("bins") as usize,
+            sweep_bins_from: params.integer("sweep_bins_from") as usize,
             spatial_alpha: params.number("spatial_alpha") as f32,
             spatial_bins: params.integer("spatial_bins") as usize,
             preset: index("ploc_preset", PRESETS),
@@ -151,16 +153,24 @@ pub fn tree_parameters() -> ParameterSchema {
         ),
         integer(
             "bins",
-            "bins on an axis for object splits (binned, sbvh)",
+            "bins on an axis for object splits (binned, sbvh, large nodes of sweep)",
             12,
             2,
             MAX_BINS as i64,
         ),
+        integer(
+            "sweep_bins_from",
+            "nodes of so many triangles are split at borders of bins only (sweep); the largest value \
+             for a sweep everywhere",
+            128,
+            2,
+            1 << 31,
+        ),
         number(
             "spatial_alpha",
             "least overlap of an object split, in areas of the root, that makes sbvh try a spatial \
-             one (Stich et al. 2009)",
-            1e-5,
+             one (sbvh; Stich et al. 2009: 1e-5)",
+            1e-3,
             0.0,
             1.0,
         ),
@@ -184,6 +194,12 @@ pub fn tree_parameters() -> ParameterSchema {
             0,
             64,
         ),
+        Parameter {
+            name: "epo",
+            description: "whether to compute the end-point overlap for the record (Aila et al. 2013; a second for 262,267 triangles); no part of the build",
+            default: ParamValue::Flag(false),
+            range: ParamRange::Flag,
+        },
         number(
             "reinsertion_share",
             "share of the nodes, largest first, that a round tries to reinsert",

@@ -94,5 +94,5 @@ fn take_over(bvh: &Bvh2) -> Tree {
             stack.push((first, None));
         }
     }
-    Tree { nodes, order }
+    Tree::new(nodes, order)
 }

@@ -27,7 +27,7 @@ impl Tree {
         deepest
     }
 
-    /// Figures of the tree; `bytes` is left 0 and `epo` absent. SAH with both constants 1: sum over
+    /// Figures of the tree; `bytes` is left 0. SAH with both constants 1: sum over
     /// inner nodes of A(node) / A(root) plus sum over leaves of A(leaf) · triangles / A(root).
     pub fn stats(&self) -> StructureStats {
         let mut stats = StructureStats {
@@ -51,6 +51,7 @@ impl Tree {
         let root_area = f64::from(root.bounds.half_area());
         stats.sah_cost = (root_area > 0.0).then(|| cost / root_area);
         stats.depth = Some(self.depth());
+        stats.epo = self.epo;
         stats
     }
 

@@ -277,6 +277,6 @@ impl Hierarchy {
                 order.extend_from_slice(&old_order[entries]);
             }
         }
-        Tree { nodes, order }
+        Tree::new(nodes, order)
     }
 }

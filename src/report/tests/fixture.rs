@@ -182,6 +182,7 @@ pub(super) fn structure(scene: &str, accel: &str, mrays: f64, wrong: usize) -> S
             leaf_histogram: vec![0, 9_000, 8_000, 5_000, 191],
             depth: (accel != "uniform-grid").then_some(31),
             sah_cost: (accel != "uniform-grid").then_some(61.2),
+            epo: None,
             bytes: 2_840_384,
         },
         gate: Some(gate(wrong)),
