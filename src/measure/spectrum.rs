@@ -8,7 +8,7 @@
 use super::image::{Image, ImageError, luminance};
 use super::record::{FilteredError, PowerAt};
 use super::statistics::bootstrap_mean;
-use rustfft::{FftPlanner, num_complex::Complex};
+use std::f64::consts::TAU;
 
 /// Standard deviations of the Gaussian filters, pixels; 0 is no filter.
 pub const SIGMAS: [f64; 6] = [0.0, 0.5, 1.0, 2.0, 4.0, 8.0];
@@ -70,7 +70,8 @@ pub fn error_spectrum(error: &[f64], [width, height]: [usize; 2]) -> ErrorSpectr
     for (index, value) in fourier(&rest, width).iter().enumerate().skip(1) {
         let cycles = |k: usize, size: usize| k.min(size - k) as f64 / size as f64;
         let frequency = cycles(index % width, width).hypot(cycles(index / width, height));
-        rings.add(frequency, value.norm_sqr() * scale);
+        let [re, im] = value;
+        rings.add(frequency, (re * re + im * im) * scale);
     }
     found.power = rings.means();
     found.low_frequency = (rings.low[1] > 0.0).then(|| rings.low[0] / rings.low[1]);
@@ -112,18 +113,60 @@ impl Rings {
     }
 }
 
+/// A complex number.
+type Complex = [f64; 2];
+
+fn product([a, b]: Complex, [c, d]: Complex) -> Complex {
+    [a * c - b * d, a * d + b * c]
+}
+
 /// Discrete Fourier transform in both directions, not scaled.
-fn fourier(values: &[f64], width: usize) -> Vec<Complex<f64>> {
+fn fourier(values: &[f64], width: usize) -> Vec<Complex> {
     let height = values.len() / width;
-    let mut planner = FftPlanner::new();
-    let mut rows: Vec<Complex<f64>> = values.iter().map(|&v| Complex::new(v, 0.0)).collect();
-    planner.plan_fft_forward(width).process(&mut rows);
-    let mut columns: Vec<Complex<f64>> = (0..values.len())
-        .map(|i| rows[i % height * width + i / height])
-        .collect();
-    planner.plan_fft_forward(height).process(&mut columns);
-    let back = |i: usize| columns[i % width * height + i / width];
-    (0..values.len()).map(back).collect()
+    let lines = |values: Vec<Complex>, length: usize| -> Vec<Complex> {
+        let roots = roots_of_one(length);
+        let line = |line| transform(line, &roots);
+        values.chunks_exact(length).flat_map(line).collect()
+    };
+    let turned = |values: &[Complex], length: usize| -> Vec<Complex> {
+        let others = values.len() / length;
+        let at = |i: usize| values[i % others * length + i / others];
+        (0..values.len()).map(at).collect()
+    };
+    let rows = lines(values.iter().map(|&v| [v, 0.0]).collect(), width);
+    turned(&lines(turned(&rows, width), height), height)
+}
+
+/// `exp(−2πi k / n)` for each k below n.
+fn roots_of_one(n: usize) -> Vec<Complex> {
+    let root = |k: usize| {
+        let (sin, cos) = (TAU * k as f64 / n as f64).sin_cos();
+        [cos, -sin]
+    };
+    (0..n).map(root).collect()
+}
+
+/// Transform of one line (Cooley & Tukey 1965, any length): split by the least prime factor p into p
+/// lines of every p-th value. `roots` are those of the whole line or of a multiple of its length.
+fn transform(line: &[Complex], roots: &[Complex]) -> Vec<Complex> {
+    let n = line.len();
+    let p = (2..=n).find(|p| n % p == 0).unwrap_or(1);
+    if p == 1 {
+        return line.to_vec();
+    }
+    let part = |r: usize| {
+        let every: Vec<Complex> = line.iter().skip(r).step_by(p).copied().collect();
+        transform(&every, roots)
+    };
+    let parts: Vec<Vec<Complex>> = (0..p).map(part).collect();
+    let stride = roots.len() / n;
+    let value = |k: usize| {
+        parts.iter().enumerate().fold([0.0; 2], |sum, (r, part)| {
+            let term = product(roots[r * k % n * stride], part[k % part.len()]);
+            [sum[0] + term[0], sum[1] + term[1]]
+        })
+    };
+    (0..n).map(value).collect()
 }
 
 /// Correlation with the next pixel in x and in y; `None` for a single pixel.
@@ -268,13 +311,29 @@ mod tests {
     }
 
     #[test]
+    fn the_transform_of_any_length_is_the_sum_that_defines_it() {
+        let mut generator = Pcg32::new(4);
+        for n in [1, 2, 7, 12, 30, 49] {
+            let line: Vec<Complex> = (0..n).map(|_| [generator.uniform(), 0.5]).collect();
+            let roots = roots_of_one(n);
+            let found = transform(&line, &roots);
+            for (k, found) in found.iter().enumerate() {
+                let terms = (0..n).map(|i| product(roots[i * k % n], line[i]));
+                let sum = terms.fold([0.0; 2], |s, t| [s[0] + t[0], s[1] + t[1]]);
+                let apart = (sum[0] - found[0]).hypot(sum[1] - found[1]);
+                assert!(apart < 1e-11, "{n}, {k}: {apart}");
+            }
+        }
+    }
+
+    #[test]
     fn powers_of_all_frequencies_have_the_mean_one() {
         // Odd sizes: no symmetry helps.
         let values: Vec<f64> = white(&mut Pcg32::new(5))[..35 * 21].to_vec();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let rest: Vec<f64> = values.iter().map(|v| v - mean).collect();
         let squares: f64 = rest.iter().map(|v| v * v).sum();
-        let sum: f64 = fourier(&rest, 35).iter().map(|f| f.norm_sqr()).sum();
+        let sum: f64 = fourier(&rest, 35).iter().flatten().map(|f| f * f).sum();
         assert!((sum / (squares * values.len() as f64) - 1.0).abs() < 1e-12);
     }
 }
