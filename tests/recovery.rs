@@ -77,6 +77,17 @@ fn subject(record: &Record) -> (String, bool) {
             );
             (format!("bias of {cell}"), false)
         }
+        Record::Spectrum(r) => {
+            let cell = format!(
+                "{}, {}, {} × {}",
+                r.scene, r.integrator, r.sequence, r.decorrelation
+            );
+            (format!("spectrum of {cell}"), false)
+        }
+        Record::SamplerCost(r) => {
+            let cell = format!("{} × {}", r.sequence, r.decorrelation);
+            (format!("cost of {cell}"), false)
+        }
         Record::Time(r) => {
             let cell = format!(
                 "{}, {}, {}, {} × {}",
@@ -188,6 +199,7 @@ fn a_device_lost_at_a_sampler_fails_that_sampler_alone() {
         format!("replicate 0 of {cell}"),
         format!("replicate 1 of {cell}"),
         format!("bias of {cell}"),
+        format!("spectrum of {cell}"),
     ];
     check_the_rest(&disturbed, &set(&missing), &set([&cell]));
 }
@@ -209,7 +221,8 @@ fn a_device_lost_at_a_stream_fails_that_stream_alone() {
     let disturbed = outcome(&SCENES, Some(&cell));
     let streams = [[0, 1], [2, 3]].map(|pair| format!("stream {cell}, {pair:?}"));
     assert_eq!(disturbed.failed, BTreeSet::from(streams));
-    check_the_rest(&disturbed, &BTreeSet::new(), &BTreeSet::new());
+    let cost = format!("cost of {cell}");
+    check_the_rest(&disturbed, &set([&cost]), &BTreeSet::new());
 }
 
 #[test]

@@ -4,6 +4,7 @@ pub mod belief;
 pub mod run;
 pub mod sampler_plots;
 pub mod samplers;
+pub mod spectrum;
 pub mod streams;
 pub mod structures;
 mod trade_off;
