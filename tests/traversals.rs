@@ -264,10 +264,7 @@ fn refusal(changes: &[(&str, &str)]) -> String {
 #[test]
 fn combinations_that_make_no_sense_are_refused_with_the_reason() {
     for (changes, tells) in [
-        (
-            [("traversal", "roped"), ("node_bytes", "64")],
-            "takes 32",
-        ),
+        ([("traversal", "roped"), ("node_bytes", "64")], "takes 32"),
         (
             [("traversal", "octant-roped"), ("node_bytes", "32")],
             "parent-pointer",
@@ -369,4 +366,3 @@ fn a_link_or_content_that_leads_astray_is_no_valid_structure() {
     let roped = default_params(&RopedBvh.parameters());
     assert!(build(&RopedBvh, &soup, &roped).validate(&other).is_err());
 }
-

@@ -361,7 +361,10 @@ impl BuiltAccel for Built {
             ],
             uniforms: vec![super::limits(self.nodes.len(), self.nodes.len())],
             // A multiple of 8, so that scenes of like depth share a kernel, and one to spare.
-            constants: vec![("STACK_ENTRIES", (self.stack_entries + 1).next_multiple_of(8))],
+            constants: vec![(
+                "STACK_ENTRIES",
+                (self.stack_entries + 1).next_multiple_of(8),
+            )],
         }
     }
 

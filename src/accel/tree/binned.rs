@@ -7,9 +7,9 @@
 //!
 //! Source: I. Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007.
 
+use super::TreeNode;
 use super::parameters::{MAX_BINS, SAH_DEPTH, Settings};
 use super::reference::{Box3, Extent, Reference};
-use super::TreeNode;
 use super::subtree::{PARALLEL_GRAIN, Subtree, leaf, make_inner};
 use glam::Vec3A;
 use rayon::prelude::*;

@@ -82,7 +82,9 @@ impl Tree {
                 };
                 for triangle in part {
                     let begin = leaves_of.partition_point(|(id, _)| *id < triangle.id);
-                    let own = leaves_of[begin..].iter().take_while(|(id, _)| *id == triangle.id);
+                    let own = leaves_of[begin..]
+                        .iter()
+                        .take_while(|(id, _)| *id == triangle.id);
                     walk.own = own.map(|(_, leaf)| *leaf).collect();
                     let polygon = Polygon::new(triangle);
                     sums[0] += polygon.area();

@@ -71,13 +71,7 @@ impl Side {
 
 impl Spatial<'_> {
     /// The subtree over `references`, with at most `budget` new ones.
-    fn grow(
-        &self,
-        references: Vec<Reference>,
-        extent: Extent,
-        budget: usize,
-        depth: u32,
-    ) -> Grown {
+    fn grow(&self, references: Vec<Reference>, extent: Extent, budget: usize, depth: u32) -> Grown {
         let count = references.len();
         let areas = references.iter().map(|r| r.bounds().half_area());
         if self.settings.must_be_leaf(extent.bounds, areas) {
