@@ -12,7 +12,14 @@ pub struct AccelRegistry {
 impl Default for AccelRegistry {
     fn default() -> Self {
         Self {
-            kinds: vec![&BruteForce, &super::Bvh, &RopedBvh, &UniformGrid],
+            kinds: vec![
+                &BruteForce,
+                &super::Bvh,
+                &RopedBvh,
+                &UniformGrid,
+                &super::ObjectList,
+                &super::MetaBvh,
+            ],
         }
     }
 }

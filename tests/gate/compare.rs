@@ -25,9 +25,11 @@ fn soup() -> TriangleSoup {
         triangle(-1.0, 9.0),
     ];
     let record = |(id, t): (usize, &Triangle)| TriangleRecord::new(t, id as u32, 0);
-    TriangleSoup {
-        records: all.iter().enumerate().map(record).collect(),
-    }
+    all.iter()
+        .enumerate()
+        .map(record)
+        .collect::<Vec<_>>()
+        .into()
 }
 
 /// A ray along z that hits triangle 0, and one that misses everything.
