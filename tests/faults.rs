@@ -67,6 +67,20 @@ const FAULTS: &[Fault] = &[
         structures: &["uniform-grid"],
     },
     Fault {
+        what: "the far child of a two-level structure is dropped",
+        file: "accel/meta_bvh",
+        from: "entries++;",
+        to: "",
+        structures: &["meta-bvh"],
+    },
+    Fault {
+        what: "the last instance is forgotten",
+        file: "accel/object_list",
+        from: "i < limits.elements; i++",
+        to: "i + 1u < limits.elements; i++",
+        structures: &["object-list"],
+    },
+    Fault {
         what: "the last triangle is forgotten",
         file: "accel/brute_force",
         from: "i < limits.elements; i++",

@@ -15,7 +15,7 @@ mod uniform_grid;
 
 pub use brute_force::{BruteForce, brute_force_hits};
 pub use bvh::{Bvh, BvhTwin};
-pub use instancing::{MetaBvh, ObjectList, Placed};
+pub use instancing::{InstanceJudge, MetaBvh, ObjectList, Placed, brute_force_instances};
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::AccelRegistry;
 pub use roped_bvh::RopedBvh;

@@ -133,7 +133,12 @@ impl SceneBuilder {
         self.triangles
     }
 
-    /// Triangles so far.
+    /// The triangles so far.
+    pub fn triangles(&self) -> &[Triangle] {
+        &self.triangles
+    }
+
+    /// How many triangles there are so far.
     pub fn len(&self) -> usize {
         self.triangles.len()
     }

@@ -96,7 +96,7 @@ impl Forest {
     /// # Errors
     /// More triangles than a leaf reference can address.
     pub(super) fn build(
-        objects: &[TriangleSoup],
+        objects: &[&TriangleSoup],
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Self, AccelError> {
@@ -109,7 +109,7 @@ impl Forest {
             });
         }
         let trees: Vec<Tree> = log.phase("objects", || {
-            let build = |object| Tree::build(object, params);
+            let build = |object: &&TriangleSoup| Tree::build(object, params);
             objects.par_iter().map(build).collect()
         });
         Ok(log.phase("layout", || {
@@ -158,7 +158,7 @@ impl Forest {
     ///
     /// # Errors
     /// The first violated invariant, with object and node.
-    pub(super) fn validate(&self, objects: &[TriangleSoup]) -> Result<(), AccelError> {
+    pub(super) fn validate(&self, objects: &[&TriangleSoup]) -> Result<(), AccelError> {
         for (index, (root, object)) in self.roots.iter().zip(objects).enumerate() {
             self.validate_object(root, object)
                 .map_err(|e| AccelError::Invalid(format!("object {index}: {e}")))?;

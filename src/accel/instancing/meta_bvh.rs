@@ -18,7 +18,7 @@ use super::instance::{
 use super::meta_bvh_nested::NestedTwin;
 use super::top::Top;
 use super::world_box::BoxMap;
-use super::{Base, Placed, clamped};
+use super::{Base, clamped};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
 use crate::measure::record::StructureStats;
@@ -67,16 +67,9 @@ impl AccelKind for MetaBvh {
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
         let base = Base::build(soup, params, log)?;
         let rebraid = params.integer("rebraid") as usize;
-        let needed = base.placed.instances.len() as u64 * rebraid.max(1) as u64;
-        if needed > u64::from(MOST_ENTRIES) {
-            return Err(AccelError::Limit {
-                what: "entries of the upper level".into(),
-                needed,
-                limit: MOST_ENTRIES.into(),
-            });
-        }
+        check_entries(base.instances.len(), rebraid)?;
         let top = log.phase("upper level", || {
-            Top::build(&base.placed, &base.forest, rebraid)
+            Top::build(&base.instances, &base.forest, rebraid)
         });
         Ok(Box::new(MetaBvhTwin {
             base,
@@ -85,6 +78,19 @@ impl AccelKind for MetaBvh {
             nested: params.name("loop") == "nested",
         }))
     }
+}
+
+/// Refuses more entries than references can address.
+fn check_entries(instances: usize, rebraid: usize) -> Result<(), AccelError> {
+    let needed = instances as u64 * rebraid.max(1) as u64;
+    if needed <= u64::from(MOST_ENTRIES) {
+        return Ok(());
+    }
+    Err(AccelError::Limit {
+        what: "entries of the upper level of a meta-bvh".into(),
+        needed,
+        limit: MOST_ENTRIES.into(),
+    })
 }
 
 /// The built structure; it is its own CPU twin.
@@ -124,7 +130,7 @@ impl MetaBvhTwin {
     fn step_fuse(&self) -> usize {
         let roots = &self.base.forest.roots;
         let below = self.top.entries.iter().map(|entry| {
-            let instance = &self.base.placed.instances[entry.instance as usize];
+            let instance = &self.base.instances[entry.instance as usize];
             roots[instance.object as usize].nodes.len() as u64
         });
         clamped(1 + self.top.nodes.len() as u64 + below.sum::<u64>())
@@ -177,8 +183,8 @@ impl MetaBvhTwin {
     }
 
     /// Checks the tree of the upper level: boxes, and that every entry is reached once.
-    fn validate_top(&self, placed: &Placed) -> Result<(), AccelError> {
-        let maps: Vec<BoxMap> = placed.instances.iter().map(BoxMap::new).collect();
+    fn validate_top(&self) -> Result<(), AccelError> {
+        let maps: Vec<BoxMap> = self.base.instances.iter().map(BoxMap::new).collect();
         let invalid = |text: String| Err(AccelError::Invalid(format!("upper level: {text}")));
         let first = self.root();
         let mut nodes = vec![false; self.top.nodes.len()];
@@ -227,10 +233,11 @@ impl MetaBvhTwin {
     }
 
     /// Checks that the entries of each instance make up its object, each part once.
-    fn validate_parts(&self, placed: &Placed) -> Result<(), AccelError> {
-        let mut parts: Vec<Vec<u32>> = vec![Vec::new(); placed.instances.len()];
+    fn validate_parts(&self) -> Result<(), AccelError> {
+        let instances = &self.base.instances;
+        let mut parts: Vec<Vec<u32>> = vec![Vec::new(); instances.len()];
         for (index, entry) in self.top.entries.iter().enumerate() {
-            let instance = placed.instances.get(entry.instance as usize);
+            let instance = instances.get(entry.instance as usize);
             if instance.map(|i| Entry::new(entry.instance, i, entry.node)) != Some(*entry) {
                 return Err(AccelError::Invalid(format!(
                     "entry {index} is not instance {} as it stands",
@@ -239,7 +246,7 @@ impl MetaBvhTwin {
             }
             parts[entry.instance as usize].push(entry.node);
         }
-        for (index, (instance, parts)) in placed.instances.iter().zip(&mut parts).enumerate() {
+        for (index, (instance, parts)) in instances.iter().zip(&mut parts).enumerate() {
             let root = &self.base.forest.roots[instance.object as usize];
             let mut stack = vec![root.nodes.start];
             let mut found = 0;
@@ -270,9 +277,9 @@ impl MetaBvhTwin {
 
 impl BuiltAccel for MetaBvhTwin {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
-        let placed = self.base.validate(soup)?;
-        self.validate_parts(&placed)?;
-        self.validate_top(&placed)
+        self.base.validate(soup)?;
+        self.validate_parts()?;
+        self.validate_top()
     }
 
     fn buffers(&self) -> GpuBuffers<'_> {
@@ -342,7 +349,7 @@ impl BuiltAccel for MetaBvhTwin {
 
     fn update(&mut self, soup: &TriangleSoup) -> Option<Result<(), AccelError>> {
         Some(self.base.update(soup).map(|()| {
-            self.top = Top::build(&self.base.placed, &self.base.forest, self.rebraid);
+            self.top = Top::build(&self.base.instances, &self.base.forest, self.rebraid);
         }))
     }
 
@@ -362,5 +369,20 @@ impl CpuTwin for &MetaBvhTwin {
 
     fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
         self.trace(ray, true, counters).triangle != NO_HIT
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_entries_than_references_can_address_are_refused_with_both_numbers() {
+        assert!(check_entries(1 << 23, 7).is_ok());
+        let error = check_entries(1 << 23, 8).unwrap_err().to_string();
+        assert!(
+            error.contains("67108864") && error.contains("67108863"),
+            "{error}"
+        );
     }
 }

@@ -29,24 +29,27 @@ pub use placed::Placed;
 
 use super::{AccelError, BuildLog, Space, TriangleSoup};
 use crate::config::Params;
+use crate::scene::Instance;
 use forest::Forest;
-use std::borrow::Cow;
+use placed::View;
 
-/// What both structures are built from: the placed objects and their BVHs.
+/// What both structures are built from: the BVHs of the objects and where these stand.
 struct Base {
-    placed: Placed,
+    instances: Vec<Instance>,
     forest: Forest,
 }
 
 impl Base {
     fn build(soup: &TriangleSoup, params: &Params, log: &mut BuildLog) -> Result<Self, AccelError> {
-        let placed = Placed::of(soup).into_owned();
-        let forest = Forest::build(&placed.objects, params, log)?;
-        Ok(Self { placed, forest })
+        let view = View::of(soup);
+        Ok(Self {
+            forest: Forest::build(&view.objects, params, log)?,
+            instances: view.instances.into_owned(),
+        })
     }
 
     fn space(&self) -> Space {
-        if self.placed.instances.iter().all(|i| i.is_identity()) {
+        if self.instances.iter().all(Instance::is_identity) {
             Space::World
         } else {
             Space::Instances
@@ -55,47 +58,50 @@ impl Base {
 
     /// Takes over the transforms of `soup`.
     fn update(&mut self, soup: &TriangleSoup) -> Result<(), AccelError> {
-        let moved = Placed::of(soup);
-        self.same_instances(&moved)?;
-        self.placed.instances.clone_from(&moved.instances);
+        let moved = View::of(soup);
+        self.has_instances_of(&moved)?;
+        self.instances = moved.instances.into_owned();
         Ok(())
     }
 
-    /// Whether `other` has the same instances of the same objects, wherever they stand.
-    fn same_instances(&self, other: &Placed) -> Result<(), AccelError> {
-        let key = |placed: &Placed| -> Vec<_> {
-            let instances = placed.instances.iter();
-            instances.map(|i| (i.object, i.first)).collect()
-        };
-        let sizes = |placed: &Placed| -> Vec<_> {
-            placed.objects.iter().map(|o| o.records.len()).collect()
-        };
-        if key(&self.placed) == key(other) && sizes(&self.placed) == sizes(other) {
+    /// Whether these are the same instances of objects of the same size, wherever they stand.
+    fn has_instances_of(&self, view: &View) -> Result<(), AccelError> {
+        let key = |i: &Instance| (i.object, i.first);
+        let same_instances = self
+            .instances
+            .iter()
+            .map(key)
+            .eq(view.instances.iter().map(key));
+        let sizes = view.objects.iter().map(|object| object.records.len());
+        let same_objects = self
+            .forest
+            .roots
+            .iter()
+            .map(|r| r.triangles.len())
+            .eq(sizes);
+        if same_instances && same_objects {
             return Ok(());
         }
         Err(AccelError::Invalid(format!(
             "built for {} instances of {} objects, given {} of {}: other ones need a new build",
-            self.placed.instances.len(),
-            self.placed.objects.len(),
-            other.instances.len(),
-            other.objects.len()
+            self.instances.len(),
+            self.forest.roots.len(),
+            view.instances.len(),
+            view.objects.len()
         )))
     }
 
     /// Checks objects and transforms against those of `soup`.
-    fn validate<'a>(&self, soup: &'a TriangleSoup) -> Result<Cow<'a, Placed>, AccelError> {
-        let given = Placed::of(soup);
-        self.same_instances(&given)?;
-        if let Some(index) = (self.placed.instances.iter())
-            .zip(&given.instances)
-            .position(|(a, b)| a != b)
-        {
+    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
+        let view = View::of(soup);
+        self.has_instances_of(&view)?;
+        let mut pairs = self.instances.iter().zip(view.instances.iter());
+        if let Some(index) = pairs.position(|(a, b)| a != b) {
             return Err(AccelError::Invalid(format!(
                 "instance {index} was moved after the build"
             )));
         }
-        self.forest.validate(&given.objects)?;
-        Ok(given)
+        self.forest.validate(&view.objects)
     }
 }
 

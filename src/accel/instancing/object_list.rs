@@ -93,7 +93,7 @@ struct Built {
 impl Built {
     /// Lists the instances as they stand.
     fn list(&mut self) {
-        let instances = &self.base.placed.instances;
+        let instances = &self.base.instances;
         let roots = &self.base.forest.roots;
         let maps: Vec<BoxMap> = instances.iter().map(BoxMap::new).collect();
         let root = |index: usize| &roots[instances[index].object as usize];
@@ -107,8 +107,8 @@ impl Built {
 
 impl BuiltAccel for Built {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
-        let placed = self.base.validate(soup)?;
-        for (index, instance) in placed.instances.iter().enumerate() {
+        self.base.validate(soup)?;
+        for (index, instance) in self.base.instances.iter().enumerate() {
             let root = &self.base.forest.roots[instance.object as usize];
             let expected = Entry::new(index as u32, instance, root.nodes.start);
             let map = BoxMap::new(instance);

@@ -1,7 +1,8 @@
 //! Objects and instances as structures see them.
 
-use super::super::TriangleSoup;
 use super::super::triangle::TriangleRecord;
+use super::super::{Ray, TriangleSoup};
+use super::instance::object_ray;
 use crate::scene::{Assembly, Instance, Transform, Triangle};
 use std::borrow::Cow;
 
@@ -28,22 +29,46 @@ impl Placed {
         }
     }
 
-    /// The instances of a scene; without any, the whole scene as one object where it is.
-    pub fn of(soup: &TriangleSoup) -> Cow<'_, Self> {
+    /// The ray in the space of an instance's object. Distances stay the same.
+    pub fn object_ray(&self, instance: &Instance, ray: &Ray) -> Ray {
+        object_ray(instance, ray)
+    }
+
+    /// Instance and record of a triangle of the scene.
+    pub fn locate(&self, id: u32) -> Option<(&Instance, &TriangleRecord)> {
+        let after = self.instances.partition_point(|i| i.first <= id);
+        let instance = self.instances.get(after.checked_sub(1)?)?;
+        let object = self.objects.get(instance.object as usize)?;
+        let record = object.records.get((id - instance.first) as usize)?;
+        Some((instance, record))
+    }
+}
+
+/// Objects and instances of any scene.
+pub(super) struct View<'a> {
+    pub objects: Vec<&'a TriangleSoup>,
+    pub instances: Cow<'a, [Instance]>,
+}
+
+impl<'a> View<'a> {
+    /// Those of the scene; without any, the whole scene as one object where it is.
+    pub(super) fn of(soup: &'a TriangleSoup) -> Self {
         if let Some(placed) = &soup.placed {
-            return Cow::Borrowed(placed);
+            return Self {
+                objects: placed.objects.iter().collect(),
+                instances: Cow::Borrowed(&placed.instances),
+            };
         }
-        if soup.records.is_empty() {
-            return Cow::Owned(Self::default());
+        let whole = Instance {
+            object: 0,
+            first: 0,
+            to_world: Transform::IDENTITY,
+            to_object: Transform::IDENTITY,
+        };
+        let parts = usize::from(!soup.records.is_empty());
+        Self {
+            objects: vec![soup; parts],
+            instances: Cow::Owned(vec![whole; parts]),
         }
-        Cow::Owned(Self {
-            objects: vec![soup.records.clone().into()],
-            instances: vec![Instance {
-                object: 0,
-                first: 0,
-                to_world: Transform::IDENTITY,
-                to_object: Transform::IDENTITY,
-            }],
-        })
     }
 }

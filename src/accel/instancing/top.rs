@@ -9,8 +9,8 @@
 use super::super::bounds::Bounds;
 use super::forest::{Forest, Node};
 use super::instance::{Entry, LEAF, entry_reference};
-use super::placed::Placed;
 use super::world_box::BoxMap;
+use crate::scene::Instance;
 
 const BINS: usize = 16;
 /// Below this depth splits are by SAH, beyond it by the median, so that depth stays below
@@ -35,14 +35,14 @@ pub(super) struct Top {
 impl Top {
     /// Builds the upper level over the instances as they stand, with up to `rebraid` entries for an
     /// instance on average.
-    pub(super) fn build(placed: &Placed, forest: &Forest, rebraid: usize) -> Self {
+    pub(super) fn build(instances: &[Instance], forest: &Forest, rebraid: usize) -> Self {
         let mut builder = Builder {
             forest,
-            maps: placed.instances.iter().map(BoxMap::new).collect(),
-            placed,
+            maps: instances.iter().map(BoxMap::new).collect(),
+            instances,
             top: Self::default(),
         };
-        let parts: Vec<Part> = (0..placed.instances.len() as u32)
+        let parts: Vec<Part> = (0..instances.len() as u32)
             .map(|instance| builder.whole(instance))
             .collect();
         let room = parts.len() * rebraid.saturating_sub(1);
@@ -71,14 +71,14 @@ struct Part {
 
 struct Builder<'a> {
     forest: &'a Forest,
-    placed: &'a Placed,
+    instances: &'a [Instance],
     maps: Vec<BoxMap>,
     top: Top,
 }
 
 impl Builder<'_> {
     fn whole(&self, instance: u32) -> Part {
-        let object = self.placed.instances[instance as usize].object;
+        let object = self.instances[instance as usize].object;
         let root = &self.forest.roots[object as usize];
         Part {
             instance,
@@ -129,7 +129,7 @@ impl Builder<'_> {
     }
 
     fn entry(&mut self, part: &Part, depth: u32) -> u32 {
-        let instance = &self.placed.instances[part.instance as usize];
+        let instance = &self.instances[part.instance as usize];
         let entry = Entry::new(part.instance, instance, part.node);
         self.top.depth = self.top.depth.max(depth);
         self.top.entries.push(entry);
