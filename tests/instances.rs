@@ -268,7 +268,18 @@ fn instances_are_where_their_flat_copies_are() {
     let scene = support::builtin("instances", &[("count", ParamValue::Integer(27))]);
     let soup = TriangleSoup::new(&scene);
     let mut rng = Pcg::new(3);
-    let rays = scenes::aimed_rays(&mut rng, &soup, 4000);
+    let rays: Vec<Ray> = (0..4000)
+        .map(|_| {
+            let mut inside = || Vec3::new(rng.unit(), rng.unit(), rng.unit());
+            let (origin, goal) = (inside() * 3.0 - 1.0, inside());
+            Ray {
+                origin: origin.to_array(),
+                t_min: 0.0,
+                direction: (goal - origin).to_array(),
+                t_max: scenes::FAR,
+            }
+        })
+        .collect();
     let flat = brute_force_hits(&soup, &rays);
     let placed = brute_force_instances(soup.placed.as_ref().expect("instances"), &rays);
     let same = flat
@@ -379,8 +390,8 @@ fn faults_in_the_kernels_of_instances_are_seen() {
         ),
         (
             "accel/object_list",
-            "i < limits.elements; i++",
-            "i + 1u < limits.elements; i++",
+            "nodes[boxes + 2u * i + 1u]",
+            "nodes[boxes + 2u * i]",
             &[0],
         ),
     ];
@@ -420,7 +431,7 @@ rays = 512
 rounds = 3
 min_warmup_ms = 0
 max_warmup_ms = 1
-rays = 512
+rays = 1024
 "#;
     let out = tempfile::tempdir().expect("a folder");
     let (summary, records) = support::run(experiment, &Registries::default(), out.path(), None);
