@@ -1,5 +1,6 @@
 //! The program as a user meets it: exit codes, messages, lists.
 
+use raystone::discrepancy::Measure;
 use raystone::measure::image::METRICS;
 use raystone::run::Registries;
 use std::path::{Path, PathBuf};
@@ -208,6 +209,9 @@ fn list_mentions_every_entry_of_every_registry() {
     for metric in METRICS {
         assert!(words.contains(metric.id), "{}", metric.id);
     }
+    for measure in Measure::ALL {
+        assert!(words.contains(measure.description()), "{measure:?}");
+    }
 }
 
 #[test]
@@ -345,4 +349,96 @@ fn render_writes_a_picture_of_the_size_asked_for() {
     );
     let nowhere = output(program(&small).arg(folder.path().join("no/such/folder.png")));
     assert!(error(&nowhere, 2).contains("folder.png"));
+}
+
+#[test]
+fn points_are_the_same_bytes_from_host_and_adapter() {
+    let arguments = "points --sequence sobol --decorrelation owen-hash --count 100 --dims 0,3,2 --pixel 5,7 --seed 9";
+    let arguments: Vec<&str> = arguments.split(' ').collect();
+    let host = run(&arguments);
+    let adapter = run(&[&arguments[..], &["--gpu"]].concat());
+    assert_eq!(
+        (host.status.code(), adapter.status.code()),
+        (Some(0), Some(0))
+    );
+    assert_eq!(stdout(&host).lines().count(), 100);
+    assert_eq!(stdout(&host), stdout(&adapter));
+    let other = run(&[&arguments[..], &["--width", "200"]].concat());
+    assert_ne!(
+        stdout(&host),
+        stdout(&other),
+        "another width is another pixel"
+    );
+
+    let corput = run(&[
+        "points",
+        "--sequence",
+        "van-der-corput",
+        "--count",
+        "3",
+        "--dims",
+        "0",
+    ]);
+    let expected = "0.0000000000000000e0\n5.0000000000000000e-1\n2.5000000000000000e-1\n";
+    assert_eq!(stdout(&corput), expected);
+    let third = [
+        "points",
+        "--sequence",
+        "van-der-corput",
+        "--count",
+        "2",
+        "--dims",
+        "0",
+        "--param",
+        "base=3",
+    ];
+    assert!(stdout(&run(&third)).ends_with("3.3333333325572312e-1\n"));
+}
+
+#[test]
+fn points_beyond_a_limit_or_without_sense_end_with_2_and_the_limit_or_reason() {
+    for (arguments, pieces) in [
+        ("--sequence sobl --count 4", &["did you mean `sobol`"][..]),
+        (
+            "--sequence sobol --count 4 --decorrelation owen-hsh",
+            &["`owen-hash`"],
+        ),
+        ("--sequence owen-sobol --count 65537", &["65537", "65536"]),
+        ("--sequence halton --count 4 --dims 0,256", &["257", "256"]),
+        (
+            "--sequence halton --count 4 --decorrelation owen-hash",
+            &["base 2"],
+        ),
+        (
+            "--sequence halton --count 4 --param digit=faure",
+            &["did you mean `digits`"],
+        ),
+        (
+            "--sequence halton --count 4 --param digits=fore",
+            &["`faure`"],
+        ),
+        (
+            "--sequence halton --count 4 --param digits=faure,plain",
+            &["one value"],
+        ),
+        (
+            "--sequence halton --count 4 --pixel 192,0",
+            &["192 pixels wide"],
+        ),
+        (
+            "--sequence hammersley --count 4 --decorrelation index-offset",
+            &["moves the index"],
+        ),
+    ] {
+        let arguments: Vec<&str> = std::iter::once("points")
+            .chain(arguments.split(' '))
+            .collect();
+        let message = error(&run(&arguments), 2);
+        for piece in pieces {
+            assert!(
+                message.contains(piece),
+                "{arguments:?}: no `{piece}` in {message}"
+            );
+        }
+    }
 }

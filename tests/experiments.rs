@@ -99,7 +99,7 @@ fn labels(variants: &[Variant]) -> Vec<&str> {
 fn plan(experiment: &Experiment, only: &[&str]) -> Result<Plan, ConfigError> {
     let only: Vec<String> = only.iter().map(|text| (*text).to_owned()).collect();
     Plan::new(experiment, &only, |sequence, decorrelation| {
-        sequence.name == "pixel-hash" || decorrelation.name == "cranley-patterson"
+        Ok(sequence.name == "pixel-hash" || decorrelation.name == "cranley-patterson")
     })
 }
 

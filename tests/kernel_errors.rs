@@ -50,28 +50,28 @@ fn broken(file: &str, from: &str, to: &str) -> (String, usize) {
 
 #[test]
 fn faults_of_all_kinds_are_told_with_file_and_line() {
-    let bvh = "accel/bvh";
+    let (bvh, pairs) = ("accel/bvh/stack", "accel/bvh/pairs");
     for (what, file, from, to, tells) in [
         (
             "a type error in the middle of a function",
-            bvh,
-            "nodes[4u * current + 2u]",
-            "nodes[4u * current + 2.5]",
-            "invalid",
+            pairs,
+            "min(left, right) < MISSED",
+            "min(left, n0) < MISSED",
+            "",
         ),
         (
             "a wrong type in an assignment",
-            bvh,
-            "stack[entries] = far",
-            "stack[entries] = 1.5",
+            pairs,
+            "inner.second = far",
+            "inner.second = 1.5",
             "u32",
         ),
         (
             "an unknown identifier",
-            bvh,
-            "let swap = right < left",
-            "let swap = rigth < left",
-            "rigth",
+            pairs,
+            "u32(swap)",
+            "u32(swop)",
+            "swop",
         ),
         (
             "an unknown member",
@@ -83,8 +83,8 @@ fn faults_of_all_kinds_are_told_with_file_and_line() {
         (
             "a syntax error",
             bvh,
-            "let far_enter = max(",
-            "let far_enter = = max(",
+            "let inner = visit(",
+            "let inner = = visit(",
             "unexpected token",
         ),
         (
@@ -96,7 +96,7 @@ fn faults_of_all_kinds_are_told_with_file_and_line() {
         ),
         (
             "a constant of the wrong type",
-            bvh,
+            "accel/leaf",
             "COUNT_MASK: u32 = 31u",
             "COUNT_MASK: u32 = 31.5",
             "COUNT_MASK",
@@ -130,7 +130,7 @@ fn faults_of_all_kinds_are_told_with_file_and_line() {
 
 #[test]
 fn sound_kernels_give_no_message() {
-    for structure in ["accel/bvh", "accel/roped_bvh", "accel/uniform_grid"] {
+    for structure in ["accel/bvh/stack", "accel/bvh/roped", "accel/uniform_grid"] {
         assert_eq!(
             message(structure, &embedded(structure), structure),
             Ok(()),
@@ -143,16 +143,20 @@ fn sound_kernels_give_no_message() {
 fn an_unknown_word_is_found_on_every_line_that_assigns() {
     let mut checked = 0;
     for (file, structure) in [
-        ("accel/bvh", "accel/bvh"),
-        ("accel/roped_bvh", "accel/roped_bvh"),
+        ("accel/bvh/stack", "accel/bvh/stack"),
+        ("accel/bvh/pairs", "accel/bvh/parent_pointer"),
+        ("accel/bvh/short_stack", "accel/bvh/short_stack"),
+        ("accel/bvh/parent_pointer", "accel/bvh/parent_pointer"),
+        ("accel/bvh/roped", "accel/bvh/roped"),
+        ("accel/bvh/octant_roped", "accel/bvh/octant_roped"),
         ("accel/uniform_grid", "accel/uniform_grid"),
         ("accel/brute_force", "accel/brute_force"),
-        ("accel/triangle", "accel/bvh"),
-        ("accel/bounds", "accel/bvh"),
-        ("integrator/path", "accel/bvh"),
-        ("integrator/frame", "accel/bvh"),
-        ("shading/texture", "accel/bvh"),
-        ("sampling/sobol", "accel/bvh"),
+        ("accel/triangle", "accel/bvh/stack"),
+        ("accel/bounds", "accel/bvh/stack"),
+        ("integrator/path", "accel/bvh/stack"),
+        ("integrator/frame", "accel/bvh/stack"),
+        ("shading/texture", "accel/bvh/stack"),
+        ("sampling/sobol", "accel/bvh/stack"),
     ] {
         let text = embedded(file);
         for (index, line) in text.lines().enumerate() {

@@ -8,9 +8,10 @@ use common::{Pcg, build, default_params, param_variants, scenes};
 use rayon::prelude::*;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::accel::{AccelRegistry, Counters, Hit, Ray};
+use raystone::config::{Entry, Variant};
 use raystone::gpu::{Composition, KernelLibrary};
-use raystone::integrator::{SceneFeatures, integrators};
-use raystone::sampling::SamplerRegistry;
+use raystone::integrator::{SceneFeatures, integrators, with_sampler};
+use raystone::sampling::{Demand, Sampler, SamplerRegistry};
 use std::mem::{offset_of, size_of};
 
 /// Names of the scene's feature flags, and the flag of the counting run.
@@ -33,23 +34,50 @@ fn with_structures(kernel: &Composition) -> Vec<Composition> {
     out
 }
 
-/// Every sequence with its parameters and every decorrelation, as the active ones of `kernel`.
+/// Every sequence and every decorrelation with every parameter, each with one partner.
+fn samplers() -> Vec<Sampler> {
+    let registry = SamplerRegistry::default();
+    let demand = Demand {
+        samples: Some(16),
+        dimensions: 1,
+        width: Some(16),
+    };
+    let variants = |entry: &Entry| -> Vec<Variant> {
+        let variant = |params| Variant {
+            name: entry.name.clone(),
+            label: entry.name.clone(),
+            params,
+        };
+        let params = param_variants(&entry.schema).into_iter();
+        params.map(variant).collect()
+    };
+    let sequences: Vec<_> = registry
+        .sequence_entries()
+        .iter()
+        .flat_map(variants)
+        .collect();
+    let decorrelations = registry.decorrelation_entries();
+    let decorrelations: Vec<_> = decorrelations.iter().flat_map(variants).collect();
+    let none = decorrelations
+        .iter()
+        .find(|d| d.name == "none")
+        .expect("none");
+    let sobol = sequences.iter().find(|s| s.name == "sobol").expect("sobol");
+    let pairs = sequences.iter().map(|s| (s, none));
+    let pairs = pairs.chain(decorrelations.iter().map(|d| (sobol, d)));
+    let sampler = |(s, d)| {
+        registry
+            .sampler(s, d, &demand)
+            .unwrap_or_else(|e| panic!("{e}"))
+    };
+    pairs.map(sampler).collect()
+}
+
+/// Every sampler as that of `kernel`.
 fn with_samplers(kernel: &Composition) -> Vec<Composition> {
-    let samplers = SamplerRegistry::default();
-    let mut out = Vec::new();
-    for sequence in samplers.sequences() {
-        for params in param_variants(&sequence.parameters()) {
-            for decorrelation in samplers.decorrelations() {
-                let kernel = kernel
-                    .clone()
-                    .with("sequence", sequence.kernel())
-                    .with("decorrelation", decorrelation.kernel());
-                let constants = sequence.constants(&params);
-                out.push(constants.iter().fold(kernel, |k, (n, v)| k.constant(n, *v)));
-            }
-        }
-    }
-    out
+    let samplers = samplers();
+    let with = |sampler| with_sampler(kernel.clone(), sampler);
+    samplers.iter().map(with).collect()
 }
 
 /// Every integrator with every structure, and with every sampler. The two are independent imports:

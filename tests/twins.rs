@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 
 /// Kernel file → Rust file, where the stem differs.
 const OTHER_FILE: &[(&str, &str)] = &[
+    ("accel/grid", "src/accel/grid/mod.rs"),
     ("accel/instance", "src/accel/instancing/instance.rs"),
+    ("accel/irregular_grid", "src/accel/irregular_grid/mod.rs"),
     ("accel/meta_bvh", "src/accel/instancing/meta_bvh.rs"),
     (
         "accel/meta_bvh_nested",
@@ -14,7 +16,6 @@ const OTHER_FILE: &[(&str, &str)] = &[
     ),
     ("accel/object_list", "src/accel/instancing/object_list.rs"),
     ("sampling/sampler", "src/sampling/mod.rs"),
-    ("sampling/state", "src/sampling/mod.rs"),
 ];
 
 /// Kernel files without a twin, with the reason.
@@ -23,6 +24,12 @@ const NO_TWIN: &[(&str, &str)] = &[
         "common/counters",
         "fields of Counters; the tests of structures compare counted work per ray",
     ),
+    (
+        "accel/nodes",
+        "a binding; the twin's layouts own their nodes",
+    ),
+    ("accel/stack", "the twins have vectors"),
+    ("common/lane", "an invocation's place in its workgroup"),
     ("common/errors", "writes the error word on the device"),
     ("common/limits", "a uniform, filled by name"),
     ("common/probe", "compared with the host in src/gpu/probe.rs"),
@@ -38,6 +45,10 @@ const NO_TWIN: &[(&str, &str)] = &[
     ("integrator/render", "the loop over samples"),
     ("integrator/trace_rays", "the loop over rays"),
     ("sampling/dump_stream", "the loop over coordinates"),
+    (
+        "sampling/sampler_cost",
+        "the loop over samples, for their cost",
+    ),
     ("shading/hemisphere", "judged by images, not by a twin"),
     ("shading/light", "judged by images, not by a twin"),
     ("shading/material", "judged by images, not by a twin"),
@@ -53,10 +64,31 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
         "one component; the twin maps a closure",
     ),
     ("accel/bounds", "MISSED", "the twin returns an Option"),
+    ("accel/leaf", "leaf_words", "parts of an array"),
     (
-        "accel/bvh",
-        "COUNT_MASK",
-        "the twin clears the leaf bit before it shifts",
+        "accel/bvh/short_stack",
+        "level_bit",
+        "the twin's words have 64 bits",
+    ),
+    (
+        "accel/bvh/short_stack",
+        "has",
+        "the twin's words have 64 bits",
+    ),
+    (
+        "accel/bvh/short_stack",
+        "deepest",
+        "the twin's words have 64 bits",
+    ),
+    (
+        "integrator/integrand",
+        "radiance",
+        "draws; the twin is given the point",
+    ),
+    (
+        "accel/two_level_grid",
+        "load_top",
+        "a method of the twin's arrays",
     ),
     ("sampling/pixel_hash", "hash", "the twin picks a function"),
     (
@@ -79,13 +111,41 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
         "the judge, in batches",
     ),
     ("accel/bvh", "layout", "build"),
+    ("accel/kd_tree", "halves", "figures and validation"),
+    ("accel/kd_tree", "lacking_in_leaf", "validation"),
     ("accel/roped_bvh", "ropes", "build"),
+    ("accel/leaf", "leaf_reference", "build"),
+    ("accel/leaf", "leaf_range", "unpacks in one place"),
+    ("accel/bvh/boxes", "split_axis", "build"),
+    ("accel/bvh/roped", "rope", "build"),
+    ("accel/bvh/roped", "rope_of", "build and validation"),
+    ("accel/bvh/octant_roped", "ropes_of", "build and validation"),
+    (
+        "accel/bvh/octant_roped",
+        "near_side",
+        "one expression of the kernel",
+    ),
     ("accel/uniform_grid", "insert", "build"),
     ("accel/uniform_grid", "insert_triangle", "build"),
     ("accel/uniform_grid", "sort_by_cell", "build"),
     ("accel/uniform_grid", "dot", "build, f64"),
     ("accel/uniform_grid", "cross", "build, f64"),
+    (
+        "integrator/integrand",
+        "half_plane_area",
+        "the integral, f64",
+    ),
+    ("sampling/blue_noise", "folder", "reads a parameter"),
+    ("sampling/blue_noise", "read_tables", "files"),
+    ("sampling/blue_noise", "read_words", "files"),
+    ("accel/two_level_grid", "parts", "build"),
+    ("accel/two_level_grid", "cut", "build"),
     ("sampling/dimensions", "needed", "planning"),
+    ("sampling/index_offset", "offsets", "reads a parameter"),
+    ("sampling/micro_jitter", "width", "makes the table"),
+    ("sampling/r2", "generalised_golden_ratio", "makes the table"),
+    ("sampling/sobol", "direction_numbers", "makes the table"),
+    ("sampling/van_der_corput", "base", "reads a parameter"),
     ("sampling/dimensions", "purpose", "words for the report"),
     (
         "sampling/dimensions",
@@ -102,21 +162,24 @@ fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// Names of all kernels in `kernels/`, without the extension.
+/// Names of all kernels in `kernels/` and its folders, without the extension.
 fn kernels() -> Vec<String> {
-    let mut out = Vec::new();
-    for folder in ["accel", "common", "integrator", "sampling", "shading"] {
-        let path = root().join("kernels").join(folder);
+    fn walk(folder: &Path, name: &str, out: &mut Vec<String>) {
         let entries =
-            std::fs::read_dir(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+            std::fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
         for entry in entries {
             let file = entry.expect("a readable entry").path();
             let stem = file.file_stem().expect("a file name").to_string_lossy();
-            out.push(format!("{folder}/{stem}"));
+            let name = format!("{name}{stem}");
+            if file.is_dir() {
+                walk(&file, &format!("{name}/"), out);
+            } else {
+                out.push(name);
+            }
         }
     }
-    let folders = std::fs::read_dir(root().join("kernels")).expect("kernels/");
-    assert_eq!(folders.count(), 5, "a folder of kernels is not walked");
+    let mut out = Vec::new();
+    walk(&root().join("kernels"), "", &mut out);
     out.sort();
     out
 }
@@ -130,11 +193,27 @@ fn twin_path(kernel: &str) -> PathBuf {
     root().join(other.map_or(format!("src/{kernel}.rs"), |(_, path)| (*path).to_owned()))
 }
 
-/// Text of a twin without its unit tests.
-fn twin_text(kernel: &str) -> String {
-    let text = read(&twin_path(kernel));
+/// Text of a Rust file without its unit tests.
+fn without_tests(path: &Path) -> String {
+    let text = read(path);
     let end = text.find("#[cfg(test)]").unwrap_or(text.len());
     text[..end].to_owned()
+}
+
+fn twin_text(kernel: &str) -> String {
+    without_tests(&twin_path(kernel))
+}
+
+/// Text of a twin with what all twins of its folder share, where a structure is a folder.
+fn twin_and_shared_text(kernel: &str) -> String {
+    let shared = twin_path(kernel).with_file_name("mod.rs");
+    let in_folder = kernel.matches('/').count() > 1;
+    let shared = if in_folder {
+        without_tests(&shared)
+    } else {
+        String::new()
+    };
+    twin_text(kernel) + &shared
 }
 
 fn twinned() -> Vec<String> {
@@ -168,6 +247,7 @@ fn constants(text: &str) -> BTreeMap<String, String> {
     for line in text.lines() {
         let line = line.trim_start();
         let line = line.strip_prefix("pub ").unwrap_or(line);
+        let line = line.strip_prefix("pub(super) ").unwrap_or(line);
         let Some(declaration) = line.strip_prefix("const ") else {
             continue;
         };
@@ -239,7 +319,8 @@ fn every_function_of_a_kernel_has_a_twin_of_the_same_name_and_the_other_way_roun
     for kernel in twinned() {
         let here = functions(&kernel_text(&kernel), false);
         let there = twin_text(&kernel);
-        for name in here.difference(&functions(&there, false)) {
+        let shared = twin_and_shared_text(&kernel);
+        for name in here.difference(&functions(&shared, false)) {
             let listed = KERNEL_ONLY
                 .iter()
                 .any(|(k, n, _)| *k == kernel && n == name);
@@ -269,7 +350,7 @@ fn constants_of_the_same_name_have_the_same_value() {
     let mut compared = BTreeSet::new();
     for kernel in twinned() {
         let here = values(&constants(&kernel_text(&kernel)));
-        let there = values(&constants(&twin_text(&kernel)));
+        let there = values(&constants(&twin_and_shared_text(&kernel)));
         for (name, value) in here {
             match there.get(&name) {
                 Some(other) => {

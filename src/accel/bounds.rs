@@ -47,6 +47,14 @@ impl Bounds {
         out
     }
 
+    /// What lies in both; `min > max` on some axis if nothing does.
+    pub fn intersection(&self, other: &Bounds) -> Bounds {
+        Bounds {
+            min: std::array::from_fn(|axis| self.min[axis].max(other.min[axis])),
+            max: std::array::from_fn(|axis| self.max[axis].min(other.max[axis])),
+        }
+    }
+
     /// Whether `other` lies inside.
     pub fn contains(&self, other: &Bounds) -> bool {
         (0..3).all(|axis| self.min[axis] <= other.min[axis] && self.max[axis] >= other.max[axis])

@@ -5,20 +5,33 @@
 pub mod bounds;
 mod brute_force;
 mod bvh;
+mod collapse;
+mod cwbvh;
+mod grid;
 pub mod instancing;
+mod irregular_grid;
+mod kd_tree;
+pub mod leaf;
+mod octree;
 pub mod ray;
 mod registry;
-mod roped_bvh;
+mod spatial;
 pub mod tree;
 pub mod triangle;
+mod two_level_grid;
 mod uniform_grid;
+mod wide;
 
 pub use brute_force::{BruteForce, brute_force_hits};
-pub use bvh::{Bvh, BvhTwin};
+pub use bvh::{BuiltBvh, Bvh, BvhTwin, RopedBvh};
+pub use cwbvh::Cwbvh;
 pub use instancing::{InstanceJudge, MetaBvh, ObjectList, Placed, brute_force_instances};
+pub use irregular_grid::IrregularGrid;
+pub use kd_tree::KdTree;
+pub use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::AccelRegistry;
-pub use roped_bvh::RopedBvh;
+pub use two_level_grid::TwoLevelGrid;
 pub use uniform_grid::UniformGrid;
 
 use crate::config::{ParameterSchema, Params};
@@ -44,6 +57,9 @@ pub enum AccelError {
         /// What the structure allows.
         limit: u64,
     },
+    /// Parameters that contradict each other, with the reason.
+    #[error("{0}")]
+    Contradiction(String),
     /// A structural invariant is violated.
     #[error("{0}")]
     Invalid(String),
@@ -255,6 +271,11 @@ pub trait BuiltAccel: Sync {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError>;
     /// The kernel with its arrays, uniforms, constants and features.
     fn buffers(&self) -> GpuBuffers<'_>;
+    /// Arrays that the kernel can read in several parts, where the adapter binds less than they need:
+    /// see [`crate::gpu::Bindings::parts`].
+    fn divisible(&self) -> &'static [&'static str] {
+        &[]
+    }
     /// Static figures.
     fn stats(&self) -> StructureStats;
     /// Where triangles are met.

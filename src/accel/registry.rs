@@ -1,6 +1,6 @@
 //! The registry of structures: one line each.
 
-use super::{AccelKind, BruteForce, RopedBvh, UniformGrid};
+use super::{AccelKind, BruteForce, KdTree, Octree, RopedBvh, UniformGrid};
 use crate::config::Entry;
 
 /// Everything that can be named on the `accel` axis.
@@ -16,7 +16,12 @@ impl Default for AccelRegistry {
                 &BruteForce,
                 &super::Bvh,
                 &RopedBvh,
+                &super::Cwbvh,
                 &UniformGrid,
+                &super::TwoLevelGrid,
+                &super::IrregularGrid,
+                &Octree,
+                &KdTree,
                 &super::ObjectList,
                 &super::MetaBvh,
             ],

@@ -5,12 +5,14 @@ use super::failure::Failure;
 use super::output::print;
 use clap::{Args, ValueEnum};
 use raystone::config::{Axis, Entry};
+use raystone::discrepancy::Measure;
 use raystone::measure::image::METRICS;
 use raystone::run::Registries;
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-/// List everything that can be named: scenes, structures, samplers, integrators, metrics, adapters
+/// List everything that can be named: scenes, structures, samplers, integrators, metrics, measures,
+/// adapters
 #[derive(Args)]
 pub struct List {
     /// What to list [default: everything]
@@ -31,6 +33,8 @@ enum Topic {
     Integrator,
     #[value(alias = "metrics")]
     Metric,
+    #[value(alias = "measures", alias = "discrepancy")]
+    Measure,
     #[value(alias = "adapters")]
     Adapter,
 }
@@ -51,6 +55,7 @@ impl List {
                 Topic::Decorrelation => axis(Axis::Decorrelation, &catalogue.decorrelation),
                 Topic::Integrator => axis(Axis::Integrator, &catalogue.integrator),
                 Topic::Metric => metrics(),
+                Topic::Measure => measures(),
                 Topic::Adapter => adapter_list(),
             })
             .collect();
@@ -84,6 +89,21 @@ fn metrics() -> String {
     let mut text = "metric: v the image, r the reference, A and B its halves\n".to_owned();
     for metric in METRICS {
         let _ = writeln!(text, "  {:width$}  {}", metric.id, metric.description);
+    }
+    text
+}
+
+fn measures() -> String {
+    let all = Measure::ALL;
+    let width = all.iter().map(|m| m.name().len()).max().unwrap_or(0);
+    let mut text = "measure: of point sets, for `raystone discrepancy`\n".to_owned();
+    for measure in all {
+        let _ = writeln!(
+            text,
+            "  {:width$}  {}",
+            measure.name(),
+            measure.description()
+        );
     }
     text
 }

@@ -2,11 +2,13 @@
 
 mod adapters;
 mod arguments;
+mod discrepancy;
 mod doctor;
 mod estimate;
 mod failure;
 mod list;
 mod output;
+mod points;
 mod render;
 mod report;
 mod run;
@@ -30,7 +32,8 @@ Examples:
   raystone doctor
   raystone run experiments/quick.toml
   raystone verify --accel bvh --scene path/to/model.obj
-  raystone render --scene cornell-box --spp 256 -o box.png";
+  raystone render --scene cornell-box --spp 256 -o box.png
+  raystone discrepancy --measure star,l2star points.txt";
 
 /// Version, commit and whether the sources differed from it.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
@@ -60,9 +63,13 @@ enum Command {
     Render(render::Render),
     #[command(after_help = EXIT_CODES)]
     Verify(verify::Verify),
+    #[command(after_help = EXIT_CODES)]
+    Points(points::Points),
     List(list::List),
     #[command(after_help = EXIT_CODES)]
     Doctor(doctor::Doctor),
+    #[command(after_help = EXIT_CODES)]
+    Discrepancy(discrepancy::Discrepancy),
     #[command(after_help = EXIT_CODES)]
     Report(report::Report),
 }
@@ -73,8 +80,10 @@ pub fn main() -> ExitCode {
         Command::Run(command) => command.execute(),
         Command::Render(command) => command.execute(),
         Command::Verify(command) => command.execute(),
+        Command::Points(command) => command.execute(),
         Command::List(command) => command.execute(),
         Command::Doctor(command) => command.execute(),
+        Command::Discrepancy(command) => command.execute(),
         Command::Report(command) => command.execute(),
     };
     done.unwrap_or_else(|failure| failure.tell())

@@ -319,7 +319,7 @@ mod tests {
         let overrides = [format!("axes.scene={scene}"), format!("axes.accel={accel}")];
         let experiment =
             Experiment::parse(&defaults(&catalogue), "test", &overrides, &catalogue).unwrap();
-        let mut plan = Plan::new(&experiment, &[], |_, _| true).unwrap();
+        let mut plan = Plan::new(&experiment, &[], |_, _| Ok(true)).unwrap();
         assert!(spare_brute_force(&mut plan).is_ok());
         plan
     }

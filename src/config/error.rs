@@ -166,6 +166,14 @@ pub enum ConfigError {
         /// Its patterns.
         exclude: String,
     },
+    /// A sequence and a decorrelation that make no sense together.
+    #[error("{at}: {reason}")]
+    Refused {
+        /// Section.
+        at: &'static str,
+        /// The pair, and why.
+        reason: String,
+    },
     /// Excludes and filters leave nothing.
     #[error("nothing is left to run: {reason}")]
     NothingLeft {

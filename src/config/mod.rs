@@ -40,7 +40,7 @@ pub enum ParamValue {
     Integer(i64),
     /// A switch.
     Flag(bool),
-    /// One of a closed list of names.
+    /// One of a closed list of names, or a text.
     Name(String),
 }
 
@@ -83,10 +83,10 @@ impl Params {
         }
     }
 
-    /// A named choice.
+    /// A named choice or a text.
     ///
     /// # Panics
-    /// If the entry's schema does not declare `name` as a choice.
+    /// If the entry's schema does not declare `name` as a choice or a text.
     pub fn name(&self, name: &str) -> &str {
         match self.0.get(name) {
             Some(ParamValue::Name(x)) => x,
@@ -127,6 +127,8 @@ pub enum ParamRange {
     Flag,
     /// One of these names.
     Choice(&'static [&'static str]),
+    /// Any text; the empty one stands for nothing.
+    Text,
 }
 
 /// One parameter of a registry entry.

@@ -48,16 +48,24 @@ impl Plan {
     ///
     /// `only` holds filters `axis=pattern`, several of them in one text behind commas; patterns of
     /// one axis are alternatives, different axes must all fit. `is_randomised` says of a sequence
-    /// and a decorrelation whether each seed gives another image: only then are replicates needed.
+    /// and a decorrelation whether each seed gives another image (only then are replicates needed),
+    /// or why the two make no sense together: such pairs are left out with the reason.
     ///
     /// # Errors
-    /// A filter of an unknown axis or without `=`, a filter or an exclude that fits nothing, and
-    /// filters that leave nothing to run.
+    /// A filter of an unknown axis or without `=`, a filter or an exclude that fits nothing, filters
+    /// that leave nothing to run, a reference or a whole product of pairs that make no sense.
     pub fn new(
         experiment: &Experiment,
         only: &[String],
-        is_randomised: impl Fn(&Variant, &Variant) -> bool,
+        is_randomised: impl Fn(&Variant, &Variant) -> Result<bool, String>,
     ) -> Result<Self, ConfigError> {
+        let reference = &experiment.reference;
+        if let Err(reason) = is_randomised(&reference.sequence, &reference.decorrelation) {
+            return Err(ConfigError::Refused {
+                at: "[reference]",
+                reason,
+            });
+        }
         let axes = &experiment.axes;
         let filter = Filter::parse(only, axes)?;
         let full: Vec<_> = product(axes, &Axis::ALL);
@@ -70,6 +78,12 @@ impl Plan {
             points.retain(|point| {
                 filter.fits(point) && !experiment.excludes.iter().any(|e| e.covers(point))
             });
+            points
+        };
+        let refused = refused(&points(&Axis::ALL), &is_randomised);
+        let points = |which: &[Axis]| {
+            let mut points = points(which);
+            points.retain(|point| point.refusal(&is_randomised).is_none());
             points
         };
         let structures = points(&[Axis::Scene, Axis::Accel]);
@@ -102,6 +116,12 @@ impl Plan {
         };
         plan.scenes
             .retain(|scene| plan.structures.iter().any(|cell| cell.scene == *scene));
+        if let (true, Some(first)) = (plan.times.is_empty(), refused.first()) {
+            return Err(ConfigError::NothingLeft {
+                reason: first.reason.clone(),
+            });
+        }
+        plan.skipped.extend(refused);
         if plan.structures.is_empty() {
             return Err(ConfigError::NothingLeft {
                 reason: format!(
@@ -186,13 +206,39 @@ fn untraceable(cell: &SamplerCell) -> Skipped {
 fn full_product(
     times: &[TimeCell],
     replicates: u32,
-    is_randomised: &impl Fn(&Variant, &Variant) -> bool,
+    is_randomised: &impl Fn(&Variant, &Variant) -> Result<bool, String>,
 ) -> usize {
     let renders = times.iter().map(|cell| {
         let randomised = is_randomised(&cell.sequence, &cell.decorrelation);
-        if randomised { replicates as usize } else { 1 }
+        if randomised == Ok(true) {
+            replicates as usize
+        } else {
+            1
+        }
     });
     renders.sum()
+}
+
+/// Pairs of a sequence and a decorrelation that make no sense, with the full cells that they cost.
+fn refused(
+    full: &[Point],
+    is_randomised: &impl Fn(&Variant, &Variant) -> Result<bool, String>,
+) -> Vec<Skipped> {
+    let mut out: Vec<Skipped> = Vec::new();
+    for point in full {
+        let Some(reason) = point.refusal(is_randomised) else {
+            continue;
+        };
+        match out.iter_mut().find(|skipped| skipped.reason == reason) {
+            Some(skipped) => skipped.cells += 1,
+            None => out.push(Skipped {
+                cell: point.stream(is_randomised).to_string(),
+                reason,
+                cells: 1,
+            }),
+        }
+    }
+    out
 }
 
 /// What one exclude takes out of the filtered product.
@@ -240,7 +286,19 @@ impl Point<'_> {
         }
     }
 
-    fn sampler(&self, is_randomised: &impl Fn(&Variant, &Variant) -> bool) -> SamplerCell {
+    /// Why its sequence and decorrelation make no sense together, if it has both and they do not.
+    fn refusal(
+        &self,
+        is_randomised: &impl Fn(&Variant, &Variant) -> Result<bool, String>,
+    ) -> Option<String> {
+        let sequence = self.get(Axis::Sequence)?;
+        is_randomised(sequence, self.get(Axis::Decorrelation)?).err()
+    }
+
+    fn sampler(
+        &self,
+        is_randomised: &impl Fn(&Variant, &Variant) -> Result<bool, String>,
+    ) -> SamplerCell {
         let StreamCell {
             sequence,
             decorrelation,
@@ -266,11 +324,14 @@ impl Point<'_> {
         }
     }
 
-    fn stream(&self, is_randomised: &impl Fn(&Variant, &Variant) -> bool) -> StreamCell {
+    fn stream(
+        &self,
+        is_randomised: &impl Fn(&Variant, &Variant) -> Result<bool, String>,
+    ) -> StreamCell {
         let sequence = self.variant(Axis::Sequence);
         let decorrelation = self.variant(Axis::Decorrelation);
         StreamCell {
-            randomised: is_randomised(&sequence, &decorrelation),
+            randomised: is_randomised(&sequence, &decorrelation) == Ok(true),
             sequence,
             decorrelation,
         }

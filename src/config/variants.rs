@@ -25,6 +25,7 @@ impl fmt::Display for ParamRange {
             .fmt(f),
             Self::Flag => Kind::Flag.fmt(f),
             Self::Choice(names) => write!(f, "one of {}", names.join(", ")),
+            Self::Text => f.write_str("a text"),
         }
     }
 }
@@ -187,6 +188,7 @@ fn value(key: &str, item: &Item, parameter: &Parameter) -> Result<ParamValue, Co
             }
             (ParamValue::Name(x.clone()), true)
         }
+        (ParamRange::Text, Value::Text(x)) => (ParamValue::Name(x.clone()), true),
         (_, found) => {
             return Err(ConfigError::WrongType {
                 at: item.at.clone(),

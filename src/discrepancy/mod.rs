@@ -1,40 +1,53 @@
-//! Exact star discrepancy of point sets in the unit square. Usable on its own: nothing here depends
-//! on the rest of the crate.
+//! How evenly point sets fill the unit cube: exact star discrepancy and its companions. Usable on its
+//! own: nothing here depends on the rest of the crate.
 //!
 //! The star discrepancy of N points is the largest difference, over all boxes with one corner at
-//! the origin, between the area of the box and the fraction of the points in it (Niederreiter 1992,
-//! definition 2.1). The supremum is reached in the limit at the grid of the points' coordinates and
-//! 1, where both counts matter: the *open* box `[0, x) × [0, y)` for boxes with too few points and
-//! the *closed* box `[0, x] × [0, y]` for boxes with too many.
+//! the origin, between the volume of the box and the fraction of the points in it (Niederreiter
+//! 1992, definition 2.1). The supremum is reached in the limit at the grid of the points'
+//! coordinates and 1, where both counts matter: the *open* box `[0, y)` for boxes with too few
+//! points and the *closed* box `[0, y]` for boxes with too many.
+//!
+//! | what | how | cost |
+//! |---|---|---|
+//! | star, 1-D | sorted points | N log N |
+//! | star, 2-D | [`planar`]: a tournament over y, its winners followed over the sweep in x | ~ N log N |
+//! | star, 3-D and up | [`orthants`]: orthants decomposed until counts are sums, cells that cannot win dropped | between N and N^(1+d/2) cells in practice |
+//! | star, over budget | the same with a tolerance, [`ascent`] from below | the budget |
+//! | square means | [`quadratic`]: L2-star, centered, wrap-around, mixture, average | N² d |
+//!
+//! [`measure()`] does any of them by [`Measure`], under a [`Budget`] of time.
 
+mod ascent;
+mod budget;
+mod distance;
+mod empty_box;
+mod error;
+mod extreme;
+mod leaf;
+mod measure;
+mod nets;
+mod orthants;
+mod planar;
+mod points;
+mod quadratic;
+mod random;
+mod spectrum;
 mod star;
+mod sum;
 
-pub use star::{star_2d, star_2d_prefixes};
+pub use budget::Budget;
+pub use distance::{Metric, minimum_distance};
+pub use empty_box::largest_empty_box;
+pub use error::DiscrepancyError;
+pub use extreme::extreme_2d;
+pub use measure::{Measure, Value, measure};
+pub use nets::{Net, elementary_shapes, net_quality};
+pub use points::PointSet;
+pub use quadratic::{Quadratic, quadratic};
+pub use spectrum::radial_spectrum;
+pub use star::{Bracket, star, star_2d, star_2d_prefixes};
 
-use thiserror::Error;
-
-/// Why a point set has no star discrepancy.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum DiscrepancyError {
-    /// There is nothing to measure.
-    #[error("star discrepancy of an empty point set is undefined: give at least one point")]
-    Empty,
-    /// A coordinate is NaN or outside `[0, 1]`.
-    #[error("point {index} is ({x}, {y}): both coordinates must lie in [0, 1]")]
-    OutsideUnitSquare {
-        /// Index of the first such point.
-        index: usize,
-        /// Its first coordinate.
-        x: f64,
-        /// Its second coordinate.
-        y: f64,
-    },
-    /// A prefix is longer than the set.
-    #[error("prefix of {count} points asked for, but the set has only {available}")]
-    PrefixTooLong {
-        /// Points asked for.
-        count: usize,
-        /// Points there are.
-        available: usize,
-    },
-}
+#[cfg(test)]
+mod sweep;
+#[cfg(test)]
+mod tests;

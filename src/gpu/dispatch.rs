@@ -2,7 +2,7 @@
 
 use super::GpuError;
 use super::adapter::Gpu;
-use super::pipeline::{Bindings, Pipeline, WORKGROUP_SIZE};
+use super::pipeline::{Bindings, MAX_PARTS, Pipeline, WORKGROUP_SIZE};
 use bytemuck::Pod;
 use std::time::{Duration, Instant};
 
@@ -67,6 +67,37 @@ impl Gpu {
             | wgpu::BufferUsages::COPY_SRC
             | wgpu::BufferUsages::COPY_DST;
         self.filled(name, contents, usage)
+    }
+
+    /// Storage buffers that together hold an array of `vec4`, each as large as the adapter can bind,
+    /// and the number of `vec4`s in each but the last. Parts end between elements of 16 to 64 bytes.
+    ///
+    /// # Errors
+    /// It needs more than [`MAX_PARTS`] parts, or the device is lost or out of memory.
+    pub fn storage_parts(
+        &self,
+        name: &str,
+        words: &[u32],
+    ) -> Result<(Vec<wgpu::Buffer>, u32), GpuError> {
+        // Three and four vec4s an element: triangles and nodes.
+        const ALIGNMENT: u64 = 12;
+        let limit = self.limits.max_storage_buffer_binding_size / 16;
+        let vec4s = (limit / ALIGNMENT * ALIGNMENT).clamp(ALIGNMENT, 1 << 28);
+        let needed = words.len() as u64 * 4;
+        let most = vec4s * 16 * MAX_PARTS as u64;
+        if needed > most {
+            return Err(GpuError::TooLarge {
+                name: name.to_owned(),
+                needed,
+                limit: most,
+            });
+        }
+        if words.is_empty() {
+            return Ok((vec![self.storage(name, words)?], vec4s as u32));
+        }
+        let parts = words.chunks(4 * vec4s as usize);
+        let buffers: Result<Vec<_>, _> = parts.map(|part| self.storage(name, part)).collect();
+        Ok((buffers?, vec4s as u32))
     }
 
     /// A buffer with this content; wgpu's `create_buffer_init` panics where this fails.

@@ -14,7 +14,7 @@ mod uniform;
 pub use adapter::{AdapterChoice, AdapterSummary, Gpu, adapters, open};
 pub use compose::{ComposedKernel, Composition, KernelLibrary};
 pub use dispatch::{Dispatch, Elapsed, groups_for};
-pub use pipeline::{Bindings, Pipeline, WORKGROUP_SIZE};
+pub use pipeline::{Bindings, MAX_PARTS, Pipeline, TEXELS_PER_ROW, WORKGROUP_SIZE};
 pub use probe::{ArithmeticProbe, probe_arithmetic};
 pub use uniform::UniformValues;
 
@@ -65,6 +65,18 @@ pub enum GpuError {
         /// Buffer name.
         name: String,
         /// Bytes needed.
+        needed: u64,
+        /// The adapter's limit.
+        limit: u64,
+    },
+    /// A kernel binds more buffers than the adapter allows, because arrays came in several parts.
+    #[error(
+        "kernel `{kernel}` needs {needed} storage buffers for a scene of this size, but this adapter binds at most {limit}"
+    )]
+    TooManyBuffers {
+        /// Entry module.
+        kernel: String,
+        /// Storage buffers of the kernel.
         needed: u64,
         /// The adapter's limit.
         limit: u64,

@@ -5,10 +5,15 @@ use super::adapter::Gpu;
 use super::compose::{ComposedKernel, Composition};
 use super::uniform::UniformValues;
 use std::collections::{BTreeMap, HashMap};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Invocations per workgroup of every one-dimensional kernel.
 pub const WORKGROUP_SIZE: u32 = 64;
+
+/// Texels in a row of an array that is read as a texture; twin of `kernels/common/texels.wesl`.
+pub const TEXELS_PER_ROW: u32 = 8192;
+const TEXEL_BYTES: u64 = 16;
+const TEXEL_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
 /// Compiled pipelines by composition and runtime checks.
 pub(super) type PipelineCache = HashMap<(Composition, bool), Arc<Pipeline>>;
@@ -22,6 +27,8 @@ enum BindingKind {
         size: u32,
         members: Vec<(String, u32)>,
     },
+    /// A storage array read as texels of `rgba32uint`, see [`Bindings::buffer`].
+    Texels,
 }
 
 #[derive(Debug, Clone)]
@@ -41,12 +48,24 @@ pub struct Pipeline {
     bindings: Vec<Binding>,
 }
 
+/// A storage buffer, and its copy in a texture once a kernel asked for that.
+#[derive(Clone)]
+struct Array {
+    buffer: wgpu::Buffer,
+    texels: Arc<OnceLock<wgpu::TextureView>>,
+}
+
 /// Buffers and uniform values by the names that kernels give them.
 #[derive(Default, Clone)]
 pub struct Bindings {
-    buffers: BTreeMap<String, wgpu::Buffer>,
+    buffers: BTreeMap<String, Array>,
     uniforms: BTreeMap<String, UniformValues>,
+    /// Arrays in several parts: how many parts, and `vec4`s in all but the last.
+    parts: BTreeMap<String, (usize, u32)>,
 }
+
+/// Parts that an array may have at most; kernels declare as many.
+pub const MAX_PARTS: usize = 4;
 
 impl Bindings {
     /// Nothing bound.
@@ -54,9 +73,15 @@ impl Bindings {
         Self::default()
     }
 
-    /// Binds a storage buffer to the kernel variable `name`.
+    /// Binds a storage buffer to the kernel variable `name`. A kernel that declares the variable as
+    /// `texture_storage_2d<rgba32uint, read>` gets a copy in rows of [`TEXELS_PER_ROW`], made when it
+    /// is first bound: the buffer must have its content by then, and must keep it.
     pub fn buffer(&mut self, name: &str, buffer: &wgpu::Buffer) -> &mut Self {
-        self.buffers.insert(name.to_owned(), buffer.clone());
+        let array = Array {
+            buffer: buffer.clone(),
+            texels: Arc::default(),
+        };
+        self.buffers.insert(name.to_owned(), array);
         self
     }
 
@@ -64,6 +89,31 @@ impl Bindings {
     pub fn uniform(&mut self, name: &str, values: UniformValues) -> &mut Self {
         self.uniforms.insert(name.to_owned(), values);
         self
+    }
+
+    /// Binds an array of `vec4` in parts (see [`Gpu::storage_parts`]): the kernel variables `name`,
+    /// `name_1`, …
+    pub fn parts(&mut self, name: &str, (buffers, vec4s): &(Vec<wgpu::Buffer>, u32)) -> &mut Self {
+        for (index, buffer) in buffers.iter().enumerate() {
+            self.buffer(&part_name(name, index), buffer);
+        }
+        if buffers.len() > 1 {
+            self.parts.insert(name.to_owned(), (buffers.len(), *vec4s));
+        }
+        self
+    }
+
+    /// `composition` with what arrays in several parts ask of kernels: the features `name_1`, … and
+    /// the constant `NAME_PART`.
+    #[must_use]
+    pub fn compose(&self, mut composition: Composition) -> Composition {
+        for (name, (count, vec4s)) in &self.parts {
+            for index in 1..*count {
+                composition = composition.feature(&part_name(name, index), true);
+            }
+            composition = composition.constant(&format!("{}_PART", name.to_uppercase()), *vec4s);
+        }
+        composition
     }
 
     /// Everything of `other` on top of this.
@@ -74,7 +124,17 @@ impl Bindings {
             .extend(other.buffers.iter().map(|(k, v)| (k.clone(), v.clone())));
         out.uniforms
             .extend(other.uniforms.iter().map(|(k, v)| (k.clone(), v.clone())));
+        out.parts
+            .extend(other.parts.iter().map(|(k, v)| (k.clone(), *v)));
         out
+    }
+}
+
+/// Name of the kernel variable that binds a part of an array.
+fn part_name(name: &str, index: usize) -> String {
+    match index {
+        0 => name.to_owned(),
+        _ => format!("{name}_{index}"),
     }
 }
 
@@ -110,6 +170,7 @@ fn reflect(kernel: &ComposedKernel) -> Vec<Binding> {
             naga::AddressSpace::Storage { access } => BindingKind::Storage {
                 writable: access.contains(naga::StorageAccess::STORE),
             },
+            naga::AddressSpace::Handle => BindingKind::Texels,
             _ => continue,
         };
         bindings.push(Binding {
@@ -123,20 +184,26 @@ fn reflect(kernel: &ComposedKernel) -> Vec<Binding> {
 }
 
 fn layout_entry(binding: &Binding) -> wgpu::BindGroupLayoutEntry {
+    let buffer = |ty| wgpu::BindingType::Buffer {
+        ty,
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    };
     let ty = match &binding.kind {
-        BindingKind::Storage { writable } => wgpu::BufferBindingType::Storage {
+        BindingKind::Storage { writable } => buffer(wgpu::BufferBindingType::Storage {
             read_only: !writable,
+        }),
+        BindingKind::Uniform { .. } => buffer(wgpu::BufferBindingType::Uniform),
+        BindingKind::Texels => wgpu::BindingType::StorageTexture {
+            access: wgpu::StorageTextureAccess::ReadOnly,
+            format: TEXEL_FORMAT,
+            view_dimension: wgpu::TextureViewDimension::D2,
         },
-        BindingKind::Uniform { .. } => wgpu::BufferBindingType::Uniform,
     };
     wgpu::BindGroupLayoutEntry {
         binding: binding.binding,
         visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Buffer {
-            ty,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        },
+        ty,
         count: None,
     }
 }
@@ -170,6 +237,16 @@ impl Gpu {
 
     fn compile(&self, kernel: ComposedKernel, runtime_checks: bool) -> Result<Pipeline, GpuError> {
         let bindings = reflect(&kernel);
+        let storage = |b: &&Binding| matches!(b.kind, BindingKind::Storage { .. });
+        let needed = bindings.iter().filter(storage).count() as u64;
+        let limit = u64::from(self.limits.max_storage_buffers_per_shader_stage);
+        if needed > limit {
+            return Err(GpuError::TooManyBuffers {
+                kernel: kernel.composition.entry,
+                needed,
+                limit,
+            });
+        }
         let groups = bindings.iter().map(|b| b.group + 1).max().unwrap_or(0);
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let layouts: Vec<_> = (0..groups)
@@ -270,23 +347,25 @@ impl Gpu {
                 .iter()
                 .filter(|b| b.group as usize == group)
             {
-                let buffer = match binding.kind {
-                    BindingKind::Uniform { .. } => uniforms.get(&binding.name),
-                    BindingKind::Storage { .. } => given.buffers.get(&binding.name),
+                let resource = match binding.kind {
+                    BindingKind::Uniform { .. } => uniforms
+                        .get(&binding.name)
+                        .map(wgpu::Buffer::as_entire_binding),
+                    BindingKind::Storage { .. } => given
+                        .buffers
+                        .get(&binding.name)
+                        .map(|array| self.bound_buffer(&binding.name, array))
+                        .transpose()?,
+                    BindingKind::Texels => given
+                        .buffers
+                        .get(&binding.name)
+                        .map(|array| self.bound_texels(&binding.name, array))
+                        .transpose()?,
                 };
-                let buffer =
-                    buffer.ok_or_else(|| pipeline.unbound(&binding.name, given.buffers.keys()))?;
-                let limit = self.limits.max_storage_buffer_binding_size;
-                if buffer.size() > limit {
-                    return Err(GpuError::TooLarge {
-                        name: binding.name.clone(),
-                        needed: buffer.size(),
-                        limit,
-                    });
-                }
                 entries.push(wgpu::BindGroupEntry {
                     binding: binding.binding,
-                    resource: buffer.as_entire_binding(),
+                    resource: resource
+                        .ok_or_else(|| pipeline.unbound(&binding.name, given.buffers.keys()))?,
                 });
             }
             groups.push(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -296,6 +375,98 @@ impl Gpu {
             }));
         }
         Ok(groups)
+    }
+
+    fn bound_buffer<'a>(
+        &self,
+        name: &str,
+        array: &'a Array,
+    ) -> Result<wgpu::BindingResource<'a>, GpuError> {
+        let (needed, limit) = (
+            array.buffer.size(),
+            self.limits.max_storage_buffer_binding_size,
+        );
+        if needed > limit {
+            return Err(GpuError::TooLarge {
+                name: name.to_owned(),
+                needed,
+                limit,
+            });
+        }
+        Ok(array.buffer.as_entire_binding())
+    }
+
+    fn bound_texels<'a>(
+        &self,
+        name: &str,
+        array: &'a Array,
+    ) -> Result<wgpu::BindingResource<'a>, GpuError> {
+        let rows = (array.buffer.size() / TEXEL_BYTES).div_ceil(u64::from(TEXELS_PER_ROW));
+        let limit = u64::from(self.limits.max_texture_dimension_2d);
+        if rows.max(u64::from(TEXELS_PER_ROW)) > limit {
+            return Err(GpuError::TooLarge {
+                name: format!("{name}, as a texture"),
+                needed: array.buffer.size(),
+                limit: limit * u64::from(TEXELS_PER_ROW) * TEXEL_BYTES,
+            });
+        }
+        let view = array
+            .texels
+            .get_or_init(|| self.texels(name, &array.buffer, rows as u32));
+        Ok(wgpu::BindingResource::TextureView(view))
+    }
+
+    /// The content of `buffer` as a texture.
+    fn texels(&self, name: &str, buffer: &wgpu::Buffer, rows: u32) -> wgpu::TextureView {
+        let texels = (buffer.size() / TEXEL_BYTES) as u32;
+        let extent = |width, height| wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: 1,
+        };
+        let texture = self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(name),
+            size: extent(TEXELS_PER_ROW, rows.max(1)),
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: TEXEL_FORMAT,
+            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        });
+        let mut encoder = self
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let (whole, rest) = (texels / TEXELS_PER_ROW, texels % TEXELS_PER_ROW);
+        for (first, size) in [(0, extent(TEXELS_PER_ROW, whole)), (whole, extent(rest, 1))] {
+            if size.width == 0 || size.height == 0 {
+                continue;
+            }
+            let row_bytes = TEXELS_PER_ROW * TEXEL_BYTES as u32;
+            encoder.copy_buffer_to_texture(
+                wgpu::TexelCopyBufferInfo {
+                    buffer,
+                    layout: wgpu::TexelCopyBufferLayout {
+                        offset: u64::from(first) * u64::from(row_bytes),
+                        bytes_per_row: Some(row_bytes),
+                        rows_per_image: None,
+                    },
+                },
+                wgpu::TexelCopyTextureInfo {
+                    texture: &texture,
+                    mip_level: 0,
+                    origin: wgpu::Origin3d {
+                        x: 0,
+                        y: first,
+                        z: 0,
+                    },
+                    aspect: wgpu::TextureAspect::All,
+                },
+                size,
+            );
+        }
+        self.queue.submit([encoder.finish()]);
+        texture.create_view(&wgpu::TextureViewDescriptor::default())
     }
 }
 
@@ -320,7 +491,7 @@ impl Pipeline {
             .find(|b| b.name == name)
             .and_then(|b| match &b.kind {
                 BindingKind::Uniform { members, .. } => Some(members.as_slice()),
-                BindingKind::Storage { .. } => None,
+                BindingKind::Storage { .. } | BindingKind::Texels => None,
             })
     }
 }

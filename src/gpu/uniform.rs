@@ -41,6 +41,11 @@ impl UniformValues {
         self
     }
 
+    /// Words of a member.
+    pub fn words(&self, name: &str) -> Option<&[u32]> {
+        self.0.get(name).map(Vec::as_slice)
+    }
+
     /// Bytes of a struct whose members lie at these offsets. `Err` names members without a value.
     pub(super) fn pack(&self, size: u32, members: &[(String, u32)]) -> Result<Vec<u8>, String> {
         let mut bytes = vec![0u8; size as usize];

@@ -1,12 +1,13 @@
 //! Integrators: what is traced per sample, and the renderer that runs them.
 
 mod frame;
+pub mod integrand;
 mod render;
 mod tables;
 mod traced;
 
 pub use frame::Frame;
-pub use render::{RAY_COUNT_CLASSES, RenderJob, Renderer, Snapshot};
+pub use render::{RAY_COUNT_CLASSES, RenderJob, Renderer, Snapshot, with_sampler};
 pub use tables::{SceneBuffers, SceneFeatures};
 pub use traced::Traced;
 
@@ -31,6 +32,10 @@ pub trait Integrator: Sync {
     }
     /// Sampler dimensions it consumes at most.
     fn dimensions(&self, params: &Params) -> u32;
+    /// The value of every pixel, where it is known: it is then the reference.
+    fn exact(&self, _params: &Params) -> Option<f64> {
+        None
+    }
     /// Length of AO rays as a fraction of the scene's diagonal, if it traces any.
     fn ao_radius(&self, _params: &Params) -> Option<f64> {
         None
@@ -139,7 +144,17 @@ impl Integrator for Path {
 }
 
 /// The registry of integrators.
-static INTEGRATORS: &[&dyn Integrator] = &[&Primary, &AmbientOcclusion, &Path];
+static INTEGRATORS: &[&dyn Integrator] = &[
+    &Primary,
+    &AmbientOcclusion,
+    &Path,
+    &integrand::INTEGRANDS[0],
+    &integrand::INTEGRANDS[1],
+    &integrand::INTEGRANDS[2],
+    &integrand::INTEGRANDS[3],
+    &integrand::INTEGRANDS[4],
+    &integrand::INTEGRANDS[5],
+];
 
 /// All integrators.
 pub fn integrators() -> &'static [&'static dyn Integrator] {

@@ -65,24 +65,29 @@ fn composition(
     job: &RenderJob,
     ray_counts: bool,
 ) -> Composition {
-    let mut out = traced
-        .compose(Composition::new("integrator/render"))
-        .with("sequence", job.sampler.sequence.kernel())
-        .with("decorrelation", job.sampler.decorrelation.kernel())
+    let kernel = traced.compose(Composition::new("integrator/render"));
+    let mut out = with_sampler(kernel, job.sampler)
         .with("integrator", job.integrator.kernel())
         .feature("ray_counts", ray_counts);
     for (name, on) in scene.features.flags() {
         out = out.feature(name, on);
     }
-    let sampler = job
-        .sampler
-        .sequence
-        .constants(&job.sampler.sequence_variant.params);
-    let integrator = job.integrator.constants(job.params);
-    for (name, value) in sampler.iter().chain(&integrator) {
-        out = out.constant(name, *value);
+    out = scene.bindings.merged(&traced.bindings).compose(out);
+    for (name, value) in job.integrator.constants(job.params) {
+        out = out.constant(name, value);
     }
     out
+}
+
+/// Puts a sampler into a kernel that draws; its words are bound as `sampler_table`.
+#[must_use]
+pub fn with_sampler(mut composition: Composition, sampler: &Sampler) -> Composition {
+    for (name, value) in sampler.constants() {
+        composition = composition.constant(name, value);
+    }
+    composition
+        .with("sequence", sampler.sequence.kernel())
+        .with("decorrelation", sampler.decorrelation.kernel())
 }
 
 impl<'a> Renderer<'a> {
@@ -110,7 +115,7 @@ impl<'a> Renderer<'a> {
             .buffer("status", &status);
         bindings.buffer(
             "sampler_table",
-            &gpu.storage("sampler_table", &job.sampler.table)?,
+            &gpu.storage("sampler_table", job.sampler.table.words())?,
         );
         Ok(Self {
             gpu,

@@ -72,7 +72,8 @@ impl SceneBuffers {
         let (lights, light_power) = light_words(scene);
         tables.extend_from_slice(&lights);
         let mut bindings = Bindings::new();
-        bindings.buffer("triangles", &gpu.storage("triangles", &soup.records)?);
+        let triangles = bytemuck::cast_slice(&soup.records);
+        bindings.parts("triangles", &gpu.storage_parts("triangles", triangles)?);
         bindings.buffer("shading_tables", &gpu.storage("shading_tables", &tables)?);
         if textured {
             bindings.buffer("texture_data", &gpu.storage("texture_data", &texture_data)?);

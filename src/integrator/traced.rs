@@ -24,7 +24,11 @@ impl Traced {
         let buffers = built.buffers();
         let mut bindings = Bindings::new();
         for array in &buffers.arrays {
-            bindings.buffer(array.name, &gpu.storage(array.name, &array.words)?);
+            if built.divisible().contains(&array.name) {
+                bindings.parts(array.name, &gpu.storage_parts(array.name, &array.words)?);
+            } else {
+                bindings.buffer(array.name, &gpu.storage(array.name, &array.words)?);
+            }
         }
         for (name, values) in buffers.uniforms {
             bindings.uniform(name, values);

@@ -71,15 +71,15 @@ impl<'a> Batch<'a> {
         runtime_checks: bool,
         counters: bool,
     ) -> Result<Self, GpuError> {
+        let mut bindings = scene.bindings.merged(&traced.bindings);
         let composition = traced
             .compose(Composition::new("integrator/trace_rays"))
             .feature("any", query == Query::Any)
             .feature("counters", counters);
-        let pipeline = gpu.pipeline(&composition, runtime_checks)?;
+        let pipeline = gpu.pipeline(&bindings.compose(composition), runtime_checks)?;
         let bytes_per_ray = if counters { 32 } else { 16 };
         let output = gpu.zeroed("hits", rays.len() as u64 * bytes_per_ray)?;
         let status = gpu.zeroed("status", 64)?;
-        let mut bindings = scene.bindings.merged(&traced.bindings);
         bindings
             .buffer("rays", &gpu.storage("rays", rays)?)
             .buffer("status", &status);

@@ -8,7 +8,7 @@
 //! The t-test supposes that tile means are about normal. Many samples per pixel make them so; at very
 //! few, fireflies skew them and very small p-values come up too often.
 
-use super::hypothesis::{benjamini_hochberg, welch_t_test_beyond};
+use super::hypothesis::{benjamini_hochberg, welch_t_test, welch_t_test_beyond};
 use super::image::{Image, ImageError, luminance};
 use std::fmt;
 
@@ -68,6 +68,9 @@ pub struct BiasCheck {
     pub min_p: f64,
     /// p-values in ten equal bins of `[0, 1]`: flat if there is no bias.
     pub p_histogram: [usize; 10],
+    /// z-score of the whole image: difference of the mean luminances over its standard error (Welch's
+    /// t); absent if not testable.
+    pub z: Option<f64>,
     /// The verdict.
     pub verdict: BiasVerdict,
 }
@@ -99,6 +102,7 @@ pub fn check_bias(
             alpha: options.alpha,
             min_p: 1.0,
             p_histogram: [0; 10],
+            z: None,
             verdict: BiasVerdict::NotTestable(reason),
         });
     }
@@ -107,7 +111,15 @@ pub fn check_bias(
     let p_values: Vec<f64> = (ours.iter().zip(&theirs))
         .map(|(a, b)| p_value(a, b, options.rounding))
         .collect();
-    Ok(summarise(&p_values, replicates[0].width, options))
+    let whole = |images: &[Image]| {
+        let edge = images[0].width.max(images[0].height);
+        tile_means(images, edge).concat()
+    };
+    let z = welch_t_test(&whole(replicates), &whole(reference_parts)).map(|test| test.t);
+    Ok(BiasCheck {
+        z,
+        ..summarise(&p_values, replicates[0].width, options)
+    })
 }
 
 fn why_not_testable(replicates: &[Image], parts: &[Image]) -> Option<String> {
@@ -174,6 +186,7 @@ fn summarise(p_values: &[f64], width: u32, options: BiasOptions) -> BiasCheck {
         alpha: options.alpha,
         min_p: p_values.iter().copied().fold(1.0, f64::min),
         p_histogram,
+        z: None,
     }
 }
 
@@ -193,6 +206,20 @@ mod tests {
             Image::new(WIDTH, HEIGHT, pixels).unwrap()
         };
         (0..count).map(&mut image).collect()
+    }
+
+    #[test]
+    fn the_z_score_is_small_without_bias_and_large_with_it() {
+        let mut generator = Pcg32::new(77);
+        let reference = noisy(16, 0.2, &mut generator);
+        let z = |images: &[Image]| {
+            let check = check_bias(images, &reference, BiasOptions::default());
+            check.unwrap().z.unwrap()
+        };
+        let mut images = noisy(16, 0.2, &mut generator);
+        assert!(z(&images).abs() < 4.0, "{}", z(&images));
+        brighten_tile(&mut images, 1.5);
+        assert!(z(&images) > 8.0, "{}", z(&images));
     }
 
     fn brighten_tile(images: &mut [Image], factor: f32) {

@@ -15,7 +15,7 @@ use super::record::{ClassVerdict, GateVerdict, JudgeCheck};
 use crate::accel::AccelKind;
 use crate::accel::triangle::TriangleRecord;
 use crate::accel::{
-    AccelError, BuildLog, BuiltAccel, Bvh, BvhTwin, Hit, NO_HIT, Ray, Space, TriangleSoup,
+    AccelError, BuildLog, BuiltAccel, BuiltBvh, Bvh, Hit, NO_HIT, Ray, Space, TriangleSoup,
     brute_force_hits,
 };
 use crate::config::{Gate, Params};
@@ -72,9 +72,11 @@ impl Judge {
                 .0
                 .insert(parameter.name.to_owned(), parameter.default);
         }
-        let twin = BvhTwin::build(soup, &params, &mut BuildLog::default())?;
-        twin.validate(soup)?;
+        let tree = BuiltBvh::build(soup, &params, &mut BuildLog::default())?;
+        tree.validate(soup)?;
+        let twin = tree.twin(soup);
         let sets = record_rays(scene, soup, camera, &twin, settings, seed);
+        drop(tree);
         let mut judge = Self {
             sets,
             brute_force: JudgeCheck::default(),

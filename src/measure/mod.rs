@@ -11,5 +11,6 @@ pub mod memory;
 pub mod picture;
 pub mod rays;
 pub mod record;
+pub mod sampler_cost;
 pub mod statistics;
 pub mod timing;

@@ -172,6 +172,9 @@ pub struct StructureStats {
     pub depth: Option<u32>,
     /// SAH cost with traversal and intersection constants both 1; absent where not defined.
     pub sah_cost: Option<f64>,
+    /// End-point overlap with both constants 1 (Aila, Karras, Laine 2013); absent unless asked for.
+    #[serde(default)]
+    pub epo: Option<f64>,
     /// Bytes of the structure's GPU buffers (the canonical triangle buffer is not counted).
     pub bytes: u64,
 }
@@ -389,6 +392,10 @@ pub struct BiasRecord {
     pub min_p: f64,
     /// Histogram of the p-values in ten equal bins: flat when there is no bias.
     pub p_histogram: Vec<usize>,
+    /// Difference of the mean luminance of all replicates from the reference's, in standard errors;
+    /// absent where it is not testable.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub z: Option<f64>,
     /// `no-bias-found`, `biased`, or `not-testable` with the reason.
     pub verdict: String,
 }

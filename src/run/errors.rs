@@ -12,8 +12,8 @@ use crate::measure::image::{Image, Reference, measure};
 use crate::measure::picture::{automatic_exposure, error_map, tone_map, write_png};
 use crate::measure::record::{BiasRecord, ErrorAtSpp, ErrorRecord, Record, ReferenceRecord};
 use crate::report::color::viridis;
-use crate::sampling::Sampler;
 use crate::sampling::hash::pcg_hash;
+use crate::sampling::{Demand, Sampler};
 use std::time::Instant;
 
 /// Relative error per pixel at the top of the colour scale of error maps.
@@ -26,7 +26,29 @@ struct Yardstick {
     exposure: f32,
 }
 
-/// A job for this world; `None` if a name is not registered or the sampler has too few dimensions.
+/// The sampler that draws `samples` samples a pixel for an integrator.
+///
+/// # Errors
+/// A name is not registered, or the sampler has too few dimensions or samples.
+pub(super) fn sampler_for(
+    session: &Session,
+    (sequence, decorrelation): (&Variant, &Variant),
+    variant: &Variant,
+    samples: u32,
+) -> Result<Sampler, String> {
+    let integrator =
+        integrator(&variant.name).ok_or_else(|| format!("no integrator is called {variant}"))?;
+    let demand = Demand {
+        samples: Some(samples),
+        dimensions: integrator.dimensions(&variant.params),
+        width: Some(session.experiment.resolution[0]),
+    };
+    let samplers = &session.registries.samplers;
+    let made = samplers.sampler(sequence, decorrelation, &demand);
+    made.map_err(|e| e.to_string())
+}
+
+/// A job for this world; an error if the integrator is not registered.
 pub(super) fn job<'j>(
     session: &Session,
     world: &World,
@@ -36,15 +58,6 @@ pub(super) fn job<'j>(
 ) -> Result<RenderJob<'j>, String> {
     let integrator =
         integrator(&variant.name).ok_or_else(|| format!("no integrator is called {variant}"))?;
-    let needed = integrator.dimensions(&variant.params);
-    if let Some(limit) = sampler.sequence.max_dimensions()
-        && needed > limit
-    {
-        return Err(format!(
-            "{variant} needs {needed} dimensions, {} has {limit}: lower max_depth or take pixel-hash",
-            sampler.sequence_variant
-        ));
-    }
     let [width, height] = session.experiment.resolution;
     let diagonal = f64::from(2.0 * world.scene.bounds().radius());
     let ao_radius = (integrator.ao_radius(&variant.params).unwrap_or(0.0) * diagonal) as f32;
@@ -125,15 +138,13 @@ fn reference(
 ) -> Result<Result<Yardstick, String>, RunError> {
     session.say(format!("{}, {variant}: reference", world.variant));
     let settings = &session.experiment.reference;
-    let Some(sampler) = session
-        .registries
-        .samplers
-        .sampler(&settings.sequence, &settings.decorrelation)
-    else {
-        return Ok(Err("the reference's sampler is not registered".to_owned()));
-    };
     let start = Instant::now();
     let spp = (settings.spp / REFERENCE_PARTS).max(1);
+    let pair = (&settings.sequence, &settings.decorrelation);
+    let sampler = match sampler_for(session, pair, variant, spp) {
+        Ok(sampler) => sampler,
+        Err(reason) => return Ok(Err(reason)),
+    };
     let seed = pcg_hash(settings.seed);
     let rendered = (|| {
         let job = job(session, world, &sampler, variant, true)?;
@@ -180,6 +191,48 @@ fn reference(
     }))
 }
 
+/// One render of a replicate, and the numbers of samples at which its image is kept.
+struct Pass<'a> {
+    renderer: Renderer<'a>,
+    spps: Vec<u32>,
+    /// Hash of the sampler's words.
+    table: String,
+}
+
+/// What a replicate is rendered in: one pass, unless each number of samples has points of its own,
+/// which makes a pass each.
+fn passes<'a>(
+    session: &Session,
+    world: &'a World,
+    fastest: &Gated,
+    cell: &SamplerCell,
+) -> Result<Vec<Pass<'a>>, String> {
+    let pair = (&cell.sequence, &cell.decorrelation);
+    let pass = |spps: Vec<u32>, sampler: &Sampler| {
+        let job = job(session, world, sampler, &cell.integrator, true)?;
+        let renderer = Renderer::new(world.gpu, &world.buffers, &fastest.traced, &job, false);
+        let words = bytemuck::cast_slice(sampler.table.words());
+        Ok(Pass {
+            renderer: renderer.map_err(|e| e.to_string())?,
+            spps,
+            table: blake3::hash(words).to_hex().to_string(),
+        })
+    };
+    let spps: Vec<u32> = session.experiment.spp.counts().collect();
+    let most = session.experiment.spp.max();
+    let sampler = sampler_for(session, pair, &cell.integrator, most)?;
+    if !sampler.by_count() {
+        return Ok(vec![pass(spps, &sampler)?]);
+    }
+    let single = |spp| {
+        pass(
+            vec![spp],
+            &sampler_for(session, pair, &cell.integrator, spp)?,
+        )
+    };
+    spps.into_iter().map(single).collect()
+}
+
 /// All replicates of one sampler. The inner error concerns this cell alone.
 fn sampler_error(
     session: &mut Session,
@@ -189,22 +242,12 @@ fn sampler_error(
     yardstick: &Yardstick,
 ) -> Result<Result<(), String>, RunError> {
     session.say(cell.to_string());
-    let Some(sampler) = session
-        .registries
-        .samplers
-        .sampler(&cell.sequence, &cell.decorrelation)
-    else {
-        return Ok(Err("this sampler is not registered".to_owned()));
-    };
-    let compiled = job(session, world, &sampler, &cell.integrator, true).and_then(|job| {
-        Renderer::new(world.gpu, &world.buffers, &fastest.traced, &job, false)
-            .map_err(|e| e.to_string())
-    });
-    let renderer = match compiled {
-        Ok(renderer) => renderer,
+    let passes = match passes(session, world, fastest, cell) {
+        Ok(passes) => passes,
         Err(reason) => return Ok(Err(reason)),
     };
-    let spps: Vec<u32> = session.experiment.spp.counts().collect();
+    let kernel = passes.iter().map(|pass| pass.renderer.kernel_text());
+    let tables: String = passes.iter().map(|pass| pass.table.as_str()).collect();
     let hash = cell_hash(&[
         ("scene", &world.scene.hash),
         (
@@ -212,7 +255,8 @@ fn sampler_error(
             &serde_json::to_string(&(&cell.sequence, &cell.decorrelation, &cell.integrator))
                 .unwrap_or_default(),
         ),
-        ("kernel", renderer.kernel_text()),
+        ("kernel", kernel.last().unwrap_or_default()),
+        ("sampler table", &tables),
         ("version", env!("CARGO_PKG_VERSION")),
     ]);
     let seeds: Vec<u32> = session
@@ -222,13 +266,14 @@ fn sampler_error(
         .collect();
     let mut finals = Vec::new();
     for (replicate, seed) in seeds.into_iter().enumerate() {
-        let snapshots = match session
-            .clock
-            .time("gpu", || render_checked(&renderer, &spps, seed))
-        {
-            Ok(snapshots) => snapshots,
-            Err(reason) => return Ok(Err(reason)),
-        };
+        let mut snapshots = Vec::new();
+        for pass in &passes {
+            let render = || render_checked(&pass.renderer, &pass.spps, seed);
+            match session.clock.time("gpu", render) {
+                Ok(rendered) => snapshots.extend(rendered),
+                Err(reason) => return Ok(Err(reason)),
+            }
+        }
         let record = match error_record(
             session,
             world,
@@ -362,6 +407,7 @@ fn bias_record(
         alpha: check.alpha,
         min_p: check.min_p,
         p_histogram: check.p_histogram.to_vec(),
+        z: check.z,
         verdict,
     })
 }

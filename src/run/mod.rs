@@ -242,11 +242,9 @@ pub fn render(
     let built = structures::build_and_gate(&mut session, &world, &cell.accel);
     let (traced, _) =
         built.map_err(|record| RunError::Input(record.failure.unwrap_or_default()))?;
-    let found = registries
-        .samplers
-        .sampler(&cell.sequence, &cell.decorrelation);
-    let sampler =
-        found.ok_or_else(|| RunError::Input("this sampler is not registered".to_owned()))?;
+    let pair = (&cell.sequence, &cell.decorrelation);
+    let sampler = errors::sampler_for(&session, pair, &cell.integrator, experiment.spp.max());
+    let sampler = sampler.map_err(RunError::Input)?;
     let job =
         errors::job(&session, &world, &sampler, &cell.integrator, true).map_err(RunError::Input)?;
     let renderer = Renderer::new(&gpu, &world.buffers, &traced, &job, false)?;

@@ -27,9 +27,15 @@ impl Registries {
     }
 
     /// Whether seeds change what this pair draws.
-    pub fn is_randomised(&self, sequence: &Variant, decorrelation: &Variant) -> bool {
-        self.samplers
-            .sampler(sequence, decorrelation)
-            .is_some_and(|s| s.is_random())
+    ///
+    /// # Errors
+    /// Why the pair makes no sense, in words.
+    pub fn is_randomised(
+        &self,
+        sequence: &Variant,
+        decorrelation: &Variant,
+    ) -> Result<bool, String> {
+        let random = self.samplers.is_random(sequence, decorrelation);
+        random.map_err(|e| e.to_string())
     }
 }

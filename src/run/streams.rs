@@ -5,9 +5,10 @@ use super::session::Session;
 use crate::config::StreamCell;
 use crate::discrepancy::star_2d_prefixes;
 use crate::gpu::{Bindings, Composition, Dispatch, Gpu, UniformValues, groups_for};
+use crate::integrator::with_sampler;
 use crate::measure::record::{Interval, Record, StarAtCount, StreamRecord};
 use crate::measure::statistics::bootstrap_mean;
-use crate::sampling::{Coordinate, Sampler, dimensions::pair_purpose, to_unit};
+use crate::sampling::{Coordinate, Demand, Sampler, dimensions::pair_purpose, to_unit};
 
 /// Fewest points whose discrepancy is taken.
 const FEWEST_POINTS: u32 = 16;
@@ -43,11 +44,6 @@ fn stream_record(
     cell: &StreamCell,
     pair: [u32; 2],
 ) -> Result<StreamRecord, String> {
-    let found = session
-        .registries
-        .samplers
-        .sampler(&cell.sequence, &cell.decorrelation);
-    let sampler = found.ok_or("this sampler is not registered")?;
     let settings = session.experiment.discrepancy.clone();
     let seeds: Vec<u32> = if cell.randomised {
         session
@@ -62,15 +58,21 @@ fn stream_record(
     let counts: Vec<usize> = (smallest..=settings.points.trailing_zeros())
         .map(|k| 1 << k)
         .collect();
+    let sets = point_sets(session, cell, pair, &counts)?;
     let mut per_seed = Vec::new();
     for &seed in &seeds {
-        let points = session.clock.time("gpu", || {
-            dump_points(gpu, &sampler, settings.points, pair, seed)
-        })?;
-        let stars = session
-            .clock
-            .time("discrepancy", || star_2d_prefixes(&points, &counts));
-        per_seed.push(stars.map_err(|e| e.to_string())?);
+        let mut stars = Vec::new();
+        for (sampler, counts) in &sets {
+            let most = counts.last().map_or(0, |&n| n as u32);
+            let points = session
+                .clock
+                .time("gpu", || dump_points(gpu, sampler, most, pair, seed))?;
+            let found = session
+                .clock
+                .time("discrepancy", || star_2d_prefixes(&points, counts));
+            stars.extend(found.map_err(|e| e.to_string())?);
+        }
+        per_seed.push(stars);
     }
     let star = counts.iter().enumerate().filter_map(|(i, &n)| {
         let values: Vec<f64> = per_seed.iter().map(|stars| stars[i]).collect();
@@ -95,6 +97,34 @@ fn stream_record(
         seeds: seeds.len(),
         star: star.collect(),
     })
+}
+
+/// Samplers, and the numbers of their first points that are measured: one sampler, unless each number
+/// has points of its own.
+fn point_sets(
+    session: &Session,
+    cell: &StreamCell,
+    pair: [u32; 2],
+    counts: &[usize],
+) -> Result<Vec<(Sampler, Vec<usize>)>, String> {
+    let sampler = |count: usize| {
+        let demand = Demand {
+            samples: Some(count as u32),
+            dimensions: pair[0].max(pair[1]) + 1,
+            width: Some(session.experiment.resolution[0]),
+        };
+        let samplers = &session.registries.samplers;
+        let made = samplers.sampler(&cell.sequence, &cell.decorrelation, &demand);
+        made.map_err(|e| e.to_string())
+    };
+    let most = sampler(counts.last().copied().unwrap_or(1))?;
+    if !most.by_count() {
+        return Ok(vec![(most, counts.to_vec())]);
+    }
+    counts
+        .iter()
+        .map(|&count| Ok((sampler(count)?, vec![count])))
+        .collect()
 }
 
 /// The first `count` points of one pixel, as the kernel draws them.
@@ -125,27 +155,21 @@ fn dump_points(
 /// The u32 of every coordinate, as the kernel computes it.
 ///
 /// # Errors
-/// A dimension beyond the sequence's table, or the kernel does not run.
+/// A dimension beyond those that the sampler was made for, or the kernel does not run.
 pub fn dump_stream(
     gpu: &Gpu,
     sampler: &Sampler,
     coordinates: &[Coordinate],
 ) -> Result<Vec<u32>, String> {
     let highest = coordinates.iter().map(|c| c.dimension).max().unwrap_or(0);
-    if let Some(limit) = sampler.sequence.max_dimensions()
-        && highest >= limit
-    {
+    if highest >= sampler.demand.dimensions {
         return Err(format!(
-            "dimension {highest} is asked for, {} has {limit}",
-            sampler.sequence_variant
+            "dimension {highest} is asked for, {} was made for {}",
+            sampler.label(),
+            sampler.demand.dimensions
         ));
     }
-    let mut composition = Composition::new("sampling/dump_stream")
-        .with("sequence", sampler.sequence.kernel())
-        .with("decorrelation", sampler.decorrelation.kernel());
-    for (name, value) in sampler.sequence.constants(&sampler.sequence_variant.params) {
-        composition = composition.constant(name, value);
-    }
+    let composition = with_sampler(Composition::new("sampling/dump_stream"), sampler);
     let words: Vec<[u32; 4]> = coordinates
         .iter()
         .map(|c| [c.pixel, c.sample, c.dimension, c.seed])
@@ -158,7 +182,7 @@ pub fn dump_stream(
             .buffer("coordinates", &gpu.storage("coordinates", &words)?)
             .buffer(
                 "sampler_table",
-                &gpu.storage("sampler_table", &sampler.table)?,
+                &gpu.storage("sampler_table", sampler.table.words())?,
             )
             .buffer("stream", &stream)
             .uniform(

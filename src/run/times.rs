@@ -2,7 +2,7 @@
 //! every structure gives the same image.
 
 use super::RunError;
-use super::errors::{image_hash, job};
+use super::errors::{image_hash, job, sampler_for};
 use super::session::Session;
 use super::structures::Gated;
 use super::world::World;
@@ -134,12 +134,13 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     Ok(())
 }
 
+/// Timed are the first samples of the set whose error is measured last: how near the rays of
+/// neighbouring pixels lie may depend on how many there are.
 fn sampler_of(session: &Session, cell: &TimeCell) -> Result<Sampler, String> {
-    let found = session
-        .registries
-        .samplers
-        .sampler(&cell.sequence, &cell.decorrelation);
-    found.ok_or_else(|| "this sampler is not registered".to_owned())
+    let experiment = &session.experiment;
+    let samples = experiment.spp.max().max(experiment.timing.spp);
+    let pair = (&cell.sequence, &cell.decorrelation);
+    sampler_for(session, pair, &cell.integrator, samples)
 }
 
 fn compile<'a>(

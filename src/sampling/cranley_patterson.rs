@@ -4,8 +4,9 @@
 //! Source: R. Cranley, T. Patterson, "Randomization of number theoretic methods for multiple
 //! integration", SIAM J. Numer. Anal. 13, 1976. On fractions of 2³² the wrap is exact.
 
-use super::hash::pcg_hash;
-use super::{Coordinate, Decorrelation};
+use super::hash::dimension_number;
+use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeding};
+use crate::config::{ParameterSchema, Params};
 
 /// The registry entry.
 pub struct CranleyPatterson;
@@ -23,15 +24,19 @@ impl Decorrelation for CranleyPatterson {
         "sampling/cranley_patterson"
     }
 
-    fn is_random(&self) -> bool {
-        true
+    fn parameters(&self) -> ParameterSchema {
+        vec![Seeding::parameter()]
     }
 
-    fn decorrelate(&self, x: u32, at: Coordinate) -> u32 {
-        let shift = pcg_hash(
-            at.dimension
-                .wrapping_add(pcg_hash(at.pixel.wrapping_add(pcg_hash(at.seed)))),
-        );
-        x.wrapping_add(shift)
+    fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
+        partner.without_structure()
+    }
+
+    fn index(&self, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+        at.sample
+    }
+
+    fn decorrelate(&self, x: u32, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+        x.wrapping_add(dimension_number(at))
     }
 }

@@ -1,14 +1,30 @@
-//! `halton`: radical inverses in prime bases. Twin of `kernels/sampling/halton.wesl`.
+//! `halton`: radical inverses in prime bases, with plain or permuted digits. Twin of
+//! `kernels/sampling/halton.wesl`.
 //!
-//! Source: J. Halton, 1960. Fractions of 2³² by truncated integer division: digit k of index n adds
-//! `digit · floor(…floor((2³² − 1) / b)… / b)`; what is lost is below 32·b/2³², and the result stays
-//! below 1. Base 2 is exact.
+//! Source: J. Halton, "On the efficiency of certain quasi-random sequences of points in evaluating
+//! multi-dimensional integrals", Numer. Math. 2, 1960. Words: for each dimension its base and where its
+//! permutation begins, then the permutations. All of them keep 0, so that an expansion ends.
 
-use super::{Coordinate, Sequence, TABLE_DIMENSIONS};
-use crate::config::Params;
+use super::primes::{faure_permutation, primes, random_permutation};
+use super::radical_inverse::radical_inverse;
+use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
+use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// The registry entry.
 pub struct Halton;
+
+/// The radical inverse whose digits d are replaced by the words `first + d`.
+fn permuted_inverse(table: &SamplerTable, n: u32, base: u32, first: u32) -> u32 {
+    let mut rest = n;
+    let mut weight = u32::MAX / base;
+    let mut x = 0;
+    while rest > 0 {
+        x += table.sequence_word(first + rest % base) * weight;
+        rest /= base;
+        weight /= base;
+    }
+    x
+}
 
 impl Sequence for Halton {
     fn name(&self) -> &'static str {
@@ -16,39 +32,57 @@ impl Sequence for Halton {
     }
 
     fn description(&self) -> &'static str {
-        "radical inverses in the first 128 primes, from index 0 (Halton 1960)"
+        "radical inverses in the first 256 primes, from index 0 (Halton 1960)"
     }
 
     fn kernel(&self) -> &'static str {
         "sampling/halton"
     }
 
-    /// The base of each dimension.
-    fn table(&self, _: &Params) -> Vec<u32> {
-        let mut primes: Vec<u32> = Vec::new();
-        let mut candidate = 2;
-        while primes.len() < TABLE_DIMENSIONS as usize {
-            if primes.iter().all(|p| candidate % p != 0) {
-                primes.push(candidate);
-            }
-            candidate += 1;
-        }
-        primes
+    fn parameters(&self) -> ParameterSchema {
+        vec![Parameter {
+            name: "digits",
+            description: "digits as they are, permuted by Faure's rule (1992), or at random once and for all",
+            default: ParamValue::Name("plain".to_owned()),
+            range: ParamRange::Choice(&["plain", "faure", "random"]),
+        }]
     }
 
-    fn sequence(&self, _: &Params, table: &[u32], at: Coordinate) -> u32 {
-        let base = table[at.dimension as usize];
-        if base == 2 {
-            return at.sample.reverse_bits();
+    fn facts(&self, _: &Params) -> Facts {
+        Facts {
+            extensible: true,
+            dimensions: Some(256),
+            ..Facts::default()
         }
-        let mut rest = at.sample;
-        let mut weight = u32::MAX / base;
-        let mut x = 0;
-        while rest > 0 {
-            x += (rest % base) * weight;
-            rest /= base;
-            weight /= base;
+    }
+
+    fn table(&self, params: &Params, demand: &Demand) -> Vec<u32> {
+        let bases = primes(demand.dimensions as usize);
+        let permutation = match params.name("digits") {
+            "faure" => faure_permutation,
+            "random" => random_permutation,
+            _ => |_| Vec::new(),
+        };
+        let mut words = Vec::new();
+        let mut permutations = Vec::new();
+        for base in &bases {
+            words.extend([*base, (2 * bases.len() + permutations.len()) as u32]);
+            permutations.extend(permutation(*base));
         }
-        x
+        words.extend(permutations);
+        words
+    }
+
+    fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {
+        vec![("PERMUTED", u32::from(params.name("digits") != "plain"))]
+    }
+
+    fn sequence(&self, params: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
+        let base = table.sequence_word(2 * at.dimension);
+        if base > 2 && params.name("digits") != "plain" {
+            let first = table.sequence_word(2 * at.dimension + 1);
+            return permuted_inverse(table, at.sample, base, first);
+        }
+        radical_inverse(at.sample, base)
     }
 }

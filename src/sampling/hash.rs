@@ -1,5 +1,7 @@
 //! Integer hashes. Twin of `kernels/sampling/hash.wesl`.
 
+use super::Coordinate;
+
 /// PCG output permutation over an LCG step.
 ///
 /// Source: M. Jarzynski, M. Olano, "Hash functions for GPU rendering", JCGT 9(3), 2020.
@@ -18,4 +20,14 @@ pub fn wang_hash(x: u32) -> u32 {
     s ^= s >> 4;
     s = s.wrapping_mul(0x27d4_eb2d);
     s ^ (s >> 15)
+}
+
+/// A random number of the pixel, the same for all its samples.
+pub fn pixel_number(at: Coordinate) -> u32 {
+    pcg_hash(at.pixel.wrapping_add(pcg_hash(at.seed)))
+}
+
+/// A random number of the pixel and dimension, the same for all samples.
+pub fn dimension_number(at: Coordinate) -> u32 {
+    pcg_hash(at.dimension.wrapping_add(pixel_number(at)))
 }

@@ -1,88 +1,76 @@
 //! Samplers: sequences and decorrelations as two independent axes, each with a kernel and a scalar
 //! twin that equals it to the bit on the u32 before the conversion to float.
+//!
+//! A decorrelation acts twice: it chooses the index of the point (`index`), the sequence gives the
+//! point's coordinate, and the decorrelation moves that (`decorrelate`).
 
+mod blue_noise;
 mod cranley_patterson;
+mod decorrelation;
+mod digital_shift;
 pub mod dimensions;
+mod disc_rotation;
+mod error;
+mod fixed_point;
 mod halton;
+mod hammersley;
 pub mod hash;
+mod index_offset;
+mod lattice_search;
+mod micro_jitter;
 mod no_decorrelation;
+pub mod owen;
+mod owen_hash;
+mod owen_sobol;
 mod pixel_hash;
+mod pmj02;
+mod pmj02_points;
+pub mod primes;
+mod r2;
+mod radical_inverse;
+mod rank1_lattice;
 mod registry;
+mod sequence;
 mod sobol;
+mod state;
+mod trig_hash;
+mod van_der_corput;
+mod void_and_cluster;
 
+pub use blue_noise::BlueNoise;
 pub use cranley_patterson::CranleyPatterson;
+pub use decorrelation::{Decorrelation, Partner};
+pub use digital_shift::DigitalShift;
+pub use disc_rotation::DiscRotation;
+pub use error::SamplerError;
 pub use halton::Halton;
+pub use hammersley::Hammersley;
+pub use index_offset::IndexOffset;
+pub use micro_jitter::MicroJitter;
 pub use no_decorrelation::NoDecorrelation;
+pub use owen_hash::OwenHash;
+pub use owen_sobol::OwenSobol;
 pub use pixel_hash::PixelHash;
+pub use pmj02::Pmj02;
+pub use r2::R2;
+pub use rank1_lattice::Rank1Lattice;
 pub use registry::SamplerRegistry;
+pub use sequence::{Facts, Seeding, Sequence};
 pub use sobol::Sobol;
+pub use state::{Coordinate, SamplerTable};
+pub use van_der_corput::VanDerCorput;
 
-use crate::config::{ParameterSchema, Params, Variant};
+use crate::config::Variant;
 
-/// Dimensions that table-driven sequences hold.
-pub const TABLE_DIMENSIONS: u32 = 128;
-
-/// What one coordinate is asked for.
+/// What will be drawn: tables are made for it, and no longer than it needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Coordinate {
-    /// Linear pixel index.
-    pub pixel: u32,
-    /// Sample within the pixel.
-    pub sample: u32,
-    /// Dimension, see [`dimensions`].
-    pub dimension: u32,
-    /// Seed of the replicate.
-    pub seed: u32,
-}
-
-/// A sequence of points; one static per sequence, one line in the registry.
-pub trait Sequence: Sync {
-    /// Name as a user types it.
-    fn name(&self) -> &'static str;
-    /// One line: what it is and where it comes from.
-    fn description(&self) -> &'static str;
-    /// Module of the kernel, relative to the kernel folder.
-    fn kernel(&self) -> &'static str;
-    /// Parameters.
-    fn parameters(&self) -> ParameterSchema {
-        Vec::new()
-    }
-    /// Whether the points depend on pixel and seed.
-    fn is_random(&self) -> bool {
-        false
-    }
-    /// Dimensions it has; `None` is any number.
-    fn max_dimensions(&self) -> Option<u32> {
-        Some(TABLE_DIMENSIONS)
-    }
-    /// Words that the kernel reads as `sampler_table`.
-    fn table(&self, _params: &Params) -> Vec<u32> {
-        Vec::new()
-    }
-    /// Constants of `package::active::constants` that the kernel imports.
-    fn constants(&self, _params: &Params) -> Vec<(&'static str, u32)> {
-        Vec::new()
-    }
-    /// Twin of the kernel's `sequence`: a fraction of 2³².
-    fn sequence(&self, params: &Params, table: &[u32], at: Coordinate) -> u32;
-}
-
-/// A decorrelation of pixels; one static per scheme, one line in the registry.
-pub trait Decorrelation: Sync {
-    /// Name as a user types it.
-    fn name(&self) -> &'static str;
-    /// One line: what it is and where it comes from.
-    fn description(&self) -> &'static str;
-    /// Module of the kernel, relative to the kernel folder.
-    fn kernel(&self) -> &'static str;
-    /// Parameters.
-    fn parameters(&self) -> ParameterSchema {
-        Vec::new()
-    }
-    /// Whether the result depends on pixel and seed.
-    fn is_random(&self) -> bool;
-    /// Twin of the kernel's `decorrelate`: moves the fraction `x` of 2³².
-    fn decorrelate(&self, x: u32, at: Coordinate) -> u32;
+pub struct Demand {
+    /// Samples per pixel, all of them together; `None` where that is not known beforehand.
+    pub samples: Option<u32>,
+    /// Dimensions: 0 … this, excluded.
+    pub dimensions: u32,
+    /// Width of the image, pixels; `None` where pixels lie in no image.
+    pub width: Option<u32>,
 }
 
 /// A sequence and a decorrelation with their parameters: what a kernel draws from.
@@ -96,14 +84,27 @@ pub struct Sampler {
     pub decorrelation: &'static dyn Decorrelation,
     /// Its parameters.
     pub decorrelation_variant: Variant,
-    /// The sequence's table.
-    pub table: Vec<u32>,
+    /// What it was made for.
+    pub demand: Demand,
+    /// The words of both.
+    pub table: SamplerTable,
+    /// Whether all pixels draw the same from the sequence and from the decorrelation.
+    shared_by_pixels: [bool; 2],
 }
 
 impl Sampler {
     /// Whether seeds give different points; a deterministic sampler has one replicate.
     pub fn is_random(&self) -> bool {
-        self.sequence.is_random() || self.decorrelation.is_random()
+        let facts = self.sequence.facts(&self.sequence_variant.params);
+        facts.random || self.decorrelation.is_random()
+    }
+
+    /// Whether each number of samples has points of its own: the first half of the points for 2N is not
+    /// the set for N.
+    pub fn by_count(&self) -> bool {
+        let facts = self.sequence.facts(&self.sequence_variant.params);
+        let decorrelation = &self.decorrelation_variant.params;
+        facts.by_count || self.decorrelation.by_count(decorrelation)
     }
 
     /// `sequence × decorrelation`, for people.
@@ -114,12 +115,38 @@ impl Sampler {
         )
     }
 
+    /// Constants of `package::active::constants`.
+    pub fn constants(&self) -> Vec<(&'static str, u32)> {
+        let [sequence, decorrelation] = self.shared_by_pixels.map(u32::from);
+        let mut out = self.sequence.constants(&self.sequence_variant.params);
+        out.extend(
+            self.decorrelation
+                .constants(&self.decorrelation_variant.params),
+        );
+        out.push(("SHARED_SEQUENCE", sequence));
+        out.push(("SHARED_DECORRELATION", decorrelation));
+        out
+    }
+
     /// The u32 that the kernel computes for this coordinate.
+    ///
+    /// # Panics
+    /// A dimension beyond the demand, where there is a table.
     pub fn sample_u32(&self, at: Coordinate) -> u32 {
+        let [sequence, decorrelation] = self.shared_by_pixels;
+        let (mut point, mut own) = (at, at);
+        if sequence {
+            point.pixel = 0;
+        }
+        if decorrelation {
+            own.pixel = 0;
+        }
+        let moves = &self.decorrelation_variant.params;
+        point.sample = self.decorrelation.index(moves, &self.table, own);
         let x = self
             .sequence
-            .sequence(&self.sequence_variant.params, &self.table, at);
-        self.decorrelation.decorrelate(x, at)
+            .sequence(&self.sequence_variant.params, &self.table, point);
+        self.decorrelation.decorrelate(x, moves, &self.table, own)
     }
 }
 

@@ -1,7 +1,8 @@
 //! `none`: every pixel uses the same points, the coherent path tracer of Dufay 2017. Twin of
 //! `kernels/sampling/no_decorrelation.wesl`.
 
-use super::{Coordinate, Decorrelation};
+use super::{Coordinate, Decorrelation, Partner, SamplerTable};
+use crate::config::Params;
 
 /// The registry entry.
 pub struct NoDecorrelation;
@@ -23,7 +24,15 @@ impl Decorrelation for NoDecorrelation {
         false
     }
 
-    fn decorrelate(&self, x: u32, _: Coordinate) -> u32 {
+    fn refusal(&self, _: &Params, _: &Partner) -> Option<String> {
+        None
+    }
+
+    fn index(&self, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+        at.sample
+    }
+
+    fn decorrelate(&self, x: u32, _: &Params, _: &SamplerTable, _: Coordinate) -> u32 {
         x
     }
 }

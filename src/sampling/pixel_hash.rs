@@ -2,13 +2,16 @@
 //! `kernels/sampling/pixel_hash.wesl`.
 
 use super::hash::{pcg_hash, wang_hash};
-use super::{Coordinate, Sequence};
+use super::trig_hash::trig_hash;
+use super::{Coordinate, Facts, SamplerTable, Seeding, Sequence};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// The registry entry.
 pub struct PixelHash;
 
-const HASHES: &[&str] = &["pcg", "wang"];
+const HASHES: &[&str] = &["pcg", "wang", "trig"];
+const WANG: u32 = 1;
+const TRIG: u32 = 2;
 
 impl Sequence for PixelHash {
     fn name(&self) -> &'static str {
@@ -16,7 +19,7 @@ impl Sequence for PixelHash {
     }
 
     fn description(&self) -> &'static str {
-        "independent numbers: a hash of pixel, sample, dimension and seed (Jarzynski & Olano 2020; Wang 1997)"
+        "independent numbers: a hash of pixel, sample, dimension and seed (Jarzynski & Olano 2020; Wang 1997; Dufay 2017 Alg. 5.1)"
     }
 
     fn kernel(&self) -> &'static str {
@@ -24,36 +27,44 @@ impl Sequence for PixelHash {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        vec![Parameter {
-            name: "hash",
-            description: "which hash",
-            default: ParamValue::Name("pcg".to_owned()),
-            range: ParamRange::Choice(HASHES),
-        }]
+        vec![
+            Parameter {
+                name: "hash",
+                description: "which hash; trig is a negative control",
+                default: ParamValue::Name("pcg".to_owned()),
+                range: ParamRange::Choice(HASHES),
+            },
+            Seeding::parameter(),
+        ]
     }
 
-    fn is_random(&self) -> bool {
-        true
-    }
-
-    fn max_dimensions(&self) -> Option<u32> {
-        None
+    fn facts(&self, _: &Params) -> Facts {
+        Facts {
+            random: true,
+            independent: true,
+            ..Facts::default()
+        }
     }
 
     fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {
-        vec![("WANG", u32::from(params.name("hash") == "wang"))]
+        let hash = match params.name("hash") {
+            "wang" => WANG,
+            "trig" => TRIG,
+            _ => 0,
+        };
+        vec![("HASH", hash)]
     }
 
-    fn sequence(&self, params: &Params, _: &[u32], at: Coordinate) -> u32 {
-        let hash = if params.name("hash") == "wang" {
-            wang_hash
-        } else {
-            pcg_hash
+    fn sequence(&self, params: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+        let hash = match params.name("hash") {
+            "trig" => return trig_hash(at),
+            "wang" => wang_hash,
+            _ => pcg_hash,
         };
-        let inner = hash(
-            at.sample
-                .wrapping_add(hash(at.pixel.wrapping_add(hash(at.seed)))),
-        );
-        hash(at.dimension.wrapping_add(inner))
+        let pixel = hash(at.pixel.wrapping_add(hash(at.seed)));
+        hash(
+            at.dimension
+                .wrapping_add(hash(at.sample.wrapping_add(pixel))),
+        )
     }
 }

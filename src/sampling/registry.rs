@@ -1,7 +1,10 @@
 //! The registries of sequences and decorrelations: one line each.
 
 use super::{
-    CranleyPatterson, Decorrelation, Halton, NoDecorrelation, PixelHash, Sampler, Sequence, Sobol,
+    BlueNoise, CranleyPatterson, Decorrelation, Demand, DigitalShift, DiscRotation, Halton,
+    Hammersley, IndexOffset, MicroJitter, NoDecorrelation, OwenHash, OwenSobol, Partner, PixelHash,
+    Pmj02, R2, Rank1Lattice, Sampler, SamplerError, SamplerTable, Seeding, Sequence, Sobol,
+    VanDerCorput,
 };
 use crate::config::{Entry, Variant};
 
@@ -15,10 +18,34 @@ pub struct SamplerRegistry {
 impl Default for SamplerRegistry {
     fn default() -> Self {
         Self {
-            sequences: vec![&PixelHash, &Halton, &Sobol],
-            decorrelations: vec![&NoDecorrelation, &CranleyPatterson],
+            sequences: vec![
+                &PixelHash,
+                &VanDerCorput,
+                &Hammersley,
+                &Halton,
+                &Sobol,
+                &OwenSobol,
+                &Pmj02,
+                &Rank1Lattice,
+                &R2,
+            ],
+            decorrelations: vec![
+                &NoDecorrelation,
+                &DiscRotation,
+                &IndexOffset,
+                &CranleyPatterson,
+                &DigitalShift,
+                &OwenHash,
+                &MicroJitter,
+                &BlueNoise,
+            ],
         }
     }
+}
+
+/// `sequence × decorrelation`, for messages.
+fn pair(sequence: &Variant, decorrelation: &Variant) -> String {
+    format!("{sequence} × {decorrelation}")
 }
 
 impl SamplerRegistry {
@@ -32,17 +59,109 @@ impl SamplerRegistry {
         self.decorrelations.iter().copied()
     }
 
-    /// The sampler of two variants; `None` if a name is not registered.
-    pub fn sampler(&self, sequence: &Variant, decorrelation: &Variant) -> Option<Sampler> {
-        let found = self.sequences().find(|s| s.name() == sequence.name)?;
-        Some(Sampler {
-            sequence: found,
-            table: found.table(&sequence.params),
+    fn find(
+        &self,
+        sequence: &Variant,
+        decorrelation: &Variant,
+    ) -> Result<(&'static dyn Sequence, &'static dyn Decorrelation), SamplerError> {
+        let unknown = |axis, variant: &Variant| SamplerError::Unknown {
+            axis,
+            name: variant.name.clone(),
+        };
+        let first = self.sequences().find(|s| s.name() == sequence.name);
+        let second = self
+            .decorrelations()
+            .find(|d| d.name() == decorrelation.name);
+        Ok((
+            first.ok_or_else(|| unknown("sequence", sequence))?,
+            second.ok_or_else(|| unknown("decorrelation", decorrelation))?,
+        ))
+    }
+
+    /// Whether seeds change what this pair draws. No table is made.
+    ///
+    /// # Errors
+    /// An unknown name, or a pair that makes no sense.
+    pub fn is_random(
+        &self,
+        sequence: &Variant,
+        decorrelation: &Variant,
+    ) -> Result<bool, SamplerError> {
+        let (first, second) = self.find(sequence, decorrelation)?;
+        let facts = first.facts(&sequence.params);
+        let partner = Partner {
+            name: &sequence.name,
+            facts,
+        };
+        match second.refusal(&decorrelation.params, &partner) {
+            None => Ok(facts.random || second.is_random()),
+            Some(reason) => Err(SamplerError::Pair {
+                pair: pair(sequence, decorrelation),
+                reason,
+            }),
+        }
+    }
+
+    /// The sampler of two variants, with tables for what is demanded.
+    ///
+    /// # Errors
+    /// An unknown name, a pair that makes no sense, a demand beyond a limit (which the message names),
+    /// or a table that cannot be made.
+    pub fn sampler(
+        &self,
+        sequence: &Variant,
+        decorrelation: &Variant,
+        demand: &Demand,
+    ) -> Result<Sampler, SamplerError> {
+        self.is_random(sequence, decorrelation)?;
+        let (first, second) = self.find(sequence, decorrelation)?;
+        let partner = Partner {
+            name: &sequence.name,
+            facts: first.facts(&sequence.params),
+        };
+        let pair = || pair(sequence, decorrelation);
+        let facts = partner.facts;
+        let [dimensions, samples] = second.limits(&decorrelation.params);
+        for limit in facts.dimensions.into_iter().chain(dimensions) {
+            if demand.dimensions > limit {
+                return Err(SamplerError::Dimensions {
+                    pair: pair(),
+                    asked: demand.dimensions,
+                    limit,
+                });
+            }
+        }
+        for limit in facts.samples.into_iter().chain(samples) {
+            if let Some(asked) = demand.samples.filter(|&n| n > limit) {
+                return Err(SamplerError::Samples {
+                    pair: pair(),
+                    asked,
+                    limit,
+                });
+            }
+        }
+        let by_count = facts.by_count || second.by_count(&decorrelation.params);
+        let unknown = [
+            (by_count && demand.samples.is_none()).then_some("the number of samples"),
+            (second.by_width() && demand.width.is_none()).then_some("the width of the image"),
+        ];
+        if let Some(what) = unknown.into_iter().flatten().next() {
+            return Err(SamplerError::NotKnown { pair: pair(), what });
+        }
+        let words = second.table(&decorrelation.params, &partner, demand);
+        let words = words.map_err(|reason| SamplerError::Table {
+            pair: pair(),
+            reason,
+        })?;
+        Ok(Sampler {
+            sequence: first,
+            table: SamplerTable::new(&first.table(&sequence.params, demand), &words),
             sequence_variant: sequence.clone(),
-            decorrelation: self
-                .decorrelations()
-                .find(|d| d.name() == decorrelation.name)?,
+            decorrelation: second,
             decorrelation_variant: decorrelation.clone(),
+            demand: *demand,
+            shared_by_pixels: [sequence, decorrelation]
+                .map(|variant| Seeding::of(&variant.params) == Seeding::Sample),
         })
     }
 

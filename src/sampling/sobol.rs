@@ -4,14 +4,31 @@
 //! Source: S. Joe, F. Kuo, "Constructing Sobol sequences with better two-dimensional projections",
 //! SIAM J. Sci. Comput. 30, 2008 (set D6, from the crate `sobol`).
 
-use super::{Coordinate, Sequence, TABLE_DIMENSIONS};
+use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
 use crate::config::Params;
 use ::sobol::params::JoeKuoD6;
 
+/// Dimensions of Joe and Kuo's file.
+const DIMENSIONS: u32 = 21_201;
 const BITS: usize = 32;
 
 /// The registry entry.
 pub struct Sobol;
+
+/// Direction numbers of the first `dimensions` dimensions: `bits` a dimension, the one of the index's
+/// bit 0 first; they are fractions of 2³². The crate packs Joe and Kuo's file in three lengths.
+pub(super) fn direction_numbers(dimensions: u32, bits: usize) -> Vec<u32> {
+    let parameters = match dimensions {
+        ..=100 => JoeKuoD6::minimal(),
+        101..=1000 => JoeKuoD6::standard(),
+        _ => JoeKuoD6::extended(),
+    };
+    let wanted = dimensions as usize;
+    ::sobol::Sobol::<u32>::init_direction_vals::<u32>(wanted, bits, &parameters)
+        .into_iter()
+        .flatten()
+        .collect()
+}
 
 impl Sequence for Sobol {
     fn name(&self) -> &'static str {
@@ -19,31 +36,33 @@ impl Sequence for Sobol {
     }
 
     fn description(&self) -> &'static str {
-        "(t, s)-sequence in base 2, 128 dimensions of Joe & Kuo's D6 direction numbers (2008), from index 0"
+        "(t, s)-sequence in base 2, 21201 dimensions of Joe & Kuo's D6 direction numbers (2008), from index 0"
     }
 
     fn kernel(&self) -> &'static str {
         "sampling/sobol"
     }
 
-    /// 32 direction numbers a dimension, most significant digit of the sample's bit 0 first.
-    fn table(&self, _: &Params) -> Vec<u32> {
-        let parameters = JoeKuoD6::standard();
-        let directions = ::sobol::Sobol::<u32>::init_direction_vals::<u32>(
-            TABLE_DIMENSIONS as usize,
-            BITS,
-            &parameters,
-        );
-        directions.into_iter().flatten().collect()
+    fn facts(&self, _: &Params) -> Facts {
+        Facts {
+            base_2: true,
+            extensible: true,
+            dimensions: Some(DIMENSIONS),
+            ..Facts::default()
+        }
     }
 
-    fn sequence(&self, _: &Params, table: &[u32], at: Coordinate) -> u32 {
+    fn table(&self, _: &Params, demand: &Demand) -> Vec<u32> {
+        direction_numbers(demand.dimensions, BITS)
+    }
+
+    fn sequence(&self, _: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
         let mut rest = at.sample;
-        let mut column = at.dimension as usize * BITS;
+        let mut column = at.dimension * BITS as u32;
         let mut x = 0;
         while rest > 0 {
             if rest & 1 == 1 {
-                x ^= table[column];
+                x ^= table.sequence_word(column);
             }
             rest >>= 1;
             column += 1;

@@ -103,6 +103,8 @@ pub fn param_variants(schema: &ParameterSchema) -> Vec<Params> {
                 let name = |n: &&str| ParamValue::Name((*n).to_owned());
                 names.iter().map(name).collect()
             }
+            // Texts name files; what reads them has tests of its own.
+            (ParamRange::Text, _) => Vec::new(),
             (range, default) => panic!("{}: default {default} of {range}", parameter.name),
         };
         for value in values.into_iter().filter(|v| *v != parameter.default) {

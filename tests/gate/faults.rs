@@ -81,7 +81,7 @@ fn one_triangle_index_changed_in_a_leaf_is_wrong_on_exactly_the_rays_that_hit_it
 #[test]
 fn a_kernel_that_drops_the_far_child_is_wrong() {
     let gpu = open(kernels_with(
-        "accel/bvh",
+        "accel/bvh/pairs",
         &[("if (far_enter < MISSED &&", "if (far_enter < 0.0 &&")],
     ));
     let stage = Stage::builtin(&gpu, "cornell-box", &[]);
@@ -143,7 +143,7 @@ fn a_kernel_that_ignores_ties_is_wrong_on_every_hit_of_a_scene_made_of_ties() {
 fn a_blown_step_fuse_and_a_stack_overflow_are_named() {
     let [(_, fuse), (_, overflow)] = KERNEL_ERRORS;
     let impatient = open(kernels_with(
-        "accel/roped_bvh",
+        "accel/bvh/roped",
         &[(
             "step < limits.step_fuse",
             "step < min(limits.step_fuse, 3u)",

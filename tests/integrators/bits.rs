@@ -20,7 +20,7 @@ fn last(renderer: &Renderer, spps: &[u32], seed: u32) -> Vec<[u32; 3]> {
 fn a_seed_gives_the_same_bits_again_and_another_seed_gives_others() {
     let stage = Stage::builtin(gpu(), "furnace-box", &[]);
     let traced = stage.traced(gpu(), structure("bvh"));
-    for sampler in samplers() {
+    for sampler in samplers(2) {
         let what = path(MAX_DEPTH);
         let renderer = stage.renderer(gpu(), &traced, &sampler, &what, [16, 16], false);
         let first = last(&renderer, &[2], 7);

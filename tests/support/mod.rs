@@ -11,7 +11,7 @@ use raystone::integrator::{
 use raystone::measure::record::{Line, Record, SCHEMA};
 use raystone::measure::statistics::{mean, variance};
 use raystone::run::{Registries, RunOptions, RunSummary};
-use raystone::sampling::{Sampler, SamplerRegistry};
+use raystone::sampling::{Demand, Sampler, SamplerRegistry, dimensions};
 use raystone::scene::{Camera, LoadOptions, SceneData, builtin_scenes, load};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -191,26 +191,44 @@ pub fn structure(name: &str) -> &'static dyn AccelKind {
         .expect("a known structure")
 }
 
-/// A sampler with default parameters.
+/// A sampler of 64 samples with default parameters.
 pub fn sampler(sequence: &str, decorrelation: &str) -> Sampler {
-    let registry = SamplerRegistry::default();
-    let sequence = variant(&registry.sequence_entries(), sequence, &[]);
-    let decorrelation = variant(&registry.decorrelation_entries(), decorrelation, &[]);
-    registry
-        .sampler(&sequence, &decorrelation)
-        .expect("a known sampler")
+    sampler_of(sequence, decorrelation, 64)
 }
 
-/// Every sequence with every decorrelation; never none.
-pub fn samplers() -> Vec<Sampler> {
+/// A sampler with as many dimensions as a path needs, else with default parameters.
+pub fn sampler_of(sequence: &str, decorrelation: &str, samples: u32) -> Sampler {
     let registry = SamplerRegistry::default();
-    let mut found = Vec::new();
-    for sequence in registry.sequences() {
-        for decorrelation in registry.decorrelations() {
-            found.push(sampler(sequence.name(), decorrelation.name()));
-        }
-    }
-    assert!(found.len() >= 6, "{} samplers", found.len());
+    let needed = dimensions::needed(6);
+    let dimensions = ("dimensions", ParamValue::Integer(i64::from(needed)));
+    let changes = if sequence == "r2" {
+        &[dimensions][..]
+    } else {
+        &[]
+    };
+    let sequence = variant(&registry.sequence_entries(), sequence, changes);
+    let decorrelation = variant(&registry.decorrelation_entries(), decorrelation, &[]);
+    let demand = Demand {
+        samples: Some(samples),
+        dimensions: needed,
+        width: Some(16),
+    };
+    registry
+        .sampler(&sequence, &decorrelation, &demand)
+        .unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Every sequence that a path can use, and every decorrelation of one of them, for so many samples;
+/// never none. Kernels and twins of all pairs are compared in `samplers.rs`.
+pub fn samplers(samples: u32) -> Vec<Sampler> {
+    let registry = SamplerRegistry::default();
+    let sequences = registry.sequences().map(|s| (s.name(), "none"));
+    let decorrelations = registry.decorrelations().map(|d| ("sobol", d.name()));
+    let pairs = sequences.chain(decorrelations);
+    let usable = pairs.filter(|pair| pair.0 != "van-der-corput" && *pair != ("sobol", "none"));
+    let mut found: Vec<_> = usable.map(|(s, d)| sampler_of(s, d, samples)).collect();
+    found.push(sampler_of("sobol", "none", samples));
+    assert!(found.len() >= 12, "{} samplers", found.len());
     found
 }
 

@@ -1,10 +1,12 @@
 //! The BVHs of all objects in one array of nodes and one of triangles.
 
 use super::super::bounds::Bounds;
+use super::super::bvh::check_leaves;
+use super::super::leaf::{FIRST_MASK, LEAF, leaf_range, leaf_reference};
 use super::super::tree::{Coverage, NodeKind, Tree};
 use super::super::triangle::TriangleRecord;
 use super::super::{AccelError, BuildLog, TriangleSoup};
-use super::instance::{COUNT_MASK, COUNT_SHIFT, FIRST_MASK, LEAF, NOTHING};
+use super::instance::NOTHING;
 use crate::config::Params;
 use crate::measure::record::StructureStats;
 use bytemuck::{Pod, Zeroable};
@@ -100,18 +102,22 @@ impl Forest {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Self, AccelError> {
-        let needed: u64 = objects.iter().map(|o| o.records.len() as u64).sum();
+        let trees: Result<Vec<Tree>, AccelError> = log.phase("objects", || {
+            let build = |object: &&TriangleSoup| {
+                let tree = Tree::build(object, params, &mut BuildLog::default())?;
+                check_leaves(&tree).map(|()| tree)
+            };
+            objects.par_iter().map(build).collect()
+        });
+        let trees = trees?;
+        let needed: u64 = trees.iter().map(|tree| tree.order.len() as u64).sum();
         if needed > u64::from(FIRST_MASK) {
             return Err(AccelError::Limit {
-                what: "triangles of all objects".into(),
+                what: "triangles in the leaves of all objects".into(),
                 needed,
                 limit: FIRST_MASK.into(),
             });
         }
-        let trees: Vec<Tree> = log.phase("objects", || {
-            let build = |object: &&TriangleSoup| Tree::build(object, params);
-            objects.par_iter().map(build).collect()
-        });
         Ok(log.phase("layout", || {
             let mut forest = Self::default();
             for (tree, object) in trees.iter().zip(objects) {
@@ -188,8 +194,8 @@ impl Forest {
                     )));
                 }
                 if reference >= LEAF {
-                    let first = (reference & FIRST_MASK) as usize;
-                    let end = first + ((reference >> COUNT_SHIFT) & COUNT_MASK) as usize;
+                    let (first, count) = leaf_range(reference);
+                    let end = first + count;
                     let own = root.triangles.start as usize..root.triangles.end as usize;
                     let is_own = own.start <= first && end <= own.end;
                     let triangles = is_own.then(|| &self.triangles[first..end]);
@@ -218,9 +224,7 @@ fn layout(tree: &Tree, first_node: u32, first_triangle: u32) -> Vec<Node> {
         let node = &tree.nodes[index as usize];
         let reference = match node.kind {
             NodeKind::Inner { .. } => place[index as usize],
-            NodeKind::Leaf { first, count } => {
-                LEAF | count << COUNT_SHIFT | (first_triangle + first)
-            }
+            NodeKind::Leaf { first, count } => leaf_reference(first_triangle + first, count),
         };
         (reference, node.bounds)
     };

@@ -3,27 +3,17 @@
 
 use super::super::Counters;
 use super::super::bounds::{BOX_PAD, Bounds};
+use super::super::leaf::{LEAF, leaf_range};
 use super::super::ray::{Hit, NO_HIT, Ray, safe_inverse};
 use super::super::triangle::{TriangleRecord, intersect_triangle};
 use super::forest::Node;
 use crate::scene::{Instance, Transform};
 use bytemuck::{Pod, Zeroable};
 
-/// Marks a reference to a leaf; bits 26–30 hold its count, bits 0–25 its first triangle. In the
-/// upper level the "first" is an entry.
-pub(super) const LEAF: u32 = 0x8000_0000;
-pub(super) const COUNT_SHIFT: u32 = 26;
-pub(super) const COUNT_MASK: u32 = 31;
-pub(super) const FIRST_MASK: u32 = 0x03ff_ffff;
 /// A leaf without content: the missing child of a node with one.
 pub(super) const NOTHING: u32 = LEAF;
 /// Flag of an entry whose rays need no transform.
 pub(super) const IDENTITY: u32 = 1;
-
-/// A reference to the upper level's leaf that holds one entry.
-pub(super) fn entry_reference(entry: usize) -> u32 {
-    LEAF | 1 << COUNT_SHIFT | entry as u32
-}
 
 /// An instance, or the part of it below a node of its object: four `vec4<u32>`. The columns of the
 /// map to the object's space and the translation.
@@ -125,8 +115,7 @@ pub(super) fn leaf(
     hit: &mut Hit,
     counters: &mut Counters,
 ) {
-    let first = (reference & FIRST_MASK) as usize;
-    let count = ((reference >> COUNT_SHIFT) & COUNT_MASK) as usize;
+    let (first, count) = leaf_range(reference);
     for triangle in &triangles[first..first + count] {
         counters.triangle_tests += 1;
         let id = triangle.id + first_id;

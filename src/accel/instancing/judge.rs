@@ -4,7 +4,8 @@ use super::super::bounds::{Bounds, enter_box};
 use super::super::ray::safe_inverse;
 use super::super::triangle::{TriangleRecord, intersect_triangle};
 use super::super::{
-    AccelError, AccelKind, BuildLog, Bvh, BvhTwin, Counters, CpuTwin, Hit, NO_HIT, Ray,
+    AccelError, AccelKind, BuildLog, BuiltAccel, BuiltBvh, Bvh, Counters, CpuTwin, Hit, NO_HIT,
+    Ray, TriangleSoup,
 };
 use super::instance::object_ray;
 use super::placed::Placed;
@@ -32,7 +33,7 @@ pub fn brute_force_instances(placed: &Placed, rays: &[Ray]) -> Vec<Hit> {
 /// No world box takes part, so it can judge those of the structures.
 pub struct InstanceJudge<'a> {
     placed: &'a Placed,
-    objects: Vec<(Bounds, BvhTwin)>,
+    objects: Vec<(Bounds, BuiltBvh)>,
 }
 
 impl<'a> InstanceJudge<'a> {
@@ -43,10 +44,10 @@ impl<'a> InstanceJudge<'a> {
     pub fn new(placed: &'a Placed) -> Result<Self, AccelError> {
         let schema = Bvh.parameters().into_iter();
         let params = Params(schema.map(|p| (p.name.to_owned(), p.default)).collect());
-        let build = |object: &'a super::TriangleSoup| {
-            let twin = BvhTwin::build(object, &params, &mut BuildLog::default())?;
-            super::super::BuiltAccel::validate(&twin, object)?;
-            Ok((object.bounds(), twin))
+        let build = |object: &TriangleSoup| {
+            let built = BuiltBvh::build(object, &params, &mut BuildLog::default())?;
+            built.validate(object)?;
+            Ok((object.bounds(), built))
         };
         Ok(Self {
             placed,
@@ -62,11 +63,12 @@ impl CpuTwin for InstanceJudge<'_> {
             let mut local = object_ray(instance, ray);
             // A hit at the same distance counts: its triangle may have the lower index.
             local.t_max = best.t;
-            let (bounds, object) = &self.objects[instance.object as usize];
+            let object = &self.placed.objects[instance.object as usize];
+            let (bounds, built) = &self.objects[instance.object as usize];
             if enter_box(bounds, &local, safe_inverse(local.direction), best.t).is_none() {
                 continue;
             }
-            let hit = object.closest_hit(&local, counters);
+            let hit = built.twin(object).closest_hit(&local, counters);
             if hit.triangle == NO_HIT {
                 continue;
             }

@@ -5,6 +5,7 @@
 //! C. Benthin et al. (HPG 2017), see [`super::top`].
 
 use super::super::bounds::Bounds;
+use super::super::leaf::{FIRST_MASK, LEAF, leaf_reference};
 use super::super::ray::{Hit, NO_HIT, Ray};
 use super::super::tree::tree_parameters;
 use super::super::{
@@ -12,9 +13,7 @@ use super::super::{
     TriangleSoup,
 };
 use super::forest::Node;
-use super::instance::{
-    Entry, FIRST_MASK, LEAF, NOTHING, entry_reference, is_open, leaf, level, near_and_far,
-};
+use super::instance::{Entry, NOTHING, is_open, leaf, level, near_and_far};
 use super::meta_bvh_nested::NestedTwin;
 use super::top::Top;
 use super::world_box::BoxMap;
@@ -211,7 +210,9 @@ impl MetaBvhTwin {
                     continue;
                 }
                 let entry = (reference & FIRST_MASK) as usize;
-                if reference != entry_reference(entry) || entries.get(entry) != Some(&false) {
+                if reference != leaf_reference(entry as u32, 1)
+                    || entries.get(entry) != Some(&false)
+                {
                     return invalid(format!("entry {entry} is missing or reached twice"));
                 }
                 entries[entry] = true;
@@ -289,15 +290,10 @@ impl BuiltAccel for MetaBvhTwin {
         let entries = bytemuck::cast_slice(&self.top.entries);
         let first_entry = forest.nodes.len() + self.top.nodes.len();
         let (objects, top_entries) = (forest.stack_entries(), self.top_stack_entries());
-        let (kernel, constants) = if self.nested {
-            let stacks = [
-                ("STACK_ENTRIES", objects.next_multiple_of(8)),
-                ("TOP_STACK_ENTRIES", top_entries.next_multiple_of(8)),
-            ];
-            ("accel/meta_bvh_nested", stacks.to_vec())
-        } else {
-            let together = (objects + top_entries).next_multiple_of(8);
-            ("accel/meta_bvh", vec![("STACK_ENTRIES", together)])
+        // Nested loops have a stack each, of the same size.
+        let (kernel, stack_entries) = match self.nested {
+            true => ("accel/meta_bvh_nested", objects.max(top_entries)),
+            false => ("accel/meta_bvh", objects + top_entries),
         };
         GpuBuffers {
             kernel,
@@ -324,8 +320,13 @@ impl BuiltAccel for MetaBvhTwin {
                         .f32("growth", self.top.growth),
                 ),
             ],
-            constants,
+            // Rounded up, so that scenes of like depth share a kernel.
+            constants: vec![("STACK_ENTRIES", stack_entries.next_multiple_of(8))],
         }
+    }
+
+    fn divisible(&self) -> &'static [&'static str] {
+        &["nodes", "leaf_triangles"]
     }
 
     fn stats(&self) -> StructureStats {

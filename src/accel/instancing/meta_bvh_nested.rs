@@ -1,9 +1,10 @@
 //! `meta-bvh` with `loop = nested`: the traversal of an object is a loop inside that of the upper
 //! level. Twin of `kernels/accel/meta_bvh_nested.wesl`.
 
+use super::super::leaf::LEAF;
 use super::super::ray::{Hit, NO_HIT, Ray};
 use super::super::{Counters, CpuTwin};
-use super::instance::{LEAF, NOTHING, is_open, level, near_and_far, trace_object};
+use super::instance::{NOTHING, is_open, level, near_and_far, trace_object};
 use super::meta_bvh::MetaBvhTwin;
 
 pub(super) struct NestedTwin<'a>(pub &'a MetaBvhTwin);

@@ -165,6 +165,10 @@ impl BuiltAccel for Built {
         }
     }
 
+    fn divisible(&self) -> &'static [&'static str] {
+        &["nodes", "leaf_triangles"]
+    }
+
     fn stats(&self) -> StructureStats {
         let bytes = size_of_val(&self.base.forest.nodes[..])
             + size_of_val(&self.base.forest.triangles[..])

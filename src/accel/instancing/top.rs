@@ -7,8 +7,9 @@
 //! overlapping: apart, there is nothing to gain.
 
 use super::super::bounds::Bounds;
+use super::super::leaf::{LEAF, leaf_reference};
 use super::forest::{Forest, Node};
-use super::instance::{Entry, LEAF, entry_reference};
+use super::instance::Entry;
 use super::world_box::BoxMap;
 use crate::scene::Instance;
 
@@ -133,7 +134,7 @@ impl Builder<'_> {
         let entry = Entry::new(part.instance, instance, part.node);
         self.top.depth = self.top.depth.max(depth);
         self.top.entries.push(entry);
-        entry_reference(self.top.entries.len() - 1)
+        leaf_reference(self.top.entries.len() as u32 - 1, 1)
     }
 
     /// Replaces large parts by their halves, the largest first; returns how many.

@@ -27,6 +27,9 @@
 //!    components of d below 10⁻²⁰ take the room of step 4, if |d| ≥ 10⁻¹² max(1, 1/‖M‖). The four
 //!    inequalities of the plain theorem follow, and monotony carries them to boxes around W. ∎
 //!
+//! Where spatial splits list a triangle in several leaves, only together covering its bounds, the clamped
+//! point of step 2 lies in one of them ([`super::super::tree::Coverage`]), and B is the box of that.
+//!
 //! M⁻¹ and ‖·‖ are computed in f64 from the f32 entries of M; its errors are 2⁻²⁹ of ours.
 
 use super::super::bounds::Bounds;

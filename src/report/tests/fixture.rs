@@ -185,6 +185,7 @@ pub(super) fn structure(scene: &str, accel: &str, mrays: f64, wrong: usize) -> S
             leaf_histogram: vec![0, 9_000, 8_000, 5_000, 191],
             depth: (accel != "uniform-grid").then_some(31),
             sah_cost: (accel != "uniform-grid").then_some(61.2),
+            epo: None,
             bytes: 2_840_384,
         },
         gate: Some(gate(wrong)),
@@ -261,6 +262,7 @@ pub(super) fn bias(scene: &str, integrator: &str, index: usize, verdict: &str) -
         rejected: if biased { 57 } else { 0 },
         alpha: 0.01,
         min_p: 0.003,
+        z: Some(0.4),
         p_histogram: match (testable, biased) {
             (false, _) => vec![0; 10],
             (true, false) => vec![44, 41, 39, 47, 42, 40, 45, 46, 44, 44],

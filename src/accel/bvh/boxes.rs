@@ -1,0 +1,200 @@
+//! Nodes of 32 bytes with their own box, the two children of a node next to each other. Twin of
+//! `kernels/accel/bvh/boxes.wesl`.
+//!
+//! The root has place 0, place 1 is empty, so that every pair begins at an even place. Which child
+//! comes first in memory is decided by the boxes: the one that lies lower on the axis along which
+//! their centres are farthest apart. A ray that runs up that axis takes it first.
+
+use super::super::bounds::{Bounds, enter_box};
+use super::super::leaf::{LEAF, Leaves, leaf_reference};
+use super::super::tree::{Coverage, NodeKind, Tree};
+use super::super::{AccelError, Counters, Ray, TriangleSoup};
+use super::layout::{Inner, Nodes, Query};
+use super::{NONE, ROOT};
+use super::options::NodeOrder;
+use super::order::InnerNodes;
+use bytemuck::{Pod, Zeroable};
+
+/// Content of an inner node: axis, first child.
+pub(super) const AXIS_SHIFT: u32 = 29;
+/// Greatest place of a first child.
+pub(super) const CHILD_MASK: u32 = 0x1fff_ffff;
+
+/// A node, two `vec4<u32>`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(super) struct BoxNode {
+    pub min: [f32; 3],
+    /// A leaf's reference, or axis and first child.
+    pub content: u32,
+    pub max: [f32; 3],
+    /// Parent or rope, whichever the traversal follows.
+    pub link: u32,
+}
+
+impl BoxNode {
+    /// Root of an empty scene, and place 1.
+    const NOTHING: BoxNode = BoxNode {
+        min: [0.0; 3],
+        content: NONE,
+        max: [0.0; 3],
+        link: NONE,
+    };
+
+    pub fn bounds(&self) -> Bounds {
+        Bounds {
+            min: self.min,
+            max: self.max,
+        }
+    }
+}
+
+/// The axis along which two boxes are farthest apart, and whether the second is the lower one.
+fn split_axis(first: &Bounds, second: &Bounds) -> (u32, bool) {
+    let (a, b) = (first.doubled_centre(), second.doubled_centre());
+    let apart: [f32; 3] = std::array::from_fn(|axis| b[axis] - a[axis]);
+    let farther = |best: usize, axis: usize| {
+        if apart[axis].abs() > apart[best].abs() {
+            axis
+        } else {
+            best
+        }
+    };
+    let axis = (1..3).fold(0, farther);
+    (axis as u32, apart[axis] < 0.0)
+}
+
+/// Which child the ray comes to first: 1 if it runs down the axis.
+fn near_side(content: u32, ray: &Ray) -> u32 {
+    u32::from(ray.direction[(content >> AXIS_SHIFT) as usize] < 0.0)
+}
+
+/// All nodes of a tree.
+pub(super) struct Boxes(pub Vec<BoxNode>);
+
+impl Boxes {
+    /// Lays out a tree; links lead to parents.
+    pub fn new(tree: &Tree, order: NodeOrder) -> Self {
+        let bounds = |node: u32| &tree.nodes[node as usize].bounds;
+        let inner = InnerNodes::new(tree, order, |l, r| split_axis(bounds(l), bounds(r)).1);
+        // The children of the inner node at place k lie at 2k + 2 and 2k + 3.
+        let content = |node: u32| match tree.nodes[node as usize].kind {
+            NodeKind::Leaf { first, count } => leaf_reference(first, count),
+            NodeKind::Inner { left, right } => {
+                let (axis, _) = split_axis(bounds(left), bounds(right));
+                axis << AXIS_SHIFT | (2 * inner.places[node as usize] + 2)
+            }
+        };
+        let node = |node: u32, link: u32| BoxNode {
+            min: bounds(node).min,
+            content: content(node),
+            max: bounds(node).max,
+            link,
+        };
+        let mut boxes = vec![BoxNode::NOTHING; 2 * inner.nodes.len() + 2];
+        if !tree.nodes.is_empty() {
+            boxes[0] = node(0, NONE);
+        }
+        let mut places = vec![ROOT; tree.nodes.len()];
+        for (k, &parent) in inner.nodes.iter().enumerate() {
+            let children = inner.children(parent).into_iter().flatten();
+            for (child, place) in children.zip(2 * k + 2..) {
+                boxes[place] = node(child, places[parent as usize]);
+                places[child as usize] = place as u32;
+            }
+        }
+        Self(boxes)
+    }
+
+    /// Checks reachability, containment, links and depth; `link_of` tells where a node must lead,
+    /// from what its parent links to, its parent and its place.
+    ///
+    /// # Errors
+    /// The first violated invariant, with the node.
+    pub fn validate(
+        &self,
+        soup: &TriangleSoup,
+        leaves: &Leaves,
+        max_depth: u32,
+        link_of: impl Fn(u32, u32, u32) -> u32,
+    ) -> Result<(), AccelError> {
+        let invalid = |index: u32, what: &str| {
+            Err(AccelError::Invalid(format!("node {index}: {what}")))
+        };
+        let mut coverage = Coverage::new(soup, self.0.len());
+        coverage.node(ROOT as usize)?;
+        coverage.node(1)?;
+        let mut stack = vec![(ROOT, NONE, Bounds::EVERYTHING, 0)];
+        while let Some((index, link, around, depth)) = stack.pop() {
+            let node = &self.0[index as usize];
+            if depth > max_depth {
+                return invalid(index, &format!("deeper than {max_depth} levels"));
+            }
+            if node.link != link {
+                return invalid(index, &format!("it leads to {}, not {link}", node.link));
+            }
+            if node.content == NONE {
+                continue;
+            }
+            let bounds = node.bounds();
+            if !around.contains(&bounds) {
+                return invalid(index, "its box leaves its parent's");
+            }
+            if node.content >= LEAF {
+                leaves.cover(&mut coverage, soup, node.content, &bounds)?;
+                continue;
+            }
+            if node.content >> AXIS_SHIFT > 2 {
+                return invalid(index, "there is no axis 3");
+            }
+            let first = node.content & CHILD_MASK;
+            for child in [first, first ^ 1] {
+                coverage.node(child as usize)?;
+                stack.push((child, link_of(node.link, index, child), bounds, depth + 1));
+            }
+        }
+        coverage.is_complete()
+    }
+}
+
+impl Nodes for Boxes {
+    fn visit(&self, node: u32, query: &mut Query) -> Inner {
+        query.counters.nodes += 1;
+        query.counters.box_tests += 1;
+        let node = &self.0[node as usize];
+        let mut inner = Inner {
+            first: NONE,
+            second: NONE,
+            side: 0,
+        };
+        if enter_box(&node.bounds(), query.ray, query.inverse, query.hit.t).is_some() {
+            if node.content >= LEAF {
+                query.test_leaf(node.content);
+            } else {
+                inner.side = near_side(node.content, query.ray);
+                inner.first = (node.content & CHILD_MASK) + inner.side;
+                inner.second = inner.first ^ 1;
+            }
+        }
+        inner
+    }
+
+    fn second_child(&self, node: u32, from: u32, query: &mut Query) -> u32 {
+        query.counters.nodes += 1;
+        let content = self.0[node as usize].content;
+        if from & 1 == near_side(content, query.ray) {
+            from ^ 1
+        } else {
+            NONE
+        }
+    }
+
+    fn parent(&self, node: u32) -> u32 {
+        self.0[node as usize].link
+    }
+
+    fn child(&self, node: u32, side: u32, counters: &mut Counters) -> u32 {
+        counters.nodes += 1;
+        (self.0[node as usize].content & CHILD_MASK) + side
+    }
+}

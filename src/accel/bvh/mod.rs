@@ -1,0 +1,286 @@
+//! `bvh` and `roped-bvh`: one binary tree, traversed in several ways over several layouts of its nodes
+//! and leaves. `roped-bvh` is the same with skip pointers by default.
+//!
+//! A traversal is a file here and one in `kernels/accel/bvh/`; what it asks of the nodes stands in
+//! `pairs` (64 bytes, both children's boxes) and `boxes` (32 bytes, own box).
+
+mod boxes;
+mod layout;
+mod octant_roped;
+mod options;
+mod order;
+mod pairs;
+mod parent_pointer;
+mod roped;
+mod short_stack;
+mod stack;
+
+use super::leaf::{COUNT_MASK, LeafReader, Leaves};
+use super::ray::{Hit, NO_HIT, Ray};
+use super::tree::{NodeKind, Tree, tree_parameters};
+use super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
+    TriangleSoup,
+};
+use crate::config::{ParameterSchema, Params};
+use crate::measure::record::StructureStats;
+use boxes::Boxes;
+use layout::Query;
+use octant_roped::Octants;
+use options::{Options, Traversal};
+use pairs::Pairs;
+
+/// The root.
+const ROOT: u32 = 0;
+/// No node: also a leaf without triangles.
+const NONE: u32 = 0x8000_0000;
+
+/// The registry entry `bvh`.
+pub struct Bvh;
+
+impl AccelKind for Bvh {
+    fn name(&self) -> &'static str {
+        "bvh"
+    }
+
+    fn description(&self) -> &'static str {
+        "binary BVH with a choice of traversal and layout, by default a stack, near child first (Aila & Laine 2009)"
+    }
+
+    fn parameters(&self) -> ParameterSchema {
+        let mut out = tree_parameters();
+        out.extend(options::bvh_parameters());
+        out
+    }
+
+    fn build(
+        &self,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        Ok(Box::new(BuiltBvh::build(soup, params, log)?))
+    }
+}
+
+/// The registry entry `roped-bvh`.
+pub struct RopedBvh;
+
+impl AccelKind for RopedBvh {
+    fn name(&self) -> &'static str {
+        "roped-bvh"
+    }
+
+    fn description(&self) -> &'static str {
+        "the tree of `bvh` with skip pointers: no stack, fixed order (Smits 1998, Dufay 2017 Alg. 4.4)"
+    }
+
+    fn parameters(&self) -> ParameterSchema {
+        let mut out = tree_parameters();
+        out.extend(options::roped_parameters());
+        out
+    }
+
+    fn build(
+        &self,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        Ok(Box::new(BuiltBvh::build(soup, params, log)?))
+    }
+}
+
+/// Nodes in the layout that the traversal reads.
+enum NodeArray {
+    Pairs(Pairs),
+    Boxes(Boxes),
+    Octants(Octants),
+}
+
+/// A built BVH.
+pub struct BuiltBvh {
+    options: Options,
+    stats: StructureStats,
+    nodes: NodeArray,
+    leaves: Leaves,
+    depth: u32,
+}
+
+impl BuiltBvh {
+    /// Builds tree and layout with the parameters of [`Bvh`] or [`RopedBvh`].
+    ///
+    /// # Errors
+    /// Parameters that contradict each other, or a tree that exceeds a limit of the layout.
+    pub fn build(
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Self, AccelError> {
+        let options = Options::new(params)?;
+        let tree = Tree::build(soup, params, log)?;
+        let depth = tree.depth();
+        options.check_depth(depth)?;
+        check_leaves(&tree)?;
+        let (nodes, leaves) = log.phase("layout", || {
+            let nodes = match options.traversal {
+                Traversal::Roped => {
+                    NodeArray::Boxes(roped::rope(Boxes::new(&tree, options.order)))
+                }
+                Traversal::OctantRoped => {
+                    NodeArray::Octants(Octants::new(&Boxes::new(&tree, options.order)))
+                }
+                _ if options.boxes => NodeArray::Boxes(Boxes::new(&tree, options.order)),
+                _ => NodeArray::Pairs(Pairs::new(&tree, options.order)),
+            };
+            (nodes, Leaves::new(soup, &tree.order, options.indexed))
+        });
+        let mut built = Self {
+            options,
+            stats: tree.stats(),
+            nodes,
+            leaves: leaves?,
+            depth,
+        };
+        built.stats.bytes =
+            (built.node_words().words.len() * 4 + built.leaves.bytes()) as u64;
+        Ok(built)
+    }
+
+    /// The scalar twin over the triangles that it was built over.
+    pub fn twin<'a>(&'a self, soup: &'a TriangleSoup) -> BvhTwin<'a> {
+        BvhTwin { built: self, soup }
+    }
+
+    fn node_words(&self) -> NamedWords<'_> {
+        let (words, element_bytes): (&[u32], _) = match &self.nodes {
+            NodeArray::Pairs(pairs) => (bytemuck::cast_slice(&pairs.0), 64),
+            NodeArray::Boxes(boxes) => (bytemuck::cast_slice(&boxes.0), 32),
+            NodeArray::Octants(octants) => (bytemuck::cast_slice(&octants.0), 64),
+        };
+        NamedWords {
+            name: "nodes",
+            words: words.into(),
+            element_bytes,
+        }
+    }
+
+    fn node_count(&self) -> usize {
+        match &self.nodes {
+            NodeArray::Pairs(pairs) => pairs.0.len(),
+            NodeArray::Boxes(boxes) => boxes.0.len(),
+            NodeArray::Octants(octants) => octants.0.len(),
+        }
+    }
+}
+
+/// Whether every leaf fits into a reference.
+pub(super) fn check_leaves(tree: &Tree) -> Result<(), AccelError> {
+    let count = |kind: &NodeKind| match kind {
+        NodeKind::Inner { .. } => 0,
+        NodeKind::Leaf { count, .. } => *count,
+    };
+    let fullest = tree.nodes.iter().map(|n| count(&n.kind)).max().unwrap_or(0);
+    if fullest > COUNT_MASK {
+        return Err(AccelError::Limit {
+            what: "triangles in one leaf of a bvh".into(),
+            needed: fullest.into(),
+            limit: COUNT_MASK.into(),
+        });
+    }
+    Ok(())
+}
+
+impl BuiltAccel for BuiltBvh {
+    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
+        let (leaves, depth) = (&self.leaves, self.depth);
+        match &self.nodes {
+            NodeArray::Pairs(pairs) => pairs.validate(soup, leaves, depth),
+            NodeArray::Octants(octants) => octants.validate(soup, leaves, depth),
+            NodeArray::Boxes(boxes) if self.options.traversal == Traversal::Roped => {
+                let rope = |link, _, child| roped::rope_of(link, child);
+                boxes.validate(soup, leaves, depth, rope)
+            }
+            NodeArray::Boxes(boxes) => boxes.validate(soup, leaves, depth, |_, parent, _| parent),
+        }
+    }
+
+    fn buffers(&self) -> GpuBuffers<'_> {
+        let mut features = self.options.features();
+        features.extend(self.leaves.features());
+        let stack_entries = self.options.stack_entries(self.depth);
+        let nodes = self.node_count();
+        GpuBuffers {
+            kernel: self.options.kernel(),
+            features,
+            arrays: vec![self.node_words(), self.leaves.words()],
+            uniforms: vec![super::limits(
+                self.options.step_fuse(nodes, self.depth),
+                nodes,
+            )],
+            constants: (stack_entries > 0)
+                .then_some(("STACK_ENTRIES", stack_entries))
+                .into_iter()
+                .collect(),
+        }
+    }
+
+    fn divisible(&self) -> &'static [&'static str] {
+        &["nodes", "leaf_triangles"]
+    }
+
+    fn stats(&self) -> StructureStats {
+        self.stats.clone()
+    }
+
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(self.twin(soup)))
+    }
+}
+
+/// The traversal in scalar Rust; with default parameters it is the judge of the gate.
+#[derive(Clone, Copy)]
+pub struct BvhTwin<'a> {
+    built: &'a BuiltBvh,
+    soup: &'a TriangleSoup,
+}
+
+impl BvhTwin<'_> {
+    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
+        let leaves = LeafReader {
+            leaves: &self.built.leaves,
+            soup: self.soup,
+        };
+        let query = Query::new(ray, any, leaves, counters);
+        let options = &self.built.options;
+        let entries = options.stack_entries(self.built.depth) as usize;
+        match (&self.built.nodes, options.traversal) {
+            (NodeArray::Octants(octants), _) => octant_roped::trace(octants, query),
+            (NodeArray::Boxes(boxes), Traversal::Roped) => roped::trace(boxes, query),
+            (NodeArray::Boxes(boxes), Traversal::ParentPointer) => {
+                parent_pointer::trace(boxes, query)
+            }
+            (NodeArray::Boxes(boxes), Traversal::ShortStack) => {
+                short_stack::trace(boxes, entries, query)
+            }
+            (NodeArray::Boxes(boxes), _) => stack::trace(boxes, query),
+            (NodeArray::Pairs(pairs), Traversal::ParentPointer) => {
+                parent_pointer::trace(pairs, query)
+            }
+            (NodeArray::Pairs(pairs), Traversal::ShortStack) => {
+                short_stack::trace(pairs, entries, query)
+            }
+            (NodeArray::Pairs(pairs), _) => stack::trace(pairs, query),
+        }
+    }
+}
+
+impl CpuTwin for BvhTwin<'_> {
+    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
+        self.trace(ray, false, counters)
+    }
+
+    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        self.trace(ray, true, counters).triangle != NO_HIT
+    }
+}

@@ -1,0 +1,115 @@
+//! Skip pointers for each of the eight orders in which rays of an octant of directions come to the
+//! boxes. Twin of `kernels/accel/bvh/octant_roped.wesl`.
+
+use super::super::bounds::enter_box;
+use super::super::leaf::{LEAF, Leaves};
+use super::super::ray::Hit;
+use super::super::{AccelError, TriangleSoup};
+use super::boxes::{AXIS_SHIFT, BoxNode, Boxes, CHILD_MASK};
+use super::layout::Query;
+use super::{NONE, ROOT};
+use bytemuck::{Pod, Zeroable};
+
+/// Box and content of [`BoxNode`], whose link is not used, and a rope for each octant.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(super) struct OctantNode {
+    pub node: BoxNode,
+    pub ropes: [u32; 8],
+}
+
+/// All nodes of a tree.
+pub(super) struct Octants(pub Vec<OctantNode>);
+
+/// Bit `axis`: the ray runs down that axis.
+fn octant_of(direction: [f32; 3]) -> u32 {
+    let bit = |axis: usize| u32::from(direction[axis] < 0.0) << axis;
+    bit(0) | bit(1) | bit(2)
+}
+
+/// Which child of a node with this content rays of an octant come to first.
+fn near_side(content: u32, octant: u32) -> u32 {
+    octant >> (content >> AXIS_SHIFT) & 1
+}
+
+/// Ropes of a child from those of its parent.
+fn ropes_of(parent: &OctantNode, child: u32) -> [u32; 8] {
+    std::array::from_fn(|octant| {
+        if child & 1 == near_side(parent.node.content, octant as u32) {
+            child ^ 1
+        } else {
+            parent.ropes[octant]
+        }
+    })
+}
+
+impl Octants {
+    /// Adds ropes to boxes.
+    pub fn new(boxes: &Boxes) -> Self {
+        let unroped = |&node: &BoxNode| OctantNode {
+            node: BoxNode { link: NONE, ..node },
+            ropes: [NONE; 8],
+        };
+        let mut nodes: Vec<OctantNode> = boxes.0.iter().map(unroped).collect();
+        for index in 0..nodes.len() {
+            let parent = nodes[index];
+            if parent.node.content < LEAF {
+                let first = parent.node.content & CHILD_MASK;
+                for child in [first, first + 1] {
+                    nodes[child as usize].ropes = ropes_of(&parent, child);
+                }
+            }
+        }
+        Self(nodes)
+    }
+
+    /// Checks reachability, containment, ropes and depth.
+    ///
+    /// # Errors
+    /// The first violated invariant, with the node.
+    pub fn validate(
+        &self,
+        soup: &TriangleSoup,
+        leaves: &Leaves,
+        max_depth: u32,
+    ) -> Result<(), AccelError> {
+        let boxes = Boxes(self.0.iter().map(|n| n.node).collect());
+        boxes.validate(soup, leaves, max_depth, |_, _, _| NONE)?;
+        let invalid =
+            |index: usize| AccelError::Invalid(format!("node {index}: a rope leads astray"));
+        if self.0[ROOT as usize].ropes != [NONE; 8] {
+            return Err(invalid(ROOT as usize));
+        }
+        for parent in self.0.iter().filter(|n| n.node.content < LEAF) {
+            let first = parent.node.content & CHILD_MASK;
+            for child in [first, first + 1] {
+                if self.0[child as usize].ropes != ropes_of(parent, child) {
+                    return Err(invalid(child as usize));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+pub(super) fn trace(octants: &Octants, mut query: Query) -> Hit {
+    let octant = octant_of(query.ray.direction);
+    let mut current = ROOT;
+    loop {
+        if current == NONE || query.is_answered() {
+            return query.hit;
+        }
+        query.counters.nodes += 1;
+        query.counters.box_tests += 1;
+        let OctantNode { node, ropes } = &octants.0[current as usize];
+        let entered = enter_box(&node.bounds(), query.ray, query.inverse, query.hit.t).is_some();
+        if entered && node.content < LEAF {
+            current = (node.content & CHILD_MASK) + near_side(node.content, octant);
+        } else {
+            if entered {
+                query.test_leaf(node.content);
+            }
+            current = ropes[octant as usize];
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Where the inner nodes of a tree lie in memory. In every order parents come before their children.
+
+use super::super::tree::{NodeKind, Tree};
+use super::options::NodeOrder;
+use std::collections::VecDeque;
+
+/// Inner nodes of a tree in memory order.
+pub(super) struct InnerNodes {
+    /// Tree index of each.
+    pub nodes: Vec<u32>,
+    /// Place in `nodes` of each node of the tree; of no meaning for leaves.
+    pub places: Vec<u32>,
+    /// Children of each node of the tree in the order of the layout.
+    children: Vec<Option<[u32; 2]>>,
+}
+
+impl InnerNodes {
+    /// Orders the inner nodes; `swap` tells of which the right child goes first.
+    pub fn new(tree: &Tree, order: NodeOrder, swap: impl Fn(u32, u32) -> bool) -> Self {
+        let children: Vec<_> = tree
+            .nodes
+            .iter()
+            .map(|node| match node.kind {
+                NodeKind::Leaf { .. } => None,
+                NodeKind::Inner { left, right } if swap(left, right) => Some([right, left]),
+                NodeKind::Inner { left, right } => Some([left, right]),
+            })
+            .collect();
+        let mut nodes = Vec::new();
+        if children.first().is_some_and(Option::is_some) {
+            match order {
+                NodeOrder::DepthFirst => depth_first(&children, &mut nodes),
+                NodeOrder::BreadthFirst => breadth_first(&children, &mut nodes),
+                NodeOrder::VanEmdeBoas => {
+                    van_emde_boas(&children, 0, tree.depth(), &mut nodes);
+                }
+            }
+        }
+        let mut places = vec![u32::MAX; tree.nodes.len()];
+        for (place, &node) in nodes.iter().enumerate() {
+            places[node as usize] = place as u32;
+        }
+        Self {
+            nodes,
+            places,
+            children,
+        }
+    }
+
+    /// Children of an inner node, first one first.
+    pub fn children(&self, node: u32) -> Option<[u32; 2]> {
+        self.children[node as usize]
+    }
+}
+
+type Children = [Option<[u32; 2]>];
+
+fn depth_first(children: &Children, out: &mut Vec<u32>) {
+    let mut stack = vec![0];
+    while let Some(node) = stack.pop() {
+        if let Some([first, second]) = children[node as usize] {
+            out.push(node);
+            stack.extend([second, first]);
+        }
+    }
+}
+
+fn breadth_first(children: &Children, out: &mut Vec<u32>) {
+    let mut queue = VecDeque::from([0]);
+    while let Some(node) = queue.pop_front() {
+        if let Some(both) = children[node as usize] {
+            out.push(node);
+            queue.extend(both);
+        }
+    }
+}
+
+/// The top half of the levels, then each subtree below it, both in this order (P. van Emde Boas 1975;
+/// Bender et al. 2000). Appends the inner nodes of the upper `levels` levels below `node` and returns
+/// the inner nodes under them.
+fn van_emde_boas(children: &Children, node: u32, levels: u32, out: &mut Vec<u32>) -> Vec<u32> {
+    if levels <= 1 {
+        out.push(node);
+        let inner = |child: &u32| children[*child as usize].is_some();
+        let both = children[node as usize].into_iter().flatten();
+        return both.filter(inner).collect();
+    }
+    let top = levels / 2;
+    let middle = van_emde_boas(children, node, top, out);
+    let mut below = Vec::new();
+    for root in middle {
+        below.extend(van_emde_boas(children, root, levels - top, out));
+    }
+    below
+}

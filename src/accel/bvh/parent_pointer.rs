@@ -1,0 +1,36 @@
+//! No stack: up to the parent, and from there to the far child. Twin of
+//! `kernels/accel/bvh/parent_pointer.wesl`.
+//!
+//! Sources: M. Hapala et al., "Efficient stack-less BVH traversal for ray tracing", SCCG 2011; Dufay
+//! 2017, Algorithm 4.3, which as printed ends early after a missed first child and forgets hits.
+
+use super::super::ray::Hit;
+use super::layout::{Nodes, Query};
+use super::{NONE, ROOT};
+
+pub(super) fn trace(nodes: &impl Nodes, mut query: Query) -> Hit {
+    let mut current = ROOT;
+    // The child that we come from, NONE on the way down.
+    let mut from_child = NONE;
+    loop {
+        let next = if from_child == NONE {
+            let inner = nodes.visit(current, &mut query);
+            if query.is_answered() {
+                return query.hit;
+            }
+            inner.first
+        } else {
+            nodes.second_child(current, from_child, &mut query)
+        };
+        if next != NONE {
+            current = next;
+            from_child = NONE;
+        } else {
+            from_child = current;
+            current = nodes.parent(current);
+            if current == NONE {
+                return query.hit;
+            }
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! Skip pointers: one order for all rays, no stack. Twin of `kernels/accel/bvh/roped.wesl`.
+//!
+//! Sources: B. Smits, "Efficiency issues for ray tracing", 1998; Dufay 2017, Algorithm 4.4.
+
+use super::super::bounds::enter_box;
+use super::super::leaf::LEAF;
+use super::super::ray::Hit;
+use super::boxes::{Boxes, CHILD_MASK};
+use super::layout::Query;
+use super::{NONE, ROOT};
+
+/// The rope of a node, from its parent's rope: the first child leads to the second, the second to
+/// where the parent leads.
+pub(super) fn rope_of(parent_rope: u32, child: u32) -> u32 {
+    if child & 1 == 0 {
+        child + 1
+    } else {
+        parent_rope
+    }
+}
+
+/// Replaces links to parents by ropes.
+pub(super) fn rope(mut boxes: Boxes) -> Boxes {
+    for index in 0..boxes.0.len() {
+        let node = boxes.0[index];
+        if node.content < LEAF {
+            let first = node.content & CHILD_MASK;
+            for child in [first, first + 1] {
+                boxes.0[child as usize].link = rope_of(node.link, child);
+            }
+        }
+    }
+    boxes
+}
+
+pub(super) fn trace(boxes: &Boxes, mut query: Query) -> Hit {
+    let mut current = ROOT;
+    loop {
+        if current == NONE || query.is_answered() {
+            return query.hit;
+        }
+        query.counters.nodes += 1;
+        query.counters.box_tests += 1;
+        let node = &boxes.0[current as usize];
+        if enter_box(&node.bounds(), query.ray, query.inverse, query.hit.t).is_none() {
+            current = node.link;
+        } else if node.content >= LEAF {
+            query.test_leaf(node.content);
+            current = node.link;
+        } else {
+            current = node.content & CHILD_MASK;
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! A stack of few entries that forgets the oldest; a trail of one bit a level leads back to what was
+//! forgotten. Twin of `kernels/accel/bvh/short_stack.wesl`.
+//!
+//! Source: S. Laine, "Restart trail for stackless BVH traversal", HPG 2010. The trail here says which
+//! child the path takes, so that a restart tests no box; a second word says where the other child is
+//! still to be visited. Visits are those of the full stack.
+
+use super::super::ray::Hit;
+use super::layout::{Nodes, Query};
+use super::{NONE, ROOT};
+use std::collections::VecDeque;
+
+pub(super) fn trace(nodes: &impl Nodes, entries: usize, mut query: Query) -> Hit {
+    let mut stack = VecDeque::with_capacity(entries);
+    let push = |stack: &mut VecDeque<u32>, query: &mut Query, node| {
+        if stack.len() == entries {
+            stack.pop_front();
+        }
+        stack.push_back(node);
+        query.count_stack(stack.len());
+    };
+    let (mut side, mut pending) = (0_u64, 0_u64);
+    let mut current = ROOT;
+    let mut level = 0;
+    // Levels above this one are walked again: the trail leads, nothing is tested.
+    let mut restart_end = 0;
+    loop {
+        if level < restart_end {
+            let taken = (side >> level & 1) as u32;
+            if pending >> level & 1 == 1 {
+                let other = nodes.child(current, taken ^ 1, query.counters);
+                push(&mut stack, &mut query, other);
+            }
+            current = nodes.child(current, taken, query.counters);
+            level += 1;
+            continue;
+        }
+        let inner = nodes.visit(current, &mut query);
+        if query.is_answered() {
+            return query.hit;
+        }
+        if inner.first != NONE {
+            side = side & !(1 << level) | u64::from(inner.side) << level;
+            if inner.second != NONE {
+                pending |= 1 << level;
+                push(&mut stack, &mut query, inner.second);
+            }
+            current = inner.first;
+            level += 1;
+            continue;
+        }
+        if pending == 0 {
+            return query.hit;
+        }
+        level = pending.ilog2();
+        pending ^= 1 << level;
+        side ^= 1 << level;
+        level += 1;
+        if let Some(node) = stack.pop_back() {
+            current = node;
+            restart_end = 0;
+        } else {
+            restart_end = level;
+            current = ROOT;
+            level = 0;
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! Near child first, the far one on a stack. Twin of `kernels/accel/bvh/stack.wesl`.
+
+use super::super::ray::Hit;
+use super::layout::{Nodes, Query};
+use super::{NONE, ROOT};
+
+pub(super) fn trace(nodes: &impl Nodes, mut query: Query) -> Hit {
+    let mut stack = Vec::new();
+    let mut current = ROOT;
+    loop {
+        let inner = nodes.visit(current, &mut query);
+        if query.is_answered() {
+            return query.hit;
+        }
+        if inner.second != NONE {
+            stack.push(inner.second);
+            query.count_stack(stack.len());
+        }
+        current = inner.first;
+        if current == NONE {
+            match stack.pop() {
+                Some(node) => current = node,
+                None => return query.hit,
+            }
+        }
+    }
+}

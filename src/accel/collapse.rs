@@ -1,0 +1,309 @@
+//! Wide trees out of binary ones: of all ways to pull grandchildren up and to merge leaves, the one
+//! of least SAH cost.
+//!
+//! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
+//! compressed wide BVHs", HPG 2017, section 3.2.
+
+use super::bounds::Bounds;
+use super::tree::{NodeKind, Tree};
+use crate::config::Params;
+use crate::measure::record::StructureStats;
+
+/// Most children of a node here; the cost table of a node has one entry less.
+const MAX_WIDTH: usize = 8;
+
+/// What a child of a wide node is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum WideKind {
+    /// A node, by index.
+    Node(u32),
+    /// A range of [`WideTree::order`].
+    Leaf {
+        /// First entry.
+        first: u32,
+        /// Number of entries.
+        count: u32,
+    },
+}
+
+/// A child of a wide node with its box.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WideChild {
+    /// Box around everything below.
+    pub bounds: Bounds,
+    /// What is below.
+    pub kind: WideKind,
+}
+
+impl WideChild {
+    /// No child.
+    pub const NOTHING: WideChild = WideChild {
+        bounds: Bounds::EMPTY,
+        kind: WideKind::Leaf { first: 0, count: 0 },
+    };
+
+    /// Whether this is [`WideChild::NOTHING`].
+    pub fn is_nothing(&self) -> bool {
+        matches!(self.kind, WideKind::Leaf { count: 0, .. })
+    }
+}
+
+/// A tree of nodes with up to `width` children each. Node 0 is the root; the nodes among the
+/// children of one node follow each other, in the order of the children.
+#[derive(Debug, Clone, Default)]
+pub struct WideTree {
+    /// Children of every node; one node without children for an empty scene.
+    pub nodes: Vec<Vec<WideChild>>,
+    /// Triangle indices, leaf by leaf in the order in which nodes list them.
+    pub order: Vec<u32>,
+    /// Nodes on the longest path from the root.
+    pub depth: u32,
+}
+
+/// What the collapse is to achieve.
+#[derive(Debug, Clone, Copy)]
+pub struct CollapseSettings {
+    /// Most children of a node, 2 to 8.
+    pub width: usize,
+    /// Most triangles in a leaf.
+    pub leaf_size: u32,
+    /// SAH cost of visiting a node.
+    pub traversal_cost: f32,
+    /// SAH cost of testing a triangle.
+    pub intersection_cost: f32,
+}
+
+impl CollapseSettings {
+    /// Settings from the parameters of [`super::wide::wide_parameters`].
+    pub fn new(width: usize, params: &Params) -> Self {
+        Self {
+            width,
+            leaf_size: params.integer("leaf_size") as u32,
+            traversal_cost: params.number("traversal_cost") as f32,
+            intersection_cost: params.number("intersection_cost") as f32,
+        }
+    }
+}
+
+impl WideTree {
+    /// Figures of the tree; `bytes` is left 0. SAH with both constants 1, as for binary trees.
+    pub fn stats(&self, root: &Bounds) -> StructureStats {
+        let children = || self.nodes.iter().flatten().filter(|c| !c.is_nothing());
+        let mut stats = StructureStats {
+            nodes: self.nodes.len() as u64,
+            references: self.order.len() as u64,
+            depth: Some(self.depth),
+            ..Default::default()
+        };
+        let leaves = children().filter_map(|child| match child.kind {
+            WideKind::Node(_) => None,
+            WideKind::Leaf { count, .. } => Some(count as usize),
+        });
+        stats.leaf_histogram = super::leaf_histogram(leaves);
+        stats.leaves = stats.leaf_histogram.iter().sum();
+        let weighted = children().map(|child| {
+            let weight = match child.kind {
+                WideKind::Node(_) => 1,
+                WideKind::Leaf { count, .. } => count,
+            };
+            f64::from(child.bounds.half_area()) * f64::from(weight)
+        });
+        let root_area = f64::from(root.half_area());
+        stats.sah_cost = (root_area > 0.0).then(|| 1.0 + weighted.sum::<f64>() / root_area);
+        stats
+    }
+
+    /// Collapses `tree`, whose leaves must hold at most `leaf_size` triangles. `arrange` may permute
+    /// the children of a node (given its box) before they get their places.
+    pub fn collapse(
+        tree: &Tree,
+        settings: &CollapseSettings,
+        mut arrange: impl FnMut(&Bounds, &mut Vec<WideChild>),
+    ) -> WideTree {
+        let mut out = WideTree {
+            nodes: vec![Vec::new()],
+            order: Vec::with_capacity(tree.order.len()),
+            depth: 1,
+        };
+        if tree.nodes.is_empty() {
+            return out;
+        }
+        let costs = Costs::new(tree, settings);
+        // Wide nodes whose children are still to be found, as (place, binary node, depth).
+        let mut open = vec![(0_u32, 0_u32, 1_u32)];
+        while let Some((place, binary, depth)) = open.pop() {
+            out.depth = out.depth.max(depth);
+            let mut roots = Vec::with_capacity(settings.width);
+            costs.children(binary, &mut roots);
+            let mut children: Vec<WideChild> = roots
+                .iter()
+                .map(|&root| WideChild {
+                    bounds: tree.nodes[root as usize].bounds,
+                    kind: costs.kind(root),
+                })
+                .collect();
+            arrange(&tree.nodes[binary as usize].bounds, &mut children);
+            let first_open = open.len();
+            for child in &mut children {
+                child.kind = match child.kind {
+                    WideKind::Node(root) => {
+                        let here = out.nodes.len() as u32;
+                        out.nodes.push(Vec::new());
+                        open.push((here, root, depth + 1));
+                        WideKind::Node(here)
+                    }
+                    WideKind::Leaf { count: 0, .. } => continue,
+                    WideKind::Leaf { first: root, .. } => {
+                        let first = out.order.len() as u32;
+                        append_triangles(tree, root, &mut out.order);
+                        let count = distinct_from(&mut out.order, first as usize);
+                        WideKind::Leaf { first, count }
+                    }
+                };
+            }
+            // Depth-first, first child first.
+            open[first_open..].reverse();
+            out.nodes[place as usize] = children;
+        }
+        out
+    }
+}
+
+/// Appends the triangles below a binary node.
+fn append_triangles(tree: &Tree, root: u32, order: &mut Vec<u32>) {
+    match tree.nodes[root as usize].kind {
+        NodeKind::Leaf { first, count } => {
+            order.extend_from_slice(&tree.order[first as usize..(first + count) as usize]);
+        }
+        NodeKind::Inner { left, right } => {
+            append_triangles(tree, left, order);
+            append_triangles(tree, right, order);
+        }
+    }
+}
+
+/// Drops what spatial splits listed twice from the entries after `first`; returns how many are left.
+fn distinct_from(order: &mut Vec<u32>, first: usize) -> u32 {
+    let mut kept = first;
+    for place in first..order.len() {
+        if !order[first..kept].contains(&order[place]) {
+            order[kept] = order[place];
+            kept += 1;
+        }
+    }
+    order.truncate(kept);
+    (kept - first) as u32
+}
+
+/// Least costs of representing the subtree of each binary node by 1, 2, … `width` − 1 children of a
+/// wide node (C(n, i) of the paper), and how many triangles it holds.
+struct Costs<'a> {
+    tree: &'a Tree,
+    settings: CollapseSettings,
+    cost: Vec<[f32; MAX_WIDTH - 1]>,
+    triangles: Vec<u32>,
+}
+
+impl<'a> Costs<'a> {
+    fn new(tree: &'a Tree, settings: &CollapseSettings) -> Self {
+        let mut costs = Self {
+            tree,
+            settings: *settings,
+            cost: vec![[f32::INFINITY; MAX_WIDTH - 1]; tree.nodes.len()],
+            triangles: vec![0; tree.nodes.len()],
+        };
+        // Children come after their parents.
+        for node in (0..tree.nodes.len()).rev() {
+            costs.fill(node);
+        }
+        costs
+    }
+
+    fn fill(&mut self, node: usize) {
+        let (left, right) = match self.tree.nodes[node].kind {
+            NodeKind::Leaf { count, .. } => {
+                self.triangles[node] = count;
+                self.cost[node] = [self.leaf_cost(node); MAX_WIDTH - 1];
+                return;
+            }
+            NodeKind::Inner { left, right } => (left as usize, right as usize),
+        };
+        self.triangles[node] = self.triangles[left].saturating_add(self.triangles[right]);
+        let width = self.settings.width;
+        let mut least = self.leaf_cost(node).min(self.inner_cost(node, left, right));
+        for children in 1..width {
+            if children > 1 {
+                least = least.min(self.shared(left, right, children).0);
+            }
+            self.cost[node][children - 1] = least;
+        }
+    }
+
+    fn leaf_cost(&self, node: usize) -> f32 {
+        let count = self.triangles[node];
+        if count > self.settings.leaf_size {
+            return f32::INFINITY;
+        }
+        self.tree.nodes[node].bounds.half_area() * count as f32 * self.settings.intersection_cost
+    }
+
+    fn inner_cost(&self, node: usize, left: usize, right: usize) -> f32 {
+        let area = self.tree.nodes[node].bounds.half_area();
+        area * self.settings.traversal_cost + self.shared(left, right, self.settings.width).0
+    }
+
+    /// Least cost of two subtrees with `children` children in all, and how many the left one gets.
+    fn shared(&self, left: usize, right: usize, children: usize) -> (f32, usize) {
+        let mut best = (f32::INFINITY, 1);
+        for k in 1..children {
+            let cost = self.cost[left][k - 1] + self.cost[right][children - k - 1];
+            if cost < best.0 {
+                best = (cost, k);
+            }
+        }
+        best
+    }
+
+    /// Whether a subtree that is one child is a leaf: its binary root in place of the first triangle.
+    fn kind(&self, root: u32) -> WideKind {
+        let node = root as usize;
+        match self.tree.nodes[node].kind {
+            NodeKind::Inner { left, right }
+                if self.leaf_cost(node) > self.inner_cost(node, left as usize, right as usize) =>
+            {
+                WideKind::Node(root)
+            }
+            _ => WideKind::Leaf {
+                first: root,
+                count: self.triangles[node],
+            },
+        }
+    }
+
+    /// Binary roots of the children of the wide node at `node`.
+    fn children(&self, node: u32, out: &mut Vec<u32>) {
+        match self.tree.nodes[node as usize].kind {
+            NodeKind::Inner { left, right } => self.split(left, right, self.settings.width, out),
+            NodeKind::Leaf { .. } => out.push(node),
+        }
+    }
+
+    fn split(&self, left: u32, right: u32, children: usize, out: &mut Vec<u32>) {
+        let (_, k) = self.shared(left as usize, right as usize, children);
+        self.take(left, k, out);
+        self.take(right, children - k, out);
+    }
+
+    /// Appends the roots that stand for the subtree of `node` with at most `children` children.
+    fn take(&self, node: u32, children: usize, out: &mut Vec<u32>) {
+        let cost = &self.cost[node as usize];
+        let mut used = children;
+        while used > 1 && cost[used - 1] == cost[used - 2] {
+            used -= 1;
+        }
+        match self.tree.nodes[node as usize].kind {
+            NodeKind::Inner { left, right } if used > 1 => self.split(left, right, used, out),
+            _ => out.push(node),
+        }
+    }
+}

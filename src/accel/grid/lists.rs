@@ -1,0 +1,244 @@
+//! The triangles of each cell: a counting sort in two steps, on all cores, whose result depends on
+//! neither their number nor the cutting of the work.
+//!
+//! Triangles are inserted in runs; each run throws its (cell, triangle) pairs into buckets, which are
+//! equal ranges of cells. Each bucket is then sorted by counting in memory that fits a cache.
+
+use super::super::{AccelError, TriangleSoup, triangle::TriangleRecord};
+use super::raster::Raster;
+use super::{Grid, MAX_WORDS, check_words};
+use crate::accel::BuildLog;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Buckets of a sort; more would spill the write buffers, fewer the counters.
+const BUCKETS: u32 = 64;
+/// References are counted up to this number, which is too many by far.
+const ENOUGH: u64 = 16 * MAX_WORDS;
+/// References after which a run tells the others how many it found.
+const REPORT: u64 = 1 << 16;
+/// Fewest triangles of a run.
+const LEAST_RUN: usize = 2048;
+
+/// Cell `c` lists `references[starts[c]..starts[c + 1]]`, triangles ascending.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lists {
+    /// Begin of each cell, and the end of the last.
+    pub starts: Vec<u32>,
+    /// Triangle indices.
+    pub references: Vec<u32>,
+}
+
+/// Pairs of one run, by bucket.
+type Pairs = Vec<Vec<(u32, u32)>>;
+
+impl Lists {
+    /// Lists all triangles of a scene; `exact` as in [`Raster::rows`]. Phases `insert` and `sort`.
+    ///
+    /// # Errors
+    /// More cells or references than [`MAX_WORDS`].
+    pub fn new(
+        name: &str,
+        grid: &Grid,
+        soup: &TriangleSoup,
+        exact: bool,
+        log: &mut BuildLog,
+    ) -> Result<Self, AccelError> {
+        check_words(&format!("cells of a {name}"), grid.cells())?;
+        let shift = bucket_shift(grid.cells() as u32);
+        let (runs, needed) = log.phase("insert", || insert(grid, &soup.records, exact, shift));
+        let more = if needed > ENOUGH {
+            "counted so far"
+        } else {
+            "in all"
+        };
+        check_words(&format!("references of a {name}, {more}"), needed)?;
+        Ok(log.phase("sort", || sort(grid.cells() as usize, shift, &runs)))
+    }
+
+    /// The list of a cell.
+    pub fn of(&self, cell: usize) -> &[u32] {
+        &self.references[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+}
+
+/// Cells of a bucket, as a power of two, so that there are at most [`BUCKETS`].
+fn bucket_shift(cells: u32) -> u32 {
+    let bits = 32 - (cells - 1).leading_zeros();
+    bits.saturating_sub(BUCKETS.ilog2())
+}
+
+/// Pairs of every run in the order of the triangles, and their number. Beyond [`MAX_WORDS`] they are
+/// only counted, and beyond [`ENOUGH`] no more.
+fn insert(grid: &Grid, records: &[TriangleRecord], exact: bool, shift: u32) -> (Vec<Pairs>, u64) {
+    let total = AtomicU64::new(0);
+    let runs = 4 * rayon::current_num_threads();
+    let run_length = records.len().div_ceil(runs).max(LEAST_RUN);
+    let buckets = ((grid.cells() as u32 - 1) >> shift) as usize + 1;
+    let insert_run = |run: &[TriangleRecord]| {
+        let room = 2 * run.len() / buckets;
+        let mut pairs: Pairs = (0..buckets).map(|_| Vec::with_capacity(room)).collect();
+        let mut raster = Raster::default();
+        let (mut so_far, mut count) = (0, 0);
+        for triangle in run {
+            raster.rows(grid, triangle, exact, |first, cells| {
+                count += u64::from(cells);
+                if so_far <= MAX_WORDS {
+                    for cell in first..first + cells {
+                        pairs[(cell >> shift) as usize].push((cell, triangle.id));
+                    }
+                }
+            });
+            if count >= REPORT {
+                so_far = total.fetch_add(count, Ordering::Relaxed) + count;
+                count = 0;
+            }
+            if so_far > ENOUGH {
+                break;
+            }
+        }
+        total.fetch_add(count, Ordering::Relaxed);
+        pairs
+    };
+    let runs = records.par_chunks(run_length).map(insert_run).collect();
+    (runs, total.into_inner())
+}
+
+fn sort(cells: usize, shift: u32, runs: &[Pairs]) -> Lists {
+    let buckets = ((cells - 1) >> shift) + 1;
+    let size = |bucket: usize| runs.iter().map(|run| run[bucket].len()).sum::<usize>();
+    let sizes: Vec<usize> = (0..buckets).map(size).collect();
+    let mut starts = vec![0u32; cells + 1];
+    let mut references = vec![0u32; sizes.iter().sum()];
+    starts[cells] = references.len() as u32;
+
+    let mut work = Vec::with_capacity(buckets);
+    let (mut rest_starts, mut rest) = (&mut starts[..cells], &mut references[..]);
+    let mut begin = 0u32;
+    for (bucket, &size) in sizes.iter().enumerate() {
+        let here = rest_starts.len().min(1 << shift);
+        let (own_starts, later_starts) = rest_starts.split_at_mut(here);
+        let (own, later) = rest.split_at_mut(size);
+        work.push((bucket, begin, own_starts, own));
+        (rest_starts, rest) = (later_starts, later);
+        begin += size as u32;
+    }
+    work.into_par_iter()
+        .for_each(|(bucket, begin, starts, references)| {
+            let pairs = || runs.iter().flat_map(|run| run[bucket].iter().copied());
+            sort_bucket((bucket << shift) as u32, begin, pairs, starts, references);
+        });
+    Lists { starts, references }
+}
+
+/// Counting sort of the pairs of one bucket, whose first cell is `first_cell` and whose first
+/// reference is number `begin` of all.
+fn sort_bucket<I: Iterator<Item = (u32, u32)>>(
+    first_cell: u32,
+    begin: u32,
+    pairs: impl Fn() -> I,
+    starts: &mut [u32],
+    references: &mut [u32],
+) {
+    pairs().for_each(|(cell, _)| starts[(cell - first_cell) as usize] += 1);
+    let mut sum = 0;
+    for start in starts.iter_mut() {
+        sum += *start;
+        *start = sum - *start;
+    }
+    // Filling moves each start to its end, which is where the next one began.
+    pairs().for_each(|(cell, triangle)| {
+        let slot = &mut starts[(cell - first_cell) as usize];
+        references[*slot as usize] = triangle;
+        *slot += 1;
+    });
+    let mut previous = 0;
+    for start in starts.iter_mut() {
+        (*start, previous) = (begin + previous, *start);
+    }
+}
+
+/// Lists of one part of a grid from a few triangles, by the calling thread; keeps memory between
+/// parts.
+#[derive(Debug, Default)]
+pub struct PartLists {
+    raster: Raster,
+    pairs: Vec<(u32, u32)>,
+    /// As in [`Lists`].
+    pub starts: Vec<u32>,
+    /// As in [`Lists`].
+    pub references: Vec<u32>,
+}
+
+impl PartLists {
+    /// Lists `ids`, which ascend, in the cells of `grid`.
+    pub fn fill(&mut self, grid: &Grid, soup: &TriangleSoup, ids: &[u32]) {
+        let Self {
+            raster,
+            pairs,
+            starts,
+            references,
+        } = self;
+        pairs.clear();
+        for &id in ids {
+            raster.rows(grid, &soup.records[id as usize], true, |first, cells| {
+                pairs.extend((first..first + cells).map(|cell| (cell, id)));
+            });
+        }
+        let cells = grid.cells() as usize;
+        starts.clear();
+        starts.resize(cells + 1, 0);
+        references.clear();
+        references.resize(pairs.len(), 0);
+        starts[cells] = pairs.len() as u32;
+        sort_bucket(
+            0,
+            0,
+            || pairs.iter().copied(),
+            &mut starts[..cells],
+            references,
+        );
+    }
+
+    /// The list of a cell.
+    pub fn of(&self, cell: usize) -> &[u32] {
+        &self.references[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+}
+
+/// Checks what every grid promises: each triangle of the scene lies in the grid, and the cells at
+/// its corners and its centroid list it. `is_listed` tells whether the cell of a position lists a
+/// triangle.
+///
+/// # Errors
+/// The first triangle for which it does not hold, or a reference to one that does not exist.
+pub fn check_lists(
+    grid: &Grid,
+    soup: &TriangleSoup,
+    references: impl Iterator<Item = u32>,
+    is_listed: impl Fn([f32; 3], u32) -> bool,
+) -> Result<(), AccelError> {
+    let wrong = |text: String| Err(AccelError::Invalid(text));
+    let triangles = soup.records.len();
+    for id in references {
+        if id as usize >= triangles {
+            return wrong(format!("triangle {id} is listed and does not exist"));
+        }
+    }
+    for record in &soup.records {
+        let id = record.id;
+        if !grid.bounds.contains(&record.bounds()) {
+            return wrong(format!("triangle {id} lies outside the grid"));
+        }
+        let [a, b, c] = super::raster::corners(record);
+        let centroid = std::array::from_fn(|i| (a[i] + b[i] + c[i]) / 3.0);
+        for position in [a, b, c, centroid] {
+            if !is_listed(position, id) {
+                return wrong(format!(
+                    "triangle {id} is not listed in the cell of {position:?}"
+                ));
+            }
+        }
+    }
+    Ok(())
+}

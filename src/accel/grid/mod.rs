@@ -1,0 +1,284 @@
+//! What the grids share: the box cut into cells, the place of a position, the insertion of triangles.
+//! Twin of `kernels/accel/grid.wesl`.
+//!
+//! A triangle is listed in every cell that it overlaps once the cell is grown by [`Frame::margin`],
+//! which is larger than what rounding can move the walk. The planes of a grid are the same f32
+//! expression everywhere, and the distance to a plane is monotone in the plane even after rounding,
+//! so that a walk passes planes in order; the margin covers the rounding of positions, from which
+//! cells are found on entry and after a jump.
+
+pub mod distance;
+pub mod lists;
+pub mod raster;
+
+use super::bounds::Bounds;
+use super::ray::Ray;
+use super::triangle::TriangleRecord;
+use super::{AccelError, TriangleSoup};
+use crate::gpu::UniformValues;
+use rayon::prelude::*;
+
+/// Most words in an array: 128 MiB, what software adapters bind, less the sentinel.
+pub const MAX_WORDS: u64 = (128 << 20) / 4 - 1;
+
+/// [`AccelError::Limit`] if `needed` words are more than [`MAX_WORDS`].
+///
+/// # Errors
+/// The limit with both numbers.
+pub fn check_words(what: &str, needed: u64) -> Result<(), AccelError> {
+    if needed <= MAX_WORDS {
+        return Ok(());
+    }
+    Err(AccelError::Limit {
+        what: what.to_owned(),
+        needed,
+        limit: MAX_WORDS,
+    })
+}
+
+/// The box that a grid fills, and how exact positions in it are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Around all triangles, grown by the margin.
+    pub bounds: Bounds,
+    /// By how much cells are grown when triangles are listed, scene units. Positions along a ray that
+    /// starts within 16 diagonals of the scene are wrong by less.
+    pub margin: f32,
+    diagonal: f32,
+}
+
+impl Frame {
+    /// The frame of a scene; a unit box if it is empty.
+    pub fn new(soup: &TriangleSoup) -> Self {
+        let mut bounds = bounds_of(&soup.records);
+        if soup.records.is_empty() {
+            bounds = Bounds {
+                min: [0.0; 3],
+                max: [1.0; 3],
+            };
+        }
+        let diagonal = bounds.extent().iter().map(|e| e * e).sum::<f32>().sqrt();
+        let far = (0..3)
+            .map(|a| bounds.min[a].abs().max(bounds.max[a].abs()))
+            .fold(0.0, f32::max);
+        let margin = ((diagonal + far) * 2.0_f32.powi(-18)).max(1e-18);
+        for axis in 0..3 {
+            bounds.min[axis] -= margin;
+            bounds.max[axis] += margin;
+        }
+        Self {
+            bounds,
+            margin,
+            diagonal,
+        }
+    }
+
+    /// Cells along each axis for `lambda` cells a triangle, from 1 to `most`.
+    pub fn resolution(&self, triangles: usize, lambda: f64, most: u32) -> [u32; 3] {
+        // A flat scene still needs a volume for Cleary's rule.
+        let side = self.bounds.extent().map(|e| {
+            f64::from(e)
+                .max(1e-3 * f64::from(self.diagonal))
+                .max(f64::from(self.margin))
+        });
+        cleary(side, triangles, lambda)
+            .map(|cells| cells.round().clamp(1.0, f64::from(most)) as u32)
+    }
+}
+
+/// Cells along each axis of a box with these sides: side · cbrt(λ · triangles / volume)
+/// (J. Cleary et al., 1986).
+pub fn cleary(side: [f64; 3], triangles: usize, lambda: f64) -> [f64; 3] {
+    let volume = side.iter().product::<f64>();
+    let density = (lambda * triangles.max(1) as f64 / volume).cbrt();
+    side.map(|s| s * density)
+}
+
+/// References that a cut of a cell may make of one, on average.
+const MOST_COPIES: f64 = 8.0;
+
+/// Parts along each axis of a cell that is to be cut, before rounding.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cut {
+    /// By Cleary's rule.
+    pub wanted: [f64; 3],
+    /// At most 1: beyond this share of the wanted parts, triangles that cross the whole cell would be
+    /// listed in too many, which no number of triangles per cell makes up for.
+    pub share: f64,
+}
+
+impl Cut {
+    /// A cell with these sides, which lists triangles of these areas.
+    pub fn new(side: [f64; 3], areas: impl ExactSizeIterator<Item = f32>, lambda: f64) -> Self {
+        // A flat cell is no reason for ever smaller parts.
+        let longest = side.iter().copied().fold(0.0, f64::max);
+        let side = side.map(|s| s.max(longest / 16.0));
+        let count = areas.len();
+        let wanted = cleary(side, count, lambda);
+        let volume = side.iter().product::<f64>();
+        let section = (volume / side.iter().copied().fold(longest, f64::min)) as f32;
+        let area = areas.map(|a| f64::from(a.min(section))).sum::<f64>();
+        // A surface meets about one and a half times its area in faces of parts.
+        let face = (volume / wanted.iter().product::<f64>()).powf(2.0 / 3.0);
+        let copies = 1.5 * area / face / count as f64;
+        Self {
+            wanted,
+            share: ((MOST_COPIES - 1.0) / copies).sqrt().min(1.0),
+        }
+    }
+}
+
+/// Area of each triangle.
+pub fn areas(soup: &TriangleSoup) -> Vec<f32> {
+    let area = |record: &TriangleRecord| {
+        let (e, f) = (record.e1, record.e2);
+        let normal = [
+            e[1] * f[2] - e[2] * f[1],
+            e[2] * f[0] - e[0] * f[2],
+            e[0] * f[1] - e[1] * f[0],
+        ];
+        0.5 * normal.iter().map(|n| n * n).sum::<f32>().sqrt()
+    };
+    soup.records.par_iter().map(area).collect()
+}
+
+/// Box around the triangles as kernels know them.
+fn bounds_of(records: &[TriangleRecord]) -> Bounds {
+    let around = |chunk: &[TriangleRecord]| {
+        chunk.iter().fold(Bounds::EMPTY, |bounds, record| {
+            let [min, max] = raster::extremes(&raster::corners(record));
+            bounds.union(&Bounds { min, max })
+        })
+    };
+    let boxes: Vec<Bounds> = records.par_chunks(16_384).map(around).collect();
+    boxes.iter().fold(Bounds::EMPTY, |b, c| b.union(c))
+}
+
+/// A box cut into equal cells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    /// The box.
+    pub bounds: Bounds,
+    /// Cells along each axis.
+    pub resolution: [u32; 3],
+    /// Sides of a cell, scene units.
+    pub cell: [f32; 3],
+    /// Their reciprocals.
+    pub inverse_cell: [f32; 3],
+    /// See [`Frame::margin`].
+    pub margin: f32,
+}
+
+impl Grid {
+    /// A frame cut into `resolution` cells.
+    pub fn new(frame: &Frame, resolution: [u32; 3]) -> Self {
+        let extent = frame.bounds.extent();
+        Self::with_cells(
+            frame.bounds.min,
+            std::array::from_fn(|a| extent[a] / resolution[a] as f32),
+            resolution,
+            frame.margin,
+        )
+    }
+
+    /// The cells from `lowest` on, `size` along each axis, cut into `resolution` cells.
+    pub fn part(&self, lowest: [u32; 3], size: [u32; 3], resolution: [u32; 3]) -> Self {
+        Self::with_cells(
+            std::array::from_fn(|a| self.plane(a, lowest[a])),
+            std::array::from_fn(|a| self.cell[a] * (size[a] as f32 / resolution[a] as f32)),
+            resolution,
+            self.margin,
+        )
+    }
+
+    fn with_cells(low: [f32; 3], cell: [f32; 3], resolution: [u32; 3], margin: f32) -> Self {
+        let high = std::array::from_fn(|a| low[a] + resolution[a] as f32 * cell[a]);
+        Self {
+            bounds: Bounds {
+                min: low,
+                max: high,
+            },
+            resolution,
+            cell,
+            inverse_cell: cell.map(|c| 1.0 / c),
+            margin,
+        }
+    }
+
+    /// Number of cells.
+    pub fn cells(&self) -> u64 {
+        self.resolution.iter().map(|&r| u64::from(r)).product()
+    }
+
+    /// Index of a cell: x runs fastest.
+    pub fn index(&self, [x, y, z]: [u32; 3]) -> u32 {
+        (z * self.resolution[1] + y) * self.resolution[0] + x
+    }
+
+    /// The cell of an index.
+    pub fn coordinates(&self, index: u32) -> [u32; 3] {
+        let [nx, ny, _] = self.resolution;
+        [index % nx, index / nx % ny, index / nx / ny]
+    }
+
+    /// Cell coordinate of a position along one axis, clamped to the grid.
+    pub fn coordinate(&self, axis: usize, position: f32) -> u32 {
+        let cells = (position - self.bounds.min[axis]) * self.inverse_cell[axis];
+        clamped(cells, self.resolution[axis])
+    }
+
+    /// The plane below cell `coordinate`.
+    pub fn plane(&self, axis: usize, coordinate: u32) -> f32 {
+        self.bounds.min[axis] + coordinate as f32 * self.cell[axis]
+    }
+
+    /// The uniform `grid` of the kernels.
+    pub fn uniform(&self) -> (&'static str, UniformValues) {
+        (
+            "grid",
+            UniformValues::new()
+                .vec("low", &self.bounds.min)
+                .vec("high", &self.bounds.max)
+                .vec("cell", &self.cell)
+                .vec("inverse_cell", &self.inverse_cell)
+                .uvec("resolution", &self.resolution),
+        )
+    }
+
+    /// Where the ray is at distance `t`, in cells from the low corner.
+    pub fn in_cells(&self, ray: &Ray, t: f32) -> [f32; 3] {
+        std::array::from_fn(|a| {
+            (ray.origin[a] + ray.direction[a] * t - self.bounds.min[a]) * self.inverse_cell[a]
+        })
+    }
+
+    /// Distances to the planes `planes` of the three axes, counted in cells from the low corner.
+    pub fn distances(&self, ray: &Ray, inverse: [f32; 3], planes: [f32; 3]) -> [f32; 3] {
+        std::array::from_fn(|a| {
+            (self.bounds.min[a] + planes[a] * self.cell[a] - ray.origin[a]) * inverse[a]
+        })
+    }
+}
+
+/// The nearest cell of `0..resolution` to a position in cells.
+pub fn clamped(position: f32, resolution: u32) -> u32 {
+    let last = (resolution - 1) as f32;
+    let position = if position > 0.0 { position } else { 0.0 };
+    (if position < last { position } else { last }) as u32
+}
+
+/// The axis that is left first; of equal ones the first.
+pub fn first_axis(next: [f32; 3], leave: f32) -> usize {
+    if next[0] == leave {
+        0
+    } else if next[1] == leave {
+        1
+    } else {
+        2
+    }
+}
+
+/// Whether a cell lies beside the grid.
+pub fn outside(cell: [u32; 3], resolution: [u32; 3]) -> bool {
+    (0..3).any(|a| cell[a] >= resolution[a])
+}

@@ -1,0 +1,79 @@
+//! Third phase: the boxes of cells grow over neighbours whose lists are parts of their own, so that a
+//! ray jumps farther. Voxels keep their cells; only the boxes overlap.
+
+use super::Partition;
+use super::voxels::{Cell, is_subset};
+use rayon::prelude::*;
+
+/// Grows all boxes `passes` times along each axis. Boxes of a step are computed from those before it.
+pub fn expand(partition: &mut Partition, passes: u32) {
+    // Two bits an axis: down and up are blocked for good, since lists never change.
+    let mut blocked = vec![0u8; partition.cells.len()];
+    for _ in 0..passes {
+        for axis in 0..3 {
+            let grown = partition
+                .cells
+                .par_iter()
+                .zip(&mut blocked)
+                .map(|(cell, blocked)| grow(partition, cell, axis, blocked))
+                .collect();
+            partition.cells = grown;
+        }
+    }
+}
+
+fn grow(partition: &Partition, cell: &Cell, axis: usize, blocked: &mut u8) -> Cell {
+    let mut grown = *cell;
+    let [down, up] = [1u8 << (2 * axis), 2 << (2 * axis)];
+    if *blocked & down == 0 {
+        match reach(partition, cell, axis, false) {
+            Some(bound) => grown.min[axis] = bound,
+            None => *blocked |= down,
+        }
+    }
+    if *blocked & up == 0 {
+        match reach(partition, cell, axis, true) {
+            Some(bound) => grown.max[axis] = bound,
+            None => *blocked |= up,
+        }
+    }
+    grown
+}
+
+/// How far the box may grow along an axis; `None` if a neighbour lists what the cell does not, or the
+/// grid ends.
+fn reach(partition: &Partition, cell: &Cell, axis: usize, up: bool) -> Option<u16> {
+    let map = &partition.map;
+    let end = (map.top[axis] << map.shift) as u16;
+    let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+    let mut voxel = cell.min.map(u32::from);
+    voxel[axis] = if up {
+        u32::from(cell.max[axis])
+    } else {
+        u32::from(cell.min[axis]).checked_sub(1)?
+    };
+    if up && cell.max[axis] == end {
+        return None;
+    }
+    let own = cell.list(&partition.pool);
+    let mut bound = if up { end } else { 0 };
+    while voxel[a] < u32::from(cell.max[a]) {
+        let mut next = u32::from(cell.max[a]);
+        voxel[b] = u32::from(cell.min[b]);
+        while voxel[b] < u32::from(cell.max[b]) {
+            let neighbour = &partition.cells[map.cell_at(voxel) as usize];
+            if !is_subset(neighbour.list(&partition.pool), own) {
+                return None;
+            }
+            bound = if up {
+                bound.min(neighbour.max[axis])
+            } else {
+                bound.max(neighbour.min[axis])
+            };
+            next = next.min(u32::from(neighbour.max[a]));
+            voxel[b] = u32::from(neighbour.max[b]);
+        }
+        voxel[a] = next;
+    }
+    Some(bound)
+}

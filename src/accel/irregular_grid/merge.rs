@@ -1,0 +1,233 @@
+//! Second phase: neighbours become one cell where the surface area heuristic gains by it.
+//!
+//! Passes along x, y and z in turn; in a pass, a cell may join the next one along the axis if their
+//! sections are equal and A(union) · (|union of lists| + 1) ≤ A₁ · (n₁ + 1) + A₂ · (n₂ + 1). Cells that
+//! want the next one form chains, which are cut into pairs from their begin, so that the result does
+//! not depend on the order of work. Rounds go on while they leave fewer than α times the cells.
+
+use super::Partition;
+use super::voxels::{Cell, Entry, Map, is_subset, push_union, union_length};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+const NONE: u32 = u32::MAX;
+const UNKNOWN: u32 = u32::MAX - 1;
+
+/// Merges cells, drops those that are gone, and renumbers the rest in the map.
+pub fn merge(partition: &mut Partition, alpha: f64) {
+    let mut state = State::new(partition);
+    let mut pass = 1;
+    loop {
+        let before = state.alive.len();
+        if alpha > 0.0 {
+            for axis in 0..3 {
+                state.merge_along(axis, pass);
+                pass += 1;
+            }
+        }
+        if state.alive.len() as f64 >= alpha * before as f64 {
+            break;
+        }
+    }
+    let State {
+        alive, mut owner, ..
+    } = state;
+    renumber(partition, &alive, &mut owner);
+}
+
+struct State<'a> {
+    map: &'a Map,
+    cells: &'a mut Vec<Cell>,
+    pool: &'a mut Vec<u32>,
+    voxel: [f32; 3],
+    /// Cells that still exist, ascending.
+    alive: Vec<u32>,
+    /// Which cell each was joined to; its own number while it exists.
+    owner: Vec<u32>,
+    /// Pass in which each cell changed last.
+    changed: Vec<u32>,
+    /// Previous pass along each axis.
+    tried: [u32; 3],
+    /// The cell at the far end of each one along each axis, once it was looked up.
+    neighbours: [Vec<AtomicU32>; 3],
+    /// The cell that each one wants to join in this pass, and whether it is wanted itself.
+    next: Vec<u32>,
+    is_wanted: Vec<bool>,
+}
+
+impl<'a> State<'a> {
+    fn new(partition: &'a mut Partition) -> Self {
+        let count = partition.cells.len();
+        Self {
+            map: &partition.map,
+            cells: &mut partition.cells,
+            pool: &mut partition.pool,
+            voxel: partition.fine.cell,
+            alive: (0..count as u32).collect(),
+            owner: (0..count as u32).collect(),
+            changed: vec![0; count],
+            tried: [0; 3],
+            neighbours: [0; 3].map(|_| (0..count).map(|_| AtomicU32::new(UNKNOWN)).collect()),
+            next: vec![NONE; count],
+            is_wanted: vec![false; count],
+        }
+    }
+
+    fn merge_along(&mut self, axis: usize, pass: u32) {
+        let wish = |&id: &u32| self.wish(id, axis).map(|other| [id, other]);
+        let wishes: Vec<[u32; 2]> = self.alive.par_iter().filter_map(wish).collect();
+        self.tried[axis] = pass;
+        if wishes.is_empty() {
+            return;
+        }
+        let pairs = self.pairs(&wishes);
+        let joined: Vec<(Vec<(u32, u32)>, Vec<u32>)> = pairs
+            .par_chunks(1024)
+            .map(|some| self.unions(some))
+            .collect();
+        for (some, (lists, new)) in pairs.chunks(1024).zip(joined) {
+            let begin = self.pool.len() as u32;
+            for (&[left, right], &(first, count)) in some.iter().zip(&lists) {
+                let end = self.cells[right as usize].max[axis];
+                let cell = &mut self.cells[left as usize];
+                cell.max[axis] = end;
+                let is_new = first & NEW != 0;
+                cell.first = if is_new {
+                    begin + (first & !NEW)
+                } else {
+                    first
+                };
+                cell.count = count;
+                self.owner[right as usize] = left;
+                self.changed[left as usize] = pass;
+                self.neighbours[axis][left as usize] = AtomicU32::new(UNKNOWN);
+            }
+            self.pool.extend_from_slice(&new);
+        }
+        let owner = &self.owner;
+        self.alive.retain(|&id| owner[id as usize] == id);
+    }
+
+    /// The next cell along `axis` if joining it pays.
+    fn wish(&self, id: u32, axis: usize) -> Option<u32> {
+        let slot = &self.neighbours[axis][id as usize];
+        let mut other = slot.load(Relaxed);
+        if other == UNKNOWN {
+            other = self.neighbour(id, axis);
+            slot.store(other, Relaxed);
+        }
+        if other == NONE {
+            return None;
+        }
+        let [here, there] = [id, other].map(|c| self.changed[c as usize]);
+        if here.max(there) < self.tried[axis] || self.owner[other as usize] != other {
+            return None;
+        }
+        let [cell, next] = [id, other].map(|c| &self.cells[c as usize]);
+        let same_section = (0..3)
+            .filter(|&a| a != axis)
+            .all(|a| next.max[a] == cell.max[a]);
+        (same_section && self.pays(cell, next, axis)).then_some(other)
+    }
+
+    /// The cell that begins where this one ends, at the same low corner otherwise. It keeps the number
+    /// that the map of the first phase gives the voxel there, whatever it was joined with since.
+    fn neighbour(&self, id: u32, axis: usize) -> u32 {
+        let cell = &self.cells[id as usize];
+        let mut voxel = cell.min.map(u32::from);
+        voxel[axis] = u32::from(cell.max[axis]);
+        if voxel[axis] == self.map.top[axis] << self.map.shift {
+            return NONE;
+        }
+        let other = self.map.cell_at(voxel);
+        let begins_here = self.cells[other as usize].min.map(u32::from) == voxel;
+        if begins_here { other } else { NONE }
+    }
+
+    fn pays(&self, cell: &Cell, neighbour: &Cell, axis: usize) -> bool {
+        let area = |min: [u16; 3], max: [u16; 3]| {
+            let [x, y, z] = [0, 1, 2].map(|a| f32::from(max[a] - min[a]) * self.voxel[a]);
+            x * y + y * z + z * x
+        };
+        let cost = |c: &Cell| area(c.min, c.max) * (c.count + 1) as f32;
+        let apart = cost(cell) + cost(neighbour);
+        let mut max = cell.max;
+        max[axis] = neighbour.max[axis];
+        let whole = area(cell.min, max);
+        if whole * (cell.count.max(neighbour.count) + 1) as f32 > apart {
+            return false;
+        }
+        let count = union_length(cell.list(self.pool), neighbour.list(self.pool));
+        whole * (count + 1) as f32 <= apart
+    }
+
+    /// Cuts the chains of wishes into pairs.
+    fn pairs(&mut self, wishes: &[[u32; 2]]) -> Vec<[u32; 2]> {
+        for &[id, other] in wishes {
+            self.next[id as usize] = other;
+            self.is_wanted[other as usize] = true;
+        }
+        let mut pairs = Vec::with_capacity(wishes.len());
+        for &[head, _] in wishes {
+            let mut left = if self.is_wanted[head as usize] {
+                NONE
+            } else {
+                head
+            };
+            while left != NONE && self.next[left as usize] != NONE {
+                let right = self.next[left as usize];
+                pairs.push([left, right]);
+                left = self.next[right as usize];
+            }
+        }
+        for &[id, other] in wishes {
+            self.next[id as usize] = NONE;
+            self.is_wanted[other as usize] = false;
+        }
+        pairs
+    }
+
+    /// Place and length of the union of the lists of each pair; a list that holds the other one is
+    /// kept, the rest are new and lie, marked by [`NEW`], in the second vector.
+    fn unions(&self, pairs: &[[u32; 2]]) -> (Vec<(u32, u32)>, Vec<u32>) {
+        let mut new = Vec::new();
+        let union = |&[left, right]: &[u32; 2]| {
+            let [a, b] = [left, right].map(|id| self.cells[id as usize]);
+            let (long, short) = if a.count >= b.count { (a, b) } else { (b, a) };
+            let [long_list, short_list] = [long, short].map(|c| c.list(self.pool));
+            if is_subset(short_list, long_list) {
+                return (long.first, long.count);
+            }
+            let first = new.len() as u32;
+            push_union(long_list, short_list, &mut new);
+            (first | NEW, new.len() as u32 - first)
+        };
+        let lists = pairs.iter().map(union).collect();
+        (lists, new)
+    }
+}
+
+/// Marks the place of a list as one in the new lists of a task.
+const NEW: u32 = 1 << 31;
+
+fn renumber(partition: &mut Partition, alive: &[u32], owner: &mut [u32]) {
+    // An owner may have been joined itself.
+    for id in 0..owner.len() {
+        let mut root = owner[id];
+        while owner[root as usize] != root {
+            root = owner[root as usize];
+        }
+        owner[id] = root;
+    }
+    let mut number = vec![0u32; owner.len()];
+    for (new, &old) in alive.iter().enumerate() {
+        number[old as usize] = new as u32;
+    }
+    partition.map.entries.par_iter_mut().for_each(|word| {
+        if let Entry::Cell(cell) = Map::decode(*word) {
+            *word = Map::encode(Entry::Cell(number[owner[cell as usize] as usize]));
+        }
+    });
+    let cells = &partition.cells;
+    partition.cells = alive.par_iter().map(|&id| cells[id as usize]).collect();
+}

@@ -1,0 +1,403 @@
+//! `irregular-grid`: boxes of voxels of any size, found through a map of voxels. Twin of
+//! `kernels/accel/irregular_grid.wesl`.
+//!
+//! Source: A. Pérard-Gayot, J. Kalojanov, P. Slusallek, "GPU ray tracing using irregular grids", 2017;
+//! defaults of the parameters are those of the authors' code (hagrid).
+//!
+//! The build has four phases, a file each: [`cut`] makes voxels where triangles are, [`merge`] joins
+//! cells by the surface area heuristic, [`expand`] lets their boxes grow over neighbours that list
+//! nothing more, [`compress`] writes 16 bytes a cell. Voxels have 16-bit coordinates, and a ray keeps
+//! the voxel it is in: on leaving a box it steps across the exit plane by integers, and its other two
+//! coordinates may only move forward and within the box.
+
+mod compress;
+mod cut;
+mod expand;
+mod merge;
+mod voxels;
+
+use self::voxels::{Cell, Map};
+use super::bounds::{BOX_PAD, enter_box};
+use super::grid::lists::check_lists;
+use super::grid::{Grid, check_words, clamped, first_axis, outside};
+use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::triangle::intersect_triangle;
+use super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
+    TriangleSoup,
+};
+use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::gpu::UniformValues;
+use crate::measure::record::StructureStats;
+
+/// Bits of an entry that hold the logarithm of its block's side; 0: the rest is a cell.
+const LOG_BITS: u32 = 2;
+const LOG_MASK: u32 = 3;
+/// Marks the last reference of a list.
+const LAST: u32 = 0x8000_0000;
+/// Place of the list of an empty cell.
+const EMPTY: u32 = 0xffff_ffff;
+
+/// The registry entry.
+pub struct IrregularGrid;
+
+impl AccelKind for IrregularGrid {
+    fn name(&self) -> &'static str {
+        "irregular-grid"
+    }
+
+    fn description(&self) -> &'static str {
+        "two-level grid with cells merged by SAH and expanded (Pérard-Gayot et al. 2017)"
+    }
+
+    fn parameters(&self) -> ParameterSchema {
+        let number = |name, description, default, min, max| Parameter {
+            name,
+            description,
+            default: ParamValue::Number(default),
+            range: ParamRange::Number { min, max },
+        };
+        let integer = |name, description, default, min, max| Parameter {
+            name,
+            description,
+            default: ParamValue::Integer(default),
+            range: ParamRange::Integer { min, max },
+        };
+        vec![
+            number(
+                "lambda1",
+                "top cells per triangle of the scene",
+                0.12,
+                0.001,
+                100.0,
+            ),
+            number(
+                "lambda2",
+                "voxels of a top cell per triangle in it, rounded up to a power of two an axis",
+                2.4,
+                0.001,
+                100.0,
+            ),
+            number(
+                "alpha",
+                "merge on while a round leaves fewer than this part of the cells; 0: not at all",
+                0.995,
+                0.0,
+                0.9999,
+            ),
+            integer(
+                "expansions",
+                "times that boxes grow along each axis",
+                3,
+                0,
+                16,
+            ),
+            integer(
+                "levels",
+                "how often a cell may be cut in all; 2 as in the paper, more only where most \
+                 triangles of a top cell lie in one voxel",
+                2,
+                2,
+                4,
+            ),
+        ]
+    }
+
+    fn build(
+        &self,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        let settings = Settings {
+            lambda1: params.number("lambda1"),
+            lambda2: params.number("lambda2"),
+            levels: params.integer("levels") as u32,
+        };
+        let mut partition = cut::cut(self.name(), soup, &settings, log)?;
+        let (alpha, passes) = (params.number("alpha"), params.integer("expansions") as u32);
+        log.phase("merge", || merge::merge(&mut partition, alpha));
+        log.phase("expand", || expand::expand(&mut partition, passes));
+        check_words(
+            "cells of an irregular-grid",
+            4 * partition.cells.len() as u64,
+        )?;
+        let arrays = log.phase("compress", || compress::compress(&partition));
+        check_words(
+            "map and references of an irregular-grid",
+            arrays.words.len() as u64,
+        )?;
+        Ok(Box::new(Built {
+            fine: partition.fine,
+            shift: partition.map.shift,
+            cells: arrays.cells,
+            words: arrays.words,
+            first_reference: arrays.first_reference,
+        }))
+    }
+}
+
+/// Parameters of the cutting.
+struct Settings {
+    lambda1: f64,
+    lambda2: f64,
+    levels: u32,
+}
+
+/// The grid between its phases.
+struct Partition {
+    /// The voxels.
+    fine: Grid,
+    map: Map,
+    cells: Vec<Cell>,
+    /// Lists of cells.
+    pool: Vec<u32>,
+}
+
+struct Built {
+    /// The voxels.
+    fine: Grid,
+    /// A top cell has 2^`shift` voxels along each axis.
+    shift: u32,
+    /// Four words a cell: coordinates of the lowest voxel and of the one past the highest, 16 bits
+    /// each, and the place of its list.
+    cells: Vec<u32>,
+    /// Entries, each place << [`LOG_BITS`] | logarithm; then references, the last of a list marked by
+    /// [`LAST`].
+    words: Vec<u32>,
+    first_reference: usize,
+}
+
+/// A cell as the kernel reads it.
+struct Found {
+    min: [i32; 3],
+    max: [i32; 3],
+    list: u32,
+}
+
+impl Built {
+    /// Top cells along each axis.
+    fn top(&self) -> [u32; 3] {
+        self.fine.resolution.map(|n| n >> self.shift)
+    }
+
+    /// The cell of a voxel; twin of `find_cell` of the kernel.
+    fn find_cell(&self, voxel: [u32; 3]) -> u32 {
+        let mut shift = self.shift;
+        let [nx, ny, _] = self.top();
+        let [x, y, z] = voxel.map(|v| v >> shift);
+        let mut entry = self.words[((z * ny + y) * nx + x) as usize];
+        loop {
+            let log = entry & LOG_MASK;
+            if log == 0 {
+                return entry >> LOG_BITS;
+            }
+            shift -= log;
+            let [x, y, z] = voxel.map(|v| (v >> shift) & ((1 << log) - 1));
+            let place = (entry >> LOG_BITS) + (((z << log) + y) << log) + x;
+            entry = self.words[place as usize];
+        }
+    }
+
+    fn load_cell(&self, cell: u32) -> Found {
+        let words = &self.cells[4 * cell as usize..4 * cell as usize + 4];
+        let low = |word: u32| (word & 0xffff) as i32;
+        let high = |word: u32| (word >> 16) as i32;
+        Found {
+            min: [low(words[0]), high(words[0]), low(words[1])],
+            max: [high(words[1]), low(words[2]), high(words[2])],
+            list: words[3],
+        }
+    }
+
+    /// References of a list, without the mark.
+    fn list(&self, place: u32) -> impl Iterator<Item = u32> {
+        let begin = if place == EMPTY {
+            self.words.len()
+        } else {
+            self.first_reference + place as usize
+        };
+        let mut ended = false;
+        self.words[begin..].iter().map_while(move |word| {
+            let id = (!ended).then_some(word & !LAST);
+            ended = word & LAST != 0;
+            id
+        })
+    }
+
+    fn count(&self) -> usize {
+        self.cells.len() / 4
+    }
+
+    /// Checks that lists are whole, and that a box lists what the cells at its corners do.
+    fn check_cells(&self) -> Result<(), AccelError> {
+        let wrong = |text: String| Err(AccelError::Invalid(text));
+        let references = self.words.len() - self.first_reference;
+        for number in 0..self.count() as u32 {
+            let cell = self.load_cell(number);
+            if cell.list != EMPTY && cell.list as usize >= references {
+                return wrong(format!("cell {number}: its list does not exist"));
+            }
+            let own: Vec<u32> = self.list(cell.list).collect();
+            for corner in 0..8 {
+                let voxel = std::array::from_fn(|a| {
+                    if corner >> a & 1 == 0 {
+                        cell.min[a]
+                    } else {
+                        cell.max[a] - 1
+                    }
+                });
+                if (0..3).any(|a| voxel[a] < 0 || voxel[a] >= self.fine.resolution[a] as i32) {
+                    return wrong(format!("cell {number} lies outside the grid"));
+                }
+                let other = self.load_cell(self.find_cell(voxel.map(|v| v as u32)));
+                if self
+                    .list(other.list)
+                    .any(|id| own.binary_search(&id).is_err())
+                {
+                    return wrong(format!(
+                        "cell {number}: voxel {voxel:?} in its box lists more"
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl BuiltAccel for Built {
+    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
+        if self.words.len() > self.first_reference && self.words[self.words.len() - 1] & LAST == 0 {
+            return Err(AccelError::Invalid("the last list has no end".to_owned()));
+        }
+        self.check_cells()?;
+        let is_listed = |position: [f32; 3], id: u32| {
+            let voxel = std::array::from_fn(|a| self.fine.coordinate(a, position[a]));
+            let cell = self.load_cell(self.find_cell(voxel));
+            let inside = (0..3).all(|a| {
+                let v = voxel[a] as i32;
+                cell.min[a] <= v && v < cell.max[a]
+            });
+            inside && self.list(cell.list).any(|other| other == id)
+        };
+        let references = self.words[self.first_reference..].iter().map(|w| w & !LAST);
+        check_lists(&self.fine, soup, references, is_listed)
+    }
+
+    fn buffers(&self) -> GpuBuffers<'_> {
+        let voxels = UniformValues::new()
+            .u32("shift", self.shift)
+            .u32("first_reference", self.first_reference as u32);
+        let steps = self.fine.resolution.iter().sum::<u32>() + 1;
+        GpuBuffers {
+            kernel: "accel/irregular_grid",
+            features: Vec::new(),
+            arrays: vec![
+                NamedWords {
+                    name: "cells",
+                    words: self.cells.as_slice().into(),
+                    element_bytes: 16,
+                },
+                NamedWords {
+                    name: "words",
+                    words: self.words.as_slice().into(),
+                    element_bytes: 4,
+                },
+            ],
+            uniforms: vec![
+                self.fine.uniform(),
+                ("voxels", voxels),
+                super::limits(steps as usize, self.count()),
+            ],
+            constants: Vec::new(),
+        }
+    }
+
+    fn stats(&self) -> StructureStats {
+        let mut lengths = vec![0usize; self.count()];
+        for (number, length) in lengths.iter_mut().enumerate() {
+            *length = self.list(self.cells[4 * number + 3]).count();
+        }
+        StructureStats {
+            nodes: lengths.len() as u64,
+            leaves: lengths.iter().filter(|&&l| l > 0).count() as u64,
+            references: (self.words.len() - self.first_reference) as u64,
+            leaf_histogram: super::leaf_histogram(lengths.into_iter()),
+            bytes: self.buffers().bytes(),
+            ..Default::default()
+        }
+    }
+
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(Twin { built: self, soup }))
+    }
+}
+
+struct Twin<'a> {
+    built: &'a Built,
+    soup: &'a TriangleSoup,
+}
+
+impl Twin<'_> {
+    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
+        let grid = &self.built.fine;
+        let inverse = safe_inverse(ray.direction);
+        let mut hit = Hit::miss(ray);
+        counters.box_tests += 1;
+        let Some(enter) = enter_box(&grid.bounds, ray, inverse, ray.t_max) else {
+            return hit;
+        };
+        let forward = inverse.map(|i| i >= 0.0);
+        let entry = grid.in_cells(ray, enter);
+        let mut voxel: [u32; 3] = std::array::from_fn(|a| clamped(entry[a], grid.resolution[a]));
+        loop {
+            counters.nodes += 1;
+            let cell = self.built.load_cell(self.built.find_cell(voxel));
+            for id in self.built.list(cell.list) {
+                counters.triangle_tests += 1;
+                intersect_triangle(&self.soup.records[id as usize], ray, inverse, &mut hit);
+            }
+            if any && hit.triangle != NO_HIT {
+                return hit;
+            }
+            let planes = std::array::from_fn(|a| {
+                (if forward[a] { cell.max[a] } else { cell.min[a] }) as f32
+            });
+            let next = grid.distances(ray, inverse, planes);
+            let leave = next[0].min(next[1]).min(next[2]);
+            // The exit must lie clearly behind the hit: an equally near one may wait next door.
+            if hit.t * BOX_PAD < leave {
+                return hit;
+            }
+            let axis = first_axis(next, leave);
+            let place = grid.in_cells(ray, leave);
+            voxel = std::array::from_fn(|a| {
+                if a == axis {
+                    return (if forward[a] {
+                        cell.max[a]
+                    } else {
+                        cell.min[a] - 1
+                    }) as u32;
+                }
+                // Forward only, and within the box.
+                let here = voxel[a] as i32;
+                let low = if forward[a] { here } else { cell.min[a] };
+                let high = if forward[a] { cell.max[a] - 1 } else { here };
+                place[a].max(low as f32).min(high as f32) as u32
+            });
+            if outside(voxel, grid.resolution) {
+                return hit;
+            }
+        }
+    }
+}
+
+impl CpuTwin for Twin<'_> {
+    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
+        self.trace(ray, false, counters)
+    }
+
+    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        self.trace(ray, true, counters).triangle != NO_HIT
+    }
+}

@@ -1,0 +1,484 @@
+//! `kd-tree`: space halved by planes that the SAH places, leaves with references, traversed near side
+//! first with a stack. Twin of `kernels/accel/kd_tree.wesl`.
+//!
+//! Sources: I. Wald, V. Havran, "On building fast kd-trees for ray tracing, and on doing that in
+//! O(N log N)", 2006 (builder); V. Havran, "Heuristic ray shooting algorithms", 2000, algorithm
+//! `TA_rec_B` (traversal with the interval of the ray in each cell); M. Pharr et al., "Physically based
+//! rendering", 2004 (8-byte nodes). Why hits are equal to brute force to the bit: [`super::spatial`].
+
+mod build;
+
+use super::bounds::{BOX_PAD, Bounds, slab};
+use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::spatial::{corners, touches};
+use super::tree::Coverage;
+use super::triangle::intersect_triangle;
+use super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
+    TriangleSoup,
+};
+use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::gpu::UniformValues;
+use crate::measure::record::StructureStats;
+use bytemuck::{Pod, Zeroable};
+
+/// Low bits of [`Node::link`]: the axis of the plane, or [`LEAF`].
+const KIND_MASK: u32 = 3;
+const LEAF: u32 = 3;
+/// The other bits: first of two children, or number of references.
+const LINK_SHIFT: u32 = 2;
+/// A cell that begins behind the hit by this factor ends the walk: all others on the stack begin
+/// no more than [`BOX_PAD`] before it. More than its square.
+const END_PAD: f32 = 1.000_004;
+
+/// The registry entry.
+pub struct KdTree;
+
+impl AccelKind for KdTree {
+    fn name(&self) -> &'static str {
+        "kd-tree"
+    }
+
+    fn description(&self) -> &'static str {
+        "kd-tree, SAH over all box faces in O(N log N) (Wald & Havran 2006), leaf references, stack"
+    }
+
+    fn parameters(&self) -> ParameterSchema {
+        let number = |name, description, default, min, max| Parameter {
+            name,
+            description,
+            default: ParamValue::Number(default),
+            range: ParamRange::Number { min, max },
+        };
+        vec![
+            Parameter {
+                name: "max_depth",
+                description: "deepest leaf; 0 stands for 8 + 1.3 log2 of the number of triangles",
+                default: ParamValue::Integer(0),
+                range: ParamRange::Integer { min: 0, max: 64 },
+            },
+            number(
+                "traversal_cost",
+                "SAH cost of visiting an inner node",
+                1.0,
+                0.01,
+                100.0,
+            ),
+            number(
+                "intersection_cost",
+                "SAH cost of testing a triangle",
+                1.0,
+                0.01,
+                100.0,
+            ),
+            number(
+                "empty_bonus",
+                "fraction of its cost that a split saves which cuts off empty space",
+                0.2,
+                0.0,
+                0.9,
+            ),
+            Parameter {
+                name: "clip",
+                description: "perfect splits: cells that a triangle's box reaches but the triangle does not are spared it",
+                default: ParamValue::Flag(true),
+                range: ParamRange::Flag,
+            },
+        ]
+    }
+
+    fn build(
+        &self,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        let bounds = if soup.records.is_empty() {
+            Bounds {
+                min: [0.0; 3],
+                max: [1.0; 3],
+            }
+        } else {
+            soup.bounds()
+        };
+        let tree = build::build(soup, bounds, params, log)?;
+        let mut built = Built {
+            bounds,
+            clipped: params.flag("clip"),
+            nodes: tree.nodes,
+            references: tree.references,
+            stats: StructureStats::default(),
+        };
+        built.stats = log.phase("stats", || built.measure());
+        Ok(Box::new(built))
+    }
+}
+
+/// A plane or a leaf, 8 bytes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+struct Node {
+    /// Bits of the plane's position, or the leaf's first place in the references.
+    word: u32,
+    /// Kind in the low bits; above them the first of two children, below and above the plane, or the
+    /// leaf's number of references.
+    link: u32,
+}
+
+/// A node in words.
+#[derive(Clone, Copy)]
+enum Content {
+    Inner {
+        axis: usize,
+        position: f32,
+        children: usize,
+    },
+    Leaf {
+        first: usize,
+        count: usize,
+    },
+}
+
+impl Node {
+    const EMPTY: Node = Node {
+        word: 0,
+        link: LEAF,
+    };
+
+    fn inner(axis: usize, position: f32, children: usize) -> Self {
+        Self {
+            word: position.to_bits(),
+            link: (children as u32) << LINK_SHIFT | axis as u32,
+        }
+    }
+
+    fn leaf(first: usize, count: usize) -> Self {
+        Self {
+            word: first as u32,
+            link: (count as u32) << LINK_SHIFT | LEAF,
+        }
+    }
+
+    fn content(self) -> Content {
+        let link = (self.link >> LINK_SHIFT) as usize;
+        match self.link & KIND_MASK {
+            LEAF => Content::Leaf {
+                first: self.word as usize,
+                count: link,
+            },
+            axis => Content::Inner {
+                axis: axis as usize,
+                position: f32::from_bits(self.word),
+                children: link,
+            },
+        }
+    }
+
+    /// The node after what it refers to moved up by this many places.
+    fn moved_by(self, nodes: usize, references: usize) -> Self {
+        match self.content() {
+            Content::Leaf { first, count } => Self::leaf(first + references, count),
+            Content::Inner {
+                axis,
+                position,
+                children,
+            } => Self::inner(axis, position, children + nodes),
+        }
+    }
+}
+
+/// Both halves of a cell.
+fn halves(cell: &Bounds, axis: usize, position: f32) -> [Bounds; 2] {
+    let mut halves = [*cell; 2];
+    halves[0].max[axis] = position;
+    halves[1].min[axis] = position;
+    halves
+}
+
+struct Built {
+    bounds: Bounds,
+    clipped: bool,
+    /// Root first; children of a node lie side by side.
+    nodes: Vec<Node>,
+    /// Triangle indices, leaf by leaf, ascending in each.
+    references: Vec<u32>,
+    stats: StructureStats,
+}
+
+impl Built {
+    /// Figures of the tree.
+    fn measure(&self) -> StructureStats {
+        let mut counts = Vec::new();
+        let (mut cost, mut deepest) = (0.0, 0);
+        let mut stack = vec![(0, self.bounds, 0)];
+        while let Some((index, cell, depth)) = stack.pop() {
+            let node: Node = self.nodes[index];
+            let weight = match node.content() {
+                Content::Leaf { count, .. } => {
+                    counts.push(count);
+                    deepest = deepest.max(depth);
+                    count as f64
+                }
+                Content::Inner {
+                    axis,
+                    position,
+                    children,
+                } => {
+                    let [below, above] = halves(&cell, axis, position);
+                    stack.push((children, below, depth + 1));
+                    stack.push((children + 1, above, depth + 1));
+                    1.0
+                }
+            };
+            cost += weight * f64::from(cell.half_area());
+        }
+        let root_area = f64::from(self.bounds.half_area());
+        StructureStats {
+            nodes: self.nodes.len() as u64,
+            leaves: counts.len() as u64,
+            references: self.references.len() as u64,
+            leaf_histogram: super::leaf_histogram(counts.into_iter()),
+            depth: Some(deepest),
+            epo: None,
+            sah_cost: (root_area > 0.0).then(|| cost / root_area),
+            bytes: self.buffers().bytes(),
+        }
+    }
+
+    /// Those of `triangles`, all of which the cell of node `index` must list, that its leaves lack.
+    fn lacking(
+        &self,
+        index: usize,
+        cell: &Bounds,
+        triangles: Vec<u32>,
+        soup: &TriangleSoup,
+        coverage: &mut Coverage,
+    ) -> Result<Vec<u32>, AccelError> {
+        coverage.node(index)?;
+        let (axis, position, children) = match self.nodes[index].content() {
+            Content::Leaf { first, count } => {
+                return lacking_in_leaf(
+                    index,
+                    self.references.get(first..first + count),
+                    triangles,
+                );
+            }
+            Content::Inner {
+                axis,
+                position,
+                children,
+            } => (axis, position, children),
+        };
+        let inside = cell.min[axis] <= position && position <= cell.max[axis];
+        if !inside {
+            return Err(AccelError::Invalid(format!(
+                "node {index}: its plane lies outside its cell"
+            )));
+        }
+        let cells = halves(cell, axis, position);
+        let (mut below, mut above, mut planar) = (Vec::new(), Vec::new(), Vec::new());
+        for id in triangles {
+            let record = &soup.records[id as usize];
+            let bounds = record.bounds();
+            let (low, high) = (bounds.min[axis], bounds.max[axis]);
+            if low == position && high == position {
+                planar.push(id);
+            } else if high <= position {
+                below.push(id);
+            } else if low >= position {
+                above.push(id);
+            } else {
+                let needed = |cell| !self.clipped || touches(&corners(record), cell);
+                below.extend(needed(&cells[0]).then_some(id));
+                above.extend(needed(&cells[1]).then_some(id));
+            }
+        }
+        // What lies in the plane may be on either side.
+        planar.sort_unstable();
+        let with_planar = |mut list: Vec<u32>| {
+            list.extend(&planar);
+            list
+        };
+        let lacks_below = self.lacking(children, &cells[0], with_planar(below), soup, coverage)?;
+        let lacks_above =
+            self.lacking(children + 1, &cells[1], with_planar(above), soup, coverage)?;
+        let on_one_side = |id: &u32| planar.binary_search(id).is_ok();
+        let (either, mut lost): (Vec<u32>, Vec<u32>) =
+            lacks_below.into_iter().partition(on_one_side);
+        let (also, rest): (Vec<u32>, Vec<u32>) = lacks_above.into_iter().partition(on_one_side);
+        lost.extend(rest);
+        lost.extend(either.into_iter().filter(|id| also.contains(id)));
+        Ok(lost)
+    }
+}
+
+/// Those of `triangles` that a leaf does not list.
+fn lacking_in_leaf(
+    index: usize,
+    references: Option<&[u32]>,
+    mut triangles: Vec<u32>,
+) -> Result<Vec<u32>, AccelError> {
+    let wrong = |text: &str| Err(AccelError::Invalid(format!("leaf {index}: {text}")));
+    let Some(references) = references else {
+        return wrong("its references lie outside the array");
+    };
+    if !references.is_sorted_by(|a, b| a < b) {
+        return wrong("its references do not ascend");
+    }
+    triangles.retain(|id| references.binary_search(id).is_err());
+    Ok(triangles)
+}
+
+impl BuiltAccel for Built {
+    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
+        let wrong = |text: String| Err(AccelError::Invalid(text));
+        for record in &soup.records {
+            if !self.bounds.contains(&record.bounds()) {
+                return wrong(format!("triangle {} lies outside the tree", record.id));
+            }
+        }
+        let exists = |id: &&u32| **id as usize >= soup.records.len();
+        if let Some(id) = self.references.iter().find(exists) {
+            return wrong(format!("triangle {id} does not exist"));
+        }
+        let listed: usize = self
+            .nodes
+            .iter()
+            .map(|node| match node.content() {
+                Content::Leaf { count, .. } => count,
+                Content::Inner { .. } => 0,
+            })
+            .sum();
+        if listed != self.references.len() {
+            return wrong(format!(
+                "leaves list {listed} of {} references",
+                self.references.len()
+            ));
+        }
+        let all = (0..soup.records.len() as u32).collect();
+        let no_triangles = TriangleSoup::default();
+        let mut coverage = Coverage::new(&no_triangles, self.nodes.len());
+        let lost = self.lacking(0, &self.bounds, all, soup, &mut coverage)?;
+        if let Some(id) = lost.first() {
+            return wrong(format!(
+                "triangle {id} is missing in a leaf that it touches"
+            ));
+        }
+        coverage.is_complete()
+    }
+
+    fn buffers(&self) -> GpuBuffers<'_> {
+        let tree = UniformValues::new()
+            .vec("low", &self.bounds.min)
+            .vec("high", &self.bounds.max);
+        let depth = self.stats.depth.unwrap_or(0);
+        GpuBuffers {
+            kernel: "accel/kd_tree",
+            features: Vec::new(),
+            arrays: vec![
+                NamedWords {
+                    name: "nodes",
+                    words: bytemuck::cast_slice(&self.nodes).into(),
+                    element_bytes: 8,
+                },
+                NamedWords {
+                    name: "references",
+                    words: self.references.as_slice().into(),
+                    element_bytes: 4,
+                },
+            ],
+            uniforms: vec![
+                ("tree", tree),
+                super::limits(self.nodes.len() + 1, self.nodes.len()),
+            ],
+            // One entry for each level at most; a multiple of 16, so that scenes of like depth share
+            // a kernel.
+            constants: vec![("STACK_ENTRIES", depth.max(1).next_multiple_of(16))],
+        }
+    }
+
+    fn stats(&self) -> StructureStats {
+        self.stats.clone()
+    }
+
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(Twin { built: self, soup }))
+    }
+}
+
+struct Twin<'a> {
+    built: &'a Built,
+    soup: &'a TriangleSoup,
+}
+
+impl Twin<'_> {
+    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
+        let inverse = safe_inverse(ray.direction);
+        let mut hit = Hit::miss(ray);
+        counters.box_tests += 1;
+        let (enter, end) = slab(&self.built.bounds, ray, inverse);
+        let mut enter = enter.max(ray.t_min);
+        let mut exit = end.min(hit.t);
+        if enter > exit * BOX_PAD {
+            return hit;
+        }
+        // Far sides that wait, with the distance where the ray enters them.
+        let mut stack: Vec<(usize, f32)> = Vec::new();
+        let mut current = 0;
+        loop {
+            counters.nodes += 1;
+            match self.built.nodes[current].content() {
+                Content::Inner {
+                    axis,
+                    position,
+                    children,
+                } => {
+                    let plane = (position - ray.origin[axis]) * inverse[axis];
+                    let side = usize::from(inverse[axis] < 0.0);
+                    let (near, far) = (children + side, children + 1 - side);
+                    if plane > exit * BOX_PAD {
+                        current = near;
+                    } else if enter > plane * BOX_PAD {
+                        current = far;
+                    } else {
+                        stack.push((far, enter.max(plane)));
+                        counters.stack_high_water =
+                            counters.stack_high_water.max(stack.len() as u32);
+                        exit = exit.min(plane);
+                        current = near;
+                    }
+                }
+                Content::Leaf { first, count } => {
+                    for &id in &self.built.references[first..first + count] {
+                        counters.triangle_tests += 1;
+                        intersect_triangle(&self.soup.records[id as usize], ray, inverse, &mut hit);
+                    }
+                    if any && hit.triangle != NO_HIT {
+                        return hit;
+                    }
+                    match stack.pop() {
+                        Some((far, distance)) if distance <= hit.t * END_PAD => {
+                            (current, enter) = (far, distance);
+                        }
+                        _ => return hit,
+                    }
+                    // A cell ends where the one waiting below it begins.
+                    exit = stack.last().map_or(end, |(_, next)| *next).min(hit.t);
+                }
+            }
+        }
+    }
+}
+
+impl CpuTwin for Twin<'_> {
+    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
+        self.trace(ray, false, counters)
+    }
+
+    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        self.trace(ray, true, counters).triangle != NO_HIT
+    }
+}
+
+#[cfg(test)]
+mod tests;

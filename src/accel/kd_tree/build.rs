@@ -1,0 +1,438 @@
+//! The builder of `kd-tree`: SAH over all box faces in O(N log N), by lists of events that are sorted
+//! once and keep their order while cells are divided.
+//!
+//! Source: I. Wald, V. Havran, "On building fast kd-trees for ray tracing, and on doing that in
+//! O(N log N)", 2006, algorithms 4 and 5.
+
+use super::Node;
+use crate::accel::bounds::Bounds;
+use crate::accel::spatial::{Margin, clip, corners, intersection};
+use crate::accel::{AccelError, BuildLog, TriangleSoup};
+use crate::config::Params;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// More references than this (1 GiB) are refused while they are made.
+pub(super) const MAX_REFERENCES: u64 = 1 << 28;
+/// Indices of items share a word with the kind of an event.
+const MAX_ITEMS: u64 = 1 << 30;
+/// Cells of fewer triangles are built by one thread.
+const PARALLEL_GRAIN: usize = 4096;
+
+/// Nodes and references in their final places.
+pub(super) struct KdTree {
+    pub nodes: Vec<Node>,
+    pub references: Vec<u32>,
+}
+
+/// Builds the tree over `bounds`.
+///
+/// # Errors
+/// More triangles or references than can be indexed.
+pub(super) fn build(
+    soup: &TriangleSoup,
+    bounds: Bounds,
+    params: &Params,
+    log: &mut BuildLog,
+) -> Result<KdTree, AccelError> {
+    let limit = |what: &str, needed, limit| AccelError::Limit {
+        what: what.to_owned(),
+        needed,
+        limit,
+    };
+    let count = soup.records.len() as u64;
+    if count >= MAX_ITEMS {
+        return Err(limit("triangles of a kd-tree", count, MAX_ITEMS - 1));
+    }
+    let settings = Settings {
+        traversal_cost: params.number("traversal_cost") as f32,
+        intersection_cost: params.number("intersection_cost") as f32,
+        kept_if_empty: 1.0 - params.number("empty_bonus") as f32,
+        max_depth: match params.integer("max_depth") {
+            0 => default_depth(soup.records.len()),
+            depth => depth as u32,
+        },
+        margin: params.flag("clip").then(|| Margin::new(&bounds)),
+        soup,
+        references: AtomicU64::new(0),
+    };
+    let root = log.phase("sort", || Cell::root(soup, bounds));
+    let subtree = log.phase("sah-events", || build_subtree(root, 0, &settings));
+    if settings.references.into_inner() > MAX_REFERENCES {
+        return Err(limit(
+            "references of a kd-tree, at least",
+            MAX_REFERENCES + 1,
+            MAX_REFERENCES,
+        ));
+    }
+    Ok(log.phase("layout", || lay_out(subtree)))
+}
+
+/// Depth where trees usually stop to gain: 8 + 1.3 log2 N (Havran 2000).
+pub(super) fn default_depth(triangles: usize) -> u32 {
+    (8.0 + 1.3 * (triangles.max(1) as f64).log2()) as u32
+}
+
+struct Settings<'a> {
+    traversal_cost: f32,
+    intersection_cost: f32,
+    /// What of its cost a split keeps that cuts off empty space.
+    kept_if_empty: f32,
+    max_depth: u32,
+    /// Set if triangles are clipped.
+    margin: Option<Margin>,
+    soup: &'a TriangleSoup,
+    /// How many were listed so far; beyond the limit nothing is divided any more.
+    references: AtomicU64,
+}
+
+/// A triangle in a cell.
+struct Item {
+    /// Box of its part within the cell.
+    bounds: Bounds,
+    id: u32,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    End,
+    Planar,
+    Start,
+}
+
+/// Where the interval of an item on an axis starts or ends, or both at once.
+#[derive(Clone, Copy)]
+struct Event {
+    position: f32,
+    /// Index in the cell, and kind in the two high bits.
+    word: u32,
+}
+
+impl Event {
+    fn new(position: f32, item: u32, kind: Kind) -> Self {
+        let word = item | (kind as u32) << 30;
+        Self { position, word }
+    }
+
+    fn item(self) -> usize {
+        (self.word & ((1 << 30) - 1)) as usize
+    }
+
+    fn of_item(self, item: u32) -> Self {
+        let word = item | (self.word & (3 << 30));
+        Self { word, ..self }
+    }
+}
+
+/// Appends the events of an item on one axis.
+fn push_events(bounds: &Bounds, axis: usize, item: u32, events: &mut Vec<Event>) {
+    let (low, high) = (bounds.min[axis], bounds.max[axis]);
+    if low == high {
+        events.push(Event::new(low, item, Kind::Planar));
+    } else {
+        events.push(Event::new(low, item, Kind::Start));
+        events.push(Event::new(high, item, Kind::End));
+    }
+}
+
+/// A cell to be built: what touches it, and along each axis the sorted events of that.
+struct Cell {
+    bounds: Bounds,
+    items: Vec<Item>,
+    events: [Vec<Event>; 3],
+}
+
+/// Where a cell is divided.
+#[derive(Clone, Copy)]
+struct Split {
+    axis: usize,
+    position: f32,
+    /// Whether what lies in the plane goes below.
+    planar_below: bool,
+    cost: f32,
+}
+
+impl Cell {
+    fn root(soup: &TriangleSoup, bounds: Bounds) -> Self {
+        let item = |(id, record): (usize, &crate::accel::triangle::TriangleRecord)| Item {
+            bounds: record.bounds(),
+            id: id as u32,
+        };
+        let items: Vec<Item> = soup.records.par_iter().enumerate().map(item).collect();
+        let events = [0, 1, 2].map(|axis| {
+            let mut events = Vec::with_capacity(2 * items.len());
+            for (index, item) in items.iter().enumerate() {
+                push_events(&item.bounds, axis, index as u32, &mut events);
+            }
+            events.par_sort_unstable_by(|a, b| a.position.total_cmp(&b.position));
+            events
+        });
+        Self {
+            bounds,
+            items,
+            events,
+        }
+    }
+
+    /// The split of least cost, if it costs less than a leaf.
+    fn best_split(&self, settings: &Settings) -> Option<Split> {
+        let leaf_cost = settings.intersection_cost * self.items.len() as f32;
+        let sweep = |axis: usize| self.sweep(axis, settings);
+        let best = if self.items.len() > PARALLEL_GRAIN {
+            let mut splits = [None; 3];
+            splits.par_iter_mut().enumerate().for_each(|(axis, split)| {
+                *split = sweep(axis);
+            });
+            splits
+        } else {
+            [0, 1, 2].map(sweep)
+        };
+        let cheaper = |a: Split, b: Split| if b.cost < a.cost { b } else { a };
+        let best = best.into_iter().flatten().reduce(cheaper)?;
+        (best.cost < leaf_cost).then_some(best)
+    }
+
+    /// The best plane along one axis (Wald & Havran, algorithm 5).
+    fn sweep(&self, axis: usize, settings: &Settings) -> Option<Split> {
+        let (low, high) = (self.bounds.min[axis], self.bounds.max[axis]);
+        let extent = self.bounds.extent();
+        let (width, depth) = (extent[(axis + 1) % 3], extent[(axis + 2) % 3]);
+        let half_area = |length: f32| width * depth + length * (width + depth);
+        let scale = settings.intersection_cost / half_area(high - low).max(f32::MIN_POSITIVE);
+        let mut best: Option<Split> = None;
+        let (mut below, mut above) = (0, self.items.len() as u32);
+        let events = &self.events[axis];
+        let mut next = 0;
+        while next < events.len() {
+            let position = events[next].position;
+            let mut kinds = [0; 3];
+            while next < events.len() && events[next].position == position {
+                kinds[(events[next].word >> 30) as usize] += 1;
+                next += 1;
+            }
+            let [ending, planar, starting] = kinds;
+            above -= ending + planar;
+            if low < position && position < high {
+                let cost_below = scale * half_area(position - low);
+                let cost_above = scale * half_area(high - position);
+                let mut consider = |below: u32, above: u32, planar_below| {
+                    let kept = if below == 0 || above == 0 {
+                        settings.kept_if_empty
+                    } else {
+                        1.0
+                    };
+                    let tests = cost_below * below as f32 + cost_above * above as f32;
+                    let cost = kept * (settings.traversal_cost + tests);
+                    if best.is_none_or(|b| cost < b.cost) {
+                        best = Some(Split {
+                            axis,
+                            position,
+                            planar_below,
+                            cost,
+                        });
+                    }
+                };
+                consider(below + planar, above, true);
+                if planar > 0 {
+                    consider(below, above + planar, false);
+                }
+            }
+            below += starting + planar;
+        }
+        best
+    }
+
+    /// Both halves. Items on one side keep their events; those on both get new ones, which are few.
+    fn divide(self, split: &Split, settings: &Settings) -> [Cell; 2] {
+        let axis = split.axis;
+        let mut bounds = [self.bounds; 2];
+        bounds[0].max[axis] = split.position;
+        bounds[1].min[axis] = split.position;
+        let mut halves = bounds.map(|bounds| Cell {
+            bounds,
+            items: Vec::new(),
+            events: [Vec::new(), Vec::new(), Vec::new()],
+        });
+        let mut fresh: [[Vec<Event>; 3]; 2] = Default::default();
+        let mut places = vec![[ELSEWHERE; 2]; self.items.len()];
+        for (item, place) in self.items.into_iter().zip(&mut places) {
+            let (low, high) = (item.bounds.min[axis], item.bounds.max[axis]);
+            let side = if low == high && low == split.position {
+                usize::from(!split.planar_below)
+            } else if high <= split.position {
+                0
+            } else if low >= split.position {
+                1
+            } else {
+                for (half, fresh) in halves.iter_mut().zip(&mut fresh) {
+                    if let Some(bounds) = part_within(&item, &half.bounds, settings) {
+                        let index = half.items.len() as u32;
+                        (0..3).for_each(|a| push_events(&bounds, a, index, &mut fresh[a]));
+                        let id = item.id;
+                        half.items.push(Item { bounds, id });
+                    }
+                }
+                continue;
+            };
+            place[side] = halves[side].items.len() as u32;
+            halves[side].items.push(item);
+        }
+        let lists = self.events.into_iter().zip(transpose(fresh));
+        let distribute = |(events, fresh)| distribute(events, fresh, &places);
+        let divided: Vec<[Vec<Event>; 2]> = if places.len() > PARALLEL_GRAIN {
+            lists
+                .collect::<Vec<_>>()
+                .into_par_iter()
+                .map(distribute)
+                .collect()
+        } else {
+            lists.map(distribute).collect()
+        };
+        for (axis, [below, above]) in divided.into_iter().enumerate() {
+            halves[0].events[axis] = below;
+            halves[1].events[axis] = above;
+        }
+        halves
+    }
+}
+
+/// Index of an item that is not in a half, or there with new events.
+const ELSEWHERE: u32 = u32::MAX;
+
+/// The box of an item within half a cell; `None` if the half is clearly missed.
+fn part_within(item: &Item, half: &Bounds, settings: &Settings) -> Option<Bounds> {
+    let by_box = intersection(&item.bounds, half);
+    let Some(margin) = &settings.margin else {
+        return Some(by_box);
+    };
+    let record = &settings.soup.records[item.id as usize];
+    let part = clip(&corners(record), half, margin.of(record))?;
+    let clipped = intersection(&by_box, &part);
+    let overlaps = (0..3).all(|a| clipped.min[a] <= clipped.max[a]);
+    Some(if overlaps { clipped } else { by_box })
+}
+
+fn transpose([below, above]: [[Vec<Event>; 3]; 2]) -> impl Iterator<Item = [Vec<Event>; 2]> {
+    below.into_iter().zip(above).map(|(b, a)| [b, a])
+}
+
+/// Splits a sorted list by the places of its items and merges each half with its new events.
+fn distribute(
+    events: Vec<Event>,
+    mut fresh: [Vec<Event>; 2],
+    places: &[[u32; 2]],
+) -> [Vec<Event>; 2] {
+    let mut halves: [Vec<Event>; 2] = Default::default();
+    for fresh in &mut fresh {
+        fresh.sort_unstable_by(|a, b| a.position.total_cmp(&b.position));
+    }
+    let mut merged = [0, 0];
+    for event in &events {
+        let place = places[event.item()];
+        for side in 0..2 {
+            if place[side] == ELSEWHERE {
+                continue;
+            }
+            let waiting = &fresh[side][merged[side]..];
+            let earlier = waiting.iter().take_while(|f| f.position < event.position);
+            let before = halves[side].len();
+            halves[side].extend(earlier);
+            merged[side] += halves[side].len() - before;
+            halves[side].push(event.of_item(place[side]));
+        }
+    }
+    for side in 0..2 {
+        halves[side].extend(&fresh[side][merged[side]..]);
+    }
+    halves
+}
+
+/// A subtree under construction. Those above the parallel grain are joined by reference and laid out
+/// once in the end.
+enum Subtree {
+    /// Root in front, children relative to it.
+    Whole(KdTree),
+    Inner(usize, f32, Box<(Subtree, Subtree)>),
+}
+
+fn build_subtree(cell: Cell, depth: u32, settings: &Settings) -> Subtree {
+    if cell.items.len() <= PARALLEL_GRAIN {
+        let mut tree = KdTree {
+            nodes: vec![Node::EMPTY],
+            references: Vec::new(),
+        };
+        append(cell, depth, 0, settings, &mut tree);
+        let made = tree.references.len() as u64;
+        settings.references.fetch_add(made, Ordering::Relaxed);
+        return Subtree::Whole(tree);
+    }
+    let Some(split) = next_split(&cell, depth, settings) else {
+        let references: Vec<u32> = cell.items.iter().map(|item| item.id).collect();
+        let made = references.len() as u64;
+        settings.references.fetch_add(made, Ordering::Relaxed);
+        let nodes = vec![Node::leaf(0, references.len())];
+        return Subtree::Whole(KdTree { nodes, references });
+    };
+    let [below, above] = cell.divide(&split, settings);
+    let children = rayon::join(
+        || build_subtree(below, depth + 1, settings),
+        || build_subtree(above, depth + 1, settings),
+    );
+    Subtree::Inner(split.axis, split.position, Box::new(children))
+}
+
+fn next_split(cell: &Cell, depth: u32, settings: &Settings) -> Option<Split> {
+    let given_up = settings.references.load(Ordering::Relaxed) > MAX_REFERENCES;
+    if depth >= settings.max_depth || given_up {
+        return None;
+    }
+    cell.best_split(settings)
+}
+
+/// Builds on one thread into `tree`; the root of the subtree gets the place `slot`.
+fn append(cell: Cell, depth: u32, slot: usize, settings: &Settings, tree: &mut KdTree) {
+    let Some(split) = next_split(&cell, depth, settings) else {
+        tree.nodes[slot] = Node::leaf(tree.references.len(), cell.items.len());
+        tree.references
+            .extend(cell.items.iter().map(|item| item.id));
+        return;
+    };
+    let children = tree.nodes.len();
+    tree.nodes.extend([Node::EMPTY; 2]);
+    tree.nodes[slot] = Node::inner(split.axis, split.position, children);
+    let [below, above] = cell.divide(&split, settings);
+    append(below, depth + 1, children, settings, tree);
+    append(above, depth + 1, children + 1, settings, tree);
+}
+
+fn lay_out(subtree: Subtree) -> KdTree {
+    let mut tree = KdTree {
+        nodes: vec![Node::EMPTY],
+        references: Vec::new(),
+    };
+    place(subtree, 0, &mut tree);
+    tree
+}
+
+/// Appends a subtree to the final arrays and frees it; its root gets the place `slot`.
+fn place(subtree: Subtree, slot: usize, tree: &mut KdTree) {
+    match subtree {
+        Subtree::Whole(part) => {
+            // The root moves elsewhere, so that all others are one place nearer.
+            let node_offset = tree.nodes.len() - 1;
+            let moved = |node: &Node| node.moved_by(node_offset, tree.references.len());
+            let root = moved(&part.nodes[0]);
+            let others: Vec<Node> = part.nodes[1..].iter().map(moved).collect();
+            tree.nodes[slot] = root;
+            tree.nodes.extend(others);
+            tree.references.extend(part.references);
+        }
+        Subtree::Inner(axis, position, children) => {
+            let first = tree.nodes.len();
+            tree.nodes.extend([Node::EMPTY; 2]);
+            tree.nodes[slot] = Node::inner(axis, position, first);
+            place(children.0, first, tree);
+            place(children.1, first + 1, tree);
+        }
+    }
+}

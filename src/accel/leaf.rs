@@ -1,0 +1,163 @@
+//! Leaves: runs of triangles, as copies of their records in leaf order (one run of memory a leaf) or
+//! as indices into the canonical buffer (less memory). Twin of `kernels/accel/leaf.wesl`.
+
+use super::bounds::Bounds;
+use super::ray::{Hit, Ray};
+use super::tree::Coverage;
+use super::triangle::{TriangleRecord, intersect_triangle};
+use super::{AccelError, Counters, NamedWords, TriangleSoup};
+
+/// Marks a reference to a leaf; bits 26–30 hold its count, bits 0–25 its first place.
+pub const LEAF: u32 = 0x8000_0000;
+/// Where the count of a leaf stands in its reference.
+pub const COUNT_SHIFT: u32 = 26;
+/// Most triangles in a leaf.
+pub const COUNT_MASK: u32 = 31;
+/// Greatest first place.
+pub const FIRST_MASK: u32 = 0x03ff_ffff;
+
+/// The reference to a leaf.
+pub fn leaf_reference(first: u32, count: u32) -> u32 {
+    LEAF | count << COUNT_SHIFT | first
+}
+
+/// First place and number of triangles of a leaf.
+pub fn leaf_range(reference: u32) -> (usize, usize) {
+    (
+        (reference & FIRST_MASK) as usize,
+        (reference >> COUNT_SHIFT & COUNT_MASK) as usize,
+    )
+}
+
+/// The triangles of all leaves, leaf by leaf.
+#[derive(Debug, Clone)]
+pub enum Leaves {
+    /// Copies of the records.
+    Gathered(Vec<TriangleRecord>),
+    /// Indices of the scene's triangles.
+    Indexed(Vec<u32>),
+}
+
+impl Leaves {
+    /// Lays out the triangles that `order` lists.
+    ///
+    /// # Errors
+    /// More entries than a reference can address, with both numbers.
+    pub fn new(soup: &TriangleSoup, order: &[u32], indexed: bool) -> Result<Self, AccelError> {
+        if order.len() as u64 > u64::from(FIRST_MASK) {
+            return Err(AccelError::Limit {
+                what: "triangles in the leaves".into(),
+                needed: order.len() as u64,
+                limit: FIRST_MASK.into(),
+            });
+        }
+        let record = |&id: &u32| soup.records[id as usize];
+        Ok(if indexed {
+            Self::Indexed(order.to_vec())
+        } else {
+            Self::Gathered(order.iter().map(record).collect())
+        })
+    }
+
+    /// Features of kernels that read these leaves.
+    pub fn features(&self) -> &'static [&'static str] {
+        match self {
+            Self::Gathered(_) => &[],
+            Self::Indexed(_) => &["indexed_triangles"],
+        }
+    }
+
+    /// The array for the GPU.
+    pub fn words(&self) -> NamedWords<'_> {
+        match self {
+            Self::Gathered(records) => NamedWords {
+                name: "leaf_triangles",
+                words: bytemuck::cast_slice(records).into(),
+                element_bytes: 48,
+            },
+            Self::Indexed(indices) => NamedWords {
+                name: "leaf_indices",
+                words: indices.as_slice().into(),
+                element_bytes: 4,
+            },
+        }
+    }
+
+    /// Bytes of the array.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Gathered(records) => size_of_val(&records[..]),
+            Self::Indexed(indices) => size_of_val(&indices[..]),
+        }
+    }
+
+    /// Notes the triangles of the leaf that `reference` names, which must lie in `bounds`.
+    ///
+    /// # Errors
+    /// The leaf lies outside the array, or what [`Coverage::leaf`] finds.
+    pub fn cover(
+        &self,
+        coverage: &mut Coverage,
+        soup: &TriangleSoup,
+        reference: u32,
+        bounds: &Bounds,
+    ) -> Result<(), AccelError> {
+        let (first, count) = leaf_range(reference);
+        match self {
+            Self::Gathered(records) => coverage.leaf(records.get(first..first + count), bounds),
+            Self::Indexed(indices) => {
+                let record = |&id: &u32| soup.records.get(id as usize).copied();
+                let records: Option<Vec<TriangleRecord>> = indices
+                    .get(first..first + count)
+                    .and_then(|ids| ids.iter().map(record).collect());
+                coverage.leaf(records.as_deref(), bounds)
+            }
+        }
+    }
+}
+
+/// The leaves of a structure with the triangles they were built over, as twins read them.
+#[derive(Clone, Copy)]
+pub struct LeafReader<'a> {
+    /// The leaves.
+    pub leaves: &'a Leaves,
+    /// The scene's triangles.
+    pub soup: &'a TriangleSoup,
+}
+
+impl LeafReader<'_> {
+    /// The triangle at a place.
+    pub fn load_leaf_triangle(&self, place: usize) -> &TriangleRecord {
+        match self.leaves {
+            Leaves::Gathered(records) => &records[place],
+            Leaves::Indexed(indices) => &self.soup.records[indices[place] as usize],
+        }
+    }
+
+    /// Tests `count` triangles from place `first` on.
+    pub fn test_triangles(
+        &self,
+        (first, count): (usize, usize),
+        ray: &Ray,
+        inverse: [f32; 3],
+        hit: &mut Hit,
+        counters: &mut Counters,
+    ) {
+        for place in first..first + count {
+            counters.triangle_tests += 1;
+            intersect_triangle(self.load_leaf_triangle(place), ray, inverse, hit);
+        }
+    }
+
+    /// Tests the triangles of the leaf that `reference` names.
+    pub fn test_leaf(
+        &self,
+        reference: u32,
+        ray: &Ray,
+        inverse: [f32; 3],
+        hit: &mut Hit,
+        counters: &mut Counters,
+    ) {
+        self.test_triangles(leaf_range(reference), ray, inverse, hit, counters);
+    }
+}

@@ -1,0 +1,522 @@
+//! `octree`: cells halved along all axes at once, leaves with references, descended by the distances of
+//! their middle planes. Twin of `kernels/accel/octree.wesl`.
+//!
+//! Sources: J. Revelles, C. Ureña, M. Lastra, "An efficient parametric algorithm for octree
+//! traversal", 2000 (middle planes, octants mirrored by the direction); S. Laine, T. Karras, "Efficient
+//! sparse voxel octrees", 2010 (cells by integer position, masks of children); T. Akenine-Möller, "Fast
+//! 3D triangle–box overlap testing", 2001. Why hits are equal to brute force to the bit:
+//! [`super::spatial`]; a level is three splits, one along each axis.
+
+mod build;
+
+use super::bounds::{BOX_PAD, Bounds};
+use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::spatial::{corners, touches};
+use super::tree::Coverage;
+use super::triangle::intersect_triangle;
+use super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
+    TriangleSoup,
+};
+use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::gpu::UniformValues;
+use crate::measure::record::StructureStats;
+
+/// Marks the word of a leaf; the other bits are its first place in the references.
+const LEAF: u32 = 0x8000_0000;
+/// Other words: the block of the children, and below this bit which of them hold anything.
+const INNER_SHIFT: u32 = 8;
+const FILLED_MASK: u32 = 255;
+/// Marks the last reference of a leaf.
+const LAST: u32 = 0x8000_0000;
+/// A cell that begins behind the hit by this factor ends the walk: all that were not yet visited begin
+/// no more than [`BOX_PAD`] before it. More than its square.
+const END_PAD: f32 = 1.000_004;
+/// Cells have integer positions that a float holds exactly.
+const DEEPEST: i64 = 20;
+
+/// The registry entry.
+pub struct Octree;
+
+impl AccelKind for Octree {
+    fn name(&self) -> &'static str {
+        "octree"
+    }
+
+    fn description(&self) -> &'static str {
+        "octree by exact triangle–box overlap, parametric descent (Revelles, Ureña & Lastra 2000)"
+    }
+
+    fn parameters(&self) -> ParameterSchema {
+        let integer = |name, description, default, min, max| Parameter {
+            name,
+            description,
+            default: ParamValue::Integer(default),
+            range: ParamRange::Integer { min, max },
+        };
+        vec![
+            integer(
+                "max_depth",
+                "deepest leaf; 0 stands for 2 + log4 of the number of triangles",
+                0,
+                0,
+                DEEPEST,
+            ),
+            integer(
+                "leaf_size",
+                "cells of no more triangles are not divided",
+                8,
+                1,
+                1024,
+            ),
+            Parameter {
+                name: "traversal_cost",
+                description: "SAH cost of visiting a cell in triangle tests; cells that would not gain are not divided",
+                default: ParamValue::Number(1.0),
+                range: ParamRange::Number {
+                    min: 0.01,
+                    max: 100.0,
+                },
+            },
+            Parameter {
+                name: "clip",
+                description: "list a triangle by itself, not by its box",
+                default: ParamValue::Flag(true),
+                range: ParamRange::Flag,
+            },
+        ]
+    }
+
+    fn build(
+        &self,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        let space = Space::around(soup);
+        let tree = log.phase("levels", || build::build(soup, &space, params))?;
+        Ok(Box::new(Built {
+            space,
+            clipped: params.flag("clip"),
+            nodes: tree.nodes,
+            references: tree.references,
+            depth: tree.depth,
+        }))
+    }
+}
+
+/// Where cells lie: at depth `d` the planes of an axis are `low + k · extent · 2⁻ᵈ`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Space {
+    low: [f32; 3],
+    extent: [f32; 3],
+}
+
+impl Space {
+    fn around(soup: &TriangleSoup) -> Self {
+        if soup.records.is_empty() {
+            return Self {
+                low: [0.0; 3],
+                extent: [1.0; 3],
+            };
+        }
+        let bounds = soup.bounds();
+        let mut extent = bounds.extent();
+        for axis in 0..3 {
+            // The difference is rounded.
+            while bounds.min[axis] + extent[axis] < bounds.max[axis] {
+                extent[axis] = extent[axis].next_up();
+            }
+        }
+        Self {
+            low: bounds.min,
+            extent,
+        }
+    }
+
+    /// Edges of the cells at this depth.
+    fn size(&self, depth: u32) -> [f32; 3] {
+        self.extent.map(|e| e * 0.5_f32.powi(depth as i32))
+    }
+
+    fn plane(&self, axis: usize, k: u32, size: f32) -> f32 {
+        self.low[axis] + k as f32 * size
+    }
+
+    /// Where the three middle planes of a cell meet.
+    fn middle(&self, position: [u32; 3], depth: u32) -> [f32; 3] {
+        let size = self.size(depth + 1);
+        std::array::from_fn(|a| self.plane(a, 2 * position[a] + 1, size[a]))
+    }
+
+    fn cell(&self, position: [u32; 3], depth: u32) -> Bounds {
+        let size = self.size(depth);
+        Bounds {
+            min: std::array::from_fn(|a| self.plane(a, position[a], size[a])),
+            max: std::array::from_fn(|a| self.plane(a, position[a] + 1, size[a])),
+        }
+    }
+
+    fn half(&self, depth: u32) -> [f64; 3] {
+        self.size(depth).map(|s| 0.5 * f64::from(s))
+    }
+
+    fn centre(&self, position: [u32; 3], depth: u32) -> [f64; 3] {
+        let half = self.half(depth);
+        std::array::from_fn(|a| {
+            f64::from(self.low[a]) + (2.0 * f64::from(position[a]) + 1.0) * half[a]
+        })
+    }
+
+    /// Position of a child; bit `a` of `octant` is its half along axis `a`.
+    fn child(position: [u32; 3], octant: u32) -> [u32; 3] {
+        std::array::from_fn(|a| 2 * position[a] + (octant >> a & 1))
+    }
+}
+
+struct Built {
+    space: Space,
+    clipped: bool,
+    /// Block 0 holds the root in its first place, each other block the children of a cell.
+    nodes: Vec<u32>,
+    /// Triangle indices, leaf by leaf, ascending in each, the last marked.
+    references: Vec<u32>,
+    depth: u32,
+}
+
+impl Built {
+    /// The references of a leaf that begins at `first`; `None` if no end is marked.
+    fn list(&self, first: u32) -> Option<&[u32]> {
+        let from = self.references.get(first as usize..)?;
+        let last = from.iter().position(|r| r & LAST != 0)?;
+        Some(&from[..=last])
+    }
+
+    /// Word, position and depth of every cell that holds anything, from the root.
+    fn walk(&self, mut visit: impl FnMut(u32, [u32; 3], u32)) {
+        let mut stack = vec![(self.nodes[0], [0; 3], 0)];
+        while let Some((word, position, depth)) = stack.pop() {
+            visit(word, position, depth);
+            if word & LEAF == 0 {
+                let block = (word >> INNER_SHIFT) as usize;
+                let filled = (0..8).filter(|octant| word >> octant & 1 == 1);
+                stack.extend(filled.map(|octant| {
+                    let child = self.nodes[8 * block + octant as usize];
+                    (child, Space::child(position, octant), depth + 1)
+                }));
+            }
+        }
+    }
+}
+
+/// `validate()` on its way down: cells, and which triangles they must list.
+struct Validation<'a> {
+    built: &'a Built,
+    soup: &'a TriangleSoup,
+    blocks: Coverage<'a>,
+    listed: usize,
+}
+
+impl Validation<'_> {
+    fn cell(
+        &mut self,
+        word: u32,
+        position: [u32; 3],
+        depth: u32,
+        triangles: &[u32],
+    ) -> Result<(), AccelError> {
+        let wrong = |text: String| {
+            Err(AccelError::Invalid(format!(
+                "cell {position:?} at depth {depth}: {text}"
+            )))
+        };
+        if word & LEAF != 0 {
+            let Some(list) = self.built.list(word & !LEAF) else {
+                return wrong("its references lie outside the array".to_owned());
+            };
+            self.listed += list.len();
+            let ids: Vec<u32> = list.iter().map(|r| r & !LAST).collect();
+            if let Some(id) = ids
+                .iter()
+                .find(|id| **id as usize >= self.soup.records.len())
+            {
+                return wrong(format!("triangle {id} does not exist"));
+            }
+            if !ids.is_sorted_by(|a, b| a < b) {
+                return wrong("its references do not ascend".to_owned());
+            }
+            let lost = triangles.iter().find(|id| ids.binary_search(id).is_err());
+            return match lost {
+                Some(id) => wrong(format!("triangle {id} touches it and is not listed")),
+                None => Ok(()),
+            };
+        }
+        if depth > self.built.depth {
+            return wrong("deeper than the tree".to_owned());
+        }
+        let block = (word >> INNER_SHIFT) as usize;
+        self.blocks.node(block)?;
+        let middle = self.built.space.middle(position, depth);
+        for octant in 0..8 {
+            let child = Space::child(position, octant);
+            let inside: Vec<u32> = triangles
+                .iter()
+                .copied()
+                .filter(|&id| self.needs(id, middle, octant, child, depth + 1))
+                .collect();
+            if word >> octant & 1 == 1 {
+                self.cell(
+                    self.built.nodes[8 * block + octant as usize],
+                    child,
+                    depth + 1,
+                    &inside,
+                )?;
+            } else if let Some(id) = inside.first() {
+                return wrong(format!(
+                    "triangle {id} touches octant {octant}, which is empty"
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a child of a cell that must list a triangle must list it, too.
+    fn needs(&self, id: u32, middle: [f32; 3], octant: u32, child: [u32; 3], depth: u32) -> bool {
+        let record = &self.soup.records[id as usize];
+        build::by_box(&record.bounds(), middle) >> octant & 1 == 1
+            && (!self.built.clipped
+                || touches(&corners(record), &self.built.space.cell(child, depth)))
+    }
+}
+
+impl BuiltAccel for Built {
+    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
+        let wrong = |text: String| Err(AccelError::Invalid(text));
+        let root = self.space.cell([0; 3], 0);
+        for record in &soup.records {
+            if !root.contains(&record.bounds()) {
+                return wrong(format!("triangle {} lies outside the tree", record.id));
+            }
+        }
+        if soup.records.is_empty() && self.nodes[0] == 0 && self.references.is_empty() {
+            return Ok(());
+        }
+        let no_triangles = TriangleSoup::default();
+        let mut validation = Validation {
+            built: self,
+            soup,
+            blocks: Coverage::new(&no_triangles, self.nodes.len() / 8),
+            listed: 0,
+        };
+        validation.blocks.node(0)?;
+        let all: Vec<u32> = (0..soup.records.len() as u32).collect();
+        validation.cell(self.nodes[0], [0; 3], 0, &all)?;
+        if validation.listed != self.references.len() {
+            return wrong(format!(
+                "leaves list {} of {} references",
+                validation.listed,
+                self.references.len()
+            ));
+        }
+        validation.blocks.is_complete()
+    }
+
+    fn buffers(&self) -> GpuBuffers<'_> {
+        let space = UniformValues::new()
+            .vec("low", &self.space.low)
+            .vec("extent", &self.space.extent);
+        GpuBuffers {
+            kernel: "accel/octree",
+            features: Vec::new(),
+            arrays: vec![
+                NamedWords {
+                    name: "nodes",
+                    words: self.nodes.as_slice().into(),
+                    element_bytes: 4,
+                },
+                NamedWords {
+                    name: "references",
+                    words: self.references.as_slice().into(),
+                    element_bytes: 4,
+                },
+            ],
+            uniforms: vec![
+                ("space", space),
+                super::limits(self.nodes.len() + 1, self.references.len()),
+            ],
+            // One entry for each level and one for the root; a multiple of 8, so that scenes of like
+            // depth share a kernel.
+            constants: vec![("STACK_ENTRIES", (self.depth + 1).next_multiple_of(8))],
+        }
+    }
+
+    fn stats(&self) -> StructureStats {
+        let mut counts = Vec::new();
+        let (mut cost, mut cells, mut filled) = (0.0, 0, 0);
+        self.walk(|word, _, depth| {
+            let weight = if word & LEAF != 0 {
+                let count = self.list(word & !LEAF).map_or(0, <[u32]>::len);
+                counts.push(count);
+                count as f64
+            } else {
+                cells += 8;
+                1.0
+            };
+            filled += 1;
+            cost += weight * 0.25_f64.powi(depth as i32);
+        });
+        let leaves = counts.len() as u64;
+        let empty = cells + 1 - filled;
+        let counts = counts.into_iter().chain((0..empty).map(|_| 0));
+        StructureStats {
+            nodes: cells as u64 + 1,
+            leaves,
+            references: self.references.len() as u64,
+            leaf_histogram: super::leaf_histogram(counts),
+            depth: Some(self.depth),
+            epo: None,
+            sah_cost: (!self.references.is_empty()).then_some(cost),
+            bytes: self.buffers().bytes(),
+        }
+    }
+
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(Twin { built: self, soup }))
+    }
+}
+
+struct Twin<'a> {
+    built: &'a Built,
+    soup: &'a TriangleSoup,
+}
+
+/// A bit for each child; bit `i` stands for octant `i ^ flip`, so that lower bits come first along
+/// the ray.
+fn mirrored(mask: u32, flip: u32) -> u32 {
+    let mut out = mask;
+    if flip & 1 != 0 {
+        out = (out & 0x55) << 1 | out >> 1 & 0x55;
+    }
+    if flip & 2 != 0 {
+        out = (out & 0x33) << 2 | out >> 2 & 0x33;
+    }
+    if flip & 4 != 0 {
+        out = (out & 0x0f) << 4 | out >> 4;
+    }
+    out
+}
+
+/// Which children, mirrored, the segment from `enter` to `exit` visits: those whose interval is not
+/// empty by more than the pad, given the distances of the middle planes.
+fn visited(enter: f32, exit: f32, middle: [f32; 3]) -> u32 {
+    let [x, y, z] = middle;
+    let [px, py, pz] = middle.map(|m| m * BOX_PAD);
+    let end = exit * BOX_PAD;
+    let without = |mask: u32, condition: bool| if condition { 0 } else { mask };
+    let mut out = 0xff;
+    out &= !without(0xff, enter <= end);
+    // Before a plane that lies before the segment, behind one that lies behind it.
+    out &= !without(0x55, enter <= px) & !without(0xaa, x <= end);
+    out &= !without(0x33, enter <= py) & !without(0xcc, y <= end);
+    out &= !without(0x0f, enter <= pz) & !without(0xf0, z <= end);
+    // Behind the later of two planes and before the earlier.
+    out &= !without(0x22, x <= py) & !without(0x44, y <= px);
+    out &= !without(0x0a, x <= pz) & !without(0x50, z <= px);
+    out &= !without(0x0c, y <= pz) & !without(0x30, z <= py);
+    out & 0xff
+}
+
+impl Twin<'_> {
+    fn leaf(
+        &self,
+        first: u32,
+        ray: &Ray,
+        inverse: [f32; 3],
+        hit: &mut Hit,
+        counters: &mut Counters,
+    ) {
+        for reference in &self.built.references[first as usize..] {
+            counters.triangle_tests += 1;
+            let id = (reference & !LAST) as usize;
+            intersect_triangle(&self.soup.records[id], ray, inverse, hit);
+            if reference & LAST != 0 {
+                return;
+            }
+        }
+    }
+
+    /// Distances of the three planes `k` of cells of this size.
+    fn distances(&self, k: [u32; 3], size: [f32; 3], ray: &Ray, inverse: [f32; 3]) -> [f32; 3] {
+        let plane = |a| self.built.space.plane(a, k[a], size[a]);
+        std::array::from_fn(|a| (plane(a) - ray.origin[a]) * inverse[a])
+    }
+
+    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
+        let inverse = safe_inverse(ray.direction);
+        let mirror = inverse.map(|i| u32::from(i < 0.0));
+        let flip = mirror[0] | mirror[1] << 1 | mirror[2] << 2;
+        let mut hit = Hit::miss(ray);
+        // The cell whose children are being visited: its block and the children to come. At first one
+        // of twice the size, of which the root is the only child.
+        let mut open = 1 << flip;
+        let mut position = [0; 3];
+        let mut size = self.built.space.extent.map(|e| 2.0 * e);
+        let mut stack = Vec::new();
+        loop {
+            while open & FILLED_MASK == 0 {
+                let Some(parent) = stack.pop() else {
+                    return hit;
+                };
+                open = parent;
+                position = position.map(|p| p >> 1);
+                size = size.map(|s| 2.0 * s);
+            }
+            let octant = open.trailing_zeros() ^ flip;
+            open &= open - 1;
+            let child = Space::child(position, octant);
+            let half = size.map(|s| 0.5 * s);
+            let first: [u32; 3] = std::array::from_fn(|a| child[a] + mirror[a]);
+            let near = self.distances(first, half, ray, inverse);
+            let enter = near[0].max(near[1]).max(near[2]).max(ray.t_min);
+            if enter > hit.t * END_PAD {
+                return hit;
+            }
+            counters.nodes += 1;
+            let word = self.built.nodes[((open >> INNER_SHIFT) * 8 + octant) as usize];
+            if word & LEAF != 0 {
+                self.leaf(word & !LEAF, ray, inverse, &mut hit, counters);
+                if any && hit.triangle != NO_HIT {
+                    return hit;
+                }
+                continue;
+            }
+            let last = std::array::from_fn(|a| child[a] + 1 - mirror[a]);
+            let far = self.distances(last, half, ray, inverse);
+            let exit = far[0].min(far[1]).min(far[2]).min(hit.t);
+            let middle = self.distances(
+                child.map(|c| 2 * c + 1),
+                half.map(|h| 0.5 * h),
+                ray,
+                inverse,
+            );
+            stack.push(open);
+            counters.stack_high_water = counters.stack_high_water.max(stack.len() as u32);
+            let filled = mirrored(word & FILLED_MASK, flip);
+            open = word & !FILLED_MASK | visited(enter, exit, middle) & filled;
+            (position, size) = (child, half);
+        }
+    }
+}
+
+impl CpuTwin for Twin<'_> {
+    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
+        self.trace(ray, false, counters)
+    }
+
+    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        self.trace(ray, true, counters).triangle != NO_HIT
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,238 @@
+//! The builder of `octree`: level by level, the cells of a level on all cores.
+
+use super::{INNER_SHIFT, LAST, LEAF, Space};
+use crate::accel::bounds::Bounds;
+use crate::accel::spatial::{Margin, Overlap, corners};
+use crate::accel::{AccelError, TriangleSoup};
+use crate::config::Params;
+use rayon::prelude::*;
+
+/// Blocks of children are numbered with 23 bits.
+const MAX_BLOCKS: u64 = 1 << (31 - INNER_SHIFT);
+/// References are numbered with 31 bits, triangles as well.
+const MAX_REFERENCES: u64 = 1 << 31;
+/// A level is not begun that would bring more than this many references for each triangle: where
+/// many large triangles coincide, cells along their edges would never run out.
+const MOST_REFERENCES_PER_TRIANGLE: usize = 16;
+
+/// Cells and references in their final places.
+pub(super) struct Octree {
+    /// Block 0 holds the root in its first place, each other block the children of a cell.
+    pub nodes: Vec<u32>,
+    pub references: Vec<u32>,
+    pub depth: u32,
+}
+
+/// A cell whose word is not yet written.
+#[derive(Clone)]
+struct Open {
+    slot: usize,
+    position: [u32; 3],
+    /// Its triangles: from here to where those of the next begin.
+    first: usize,
+}
+
+/// Triangles of the eight children of a cell, one after the other.
+struct Children {
+    ends: [usize; 8],
+    triangles: Vec<u32>,
+}
+
+/// Builds the tree.
+///
+/// # Errors
+/// More blocks or references than a word can address.
+pub(super) fn build(
+    soup: &TriangleSoup,
+    space: &Space,
+    params: &Params,
+) -> Result<Octree, AccelError> {
+    let settings = Settings::new(soup, space, params);
+    let mut tree = Octree {
+        nodes: vec![0; 8],
+        references: Vec::new(),
+        depth: 0,
+    };
+    let mut triangles: Vec<u32> = (0..soup.records.len() as u32).collect();
+    let mut cells = vec![Open {
+        slot: 0,
+        position: [0; 3],
+        first: 0,
+    }];
+    cells.retain(|_| !triangles.is_empty());
+    while !cells.is_empty() {
+        let divided = settings.divide_all(&cells, &triangles, tree.depth);
+        (cells, triangles) = assemble(&cells, &triangles, divided, &mut tree)?;
+        tree.depth += u32::from(!cells.is_empty());
+    }
+    Ok(tree)
+}
+
+/// Deepest level by default: that where the cells along a surface are as many as the triangles, and
+/// two more.
+pub(super) fn default_depth(triangles: usize) -> u32 {
+    ((triangles.max(1) as f64).log2() / 2.0).ceil() as u32 + 2
+}
+
+struct Settings<'a> {
+    soup: &'a TriangleSoup,
+    space: &'a Space,
+    max_depth: u32,
+    leaf_size: usize,
+    traversal_cost: f64,
+    /// Set if triangles are clipped.
+    margin: Option<Margin>,
+    boxes: Vec<Bounds>,
+}
+
+impl<'a> Settings<'a> {
+    fn new(soup: &'a TriangleSoup, space: &'a Space, params: &Params) -> Self {
+        Self {
+            soup,
+            space,
+            max_depth: match params.integer("max_depth") {
+                0 => default_depth(soup.records.len()),
+                depth => depth as u32,
+            },
+            leaf_size: params.integer("leaf_size") as usize,
+            traversal_cost: params.number("traversal_cost"),
+            margin: params.flag("clip").then(|| Margin::new(&soup.bounds())),
+            boxes: soup.records.par_iter().map(|r| r.bounds()).collect(),
+        }
+    }
+
+    /// Children of every cell of a level that gets any.
+    fn divide_all(&self, cells: &[Open], triangles: &[u32], depth: u32) -> Vec<Option<Children>> {
+        if depth >= self.max_depth {
+            return cells.iter().map(|_| None).collect();
+        }
+        let list = |i: usize| {
+            let end = cells.get(i + 1).map_or(triangles.len(), |next| next.first);
+            &triangles[cells[i].first..end]
+        };
+        let divided: Vec<Option<Children>> = (0..cells.len())
+            .into_par_iter()
+            .map(|i| self.divide(cells[i].position, list(i), depth))
+            .collect();
+        let made: usize = divided.iter().flatten().map(|c| c.triangles.len()).sum();
+        if made > MOST_REFERENCES_PER_TRIANGLE * self.soup.records.len() {
+            return cells.iter().map(|_| None).collect();
+        }
+        divided
+    }
+
+    /// The children of a cell; `None` if it is to be a leaf.
+    fn divide(&self, position: [u32; 3], triangles: &[u32], depth: u32) -> Option<Children> {
+        if triangles.len() <= self.leaf_size {
+            return None;
+        }
+        let octants: Vec<u8> = triangles
+            .iter()
+            .map(|&id| self.octants(id, position, depth))
+            .collect();
+        let listed: u32 = octants.iter().map(|mask| mask.count_ones()).sum();
+        // Every child has a quarter of the area of its parent.
+        let cost = self.traversal_cost + 0.25 * f64::from(listed);
+        if cost >= triangles.len() as f64 {
+            return None;
+        }
+        let mut children = Children {
+            ends: [0; 8],
+            triangles: Vec::with_capacity(listed as usize),
+        };
+        for octant in 0..8 {
+            let inside = triangles.iter().zip(&octants);
+            let inside = inside.filter(|(_, mask)| *mask >> octant & 1 == 1);
+            children.triangles.extend(inside.map(|(id, _)| id));
+            children.ends[octant] = children.triangles.len();
+        }
+        Some(children)
+    }
+
+    /// Which children of the cell at `position` list a triangle, a bit each.
+    fn octants(&self, id: u32, position: [u32; 3], depth: u32) -> u8 {
+        let middle = self.space.middle(position, depth);
+        let mut mask = by_box(&self.boxes[id as usize], middle);
+        let Some(margin) = self.margin.as_ref().filter(|_| !mask.is_power_of_two()) else {
+            return mask;
+        };
+        let record = &self.soup.records[id as usize];
+        let margin = margin.of(record);
+        let half = self.space.half(depth + 1).map(|h| h + margin);
+        let overlap = Overlap::new(&corners(record), half);
+        for octant in 0..8_u32 {
+            let child = Space::child(position, octant);
+            if mask >> octant & 1 == 1 && !overlap.touches(self.space.centre(child, depth + 1)) {
+                mask &= !(1 << octant);
+            }
+        }
+        mask
+    }
+}
+
+/// The octants around `middle` that a box reaches; what ends in a plane is below it only.
+pub(super) fn by_box(bounds: &Bounds, middle: [f32; 3]) -> u8 {
+    const ABOVE: [u8; 3] = [0b1010_1010, 0b1100_1100, 0b1111_0000];
+    let mut mask = 0xff;
+    for axis in 0..3 {
+        if bounds.max[axis] <= middle[axis] {
+            mask &= !ABOVE[axis];
+        } else if bounds.min[axis] >= middle[axis] {
+            mask &= ABOVE[axis];
+        }
+    }
+    mask
+}
+
+/// Writes the words of a level and lists the cells of the next with their triangles.
+fn assemble(
+    cells: &[Open],
+    triangles: &[u32],
+    divided: Vec<Option<Children>>,
+    tree: &mut Octree,
+) -> Result<(Vec<Open>, Vec<u32>), AccelError> {
+    let (mut next_cells, mut next_triangles) = (Vec::new(), Vec::new());
+    for (i, (cell, children)) in cells.iter().zip(divided).enumerate() {
+        let Some(children) = children else {
+            let end = cells.get(i + 1).map_or(triangles.len(), |next| next.first);
+            tree.nodes[cell.slot] = LEAF | tree.references.len() as u32;
+            tree.references.extend(&triangles[cell.first..end]);
+            if let Some(last) = tree.references.last_mut() {
+                *last |= LAST;
+            }
+            continue;
+        };
+        let block = tree.nodes.len() / 8;
+        let mut filled = 0;
+        for octant in 0..8 {
+            let start = if octant == 0 {
+                0
+            } else {
+                children.ends[octant - 1]
+            };
+            if start < children.ends[octant] {
+                filled |= 1 << octant;
+                next_cells.push(Open {
+                    slot: 8 * block + octant,
+                    position: Space::child(cell.position, octant as u32),
+                    first: next_triangles.len() + start,
+                });
+            }
+        }
+        next_triangles.extend(children.triangles);
+        tree.nodes.extend([0; 8]);
+        tree.nodes[cell.slot] = (block as u32) << INNER_SHIFT | filled;
+    }
+    let (blocks, references) = (tree.nodes.len() as u64 / 8, tree.references.len() as u64);
+    let checked = |what: &str, needed, limit| {
+        let what = what.to_owned();
+        (needed <= limit).then_some(()).ok_or(AccelError::Limit {
+            what,
+            needed,
+            limit,
+        })
+    };
+    checked("cells of an octree that have children", blocks, MAX_BLOCKS)?;
+    checked("references of an octree", references, MAX_REFERENCES)?;
+    Ok((next_cells, next_triangles))
+}

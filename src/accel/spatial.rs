@@ -1,0 +1,248 @@
+//! What structures that divide space (`octree`, `kd-tree`) share: which cells list a triangle.
+//!
+//! A triangle may be listed *by its box* or *clipped*. By its box: a plane sends it to every side that
+//! its box reaches, to one side only if the box ends in the plane. Then the theorem of
+//! [`super::triangle`] holds for cells as it does for boxes of a BVH. Proof: `N` and `F` are the
+//! computed slab distances of the triangle's box, `t` its clamped hit, `s` the computed distance of a
+//! split plane. Going down from the root, if the box lies on one side, follow it: `s ≥ F` on the near
+//! side and `s ≤ N` on the far one, because computed distances are monotone in the plane. If it is
+//! listed on both, follow the near side if `t ≤ s`, else the far one. So the interval `[n, f]` of every
+//! cell on the way satisfies `n ≤ max(N, t)` and `f ≥ min(F, t)`, which is all that the four
+//! inequalities of that proof use: each cell passes `max(n, t_min) ≤ min(f, t_best) · BOX_PAD`, and the
+//! leaf at the end lists the triangle. ∎
+//!
+//! Clipped: a cell that the triangle itself misses by more than its [`Margin`] does not list it,
+//! although its box may reach in. That makes shorter lists, but assumes that the computed hit lies
+//! within the margin of the triangle. It does unless the ray grazes the plane of the triangle at less
+//! than [`LEAST_COSINE`]; and then only a hit, or an end of the ray, between the computed distance and
+//! the exact one can make a difference.
+
+use super::bounds::Bounds;
+use super::triangle::{DISTANCE_PAD, TriangleRecord};
+
+/// Cosine between ray and normal down to which margins cover the error of a hit, 2⁻⁵.
+const LEAST_COSINE: f64 = 0.03125;
+
+/// By how much cells are grown before a clipped triangle counts as missing them.
+///
+/// The distance of a hit errs by less than [`DISTANCE_PAD`] times the terms that it is made of, over
+/// the determinant (see [`super::triangle`]). With edges `e1` and `e2`, normal `n`, `m` the sum of the
+/// magnitudes of both products in each component of `n`, and a ray no longer than the scene, that is
+/// `2 · DISTANCE_PAD · diagonal · |m| / (|n| · cosine)`, a point along the ray.
+pub(super) struct Margin {
+    /// The margin of a triangle whose |m| and |n| are equal, scene units.
+    least: f64,
+}
+
+impl Margin {
+    /// Margins in a scene with this box.
+    pub fn new(bounds: &Bounds) -> Self {
+        let extent = bounds.extent().map(f64::from);
+        let diagonal = extent.iter().map(|e| e * e).sum::<f64>().sqrt();
+        let far = (0..3)
+            .map(|a| bounds.min[a].abs().max(bounds.max[a].abs()))
+            .fold(0.0, f32::max);
+        let length = diagonal + f64::from(far) * LEAST_COSINE;
+        let least = 2.0 * f64::from(DISTANCE_PAD) * length / LEAST_COSINE;
+        Self {
+            least: least.max(1e-18),
+        }
+    }
+
+    /// The margin of one triangle, scene units; beyond everything if it has no area.
+    pub fn of(&self, record: &TriangleRecord) -> f64 {
+        let [e1, e2] = [record.e1, record.e2].map(|e| e.map(f64::from));
+        let (mut products, mut normal) = (0.0, 0.0);
+        for a in 0..3 {
+            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+            products += ((e1[b] * e2[c]).abs() + (e1[c] * e2[b]).abs()).powi(2);
+            normal += (e1[b] * e2[c] - e1[c] * e2[b]).powi(2);
+        }
+        // Finite, so that its product with a zero is no NaN.
+        let beyond = f64::from(f32::MAX);
+        if normal > 0.0 {
+            (self.least * (products / normal).sqrt()).min(beyond)
+        } else {
+            beyond
+        }
+    }
+}
+
+/// The corners of a triangle as kernels know them.
+pub(super) type Corners = [[f64; 3]; 3];
+
+/// Corners of `record`, rebuilt from its rounded edges.
+pub(super) fn corners(record: &TriangleRecord) -> Corners {
+    record
+        .triangle()
+        .vertices
+        .map(|v| v.to_array().map(f64::from))
+}
+
+/// Separating-axis test of one triangle against boxes of one size whose boxes meet that of the
+/// triangle (T. Akenine-Möller, "Fast 3D triangle–box overlap testing", 2001).
+pub(super) struct Overlap {
+    normal: [f64; 3],
+    /// Interval of the triangle on its normal, grown by the half extent of the boxes.
+    on_normal: [f64; 2],
+    /// The products of edge `i` with axis `a` at `3 i + a`: both components that are not 0, and the
+    /// grown interval on it.
+    products: [([f64; 2], [f64; 2]); 9],
+}
+
+impl Overlap {
+    /// For boxes with these half extents.
+    pub fn new(corners: &Corners, half: [f64; 3]) -> Self {
+        let edges: Corners = std::array::from_fn(|i| {
+            std::array::from_fn(|a| corners[(i + 1) % 3][a] - corners[i][a])
+        });
+        let normal = cross(edges[0], edges[1]);
+        let reach: f64 = (0..3).map(|a| half[a] * normal[a].abs()).sum();
+        let height = corners.map(|corner| dot(corner, normal));
+        let products = std::array::from_fn(|k| {
+            let (i, [b, c]) = (k / 3, others(k % 3));
+            let axis = [edges[i][c], -edges[i][b]];
+            // Both ends of the edge lie at the same place.
+            let on_axis = |corner: &[f64; 3]| axis[0] * corner[b] + axis[1] * corner[c];
+            let (p, q) = (on_axis(&corners[i]), on_axis(&corners[(i + 2) % 3]));
+            let reach = half[b] * axis[0].abs() + half[c] * axis[1].abs();
+            (axis, [p.min(q) - reach, p.max(q) + reach])
+        });
+        Self {
+            normal,
+            on_normal: [
+                height[0].min(height[1]).min(height[2]) - reach,
+                height[0].max(height[1]).max(height[2]) + reach,
+            ],
+            products,
+        }
+    }
+
+    /// Whether the triangle touches the box around `centre`.
+    pub fn touches(&self, centre: [f64; 3]) -> bool {
+        let within = |[low, high]: [f64; 2], x: f64| low <= x && x <= high;
+        within(self.on_normal, dot(centre, self.normal))
+            && self
+                .products
+                .iter()
+                .enumerate()
+                .all(|(k, (axis, interval))| {
+                    let [b, c] = others(k % 3);
+                    within(*interval, axis[0] * centre[b] + axis[1] * centre[c])
+                })
+    }
+}
+
+/// The axes that are not `axis`.
+fn others(axis: usize) -> [usize; 2] {
+    [(axis + 1) % 3, (axis + 2) % 3]
+}
+
+/// Whether the triangle touches the closed box.
+pub(super) fn touches(corners: &Corners, cell: &Bounds) -> bool {
+    let side = |a: usize| (f64::from(cell.min[a]), f64::from(cell.max[a]));
+    let meets = (0..3).all(|a| {
+        let (low, high) = side(a);
+        corners.iter().any(|c| c[a] <= high) && corners.iter().any(|c| c[a] >= low)
+    });
+    let half = std::array::from_fn(|a| 0.5 * (side(a).1 - side(a).0));
+    let centre = std::array::from_fn(|a| 0.5 * (side(a).1 + side(a).0));
+    meets && Overlap::new(corners, half).touches(centre)
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// Box of the part of a triangle within `cell` grown by `margin`, itself grown by `margin`; `None` if
+/// there is no such part (I. Sutherland, G. Hodgman, "Reentrant polygon clipping", 1974).
+pub(super) fn clip(corners: &Corners, cell: &Bounds, margin: f64) -> Option<Bounds> {
+    // Each of six planes adds one corner at most.
+    let mut polygon = [[0.0; 3]; 9];
+    polygon[..3].copy_from_slice(corners);
+    let mut count = 3;
+    for axis in 0..3 {
+        for (plane, sign) in [
+            (f64::from(cell.min[axis]) - margin, 1.0),
+            (f64::from(cell.max[axis]) + margin, -1.0),
+        ] {
+            let inside = |p: &[f64; 3]| (p[axis] - plane) * sign;
+            if polygon[..count].iter().all(|p| inside(p) >= 0.0) {
+                continue;
+            }
+            let old = polygon;
+            let before = count;
+            count = 0;
+            for i in 0..before {
+                let (p, q) = (&old[i], &old[(i + 1) % before]);
+                let (from, to) = (inside(p), inside(q));
+                if from >= 0.0 {
+                    polygon[count] = *p;
+                    count += 1;
+                }
+                if (from >= 0.0) != (to >= 0.0) {
+                    let along = from / (from - to);
+                    polygon[count] = std::array::from_fn(|a| p[a] + along * (q[a] - p[a]));
+                    polygon[count][axis] = plane;
+                    count += 1;
+                }
+            }
+        }
+    }
+    let mut bounds = (count > 0).then_some(Bounds::EMPTY)?;
+    for corner in &polygon[..count] {
+        bounds = bounds.union(&Bounds {
+            min: corner.map(|c| (c - margin) as f32),
+            max: corner.map(|c| (c + margin) as f32),
+        });
+    }
+    Some(bounds)
+}
+
+/// The box that two overlapping boxes share.
+pub(super) fn intersection(a: &Bounds, b: &Bounds) -> Bounds {
+    Bounds {
+        min: std::array::from_fn(|axis| a.min[axis].max(b.min[axis])),
+        max: std::array::from_fn(|axis| a.max[axis].min(b.max[axis])),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CORNER: Corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+
+    fn cell(min: [f32; 3], max: [f32; 3]) -> Bounds {
+        Bounds { min, max }
+    }
+
+    #[test]
+    fn a_triangle_touches_boxes_at_its_hypotenuse_but_not_beyond() {
+        let at = |x: f32, y: f32| touches(&CORNER, &cell([x, y, -1.0], [x + 1.0, y + 1.0, 1.0]));
+        assert!(at(1.0, 1.0) && at(2.0, 2.0) && at(3.0, 1.0));
+        assert!(!at(2.001, 2.0) && !at(3.0, 3.0) && !at(-1.001, 1.0));
+        assert!(touches(&CORNER, &cell([0.0, 0.0, 0.0], [1.0, 1.0, 0.0])));
+        assert!(!touches(&CORNER, &cell([0.0, 0.0, 0.001], [1.0, 1.0, 1.0])));
+    }
+
+    #[test]
+    fn clipping_gives_the_box_of_the_part_inside() {
+        let inside = clip(&CORNER, &cell([1.0, 1.0, -1.0], [2.5, 9.0, 1.0]), 0.0);
+        assert_eq!(inside, Some(cell([1.0, 1.0, 0.0], [2.5, 3.0, 0.0])));
+        assert_eq!(
+            clip(&CORNER, &cell([2.001, 2.0, -1.0], [3.0, 3.0, 1.0]), 0.0),
+            None
+        );
+        let grown = clip(&CORNER, &cell([2.001, 2.0, -1.0], [3.0, 3.0, 1.0]), 0.5);
+        assert_eq!(grown, Some(cell([1.001, 1.0, -0.5], [3.0, 2.999, 0.5])));
+    }
+}

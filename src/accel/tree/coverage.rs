@@ -1,0 +1,214 @@
+//! What `validate()` of a structure over triangles checks.
+//!
+//! A triangle may stand in several leaves, none of which contains its box T (after spatial splits).
+//! The premise of the theorem in `docs/design.md` is then that the boxes of these leaves together
+//! *cover* T, and the proof goes on as follows. Let the triangle's hit at t be the final answer. On each
+//! axis a, the computed slab distances of T's sides bound an interval; let t_a be t clamped into it. The
+//! computed distance is monotone in the coordinate, so some coordinate y_a of T, or one as near as
+//! we like, has the distance t_a. The point y lies in T, hence in some box B of the finite cover,
+//! and by monotonicity n(B) ≤ max t_a ≤ max(t, n(T)) and f(B) ≥ min t_a ≥ min(t, f(T)). With
+//! t ≤ f(T)(1 + p) and n(T)(1 − p) ≤ t, the four inequalities of the theorem follow for B, and for
+//! every box around B. No pad is needed, and nothing is assumed about where in T the hit lies.
+
+use crate::accel::bounds::Bounds;
+use crate::accel::triangle::TriangleRecord;
+use crate::accel::{AccelError, TriangleSoup};
+
+/// Bookkeeping of `validate()`: every node reached once, and every triangle in a leaf that contains
+/// its box or in several that together cover it. More leaves than needed are a waste, which
+/// `references` of the statistics shows, but no fault.
+pub struct Coverage<'a> {
+    soup: &'a TriangleSoup,
+    nodes: Vec<bool>,
+    /// Whether a leaf contains the whole triangle.
+    contained: Vec<bool>,
+    /// Leaves that contain a part of a triangle.
+    parts: Vec<(u32, Bounds)>,
+}
+
+fn invalid(what: String) -> AccelError {
+    AccelError::Invalid(what)
+}
+
+impl<'a> Coverage<'a> {
+    /// Nothing reached yet.
+    pub fn new(soup: &'a TriangleSoup, nodes: usize) -> Self {
+        Self {
+            soup,
+            nodes: vec![false; nodes],
+            contained: vec![false; soup.records.len()],
+            parts: Vec::new(),
+        }
+    }
+
+    /// Notes that a node is reached.
+    ///
+    /// # Errors
+    /// It does not exist or was reached before.
+    pub fn node(&mut self, index: usize) -> Result<(), AccelError> {
+        match self.nodes.get_mut(index) {
+            // The root of an empty scene is no node.
+            None if index == 0 => Ok(()),
+            None => Err(invalid(format!("node {index} does not exist"))),
+            Some(true) => Err(invalid(format!("node {index} is reached twice"))),
+            Some(seen) => {
+                *seen = true;
+                Ok(())
+            }
+        }
+    }
+
+    /// Notes the triangles of a leaf with these bounds; `None` is a range outside the array.
+    ///
+    /// # Errors
+    /// The range does not exist, or a triangle differs from the scene's, is in the leaf twice, or lies
+    /// outside it.
+    pub fn leaf(
+        &mut self,
+        triangles: Option<&[TriangleRecord]>,
+        bounds: &Bounds,
+    ) -> Result<(), AccelError> {
+        let Some(triangles) = triangles else {
+            return Err(invalid(
+                "a leaf lies outside the triangle array".to_owned(),
+            ));
+        };
+        for (place, triangle) in triangles.iter().enumerate() {
+            let id = triangle.id;
+            if self.soup.records.get(id as usize) != Some(triangle) {
+                return Err(invalid(format!("triangle {id} is not the scene's")));
+            }
+            if triangles[..place].iter().any(|other| other.id == id) {
+                return Err(invalid(format!("triangle {id} is in one leaf twice")));
+            }
+            let own = triangle.bounds();
+            if bounds.contains(&own) {
+                self.contained[id as usize] = true;
+            } else if meet(bounds, &own) {
+                self.parts.push((id, *bounds));
+            } else {
+                return Err(invalid(format!("triangle {id} lies outside its leaf's box")));
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that nothing was missed.
+    ///
+    /// # Errors
+    /// A node was not reached, or a triangle is in no leaf, or its leaves do not cover it.
+    pub fn is_complete(mut self) -> Result<(), AccelError> {
+        self.parts.sort_by_key(|(id, _)| *id);
+        for parts in self.parts.chunk_by(|a, b| a.0 == b.0) {
+            let id = parts[0].0;
+            let boxes: Vec<Bounds> = parts.iter().map(|(_, bounds)| *bounds).collect();
+            let own = self.soup.records[id as usize].bounds();
+            if self.contained[id as usize] {
+                continue;
+            }
+            if !covers(&boxes, &own) {
+                return Err(invalid(format!(
+                    "triangle {id} sticks out of its leaf's box, or its {} leaves do not cover it",
+                    boxes.len()
+                )));
+            }
+            self.contained[id as usize] = true;
+        }
+        if let Some(lost) = self.contained.iter().position(|seen| !seen) {
+            return Err(invalid(format!("triangle {lost} is in no leaf")));
+        }
+        match self.nodes.iter().position(|seen| !seen) {
+            Some(orphan) => Err(invalid(format!("node {orphan} is never reached"))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Whether two closed boxes have a point in common.
+fn meet(a: &Bounds, b: &Bounds) -> bool {
+    (0..3).all(|axis| a.min[axis] <= b.max[axis] && b.min[axis] <= a.max[axis])
+}
+
+/// Whether closed `boxes` together cover `whole`: what sticks out of the first that meets it must
+/// be covered by the others.
+fn covers(boxes: &[Bounds], whole: &Bounds) -> bool {
+    let Some(first) = boxes.iter().position(|b| meet(b, whole)) else {
+        return false;
+    };
+    let (cover, others) = (&boxes[first], &boxes[first + 1..]);
+    let mut rest = *whole;
+    for axis in 0..3 {
+        if rest.min[axis] < cover.min[axis] {
+            let mut below = rest;
+            below.max[axis] = cover.min[axis];
+            if !covers(others, &below) {
+                return false;
+            }
+            rest.min[axis] = cover.min[axis];
+        }
+        if rest.max[axis] > cover.max[axis] {
+            let mut above = rest;
+            above.min[axis] = cover.max[axis];
+            if !covers(others, &above) {
+                return false;
+            }
+            rest.max[axis] = cover.max[axis];
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Triangle;
+    use glam::Vec3;
+
+    fn soup() -> TriangleSoup {
+        let vertices = [
+            Vec3::ZERO,
+            Vec3::new(4.0, 2.0, 0.0),
+            Vec3::new(0.0, 2.0, 8.0),
+        ];
+        vec![TriangleRecord::new(&Triangle { vertices }, 0, 0)].into()
+    }
+
+    fn slab(from: [f32; 3], to: [f32; 3]) -> Bounds {
+        Bounds { min: from, max: to }
+    }
+
+    fn check(leaves: &[Bounds]) -> Result<(), AccelError> {
+        let soup = soup();
+        let mut coverage = Coverage::new(&soup, 0);
+        for bounds in leaves {
+            coverage.leaf(Some(&soup.records), bounds)?;
+        }
+        coverage.is_complete()
+    }
+
+    #[test]
+    fn leaves_that_cover_a_triangle_only_together_are_accepted() {
+        let low = slab([0.0; 3], [1.5, 2.0, 8.0]);
+        let high_near = slab([1.5, 0.0, 0.0], [4.0, 2.0, 3.0]);
+        let high_far = slab([1.5, 0.0, 3.0], [4.0, 2.0, 8.0]);
+        assert_eq!(check(&[low, high_near, high_far]), Ok(()));
+        assert_eq!(check(&[high_far, low, high_near]), Ok(()));
+        // A hole of one ulp.
+        let moved = slab([1.5_f32.next_up(), 0.0, 0.0], [4.0, 2.0, 3.0]);
+        assert!(check(&[low, moved, high_far]).is_err());
+        assert!(check(&[low, high_near]).is_err());
+        assert!(check(&[low, high_near, low]).is_err());
+    }
+
+    #[test]
+    fn a_triangle_outside_its_leaf_or_twice_in_one_is_refused() {
+        let whole = slab([0.0; 3], [4.0, 2.0, 8.0]);
+        assert_eq!(check(&[whole]), Ok(()));
+        assert!(check(&[]).is_err());
+        assert!(check(&[whole, slab([5.0; 3], [9.0; 3])]).is_err());
+        let soup = soup();
+        let twice = [soup.records[0]; 2];
+        let mut coverage = Coverage::new(&soup, 0);
+        assert!(coverage.leaf(Some(&twice), &whole).is_err());
+    }
+}

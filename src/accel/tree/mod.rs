@@ -1,0 +1,128 @@
+//! The binary tree under `bvh`, `roped-bvh` and their kin: one type, several builders, the same tree
+//! for any number of threads.
+//!
+//! A builder makes a tree down to (nearly) single triangles; rounds of reinsertion may improve it;
+//! then leaves are chosen. Each step has a file of its own.
+
+mod binned;
+mod coverage;
+mod depth;
+mod leaves;
+mod parameters;
+mod ploc;
+mod quality;
+mod reference;
+mod reinsertion;
+mod sbvh;
+mod subtree;
+mod sweep;
+
+pub use coverage::Coverage;
+pub use parameters::tree_parameters;
+
+use super::bounds::Bounds;
+use super::{AccelError, BuildLog, TriangleSoup};
+use crate::config::Params;
+use parameters::{Builder, Settings};
+use reference::Reference;
+use sweep::Axes;
+
+/// A node; children of an inner node lie at `left` and `right`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TreeNode {
+    /// Box around everything below.
+    pub bounds: Bounds,
+    /// What is below.
+    pub kind: NodeKind,
+}
+
+/// What a node holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NodeKind {
+    /// Two children, by node index.
+    Inner {
+        /// First child.
+        left: u32,
+        /// Second child.
+        right: u32,
+    },
+    /// A range of [`Tree::order`].
+    Leaf {
+        /// First entry.
+        first: u32,
+        /// Number of entries.
+        count: u32,
+    },
+}
+
+/// A binary tree over triangles; node 0 is the root, nodes are in depth-first order.
+#[derive(Debug, Clone, Default)]
+pub struct Tree {
+    /// Nodes; empty for an empty scene.
+    pub nodes: Vec<TreeNode>,
+    /// Triangle indices, leaf by leaf in the order of the nodes. After spatial splits a triangle may
+    /// stand in several leaves, whose boxes cover its own only together.
+    pub order: Vec<u32>,
+    /// End-point overlap, if the parameter `epo` asks for it: see [`Tree::epo`].
+    pub epo: Option<f64>,
+}
+
+impl Tree {
+    /// Builds the tree with the builder that `params` name; phases are timed in `log`.
+    ///
+    /// # Errors
+    /// A limit of the builder is exceeded.
+    pub fn build(
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Tree, AccelError> {
+        let settings = Settings::new(params);
+        if soup.records.is_empty() {
+            return Ok(Tree::default());
+        }
+        let references = log.phase("boxes", || reference::references(soup));
+        let name = params.name("builder");
+        let mut tree = log.phase(name, || Tree::grow(references, &settings))?;
+        if settings.reinsertion > 0 {
+            tree = log.phase("reinsertion", || reinsertion::optimise(tree, &settings));
+        }
+        let has_duplicates = tree.has_duplicates(soup);
+        let mut tree = log.phase("leaves", || {
+            leaves::choose_leaves(tree, has_duplicates, &settings)
+        });
+        tree.epo = params.flag("epo").then(|| tree.epo(soup));
+        Ok(tree)
+    }
+
+    /// The tree of the builder alone.
+    fn grow(mut references: Vec<Reference>, settings: &Settings) -> Result<Tree, AccelError> {
+        let (subtree, order) = match settings.builder {
+            Builder::Binned => {
+                let subtree = binned::build(&mut references, settings);
+                (subtree, references.iter().map(|r| r.id).collect())
+            }
+            Builder::Sweep => sweep::build(&references, Axes::All, settings),
+            Builder::LongestAxisSweep => sweep::build(&references, Axes::Longest, settings),
+            Builder::Sbvh => sbvh::build(std::mem::take(&mut references), settings),
+            Builder::Ploc => return ploc::build(&references, settings, false),
+            Builder::PlocReinsertion => return ploc::build(&references, settings, true),
+        };
+        drop(references);
+        let nodes = subtree.lay_out();
+        Ok(Tree::new(nodes, order))
+    }
+
+    fn new(nodes: Vec<TreeNode>, order: Vec<u32>) -> Self {
+        Tree {
+            nodes,
+            order,
+            epo: None,
+        }
+    }
+
+    /// Whether some triangle is listed more than once, in leaves that only together cover it.
+    pub fn has_duplicates(&self, soup: &TriangleSoup) -> bool {
+        self.order.len() > soup.records.len()
+    }
+}

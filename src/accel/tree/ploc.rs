@@ -1,0 +1,98 @@
+//! Parallel locally-ordered clustering, as the crate `obvhs` builds it.
+//!
+//! Source: D. Meister, J. Bittner, "Parallel locally-ordered clustering for bounding volume hierarchy
+//! construction", 2018.
+
+use super::depth::limit_depth;
+use super::parameters::Settings;
+use super::reference::{Box3, Reference};
+use super::subtree::{leaf, make_inner};
+use super::Tree;
+use crate::accel::AccelError;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::PlocBuilder;
+use obvhs::{Boundable, BvhBuildParams};
+
+/// Boxes whose coordinates exceed this have areas that are not finite, and obvhs compares areas.
+const LARGEST_COORDINATE: f32 = 1e18;
+
+impl Boundable for Reference {
+    fn aabb(&self) -> obvhs::aabb::Aabb {
+        let Box3 { min, max } = self.bounds();
+        obvhs::aabb::Aabb { min, max }
+    }
+}
+
+/// The parameters of obvhs' presets. Those that split triangles do without: see `sbvh`.
+fn preset(index: usize) -> BvhBuildParams {
+    match index {
+        0 => BvhBuildParams::fastest_build(),
+        1 => BvhBuildParams::very_fast_build(),
+        2 => BvhBuildParams::fast_build(),
+        3 => BvhBuildParams::medium_build(),
+        4 => BvhBuildParams::slow_build(),
+        _ => BvhBuildParams::very_slow_build(),
+    }
+}
+
+/// The tree over `references`, with or without the reinsertion of obvhs' preset.
+///
+/// # Errors
+/// A coordinate is too large or not a number.
+pub(super) fn build(
+    references: &[Reference],
+    settings: &Settings,
+    reinsertion: bool,
+) -> Result<Tree, AccelError> {
+    let usable = |x: &f32| x.abs() <= LARGEST_COORDINATE;
+    if let Some(bad) = references
+        .iter()
+        .find(|r| !r.min.iter().chain(&r.max).all(usable))
+    {
+        return Err(AccelError::Invalid(format!(
+            "triangle {}: ploc takes coordinates up to {LARGEST_COORDINATE:e}; its box is {:?} to {:?}",
+            bad.id, bad.min, bad.max
+        )));
+    }
+    let preset = preset(settings.preset);
+    let ids = references.iter().map(|r| r.id).collect();
+    let mut bvh = PlocBuilder::with_capacity(references.len()).build(
+        preset.ploc_search_distance,
+        references,
+        ids,
+        preset.sort_precision,
+        preset.search_depth_threshold,
+    );
+    if reinsertion {
+        ReinsertionOptimizer::default().run(&mut bvh, preset.reinsertion_batch_ratio, None);
+    }
+    Ok(limit_depth(take_over(&bvh)))
+}
+
+/// The nodes in depth-first order.
+fn take_over(bvh: &Bvh2) -> Tree {
+    let mut nodes = Vec::with_capacity(bvh.nodes.len());
+    let mut order = Vec::with_capacity(bvh.primitive_indices.len());
+    // Nodes to visit, with the parent whose second child they are.
+    let mut stack = vec![(0, None)];
+    while let Some((index, second_of)) = stack.pop() {
+        if let Some(parent) = second_of {
+            make_inner(&mut nodes, parent);
+        }
+        let node = &bvh.nodes[index as usize];
+        let bounds = Box3 {
+            min: node.aabb().min,
+            max: node.aabb().max,
+        };
+        let (first, count) = (node.first_index, node.prim_count);
+        nodes.push(leaf(bounds, order.len() as u32, count as usize));
+        if node.is_leaf() {
+            order.extend_from_slice(&bvh.primitive_indices[first as usize..(first + count) as usize]);
+        } else {
+            stack.push((first + 1, Some(nodes.len() - 1)));
+            stack.push((first, None));
+        }
+    }
+    Tree::new(nodes, order)
+}

@@ -1,0 +1,154 @@
+//! Boxes in vector registers, and references: what builders move around.
+
+use crate::accel::TriangleSoup;
+use crate::accel::bounds::Bounds;
+use glam::{Vec3A, Vec3Swizzles, Vec4};
+use rayon::prelude::*;
+
+/// An axis-aligned box as builders compute with it: [`Bounds`] in two vector registers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Box3 {
+    pub min: Vec3A,
+    pub max: Vec3A,
+}
+
+impl Box3 {
+    /// The neutral element of [`Box3::union`].
+    pub const EMPTY: Box3 = Box3 {
+        min: Vec3A::INFINITY,
+        max: Vec3A::NEG_INFINITY,
+    };
+
+    pub fn union(self, other: Box3) -> Box3 {
+        Box3 {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+        }
+    }
+
+    /// The common part; its half area is 0 if there is none.
+    pub fn intersection(self, other: Box3) -> Box3 {
+        Box3 {
+            min: self.min.max(other.min),
+            max: self.max.min(other.max),
+        }
+    }
+
+    pub fn with_point(self, point: Vec3A) -> Box3 {
+        self.union(Box3 {
+            min: point,
+            max: point,
+        })
+    }
+
+    /// Half the surface area; 0 for an empty box.
+    pub fn half_area(self) -> f32 {
+        let e = (self.max - self.min).max(Vec3A::ZERO);
+        e.dot(e.yzx())
+    }
+
+    /// The axis of the greatest extent.
+    pub fn longest_axis(self) -> usize {
+        (self.max - self.min).max_position()
+    }
+}
+
+impl From<Bounds> for Box3 {
+    fn from(bounds: Bounds) -> Self {
+        Box3 {
+            min: bounds.min.into(),
+            max: bounds.max.into(),
+        }
+    }
+}
+
+impl From<Box3> for Bounds {
+    fn from(bounds: Box3) -> Self {
+        Bounds {
+            min: bounds.min.into(),
+            max: bounds.max.into(),
+        }
+    }
+}
+
+/// A triangle in a leaf: its box, or after a spatial split a part of its box. 32 bytes.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(32))]
+pub(super) struct Reference {
+    pub min: [f32; 3],
+    pub id: u32,
+    pub max: [f32; 3],
+    /// Fills the register: 1, since arithmetic on tiny numbers is slow on some processors.
+    filling: f32,
+}
+
+impl Reference {
+    pub fn new(bounds: Box3, id: u32) -> Self {
+        Self {
+            min: bounds.min.into(),
+            id,
+            max: bounds.max.into(),
+            filling: 1.0,
+        }
+    }
+
+    pub fn bounds(&self) -> Box3 {
+        // One load each; the fourth lane takes part in nothing.
+        let [x, y, z] = self.min;
+        let min = Vec4::new(x, y, z, f32::from_bits(self.id));
+        let [x, y, z] = self.max;
+        let max = Vec4::new(x, y, z, self.filling);
+        Box3 {
+            min: Vec3A::from_vec4(min),
+            max: Vec3A::from_vec4(max),
+        }
+    }
+
+    /// Twice the centre: enough to sort and bin by, without the division.
+    pub fn centre(&self) -> Vec3A {
+        let Box3 { min, max } = self.bounds();
+        min + max
+    }
+
+    /// Sorts by centre along `axis`; ids make the order total, so that it does not depend on the
+    /// order before.
+    pub fn compare(&self, other: &Self, axis: usize) -> std::cmp::Ordering {
+        let centre = |r: &Self| r.min[axis] + r.max[axis];
+        centre(self)
+            .total_cmp(&centre(other))
+            .then(self.id.cmp(&other.id))
+    }
+}
+
+/// One reference for each triangle.
+pub(super) fn references(soup: &TriangleSoup) -> Vec<Reference> {
+    let reference = |record: &crate::accel::triangle::TriangleRecord| {
+        Reference::new(record.bounds().into(), record.id)
+    };
+    soup.records.par_iter().map(reference).collect()
+}
+
+/// Box around references and box around their (doubled) centres.
+#[derive(Clone, Copy)]
+pub(super) struct Extent {
+    pub bounds: Box3,
+    pub centres: Box3,
+}
+
+impl Extent {
+    pub const EMPTY: Extent = Extent {
+        bounds: Box3::EMPTY,
+        centres: Box3::EMPTY,
+    };
+
+    pub fn of(references: &[Reference]) -> Self {
+        references.iter().fold(Self::EMPTY, Self::with)
+    }
+
+    pub fn with(self, reference: &Reference) -> Self {
+        Extent {
+            bounds: self.bounds.union(reference.bounds()),
+            centres: self.centres.with_point(reference.centre()),
+        }
+    }
+}

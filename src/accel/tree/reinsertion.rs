@@ -1,0 +1,282 @@
+//! Reinsertion: subtrees are taken out and put back where the tree's surface area shrinks most.
+//!
+//! A round looks for the best place of the largest subtrees on all cores while the tree rests, then
+//! moves them one after the other, most profitable first. A move is dropped if an earlier one
+//! touched its nodes, so the result does not depend on the number of threads.
+//!
+//! Sources: J. Bittner, M. Hapala, V. Havran, "Fast insertion-based optimization of bounding volume
+//! hierarchies", 2013 (the search); D. Meister, J. Bittner, "Parallel reinsertion for bounding volume
+//! hierarchy optimization", 2018 (rounds).
+
+use super::depth::depth_limit;
+use super::parameters::Settings;
+use super::reference::Box3;
+use super::subtree::{leaf, make_inner};
+use super::{NodeKind, Tree, TreeNode};
+use rayon::prelude::*;
+
+const ROOT: u32 = 0;
+
+/// A node with a way up. Children lie side by side, at an odd index and the even one behind it.
+#[derive(Clone, Copy)]
+struct Node {
+    bounds: Box3,
+    parent: u32,
+    /// First child, or [`Node::leaf_first`] of a leaf.
+    first: u32,
+    /// Entries of a leaf; 0 for inner nodes.
+    count: u32,
+    /// Levels below.
+    height: u32,
+}
+
+/// A move: `node` next to `target`.
+#[derive(Clone, Copy)]
+struct Move {
+    node: u32,
+    target: u32,
+    /// Half area by which the tree shrinks.
+    gain: f32,
+}
+
+/// Improves `tree` by `settings.reinsertion` rounds; the leaves stay as they are.
+pub(super) fn optimise(tree: Tree, settings: &Settings) -> Tree {
+    let mut hierarchy = Hierarchy::new(&tree);
+    let order = tree.order;
+    drop(tree.nodes);
+    for _ in 0..settings.reinsertion {
+        if hierarchy.round(settings.reinsertion_share) == 0 {
+            break;
+        }
+    }
+    hierarchy.lay_out(&order)
+}
+
+struct Hierarchy {
+    nodes: Vec<Node>,
+    /// Moves may not make the tree deeper than this.
+    depth_limit: u32,
+    /// Nodes that a move of this round changed.
+    touched: Vec<bool>,
+}
+
+fn sibling(node: u32) -> u32 {
+    ((node - 1) ^ 1) + 1
+}
+
+impl Hierarchy {
+    fn new(tree: &Tree) -> Self {
+        let mut nodes: Vec<Node> = Vec::with_capacity(tree.nodes.len());
+        let node = |index: u32, parent| {
+            let TreeNode { bounds, kind } = tree.nodes[index as usize];
+            let (first, count) = match kind {
+                NodeKind::Leaf { first, count } => (first, count),
+                // For now where its children come from.
+                NodeKind::Inner { .. } => (index, 0),
+            };
+            Node {
+                bounds: bounds.into(),
+                parent,
+                first,
+                count,
+                height: 0,
+            }
+        };
+        nodes.push(node(0, ROOT));
+        // Breadth first: large nodes, which searches visit most, lie together.
+        let mut here = 0;
+        while here < nodes.len() {
+            if nodes[here].count == 0
+                && let NodeKind::Inner { left, right } = tree.nodes[nodes[here].first as usize].kind
+            {
+                nodes[here].first = nodes.len() as u32;
+                nodes.push(node(left, here as u32));
+                nodes.push(node(right, here as u32));
+            }
+            here += 1;
+        }
+        let mut hierarchy = Self {
+            depth_limit: depth_limit(tree.order.len()),
+            touched: vec![false; nodes.len()],
+            nodes,
+        };
+        for index in (0..hierarchy.nodes.len() as u32).rev() {
+            hierarchy.update(index);
+        }
+        hierarchy
+    }
+
+    fn node(&self, index: u32) -> &Node {
+        &self.nodes[index as usize]
+    }
+
+    /// Sets box and height of an inner node from its children.
+    fn update(&mut self, index: u32) {
+        let Node { first, count, .. } = *self.node(index);
+        if count == 0 {
+            let (left, right) = (*self.node(first), *self.node(first + 1));
+            let node = &mut self.nodes[index as usize];
+            node.bounds = left.bounds.union(right.bounds);
+            node.height = 1 + left.height.max(right.height);
+        }
+    }
+
+    /// One round; returns how many subtrees were moved.
+    fn round(&mut self, share: f32) -> usize {
+        let mut moves: Vec<Move> = self
+            .candidates(share)
+            .into_par_iter()
+            .filter_map(|node| self.best_move(node))
+            .collect();
+        moves.par_sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain).then(a.node.cmp(&b.node)));
+        self.touched.fill(false);
+        moves.into_iter().filter(|&m| self.apply(m)).count()
+    }
+
+    /// The largest nodes, in the order of their index.
+    fn candidates(&self, share: f32) -> Vec<u32> {
+        // Neither the root nor its children can move.
+        let mut all: Vec<u32> = (3..self.nodes.len() as u32).collect();
+        let wanted = (all.len() as f32 * share).ceil() as usize;
+        if wanted < all.len() {
+            let area = |index: &u32| self.node(*index).bounds.half_area();
+            all.select_nth_unstable_by(wanted, |a, b| {
+                area(b).total_cmp(&area(a)).then(a.cmp(b))
+            });
+            all.truncate(wanted);
+            all.sort_unstable();
+        }
+        all
+    }
+
+    /// The best new place of a subtree, by branch and bound over the rest of the tree.
+    ///
+    /// Going up from the node, `saved` is what its removal takes from the boxes of the nodes passed;
+    /// going down again, what the insertion adds to the boxes on the way is taken off.
+    fn best_move(&self, index: u32) -> Option<Move> {
+        let moved = self.node(index).bounds;
+        let least = moved.half_area();
+        let parent = self.node(index).parent;
+        let mut best = Move {
+            node: index,
+            target: ROOT,
+            gain: 0.0,
+        };
+        let mut pivot = parent;
+        let mut beside = sibling(index);
+        let mut without = self.node(beside).bounds;
+        let mut saved = self.node(parent).bounds.half_area();
+        let mut stack: Vec<(f32, u32)> = Vec::with_capacity(64);
+        loop {
+            stack.push((saved, beside));
+            while let Some((saved, target)) = stack.pop() {
+                if saved - least <= best.gain {
+                    continue;
+                }
+                let node = self.node(target);
+                let gain = saved - node.bounds.union(moved).half_area();
+                // Next to its present sibling it is already.
+                if gain > best.gain && target != sibling(index) {
+                    (best.gain, best.target) = (gain, target);
+                }
+                if node.count == 0 {
+                    let below = gain + node.bounds.half_area();
+                    stack.push((below, node.first));
+                    stack.push((below, node.first + 1));
+                }
+            }
+            if pivot == ROOT {
+                break;
+            }
+            if pivot != parent {
+                without = without.union(self.node(beside).bounds);
+                saved += self.node(pivot).bounds.half_area() - without.half_area();
+            }
+            beside = sibling(pivot);
+            pivot = self.node(pivot).parent;
+        }
+        (best.gain > 0.0).then_some(best)
+    }
+
+    /// Moves a subtree unless an earlier move of the round is in the way or the tree would become
+    /// too deep; says whether it did.
+    fn apply(&mut self, Move { node, target, .. }: Move) -> bool {
+        let parent = self.node(node).parent;
+        let beside = sibling(node);
+        let involved = [node, beside, parent, target, self.node(target).parent];
+        if target == parent || involved.iter().any(|&i| self.touched[i as usize]) {
+            return false;
+        }
+        let mut depth = 1;
+        let mut above = target;
+        while above != ROOT {
+            // Earlier moves may have brought the target below the node.
+            if above == node {
+                return false;
+            }
+            above = self.node(above).parent;
+            depth += 1;
+        }
+        if depth + self.node(node).height.max(self.node(target).height) > self.depth_limit {
+            return false;
+        }
+        involved.iter().for_each(|&i| self.touched[i as usize] = true);
+
+        // The sibling takes the parent's place, which frees the pair.
+        let pair = node.min(beside);
+        let (moved, kept, displaced) = (*self.node(node), *self.node(beside), *self.node(target));
+        self.place(parent, Node { parent: self.node(parent).parent, ..kept });
+        // Had the target been the sibling, it would have moved; but that is excluded.
+        self.place(pair, Node { parent: target, ..displaced });
+        self.place(pair + 1, Node { parent: target, ..moved });
+        let joint = &mut self.nodes[target as usize];
+        (joint.first, joint.count) = (pair, 0);
+        self.update_upwards(target);
+        self.update_upwards(self.node(parent).parent);
+        true
+    }
+
+    /// Puts a node at `index` and tells its children.
+    fn place(&mut self, index: u32, node: Node) {
+        self.nodes[index as usize] = node;
+        if node.count == 0 {
+            self.nodes[node.first as usize].parent = index;
+            self.nodes[node.first as usize + 1].parent = index;
+        }
+    }
+
+    fn update_upwards(&mut self, mut index: u32) {
+        loop {
+            let before = *self.node(index);
+            self.update(index);
+            let after = self.node(index);
+            if index == ROOT || (before.bounds == after.bounds && before.height == after.height) {
+                return;
+            }
+            index = before.parent;
+        }
+    }
+
+    /// The tree in depth-first order, with the leaves as consecutive runs of a new order.
+    fn lay_out(&self, old_order: &[u32]) -> Tree {
+        let mut nodes = Vec::with_capacity(self.nodes.len());
+        let mut order = Vec::with_capacity(old_order.len());
+        // Nodes to visit, with the parent whose second child they are.
+        let mut stack = vec![(ROOT, None)];
+        while let Some((index, second_of)) = stack.pop() {
+            if let Some(parent) = second_of {
+                make_inner(&mut nodes, parent);
+            }
+            let node = self.node(index);
+            let entries = node.first as usize..(node.first + node.count) as usize;
+            nodes.push(leaf(node.bounds, order.len() as u32, entries.len()));
+            if node.count == 0 {
+                stack.push((node.first + 1, Some(nodes.len() - 1)));
+                stack.push((node.first, None));
+            } else {
+                order.extend_from_slice(&old_order[entries]);
+            }
+        }
+        Tree::new(nodes, order)
+    }
+}

@@ -1,0 +1,368 @@
+//! `two-level-grid`: a coarse grid whose occupied cells are cut into grids of their own. Twin of
+//! `kernels/accel/two_level_grid.wesl`.
+//!
+//! Source: J. Kalojanov, M. Billeter, P. Slusallek, "Two-level grids for ray tracing on GPUs", 2011.
+//! Top cells by Cleary's rule with λ₁; a top cell with n triangles is cut by the same rule with λ₂.
+//! One loop walks both levels: it steps through the parts of a top cell until it leaves the cell, and
+//! then finds its place in the next one.
+
+use super::bounds::{BOX_PAD, enter_box};
+use super::grid::lists::{Lists, PartLists, check_lists};
+use super::grid::{Cut, Frame, Grid, areas, check_words, clamped, first_axis, outside};
+use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::triangle::intersect_triangle;
+use super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
+    TriangleSoup,
+};
+use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::measure::record::StructureStats;
+use rayon::prelude::*;
+
+/// Most parts of a top cell along an axis: its resolution takes ten bits an axis.
+const MOST_PARTS: u32 = 1023;
+/// Bits of a top cell's resolution for each axis.
+const PART_BITS: u32 = 10;
+const PART_MASK: u32 = 1023;
+/// Top cells that one task cuts.
+const RUN: usize = 64;
+
+/// The registry entry.
+pub struct TwoLevelGrid;
+
+impl AccelKind for TwoLevelGrid {
+    fn name(&self) -> &'static str {
+        "two-level-grid"
+    }
+
+    fn description(&self) -> &'static str {
+        "a coarse grid whose occupied cells are grids of their own (Kalojanov et al. 2011)"
+    }
+
+    fn parameters(&self) -> ParameterSchema {
+        let density = |name, description, default| Parameter {
+            name,
+            description,
+            default: ParamValue::Number(default),
+            range: ParamRange::Number {
+                min: 0.001,
+                max: 1000.0,
+            },
+        };
+        vec![
+            density("lambda1", "top cells per triangle of the scene", 0.12),
+            density("lambda2", "parts of a top cell per triangle in it", 2.4),
+        ]
+    }
+
+    fn build(
+        &self,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        let frame = log.phase("bounds", || Frame::new(soup));
+        let resolution = frame.resolution(soup.records.len(), params.number("lambda1"), 4096);
+        let grid = Grid::new(&frame, resolution);
+        let top = Lists::new(self.name(), &grid, soup, true, log)?;
+        let lambda = params.number("lambda2");
+        let built = log.phase("parts", || cut(grid, soup, &top, lambda))?;
+        Ok(Box::new(built))
+    }
+}
+
+/// Parts along each axis of a top cell that lists triangles of these areas.
+fn parts(grid: &Grid, areas: impl ExactSizeIterator<Item = f32>, lambda: f64) -> [u32; 3] {
+    let side = grid.cell.map(f64::from);
+    let Cut { wanted, share } = Cut::new(side, areas, lambda);
+    std::array::from_fn(|a| {
+        // Smaller parts would be all margin.
+        let most = (side[a] / (4.0 * f64::from(grid.margin))).clamp(1.0, f64::from(MOST_PARTS));
+        (wanted[a] * share).round().clamp(1.0, most) as u32
+    })
+}
+
+/// Top cells of one task, cut: words of each top cell with places relative to the run, the begins of
+/// the lists of all parts, and the lists.
+#[derive(Default)]
+struct Run {
+    top: Vec<[u32; 2]>,
+    starts: Vec<u32>,
+    references: Vec<u32>,
+}
+
+fn cut(grid: Grid, soup: &TriangleSoup, top: &Lists, lambda: f64) -> Result<Built, AccelError> {
+    let tops = grid.cells() as usize;
+    let areas = areas(soup);
+    let resolutions = |cell: usize| {
+        let ids = top.of(cell).iter();
+        parts(&grid, ids.map(|&id| areas[id as usize]), lambda)
+    };
+    let all_parts = |cell: usize| {
+        resolutions(cell)
+            .iter()
+            .map(|&r| u64::from(r))
+            .product::<u64>()
+    };
+    let occupied = |cell: &usize| !top.of(*cell).is_empty();
+    let needed: u64 = (0..tops)
+        .into_par_iter()
+        .filter(occupied)
+        .map(all_parts)
+        .sum();
+    check_words("cells of a two-level-grid", 2 * tops as u64 + needed + 1)?;
+
+    let cut_run = |cells: std::ops::Range<usize>| {
+        let mut run = Run::default();
+        let mut lists = PartLists::default();
+        for cell in cells {
+            let ids = top.of(cell);
+            if ids.is_empty() {
+                run.top.push([run.starts.len() as u32, 0]);
+                continue;
+            }
+            let [x, y, z] = resolutions(cell);
+            let part = grid.part(grid.coordinates(cell as u32), [1; 3], [x, y, z]);
+            lists.fill(&part, soup, ids);
+            let packed = x | y << PART_BITS | z << (2 * PART_BITS);
+            run.top.push([run.starts.len() as u32, packed]);
+            let begin = run.references.len() as u32;
+            let (_, starts) = lists.starts.split_last().unwrap_or((&0, &[]));
+            run.starts.extend(starts.iter().map(|s| begin + s));
+            run.references.extend_from_slice(&lists.references);
+        }
+        run
+    };
+    let ranges: Vec<_> = (0..tops)
+        .step_by(RUN)
+        .map(|c| c..(c + RUN).min(tops))
+        .collect();
+    let runs: Vec<Run> = ranges.into_par_iter().map(cut_run).collect();
+    let references = runs.iter().map(|r| r.references.len() as u64).sum();
+    check_words("references of a two-level-grid", references)?;
+    Ok(Built::join(
+        grid,
+        &runs,
+        needed as usize,
+        references as usize,
+    ))
+}
+
+struct Built {
+    grid: Grid,
+    /// Two words a top cell: the place of its first part, and its resolution (0: empty). Then a word
+    /// for each part: the begin of its list; the next word is its end.
+    cells: Vec<u32>,
+    references: Vec<u32>,
+}
+
+impl Built {
+    fn join(grid: Grid, runs: &[Run], parts: usize, references: usize) -> Self {
+        let first_part = 2 * grid.cells() as usize;
+        let mut cells = Vec::with_capacity(first_part + parts + 1);
+        let mut place = first_part as u32;
+        for run in runs {
+            cells.extend(
+                run.top
+                    .iter()
+                    .flat_map(|[first, packed]| [place + first, *packed]),
+            );
+            place += run.starts.len() as u32;
+        }
+        let mut all = Vec::with_capacity(references);
+        for run in runs {
+            let begin = all.len() as u32;
+            cells.extend(run.starts.iter().map(|start| begin + start));
+            all.extend_from_slice(&run.references);
+        }
+        cells.push(references as u32);
+        Self {
+            grid,
+            cells,
+            references: all,
+        }
+    }
+
+    fn first_part(&self) -> usize {
+        2 * self.grid.cells() as usize
+    }
+
+    /// Place of the first part of a top cell, and its resolution: 0 if it is empty.
+    fn top(&self, cell: [u32; 3]) -> (u32, [u32; 3]) {
+        let index = 2 * self.grid.index(cell) as usize;
+        let packed = self.cells[index + 1];
+        let resolution = [0, PART_BITS, 2 * PART_BITS].map(|shift| packed >> shift & PART_MASK);
+        (self.cells[index], resolution)
+    }
+
+    fn list(&self, place: usize) -> &[u32] {
+        &self.references[self.cells[place] as usize..self.cells[place + 1] as usize]
+    }
+
+    /// Lengths of the lists of all parts.
+    fn lengths(&self) -> impl Iterator<Item = usize> {
+        self.cells[self.first_part()..]
+            .windows(2)
+            .map(|w| (w[1] - w[0]) as usize)
+    }
+
+    fn check_order(&self) -> Result<(), AccelError> {
+        let wrong = |text: String| Err(AccelError::Invalid(text));
+        let mut place = self.first_part() as u32;
+        for cell in 0..self.grid.cells() as u32 {
+            let (first, resolution) = self.top(self.grid.coordinates(cell));
+            if first != place {
+                return wrong(format!("top cell {cell}: its parts are those of another"));
+            }
+            place += resolution.iter().product::<u32>();
+        }
+        let starts = &self.cells[self.first_part()..];
+        if place as usize + 1 != self.cells.len()
+            || starts.last() != Some(&(self.references.len() as u32))
+        {
+            return wrong("the cells do not cover the references".to_owned());
+        }
+        match starts.windows(2).position(|w| w[0] > w[1]) {
+            Some(part) => wrong(format!("part {part}: its list runs backwards")),
+            None => Ok(()),
+        }
+    }
+}
+
+impl BuiltAccel for Built {
+    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
+        self.check_order()?;
+        let is_listed = |position: [f32; 3], id: u32| {
+            let cell = std::array::from_fn(|a| self.grid.coordinate(a, position[a]));
+            let (first, resolution) = self.top(cell);
+            if resolution[0] == 0 {
+                return false;
+            }
+            let part = self.grid.part(cell, [1; 3], resolution);
+            let at = std::array::from_fn(|a| part.coordinate(a, position[a]));
+            let list = self.list((first + part.index(at)) as usize);
+            list.binary_search(&id).is_ok()
+        };
+        check_lists(&self.grid, soup, self.references.iter().copied(), is_listed)
+    }
+
+    fn buffers(&self) -> GpuBuffers<'_> {
+        // Along an axis a ray passes every part of a column once, and finds its part again whenever
+        // it enters another top cell.
+        let column = |a: usize| {
+            let tops = 0..self.grid.cells() as u32;
+            let parts = tops.map(|cell| self.top(self.grid.coordinates(cell)).1[a].max(1));
+            self.grid.resolution[a] as usize * (parts.max().unwrap_or(1) as usize + 2)
+        };
+        let steps = 2 * (0..3).map(column).sum::<usize>();
+        let array = |name, words| NamedWords {
+            name,
+            words,
+            element_bytes: 4,
+        };
+        GpuBuffers {
+            kernel: "accel/two_level_grid",
+            features: Vec::new(),
+            arrays: vec![
+                array("cells", self.cells.as_slice().into()),
+                array("references", self.references.as_slice().into()),
+            ],
+            uniforms: vec![
+                self.grid.uniform(),
+                super::limits(steps, self.references.len()),
+            ],
+            constants: Vec::new(),
+        }
+    }
+
+    fn stats(&self) -> StructureStats {
+        let parts = (self.cells.len() - self.first_part() - 1) as u64;
+        StructureStats {
+            nodes: self.grid.cells() + parts,
+            leaves: self.lengths().filter(|&l| l > 0).count() as u64,
+            references: self.references.len() as u64,
+            leaf_histogram: super::leaf_histogram(self.lengths()),
+            depth: Some(1),
+            bytes: self.buffers().bytes(),
+            ..Default::default()
+        }
+    }
+
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(Twin { built: self, soup }))
+    }
+}
+
+struct Twin<'a> {
+    built: &'a Built,
+    soup: &'a TriangleSoup,
+}
+
+/// Cell of a top cell's grid at `place`, in top cells.
+fn find_part(place: [f32; 3], top: [u32; 3], parts: [u32; 3]) -> [u32; 3] {
+    std::array::from_fn(|a| clamped((place[a] - top[a] as f32) * parts[a] as f32, parts[a]))
+}
+
+impl Twin<'_> {
+    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
+        let grid = &self.built.grid;
+        let inverse = safe_inverse(ray.direction);
+        let mut hit = Hit::miss(ray);
+        counters.box_tests += 1;
+        let Some(enter) = enter_box(&grid.bounds, ray, inverse, ray.t_max) else {
+            return hit;
+        };
+        let forward = inverse.map(|i| i >= 0.0);
+        let entry = grid.in_cells(ray, enter);
+        let mut top: [u32; 3] = std::array::from_fn(|a| clamped(entry[a], grid.resolution[a]));
+        let (mut first, mut resolution) = self.built.top(top);
+        let mut parts = resolution.map(|r| r.max(1));
+        let mut part = find_part(entry, top, parts);
+        loop {
+            counters.nodes += 1;
+            if resolution[0] != 0 {
+                let place = first + (part[2] * parts[1] + part[1]) * parts[0] + part[0];
+                for &id in self.built.list(place as usize) {
+                    counters.triangle_tests += 1;
+                    intersect_triangle(&self.soup.records[id as usize], ray, inverse, &mut hit);
+                }
+            }
+            if any && hit.triangle != NO_HIT {
+                return hit;
+            }
+            let planes = std::array::from_fn(|a| {
+                top[a] as f32 + (part[a] + u32::from(forward[a])) as f32 / parts[a] as f32
+            });
+            let next = grid.distances(ray, inverse, planes);
+            let leave = next[0].min(next[1]).min(next[2]);
+            // The exit must lie clearly behind the hit: an equally near one may wait next door.
+            if hit.t * BOX_PAD < leave {
+                return hit;
+            }
+            let axis = first_axis(next, leave);
+            let step = if forward[axis] { 1 } else { -1 };
+            part[axis] = part[axis].wrapping_add_signed(step);
+            if part[axis] < parts[axis] {
+                continue;
+            }
+            top[axis] = top[axis].wrapping_add_signed(step);
+            if outside(top, grid.resolution) {
+                return hit;
+            }
+            (first, resolution) = self.built.top(top);
+            parts = resolution.map(|r| r.max(1));
+            part = find_part(grid.in_cells(ray, leave), top, parts);
+            part[axis] = if forward[axis] { 0 } else { parts[axis] - 1 };
+        }
+    }
+}
+
+impl CpuTwin for Twin<'_> {
+    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
+        self.trace(ray, false, counters)
+    }
+
+    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        self.trace(ray, true, counters).triangle != NO_HIT
+    }
+}

@@ -1,0 +1,218 @@
+//! Boxes of eight bits a plane in the frame of their node. Twin of `kernels/accel/wide.wesl`.
+//!
+//! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
+//! compressed wide BVHs", HPG 2017, sections 3.1 and 4.1.
+//!
+//! A plane lies at `low + q · 2^e` for a whole q in 0..256. `low` is a multiple of `2^e`, and `e` is
+//! so large that all planes are multiples of `2^e` below `2^24 · 2^e`: they are floats, their decoding
+//! is exact however an adapter rounds, and a box of planes contains what it was made for by integer
+//! arithmetic ([`Grid::new`]).
+//!
+//! **No hit is lost.** The proof in `docs/design.md` needs n(B) ≤ n(T) and f(T) ≤ f(B) for the
+//! computed distances of a box B around a triangle's box T. Decoding planes and calling `slab` would
+//! give that by monotony. Kernels save the decoding: with `s = 2^e · inverse` (exact) and
+//! `b = (low − origin) · inverse` they compute `q · s + (b ∓ slack)`. Let u = 2⁻²⁴ and
+//! M = |b| + 256 |s|, which bounds |q · s| + |b|. The two roundings of b, those of the product, of
+//! slack and of the two sums move the result by less than 5uM, and the slab of T by less than
+//! 2u(1 + u) times the distance of its plane, which grows with the distance: taken at the plane of B,
+//! it is below 3uM. With `slack ≥ 16uM(1 − 4u)` ([`FRAME_PAD`] = 16u) there is a factor of two left,
+//! also for reciprocals of 2.5 ulp, since both sides use the same one.
+
+use super::bounds::{BOX_PAD, Bounds};
+use super::tree::{Tree, tree_parameters};
+use super::{AccelError, BuildLog, TriangleSoup};
+use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+
+/// Relative slack of the distances to quantised planes, 2⁻²⁰.
+pub const FRAME_PAD: f32 = 9.536_743e-7;
+/// Number of planes on an axis.
+pub const PLANES: f32 = 256.0;
+
+/// Quanta are at least 2⁻⁶⁰: their distances stay far from denormal numbers.
+const LEAST_EXPONENT: i32 = -60;
+const BIAS: i32 = 127;
+const MANTISSA: i32 = 24;
+
+/// Parameters of a wide structure: those of the binary tree it is collapsed from, with leaves of at
+/// most `max_leaf` triangles, and where kernels read it from.
+pub fn wide_parameters(max_leaf: u32) -> ParameterSchema {
+    let max = i64::from(max_leaf);
+    let mut schema = tree_parameters();
+    for parameter in &mut schema {
+        if parameter.name == "leaf_size" {
+            parameter.default = ParamValue::Integer(max);
+            parameter.range = ParamRange::Integer { min: 1, max };
+        }
+    }
+    schema.push(Parameter {
+        name: "texels",
+        description: "read nodes and triangles as texels of textures instead of from buffers",
+        default: ParamValue::Flag(true),
+        range: ParamRange::Flag,
+    });
+    schema
+}
+
+/// The binary tree to collapse, one triangle a leaf: the collapse decides about leaves.
+///
+/// # Errors
+/// The tree cannot be built.
+pub fn wide_tree(
+    soup: &TriangleSoup,
+    params: &Params,
+    log: &mut BuildLog,
+) -> Result<Tree, AccelError> {
+    let mut params = params.clone();
+    params
+        .0
+        .insert("leaf_size".to_owned(), ParamValue::Integer(1));
+    Tree::build(soup, &params, log)
+}
+
+/// The planes of a node: where the first one lies and how far they are apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    /// First plane on each axis.
+    pub low: [f32; 3],
+    /// Biased exponents of the distance between planes.
+    pub exponents: [u8; 3],
+}
+
+/// A box by plane numbers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Planes {
+    /// Planes at the minimum.
+    pub low: [u8; 3],
+    /// Planes at the maximum.
+    pub high: [u8; 3],
+}
+
+impl Grid {
+    /// The finest grid that covers `bounds`.
+    pub fn new(bounds: &Bounds) -> Self {
+        let mut grid = Self {
+            low: [0.0; 3],
+            exponents: [0; 3],
+        };
+        for axis in 0..3 {
+            let (low, high) = (bounds.min[axis], bounds.max[axis]);
+            let largest = low.abs().max(high.abs());
+            let extent = f64::from(high) - f64::from(low);
+            let by_extent = (extent / 255.0).log2().floor().max(-200.0) as i32;
+            let by_size = exponent(largest) + 2 - MANTISSA;
+            let mut e = by_extent.max(by_size).max(LEAST_EXPONENT);
+            // Exact: scaling by powers of two, and integers below 2^24.
+            let plane = |x: f32, e: i32| f64::from(x) * 2.0_f64.powi(-e);
+            while plane(high, e).ceil() - plane(low, e).floor() > 255.0 {
+                e += 1;
+            }
+            grid.low[axis] = (plane(low, e).floor() * 2.0_f64.powi(e)) as f32;
+            grid.exponents[axis] = (e + BIAS) as u8;
+        }
+        grid
+    }
+
+    /// The smallest box of planes around `bounds`, which must lie in the grid.
+    pub fn around(&self, bounds: &Bounds) -> Planes {
+        let mut planes = Planes::default();
+        for axis in 0..3 {
+            let scale = 2.0_f64.powi(BIAS - i32::from(self.exponents[axis]));
+            let plane = |x: f32| f64::from(x) * scale;
+            let first = plane(self.low[axis]);
+            planes.low[axis] = (plane(bounds.min[axis]).floor() - first) as u8;
+            planes.high[axis] = (plane(bounds.max[axis]).ceil() - first) as u8;
+        }
+        planes
+    }
+
+    /// The box between planes, in the arithmetic of kernels.
+    pub fn bounds(&self, planes: &Planes) -> Bounds {
+        let at = |axis: usize, number: u8| {
+            self.low[axis]
+                + f32::from(number) * f32::from_bits(u32::from(self.exponents[axis]) << 23)
+        };
+        Bounds {
+            min: std::array::from_fn(|axis| at(axis, planes.low[axis])),
+            max: std::array::from_fn(|axis| at(axis, planes.high[axis])),
+        }
+    }
+
+    /// The exponents as kernels read them, a byte each; the highest byte is `top`.
+    pub fn exponent_word(&self, top: u8) -> u32 {
+        let [x, y, z] = self.exponents;
+        u32::from_le_bytes([x, y, z, top])
+    }
+}
+
+/// Exponent of the leading bit; that of the smallest normal number for what lies below.
+fn exponent(x: f32) -> i32 {
+    ((x.to_bits() >> 23 & 255) as i32 - BIAS).max(1 - BIAS)
+}
+
+/// Distances along a ray to the planes of a node: `q · scale + near` where the ray enters a box,
+/// `+ far` where it leaves.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    scale: [f32; 3],
+    near: [f32; 3],
+    far: [f32; 3],
+}
+
+/// The frame of a node with first plane `low` and biased exponents in the bytes of `exponents`.
+pub fn frame(low: [f32; 3], exponents: u32, origin: [f32; 3], inverse: [f32; 3]) -> Frame {
+    let biased = exponents.to_le_bytes();
+    let mut frame = Frame {
+        scale: [0.0; 3],
+        near: [0.0; 3],
+        far: [0.0; 3],
+    };
+    for axis in 0..3 {
+        let scale = f32::from_bits(u32::from(biased[axis]) << 23) * inverse[axis];
+        let base = (low[axis] - origin[axis]) * inverse[axis];
+        let slack = (base.abs() + scale.abs() * PLANES) * FRAME_PAD;
+        frame.scale[axis] = scale;
+        frame.near[axis] = base - slack;
+        frame.far[axis] = base + slack;
+    }
+    frame
+}
+
+fn bytes(word: u32) -> [f32; 4] {
+    word.to_le_bytes().map(f32::from)
+}
+
+/// Distances of a plane of four boxes.
+fn planes(word: u32, scale: f32, base: f32) -> [f32; 4] {
+    bytes(word).map(|q| q * scale + base)
+}
+
+/// The later of two distances as kernels see it: by integers, so that of two negative distances it
+/// may be the earlier one.
+fn later(a: f32, b: f32) -> f32 {
+    f32::from_bits((a.to_bits() as i32).max(b.to_bits() as i32) as u32)
+}
+
+/// The earlier of two distances, of two negative ones perhaps the later.
+fn earlier(a: f32, b: f32) -> f32 {
+    f32::from_bits((a.to_bits() as i32).min(b.to_bits() as i32) as u32)
+}
+
+/// Where the segment enters four boxes, whose near planes on the three axes are these.
+pub fn enter_four(near: [u32; 3], frame: &Frame, t_min: f32) -> [f32; 4] {
+    let distances: [_; 3] =
+        std::array::from_fn(|axis| planes(near[axis], frame.scale[axis], frame.near[axis]));
+    std::array::from_fn(|i| {
+        let [x, y, z] = distances.map(|d| d[i]);
+        later(later(later(x, y), z), t_min)
+    })
+}
+
+/// Where it leaves them, padded: a box is entered if it does not leave before it enters.
+pub fn leave_four(far: [u32; 3], frame: &Frame, t_best: f32) -> [f32; 4] {
+    let distances: [_; 3] =
+        std::array::from_fn(|axis| planes(far[axis], frame.scale[axis], frame.far[axis]));
+    std::array::from_fn(|i| {
+        let [x, y, z] = distances.map(|d| d[i]);
+        earlier(earlier(earlier(x, y), z), t_best) * BOX_PAD
+    })
+}

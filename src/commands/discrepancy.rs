@@ -1,0 +1,149 @@
+//! `raystone discrepancy`.
+
+use super::failure::Failure;
+use super::output::print;
+use anyhow::{Context as _, anyhow};
+use clap::Args;
+use raystone::config::nearest;
+use raystone::discrepancy::{Budget, DiscrepancyError, Measure, PointSet, Value, measure};
+use serde::Serialize;
+use serde_json::{Map, json};
+use std::io::Read as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Measure how evenly points fill the unit cube: exact star discrepancy and others, as JSON
+#[derive(Args)]
+pub struct Discrepancy {
+    /// File with a point a line, coordinates parted by blanks, commas or tabs, `#` for comments;
+    /// `-` is standard input
+    #[arg(default_value = "-")]
+    file: PathBuf,
+    /// What to measure, by the names of `raystone list measure`, or `all`
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
+    #[arg(default_value = "star,l2star,centered,wrap,mixture")]
+    measure: Vec<String>,
+    /// Use the first D coordinates of each point only
+    #[arg(long, value_name = "D")]
+    dim: Option<usize>,
+    /// Time that each measure may take; a star discrepancy in three dimensions or more that is not
+    /// found in time is given as bounds
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 60.0,
+        allow_negative_numbers = true
+    )]
+    budget: f64,
+}
+
+/// What is printed.
+#[derive(Serialize)]
+struct Results {
+    n: usize,
+    dim: usize,
+    measures: Map<String, serde_json::Value>,
+}
+
+impl Discrepancy {
+    pub fn execute(self) -> Result<ExitCode, Failure> {
+        let measures = measures(&self.measure).map_err(Failure::input)?;
+        if self.budget.is_nan() || self.budget <= 0.0 {
+            let message = "--budget: give a number of seconds above 0";
+            return Err(Failure::input(anyhow!(message)));
+        }
+        let points = self.points().map_err(Failure::input)?;
+        let mut results = Map::new();
+        for kind in measures {
+            let clock = Instant::now();
+            let result = measure(&points, kind, &Budget::seconds(self.budget));
+            let seconds = clock.elapsed().as_secs_f64();
+            results.insert(kind.name().to_owned(), fields(result, seconds));
+        }
+        let all = Results {
+            n: points.len(),
+            dim: points.dim(),
+            measures: results,
+        };
+        let text = serde_json::to_string_pretty(&all).context("cannot write the results as JSON");
+        print(&(text.map_err(Failure::input)? + "\n"))?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn points(&self) -> anyhow::Result<PointSet> {
+        let from_stdin = self.file.as_os_str() == "-";
+        let name = if from_stdin {
+            "standard input".to_owned()
+        } else {
+            self.file.display().to_string()
+        };
+        let mut text = String::new();
+        let read = if from_stdin {
+            std::io::stdin().lock().read_to_string(&mut text)
+        } else {
+            std::fs::File::open(&self.file).and_then(|mut file| file.read_to_string(&mut text))
+        };
+        read.with_context(|| format!("cannot read {name}"))?;
+        let points = PointSet::parse(&text).map_err(|error| match error {
+            DiscrepancyError::Line { line, reason } => anyhow!("{name}:{line}: {reason}"),
+            error => anyhow!("{name}: {error}"),
+        })?;
+        let Some(dim) = self.dim else {
+            return Ok(points);
+        };
+        if dim == 0 {
+            return Err(anyhow!("--dim: give at least 1"));
+        }
+        let first: Vec<usize> = (0..dim.min(points.dim() + 1)).collect();
+        points.project(&first).map_err(|_| {
+            let available = points.dim();
+            anyhow!("--dim {dim}: the points of {name} have {available} coordinates only")
+        })
+    }
+}
+
+fn measures(names: &[String]) -> anyhow::Result<Vec<Measure>> {
+    let mut found = Vec::new();
+    for name in names.iter().map(|name| name.trim()) {
+        if name == "all" {
+            found.extend(Measure::ALL);
+            continue;
+        }
+        let known = Measure::ALL.map(Measure::name);
+        let measure = Measure::from_name(name).ok_or_else(|| {
+            let hint = nearest(name, known).map(|near| format!(", did you mean `{near}`?"));
+            anyhow!(
+                "--measure: there is no `{name}`{} (known: {}, all)",
+                hint.unwrap_or_default(),
+                known.join(", ")
+            )
+        })?;
+        found.push(measure);
+    }
+    Ok(found)
+}
+
+/// What was measured, or the reason why there is nothing; an absent value is absent, never 0.
+fn fields(result: Result<Value, DiscrepancyError>, seconds: f64) -> serde_json::Value {
+    let mut fields = match result {
+        Ok(Value::Bracket(bracket)) => {
+            let (lower, upper) = (bracket.lower, bracket.upper);
+            match bracket.value() {
+                Some(value) => {
+                    json!({ "value": value, "lower": lower, "upper": upper, "exact": true })
+                }
+                None => json!({ "lower": lower, "upper": upper, "exact": false }),
+            }
+        }
+        Ok(Value::Number(value)) => json!({ "value": value }),
+        Ok(Value::Square(square)) => json!({ "root": square.sqrt(), "square": square }),
+        Ok(Value::Net(net)) => json!({ "t": net.t, "m": net.m }),
+        Ok(Value::Shapes { all, even }) => json!({ "shapes": all, "even": even }),
+        Ok(Value::Spectrum(power)) => json!({ "power": power }),
+        Ok(Value::Matrix(rows)) => json!({ "matrix": rows }),
+        Err(reason) => json!({ "reason": reason.to_string() }),
+    };
+    fields["seconds"] = json!(seconds);
+    fields
+}

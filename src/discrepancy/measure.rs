@@ -1,0 +1,167 @@
+//! All measures by name.
+
+use super::{
+    Budget, DiscrepancyError, Metric, PointSet, Quadratic, elementary_shapes, extreme_2d,
+    largest_empty_box, minimum_distance, net_quality, quadratic, radial_spectrum, star,
+};
+
+/// What can be measured of a point set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    /// Star discrepancy.
+    Star,
+    /// Extreme discrepancy in two dimensions.
+    Extreme,
+    /// A discrepancy in the mean square.
+    Quadratic(Quadratic),
+    /// Least distance between two points.
+    Distance(Metric),
+    /// Largest empty box in two dimensions.
+    Dispersion,
+    /// Quality of a net in base 2.
+    NetQuality,
+    /// Elementary intervals of volume 1/N.
+    Intervals,
+    /// Radial power spectrum in two dimensions.
+    Spectrum,
+    /// Star discrepancy of all pairs of dimensions.
+    Pairs,
+}
+
+/// What was measured.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// A value between two bounds that are equal if it is exact.
+    Bracket(super::Bracket),
+    /// One number.
+    Number(f64),
+    /// A discrepancy in the mean square.
+    Square(f64),
+    /// Quality of a net.
+    Net(super::Net),
+    /// Shapes of intervals of volume 1/N, and those with one point in each interval.
+    Shapes {
+        /// All shapes.
+        all: u64,
+        /// Shapes in which each interval has one point.
+        even: u64,
+    },
+    /// Mean power at frequencies 1, 2, ….
+    Spectrum(Vec<f64>),
+    /// Symmetric matrix by two dimensions; the diagonal has no value.
+    Matrix(Vec<Vec<Option<f64>>>),
+}
+
+impl Measure {
+    /// Every measure, in the order of the documentation.
+    pub const ALL: [Self; 14] = [
+        Self::Star,
+        Self::Extreme,
+        Self::Quadratic(Quadratic::L2Star),
+        Self::Quadratic(Quadratic::Centered),
+        Self::Quadratic(Quadratic::WrapAround),
+        Self::Quadratic(Quadratic::Mixture),
+        Self::Quadratic(Quadratic::Average),
+        Self::Distance(Metric::Plain),
+        Self::Distance(Metric::Torus),
+        Self::Dispersion,
+        Self::NetQuality,
+        Self::Intervals,
+        Self::Spectrum,
+        Self::Pairs,
+    ];
+
+    /// The measure of a name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|m| m.name() == name)
+    }
+
+    /// Name on the command line and in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Star => "star",
+            Self::Extreme => "extreme",
+            Self::Quadratic(kind) => kind.name(),
+            Self::Distance(Metric::Plain) => "distance",
+            Self::Distance(Metric::Torus) => "torus-distance",
+            Self::Dispersion => "dispersion",
+            Self::NetQuality => "tvalue",
+            Self::Intervals => "intervals",
+            Self::Spectrum => "spectrum",
+            Self::Pairs => "pairs",
+        }
+    }
+
+    /// One line that says what it is.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::Star => "star discrepancy: largest error of a box at the origin; exact or bounds",
+            Self::Extreme => "extreme discrepancy, 2-D: largest error of any box",
+            Self::Quadratic(Quadratic::L2Star) => "L2-star discrepancy, root and square",
+            Self::Quadratic(Quadratic::Centered) => "centered L2 discrepancy, root and square",
+            Self::Quadratic(Quadratic::WrapAround) => "wrap-around L2 discrepancy, root and square",
+            Self::Quadratic(Quadratic::Mixture) => "mixture discrepancy, root and square",
+            Self::Quadratic(Quadratic::Average) => {
+                "L2-star averaged over all corners as origin, root and square"
+            }
+            Self::Distance(Metric::Plain) => "least distance between two points",
+            Self::Distance(Metric::Torus) => "least distance between two points on the torus",
+            Self::Dispersion => "area of the largest empty axis-parallel box, 2-D",
+            Self::NetQuality => "t of a (t, m, d)-net in base 2",
+            Self::Intervals => "shapes of elementary intervals with one point in each",
+            Self::Spectrum => "radial mean of the power spectrum, 2-D",
+            Self::Pairs => "star discrepancy of every pair of dimensions",
+        }
+    }
+}
+
+/// Highest frequency of a spectrum: twice that of a square grid of as many points, at most this.
+const HIGHEST_FREQUENCY: usize = 256;
+
+/// Measures a set of points within a budget.
+///
+/// # Errors
+/// The measure is not defined for such a set, or was not finished in time; both say what to change.
+pub fn measure(
+    points: &PointSet,
+    measure: Measure,
+    budget: &Budget,
+) -> Result<Value, DiscrepancyError> {
+    Ok(match measure {
+        Measure::Star => Value::Bracket(star(points, budget)),
+        Measure::Extreme => Value::Number(extreme_2d(points, budget)?),
+        Measure::Quadratic(kind) => Value::Square(quadratic(points, kind, budget)?),
+        Measure::Distance(metric) => {
+            let reason = "needs two points, there is one".to_owned();
+            let missing = DiscrepancyError::NotDefined {
+                measure: measure.name(),
+                reason,
+            };
+            Value::Number(minimum_distance(points, metric).ok_or(missing)?)
+        }
+        Measure::Dispersion => Value::Number(largest_empty_box(points, budget)?),
+        Measure::NetQuality => Value::Net(net_quality(points, budget)?),
+        Measure::Intervals => {
+            let (all, even) = elementary_shapes(points, budget)?;
+            Value::Shapes { all, even }
+        }
+        Measure::Spectrum => {
+            let highest = (2.0 * (points.len() as f64).sqrt()).ceil() as usize;
+            let highest = highest.clamp(1, HIGHEST_FREQUENCY);
+            Value::Spectrum(radial_spectrum(points, highest, budget)?)
+        }
+        Measure::Pairs => Value::Matrix(pairs(points, budget)?),
+    })
+}
+
+fn pairs(points: &PointSet, budget: &Budget) -> Result<Vec<Vec<Option<f64>>>, DiscrepancyError> {
+    let dim = points.dim();
+    let mut matrix = vec![vec![None; dim]; dim];
+    for (i, j) in (0..dim).flat_map(|i| (0..i).map(move |j| (i, j))) {
+        budget.check(Measure::Pairs.name())?;
+        let value = star(&points.project(&[j, i])?, budget).value();
+        matrix[i][j] = value;
+        matrix[j][i] = value;
+    }
+    Ok(matrix)
+}

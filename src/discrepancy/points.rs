@@ -1,0 +1,180 @@
+//! A set of points in the unit cube, and how it is read from text.
+
+use super::DiscrepancyError;
+
+/// N points in `[0, 1]^d`, N ≥ 1, d ≥ 1. Repeated points count as often as they are there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointSet {
+    dim: usize,
+    coordinates: Vec<f64>,
+}
+
+impl PointSet {
+    /// Points of `dim` coordinates, one after the other.
+    ///
+    /// # Errors
+    /// No point, a part of a point, or a coordinate that is NaN or outside `[0, 1]`.
+    pub fn new(dim: usize, coordinates: Vec<f64>) -> Result<Self, DiscrepancyError> {
+        if dim == 0 || !coordinates.len().is_multiple_of(dim) {
+            let count = coordinates.len();
+            return Err(DiscrepancyError::Ragged { count, dim });
+        }
+        if coordinates.is_empty() {
+            return Err(DiscrepancyError::Empty);
+        }
+        match coordinates.iter().position(|c| !(0.0..=1.0).contains(c)) {
+            None => Ok(Self { dim, coordinates }),
+            Some(at) => {
+                let index = at / dim;
+                let point = coordinates[index * dim..][..dim].to_vec();
+                Err(DiscrepancyError::Outside { index, point })
+            }
+        }
+    }
+
+    /// Points given one by one, all of `D` coordinates.
+    ///
+    /// # Errors
+    /// As [`PointSet::new`].
+    pub fn from_points<const D: usize>(points: &[[f64; D]]) -> Result<Self, DiscrepancyError> {
+        Self::new(D, points.as_flattened().to_vec())
+    }
+
+    /// Reads a point a line, coordinates parted by blanks, commas or tabs. Empty lines are passed
+    /// over, and so is the rest of a line after `#`.
+    ///
+    /// # Errors
+    /// [`DiscrepancyError::Line`] names the first line that is not a point of as many coordinates as
+    /// those before it, all in `[0, 1]`; [`DiscrepancyError::Empty`] if there is no point.
+    pub fn parse(text: &str) -> Result<Self, DiscrepancyError> {
+        let mut dim = 0;
+        let mut coordinates = Vec::new();
+        for (index, content) in text.lines().enumerate() {
+            let refuse = |reason: String| DiscrepancyError::Line {
+                line: index + 1,
+                reason,
+            };
+            let before = coordinates.len();
+            let content = content.split('#').next().unwrap_or_default();
+            for word in words(content) {
+                coordinates.push(coordinate(word).map_err(refuse)?);
+            }
+            let found = coordinates.len() - before;
+            if found == 0 {
+                continue;
+            }
+            if dim == 0 {
+                dim = found;
+            } else if found != dim {
+                let reason = format!("{found} coordinates, but the lines before have {dim}");
+                return Err(refuse(reason));
+            }
+        }
+        if coordinates.is_empty() {
+            return Err(DiscrepancyError::Empty);
+        }
+        Self::new(dim, coordinates)
+    }
+
+    /// Number of points.
+    #[expect(clippy::len_without_is_empty, reason = "a set is never empty")]
+    pub fn len(&self) -> usize {
+        self.coordinates.len() / self.dim
+    }
+
+    /// Number of dimensions.
+    pub fn dim(&self) -> usize {
+        self.dim
+    }
+
+    /// The points in order, each a slice of [`PointSet::dim`] coordinates.
+    pub fn points(&self) -> impl ExactSizeIterator<Item = &[f64]> + Clone {
+        self.coordinates.chunks_exact(self.dim)
+    }
+
+    /// One coordinate of all points, dimensions counted from 0.
+    pub(super) fn column(&self, dim: usize) -> Vec<f64> {
+        self.points().map(|p| p[dim]).collect()
+    }
+
+    /// The set of the given coordinates of all points, dimensions counted from 0.
+    ///
+    /// # Errors
+    /// A dimension that the points do not have.
+    pub fn project(&self, dims: &[usize]) -> Result<Self, DiscrepancyError> {
+        if let Some(&beyond) = dims.iter().find(|&&dim| dim >= self.dim) {
+            return Err(DiscrepancyError::NoSuchDimension {
+                dim: beyond + 1,
+                available: self.dim,
+            });
+        }
+        let select = |point: &'_ [f64]| dims.iter().map(|&dim| point[dim]).collect::<Vec<_>>();
+        Self::new(dims.len(), self.points().flat_map(select).collect())
+    }
+
+    /// The points as pairs, if they have two coordinates.
+    pub(super) fn pairs(&self) -> Option<&[[f64; 2]]> {
+        (self.dim == 2).then(|| self.coordinates.as_chunks().0)
+    }
+}
+
+fn words(line: &str) -> impl Iterator<Item = &str> {
+    let is_gap = |c: char| c.is_whitespace() || c == ',';
+    line.split(is_gap).filter(|word| !word.is_empty())
+}
+
+fn coordinate(word: &str) -> Result<f64, String> {
+    match word.parse::<f64>() {
+        Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
+        Ok(value) => Err(format!("coordinate {value} does not lie in [0, 1]")),
+        Err(_) => Err(format!("`{word}` is not a number")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blanks_commas_tabs_comments_and_empty_lines_are_understood() {
+        let text = "# x y\n0.25 0.5\n\n1,0 # corner\n0.125,\t1e-3\r\n";
+        let points = PointSet::parse(text).unwrap();
+        let expected = PointSet::from_points(&[[0.25, 0.5], [1.0, 0.0], [0.125, 0.001]]);
+        assert_eq!(Ok(points), expected);
+    }
+
+    #[test]
+    fn seventeen_digits_are_read_to_the_bit() {
+        let value = 0.1 + 0.2;
+        let points = PointSet::parse(&format!("{value:.16e}")).unwrap();
+        assert_eq!(points.column(0), [value]);
+    }
+
+    #[test]
+    fn a_bad_line_is_named() {
+        for (text, line, word) in [
+            ("0.5 0.5\n0.5\n", 2, "1 coordinates"),
+            ("0.5 NaN", 1, "NaN"),
+            ("\n\n0.5 1.5", 3, "1.5"),
+            ("0.5 -1e-9", 1, "-0.000000001"),
+            ("0.5 0.5\nhalf 0.5", 2, "`half`"),
+            ("inf 0", 1, "inf"),
+        ] {
+            let message = PointSet::parse(text).unwrap_err().to_string();
+            assert!(message.starts_with(&format!("line {line}:")), "{message}");
+            assert!(message.contains(word), "{message}");
+        }
+        for text in ["", "# nothing\n\n"] {
+            assert_eq!(PointSet::parse(text), Err(DiscrepancyError::Empty));
+        }
+    }
+
+    #[test]
+    fn projections_name_the_dimension_that_is_not_there() {
+        let points = PointSet::from_points(&[[0.1, 0.2, 0.3]]).unwrap();
+        let pair = points.project(&[2, 0]).unwrap();
+        assert_eq!(pair.pairs(), Some(&[[0.3, 0.1]][..]));
+        let message = points.project(&[0, 3]).unwrap_err().to_string();
+        assert_eq!(message, "dimension 4 is asked for, but the points have 3");
+    }
+}

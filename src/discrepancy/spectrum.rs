@@ -1,0 +1,103 @@
+//! Power spectrum of a point set in two dimensions.
+
+use super::{Budget, DiscrepancyError, PointSet};
+use std::f64::consts::TAU;
+
+const NAME: &str = "spectrum";
+
+/// Mean power `|Σ_i exp(−2πi k·x_i)|² / N` over the integer frequencies k whose length rounds to 1, 2, …,
+/// `highest`; element 0 is for frequency 1. White noise has power 1 on average.
+///
+/// Cost: 2·highest²·N multiplications of complex numbers.
+///
+/// # Errors
+/// The time of the budget is spent first; points that are not pairs.
+pub fn radial_spectrum(
+    points: &PointSet,
+    highest: usize,
+    budget: &Budget,
+) -> Result<Vec<f64>, DiscrepancyError> {
+    let Some(pairs) = points.pairs() else {
+        let reason = format!("needs points of 2 dimensions, these have {}", points.dim());
+        let measure = NAME;
+        return Err(DiscrepancyError::NotDefined { measure, reason });
+    };
+    let size = highest + 1;
+    let mut sums = vec![[0.0; 2]; size * (2 * size - 1)];
+    let (mut across, mut along) = (Vec::new(), Vec::new());
+    for (i, &[x, y]) in pairs.iter().enumerate() {
+        if i % 16 == 0 {
+            budget.check(NAME)?;
+        }
+        // Opposite frequencies have the same power: x from 0 up, y from -highest.
+        waves(&mut across, x, 0..=highest as i32);
+        waves(&mut along, y, -(highest as i32)..=highest as i32);
+        for (row, &[a, b]) in sums.chunks_exact_mut(along.len()).zip(&across) {
+            for (sum, &[c, d]) in row.iter_mut().zip(&along) {
+                sum[0] += a * c - b * d;
+                sum[1] += a * d + b * c;
+            }
+        }
+    }
+    let mut power = vec![0.0; size];
+    let mut weight = vec![0.0; size];
+    for (index, [re, im]) in sums.iter().enumerate() {
+        let (u, v) = (index / (2 * size - 1), index % (2 * size - 1));
+        let radius = (u as f64).hypot(v as f64 - highest as f64).round() as usize;
+        if radius <= highest {
+            // Those with u = 0 are in the table with their opposites.
+            let times = if u == 0 { 0.5 } else { 1.0 };
+            power[radius] += times * (re * re + im * im) / pairs.len() as f64;
+            weight[radius] += times;
+        }
+    }
+    let mean = |(power, weight): (&f64, &f64)| power / weight;
+    Ok(power.iter().zip(&weight).skip(1).map(mean).collect())
+}
+
+/// `exp(−2πi k x)` for each k: the angle is reduced first, so that high frequencies are as accurate
+/// as low ones.
+fn waves(out: &mut Vec<[f64; 2]>, x: f64, frequencies: std::ops::RangeInclusive<i32>) {
+    out.clear();
+    out.extend(frequencies.map(|k| {
+        let turns = f64::from(k) * x;
+        let (sin, cos) = (TAU * (turns - turns.round())).sin_cos();
+        [cos, -sin]
+    }));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::Random;
+    use super::*;
+
+    fn spectrum(points: &[[f64; 2]], highest: usize) -> Vec<f64> {
+        let set = PointSet::from_points(points).unwrap();
+        radial_spectrum(&set, highest, &Budget::seconds(60.0)).unwrap()
+    }
+
+    #[test]
+    fn a_square_grid_has_peaks_at_multiples_of_its_frequency_only() {
+        let grid: Vec<[f64; 2]> = (0..64)
+            .map(|i| [i % 8, i / 8].map(|c| f64::from(c) / 8.0))
+            .collect();
+        let power = spectrum(&grid, 9);
+        for (index, &p) in power.iter().enumerate() {
+            // At radius 8, (8, 0) and (0, ±8) are peaks of power 64.
+            assert_eq!(p > 1.0, index + 1 == 8, "{power:?}");
+            assert!(index + 1 == 8 || p < 1e-20, "{power:?}");
+        }
+    }
+
+    #[test]
+    fn one_point_and_random_points_have_power_one() {
+        for p in spectrum(&[[0.3, 0.7]], 12) {
+            assert!((p - 1.0).abs() < 1e-12, "{p}");
+        }
+        let mut random = Random(3);
+        let noise: Vec<_> = (0..512).map(|_| [random.unit(), random.unit()]).collect();
+        let power = spectrum(&noise, 24);
+        let mean = power.iter().sum::<f64>() / 24.0;
+        assert!((mean - 1.0).abs() < 0.2, "{mean}");
+    }
+}

@@ -1,0 +1,101 @@
+//! What a decorrelation is.
+
+use super::{Coordinate, Demand, Facts, SamplerTable};
+use crate::config::{ParameterSchema, Params};
+
+/// The sequence that a decorrelation is to work on.
+#[derive(Debug, Clone, Copy)]
+pub struct Partner<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// What is to be known of it.
+    pub facts: Facts,
+}
+
+impl Partner<'_> {
+    /// A reason to refuse a sequence whose pixels are independent already.
+    pub fn without_structure(&self) -> Option<String> {
+        let reason = || {
+            format!(
+                "{} draws independent numbers in every pixel, there is nothing to decorrelate; take none",
+                self.name
+            )
+        };
+        self.facts.independent.then(reason)
+    }
+
+    /// A reason to refuse a sequence whose structure exclusive or destroys.
+    pub fn not_base_2(&self) -> Option<String> {
+        let reason = || {
+            format!(
+                "it works on the binary digits of points, and {} is not digital in base 2; take \
+                 cranley-patterson",
+                self.name
+            )
+        };
+        (!self.facts.base_2).then(reason)
+    }
+
+    /// A reason to refuse a sequence whose index must not be moved.
+    pub fn not_extensible(&self) -> Option<String> {
+        let reason = || {
+            format!(
+                "it moves the index, and {} is good from its first point on only; take a shift",
+                self.name
+            )
+        };
+        (!self.facts.extensible).then(reason)
+    }
+}
+
+/// A decorrelation of pixels; one static per scheme, one line in the registry.
+pub trait Decorrelation: Sync {
+    /// Name as a user types it.
+    fn name(&self) -> &'static str;
+    /// One line: what it is and where it comes from.
+    fn description(&self) -> &'static str;
+    /// Module of the kernel, relative to the kernel folder.
+    fn kernel(&self) -> &'static str;
+    /// Parameters.
+    fn parameters(&self) -> ParameterSchema {
+        Vec::new()
+    }
+    /// Whether another seed gives other points.
+    fn is_random(&self) -> bool {
+        true
+    }
+    /// Whether it depends on how many samples are drawn.
+    fn by_count(&self, _params: &Params) -> bool {
+        false
+    }
+    /// Whether it depends on where the pixel lies in the image.
+    fn by_width(&self) -> bool {
+        false
+    }
+    /// Dimensions and samples it has; `None` is any number.
+    fn limits(&self, _params: &Params) -> [Option<u32>; 2] {
+        [None, None]
+    }
+    /// Why it makes no sense with this sequence, if so.
+    fn refusal(&self, params: &Params, partner: &Partner) -> Option<String>;
+    /// Words that the kernel reads by `decorrelation_word`.
+    ///
+    /// # Errors
+    /// A file cannot be read or holds something else, or the demand cannot be met: in words.
+    fn table(
+        &self,
+        _params: &Params,
+        _partner: &Partner,
+        _demand: &Demand,
+    ) -> Result<Vec<u32>, String> {
+        Ok(Vec::new())
+    }
+    /// Constants of `package::active::constants` that the kernel imports.
+    fn constants(&self, _params: &Params) -> Vec<(&'static str, u32)> {
+        Vec::new()
+    }
+    /// Twin of the kernel's `index`: which point of the sequence the sample takes.
+    fn index(&self, params: &Params, table: &SamplerTable, at: Coordinate) -> u32;
+    /// Twin of the kernel's `decorrelate`: moves the fraction `x` of 2³².
+    fn decorrelate(&self, x: u32, params: &Params, table: &SamplerTable, at: Coordinate) -> u32;
+}

@@ -1,0 +1,43 @@
+//! `digital-shift`: flips the same random bits in all points of a pixel and dimension. Twin of
+//! `kernels/sampling/digital_shift.wesl`.
+//!
+//! Source: P. L'Ecuyer, C. Lemieux, "Recent advances in randomized quasi-Monte Carlo methods", 2002;
+//! Kollig and Keller 2002 in rendering. It keeps nets in base 2, as Cranley and Patterson's shift does
+//! not, and leaves other structure in ruins.
+
+use super::hash::dimension_number;
+use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeding};
+use crate::config::{ParameterSchema, Params};
+
+/// The registry entry.
+pub struct DigitalShift;
+
+impl Decorrelation for DigitalShift {
+    fn name(&self) -> &'static str {
+        "digital-shift"
+    }
+
+    fn description(&self) -> &'static str {
+        "random bits flipped for each pixel and dimension, keeps nets in base 2 (L'Ecuyer & Lemieux 2002)"
+    }
+
+    fn kernel(&self) -> &'static str {
+        "sampling/digital_shift"
+    }
+
+    fn parameters(&self) -> ParameterSchema {
+        vec![Seeding::parameter()]
+    }
+
+    fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
+        partner.without_structure().or_else(|| partner.not_base_2())
+    }
+
+    fn index(&self, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+        at.sample
+    }
+
+    fn decorrelate(&self, x: u32, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+        x ^ dimension_number(at)
+    }
+}

@@ -1,0 +1,48 @@
+//! `disc-rotation`: turns the points on the disc by a random angle. Twin of
+//! `kernels/sampling/disc_rotation.wesl`.
+//!
+//! Source: Dufay 2017, §5.3.2. The hemisphere is sampled through the disc, whose angle is the second
+//! number of a pair: turning it is Cranley and Patterson's shift of odd dimensions alone. It leaves rings,
+//! since no radius changes.
+
+use super::hash::dimension_number;
+use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeding};
+use crate::config::{ParameterSchema, Params};
+
+/// The registry entry.
+pub struct DiscRotation;
+
+impl Decorrelation for DiscRotation {
+    fn name(&self) -> &'static str {
+        "disc-rotation"
+    }
+
+    fn description(&self) -> &'static str {
+        "a random turn of the disc of each pair of dimensions, leaves rings (Dufay 2017 §5.3.2)"
+    }
+
+    fn kernel(&self) -> &'static str {
+        "sampling/disc_rotation"
+    }
+
+    fn parameters(&self) -> ParameterSchema {
+        vec![Seeding::parameter()]
+    }
+
+    fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
+        let flat = partner.facts.dimensions == Some(1);
+        let reason = || format!("{} has one dimension, a disc has two", partner.name);
+        partner.without_structure().or_else(|| flat.then(reason))
+    }
+
+    fn index(&self, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+        at.sample
+    }
+
+    fn decorrelate(&self, x: u32, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+        if at.dimension & 1 == 0 {
+            return x;
+        }
+        x.wrapping_add(dimension_number(at))
+    }
+}

@@ -1,0 +1,61 @@
+//! `hammersley`: i / N, then radical inverses in prime bases. Twin of
+//! `kernels/sampling/hammersley.wesl`.
+//!
+//! Source: J. Hammersley, "Monte Carlo methods for solving multivariable problems", Ann. New York Acad.
+//! Sci. 86, 1960. The set is made for N points: a part of it is biased, so a run draws a set of its own
+//! for every number of samples. Words: N, the quotient and the remainder of 2³² / N, the bases.
+
+use super::primes::primes;
+use super::radical_inverse::radical_inverse;
+use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
+use crate::config::Params;
+
+/// The registry entry.
+pub struct Hammersley;
+
+const BASES: u32 = 3;
+
+impl Sequence for Hammersley {
+    fn name(&self) -> &'static str {
+        "hammersley"
+    }
+
+    fn description(&self) -> &'static str {
+        "i/N and radical inverses in prime bases, for N known beforehand (Hammersley 1960)"
+    }
+
+    fn kernel(&self) -> &'static str {
+        "sampling/hammersley"
+    }
+
+    fn facts(&self, _: &Params) -> Facts {
+        Facts {
+            by_count: true,
+            dimensions: Some(256),
+            // Up to here i · (2³² mod N) fits a word.
+            samples: Some(1 << 16),
+            ..Facts::default()
+        }
+    }
+
+    fn table(&self, _: &Params, demand: &Demand) -> Vec<u32> {
+        let count = u64::from(demand.samples.unwrap_or(1).max(1));
+        let whole = 1_u64 << 32;
+        let mut words = vec![count as u32, (whole / count) as u32, (whole % count) as u32];
+        words.extend(primes(demand.dimensions.saturating_sub(1) as usize));
+        words
+    }
+
+    /// i / N rounded down: i · 2³² / N in two parts.
+    fn sequence(&self, _: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
+        if at.dimension == 0 {
+            let count = table.sequence_word(0);
+            let part = at.sample.wrapping_mul(table.sequence_word(2)) / count;
+            return at
+                .sample
+                .wrapping_mul(table.sequence_word(1))
+                .wrapping_add(part);
+        }
+        radical_inverse(at.sample, table.sequence_word(BASES + at.dimension - 1))
+    }
+}

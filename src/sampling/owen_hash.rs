@@ -1,0 +1,47 @@
+//! `owen-hash`: nested uniform scrambling of index and digits by hashes. Twin of
+//! `kernels/sampling/owen_hash.wesl`.
+//!
+//! Source: A. Owen, "Randomly permuted (t, m, s)-nets and (t, s)-sequences", 1995, by the hash of
+//! [`super::owen`]. The index is scrambled as well (B. Burley 2020), so that pixels differ in order and
+//! not in place alone; blocks of 2^m samples stay blocks.
+
+use super::hash::{dimension_number, pixel_number};
+use super::owen::owen_scramble;
+use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeding};
+use crate::config::{ParameterSchema, Params};
+
+/// The registry entry.
+pub struct OwenHash;
+
+impl Decorrelation for OwenHash {
+    fn name(&self) -> &'static str {
+        "owen-hash"
+    }
+
+    fn description(&self) -> &'static str {
+        "Owen scrambling and a nested shuffle of the index, by hashing, for each pixel (Burley 2020; Vegdahl 2021)"
+    }
+
+    fn kernel(&self) -> &'static str {
+        "sampling/owen_hash"
+    }
+
+    fn parameters(&self) -> ParameterSchema {
+        vec![Seeding::parameter()]
+    }
+
+    fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
+        let refused = partner.without_structure();
+        refused
+            .or_else(|| partner.not_base_2())
+            .or_else(|| partner.not_extensible())
+    }
+
+    fn index(&self, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+        owen_scramble(at.sample, pixel_number(at))
+    }
+
+    fn decorrelate(&self, x: u32, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+        owen_scramble(x, dimension_number(at))
+    }
+}

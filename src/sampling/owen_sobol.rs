@@ -1,0 +1,73 @@
+//! `owen-sobol`: Sobol points in an order and with digits scrambled by hashes. Twin of
+//! `kernels/sampling/owen_sobol.wesl`.
+//!
+//! Source: B. Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020, as the crate
+//! `sobol_burley` computes it: the numbers of a pixel are `sobol_burley::sample(sample, dimension,
+//! pixel_number)` to the bit. Words: 16 direction numbers a dimension, bits in reverse order, which is
+//! why 2¹⁶ samples are its limit.
+
+use super::hash::pixel_number;
+use super::owen::{owen_key, scramble_reversed};
+use super::sobol::direction_numbers;
+use super::{Coordinate, Demand, Facts, SamplerTable, Seeding, Sequence};
+use crate::config::{ParameterSchema, Params};
+
+/// The registry entry.
+pub struct OwenSobol;
+
+const BITS: usize = 16;
+const INDEX_KEY: u32 = 0x79c6_8e4a;
+const SEED_FACTOR: u32 = 0x9c8f_2d3b;
+
+impl Sequence for OwenSobol {
+    fn name(&self) -> &'static str {
+        "owen-sobol"
+    }
+
+    fn description(&self) -> &'static str {
+        "Sobol points Owen-scrambled and shuffled by hashing, as the crate sobol_burley (Burley 2020)"
+    }
+
+    fn kernel(&self) -> &'static str {
+        "sampling/owen_sobol"
+    }
+
+    fn parameters(&self) -> ParameterSchema {
+        vec![Seeding::parameter()]
+    }
+
+    fn facts(&self, params: &Params) -> Facts {
+        Facts {
+            random: true,
+            independent: Seeding::of(params) == Seeding::PixelSample,
+            base_2: true,
+            dimensions: Some(256),
+            samples: Some(1 << BITS),
+            ..Facts::default()
+        }
+    }
+
+    fn table(&self, _: &Params, demand: &Demand) -> Vec<u32> {
+        let numbers = direction_numbers(demand.dimensions, BITS);
+        numbers.into_iter().map(u32::reverse_bits).collect()
+    }
+
+    fn sequence(&self, _: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
+        let seed = pixel_number(at);
+        let index = scramble_reversed(at.sample.reverse_bits(), owen_key(seed ^ INDEX_KEY));
+        let mut rest = index & 0xffff_0000;
+        let mut column = at.dimension * BITS as u32;
+        let mut x = 0;
+        while rest > 0 {
+            if rest & 0x8000_0000 != 0 {
+                x ^= table.sequence_word(column);
+            }
+            rest <<= 1;
+            column += 1;
+        }
+        let lanes = [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8];
+        let lane: u32 = lanes[at.dimension as usize & 3];
+        let key = (at.dimension >> 2) ^ seed.wrapping_mul(SEED_FACTOR) ^ lane;
+        scramble_reversed(x, owen_key(key)).reverse_bits()
+    }
+}

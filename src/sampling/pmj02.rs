@@ -1,0 +1,63 @@
+//! `pmj02`: progressive multi-jittered (0, 2) points from a table. Twin of `kernels/sampling/pmj02.wesl`.
+//!
+//! Every prefix of 2^m points has one point in each elementary interval of area 2^-m. Words: the number
+//! of points less one, then for each pair of dimensions a set of its own, x and y by turns.
+
+use super::pmj02_points::pmj02_points;
+use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
+use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+
+/// The registry entry.
+pub struct Pmj02;
+
+impl Sequence for Pmj02 {
+    fn name(&self) -> &'static str {
+        "pmj02"
+    }
+
+    fn description(&self) -> &'static str {
+        "progressive multi-jittered (0,2) points, a random set for each pair of dimensions (Christensen et al. 2018)"
+    }
+
+    fn kernel(&self) -> &'static str {
+        "sampling/pmj02"
+    }
+
+    fn parameters(&self) -> ParameterSchema {
+        vec![Parameter {
+            name: "set",
+            description: "seed of the generator: which of the random sets",
+            default: ParamValue::Integer(1),
+            range: ParamRange::Integer {
+                min: 0,
+                max: 65_535,
+            },
+        }]
+    }
+
+    fn facts(&self, _: &Params) -> Facts {
+        Facts {
+            base_2: true,
+            dimensions: Some(128),
+            samples: Some(1 << 16),
+            ..Facts::default()
+        }
+    }
+
+    fn table(&self, params: &Params, demand: &Demand) -> Vec<u32> {
+        let count = demand.samples.unwrap_or(4096).max(1).next_power_of_two();
+        let set = params.integer("set") as u32;
+        let mut words = vec![count - 1];
+        for pair in 0..demand.dimensions.div_ceil(2) {
+            let points = pmj02_points(count, set << 8 | pair);
+            words.extend(points.into_iter().flatten());
+        }
+        words
+    }
+
+    fn sequence(&self, _: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
+        let last = table.sequence_word(0);
+        let point = (at.dimension >> 1) * (last + 1) + (at.sample & last);
+        table.sequence_word(1 + 2 * point + (at.dimension & 1))
+    }
+}

@@ -1,0 +1,135 @@
+//! Generates progressive multi-jittered (0, 2) points.
+//!
+//! Source: P. Christensen, A. Kensler, C. Kilpatrick, "Progressive multi-jittered sample sequences",
+//! EGSR 2018, for the order of the cells; M. Pharr, "Efficient generation of points that satisfy
+//! two-dimensional elementary intervals", JCGT 8(1), 2019, for choosing the digits of x and y apart.
+
+/// Which elementary intervals of area 2^-m hold a point: bit column · rows + row of shape k, which has
+/// 2^k columns and 2^(m−k) rows.
+struct Occupancy {
+    m: u32,
+    shapes: Vec<Vec<bool>>,
+}
+
+/// The first `bits` bits of a fraction of 2³².
+fn leading(x: u32, bits: u32) -> u32 {
+    if bits == 0 { 0 } else { x >> (32 - bits) }
+}
+
+impl Occupancy {
+    fn new(m: u32, points: &[[u32; 2]]) -> Self {
+        let shapes = vec![vec![false; 1 << m]; m as usize + 1];
+        let mut out = Self { m, shapes };
+        points.iter().for_each(|point| out.insert(*point));
+        out
+    }
+
+    fn cell(&self, columns: u32, [x, y]: [u32; 2]) -> usize {
+        let rows = self.m - columns;
+        (leading(x, columns) << rows | leading(y, rows)) as usize
+    }
+
+    fn insert(&mut self, point: [u32; 2]) {
+        for columns in 0..=self.m {
+            let cell = self.cell(columns, point);
+            self.shapes[columns as usize][cell] = true;
+        }
+    }
+
+    fn is_free(&self, columns: u32, point: [u32; 2]) -> bool {
+        !self.shapes[columns as usize][self.cell(columns, point)]
+    }
+}
+
+/// A random stream: SplitMix64 (G. Steele, D. Lea, C. Flood 2014), upper half.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 32) as u32
+    }
+}
+
+/// A point in the cell of `corner`, whose first `x_bits` and `y_bits` digits (m together) are given.
+///
+/// The interval of x's first k + 1 digits and y's first m − k − 1 depends on no later digit of either,
+/// so the digits are chosen one after the other. Its two halves came from two intervals with one point
+/// each, so one of them is always free.
+fn place(occupied: &Occupancy, corner: [u32; 2], x_bits: u32, random: &mut Random) -> [u32; 2] {
+    let m = occupied.m;
+    let mut point = corner;
+    for axis in [0, 1] {
+        let first = if axis == 0 { x_bits } else { m - x_bits };
+        let below = |bits: u32| u32::MAX.checked_shr(bits).unwrap_or(0);
+        let mut digits = corner[axis] & !below(first);
+        for bit in first..m {
+            let columns = if axis == 0 { bit + 1 } else { m - bit - 1 };
+            let set = 0x8000_0000 >> bit;
+            let with = |digits| {
+                let mut at = corner;
+                at[axis] = digits;
+                at
+            };
+            let free = [digits, digits | set].map(|d| occupied.is_free(columns, with(d)));
+            let choose_set = match free {
+                [true, true] => random.next() >> 31 == 1,
+                [zero, _] => !zero,
+            };
+            digits |= u32::from(choose_set) * set;
+        }
+        point[axis] = digits | random.next() & below(m);
+    }
+    point
+}
+
+/// `count` points (a power of two), of which every prefix of 2^m is a (0, m, 2)-net in base 2.
+pub(super) fn pmj02_points(count: u32, seed: u32) -> Vec<[u32; 2]> {
+    let mut random = Random(u64::from(seed) << 32);
+    let mut points = vec![[random.next(), random.next()]];
+    let mut k = 0;
+    // From 4^k points to 4^(k+1): first into the opposite quarter of each point's cell, then into
+    // either of the two left, at last opposite of those.
+    while points.len() < count as usize {
+        let half = 0x8000_0000 >> k;
+        let before = points.len();
+        let mut occupied = Occupancy::new(2 * k + 1, &points);
+        for i in 0..before {
+            let [x, y] = points[i];
+            let point = place(&occupied, [x ^ half, y ^ half], k + 1, &mut random);
+            occupied.insert(point);
+            points.push(point);
+        }
+        if points.len() == count as usize {
+            break;
+        }
+        let mut occupied = Occupancy::new(2 * k + 2, &points);
+        for i in 0..before {
+            let [x, y] = points[i];
+            let turned = if random.next() >> 31 == 1 {
+                [half, 0]
+            } else {
+                [0, half]
+            };
+            let point = place(
+                &occupied,
+                [x ^ turned[0], y ^ turned[1]],
+                k + 1,
+                &mut random,
+            );
+            occupied.insert(point);
+            points.push(point);
+        }
+        for i in 2 * before..3 * before {
+            let [x, y] = points[i];
+            let point = place(&occupied, [x ^ half, y ^ half], k + 1, &mut random);
+            occupied.insert(point);
+            points.push(point);
+        }
+        k += 1;
+    }
+    points
+}

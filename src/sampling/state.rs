@@ -1,0 +1,52 @@
+//! What a draw depends on, and the words that sequence and decorrelation read. Twin of
+//! `kernels/sampling/state.wesl`.
+
+/// What one coordinate is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Coordinate {
+    /// Linear pixel index.
+    pub pixel: u32,
+    /// Sample within the pixel.
+    pub sample: u32,
+    /// Dimension, see [`super::dimensions`].
+    pub dimension: u32,
+    /// Seed of the replicate.
+    pub seed: u32,
+}
+
+/// Words before those of the sequence: where the words of the decorrelation begin.
+const HEADER: u32 = 1;
+
+/// The words that kernels read as `sampler_table`: the header, the sequence's, the decorrelation's.
+/// Lengths are data, not constants, so that neither the number of samples nor that of dimensions
+/// makes another kernel.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SamplerTable(Vec<u32>);
+
+impl SamplerTable {
+    pub(super) fn new(sequence: &[u32], decorrelation: &[u32]) -> Self {
+        let header = [HEADER + sequence.len() as u32];
+        Self([&header, sequence, decorrelation].concat())
+    }
+
+    /// All words, as the device gets them.
+    pub fn words(&self) -> &[u32] {
+        &self.0
+    }
+
+    /// Word `i` of the sequence.
+    ///
+    /// # Panics
+    /// Beyond the table: a dimension that the sampler was not made for.
+    pub fn sequence_word(&self, i: u32) -> u32 {
+        self.0[HEADER as usize + i as usize]
+    }
+
+    /// Word `i` of the decorrelation.
+    ///
+    /// # Panics
+    /// Beyond the table.
+    pub fn decorrelation_word(&self, i: u32) -> u32 {
+        self.0[self.0[0] as usize + i as usize]
+    }
+}
