@@ -7,7 +7,14 @@ use std::path::{Path, PathBuf};
 /// Kernel file → Rust file, where the stem differs.
 const OTHER_FILE: &[(&str, &str)] = &[
     ("accel/grid", "src/accel/grid/mod.rs"),
+    ("accel/instance", "src/accel/instancing/instance.rs"),
     ("accel/irregular_grid", "src/accel/irregular_grid/mod.rs"),
+    ("accel/meta_bvh", "src/accel/instancing/meta_bvh.rs"),
+    (
+        "accel/meta_bvh_nested",
+        "src/accel/instancing/meta_bvh_nested.rs",
+    ),
+    ("accel/object_list", "src/accel/instancing/object_list.rs"),
     ("sampling/sampler", "src/sampling/mod.rs"),
 ];
 

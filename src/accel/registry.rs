@@ -23,6 +23,8 @@ impl Default for AccelRegistry {
                 &super::IrregularGrid,
                 &Octree,
                 &KdTree,
+                &super::ObjectList,
+                &super::MetaBvh,
             ],
         }
     }

@@ -172,7 +172,7 @@ impl BuiltBvh {
 }
 
 /// Whether every leaf fits into a reference.
-fn check_leaves(tree: &Tree) -> Result<(), AccelError> {
+pub(super) fn check_leaves(tree: &Tree) -> Result<(), AccelError> {
     let count = |kind: &NodeKind| match kind {
         NodeKind::Inner { .. } => 0,
         NodeKind::Leaf { count, .. } => *count,

@@ -170,9 +170,7 @@ mod tests {
             Vec3::new(4.0, 2.0, 0.0),
             Vec3::new(0.0, 2.0, 8.0),
         ];
-        TriangleSoup {
-            records: vec![TriangleRecord::new(&Triangle { vertices }, 0, 0)],
-        }
+        vec![TriangleRecord::new(&Triangle { vertices }, 0, 0)].into()
     }
 
     fn slab(from: [f32; 3], to: [f32; 3]) -> Bounds {

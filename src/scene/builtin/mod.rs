@@ -5,6 +5,7 @@
 mod cornell_box;
 mod displaced_sphere;
 mod furnace;
+mod instances;
 pub(super) mod numeric;
 mod single_triangle;
 mod sphere;
@@ -30,6 +31,7 @@ const BUILTINS: [Builtin; 7] = [
     displaced_sphere::SCENE,
     triangle_soup::SCENE,
     teapot_in_a_stadium::SCENE,
+    instances::SCENE,
     furnace::FURNACE_BOX,
     furnace::WHITE_FURNACE,
     single_triangle::SCENE,
