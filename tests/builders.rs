@@ -447,6 +447,7 @@ fn triangles_are_built_from_the_vertices_that_kernels_see() {
     let record = TriangleRecord::new(&Triangle { vertices }, 0, 0);
     let soup = TriangleSoup {
         records: vec![record],
+        ..Default::default()
     };
     for name in builders() {
         let tree = build(&soup, &with_builder(name, &[]));

@@ -309,6 +309,7 @@ mod tests {
             );
             let soup = TriangleSoup {
                 records: vec![record, far],
+                ..Default::default()
             };
             let grid = Grid::new(&Frame::new(&soup), [9, 7, 8]);
             let listed = |exact: bool| {

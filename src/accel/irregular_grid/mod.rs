@@ -425,6 +425,7 @@ mod tests {
         });
         TriangleSoup {
             records: records.collect(),
+            ..Default::default()
         }
     }
 

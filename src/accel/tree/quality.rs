@@ -257,6 +257,7 @@ mod tests {
                 record(0, [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]]),
                 record(1, [[0.0, 0.0, 0.0], [1.0, 0.0, 3.0], [1.0, 1.0, 3.0]]),
             ],
+            ..Default::default()
         };
         let [a, b] = [0, 1].map(|i| soup.records[i].bounds());
         let leaf = |first| NodeKind::Leaf { first, count: 1 };

@@ -26,7 +26,7 @@ struct Builtin {
 }
 
 /// The registry.
-const BUILTINS: [Builtin; 7] = [
+const BUILTINS: [Builtin; 8] = [
     cornell_box::SCENE,
     displaced_sphere::SCENE,
     triangle_soup::SCENE,
