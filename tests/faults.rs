@@ -53,10 +53,10 @@ const FAULTS: &[Fault] = &[
         structures: &["bvh"],
     },
     Fault {
-        what: "ropes skip one node too many",
+        what: "a leaf ends the walk along the ropes",
         file: "accel/bvh/roped",
         from: "let rope = high.w;",
-        to: "let rope = select(high.w + 1u, NONE, high.w == NONE);",
+        to: "let rope = select(NONE, high.w, enter == MISSED || low.w < LEAF);",
         structures: &["roped-bvh"],
     },
     Fault {

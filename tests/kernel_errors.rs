@@ -10,6 +10,8 @@ fn composition(structure: &str) -> Composition {
         .with("decorrelation", "sampling/cranley_patterson")
         .with("integrator", "integrator/path")
         .constant("STACK_ENTRIES", 32)
+        .constant("SHARED_SEQUENCE", 0)
+        .constant("SHARED_DECORRELATION", 0)
         .constant("MAX_DEPTH", 4);
     for feature in ["textures", "emitters", "mirrors", "environment"] {
         out = out.feature(feature, true);
