@@ -478,7 +478,8 @@ fn a_grid_over_its_cap_says_so_with_both_numbers() {
         [Vec3::ZERO, Vec3::new(1.0, x, 1.0), Vec3::new(x, 1.0, 1.0)]
     }));
     let number = |x: f64| ParamValue::Number(x);
-    let cases: [(&str, &str, &TriangleSoup, Vec<(&str, ParamValue)>); 4] = [
+    type Changes = Vec<(&'static str, ParamValue)>;
+    let cases: [(&str, &str, &TriangleSoup, Changes); 4] = [
         (
             "uniform-grid",
             "cells",

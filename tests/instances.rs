@@ -144,7 +144,8 @@ fn structures_equal_brute_force_over_instances_and_count_like_their_twins() {
     if !common::is_exact(common::gpu()) {
         return;
     }
-    let sorts: [(&str, usize, fn(&mut Pcg) -> Transform); 4] = [
+    type Draw = fn(&mut Pcg) -> Transform;
+    let sorts: [(&str, usize, Draw); 4] = [
         ("one", 1, lattice_transform),
         ("lattice", 30, lattice_transform),
         ("wild", 30, wild_transform),

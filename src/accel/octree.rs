@@ -122,10 +122,10 @@ impl Space {
         }
         let bounds = soup.bounds();
         let mut extent = bounds.extent();
-        for axis in 0..3 {
+        for (axis, side) in extent.iter_mut().enumerate() {
             // The difference is rounded.
-            while bounds.min[axis] + extent[axis] < bounds.max[axis] {
-                extent[axis] = extent[axis].next_up();
+            while bounds.min[axis] + *side < bounds.max[axis] {
+                *side = side.next_up();
             }
         }
         Self {

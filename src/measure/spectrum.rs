@@ -150,7 +150,7 @@ fn roots_of_one(n: usize) -> Vec<Complex> {
 /// lines of every p-th value. `roots` are those of the whole line or of a multiple of its length.
 fn transform(line: &[Complex], roots: &[Complex]) -> Vec<Complex> {
     let n = line.len();
-    let p = (2..=n).find(|p| n % p == 0).unwrap_or(1);
+    let p = (2..=n).find(|p| n.is_multiple_of(*p)).unwrap_or(1);
     if p == 1 {
         return line.to_vec();
     }

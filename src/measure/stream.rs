@@ -219,12 +219,14 @@ mod tests {
                 let points: Vec<_> = (0..1024)
                     .map(|_| [generator.uniform(), generator.uniform()])
                     .collect();
-                let mut figures = SeedFigures::default();
-                figures.squared_errors = functions()
-                    .iter()
-                    .map(|(_, f)| squared_errors(f, &points, &counts))
-                    .collect();
-                figures
+                let errors = functions();
+                let errors = errors.iter();
+                SeedFigures {
+                    squared_errors: errors
+                        .map(|(_, f)| squared_errors(f, &points, &counts))
+                        .collect(),
+                    ..Default::default()
+                }
             })
             .collect();
         for figures in integrands(&counts, &seeds) {

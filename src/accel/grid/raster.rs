@@ -109,8 +109,9 @@ fn margin_of(record: &TriangleRecord) -> f64 {
     ];
     let third = std::array::from_fn(|a| e[a] + f[a]);
     let longest = square(e).max(square(f)).max(square(third));
-    // Not clamp: a point has no width either, and max takes the number.
-    (longest / square(normal).sqrt()).max(1.0).min(1e6)
+    let ratio = longest / square(normal).sqrt();
+    // A point has no width either: 0 / 0.
+    if ratio > 1.0 { ratio.min(1e6) } else { 1.0 }
 }
 
 /// A triangle in units of cells, and by how much cells are grown.

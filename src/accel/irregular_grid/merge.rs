@@ -81,7 +81,7 @@ impl<'a> State<'a> {
             return;
         }
         let pairs = self.pairs(&wishes);
-        let joined: Vec<(Vec<(u32, u32)>, Vec<u32>)> = pairs
+        let joined: Vec<_> = pairs
             .par_chunks(1024)
             .map(|some| self.unions(some))
             .collect();
