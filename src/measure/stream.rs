@@ -219,12 +219,14 @@ mod tests {
                 let points: Vec<_> = (0..1024)
                     .map(|_| [generator.uniform(), generator.uniform()])
                     .collect();
-                let mut figures = SeedFigures::default();
-                figures.squared_errors = functions()
+                let squared_errors = functions()
                     .iter()
                     .map(|(_, f)| squared_errors(f, &points, &counts))
                     .collect();
-                figures
+                SeedFigures {
+                    squared_errors,
+                    ..SeedFigures::default()
+                }
             })
             .collect();
         for figures in integrands(&counts, &seeds) {
