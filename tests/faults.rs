@@ -67,6 +67,20 @@ const FAULTS: &[Fault] = &[
         structures: &["uniform-grid"],
     },
     Fault {
+        what: "the far child of a two-level structure is dropped",
+        file: "accel/meta_bvh",
+        from: "push(&stack, children.far);",
+        to: "",
+        structures: &["meta-bvh"],
+    },
+    Fault {
+        what: "the last instance is forgotten",
+        file: "accel/object_list",
+        from: "i < limits.elements; i++",
+        to: "i + 1u < limits.elements; i++",
+        structures: &["object-list"],
+    },
+    Fault {
         what: "the walk stops at the first leaf with a hit",
         file: "accel/kd_tree",
         from: "if (enter > hit.t * END_PAD)",

@@ -298,9 +298,7 @@ fn a_single_wrong_bit_in_a_hit_is_seen() {
 fn validation_refuses_structures_that_were_built_for_other_triangles() {
     let mut rng = Pcg::new(8);
     let soup = scenes::lattice_soup(&mut rng, 120, 9);
-    let without_last = TriangleSoup {
-        records: soup.records[..119].to_vec(),
-    };
+    let without_last = TriangleSoup::from(soup.records[..119].to_vec());
     let mut with_more = soup.clone();
     with_more.records.push(TriangleRecord {
         id: 120,

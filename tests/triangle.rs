@@ -55,9 +55,7 @@ fn brute_force_agrees_with_exact_integer_arithmetic() {
         let soup = scenes::lattice_soup(&mut rng, 24, extent);
         for ray in scenes::lattice_rays(&mut rng, 64, extent) {
             for record in &soup.records {
-                let alone = TriangleSoup {
-                    records: vec![*record],
-                };
+                let alone = TriangleSoup::from(vec![*record]);
                 let hit = brute_force(&alone, &[ray])[0];
                 let found = hit.triangle != NO_HIT;
                 match exactly(record, &ray) {

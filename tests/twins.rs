@@ -7,7 +7,14 @@ use std::path::{Path, PathBuf};
 /// Kernel file → Rust file, where the stem differs.
 const OTHER_FILE: &[(&str, &str)] = &[
     ("accel/grid", "src/accel/grid/mod.rs"),
+    ("accel/instance", "src/accel/instancing/instance.rs"),
     ("accel/irregular_grid", "src/accel/irregular_grid/mod.rs"),
+    ("accel/meta_bvh", "src/accel/instancing/meta_bvh.rs"),
+    (
+        "accel/meta_bvh_nested",
+        "src/accel/instancing/meta_bvh_nested.rs",
+    ),
+    ("accel/object_list", "src/accel/instancing/object_list.rs"),
     ("sampling/sampler", "src/sampling/mod.rs"),
 ];
 
@@ -23,6 +30,10 @@ const NO_TWIN: &[(&str, &str)] = &[
     ),
     ("accel/stack", "the twins have vectors"),
     ("common/lane", "an invocation's place in its workgroup"),
+    (
+        "common/texels",
+        "arrays as textures; tests/kernels.rs compares the length of a row",
+    ),
     ("common/errors", "writes the error word on the device"),
     ("common/limits", "a uniform, filled by name"),
     ("common/probe", "compared with the host in src/gpu/probe.rs"),
@@ -58,6 +69,10 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
     ),
     ("accel/bounds", "MISSED", "the twin returns an Option"),
     ("accel/leaf", "leaf_words", "parts of an array"),
+    ("accel/cwbvh", "node_word", "parts of an array"),
+    ("accel/cwbvh", "triangle_word", "parts of an array"),
+    ("accel/bvh4", "node_word", "parts of an array"),
+    ("accel/bvh4", "triangle_word", "parts of an array"),
     (
         "accel/bvh/short_stack",
         "level_bit",
@@ -104,6 +119,15 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
         "the judge, in batches",
     ),
     ("accel/bvh", "layout", "build"),
+    ("accel/bvh4", "child", "one expression of the kernel"),
+    ("accel/bvh4", "pack", "build"),
+    ("accel/cwbvh", "arrange_by_octant", "build"),
+    ("accel/cwbvh", "pack", "build"),
+    ("accel/wide", "exponent", "build"),
+    ("accel/wide", "node_limit", "build"),
+    ("accel/wide", "wide_arrays", "binds"),
+    ("accel/wide", "wide_parameters", "parameters"),
+    ("accel/wide", "wide_tree", "build"),
     ("accel/kd_tree", "halves", "figures and validation"),
     ("accel/kd_tree", "lacking_in_leaf", "validation"),
     ("accel/roped_bvh", "ropes", "build"),

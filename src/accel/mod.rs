@@ -5,9 +5,11 @@
 pub mod bounds;
 mod brute_force;
 mod bvh;
+mod bvh4;
 mod collapse;
 mod cwbvh;
 mod grid;
+pub mod instancing;
 mod irregular_grid;
 mod kd_tree;
 pub mod leaf;
@@ -23,7 +25,9 @@ mod wide;
 
 pub use brute_force::{BruteForce, brute_force_hits};
 pub use bvh::{BuiltBvh, Bvh, BvhTwin, RopedBvh};
+pub use bvh4::Bvh4;
 pub use cwbvh::Cwbvh;
+pub use instancing::{InstanceJudge, MetaBvh, ObjectList, Placed, brute_force_instances};
 pub use irregular_grid::IrregularGrid;
 pub use kd_tree::KdTree;
 pub use octree::Octree;
@@ -36,6 +40,7 @@ use crate::config::{ParameterSchema, Params};
 use crate::gpu::{Composition, UniformValues};
 use crate::measure::record::{Phase, StructureStats};
 use crate::scene::SceneData;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::time::Instant;
 use thiserror::Error;
@@ -67,6 +72,18 @@ pub enum AccelError {
 pub struct TriangleSoup {
     /// Record `i` is triangle `i` of the scene.
     pub records: Vec<TriangleRecord>,
+    /// What they are copies of, if the scene consists of instances.
+    pub placed: Option<Placed>,
+}
+
+impl From<Vec<TriangleRecord>> for TriangleSoup {
+    /// Triangles that are no copies.
+    fn from(records: Vec<TriangleRecord>) -> Self {
+        Self {
+            records,
+            placed: None,
+        }
+    }
 }
 
 impl TriangleSoup {
@@ -79,7 +96,10 @@ impl TriangleSoup {
             .enumerate()
             .map(|(id, (triangle, material))| TriangleRecord::new(triangle, id as u32, *material))
             .collect();
-        Self { records }
+        Self {
+            records,
+            placed: scene.assembly.as_ref().map(Placed::new),
+        }
     }
 
     /// Box around all triangles; [`bounds::Bounds::EMPTY`] if there are none.
@@ -230,6 +250,20 @@ pub trait AccelKind: Sync {
     ) -> Result<Box<dyn BuiltAccel>, AccelError>;
 }
 
+/// In which space a structure meets triangles, and so which judge it has to equal to the bit.
+#[derive(
+    Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Space {
+    /// World space: the flat list of triangles.
+    #[default]
+    World,
+    /// The space of each instance's object: rays are transformed, triangles are not. Rounding then
+    /// differs from the flat list's.
+    Instances,
+}
+
 /// A built structure.
 pub trait BuiltAccel: Sync {
     /// Checks structural invariants: reachability, containment, depth, ranges.
@@ -246,6 +280,18 @@ pub trait BuiltAccel: Sync {
     }
     /// Static figures.
     fn stats(&self) -> StructureStats;
+    /// Where triangles are met.
+    fn space(&self) -> Space {
+        Space::World
+    }
+    /// Takes over the transforms of the same instances from `soup`, rebuilding only what depends on
+    /// them; `None` if a full build is needed.
+    ///
+    /// # Errors
+    /// `soup` has other instances or objects.
+    fn update(&mut self, _soup: &TriangleSoup) -> Option<Result<(), AccelError>> {
+        None
+    }
     /// The traversal on the host, if it has one.
     fn cpu_twin<'a>(&'a self, _soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
         None

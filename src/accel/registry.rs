@@ -16,12 +16,15 @@ impl Default for AccelRegistry {
                 &BruteForce,
                 &super::Bvh,
                 &RopedBvh,
+                &super::Bvh4,
                 &super::Cwbvh,
                 &UniformGrid,
                 &super::TwoLevelGrid,
                 &super::IrregularGrid,
                 &Octree,
                 &KdTree,
+                &super::ObjectList,
+                &super::MetaBvh,
             ],
         }
     }

@@ -9,6 +9,7 @@ mod failure;
 mod list;
 mod output;
 mod points;
+mod points_plot;
 mod render;
 mod report;
 mod run;

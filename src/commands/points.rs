@@ -6,6 +6,7 @@ use super::output::print;
 use anyhow::anyhow;
 use clap::Args;
 use raystone::config::{Axis, Catalogue, Entry, Experiment, Variant, nearest};
+use raystone::gpu::Gpu;
 use raystone::run::{Registries, dump_stream, open_gpu};
 use raystone::sampling::{Coordinate, Demand, Sampler};
 use std::fmt::Write as _;
@@ -19,7 +20,7 @@ const BATCH: usize = 1 << 18;
 const DEFAULTS: &str =
     "[axes]\nscene = [\"cornell-box\"]\naccel = [\"bvh\"]\nsequence = [\"sobol\"]\n";
 
-/// Print the points of a sampler, one a line
+/// Print the points of a sampler, one a line, or draw them
 ///
 /// A number is the 32-bit fraction that kernel and scalar twin agree on, with 17 significant digits; the
 /// renderer draws its upper 24 bits.
@@ -33,23 +34,29 @@ pub struct Points {
     decorrelation: String,
     /// Number of points
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    count: u32,
+    pub(super) count: u32,
     /// Dimensions of each point
     #[arg(long, value_name = "D,…", value_delimiter = ',', default_value = "0,1")]
-    dims: Vec<u32>,
+    pub(super) dims: Vec<u32>,
     /// Pixel whose points are drawn
     #[arg(long, value_name = "X,Y", value_parser = parse_pixel, default_value = "0,0")]
-    pixel: [u32; 2],
+    pub(super) pixel: [u32; 2],
     /// Width of the image that the pixel lies in
     #[arg(long, value_name = "W", default_value_t = 192, value_parser = clap::value_parser!(u32).range(1..=8192))]
-    width: u32,
+    pub(super) width: u32,
     /// Seed
     #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u32,
+    pub(super) seed: u32,
     /// Parameter of the sequence or the decorrelation (of both, if both have it): `--param
     /// digits=faure`
     #[arg(long, value_name = "KEY=VALUE")]
     param: Vec<String>,
+    /// Draw the points instead of printing them: a page and its pictures, into this folder
+    #[arg(long, value_name = "DIR")]
+    pub(super) plot: Option<PathBuf>,
+    /// Pixels whose points are drawn upon each other, from --pixel on
+    #[arg(long, value_name = "N", default_value_t = 150, requires = "plot", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    pub(super) copies: u32,
     /// Compute on the adapter instead of the host: the bytes are the same
     #[arg(long)]
     gpu: bool,
@@ -76,32 +83,36 @@ impl Points {
             true => Some(open_gpu(&self.device.options(PathBuf::new(), true))?),
             false => None,
         };
+        let stream = Stream { sampler, gpu };
+        if let Some(folder) = &self.plot {
+            return self.draw(&stream, pixel, folder);
+        }
         let per_batch = (BATCH / self.dims.len()).max(1) as u32;
         let mut first = 0;
         while first < self.count {
             let count = per_batch.min(self.count - first);
-            let coordinates = self.coordinates(pixel, first, count);
-            let words = match &gpu {
-                Some(gpu) => dump_stream(gpu, &sampler, &coordinates)
-                    .map_err(|reason| Failure::input(anyhow!(reason)))?,
-                None => coordinates.iter().map(|c| sampler.sample_u32(*c)).collect(),
-            };
+            let words = stream.words(&self.coordinates(pixel, first..first + count, &self.dims))?;
             print(&lines(&words, self.dims.len()))?;
             first += count;
         }
         Ok(ExitCode::SUCCESS)
     }
 
-    /// Samples `first … first + count − 1`, dimension by dimension.
-    fn coordinates(&self, pixel: u32, first: u32, count: u32) -> Vec<Coordinate> {
+    /// These samples, dimension by dimension.
+    pub(super) fn coordinates(
+        &self,
+        pixel: u32,
+        samples: impl IntoIterator<Item = u32>,
+        dims: &[u32],
+    ) -> Vec<Coordinate> {
         let coordinate = |sample, dimension: &u32| Coordinate {
             pixel,
             sample,
             dimension: *dimension,
             seed: self.seed,
         };
-        let point = |sample| self.dims.iter().map(move |d| coordinate(sample, d));
-        (first..first + count).flat_map(point).collect()
+        let point = |sample| dims.iter().map(move |d| coordinate(sample, d));
+        samples.into_iter().flat_map(point).collect()
     }
 
     fn sampler(&self, registries: &Registries) -> Result<Sampler, Failure> {
@@ -159,6 +170,31 @@ impl Points {
             }
         }
         Ok(overrides)
+    }
+}
+
+/// A sampler and where it is computed.
+pub(super) struct Stream {
+    pub(super) sampler: Sampler,
+    /// The adapter, unless the host computes.
+    gpu: Option<Gpu>,
+}
+
+impl Stream {
+    /// The number at each coordinate.
+    pub(super) fn words(&self, coordinates: &[Coordinate]) -> Result<Vec<u32>, Failure> {
+        let Some(gpu) = &self.gpu else {
+            return Ok(coordinates
+                .iter()
+                .map(|c| self.sampler.sample_u32(*c))
+                .collect());
+        };
+        let mut words = Vec::with_capacity(coordinates.len());
+        for batch in coordinates.chunks(BATCH) {
+            let dumped = dump_stream(gpu, &self.sampler, batch);
+            words.extend(dumped.map_err(|reason| Failure::input(anyhow!(reason)))?);
+        }
+        Ok(words)
     }
 }
 

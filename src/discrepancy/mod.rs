@@ -44,7 +44,7 @@ pub use measure::{Measure, Value, measure};
 pub use nets::{Net, elementary_shapes, net_quality};
 pub use points::PointSet;
 pub use quadratic::{Quadratic, quadratic};
-pub use spectrum::radial_spectrum;
+pub use spectrum::{Periodogram, periodogram, radial_spectrum};
 pub use star::{Bracket, star, star_2d, star_2d_prefixes};
 
 #[cfg(test)]

@@ -5,18 +5,59 @@ use std::f64::consts::TAU;
 
 const NAME: &str = "spectrum";
 
-/// Mean power `|Σ_i exp(−2πi k·x_i)|² / N` over the integer frequencies k whose length rounds to 1, 2, …,
-/// `highest`; element 0 is for frequency 1. White noise has power 1 on average.
+/// The power of a point set at integer frequencies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Periodogram {
+    /// Largest component of a frequency.
+    pub highest: usize,
+    /// `(highest + 1) × (2·highest + 1)` powers: x from 0, y from −highest, y fastest.
+    power: Vec<f64>,
+}
+
+impl Periodogram {
+    /// Power `|Σ_i exp(−2πi k·x_i)|² / N` at frequency k; N at 0, where there is nothing to see.
+    ///
+    /// # Panics
+    /// A component beyond the highest.
+    pub fn power(&self, [x, y]: [i32; 2]) -> f64 {
+        // Opposite frequencies have the same power.
+        let (x, y) = if x < 0 { (-x, -y) } else { (x, y) };
+        let columns = 2 * self.highest + 1;
+        self.power[x as usize * columns + (y + self.highest as i32) as usize]
+    }
+
+    /// Mean power over the frequencies whose length rounds to 1, 2, …, `highest`; element 0 is for
+    /// frequency 1. White noise has power 1 on average.
+    pub fn radial(&self) -> Vec<f64> {
+        let columns = 2 * self.highest + 1;
+        let mut power = vec![0.0; self.highest + 1];
+        let mut weight = vec![0.0; self.highest + 1];
+        for (index, value) in self.power.iter().enumerate() {
+            let (u, v) = (index / columns, index % columns);
+            let radius = (u as f64).hypot(v as f64 - self.highest as f64).round() as usize;
+            if radius <= self.highest {
+                // Those with u = 0 are in the table with their opposites.
+                let times = if u == 0 { 0.5 } else { 1.0 };
+                power[radius] += times * value;
+                weight[radius] += times;
+            }
+        }
+        let mean = |(power, weight): (&f64, &f64)| power / weight;
+        power.iter().zip(&weight).skip(1).map(mean).collect()
+    }
+}
+
+/// Power at all integer frequencies whose components are at most `highest`.
 ///
 /// Cost: 2·highest²·N multiplications of complex numbers.
 ///
 /// # Errors
 /// The time of the budget is spent first; points that are not pairs.
-pub fn radial_spectrum(
+pub fn periodogram(
     points: &PointSet,
     highest: usize,
     budget: &Budget,
-) -> Result<Vec<f64>, DiscrepancyError> {
+) -> Result<Periodogram, DiscrepancyError> {
     let Some(pairs) = points.pairs() else {
         let reason = format!("needs points of 2 dimensions, these have {}", points.dim());
         let measure = NAME;
@@ -39,20 +80,24 @@ pub fn radial_spectrum(
             }
         }
     }
-    let mut power = vec![0.0; size];
-    let mut weight = vec![0.0; size];
-    for (index, [re, im]) in sums.iter().enumerate() {
-        let (u, v) = (index / (2 * size - 1), index % (2 * size - 1));
-        let radius = (u as f64).hypot(v as f64 - highest as f64).round() as usize;
-        if radius <= highest {
-            // Those with u = 0 are in the table with their opposites.
-            let times = if u == 0 { 0.5 } else { 1.0 };
-            power[radius] += times * (re * re + im * im) / pairs.len() as f64;
-            weight[radius] += times;
-        }
-    }
-    let mean = |(power, weight): (&f64, &f64)| power / weight;
-    Ok(power.iter().zip(&weight).skip(1).map(mean).collect())
+    let n = pairs.len() as f64;
+    let power = sums.iter().map(|[re, im]| (re * re + im * im) / n);
+    Ok(Periodogram {
+        highest,
+        power: power.collect(),
+    })
+}
+
+/// [`Periodogram::radial`] of [`periodogram`].
+///
+/// # Errors
+/// As [`periodogram`].
+pub fn radial_spectrum(
+    points: &PointSet,
+    highest: usize,
+    budget: &Budget,
+) -> Result<Vec<f64>, DiscrepancyError> {
+    Ok(periodogram(points, highest, budget)?.radial())
 }
 
 /// `exp(−2πi k x)` for each k: the angle is reduced first, so that high frequencies are as accurate
@@ -87,6 +132,17 @@ mod tests {
             assert_eq!(p > 1.0, index + 1 == 8, "{power:?}");
             assert!(index + 1 == 8 || p < 1e-20, "{power:?}");
         }
+    }
+
+    #[test]
+    fn opposite_frequencies_of_a_row_have_the_same_power_and_others_none() {
+        let row: Vec<[f64; 2]> = (0..4).map(|i| [f64::from(i) / 4.0, 0.5]).collect();
+        let set = PointSet::from_points(&row).unwrap();
+        let found = periodogram(&set, 5, &Budget::seconds(60.0)).unwrap();
+        for (x, y) in [(4, 0), (-4, 0), (4, -3), (-4, 5), (0, 1)] {
+            assert!((found.power([x, y]) - 4.0).abs() < 1e-12, "{x} {y}");
+        }
+        assert!(found.power([1, 0]).abs() < 1e-12 && found.power([-3, 2]).abs() < 1e-12);
     }
 
     #[test]

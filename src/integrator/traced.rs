@@ -1,6 +1,6 @@
 //! A built structure on the GPU.
 
-use crate::accel::{BuiltAccel, GpuBuffers};
+use crate::accel::{BuiltAccel, GpuBuffers, Space};
 use crate::gpu::{Bindings, Composition, Gpu, GpuError};
 
 /// What a kernel needs to trace with a structure: its module, features, constants, arrays and
@@ -11,6 +11,8 @@ pub struct Traced {
     active: GpuBuffers<'static>,
     /// Arrays and uniforms of the structure.
     pub bindings: Bindings,
+    /// Where triangles are met: decides which judge and which images it is compared with.
+    pub space: Space,
 }
 
 impl Traced {
@@ -37,7 +39,11 @@ impl Traced {
             constants: buffers.constants,
             ..Default::default()
         };
-        Ok(Self { active, bindings })
+        Ok(Self {
+            active,
+            bindings,
+            space: built.space(),
+        })
     }
 
     /// `composition` with this structure as the active one.

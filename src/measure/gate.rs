@@ -4,13 +4,18 @@
 //! the f64 oracle on as many rays as a budget allows. On an adapter that computes like the host,
 //! hits must be equal to the bit. On one that fuses or divides otherwise, a differing hit is a *tie*
 //! if both triangles lie within 4 ulp of the same distance in f64; ties are counted and shown.
+//!
+//! A scene of instances has a second judge, for structures that take rays to the objects' spaces:
+//! see [`super::instance_judge`].
 
 use super::batch::{Batch, Query};
+use super::instance_judge;
 use super::rays::{RaySet, record_rays};
 use super::record::{ClassVerdict, GateVerdict, JudgeCheck};
 use crate::accel::AccelKind;
+use crate::accel::triangle::TriangleRecord;
 use crate::accel::{
-    AccelError, BuildLog, BuiltAccel, BuiltBvh, Bvh, Hit, NO_HIT, Ray, TriangleSoup,
+    AccelError, BuildLog, BuiltAccel, BuiltBvh, Bvh, Hit, NO_HIT, Ray, Space, TriangleSoup,
     brute_force_hits,
 };
 use crate::config::{Gate, Params};
@@ -31,7 +36,7 @@ pub const KERNEL_ERRORS: [(u32, &str); 2] = [
 /// The judge is compared with brute force on at least this many rays.
 const LEAST_BRUTE_FORCE_RAYS: usize = 2000;
 /// Triangle tests that the f64 oracle may spend on a scene.
-const ORACLE_TESTS: usize = 300_000_000;
+pub(super) const ORACLE_TESTS: usize = 300_000_000;
 /// Two distances within this many ulp are the same on an adapter with inexact arithmetic.
 const TIE_ULPS: f64 = 4.0;
 
@@ -45,6 +50,8 @@ pub struct Judge {
     pub oracle: JudgeCheck,
     /// The first ray on which the judge itself is wrong.
     pub first_wrong: Option<String>,
+    /// The judge of structures that trace instances; `None` if no ray of the scene is transformed.
+    pub instances: Option<Box<Judge>>,
 }
 
 impl Judge {
@@ -75,14 +82,26 @@ impl Judge {
             brute_force: JudgeCheck::default(),
             oracle: JudgeCheck::default(),
             first_wrong: None,
+            instances: None,
         };
-        judge.check_brute_force(soup, settings.brute_force_tests);
+        judge.check_brute_force(settings.brute_force_tests, soup.records.len(), |rays| {
+            brute_force_hits(soup, rays)
+        });
         judge.check_oracle(scene, settings.oracle_rays as usize);
+        judge.instances = instance_judge::new(soup, &judge.sets, settings)?.map(Box::new);
         Ok(judge)
     }
 
+    /// The judge of structures that meet triangles in this space.
+    pub fn of(&self, space: Space) -> &Self {
+        match (space, &self.instances) {
+            (Space::Instances, Some(judge)) => judge,
+            _ => self,
+        }
+    }
+
     /// `count` rays (or all, if there are fewer) spread evenly over all classes.
-    fn subset(&self, count: usize) -> Vec<(Ray, Hit)> {
+    pub(super) fn subset(&self, count: usize) -> Vec<(Ray, Hit)> {
         let pairs = self
             .sets
             .iter()
@@ -92,11 +111,17 @@ impl Judge {
         (0..count).map(|i| all[i * all.len() / count]).collect()
     }
 
-    fn check_brute_force(&mut self, soup: &TriangleSoup, tests: u64) {
-        let affordable = (tests / soup.records.len().max(1) as u64) as usize;
+    /// Compares with `brute_force`, which costs a ray `triangles` tests, as far as `tests` reach.
+    pub(super) fn check_brute_force(
+        &mut self,
+        tests: u64,
+        triangles: usize,
+        brute_force: impl FnOnce(&[Ray]) -> Vec<Hit>,
+    ) {
+        let affordable = (tests / triangles.max(1) as u64) as usize;
         let pairs = self.subset(affordable.max(LEAST_BRUTE_FORCE_RAYS));
         let rays: Vec<Ray> = pairs.iter().map(|(ray, _)| *ray).collect();
-        let truth = brute_force_hits(soup, &rays);
+        let truth = brute_force(&rays);
         self.brute_force.rays = rays.len();
         for ((ray, judged), brute) in pairs.iter().zip(&truth) {
             if !judged.same_bits(brute) {
@@ -119,11 +144,14 @@ impl Judge {
                 )
             })
             .collect();
-        self.oracle.rays = questions.len();
-        for ((ray, hit), verdict) in pairs
-            .iter()
-            .zip(oracle::judge_closest_hits(&scene.triangles, &questions))
-        {
+        let verdicts = oracle::judge_closest_hits(&scene.triangles, &questions);
+        self.note_oracle(&pairs, verdicts);
+    }
+
+    /// Counts what the oracle thinks of these answers.
+    pub(super) fn note_oracle(&mut self, pairs: &[(Ray, Hit)], verdicts: Vec<Verdict>) {
+        self.oracle.rays = pairs.len();
+        for ((ray, hit), verdict) in pairs.iter().zip(verdicts) {
             match verdict {
                 Verdict::Agrees => {}
                 Verdict::Ambiguous => self.oracle.ambiguous += 1,
@@ -143,7 +171,7 @@ impl Judge {
     }
 }
 
-fn oracle_ray(ray: &Ray) -> OracleRay {
+pub(super) fn oracle_ray(ray: &Ray) -> OracleRay {
     OracleRay {
         origin: ray.origin,
         t_min: ray.t_min,
@@ -152,7 +180,8 @@ fn oracle_ray(ray: &Ray) -> OracleRay {
     }
 }
 
-/// Traces all recorded rays, closest and any hit, and compares.
+/// Traces all recorded rays, closest and any hit, and compares with the judge of the space in which
+/// the structure meets triangles.
 ///
 /// # Errors
 /// A kernel does not compile, or the device is lost or hangs.
@@ -165,6 +194,7 @@ pub fn gate(
     probe: &ArithmeticProbe,
     runtime_checks: bool,
 ) -> Result<GateVerdict, GpuError> {
+    let judge = judge.of(traced.space);
     let mut errors = 0;
     let mut classes = Vec::new();
     for set in &judge.sets {
@@ -185,6 +215,7 @@ pub fn gate(
             &closest.hits()?,
             &any.found()?,
             soup,
+            traced.space,
             probe.is_exact(),
         ));
     }
@@ -210,6 +241,7 @@ pub fn compare(
     hits: &[Hit],
     found: &[bool],
     soup: &TriangleSoup,
+    space: Space,
     exact: bool,
 ) -> ClassVerdict {
     let mut verdict = ClassVerdict {
@@ -230,7 +262,7 @@ pub fn compare(
         if hit.same_bits(truth) && any_right {
             continue;
         }
-        if !exact && any_right && is_tie(ray, &hit, truth, soup) {
+        if !exact && any_right && is_tie(ray, &hit, truth, soup, space) {
             verdict.ties += 1;
             continue;
         }
@@ -248,36 +280,64 @@ pub fn compare(
 }
 
 /// Whether both triangles lie within 4 ulp of the same distance in f64, as does the answer, and the
-/// ray may hit the other one there: a plane goes on beyond its triangle.
-fn is_tie(ray: &Ray, hit: &Hit, truth: &Hit, soup: &TriangleSoup) -> bool {
-    if hit.triangle == NO_HIT
-        || truth.triangle == NO_HIT
-        || hit.triangle as usize >= soup.records.len()
-    {
+/// ray may hit the other one there: a plane goes on beyond its triangle. Where rays are transformed,
+/// what rounding the transform can move the distance by comes on top.
+fn is_tie(ray: &Ray, hit: &Hit, truth: &Hit, soup: &TriangleSoup, space: Space) -> bool {
+    let (Some(found), Some(expected)) = (
+        Meeting::new(ray, hit, soup, space),
+        Meeting::new(ray, truth, soup, space),
+    ) else {
         return false;
-    }
+    };
     let ulp = |t: f64| t.abs() * f64::from(f32::EPSILON);
-    let near = |a: f64, b: f64| (a - b).abs() <= TIE_ULPS * ulp(a.abs().max(b.abs()));
-    let plane = |id: u32| plane_distance(ray, &soup.records[id as usize]);
-    near(plane(hit.triangle), plane(truth.triangle))
+    let slack = found.transform_error + expected.transform_error;
+    let near = |a: f64, b: f64| (a - b).abs() <= TIE_ULPS * ulp(a.abs().max(b.abs())) + slack;
+    near(found.plane_distance(), expected.plane_distance())
         && near(f64::from(hit.t), f64::from(truth.t))
-        && (hit.triangle == truth.triangle || may_hit(ray, hit, soup))
+        && (hit.triangle == truth.triangle || found.may_hit(hit.t))
 }
 
-/// Whether rounding alone can explain that the triangle was found there.
-fn may_hit(ray: &Ray, hit: &Hit, soup: &TriangleSoup) -> bool {
-    let triangle = soup.records[hit.triangle as usize].triangle();
-    !matches!(
-        oracle::judge(&[triangle], oracle_ray(ray), Some((0, hit.t))),
-        Verdict::Wrong(_)
-    )
+/// A ray and a triangle in the space where they meet.
+pub(super) struct Meeting {
+    pub ray: Ray,
+    pub record: TriangleRecord,
+    /// How far rounding of the transformed ray may move the distance to the plane.
+    pub transform_error: f64,
 }
 
-/// Distance to the triangle's plane, f64.
-fn plane_distance(ray: &Ray, record: &crate::accel::triangle::TriangleRecord) -> f64 {
-    let v = |a: [f32; 3]| glam::DVec3::from_array(a.map(f64::from));
-    let normal = v(record.e1).cross(v(record.e2));
-    normal.dot(v(record.v0) - v(ray.origin)) / normal.dot(v(ray.direction))
+impl Meeting {
+    /// `None` for a miss, or for a triangle that the scene has not.
+    fn new(ray: &Ray, hit: &Hit, soup: &TriangleSoup, space: Space) -> Option<Self> {
+        if hit.triangle == NO_HIT {
+            return None;
+        }
+        match (space, &soup.placed) {
+            (Space::Instances, Some(placed)) => {
+                instance_judge::meeting(placed, ray, hit.triangle, hit.t)
+            }
+            _ => Some(Self {
+                ray: *ray,
+                record: *soup.records.get(hit.triangle as usize)?,
+                transform_error: 0.0,
+            }),
+        }
+    }
+
+    /// Distance to the triangle's plane, f64.
+    fn plane_distance(&self) -> f64 {
+        let v = |a: [f32; 3]| glam::DVec3::from_array(a.map(f64::from));
+        let normal = v(self.record.e1).cross(v(self.record.e2));
+        normal.dot(v(self.record.v0) - v(self.ray.origin)) / normal.dot(v(self.ray.direction))
+    }
+
+    /// Whether rounding alone can explain that the triangle was found at `t`.
+    fn may_hit(&self, t: f32) -> bool {
+        let triangle = self.record.triangle();
+        !matches!(
+            oracle::judge(&[triangle], oracle_ray(&self.ray), Some((0, t))),
+            Verdict::Wrong(_)
+        )
+    }
 }
 
 fn describe(ray: &Ray, left: &str, a: &Hit, right: &str, b: &Hit) -> String {

@@ -6,6 +6,7 @@ pub mod bias;
 pub mod gate;
 pub mod hypothesis;
 pub mod image;
+mod instance_judge;
 pub mod memory;
 pub mod picture;
 pub mod rays;

@@ -41,6 +41,11 @@ impl RaySet {
         Self { class, rays, truth }
     }
 
+    /// The same rays with the answers of another judge.
+    pub fn judged_by(&self, judge: &dyn CpuTwin) -> Self {
+        Self::new(self.class, self.rays.clone(), judge)
+    }
+
     /// Whether the class asks for any hit instead of the nearest.
     pub fn is_any(&self) -> bool {
         matches!(self.class, RayClass::Shadow | RayClass::Ao)

@@ -1,6 +1,7 @@
 //! Records: one JSON line per thing measured, schema `raystone/1`. Every table, plot and export
 //! derives from these lines alone; an absent value is absent, never 0.
 
+use crate::accel::Space;
 use crate::config::Variant;
 use crate::scene::{Camera, LoadReport};
 use serde::{Deserialize, Serialize};
@@ -284,6 +285,9 @@ pub struct StructureRecord {
     pub features: Vec<String>,
     /// Whether the driver's bounds checks and loop bounds were on.
     pub runtime_checks: bool,
+    /// Where triangles are met, which decides on the judge: see [`Space`].
+    #[serde(default)]
+    pub space: Space,
     /// Timed build phases.
     pub build: Vec<Phase>,
     /// Sum of the phases, milliseconds.
@@ -292,6 +296,10 @@ pub struct StructureRecord {
     /// bytes; absent where allocations are not counted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub build_peak_bytes: Option<u64>,
+    /// Milliseconds to take over new transforms of all instances, objects kept: median of several;
+    /// absent where a moved object needs a full build.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub update_ms: Option<f64>,
     /// Static figures.
     pub stats: StructureStats,
     /// Verdict; `None` only if the build failed.

@@ -13,6 +13,7 @@ pub mod html;
 pub mod markdown;
 pub mod pictures;
 pub mod plot;
+pub mod point_page;
 pub mod read;
 pub mod ruling;
 pub mod samplers;
@@ -108,10 +109,7 @@ pub fn write_report(dir: &Path) -> Result<ReportPaths, ReportError> {
     let records = read_records(dir)?;
     let data = RunData::new(&records.lines);
     let mut document = sections::document(dir, &data, &records.warnings);
-    document.paint()?;
-    let plots = write_plots(dir, &document)?;
-    let html = dir.join("index.html");
-    write_file(&html, html::page(&document)?.as_bytes())?;
+    let (html, plots) = write_page(dir, &mut document)?;
     let summary = dir.join("summary.md");
     write_file(&summary, markdown::summary(&document).as_bytes())?;
     Ok(ReportPaths {
@@ -120,6 +118,22 @@ pub fn write_report(dir: &Path) -> Result<ReportPaths, ReportError> {
         plots,
         warnings: records.warnings,
     })
+}
+
+/// Paints the document and writes `index.html` and `plots/*.{svg,png}` into `dir`, which is made if
+/// it is not there: the page and the plots.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub fn write_page(
+    dir: &Path,
+    document: &mut Document,
+) -> Result<(PathBuf, Vec<PathBuf>), ReportError> {
+    document.paint()?;
+    let plots = write_plots(dir, document)?;
+    let html = dir.join("index.html");
+    write_file(&html, html::page(document)?.as_bytes())?;
+    Ok((html, plots))
 }
 
 fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {

@@ -3,7 +3,7 @@
 use super::RunError;
 use super::session::Session;
 use super::world::World;
-use crate::accel::{BuildLog, Counters};
+use crate::accel::{AccelError, BuildLog, BuiltAccel, Counters, Space};
 use crate::config::{StructureCell, Variant, cell_hash};
 use crate::gpu::{Elapsed, GpuError};
 use crate::integrator::Traced;
@@ -19,6 +19,7 @@ use crate::measure::timing::{
     Measured, empty_ms, interleave, millions_per_second, without_overhead,
 };
 use crate::report::color::viridis;
+use std::time::Instant;
 
 /// A structure that passed its gate.
 pub(super) struct Gated {
@@ -52,13 +53,23 @@ pub(super) fn build_and_gate(
     record.build_peak_bytes = peak;
     record.build_ms = log.total_ms();
     record.build = log.phases;
-    let built = match built {
-        Ok(built) => built,
+    let updated = built.and_then(|mut built| {
+        let update_ms = session
+            .clock
+            .time("build", || update_ms(&mut *built, world))?;
+        Ok((built, update_ms))
+    });
+    let built = match updated {
+        Ok((built, update_ms)) => {
+            record.update_ms = update_ms;
+            built
+        }
         Err(error) => {
             record.failure = Some(error.to_string());
             return Err(Box::new(record));
         }
     };
+    record.space = built.space();
     record.stats = built.stats();
     let structural = session
         .clock
@@ -81,7 +92,8 @@ pub(super) fn build_and_gate(
             verdict.passed &= structural.is_none();
             verdict.structural = structural;
             if !verdict.passed {
-                record.failure = Some(failure_text(&verdict, world.judge.first_wrong.as_deref()));
+                let judge_fault = world.judge.of(traced.space).first_wrong.as_deref();
+                record.failure = Some(failure_text(&verdict, judge_fault));
             }
             record.gate = Some(verdict);
         }
@@ -91,6 +103,28 @@ pub(super) fn build_and_gate(
     } else {
         Ok((traced, record))
     }
+}
+
+/// Updates of which the median is taken.
+const UPDATES: usize = 5;
+
+/// Milliseconds of wall time to take the transforms of the scene's instances over once more, as if all
+/// had moved; the gate then judges what an update leaves. `None` for structures without updates.
+fn update_ms(built: &mut dyn BuiltAccel, world: &World) -> Result<Option<f64>, AccelError> {
+    let mut samples = Vec::new();
+    if world.soup.placed.is_none() {
+        return Ok(None);
+    }
+    for _ in 0..UPDATES {
+        let start = Instant::now();
+        match built.update(&world.soup) {
+            None => return Ok(None),
+            Some(updated) => updated?,
+        }
+        samples.push(start.elapsed().as_secs_f64() * 1e3);
+    }
+    samples.sort_by(f64::total_cmp);
+    Ok(Some(samples[UPDATES / 2]))
 }
 
 /// The gate with the driver's checks; without them only if that passed.
@@ -151,9 +185,11 @@ fn empty_record(world: &World, accel: &Variant, runtime_checks: bool) -> Structu
         accel: accel.clone(),
         features: Vec::new(),
         runtime_checks,
+        space: Space::World,
         build: Vec::new(),
         build_ms: 0.0,
         build_peak_bytes: None,
+        update_ms: None,
         stats: StructureStats::default(),
         gate: None,
         timings: Vec::new(),
@@ -267,7 +303,7 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
     let mut failures: Vec<Option<String>> = vec![None; gated.len()];
     let mut timed = Vec::new();
     for structure in 0..gated.len() {
-        for set in &world.judge.sets {
+        for set in &world.judge.of(gated[structure].traced.space).sets {
             let Gated {
                 traced,
                 runtime_checks,

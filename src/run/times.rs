@@ -6,6 +6,7 @@ use super::errors::{image_hash, job, sampler_for};
 use super::session::Session;
 use super::structures::Gated;
 use super::world::World;
+use crate::accel::Space;
 use crate::config::{TimeCell, Variant, cell_hash};
 use crate::gpu::{Elapsed, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
@@ -22,6 +23,7 @@ struct Timed<'a> {
     spp: u32,
     seed: u32,
     runtime_checks: bool,
+    space: Space,
 }
 
 impl Measured for Timed<'_> {
@@ -32,16 +34,17 @@ impl Measured for Timed<'_> {
     }
 }
 
-/// What does not depend on the structure: counted rays and the image, per sampler and integrator.
+/// What does not depend on the structure: counted rays and the image, per sampler, integrator and
+/// space in which structures meet triangles.
 #[derive(Default)]
 struct Shared {
     rays: BTreeMap<String, [u64; 4]>,
     image: BTreeMap<String, String>,
 }
 
-fn key(cell: &TimeCell) -> String {
+fn key(cell: &TimeCell, space: Space) -> String {
     format!(
-        "{}, {} × {}",
+        "{}, {} × {} in {space:?}",
         cell.integrator, cell.sequence, cell.decorrelation
     )
 }
@@ -160,6 +163,7 @@ fn compile<'a>(
         spp,
         seed,
         runtime_checks: checks,
+        space: structure.traced.space,
     })
 }
 
@@ -178,17 +182,18 @@ fn finish(
         .and_then(|image| Ok((image, item.renderer.error_word()?)));
     let (image, error_word) = image.map_err(|e| e.to_string())?;
     let hash = image_hash(&image);
+    let key = key(&item.cell, item.space);
     let first = shared
         .image
-        .entry(key(&item.cell))
+        .entry(key.clone())
         .or_insert_with(|| hash.clone())
         .clone();
-    let rays = match shared.rays.get(&key(&item.cell)) {
+    let rays = match shared.rays.get(&key) {
         Some(rays) => *rays,
         None => {
             let structure = structure.ok_or("its structure is gone")?;
             let rays = count_rays(session, world, structure, item)?;
-            shared.rays.insert(key(&item.cell), rays);
+            shared.rays.insert(key, rays);
             rays
         }
     };
@@ -203,9 +208,10 @@ fn finish(
     let equal = hash == first;
     let failure = match (equal, error_word) {
         (_, word) if word != 0 => Some(format!("a kernel raised error word {word}")),
-        (false, _) if world.probe.is_exact() => {
-            Some("its image differs from that of the scene's first structure".to_owned())
-        }
+        (false, _) if world.probe.is_exact() => Some(
+            "its image differs from that of the first structure on this scene (in the same space)"
+                .to_owned(),
+        ),
         _ => None,
     };
     let mut record = empty_record(session, world, &item.cell, String::new());

@@ -1,8 +1,8 @@
 //! Gathers triangles from a loader and turns them into a checked [`SceneData`].
 
 use super::{
-    Bounds, Camera, LoadReport, Material, MaterialKind, MaterialSource, SceneData, SceneError,
-    Texture, Triangle,
+    Assembly, Bounds, Camera, InstanceError, LoadReport, Material, MaterialKind, MaterialSource,
+    SceneData, SceneError, Texture, Transform, Triangle,
 };
 use glam::{Vec2, Vec3};
 
@@ -59,6 +59,10 @@ pub(super) struct SceneBuilder {
     uvs: Vec<[Vec2; 3]>,
     material_ids: Vec<u32>,
     keep_uvs: bool,
+    /// Objects and instances; given up if they do not account for every triangle.
+    pub assembly: Assembly,
+    /// The first instance that could not be placed.
+    misplaced: Option<InstanceError>,
     pub report: LoadReport,
 }
 
@@ -70,7 +74,7 @@ impl SceneBuilder {
             uvs: Vec::with_capacity(if keep_uvs { capacity } else { 0 }),
             material_ids: Vec::with_capacity(capacity),
             keep_uvs,
-            report: LoadReport::default(),
+            ..Self::default()
         }
     }
 
@@ -101,12 +105,63 @@ impl SceneBuilder {
         self.push([a, c, d], material);
     }
 
+    /// Adds an object to the assembly. It is numbered by the order of addition.
+    pub fn add_object(&mut self, triangles: Vec<Triangle>) {
+        if let Err(error) = self.assembly.add_object(triangles) {
+            self.misplaced.get_or_insert(error);
+        }
+    }
+
+    /// Adds an instance of an object of the assembly, all of one material. What cannot be placed
+    /// makes [`SceneBuilder::finish`] fail.
+    pub fn place(&mut self, object: u32, to_world: Transform, material: u32) {
+        match self.assembly.place(object, to_world) {
+            Ok(instance) => {
+                let copy: Vec<Triangle> = self.assembly.copy(&instance).collect();
+                for triangle in copy {
+                    self.push(triangle.vertices, material);
+                }
+            }
+            Err(error) => {
+                self.misplaced.get_or_insert(error);
+            }
+        }
+    }
+
+    /// The triangles alone.
+    pub fn into_triangles(self) -> Vec<Triangle> {
+        self.triangles
+    }
+
+    /// The triangles so far.
+    pub fn triangles(&self) -> &[Triangle] {
+        &self.triangles
+    }
+
+    /// How many triangles there are so far.
+    pub fn len(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// The assembly, if it accounts for every triangle.
+    fn take_assembly(&mut self) -> Option<Assembly> {
+        let assembly = std::mem::take(&mut self.assembly);
+        let whole = assembly.triangles() == self.triangles.len() as u64;
+        (whole && !assembly.instances().is_empty()).then_some(assembly)
+    }
+
     /// Checks the whole, puts a white sky over a scene without any light, and hashes it.
     ///
     /// # Errors
-    /// [`SceneError::NoTriangles`], [`SceneError::TooLarge`], and [`SceneError::Camera`] if the
-    /// scene brings a camera that sees nothing.
-    pub fn finish(self, name: &str, look: Look) -> Result<SceneData, SceneError> {
+    /// [`SceneError::NoTriangles`], [`SceneError::TooLarge`], [`SceneError::Instance`], and
+    /// [`SceneError::Camera`] if the scene brings a camera that sees nothing.
+    pub fn finish(mut self, name: &str, look: Look) -> Result<SceneData, SceneError> {
+        if let Some(source) = self.misplaced {
+            return Err(SceneError::Instance {
+                name: name.to_owned(),
+                source,
+            });
+        }
         if self.triangles.is_empty() {
             let reason = match self.report.dropped_non_finite {
                 0 => "it lists no faces".to_owned(),
@@ -130,6 +185,7 @@ impl SceneBuilder {
             camera.validate()?;
         }
         let textured = !look.textures.is_empty();
+        let assembly = self.take_assembly();
         let mut scene = SceneData {
             name: name.to_owned(),
             triangles: self.triangles,
@@ -137,6 +193,7 @@ impl SceneBuilder {
             material_ids: self.material_ids,
             materials: look.materials,
             textures: look.textures,
+            assembly,
             camera: look.camera,
             environment: look.environment,
             hash: String::new(),

@@ -1,6 +1,6 @@
 //! Questions asked of a loaded scene: extent, size in bytes, emitters, content hash.
 
-use super::{Bounds, SceneData, Triangle};
+use super::{Bounds, InstanceError, SceneData, Transform, Triangle};
 use glam::{Vec2, Vec3};
 use std::mem::size_of_val;
 
@@ -11,6 +11,31 @@ impl SceneData {
     /// The box of all triangles, scene units.
     pub fn bounds(&self) -> Bounds {
         Bounds::of(&self.triangles)
+    }
+
+    /// Gives an instance another transform, moves its triangles, and hashes the scene anew.
+    ///
+    /// # Errors
+    /// The scene has no such instance, or the transform is singular or not finite.
+    pub fn move_instance(
+        &mut self,
+        instance: usize,
+        to_world: Transform,
+    ) -> Result<(), InstanceError> {
+        let instances = 0;
+        let missing = InstanceError::NoSuchInstance {
+            instance,
+            instances,
+        };
+        let assembly = self.assembly.as_mut().ok_or(missing)?;
+        assembly.move_to(instance, to_world)?;
+        let moved = &assembly.instances()[instance];
+        let first = moved.first as usize;
+        for (triangle, copy) in self.triangles[first..].iter_mut().zip(assembly.copy(moved)) {
+            *triangle = copy;
+        }
+        self.hash = self.content_hash();
+        Ok(())
     }
 
     /// Bytes of the scene's arrays: triangles, texture coordinates, material indices, texels.
@@ -70,6 +95,15 @@ impl SceneData {
             hash.vectors(&[camera.eye, camera.target, camera.up, lens]);
         }
         hash.vectors(&[self.environment]);
+        if let Some(assembly) = &self.assembly {
+            for object in assembly.objects() {
+                hash.bytes(bytemuck::cast_slice::<Triangle, u8>(object));
+            }
+            for instance in assembly.instances() {
+                hash.bytes(&instance.object.to_le_bytes());
+                hash.bytes(bytemuck::bytes_of(&instance.to_world));
+            }
+        }
         hash.0.finalize().to_hex().to_string()
     }
 }

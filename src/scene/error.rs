@@ -65,6 +65,14 @@ pub enum SceneError {
         /// Largest allowed.
         limit: f32,
     },
+    /// An object or instance that cannot be placed.
+    #[error("{name}: {source}")]
+    Instance {
+        /// The scene, as typed.
+        name: String,
+        /// Which, and why.
+        source: super::InstanceError,
+    },
     /// A camera that sees nothing.
     #[error("camera: {problem}; {advice}")]
     Camera {

@@ -1,10 +1,11 @@
-//! glTF 2.0 and GLB by the `gltf` crate: nodes are flattened into world space, instances included.
+//! glTF 2.0 and GLB by the `gltf` crate: nodes are flattened into world space. Where nodes share a
+//! mesh, the scene also says which triangles are copies of which object.
 
 use super::builder::{Look, SceneBuilder};
 use super::error::{guarded, open};
 use super::gltf_material::{self, TextureUse};
 use super::texture::decode_all;
-use super::{Camera, LoadOptions, SceneData, SceneError};
+use super::{Camera, InstanceError, LoadOptions, SceneData, SceneError, Transform, Triangle};
 use base64::Engine;
 use glam::{Mat4, Vec2, Vec3};
 use gltf::mesh::Mode;
@@ -52,6 +53,7 @@ fn build(
         texture_uses: &palette.texture_uses,
         builder: SceneBuilder::new(!palette.images.is_empty(), 0),
         camera: None,
+        copies: Copies::new(document),
         lines_or_points: 0,
         deformed: 0,
     };
@@ -142,8 +144,40 @@ struct Geometry<'a> {
     texture_uses: &'a [TextureUse],
     builder: SceneBuilder,
     camera: Option<Camera>,
+    /// `None` where no nodes share a mesh, or once a node could not be made an instance.
+    copies: Option<Copies>,
     lines_or_points: usize,
     deformed: usize,
+}
+
+/// Meshes that several nodes use become objects.
+struct Copies {
+    /// Nodes that use each mesh.
+    uses: Vec<usize>,
+    /// The object that a mesh became.
+    objects: Vec<Option<u32>>,
+    /// Triangles of the present mesh in its own space, if they are still needed.
+    triangles: Vec<Triangle>,
+}
+
+impl Copies {
+    fn new(document: &gltf::Document) -> Option<Self> {
+        let mut uses = vec![0; document.meshes().len()];
+        for mesh in document.nodes().filter_map(|node| node.mesh()) {
+            uses[mesh.index()] += 1;
+        }
+        let shared = uses.iter().any(|n| *n > 1);
+        shared.then(|| Self {
+            objects: vec![None; uses.len()],
+            uses,
+            triangles: Vec::new(),
+        })
+    }
+
+    /// Whether the mesh's own triangles are to be gathered.
+    fn needs(&self, mesh: usize) -> bool {
+        self.uses[mesh] > 1 && self.objects[mesh].is_none()
+    }
 }
 
 impl<'a> Geometry<'a> {
@@ -183,8 +217,11 @@ impl<'a> Geometry<'a> {
             return Ok(());
         };
         self.deformed += usize::from(node.skin().is_some());
+        let before = self.builder.len();
+        let gather = self.copies.as_ref().is_some_and(|c| c.needs(mesh.index()));
         for primitive in mesh.primitives() {
-            self.read_primitive(&primitive, world).map_err(|problem| {
+            let read = self.read_primitive(&primitive, world, gather);
+            read.map_err(|problem| {
                 let label = mesh.name().unwrap_or("unnamed");
                 let place = format!(
                     "mesh {} `{label}`, primitive {}",
@@ -194,7 +231,53 @@ impl<'a> Geometry<'a> {
                 SceneError::malformed(self.path, place, problem)
             })?;
         }
+        self.place(node, &mesh, world, before);
         Ok(())
+    }
+
+    /// Makes the node an instance of its mesh, whose triangles in world space begin at `before`. What
+    /// cannot be one leaves the scene without instances.
+    fn place(&mut self, node: &gltf::Node<'a>, mesh: &gltf::Mesh<'a>, world: Mat4, before: usize) {
+        let Some(mut copies) = self.copies.take() else {
+            return;
+        };
+        let pushed = self.builder.len() - before;
+        let triangles = std::mem::take(&mut copies.triangles);
+        if pushed == 0 {
+            self.copies = Some(copies);
+            return;
+        }
+        let assembly = &mut self.builder.assembly;
+        let placed = if copies.uses[mesh.index()] > 1 {
+            let known = copies.objects[mesh.index()];
+            let object = known.map_or_else(|| assembly.add_object(triangles), Ok);
+            object.and_then(|object| {
+                copies.objects[mesh.index()] = Some(object);
+                assembly.place(object, Transform::from_matrix(world))
+            })
+        } else {
+            let own = self.builder.triangles()[before..].to_vec();
+            let assembly = &mut self.builder.assembly;
+            let object = assembly.add_object(own);
+            object.and_then(|object| assembly.place(object, Transform::IDENTITY))
+        };
+        let problem = match placed {
+            Ok(_) if self.builder.assembly.triangles() == self.builder.len() as u64 => None,
+            Ok(_) => Some("it has triangles that are not finite".to_owned()),
+            Err(error) => Some(reason(&error)),
+        };
+        match problem {
+            None => self.copies = Some(copies),
+            Some(problem) => {
+                let label = node.name().unwrap_or("unnamed");
+                self.builder.assembly = Default::default();
+                self.builder.report.warnings.push(format!(
+                    "node {} `{label}` cannot be an instance ({problem}): the scene is traced as a \
+                     flat list of triangles",
+                    node.index()
+                ));
+            }
+        }
     }
 
     fn read_camera(&mut self, camera: &gltf::Camera<'_>, world: Mat4) -> Option<Camera> {
@@ -225,6 +308,7 @@ impl<'a> Geometry<'a> {
         &mut self,
         primitive: &gltf::Primitive<'a>,
         world: Mat4,
+        gather: bool,
     ) -> Result<(), String> {
         let mode = primitive.mode();
         if !matches!(
@@ -238,11 +322,12 @@ impl<'a> Geometry<'a> {
         let buffers = self.buffers;
         let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
         check_accessors(primitive)?;
-        let positions: Vec<Vec3> = reader
+        let own: Vec<Vec3> = reader
             .read_positions()
             .ok_or("its positions are missing or outside their buffer")?
-            .map(|p| world.transform_point3(Vec3::from(p)))
+            .map(Vec3::from)
             .collect();
+        let positions: Vec<Vec3> = own.iter().map(|p| world.transform_point3(*p)).collect();
         let indices: Cow<'_, [u32]> = match (primitive.indices(), reader.read_indices()) {
             (None, _) => (0..positions.len() as u32).collect(),
             (Some(_), Some(indices)) => indices.into_u32().collect(),
@@ -264,36 +349,19 @@ impl<'a> Geometry<'a> {
                 .map(|uvs| uvs.into_f32().map(|uv| transform.apply(uv)).collect())
                 .unwrap_or_default(),
         };
-        self.push_faces(mode, &indices, &positions, &uvs, material as u32);
-        Ok(())
-    }
-
-    fn push_faces(
-        &mut self,
-        mode: Mode,
-        indices: &[u32],
-        positions: &[Vec3],
-        uvs: &[Vec2],
-        material: u32,
-    ) {
-        let mut push = |corners: [u32; 3]| {
-            let uv = |i: u32| uvs.get(i as usize).copied().unwrap_or_default();
+        let uv = |i: u32| uvs.get(i as usize).copied().unwrap_or_default();
+        for_each_face(mode, &indices, |corners| {
             let vertices = corners.map(|i| positions[i as usize]);
             self.builder
-                .push_textured(vertices, corners.map(uv), material);
-        };
-        match mode {
-            Mode::Triangles => indices.as_chunks::<3>().0.iter().for_each(|c| push(*c)),
-            Mode::TriangleStrip => indices
-                .windows(3)
-                .enumerate()
-                .for_each(|(k, w)| push([w[0], w[1 + k % 2], w[2 - k % 2]])),
-            _ => indices
-                .get(1..)
-                .unwrap_or_default()
-                .windows(2)
-                .for_each(|w| push([indices[0], w[0], w[1]])),
+                .push_textured(vertices, corners.map(uv), material as u32);
+        });
+        if let Some(copies) = self.copies.as_mut().filter(|_| gather) {
+            for_each_face(mode, &indices, |corners| {
+                let vertices = corners.map(|i| own[i as usize]);
+                copies.triangles.push(Triangle { vertices });
+            });
         }
+        Ok(())
     }
 
     fn report_left_out(&mut self) {
@@ -308,6 +376,31 @@ impl<'a> Geometry<'a> {
                 "{count} meshes have a skin or morph targets: shown in their rest shape"
             ));
         }
+    }
+}
+
+/// Vertex indices of every triangle of a list, strip or fan.
+fn for_each_face(mode: Mode, indices: &[u32], mut face: impl FnMut([u32; 3])) {
+    match mode {
+        Mode::Triangles => indices.as_chunks::<3>().0.iter().for_each(|c| face(*c)),
+        Mode::TriangleStrip => indices
+            .windows(3)
+            .enumerate()
+            .for_each(|(k, w)| face([w[0], w[1 + k % 2], w[2 - k % 2]])),
+        _ => indices
+            .get(1..)
+            .unwrap_or_default()
+            .windows(2)
+            .for_each(|w| face([indices[0], w[0], w[1]])),
+    }
+}
+
+/// Why a node cannot be an instance, without the number that only the built-in scenes know.
+fn reason(error: &InstanceError) -> String {
+    match error {
+        InstanceError::NotFinite { .. } => "its transform is not finite".to_owned(),
+        InstanceError::Singular { .. } => "its transform cannot be inverted".to_owned(),
+        other => other.to_string(),
     }
 }
 

@@ -2,7 +2,7 @@
 //! materials and emitters.
 //!
 //! A scene is one flat triangle soup in world space with per-triangle material indices. Structures
-//! see only [`Triangle`]s; shading sees the rest.
+//! see only [`Triangle`]s, two-level ones also the [`Assembly`]; shading sees the rest.
 
 mod builder;
 pub mod builtin;
@@ -11,6 +11,7 @@ mod content;
 mod error;
 mod gltf;
 mod gltf_material;
+mod instances;
 mod mtl;
 mod obj;
 mod ply;
@@ -22,6 +23,7 @@ pub use builder::{DEFAULT_ALBEDO, MAX_COORDINATE};
 pub use builtin::builtin_scenes;
 pub use camera::Bounds;
 pub use error::SceneError;
+pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 
 use crate::config::Variant;
 use glam::{Vec2, Vec3};
@@ -141,6 +143,8 @@ pub struct SceneData {
     pub materials: Vec<Material>,
     /// Base-colour textures.
     pub textures: Vec<Texture>,
+    /// What the triangles are copies of, if the scene consists of instances.
+    pub assembly: Option<Assembly>,
     /// The camera of the file or of the built-in scene; `None` means "frame automatically".
     pub camera: Option<Camera>,
     /// Constant radiance of the environment, linear RGB; zero is a black sky.

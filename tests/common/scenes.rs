@@ -19,8 +19,8 @@ pub struct Case {
 
 pub fn soup(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> TriangleSoup {
     let record = |(id, vertices)| TriangleRecord::new(&Triangle { vertices }, id as u32, 0);
-    let records = triangles.into_iter().enumerate().map(record).collect();
-    TriangleSoup { records }
+    let records: Vec<_> = triangles.into_iter().enumerate().map(record).collect();
+    records.into()
 }
 
 fn lattice_point(rng: &mut Pcg, extent: i32) -> Vec3 {

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use raystone::accel::triangle::TriangleRecord;
-use raystone::accel::{Hit, NO_HIT, Ray, TriangleSoup};
+use raystone::accel::{Hit, NO_HIT, Ray, Space, TriangleSoup};
 use raystone::measure::gate::compare;
 use raystone::measure::rays::RaySet;
 use raystone::measure::record::{ClassVerdict, RayClass};
@@ -25,9 +25,11 @@ fn soup() -> TriangleSoup {
         triangle(-1.0, 9.0),
     ];
     let record = |(id, t): (usize, &Triangle)| TriangleRecord::new(t, id as u32, 0);
-    TriangleSoup {
-        records: all.iter().enumerate().map(record).collect(),
-    }
+    all.iter()
+        .enumerate()
+        .map(record)
+        .collect::<Vec<_>>()
+        .into()
 }
 
 /// A ray along z that hits triangle 0, and one that misses everything.
@@ -54,7 +56,7 @@ fn with(change: impl Fn(&mut Hit), exact: bool) -> ClassVerdict {
     let set = set();
     let mut hits = set.truth.clone();
     change(&mut hits[0]);
-    compare(&set, &hits, &[true, false], &soup(), exact)
+    compare(&set, &hits, &[true, false], &soup(), Space::World, exact)
 }
 
 fn wrong_and_ties(verdict: &ClassVerdict) -> [usize; 2] {
@@ -119,7 +121,7 @@ fn a_wrong_any_hit_answer_is_wrong_on_every_adapter() {
     let set = set();
     for exact in [true, false] {
         for found in [[false, false], [true, true]] {
-            let verdict = compare(&set, &set.truth, &found, &soup(), exact);
+            let verdict = compare(&set, &set.truth, &found, &soup(), Space::World, exact);
             assert_eq!(
                 wrong_and_ties(&verdict),
                 [1, 0],
@@ -134,8 +136,15 @@ fn a_wrong_any_hit_answer_is_wrong_on_every_adapter() {
 #[test]
 fn missing_answers_are_wrong() {
     let set = set();
-    let verdict = compare(&set, &[], &[], &soup(), true);
+    let verdict = compare(&set, &[], &[], &soup(), Space::World, true);
     assert_eq!(wrong_and_ties(&verdict), [2, 0]);
-    let verdict = compare(&set, &set.truth[..1], &[true, false], &soup(), false);
+    let verdict = compare(
+        &set,
+        &set.truth[..1],
+        &[true, false],
+        &soup(),
+        Space::World,
+        false,
+    );
     assert_eq!(wrong_and_ties(&verdict), [1, 0]);
 }

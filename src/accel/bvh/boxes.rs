@@ -10,9 +10,9 @@ use super::super::leaf::{LEAF, Leaves, leaf_reference};
 use super::super::tree::{Coverage, NodeKind, Tree};
 use super::super::{AccelError, Counters, Ray, TriangleSoup};
 use super::layout::{Inner, Nodes, Query};
-use super::{NONE, ROOT};
 use super::options::NodeOrder;
 use super::order::InnerNodes;
+use super::{NONE, ROOT};
 use bytemuck::{Pod, Zeroable};
 
 /// Content of an inner node: axis, first child.
@@ -118,9 +118,8 @@ impl Boxes {
         max_depth: u32,
         link_of: impl Fn(u32, u32, u32) -> u32,
     ) -> Result<(), AccelError> {
-        let invalid = |index: u32, what: &str| {
-            Err(AccelError::Invalid(format!("node {index}: {what}")))
-        };
+        let invalid =
+            |index: u32, what: &str| Err(AccelError::Invalid(format!("node {index}: {what}")));
         let mut coverage = Coverage::new(soup, self.0.len());
         coverage.node(ROOT as usize)?;
         coverage.node(1)?;

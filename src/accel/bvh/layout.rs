@@ -1,8 +1,8 @@
 //! What traversals ask of a layout of nodes, and what they carry for one ray.
 
+use super::super::Counters;
 use super::super::leaf::LeafReader;
 use super::super::ray::{Hit, NO_HIT, Ray, safe_inverse};
-use super::super::Counters;
 
 /// Inner nodes to go to from a node, in order, and which child the first is (0 or 1).
 pub(super) struct Inner {
@@ -22,7 +22,12 @@ pub(super) struct Query<'a> {
 }
 
 impl<'a> Query<'a> {
-    pub fn new(ray: &'a Ray, any: bool, leaves: LeafReader<'a>, counters: &'a mut Counters) -> Self {
+    pub fn new(
+        ray: &'a Ray,
+        any: bool,
+        leaves: LeafReader<'a>,
+        counters: &'a mut Counters,
+    ) -> Self {
         Self {
             ray,
             inverse: safe_inverse(ray.direction),

@@ -124,9 +124,7 @@ impl BuiltBvh {
         check_leaves(&tree)?;
         let (nodes, leaves) = log.phase("layout", || {
             let nodes = match options.traversal {
-                Traversal::Roped => {
-                    NodeArray::Boxes(roped::rope(Boxes::new(&tree, options.order)))
-                }
+                Traversal::Roped => NodeArray::Boxes(roped::rope(Boxes::new(&tree, options.order))),
                 Traversal::OctantRoped => {
                     NodeArray::Octants(Octants::new(&Boxes::new(&tree, options.order)))
                 }
@@ -142,8 +140,7 @@ impl BuiltBvh {
             leaves: leaves?,
             depth,
         };
-        built.stats.bytes =
-            (built.node_words().words.len() * 4 + built.leaves.bytes()) as u64;
+        built.stats.bytes = (built.node_words().words.len() * 4 + built.leaves.bytes()) as u64;
         Ok(built)
     }
 
@@ -175,7 +172,7 @@ impl BuiltBvh {
 }
 
 /// Whether every leaf fits into a reference.
-fn check_leaves(tree: &Tree) -> Result<(), AccelError> {
+pub(super) fn check_leaves(tree: &Tree) -> Result<(), AccelError> {
     let count = |kind: &NodeKind| match kind {
         NodeKind::Inner { .. } => 0,
         NodeKind::Leaf { count, .. } => *count,

@@ -200,7 +200,11 @@ impl Options {
         }
         if self.stack_feature == Some("stack_workgroup") {
             let bytes = self.stack_entries(depth) * LANES * 4;
-            limit("bytes of stacks in workgroup memory", bytes, WORKGROUP_BYTES)?;
+            limit(
+                "bytes of stacks in workgroup memory",
+                bytes,
+                WORKGROUP_BYTES,
+            )?;
         }
         Ok(())
     }

@@ -7,9 +7,9 @@ use super::super::leaf::{LEAF, Leaves, leaf_reference};
 use super::super::tree::{Coverage, NodeKind, Tree};
 use super::super::{AccelError, Counters, TriangleSoup};
 use super::layout::{Inner, Nodes, Query};
-use super::{NONE, ROOT};
 use super::options::NodeOrder;
 use super::order::InnerNodes;
+use super::{NONE, ROOT};
 use bytemuck::{Pod, Zeroable};
 
 /// Boxes of both children with what they refer to: four `vec4<u32>`.
@@ -109,9 +109,8 @@ impl Pairs {
         leaves: &Leaves,
         max_depth: u32,
     ) -> Result<(), AccelError> {
-        let invalid = |index: u32, what: &str| {
-            Err(AccelError::Invalid(format!("node {index}: {what}")))
-        };
+        let invalid =
+            |index: u32, what: &str| Err(AccelError::Invalid(format!("node {index}: {what}")));
         let mut coverage = Coverage::new(soup, self.0.len());
         coverage.node(ROOT as usize)?;
         let mut stack = vec![(ROOT, NONE, Bounds::EVERYTHING, 1)];

@@ -15,9 +15,7 @@ fn soup() -> TriangleSoup {
         ];
         super::super::triangle::TriangleRecord::new(&Triangle { vertices }, i as u32, 0)
     };
-    TriangleSoup {
-        records: (0..72).map(triangle).collect(),
-    }
+    (0..72).map(triangle).collect::<Vec<_>>().into()
 }
 
 fn built(soup: &TriangleSoup, clip: bool) -> Built {
@@ -134,9 +132,7 @@ fn the_split_of_two_clusters_is_beside_the_greater_gap() {
         ];
         super::super::triangle::TriangleRecord::new(&Triangle { vertices }, i as u32, 0)
     };
-    let soup = TriangleSoup {
-        records: (0..5).map(triangle).collect(),
-    };
+    let soup: TriangleSoup = (0..5).map(triangle).collect::<Vec<_>>().into();
     let built = built(&soup, false);
     let Content::Inner { axis, position, .. } = built.nodes[0].content() else {
         panic!("the root is a leaf")

@@ -14,9 +14,7 @@ fn soup() -> TriangleSoup {
         ];
         super::super::triangle::TriangleRecord::new(&Triangle { vertices }, i as u32, 0)
     };
-    TriangleSoup {
-        records: (0..216).map(triangle).collect(),
-    }
+    (0..216).map(triangle).collect::<Vec<_>>().into()
 }
 
 fn built(soup: &TriangleSoup, clip: bool) -> Built {

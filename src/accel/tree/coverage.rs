@@ -69,9 +69,7 @@ impl<'a> Coverage<'a> {
         bounds: &Bounds,
     ) -> Result<(), AccelError> {
         let Some(triangles) = triangles else {
-            return Err(invalid(
-                "a leaf lies outside the triangle array".to_owned(),
-            ));
+            return Err(invalid("a leaf lies outside the triangle array".to_owned()));
         };
         for (place, triangle) in triangles.iter().enumerate() {
             let id = triangle.id;
@@ -87,7 +85,9 @@ impl<'a> Coverage<'a> {
             } else if meet(bounds, &own) {
                 self.parts.push((id, *bounds));
             } else {
-                return Err(invalid(format!("triangle {id} lies outside its leaf's box")));
+                return Err(invalid(format!(
+                    "triangle {id} lies outside its leaf's box"
+                )));
             }
         }
         Ok(())
@@ -170,9 +170,7 @@ mod tests {
             Vec3::new(4.0, 2.0, 0.0),
             Vec3::new(0.0, 2.0, 8.0),
         ];
-        TriangleSoup {
-            records: vec![TriangleRecord::new(&Triangle { vertices }, 0, 0)],
-        }
+        vec![TriangleRecord::new(&Triangle { vertices }, 0, 0)].into()
     }
 
     fn slab(from: [f32; 3], to: [f32; 3]) -> Bounds {

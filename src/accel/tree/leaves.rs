@@ -71,7 +71,11 @@ pub(super) fn choose_leaves(tree: Tree, has_duplicates: bool, settings: &Setting
 /// Entries without repetition, in the order of their first places.
 fn distinct(entries: &[u32]) -> impl Iterator<Item = u32> {
     let is_first = |(place, id): &(usize, &u32)| !entries[..*place].contains(id);
-    entries.iter().enumerate().filter(is_first).map(|(_, id)| *id)
+    entries
+        .iter()
+        .enumerate()
+        .filter(is_first)
+        .map(|(_, id)| *id)
 }
 
 /// The nodes above and at the chosen leaves, still in depth-first order.

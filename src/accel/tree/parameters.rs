@@ -31,7 +31,14 @@ pub(super) enum Builder {
 }
 
 /// Presets of the crate obvhs, from fast to slow.
-const PRESETS: &[&str] = &["fastest", "very-fast", "fast", "medium", "slow", "very-slow"];
+const PRESETS: &[&str] = &[
+    "fastest",
+    "very-fast",
+    "fast",
+    "medium",
+    "slow",
+    "very-slow",
+];
 
 /// The parameters as builders read them.
 #[derive(Debug, Clone)]

@@ -3,11 +3,11 @@
 //! Source: D. Meister, J. Bittner, "Parallel locally-ordered clustering for bounding volume hierarchy
 //! construction", 2018.
 
+use super::Tree;
 use super::depth::limit_depth;
 use super::parameters::Settings;
 use super::reference::{Box3, Reference};
 use super::subtree::{leaf, make_inner};
-use super::Tree;
 use crate::accel::AccelError;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
@@ -88,7 +88,9 @@ fn take_over(bvh: &Bvh2) -> Tree {
         let (first, count) = (node.first_index, node.prim_count);
         nodes.push(leaf(bounds, order.len() as u32, count as usize));
         if node.is_leaf() {
-            order.extend_from_slice(&bvh.primitive_indices[first as usize..(first + count) as usize]);
+            order.extend_from_slice(
+                &bvh.primitive_indices[first as usize..(first + count) as usize],
+            );
         } else {
             stack.push((first + 1, Some(nodes.len() - 1)));
             stack.push((first, None));

@@ -140,9 +140,7 @@ impl Hierarchy {
         let wanted = (all.len() as f32 * share).ceil() as usize;
         if wanted < all.len() {
             let area = |index: &u32| self.node(*index).bounds.half_area();
-            all.select_nth_unstable_by(wanted, |a, b| {
-                area(b).total_cmp(&area(a)).then(a.cmp(b))
-            });
+            all.select_nth_unstable_by(wanted, |a, b| area(b).total_cmp(&area(a)).then(a.cmp(b)));
             all.truncate(wanted);
             all.sort_unstable();
         }
@@ -220,15 +218,35 @@ impl Hierarchy {
         if depth + self.node(node).height.max(self.node(target).height) > self.depth_limit {
             return false;
         }
-        involved.iter().for_each(|&i| self.touched[i as usize] = true);
+        involved
+            .iter()
+            .for_each(|&i| self.touched[i as usize] = true);
 
         // The sibling takes the parent's place, which frees the pair.
         let pair = node.min(beside);
         let (moved, kept, displaced) = (*self.node(node), *self.node(beside), *self.node(target));
-        self.place(parent, Node { parent: self.node(parent).parent, ..kept });
+        self.place(
+            parent,
+            Node {
+                parent: self.node(parent).parent,
+                ..kept
+            },
+        );
         // Had the target been the sibling, it would have moved; but that is excluded.
-        self.place(pair, Node { parent: target, ..displaced });
-        self.place(pair + 1, Node { parent: target, ..moved });
+        self.place(
+            pair,
+            Node {
+                parent: target,
+                ..displaced
+            },
+        );
+        self.place(
+            pair + 1,
+            Node {
+                parent: target,
+                ..moved
+            },
+        );
         let joint = &mut self.nodes[target as usize];
         (joint.first, joint.count) = (pair, 0);
         self.update_upwards(target);

@@ -132,7 +132,9 @@ impl Sweep<'_> {
         depth: u32,
     ) -> Option<(usize, usize)> {
         let count = lists[0].len();
-        let own_areas = lists[0].iter().map(|&p| self.reference(p).bounds().half_area());
+        let own_areas = lists[0]
+            .iter()
+            .map(|&p| self.reference(p).bounds().half_area());
         if self.settings.must_be_leaf(bounds, own_areas) {
             return None;
         }

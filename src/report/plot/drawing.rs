@@ -2,6 +2,8 @@
 //!
 //! Plots are laid out once, in pixels of the size shown; [`super::paint`] paints them.
 
+use super::raster::Raster;
+
 /// Colour with opacity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ink {
@@ -92,6 +94,8 @@ pub struct Drawing {
     pub width: f64,
     /// Height in pixels.
     pub height: f64,
+    /// Pixels behind all shapes.
+    pub rasters: Vec<Raster>,
     /// From back to front.
     pub shapes: Vec<Shape>,
 }
@@ -102,6 +106,7 @@ impl Drawing {
         Self {
             width,
             height,
+            rasters: Vec::new(),
             shapes: Vec::new(),
         }
     }

@@ -62,6 +62,14 @@ pub fn to_svg(drawing: &Drawing) -> Result<String, ReportError> {
         .draw_rect((0, 0), corner, &WHITE, true)
         .map_err(|error| ReportError::Draw(error.to_string()))?;
     paint(drawing, backend, SCALE, 0.5)?;
+    // Between the paper and the first shape.
+    let paper = svg
+        .find("<rect")
+        .and_then(|at| Some(at + svg[at..].find("/>")? + 2));
+    if let Some(end) = paper {
+        let rasters: Result<String, _> = drawing.rasters.iter().map(|r| r.svg(SCALE)).collect();
+        svg.insert_str(end, &rasters?);
+    }
     Ok(svg.replacen(
         &format!(r#"width="{width}" height="{height}""#),
         &format!(r#"width="{}" height="{}""#, drawing.width, drawing.height),
@@ -75,6 +83,9 @@ pub fn to_png(drawing: &Drawing) -> Result<Vec<u8>, ReportError> {
     let (width, height) = scaled_size(drawing, SCALE);
     // White already: painting it pixel by pixel would take longer than the plot.
     let mut pixels = vec![255u8; width as usize * height as usize * 3];
+    for raster in &drawing.rasters {
+        raster.blit(&mut pixels, width as usize, SCALE);
+    }
     let backend = BitMapBackend::with_buffer(&mut pixels, (width, height));
     paint(drawing, backend, SCALE, 2.5)?;
     let mut png = Vec::new();

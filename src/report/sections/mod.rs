@@ -1,6 +1,7 @@
 //! The content of the report, section by section.
 
 pub mod belief;
+pub mod point_sets;
 pub mod run;
 pub mod sampler_plots;
 pub mod samplers;
@@ -22,6 +23,7 @@ pub fn document(dir: &Path, data: &RunData, warnings: &[String]) -> Document {
         sections.push(scene_section(dir, data, index, scene));
     }
     sections.extend(streams::section(data));
+    sections.extend(point_sets::section(data));
     sections.extend(run::sections(data));
     Document {
         title: title(data),

@@ -3,6 +3,7 @@
 use super::file_stem;
 use super::trade_off;
 use super::verdict::ray_classes;
+use crate::accel::Space;
 use crate::measure::record::{RayClass, StructureRecord};
 use crate::report::color::viridis_css;
 use crate::report::data::{RunData, SceneGroup, structure_name};
@@ -87,12 +88,19 @@ pub fn speed_table(scene: &SceneGroup) -> Table {
     for s in &scene.structures {
         let fault = s.fault();
         let verdict = if fault.is_none() { "passed" } else { "FAILED" };
+        let judge = match s.space {
+            Space::World => "",
+            Space::Instances => "judged over instances",
+        };
         let tone = if fault.is_none() {
             Tone::Good
         } else {
             Tone::Bad
         };
-        let mut row = vec![name(s).into(), Cell::from(verdict).toned(tone)];
+        let mut row = vec![
+            name(s).into(),
+            Cell::with_detail(verdict, judge).toned(tone),
+        ];
         row.extend(classes.iter().map(|&class| {
             let timing = s
                 .timings
@@ -113,20 +121,27 @@ pub fn speed_table(scene: &SceneGroup) -> Table {
 fn build_table(scene: &SceneGroup) -> Table {
     let columns = ["structure", "build, ms", ":of which, ms", "peak memory"];
     let mut table = Table::new("Build (one each)", &columns);
+    let updated = built(scene).any(|s| s.update_ms.is_some());
+    if updated {
+        table.caption += "; update: all instances moved, objects kept (median of 5)";
+        table.add_column("update, ms");
+    }
     for s in built(scene) {
         let phases: Vec<String> = s
             .build
             .iter()
             .map(|phase| format!("{} {}", phase.name, format::number(phase.ms)))
             .collect();
-        table.rows.push(vec![
+        let mut row = vec![
             name(s).into(),
             format::number(s.build_ms).into(),
             phases.join(" + ").into(),
             s.build_peak_bytes
                 .map_or(format::ABSENT.into(), format::bytes)
                 .into(),
-        ]);
+        ];
+        row.extend(updated.then(|| format::optional(s.update_ms).into()));
+        table.rows.push(row);
     }
     table
 }

@@ -1,5 +1,6 @@
 //! Synthetic but realistic records.
 
+use crate::accel::Space;
 use crate::config::{Params, Variant};
 use crate::measure::record::*;
 use crate::scene::{Camera, LoadReport};
@@ -175,6 +176,8 @@ pub(super) fn structure(scene: &str, accel: &str, mrays: f64, wrong: usize) -> S
         ],
         build_ms: 34.0,
         build_peak_bytes: Some(23_000_000),
+        space: Space::World,
+        update_ms: None,
         stats: StructureStats {
             nodes: 44_381,
             leaves: 22_191,

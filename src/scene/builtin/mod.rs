@@ -5,6 +5,7 @@
 mod cornell_box;
 mod displaced_sphere;
 mod furnace;
+mod instances;
 pub(super) mod numeric;
 mod single_triangle;
 mod sphere;
@@ -25,11 +26,12 @@ struct Builtin {
 }
 
 /// The registry.
-const BUILTINS: [Builtin; 7] = [
+const BUILTINS: [Builtin; 8] = [
     cornell_box::SCENE,
     displaced_sphere::SCENE,
     triangle_soup::SCENE,
     teapot_in_a_stadium::SCENE,
+    instances::SCENE,
     furnace::FURNACE_BOX,
     furnace::WHITE_FURNACE,
     single_triangle::SCENE,

@@ -116,3 +116,26 @@ fn broken_gltf_files_say_which_part() {
         }
     }
 }
+
+#[test]
+fn nodes_that_share_a_mesh_become_instances_of_one_object() {
+    let image = png();
+    let bin = square_bin(&image);
+    let json = square_json(image.len());
+    let scene = load_files("a.glb", &[("a.glb", &glb(&json, &bin))]).unwrap();
+    let assembly = scene.assembly.as_ref().unwrap();
+    assert_eq!(assembly.objects().len(), 1);
+    assert_eq!(assembly.instances().len(), 2);
+    let copies = assembly.instances().iter().flat_map(|i| assembly.copy(i));
+    assert!(copies.eq(scene.triangles.iter().copied()));
+    assert!(scene.report.warnings.is_empty());
+    // Used once, the mesh is no object; flattened by a node, it cannot be one.
+    let once = json.replacen("{\"mesh\":0}", "{}", 1);
+    let scene = load_files("a.glb", &[("a.glb", &glb(&once, &bin))]).unwrap();
+    assert!(scene.assembly.is_none() && scene.report.warnings.is_empty());
+    let flat = json.replacen("{\"mesh\":0}", "{\"mesh\":0,\"scale\":[1,0,1]}", 1);
+    let scene = load_files("a.glb", &[("a.glb", &glb(&flat, &bin))]).unwrap();
+    assert!(scene.assembly.is_none());
+    let warning = &scene.report.warnings[0];
+    assert!(warning.contains("cannot be inverted"), "{warning}");
+}

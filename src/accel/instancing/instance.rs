@@ -1,0 +1,192 @@
+//! What the two-level traversals share: instances as kernels read them, rays in an object's space,
+//! boxes grown for the ray, and the traversal of one object. Twin of `kernels/accel/instance.wesl`.
+
+use super::super::Counters;
+use super::super::bounds::{BOX_PAD, Bounds};
+use super::super::leaf::{LEAF, leaf_range};
+use super::super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::super::triangle::{TriangleRecord, intersect_triangle};
+use super::forest::Node;
+use crate::scene::{Instance, Transform};
+use bytemuck::{Pod, Zeroable};
+
+/// A leaf without content: the missing child of a node with one.
+pub(super) const NOTHING: u32 = LEAF;
+/// Flag of an entry whose rays need no transform.
+pub(super) const IDENTITY: u32 = 1;
+
+/// An instance, or the part of it below a node of its object: four `vec4<u32>`. The columns of the
+/// map to the object's space and the translation.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(super) struct Entry {
+    pub x: [f32; 3],
+    /// Node of the object's BVH to start from.
+    pub node: u32,
+    pub y: [f32; 3],
+    /// Index in the scene of the instance's first triangle.
+    pub first_id: u32,
+    pub z: [f32; 3],
+    /// [`IDENTITY`] or 0.
+    pub flags: u32,
+    pub offset: [f32; 3],
+    /// Index of the instance, for checks.
+    pub instance: u32,
+}
+
+impl Entry {
+    pub(super) fn new(index: u32, instance: &Instance, node: u32) -> Self {
+        let Transform { rows } = instance.to_object;
+        let column = |c: usize| rows.map(|row| row[c]);
+        Self {
+            x: column(0),
+            node,
+            y: column(1),
+            first_id: instance.first,
+            z: column(2),
+            flags: if instance.is_identity() { IDENTITY } else { 0 },
+            offset: column(3),
+            instance: index,
+        }
+    }
+
+    pub(super) fn object_ray(&self, ray: &Ray) -> Ray {
+        if self.flags & IDENTITY != 0 {
+            return *ray;
+        }
+        let linear = |v: [f32; 3], axis: usize| {
+            self.x[axis] * v[0] + self.y[axis] * v[1] + self.z[axis] * v[2]
+        };
+        Ray {
+            origin: [0, 1, 2].map(|axis| linear(ray.origin, axis) + self.offset[axis]),
+            direction: [0, 1, 2].map(|axis| linear(ray.direction, axis)),
+            ..*ray
+        }
+    }
+}
+
+/// The ray in the space of an instance's object. Distances stay the same.
+pub(super) fn object_ray(instance: &Instance, ray: &Ray) -> Ray {
+    Entry::new(0, instance, 0).object_ray(ray)
+}
+
+/// A ray as the boxes of one level see it: low planes from one origin and high planes from another,
+/// which grows every box by their distance.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Level {
+    pub ray: Ray,
+    pub inverse: [f32; 3],
+    low_origin: [f32; 3],
+    high_origin: [f32; 3],
+}
+
+/// The level of the boxes that are tested with `ray`, grown by `growth` for each unit of the origin's
+/// greatest coordinate.
+pub(super) fn level(ray: &Ray, growth: f32) -> Level {
+    let [x, y, z] = ray.origin.map(f32::abs);
+    let grown = growth * x.max(y).max(z);
+    Level {
+        ray: *ray,
+        inverse: safe_inverse(ray.direction),
+        low_origin: ray.origin.map(|x| x + grown),
+        high_origin: ray.origin.map(|x| x - grown),
+    }
+}
+
+/// Distance at which the segment up to `t_best` enters the grown and padded box, or `None`.
+pub(super) fn enter_grown(level: &Level, bounds: &Bounds, t_best: f32) -> Option<f32> {
+    let near = |a: usize| (bounds.min[a] - level.low_origin[a]) * level.inverse[a];
+    let far = |a: usize| (bounds.max[a] - level.high_origin[a]) * level.inverse[a];
+    let (x1, x2) = (near(0), far(0));
+    let (y1, y2) = (near(1), far(1));
+    let (z1, z2) = (near(2), far(2));
+    let enter = x1.min(x2).max(y1.min(y2)).max(z1.min(z2));
+    let exit = x1.max(x2).min(y1.max(y2)).min(z1.max(z2));
+    let enter = enter.max(level.ray.t_min);
+    (enter <= exit.min(t_best) * BOX_PAD).then_some(enter)
+}
+
+/// Tests the triangles of a leaf; `first_id` turns their ids into those of the scene.
+pub(super) fn leaf(
+    triangles: &[TriangleRecord],
+    reference: u32,
+    first_id: u32,
+    level: &Level,
+    hit: &mut Hit,
+    counters: &mut Counters,
+) {
+    let (first, count) = leaf_range(reference);
+    for triangle in &triangles[first..first + count] {
+        counters.triangle_tests += 1;
+        let id = triangle.id + first_id;
+        let triangle = TriangleRecord { id, ..*triangle };
+        intersect_triangle(&triangle, &level.ray, level.inverse, hit);
+    }
+}
+
+/// Both children of a node in the order of their distance, with where they are entered.
+pub(super) fn near_and_far(
+    node: &Node,
+    level: &Level,
+    t_best: f32,
+    counters: &mut Counters,
+) -> [(Option<f32>, u32); 2] {
+    counters.nodes += 1;
+    counters.box_tests += 2;
+    let [(left, left_box), (right, right_box)] = node.children();
+    let enter_left = enter_grown(level, &left_box, t_best);
+    let enter_right = enter_grown(level, &right_box, t_best);
+    let swap = enter_right.is_some_and(|r| enter_left.is_none_or(|l| r < l));
+    if swap {
+        [(enter_right, right), (enter_left, left)]
+    } else {
+        [(enter_left, left), (enter_right, right)]
+    }
+}
+
+/// Whether a child is worth a visit: the near one may have brought a hit in the meantime.
+pub(super) fn is_open(enter: Option<f32>, hit: &Hit) -> bool {
+    enter.is_some_and(|e| e <= hit.t * BOX_PAD)
+}
+
+/// Traces the object below `entry.node`, near child first.
+pub(super) fn trace_object(
+    nodes: &[Node],
+    triangles: &[TriangleRecord],
+    entry: &Entry,
+    ray: &Ray,
+    any: bool,
+    hit: &mut Hit,
+    counters: &mut Counters,
+) {
+    let level = level(&entry.object_ray(ray), 0.0);
+    let mut stack = Vec::new();
+    let mut current = entry.node;
+    loop {
+        let children = near_and_far(&nodes[current as usize], &level, hit.t, counters);
+        let mut next = NOTHING;
+        for (enter, reference) in children {
+            if !is_open(enter, hit) {
+                continue;
+            }
+            if reference >= LEAF {
+                leaf(triangles, reference, entry.first_id, &level, hit, counters);
+                if any && hit.triangle != NO_HIT {
+                    return;
+                }
+            } else if next == NOTHING {
+                next = reference;
+            } else {
+                stack.push(reference);
+                counters.stack_high_water = counters.stack_high_water.max(stack.len() as u32);
+            }
+        }
+        if next == NOTHING {
+            match stack.pop() {
+                Some(reference) => next = reference,
+                None => return,
+            }
+        }
+        current = next;
+    }
+}

@@ -1,0 +1,86 @@
+//! The truth for structures that transform rays: every instance is looked at, whatever its world box.
+
+use super::super::bounds::{Bounds, enter_box};
+use super::super::ray::safe_inverse;
+use super::super::triangle::{TriangleRecord, intersect_triangle};
+use super::super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, BuiltBvh, Bvh, Counters, CpuTwin, Hit, NO_HIT,
+    Ray, TriangleSoup,
+};
+use super::instance::object_ray;
+use super::placed::Placed;
+use crate::config::Params;
+use rayon::prelude::*;
+
+/// Nearest hits by testing every triangle of every instance, in parallel over the rays.
+pub fn brute_force_instances(placed: &Placed, rays: &[Ray]) -> Vec<Hit> {
+    let closest = |ray: &Ray| {
+        let mut hit = Hit::miss(ray);
+        for instance in &placed.instances {
+            let local = object_ray(instance, ray);
+            let inverse = safe_inverse(local.direction);
+            for record in &placed.objects[instance.object as usize].records {
+                let id = record.id + instance.first;
+                intersect_triangle(&TriangleRecord { id, ..*record }, &local, inverse, &mut hit);
+            }
+        }
+        hit
+    };
+    rays.par_iter().map(closest).collect()
+}
+
+/// The same answers faster: the scalar plain BVH of every object, for one instance after the other.
+/// No world box takes part, so it can judge those of the structures.
+pub struct InstanceJudge<'a> {
+    placed: &'a Placed,
+    objects: Vec<(Bounds, BuiltBvh)>,
+}
+
+impl<'a> InstanceJudge<'a> {
+    /// Builds and validates the BVH of each object, all parameters at their defaults.
+    ///
+    /// # Errors
+    /// An object has too many triangles for a BVH.
+    pub fn new(placed: &'a Placed) -> Result<Self, AccelError> {
+        let schema = Bvh.parameters().into_iter();
+        let params = Params(schema.map(|p| (p.name.to_owned(), p.default)).collect());
+        let build = |object: &TriangleSoup| {
+            let built = BuiltBvh::build(object, &params, &mut BuildLog::default())?;
+            built.validate(object)?;
+            Ok((object.bounds(), built))
+        };
+        Ok(Self {
+            placed,
+            objects: placed.objects.iter().map(build).collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+impl CpuTwin for InstanceJudge<'_> {
+    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
+        let mut best = Hit::miss(ray);
+        for instance in &self.placed.instances {
+            let mut local = object_ray(instance, ray);
+            // A hit at the same distance counts: its triangle may have the lower index.
+            local.t_max = best.t;
+            let object = &self.placed.objects[instance.object as usize];
+            let (bounds, built) = &self.objects[instance.object as usize];
+            if enter_box(bounds, &local, safe_inverse(local.direction), best.t).is_none() {
+                continue;
+            }
+            let hit = built.twin(object).closest_hit(&local, counters);
+            if hit.triangle == NO_HIT {
+                continue;
+            }
+            let triangle = hit.triangle + instance.first;
+            if hit.t < best.t || triangle < best.triangle {
+                best = Hit { triangle, ..hit };
+            }
+        }
+        best
+    }
+
+    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        self.closest_hit(ray, counters).triangle != NO_HIT
+    }
+}

@@ -1,0 +1,111 @@
+//! Two-level structures: a BVH for each object in the object's own space, and above them either a
+//! list of the instances (`object-list`) or a BVH over them (`meta-bvh`). A moved instance changes
+//! the upper level only.
+//!
+//! Rays are taken to the object's space, so t, u and v are those of brute force *over the same
+//! instances with the same transforms* ([`brute_force_instances`]), to the bit; brute force over the
+//! flat triangles rounds otherwise. The direction is transformed and not normalised, which makes the
+//! distance of a hit the same number in both spaces.
+//!
+//! Where a scene has no instances, it is one object that lies where it is. Rays are then not
+//! transformed, and all answers equal those of the flat list.
+
+mod forest;
+mod instance;
+mod judge;
+mod meta_bvh;
+mod meta_bvh_nested;
+mod object_list;
+mod placed;
+#[cfg(test)]
+mod tests;
+mod top;
+mod world_box;
+
+pub use judge::{InstanceJudge, brute_force_instances};
+pub use meta_bvh::MetaBvh;
+pub use object_list::ObjectList;
+pub use placed::Placed;
+
+use super::{AccelError, BuildLog, Space, TriangleSoup};
+use crate::config::Params;
+use crate::scene::Instance;
+use forest::Forest;
+use placed::View;
+
+/// What both structures are built from: the BVHs of the objects and where these stand.
+struct Base {
+    instances: Vec<Instance>,
+    forest: Forest,
+}
+
+impl Base {
+    fn build(soup: &TriangleSoup, params: &Params, log: &mut BuildLog) -> Result<Self, AccelError> {
+        let view = View::of(soup);
+        Ok(Self {
+            forest: Forest::build(&view.objects, params, log)?,
+            instances: view.instances.into_owned(),
+        })
+    }
+
+    fn space(&self) -> Space {
+        if self.instances.iter().all(Instance::is_identity) {
+            Space::World
+        } else {
+            Space::Instances
+        }
+    }
+
+    /// Takes over the transforms of `soup`.
+    fn update(&mut self, soup: &TriangleSoup) -> Result<(), AccelError> {
+        let moved = View::of(soup);
+        self.has_instances_of(&moved)?;
+        self.instances = moved.instances.into_owned();
+        Ok(())
+    }
+
+    /// Whether these are the same instances of objects of the same size, wherever they stand.
+    fn has_instances_of(&self, view: &View) -> Result<(), AccelError> {
+        let key = |i: &Instance| (i.object, i.first);
+        let same_instances = self
+            .instances
+            .iter()
+            .map(key)
+            .eq(view.instances.iter().map(key));
+        let sizes = view.objects.iter().map(|object| object.records.len());
+        let same_objects = self
+            .forest
+            .roots
+            .iter()
+            .map(|r| r.triangles.len())
+            .eq(sizes);
+        if same_instances && same_objects {
+            return Ok(());
+        }
+        Err(AccelError::Invalid(format!(
+            "built for {} instances of {} objects, given {} of {}: other ones need a new build",
+            self.instances.len(),
+            self.forest.roots.len(),
+            view.instances.len(),
+            view.objects.len()
+        )))
+    }
+
+    /// Checks objects and transforms against those of `soup`.
+    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
+        let view = View::of(soup);
+        self.has_instances_of(&view)?;
+        let mut pairs = self.instances.iter().zip(view.instances.iter());
+        if let Some(index) = pairs.position(|(a, b)| a != b) {
+            return Err(AccelError::Invalid(format!(
+                "instance {index} was moved after the build"
+            )));
+        }
+        self.forest.validate(&view.objects)
+    }
+}
+
+/// The step fuse as the uniform holds it: no sum of subtrees wraps around.
+fn clamped(steps: u64) -> usize {
+    steps.min(u64::from(u32::MAX)) as usize
+}

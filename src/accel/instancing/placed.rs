@@ -1,0 +1,74 @@
+//! Objects and instances as structures see them.
+
+use super::super::triangle::TriangleRecord;
+use super::super::{Ray, TriangleSoup};
+use super::instance::object_ray;
+use crate::scene::{Assembly, Instance, Transform, Triangle};
+use std::borrow::Cow;
+
+/// Canonical records of each object in its own space, and where the objects stand.
+#[derive(Debug, Clone, Default)]
+pub struct Placed {
+    /// Record `i` of an object has the id `i`; an instance adds its first id.
+    pub objects: Vec<TriangleSoup>,
+    /// The instances, in the order of their triangles in the scene.
+    pub instances: Vec<Instance>,
+}
+
+impl Placed {
+    /// The records of an assembly. Materials belong to the triangles of the scene: they are 0 here.
+    pub fn new(assembly: &Assembly) -> Self {
+        let records = |triangles: &Vec<Triangle>| -> TriangleSoup {
+            let triangles = triangles.iter().enumerate();
+            let record = |(id, t): (usize, &Triangle)| TriangleRecord::new(t, id as u32, 0);
+            triangles.map(record).collect::<Vec<_>>().into()
+        };
+        Self {
+            objects: assembly.objects().iter().map(records).collect(),
+            instances: assembly.instances().to_vec(),
+        }
+    }
+
+    /// The ray in the space of an instance's object. Distances stay the same.
+    pub fn object_ray(&self, instance: &Instance, ray: &Ray) -> Ray {
+        object_ray(instance, ray)
+    }
+
+    /// Instance and record of a triangle of the scene.
+    pub fn locate(&self, id: u32) -> Option<(&Instance, &TriangleRecord)> {
+        let after = self.instances.partition_point(|i| i.first <= id);
+        let instance = self.instances.get(after.checked_sub(1)?)?;
+        let object = self.objects.get(instance.object as usize)?;
+        let record = object.records.get((id - instance.first) as usize)?;
+        Some((instance, record))
+    }
+}
+
+/// Objects and instances of any scene.
+pub(super) struct View<'a> {
+    pub objects: Vec<&'a TriangleSoup>,
+    pub instances: Cow<'a, [Instance]>,
+}
+
+impl<'a> View<'a> {
+    /// Those of the scene; without any, the whole scene as one object where it is.
+    pub(super) fn of(soup: &'a TriangleSoup) -> Self {
+        if let Some(placed) = &soup.placed {
+            return Self {
+                objects: placed.objects.iter().collect(),
+                instances: Cow::Borrowed(&placed.instances),
+            };
+        }
+        let whole = Instance {
+            object: 0,
+            first: 0,
+            to_world: Transform::IDENTITY,
+            to_object: Transform::IDENTITY,
+        };
+        let parts = usize::from(!soup.records.is_empty());
+        Self {
+            objects: vec![soup; parts],
+            instances: Cow::Owned(vec![whole; parts]),
+        }
+    }
+}

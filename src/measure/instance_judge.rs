@@ -1,0 +1,124 @@
+//! The judge of structures that take rays to the spaces of objects. Its answers are those of brute
+//! force over the same instances with the same transforms and the same records, so that hits must be
+//! equal to the bit here too; flat triangles in world space round otherwise and judge flat
+//! structures only.
+
+use super::gate::{Judge, Meeting, ORACLE_TESTS, oracle_ray};
+use super::rays::RaySet;
+use super::record::JudgeCheck;
+use crate::accel::{
+    AccelError, Hit, InstanceJudge, Placed, Ray, TriangleSoup, brute_force_instances,
+};
+use crate::config::Gate;
+use crate::oracle::{self, OracleRay, Verdict};
+use crate::scene::{Instance, Triangle};
+use glam::DVec3;
+
+/// Answers of the oracle that are held at a time, one for each ray and instance.
+const ORACLE_QUESTIONS: usize = 1_000_000;
+
+/// The judge of the same rays in the spaces of the objects; `None` if no ray is transformed.
+///
+/// # Errors
+/// An object has too many triangles for a BVH.
+pub(super) fn new(
+    soup: &TriangleSoup,
+    sets: &[RaySet],
+    settings: &Gate,
+) -> Result<Option<Judge>, AccelError> {
+    let placed = soup.placed.as_ref();
+    let Some(placed) = placed.filter(|p| !p.instances.iter().all(Instance::is_identity)) else {
+        return Ok(None);
+    };
+    let twin = InstanceJudge::new(placed)?;
+    let sets = sets.iter();
+    let mut judge = Judge {
+        sets: sets.map(|set| set.judged_by(&twin)).collect(),
+        brute_force: JudgeCheck::default(),
+        oracle: JudgeCheck::default(),
+        first_wrong: None,
+        instances: None,
+    };
+    let triangles = soup.records.len();
+    judge.check_brute_force(settings.brute_force_tests, triangles, |rays| {
+        brute_force_instances(placed, rays)
+    });
+    let affordable = (ORACLE_TESTS / triangles.max(1)).max(64);
+    let at_once = (ORACLE_QUESTIONS / placed.instances.len()).max(64);
+    let rays = (settings.oracle_rays as usize).min(affordable).min(at_once);
+    let pairs = judge.subset(rays);
+    let verdicts = oracle_verdicts(placed, &pairs);
+    judge.note_oracle(&pairs, verdicts);
+    Ok(Some(judge))
+}
+
+/// What the oracle thinks of each answer. Every instance is asked with the ray as it is in its
+/// object's space: the one that was hit whether the hit is right, the others whether they leave the
+/// way to it free.
+fn oracle_verdicts(placed: &Placed, pairs: &[(Ray, Hit)]) -> Vec<Verdict> {
+    let mut verdicts = vec![Verdict::Agrees; pairs.len()];
+    for (index, object) in placed.objects.iter().enumerate() {
+        let of_object = |i: &&Instance| i.object as usize == index;
+        let mut questions = Vec::new();
+        let mut asked = Vec::new();
+        for instance in placed.instances.iter().filter(of_object) {
+            let ids = instance.first..instance.first + object.records.len() as u32;
+            for (pair, (ray, hit)) in pairs.iter().enumerate() {
+                let local = oracle_ray(&placed.object_ray(instance, ray));
+                questions.push(if ids.contains(&hit.triangle) {
+                    (local, Some((hit.triangle - instance.first, hit.t)))
+                } else {
+                    let t_max = hit.t;
+                    (OracleRay { t_max, ..local }, None)
+                });
+                asked.push(pair);
+            }
+        }
+        let records = object.records.iter();
+        let triangles: Vec<Triangle> = records.map(|record| record.triangle()).collect();
+        let answers = oracle::judge_closest_hits(&triangles, &questions);
+        for (pair, answer) in asked.into_iter().zip(answers) {
+            match (&verdicts[pair], &answer) {
+                (Verdict::Wrong(_), _) | (_, Verdict::Agrees) => {}
+                _ => verdicts[pair] = answer,
+            }
+        }
+    }
+    verdicts
+}
+
+/// Where a ray meets the triangle `id` of the scene: in the space of its object.
+pub(super) fn meeting(placed: &Placed, ray: &Ray, id: u32, t: f32) -> Option<Meeting> {
+    let (instance, record) = placed.locate(id)?;
+    Some(Meeting {
+        ray: placed.object_ray(instance, ray),
+        record: *record,
+        transform_error: transform_error(instance, record, ray, f64::from(t)),
+    })
+}
+
+/// How far, to first order, rounding of the transformed ray moves the distance to the plane of a
+/// triangle: t = n·(v0 − o′) / n·d′, and o′ and d′ are sums of four and three products.
+fn transform_error(
+    instance: &Instance,
+    record: &crate::accel::triangle::TriangleRecord,
+    ray: &Ray,
+    t: f64,
+) -> f64 {
+    if instance.is_identity() {
+        return 0.0;
+    }
+    let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
+    let (linear, offset) = instance.to_object.parts();
+    let sizes = glam::DMat3::from_cols(
+        linear.x_axis.abs(),
+        linear.y_axis.abs(),
+        linear.z_axis.abs(),
+    );
+    let unit = 0.5 * f64::from(f32::EPSILON);
+    let origin_error = 4.0 * unit * (sizes * wide(ray.origin).abs() + offset.abs());
+    let direction_error = 3.0 * unit * (sizes * wide(ray.direction).abs());
+    let normal = wide(record.e1).cross(wide(record.e2));
+    let moved = normal.abs().dot(origin_error + t.abs() * direction_error);
+    moved / normal.dot(linear * wide(ray.direction)).abs()
+}

@@ -1,0 +1,331 @@
+//! A page about one point set: the set, its projections, disc and hemisphere, superposed pixels,
+//! spectra and the star discrepancy of all pairs of dimensions.
+
+use super::document::{Block, Document, Figure, Section};
+use super::format;
+use super::plot::matrix::PairMatrix;
+use super::plot::panels::{self, Panel};
+use super::plot::points::{Cloud, Domain, Pair, drawn_in_words, interval_counts};
+use super::plot::spectrum::{ColorBar, PeriodogramMap, RadialCurve, highest_frequency};
+use crate::discrepancy::{Budget, DiscrepancyError, PointSet, periodogram, star_2d};
+use rayon::prelude::*;
+
+/// Dimensions whose projections are drawn at most.
+pub const MOST_PROJECTED: usize = 8;
+/// Points for which elementary intervals are drawn at most: more lines would hide the points.
+const MOST_INTERVALS: usize = 1024;
+/// Points of the first pixel that are drawn upon those of the others at most.
+const MOST_HIGHLIGHTED: usize = 1024;
+/// Time for the spectra, seconds.
+const SPECTRUM_SECONDS: f64 = 60.0;
+/// Width of a drawing that fills the page, pixels.
+const WIDTH: f64 = 900.0;
+
+/// What the page is about.
+#[derive(Debug, Clone)]
+pub struct PointPage {
+    /// Name of the sampler.
+    pub label: String,
+    /// Where the points come from: pixel, seed, parameters.
+    pub origin: String,
+    /// Dimensions of the sampler, one for each coordinate of `points`; two at least.
+    pub dims: Vec<u32>,
+    /// The points of one pixel.
+    pub points: PointSet,
+    /// The first two coordinates of the points of several pixels, that of `points` first.
+    pub copies: Vec<Vec<Pair>>,
+}
+
+/// The page; star discrepancies and spectra are computed here, on all cores.
+///
+/// # Errors
+/// Coordinates outside `[0, 1]`, or fewer than two dimensions.
+pub fn document(page: &PointPage) -> Result<Document, DiscrepancyError> {
+    let n = page.points.len();
+    let mut set = Section::new("set", "Point set");
+    set.blocks.push(Block::Figures(page.sets()?));
+    let mut projections = Section::new("projections", "Projections");
+    projections.blocks.push(Block::Figures(page.projections()?));
+    let mut pixels = Section::new("pixels", "Superposed pixels");
+    pixels.blocks.push(Block::Figures(vec![page.copies()]));
+    let mut spectrum = Section::new("spectrum", "Power spectrum");
+    spectrum.blocks.push(page.spectra()?);
+    let sections = [set, projections, pixels, spectrum];
+    let dims: Vec<String> = page.dims.iter().map(u32::to_string).collect();
+    Ok(Document {
+        title: page.label.clone(),
+        subtitle: format!(
+            "{n} points, dimensions {}; {}",
+            dims.join(", "),
+            page.origin
+        ),
+        banners: Vec::new(),
+        sections: sections.into(),
+    })
+}
+
+impl PointPage {
+    /// The coordinates at two positions of `dims`.
+    fn pairs(&self, i: usize, j: usize) -> Result<Vec<Pair>, DiscrepancyError> {
+        let projected = self.points.project(&[i, j])?;
+        Ok(projected.points().map(|p| [p[0], p[1]]).collect())
+    }
+
+    /// `dimensions 0 and 1` of two positions.
+    fn names(&self, i: usize, j: usize) -> String {
+        format!("dimensions {} and {}", self.dims[i], self.dims[j])
+    }
+
+    /// m, if there are 2^m points and not too many for elementary intervals.
+    fn net(&self) -> Option<u32> {
+        let n = self.points.len();
+        (n.is_power_of_two() && n <= MOST_INTERVALS).then(|| n.trailing_zeros())
+    }
+
+    /// The first two dimensions: square, discs and dome, then every shape of elementary intervals.
+    fn sets(&self) -> Result<Vec<Figure>, DiscrepancyError> {
+        let points = self.pairs(0, 1)?;
+        let cloud = |domain| Cloud::new(domain, points.clone());
+        let square = Cloud {
+            intervals: self.net().map(|m| [m.div_ceil(2), m / 2]),
+            ..cloud(Domain::Square)
+        };
+        let panels = [
+            Panel::new("unit square", self.names(0, 1), square),
+            Panel::new(
+                "disc, radius √x, angle 2πy",
+                "the path tracer's",
+                cloud(Domain::PolarDisc),
+            ),
+            Panel::new(
+                "cosine hemisphere",
+                "the disc lifted; far side pale",
+                cloud(Domain::Hemisphere),
+            ),
+            Panel::new(
+                "concentric disc",
+                "for comparison, used nowhere",
+                cloud(Domain::ConcentricDisc),
+            ),
+        ];
+        let drawn = drawn_in_words(points.len());
+        let mut caption = format!("{drawn}, {}.", self.names(0, 1));
+        if self.net().is_some() {
+            caption += " Lines: elementary intervals; tinted: an interval without a point.";
+        }
+        let drawing = panels::draw(&panels, 2, panels::side(WIDTH, 2));
+        let mut figures = vec![Figure::new("point-set", caption, drawing)];
+        figures.extend(self.net().map(|m| intervals(&points, m)));
+        Ok(figures)
+    }
+
+    /// All pairs of the first dimensions, and the star discrepancy of all pairs.
+    fn projections(&self) -> Result<Vec<Figure>, DiscrepancyError> {
+        let shown = self.dims.len().min(MOST_PROJECTED);
+        let mut panels = Vec::new();
+        for (i, j) in pairs_below(shown) {
+            let title = format!("x: {}, y: {}", self.dims[i], self.dims[j]);
+            panels.push(Panel::new(
+                title,
+                "",
+                Cloud::new(Domain::Square, self.pairs(i, j)?),
+            ));
+        }
+        let of = match self.dims.len() > shown {
+            true => format!("the first {shown} dimensions given"),
+            false => "all dimensions given".into(),
+        };
+        let drawn = drawn_in_words(self.points.len());
+        let caption = format!("Every pair of {of}: {drawn}.");
+        let columns = panels.len().min(4);
+        let drawing = panels::draw(&panels, columns, panels::side(WIDTH, 4));
+        let projections = Figure::new("projections", caption, drawing);
+        let matrix = self.matrix()?;
+        let discrepancies = matrix.draw().zip(matrix.worst()).map(|(drawing, (i, j, worst))| {
+            let caption = format!(
+                "Exact star discrepancy of each pair of dimensions; the worst are {i} and {j} with {}.",
+                format::number(worst)
+            );
+            Figure::new("pair-discrepancy", caption, drawing)
+        });
+        Ok(std::iter::once(projections).chain(discrepancies).collect())
+    }
+
+    fn matrix(&self) -> Result<PairMatrix, DiscrepancyError> {
+        let star = |(i, j)| Ok((i, j, star_2d(&self.pairs(i, j)?)?));
+        let pairs: Vec<_> = pairs_below(self.dims.len()).collect();
+        let values: Result<_, DiscrepancyError> = pairs.into_par_iter().map(star).collect();
+        Ok(PairMatrix {
+            dims: self.dims.clone(),
+            values: values?,
+        })
+    }
+
+    /// All pixels upon each other (Dufay 2017, Figs. 5.7 and 5.13).
+    fn copies(&self) -> Figure {
+        let all: Vec<Pair> = self.copies.concat();
+        let first = self.copies.first().map_or(0, Vec::len);
+        let own = self
+            .copies
+            .first()
+            .filter(|own| own.len() <= MOST_HIGHLIGHTED);
+        let cloud = |domain| Cloud {
+            highlighted: own.cloned().unwrap_or_default(),
+            ..Cloud::new(domain, all.clone())
+        };
+        let pixels = format::plural(self.copies.len(), "pixel");
+        let panels = [
+            Panel::new(pixels.clone(), "unit square", cloud(Domain::Square)),
+            Panel::new(pixels.clone(), "disc", cloud(Domain::PolarDisc)),
+        ];
+        let caption = format!(
+            "The points of {pixels} in a row upon each other, {first} of {} each; the first pixel's in \
+             another colour. Holes and stripes are directions that no pixel looks into.",
+            self.points.len()
+        );
+        Figure::new(
+            "pixels",
+            caption,
+            panels::draw(&panels, 2, panels::side(WIDTH, 2)),
+        )
+    }
+
+    /// Periodogram and its radial mean, or why there are none.
+    fn spectra(&self) -> Result<Block, DiscrepancyError> {
+        let highest = highest_frequency(self.points.len());
+        let pair = self.points.project(&[0, 1])?;
+        let found = match periodogram(&pair, highest, &Budget::seconds(SPECTRUM_SECONDS)) {
+            Ok(found) => found,
+            Err(reason @ DiscrepancyError::OverBudget { .. }) => {
+                return Ok(Block::Paragraph(format!("No spectrum: {reason}.")));
+            }
+            Err(reason) => return Err(reason),
+        };
+        let range = format!("frequencies up to ±{highest}");
+        let panels = [
+            Panel::new(
+                "radial mean",
+                format!("frequency 1 to {highest}"),
+                RadialCurve(found.radial()),
+            ),
+            Panel::new("periodogram", range, PeriodogramMap(found)),
+            Panel::new("power", "", ColorBar),
+        ];
+        let caption = format!(
+            "Power of the {} points in {}: |Σ exp(−2πi k·x)|² / N at integer frequencies k. \
+             Dashed: white noise. What lies beyond the scale lies on its edge.",
+            pair.len(),
+            self.names(0, 1)
+        );
+        let drawing = panels::draw(&panels, 3, panels::side(WIDTH, 3));
+        Ok(Block::Figures(vec![Figure::new(
+            "spectrum", caption, drawing,
+        )]))
+    }
+}
+
+/// Every pair `i < j` below `n`.
+fn pairs_below(n: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..n).flat_map(move |i| (i + 1..n).map(move |j| (i, j)))
+}
+
+/// All shapes of elementary intervals of volume 1/N of 2^m points.
+fn intervals(points: &[Pair], m: u32) -> Figure {
+    let panel = |a: u32| {
+        let shape = [a, m - a];
+        let empty = interval_counts(points, shape)
+            .iter()
+            .filter(|&&count| count == 0)
+            .count();
+        let note = match empty {
+            0 => "one point in each".into(),
+            empty => format!("{empty} of {} empty", points.len()),
+        };
+        let cloud = Cloud {
+            intervals: Some(shape),
+            ..Cloud::new(Domain::Square, points.to_vec())
+        };
+        Panel::new(format!("{} × {}", 1u32 << a, 1u32 << (m - a)), note, cloud)
+    };
+    let panels: Vec<Panel> = (0..=m).rev().map(panel).collect();
+    let caption =
+        "Every shape of elementary intervals of volume 1/N. A (0, m, 2)-net has one point in each.";
+    let drawing = panels::draw(&panels, 4, panels::side(WIDTH, 4));
+    Figure::new("elementary-intervals", caption, drawing)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Four points in three dimensions that tell the dimensions apart, two pixels.
+    fn page() -> PointPage {
+        let points = [
+            [0.0, 0.0, 0.9],
+            [0.5, 0.5, 0.9],
+            [0.25, 0.75, 0.9],
+            [0.75, 0.25, 0.9],
+        ];
+        let own: Vec<Pair> = points.iter().map(|p| [p[0], p[1]]).collect();
+        PointPage {
+            label: "known".into(),
+            origin: "by hand".into(),
+            dims: vec![4, 5, 9],
+            points: PointSet::from_points(&points).unwrap(),
+            copies: vec![own.clone(), own],
+        }
+    }
+
+    #[test]
+    fn projections_take_the_dimensions_that_they_name() {
+        let page = page();
+        assert_eq!(page.pairs(0, 2).unwrap()[3], [0.75, 0.9]);
+        assert_eq!(page.pairs(1, 2).unwrap()[3], [0.25, 0.9]);
+        let figures = page.projections().unwrap();
+        let texts = figures[0].drawing.texts();
+        let titles: Vec<_> = texts.iter().filter(|text| text.starts_with("x:")).collect();
+        assert_eq!(titles, [&"x: 4, y: 5", &"x: 4, y: 9", &"x: 5, y: 9"]);
+        // The third dimension is bad with both others: D* is that of its one value.
+        let matrix = page.matrix().unwrap();
+        let good = star_2d(&page.pairs(0, 1).unwrap()).unwrap();
+        assert_eq!(matrix.values[0], (0, 1, good));
+        assert!(matrix.values[1].2 >= 0.9 && matrix.values[2].2 >= 0.9 && good < 0.6);
+        assert!(page.pairs(0, 3).is_err());
+    }
+
+    #[test]
+    fn the_page_holds_every_picture_and_says_how_many_pixels() {
+        let document = document(&page()).unwrap();
+        let figures: Vec<&Figure> = document
+            .sections
+            .iter()
+            .flat_map(|section| &section.blocks)
+            .flat_map(|block| match block {
+                Block::Figures(figures) => figures.as_slice(),
+                _ => &[],
+            })
+            .collect();
+        let names: Vec<&str> = figures.iter().map(|figure| figure.name.as_str()).collect();
+        let expected = [
+            "point-set",
+            "elementary-intervals",
+            "projections",
+            "pair-discrepancy",
+            "pixels",
+            "spectrum",
+        ];
+        assert_eq!(names, expected);
+        assert!(
+            figures[4].caption.contains("2 pixels") && figures[4].caption.contains("4 of 4 each")
+        );
+        let texts = figures[1].drawing.texts();
+        assert_eq!(
+            texts
+                .iter()
+                .filter(|text| **text == "one point in each")
+                .count(),
+            3
+        );
+        assert_eq!(document.subtitle, "4 points, dimensions 4, 5, 9; by hand");
+    }
+}
