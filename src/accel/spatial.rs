@@ -239,10 +239,11 @@ mod tests {
         let inside = clip(&CORNER, &cell([1.0, 1.0, -1.0], [2.5, 9.0, 1.0]), 0.0);
         assert_eq!(inside, Some(cell([1.0, 1.0, 0.0], [2.5, 3.0, 0.0])));
         assert_eq!(
-            clip(&CORNER, &cell([2.001, 2.0, -1.0], [3.0, 3.0, 1.0]), 0.0),
+            clip(&CORNER, &cell([2.125, 2.0, -1.0], [3.0, 3.0, 1.0]), 0.0),
             None
         );
-        let grown = clip(&CORNER, &cell([2.001, 2.0, -1.0], [3.0, 3.0, 1.0]), 0.5);
-        assert_eq!(grown, Some(cell([1.001, 1.0, -0.5], [3.0, 2.999, 0.5])));
+        // In eighths, so that nothing is rounded.
+        let grown = clip(&CORNER, &cell([2.125, 2.0, -1.0], [3.0, 3.0, 1.0]), 0.5);
+        assert_eq!(grown, Some(cell([1.125, 1.0, -0.5], [3.0, 2.875, 0.5])));
     }
 }

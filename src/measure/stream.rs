@@ -15,6 +15,8 @@ pub const MOST_QUADRATIC: usize = 1 << 13;
 const SUM_SECONDS: f64 = 600.0;
 /// Copies that are superposed for the coverage, as in Dufay 2017, Fig. 5.13.
 pub const COPIES: u32 = 150;
+/// Coordinates are multiples of this: errors below it are theirs and not the points'.
+const RESOLUTION: f64 = 1.0 / (1 << 24) as f64;
 /// Cells along a side of the coverage's grid, per √N.
 const CELLS: usize = 4;
 
@@ -105,7 +107,8 @@ fn curve(counts: &[usize], values: &[f64]) -> Vec<(f64, f64)> {
 }
 
 /// RMSE over seeds of every function, and its slope. The slope is half that of the mean square, so that
-/// it is the slope of the RMSE and not of a mean of absolute errors.
+/// it is the slope of the RMSE and not of a mean of absolute errors. A single set that happens to be right
+/// to the resolution of its coordinates says nothing of a slope there and is left out of it.
 fn integrands(counts: &[usize], seeds: &[SeedFigures]) -> Vec<IntegrandFigures> {
     let figures = |(k, (name, function)): (usize, (&str, Function))| {
         let errors: Vec<&Vec<f64>> = seeds.iter().map(|s| &s.squared_errors[k]).collect();
@@ -114,7 +117,13 @@ fn integrands(counts: &[usize], seeds: &[SeedFigures]) -> Vec<IntegrandFigures> 
             let root = |s: &[f64]| (s.iter().sum::<f64>() / s.len() as f64).sqrt();
             bootstrap_interval(&squares, root).map(|value| FigureAtCount { n, value })
         });
-        let curves: Vec<_> = errors.iter().map(|e| curve(counts, e)).collect();
+        let least = RESOLUTION.powi(2);
+        let instead = if seeds.len() > 1 { least } else { 0.0 };
+        let resolved = |e: &&Vec<f64>| {
+            let squares = e.iter().map(|&e| if e < least { instead } else { e });
+            curve(counts, &squares.collect::<Vec<f64>>())
+        };
+        let curves: Vec<_> = errors.iter().map(resolved).collect();
         let half = |slope: Interval| Interval {
             value: 0.5 * slope.value,
             low: 0.5 * slope.low,
@@ -219,13 +228,13 @@ mod tests {
                 let points: Vec<_> = (0..1024)
                     .map(|_| [generator.uniform(), generator.uniform()])
                     .collect();
-                let errors = functions();
-                let errors = errors.iter();
+                let squared_errors = functions()
+                    .iter()
+                    .map(|(_, f)| squared_errors(f, &points, &counts))
+                    .collect();
                 SeedFigures {
-                    squared_errors: errors
-                        .map(|(_, f)| squared_errors(f, &points, &counts))
-                        .collect(),
-                    ..Default::default()
+                    squared_errors,
+                    ..SeedFigures::default()
                 }
             })
             .collect();

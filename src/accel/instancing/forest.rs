@@ -73,8 +73,10 @@ impl Node {
 pub(super) struct Root {
     /// Its nodes, the root first.
     pub nodes: Range<u32>,
-    /// Its triangles.
+    /// Its triangles, leaf by leaf; one that spatial splits cut stands there more than once.
     pub triangles: Range<u32>,
+    /// Triangles of the object.
+    pub object_size: usize,
     /// Box around it, object space.
     pub bounds: Bounds,
     /// Deepest leaf.
@@ -135,6 +137,7 @@ impl Forest {
         self.roots.push(Root {
             nodes: first_node..self.nodes.len() as u32,
             triangles: first_triangle..self.triangles.len() as u32,
+            object_size: object.records.len(),
             bounds: object.bounds(),
             depth: tree.depth(),
         });

@@ -77,7 +77,7 @@ impl Base {
             .forest
             .roots
             .iter()
-            .map(|r| r.triangles.len())
+            .map(|r| r.object_size)
             .eq(sizes);
         if same_instances && same_objects {
             return Ok(());
