@@ -5,6 +5,7 @@ use raystone::config::{
     Axis, Catalogue, ConfigError, Entry, Experiment, ParamRange, ParamValue, Parameter, Plan,
     Variant, keys,
 };
+use raystone::run::Registries;
 use std::path::Path;
 
 fn entry(name: &str, schema: Vec<Parameter>) -> Entry {
@@ -680,18 +681,29 @@ fn every_default_is_accepted_by_the_parser() {
 
 #[test]
 fn committed_experiments_parse_and_plan() {
+    let registries = Registries::default();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
     let mut seen = 0;
-    for file in std::fs::read_dir(&folder).expect("experiments/") {
-        let path = file.expect("a directory entry").path();
-        if path.extension().is_none_or(|extension| extension != "toml") {
-            continue;
+    for folder in [folder.clone(), folder.join("thesis")] {
+        for file in std::fs::read_dir(&folder).expect("a folder of experiments") {
+            let path = file.expect("a directory entry").path();
+            if path.extension().is_none_or(|extension| extension != "toml") {
+                continue;
+            }
+            let experiment = Experiment::load(&path, &[], &registries.catalogue())
+                .unwrap_or_else(|error| panic!("{error}"));
+            let is_randomised =
+                |sequence: &_, decorrelation: &_| registries.is_randomised(sequence, decorrelation);
+            let plan = Plan::new(&experiment, &[], is_randomised)
+                .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+            assert!(!plan.times.is_empty() && !plan.streams.is_empty());
+            // The saving is in the structures.
+            match experiment.axes.accel.len() {
+                1 => assert_eq!(plan.renders_planned, plan.renders_full_product),
+                _ => assert!(plan.renders_planned < plan.renders_full_product),
+            }
+            seen += 1;
         }
-        let experiment =
-            Experiment::load(&path, &[], &catalogue()).unwrap_or_else(|error| panic!("{error}"));
-        let plan = plan(&experiment, &[]).unwrap_or_else(|error| panic!("{error}"));
-        assert!(plan.renders_planned < plan.renders_full_product);
-        seen += 1;
     }
-    assert!(seen >= 3, "only {seen} experiments found");
+    assert!(seen >= 8, "only {seen} experiments found");
 }

@@ -341,12 +341,12 @@ const FAULTS: &[Fault] = &[
         to: "select(low, high, forward)",
     },
     Fault {
-        what: "the exit plane is one voxel too far",
+        what: "half a top cell is skipped at every exit",
         grid: "irregular-grid",
         skip: false,
         file: "accel/irregular_grid",
         from: "select(exit - 1, exit, forward)",
-        to: "select(exit - 2, exit + 1, forward)",
+        to: "select(exit - 1 - i32(1u << (voxels.shift - 1u)), exit + i32(1u << (voxels.shift - 1u)), forward)",
     },
     Fault {
         what: "the axis that is left is always x",

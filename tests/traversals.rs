@@ -171,6 +171,27 @@ fn kernels_of_all_combinations_equal_brute_force_and_count_like_their_twins() {
     }
 }
 
+#[test]
+fn trees_that_list_a_triangle_in_several_leaves_are_traversed_to_the_bit_too() {
+    let mut rng = Pcg::new(12);
+    // Long thin triangles across each other: spatial splits cut them.
+    let soup = scenes::lattice_soup(&mut rng, 600, 30);
+    let rays = scenes::aimed_rays(&mut rng, &soup, 1500);
+    let expected = brute_force(&soup, &rays);
+    for builder in names_of("builder") {
+        let built = build(&Bvh, &soup, &params(&[("builder", builder)]));
+        if *builder == "sbvh" {
+            let references = built.stats().references;
+            assert!(references > 600, "only {references} references");
+        }
+        for kernel in KERNELS {
+            let params = params(&[*kernel, &[("builder", builder)]].concat());
+            let (found, _) = twin_answers(&soup, &params, &rays);
+            assert_same_hits(&format!("{params:?}"), &rays, &expected, &found);
+        }
+    }
+}
+
 /// Work of the twin over a scene with much behind much else, summed over all rays.
 fn summed_work(changes: &[(&str, &str)]) -> (Vec<Counters>, Counters) {
     let mut rng = Pcg::new(5);
@@ -365,4 +386,113 @@ fn a_link_or_content_that_leads_astray_is_no_valid_structure() {
     }
     let roped = default_params(&RopedBvh.parameters());
     assert!(build(&RopedBvh, &soup, &roped).validate(&other).is_err());
+}
+
+#[test]
+fn arrays_in_two_to_four_parts_give_the_same_hits() {
+    use raystone::integrator::{SceneBuffers, Traced};
+    use raystone::measure::batch::{Batch, Query};
+    if !common::is_exact(common::gpu()) {
+        return;
+    }
+    let catalogue = raystone::run::Registries::default().catalogue();
+    let sphere = catalogue
+        .scene
+        .iter()
+        .find(|e| e.name == "displaced-sphere");
+    let mut variant = sphere.expect("a built-in scene").default_variant();
+    let few = ("triangles".to_owned(), ParamValue::Integer(3000));
+    variant.params.0.extend([few]);
+    let scene = raystone::scene::load(&variant, &Default::default()).expect("a scene");
+    let soup = TriangleSoup::new(&scene);
+    let rays = scenes::aimed_rays(&mut Pcg::new(4), &soup, 1000);
+    let expected = brute_force(&soup, &rays);
+    let mut gpu = common::open(raystone::gpu::KernelLibrary::default());
+    let mut seen = std::collections::BTreeSet::new();
+    for (index, kernel) in KERNELS.iter().enumerate() {
+        for triangles in names_of("triangles") {
+            let params = params(&[*kernel, &[("triangles", *triangles)]].concat());
+            let built = build(&Bvh, &soup, &params);
+            let arrays = built.buffers().arrays;
+            let largest = arrays.iter().map(|a| 4 * a.words.len()).max().unwrap_or(0);
+            let largest = largest.max(48 * soup.records.len()) as u64;
+            gpu.limits.max_storage_buffer_binding_size = largest / (2 + index as u64 % 3) + 400;
+            let buffers = SceneBuffers::upload(&gpu, &scene, &soup).expect("scene buffers");
+            let traced = Traced::upload(&gpu, &*built).expect("arrays in parts");
+            let batch = Batch::new(&gpu, &buffers, &traced, Query::Closest, &rays, true)
+                .unwrap_or_else(|e| panic!("{params:?}: {e}"));
+            batch.trace().unwrap_or_else(|e| panic!("{params:?}: {e}"));
+            assert_eq!(batch.error_word().expect("the error word"), 0);
+            let hits = batch.hits().expect("hits");
+            assert_same_hits(&format!("{params:?}"), &rays, &expected, &hits);
+            seen.extend(batch.features());
+        }
+    }
+    for array in ["nodes", "leaf_triangles", "triangles"] {
+        let last = format!("{array}_3");
+        assert!(seen.contains(&last), "{last} is not among {seen:?}");
+    }
+}
+
+#[test]
+fn more_parts_than_the_adapter_binds_are_refused_with_both_numbers() {
+    use raystone::integrator::{SceneBuffers, Traced};
+    use raystone::measure::batch::{Batch, Query};
+    let catalogue = raystone::run::Registries::default().catalogue();
+    let sphere = catalogue
+        .scene
+        .iter()
+        .find(|e| e.name == "displaced-sphere");
+    let variant = sphere.expect("a built-in scene").default_variant();
+    let scene = raystone::scene::load(&variant, &Default::default()).expect("a scene");
+    let soup = TriangleSoup::new(&scene);
+    let mut gpu = common::open(raystone::gpu::KernelLibrary::default());
+    gpu.limits.max_storage_buffer_binding_size = soup.records.len() as u64 * 12 + 400;
+    gpu.limits.max_storage_buffers_per_shader_stage = 8;
+    let built = build(&Bvh, &soup, &params(&[("triangles", "indexed")]));
+    let buffers = SceneBuffers::upload(&gpu, &scene, &soup).expect("scene buffers");
+    let traced = Traced::upload(&gpu, &*built).expect("arrays in parts");
+    let rays = scenes::aimed_rays(&mut Pcg::new(4), &soup, 10);
+    let batch = Batch::new(&gpu, &buffers, &traced, Query::Closest, &rays, true);
+    let told = batch.err().expect("too many buffers").to_string();
+    assert!(told.contains("at most 8"), "{told}");
+    assert!(["9", "10", "11"].iter().any(|n| told.contains(n)), "{told}");
+}
+
+#[test]
+fn skip_pointers_visit_at_most_three_times_the_nodes_of_the_ordered_traversal_on_real_scenes() {
+    for path in [
+        "sponza-crytek/sponza.obj",
+        "stanford-dragon/dragon_100k.obj",
+    ] {
+        let at = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../shared/scenes")
+            .join(path);
+        if !at.exists() {
+            println!("skipped: {} is absent", at.display());
+            continue;
+        }
+        let variant = raystone::config::Variant {
+            name: at.display().to_string(),
+            params: Params::default(),
+            label: path.to_owned(),
+        };
+        let options = raystone::scene::LoadOptions {
+            textures: false,
+            ..Default::default()
+        };
+        let scene = raystone::scene::load(&variant, &options).expect("a scene");
+        let soup = TriangleSoup::new(&scene);
+        let rays = scenes::aimed_rays(&mut Pcg::new(6), &soup, 4000);
+        let nodes = |changes: &[(&str, &str)]| -> u64 {
+            let (_, work) = twin_answers(&soup, &params(changes), &rays);
+            work.iter().map(|w| u64::from(w.nodes)).sum()
+        };
+        let ordered = nodes(&[("traversal", "stack"), ("node_bytes", "32")]);
+        let roped = nodes(&[("traversal", "roped")]);
+        let octants = nodes(&[("traversal", "octant-roped")]);
+        println!("{path}: ordered {ordered}, roped {roped}, in octants {octants}");
+        assert!(ordered < roped && roped <= 3 * ordered);
+        assert_eq!(octants, ordered);
+    }
 }

@@ -4,8 +4,10 @@
 //! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
 //! compressed wide BVHs", HPG 2017, section 3.2.
 
+use super::TriangleSoup;
 use super::bounds::Bounds;
 use super::tree::{NodeKind, Tree};
+use super::triangle::TriangleRecord;
 use crate::config::Params;
 use crate::measure::record::StructureStats;
 
@@ -87,7 +89,7 @@ impl CollapseSettings {
 
 impl WideTree {
     /// Figures of the tree; `bytes` is left 0. SAH with both constants 1, as for binary trees.
-    pub fn stats(&self, root: &Bounds) -> StructureStats {
+    pub fn stats(&self) -> StructureStats {
         let children = || self.nodes.iter().flatten().filter(|c| !c.is_nothing());
         let mut stats = StructureStats {
             nodes: self.nodes.len() as u64,
@@ -108,9 +110,20 @@ impl WideTree {
             };
             f64::from(child.bounds.half_area()) * f64::from(weight)
         });
+        let root = self.nodes[0]
+            .iter()
+            .fold(Bounds::EMPTY, |b, child| b.union(&child.bounds));
         let root_area = f64::from(root.half_area());
         stats.sah_cost = (root_area > 0.0).then(|| 1.0 + weighted.sum::<f64>() / root_area);
         stats
+    }
+
+    /// The triangles in the order of the leaves.
+    pub fn records(&self, soup: &TriangleSoup) -> Vec<TriangleRecord> {
+        self.order
+            .iter()
+            .map(|&id| soup.records[id as usize])
+            .collect()
     }
 
     /// Collapses `tree`, whose leaves must hold at most `leaf_size` triangles. `arrange` may permute

@@ -9,10 +9,12 @@ use super::collapse::{CollapseSettings, WideChild, WideKind, WideTree};
 use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
 use super::tree::Coverage;
 use super::triangle::{TriangleRecord, intersect_triangle};
-use super::wide::{Grid, Planes, enter_four, frame, leave_four, wide_parameters, wide_tree};
+use super::wide::{
+    Grid, Planes, enter_four, frame, leave_four, node_limit, wide_arrays, wide_parameters,
+    wide_tree,
+};
 use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
-    TriangleSoup,
+    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, TriangleSoup,
 };
 use crate::config::{ParameterSchema, Params};
 use crate::measure::record::StructureStats;
@@ -58,10 +60,10 @@ impl AccelKind for Cwbvh {
                 arrange_by_octant(bounds, children)
             })
         });
-        let stats = wide.stats(&tree.nodes.first().map_or(Bounds::EMPTY, |root| root.bounds));
-        Ok(Box::new(
-            log.phase("layout", || Built::new(soup, wide, stats, params)),
-        ))
+        node_limit("cwbvh", wide.nodes.len(), INDEX_MASK)?;
+        Ok(Box::new(log.phase("layout", || {
+            Built::new(soup, &wide, params.flag("texels"))
+        })))
     }
 }
 
@@ -163,24 +165,20 @@ fn arrange_by_octant(bounds: &Bounds, children: &mut Vec<WideChild>) {
 }
 
 impl Built {
-    fn new(soup: &TriangleSoup, wide: WideTree, stats: StructureStats, params: &Params) -> Self {
+    fn new(soup: &TriangleSoup, wide: &WideTree, texels: bool) -> Self {
         let nodes: Vec<Node> = wide.nodes.iter().map(|slots| pack(slots)).collect();
-        let leaf_triangles: Vec<TriangleRecord> = wide
-            .order
-            .iter()
-            .map(|&id| soup.records[id as usize])
-            .collect();
+        let leaf_triangles = wide.records(soup);
         let bytes = size_of_val(&nodes[..]) + size_of_val(&leaf_triangles[..]);
         Self {
             stats: StructureStats {
                 bytes: bytes as u64,
-                ..stats
+                ..wide.stats()
             },
             nodes,
             leaf_triangles,
             // A level leaves one group behind at most.
             stack_entries: wide.depth,
-            texels: params.flag("texels"),
+            texels,
         }
     }
 
@@ -342,29 +340,13 @@ impl BuiltAccel for Built {
     fn buffers(&self) -> GpuBuffers<'_> {
         GpuBuffers {
             kernel: "accel/cwbvh",
-            features: if self.texels {
-                vec!["texels"]
-            } else {
-                Vec::new()
-            },
-            arrays: vec![
-                NamedWords {
-                    name: "nodes",
-                    words: bytemuck::cast_slice(&self.nodes).into(),
-                    element_bytes: size_of::<Node>() as u32,
-                },
-                NamedWords {
-                    name: "leaf_triangles",
-                    words: bytemuck::cast_slice(&self.leaf_triangles).into(),
-                    element_bytes: size_of::<TriangleRecord>() as u32,
-                },
-            ],
             uniforms: vec![super::limits(self.nodes.len(), self.nodes.len())],
             // A multiple of 8, so that scenes of like depth share a kernel, and one to spare.
             constants: vec![(
                 "STACK_ENTRIES",
                 (self.stack_entries + 1).next_multiple_of(8),
             )],
+            ..wide_arrays(&self.nodes, &self.leaf_triangles, self.texels)
         }
     }
 

@@ -242,6 +242,7 @@ impl Built {
             epo: None,
             sah_cost: (root_area > 0.0).then(|| cost / root_area),
             bytes: self.buffers().bytes(),
+            epo: None,
         }
     }
 

@@ -5,6 +5,7 @@
 pub mod bounds;
 mod brute_force;
 mod bvh;
+mod bvh4;
 mod collapse;
 mod cwbvh;
 mod grid;
@@ -23,6 +24,7 @@ mod wide;
 
 pub use brute_force::{BruteForce, brute_force_hits};
 pub use bvh::{BuiltBvh, Bvh, BvhTwin, RopedBvh};
+pub use bvh4::Bvh4;
 pub use cwbvh::Cwbvh;
 pub use irregular_grid::IrregularGrid;
 pub use kd_tree::KdTree;

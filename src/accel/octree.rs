@@ -377,6 +377,7 @@ impl BuiltAccel for Built {
             epo: None,
             sah_cost: (!self.references.is_empty()).then_some(cost),
             bytes: self.buffers().bytes(),
+            epo: None,
         }
     }
 

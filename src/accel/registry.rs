@@ -16,6 +16,7 @@ impl Default for AccelRegistry {
                 &BruteForce,
                 &super::Bvh,
                 &RopedBvh,
+                &super::Bvh4,
                 &super::Cwbvh,
                 &UniformGrid,
                 &super::TwoLevelGrid,

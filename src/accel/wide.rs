@@ -19,9 +19,11 @@
 //! also for reciprocals of 2.5 ulp, since both sides use the same one.
 
 use super::bounds::{BOX_PAD, Bounds};
-use super::tree::{Tree, tree_parameters};
-use super::{AccelError, BuildLog, TriangleSoup};
+use super::tree::{NodeKind, Tree, tree_parameters};
+use super::triangle::TriangleRecord;
+use super::{AccelError, BuildLog, GpuBuffers, NamedWords, TriangleSoup};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use bytemuck::Pod;
 
 /// Relative slack of the distances to quantised planes, 2⁻²⁰.
 pub const FRAME_PAD: f32 = 9.536_743e-7;
@@ -66,7 +68,58 @@ pub fn wide_tree(
     params
         .0
         .insert("leaf_size".to_owned(), ParamValue::Integer(1));
-    Tree::build(soup, &params, log)
+    let tree = Tree::build(soup, &params, log)?;
+    let largest = tree.nodes.iter().map(|node| match node.kind {
+        NodeKind::Leaf { count, .. } => count,
+        NodeKind::Inner { .. } => 0,
+    });
+    match largest.max() {
+        Some(count) if count > 1 => Err(AccelError::Limit {
+            what: "triangles of a leaf before the collapse".into(),
+            needed: count.into(),
+            limit: 1,
+        }),
+        _ => Ok(tree),
+    }
+}
+
+/// Fails if there are more nodes than `limit`.
+///
+/// # Errors
+/// There are, with both numbers.
+pub fn node_limit(structure: &str, nodes: usize, limit: u32) -> Result<(), AccelError> {
+    if nodes as u64 > u64::from(limit) {
+        return Err(AccelError::Limit {
+            what: format!("nodes of a {structure}"),
+            needed: nodes as u64,
+            limit: limit.into(),
+        });
+    }
+    Ok(())
+}
+
+/// Nodes and triangles of a wide structure as its kernel binds them.
+pub fn wide_arrays<'a, N: Pod>(
+    nodes: &'a [N],
+    leaf_triangles: &'a [TriangleRecord],
+    texels: bool,
+) -> GpuBuffers<'a> {
+    GpuBuffers {
+        features: if texels { vec!["texels"] } else { Vec::new() },
+        arrays: vec![
+            NamedWords {
+                name: "nodes",
+                words: bytemuck::cast_slice(nodes).into(),
+                element_bytes: size_of::<N>() as u32,
+            },
+            NamedWords {
+                name: "leaf_triangles",
+                words: bytemuck::cast_slice(leaf_triangles).into(),
+                element_bytes: size_of::<TriangleRecord>() as u32,
+            },
+        ],
+        ..Default::default()
+    }
 }
 
 /// The planes of a node: where the first one lies and how far they are apart.

@@ -76,7 +76,39 @@ fn layers(text: &str, file: &str, overrides: &[String]) -> Result<Table, ConfigE
         tree::merge(&mut tree, [(key.section.to_owned(), section)].into());
     }
     tree::merge(&mut tree, user);
+    add_least_scene(&mut tree);
     Ok(tree)
+}
+
+/// Integrands trace nothing: an experiment of nothing else needs neither a scene nor a structure, and
+/// gets the least there is where it names none.
+fn add_least_scene(tree: &mut Table) {
+    let Some(Item {
+        value: Value::Table(axes),
+        ..
+    }) = tree.get_mut("axes")
+    else {
+        return;
+    };
+    let is_integrand =
+        |item: &Item| matches!(&item.value, Value::Text(name) if name.starts_with("integrand:"));
+    let scene_free = match axes.get("integrator").map(|item| &item.value) {
+        Some(Value::List(items)) => !items.is_empty() && items.iter().all(is_integrand),
+        _ => false,
+    };
+    if !scene_free {
+        return;
+    }
+    for (axis, name) in [
+        (Axis::Scene, "single-triangle"),
+        (Axis::Accel, "brute-force"),
+    ] {
+        let least = Item {
+            at: Place::Default,
+            value: tree::default_value(&format!("[\"{name}\"]")),
+        };
+        axes.entry(axis.name().to_owned()).or_insert(least);
+    }
 }
 
 fn with_overrides(text: &str, overrides: &[String]) -> String {

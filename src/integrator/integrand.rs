@@ -17,6 +17,9 @@ const BOX_CORNER: [f32; 2] = [std::f32::consts::FRAC_1_SQRT_2, 0.618_034];
 /// `half-plane`: x · cos + y · sin < offset.
 const OBLIQUE_EDGE: [f32; 3] = [-0.6, 0.8, 0.2];
 
+/// `heaviside`: degrees unless the experiment says otherwise.
+const ANGLE: f64 = 30.0;
+
 // Numbers of the functions in the kernel.
 const EXPONENTIAL: u32 = 0;
 const GAUSSIAN: u32 = 1;
@@ -56,6 +59,24 @@ impl Function {
             Self::Disk => indicator(x * x + y * y < DISK_RADIUS_SQUARED),
             Self::CornerBox => indicator(x < BOX_CORNER[0] && y < BOX_CORNER[1]),
             Self::HalfPlane([a, b, offset]) => indicator(x * a + y * b < *offset),
+        }
+    }
+
+    /// The function itself, in double precision.
+    pub fn value(&self, [x, y]: [f64; 2]) -> f64 {
+        let indicator = |inside: bool| f64::from(u8::from(inside));
+        match self {
+            Self::Exponential => (x + y).exp(),
+            Self::Gaussian => (-x * x - y * y).exp(),
+            Self::Disk => indicator(x * x + y * y < f64::from(DISK_RADIUS_SQUARED)),
+            Self::CornerBox => {
+                let [a, b] = BOX_CORNER.map(f64::from);
+                indicator(x < a && y < b)
+            }
+            Self::HalfPlane(edge) => {
+                let [a, b, offset] = edge.map(f64::from);
+                indicator(x * a + y * b < offset)
+            }
         }
     }
 
@@ -165,6 +186,16 @@ pub(super) static INTEGRANDS: [Integrand; 6] = [
     },
 ];
 
+/// Every function by its name without `integrand:`, in the order of `raystone list`; parameters at
+/// their defaults.
+pub fn functions() -> Vec<(&'static str, Function)> {
+    let function = |integrand: &'static Integrand| {
+        let function = integrand.function.unwrap_or(Function::heaviside(ANGLE));
+        (integrand.name.trim_start_matches("integrand:"), function)
+    };
+    INTEGRANDS.iter().map(function).collect()
+}
+
 impl Integrand {
     fn function(&self, params: &Params) -> Function {
         self.function
@@ -192,7 +223,7 @@ impl Integrator for Integrand {
         vec![Parameter {
             name: "angle",
             description: "angle of the edge's normal to the x axis, degrees",
-            default: ParamValue::Number(30.0),
+            default: ParamValue::Number(ANGLE),
             range: ParamRange::Number {
                 min: 0.0,
                 max: 360.0,
@@ -234,14 +265,18 @@ mod tests {
         const N: usize = 1000;
         let at = |i: usize| (i as f32 + 0.5) / N as f32;
         for function in functions() {
-            let sum: f64 = (0..N * N)
-                .map(|k| f64::from(function.evaluate([at(k % N), at(k / N)])))
-                .sum();
-            let (found, exact) = (sum / (N * N) as f64, function.integral());
-            assert!(
-                (found - exact).abs() < 1e-3,
-                "{function:?}: {found} {exact}"
-            );
+            let mut sums = [0.0; 2];
+            for point in (0..N * N).map(|k| [at(k % N), at(k / N)]) {
+                sums[0] += f64::from(function.evaluate(point));
+                sums[1] += function.value(point.map(f64::from));
+            }
+            let exact = function.integral();
+            for found in sums.map(|sum| sum / (N * N) as f64) {
+                assert!(
+                    (found - exact).abs() < 1e-3,
+                    "{function:?}: {found} {exact}"
+                );
+            }
         }
     }
 

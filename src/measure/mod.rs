@@ -11,5 +11,7 @@ pub mod picture;
 pub mod rays;
 pub mod record;
 pub mod sampler_cost;
+pub mod spectrum;
 pub mod statistics;
+pub mod stream;
 pub mod timing;

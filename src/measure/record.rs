@@ -36,10 +36,14 @@ pub enum Record {
     Error(ErrorRecord),
     /// Verdict on the bias of a sampler over all its replicates.
     Bias(BiasRecord),
+    /// What the error of a sampler looks like, over all its replicates.
+    Spectrum(SpectrumRecord),
     /// Time of a full cell (structure × sampler × integrator).
     Time(TimeRecord),
     /// Star discrepancy of the stream that a dimension pair of the path really consumed.
     Stream(StreamRecord),
+    /// What drawing from a sampler costs.
+    SamplerCost(SamplerCostRecord),
     /// A cell that was not run, with the reason.
     Skipped(SkippedRecord),
     /// A cell that failed before it had a record of its own kind, with the reason.
@@ -309,9 +313,12 @@ pub struct ReferenceRecord {
     pub scene: String,
     /// Integrator with parameters.
     pub integrator: Variant,
-    /// Samples per pixel of both halves together.
+    /// Samples per pixel of both halves together; 0 if nothing had to be rendered.
     pub spp: u32,
-    /// Sampler, as `sequence × decorrelation`.
+    /// The value of every pixel, if it is known: then this is the reference.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exact: Option<f64>,
+    /// Sampler, as `sequence × decorrelation`; `exact` if there was none.
     pub sampler: String,
     /// Seconds it took.
     pub seconds: f64,
@@ -392,6 +399,50 @@ pub struct BiasRecord {
     pub verdict: String,
 }
 
+/// The signed luminance error of the image at the highest spp, see [`crate::measure::spectrum`]: means
+/// over replicates with intervals.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SpectrumRecord {
+    /// Scene name.
+    pub scene: String,
+    /// Integrator with parameters.
+    pub integrator: Variant,
+    /// Sequence with parameters.
+    pub sequence: Variant,
+    /// Decorrelation with parameters.
+    pub decorrelation: Variant,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Replicates.
+    pub replicates: usize,
+    /// Power by frequency, white noise being 1; empty if the error is the same in all pixels.
+    pub power: Vec<PowerAt>,
+    /// Mean power up to 1/8 cycle per pixel, white noise being 1.
+    pub low_frequency: Option<Interval>,
+    /// Correlation of the errors of neighbouring pixels.
+    pub autocorrelation: Option<Interval>,
+    /// What Gaussian filters leave of the error.
+    pub filtered: Vec<FilteredError>,
+}
+
+/// A point of a radial spectrum.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PowerAt {
+    /// Cycles per pixel.
+    pub frequency: f64,
+    /// Mean power around that frequency, white noise being 1.
+    pub power: Interval,
+}
+
+/// Error after a Gaussian filter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FilteredError {
+    /// Standard deviation of the filter, pixels; 0 is no filter.
+    pub sigma: f64,
+    /// Root mean square of what is left of the luminance error.
+    pub rmse: Interval,
+}
+
 /// Time of a full cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TimeRecord {
@@ -451,6 +502,73 @@ pub struct StreamRecord {
     pub seeds: usize,
     /// `(N, D*)` for the first N points: mean over seeds with interval.
     pub star: Vec<StarAtCount>,
+    /// Everything else, see [`crate::measure::stream`].
+    #[serde(default)]
+    pub figures: StreamFigures,
+}
+
+/// Figures of a dumped stream beside its star discrepancy.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct StreamFigures {
+    /// Exponent of D* in N: slope of the mean over seeds.
+    pub star_slope: Option<Interval>,
+    /// L2-star discrepancy (the root).
+    pub l2_star: Vec<FigureAtCount>,
+    /// Its exponent.
+    pub l2_star_slope: Option<Interval>,
+    /// Centered discrepancy (the square).
+    pub centered: Vec<FigureAtCount>,
+    /// Errors of integrals that are known.
+    pub integrands: Vec<IntegrandFigures>,
+    /// What neighbouring and superposed pixels draw; only of pairs that are a direction.
+    pub pixels: Vec<PixelsAtCount>,
+}
+
+/// A figure at one number of points: mean over seeds with interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FigureAtCount {
+    /// Number of points.
+    pub n: usize,
+    /// The figure.
+    pub value: Interval,
+}
+
+/// Errors of one function on the unit square.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct IntegrandFigures {
+    /// Its name, as in `integrand:NAME`.
+    pub function: String,
+    /// The exact value.
+    pub integral: f64,
+    /// RMSE over seeds; of a deterministic stream the absolute error.
+    pub rmse: Vec<FigureAtCount>,
+    /// Exponent of the RMSE in N.
+    pub slope: Option<Interval>,
+}
+
+/// What several pixels draw for N samples each, one seed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PixelsAtCount {
+    /// Samples of a pixel.
+    pub n: usize,
+    /// Mean angle between the directions of neighbouring pixels at the same sample, radians.
+    pub neighbour_angle: f64,
+    /// Share of the cells of a grid of 4√N × 4√N that the points of 150 pixels fall into.
+    pub coverage: f64,
+}
+
+/// What drawing from a sampler costs, see [`crate::measure::sampler_cost`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SamplerCostRecord {
+    /// Sequence with parameters.
+    pub sequence: Variant,
+    /// Decorrelation with parameters.
+    pub decorrelation: Variant,
+    /// Nanoseconds of adapter time per two-dimensional sample, median; near zero it may be negative.
+    pub ns_per_sample: Interval,
+    /// Nanoseconds of the empty loop that was taken off.
+    pub loop_ns_per_sample: Interval,
 }
 
 /// Star discrepancy at one number of points.

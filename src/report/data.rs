@@ -16,6 +16,8 @@ pub struct RunData<'a> {
     pub scenes: Vec<SceneGroup<'a>>,
     /// Dumped streams.
     pub streams: Vec<&'a StreamRecord>,
+    /// What drawing costs.
+    pub costs: Vec<&'a SamplerCostRecord>,
     /// Cells left out.
     pub skipped: Vec<&'a SkippedRecord>,
     /// Cells that failed without a record of their own kind.
@@ -81,6 +83,14 @@ impl<'a> RunData<'a> {
                         && a.decorrelation == b.decorrelation
                         && a.dimensions == b.dimensions
                 }),
+                Record::SamplerCost(record) => put(&mut data.costs, record, |a, b| {
+                    a.sequence == b.sequence && a.decorrelation == b.decorrelation
+                }),
+                Record::Spectrum(record) => {
+                    let view = data.view(&record.scene, &record.integrator);
+                    let sampler = view.sampler(&record.sequence, &record.decorrelation);
+                    sampler.spectrum = Some(record);
+                }
                 Record::Scene(record) => data.scene(&record.scene).record = Some(record),
                 Record::Structure(record) => {
                     put(&mut data.scene(&record.scene).structures, record, |a, b| {
@@ -199,6 +209,7 @@ impl<'a> View<'a> {
             name: name.clone(),
             replicates: Vec::new(),
             bias: None,
+            spectrum: None,
         };
         find_or_push(&mut self.samplers, |sampler| sampler.name == name, new)
     }

@@ -1,7 +1,7 @@
 //! What the replicates of a sampler say together.
 
 use super::data::View;
-use crate::measure::record::{BiasRecord, ErrorRecord, Interval};
+use crate::measure::record::{BiasRecord, ErrorRecord, Interval, SpectrumRecord};
 use crate::measure::statistics::{bootstrap_mean, log_log_slope};
 
 /// A sampler under one scene and integrator.
@@ -13,6 +13,8 @@ pub struct Sampler<'a> {
     pub replicates: Vec<&'a ErrorRecord>,
     /// Verdict on its bias.
     pub bias: Option<&'a BiasRecord>,
+    /// What its error looks like.
+    pub spectrum: Option<&'a SpectrumRecord>,
 }
 
 /// An error metric that the report shows.

@@ -207,7 +207,7 @@ fn every_check_passes_on_a_clean_run_and_fails_on_its_planted_fault() {
 
 #[test]
 fn a_run_without_one_kind_of_record_still_reports() {
-    let kinds: [(&str, IsKind); 9] = [
+    let kinds: [(&str, IsKind); 11] = [
         ("no-run", |r| matches!(r, Record::Run(_))),
         ("no-scene", |r| matches!(r, Record::Scene(_))),
         ("no-structure", |r| matches!(r, Record::Structure(_))),
@@ -216,6 +216,8 @@ fn a_run_without_one_kind_of_record_still_reports() {
         ("no-bias", |r| matches!(r, Record::Bias(_))),
         ("no-time", |r| matches!(r, Record::Time(_))),
         ("no-stream", |r| matches!(r, Record::Stream(_))),
+        ("no-spectrum", |r| matches!(r, Record::Spectrum(_))),
+        ("no-cost", |r| matches!(r, Record::SamplerCost(_))),
         ("no-finished", |r| matches!(r, Record::Finished(_))),
     ];
     let small = small_run();

@@ -10,7 +10,13 @@ use crate::integrator::{Frame, RenderJob, Renderer, Snapshot, integrator};
 use crate::measure::bias::{BiasOptions, check_bias};
 use crate::measure::image::{Image, Reference, measure};
 use crate::measure::picture::{automatic_exposure, error_map, tone_map, write_png};
-use crate::measure::record::{BiasRecord, ErrorAtSpp, ErrorRecord, Record, ReferenceRecord};
+use crate::measure::record::{
+    BiasRecord, ErrorAtSpp, ErrorRecord, Record, ReferenceRecord, SpectrumRecord,
+};
+use crate::measure::spectrum::{
+    ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power,
+};
+use crate::measure::statistics::bootstrap_mean;
 use crate::report::color::viridis;
 use crate::sampling::hash::pcg_hash;
 use crate::sampling::{Demand, Sampler};
@@ -137,6 +143,10 @@ fn reference(
     variant: &Variant,
 ) -> Result<Result<Yardstick, String>, RunError> {
     session.say(format!("{}, {variant}: reference", world.variant));
+    let known = integrator(&variant.name).and_then(|i| i.exact(&variant.params));
+    if let Some(value) = known {
+        return exact_reference(session, world, variant, value);
+    }
     let settings = &session.experiment.reference;
     let start = Instant::now();
     let spp = (settings.spp / REFERENCE_PARTS).max(1);
@@ -165,30 +175,79 @@ fn reference(
         Ok(rendered) => rendered,
         Err(reason) => return Ok(Err(reason)),
     };
+    let record = ReferenceRecord {
+        spp: spp * REFERENCE_PARTS,
+        sampler: sampler.label(),
+        seconds: start.elapsed().as_secs_f64(),
+        ..reference_record(world, variant, &reference)
+    };
+    finish_reference(session, world, record, reference, parts).map(Ok)
+}
+
+/// The constant image of a known value: nothing is rendered.
+fn exact_reference(
+    session: &mut Session,
+    world: &World,
+    variant: &Variant,
+    value: f64,
+) -> Result<Result<Yardstick, String>, RunError> {
+    let [width, height] = session.experiment.resolution;
+    let pixels = vec![[value as f32; 3]; width as usize * height as usize];
+    let made = Image::new(width, height, pixels).and_then(|image| {
+        let parts = vec![image; REFERENCE_PARTS as usize];
+        Ok((Reference::from_parts(&parts)?, parts))
+    });
+    let (reference, parts) = match made {
+        Ok(made) => made,
+        Err(error) => return Ok(Err(error.to_string())),
+    };
+    session.progress.inc(u64::from(REFERENCE_PARTS));
+    let record = ReferenceRecord {
+        exact: Some(value),
+        ..reference_record(world, variant, &reference)
+    };
+    finish_reference(session, world, record, reference, parts).map(Ok)
+}
+
+/// The record of a reference that was not rendered; what was rendered sets more.
+fn reference_record(world: &World, variant: &Variant, reference: &Reference) -> ReferenceRecord {
+    ReferenceRecord {
+        scene: world.variant.label.clone(),
+        integrator: variant.clone(),
+        spp: 0,
+        exact: None,
+        sampler: "exact".to_owned(),
+        seconds: 0.0,
+        mse: reference.own_mse().unwrap_or(f64::NAN),
+        image: String::new(),
+        mean: reference.image().mean(),
+    }
+}
+
+/// Writes the picture and the record.
+fn finish_reference(
+    session: &mut Session,
+    world: &World,
+    mut record: ReferenceRecord,
+    reference: Reference,
+    parts: Vec<Image>,
+) -> Result<Yardstick, RunError> {
     let exposure = automatic_exposure(reference.image());
-    let (relative, path) = session.image_path(&["reference", &world.variant.label, &variant.label]);
+    let labels = [&world.variant.label, &record.integrator.label].map(String::as_str);
+    let (relative, path) = session.image_path(&[&["reference"], &labels[..]].concat());
     write_png(&path, &tone_map(reference.image(), exposure))
         .map_err(|e| RunError::Input(e.to_string()))?;
-    let cell = format!("reference {}, {variant}: done", world.variant);
+    record.image = relative;
+    let cell = format!("reference {}, {}: done", world.variant, record.integrator);
     if !session.is_done(&cell) {
-        let record = ReferenceRecord {
-            scene: world.variant.label.clone(),
-            integrator: variant.clone(),
-            spp: spp * REFERENCE_PARTS,
-            sampler: sampler.label(),
-            seconds: start.elapsed().as_secs_f64(),
-            mse: reference.own_mse().unwrap_or(f64::NAN),
-            image: relative,
-            mean: reference.image().mean(),
-        };
         session.write(&world.scene.hash, Record::Reference(record))?;
         session.finish(cell);
     }
-    Ok(Ok(Yardstick {
+    Ok(Yardstick {
         reference,
         parts,
         exposure,
-    }))
+    })
 }
 
 /// One render of a replicate, and the numbers of samples at which its image is kept.
@@ -297,9 +356,46 @@ fn sampler_error(
     }
     session.finish(cell.to_string());
     match bias_record(session, cell, world, &finals, yardstick) {
-        Ok(record) => session.write(&hash, Record::Bias(record)).map(Ok),
+        Ok(record) => session.write(&hash, Record::Bias(record))?,
+        Err(reason) => return Ok(Err(reason)),
+    }
+    match spectrum_record(session, cell, world, &finals, yardstick) {
+        Ok(record) => session.write(&hash, Record::Spectrum(record)).map(Ok),
         Err(reason) => Ok(Err(reason)),
     }
+}
+
+/// The spectra of all replicates, at the highest number of samples.
+fn spectrum_record(
+    session: &Session,
+    cell: &SamplerCell,
+    world: &World,
+    images: &[Image],
+    yardstick: &Yardstick,
+) -> Result<SpectrumRecord, String> {
+    let size = session.experiment.resolution.map(|edge| edge as usize);
+    let spectrum = |image: &Image| {
+        let error = luminance_error(image, yardstick.reference.image());
+        error.map(|error| error_spectrum(&error, size))
+    };
+    let spectra: Result<Vec<_>, _> = images.iter().map(spectrum).collect();
+    let spectra = spectra.map_err(|e| e.to_string())?;
+    let mean = |figure: fn(&ErrorSpectrum) -> Option<f64>| {
+        let values: Vec<f64> = spectra.iter().filter_map(figure).collect();
+        bootstrap_mean(&values)
+    };
+    Ok(SpectrumRecord {
+        scene: world.variant.label.clone(),
+        integrator: cell.integrator.clone(),
+        sequence: cell.sequence.clone(),
+        decorrelation: cell.decorrelation.clone(),
+        spp: session.experiment.spp.max(),
+        replicates: spectra.len(),
+        power: mean_power(&spectra),
+        low_frequency: mean(|s| s.low_frequency),
+        autocorrelation: mean(|s| s.autocorrelation),
+        filtered: mean_filtered(&spectra),
+    })
 }
 
 fn error_record(

@@ -1,17 +1,25 @@
-//! Star discrepancy of the streams that the path really consumes, dumped from the kernel.
+//! Figures of the streams that the path really consumes, dumped from the kernel, and what drawing costs.
 
 use super::RunError;
 use super::session::Session;
 use crate::config::StreamCell;
-use crate::discrepancy::star_2d_prefixes;
 use crate::gpu::{Bindings, Composition, Dispatch, Gpu, UniformValues, groups_for};
 use crate::integrator::with_sampler;
-use crate::measure::record::{Interval, Record, StarAtCount, StreamRecord};
-use crate::measure::statistics::bootstrap_mean;
-use crate::sampling::{Coordinate, Demand, Sampler, dimensions::pair_purpose, to_unit};
+use crate::measure::record::{PixelsAtCount, Record, SamplerCostRecord, StreamRecord};
+use crate::measure::sampler_cost::sampler_cost;
+use crate::measure::stream::{COPIES, SeedFigures, coverage, neighbour_angle, over_seeds};
+use crate::sampling::dimensions::{DIRECTION, FIRST_BOUNCE, PER_BOUNCE, pair_purpose};
+use crate::sampling::{Coordinate, Demand, Sampler, to_unit};
+use std::ops::Range;
 
 /// Fewest points whose discrepancy is taken.
 const FEWEST_POINTS: u32 = 16;
+/// Several pixels are looked at up to this many samples.
+const MOST_SAMPLES: usize = 1024;
+/// Neighbours are compared in a tile of this edge …
+const TILE: u32 = 8;
+/// … at this many samples at most.
+const TILE_SAMPLES: u32 = 32;
 
 /// All streams of the plan.
 pub(super) fn run(session: &mut Session, gpu: &Gpu) -> Result<(), RunError> {
@@ -27,6 +35,12 @@ pub(super) fn run(session: &mut Session, gpu: &Gpu) -> Result<(), RunError> {
                 Err(reason) => {
                     session.write_failure(&format!("stream {cell}, {pair:?}"), reason)?
                 }
+            }
+        }
+        if gpu.lost().is_none() {
+            match cost_record(session, gpu, &cell) {
+                Ok(record) => session.write("", Record::SamplerCost(record))?,
+                Err(reason) => session.write_failure(&format!("cost of {cell}"), reason)?,
             }
         }
         session.finish(cell.to_string());
@@ -61,33 +75,32 @@ fn stream_record(
     let sets = point_sets(session, cell, pair, &counts)?;
     let mut per_seed = Vec::new();
     for &seed in &seeds {
-        let mut stars = Vec::new();
+        let mut figures = SeedFigures::default();
         for (sampler, counts) in &sets {
             let most = counts.last().map_or(0, |&n| n as u32);
             let points = session
                 .clock
-                .time("gpu", || dump_points(gpu, sampler, most, pair, seed))?;
-            let found = session
+                .time("gpu", || dump_points(gpu, sampler, 0..1, most, pair, seed))?;
+            let measured = session
                 .clock
-                .time("discrepancy", || star_2d_prefixes(&points, counts));
-            stars.extend(found.map_err(|e| e.to_string())?);
+                .time("discrepancy", || figures.add(&points, counts));
+            measured.map_err(|e| e.to_string())?;
         }
-        per_seed.push(stars);
+        per_seed.push(figures);
     }
-    let star = counts.iter().enumerate().filter_map(|(i, &n)| {
-        let values: Vec<f64> = per_seed.iter().map(|stars| stars[i]).collect();
-        let alone = Interval {
-            value: values[0],
-            low: values[0],
-            high: values[0],
-        };
-        let star = if values.len() == 1 {
-            alone
-        } else {
-            bootstrap_mean(&values)?
-        };
-        Some(StarAtCount { n, star })
-    });
+    let (star, mut figures) = over_seeds(&counts, &per_seed);
+    if is_direction(pair) {
+        let counts = counts.iter().filter(|&&n| n <= MOST_SAMPLES);
+        // Powers of four have whole roots.
+        for &n in counts.filter(|n| n.trailing_zeros() % 2 == 0) {
+            let set = sets.iter().find(|(_, counts)| counts.contains(&n));
+            let (sampler, _) = set.unwrap_or(&sets[0]);
+            let pixels = session
+                .clock
+                .time("gpu", || pixels_at(gpu, sampler, n, pair, seeds[0]))?;
+            figures.pixels.push(pixels);
+        }
+    }
     Ok(StreamRecord {
         sequence: cell.sequence.clone(),
         decorrelation: cell.decorrelation.clone(),
@@ -95,8 +108,79 @@ fn stream_record(
         purpose: pair_purpose(pair),
         randomised: cell.randomised,
         seeds: seeds.len(),
-        star: star.collect(),
+        star,
+        figures,
     })
+}
+
+/// Whether the path makes a direction of these dimensions.
+fn is_direction([a, b]: [u32; 2]) -> bool {
+    a >= FIRST_BOUNCE && (a - FIRST_BOUNCE) % PER_BOUNCE == DIRECTION && b == a + 1
+}
+
+/// What neighbouring and superposed pixels draw for `n` samples each.
+fn pixels_at(
+    gpu: &Gpu,
+    sampler: &Sampler,
+    n: usize,
+    pair: [u32; 2],
+    seed: u32,
+) -> Result<PixelsAtCount, String> {
+    let width = sampler.demand.width.unwrap_or(TILE).max(TILE);
+    let samples = TILE_SAMPLES.min(n as u32);
+    let mut tile = Vec::new();
+    for row in 0..TILE {
+        let pixels = row * width..row * width + TILE;
+        tile.extend(dump_points(gpu, sampler, pixels, samples, pair, seed)?);
+    }
+    let copies = dump_points(gpu, sampler, 0..COPIES, n as u32, pair, seed)?;
+    let angle = neighbour_angle(&tile, TILE as usize, samples as usize);
+    Ok(PixelsAtCount {
+        n,
+        neighbour_angle: angle.ok_or("a direction that is not finite")?,
+        coverage: coverage(&copies, n),
+    })
+}
+
+/// What drawing costs, with as many dimensions as the pairs of the experiment need.
+fn cost_record(
+    session: &mut Session,
+    gpu: &Gpu,
+    cell: &StreamCell,
+) -> Result<SamplerCostRecord, String> {
+    let pairs = session.experiment.discrepancy.pairs.iter().flatten();
+    let highest = pairs.max().copied().unwrap_or(1).max(1);
+    let sampler = sampler_of(
+        session,
+        cell,
+        session.experiment.discrepancy.points,
+        highest,
+    )?;
+    let cost = session.clock.time("gpu", || sampler_cost(gpu, &sampler));
+    let cost = cost.map_err(|e| e.to_string())?;
+    Ok(SamplerCostRecord {
+        sequence: cell.sequence.clone(),
+        decorrelation: cell.decorrelation.clone(),
+        ns_per_sample: cost.ns_per_sample,
+        loop_ns_per_sample: cost.loop_ns_per_sample,
+    })
+}
+
+/// The sampler of a stream for so many samples, with dimensions up to `highest`.
+fn sampler_of(
+    session: &Session,
+    cell: &StreamCell,
+    samples: u32,
+    highest: u32,
+) -> Result<Sampler, String> {
+    let demand = Demand {
+        samples: Some(samples),
+        dimensions: highest + 1,
+        width: Some(session.experiment.resolution[0]),
+    };
+    let samplers = &session.registries.samplers;
+    let made = samplers.sampler(&cell.sequence, &cell.decorrelation, &demand);
+    made.map_err(|e| e.to_string())
 }
 
 /// Samplers, and the numbers of their first points that are measured: one sampler, unless each number
@@ -107,16 +191,7 @@ fn point_sets(
     pair: [u32; 2],
     counts: &[usize],
 ) -> Result<Vec<(Sampler, Vec<usize>)>, String> {
-    let sampler = |count: usize| {
-        let demand = Demand {
-            samples: Some(count as u32),
-            dimensions: pair[0].max(pair[1]) + 1,
-            width: Some(session.experiment.resolution[0]),
-        };
-        let samplers = &session.registries.samplers;
-        let made = samplers.sampler(&cell.sequence, &cell.decorrelation, &demand);
-        made.map_err(|e| e.to_string())
-    };
+    let sampler = |count: usize| sampler_of(session, cell, count as u32, pair[0].max(pair[1]));
     let most = sampler(counts.last().copied().unwrap_or(1))?;
     if !most.by_count() {
         return Ok(vec![(most, counts.to_vec())]);
@@ -127,24 +202,26 @@ fn point_sets(
         .collect()
 }
 
-/// The first `count` points of one pixel, as the kernel draws them.
+/// The first `count` points of each pixel, pixel by pixel, as the kernel draws them.
 fn dump_points(
     gpu: &Gpu,
     sampler: &Sampler,
+    pixels: Range<u32>,
     count: u32,
     pair: [u32; 2],
     seed: u32,
 ) -> Result<Vec<[f64; 2]>, String> {
-    let coordinates: Vec<Coordinate> = (0..count)
-        .flat_map(|sample| {
+    let of_pixel = |pixel: u32| {
+        (0..count).flat_map(move |sample| {
             pair.map(|dimension| Coordinate {
-                pixel: 0,
+                pixel,
                 sample,
                 dimension,
                 seed,
             })
         })
-        .collect();
+    };
+    let coordinates: Vec<Coordinate> = pixels.flat_map(of_pixel).collect();
     let words = dump_stream(gpu, sampler, &coordinates)?;
     Ok(words
         .chunks_exact(2)

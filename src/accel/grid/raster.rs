@@ -245,3 +245,100 @@ impl Plane {
         [low + u32::from(above), high]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Frame, Grid};
+    use super::*;
+    use crate::accel::TriangleSoup;
+    use crate::scene::Triangle;
+    use glam::Vec3;
+    use std::collections::BTreeSet;
+
+    fn random() -> impl FnMut() -> f32 {
+        let mut state = 7u32;
+        move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        }
+    }
+
+    /// The separating-axis test with all 13 axes, for one cell grown by `grow` cells.
+    fn overlaps(corners: &[[f64; 3]; 3], cell: [u32; 3], grow: [f64; 3]) -> bool {
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let cross = |a: [f64; 3], b: [f64; 3]| {
+            [
+                a[1] * b[2] - a[2] * b[1],
+                a[2] * b[0] - a[0] * b[2],
+                a[0] * b[1] - a[1] * b[0],
+            ]
+        };
+        let edge = |i: usize| -> [f64; 3] {
+            std::array::from_fn(|a| corners[(i + 1) % 3][a] - corners[i][a])
+        };
+        let unit = |i: usize| -> [f64; 3] { std::array::from_fn(|a| f64::from(u8::from(a == i))) };
+        let mut axes = vec![cross(edge(0), edge(1))];
+        axes.extend((0..3).map(unit));
+        axes.extend((0..9).map(|i| cross(edge(i / 3), unit(i % 3))));
+        let centre = cell.map(|c| f64::from(c) + 0.5);
+        axes.iter().all(|&axis| {
+            let reach = (0..3).map(|a| (0.5 + grow[a]) * axis[a].abs()).sum::<f64>();
+            let along = corners.map(|c| dot(c, axis) - dot(centre, axis));
+            let low = along.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = along.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            low <= reach && high >= -reach
+        })
+    }
+
+    #[test]
+    fn rows_hold_the_cells_of_the_separating_axis_test_and_no_others() {
+        let mut random = random();
+        let mut fewer_than_box = 0;
+        for case in 0..400 {
+            let size = [0.05, 0.3, 1.0][case % 3];
+            let mut point = |at: Vec3, s: f32| at + s * Vec3::new(random(), random(), random());
+            let at = point(Vec3::ZERO, 1.0);
+            let corners = [point(at, size), point(at, size), point(at, size)];
+            let record = TriangleRecord::new(&Triangle { vertices: corners }, 0, 0);
+            let far = TriangleRecord::new(
+                &Triangle {
+                    vertices: [Vec3::ZERO, Vec3::splat(2.0), Vec3::new(2.0, 0.0, 1.0)],
+                },
+                1,
+                0,
+            );
+            let soup = TriangleSoup {
+                records: vec![record, far],
+            };
+            let grid = Grid::new(&Frame::new(&soup), [9, 7, 8]);
+            let listed = |exact: bool| {
+                let mut cells = BTreeSet::new();
+                Raster::default().rows(&grid, &record, exact, |first, count| {
+                    cells.extend(first..first + count);
+                });
+                cells
+            };
+            let shape = Shape::new(&grid, &super::corners(&record), margin_of(&record));
+            let sat = |factor: f64| -> BTreeSet<u32> {
+                let all = (0..grid.cells() as u32).filter(|&cell| {
+                    let grow = shape.grow.map(|g| g * factor);
+                    overlaps(&shape.corners, grid.coordinates(cell), grow)
+                });
+                all.collect()
+            };
+            let (exact, boxed) = (listed(true), listed(false));
+            assert!(
+                exact.is_superset(&sat(0.99)),
+                "case {case}: a cell is missing"
+            );
+            let wide = sat(1.01);
+            // The box is grown by one margin only.
+            assert!(exact.is_subset(&wide), "case {case}: a cell too many");
+            fewer_than_box += usize::from(exact.len() < boxed.len());
+        }
+        assert!(
+            fewer_than_box > 100,
+            "only {fewer_than_box} triangles leave out cells"
+        );
+    }
+}

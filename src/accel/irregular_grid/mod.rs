@@ -94,9 +94,9 @@ impl AccelKind for IrregularGrid {
             ),
             integer(
                 "levels",
-                "how often a cell may be cut in all; 2 as in the paper, more only where most \
-                 triangles of a top cell lie in one voxel",
-                2,
+                "levels of the grid: 2 as in the paper; more cut a voxel again where it holds most \
+                 triangles of its top cell",
+                3,
                 2,
                 4,
             ),
@@ -399,5 +399,111 @@ impl CpuTwin for Twin<'_> {
 
     fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
         self.trace(ray, true, counters).triangle != NO_HIT
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Triangle;
+    use glam::Vec3;
+
+    /// Triangles of all sizes, bunched in one corner.
+    fn soup() -> TriangleSoup {
+        let mut state = 3u32;
+        let mut random = move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let records = (0..400).map(|id| {
+            let size = [0.02, 0.2, 3.0][id % 3];
+            let bunched = if id % 2 == 0 { 0.1 } else { 4.0 };
+            let mut point = |s: f32| s * Vec3::new(random(), random(), random());
+            let at = point(bunched);
+            let vertices = [at, at + point(size), at + point(size)];
+            super::super::triangle::TriangleRecord::new(&Triangle { vertices }, id as u32, 0)
+        });
+        TriangleSoup {
+            records: records.collect(),
+        }
+    }
+
+    fn cut_soup() -> Partition {
+        let settings = Settings {
+            lambda1: 0.12,
+            lambda2: 2.4,
+            levels: 3,
+        };
+        let log = &mut BuildLog::default();
+        cut::cut("irregular-grid", &soup(), &settings, log).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    fn volume(cells: &[Cell]) -> u64 {
+        let side = |c: &Cell, a: usize| u64::from(c.max[a] - c.min[a]);
+        cells
+            .iter()
+            .map(|c| side(c, 0) * side(c, 1) * side(c, 2))
+            .sum()
+    }
+
+    fn area_cost(partition: &Partition) -> f64 {
+        let cost = |c: &Cell| {
+            let [x, y, z] = [0, 1, 2]
+                .map(|a| f64::from(c.max[a] - c.min[a]) * f64::from(partition.fine.cell[a]));
+            (x * y + y * z + z * x) * f64::from(c.count + 1)
+        };
+        partition.cells.iter().map(cost).sum()
+    }
+
+    #[test]
+    fn merged_cells_still_tile_the_grid_and_cost_less() {
+        let mut partition = cut_soup();
+        let all = partition
+            .fine
+            .resolution
+            .iter()
+            .map(|&n| u64::from(n))
+            .product::<u64>();
+        assert_eq!(volume(&partition.cells), all);
+        let (cells, cost) = (partition.cells.len(), area_cost(&partition));
+        merge::merge(&mut partition, 0.995);
+        assert_eq!(volume(&partition.cells), all);
+        assert!(partition.cells.len() < cells, "{cells} cells");
+        assert!(area_cost(&partition) < cost);
+        for (number, cell) in partition.cells.iter().enumerate() {
+            let corner = cell.min.map(u32::from);
+            assert_eq!(partition.map.cell_at(corner), number as u32);
+            assert!(cell.list(&partition.pool).is_sorted());
+        }
+    }
+
+    #[test]
+    fn boxes_grow_only_over_cells_that_list_nothing_more() {
+        let mut partition = cut_soup();
+        merge::merge(&mut partition, 0.995);
+        let tiles = partition.cells.clone();
+        let before = volume(&tiles);
+        expand::expand(&mut partition, 3);
+        assert!(volume(&partition.cells) > before);
+        let overlap =
+            |a: &Cell, b: &Cell| (0..3).all(|i| a.min[i] < b.max[i] && b.min[i] < a.max[i]);
+        let mut foreign = 0;
+        for grown in &partition.cells {
+            for tile in &tiles {
+                let lists = [tile, grown].map(|c| c.list(&partition.pool));
+                if overlap(grown, tile) {
+                    assert!(
+                        voxels::is_subset(lists[0], lists[1]),
+                        "{grown:?} over {tile:?}"
+                    );
+                } else {
+                    foreign += usize::from(!voxels::is_subset(lists[0], lists[1]));
+                }
+            }
+        }
+        assert!(
+            foreign > 0,
+            "every list is a part of every other: the test is blunt"
+        );
     }
 }

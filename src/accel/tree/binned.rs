@@ -9,7 +9,7 @@
 
 use super::TreeNode;
 use super::parameters::{MAX_BINS, SAH_DEPTH, Settings};
-use super::reference::{Box3, Extent, Reference};
+use super::reference::{Box3, Reference, bounds_of};
 use super::subtree::{PARALLEL_GRAIN, Subtree, leaf, make_inner};
 use glam::Vec3A;
 use rayon::prelude::*;
@@ -21,93 +21,93 @@ const PARALLEL_BINNING: usize = 1 << 16;
 
 /// The tree over `references`, which are brought into the order of the leaves.
 pub(super) fn build(references: &mut [Reference], settings: &Settings) -> Subtree {
-    let extent = Extent::of(references);
-    grow(references, extent, 0, settings, 0)
+    let bounds = bounds_of(references);
+    grow(references, bounds, 0, settings, 0)
 }
 
 /// The subtree over `references`, which begin at `first` in the whole order.
 fn grow(
     references: &mut [Reference],
-    extent: Extent,
+    bounds: Box3,
     first: u32,
     settings: &Settings,
     depth: u32,
 ) -> Subtree {
     if references.len() <= PARALLEL_GRAIN {
         let mut nodes = Vec::with_capacity(references.len());
-        append(references, extent, first, settings, depth, &mut nodes);
+        append(references, bounds, first, settings, depth, &mut nodes);
         return Subtree::Whole(nodes);
     }
-    let Some((middle, [low_extent, high_extent])) = split(references, &extent, settings, depth)
+    let Some((middle, [low_bounds, high_bounds])) = split(references, bounds, settings, depth)
     else {
-        return Subtree::leaf(extent.bounds, first, references.len());
+        return Subtree::leaf(bounds, first, references.len());
     };
     let (low, high) = references.split_at_mut(middle);
     let second = first + middle as u32;
     let (low, high) = rayon::join(
-        || grow(low, low_extent, first, settings, depth + 1),
-        || grow(high, high_extent, second, settings, depth + 1),
+        || grow(low, low_bounds, first, settings, depth + 1),
+        || grow(high, high_bounds, second, settings, depth + 1),
     );
-    Subtree::inner(extent.bounds, low, high)
+    Subtree::inner(bounds, low, high)
 }
 
 /// The same on one thread, straight into `nodes`.
 fn append(
     references: &mut [Reference],
-    extent: Extent,
+    bounds: Box3,
     first: u32,
     settings: &Settings,
     depth: u32,
     nodes: &mut Vec<TreeNode>,
 ) {
     let here = nodes.len();
-    nodes.push(leaf(extent.bounds, first, references.len()));
-    let Some((middle, [low_extent, high_extent])) = split(references, &extent, settings, depth)
+    nodes.push(leaf(bounds, first, references.len()));
+    let Some((middle, [low_bounds, high_bounds])) = split(references, bounds, settings, depth)
     else {
         return;
     };
     let (low, high) = references.split_at_mut(middle);
-    append(low, low_extent, first, settings, depth + 1, nodes);
+    append(low, low_bounds, first, settings, depth + 1, nodes);
     make_inner(nodes, here);
     let second = first + middle as u32;
-    append(high, high_extent, second, settings, depth + 1, nodes);
+    append(high, high_bounds, second, settings, depth + 1, nodes);
 }
 
-/// Partitions `references`; returns where the second half starts and the extents of both. `None`
-/// makes a leaf.
+/// Partitions `references`; returns where the second half starts and the boxes of both. `None` makes a
+/// leaf.
 fn split(
     references: &mut [Reference],
-    extent: &Extent,
+    bounds: Box3,
     settings: &Settings,
     depth: u32,
-) -> Option<(usize, [Extent; 2])> {
+) -> Option<(usize, [Box3; 2])> {
     let areas = references.iter().map(|r| r.bounds().half_area());
-    if settings.must_be_leaf(extent.bounds, areas) {
+    if settings.must_be_leaf(bounds, areas) {
         return None;
     }
     if references.len() <= EXHAUSTIVE {
         return Some(exhaustive_split(references));
     }
     let plan = (depth < SAH_DEPTH)
-        .then(|| best_bin_split(references, extent, settings.bins))
+        .then(|| best_bin_split(references, bounds, settings.bins))
         .flatten();
     Some(match plan {
-        Some(plan) => partition(references, |r| plan.is_low(r)),
-        None => median_split(references, extent.bounds.longest_axis()),
+        Some(plan) => (partition(references, |r| plan.is_low(r)), plan.bounds),
+        None => median_split(references, bounds.longest_axis()),
     })
 }
 
 /// Halves, in an order that depends on the input alone: for nodes whose centres coincide, or that
 /// are already deep.
-pub(super) fn median_split(references: &mut [Reference], axis: usize) -> (usize, [Extent; 2]) {
+pub(super) fn median_split(references: &mut [Reference], axis: usize) -> (usize, [Box3; 2]) {
     let middle = references.len() / 2;
     references.sort_unstable_by(|a, b| a.compare(b, axis));
     let (low, high) = references.split_at(middle);
-    (middle, [Extent::of(low), Extent::of(high)])
+    (middle, [bounds_of(low), bounds_of(high)])
 }
 
 /// The cheapest of all partitions of 2 to 4 references.
-fn exhaustive_split(references: &mut [Reference]) -> (usize, [Extent; 2]) {
+fn exhaustive_split(references: &mut [Reference]) -> (usize, [Box3; 2]) {
     let count = references.len();
     let all = (1_usize << count) - 1;
     // Boxes and costs of all subsets, each made of a smaller one.
@@ -133,8 +133,7 @@ fn exhaustive_split(references: &mut [Reference]) -> (usize, [Extent; 2]) {
             middle += 1;
         }
     }
-    let (low, high) = references.split_at(middle);
-    (middle, [Extent::of(low), Extent::of(high)])
+    (middle, [subsets[chosen], subsets[all - chosen]])
 }
 
 /// A border between two bins.
@@ -144,8 +143,8 @@ pub(super) struct BinSplit {
     bin: usize,
     /// Sum over both sides of half area times count.
     pub cost: f32,
-    /// Box that both sides share.
-    pub overlap: Box3,
+    /// Boxes of both sides.
+    pub bounds: [Box3; 2],
 }
 
 impl BinSplit {
@@ -166,7 +165,7 @@ struct BinGrid {
 
 impl BinGrid {
     /// Bins over a box; those at the ends have half the width. `None` if the box is a point.
-    fn new(over: &Box3, bins: usize) -> Option<Self> {
+    fn new(over: Box3, bins: usize) -> Option<Self> {
         let extent = over.max - over.min;
         let scale = Vec3A::splat(bins as f32 - 1.0) / extent;
         // An axis without extent, or with an infinite one, puts everything into bin 0.
@@ -246,15 +245,11 @@ impl<const N: usize> Bins<N> {
 /// centres fall into one such bin of each axis, their own box is divided.
 pub(super) fn best_bin_split(
     references: &[Reference],
-    extent: &Extent,
+    bounds: Box3,
     bins: usize,
 ) -> Option<BinSplit> {
     let bins = bins.min(references.len().max(4));
-    let doubled = Box3 {
-        min: extent.bounds.min * 2.0,
-        max: extent.bounds.max * 2.0,
-    };
-    let over = |grid_box| {
+    let over = |grid_box: Box3| {
         let grid = BinGrid::new(grid_box, bins)?;
         // Small nodes are the most, and their bins cost more than their references.
         match bins {
@@ -263,7 +258,14 @@ pub(super) fn best_bin_split(
             _ => best_border::<MAX_BINS>(references, grid, bins),
         }
     };
-    over(&doubled).or_else(|| over(&extent.centres))
+    let doubled = Box3 {
+        min: bounds.min * 2.0,
+        max: bounds.max * 2.0,
+    };
+    over(doubled).or_else(|| {
+        let centres = references.iter().map(Reference::centre);
+        over(centres.fold(Box3::EMPTY, Box3::with_point))
+    })
 }
 
 /// The best border between the bins of a grid; `None` if on every axis one bin holds everything.
@@ -304,28 +306,18 @@ fn best_border<const N: usize>(
         grid,
         bin,
         cost: best_cost,
-        overlap: side(&boxes[..bin]).intersection(side(&boxes[bin..])),
+        bounds: [side(&boxes[..bin]), side(&boxes[bin..])],
     })
 }
 
-/// Moves the references of the first side to the front; returns how many there are and the extents
-/// of both sides.
-fn partition(
-    references: &mut [Reference],
-    is_low: impl Fn(&Reference) -> bool,
-) -> (usize, [Extent; 2]) {
-    let mut extents = [Extent::EMPTY; 2];
-    let (mut begin, mut end) = (0, references.len());
-    while begin < end {
-        let reference = references[begin];
-        if is_low(&reference) {
-            extents[0] = extents[0].with(&reference);
-            begin += 1;
-        } else {
-            extents[1] = extents[1].with(&reference);
-            end -= 1;
-            references.swap(begin, end);
-        }
+/// Moves the references of the first side to the front; returns how many there are. Every one is
+/// swapped, since a branch would be mispredicted half the time.
+fn partition(references: &mut [Reference], is_low: impl Fn(&Reference) -> bool) -> usize {
+    let mut middle = 0;
+    for place in 0..references.len() {
+        let low = is_low(&references[place]);
+        references.swap(middle, place);
+        middle += usize::from(low);
     }
-    (begin, extents)
+    middle
 }

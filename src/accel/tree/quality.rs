@@ -211,3 +211,79 @@ impl Polygon {
         out
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::tree::TreeNode;
+    use crate::scene::Triangle;
+    use glam::Vec3;
+
+    fn record(id: u32, vertices: [[f32; 3]; 3]) -> TriangleRecord {
+        let vertices = vertices.map(Vec3::from);
+        TriangleRecord::new(&Triangle { vertices }, id, 0)
+    }
+
+    fn unit_box() -> Bounds {
+        Bounds {
+            min: [0.0; 3],
+            max: [1.0; 3],
+        }
+    }
+
+    #[test]
+    fn a_clipped_triangle_has_the_area_that_geometry_gives() {
+        let area = |vertices| {
+            Polygon::new(&record(0, vertices))
+                .clipped(&unit_box())
+                .area()
+        };
+        let inside = [[0.0, 0.0, 0.5], [1.0, 0.0, 0.5], [0.0, 1.0, 0.5]];
+        assert_eq!(area(inside), 0.5);
+        // Twice the size: the corner square of side 1.
+        let larger = [[0.0, 0.0, 0.5], [2.0, 0.0, 0.5], [0.0, 2.0, 0.5]];
+        assert_eq!(area(larger), 1.0);
+        // The plane x + y + z = 3/2 cuts a cube in a regular hexagon of side √½.
+        let third = [[-9.0, 5.25, 5.25], [5.25, -9.0, 5.25], [5.25, 5.25, -9.0]];
+        let hexagon = 1.5 * 3.0_f64.sqrt() * 0.5;
+        assert!((area(third) - hexagon).abs() < 1e-12, "{}", area(third));
+        assert_eq!(area(inside.map(|[x, y, z]| [x + 3.0, y, z])), 0.0);
+    }
+
+    /// Two leaves, the second of them a box whose lower half the first triangle reaches into.
+    fn two_leaves() -> (Tree, TriangleSoup) {
+        let soup = TriangleSoup {
+            records: vec![
+                record(0, [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]]),
+                record(1, [[0.0, 0.0, 0.0], [1.0, 0.0, 3.0], [1.0, 1.0, 3.0]]),
+            ],
+        };
+        let [a, b] = [0, 1].map(|i| soup.records[i].bounds());
+        let leaf = |first| NodeKind::Leaf { first, count: 1 };
+        let inner = NodeKind::Inner { left: 1, right: 2 };
+        let nodes = [(a.union(&b), inner), (a, leaf(0)), (b, leaf(1))];
+        let node = |(bounds, kind)| TreeNode { bounds, kind };
+        let tree = Tree::new(nodes.map(node).to_vec(), vec![0, 1]);
+        (tree, soup)
+    }
+
+    #[test]
+    fn end_point_overlap_counts_foreign_surface_in_each_box_and_nothing_else() {
+        let (tree, soup) = two_leaves();
+        // Of the first triangle (area 8) the unit square in its corner lies in the second leaf's
+        // box; the second triangle touches the first leaf's box in one point.
+        let second = Polygon::new(&soup.records[1]).area();
+        let expected = 1.0 / (8.0 + second);
+        let found = tree.epo(&soup);
+        assert!((found - expected).abs() < 1e-12, "{found} for {expected}");
+    }
+
+    #[test]
+    fn a_triangle_in_two_leaves_is_foreign_to_neither() {
+        let (mut tree, soup) = two_leaves();
+        tree.order = vec![0, 1, 0];
+        tree.nodes[2].kind = NodeKind::Leaf { first: 1, count: 2 };
+        assert_eq!(tree.epo(&soup), 0.0);
+        assert_eq!(Tree::default().epo(&soup), 0.0);
+    }
+}

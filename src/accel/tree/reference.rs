@@ -128,27 +128,8 @@ pub(super) fn references(soup: &TriangleSoup) -> Vec<Reference> {
     soup.records.par_iter().map(reference).collect()
 }
 
-/// Box around references and box around their (doubled) centres.
-#[derive(Clone, Copy)]
-pub(super) struct Extent {
-    pub bounds: Box3,
-    pub centres: Box3,
-}
-
-impl Extent {
-    pub const EMPTY: Extent = Extent {
-        bounds: Box3::EMPTY,
-        centres: Box3::EMPTY,
-    };
-
-    pub fn of(references: &[Reference]) -> Self {
-        references.iter().fold(Self::EMPTY, Self::with)
-    }
-
-    pub fn with(self, reference: &Reference) -> Self {
-        Extent {
-            bounds: self.bounds.union(reference.bounds()),
-            centres: self.centres.with_point(reference.centre()),
-        }
-    }
+/// Box around references.
+pub(super) fn bounds_of(references: &[Reference]) -> Box3 {
+    let boxes = references.iter().map(Reference::bounds);
+    boxes.fold(Box3::EMPTY, Box3::union)
 }

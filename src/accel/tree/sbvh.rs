@@ -11,18 +11,18 @@
 
 use super::binned::{best_bin_split, median_split};
 use super::parameters::{SAH_DEPTH, Settings};
-use super::reference::{Box3, Extent, Reference};
+use super::reference::{Box3, Reference, bounds_of};
 use super::subtree::{PARALLEL_GRAIN, Subtree};
 
 /// The tree, with the order of the leaves. There are at most twice as many references as triangles.
 pub(super) fn build(references: Vec<Reference>, settings: &Settings) -> (Subtree, Vec<u32>) {
-    let extent = Extent::of(&references);
+    let bounds = bounds_of(&references);
     let spatial = Spatial {
         settings,
-        least_overlap: settings.spatial_alpha * extent.bounds.half_area(),
+        least_overlap: settings.spatial_alpha * bounds.half_area(),
     };
     let budget = references.len();
-    let grown = spatial.grow(references, extent, budget, 0);
+    let grown = spatial.grow(references, bounds, budget, 0);
     let mut order = Vec::new();
     (grown.subtree(&mut order), order)
 }
@@ -59,54 +59,55 @@ impl Grown {
 /// References of one side of a split.
 struct Side {
     references: Vec<Reference>,
-    extent: Extent,
+    bounds: Box3,
 }
 
 impl Side {
     fn of(references: Vec<Reference>) -> Self {
-        let extent = Extent::of(&references);
-        Side { references, extent }
+        let bounds = bounds_of(&references);
+        Side { references, bounds }
     }
 }
 
 impl Spatial<'_> {
     /// The subtree over `references`, with at most `budget` new ones.
-    fn grow(&self, references: Vec<Reference>, extent: Extent, budget: usize, depth: u32) -> Grown {
+    fn grow(&self, references: Vec<Reference>, bounds: Box3, budget: usize, depth: u32) -> Grown {
         let count = references.len();
         let areas = references.iter().map(|r| r.bounds().half_area());
-        if self.settings.must_be_leaf(extent.bounds, areas) {
-            return Grown::Leaf(extent.bounds, references.iter().map(|r| r.id).collect());
+        if self.settings.must_be_leaf(bounds, areas) {
+            return Grown::Leaf(bounds, references.iter().map(|r| r.id).collect());
         }
-        let [low, high] = self.split(references, &extent, budget, depth);
+        let [low, high] = self.split(references, bounds, budget, depth);
         let sum = low.references.len() + high.references.len();
         let left = budget - (sum - count);
         // Each side gets its share of what is left.
         let low_budget = (left as u64 * low.references.len() as u64 / sum as u64) as usize;
-        let grow_low = || self.grow(low.references, low.extent, low_budget, depth + 1);
-        let grow_high = || self.grow(high.references, high.extent, left - low_budget, depth + 1);
+        let grow_low = || self.grow(low.references, low.bounds, low_budget, depth + 1);
+        let grow_high = || self.grow(high.references, high.bounds, left - low_budget, depth + 1);
         let children = if count <= PARALLEL_GRAIN {
             (grow_low(), grow_high())
         } else {
             rayon::join(grow_low, grow_high)
         };
-        Grown::Inner(extent.bounds, Box::new(children))
+        Grown::Inner(bounds, Box::new(children))
     }
 
     fn split(
         &self,
         mut references: Vec<Reference>,
-        extent: &Extent,
+        bounds: Box3,
         budget: usize,
         depth: u32,
     ) -> [Side; 2] {
         let deep = depth >= SAH_DEPTH;
         let object = (!deep)
-            .then(|| best_bin_split(&references, extent, self.settings.bins))
+            .then(|| best_bin_split(&references, bounds, self.settings.bins))
             .flatten();
-        let overlaps = |overlap: Box3| overlap.half_area() >= self.least_overlap;
-        if !deep && object.as_ref().is_none_or(|o| overlaps(o.overlap)) {
+        let overlaps =
+            |[low, high]: [Box3; 2]| low.intersection(high).half_area() >= self.least_overlap;
+        if !deep && object.as_ref().is_none_or(|o| overlaps(o.bounds)) {
             let cost = object.as_ref().map_or(f32::INFINITY, |o| o.cost);
-            if let Some(plane) = best_plane(&references, &extent.bounds, self.settings, cost)
+            if let Some(plane) = best_plane(&references, &bounds, self.settings, cost)
                 && let Some(sides) = cut(&references, &plane, budget)
             {
                 return sides;
@@ -118,7 +119,7 @@ impl Spatial<'_> {
                 [Side::of(low), Side::of(high)]
             }
             None => {
-                let longest = extent.bounds.longest_axis();
+                let longest = bounds.longest_axis();
                 let (middle, _) = median_split(&mut references, longest);
                 let high = references.split_off(middle);
                 [Side::of(references), Side::of(high)]

@@ -5,6 +5,7 @@ pub mod point_sets;
 pub mod run;
 pub mod sampler_plots;
 pub mod samplers;
+pub mod spectrum;
 pub mod streams;
 pub mod structures;
 mod trade_off;

@@ -1,6 +1,7 @@
 //! Samplers under one scene and integrator: errors, times, bias, pictures.
 
 use super::sampler_plots::{error_figures, histograms, pareto_plot};
+use super::spectrum;
 use super::verdict::Race;
 use crate::measure::record::{BiasRecord, Interval, TimeRecord};
 use crate::report::data::{RunData, View, sampler_name, structure_name};
@@ -20,6 +21,7 @@ pub fn blocks(dir: &Path, data: &RunData, stem: &str, view: &View) -> Vec<Block>
     }
     blocks.extend(error_table(view, Metric::RelMse).into_block());
     blocks.extend(error_table(view, Metric::Rmse).into_block());
+    blocks.extend(spectrum::blocks(data, stem, view));
     blocks.extend(efficiency_table(view).into_block());
     if let Some(pareto) = pareto_plot(data, view)
         && let Some(drawing) = pareto.draw()
@@ -128,7 +130,14 @@ fn slope_cell(slope: Option<Interval>) -> Cell {
 /// Verdict on the bias of every sampler.
 pub fn bias_table(view: &View) -> Table {
     let caption = format!("Bias check with {}", view.integrator);
-    let columns = ["sampler", ":verdict", "tiles", "rejected", "smallest p"];
+    let columns = [
+        "sampler",
+        ":verdict",
+        "tiles",
+        "rejected",
+        "smallest p",
+        "z",
+    ];
     let mut table = Table::new(caption, &columns);
     for sampler in view.samplers.iter().filter(|s| !s.replicates.is_empty()) {
         let name = sampler.name.clone().into();
@@ -141,6 +150,7 @@ pub fn bias_table(view: &View) -> Table {
             count(bias.map(|bias| bias.tiles)).into(),
             count(bias.map(|bias| bias.rejected)).into(),
             format::optional(bias.map(|bias| bias.min_p)).into(),
+            format::optional(bias.and_then(|bias| bias.z)).into(),
         ]);
     }
     table
@@ -241,11 +251,14 @@ fn gallery(dir: &Path, view: &View) -> Option<Block> {
     let mut items = Vec::new();
     if let Some(reference) = view.reference {
         let spp = format::count(u64::from(reference.spp));
-        let caption = format!(
-            "reference: {spp} spp of {}, {} s",
-            reference.sampler,
-            format::number(reference.seconds)
-        );
+        let caption = match reference.exact {
+            Some(value) => format!("reference: the exact value, {value}"),
+            None => format!(
+                "reference: {spp} spp of {}, {} s",
+                reference.sampler,
+                format::number(reference.seconds)
+            ),
+        };
         items.push(pictures::load(dir, &reference.image, caption));
     }
     for sampler in &view.samplers {

@@ -1,130 +1,317 @@
-//! Star discrepancy of what the path consumed.
+//! Figures of what the path consumed: discrepancies, errors of integrands, what several pixels draw, and
+//! what drawing costs.
 
 use super::file_stem;
-use crate::measure::record::StreamRecord;
+use crate::measure::record::{FigureAtCount, Interval, SamplerCostRecord, StreamRecord};
 use crate::report::data::{RunData, sampler_name};
 use crate::report::document::*;
 use crate::report::format;
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
 
-/// Columns of the table at most.
+/// Columns of a table over N at most.
 const COLUMNS: usize = 8;
+/// Functions that are plotted; all are in the table: a smooth one, and one with an edge.
+const PLOTTED: [&str; 2] = ["exponential", "disk"];
 
 /// The section; `None` when no stream was measured.
 pub fn section(data: &RunData) -> Option<Section> {
-    if data.streams.is_empty() {
+    if data.streams.is_empty() && data.costs.is_empty() {
         return None;
     }
-    let mut section = Section::new("discrepancy", "Star discrepancy of the streams");
-    let mut purposes: Vec<(&str, [u32; 2])> = Vec::new();
+    let mut section = Section::new("discrepancy", "Streams: discrepancy and integration error");
+    let mut pairs: Vec<(&str, [u32; 2])> = Vec::new();
     for stream in &data.streams {
-        if !purposes.contains(&(&stream.purpose, stream.dimensions)) {
-            purposes.push((&stream.purpose, stream.dimensions));
+        if !pairs.contains(&(&stream.purpose, stream.dimensions)) {
+            pairs.push((&stream.purpose, stream.dimensions));
         }
     }
-    let mut figures = Vec::new();
-    let mut tables = Vec::new();
-    for (purpose, dimensions) in purposes {
+    for (purpose, dimensions) in pairs {
         let is_of = |s: &&&StreamRecord| s.purpose == purpose && s.dimensions == dimensions;
-        let streams: Vec<&StreamRecord> = data.streams.iter().filter(is_of).copied().collect();
-        let what = format!(
-            "{purpose} (dimensions {} and {})",
-            dimensions[0], dimensions[1]
-        );
-        if let Some(drawing) = plot(data, &streams).draw() {
-            let stem = format!(
-                "discrepancy-{}-{}-{}",
-                file_stem(purpose),
-                dimensions[0],
-                dimensions[1]
-            );
-            let caption = format!(
-                "{what}: exact star discrepancy of the first N points. Bands: 95 % interval over seeds; dashed curves: deterministic."
-            );
-            figures.push(Figure::new(stem, caption, drawing));
-        }
-        tables.extend(table(&what, &streams).into_block());
+        let streams = data.streams.iter().filter(is_of).copied().collect();
+        section.blocks.extend(Pair::new(data, streams).blocks());
     }
-    if !figures.is_empty() {
-        section.blocks.push(Block::Figures(figures));
-    }
-    section.blocks.extend(tables);
+    section.blocks.extend(cost_table(data).into_block());
     Some(section)
 }
 
-fn plot(data: &RunData, streams: &[&StreamRecord]) -> CurvePlot {
-    let curve = |stream: &&StreamRecord| {
-        let name = sampler_name(&stream.sequence, &stream.decorrelation);
-        let point = |at: &crate::measure::record::StarAtCount| CurvePoint {
-            x: at.n as f64,
-            y: at.star.value,
-            low: at.star.low,
-            high: at.star.high,
-        };
-        Curve {
-            look: data.sampler_look(&name),
-            label: name,
-            exact: !stream.randomised,
-            points: stream.star.iter().map(point).collect(),
+/// The streams of one pair of dimensions.
+struct Pair<'a> {
+    data: &'a RunData<'a>,
+    /// What the path uses the pair for, with its dimensions.
+    what: String,
+    /// Start of file names.
+    stem: String,
+    streams: Vec<&'a StreamRecord>,
+}
+
+impl<'a> Pair<'a> {
+    fn new(data: &'a RunData<'a>, streams: Vec<&'a StreamRecord>) -> Self {
+        let (purpose, [a, b]) = streams
+            .first()
+            .map_or(("", [0, 0]), |s| (&s.purpose, s.dimensions));
+        Self {
+            data,
+            what: format!("{purpose} (dimensions {a} and {b})"),
+            stem: format!("discrepancy-{}-{a}-{b}", file_stem(purpose)),
+            streams,
         }
-    };
-    let guide = |factor, of| Guide {
-        label: format!("{factor}/√N, fit of Dufay 2017 for {of}"),
-        factor,
-        exponent: -0.5,
-    };
-    CurvePlot {
-        x_title: "number of points N".into(),
-        x_ticks: Ticks::PowersOfTwo,
-        y_title: "star discrepancy D*".into(),
-        curves: streams.iter().map(curve).collect(),
-        guides: vec![guide(2.5, "Halton"), guide(1.5, "Hammersley")],
+    }
+
+    fn blocks(&self) -> Vec<Block> {
+        let mut blocks = vec![Block::Heading(self.what.clone())];
+        let figures = self.figures();
+        if !figures.is_empty() {
+            blocks.push(Block::Figures(figures));
+        }
+        let tables = [
+            self.ranking_table(),
+            self.count_table("D*, star discrepancy", star),
+            self.count_table("L2-star discrepancy (root)", |s| s.figures.l2_star.clone()),
+            self.count_table("Centered discrepancy (square)", |s| {
+                s.figures.centered.clone()
+            }),
+            self.pixel_table(),
+        ];
+        blocks.extend(tables.into_iter().filter_map(Table::into_block));
+        blocks
+    }
+
+    fn figures(&self) -> Vec<Figure> {
+        let guide = |factor, of| Guide {
+            label: format!("{factor}/√N, fit of Dufay 2017 for {of}"),
+            factor,
+            exponent: -0.5,
+        };
+        let guides = vec![guide(2.5, "Halton"), guide(1.5, "Hammersley")];
+        let mut plots = vec![(
+            String::new(),
+            "exact star discrepancy of the first N points".to_owned(),
+            self.plot("star discrepancy D*", guides, star),
+        )];
+        for name in PLOTTED {
+            let values = |s: &StreamRecord| {
+                let found = s.figures.integrands.iter().find(|i| i.function == name);
+                found.map_or(Vec::new(), |i| i.rmse.clone())
+            };
+            plots.push((
+                format!("-{name}"),
+                format!("RMSE of the integral of integrand:{name} over the first N points"),
+                self.plot(&format!("RMSE of {name}"), Vec::new(), values),
+            ));
+        }
+        let figure = |(ending, says, plot): (String, String, CurvePlot)| {
+            let caption = format!(
+                "{}: {says}. Bands: 95 % interval over seeds; dashed curves: deterministic.",
+                self.what
+            );
+            Some(Figure::new(
+                format!("{}{ending}", self.stem),
+                caption,
+                plot.draw()?,
+            ))
+        };
+        plots.into_iter().filter_map(figure).collect()
+    }
+
+    fn plot(
+        &self,
+        y_title: &str,
+        guides: Vec<Guide>,
+        values: impl Fn(&StreamRecord) -> Vec<FigureAtCount>,
+    ) -> CurvePlot {
+        let curve = |stream: &&StreamRecord| {
+            let name = name(stream);
+            let point = |at: FigureAtCount| CurvePoint {
+                x: at.n as f64,
+                y: at.value.value,
+                low: at.value.low,
+                high: at.value.high,
+            };
+            Curve {
+                look: self.data.sampler_look(&name),
+                label: name,
+                exact: !stream.randomised,
+                points: values(stream).into_iter().map(point).collect(),
+            }
+        };
+        let curves = self.streams.iter().map(curve);
+        CurvePlot {
+            x_title: "number of points N".into(),
+            x_ticks: Ticks::PowersOfTwo,
+            y_title: y_title.into(),
+            curves: curves.filter(|c| !c.points.is_empty()).collect(),
+            guides,
+        }
+    }
+
+    /// Exponents side by side: D* and errors do not rank alike.
+    fn ranking_table(&self) -> Table {
+        let functions: Vec<&str> = self.streams.first().map_or(Vec::new(), |s| {
+            let integrands = s.figures.integrands.iter();
+            integrands.map(|i| i.function.as_str()).collect()
+        });
+        let largest = self.streams.iter().filter_map(|s| s.star.last());
+        let most = largest.map(|at| at.n).max().unwrap_or(0);
+        let caption = format!(
+            "{}: D* at N = {most}, and exponents of N fitted over all N [95 % interval over seeds]: of D*, and of \
+             the RMSE of each integrand. Plain Monte Carlo has −0.5 everywhere. A small D* is no promise of a small \
+             error: D* ranks a digital shift before Owen scrambling, errors of smooth functions rank them the other \
+             way round",
+            self.what
+        );
+        let mut table = Table::new(caption, &["sampler", "D*", "D* exponent"]);
+        if functions.is_empty() {
+            return table;
+        }
+        functions.iter().for_each(|name| table.add_column(*name));
+        for stream in &self.streams {
+            let last = stream.star.last().filter(|at| at.n == most);
+            let mut row = vec![
+                Cell::from(name(stream)),
+                format::optional(last.map(|at| at.star.value)).into(),
+                slope_cell(stream.figures.star_slope),
+            ];
+            row.extend(functions.iter().map(|name| {
+                let found = stream.figures.integrands.iter();
+                let found = found.filter(|i| i.function == *name).find_map(|i| i.slope);
+                slope_cell(found)
+            }));
+            table.rows.push(row);
+        }
+        table
+    }
+
+    /// One figure by N: mean over seeds.
+    fn count_table(
+        &self,
+        figure: &str,
+        values: impl Fn(&StreamRecord) -> Vec<FigureAtCount>,
+    ) -> Table {
+        let caption = format!("{figure} of {}: mean over seeds [95 % interval]", self.what);
+        let mut table = Table::new(caption, &["sampler", "seeds"]);
+        let rows: Vec<_> = self.streams.iter().map(|s| (s, values(s))).collect();
+        let mut counts: Vec<usize> = rows.iter().flat_map(|(_, v)| v).map(|at| at.n).collect();
+        counts.sort_unstable();
+        counts.dedup();
+        // Thinned from the end, so that the largest N always stays.
+        let stride = counts.len().div_ceil(COLUMNS).max(1);
+        let mut shown: Vec<usize> = counts.into_iter().rev().step_by(stride).collect();
+        shown.reverse();
+        if shown.is_empty() {
+            return table;
+        }
+        shown
+            .iter()
+            .for_each(|n| table.add_column(format!("N = {n}")));
+        for (stream, values) in rows {
+            let mut row = vec![name(stream).into(), seeds_cell(stream)];
+            row.extend(shown.iter().map(|&n| {
+                let found = values.iter().find(|at| at.n == n);
+                interval_cell(found.map(|at| at.value))
+            }));
+            table.rows.push(row);
+        }
+        table
+    }
+
+    /// Coherence and coverage.
+    fn pixel_table(&self) -> Table {
+        let caption = format!(
+            "{}: mean angle between the directions of neighbouring pixels at the same sample, degrees (0: fully \
+             coherent), and share of a grid of 4√N × 4√N cells that the points of 150 pixels fall into",
+            self.what
+        );
+        let mut table = Table::new(caption, &["sampler"]);
+        let pixels = |s: &StreamRecord| s.figures.pixels.clone();
+        let longest = self.streams.iter().map(|s| pixels(s)).max_by_key(Vec::len);
+        let counts: Vec<usize> = longest.iter().flatten().map(|at| at.n).collect();
+        if counts.is_empty() {
+            return table;
+        }
+        for n in &counts {
+            table.add_column(format!("angle, N = {n}"));
+        }
+        for n in &counts {
+            table.add_column(format!("coverage, N = {n}"));
+        }
+        for stream in &self.streams {
+            let pixels = pixels(stream);
+            let at = |n: &usize| pixels.iter().find(|at| at.n == *n);
+            let mut row = vec![Cell::from(name(stream))];
+            row.extend(counts.iter().map(|n| {
+                let angle = at(n).map(|at| at.neighbour_angle.to_degrees());
+                Cell::from(format::optional(angle))
+            }));
+            row.extend(counts.iter().map(|n| {
+                let share = at(n).map(|at| format!("{:.1} %", 100.0 * at.coverage));
+                Cell::from(share.unwrap_or_else(|| format::ABSENT.into()))
+            }));
+            table.rows.push(row);
+        }
+        table
     }
 }
 
-fn table(what: &str, streams: &[&StreamRecord]) -> Table {
-    let mut table = Table::new(
-        format!("D* of {what}: mean over seeds [95 % interval]"),
-        &["sampler", "seeds"],
-    );
-    let mut counts: Vec<usize> = streams
-        .iter()
-        .flat_map(|s| &s.star)
-        .map(|at| at.n)
-        .collect();
-    counts.sort_unstable();
-    counts.dedup();
-    // Thinned from the end, so that the largest N always stays.
-    let stride = counts.len().div_ceil(COLUMNS).max(1);
-    let mut shown: Vec<usize> = counts.into_iter().rev().step_by(stride).collect();
-    shown.reverse();
-    if shown.is_empty() {
-        return table;
-    }
-    shown
-        .iter()
-        .for_each(|n| table.add_column(format!("N = {n}")));
-    for stream in streams {
-        let seeds = stream.seeds.to_string();
-        let seeds = if stream.randomised {
-            seeds.into()
-        } else {
-            Cell::with_detail(seeds, "deterministic")
-        };
-        let mut row = vec![
-            sampler_name(&stream.sequence, &stream.decorrelation).into(),
-            seeds,
-        ];
-        row.extend(shown.iter().map(|&n| {
-            match stream.star.iter().find(|at| at.n == n).map(|at| at.star) {
-                Some(star) if star.low < star.high => {
-                    Cell::with_detail(format::number(star.value), format::bounds(&star))
-                }
-                Some(star) => format::number(star.value).into(),
-                None => format::ABSENT.into(),
-            }
-        }));
-        table.rows.push(row);
+/// What drawing costs.
+fn cost_table(data: &RunData) -> Table {
+    let caption = "Cost of drawing on this adapter, nanoseconds per two-dimensional sample: median [95 % interval], \
+                   empty loop taken off, all units of the adapter together";
+    let mut table = Table::new(caption, &["sampler", "ns per sample", "empty loop, ns"]);
+    for cost in &data.costs {
+        let SamplerCostRecord {
+            sequence,
+            decorrelation,
+            ns_per_sample,
+            loop_ns_per_sample,
+        } = cost;
+        table.rows.push(vec![
+            sampler_name(sequence, decorrelation).into(),
+            interval_cell(Some(*ns_per_sample)),
+            format::number(loop_ns_per_sample.value).into(),
+        ]);
     }
     table
+}
+
+fn name(stream: &StreamRecord) -> String {
+    sampler_name(&stream.sequence, &stream.decorrelation)
+}
+
+fn star(stream: &StreamRecord) -> Vec<FigureAtCount> {
+    let star = stream.star.iter();
+    star.map(|at| FigureAtCount {
+        n: at.n,
+        value: at.star,
+    })
+    .collect()
+}
+
+fn seeds_cell(stream: &StreamRecord) -> Cell {
+    let seeds = stream.seeds.to_string();
+    if stream.randomised {
+        seeds.into()
+    } else {
+        Cell::with_detail(seeds, "deterministic")
+    }
+}
+
+fn interval_cell(figure: Option<Interval>) -> Cell {
+    match figure {
+        Some(figure) if figure.low < figure.high => {
+            Cell::with_detail(format::number(figure.value), format::bounds(&figure))
+        }
+        Some(figure) => format::number(figure.value).into(),
+        None => format::ABSENT.into(),
+    }
+}
+
+fn slope_cell(slope: Option<Interval>) -> Cell {
+    let Some(slope) = slope else {
+        return format::ABSENT.into();
+    };
+    let text = format::slope(&slope);
+    match text.split_once(' ') {
+        Some((value, bounds)) => Cell::with_detail(value, bounds),
+        None => text.into(),
+    }
 }

@@ -306,6 +306,7 @@ pub(super) fn reference(scene: &str, integrator: &str) -> Record {
         scene: scene.into(),
         integrator: variant(integrator),
         spp: 4096,
+        exact: None,
         sampler: "pixel-hash × none".into(),
         seconds: 21.4,
         mse: 2.0e-6,
@@ -338,9 +339,80 @@ pub(super) fn streams() -> Vec<Record> {
                 randomised,
                 seeds: if randomised { 8 } else { 1 },
                 star: (0..11).map(star).collect(),
+                figures: stream_figures(exponent),
             })
         };
     SAMPLERS.iter().map(stream).collect()
+}
+
+/// Figures of a stream whose D* falls with this exponent.
+fn stream_figures(exponent: f64) -> StreamFigures {
+    let at = |n: usize| FigureAtCount {
+        n,
+        value: around(0.3 * (n as f64).powf(exponent), 0.1),
+    };
+    let slope = Interval {
+        value: exponent,
+        low: exponent - 0.1,
+        high: exponent + 0.1,
+    };
+    StreamFigures {
+        star_slope: Some(slope),
+        l2_star: [16, 64, 256].map(at).to_vec(),
+        l2_star_slope: Some(slope),
+        centered: [16, 64].map(at).to_vec(),
+        integrands: vec![IntegrandFigures {
+            function: "disk".into(),
+            integral: 0.5,
+            rmse: [16, 64, 256].map(at).to_vec(),
+            slope: Some(slope),
+        }],
+        pixels: vec![PixelsAtCount {
+            n: 64,
+            neighbour_angle: 0.7,
+            coverage: 0.9,
+        }],
+    }
+}
+
+pub(super) fn costs() -> Vec<Record> {
+    let cost = |&(sequence, decorrelation, ..): &(&str, &str, f64, f64, bool, f64)| {
+        Record::SamplerCost(SamplerCostRecord {
+            sequence: variant(sequence),
+            decorrelation: variant(decorrelation),
+            ns_per_sample: around(12.5, 0.1),
+            loop_ns_per_sample: around(1.5, 0.1),
+        })
+    };
+    SAMPLERS.iter().map(cost).collect()
+}
+
+/// Spectra that rise, so that low frequencies are weak.
+pub(super) fn spectra(scene: &str, integrator: &str) -> Vec<Record> {
+    let spectrum =
+        |&(sequence, decorrelation, _, _, randomised, _): &(&str, &str, f64, f64, bool, f64)| {
+            let power = |k: usize| PowerAt {
+                frequency: 0.05 * k as f64,
+                power: around(0.2 * k as f64, 0.1),
+            };
+            let filtered = |sigma: f64| FilteredError {
+                sigma,
+                rmse: around(0.02 / (1.0 + sigma), 0.05),
+            };
+            Record::Spectrum(SpectrumRecord {
+                scene: scene.into(),
+                integrator: variant(integrator),
+                sequence: variant(sequence),
+                decorrelation: variant(decorrelation),
+                spp: 32,
+                replicates: if randomised { 8 } else { 1 },
+                power: (1..10).map(power).collect(),
+                low_frequency: Some(around(0.4, 0.1)),
+                autocorrelation: Some(around(-0.1, -0.1)),
+                filtered: [0.0, 1.0, 2.0].map(filtered).to_vec(),
+            })
+        };
+    SAMPLERS.iter().map(spectrum).collect()
 }
 
 pub(super) fn finished() -> Record {
@@ -391,6 +463,7 @@ pub(super) fn full_run() -> Vec<Line> {
         for integrator in ["path", "ao"] {
             records.push(reference(name, integrator));
             records.extend(errors(name, integrator, 8));
+            records.extend(spectra(name, integrator));
             records.extend(times(name, integrator, &timed));
             let verdicts = [
                 "no-bias-found",
@@ -403,6 +476,7 @@ pub(super) fn full_run() -> Vec<Line> {
         }
     }
     records.extend(streams());
+    records.extend(costs());
     records.push(finished());
     records.into_iter().map(line).collect()
 }
@@ -422,6 +496,7 @@ pub(super) fn small_run() -> Vec<Line> {
         Record::Reference(r) => keeps(&r.scene, &r.integrator.label),
         Record::Error(r) => keeps(&r.scene, &r.integrator.label),
         Record::Bias(r) => keeps(&r.scene, &r.integrator.label),
+        Record::Spectrum(r) => keeps(&r.scene, &r.integrator.label),
         Record::Time(r) => keeps(&r.scene, &r.integrator.label),
         _ => true,
     };

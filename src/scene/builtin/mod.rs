@@ -6,6 +6,7 @@ mod cornell_box;
 mod displaced_sphere;
 mod furnace;
 pub(super) mod numeric;
+mod single_triangle;
 mod sphere;
 mod teapot_in_a_stadium;
 mod teapot_patches;
@@ -24,13 +25,14 @@ struct Builtin {
 }
 
 /// The registry.
-const BUILTINS: [Builtin; 6] = [
+const BUILTINS: [Builtin; 7] = [
     cornell_box::SCENE,
     displaced_sphere::SCENE,
     triangle_soup::SCENE,
     teapot_in_a_stadium::SCENE,
     furnace::FURNACE_BOX,
     furnace::WHITE_FURNACE,
+    single_triangle::SCENE,
 ];
 
 /// The built-in scenes with their parameters, for the parser, lists and docs.
