@@ -204,21 +204,22 @@ impl Content for Cloud {
         let radius = self.radius(chosen.len(), area);
         // Dots that lie upon each other add up to a full colour.
         let alpha = if chosen.len() > MOST_SHAPES { 0.6 } else { 0.9 };
-        let ink = marker::ink(0).with_alpha(alpha);
+        let ink = marker::ink(0);
         let dots = chosen.iter().map(|&i| {
             let point = self.points[i];
-            let ink = match self.domain.is_behind(point) {
-                true => ink.with_alpha(0.3 * alpha),
-                false => ink,
+            let pale = if self.domain.is_behind(point) {
+                0.3
+            } else {
+                1.0
             };
-            (area.at(self.domain.place(point)), ink)
+            (area.at(self.domain.place(point)), pale * alpha)
         });
         if chosen.len() > MOST_SHAPES {
-            let mut canvas = Canvas::new((area.left, area.top), area.side);
-            dots.for_each(|(at, ink)| canvas.dot(at, radius, ink));
+            let mut canvas = Canvas::new((area.left, area.top), area.side, ink);
+            dots.for_each(|(at, alpha)| canvas.dot(at, radius, alpha));
             drawing.rasters.push(canvas.into_raster());
         } else {
-            dots.for_each(|(at, ink)| dot(drawing, at, radius, ink));
+            dots.for_each(|(at, alpha)| dot(drawing, at, radius, ink.with_alpha(alpha)));
         }
         for point in &self.highlighted {
             let at = area.at(self.domain.place(*point));

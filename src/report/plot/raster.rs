@@ -8,6 +8,8 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 
 /// Pixels of a [`Canvas`] to a pixel of the drawing: those of the PNG file.
 const CANVAS_SCALE: f64 = 2.0;
+/// Shades between paper and ink on a [`Canvas`]: few, so that files stay small.
+const SHADES: f32 = 16.0;
 
 /// A rectangle of pixels behind all shapes of a drawing.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,7 +58,8 @@ impl Raster {
     /// If the pixels cannot be encoded.
     pub fn svg(&self, scale: f64) -> Result<String, ReportError> {
         let mut png = Vec::new();
-        PngEncoder::new_with_quality(&mut png, CompressionType::Best, FilterType::Adaptive)
+        // Few colours compress best unfiltered.
+        PngEncoder::new_with_quality(&mut png, CompressionType::Best, FilterType::NoFilter)
             .write_image(
                 self.rgb.as_flattened(),
                 self.columns as u32,
@@ -79,30 +82,32 @@ impl Raster {
     }
 }
 
-/// A white square on which dots are painted.
+/// A white square on which dots of one ink are painted.
 pub struct Canvas {
     at: Point,
     side: f64,
     columns: usize,
-    rgb: Vec<[f32; 3]>,
+    ink: Ink,
+    /// How much of each pixel is covered, 0 to 1.
+    cover: Vec<f32>,
 }
 
 impl Canvas {
     /// A square of `side` pixels with this upper left corner.
-    pub fn new(at: Point, side: f64) -> Self {
+    pub fn new(at: Point, side: f64, ink: Ink) -> Self {
         let columns = (side * CANVAS_SCALE).round().max(1.0) as usize;
-        let rgb = vec![[255.0; 3]; columns * columns];
         Self {
             at,
             side,
             columns,
-            rgb,
+            ink,
+            cover: vec![0.0; columns * columns],
         }
     }
 
-    /// Paints a disc with a smooth edge; place and radius in pixels of the drawing. What lies outside
-    /// the square is cut off.
-    pub fn dot(&mut self, (x, y): Point, radius: f64, ink: Ink) {
+    /// Paints a disc with a smooth edge; place and radius in pixels of the drawing, opacity in [0, 1].
+    /// What lies outside the square is cut off.
+    pub fn dot(&mut self, (x, y): Point, radius: f64, alpha: f64) {
         let (x, y) = (
             (x - self.at.0) * CANVAS_SCALE,
             (y - self.at.1) * CANVAS_SCALE,
@@ -115,23 +120,26 @@ impl Canvas {
         for row in range(y) {
             for column in range(x) {
                 let distance = (column as f64 + 0.5 - x).hypot(row as f64 + 0.5 - y);
-                let cover = (radius + 0.5 - distance).clamp(0.0, 1.0) * ink.alpha;
-                let pixel = &mut self.rgb[row * self.columns + column];
-                for (value, target) in pixel.iter_mut().zip(ink.rgb) {
-                    *value += (f32::from(target) - *value) * cover as f32;
-                }
+                let more = (radius + 0.5 - distance).clamp(0.0, 1.0) * alpha;
+                let cover = &mut self.cover[row * self.columns + column];
+                *cover += (1.0 - *cover) * more as f32;
             }
         }
     }
 
     /// What was painted.
     pub fn into_raster(self) -> Raster {
-        let to_bytes = |rgb: &[f32; 3]| rgb.map(|value| value.round() as u8);
+        let color = |cover: &f32| {
+            let share = (cover * SHADES).round() / SHADES;
+            self.ink
+                .rgb
+                .map(|ink| (255.0 + (f32::from(ink) - 255.0) * share).round() as u8)
+        };
         Raster {
             at: self.at,
             size: (self.side, self.side),
             columns: self.columns,
-            rgb: self.rgb.iter().map(to_bytes).collect(),
+            rgb: self.cover.iter().map(color).collect(),
         }
     }
 }
@@ -143,10 +151,10 @@ mod tests {
 
     #[test]
     fn a_dot_is_painted_where_it_lies_and_cut_off_at_the_border() {
-        let mut canvas = Canvas::new((10.0, 20.0), 30.0);
-        canvas.dot((15.0, 25.0), 2.0, INK);
-        canvas.dot((40.0, 50.0), 2.0, INK);
-        canvas.dot((-500.0, 1e9), 2.0, INK);
+        let mut canvas = Canvas::new((10.0, 20.0), 30.0, INK);
+        canvas.dot((15.0, 25.0), 2.0, 1.0);
+        canvas.dot((40.0, 50.0), 2.0, 1.0);
+        canvas.dot((-500.0, 1e9), 2.0, 1.0);
         let raster = canvas.into_raster();
         assert_eq!((raster.columns, raster.rows()), (60, 60));
         assert_eq!(raster.rgb[10 * 60 + 10], INK.rgb);

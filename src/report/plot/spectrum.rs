@@ -10,6 +10,9 @@ use crate::report::color::viridis;
 /// Ends of the scale of powers, as powers of ten.
 const DECADES: [f64; 2] = [-2.0, 2.0];
 
+/// Width of the labels of a curve, pixels.
+const LABELS: f64 = 42.0;
+
 /// The highest frequency shown for this many points: twice their mean number per unit of length, within
 /// limits.
 pub fn highest_frequency(points: usize) -> usize {
@@ -30,25 +33,29 @@ pub struct RadialCurve(pub Vec<f64>);
 
 impl Content for RadialCurve {
     fn draw(&self, drawing: &mut Drawing, area: Area) {
+        // Labels stand inside the frame, so that panels may stand close together.
+        let left = LABELS / area.side;
+        let across = |power| [[left, share(power)], [1.0, share(power)]].map(|end| area.at(end));
         for power in [0.1, 1.0, 10.0] {
-            let y = share(power);
-            drawing.line(vec![area.at([0.0, y]), area.at([1.0, y])], GRID, 1.0);
+            drawing.line(across(power).into(), GRID, 1.0);
         }
-        let white = [[0.0, share(1.0)], [1.0, share(1.0)]].map(|end| area.at(end));
-        drawing.dashed_line(&white, DIM, 1.2, 5.0, 4.0);
+        drawing.dashed_line(&across(1.0), DIM, 1.2, 5.0, 4.0);
         area.frame(drawing);
-        for (power, label) in [(0.01, "0.01"), (1.0, "1"), (100.0, "100")] {
-            // Inside the frame, so that panels may stand close together.
-            let (x, y) = area.at([0.0, share(power).clamp(0.05, 0.95)]);
-            drawing.text(
-                (x + 5.0, y - 9.0 * f64::from(u8::from(power == 1.0))),
-                label,
-                DIM,
-                Anchor::Start,
-            );
+        for (power, label) in [
+            (0.01, "0.01"),
+            (0.1, "0.1"),
+            (1.0, "1"),
+            (10.0, "10"),
+            (100.0, "100"),
+        ] {
+            let (x, y) = area.at([left, share(power)]);
+            let y = y.clamp(area.top + 10.0, area.top + area.side - 10.0);
+            drawing.text((x - 6.0, y), label, DIM, Anchor::End);
         }
         let last = self.0.len().max(2) as f64;
-        let at = |(i, power): (usize, &f64)| area.at([(i + 1) as f64 / last, share(*power)]);
+        let at = |(i, power): (usize, &f64)| {
+            area.at([left + (1.0 - left) * (i + 1) as f64 / last, share(*power)])
+        };
         let line = self.0.iter().enumerate().map(at).collect();
         drawing.line(line, marker::ink(0), 1.6);
     }
