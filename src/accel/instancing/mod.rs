@@ -73,12 +73,7 @@ impl Base {
             .map(key)
             .eq(view.instances.iter().map(key));
         let sizes = view.objects.iter().map(|object| object.records.len());
-        let same_objects = self
-            .forest
-            .roots
-            .iter()
-            .map(|r| r.object_size)
-            .eq(sizes);
+        let same_objects = self.forest.roots.iter().map(|r| r.object_size).eq(sizes);
         if same_instances && same_objects {
             return Ok(());
         }
