@@ -29,7 +29,7 @@ fn builders() -> &'static [&'static str] {
 
 /// Default parameters with some changed: `name=value`.
 fn params(changes: &[&str]) -> Params {
-    let mut out = default_params(&tree_parameters());
+    let mut out = default_params(&Bvh.parameters());
     for change in changes {
         let (name, text) = change.split_once('=').expect("name=value");
         let value = out.0.get_mut(name).expect("a known parameter");

@@ -151,7 +151,7 @@ fn an_unknown_word_is_found_on_every_line_that_assigns() {
         ("accel/bvh/parent_pointer", "accel/bvh/parent_pointer"),
         ("accel/bvh/roped", "accel/bvh/roped"),
         ("accel/bvh/octant_roped", "accel/bvh/octant_roped"),
-        ("accel/uniform_grid", "accel/uniform_grid"),
+        ("accel/two_level_grid", "accel/two_level_grid"),
         ("accel/brute_force", "accel/brute_force"),
         ("accel/triangle", "accel/bvh/stack"),
         ("accel/bounds", "accel/bvh/stack"),

@@ -63,6 +63,11 @@ const NO_TWIN: &[(&str, &str)] = &[
 /// Functions and constants of a kernel that its twin writes in another way, with the reason.
 const KERNEL_ONLY: &[(&str, &str, &str)] = &[
     (
+        "accel/instance",
+        "load_entry",
+        "reads words; the twin has structs",
+    ),
+    (
         "accel/ray",
         "safe_inverse_1",
         "one component; the twin maps a closure",
@@ -140,16 +145,12 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
         "near_side",
         "one expression of the kernel",
     ),
-    ("accel/uniform_grid", "insert", "build"),
-    ("accel/uniform_grid", "insert_triangle", "build"),
-    ("accel/uniform_grid", "sort_by_cell", "build"),
-    ("accel/uniform_grid", "dot", "build, f64"),
-    ("accel/uniform_grid", "cross", "build, f64"),
     (
         "integrator/integrand",
         "half_plane_area",
         "the integral, f64",
     ),
+    ("integrator/integrand", "functions", "for streams"),
     ("sampling/blue_noise", "folder", "reads a parameter"),
     ("sampling/blue_noise", "read_tables", "files"),
     ("sampling/blue_noise", "read_words", "files"),
