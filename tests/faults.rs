@@ -109,6 +109,27 @@ const FAULTS: &[Fault] = &[
         structures: &["octree"],
     },
     Fault {
+        what: "planes of quantised boxes are moved inwards",
+        file: "accel/wide",
+        from: "base - slack, base + slack",
+        to: "base + slack, base - slack",
+        structures: &["bvh4", "cwbvh"],
+    },
+    Fault {
+        what: "children that must wait are dropped",
+        file: "accel/cwbvh",
+        from: "entries += select(0u, 1u, left != 0u);",
+        to: "",
+        structures: &["cwbvh"],
+    },
+    Fault {
+        what: "children nearly as far as the hit are dropped",
+        file: "accel/bvh4",
+        from: "> hit.t * BOX_PAD",
+        to: "> hit.t * 0.9",
+        structures: &["bvh4"],
+    },
+    Fault {
         what: "the last triangle is forgotten",
         file: "accel/brute_force",
         from: "i < limits.elements; i++",

@@ -308,3 +308,23 @@ fn structs_of_kernels_are_laid_out_like_those_of_rust() {
         ["nodes", "box_tests", "triangle_tests", "stack_high_water"]
     );
 }
+
+#[test]
+fn arrays_read_as_textures_have_rows_of_one_length_on_both_sides() {
+    let library = KernelLibrary::default();
+    let text = library.text("common/texels").expect("an embedded kernel");
+    let module = naga::front::wgsl::parse_str(text).expect("a kernel without imports");
+    let value = |name: &str| {
+        let found = module
+            .constants
+            .iter()
+            .find(|(_, c)| c.name.as_deref() == Some(name));
+        let (_, constant) = found.unwrap_or_else(|| panic!("no constant {name}"));
+        match module.global_expressions[constant.init] {
+            naga::Expression::Literal(naga::Literal::U32(x)) => x,
+            ref other => panic!("{name} is {other:?}"),
+        }
+    };
+    assert_eq!(1 << value("ROW_SHIFT"), raystone::gpu::TEXELS_PER_ROW);
+    assert_eq!(value("ROW_MASK"), raystone::gpu::TEXELS_PER_ROW - 1);
+}

@@ -320,3 +320,150 @@ impl<'a> Costs<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::tree::TreeNode;
+    use crate::measure::statistics::Pcg32;
+
+    fn around(x: f32, size: f32) -> Bounds {
+        Bounds {
+            min: [x, 0.0, 0.0],
+            max: [x + size, size, size],
+        }
+    }
+
+    /// A random tree over `count` boxes of one triangle each; returns where it stands.
+    fn grow(nodes: &mut Vec<TreeNode>, first: u32, count: u32, random: &mut Pcg32) -> usize {
+        let here = nodes.len();
+        let leaf = NodeKind::Leaf { first, count };
+        let bounds = around(random.uniform() as f32 * 9.0, 0.2 + random.uniform() as f32);
+        nodes.push(TreeNode { bounds, kind: leaf });
+        if count > 1 {
+            let middle = 1 + random.below(count as usize - 1) as u32;
+            let left = grow(nodes, first, middle, random);
+            let right = grow(nodes, first + middle, count - middle, random);
+            nodes[here] = TreeNode {
+                bounds: nodes[left].bounds.union(&nodes[right].bounds),
+                kind: NodeKind::Inner {
+                    left: left as u32,
+                    right: right as u32,
+                },
+            };
+        }
+        here
+    }
+
+    fn random_tree(count: u32, random: &mut Pcg32) -> Tree {
+        let mut tree = Tree {
+            order: (0..count).collect(),
+            ..Default::default()
+        };
+        grow(&mut tree.nodes, 0, count, random);
+        tree
+    }
+
+    fn settings(width: usize) -> CollapseSettings {
+        CollapseSettings {
+            width,
+            leaf_size: 3,
+            traversal_cost: 1.0,
+            intersection_cost: 0.6,
+        }
+    }
+
+    /// Least cost of all ways to collapse, by trying each: every set of roots that stands for the
+    /// subtree of a node is opened root by root.
+    fn least_cost(tree: &Tree, node: usize, count: &dyn Fn(usize) -> u32, width: usize) -> f32 {
+        let area = tree.nodes[node].bounds.half_area();
+        let as_leaf = if count(node) <= 3 {
+            area * count(node) as f32 * 0.6
+        } else {
+            f32::INFINITY
+        };
+        let NodeKind::Inner { left, right } = tree.nodes[node].kind else {
+            return as_leaf;
+        };
+        let mut best = f32::INFINITY;
+        let mut sets = vec![vec![left as usize, right as usize]];
+        while let Some(set) = sets.pop() {
+            let cost: f32 = set.iter().map(|&n| least_cost(tree, n, count, width)).sum();
+            best = best.min(cost);
+            for (place, &member) in set.iter().enumerate() {
+                if let NodeKind::Inner { left, right } = tree.nodes[member].kind
+                    && set.len() < width
+                {
+                    let mut opened = set.clone();
+                    opened[place] = left as usize;
+                    opened.push(right as usize);
+                    sets.push(opened);
+                }
+            }
+        }
+        as_leaf.min(area + best)
+    }
+
+    fn cost_of(wide: &WideTree, node: usize, bounds: &Bounds) -> f32 {
+        let child = |child: &WideChild| match child.kind {
+            WideKind::Node(index) => cost_of(wide, index as usize, &child.bounds),
+            WideKind::Leaf { count, .. } => child.bounds.half_area() * count as f32 * 0.6,
+        };
+        bounds.half_area() + wide.nodes[node].iter().map(child).sum::<f32>()
+    }
+
+    #[test]
+    fn no_other_collapse_is_cheaper() {
+        let mut random = Pcg32::new(3);
+        for _ in 0..60 {
+            let tree = random_tree(4 + random.below(5) as u32, &mut random);
+            let triangles: Vec<u32> = (0..tree.nodes.len()).map(|n| below(&tree, n)).collect();
+            for width in [2, 3, 4] {
+                let wide = WideTree::collapse(&tree, &settings(width), |_, _| ());
+                let found = cost_of(&wide, 0, &tree.nodes[0].bounds);
+                let least = least_cost(&tree, 0, &|n| triangles[n], width);
+                assert!(
+                    (found - least).abs() <= 1e-4 * least,
+                    "{width}: {found}, {least}"
+                );
+            }
+        }
+    }
+
+    fn below(tree: &Tree, node: usize) -> u32 {
+        match tree.nodes[node].kind {
+            NodeKind::Leaf { count, .. } => count,
+            NodeKind::Inner { left, right } => {
+                below(tree, left as usize) + below(tree, right as usize)
+            }
+        }
+    }
+
+    #[test]
+    fn every_triangle_stays_in_one_leaf_and_nodes_are_as_wide_as_allowed() {
+        let mut random = Pcg32::new(4);
+        for width in [2, 4, 8] {
+            let tree = random_tree(300, &mut random);
+            let wide = WideTree::collapse(&tree, &settings(width), |_, _| ());
+            let mut order = wide.order.clone();
+            order.sort_unstable();
+            assert_eq!(order, tree.order);
+            assert!(
+                wide.nodes
+                    .iter()
+                    .all(|children| (1..=width).contains(&children.len()))
+            );
+            assert!(wide.nodes.len() < tree.nodes.len() / 2);
+            for child in wide.nodes.iter().flatten() {
+                assert!(matches!(child.kind, WideKind::Node(_)) || !child.is_nothing());
+            }
+        }
+    }
+
+    #[test]
+    fn triangles_that_spatial_splits_listed_twice_stand_in_a_leaf_once() {
+        let mut order = vec![7, 7, 1, 2, 1];
+        assert_eq!(distinct_from(&mut order, 2), 2);
+        assert_eq!(order, [7, 7, 1, 2]);
+    }
+}
