@@ -56,12 +56,27 @@ fn twin_hits(built: &dyn BuiltAccel, soup: &TriangleSoup, rays: &[Ray]) -> Vec<H
     rays.iter().map(closest).collect()
 }
 
-/// Twin and kernel of every variant against brute force, and any hit against closest.
-fn check(what: &str, soup: &TriangleSoup, rays: &[Ray], on_device: bool) -> usize {
+/// Those that list triangles by their boxes, for which equality is proved for any ray.
+fn by_boxes() -> Vec<(&'static str, Params)> {
+    let mut out = variants();
+    out.retain(|(_, params)| !params.flag("clip"));
+    assert_eq!(out.len(), 4);
+    out
+}
+
+/// Twin and kernel of variants against brute force, and any hit against closest; returns the number of
+/// hits.
+fn check(
+    what: &str,
+    variants: &[(&str, Params)],
+    soup: &TriangleSoup,
+    rays: &[Ray],
+    on_device: bool,
+) -> usize {
     let expected = brute_force(soup, rays);
     let blocked: Vec<bool> = expected.iter().map(|h| h.triangle != NO_HIT).collect();
-    for (name, params) in variants() {
-        let built = build(kind(name), soup, &params);
+    for (name, params) in variants {
+        let built = build(kind(name), soup, params);
         let what = format!("{what}: {name} {params:?}");
         assert_same_hits(&what, rays, &expected, &twin_hits(&*built, soup, rays));
         let twin = built.cpu_twin(soup).expect("a twin");
@@ -133,9 +148,30 @@ fn rays_in_planes_along_edges_and_through_corners_of_cells_see_what_brute_force_
         let mut rays = rays_in_planes(&mut rng, 1500);
         let first = brute_force(&soup, &rays);
         rays.extend(scenes::cut_at_hits(&rays, &first));
-        hits += check(&format!("halls {round}"), &soup, &rays, round % 3 == 0);
+        let what = format!("halls {round}");
+        hits += check(&what, &variants(), &soup, &rays, round % 3 == 0);
     }
     assert!(hits > 5_000, "only {hits} hits: the test is blunt");
+}
+
+/// Rays towards points of needles; the sine of the angle to their planes is about `lift`.
+fn rays_at(rng: &mut Pcg, needles: &[[Vec3; 3]], lifts: &[f32], count: usize) -> Vec<Ray> {
+    let ray = |_| {
+        let [a, b, c] = needles[rng.below(needles.len() as u32) as usize];
+        let (u, v) = (rng.unit(), rng.unit());
+        let target = a + u * (b - a) + v * u * (c - b);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let mut along = (b - a) * rng.signed() + (c - b).normalize_or_zero() * rng.signed() * 8.0;
+        let lift = lifts[rng.below(lifts.len() as u32) as usize];
+        along += lift * along.length() * normal;
+        Ray {
+            origin: (target - along * rng.between(1, 3) as f32).to_array(),
+            t_min: 0.0,
+            direction: along.to_array(),
+            t_max: FAR,
+        }
+    };
+    (0..count).map(ray).collect()
 }
 
 #[test]
@@ -145,37 +181,25 @@ fn needles_and_grazing_rays_see_what_brute_force_sees() {
     for exponent in [1, 2, 3, 4, 6] {
         let width = 10.0_f32.powi(-exponent);
         let mut point = || 8.0 * Vec3::new(rng.signed(), rng.signed(), rng.signed());
-        let needles: Vec<[Vec3; 3]> = (0..150)
-            .map(|_| {
-                let (a, b) = (point(), point());
-                [a, b, b + width * point()]
-            })
-            .collect();
-        let mut rays = Vec::new();
-        for _ in 0..2000 {
-            // Towards a point of a needle, nearly within its plane.
-            let [a, b, c] = needles[rng.below(needles.len() as u32) as usize];
-            let (u, v) = (rng.unit(), 0.5 * rng.unit());
-            let target = a + u * (b - a) + v * u * (c - b);
-            let normal = (b - a).cross(c - a).normalize_or_zero();
-            let lift = 10.0_f32.powi(-(rng.below(5) as i32)) * rng.signed();
-            let along = (b - a) * rng.signed() + (c - b).normalize_or_zero() * rng.signed() * 8.0;
-            rays.push(Ray {
-                origin: (target - along - lift * normal * along.length()).to_array(),
-                t_min: 0.0,
-                direction: (along + lift * normal * along.length()).to_array(),
-                t_max: FAR,
-            });
-        }
-        let soup = scenes::soup(needles);
-        let first = brute_force(&soup, &rays);
-        rays.extend(scenes::cut_at_hits(&rays, &first));
-        hits += check(
-            &format!("needles 1e-{exponent}"),
-            &soup,
-            &rays,
-            exponent == 3,
+        let needle = |_| {
+            let (a, b) = (point(), point());
+            [a, b, b + width * point()]
+        };
+        let needles: Vec<[Vec3; 3]> = (0..150).map(needle).collect();
+        let soup = scenes::soup(needles.iter().copied());
+        // Clipped lists promise nothing below an angle of 1/32.
+        let steep = (
+            variants(),
+            rays_at(&mut rng, &needles, &[-1.0, 0.2, 0.05], 1500),
         );
+        let lifts = [1e-2, -1e-3, 1e-4, -1e-6, 0.0];
+        let grazing = (by_boxes(), rays_at(&mut rng, &needles, &lifts, 1500));
+        for (variants, mut rays) in [steep, grazing] {
+            let first = brute_force(&soup, &rays);
+            rays.extend(scenes::cut_at_hits(&rays, &first));
+            let what = format!("needles 1e-{exponent}");
+            hits += check(&what, &variants, &soup, &rays, exponent == 3);
+        }
     }
     assert!(hits > 10_000, "only {hits} hits: the test is blunt");
 }
