@@ -477,7 +477,7 @@ impl Twin<'_> {
             let half = size.map(|s| 0.5 * s);
             let first: [u32; 3] = std::array::from_fn(|a| child[a] + mirror[a]);
             let near = self.distances(first, half, ray, inverse);
-            let enter = near[0].max(near[1]).max(near[2]).max(0.0);
+            let enter = near[0].max(near[1]).max(near[2]).max(ray.t_min);
             if enter > hit.t * END_PAD {
                 return hit;
             }

@@ -107,8 +107,9 @@ fn curve(counts: &[usize], values: &[f64]) -> Vec<(f64, f64)> {
 }
 
 /// RMSE over seeds of every function, and its slope. The slope is half that of the mean square, so that
-/// it is the slope of the RMSE and not of a mean of absolute errors. A single set that happens to be right
-/// to the resolution of its coordinates says nothing of a slope there and is left out of it.
+/// it is the slope of the RMSE and not of a mean of absolute errors. An N at which half of the seeds or
+/// more are right to the resolution of the coordinates (16 points often halve the square exactly) says
+/// nothing of a slope and is left out of it.
 fn integrands(counts: &[usize], seeds: &[SeedFigures]) -> Vec<IntegrandFigures> {
     let figures = |(k, (name, function)): (usize, (&str, Function))| {
         let errors: Vec<&Vec<f64>> = seeds.iter().map(|s| &s.squared_errors[k]).collect();
@@ -118,12 +119,16 @@ fn integrands(counts: &[usize], seeds: &[SeedFigures]) -> Vec<IntegrandFigures> 
             bootstrap_interval(&squares, root).map(|value| FigureAtCount { n, value })
         });
         let least = RESOLUTION.powi(2);
-        let instead = if seeds.len() > 1 { least } else { 0.0 };
-        let resolved = |e: &&Vec<f64>| {
-            let squares = e.iter().map(|&e| if e < least { instead } else { e });
-            curve(counts, &squares.collect::<Vec<f64>>())
+        let resolved = |i: usize| {
+            let seen = errors.iter().filter(|e| e[i] > least).count();
+            2 * seen > errors.len()
         };
-        let curves: Vec<_> = errors.iter().map(resolved).collect();
+        let squares = |e: &&Vec<f64>| -> Vec<(f64, f64)> {
+            let points = curve(counts, e).into_iter().enumerate();
+            let fitted = points.filter(|(i, _)| resolved(*i));
+            fitted.map(|(_, (n, e))| (n, e.max(least))).collect()
+        };
+        let curves: Vec<_> = errors.iter().map(squares).collect();
         let half = |slope: Interval| Interval {
             value: 0.5 * slope.value,
             low: 0.5 * slope.low,
@@ -242,6 +247,23 @@ mod tests {
             let slope = figures.slope.unwrap();
             assert!((slope.value + 0.5).abs() < 0.12, "{figures:?}");
             assert!(slope.low < slope.high);
+        }
+    }
+
+    #[test]
+    fn an_exact_hit_is_left_out_of_a_slope() {
+        let counts = [16, 32, 64, 128];
+        let law = |n: usize| if n == 16 { 1e-20 } else { 1.0 / n as f64 };
+        let seed = SeedFigures {
+            squared_errors: vec![counts.map(law).to_vec(); functions().len()],
+            ..SeedFigures::default()
+        };
+        for seeds in [vec![seed.clone()], vec![seed; 3]] {
+            for figures in integrands(&counts, &seeds) {
+                assert_eq!(figures.rmse.len(), 4);
+                let slope = figures.slope.unwrap().value;
+                assert!((slope + 0.5).abs() < 1e-12, "{slope}");
+            }
         }
     }
 

@@ -148,7 +148,9 @@ impl PointPage {
             );
             Figure::new("pair-discrepancy", caption, drawing)
         });
-        Ok(std::iter::once(projections).chain(discrepancies).collect())
+        // The only pair of two dimensions is the set itself.
+        let projections = (shown > 2).then_some(projections);
+        Ok(projections.into_iter().chain(discrepancies).collect())
     }
 
     fn matrix(&self) -> Result<PairMatrix, DiscrepancyError> {

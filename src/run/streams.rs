@@ -59,15 +59,10 @@ fn stream_record(
     pair: [u32; 2],
 ) -> Result<StreamRecord, String> {
     let settings = session.experiment.discrepancy.clone();
-    let seeds: Vec<u32> = if cell.randomised {
-        session
-            .experiment
-            .replicate_seeds()
-            .take(settings.seeds as usize)
-            .collect()
-    } else {
-        vec![session.experiment.seed]
-    };
+    let first = session.experiment.seed;
+    let count = if cell.randomised { settings.seeds } else { 1 };
+    // The first ones are the seeds of the replicates; streams are cheap and may have more.
+    let seeds: Vec<u32> = (0..count).map(|i| first.wrapping_add(i)).collect();
     let smallest = FEWEST_POINTS.min(settings.points).trailing_zeros();
     let counts: Vec<usize> = (smallest..=settings.points.trailing_zeros())
         .map(|k| 1 << k)

@@ -6,9 +6,11 @@ use crate::report::color::viridis;
 use crate::report::format;
 
 /// Width and height of a cell, pixels.
-const CELL: (f64, f64) = (66.0, 40.0);
+const CELL: (f64, f64) = (74.0, 40.0);
 /// White between cells, pixels.
 const GAP: f64 = 2.0;
+/// Least width of the drawing, pixels: a page stretches narrow ones.
+const LEAST_WIDTH: f64 = 500.0;
 
 /// Star discrepancies of pairs of dimensions; D* is the same with the dimensions exchanged, so that half a
 /// matrix says all.
@@ -29,7 +31,8 @@ impl PairMatrix {
         let left = widest.fold(0.0, f64::max) + 24.0;
         let size = self.dims.len().saturating_sub(1) as f64;
         let bottom = 8.0 + size * CELL.1;
-        let mut drawing = Drawing::new(left + size * CELL.0 + 12.0, bottom + 26.0);
+        let width = (left + size * CELL.0 + 12.0).max(LEAST_WIDTH);
+        let mut drawing = Drawing::new(width, bottom + 26.0);
         for &(i, j, value) in &self.values {
             let corner = (left + i as f64 * CELL.0, 8.0 + (j - 1) as f64 * CELL.1);
             let share = if high > low {
