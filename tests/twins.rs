@@ -288,6 +288,8 @@ fn values(constants: &BTreeMap<String, String>) -> BTreeMap<String, u32> {
             (!separator).then_some(c)
         };
         let value = value.replace("u32::MAX", "0xffffffffu");
+        let two_over_pi = format!("{:?}f", std::f32::consts::FRAC_2_PI);
+        let value = value.replace("std::f32::consts::FRAC_2_PI", &two_over_pi);
         let is_hex = value.contains("0x");
         let value: String = if is_hex {
             value.replace('_', "")

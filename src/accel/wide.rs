@@ -367,8 +367,8 @@ mod tests {
             };
             let inverse = safe_inverse(ray.direction);
             let mut frame = frame(grid.low, grid.exponent_word(0), ray.origin, inverse);
-            for axis in 0..3 {
-                let base = (grid.low[axis] - ray.origin[axis]) * inverse[axis];
+            for (axis, inverse) in inverse.iter().enumerate() {
+                let base = (grid.low[axis] - ray.origin[axis]) * inverse;
                 let slack = (base.abs() + frame.scale[axis].abs() * PLANES) * pad;
                 (frame.near[axis], frame.far[axis]) = (base - slack, base + slack);
             }

@@ -10,8 +10,8 @@ use super::forest::Node;
 use crate::scene::{Instance, Transform};
 use bytemuck::{Pod, Zeroable};
 
-/// A leaf without content: the missing child of a node with one.
-pub(super) const NOTHING: u32 = LEAF;
+/// `LEAF` without content: the missing child of a node with one.
+pub(super) const NOTHING: u32 = 0x8000_0000;
 /// Flag of an entry whose rays need no transform.
 pub(super) const IDENTITY: u32 = 1;
 

@@ -22,8 +22,6 @@ use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
 use crate::measure::record::StructureStats;
 
-/// Entries of the upper level are addressed like triangles.
-const MOST_ENTRIES: u32 = FIRST_MASK;
 /// Stands for the size of the stack when an object was entered, outside of any.
 const OUTSIDE: u32 = u32::MAX;
 
@@ -79,16 +77,16 @@ impl AccelKind for MetaBvh {
     }
 }
 
-/// Refuses more entries than references can address.
+/// Refuses more entries than references can address: like triangles, by `FIRST_MASK`.
 fn check_entries(instances: usize, rebraid: usize) -> Result<(), AccelError> {
     let needed = instances as u64 * rebraid.max(1) as u64;
-    if needed <= u64::from(MOST_ENTRIES) {
+    if needed <= u64::from(FIRST_MASK) {
         return Ok(());
     }
     Err(AccelError::Limit {
         what: "entries of the upper level of a meta-bvh".into(),
         needed,
-        limit: MOST_ENTRIES.into(),
+        limit: FIRST_MASK.into(),
     })
 }
 
