@@ -1,0 +1,3 @@
+//! Numerical stress.
+
+pub mod numerics;
