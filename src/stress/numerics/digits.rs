@@ -70,7 +70,7 @@ pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
 /// neighbours.
 fn indices(base: u32) -> impl Iterator<Item = u32> {
     let powers = std::iter::successors(Some(base), move |power| power.checked_mul(base));
-    let around = powers.flat_map(|power| {
+    let around = powers.flat_map(move |power| {
         [
             power - 1,
             power,

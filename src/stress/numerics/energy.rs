@@ -79,13 +79,8 @@ fn walk(gpu: &Gpu, spp: u32) -> Result<Vec<Figure>, NumericsError> {
     let image = renderer.image()?;
     let walks = f64::from(SIZE * SIZE * spp);
     let drift = |(channel, bounces): (usize, u32)| {
-        let left = mean(
-            &image
-                .pixels
-                .iter()
-                .map(|p| f64::from(p[channel]))
-                .collect::<Vec<_>>(),
-        );
+        let pixels = image.pixels.iter().map(|p| f64::from(p[channel]));
+        let left = mean(&pixels.collect::<Vec<_>>()).unwrap_or(f64::NAN);
         Figure::checked(
             &format!("energy lost or gained in {bounces} bounces of albedo 1"),
             (left - 1.0).abs(),
@@ -116,8 +111,8 @@ fn path(gpu: &Gpu, stage: &Stage, depth: i64, spp: u32) -> Result<Figure, Numeri
     let image = renderer.image()?;
     let pixels: Vec<f64> = image.pixels.iter().map(|p| f64::from(p[0])).collect();
     let expected = depth as f64 + 1.0;
-    let error = (variance(&pixels) / pixels.len() as f64).sqrt();
-    let drift = mean(&pixels) - expected;
+    let error = (variance(&pixels).unwrap_or(f64::NAN) / pixels.len() as f64).sqrt();
+    let drift = mean(&pixels).unwrap_or(f64::NAN) - expected;
     Ok(Figure::checked(
         &format!("energy of the path tracer after {depth} bounces, off the truth"),
         drift.abs() / error,
