@@ -32,14 +32,29 @@ pub(super) fn load(
         let (json, blob) = gltf_container::split(&bytes).map_err(|(byte, problem)| {
             SceneError::malformed(path, format!("byte {byte}"), problem)
         })?;
-        let gltf = gltf::Gltf::from_slice(json)
-            .map_err(|error| SceneError::malformed(path, "", error.to_string()))?;
+        let document = parse(json).map_err(|problem| SceneError::malformed(path, "", problem))?;
         let blob = blob.map(<[u8]>::to_vec);
         drop(bytes);
-        let document = gltf.document;
         let buffers = read_buffers(path, &document, blob)?;
         build(path, name, options, &document, &buffers)
     })
+}
+
+/// The validated document. The crate's validation looks up the accessors of attributes before it
+/// compares their indices with what there is, so that is done here.
+fn parse(json: &[u8]) -> Result<gltf::Document, String> {
+    let unchecked = gltf::Gltf::from_slice_without_validation(json).map_err(|e| e.to_string())?;
+    let root = unchecked.document.into_json();
+    for (m, mesh) in root.meshes.iter().enumerate() {
+        for (p, primitive) in mesh.primitives.iter().enumerate() {
+            let mut accessors = primitive.attributes.values().map(|index| index.value());
+            if let Some(missing) = accessors.find(|index| *index >= root.accessors.len()) {
+                let place = format!("meshes[{m}].primitives[{p}].attributes");
+                return Err(format!("{place}: there is no accessor {missing}"));
+            }
+        }
+    }
+    gltf::Document::from_json(root).map_err(|e| e.to_string())
 }
 
 fn build(

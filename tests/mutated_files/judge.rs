@@ -112,7 +112,7 @@ impl Judge {
 
 /// Whether a message names the file and a place in it, or says that it speaks of the whole.
 pub fn says_where(message: &str) -> bool {
-    const PLACES: [&str; 13] = [
+    const PLACES: [&str; 14] = [
         "line ",
         "face ",
         "vertex ",
@@ -124,6 +124,7 @@ pub fn says_where(message: &str) -> bool {
         "node ",
         "image ",
         "triangle ",
+        "s[",
         "byte ",
         "accessor",
     ];
