@@ -5,11 +5,14 @@ const HEADER_BYTES: usize = 12;
 const JSON: &[u8] = b"JSON";
 const BINARY: &[u8] = b"BIN\0";
 
+/// The JSON text and the binary chunk.
+type Chunks<'a> = (&'a [u8], Option<&'a [u8]>);
+
 /// The JSON text, and the binary chunk if there is one. A file that is no container is all text.
 ///
 /// # Errors
 /// The place of the fault (bytes from the beginning), and what it is.
-pub(super) fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), (usize, String)> {
+pub(super) fn split(bytes: &[u8]) -> Result<Chunks<'_>, (usize, String)> {
     if !bytes.starts_with(MAGIC) {
         return Ok((bytes, None));
     }
