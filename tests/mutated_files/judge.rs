@@ -163,11 +163,11 @@ fn watch_panics() {
 fn watch_time() {
     loop {
         std::thread::sleep(Duration::from_millis(250));
-        if let Some((case, began)) = &*lock(&CURRENT) {
-            if cpu_time().saturating_sub(*began) > LONGEST {
-                eprintln!("{case}: not read after {LONGEST:?} of CPU time");
-                std::process::abort();
-            }
+        if let Some((case, began)) = &*lock(&CURRENT)
+            && cpu_time().saturating_sub(*began) > LONGEST
+        {
+            eprintln!("{case}: not read after {LONGEST:?} of CPU time");
+            std::process::abort();
         }
     }
 }

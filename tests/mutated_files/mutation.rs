@@ -1,4 +1,5 @@
 //! How files are broken.
+#![allow(clippy::ptr_arg)] // All mutations have one type; most of them change the length.
 
 /// A small deterministic generator (PCG-RXS-M-XS with 64 bits of state; O'Neill 2014).
 pub struct Pcg(u64);
