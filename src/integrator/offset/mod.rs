@@ -140,3 +140,47 @@ pub fn position_error(
     let far = reach[0].max(reach[1]).max(reach[2]);
     reach.map(|r| POSITION_ERROR * (r + (transform.scale * far + transform.shift)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::keys;
+    use crate::measure::statistics::Pcg32;
+
+    #[test]
+    fn experiment_files_know_every_offset() {
+        assert_eq!(RayOffset::ALL.map(RayOffset::name), keys::RAY_OFFSETS);
+        for offset in RayOffset::ALL {
+            assert_eq!(RayOffset::named(offset.name()), Some(offset));
+            assert!(!offset.description().is_empty());
+        }
+    }
+
+    #[test]
+    fn a_point_computed_on_a_triangle_lies_within_the_bound_and_not_within_a_sixteenth() {
+        let mut rng = Pcg32::new(7);
+        let mut next = || rng.uniform() as f32;
+        let (mut beyond, mut beyond_part) = (0, 0);
+        for _ in 0..100_000 {
+            let corners: [[f32; 3]; 3] =
+                std::array::from_fn(|_| std::array::from_fn(|_| 10.0 * next() - 5.0));
+            let [v0, v1, v2] = corners;
+            let (e1, e2) = (
+                [0, 1, 2].map(|a| v0[a] - v1[a]),
+                [0, 1, 2].map(|a| v2[a] - v0[a]),
+            );
+            let (u, v) = (next(), next());
+            let error = position_error(v0, e1, e2, &TransformError::default());
+            for a in 0..3 {
+                let computed = v0[a] - u * e1[a] + v * e2[a];
+                let [x, y, z, u, v] = [v0[a], v1[a], v2[a], u, v].map(f64::from);
+                let exact = x - u * (x - y) + v * (z - x);
+                let off = (f64::from(computed) - exact).abs();
+                beyond += usize::from(off > f64::from(error[a]));
+                beyond_part += usize::from(off > f64::from(error[a]) / 16.0);
+            }
+        }
+        assert_eq!(beyond, 0);
+        assert!(beyond_part > 0, "the bound is far from tight");
+    }
+}
