@@ -1,6 +1,7 @@
 //! Scene buffers for shading: canonical triangles, materials, lights, textures.
 
-use crate::accel::TriangleSoup;
+use super::offset::{RayOffset, TransformError};
+use crate::accel::{Intersection, TriangleSoup};
 use crate::gpu::{Bindings, Gpu, GpuError};
 use crate::scene::{MaterialKind, SceneData};
 use glam::Vec3;
@@ -34,6 +35,12 @@ impl SceneFeatures {
 pub struct SceneBuffers {
     /// `triangles`, `shading_tables`, `texture_data`.
     pub bindings: Bindings,
+    /// How rays meet the triangles.
+    pub intersection: Intersection,
+    /// Where rays that leave a surface start; integrators ask.
+    pub offset: RayOffset,
+    /// What instances add to the error of points.
+    pub transform_error: TransformError,
     /// What kernels must carry.
     pub features: SceneFeatures,
     /// Radiance of the environment.
@@ -72,7 +79,8 @@ impl SceneBuffers {
         let (lights, light_power) = light_words(scene);
         tables.extend_from_slice(&lights);
         let mut bindings = Bindings::new();
-        let triangles = bytemuck::cast_slice(&soup.records);
+        let triangles = soup.words();
+        let triangles = triangles.as_flattened();
         bindings.parts("triangles", &gpu.storage_parts("triangles", triangles)?);
         bindings.buffer("shading_tables", &gpu.storage("shading_tables", &tables)?);
         if textured {
@@ -80,6 +88,9 @@ impl SceneBuffers {
         }
         Ok(Self {
             bindings,
+            intersection: soup.intersection,
+            offset: RayOffset::default(),
+            transform_error: TransformError::of(soup),
             features: SceneFeatures {
                 textures: textured,
                 emitters: !lights.is_empty(),
