@@ -1,0 +1,2 @@
+//! The numerical stress suite: every intersector and structure on scenes and rays that rounding makes
+//! hard, judged exactly.
