@@ -2,7 +2,7 @@
 
 use super::place::Place;
 use super::shapes::Mesh;
-use crate::accel::{Ray, TriangleSoup};
+use crate::accel::Ray;
 use crate::measure::statistics::Pcg32;
 use crate::scene::{Assembly, Material, SceneData, Triangle};
 use glam::{DVec3, Vec3};
@@ -35,10 +35,8 @@ pub struct Case {
     pub label: String,
     /// Where the mesh stands.
     pub place: Place,
-    /// Triangles in world space.
-    pub triangles: Mesh,
-    /// The same as structures see them.
-    pub soup: TriangleSoup,
+    /// The triangles in world space, and what they are copies of.
+    pub scene: SceneData,
     /// The rays.
     pub rays: Vec<Ray>,
     /// What is right.
@@ -209,8 +207,7 @@ impl Maker {
             family: self.family,
             label,
             place,
-            soup: TriangleSoup::new(&scene),
-            triangles: scene.triangles,
+            scene,
             rays,
             truth,
         });

@@ -140,7 +140,7 @@ mod tests {
                 assert!(starts, "{} {}", family.name, case.label);
                 let finite = |t: &crate::scene::Triangle| t.vertices.iter().all(|v| v.is_finite());
                 assert!(
-                    case.triangles.iter().all(finite),
+                    case.scene.triangles.iter().all(finite),
                     "{} {}",
                     family.name,
                     case.label
@@ -159,7 +159,7 @@ mod tests {
                 let same = all.iter().find(|c| c.label == case.label);
                 let same = same.unwrap_or_else(|| panic!("{} {}", family.name, case.label));
                 assert_eq!(
-                    same.triangles, case.triangles,
+                    same.scene.triangles, case.scene.triangles,
                     "{} {}",
                     family.name, case.label
                 );
