@@ -327,8 +327,8 @@ fn coordinates_that_are_no_numbers_neither_hang_nor_panic() {
                 let component = rng.below(3) as usize;
                 match rng.below(3) {
                     0 => record.v0[component] = bad,
-                    1 => record.e1 = [bad; 3],
-                    _ => record.e2[component] = bad,
+                    1 => record.v1 = [bad; 3],
+                    _ => record.v2[component] = bad,
                 }
             }
             for name in builders() {

@@ -288,8 +288,8 @@ fn structs_of_kernels_are_laid_out_like_those_of_rust() {
     assert_eq!(layout(&module, "Hit"), (size_of::<Hit>() as u32, hit));
     let record = offsets(&[
         ("v0", offset_of!(TriangleRecord, v0)),
-        ("e1", offset_of!(TriangleRecord, e1)),
-        ("e2", offset_of!(TriangleRecord, e2)),
+        ("v1", offset_of!(TriangleRecord, v1)),
+        ("v2", offset_of!(TriangleRecord, v2)),
     ]);
     let record_size = size_of::<TriangleRecord>() as u32;
     assert_eq!(layout(&module, "TriangleRecord"), (record_size, record));

@@ -217,7 +217,7 @@ fn a_leaf_that_lost_a_triangle_is_seen_by_the_same_rays() {
     // As if every leaf had lost it: its place is taken by a copy of triangle 0.
     let mut without = soup.clone();
     let lost = &mut without.records[struck.triangle as usize];
-    (lost.v0, lost.e1, lost.e2) = (soup.records[0].v0, soup.records[0].e1, soup.records[0].e2);
+    (lost.v0, lost.v1, lost.v2) = (soup.records[0].v0, soup.records[0].v1, soup.records[0].v2);
     for (name, params) in variants() {
         let built = build(kind(name), &without, &params);
         let found = twin_hits(&*built, &soup, &rays);

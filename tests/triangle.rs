@@ -25,8 +25,8 @@ fn exactly(triangle: &TriangleRecord, ray: &Ray) -> Exact {
     };
     let dot = |a: [i64; 3], b: [i64; 3]| -> i64 { (0..3).map(|i| a[i] * b[i]).sum() };
     let subtract = |a: [i64; 3], b: [i64; 3]| -> [i64; 3] { [0, 1, 2].map(|i| a[i] - b[i]) };
-    let edge_1 = whole(triangle.e1).map(|x| -x);
-    let edge_2 = whole(triangle.e2);
+    let edge_1 = subtract(whole(triangle.v1), whole(triangle.v0));
+    let edge_2 = subtract(whole(triangle.v2), whole(triangle.v0));
     let direction = whole(ray.direction);
     let to_origin = subtract(whole(ray.origin), whole(triangle.v0));
     // Cramer's rule for origin + t · direction = v0 + u · edge_1 + v · edge_2.

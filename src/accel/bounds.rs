@@ -1,10 +1,7 @@
 //! Axis-aligned bounds and the slab test. Twin of `kernels/accel/bounds.wesl`.
 
+use super::intersection::Reciprocal;
 use super::ray::Ray;
-
-/// A box is entered if `enter <= exit * BOX_PAD`: 1 + 2⁻¹⁹, more than twice the triangle's own pad
-/// ([`super::triangle::TRIANGLE_PAD`]), so that no accepted hit is culled.
-pub const BOX_PAD: f32 = 1.000_001_9;
 
 /// An axis-aligned box, scene units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,21 +74,30 @@ impl Bounds {
     }
 }
 
+/// Distances at which the ray's line enters and leaves the slab of each axis.
+pub fn slabs(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> ([f32; 3], [f32; 3]) {
+    let low = |axis: usize| (bounds.min[axis] - ray.origin[axis]) * inverse[axis];
+    let high = |axis: usize| (bounds.max[axis] - ray.origin[axis]) * inverse[axis];
+    let (x1, x2) = (low(0), high(0));
+    let (y1, y2) = (low(1), high(1));
+    let (z1, z2) = (low(2), high(2));
+    let near = [x1.min(x2), y1.min(y2), z1.min(z2)];
+    let far = [x1.max(x2), y1.max(y2), z1.max(z2)];
+    (near, far)
+}
+
 /// Distances at which the ray's line enters and leaves the box (enter > exit: it misses).
 pub fn slab(bounds: &Bounds, ray: &Ray, inverse: [f32; 3]) -> (f32, f32) {
-    let near = |axis: usize| (bounds.min[axis] - ray.origin[axis]) * inverse[axis];
-    let far = |axis: usize| (bounds.max[axis] - ray.origin[axis]) * inverse[axis];
-    let (x1, x2) = (near(0), far(0));
-    let (y1, y2) = (near(1), far(1));
-    let (z1, z2) = (near(2), far(2));
-    let enter = x1.min(x2).max(y1.min(y2)).max(z1.min(z2));
-    let exit = x1.max(x2).min(y1.max(y2)).min(z1.max(z2));
+    let (near, far) = slabs(bounds, ray, inverse);
+    let enter = near[0].max(near[1]).max(near[2]);
+    let exit = far[0].min(far[1]).min(far[2]);
     (enter, exit)
 }
 
-/// Distance at which the segment `[t_min, t_best]` enters the padded box, or `None`.
-pub fn enter_box(bounds: &Bounds, ray: &Ray, inverse: [f32; 3], t_best: f32) -> Option<f32> {
-    let (enter, exit) = slab(bounds, ray, inverse);
+/// Distance at which the segment `[t_min, t_best]` enters the padded box, or `None`. With the default
+/// pad ([`super::intersection::BoxTest`]) no accepted hit is culled.
+pub fn enter_box(bounds: &Bounds, ray: &Ray, inverse: Reciprocal, t_best: f32) -> Option<f32> {
+    let (enter, exit) = slab(bounds, ray, *inverse);
     let enter = enter.max(ray.t_min);
-    (enter <= exit.min(t_best) * BOX_PAD).then_some(enter)
+    (enter <= exit.min(t_best) * inverse.pad).then_some(enter)
 }

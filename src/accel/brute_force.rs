@@ -1,8 +1,10 @@
 //! No structure: every ray is tested against every triangle. Twin of
 //! `kernels/accel/brute_force.wesl`.
 
-use super::ray::{Hit, Ray, safe_inverse};
-use super::triangle::{TriangleRecord, intersect_triangle};
+use super::intersection::Reciprocal;
+use super::ray::{Hit, Ray};
+use super::triangle::watertight::{Shear, products, shear, sheared};
+use super::triangle::{TriangleRecord, TriangleTest, intersect_triangle};
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, TriangleSoup,
 };
@@ -83,7 +85,7 @@ struct Twin<'a> {
 
 impl CpuTwin for Twin<'_> {
     fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        let inverse = safe_inverse(ray.direction);
+        let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         for triangle in &self.soup.records {
             counters.triangle_tests += 1;
@@ -93,7 +95,7 @@ impl CpuTwin for Twin<'_> {
     }
 
     fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        let inverse = safe_inverse(ray.direction);
+        let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         for triangle in &self.soup.records {
             counters.triangle_tests += 1;
@@ -112,56 +114,78 @@ const LANES: usize = 16;
 const TILE_BLOCKS: usize = 64;
 const RAY_CHUNK: usize = 64;
 
-/// `LANES` triangles, component by component; missing ones are degenerate and never hit.
+/// `LANES` triangles, vertex by vertex and component by component; missing ones are degenerate.
 struct Block {
-    v0: [[f32; LANES]; 3],
-    e1: [[f32; LANES]; 3],
-    e2: [[f32; LANES]; 3],
+    vertices: [[[f32; LANES]; 3]; 3],
 }
 
 impl Block {
     fn new(records: &[TriangleRecord]) -> Self {
-        let lanes = |get: fn(&TriangleRecord) -> [f32; 3]| {
-            std::array::from_fn(|axis| {
-                std::array::from_fn(|lane| records.get(lane).map_or(0.0, |r| get(r)[axis]))
+        let lanes = |vertex: usize, axis: usize| {
+            std::array::from_fn(|lane| {
+                records
+                    .get(lane)
+                    .map_or(0.0, |r| r.vertices()[vertex][axis])
             })
         };
         Self {
-            v0: lanes(|r| r.v0),
-            e1: lanes(|r| r.e1),
-            e2: lanes(|r| r.e2),
+            vertices: [0, 1, 2].map(|vertex| [0, 1, 2].map(|axis| lanes(vertex, axis))),
         }
     }
 
-    /// Lanes that pass the sign tests of [`intersect_triangle`]: the same products in the same order.
-    fn candidates(&self, ray: &Ray) -> u32 {
-        let [dx, dy, dz] = ray.direction;
-        let mut inside = [0u32; LANES];
-        for (lane, inside) in inside.iter_mut().enumerate() {
-            let [cx, cy, cz]: [f32; 3] = std::array::from_fn(|a| self.v0[a][lane] - ray.origin[a]);
-            let [e1x, e1y, e1z]: [f32; 3] = std::array::from_fn(|a| self.e1[a][lane]);
-            let [e2x, e2y, e2z]: [f32; 3] = std::array::from_fn(|a| self.e2[a][lane]);
-            let (nx, ny, nz) = (
-                e1y * e2z - e1z * e2y,
-                e1z * e2x - e1x * e2z,
-                e1x * e2y - e1y * e2x,
-            );
-            let (rx, ry, rz) = (dy * cz - dz * cy, dz * cx - dx * cz, dx * cy - dy * cx);
-            let det = nx * dx + ny * dy + nz * dz;
-            let sign = det.to_bits() & 0x8000_0000;
-            let u = f32::from_bits((rx * e2x + ry * e2y + rz * e2z).to_bits() ^ sign);
-            let v = f32::from_bits((rx * e1x + ry * e1y + rz * e1z).to_bits() ^ sign);
-            let area = det.abs();
-            *inside = u32::from(area > 0.0)
-                & u32::from(u >= 0.0)
-                & u32::from(v >= 0.0)
-                & u32::from(u + v <= area);
+    /// Lanes that may meet the ray: those that pass the sign tests of its triangle test, by the same
+    /// products in the same order, or all of them where signs are not cheaper than the test itself.
+    fn candidates(&self, ray: &Ray, inverse: &Reciprocal) -> u32 {
+        match inverse.triangle {
+            TriangleTest::MoellerTrumbore => mask(std::array::from_fn(|l| self.triple(l, ray))),
+            TriangleTest::Watertight | TriangleTest::Compensated => {
+                let s = shear(ray, inverse);
+                mask(std::array::from_fn(|l| self.sheared(l, &s)))
+            }
+            TriangleTest::BaldwinWeber | TriangleTest::Pluecker => (1 << LANES) - 1,
         }
-        inside
-            .iter()
-            .enumerate()
-            .fold(0, |mask, (lane, bit)| mask | bit << lane)
     }
+
+    fn vertex(&self, vertex: usize, lane: usize) -> [f32; 3] {
+        [0, 1, 2].map(|axis| self.vertices[vertex][axis][lane])
+    }
+
+    /// The scalar triple products of [`TriangleTest::MoellerTrumbore`].
+    fn triple(&self, lane: usize, ray: &Ray) -> u32 {
+        let [dx, dy, dz] = ray.direction;
+        let [v0, v1, v2] = [0, 1, 2].map(|vertex| self.vertex(vertex, lane));
+        let [cx, cy, cz] = [0, 1, 2].map(|a| v0[a] - ray.origin[a]);
+        let [e1x, e1y, e1z] = [0, 1, 2].map(|a| v0[a] - v1[a]);
+        let [e2x, e2y, e2z] = [0, 1, 2].map(|a| v2[a] - v0[a]);
+        let (nx, ny, nz) = (
+            e1y * e2z - e1z * e2y,
+            e1z * e2x - e1x * e2z,
+            e1x * e2y - e1y * e2x,
+        );
+        let (rx, ry, rz) = (dy * cz - dz * cy, dz * cx - dx * cz, dx * cy - dy * cx);
+        let det = nx * dx + ny * dy + nz * dz;
+        let sign = det.to_bits() & 0x8000_0000;
+        let u = f32::from_bits((rx * e2x + ry * e2y + rz * e2z).to_bits() ^ sign);
+        let v = f32::from_bits((rx * e1x + ry * e1y + rz * e1z).to_bits() ^ sign);
+        let area = det.abs();
+        u32::from(area > 0.0) & u32::from(u >= 0.0) & u32::from(v >= 0.0) & u32::from(u + v <= area)
+    }
+
+    /// The compared products of [`TriangleTest::Watertight`].
+    fn sheared(&self, lane: usize, s: &Shear) -> u32 {
+        let vertices = [0, 1, 2].map(|vertex| sheared(s, self.vertex(vertex, lane)));
+        let (p, q) = products(vertices);
+        let all = |compare: fn(&f32, &f32) -> bool| {
+            (0..3).fold(1, |all, i| all & u32::from(compare(&p[i], &q[i])))
+        };
+        all(f32::ge) | all(f32::le)
+    }
+}
+
+/// One bit a lane.
+fn mask(inside: [u32; LANES]) -> u32 {
+    let lanes = inside.iter().enumerate();
+    lanes.fold(0, |mask, (lane, bit)| mask | bit << lane)
 }
 
 /// Nearest hits of many rays by testing every triangle, on all cores: what judges are judged by.
@@ -173,14 +197,16 @@ pub fn brute_force_hits(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
         .for_each(|(hits, rays)| {
             for (tile, blocks) in blocks.chunks(TILE_BLOCKS).enumerate() {
                 for (ray, hit) in rays.iter().zip(hits.iter_mut()) {
-                    let inverse = safe_inverse(ray.direction);
+                    let inverse = soup.intersection.inverse(ray.direction);
                     for (index, block) in blocks.iter().enumerate() {
-                        let mut mask = block.candidates(ray);
+                        let mut mask = block.candidates(ray, &inverse);
                         while mask != 0 {
                             let lane = mask.trailing_zeros() as usize;
                             mask &= mask - 1;
                             let id = (tile * TILE_BLOCKS + index) * LANES + lane;
-                            intersect_triangle(&soup.records[id], ray, inverse, hit);
+                            if let Some(triangle) = soup.records.get(id) {
+                                intersect_triangle(triangle, ray, inverse, hit);
+                            }
                         }
                     }
                 }

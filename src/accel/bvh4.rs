@@ -4,9 +4,10 @@
 //! Source: H. Dammertz, J. Hanika, A. Keller, "Shallow bounding volume hierarchies for fast SIMD ray
 //! tracing of incoherent rays", EGSR 2008, with the quantised boxes of Ylitie, Karras & Laine 2017.
 
-use super::bounds::{BOX_PAD, Bounds};
+use super::bounds::Bounds;
 use super::collapse::{CollapseSettings, WideChild, WideKind, WideTree};
-use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::intersection::{Intersection, Reciprocal};
+use super::ray::{Hit, NO_HIT, Ray};
 use super::tree::Coverage;
 use super::triangle::{TriangleRecord, intersect_triangle};
 use super::wide::{
@@ -151,8 +152,7 @@ impl Built {
         }
     }
 
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let inverse = safe_inverse(ray.direction);
+    fn trace(&self, ray: &Ray, inverse: Reciprocal, any: bool, counters: &mut Counters) -> Hit {
         let mut hit = Hit::miss(ray);
         let mut stack: Vec<(u32, u32)> = Vec::with_capacity(self.stack_entries as usize);
         let (mut children, mut list) = (0, ROOT_LIST);
@@ -183,7 +183,7 @@ impl Built {
                     }
                 }
             }
-            while list == EMPTY_LIST || f32::from_bits(nearest) > hit.t * BOX_PAD {
+            while list == EMPTY_LIST || f32::from_bits(nearest) > hit.t * inverse.pad {
                 let Some(below) = stack.pop() else {
                     return hit;
                 };
@@ -197,7 +197,7 @@ impl Built {
 }
 
 /// Keys of the children that are entered, in ascending order, then `MISSED`.
-fn sorted_keys(node: &Node, ray: &Ray, inverse: [f32; 3], t_best: f32) -> [u32; 4] {
+fn sorted_keys(node: &Node, ray: &Ray, inverse: Reciprocal, t_best: f32) -> [u32; 4] {
     let planes = frame(node.low, node.exponents, ray.origin, inverse);
     let words = |far: bool| -> [u32; 3] {
         std::array::from_fn(|axis| {
@@ -329,19 +329,22 @@ impl BuiltAccel for Built {
         self.stats.clone()
     }
 
-    fn cpu_twin<'a>(&'a self, _: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin(self)))
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(Twin(self, soup.intersection)))
     }
 }
 
-struct Twin<'a>(&'a Built);
+struct Twin<'a>(&'a Built, Intersection);
 
 impl CpuTwin for Twin<'_> {
     fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.0.trace(ray, false, counters)
+        let inverse = self.1.inverse(ray.direction);
+        self.0.trace(ray, inverse, false, counters)
     }
 
     fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.0.trace(ray, true, counters).triangle != NO_HIT
+        let inverse = self.1.inverse(ray.direction);
+        let hit = self.0.trace(ray, inverse, true, counters);
+        hit.triangle != NO_HIT
     }
 }

@@ -6,7 +6,8 @@
 
 use super::bounds::Bounds;
 use super::collapse::{CollapseSettings, WideChild, WideKind, WideTree};
-use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::intersection::{Intersection, Reciprocal};
+use super::ray::{Hit, NO_HIT, Ray};
 use super::tree::Coverage;
 use super::triangle::{TriangleRecord, intersect_triangle};
 use super::wide::{
@@ -182,8 +183,7 @@ impl Built {
         }
     }
 
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let inverse = safe_inverse(ray.direction);
+    fn trace(&self, ray: &Ray, inverse: Reciprocal, any: bool, counters: &mut Counters) -> Hit {
         let backward = inverse.map(|x| x < 0.0);
         let octant = (0..3).fold(0, |bits, axis| bits | u32::from(backward[axis]) << axis);
         let mut hit = Hit::miss(ray);
@@ -235,7 +235,7 @@ fn bit_number(bit: u32) -> u32 {
 }
 
 /// Slots of a node whose boxes are entered, as bits.
-fn slot_bits(node: &Node, ray: &Ray, inverse: [f32; 3], t_best: f32) -> u32 {
+fn slot_bits(node: &Node, ray: &Ray, inverse: Reciprocal, t_best: f32) -> u32 {
     let planes = frame(node.low, node.exponents, ray.origin, inverse);
     let mut bits = 0;
     for half in [0, 4] {
@@ -354,19 +354,22 @@ impl BuiltAccel for Built {
         self.stats.clone()
     }
 
-    fn cpu_twin<'a>(&'a self, _: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin(self)))
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(Twin(self, soup.intersection)))
     }
 }
 
-struct Twin<'a>(&'a Built);
+struct Twin<'a>(&'a Built, Intersection);
 
 impl CpuTwin for Twin<'_> {
     fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.0.trace(ray, false, counters)
+        let inverse = self.1.inverse(ray.direction);
+        self.0.trace(ray, inverse, false, counters)
     }
 
     fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.0.trace(ray, true, counters).triangle != NO_HIT
+        let inverse = self.1.inverse(ray.direction);
+        let hit = self.0.trace(ray, inverse, true, counters);
+        hit.triangle != NO_HIT
     }
 }

@@ -8,8 +8,8 @@
 
 mod build;
 
-use super::bounds::{BOX_PAD, Bounds, slab};
-use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::bounds::{Bounds, slab};
+use super::ray::{Hit, NO_HIT, Ray};
 use super::spatial::{corners, touches};
 use super::tree::Coverage;
 use super::triangle::intersect_triangle;
@@ -28,7 +28,7 @@ const LEAF: u32 = 3;
 /// The other bits: first of two children, or number of references.
 const LINK_SHIFT: u32 = 2;
 /// A cell that begins behind the hit by this factor ends the walk: all others on the stack begin
-/// no more than [`BOX_PAD`] before it. More than its square.
+/// no more than `BOX_PAD` before it. More than its square.
 const END_PAD: f32 = 1.000_004;
 
 /// The registry entry.
@@ -413,13 +413,13 @@ struct Twin<'a> {
 
 impl Twin<'_> {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let inverse = safe_inverse(ray.direction);
+        let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         counters.box_tests += 1;
-        let (enter, end) = slab(&self.built.bounds, ray, inverse);
+        let (enter, end) = slab(&self.built.bounds, ray, *inverse);
         let mut enter = enter.max(ray.t_min);
         let mut exit = end.min(hit.t);
-        if enter > exit * BOX_PAD {
+        if enter > exit * inverse.pad {
             return hit;
         }
         // Far sides that wait, with the distance where the ray enters them.
@@ -436,9 +436,9 @@ impl Twin<'_> {
                     let plane = (position - ray.origin[axis]) * inverse[axis];
                     let side = usize::from(inverse[axis] < 0.0);
                     let (near, far) = (children + side, children + 1 - side);
-                    if plane > exit * BOX_PAD {
+                    if plane > exit * inverse.pad {
                         current = near;
-                    } else if enter > plane * BOX_PAD {
+                    } else if enter > plane * inverse.pad {
                         current = far;
                     } else {
                         stack.push((far, enter.max(plane)));

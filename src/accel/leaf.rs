@@ -2,6 +2,7 @@
 //! as indices into the canonical buffer (less memory). Twin of `kernels/accel/leaf.wesl`.
 
 use super::bounds::Bounds;
+use super::intersection::Reciprocal;
 use super::ray::{Hit, Ray};
 use super::tree::Coverage;
 use super::triangle::{TriangleRecord, intersect_triangle};
@@ -139,7 +140,7 @@ impl LeafReader<'_> {
         &self,
         (first, count): (usize, usize),
         ray: &Ray,
-        inverse: [f32; 3],
+        inverse: Reciprocal,
         hit: &mut Hit,
         counters: &mut Counters,
     ) {
@@ -154,7 +155,7 @@ impl LeafReader<'_> {
         &self,
         reference: u32,
         ray: &Ray,
-        inverse: [f32; 3],
+        inverse: Reciprocal,
         hit: &mut Hit,
         counters: &mut Counters,
     ) {

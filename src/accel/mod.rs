@@ -10,6 +10,7 @@ mod collapse;
 mod cwbvh;
 mod grid;
 pub mod instancing;
+pub mod intersection;
 mod irregular_grid;
 mod kd_tree;
 pub mod leaf;
@@ -28,6 +29,7 @@ pub use bvh::{BuiltBvh, Bvh, BvhTwin, RopedBvh};
 pub use bvh4::Bvh4;
 pub use cwbvh::Cwbvh;
 pub use instancing::{InstanceJudge, MetaBvh, ObjectList, Placed, brute_force_instances};
+pub use intersection::{BoxTest, Intersection};
 pub use irregular_grid::IrregularGrid;
 pub use kd_tree::KdTree;
 pub use octree::Octree;
@@ -74,6 +76,8 @@ pub struct TriangleSoup {
     pub records: Vec<TriangleRecord>,
     /// What they are copies of, if the scene consists of instances.
     pub placed: Option<Placed>,
+    /// How rays meet them: see [`TriangleSoup::intersecting`].
+    pub intersection: Intersection,
 }
 
 impl From<Vec<TriangleRecord>> for TriangleSoup {
@@ -81,7 +85,7 @@ impl From<Vec<TriangleRecord>> for TriangleSoup {
     fn from(records: Vec<TriangleRecord>) -> Self {
         Self {
             records,
-            placed: None,
+            ..Self::default()
         }
     }
 }
@@ -99,6 +103,44 @@ impl TriangleSoup {
         Self {
             records,
             placed: scene.assembly.as_ref().map(Placed::new),
+            intersection: Intersection::default(),
+        }
+    }
+
+    /// The same triangles, met by these tests. Structures take copies of records: choose before building.
+    #[must_use]
+    pub fn intersecting(mut self, intersection: Intersection) -> Self {
+        // Behind the records lie the words made of them, then those of the objects.
+        let mut place = 3 * self.records.len() as u32;
+        let objects = self.placed.iter_mut().flat_map(|p| &mut p.objects);
+        let objects = objects.map(|object| {
+            object.intersection = intersection;
+            &mut object.records
+        });
+        for record in std::iter::once(&mut self.records).chain(objects).flatten() {
+            record.transformed = 0;
+            if intersection.triangle.transformed(record).is_some() {
+                record.transformed = place;
+                place += 3;
+            }
+        }
+        self.intersection = intersection;
+        self
+    }
+
+    /// The buffer `triangles` of kernels: the records, and what the triangle test made of them.
+    pub fn words(&self) -> Cow<'_, [[u32; 4]]> {
+        let records = bytemuck::cast_slice(&self.records);
+        let objects = self.placed.iter().flat_map(|p| &p.objects);
+        let objects = objects.flat_map(|object| &object.records);
+        let transformed = |record| self.intersection.triangle.transformed(record);
+        let mut made = self.records.iter().chain(objects).filter_map(transformed);
+        match made.next() {
+            None => Cow::Borrowed(records),
+            Some(first) => {
+                let made = std::iter::once(first).chain(made).flatten();
+                Cow::Owned(records.iter().copied().chain(made).collect())
+            }
         }
     }
 

@@ -9,8 +9,9 @@
 
 mod build;
 
-use super::bounds::{BOX_PAD, Bounds};
-use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::bounds::Bounds;
+use super::intersection::Reciprocal;
+use super::ray::{Hit, NO_HIT, Ray};
 use super::spatial::{corners, touches};
 use super::tree::Coverage;
 use super::triangle::intersect_triangle;
@@ -30,7 +31,7 @@ const FILLED_MASK: u32 = 255;
 /// Marks the last reference of a leaf.
 const LAST: u32 = 0x8000_0000;
 /// A cell that begins behind the hit by this factor ends the walk: all that were not yet visited begin
-/// no more than [`BOX_PAD`] before it. More than its square.
+/// no more than `BOX_PAD` before it. More than its square.
 const END_PAD: f32 = 1.000_004;
 /// Cells have integer positions that a float holds exactly.
 const DEEPEST: i64 = 20;
@@ -408,10 +409,10 @@ fn mirrored(mask: u32, flip: u32) -> u32 {
 
 /// Which children, mirrored, the segment from `enter` to `exit` visits: those whose interval is not
 /// empty by more than the pad, given the distances of the middle planes.
-fn visited(enter: f32, exit: f32, middle: [f32; 3]) -> u32 {
+fn visited(enter: f32, exit: f32, middle: [f32; 3], pad: f32) -> u32 {
     let [x, y, z] = middle;
-    let [px, py, pz] = middle.map(|m| m * BOX_PAD);
-    let end = exit * BOX_PAD;
+    let [px, py, pz] = middle.map(|m| m * pad);
+    let end = exit * pad;
     let without = |mask: u32, condition: bool| if condition { 0 } else { mask };
     let mut out = 0xff;
     out &= !without(0xff, enter <= end);
@@ -431,7 +432,7 @@ impl Twin<'_> {
         &self,
         first: u32,
         ray: &Ray,
-        inverse: [f32; 3],
+        inverse: Reciprocal,
         hit: &mut Hit,
         counters: &mut Counters,
     ) {
@@ -452,7 +453,7 @@ impl Twin<'_> {
     }
 
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let inverse = safe_inverse(ray.direction);
+        let inverse = self.soup.intersection.inverse(ray.direction);
         let mirror = inverse.map(|i| u32::from(i < 0.0));
         let flip = mirror[0] | mirror[1] << 1 | mirror[2] << 2;
         let mut hit = Hit::miss(ray);
@@ -476,7 +477,7 @@ impl Twin<'_> {
             let child = Space::child(position, octant);
             let half = size.map(|s| 0.5 * s);
             let first: [u32; 3] = std::array::from_fn(|a| child[a] + mirror[a]);
-            let near = self.distances(first, half, ray, inverse);
+            let near = self.distances(first, half, ray, *inverse);
             let enter = near[0].max(near[1]).max(near[2]).max(ray.t_min);
             if enter > hit.t * END_PAD {
                 return hit;
@@ -491,18 +492,18 @@ impl Twin<'_> {
                 continue;
             }
             let last = std::array::from_fn(|a| child[a] + 1 - mirror[a]);
-            let far = self.distances(last, half, ray, inverse);
+            let far = self.distances(last, half, ray, *inverse);
             let exit = far[0].min(far[1]).min(far[2]).min(hit.t);
             let middle = self.distances(
                 child.map(|c| 2 * c + 1),
                 half.map(|h| 0.5 * h),
                 ray,
-                inverse,
+                *inverse,
             );
             stack.push(open);
             counters.stack_high_water = counters.stack_high_water.max(stack.len() as u32);
             let filled = mirrored(word & FILLED_MASK, flip);
-            open = word & !FILLED_MASK | visited(enter, exit, middle) & filled;
+            open = word & !FILLED_MASK | visited(enter, exit, middle, inverse.pad) & filled;
             (position, size) = (child, half);
         }
     }

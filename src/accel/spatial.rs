@@ -51,7 +51,7 @@ impl Margin {
 
     /// The margin of one triangle, scene units; beyond everything if it has no area.
     pub fn of(&self, record: &TriangleRecord) -> f64 {
-        let [e1, e2] = [record.e1, record.e2].map(|e| e.map(f64::from));
+        let [e1, e2] = record.edges();
         let (mut products, mut normal) = (0.0, 0.0);
         for a in 0..3 {
             let (b, c) = ((a + 1) % 3, (a + 2) % 3);
@@ -68,15 +68,12 @@ impl Margin {
     }
 }
 
-/// The corners of a triangle as kernels know them.
+/// The corners of a triangle.
 pub(super) type Corners = [[f64; 3]; 3];
 
-/// Corners of `record`, rebuilt from its rounded edges.
+/// Corners of `record`.
 pub(super) fn corners(record: &TriangleRecord) -> Corners {
-    record
-        .triangle()
-        .vertices
-        .map(|v| v.to_array().map(f64::from))
+    record.vertices().map(|v| v.map(f64::from))
 }
 
 /// Separating-axis test of one triangle against boxes of one size whose boxes meet that of the

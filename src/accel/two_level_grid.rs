@@ -6,10 +6,10 @@
 //! One loop walks both levels: it steps through the parts of a top cell until it leaves the cell, and
 //! then finds its place in the next one.
 
-use super::bounds::{BOX_PAD, enter_box};
+use super::bounds::enter_box;
 use super::grid::lists::{Lists, PartLists, check_lists};
 use super::grid::{Cut, Frame, Grid, areas, check_words, clamped, first_axis, outside};
-use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::ray::{Hit, NO_HIT, Ray};
 use super::triangle::intersect_triangle;
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
@@ -306,7 +306,7 @@ fn find_part(place: [f32; 3], top: [u32; 3], parts: [u32; 3]) -> [u32; 3] {
 impl Twin<'_> {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
         let grid = &self.built.grid;
-        let inverse = safe_inverse(ray.direction);
+        let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         counters.box_tests += 1;
         let Some(enter) = enter_box(&grid.bounds, ray, inverse, ray.t_max) else {
@@ -333,10 +333,10 @@ impl Twin<'_> {
             let planes = std::array::from_fn(|a| {
                 top[a] as f32 + (part[a] + u32::from(forward[a])) as f32 / parts[a] as f32
             });
-            let next = grid.distances(ray, inverse, planes);
+            let next = grid.distances(ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
             // The exit must lie clearly behind the hit: an equally near one may wait next door.
-            if hit.t * BOX_PAD < leave {
+            if hit.t * inverse.pad < leave {
                 return hit;
             }
             let axis = first_axis(next, leave);

@@ -9,10 +9,10 @@
 //! nearest hit. With `skip = chebyshev` an empty cell knows how far the nearest list is, and the walk
 //! leaves the whole empty cube around it at once.
 
-use super::bounds::{BOX_PAD, enter_box};
+use super::bounds::enter_box;
 use super::grid::lists::{Lists, check_lists};
 use super::grid::{Frame, Grid, check_words, clamped, distance, first_axis, outside};
-use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::ray::{Hit, NO_HIT, Ray};
 use super::triangle::intersect_triangle;
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
@@ -223,7 +223,7 @@ struct Twin<'a> {
 impl Twin<'_> {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
         let grid = &self.built.grid;
-        let inverse = safe_inverse(ray.direction);
+        let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         counters.box_tests += 1;
         let Some(enter) = enter_box(&grid.bounds, ray, inverse, ray.t_max) else {
@@ -248,10 +248,10 @@ impl Twin<'_> {
                 let plane = if forward[a] { reach } else { 1 - reach };
                 (cell[a] as i32 + plane) as f32
             });
-            let next = grid.distances(ray, inverse, planes);
+            let next = grid.distances(ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
             // The exit must lie clearly behind the hit: an equally near one may wait next door.
-            if hit.t * BOX_PAD < leave {
+            if hit.t * inverse.pad < leave {
                 return hit;
             }
             let axis = first_axis(next, leave);

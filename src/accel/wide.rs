@@ -18,7 +18,8 @@
 //! With `slack ≥ 16uM(1 − 4u)` ([`FRAME_PAD`] = 16u) there is a factor of two left. Both sides use the
 //! same reciprocal, whose own error does not count.
 
-use super::bounds::{BOX_PAD, Bounds};
+use super::bounds::Bounds;
+use super::intersection::Reciprocal;
 use super::tree::{NodeKind, Tree, tree_parameters};
 use super::triangle::TriangleRecord;
 use super::{AccelError, BuildLog, GpuBuffers, NamedWords, TriangleSoup};
@@ -209,15 +210,18 @@ pub struct Frame {
     scale: [f32; 3],
     near: [f32; 3],
     far: [f32; 3],
+    /// The pad of boxes.
+    pad: f32,
 }
 
 /// The frame of a node with first plane `low` and biased exponents in the bytes of `exponents`.
-pub fn frame(low: [f32; 3], exponents: u32, origin: [f32; 3], inverse: [f32; 3]) -> Frame {
+pub fn frame(low: [f32; 3], exponents: u32, origin: [f32; 3], inverse: Reciprocal) -> Frame {
     let biased = exponents.to_le_bytes();
     let mut frame = Frame {
         scale: [0.0; 3],
         near: [0.0; 3],
         far: [0.0; 3],
+        pad: inverse.pad,
     };
     for axis in 0..3 {
         let scale = f32::from_bits(u32::from(biased[axis]) << 23) * inverse[axis];
@@ -266,15 +270,16 @@ pub fn leave_four(far: [u32; 3], frame: &Frame, t_best: f32) -> [f32; 4] {
         std::array::from_fn(|axis| planes(far[axis], frame.scale[axis], frame.far[axis]));
     std::array::from_fn(|i| {
         let [x, y, z] = distances.map(|d| d[i]);
-        earlier(earlier(earlier(x, y), z), t_best) * BOX_PAD
+        earlier(earlier(earlier(x, y), z), t_best) * frame.pad
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::Intersection;
     use crate::accel::bounds::slab;
-    use crate::accel::ray::{Ray, safe_inverse};
+    use crate::accel::ray::Ray;
     use crate::measure::statistics::Pcg32;
 
     /// Numbers of all sizes, both signs, zero and neighbours of powers of two among them.
@@ -365,7 +370,7 @@ mod tests {
                 direction: std::array::from_fn(|_| number(&mut random)),
                 t_max: 1e30,
             };
-            let inverse = safe_inverse(ray.direction);
+            let inverse = Intersection::default().inverse(ray.direction);
             let mut frame = frame(grid.low, grid.exponent_word(0), ray.origin, inverse);
             for (axis, inverse) in inverse.iter().enumerate() {
                 let base = (grid.low[axis] - ray.origin[axis]) * inverse;
@@ -378,12 +383,12 @@ mod tests {
                     u32::from(if high { planes.high } else { planes.low }[axis])
                 })
             };
-            let (enter, leave) = slab(&inner, &ray, inverse);
+            let (enter, leave) = slab(&inner, &ray, *inverse);
             let quantised_enter = enter_four(word(false), &frame, 0.0)[0];
             let quantised_leave = leave_four(word(true), &frame, 1e30)[0];
             // Boxes behind the origin are left before 0, whatever the exact distance.
             if quantised_enter > enter.max(0.0)
-                || (leave >= 0.0 && quantised_leave < leave.min(1e30) * BOX_PAD)
+                || (leave >= 0.0 && quantised_leave < leave.min(1e30) * inverse.pad)
             {
                 wrong += 1;
             }

@@ -6,6 +6,7 @@
 
 use super::GpuError;
 use super::diagnose;
+use crate::accel::Intersection;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use wesl::{BasicSourceMap, ModulePath, SourceMap, VirtualResolver, Wesl};
@@ -101,6 +102,8 @@ impl KernelLibrary {
     /// A module is missing, does not parse, or the result is not valid WGSL; the message names the
     /// source file and line.
     pub fn compose(&self, composition: &Composition) -> Result<ComposedKernel, GpuError> {
+        // Where nobody chose how rays meet triangles and boxes, the default does.
+        let composition = &Intersection::default().activate(composition.clone());
         let mut resolver = VirtualResolver::new();
         let mut paths = BTreeMap::new();
         for (name, (path, text)) in &self.files {

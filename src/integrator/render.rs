@@ -65,7 +65,10 @@ fn composition(
     job: &RenderJob,
     ray_counts: bool,
 ) -> Composition {
-    let kernel = traced.compose(Composition::new("integrator/render"));
+    let kernel = scene
+        .intersection
+        .activate(Composition::new("integrator/render"));
+    let kernel = traced.compose(kernel);
     let mut out = with_sampler(kernel, job.sampler)
         .with("integrator", job.integrator.kernel())
         .feature("ray_counts", ray_counts);

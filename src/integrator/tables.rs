@@ -1,6 +1,6 @@
 //! Scene buffers for shading: canonical triangles, materials, lights, textures.
 
-use crate::accel::TriangleSoup;
+use crate::accel::{Intersection, TriangleSoup};
 use crate::gpu::{Bindings, Gpu, GpuError};
 use crate::scene::{MaterialKind, SceneData};
 use glam::Vec3;
@@ -34,6 +34,8 @@ impl SceneFeatures {
 pub struct SceneBuffers {
     /// `triangles`, `shading_tables`, `texture_data`.
     pub bindings: Bindings,
+    /// How rays meet the triangles.
+    pub intersection: Intersection,
     /// What kernels must carry.
     pub features: SceneFeatures,
     /// Radiance of the environment.
@@ -72,7 +74,8 @@ impl SceneBuffers {
         let (lights, light_power) = light_words(scene);
         tables.extend_from_slice(&lights);
         let mut bindings = Bindings::new();
-        let triangles = bytemuck::cast_slice(&soup.records);
+        let triangles = soup.words();
+        let triangles = triangles.as_flattened();
         bindings.parts("triangles", &gpu.storage_parts("triangles", triangles)?);
         bindings.buffer("shading_tables", &gpu.storage("shading_tables", &tables)?);
         if textured {
@@ -80,6 +83,7 @@ impl SceneBuffers {
         }
         Ok(Self {
             bindings,
+            intersection: soup.intersection,
             features: SceneFeatures {
                 textures: textured,
                 emitters: !lights.is_empty(),

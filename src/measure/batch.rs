@@ -73,7 +73,11 @@ impl<'a> Batch<'a> {
     ) -> Result<Self, GpuError> {
         let mut bindings = scene.bindings.merged(&traced.bindings);
         let composition = traced
-            .compose(Composition::new("integrator/trace_rays"))
+            .compose(
+                scene
+                    .intersection
+                    .activate(Composition::new("integrator/trace_rays")),
+            )
             .feature("any", query == Query::Any)
             .feature("counters", counters);
         let pipeline = gpu.pipeline(&bindings.compose(composition), runtime_checks)?;

@@ -326,8 +326,9 @@ impl Meeting {
     /// Distance to the triangle's plane, f64.
     fn plane_distance(&self) -> f64 {
         let v = |a: [f32; 3]| glam::DVec3::from_array(a.map(f64::from));
-        let normal = v(self.record.e1).cross(v(self.record.e2));
-        normal.dot(v(self.record.v0) - v(self.ray.origin)) / normal.dot(v(self.ray.direction))
+        let [v0, v1, v2] = self.record.vertices().map(v);
+        let normal = (v1 - v0).cross(v2 - v0);
+        normal.dot(v0 - v(self.ray.origin)) / normal.dot(v(self.ray.direction))
     }
 
     /// Whether rounding alone can explain that the triangle was found at `t`.

@@ -118,7 +118,8 @@ fn transform_error(
     let unit = 0.5 * f64::from(f32::EPSILON);
     let origin_error = 4.0 * unit * (sizes * wide(ray.origin).abs() + offset.abs());
     let direction_error = 3.0 * unit * (sizes * wide(ray.direction).abs());
-    let normal = wide(record.e1).cross(wide(record.e2));
+    let [e, f] = record.edges().map(DVec3::from_array);
+    let normal = e.cross(f);
     let moved = normal.abs().dot(origin_error + t.abs() * direction_error);
     moved / normal.dot(linear * wide(ray.direction)).abs()
 }

@@ -114,14 +114,15 @@ fn surface_points(primary: &RaySet, soup: &TriangleSoup) -> Vec<(Vec3, Vec3)> {
         .filter(|(_, h)| h.triangle != NO_HIT);
     hits.filter_map(|(ray, hit)| {
         let record = &soup.records[hit.triangle as usize];
-        let (e1, e2) = (Vec3::from(record.e1), Vec3::from(record.e2));
+        let [v0, v1, v2] = record.vertices().map(Vec3::from);
+        let (e1, e2) = (v0 - v1, v2 - v0);
         let normal = e1.cross(e2).try_normalize()?;
         let facing = if normal.dot(Vec3::from(ray.direction)) > 0.0 {
             -normal
         } else {
             normal
         };
-        Some((Vec3::from(record.v0) - hit.u * e1 + hit.v * e2, facing))
+        Some((v0 - hit.u * e1 + hit.v * e2, facing))
     })
     .collect()
 }

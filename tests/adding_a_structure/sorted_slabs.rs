@@ -2,7 +2,6 @@
 //! tests every box. The example of `docs/adding-a-structure.md`.
 
 use raystone::accel::bounds::{Bounds, enter_box};
-use raystone::accel::ray::safe_inverse;
 use raystone::accel::triangle::intersect_triangle;
 use raystone::accel::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, Hit, NO_HIT,
@@ -147,7 +146,7 @@ struct Twin<'a> {
 
 impl Twin<'_> {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let inverse = safe_inverse(ray.direction);
+        let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         for run in &self.built.runs {
             counters.nodes += 1;

@@ -4,7 +4,6 @@
 
 pub mod scenes;
 
-use raystone::accel::ray::safe_inverse;
 use raystone::accel::triangle::intersect_triangle;
 use raystone::accel::{
     AccelKind, BuildLog, BuiltAccel, Counters, GpuBuffers, Hit, Ray, TriangleSoup,
@@ -166,7 +165,10 @@ pub fn trace(
     let kernel = buffers.kernel;
     let fail = |e: raystone::gpu::GpuError| -> ! { panic!("{kernel} {features:?}: {e}") };
     let pipeline = gpu
-        .pipeline(&batch_kernel(&buffers, features), true)
+        .pipeline(
+            &soup.intersection.activate(batch_kernel(&buffers, features)),
+            true,
+        )
         .unwrap_or_else(|e| fail(e));
     let storage = |name: &str, words: &[u32]| gpu.storage(name, words).unwrap_or_else(|e| fail(e));
     let answer = gpu
@@ -184,7 +186,7 @@ pub fn trace(
     bindings
         .buffer(
             "triangles",
-            &storage("triangles", bytemuck::cast_slice(&soup.records)),
+            &storage("triangles", soup.words().as_flattened()),
         )
         .buffer("rays", &storage("rays", bytemuck::cast_slice(rays)))
         .buffer("status", &status)
@@ -233,7 +235,7 @@ fn unpack(words: &[[u32; 4]], counted: bool) -> Batch {
 /// The judge: every triangle for every ray.
 pub fn brute_force(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
     let closest = |ray: &Ray| {
-        let inverse = safe_inverse(ray.direction);
+        let inverse = soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         for triangle in &soup.records {
             intersect_triangle(triangle, ray, inverse, &mut hit);

@@ -161,11 +161,9 @@ pub fn degenerate_cases() -> Vec<Case> {
     ]
 }
 
-/// Corners of triangle `id` as kernels know them.
+/// Corners of triangle `id`.
 fn corners(soup: &TriangleSoup, id: usize) -> [Vec3; 3] {
-    let r = &soup.records[id];
-    let v0 = Vec3::from(r.v0);
-    [v0, v0 - Vec3::from(r.e1), v0 + Vec3::from(r.e2)]
+    soup.records[id].vertices().map(Vec3::from)
 }
 
 /// The scene's box, or the unit box where there is nothing.

@@ -1,8 +1,9 @@
 //! What traversals ask of a layout of nodes, and what they carry for one ray.
 
 use super::super::Counters;
+use super::super::intersection::Reciprocal;
 use super::super::leaf::LeafReader;
-use super::super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::super::ray::{Hit, NO_HIT, Ray};
 
 /// Inner nodes to go to from a node, in order, and which child the first is (0 or 1).
 pub(super) struct Inner {
@@ -14,7 +15,7 @@ pub(super) struct Inner {
 /// One ray on its way.
 pub(super) struct Query<'a> {
     pub ray: &'a Ray,
-    pub inverse: [f32; 3],
+    pub inverse: Reciprocal,
     pub any: bool,
     pub leaves: LeafReader<'a>,
     pub hit: Hit,
@@ -30,7 +31,7 @@ impl<'a> Query<'a> {
     ) -> Self {
         Self {
             ray,
-            inverse: safe_inverse(ray.direction),
+            inverse: leaves.soup.intersection.inverse(ray.direction),
             any,
             leaves,
             hit: Hit::miss(ray),

@@ -2,7 +2,7 @@
 //!
 //! Source: T. Aila, S. Laine, "Understanding the efficiency of ray traversal on GPUs", HPG 2009.
 
-use super::super::bounds::{BOX_PAD, Bounds, enter_box};
+use super::super::bounds::{Bounds, enter_box};
 use super::super::leaf::{LEAF, Leaves, leaf_reference};
 use super::super::tree::{Coverage, NodeKind, Tree};
 use super::super::{AccelError, Counters, TriangleSoup};
@@ -170,7 +170,7 @@ impl Nodes for Pairs {
             }
         }
         // The far child is looked at again: the near one may have brought a nearer hit.
-        let entered = far.0.is_some_and(|e| e <= query.hit.t * BOX_PAD);
+        let entered = far.0.is_some_and(|e| e <= query.hit.t * query.inverse.pad);
         if entered && !query.is_answered() {
             if far.1 >= LEAF {
                 query.test_leaf(far.1);
@@ -197,7 +197,7 @@ impl Nodes for Pairs {
         } else {
             (pair.left, pair.right, right)
         };
-        let entered = enter.is_some_and(|e| e <= query.hit.t * BOX_PAD);
+        let entered = enter.is_some_and(|e| e <= query.hit.t * query.inverse.pad);
         if from == near && far < LEAF && entered {
             far
         } else {

@@ -131,18 +131,18 @@ impl Cut {
 /// Area of each triangle.
 pub fn areas(soup: &TriangleSoup) -> Vec<f32> {
     let area = |record: &TriangleRecord| {
-        let (e, f) = (record.e1, record.e2);
+        let [e, f] = record.edges();
         let normal = [
             e[1] * f[2] - e[2] * f[1],
             e[2] * f[0] - e[0] * f[2],
             e[0] * f[1] - e[1] * f[0],
         ];
-        0.5 * normal.iter().map(|n| n * n).sum::<f32>().sqrt()
+        0.5 * normal.iter().map(|n| n * n).sum::<f64>().sqrt() as f32
     };
     soup.records.par_iter().map(area).collect()
 }
 
-/// Box around the triangles as kernels know them.
+/// Box around the triangles.
 fn bounds_of(records: &[TriangleRecord]) -> Bounds {
     let around = |chunk: &[TriangleRecord]| {
         chunk.iter().fold(Bounds::EMPTY, |bounds, record| {

@@ -9,14 +9,9 @@
 use super::super::triangle::TriangleRecord;
 use super::Grid;
 
-/// Corners of a triangle as kernels know them.
+/// Corners of a triangle.
 pub fn corners(record: &TriangleRecord) -> [[f32; 3]; 3] {
-    let v0 = record.v0;
-    [
-        v0,
-        std::array::from_fn(|a| v0[a] - record.e1[a]),
-        std::array::from_fn(|a| v0[a] + record.e2[a]),
-    ]
+    record.vertices()
 }
 
 /// Least and greatest coordinates.
@@ -100,14 +95,14 @@ impl Raster {
 /// plane of a needle is less exact by its length over its width, so that hits land beside it; they
 /// stay in its box.
 fn margin_of(record: &TriangleRecord) -> f64 {
-    let (e, f) = (record.e1.map(f64::from), record.e2.map(f64::from));
+    let [e, f] = record.edges();
     let square = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>();
     let normal = [
         e[1] * f[2] - e[2] * f[1],
         e[2] * f[0] - e[0] * f[2],
         e[0] * f[1] - e[1] * f[0],
     ];
-    let third = std::array::from_fn(|a| e[a] + f[a]);
+    let third = std::array::from_fn(|a| f[a] - e[a]);
     let longest = square(e).max(square(f)).max(square(third));
     let ratio = longest / square(normal).sqrt();
     // A point has no width either: 0 / 0.

@@ -2,6 +2,7 @@
 
 use super::super::bounds::Bounds;
 use super::super::bvh::check_leaves;
+use super::super::intersection::Intersection;
 use super::super::leaf::{FIRST_MASK, LEAF, leaf_range, leaf_reference};
 use super::super::tree::{Coverage, NodeKind, Tree};
 use super::super::triangle::TriangleRecord;
@@ -90,6 +91,8 @@ pub(super) struct Forest {
     /// Records in object space, leaf by leaf, with ids of the object.
     pub triangles: Vec<TriangleRecord>,
     pub roots: Vec<Root>,
+    /// How rays meet the triangles.
+    pub intersection: Intersection,
     /// Sums over all objects.
     pub stats: StructureStats,
 }
@@ -121,7 +124,12 @@ impl Forest {
             });
         }
         Ok(log.phase("layout", || {
-            let mut forest = Self::default();
+            let mut forest = Self {
+                intersection: objects
+                    .first()
+                    .map_or_else(Default::default, |o| o.intersection),
+                ..Self::default()
+            };
             for (tree, object) in trees.iter().zip(objects) {
                 forest.append(tree, object);
             }

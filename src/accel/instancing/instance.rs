@@ -2,11 +2,12 @@
 //! boxes grown for the ray, and the traversal of one object. Twin of `kernels/accel/instance.wesl`.
 
 use super::super::Counters;
-use super::super::bounds::{BOX_PAD, Bounds};
+use super::super::bounds::Bounds;
+use super::super::intersection::{Intersection, Reciprocal};
 use super::super::leaf::{LEAF, leaf_range};
-use super::super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::super::ray::{Hit, NO_HIT, Ray};
 use super::super::triangle::{TriangleRecord, intersect_triangle};
-use super::forest::Node;
+use super::forest::{Forest, Node};
 use crate::scene::{Instance, Transform};
 use bytemuck::{Pod, Zeroable};
 
@@ -75,19 +76,19 @@ pub(super) fn object_ray(instance: &Instance, ray: &Ray) -> Ray {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Level {
     pub ray: Ray,
-    pub inverse: [f32; 3],
+    pub inverse: Reciprocal,
     low_origin: [f32; 3],
     high_origin: [f32; 3],
 }
 
 /// The level of the boxes that are tested with `ray`, grown by `growth` for each unit of the origin's
 /// greatest coordinate.
-pub(super) fn level(ray: &Ray, growth: f32) -> Level {
+pub(super) fn level(ray: &Ray, growth: f32, tests: Intersection) -> Level {
     let [x, y, z] = ray.origin.map(f32::abs);
     let grown = growth * x.max(y).max(z);
     Level {
         ray: *ray,
-        inverse: safe_inverse(ray.direction),
+        inverse: tests.inverse(ray.direction),
         low_origin: ray.origin.map(|x| x + grown),
         high_origin: ray.origin.map(|x| x - grown),
     }
@@ -103,7 +104,7 @@ pub(super) fn enter_grown(level: &Level, bounds: &Bounds, t_best: f32) -> Option
     let enter = x1.min(x2).max(y1.min(y2)).max(z1.min(z2));
     let exit = x1.max(x2).min(y1.max(y2)).min(z1.max(z2));
     let enter = enter.max(level.ray.t_min);
-    (enter <= exit.min(t_best) * BOX_PAD).then_some(enter)
+    (enter <= exit.min(t_best) * level.inverse.pad).then_some(enter)
 }
 
 /// Tests the triangles of a leaf; `first_id` turns their ids into those of the scene.
@@ -145,28 +146,30 @@ pub(super) fn near_and_far(
 }
 
 /// Whether a child is worth a visit: the near one may have brought a hit in the meantime.
-pub(super) fn is_open(enter: Option<f32>, hit: &Hit) -> bool {
-    enter.is_some_and(|e| e <= hit.t * BOX_PAD)
+pub(super) fn is_open(enter: Option<f32>, level: &Level, hit: &Hit) -> bool {
+    enter.is_some_and(|e| e <= hit.t * level.inverse.pad)
 }
 
 /// Traces the object below `entry.node`, near child first.
 pub(super) fn trace_object(
-    nodes: &[Node],
-    triangles: &[TriangleRecord],
+    forest: &Forest,
     entry: &Entry,
     ray: &Ray,
     any: bool,
     hit: &mut Hit,
     counters: &mut Counters,
 ) {
-    let level = level(&entry.object_ray(ray), 0.0);
+    let Forest {
+        nodes, triangles, ..
+    } = forest;
+    let level = level(&entry.object_ray(ray), 0.0, forest.intersection);
     let mut stack = Vec::new();
     let mut current = entry.node;
     loop {
         let children = near_and_far(&nodes[current as usize], &level, hit.t, counters);
         let mut next = NOTHING;
         for (enter, reference) in children {
-            if !is_open(enter, hit) {
+            if !is_open(enter, &level, hit) {
                 continue;
             }
             if reference >= LEAF {

@@ -1,7 +1,6 @@
 //! The truth for structures that transform rays: every instance is looked at, whatever its world box.
 
 use super::super::bounds::{Bounds, enter_box};
-use super::super::ray::safe_inverse;
 use super::super::triangle::{TriangleRecord, intersect_triangle};
 use super::super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, BuiltBvh, Bvh, Counters, CpuTwin, Hit, NO_HIT,
@@ -18,8 +17,9 @@ pub fn brute_force_instances(placed: &Placed, rays: &[Ray]) -> Vec<Hit> {
         let mut hit = Hit::miss(ray);
         for instance in &placed.instances {
             let local = object_ray(instance, ray);
-            let inverse = safe_inverse(local.direction);
-            for record in &placed.objects[instance.object as usize].records {
+            let object = &placed.objects[instance.object as usize];
+            let inverse = object.intersection.inverse(local.direction);
+            for record in &object.records {
                 let id = record.id + instance.first;
                 intersect_triangle(&TriangleRecord { id, ..*record }, &local, inverse, &mut hit);
             }
@@ -65,7 +65,8 @@ impl CpuTwin for InstanceJudge<'_> {
             local.t_max = best.t;
             let object = &self.placed.objects[instance.object as usize];
             let (bounds, built) = &self.objects[instance.object as usize];
-            if enter_box(bounds, &local, safe_inverse(local.direction), best.t).is_none() {
+            let inverse = object.intersection.inverse(local.direction);
+            if enter_box(bounds, &local, inverse, best.t).is_none() {
                 continue;
             }
             let hit = built.twin(object).closest_hit(&local, counters);

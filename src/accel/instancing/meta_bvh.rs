@@ -135,7 +135,8 @@ impl MetaBvhTwin {
 
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
         let triangles = &self.base.forest.triangles;
-        let world = level(ray, self.top.growth);
+        let tests = self.base.forest.intersection;
+        let world = level(ray, self.top.growth, tests);
         let mut hit = Hit::miss(ray);
         let mut stack: Vec<u32> = Vec::new();
         // The level that is traversed: the world, or the object that was entered with `floor` entries
@@ -146,7 +147,7 @@ impl MetaBvhTwin {
             let children = near_and_far(self.node(current), &here, hit.t, counters);
             let mut next = NOTHING;
             for (enter, reference) in children {
-                if !is_open(enter, &hit) {
+                if !is_open(enter, &here, &hit) {
                     continue;
                 }
                 if floor != OUTSIDE && reference >= LEAF {
@@ -172,7 +173,7 @@ impl MetaBvhTwin {
             }
             if floor == OUTSIDE && next >= LEAF {
                 let entry = self.load_entry(next);
-                here = level(&entry.object_ray(ray), 0.0);
+                here = level(&entry.object_ray(ray), 0.0, tests);
                 (floor, first_id, next) = (stack.len() as u32, entry.first_id, entry.node);
             }
             current = next;

@@ -13,7 +13,7 @@ impl NestedTwin<'_> {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
         let built = self.0;
         let forest = &built.base.forest;
-        let world = level(ray, built.top.growth);
+        let world = level(ray, built.top.growth, forest.intersection);
         let mut hit = Hit::miss(ray);
         let mut stack = Vec::new();
         let mut current = built.root();
@@ -21,13 +21,12 @@ impl NestedTwin<'_> {
             let children = near_and_far(built.node(current), &world, hit.t, counters);
             let mut next = NOTHING;
             for (enter, reference) in children {
-                if !is_open(enter, &hit) || reference == NOTHING {
+                if !is_open(enter, &world, &hit) || reference == NOTHING {
                     continue;
                 }
                 if reference >= LEAF {
-                    let (nodes, triangles) = (&forest.nodes, &forest.triangles);
                     let entry = built.load_entry(reference);
-                    trace_object(nodes, triangles, entry, ray, any, &mut hit, counters);
+                    trace_object(forest, entry, ray, any, &mut hit, counters);
                     if any && hit.triangle != NO_HIT {
                         return hit;
                     }

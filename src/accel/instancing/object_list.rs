@@ -12,7 +12,6 @@ use super::super::{
     TriangleSoup,
 };
 use super::Base;
-use super::forest::Forest;
 use super::instance::{Entry, enter_grown, level, trace_object};
 use super::world_box::BoxMap;
 use crate::config::{ParameterSchema, Params};
@@ -197,17 +196,15 @@ struct Twin<'a>(&'a Built);
 
 impl Twin<'_> {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let Forest {
-            nodes, triangles, ..
-        } = &self.0.base.forest;
-        let world = level(ray, self.0.growth);
+        let forest = &self.0.base.forest;
+        let world = level(ray, self.0.growth, forest.intersection);
         let mut hit = Hit::miss(ray);
         for (entry, world_box) in self.0.entries.iter().zip(&self.0.boxes) {
             counters.box_tests += 1;
             if enter_grown(&world, &world_box.bounds(), hit.t).is_none() {
                 continue;
             }
-            trace_object(nodes, triangles, entry, ray, any, &mut hit, counters);
+            trace_object(forest, entry, ray, any, &mut hit, counters);
             if any && hit.triangle != NO_HIT {
                 break;
             }

@@ -1,7 +1,7 @@
 //! World boxes against rays that only just hit: nothing that an object's triangles accept is culled.
 
 use super::super::bounds::Bounds;
-use super::super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::super::ray::{Hit, NO_HIT, Ray};
 use super::super::triangle::{TriangleRecord, intersect_triangle};
 use super::instance::{enter_grown, level, object_ray};
 use super::world_box::BoxMap;
@@ -84,6 +84,7 @@ fn ray(rng: &mut Pcg32, instance: &Instance, triangle: &Triangle) -> Ray {
 /// Hits of rays at single triangles in instances, and how many of them the world box would cull,
 /// with this much pad.
 fn hits_and_culled(seeds: std::ops::Range<u64>, pad: Option<f64>) -> (usize, usize) {
+    let tests = Intersection::default();
     let one = |seed: u64| {
         let mut rng = Pcg32::new(seed);
         let mut counts = (0, 0);
@@ -101,13 +102,13 @@ fn hits_and_culled(seeds: std::ops::Range<u64>, pad: Option<f64>) -> (usize, usi
                 let ray = ray(&mut rng, &instance, &target);
                 let local = object_ray(&instance, &ray);
                 let mut hit = Hit::miss(&ray);
-                intersect_triangle(&record, &local, safe_inverse(local.direction), &mut hit);
+                intersect_triangle(&record, &local, tests.inverse(local.direction), &mut hit);
                 if hit.triangle == NO_HIT {
                     continue;
                 }
                 counts.0 += 1;
                 // The least t_best with which the box may be tested.
-                let entered = enter_grown(&level(&ray, map.growth()), &world_box, hit.t);
+                let entered = enter_grown(&level(&ray, map.growth(), tests), &world_box, hit.t);
                 counts.1 += usize::from(entered.is_none());
             }
         }

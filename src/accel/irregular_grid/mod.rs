@@ -17,10 +17,10 @@ mod merge;
 mod voxels;
 
 use self::voxels::{Cell, Map};
-use super::bounds::{BOX_PAD, enter_box};
+use super::bounds::enter_box;
 use super::grid::lists::check_lists;
 use super::grid::{Grid, check_words, clamped, first_axis, outside};
-use super::ray::{Hit, NO_HIT, Ray, safe_inverse};
+use super::ray::{Hit, NO_HIT, Ray};
 use super::triangle::intersect_triangle;
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
@@ -341,7 +341,7 @@ struct Twin<'a> {
 impl Twin<'_> {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
         let grid = &self.built.fine;
-        let inverse = safe_inverse(ray.direction);
+        let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         counters.box_tests += 1;
         let Some(enter) = enter_box(&grid.bounds, ray, inverse, ray.t_max) else {
@@ -363,10 +363,10 @@ impl Twin<'_> {
             let planes = std::array::from_fn(|a| {
                 (if forward[a] { cell.max[a] } else { cell.min[a] }) as f32
             });
-            let next = grid.distances(ray, inverse, planes);
+            let next = grid.distances(ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
             // The exit must lie clearly behind the hit: an equally near one may wait next door.
-            if hit.t * BOX_PAD < leave {
+            if hit.t * inverse.pad < leave {
                 return hit;
             }
             let axis = first_axis(next, leave);

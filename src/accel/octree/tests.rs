@@ -107,6 +107,7 @@ fn visited_children_are_those_whose_interval_is_not_empty() {
     let distances = [-1.0, 0.0, 1.0, 2.0, 3.0, 4.0];
     let mut counts = [0; 9];
     for [x, y, z] in (0..216).map(|i| [i / 36, i / 6 % 6, i % 6].map(|k| distances[k])) {
+        let pad = crate::accel::BoxTest::default().pad();
         for (enter, exit) in [(0.0, 4.0), (1.0, 3.0), (2.0, 2.0), (3.0, 2.0)] {
             let middle = [x, y, z];
             let overlaps = |octant: u32| {
@@ -118,11 +119,11 @@ fn visited_children_are_those_whose_interval_is_not_empty() {
                         to = f32::min(to, *plane);
                     }
                 }
-                from <= to * BOX_PAD
+                from <= to * pad
             };
             let expected: u32 = (0..8).filter(|o| overlaps(*o)).map(|o| 1 << o).sum();
             assert_eq!(
-                visited(enter, exit, middle),
+                visited(enter, exit, middle, pad),
                 expected,
                 "{enter}..{exit} {middle:?}"
             );

@@ -1,0 +1,191 @@
+//! How rays meet triangles and boxes: the choice that every structure follows, on the device by
+//! composition and on the host through [`Reciprocal`].
+
+use super::ray::safe_inverse;
+use super::triangle::TriangleTest;
+use crate::gpu::Composition;
+use serde::{Deserialize, Serialize};
+use std::ops::Deref;
+
+/// The tests of one run. Hits of every structure equal those of brute force with the same choice to
+/// the bit, if [`BoxTest`] is padded by [`BoxTest::PROVEN_ULPS`] or more; less is there to be measured.
+#[derive(
+    Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+pub struct Intersection {
+    /// The ray–triangle test.
+    pub triangle: TriangleTest,
+    /// The ray–box test.
+    pub box_test: BoxTest,
+}
+
+/// A slab test: which reciprocal of the direction it uses, and how far it is padded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct BoxTest {
+    /// Whether components near 0 get a finite reciprocal ([`super::ray::SMALLEST_DIRECTION`]) in place of 1/d, whose
+    /// infinity and 0 · ∞ WGSL does not define.
+    pub finite: bool,
+    /// A box is entered if `enter <= exit * (1 + pad_ulps · 2⁻²³)`.
+    pub pad_ulps: u32,
+}
+
+impl Default for BoxTest {
+    fn default() -> Self {
+        Self {
+            finite: true,
+            pad_ulps: Self::DEFAULT_ULPS,
+        }
+    }
+}
+
+impl BoxTest {
+    /// The default pad, 2⁻¹⁹: more than twice [`super::triangle::TRIANGLE_PAD`].
+    pub const DEFAULT_ULPS: u32 = 16;
+    /// The least pad for which the theorem of [`super::triangle`] holds: (1 + p) / (1 − p) for the pad p
+    /// of triangles, and their roundings.
+    pub const PROVEN_ULPS: u32 = 9;
+
+    /// Every box test, by the name and the line that users see.
+    pub const ALL: [(BoxTest, &'static str, &'static str); 6] = [
+        (
+            Self::finite(Self::DEFAULT_ULPS),
+            "padded-16",
+            "slabs, finite reciprocal, far side times 1 + 16 ulp: the pad that the proof needs, twice",
+        ),
+        (
+            Self::finite(4),
+            "padded-4",
+            "slabs, finite reciprocal, far side times 1 + 4 ulp",
+        ),
+        (
+            Self::finite(3),
+            "padded-3",
+            "slabs, finite reciprocal, far side times 1 + 3 ulp (Embree's robust mode)",
+        ),
+        (
+            Self::finite(2),
+            "padded-2",
+            "slabs, finite reciprocal, far side times 1 + 2 ulp (Ize 2013)",
+        ),
+        (
+            Self::finite(0),
+            "padded-0",
+            "slabs, finite reciprocal, no pad",
+        ),
+        (
+            Self {
+                finite: false,
+                pad_ulps: 0,
+            },
+            "plain",
+            "slabs with 1/d, no pad: relies on infinity and on minimum and maximum of NaN",
+        ),
+    ];
+
+    const fn finite(pad_ulps: u32) -> Self {
+        Self {
+            finite: true,
+            pad_ulps,
+        }
+    }
+
+    /// The test of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        let found = Self::ALL.iter().find(|(_, known, _)| *known == name);
+        found.map(|(test, ..)| *test)
+    }
+
+    /// The name of one of [`BoxTest::ALL`], or `custom`.
+    pub fn name(&self) -> &'static str {
+        let found = Self::ALL.iter().find(|(test, ..)| test == self);
+        found.map_or("custom", |(_, name, _)| name)
+    }
+
+    /// The factor on the far side of a box. Twin of `BOX_PAD` in `kernels/accel/bounds.wesl`.
+    pub fn pad(&self) -> f32 {
+        1.0 + self.pad_ulps as f32 * f32::EPSILON
+    }
+}
+
+impl Intersection {
+    /// `composition` with these tests, unless it chose others before.
+    #[must_use]
+    pub fn activate(&self, mut composition: Composition) -> Composition {
+        if !composition.active.contains_key(TRIANGLE) {
+            composition = composition.with(TRIANGLE, self.triangle.kernel());
+        }
+        if !composition.constants.contains_key(PAD_CONSTANT) {
+            composition = composition
+                .constant(PAD_CONSTANT, self.box_test.pad_ulps)
+                .feature("plain_reciprocal", !self.box_test.finite);
+        }
+        composition
+    }
+
+    /// What the tests need of a direction, computed once a ray.
+    pub fn inverse(&self, direction: [f32; 3]) -> Reciprocal {
+        Reciprocal {
+            inverse: if self.box_test.finite {
+                safe_inverse(direction)
+            } else {
+                direction.map(|d| 1.0 / d)
+            },
+            pad: self.box_test.pad(),
+            triangle: self.triangle,
+        }
+    }
+}
+
+/// Role of the triangle test in a composition, and the constant of the pad.
+const TRIANGLE: &str = "triangle";
+const PAD_CONSTANT: &str = "BOX_PAD_ULPS";
+
+/// The reciprocal of a ray's direction, which it dereferences to, and how to test with it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reciprocal {
+    inverse: [f32; 3],
+    /// The factor on the far side of boxes; `BOX_PAD` of kernels.
+    pub pad: f32,
+    /// The triangle test.
+    pub triangle: TriangleTest,
+}
+
+impl Deref for Reciprocal {
+    type Target = [f32; 3];
+
+    fn deref(&self) -> &[f32; 3] {
+        &self.inverse
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::ray::SMALLEST_DIRECTION;
+
+    #[test]
+    fn the_default_pad_is_two_to_the_minus_nineteen_and_names_are_found_again() {
+        assert_eq!(BoxTest::default().pad(), 1.0 + 2.0_f32.powi(-19));
+        for (test, name, description) in BoxTest::ALL {
+            assert_eq!(BoxTest::named(name), Some(test));
+            assert_eq!(test.name(), name);
+            assert!(!description.is_empty());
+        }
+        assert_eq!(BoxTest::named("padded-5"), None);
+    }
+
+    #[test]
+    fn only_the_finite_reciprocal_is_finite() {
+        let of = |box_test| {
+            let tests = Intersection {
+                box_test,
+                ..Default::default()
+            };
+            tests.inverse([0.0, -0.0, 2.0])
+        };
+        let limit = 1.0 / SMALLEST_DIRECTION;
+        assert_eq!(*of(BoxTest::default()), [limit, -limit, 0.5]);
+        let plain = BoxTest::named("plain").expect("a known name");
+        assert_eq!(*of(plain), [f32::INFINITY, f32::NEG_INFINITY, 0.5]);
+    }
+}

@@ -1,0 +1,124 @@
+//! The watertight test. Twin of `kernels/accel/triangle/watertight.wesl`.
+//! Source: S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", JCGT 2(1), 2013.
+//!
+//! Vertices are sheared so that the ray is the z axis. What a vertex becomes depends on vertex and ray
+//! alone, so that the triangles of a closed mesh still fit together. The sign of an edge function
+//! `p − q` is that of comparing the rounded products: rounding is monotone, so it is the true sign or
+//! 0, never the opposite. Zero counts as inside, on both sides of the edge. So wherever the sheared mesh
+//! holds the ray, some triangle accepts it, and the paper's second test in double precision, which WGSL
+//! has not got, is not needed: without it a ray on an edge may meet both triangles.
+//!
+//! The distance is an average of those of the vertices, so that it stays between them.
+
+use super::{APART, Meeting, TRIANGLE_PAD, TriangleRecord};
+use crate::accel::ray::Ray;
+
+/// The axis along which the direction is longest.
+pub(super) fn longest(d: [f32; 3]) -> usize {
+    let [x, y, z] = d.map(f32::abs);
+    if z >= x.max(y) { 2 } else { usize::from(y > x) }
+}
+
+/// Axes turned so that `axis` comes last.
+pub(super) fn turned([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
+    match axis {
+        0 => [y, z, x],
+        1 => [z, x, y],
+        _ => [x, y, z],
+    }
+}
+
+/// The inverse of [`turned`].
+fn turned_back([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
+    match axis {
+        0 => [z, x, y],
+        1 => [y, z, x],
+        _ => [x, y, z],
+    }
+}
+
+/// A ray as vertices are sheared by it: x and y for each unit of z, and 1 / direction along z.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Shear {
+    axis: usize,
+    origin: [f32; 3],
+    x: f32,
+    y: f32,
+    /// 1 / direction along z.
+    pub scale: f32,
+}
+
+pub(crate) fn shear(ray: &Ray, inverse: &[f32; 3]) -> Shear {
+    let axis = longest(ray.direction);
+    let [dx, dy, _] = turned(ray.direction, axis);
+    let [_, _, scale] = turned(*inverse, axis);
+    Shear {
+        axis,
+        origin: ray.origin,
+        x: dx * scale,
+        y: dy * scale,
+        scale,
+    }
+}
+
+/// A vertex relative to the ray: across it in x and y, along it in z.
+pub(crate) fn sheared(s: &Shear, vertex: [f32; 3]) -> [f32; 3] {
+    let relative = [0, 1, 2].map(|a| vertex[a] - s.origin[a]);
+    let [x, y, z] = turned(relative, s.axis);
+    [x - s.x * z, y - s.y * z, z]
+}
+
+/// Both products of the edge functions opposite to the three vertices.
+pub(crate) fn products([a, b, c]: [[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
+    (
+        [c[0] * b[1], a[0] * c[1], b[0] * a[1]],
+        [c[1] * b[0], a[1] * c[0], b[1] * a[0]],
+    )
+}
+
+pub(super) fn meet(triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> Meeting {
+    let s = shear(ray, inverse);
+    let [a, b, c] = triangle.vertices().map(|v| sheared(&s, v));
+    let (p, q) = products([a, b, c]);
+    if !((0..3).all(|i| p[i] >= q[i]) || (0..3).all(|i| p[i] <= q[i])) {
+        return APART;
+    }
+    let w = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
+    let area = w[0] + w[1] + w[2];
+    Meeting {
+        area,
+        t: (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * s.scale / area,
+        u: w[1],
+        v: w[2],
+    }
+}
+
+/// Error of x and y of the point that the weights stand for, and what it makes of the distance.
+///
+/// The point Σ wᵢ·vᵢ lies in the bounds. The ray passes it by the residual Σ wᵢ·v′ᵢ of the sheared
+/// vertices, which is 0 but for rounding: of the weights (three units of the products, times x or y of
+/// the vertex) and of the vertices (a unit of the difference, up to seven of what is taken off by the
+/// shear where division errs by 2.5 ulp). Divided by the direction, that is how far the distance may lie
+/// outside the slab. [`TRIANGLE_PAD`] is eight units.
+pub(super) fn allowance(
+    triangle: &TriangleRecord,
+    ray: &Ray,
+    inverse: &[f32; 3],
+    found: &Meeting,
+) -> [f32; 3] {
+    let s = shear(ray, inverse);
+    let vertices = triangle.vertices().map(|v| sheared(&s, v));
+    let (p, q) = products(vertices);
+    let [a, b, c] = vertices.map(|v| v.map(f32::abs));
+    let w = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
+    let terms = [0, 1, 2].map(|i| p[i].abs() + q[i].abs());
+    let slope = [s.x.abs(), s.y.abs(), 0.0];
+    let weights = |i: usize| terms[0] * a[i] + terms[1] * b[i] + terms[2] * c[i];
+    let place = |v: [f32; 3], i: usize| v[i] + 2.0 * slope[i] * v[2];
+    let places = |i: usize| w[0] * place(a, i) + w[1] * place(b, i) + w[2] * place(c, i);
+    let across = |i: usize| (weights(i) + places(i)) / found.area * TRIANGLE_PAD;
+    // Along the ray the distance is an average: its own rounding alone counts.
+    let along = places(2) / found.area * TRIANGLE_PAD;
+    let errors = turned_back([across(0), across(1), along], s.axis);
+    [0, 1, 2].map(|i| errors[i] * inverse[i].abs())
+}
