@@ -13,6 +13,7 @@ mod points_plot;
 mod render;
 mod report;
 mod run;
+mod stress;
 mod system;
 mod table;
 mod verify;
@@ -73,6 +74,8 @@ enum Command {
     Discrepancy(discrepancy::Discrepancy),
     #[command(after_help = EXIT_CODES)]
     Report(report::Report),
+    #[command(after_help = EXIT_CODES)]
+    Stress(stress::Stress),
 }
 
 /// Reads the command line and does what it says; clap itself ends the program with 2 on bad usage.
@@ -86,6 +89,7 @@ pub fn main() -> ExitCode {
         Command::Doctor(command) => command.execute(),
         Command::Discrepancy(command) => command.execute(),
         Command::Report(command) => command.execute(),
+        Command::Stress(command) => command.execute(),
     };
     done.unwrap_or_else(|failure| failure.tell())
 }

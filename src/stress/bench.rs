@@ -41,7 +41,9 @@ pub fn default_params(kind: &dyn AccelKind) -> Params {
 pub fn build(kind: &dyn AccelKind, soup: &TriangleSoup) -> Result<Box<dyn BuiltAccel>, String> {
     let built = kind.build(soup, &default_params(kind), &mut BuildLog::default());
     let built = built.map_err(|e| format!("not built: {e}"))?;
-    built.validate(soup).map_err(|e| format!("not valid: {e}"))?;
+    built
+        .validate(soup)
+        .map_err(|e| format!("not valid: {e}"))?;
     Ok(built)
 }
 
@@ -90,7 +92,12 @@ impl<'a> Stage<'a> {
     ///
     /// # Errors
     /// The kernel does not compile, or the rays exceed the adapter's limit.
-    pub fn batch(&self, traced: &Traced, query: Query, rays: &[Ray]) -> Result<Batch<'a>, GpuError> {
+    pub fn batch(
+        &self,
+        traced: &Traced,
+        query: Query,
+        rays: &[Ray],
+    ) -> Result<Batch<'a>, GpuError> {
         Batch::new(self.gpu, &self.buffers, traced, query, rays, true)
     }
 
@@ -142,7 +149,12 @@ impl Expected {
 ///
 /// # Errors
 /// As for [`Stage::closest`].
-pub fn ratio(stage: &Stage, traced: &Traced, rays: &[Ray], others: &[Ray]) -> Result<f64, GpuError> {
+pub fn ratio(
+    stage: &Stage,
+    traced: &Traced,
+    rays: &[Ray],
+    others: &[Ray],
+) -> Result<f64, GpuError> {
     const ROUNDS: usize = 3;
     let [a, b] = [rays, others].map(|rays| stage.batch(traced, Query::Closest, rays));
     let (a, b) = (a?, b?);
@@ -169,5 +181,7 @@ pub fn ordinary_rays(case: &Case, seed: u64, count: usize) -> Vec<Ray> {
     let (low, size) = (bounds.min.as_dvec3(), (bounds.max - bounds.min).as_dvec3());
     let mut random = super::case::Random::with_stream(seed, 0x0c0d);
     let mut point = || (low + size * (0.5 * (random.in_cube() + glam::DVec3::ONE))).as_vec3();
-    (0..count).map(|_| super::case::towards(point(), point())).collect()
+    (0..count)
+        .map(|_| super::case::towards(point(), point()))
+        .collect()
 }

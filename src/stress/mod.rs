@@ -3,7 +3,7 @@
 //!
 //! Families make cases ([`families`]), a suite traces them on the adapter ([`suite`]) and a million
 //! shots at closed meshes ([`shots`]), the exact oracle judges ([`tally`]), and everything ends up as
-//! records ([`record`]), from which the table ([`table`]) and the page of the report derive.
+//! records ([`record`]), from which tables and the page of the report derive.
 
 pub mod bench;
 pub mod case;
@@ -13,14 +13,13 @@ pub mod record;
 pub mod shapes;
 pub mod shots;
 pub mod suite;
-pub mod table;
 pub mod tally;
 pub mod targets;
 
 use crate::accel::triangle::TriangleTest;
 use crate::accel::{AccelRegistry, Intersection};
 use crate::gpu::{Gpu, GpuError, probe_arithmetic};
-use crate::run::capture_environment;
+use crate::run::environment::capture as capture_environment;
 use record::{Record, SuiteRecord};
 use std::path::PathBuf;
 use std::time::{Instant, SystemTime};
@@ -72,12 +71,30 @@ impl Settings {
         }
     }
 
+    /// Checks every name.
+    ///
+    /// # Errors
+    /// [`StressError::Unknown`].
+    pub fn check(&self) -> Result<(), StressError> {
+        let families = families::FAMILIES.iter().map(|f| f.name);
+        check_names("family", &self.families, families)?;
+        let registry = AccelRegistry::default();
+        let structures: Vec<&str> = registry.iter().map(|kind| kind.name()).collect();
+        check_names("structure", &self.accels, structures.iter().copied())?;
+        let tests = TriangleTest::ALL.iter().map(|t| t.name());
+        check_names("triangle test", &self.triangles, tests)
+    }
+
     pub(crate) fn wants_family(&self, name: &str) -> bool {
         self.families.is_empty() || self.families.iter().any(|family| family == name)
     }
 
     fn timed_rays(&self) -> usize {
-        if self.quick { TIMED_RAYS.1 } else { TIMED_RAYS.0 }
+        if self.quick {
+            TIMED_RAYS.1
+        } else {
+            TIMED_RAYS.0
+        }
     }
 }
 
@@ -97,28 +114,35 @@ pub enum StressError {
         /// All names.
         known: String,
     },
-    /// One cell cannot be run; others can.
-    #[error("{0}")]
-    Cell(String),
 }
 
 /// Runs the suite; `progress` is told what is being done.
 ///
 /// # Errors
 /// A name that does not exist, or the device is lost or hangs.
-pub fn run(gpu: &Gpu, settings: &Settings, progress: &dyn Fn(&str)) -> Result<Vec<Record>, StressError> {
+pub fn run(
+    gpu: &Gpu,
+    settings: &Settings,
+    progress: &dyn Fn(&str),
+) -> Result<Vec<Record>, StressError> {
     let start = Instant::now();
-    check_names("family", &settings.families, families::FAMILIES.iter().map(|f| f.name))?;
+    check_names(
+        "family",
+        &settings.families,
+        families::FAMILIES.iter().map(|f| f.name),
+    )?;
     let suite = Suite {
         gpu,
         exact: probe_arithmetic(gpu)?.is_exact(),
         settings,
-        kinds: kinds(settings)?,
-        tests: tests(settings)?,
+        kinds: kinds(settings),
+        tests: tests(settings),
     };
     let mut records = vec![Record::Suite(first_record(gpu, settings, suite.exact))];
     records.extend(suite.cells(progress)?);
-    records.extend(suite.shots(progress)?);
+    if settings.shots > 0 {
+        records.extend(suite.shots(progress)?);
+    }
     let targets = targets::targets(&records);
     records.extend(targets.into_iter().map(Record::Target));
     records.push(Record::Finished {
@@ -159,26 +183,23 @@ fn check_names<'a>(
 }
 
 /// The structures to try, brute force first.
-fn kinds(settings: &Settings) -> Result<Vec<suite::Kind>, StressError> {
-    let registry = AccelRegistry::default();
-    let names: Vec<&str> = registry.iter().map(|kind| kind.name()).collect();
-    check_names("structure", &settings.accels, names.iter().copied())?;
+fn kinds(settings: &Settings) -> Vec<suite::Kind> {
     let wanted = |name: &str| {
-        settings.accels.is_empty() || name == BRUTE_FORCE || settings.accels.iter().any(|a| a == name)
+        let accels = &settings.accels;
+        accels.is_empty() || name == BRUTE_FORCE || accels.iter().any(|a| a == name)
     };
+    let registry = AccelRegistry::default();
     let mut kinds: Vec<suite::Kind> = registry.iter().filter(|kind| wanted(kind.name())).collect();
     kinds.sort_by_key(|kind| kind.name() != BRUTE_FORCE);
-    Ok(kinds)
+    kinds
 }
 
 /// The triangle tests to try, the default first.
-fn tests(settings: &Settings) -> Result<Vec<TriangleTest>, StressError> {
-    let all = TriangleTest::ALL;
-    check_names("triangle test", &settings.triangles, all.iter().map(|t| t.name()))?;
+fn tests(settings: &Settings) -> Vec<TriangleTest> {
     let wanted = |test: &TriangleTest| {
         settings.triangles.is_empty() || settings.triangles.iter().any(|t| t == test.name())
     };
-    let mut tests: Vec<TriangleTest> = all.into_iter().filter(wanted).collect();
+    let mut tests: Vec<TriangleTest> = TriangleTest::ALL.into_iter().filter(wanted).collect();
     tests.sort_by_key(|test| *test != Intersection::default().triangle);
-    Ok(tests)
+    tests
 }

@@ -363,6 +363,9 @@ mod tests {
         let text = std::fs::read_to_string(&path).unwrap();
         std::fs::write(&path, text.replacen(SCHEMA, "raystone-stress/9", 1)).unwrap();
         let error = read(dir.path()).unwrap_err().to_string();
-        assert!(error.contains(":1:") && error.contains("raystone-stress/9"), "{error}");
+        assert!(
+            error.contains(":1:") && error.contains("raystone-stress/9"),
+            "{error}"
+        );
     }
 }

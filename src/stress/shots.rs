@@ -7,15 +7,15 @@ use super::families::on_edge;
 use super::place::Place;
 use super::record::{Record, ShotsRecord, SkippedRecord, Worst};
 use super::shapes::{self, Mesh, RADIUS};
-use super::suite::{BRUTE_FORCE, Kind, PLAIN, Suite};
+use super::suite::{BRUTE_FORCE, PLAIN, Suite};
 use super::tally::oracle_ray;
 use super::{StressError, case};
-use crate::accel::triangle::TriangleTest;
 use crate::accel::{NO_HIT, Ray};
 use crate::config::{Params, Variant};
+use crate::integrator::Traced;
 use crate::oracle::{Side, exact_truths};
 use crate::scene::{LoadOptions, Triangle, load};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// Bands of the sphere: 16,256 triangles.
@@ -65,7 +65,9 @@ impl Suite<'_> {
     fn targets(&self, place: Place, records: &mut Vec<Record>) -> Vec<Target> {
         let mut random = Random::with_stream(self.settings.seed, 77);
         let mut inside = |reach: f64| -> Vec<Vec3> {
-            (0..512).map(|_| place.point(reach * random.in_cube())).collect()
+            (0..512)
+                .map(|_| place.point(reach * random.in_cube()))
+                .collect()
         };
         let mut targets = vec![
             Target {
@@ -79,7 +81,10 @@ impl Suite<'_> {
                 name: "plane",
                 place,
                 mesh: shapes::plane(CELLS, SIDE, &place),
-                origins: inside(0.2 * SIDE).iter().map(|p| *p + Vec3::Y * (0.3 * SIDE) as f32).collect(),
+                origins: inside(0.2 * SIDE)
+                    .iter()
+                    .map(|p| *p + Vec3::Y * (0.3 * SIDE) as f32)
+                    .collect(),
                 is_plane: true,
             },
         ];
@@ -105,11 +110,19 @@ impl Suite<'_> {
         let mesh = shapes::model(&scene.triangles, &place);
         let mut random = Random::with_stream(self.settings.seed, 78);
         let tried: Vec<Ray> = (0..TRIED)
-            .map(|_| ray(place.point(0.7 * RADIUS * random.in_cube()), random.direction().as_vec3()))
+            .map(|_| {
+                ray(
+                    place.point(0.7 * RADIUS * random.in_cube()),
+                    random.direction().as_vec3(),
+                )
+            })
             .collect();
         let origins = inside(&mesh, &tried);
         if origins.len() < LEAST_ORIGINS {
-            return Err(format!("only {} of {TRIED} points lie inside it", origins.len()));
+            return Err(format!(
+                "only {} of {TRIED} points lie inside it",
+                origins.len()
+            ));
         }
         Ok(Target {
             name: "model",
@@ -129,17 +142,19 @@ impl Suite<'_> {
                 _ => kind.name() == PLAIN,
             });
             for kind in kinds {
-                for (number, aim) in AIMS.iter().enumerate() {
-                    let series = self.series(target, &stage, *kind, *test, number);
-                    let record = match series {
-                        Ok(record) => Record::Shots(record),
-                        Err(StressError::Cell(reason)) => Record::Skipped(SkippedRecord {
-                            what: format!("{}, {}, {} {aim}", test.name(), kind.name(), target.name),
-                            reason,
-                        }),
-                        Err(error) => return Err(error),
-                    };
-                    records.push(record);
+                let name = (test.name(), kind.name());
+                match bench::build(*kind, &stage.soup) {
+                    Ok(built) => {
+                        let traced = stage.upload(&*built)?;
+                        for aim in 0..AIMS.len() {
+                            let series = self.series(target, &stage, &traced, name, aim)?;
+                            records.push(Record::Shots(series));
+                        }
+                    }
+                    Err(reason) => records.push(Record::Skipped(SkippedRecord {
+                        what: format!("{}, {}, {}", name.0, name.1, target.name),
+                        reason,
+                    })),
                 }
             }
         }
@@ -151,15 +166,13 @@ impl Suite<'_> {
         &self,
         target: &Target,
         stage: &Stage,
-        kind: Kind,
-        test: TriangleTest,
+        traced: &Traced,
+        (triangle, accel): (&str, &str),
         aim: usize,
     ) -> Result<ShotsRecord, StressError> {
-        let built = bench::build(kind, &stage.soup).map_err(StressError::Cell)?;
-        let traced = stage.upload(&*built)?;
         let mut record = ShotsRecord {
-            triangle: test.name().into(),
-            accel: kind.name().into(),
+            triangle: triangle.into(),
+            accel: accel.into(),
             mesh: target.name.into(),
             triangles: target.mesh.len(),
             place: target.place,
@@ -176,10 +189,14 @@ impl Suite<'_> {
             let count = CHUNK.min(self.settings.shots - record.rays);
             let stream = (aim as u64) << 32 | chunk;
             let rays = target.shots(aim, self.settings.seed, stream, count);
-            let found = stage.closest(&traced, &rays)?;
+            let found = stage.closest(traced, &rays)?;
             record.rays += count;
             chunk += 1;
-            let misses = found.answers.iter().zip(&rays).filter(|(hit, _)| hit.triangle == NO_HIT);
+            let misses = found
+                .answers
+                .iter()
+                .zip(&rays)
+                .filter(|(hit, _)| hit.triangle == NO_HIT);
             for (_, ray) in misses {
                 record.misses += 1;
                 if missed.len() < LOOKED_UP {
@@ -208,9 +225,14 @@ impl Target {
         let block = |block: usize| {
             let mut random = Random::with_stream(seed, stream << 16 | block as u64);
             let rays = BLOCK.min(count - block * BLOCK);
-            (0..rays).map(|_| self.shot(aim, &mut random)).collect::<Vec<_>>()
+            (0..rays)
+                .map(|_| self.shot(aim, &mut random))
+                .collect::<Vec<_>>()
         };
-        (0..count.div_ceil(BLOCK)).into_par_iter().flat_map_iter(block).collect()
+        (0..count.div_ceil(BLOCK))
+            .into_par_iter()
+            .flat_map_iter(block)
+            .collect()
     }
 
     fn shot(&self, aim: usize, random: &mut Random) -> Ray {
@@ -233,7 +255,10 @@ fn inside(mesh: &[Triangle], rays: &[Ray]) -> Vec<Vec3> {
         truth.hits.len() % 2 == 1 && truth.hits.iter().all(|hit| hit.side == Side::Inside)
     };
     let pairs = rays.iter().zip(&truths);
-    pairs.filter(|(_, truth)| is_inside(truth)).map(|(ray, _)| Vec3::from(ray.origin)).collect()
+    pairs
+        .filter(|(_, truth)| is_inside(truth))
+        .map(|(ray, _)| Vec3::from(ray.origin))
+        .collect()
 }
 
 #[cfg(test)]
@@ -245,13 +270,14 @@ mod tests {
         let mesh = shapes::sphere(8, &Place::ORDINARY);
         let mut random = Random::with_stream(1, 0);
         let mut rays = |radius: f64| -> Vec<Ray> {
-            (0..40).map(|_| {
-                let origin = (radius * random.direction()).as_vec3();
-                ray(origin, random.direction().as_vec3())
-            }).collect()
+            (0..40)
+                .map(|_| {
+                    let origin = (radius * random.direction()).as_vec3();
+                    ray(origin, random.direction().as_vec3())
+                })
+                .collect()
         };
         assert!(inside(&mesh, &rays(0.8 * RADIUS)).len() > 38);
         assert_eq!(inside(&mesh, &rays(1.1 * RADIUS)).len(), 0);
-        let _ = DVec3::ZERO;
     }
 }

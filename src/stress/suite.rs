@@ -139,11 +139,20 @@ impl Suite<'_> {
                     continue;
                 }
             };
-            let trace = Trace { suite: self, case, judge, stage: &stage, expected: &expected, test };
+            let trace = Trace {
+                suite: self,
+                case,
+                judge,
+                stage: &stage,
+                expected: &expected,
+                test,
+            };
             let traced = stage.upload(&*built)?;
             let outcome = trace.run(*kind, &*built, &traced, is_default, cell, &mut judged);
             match outcome {
-                Err(error @ (GpuError::Lost(_) | GpuError::Timeout { .. })) => return Err(error.into()),
+                Err(error @ (GpuError::Lost(_) | GpuError::Timeout { .. })) => {
+                    return Err(error.into());
+                }
                 Err(error) => cell.failures.push(format!("{}: {error}", case.label)),
                 Ok(()) => {}
             }
@@ -159,7 +168,13 @@ impl Suite<'_> {
     }
 
     /// The command that shows what a structure does with a ray of a case.
-    pub fn replay(&self, case: &Case, kind: &str, test: TriangleTest, ray: &crate::accel::Ray) -> String {
+    pub fn replay(
+        &self,
+        case: &Case,
+        kind: &str,
+        test: TriangleTest,
+        ray: &crate::accel::Ray,
+    ) -> String {
         let address = Address {
             family: case.family.to_owned(),
             label: case.label.clone(),
@@ -197,9 +212,8 @@ impl Trace<'_> {
         let found = self.stage.closest(traced, &case.rays)?;
         let expected = self.expected.of(built.space());
         let mut errors = found.errors;
-        let (known, outcomes) = judged.get_or_insert_with(|| {
-            (found.answers.clone(), self.judge.judge_all(&found.answers))
-        });
+        let (known, outcomes) = judged
+            .get_or_insert_with(|| (found.answers.clone(), self.judge.judge_all(&found.answers)));
         let mut tally = Tally::default();
         let closed = matches!(case.truth, Truth::Closed | Truth::Hit);
         for (index, (hit, ray)) in found.answers.iter().zip(&case.rays).enumerate() {

@@ -64,7 +64,9 @@ impl<'a> Judge<'a> {
                 let triangles = &self.case.scene.triangles;
                 let verdict = self.truths[index].judge(triangles, &oracle_ray(ray), answer);
                 let errors = match verdict {
-                    ExactVerdict::Hit(t) => Some(errors(&triangles[hit.triangle as usize], ray, hit, t)),
+                    ExactVerdict::Hit(t) => {
+                        Some(errors(&triangles[hit.triangle as usize], ray, hit, t))
+                    }
                     _ => None,
                 };
                 Outcome { verdict, errors }
@@ -74,7 +76,9 @@ impl<'a> Judge<'a> {
 
     /// Judges the answers to all rays, on all cores.
     pub fn judge_all(&self, hits: &[Hit]) -> Vec<Outcome> {
-        (hits.par_iter().enumerate()).map(|(i, hit)| self.judge(i, hit)).collect()
+        (hits.par_iter().enumerate())
+            .map(|(i, hit)| self.judge(i, hit))
+            .collect()
     }
 }
 
@@ -96,8 +100,19 @@ fn errors(triangle: &Triangle, ray: &Ray, hit: &Hit, t: f64) -> Errors {
     let off = (f64::from(hit.t) - t).abs();
     let point_off = (found.as_dvec3() - point).abs().max_element();
     // Records hold finite numbers only.
-    let relative = |off: f64, to: f64| if off == 0.0 { 0.0 } else { (off / to).min(f64::MAX) };
-    [off / ulp(t), relative(off, t.abs()), point_off / ulp(size), relative(point_off, way)]
+    let relative = |off: f64, to: f64| {
+        if off == 0.0 {
+            0.0
+        } else {
+            (off / to).min(f64::MAX)
+        }
+    };
+    [
+        off / ulp(t),
+        relative(off, t.abs()),
+        point_off / ulp(size),
+        relative(point_off, way),
+    ]
 }
 
 /// Counts over the rays of a cell.
@@ -252,9 +267,15 @@ mod tests {
         let worst = |tally: &Tally| tally.worst.as_ref().map(|w| w.1.replay.clone());
         assert_eq!(worst(&tally).as_deref(), Some("ray 99"));
         let quantiles = tally.quantiles(0).unwrap();
-        assert_eq!((quantiles.median, quantiles.p99, quantiles.max), (50.0, 98.0, 99.0));
+        assert_eq!(
+            (quantiles.median, quantiles.p99, quantiles.max),
+            (50.0, 98.0, 99.0)
+        );
         let mut other = Tally::default();
-        let miss = Outcome { verdict: ExactVerdict::FalseMiss { explained: true }, errors: None };
+        let miss = Outcome {
+            verdict: ExactVerdict::FalseMiss { explained: true },
+            errors: None,
+        };
         other.add(&miss, true, || "crack".into());
         other.add(&miss, false, || "silhouette".into());
         tally.join(other);

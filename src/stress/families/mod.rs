@@ -10,6 +10,8 @@ mod placed;
 
 use super::case::{Case, Maker};
 
+pub(super) use closed::on_edge;
+
 /// A kind of trouble.
 pub struct Family {
     /// Name as a user types it.
