@@ -106,8 +106,8 @@ fn faults_of_all_kinds_are_told_with_file_and_line() {
         (
             "a fault in a shared file",
             "accel/triangle",
-            "let c = v0 - ray.origin",
-            "let c = v0 - ray.direction.x.x",
+            "let found = meet(triangle, ray, inverse)",
+            "let found = meet(triangle, ray, inverse.x.x)",
             "",
         ),
         (

@@ -3,7 +3,8 @@
 
 use super::ray::safe_inverse;
 use super::triangle::TriangleTest;
-use crate::gpu::Composition;
+use crate::config::nearest;
+use crate::gpu::{ArithmeticProbe, Composition};
 use serde::{Deserialize, Serialize};
 use std::ops::Deref;
 
@@ -108,6 +109,38 @@ impl BoxTest {
 }
 
 impl Intersection {
+    /// The tests of these names, with what was wrong of an unknown one.
+    ///
+    /// # Errors
+    /// A name is not known; the message names the nearest known one.
+    pub fn named(triangle: &str, box_test: &str) -> Result<Self, String> {
+        let unknown = |what: &str, name: &str, known: Vec<&'static str>| {
+            let near = nearest(name, known).unwrap_or_default();
+            format!("unknown {what} test `{name}`; did you mean `{near}`?")
+        };
+        Ok(Self {
+            triangle: TriangleTest::named(triangle).ok_or_else(|| {
+                let known = TriangleTest::ALL.map(TriangleTest::name);
+                unknown("triangle", triangle, known.to_vec())
+            })?,
+            box_test: BoxTest::named(box_test).ok_or_else(|| {
+                let known = BoxTest::ALL.map(|(_, name, _)| name);
+                unknown("box", box_test, known.to_vec())
+            })?,
+        })
+    }
+
+    /// What an adapter can keep of this choice, and what it cannot: without exact two-products the
+    /// compensated test is the watertight one at a higher price.
+    pub fn kept_by(self, probe: &ArithmeticProbe) -> (Self, Option<String>) {
+        if self.triangle != TriangleTest::Compensated || probe.exact_products {
+            return (self, None);
+        }
+        let triangle = TriangleTest::Watertight;
+        let reason = "compensated: this adapter does not keep two-products; watertight instead";
+        (Self { triangle, ..self }, Some(reason.to_owned()))
+    }
+
     /// `composition` with these tests, unless it chose others before.
     #[must_use]
     pub fn activate(&self, mut composition: Composition) -> Composition {
@@ -172,6 +205,45 @@ mod tests {
             assert!(!description.is_empty());
         }
         assert_eq!(BoxTest::named("padded-5"), None);
+    }
+
+    #[test]
+    fn experiment_files_know_every_test_and_nearest_names_are_told() {
+        use crate::config::keys;
+        let triangles = TriangleTest::ALL.map(TriangleTest::name);
+        assert_eq!(triangles, keys::TRIANGLE_TESTS);
+        assert_eq!(BoxTest::ALL.map(|(_, name, _)| name), keys::BOX_TESTS);
+        for triangle in triangles {
+            for (box_test, name, _) in BoxTest::ALL {
+                let tests = Intersection::named(triangle, name).expect("known names");
+                assert_eq!(
+                    (tests.triangle.name(), tests.box_test),
+                    (triangle, box_test)
+                );
+            }
+        }
+        let error = Intersection::named("watertigth", "plain").expect_err("no such test");
+        assert!(error.contains("`watertight`"), "{error}");
+        let error = Intersection::named("pluecker", "padded-5").expect_err("no such test");
+        assert!(error.contains("`padded-"), "{error}");
+    }
+
+    #[test]
+    fn only_an_adapter_that_keeps_two_products_gets_the_compensated_test() {
+        let probe = |exact_products| ArithmeticProbe {
+            unfused: true,
+            exact_division: true,
+            exact_sqrt: true,
+            exact_products,
+        };
+        let tests = Intersection {
+            triangle: TriangleTest::Compensated,
+            ..Default::default()
+        };
+        assert_eq!(tests.kept_by(&probe(true)), (tests, None));
+        let (kept, reason) = tests.kept_by(&probe(false));
+        assert_eq!(kept.triangle, TriangleTest::Watertight);
+        assert!(reason.is_some_and(|r| r.contains("two-products")));
     }
 
     #[test]

@@ -4,8 +4,11 @@ use super::adapters;
 use super::failure::Failure;
 use super::output::print;
 use clap::{Args, ValueEnum};
-use raystone::config::{Axis, Entry};
+use raystone::accel::BoxTest;
+use raystone::accel::triangle::TriangleTest;
+use raystone::config::{Axis, Entry, keys};
 use raystone::discrepancy::Measure;
+use raystone::integrator::RayOffset;
 use raystone::measure::image::METRICS;
 use raystone::run::Registries;
 use std::fmt::Write as _;
@@ -31,6 +34,12 @@ enum Topic {
     Decorrelation,
     #[value(alias = "integrators")]
     Integrator,
+    #[value(alias = "triangles")]
+    Triangle,
+    #[value(alias = "box-tests", alias = "box")]
+    BoxTest,
+    #[value(alias = "offsets")]
+    Offset,
     #[value(alias = "metrics")]
     Metric,
     #[value(alias = "measures", alias = "discrepancy")]
@@ -54,6 +63,15 @@ impl List {
                 Topic::Sequence => axis(Axis::Sequence, &catalogue.sequence),
                 Topic::Decorrelation => axis(Axis::Decorrelation, &catalogue.decorrelation),
                 Topic::Integrator => axis(Axis::Integrator, &catalogue.integrator),
+                Topic::Triangle => triangles(),
+                Topic::BoxTest => named(
+                    "box_test: of all structures",
+                    BoxTest::ALL.map(|(_, name, text)| (name, text)),
+                ),
+                Topic::Offset => named(
+                    "offset: how rays leave a surface",
+                    RayOffset::ALL.map(|o| (o.name(), o.description())),
+                ),
                 Topic::Metric => metrics(),
                 Topic::Measure => measures(),
                 Topic::Adapter => adapter_list(),
@@ -80,6 +98,27 @@ fn axis(axis: Axis, entries: &[Entry]) -> String {
                 "", parameter.name, parameter.default, parameter.description, parameter.range,
             );
         }
+    }
+    text
+}
+
+fn triangles() -> String {
+    let width = keys::TRIANGLE_TESTS.iter().map(|n| n.len()).max();
+    let width = width.unwrap_or(0);
+    let mut text = "triangle: ray-triangle test of all structures\n".to_owned();
+    for test in TriangleTest::ALL {
+        let (name, what, bytes) = (test.name(), test.description(), test.bytes());
+        let _ = writeln!(text, "  {name:width$}  {what}; {bytes} bytes a triangle");
+    }
+    text
+}
+
+fn named<const N: usize>(title: &str, entries: [(&str, &str); N]) -> String {
+    let width = entries.iter().map(|(name, _)| name.len()).max();
+    let width = width.unwrap_or(0);
+    let mut text = format!("{title}\n");
+    for (name, description) in entries {
+        let _ = writeln!(text, "  {name:width$}  {description}");
     }
     text
 }

@@ -28,6 +28,8 @@ pub struct Experiment {
     pub spp: SppRange,
     /// Whether kernels keep the bounds checks and loop bounds of the driver layer.
     pub runtime_checks: bool,
+    /// How rays meet triangles and boxes, and leave surfaces.
+    pub tests: Tests,
     /// Camera for all scenes; `None` leaves it to each scene.
     pub camera: Option<Camera>,
     /// What is varied.
@@ -142,6 +144,18 @@ pub struct Timing {
     pub max_warmup_ms: u32,
     /// Rays per class and dispatch.
     pub rays: u32,
+}
+
+/// Names of the tests that all structures share, and of the offset of rays: the section
+/// `[intersection]`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tests {
+    /// The ray–triangle test.
+    pub triangle: &'static str,
+    /// The ray–box test.
+    pub box_test: &'static str,
+    /// How rays are moved off the surface that they leave.
+    pub offset: &'static str,
 }
 
 /// How much the gate checks.

@@ -72,6 +72,8 @@ pub enum Kind {
         /// Greatest value.
         max: i64,
     },
+    /// One of these names.
+    Choice(&'static [&'static str]),
     /// Two integers.
     IntegerPair {
         /// Least value of each.
@@ -113,6 +115,7 @@ impl fmt::Display for Kind {
             Self::Flag => write!(f, "true or false"),
             Self::Integer { min, max } => write!(f, "an integer in [{min}, {max}]"),
             Self::PowerOfTwo { min, max } => write!(f, "a power of two in [{min}, {max}]"),
+            Self::Choice(names) => write!(f, "one of {}", names.join(", ")),
             Self::IntegerPair { min, max } => {
                 write!(f, "a list of two integers in [{min}, {max}]")
             }
@@ -179,6 +182,26 @@ const fn integer(min: i64, max: i64) -> Kind {
     Kind::Integer { min, max }
 }
 
+/// Names of the ray–triangle tests.
+pub const TRIANGLE_TESTS: &[&str] = &[
+    "moeller-trumbore",
+    "baldwin-weber",
+    "pluecker",
+    "watertight",
+    "compensated",
+];
+/// Names of the ray–box tests.
+pub const BOX_TESTS: &[&str] = &[
+    "padded-16",
+    "padded-4",
+    "padded-3",
+    "padded-2",
+    "padded-0",
+    "plain",
+];
+/// Names of the offsets of rays.
+pub const RAY_OFFSETS: &[&str] = &["none", "fixed", "integer", "error-bound"];
+
 const SEED: Kind = integer(0, u32::MAX as i64);
 
 /// All keys, in the order of the documentation. Parameters of registry entries (`[accel.NAME]` and
@@ -200,6 +223,9 @@ pub const KEYS: &[Key] = &[
     key("camera", "target", Kind::Vector, None, "Point that projects to the centre of the image, scene units."),
     key("camera", "up", Kind::Vector, Some("[0, 1, 0]"), "Up direction; not parallel to the viewing direction."),
     key("camera", "fov", Kind::Number { min: 1.0, max: 179.0 }, Some("40"), "Vertical field of view, degrees."),
+    key("intersection", "triangle", Kind::Choice(TRIANGLE_TESTS), Some("\"moeller-trumbore\""), "Ray-triangle test of all structures and of the judge."),
+    key("intersection", "box_test", Kind::Choice(BOX_TESTS), Some("\"padded-16\""), "Ray-box test: reciprocal and pad. Hits are proven for `padded-16` alone; the others are there to be measured."),
+    key("intersection", "offset", Kind::Choice(RAY_OFFSETS), Some("\"integer\""), "How rays that leave a surface are moved off it by integrators."),
     key("exclude", "scene", Kind::Patterns(Axis::Scene), None, "Cells of these scenes …"),
     key("exclude", "accel", Kind::Patterns(Axis::Accel), None, "… with these structures …"),
     key("exclude", "sequence", Kind::Patterns(Axis::Sequence), None, "… these sequences …"),

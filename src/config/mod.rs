@@ -20,7 +20,9 @@ mod variants;
 
 pub use cells::{SamplerCell, StreamCell, StructureCell, TimeCell};
 pub use error::{ConfigError, Place, nearest};
-pub use experiment::{Axes, Discrepancy, Exclude, Experiment, Gate, Reference, SppRange, Timing};
+pub use experiment::{
+    Axes, Discrepancy, Exclude, Experiment, Gate, Reference, SppRange, Tests, Timing,
+};
 pub use hash::cell_hash;
 pub use keys::Axis;
 pub use pattern::Pattern;

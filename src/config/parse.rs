@@ -4,7 +4,7 @@ use super::check::{
     as_table, check_on_axis, check_sections, exclude_tables, parameter_tables, pattern_list,
 };
 use super::error::{ConfigError, Place};
-use super::experiment::{Axes, Discrepancy, Exclude, Experiment, Gate, Reference, Timing};
+use super::experiment::{Axes, Discrepancy, Exclude, Experiment, Gate, Reference, Tests, Timing};
 use super::keys::{Axis, KEYS, OPTIONAL_SECTIONS};
 use super::section::{Section, texts};
 use super::tree::{self, Item, Table, Value};
@@ -41,6 +41,7 @@ pub(super) fn parse(
         resolution: run.unsigned_pair("resolution")?,
         spp: run.exponents("spp")?,
         runtime_checks: run.flag("runtime_checks")?,
+        tests: reader.tests()?,
         camera: reader.camera()?,
         excludes: reader.excludes(&axes)?,
         axes,
@@ -321,6 +322,15 @@ impl<'t> Reader<'t> {
             return Err(section.not_allowed("max_warmup_ms", expected));
         }
         Ok(timing)
+    }
+
+    fn tests(&self) -> Result<Tests, ConfigError> {
+        let section = self.section("intersection")?;
+        Ok(Tests {
+            triangle: section.choice("triangle")?,
+            box_test: section.choice("box_test")?,
+            offset: section.choice("offset")?,
+        })
     }
 
     fn gate(&self) -> Result<Gate, ConfigError> {

@@ -7,6 +7,7 @@
 use super::GpuError;
 use super::diagnose;
 use crate::accel::Intersection;
+use crate::integrator::RayOffset;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use wesl::{BasicSourceMap, ModulePath, SourceMap, VirtualResolver, Wesl};
@@ -102,8 +103,9 @@ impl KernelLibrary {
     /// A module is missing, does not parse, or the result is not valid WGSL; the message names the
     /// source file and line.
     pub fn compose(&self, composition: &Composition) -> Result<ComposedKernel, GpuError> {
-        // Where nobody chose how rays meet triangles and boxes, the default does.
-        let composition = &Intersection::default().activate(composition.clone());
+        // Where nobody chose how rays meet triangles and boxes, and leave surfaces, the defaults do.
+        let composition = Intersection::default().activate(composition.clone());
+        let composition = &RayOffset::default().activate(composition);
         let mut resolver = VirtualResolver::new();
         let mut paths = BTreeMap::new();
         for (name, (path, text)) in &self.files {

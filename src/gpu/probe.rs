@@ -4,6 +4,7 @@ use super::compose::Composition;
 use super::dispatch::{Dispatch, groups_for};
 use super::pipeline::Bindings;
 use super::{Gpu, GpuError};
+use crate::accel::triangle::product_error;
 use serde::{Deserialize, Serialize};
 
 /// Whether the adapter computes like IEEE f32 on the host in the patterns that traversal uses.
@@ -15,6 +16,10 @@ pub struct ArithmeticProbe {
     pub exact_division: bool,
     /// `sqrt(a)` is correctly rounded.
     pub exact_sqrt: bool,
+    /// What rounding takes off a product can be computed exactly: see
+    /// [`crate::accel::triangle::product_error`].
+    #[serde(default)]
+    pub exact_products: bool,
 }
 
 impl ArithmeticProbe {
@@ -41,7 +46,7 @@ pub fn probe_arithmetic(gpu: &Gpu) -> Result<ArithmeticProbe, GpuError> {
     };
     let input: Vec<[f32; 4]> = (0..COUNT).map(|_| [next(), next(), next(), 0.0]).collect();
     let pipeline = gpu.pipeline(&Composition::new("common/probe"), true)?;
-    let output = gpu.zeroed("probe_out", u64::from(COUNT) * 16)?;
+    let output = gpu.zeroed("probe_out", u64::from(COUNT) * 32)?;
     let mut bindings = Bindings::new();
     bindings
         .buffer("probe_in", &gpu.storage("probe_in", &input)?)
@@ -51,7 +56,7 @@ pub fn probe_arithmetic(gpu: &Gpu) -> Result<ArithmeticProbe, GpuError> {
         bindings: &bindings,
         groups: groups_for(COUNT),
     })?;
-    let result: Vec<[f32; 4]> = gpu.read(&output)?;
+    let result: Vec<[f32; 8]> = gpu.read(&output)?;
     let all = |expected: fn(&[f32; 4]) -> f32, lane: usize| {
         input
             .iter()
@@ -62,5 +67,7 @@ pub fn probe_arithmetic(gpu: &Gpu) -> Result<ArithmeticProbe, GpuError> {
         unfused: all(|[a, b, c, _]| a * b + c, 0) && all(|[a, b, c, _]| a * b - c * a, 1),
         exact_division: all(|[a, b, ..]| a / b, 2),
         exact_sqrt: all(|[a, ..]| a.abs().sqrt(), 3),
+        exact_products: all(|[a, b, ..]| product_error(*a, *b, a * b), 4)
+            && all(|[_, b, c, _]| product_error(*b, *c, b * c), 5),
     })
 }

@@ -58,5 +58,7 @@ impl Frame {
             .u32("first_light", scene.first_light)
             .f32("light_power", scene.light_power)
             .f32("ao_radius", self.ao_radius)
+            .f32("transform_scale", scene.transform_error.scale)
+            .f32("transform_shift", scene.transform_error.shift)
     }
 }

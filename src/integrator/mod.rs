@@ -2,11 +2,13 @@
 
 mod frame;
 pub mod integrand;
+pub mod offset;
 mod render;
 mod tables;
 mod traced;
 
 pub use frame::Frame;
+pub use offset::RayOffset;
 pub use render::{RAY_COUNT_CLASSES, RenderJob, Renderer, Snapshot, with_sampler};
 pub use tables::{SceneBuffers, SceneFeatures};
 pub use traced::Traced;

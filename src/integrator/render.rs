@@ -68,7 +68,7 @@ fn composition(
     let kernel = scene
         .intersection
         .activate(Composition::new("integrator/render"));
-    let kernel = traced.compose(kernel);
+    let kernel = traced.compose(scene.offset.activate(kernel));
     let mut out = with_sampler(kernel, job.sampler)
         .with("integrator", job.integrator.kernel())
         .feature("ray_counts", ray_counts);

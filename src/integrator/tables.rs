@@ -1,5 +1,6 @@
 //! Scene buffers for shading: canonical triangles, materials, lights, textures.
 
+use super::offset::{RayOffset, TransformError};
 use crate::accel::{Intersection, TriangleSoup};
 use crate::gpu::{Bindings, Gpu, GpuError};
 use crate::scene::{MaterialKind, SceneData};
@@ -36,6 +37,10 @@ pub struct SceneBuffers {
     pub bindings: Bindings,
     /// How rays meet the triangles.
     pub intersection: Intersection,
+    /// Where rays that leave a surface start; integrators ask.
+    pub offset: RayOffset,
+    /// What instances add to the error of points.
+    pub transform_error: TransformError,
     /// What kernels must carry.
     pub features: SceneFeatures,
     /// Radiance of the environment.
@@ -84,6 +89,8 @@ impl SceneBuffers {
         Ok(Self {
             bindings,
             intersection: soup.intersection,
+            offset: RayOffset::default(),
+            transform_error: TransformError::of(soup),
             features: SceneFeatures {
                 textures: textured,
                 emitters: !lights.is_empty(),

@@ -268,6 +268,7 @@ fn structure_hash(world: &World, cell: &StructureCell) -> String {
     cell_hash(&[
         ("scene", &world.scene.hash),
         ("accel", &params),
+        ("intersection", &format!("{:?}", world.soup.intersection)),
         ("version", env!("CARGO_PKG_VERSION")),
     ])
 }

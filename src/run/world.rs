@@ -2,10 +2,10 @@
 
 use super::RunError;
 use super::session::Session;
-use crate::accel::TriangleSoup;
+use crate::accel::{Intersection, TriangleSoup};
 use crate::config::Variant;
 use crate::gpu::{ArithmeticProbe, Gpu};
-use crate::integrator::SceneBuffers;
+use crate::integrator::{RayOffset, SceneBuffers};
 use crate::measure::gate::Judge;
 use crate::measure::record::{Record, SceneRecord};
 use crate::scene::{self, Camera, LoadOptions, SceneData};
@@ -58,7 +58,24 @@ impl<'a> World<'a> {
             session.finish(cell);
         }
         session.say(format!("{variant}: checking the judge"));
-        let soup = session.clock.time("load", || TriangleSoup::new(&scene));
+        let tests = session.experiment.tests;
+        let chosen = Intersection::named(tests.triangle, tests.box_test);
+        let probe = session
+            .clock
+            .time("gate", || crate::gpu::probe_arithmetic(gpu));
+        let (intersection, offset) = match (&probe, chosen, RayOffset::named(tests.offset)) {
+            (Ok(probe), Ok(chosen), Some(offset)) => (chosen.kept_by(probe), offset),
+            (Err(error), ..) => return Ok(Err(error.to_string())),
+            (_, Err(error), _) => return Ok(Err(error)),
+            (.., None) => return Ok(Err(format!("no ray offset is called {}", tests.offset))),
+        };
+        let (intersection, reason) = intersection;
+        if let Some(reason) = reason {
+            session.say(reason);
+        }
+        let soup = session.clock.time("load", || {
+            TriangleSoup::new(&scene).intersecting(intersection)
+        });
         let uploaded = session
             .clock
             .time("load", || SceneBuffers::upload(gpu, &scene, &soup));
@@ -68,11 +85,9 @@ impl<'a> World<'a> {
         let judged = session.clock.time("judge", || {
             Judge::new(&scene, &soup, camera, &settings, u64::from(experiment.seed))
         });
-        let probe = session
-            .clock
-            .time("gate", || crate::gpu::probe_arithmetic(gpu));
         Ok((|| {
-            let buffers = uploaded.map_err(|e| e.to_string())?;
+            let mut buffers = uploaded.map_err(|e| e.to_string())?;
+            buffers.offset = offset;
             let judge = judged.map_err(|e| e.to_string())?;
             let probe = probe.map_err(|e| e.to_string())?;
             Ok(Self {

@@ -1,6 +1,7 @@
 //! World boxes against rays that only just hit: nothing that an object's triangles accept is culled.
 
 use super::super::bounds::Bounds;
+use super::super::intersection::Intersection;
 use super::super::ray::{Hit, NO_HIT, Ray};
 use super::super::triangle::{TriangleRecord, intersect_triangle};
 use super::instance::{enter_grown, level, object_ray};

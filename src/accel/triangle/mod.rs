@@ -15,10 +15,12 @@
 //! ray only grazed an edge of the triangle: no hit.
 
 mod baldwin_weber;
-pub(crate) mod compensated;
+mod compensated;
 mod moeller_trumbore;
 mod pluecker;
-pub(crate) mod watertight;
+pub(super) mod watertight;
+
+pub use compensated::product_error;
 
 use super::bounds::{Bounds, slabs};
 use super::intersection::Reciprocal;

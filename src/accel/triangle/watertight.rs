@@ -14,13 +14,13 @@ use super::{APART, Meeting, TRIANGLE_PAD, TriangleRecord};
 use crate::accel::ray::Ray;
 
 /// The axis along which the direction is longest.
-pub(super) fn longest(d: [f32; 3]) -> usize {
+pub fn longest(d: [f32; 3]) -> usize {
     let [x, y, z] = d.map(f32::abs);
     if z >= x.max(y) { 2 } else { usize::from(y > x) }
 }
 
 /// Axes turned so that `axis` comes last.
-pub(super) fn turned([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
+pub fn turned([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
     match axis {
         0 => [y, z, x],
         1 => [z, x, y],
@@ -39,7 +39,7 @@ fn turned_back([x, y, z]: [f32; 3], axis: usize) -> [f32; 3] {
 
 /// A ray as vertices are sheared by it: x and y for each unit of z, and 1 / direction along z.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shear {
+pub struct Shear {
     axis: usize,
     origin: [f32; 3],
     x: f32,
@@ -48,7 +48,7 @@ pub(crate) struct Shear {
     pub scale: f32,
 }
 
-pub(crate) fn shear(ray: &Ray, inverse: &[f32; 3]) -> Shear {
+pub fn shear(ray: &Ray, inverse: &[f32; 3]) -> Shear {
     let axis = longest(ray.direction);
     let [dx, dy, _] = turned(ray.direction, axis);
     let [_, _, scale] = turned(*inverse, axis);
@@ -62,14 +62,14 @@ pub(crate) fn shear(ray: &Ray, inverse: &[f32; 3]) -> Shear {
 }
 
 /// A vertex relative to the ray: across it in x and y, along it in z.
-pub(crate) fn sheared(s: &Shear, vertex: [f32; 3]) -> [f32; 3] {
+pub fn sheared(s: &Shear, vertex: [f32; 3]) -> [f32; 3] {
     let relative = [0, 1, 2].map(|a| vertex[a] - s.origin[a]);
     let [x, y, z] = turned(relative, s.axis);
     [x - s.x * z, y - s.y * z, z]
 }
 
 /// Both products of the edge functions opposite to the three vertices.
-pub(crate) fn products([a, b, c]: [[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
+pub fn products([a, b, c]: [[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
     (
         [c[0] * b[1], a[0] * c[1], b[0] * a[1]],
         [c[1] * b[0], a[1] * c[0], b[1] * a[0]],

@@ -1,0 +1,437 @@
+//! Every ray–triangle test and ray offset: kernel and twin to the bit, structures equal to brute force,
+//! and closed surfaces from inside.
+
+mod common;
+
+use common::{Pcg, assert_same_hits, build, default_params, scenes};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use raystone::accel::triangle::{TriangleRecord, TriangleTest, intersect_triangle};
+use raystone::accel::{AccelKind, BoxTest};
+use raystone::accel::{
+    AccelRegistry, BuildLog, BuiltBvh, Bvh, Counters, CpuTwin, Hit, Intersection, NO_HIT, Ray,
+    TriangleSoup,
+};
+use raystone::gpu::{Bindings, Composition, Dispatch, Gpu, KernelLibrary, groups_for};
+use raystone::integrator::RayOffset;
+use raystone::scene::Triangle;
+use std::path::Path;
+use std::sync::OnceLock;
+
+/// A device with the kernels of this test.
+fn gpu() -> &'static Gpu {
+    static GPU: OnceLock<Gpu> = OnceLock::new();
+    GPU.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/intersectors/kernels");
+        let library = KernelLibrary::default().with_folder(&folder);
+        common::open(library.expect("the kernels of this test"))
+    })
+}
+
+fn tests_of(triangle: TriangleTest) -> Intersection {
+    Intersection {
+        triangle,
+        ..Default::default()
+    }
+}
+
+fn ray(origin: Vec3, direction: Vec3) -> Ray {
+    Ray {
+        origin: origin.to_array(),
+        t_min: 0.0,
+        direction: direction.to_array(),
+        t_max: scenes::FAR,
+    }
+}
+
+/// A point of a triangle: a vertex, on an edge, inside, or beside it.
+fn target([a, b, c]: [Vec3; 3], rng: &mut Pcg) -> Vec3 {
+    let (u, v) = (rng.unit(), rng.unit());
+    match rng.below(6) {
+        0 => [a, b, c][rng.below(3) as usize],
+        1 => a + u * (b - a),
+        2 => b + u * (c - b),
+        3 => a + 2.0 * (u - 0.5) * (b - a) + 2.0 * v * (c - a),
+        _ => a + u.min(1.0 - v) * (b - a) + v.min(1.0 - u) * (c - a),
+    }
+}
+
+/// Rays and triangles of many scales and shapes, each ray aimed at its triangle.
+fn pairs(count: usize) -> (Vec<[Vec3; 3]>, Vec<Ray>) {
+    let mut rng = Pcg::new(17);
+    let mut triangles = Vec::new();
+    let mut rays = Vec::new();
+    for index in 0..count {
+        let scale = 10.0_f32.powi(rng.between(-6, 6));
+        let far = scale * 10.0_f32.powi(rng.between(-2, 4));
+        let point = |rng: &mut Pcg| Vec3::new(rng.signed(), rng.signed(), rng.signed());
+        let centre = far * point(&mut rng);
+        let mut triangle = [0, 1, 2].map(|_| centre + scale * point(&mut rng));
+        match index % 8 {
+            // Needles, triangles in coordinate planes, without area, on a lattice.
+            0 => triangle[2] = triangle[1] + 1e-5 * scale * point(&mut rng),
+            1 => {
+                let axis = rng.below(3) as usize;
+                let plane = triangle[0][axis];
+                triangle.iter_mut().for_each(|v| v[axis] = plane);
+            }
+            2 if rng.below(4) == 0 => triangle[1] = triangle[0],
+            3 => triangle = triangle.map(|v| (4.0 * v / scale).round() * scale * 0.25),
+            _ => {}
+        }
+        let aim = target(triangle, &mut rng);
+        let mut direction = scale * point(&mut rng);
+        let mut origin = aim - direction * rng.unit() * 8.0;
+        match rng.below(8) {
+            0 => {
+                let axis = rng.below(3) as usize;
+                direction = Vec3::ZERO * direction;
+                direction[axis] = if rng.below(2) == 0 { 1.0 } else { -1.0 };
+                origin = aim - direction * scale * rng.unit();
+            }
+            1 => direction[rng.below(3) as usize] = -0.0,
+            2 => origin = target(triangle, &mut rng),
+            3 => direction *= 1e-9,
+            _ => {}
+        }
+        triangles.push(triangle);
+        rays.push(ray(origin, direction));
+    }
+    (triangles, rays)
+}
+
+fn pairs_on_device(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
+    let gpu = gpu();
+    let kernel = soup
+        .intersection
+        .activate(Composition::new("intersectors/pairs"));
+    let pipeline = gpu.pipeline(&kernel, true).expect("a sound kernel");
+    let output = gpu.zeroed("hits", rays.len() as u64 * 16).expect("fits");
+    let mut bindings = Bindings::new();
+    let words = soup.words();
+    bindings
+        .buffer(
+            "triangles",
+            &gpu.storage("triangles", &words).expect("fits"),
+        )
+        .buffer("rays", &gpu.storage("rays", rays).expect("fits"))
+        .buffer("hits", &output);
+    gpu.run(&Dispatch {
+        pipeline: &pipeline,
+        bindings: &bindings,
+        groups: groups_for(rays.len() as u32),
+    })
+    .expect("runs");
+    gpu.read(&output).expect("reads")
+}
+
+#[test]
+fn kernel_and_twin_of_every_test_agree_to_the_bit_on_pairs() {
+    if !common::is_exact(gpu()) {
+        return;
+    }
+    let (triangles, rays) = pairs(120_000);
+    for triangle in TriangleTest::ALL {
+        let soup = scenes::soup(triangles.iter().copied()).intersecting(tests_of(triangle));
+        let closest = |(ray, record): (&Ray, &TriangleRecord)| {
+            let mut hit = Hit::miss(ray);
+            let inverse = soup.intersection.inverse(ray.direction);
+            intersect_triangle(record, ray, inverse, &mut hit);
+            hit
+        };
+        let expected: Vec<Hit> = rays.iter().zip(&soup.records).map(closest).collect();
+        let found = pairs_on_device(&soup, &rays);
+        assert_same_hits(triangle.name(), &rays, &expected, &found);
+        let hits = expected.iter().filter(|h| h.triangle != NO_HIT).count();
+        assert!(hits > 30_000, "{}: only {hits} hits", triangle.name());
+        // Negative control: the tests are not all the same.
+        if triangle != TriangleTest::default() {
+            let soup =
+                scenes::soup(triangles.iter().copied()).intersecting(Intersection::default());
+            let other = pairs_on_device(&soup, &rays);
+            let different = common::differences(&expected, &other).len();
+            assert!(different > 0, "{} is the default", triangle.name());
+        }
+    }
+}
+
+#[test]
+fn kernel_and_twin_of_every_offset_agree_to_the_bit() {
+    if !common::is_exact(gpu()) {
+        return;
+    }
+    let mut rng = Pcg::new(5);
+    let mut points = Vec::new();
+    for _ in 0..100_000 {
+        let scale = 10.0_f32.powi(rng.between(-6, 6));
+        let mut vector = |scale: f32| [rng.signed(), rng.signed(), rng.signed()].map(|x| x * scale);
+        let (p, n) = (vector(scale), Vec3::from(vector(1.0)).normalize_or(Vec3::X));
+        let error = vector(1e-6 * scale).map(f32::abs);
+        points.push([p, n.to_array(), error]);
+    }
+    let pad = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
+    let words: Vec<[f32; 4]> = points.iter().flatten().copied().map(pad).collect();
+    let gpu = gpu();
+    for offset in RayOffset::ALL {
+        let kernel = offset.activate(Composition::new("intersectors/offsets"));
+        let pipeline = gpu.pipeline(&kernel, true).expect("a sound kernel");
+        let output = gpu.zeroed("hits", points.len() as u64 * 16).expect("fits");
+        let mut bindings = Bindings::new();
+        bindings
+            .buffer("rays", &gpu.storage("rays", &words).expect("fits"))
+            .buffer("hits", &output);
+        gpu.run(&Dispatch {
+            pipeline: &pipeline,
+            bindings: &bindings,
+            groups: groups_for(points.len() as u32),
+        })
+        .expect("runs");
+        let found: Vec<[f32; 4]> = gpu.read(&output).expect("reads");
+        let mut moved = 0;
+        for ([p, n, error], found) in points.iter().zip(&found) {
+            let expected = offset.offset_point(*p, *n, *error);
+            let same = (0..3).all(|a| expected[a].to_bits() == found[a].to_bits());
+            assert!(
+                same,
+                "{}: {p:?} {n:?}: {expected:?} {found:?}",
+                offset.name()
+            );
+            moved += usize::from(expected != *p);
+        }
+        assert_eq!(offset == RayOffset::None, moved == 0, "{}", offset.name());
+    }
+}
+
+#[test]
+fn every_structure_equals_brute_force_with_every_test() {
+    let gpu = gpu();
+    let exact = common::is_exact(gpu);
+    let mut rng = Pcg::new(3);
+    let lattice = scenes::lattice_soup(&mut rng, 60, 6);
+    let rays = scenes::lattice_rays(&mut rng, 400, 6);
+    for triangle in TriangleTest::ALL {
+        let soup = lattice.clone().intersecting(tests_of(triangle));
+        let expected = common::brute_force(&soup, &rays);
+        assert!(expected.iter().any(|h| h.triangle != NO_HIT));
+        assert_same_hits(
+            "brute force in blocks",
+            &rays,
+            &expected,
+            &raystone::accel::brute_force_hits(&soup, &rays),
+        );
+        for kind in AccelRegistry::default().iter() {
+            let what = format!("{} with {}", kind.name(), triangle.name());
+            let built = build(kind, &soup, &default_params(&kind.parameters()));
+            if let Some(twin) = built.cpu_twin(&soup) {
+                let mut counters = Counters::default();
+                let found: Vec<Hit> = rays
+                    .iter()
+                    .map(|ray| twin.closest_hit(ray, &mut counters))
+                    .collect();
+                assert_same_hits(&format!("twin of {what}"), &rays, &expected, &found);
+            }
+            if exact {
+                let found = common::trace(gpu, &*built, &soup, &rays, &[]).hits;
+                assert_same_hits(&what, &rays, &expected, &found);
+            }
+        }
+    }
+}
+
+/// A closed surface of triangles whose corners are shared to the bit: a sphere of radius 2 over the
+/// faces of an octahedron, around `centre`.
+fn sphere(steps: i32, centre: DVec3) -> Vec<[Vec3; 3]> {
+    let vertex = |signs: [i32; 3], i: i32, j: i32| {
+        let lattice = [i, j, steps - i - j];
+        let direction = DVec3::from_array([0, 1, 2].map(|a| f64::from(lattice[a] * signs[a])));
+        (centre + 2.0 * direction.normalize()).as_vec3()
+    };
+    let mut out = Vec::new();
+    for octant in 0..8 {
+        let signs = [0, 1, 2].map(|a| 1 - 2 * (octant >> a & 1));
+        for i in 0..steps {
+            for j in 0..steps - i {
+                let corner = |di, dj| vertex(signs, i + di, j + dj);
+                out.push([corner(0, 0), corner(1, 0), corner(0, 1)]);
+                if i + j + 1 < steps {
+                    out.push([corner(1, 0), corner(1, 1), corner(0, 1)]);
+                }
+            }
+        }
+    }
+    out
+}
+
+/// A closed cube of side 4 around `centre`, each face a grid.
+fn cube(steps: i32, centre: DVec3) -> Vec<[Vec3; 3]> {
+    let mut out = Vec::new();
+    for face in 0..6 {
+        let (axis, side) = (face / 2, f64::from(face % 2 * 4 - 2));
+        let vertex = |i: i32, j: i32| {
+            let at = |k: i32| f64::from(k) * 4.0 / f64::from(steps) - 2.0;
+            let mut point = DVec3::ZERO;
+            (point[axis as usize], point[(axis as usize + 1) % 3]) = (side, at(i));
+            point[(axis as usize + 2) % 3] = at(j);
+            (centre + point).as_vec3()
+        };
+        for i in 0..steps {
+            for j in 0..steps {
+                let [a, b] = [vertex(i, j), vertex(i + 1, j)];
+                let [c, d] = [vertex(i + 1, j + 1), vertex(i, j + 1)];
+                if (i + j) % 2 == 0 {
+                    out.extend([[a, b, c], [a, c, d]]);
+                } else {
+                    out.extend([[a, b, d], [b, c, d]]);
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Rays from inside: in all directions, at vertices and at edges, along axes with zeros of both signs.
+fn inner_rays(triangles: &[[Vec3; 3]], centre: DVec3, count: usize) -> Vec<Ray> {
+    let one = |index: usize| {
+        let mut rng = Pcg::new(index as u64);
+        let point = |rng: &mut Pcg| Vec3::new(rng.signed(), rng.signed(), rng.signed());
+        let mut origin = (centre + 0.7 * point(&mut rng).as_dvec3()).as_vec3();
+        let triangle = triangles[rng.below(triangles.len() as u32) as usize];
+        let direction = match index % 4 {
+            0 => point(&mut rng),
+            1 => triangle[rng.below(3) as usize] - origin,
+            2 => triangle[0] + rng.unit() * (triangle[1] - triangle[0]) - origin,
+            _ => {
+                // From a coordinate of a vertex, so that the ray runs through vertices and along edges.
+                let axis = rng.below(3) as usize;
+                let other = (axis + 1 + rng.below(2) as usize) % 3;
+                let near = triangle[0][other] as f64 - centre[other];
+                if near.abs() < 1.0 {
+                    origin[other] = triangle[0][other];
+                }
+                let mut direction = Vec3::splat(if rng.below(2) == 0 { 0.0 } else { -0.0 });
+                direction[axis] = if rng.below(2) == 0 { 1.0 } else { -1.0 };
+                if rng.below(2) == 0 {
+                    direction[3 - axis - other] = rng.signed();
+                }
+                direction
+            }
+        };
+        ray(origin, direction)
+    };
+    (0..count).into_par_iter().map(one).collect()
+}
+
+/// Rays that leave a closed surface unseen.
+fn leaks(soup: &TriangleSoup, rays: &[Ray]) -> Vec<usize> {
+    let params = default_params(&Bvh.parameters());
+    let built = BuiltBvh::build(soup, &params, &mut BuildLog::default()).expect("a small scene");
+    let twin = built.twin(soup);
+    let leaks = |i: &usize| {
+        let hit = twin.closest_hit(&rays[*i], &mut Counters::default());
+        hit.triangle == NO_HIT
+    };
+    (0..rays.len()).into_par_iter().filter(leaks).collect()
+}
+
+const ORDINARY: DVec3 = DVec3::new(0.3, -0.2, 0.1);
+/// Where Embree's own test puts its meshes.
+const FAR_AWAY: DVec3 = DVec3::new(148_376.0, 1234.0, -223_423.0);
+
+fn closed_meshes() -> [(&'static str, DVec3, Vec<[Vec3; 3]>); 4] {
+    [
+        ("sphere", ORDINARY, sphere(40, ORDINARY)),
+        ("cube", ORDINARY, cube(16, ORDINARY)),
+        ("sphere far away", FAR_AWAY, sphere(40, FAR_AWAY)),
+        ("cube far away", FAR_AWAY, cube(16, FAR_AWAY)),
+    ]
+}
+
+#[test]
+fn closed_surfaces_are_watertight_and_another_test_leaks() {
+    let mut leaking = [0; TriangleTest::ALL.len()];
+    for (mesh, centre, triangles) in closed_meshes() {
+        let rays = inner_rays(&triangles, centre, 1_000_000);
+        for (index, triangle) in TriangleTest::ALL.into_iter().enumerate() {
+            let watertight = matches!(
+                triangle,
+                TriangleTest::Watertight | TriangleTest::Compensated
+            );
+            let rays = if watertight {
+                &rays[..]
+            } else {
+                &rays[..200_000]
+            };
+            let soup = scenes::soup(triangles.iter().copied()).intersecting(tests_of(triangle));
+            let lost = leaks(&soup, rays);
+            println!(
+                "{mesh}, {}: {} of {} rays leak {:?}",
+                triangle.name(),
+                lost.len(),
+                rays.len(),
+                lost.first().map(|&i| (i % 4, rays[i]))
+            );
+            leaking[index] += lost.len();
+            if watertight {
+                assert!(lost.is_empty(), "{mesh}, {}: leaks", triangle.name());
+            }
+        }
+    }
+    // Negative control.
+    assert!(leaking[0] > 0, "Möller–Trumbore never leaked: {leaking:?}");
+}
+
+#[test]
+fn less_padded_boxes_are_another_kernel_and_the_twins_follow() {
+    let gpu = gpu();
+    if !common::is_exact(gpu) {
+        return;
+    }
+    let triangles = sphere(8, ORDINARY);
+    let rays = inner_rays(&triangles, ORDINARY, 4000);
+    for (box_test, name, _) in BoxTest::ALL {
+        let tests = Intersection {
+            box_test,
+            ..Default::default()
+        };
+        let soup = scenes::soup(triangles.iter().copied()).intersecting(tests);
+        for kind in AccelRegistry::default().iter() {
+            // 0 · ∞ is no number that WGSL promises anything about.
+            if !box_test.finite {
+                continue;
+            }
+            let built = build(kind, &soup, &default_params(&kind.parameters()));
+            let Some(twin) = built.cpu_twin(&soup) else {
+                continue;
+            };
+            let mut counters = Counters::default();
+            let closest = |ray| twin.closest_hit(ray, &mut counters);
+            let expected: Vec<Hit> = rays.iter().map(closest).collect();
+            let found = common::trace(gpu, &*built, &soup, &rays, &[]).hits;
+            assert_same_hits(
+                &format!("{} with {name}", kind.name()),
+                &rays,
+                &expected,
+                &found,
+            );
+        }
+    }
+}
+
+#[test]
+fn baldwin_and_weber_read_three_more_vectors_a_triangle() {
+    let soup = scenes::soup([[Vec3::ZERO, Vec3::X, Vec3::Y]; 2]);
+    assert_eq!(soup.words().len(), 6);
+    let soup = soup.intersecting(tests_of(TriangleTest::BaldwinWeber));
+    assert_eq!(soup.words().len(), 12);
+    assert_eq!(soup.records[1].transformed, 9);
+    let record = TriangleRecord::new(
+        &Triangle {
+            vertices: [Vec3::ZERO, Vec3::X, Vec3::Y],
+        },
+        0,
+        0,
+    );
+    assert_eq!(record.transformed, 0);
+    assert_eq!(TriangleTest::BaldwinWeber.bytes(), 96);
+    assert_eq!(TriangleTest::Watertight.bytes(), 48);
+}
