@@ -16,6 +16,7 @@ mod run;
 mod stress;
 mod system;
 mod table;
+mod trace;
 mod verify;
 
 use clap::{Parser, Subcommand};
@@ -76,6 +77,8 @@ enum Command {
     Report(report::Report),
     #[command(after_help = EXIT_CODES)]
     Stress(stress::Stress),
+    #[command(after_help = EXIT_CODES)]
+    Trace(trace::Trace),
 }
 
 /// Reads the command line and does what it says; clap itself ends the program with 2 on bad usage.
@@ -90,6 +93,7 @@ pub fn main() -> ExitCode {
         Command::Discrepancy(command) => command.execute(),
         Command::Report(command) => command.execute(),
         Command::Stress(command) => command.execute(),
+        Command::Trace(command) => command.execute(),
     };
     done.unwrap_or_else(|failure| failure.tell())
 }

@@ -17,7 +17,8 @@ pub struct Stage<'a> {
     gpu: &'a Gpu,
     /// The triangles.
     pub soup: TriangleSoup,
-    buffers: SceneBuffers,
+    /// The same on the adapter.
+    pub buffers: SceneBuffers,
 }
 
 /// Answers with the error word of the kernels.

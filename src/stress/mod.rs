@@ -5,8 +5,10 @@
 //! shots at closed meshes ([`shots`]), the exact oracle judges ([`tally`]), and everything ends up as
 //! records ([`record`]), from which tables and the page of the report derive.
 
+pub mod axes;
 pub mod bench;
 pub mod case;
+pub mod explain;
 pub mod families;
 pub mod place;
 pub mod record;
@@ -104,6 +106,9 @@ pub enum StressError {
     /// The adapter.
     #[error(transparent)]
     Gpu(#[from] GpuError),
+    /// A tree that the suite itself needs.
+    #[error("a tree of the suite is not built: {0}")]
+    Build(String),
     /// A name that nothing has.
     #[error("unknown {what} `{name}`; there are: {known}")]
     Unknown {
@@ -142,6 +147,11 @@ pub fn run(
     records.extend(suite.cells(progress)?);
     if settings.shots > 0 {
         records.extend(suite.shots(progress)?);
+    }
+    if settings.families.is_empty() {
+        records.extend(suite.box_tests(progress)?);
+        records.extend(suite.offsets(progress)?);
+        records.extend(suite.costs(progress)?);
     }
     let targets = targets::targets(&records);
     records.extend(targets.into_iter().map(Record::Target));

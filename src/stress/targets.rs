@@ -1,7 +1,9 @@
 //! What the default configuration promises, and whether it holds here.
 
+use super::axes::smallest_sound_pad;
 use super::place::Place;
 use super::record::{CellRecord, CostRecord, Record, ShotsRecord, SuiteRecord, TargetRecord};
+use crate::accel::BoxTest;
 
 /// Misses that Embree's own test allows at the far position, as a share of the rays.
 const FAR_MISSES: f64 = 2e-5;
@@ -27,7 +29,9 @@ pub fn targets(records: &[Record]) -> Vec<TargetRecord> {
     });
     let mut targets = shot_targets(&shots, suite.shots);
     targets.extend(cell_targets(&cells));
-    targets.extend(cost.map(cost_target));
+    targets.extend(pad_target(records));
+    // Times of so few rays tell nothing.
+    targets.extend(cost.filter(|_| !suite.quick).map(cost_target));
     targets
 }
 
@@ -146,6 +150,20 @@ fn cell_targets(cells: &[&CellRecord]) -> Vec<TargetRecord> {
             slowdown,
         ),
     ]
+}
+
+fn pad_target(records: &[Record]) -> Option<TargetRecord> {
+    let is_box_test = |r: &Record| matches!(r, Record::BoxTest(_));
+    records.iter().any(is_box_test).then(|| {
+        let found = smallest_sound_pad(records).map(f64::from);
+        let found = found.unwrap_or(f64::MAX);
+        let limit = f64::from(BoxTest::DEFAULT_ULPS);
+        target(
+            "smallest pad of boxes that loses no hit here, ulp",
+            limit,
+            std::iter::once((found, String::new())),
+        )
+    })
 }
 
 fn cost_target(cost: &CostRecord) -> TargetRecord {
