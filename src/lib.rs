@@ -23,3 +23,4 @@ pub mod report;
 pub mod run;
 pub mod sampling;
 pub mod scene;
+pub mod stress;
