@@ -10,6 +10,7 @@ pub mod bench;
 pub mod case;
 pub mod explain;
 pub mod families;
+pub mod mutants;
 pub mod place;
 pub mod record;
 pub mod shapes;
