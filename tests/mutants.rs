@@ -34,6 +34,7 @@ fn run(names: &[&str]) -> (Report, Vec<String>) {
     let told = std::sync::Mutex::new(Vec::new());
     let note = |outcome: &Outcome| {
         let name = outcome.mutant.name.to_owned();
+        println!("{name}: {:?}, {:.0} ms", outcome.killed_by(), outcome.ms);
         told.lock().expect("no panic elsewhere").push(name);
     };
     let report = mutants::run(&options, &note).unwrap_or_else(|e| panic!("{e}"));

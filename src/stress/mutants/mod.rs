@@ -26,8 +26,8 @@ pub use table::mutants;
 use crate::accel::AccelError;
 use crate::gpu::{AdapterChoice, Gpu, GpuError, KernelLibrary, probe_arithmetic};
 use checks::Bench;
-use rayon::prelude::*;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 use thiserror::Error;
 use world::World;
@@ -141,20 +141,16 @@ pub fn run(options: &Options, progress: &(dyn Fn(&Outcome) + Sync)) -> Result<Re
         .map(Job::Control)
         .chain(selected.into_iter().map(Job::Mutant))
         .collect();
-    let done: Result<Vec<Done>, MutantError> = jobs
-        .into_par_iter()
-        .with_max_len(1)
-        .map(|job| match job {
-            Job::Control(subject) => control(options, &world, subject).map(Done::Control),
-            Job::Mutant(mutant) => {
-                let outcome = decide(options, &world, &mutant)?;
-                progress(&outcome);
-                Ok(Done::Mutant(outcome))
-            }
-        })
-        .collect();
+    let done = in_parallel(&jobs, |job| match job {
+        Job::Control(subject) => control(options, &world, *subject).map(Done::Control),
+        Job::Mutant(mutant) => {
+            let outcome = decide(options, &world, mutant)?;
+            progress(&outcome);
+            Ok(Done::Mutant(outcome))
+        }
+    })?;
     let mut report = Report::new(&world);
-    for one in done? {
+    for one in done {
         match one {
             Done::Control(outcome) => report.controls.push(outcome),
             Done::Mutant(outcome) => report.mutants.push(outcome),
@@ -163,6 +159,39 @@ pub fn run(options: &Options, progress: &(dyn Fn(&Outcome) + Sync)) -> Result<Re
     report.distrust_red_controls();
     report.seconds = start.elapsed().as_secs_f64();
     Ok(report)
+}
+
+/// Does all jobs on as many threads as there are, and returns the results in the order of the jobs.
+/// Not by rayon: builders use it, and a thread that waits for a builder's part would meanwhile begin
+/// another job, whose time would count for both.
+fn in_parallel<T: Sync, R: Send>(
+    jobs: &[T],
+    work: impl Fn(&T) -> Result<R, MutantError> + Sync,
+) -> Result<Vec<R>, MutantError> {
+    let next = AtomicUsize::new(0);
+    let one_thread = || {
+        let mut done = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(job) = jobs.get(index) else {
+                return Ok(done);
+            };
+            let result = work(job).inspect_err(|_| next.store(jobs.len(), Ordering::Relaxed))?;
+            done.push((index, result));
+        }
+    };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut done = Vec::with_capacity(jobs.len());
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..threads).map(|_| scope.spawn(one_thread)).collect();
+        for thread in threads {
+            let part = thread.join();
+            done.extend(part.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
+        }
+        Ok(())
+    })?;
+    done.sort_by_key(|(index, _)| *index);
+    Ok(done.into_iter().map(|(_, result)| result).collect())
 }
 
 enum Job {
@@ -254,7 +283,14 @@ fn decide(options: &Options, world: &World, mutant: &Mutant) -> Result<Outcome, 
         if !check.is_possible(exact) {
             continue;
         }
-        if let Some(evidence) = bench.carry_out(*check, &mutant.subject).map_err(failed)? {
+        let finding = match bench.carry_out(*check, &mutant.subject) {
+            // A kernel that does not come to its end is seen by whoever waits for it.
+            Err(CheckError::Gpu(e @ (GpuError::Timeout { .. } | GpuError::Lost(_)))) => {
+                Some(e.to_string())
+            }
+            other => other.map_err(failed)?,
+        };
+        if let Some(evidence) = finding {
             verdict = Verdict::Killed {
                 by: *check,
                 evidence,

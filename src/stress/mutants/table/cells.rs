@@ -25,14 +25,14 @@ pub(super) const MUTANTS: &[Mutant] = &[
     ),
     row(
         "dda-starts-at-the-origin",
-        "the first cell is that of the origin, clamped",
+        "the walk begins at the cell next to the origin: slower, and no other answer",
         text(
             "accel/uniform_grid",
             "in_cells(ray, enter)",
             "in_cells(ray, 0.0)",
         ),
         GRID,
-        Check::Lattice,
+        Check::Work,
     ),
     row(
         "cell-list-one-short",
@@ -118,12 +118,12 @@ pub(super) const MUTANTS: &[Mutant] = &[
         Check::Lattice,
     ),
     row(
-        "exit-plane-not-crossed",
-        "against an axis the walk stays in the box that it leaves",
+        "voxel-skipped",
+        "against an axis the walk enters the next box one voxel too deep",
         text(
             "accel/irregular_grid",
             "select(exit - 1, exit, forward)",
-            "exit",
+            "select(exit - 2, exit, forward)",
         ),
         IRREGULAR,
         Check::Lattice,

@@ -103,12 +103,12 @@ pub(super) const MUTANTS: &[Mutant] = &[
         Check::Work,
     ),
     row(
-        "leaf-of-three-cut",
-        "leaves of two and three triangles are cut to the lowest bit of their number",
+        "leaf-of-one",
+        "only the first triangle of a leaf is tested",
         text(
             "accel/cwbvh",
             "((triangles >> COUNT_SHIFT) & 3u)",
-            "((triangles >> COUNT_SHIFT) & 1u)",
+            "min((triangles >> COUNT_SHIFT) & 3u, 1u)",
         ),
         CWBVH,
         Check::Lattice,
