@@ -12,9 +12,12 @@ use raystone::accel::{
     AccelRegistry, BuildLog, BuiltBvh, Bvh, Counters, CpuTwin, Hit, Intersection, NO_HIT, Ray,
     TriangleSoup,
 };
+use raystone::config::{Gate, Params, Variant};
 use raystone::gpu::{Bindings, Composition, Dispatch, Gpu, KernelLibrary, groups_for};
-use raystone::integrator::RayOffset;
-use raystone::scene::Triangle;
+use raystone::integrator::{RayOffset, SceneBuffers, Traced};
+use raystone::measure::batch::{Batch, Query};
+use raystone::measure::rays::record_rays;
+use raystone::scene::{self, Camera, LoadOptions, Triangle};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -434,4 +437,91 @@ fn baldwin_and_weber_read_three_more_vectors_a_triangle() {
     assert_eq!(record.transformed, 0);
     assert_eq!(TriangleTest::BaldwinWeber.bytes(), 96);
     assert_eq!(TriangleTest::Watertight.bytes(), 48);
+}
+
+/// Seconds of processor time that this program took on all threads: the software driver's included.
+#[cfg(target_os = "linux")]
+fn processor_seconds() -> f64 {
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields = text.rsplit(") ").next().unwrap_or_default();
+    let ticks = fields.split(' ').skip(11).take(2);
+    ticks.filter_map(|t| t.parse::<f64>().ok()).sum::<f64>() / 100.0
+}
+
+/// Not a check: processor time of every test through the plain BVH on a software adapter, for each class
+/// of rays, as a multiple of the first test's. Rounds alternate, so that load from outside hits all alike.
+#[test]
+#[ignore = "a measurement of minutes"]
+#[cfg(target_os = "linux")]
+fn what_tests_cost_in_a_whole_traversal() {
+    const ROUNDS: usize = 7;
+    for name in [
+        "stanford-dragon/dragon_100k.obj",
+        "sponza-crytek/sponza.obj",
+    ] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../shared/scenes")
+            .join(name);
+        let variant = Variant {
+            name: path.display().to_string(),
+            params: Params::default(),
+            label: name.to_owned(),
+        };
+        let Ok(scene) = scene::load(&variant, &LoadOptions::default()) else {
+            println!("skipped: {} is not there", path.display());
+            continue;
+        };
+        let camera = scene
+            .camera
+            .unwrap_or_else(|| Camera::frame(&scene.bounds()));
+        let settings = Gate {
+            rays: 1 << 18,
+            brute_force_tests: 0,
+            oracle_rays: 0,
+            ao_length: 0.0,
+            offset: 0.0,
+        };
+        let params = default_params(&Bvh.parameters());
+        let soup = TriangleSoup::new(&scene);
+        let tree = BuiltBvh::build(&soup, &params, &mut BuildLog::default()).expect("a BVH");
+        let sets = record_rays(&scene, &soup, camera, &tree.twin(&soup), &settings, 1);
+        let prepared = TriangleTest::ALL.map(|test| {
+            let soup = soup.clone().intersecting(tests_of(test));
+            let tree = BuiltBvh::build(&soup, &params, &mut BuildLog::default()).expect("a BVH");
+            let buffers = SceneBuffers::upload(gpu(), &scene, &soup).expect("fits");
+            (buffers, Traced::upload(gpu(), &tree).expect("fits"))
+        });
+        for set in &sets {
+            let batches = prepared.each_ref().map(|(buffers, traced)| {
+                Batch::new(gpu(), buffers, traced, Query::of(set), &set.rays, false)
+                    .expect("compiles")
+            });
+            for batch in &batches {
+                batch.trace().expect("traces");
+            }
+            let mut ratios = [const { Vec::new() }; TriangleTest::ALL.len()];
+            let mut first_ns = Vec::new();
+            for _ in 0..ROUNDS {
+                let seconds = batches.each_ref().map(|batch| {
+                    let start = processor_seconds();
+                    for _ in 0..2 {
+                        batch.trace().expect("traces");
+                    }
+                    processor_seconds() - start
+                });
+                first_ns.push(seconds[0] * 5e8 / set.rays.len() as f64);
+                for (ratios, seconds_of_one) in ratios.iter_mut().zip(seconds) {
+                    ratios.push(seconds_of_one / seconds[0]);
+                }
+            }
+            first_ns.sort_by(f64::total_cmp);
+            print!("{name} {:?}: {:.0} ns;", set.class, first_ns[ROUNDS / 2]);
+            for (test, ratios) in TriangleTest::ALL.iter().zip(&mut ratios) {
+                ratios.sort_by(f64::total_cmp);
+                let [low, middle, high] = [1, ROUNDS / 2, ROUNDS - 2].map(|i| ratios[i]);
+                print!(" {} {middle:.3} [{low:.3}, {high:.3}]", test.name());
+            }
+            println!();
+        }
+    }
 }

@@ -85,10 +85,12 @@ pub(super) fn meet(triangle: &TriangleRecord, ray: &Ray) -> Meeting {
         return APART;
     }
     let t = (m.plane[2] - o[2] - m.plane[0] * o[0] - m.plane[1] * o[1]) / det;
-    let x = o[0] + t * d[0];
-    let y = o[1] + t * d[1];
-    let u = m.u[0] * x + m.u[1] * y + m.u[2];
-    let v = m.v[0] * x + m.v[1] * y + m.v[2];
+    // The transformed ray, and not the transformed point: compilers take apart what is nested.
+    let at = |row: [f32; 3]| {
+        let start = row[0] * o[0] + row[1] * o[1] + row[2];
+        start + t * (row[0] * d[0] + row[1] * d[1])
+    };
+    let (u, v) = (at(m.u), at(m.v));
     if !(u >= 0.0 && v >= 0.0 && u + v <= 1.0) {
         return APART;
     }

@@ -5,8 +5,8 @@
 //! an adapter computes otherwise, signs are as good as the watertight test's:
 //! [`crate::gpu::ArithmeticProbe::exact_products`] tells.
 
-use super::watertight::{products, shear, sheared};
-use super::{APART, Meeting, TriangleRecord, watertight};
+use super::watertight::{products, residual, shear, sheared};
+use super::{APART, Meeting, TriangleRecord};
 use crate::accel::ray::Ray;
 
 /// The upper half of a significand.
@@ -54,7 +54,7 @@ pub(super) fn allowance(
     inverse: &[f32; 3],
     found: &Meeting,
 ) -> [f32; 3] {
-    watertight::allowance(triangle, ray, inverse, found)
+    residual(triangle, ray, inverse, found.area)
 }
 
 #[cfg(test)]

@@ -100,11 +100,11 @@ pub(super) fn meet(triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> 
 /// the vertex) and of the vertices (a unit of the difference, up to seven of what is taken off by the
 /// shear where division errs by 2.5 ulp). Divided by the direction, that is how far the distance may lie
 /// outside the slab. [`TRIANGLE_PAD`] is eight units.
-pub(super) fn allowance(
+pub(super) fn residual(
     triangle: &TriangleRecord,
     ray: &Ray,
     inverse: &[f32; 3],
-    found: &Meeting,
+    area: f32,
 ) -> [f32; 3] {
     let s = shear(ray, inverse);
     let vertices = triangle.vertices().map(|v| sheared(&s, v));
@@ -116,9 +116,18 @@ pub(super) fn allowance(
     let weights = |i: usize| terms[0] * a[i] + terms[1] * b[i] + terms[2] * c[i];
     let place = |v: [f32; 3], i: usize| v[i] + 2.0 * slope[i] * v[2];
     let places = |i: usize| w[0] * place(a, i) + w[1] * place(b, i) + w[2] * place(c, i);
-    let across = |i: usize| (weights(i) + places(i)) / found.area * TRIANGLE_PAD;
+    let across = |i: usize| (weights(i) + places(i)) / area * TRIANGLE_PAD;
     // Along the ray the distance is an average: its own rounding alone counts.
-    let along = places(2) / found.area * TRIANGLE_PAD;
+    let along = places(2) / area * TRIANGLE_PAD;
     let errors = turned_back([across(0), across(1), along], s.axis);
     [0, 1, 2].map(|i| errors[i] * inverse[i].abs())
+}
+
+pub(super) fn allowance(
+    triangle: &TriangleRecord,
+    ray: &Ray,
+    inverse: &[f32; 3],
+    found: &Meeting,
+) -> [f32; 3] {
+    residual(triangle, ray, inverse, found.area)
 }
