@@ -20,6 +20,7 @@ pub(super) fn same_hits(bench: &Bench, name: &str, changes: Changes, cases: &[Ca
         unfused: bench.exact,
         exact_division: bench.exact,
         exact_sqrt: bench.exact,
+        exact_products: bench.exact,
     };
     for Case { stage, judge } in cases {
         let built = build(name, changes, &stage.soup)?;
