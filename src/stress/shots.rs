@@ -14,7 +14,7 @@ use crate::accel::{NO_HIT, Ray};
 use crate::config::{Params, Variant};
 use crate::integrator::Traced;
 use crate::oracle::{Side, exact_truths};
-use crate::scene::{LoadOptions, Triangle, load};
+use crate::scene::{Bounds, LoadOptions, Triangle, load};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -40,6 +40,8 @@ struct Target {
     name: &'static str,
     place: Place,
     mesh: Mesh,
+    /// What is aimed at: a plane ends, and past its border lies nothing.
+    aims: Mesh,
     origins: Vec<Vec3>,
     /// Rays from above go down, not anywhere.
     is_plane: bool,
@@ -69,18 +71,22 @@ impl Suite<'_> {
                 .map(|_| place.point(reach * random.in_cube()))
                 .collect()
         };
+        let sphere = shapes::sphere(BANDS, &place);
+        let plane = shapes::plane(CELLS, SIDE, &place);
         let mut targets = vec![
             Target {
                 name: "sphere",
                 place,
-                mesh: shapes::sphere(BANDS, &place),
+                aims: sphere.clone(),
+                mesh: sphere,
                 origins: inside(0.45 * RADIUS),
                 is_plane: false,
             },
             Target {
                 name: "plane",
                 place,
-                mesh: shapes::plane(CELLS, SIDE, &place),
+                aims: within_border(&plane),
+                mesh: plane,
                 origins: inside(0.2 * SIDE)
                     .iter()
                     .map(|p| *p + Vec3::Y * (0.3 * SIDE) as f32)
@@ -127,6 +133,7 @@ impl Suite<'_> {
         Ok(Target {
             name: "model",
             place,
+            aims: mesh.clone(),
             mesh,
             origins,
             is_plane: false,
@@ -237,7 +244,7 @@ impl Target {
 
     fn shot(&self, aim: usize, random: &mut Random) -> Ray {
         let origin = random.one_of(&self.origins);
-        let triangle = random.one_of(&self.mesh);
+        let triangle = random.one_of(&self.aims);
         match aim {
             0 if self.is_plane => towards(origin, random.on(triangle.vertices).as_vec3()),
             0 => ray(origin, random.direction().as_vec3()),
@@ -245,6 +252,18 @@ impl Target {
             _ => towards(origin, on_edge(&triangle, random)),
         }
     }
+}
+
+/// The triangles that do not touch the border of a level plane.
+fn within_border(plane: &[Triangle]) -> Mesh {
+    let bounds = Bounds::of(plane);
+    let is_inner = |v: &Vec3| {
+        [0, 2]
+            .iter()
+            .all(|&a| v[a] > bounds.min[a] && v[a] < bounds.max[a])
+    };
+    let inner = plane.iter().filter(|t| t.vertices.iter().all(is_inner));
+    inner.copied().collect()
 }
 
 /// Origins of those rays that leave the mesh an odd number of times, through insides only.
