@@ -55,6 +55,16 @@ const NO_TWIN: &[(&str, &str)] = &[
         "sampling/sampler_cost",
         "the loop over samples, for their cost",
     ),
+    (
+        "stress/conversion",
+        "judged in src/stress/numerics/conversion.rs",
+    ),
+    ("stress/energy", "judged in src/stress/numerics/energy.rs"),
+    (
+        "stress/mappings",
+        "judged in src/stress/numerics/mappings.rs",
+    ),
+    ("stress/sums", "judged in src/stress/numerics/sums.rs"),
     ("shading/hemisphere", "judged by images, not by a twin"),
     ("shading/light", "judged by images, not by a twin"),
     ("shading/material", "judged by images, not by a twin"),

@@ -78,14 +78,15 @@ impl Discrepancy {
         } else {
             self.file.display().to_string()
         };
-        let mut text = String::new();
-        let read = if from_stdin {
-            std::io::stdin().lock().read_to_string(&mut text)
+        let bytes = if from_stdin {
+            let mut bytes = Vec::new();
+            let read = std::io::stdin().lock().read_to_end(&mut bytes);
+            read.map(|_| bytes)
         } else {
-            std::fs::File::open(&self.file).and_then(|mut file| file.read_to_string(&mut text))
+            std::fs::read(&self.file)
         };
-        read.with_context(|| format!("cannot read {name}"))?;
-        let points = PointSet::parse(&text).map_err(|error| match error {
+        let bytes = bytes.with_context(|| format!("cannot read {name}"))?;
+        let points = PointSet::from_bytes(&bytes).map_err(|error| match error {
             DiscrepancyError::Line { line, reason } => anyhow!("{name}:{line}: {reason}"),
             error => anyhow!("{name}: {error}"),
         })?;

@@ -114,6 +114,18 @@ pub enum ConfigError {
         /// The repeated value.
         value: String,
     },
+    /// More variants or cells than anybody can want to run.
+    #[error("{at}: {what} make {count} or more, the limit is {limit}; list fewer values")]
+    TooMany {
+        /// Where.
+        at: Place,
+        /// What is multiplied.
+        what: String,
+        /// How many there would be, or a part of them.
+        count: usize,
+        /// How many there may be.
+        limit: usize,
+    },
     /// Parameters for an entry that the experiment does not use.
     #[error(
         "{at}: [{axis}.{name}] sets parameters, but `{name}` is not in axes.{axis} ({}); \
@@ -169,28 +181,36 @@ pub enum ConfigError {
     /// A sequence and a decorrelation that make no sense together.
     #[error("{at}: {reason}")]
     Refused {
-        /// Section.
-        at: &'static str,
+        /// File and section.
+        at: String,
         /// The pair, and why.
         reason: String,
     },
     /// Excludes and filters leave nothing.
-    #[error("nothing is left to run: {reason}")]
+    #[error("{file}: nothing is left to run: {reason}")]
     NothingLeft {
+        /// The experiment file.
+        file: String,
         /// What removed the last cell.
         reason: String,
     },
 }
+
+/// Characters of names that are compared: the time and the memory that it takes are their product.
+const COMPARED: usize = 64;
 
 /// The known name nearest to `name`, if any are known.
 ///
 /// Nearness is the normalised Damerau–Levenshtein similarity; a name that contains the other one
 /// counts as a near one, so that `grid` finds `uniform-grid`.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let name = name.to_lowercase();
+    let beginning = |text: &str| text.chars().take(COMPARED).collect::<String>();
+    let name = beginning(name).to_lowercase();
     let score = |candidate: &str| {
-        let contained = name.len() >= 3 && (candidate.contains(&name) || name.contains(candidate));
-        strsim::normalized_damerau_levenshtein(&name, candidate) + if contained { 0.5 } else { 0.0 }
+        let candidate = beginning(candidate);
+        let contained = name.len() >= 3 && (candidate.contains(&name) || name.contains(&candidate));
+        strsim::normalized_damerau_levenshtein(&name, &candidate)
+            + if contained { 0.5 } else { 0.0 }
     };
     known
         .into_iter()

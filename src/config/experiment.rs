@@ -197,11 +197,22 @@ impl Experiment {
         overrides: &[String],
         catalogue: &Catalogue,
     ) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Read {
+        let bytes = std::fs::read(path).map_err(|source| ConfigError::Read {
             path: path.to_owned(),
             source,
         })?;
-        Self::parse(&text, &path.display().to_string(), overrides, catalogue)
+        let file = path.display().to_string();
+        let text = std::str::from_utf8(&bytes).map_err(|error| ConfigError::Syntax {
+            at: Place::File {
+                file: file.as_str().into(),
+                line: 1 + bytes[..error.valid_up_to()]
+                    .iter()
+                    .filter(|b| **b == b'\n')
+                    .count(),
+            },
+            message: "it is not UTF-8 text".to_owned(),
+        })?;
+        Self::parse(text, &file, overrides, catalogue)
     }
 
     /// The same as [`Experiment::load`] for a text; `file` is what messages call it.

@@ -191,7 +191,9 @@ impl<'t> Reader<'t> {
     fn axis(&self, axis: Axis) -> Result<Vec<Variant>, ConfigError> {
         let axes = self.section("axes")?;
         let key = format!("axes.{axis}");
-        let names = texts(&key, axes.item(axis.name())?)?;
+        let list = axes.item(axis.name())?;
+        let names = texts(&key, list)?;
+        variants::check_count(axis, list, names.len())?;
         let empty = Table::new();
         let parameters = match self.tree.get(axis.name()) {
             Some(item) => as_table(item, axis.name(), "sections")?,
@@ -220,6 +222,7 @@ impl<'t> Reader<'t> {
                         variants.push(variant);
                     }
                 }
+                variants::check_count(axis, item, variants.len())?;
             }
         }
         let replaced = matches!(axes.place(axis.name()), Place::Override(_));

@@ -5,6 +5,7 @@
 //! for every full cell, at few samples per pixel. The plan counts what this saves.
 
 use super::cells::{SamplerCell, StreamCell, StructureCell, TimeCell};
+use super::error::Place;
 use super::experiment::{Axes, Exclude, Experiment};
 use super::keys::Axis;
 use super::pattern::Pattern;
@@ -62,11 +63,12 @@ impl Plan {
         let reference = &experiment.reference;
         if let Err(reason) = is_randomised(&reference.sequence, &reference.decorrelation) {
             return Err(ConfigError::Refused {
-                at: "[reference]",
+                at: format!("{}: [reference]", experiment.source),
                 reason,
             });
         }
         let axes = &experiment.axes;
+        check_size(experiment)?;
         let filter = Filter::parse(only, axes)?;
         let full: Vec<_> = product(axes, &Axis::ALL);
         let mut skipped = Vec::new();
@@ -118,12 +120,14 @@ impl Plan {
             .retain(|scene| plan.structures.iter().any(|cell| cell.scene == *scene));
         if let (true, Some(first)) = (plan.times.is_empty(), refused.first()) {
             return Err(ConfigError::NothingLeft {
+                file: experiment.source.clone(),
                 reason: first.reason.clone(),
             });
         }
         plan.skipped.extend(refused);
         if plan.structures.is_empty() {
             return Err(ConfigError::NothingLeft {
+                file: experiment.source.clone(),
                 reason: format!(
                     "the excludes{} leave no scene with a structure",
                     if only.is_empty() { "" } else { " and --only" }
@@ -184,6 +188,26 @@ impl Plan {
             self.renders_planned, self.renders_full_product
         )
     }
+}
+
+/// Cells of the full product, before anything is left out.
+const MAX_CELLS: usize = 1 << 20;
+
+fn check_size(experiment: &Experiment) -> Result<(), ConfigError> {
+    let lengths = Axis::ALL.map(|axis| experiment.axes.variants(axis).len());
+    let cells = lengths.into_iter().fold(1, usize::saturating_mul);
+    if cells <= MAX_CELLS {
+        return Ok(());
+    }
+    Err(ConfigError::TooMany {
+        at: Place::File {
+            file: experiment.source.as_str().into(),
+            line: 1,
+        },
+        what: "the cells of all axes".to_owned(),
+        count: cells,
+        limit: MAX_CELLS,
+    })
 }
 
 const SAMPLER_AXES: [Axis; 4] = [

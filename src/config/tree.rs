@@ -61,9 +61,10 @@ impl Value {
 /// Parses a file's text; `file` is its name in messages.
 pub(super) fn parse_file(text: &str, file: &str) -> Result<Table, ConfigError> {
     let file: Arc<str> = file.into();
+    let ends: Vec<usize> = text.match_indices('\n').map(|(at, _)| at).collect();
     let place = |offset: usize| Place::File {
         file: file.clone(),
-        line: 1 + text.bytes().take(offset).filter(|&b| b == b'\n').count(),
+        line: 1 + ends.partition_point(|end| *end < offset),
     };
     let table = DeTable::parse(text).map_err(|error| ConfigError::Syntax {
         at: place(error.span().map_or(0, |span| span.start)),

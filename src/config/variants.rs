@@ -123,6 +123,7 @@ pub(super) fn expand(
         };
         let key = format!("{axis}.{}.{}", entry.name, parameter.name);
         let values = values(&key, item, parameter)?;
+        check_count(axis, item, products.len().saturating_mul(values.len()))?;
         products = products
             .iter()
             .flat_map(|product| {
@@ -135,6 +136,22 @@ pub(super) fn expand(
             .collect();
     }
     Ok(products.into_iter().map(|set| entry.variant(set)).collect())
+}
+
+/// Variants that one axis may have.
+const MAX_VARIANTS: usize = 1024;
+
+/// Refuses more variants of an axis than it may have; `item` is what asks for them.
+pub(super) fn check_count(axis: Axis, item: &Item, count: usize) -> Result<(), ConfigError> {
+    if count <= MAX_VARIANTS {
+        return Ok(());
+    }
+    Err(ConfigError::TooMany {
+        at: item.at.clone(),
+        what: format!("the variants on the axis {axis}"),
+        count,
+        limit: MAX_VARIANTS,
+    })
 }
 
 /// The values that an experiment gives to one parameter: one, or a list of different ones.

@@ -76,6 +76,21 @@ impl PointSet {
         Self::new(dim, coordinates)
     }
 
+    /// The same as [`PointSet::parse`] for the bytes of a file.
+    ///
+    /// # Errors
+    /// As [`PointSet::parse`], and the first line that is not UTF-8.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, DiscrepancyError> {
+        let text = std::str::from_utf8(bytes).map_err(|error| {
+            let before = &bytes[..error.valid_up_to()];
+            DiscrepancyError::Line {
+                line: 1 + before.iter().filter(|byte| **byte == b'\n').count(),
+                reason: "it is not UTF-8 text".to_owned(),
+            }
+        })?;
+        Self::parse(text)
+    }
+
     /// Number of points.
     #[expect(clippy::len_without_is_empty, reason = "a set is never empty")]
     pub fn len(&self) -> usize {

@@ -512,15 +512,27 @@ fn extras(records: &[Record]) -> Vec<Table> {
             "tests a ray",
         ],
     );
+    let mut figures = Table::new(
+        "accumulation and sampling",
+        &["figure", "value", "alarm", ":unit", ":verdict", ":note"],
+    );
     for record in records {
         match record {
+            Record::Figure(f) => figures.rows.push(vec![
+                f.name.clone().into(),
+                format::number(f.value).into(),
+                format::optional(f.alarm).into(),
+                f.unit.clone().into(),
+                if f.passed { "ok" } else { "ALARM" }.into(),
+                f.note.clone().into(),
+            ]),
             Record::BoxTest(r) => boxes.rows.push(box_row(r)),
             Record::Offset(r) => offsets.rows.push(offset_row(r)),
             Record::Cost(r) => costs.rows.push(cost_row(r)),
             _ => {}
         }
     }
-    vec![boxes, offsets, costs]
+    vec![boxes, offsets, costs, figures]
 }
 
 fn box_row(r: &BoxTestRecord) -> Vec<Cell> {

@@ -1,8 +1,8 @@
 //! Gathers triangles from a loader and turns them into a checked [`SceneData`].
 
 use super::{
-    Assembly, Bounds, Camera, InstanceError, LoadReport, Material, MaterialKind, MaterialSource,
-    SceneData, SceneError, Texture, Transform, Triangle,
+    Assembly, Camera, InstanceError, LoadReport, Material, MaterialKind, MaterialSource, SceneData,
+    SceneError, Texture, Transform, Triangle,
 };
 use glam::{Vec2, Vec3};
 
@@ -76,6 +76,13 @@ impl SceneBuilder {
             keep_uvs,
             ..Self::default()
         }
+    }
+
+    /// Makes room for `more` triangles.
+    pub fn reserve(&mut self, more: usize) {
+        self.triangles.reserve(more);
+        self.material_ids.reserve(more);
+        self.uvs.reserve(if self.keep_uvs { more } else { 0 });
     }
 
     /// Adds a triangle without texture coordinates.
@@ -172,12 +179,16 @@ impl SceneBuilder {
                 reason,
             });
         }
-        let bounds = Bounds::of(&self.triangles);
-        let magnitude = bounds.min.abs().max(bounds.max.abs()).max_element();
-        if magnitude > MAX_COORDINATE {
+        let magnitude = |triangle: &Triangle| {
+            let [a, b, c] = triangle.vertices.map(Vec3::abs);
+            a.max(b).max(c).max_element()
+        };
+        let too_large = |triangle: &Triangle| magnitude(triangle) > MAX_COORDINATE;
+        if let Some(first) = self.triangles.iter().position(too_large) {
             return Err(SceneError::TooLarge {
                 name: name.to_owned(),
-                magnitude,
+                triangle: first,
+                magnitude: magnitude(&self.triangles[first]),
                 limit: MAX_COORDINATE,
             });
         }

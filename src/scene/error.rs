@@ -1,5 +1,7 @@
 //! What can go wrong between a scene's name and its triangles.
 
+use std::any::Any;
+use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
@@ -54,13 +56,15 @@ pub enum SceneError {
     },
     /// Coordinates so large that f32 arithmetic on them overflows.
     #[error(
-        "{name}: a coordinate of {magnitude:e} is beyond the limit of {limit:e} of f32 tracing; \
-         scale the model down"
+        "{name}: triangle {triangle} has a coordinate of {magnitude:e}, beyond the limit of \
+         {limit:e} of f32 tracing; scale the model down"
     )]
     TooLarge {
         /// The scene, as typed.
         name: String,
-        /// Largest absolute coordinate found.
+        /// The first such triangle, in the order of the file.
+        triangle: usize,
+        /// Its largest absolute coordinate.
         magnitude: f32,
         /// Largest allowed.
         limit: f32,
@@ -112,17 +116,44 @@ pub(super) fn open(path: &Path) -> Result<std::fs::File, SceneError> {
         path: path.to_owned(),
         source,
     };
-    let file = std::fs::File::open(path).map_err(read)?;
-    let meta = file.metadata().map_err(read)?;
-    if meta.is_dir() {
-        return Err(read(std::io::ErrorKind::IsADirectory.into()));
-    }
-    if meta.len() == 0 {
+    let (file, bytes) = open_regular(path).map_err(read)?;
+    if bytes == 0 {
         return Err(SceneError::Empty {
             path: path.to_owned(),
         });
     }
     Ok(file)
+}
+
+/// Opens a regular file, and tells its length in bytes. Folders are none, nor are devices and pipes,
+/// which may have no end.
+fn open_regular(path: &Path) -> std::io::Result<(std::fs::File, u64)> {
+    let meta = std::fs::metadata(path)?;
+    if meta.is_dir() {
+        return Err(std::io::ErrorKind::IsADirectory.into());
+    }
+    if !meta.is_file() {
+        return Err(std::io::Error::other("it is no regular file"));
+    }
+    Ok((std::fs::File::open(path)?, meta.len()))
+}
+
+/// The bytes of a regular file that a model names.
+pub(super) fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
+    let (mut file, length) = open_regular(path)?;
+    let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or(0));
+    file.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// What a third-party parser said when it panicked.
+pub(super) fn panic_text(payload: &(dyn Any + Send)) -> String {
+    let text = payload
+        .downcast_ref::<String>()
+        .map(String::as_str)
+        .or_else(|| payload.downcast_ref::<&str>().copied())
+        .unwrap_or("no message");
+    format!("the parser gave up: {text}")
 }
 
 /// Runs a loader built on third-party parsers, which may panic on malformed files, and turns a
@@ -132,15 +163,7 @@ pub(super) fn guarded<T>(
     load: impl FnOnce() -> Result<T, SceneError>,
 ) -> Result<T, SceneError> {
     catch_unwind(AssertUnwindSafe(load)).unwrap_or_else(|payload| {
-        let text = payload
-            .downcast_ref::<String>()
-            .map(String::as_str)
-            .or_else(|| payload.downcast_ref::<&str>().copied())
-            .unwrap_or("no message");
-        Err(SceneError::malformed(
-            path,
-            "",
-            format!("the parser gave up: {text}"),
-        ))
+        let problem = panic_text(payload.as_ref());
+        Err(SceneError::malformed(path, "", problem))
     })
 }

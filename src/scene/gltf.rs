@@ -2,7 +2,9 @@
 //! mesh, the scene also says which triangles are copies of which object.
 
 use super::builder::{Look, SceneBuilder};
-use super::error::{guarded, open};
+use super::error::{guarded, open, read_regular};
+use super::gltf_accessor::check_accessors;
+use super::gltf_container;
 use super::gltf_material::{self, TextureUse};
 use super::texture::decode_all;
 use super::{Camera, InstanceError, LoadOptions, SceneData, SceneError, Transform, Triangle};
@@ -10,7 +12,6 @@ use base64::Engine;
 use glam::{Mat4, Vec2, Vec3};
 use gltf::mesh::Mode;
 use std::borrow::Cow;
-use std::io::Read;
 use std::path::Path;
 
 /// Loads a glTF or GLB model: its default scene, with the first camera of it.
@@ -22,21 +23,38 @@ pub(super) fn load(
     name: &str,
     options: &LoadOptions,
 ) -> Result<SceneData, SceneError> {
-    let mut file = open(path)?;
-    let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes)
-        .map_err(|source| SceneError::Read {
-            path: path.to_owned(),
-            source,
-        })?;
+    open(path)?;
+    let bytes = read_regular(path).map_err(|source| SceneError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
     guarded(path, || {
-        let gltf = gltf::Gltf::from_slice(&bytes)
-            .map_err(|error| SceneError::malformed(path, "", error.to_string()))?;
+        let (json, blob) = gltf_container::split(&bytes).map_err(|(byte, problem)| {
+            SceneError::malformed(path, format!("byte {byte}"), problem)
+        })?;
+        let document = parse(json).map_err(|problem| SceneError::malformed(path, "", problem))?;
+        let blob = blob.map(<[u8]>::to_vec);
         drop(bytes);
-        let gltf::Gltf { document, blob } = gltf;
         let buffers = read_buffers(path, &document, blob)?;
         build(path, name, options, &document, &buffers)
     })
+}
+
+/// The validated document. The crate's validation looks up the accessors of attributes before it
+/// compares their indices with what there is, so that is done here.
+fn parse(json: &[u8]) -> Result<gltf::Document, String> {
+    let unchecked = gltf::Gltf::from_slice_without_validation(json).map_err(|e| e.to_string())?;
+    let root = unchecked.document.into_json();
+    for (m, mesh) in root.meshes.iter().enumerate() {
+        for (p, primitive) in mesh.primitives.iter().enumerate() {
+            let mut accessors = primitive.attributes.values().map(|index| index.value());
+            if let Some(missing) = accessors.find(|index| *index >= root.accessors.len()) {
+                let place = format!("meshes[{m}].primitives[{p}].attributes");
+                return Err(format!("{place}: there is no accessor {missing}"));
+            }
+        }
+    }
+    gltf::Document::from_json(root).map_err(|e| e.to_string())
 }
 
 fn build(
@@ -120,7 +138,7 @@ pub(super) fn read_uri(model: &Path, uri: &str) -> Result<Vec<u8>, String> {
             .map_err(|error| format!("the data URI cannot be decoded: {error}"));
     }
     let file = uri_file(model, uri);
-    std::fs::read(&file).map_err(|error| format!("{}: {error}", file.display()))
+    read_regular(&file).map_err(|error| format!("{}: {error}", file.display()))
 }
 
 /// The file a relative URI names, `%20` and the like decoded.
@@ -321,7 +339,11 @@ impl<'a> Geometry<'a> {
         self.deformed += usize::from(primitive.morph_targets().len() > 0);
         let buffers = self.buffers;
         let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
-        check_accessors(primitive)?;
+        // The file's materials, then one for primitives that name none.
+        let last = self.texture_uses.len() - 1;
+        let material = primitive.material().index().unwrap_or(last);
+        let texture_use = &self.texture_uses[material];
+        check_accessors(primitive, buffers, texture_use)?;
         let own: Vec<Vec3> = reader
             .read_positions()
             .ok_or("its positions are missing or outside their buffer")?
@@ -339,10 +361,7 @@ impl<'a> Geometry<'a> {
                 positions.len()
             ));
         }
-        // The file's materials, then one for primitives that name none.
-        let last = self.texture_uses.len() - 1;
-        let material = primitive.material().index().unwrap_or(last);
-        let uvs: Vec<Vec2> = match &self.texture_uses[material] {
+        let uvs: Vec<Vec2> = match texture_use {
             TextureUse::None => Vec::new(),
             TextureUse::Mapped { set, transform } => reader
                 .read_tex_coords(*set)
@@ -402,32 +421,4 @@ fn reason(error: &InstanceError) -> String {
         InstanceError::Singular { .. } => "its transform cannot be inverted".to_owned(),
         other => other.to_string(),
     }
-}
-
-/// What the crate's readers take for granted: types, and data behind every count.
-fn check_accessors(primitive: &gltf::Primitive<'_>) -> Result<(), String> {
-    use gltf::accessor::{DataType, Dimensions};
-    let with_data = |accessor: &gltf::Accessor<'_>, what: &str| {
-        if accessor.count() == 0 {
-            Err(format!("its {what} are empty"))
-        } else if accessor.view().is_none() {
-            Err(format!("its {what} have no buffer view"))
-        } else {
-            Ok(())
-        }
-    };
-    if let Some(positions) = primitive.get(&gltf::Semantic::Positions) {
-        with_data(&positions, "positions")?;
-        if (positions.dimensions(), positions.data_type()) != (Dimensions::Vec3, DataType::F32) {
-            return Err("its positions are not three 32-bit floats".to_owned());
-        }
-    }
-    if let Some(indices) = primitive.indices() {
-        with_data(&indices, "indices")?;
-        let integers = [DataType::U8, DataType::U16, DataType::U32];
-        if indices.dimensions() != Dimensions::Scalar || !integers.contains(&indices.data_type()) {
-            return Err("its indices are not unsigned integers".to_owned());
-        }
-    }
-    Ok(())
 }

@@ -10,6 +10,8 @@ mod camera;
 mod content;
 mod error;
 mod gltf;
+mod gltf_accessor;
+mod gltf_container;
 mod gltf_material;
 mod instances;
 mod mtl;

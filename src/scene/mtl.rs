@@ -1,10 +1,12 @@
 //! Material libraries (MTL) of OBJ files.
 
 use super::builder::DEFAULT_ALBEDO;
+use super::error::read_regular;
 use super::texture::{Encoded, ImageSource};
 use super::{Material, MaterialKind, MaterialSource};
 use glam::Vec3;
 use std::cell::RefCell;
+use std::collections::{HashMap, HashSet};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use tobj::{LoadError, MTLLoadResult};
@@ -21,6 +23,8 @@ pub(super) struct Library {
     folder: PathBuf,
     with_textures: bool,
     contents: RefCell<Contents>,
+    /// The libraries so far: each is read once, however often the model names it.
+    loaded: RefCell<HashSet<PathBuf>>,
 }
 
 /// What the libraries defined.
@@ -29,6 +33,8 @@ pub(super) struct Contents {
     pub materials: Vec<Material>,
     pub textures: Vec<ImageSource<'static>>,
     pub warnings: Vec<String>,
+    /// Places of the textures' paths in `textures`.
+    texture_ids: HashMap<PathBuf, u32>,
 }
 
 impl Library {
@@ -38,19 +44,24 @@ impl Library {
             folder: obj.parent().unwrap_or(Path::new("")).to_owned(),
             with_textures,
             contents: RefCell::default(),
+            loaded: RefCell::default(),
         }
     }
 
     /// Forgets everything: `tobj` starts again.
     pub fn forget(&self) {
         self.contents.take();
+        self.loaded.take();
     }
 
     /// Loads one library for `tobj`. A missing or broken one is a warning.
     pub fn load(&self, file: &Path) -> MTLLoadResult {
         let path = self.folder.join(file.to_string_lossy().replace('\\', "/"));
+        if !self.loaded.borrow_mut().insert(path.clone()) {
+            return Ok(Default::default());
+        }
         let mut contents = self.contents.borrow_mut();
-        let bytes = std::fs::read(&path).map_err(|error| {
+        let bytes = read_regular(&path).map_err(|error| {
             contents.warnings.push(format!(
                 "material library {}: {error}; its materials are drawn grey",
                 path.display()
@@ -119,15 +130,14 @@ impl Contents {
 
     /// Index of the texture in `path`, each file once.
     fn texture(&mut self, path: PathBuf) -> u32 {
-        let name = path.display().to_string();
-        let known = self.textures.iter().position(|t| t.name == name);
-        known.unwrap_or_else(|| {
+        let next = self.textures.len() as u32;
+        *self.texture_ids.entry(path).or_insert_with_key(|path| {
             self.textures.push(ImageSource {
-                name,
-                encoded: Encoded::File(path),
+                name: path.display().to_string(),
+                encoded: Encoded::File(path.clone()),
             });
-            self.textures.len() - 1
-        }) as u32
+            next
+        })
     }
 }
 

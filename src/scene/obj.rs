@@ -1,12 +1,13 @@
 //! Wavefront OBJ by `tobj`; materials are in [`super::mtl`].
 
 use super::builder::{DEFAULT_ALBEDO, Look, SceneBuilder};
-use super::error::{guarded, open};
+use super::error::{guarded, open, panic_text, read_regular};
 use super::texture::decode_all;
 use super::{LoadOptions, Material, SceneData, SceneError, mtl};
 use glam::{Vec2, Vec3};
 use std::fs::File;
-use std::io::{BufReader, Cursor};
+use std::io::{BufRead, BufReader, Cursor};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use tobj::LoadError;
 
@@ -36,24 +37,39 @@ pub(super) fn load(
 }
 
 fn parse(path: &Path, file: File, library: &mtl::Library) -> Result<Vec<tobj::Model>, SceneError> {
-    let load_mtl = |file: &Path| library.load(file);
-    let mut reader = BufReader::with_capacity(1 << 20, file);
-    let mut result = tobj::load_obj_buf(&mut reader, &OPTIONS, load_mtl);
-    if matches!(result, Err(LoadError::ReadError)) {
+    let mut reader = BufReader::with_capacity(1 << 16, file);
+    let mut result = read(&mut reader, library);
+    if matches!(result, Err(Failure::Refused(LoadError::ReadError))) {
         // Old exporters write names in Latin-1; the geometry is ASCII all the same.
         let text = lossy_text(path)?;
         library.forget();
-        result = tobj::load_obj_buf(&mut Cursor::new(text), &OPTIONS, load_mtl);
+        result = read(&mut Cursor::new(text), library);
     }
-    match result {
-        Ok((models, _)) => Ok(models),
-        Err(error) => {
-            let (place, problem) = match first_broken_line(&lossy_text(path)?) {
-                Some((line, problem)) => (format!("line {line}"), problem),
-                None => (String::new(), error.to_string()),
-            };
-            Err(SceneError::malformed(path, place, problem))
-        }
+    result.map_err(|failure| {
+        let (place, problem) = match lossy_text(path).map(|text| first_broken_line(&text)) {
+            Ok(Some((line, problem))) => (format!("line {line}"), problem),
+            _ => (String::new(), failure.to_string()),
+        };
+        SceneError::malformed(path, place, problem)
+    })
+}
+
+/// How `tobj` ends without a model.
+#[derive(Debug, thiserror::Error)]
+enum Failure {
+    #[error("{0}")]
+    Refused(LoadError),
+    /// It multiplies indices before it compares them with what there is.
+    #[error("{0}")]
+    Panicked(String),
+}
+
+fn read(source: &mut impl BufRead, library: &mtl::Library) -> Result<Vec<tobj::Model>, Failure> {
+    let load = || tobj::load_obj_buf(source, &OPTIONS, |file| library.load(file));
+    match catch_unwind(AssertUnwindSafe(load)) {
+        Ok(Ok((models, _))) => Ok(models),
+        Ok(Err(error)) => Err(Failure::Refused(error)),
+        Err(payload) => Err(Failure::Panicked(panic_text(payload.as_ref()))),
     }
 }
 
@@ -67,6 +83,7 @@ fn build(
         mut materials,
         textures,
         warnings,
+        ..
     } = library.into_contents();
     let count = models.iter().map(|m| m.mesh.indices.len() / 3).sum();
     let mut builder = SceneBuilder::new(!textures.is_empty(), count);
@@ -121,7 +138,7 @@ fn push_mesh(builder: &mut SceneBuilder, mesh: &tobj::Mesh, material: u32) {
 }
 
 fn lossy_text(path: &Path) -> Result<String, SceneError> {
-    let bytes = std::fs::read(path).map_err(|source| SceneError::Read {
+    let bytes = read_regular(path).map_err(|source| SceneError::Read {
         path: path.to_owned(),
         source,
     })?;
@@ -132,8 +149,9 @@ fn lossy_text(path: &Path) -> Result<String, SceneError> {
 /// `tobj` tells what is wrong, not where: reads the statements again, only after a failure, and
 /// returns the number (from 1) of the first line that no reader can accept.
 fn first_broken_line(text: &str) -> Option<(usize, String)> {
-    // Numbers of `v`, `vt`, `vn` so far.
+    // Numbers of `v`, `vt`, `vn` so far, and whether vertices have colours.
     let mut counts = [0_i64; 3];
+    let mut colored = None;
     for (number, line) in (1..).zip(text.lines()) {
         let mut words = line.split_whitespace();
         let keyword = words.next().unwrap_or("");
@@ -141,9 +159,23 @@ fn first_broken_line(text: &str) -> Option<(usize, String)> {
             "v" | "vt" | "vn" => {
                 let kind = ["v", "vt", "vn"].iter().position(|k| *k == keyword)?;
                 counts[kind] += 1;
-                vector_problem(keyword, words)
+                let has_color = words.clone().count() == 6;
+                let problem = vector_problem(keyword, words);
+                let mixed = keyword == "v" && *colored.get_or_insert(has_color) != has_color;
+                let mixed = mixed.then(|| "some vertices have a colour, others none".to_owned());
+                problem.or(mixed)
             }
-            "f" => words.find_map(|corner| corner_problem(corner, &counts)),
+            "f" | "l" => {
+                let problem = words
+                    .clone()
+                    .find_map(|corner| corner_problem(corner, &counts));
+                let bare = words
+                    .next()
+                    .is_none()
+                    .then(|| format!("`{keyword}` with no corners"));
+                problem.or(bare)
+            }
+            "usemtl" if words.next().is_none() => Some("`usemtl` with no name".to_owned()),
             _ => None,
         };
         if let Some(problem) = problem {
@@ -163,8 +195,15 @@ fn vector_problem<'a>(keyword: &str, words: impl Iterator<Item = &'a str>) -> Op
     if words.len() < least || !(allowed.is_empty() || allowed.contains(&words.len())) {
         return Some(format!("`{keyword}` with {} numbers", words.len()));
     }
-    let broken = words[..least].iter().find(|w| w.parse::<f32>().is_err())?;
-    Some(format!("`{broken}` is not a number"))
+    let read = if keyword == "v" { words.len() } else { least };
+    if let Some(broken) = words[..read].iter().find(|w| w.parse::<f32>().is_err()) {
+        return Some(format!("`{broken}` is not a number"));
+    }
+    // The fourth number of a vertex divides the others.
+    let weight = words
+        .get(3)
+        .filter(|_| keyword == "v" && words.len() == 4)?;
+    (weight.parse() == Ok(0.0_f32)).then(|| "a vertex of weight 0".to_owned())
 }
 
 fn corner_problem(corner: &str, counts: &[i64; 3]) -> Option<String> {

@@ -1,9 +1,12 @@
 //! Decoding of base-colour textures, all of a scene in parallel.
 
+use super::error::read_regular;
 use super::{LoadReport, Material, Texture};
+use image::ImageReader;
 use image::imageops::FilterType;
 use rayon::prelude::*;
 use std::borrow::Cow;
+use std::io::Cursor;
 use std::path::PathBuf;
 
 /// Where the encoded image lies.
@@ -69,15 +72,40 @@ pub(super) fn decode_all(
 
 type Size = (u32, u32);
 
+/// Bytes of texels that one byte of an image can stand for: deflate shrinks at most 1032 times, and
+/// a texel of four bytes may take one.
+const MOST_TEXEL_BYTES: u64 = 4 * 1032;
+
+/// Bytes of texels that are always allowed.
+const FREE_TEXEL_BYTES: u64 = 1 << 20;
+
+/// Refuses an image that announces more texels than its bytes can hold, before there is memory for
+/// them.
+fn check_size(bytes: &[u8]) -> Result<(), String> {
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let reader = reader.map_err(|e| e.to_string())?;
+    let (width, height) = reader.into_dimensions().map_err(|e| e.to_string())?;
+    let needed = 4 * u64::from(width) * u64::from(height);
+    let most = FREE_TEXEL_BYTES.max(MOST_TEXEL_BYTES * bytes.len() as u64);
+    if needed > most {
+        let length = bytes.len();
+        return Err(format!(
+            "{width}x{height} texels cannot be in {length} bytes"
+        ));
+    }
+    Ok(())
+}
+
 /// The texture, and its size in the file if that was larger.
 fn decode(source: &ImageSource<'_>, max_size: u32) -> Result<(Texture, Option<Size>), String> {
     let bytes = match &source.encoded {
         Encoded::File(path) => {
-            Cow::Owned(std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?)
+            Cow::Owned(read_regular(path).map_err(|e| format!("{}: {e}", path.display()))?)
         }
         Encoded::Memory(bytes) => Cow::Borrowed(bytes.as_ref()),
         Encoded::Missing(why) => return Err(why.clone()),
     };
+    check_size(&bytes)?;
     let image = image::load_from_memory(&bytes).map_err(|e| e.to_string())?;
     let size = (image.width(), image.height());
     let larger = size.0 > max_size || size.1 > max_size;

@@ -11,6 +11,7 @@ pub mod case;
 pub mod explain;
 pub mod families;
 pub mod mutants;
+pub mod numerics;
 pub mod place;
 pub mod record;
 pub mod shapes;
@@ -107,6 +108,9 @@ pub enum StressError {
     /// The adapter.
     #[error(transparent)]
     Gpu(#[from] GpuError),
+    /// The figures of accumulation and sampling.
+    #[error(transparent)]
+    Numerics(#[from] numerics::NumericsError),
     /// A tree that the suite itself needs.
     #[error("a tree of the suite is not built: {0}")]
     Build(String),
@@ -153,6 +157,9 @@ pub fn run(
         records.extend(suite.box_tests(progress)?);
         records.extend(suite.offsets(progress)?);
         records.extend(suite.costs(progress)?);
+        progress("accumulation and sampling");
+        let figures = numerics::run(gpu, settings.quick)?;
+        records.extend(figures.into_iter().map(Record::Figure));
     }
     let targets = targets::targets(&records);
     records.extend(targets.into_iter().map(Record::Target));

@@ -37,6 +37,8 @@ pub enum Record {
     Offset(OffsetRecord),
     /// Cost of a triangle test.
     Cost(CostRecord),
+    /// Accumulation and sampling.
+    Figure(super::numerics::Figure),
     /// A target of the default configuration.
     Target(TargetRecord),
     /// What was not done, and why.

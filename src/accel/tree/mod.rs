@@ -55,8 +55,8 @@ pub enum NodeKind {
     },
 }
 
-/// The end-point overlap of a record is taken of so many triangles at most.
-const EPO_TRIANGLES: usize = 32_768;
+/// Boxes visited for the end-point overlap of a record, about: some tenths of a second.
+const EPO_VISITS: u64 = 4_000_000;
 
 /// A binary tree over triangles; node 0 is the root, nodes are in depth-first order.
 #[derive(Debug, Clone, Default)]
@@ -96,10 +96,10 @@ impl Tree {
         }))
     }
 
-    /// Takes the end-point overlap ([`Tree::epo`]) for the record, of every triangle where they are few
-    /// and of a part where they are many. No part of a build, and not timed.
+    /// Takes the end-point overlap ([`Tree::epo`]) for the record, of every triangle where that is quick and of
+    /// a part else. No part of a build, and not timed.
     pub fn note_epo(&mut self, soup: &TriangleSoup) {
-        self.epo = Some(self.epo(soup, EPO_TRIANGLES));
+        self.epo = Some(self.epo(soup, EPO_VISITS));
     }
 
     /// The tree of the builder alone.

@@ -1,0 +1,98 @@
+//! Checks of glTF accessors. The crate's readers take for granted that types fit, that strides are
+//! wide enough and that offsets and counts stay within their buffers, and panic where they do not.
+
+use super::gltf_material::TextureUse;
+use gltf::Semantic;
+use gltf::accessor::{Accessor, DataType, Dimensions};
+use gltf::buffer::View;
+
+/// Checks everything that is going to be read of a primitive.
+///
+/// # Errors
+/// What cannot be read, and why.
+pub(super) fn check_accessors(
+    primitive: &gltf::Primitive<'_>,
+    buffers: &[Vec<u8>],
+    texture_use: &TextureUse,
+) -> Result<(), String> {
+    if let Some(positions) = primitive.get(&Semantic::Positions) {
+        check_data(&positions, buffers).map_err(|p| format!("its positions {p}"))?;
+        if (positions.dimensions(), positions.data_type()) != (Dimensions::Vec3, DataType::F32) {
+            return Err("its positions are not three 32-bit floats".to_owned());
+        }
+    }
+    if let Some(indices) = primitive.indices() {
+        check_data(&indices, buffers).map_err(|p| format!("its indices {p}"))?;
+        let integers = [DataType::U8, DataType::U16, DataType::U32];
+        if indices.dimensions() != Dimensions::Scalar || !integers.contains(&indices.data_type()) {
+            return Err("its indices are not unsigned integers".to_owned());
+        }
+    }
+    let TextureUse::Mapped { set, .. } = texture_use else {
+        return Ok(());
+    };
+    if let Some(uvs) = primitive.get(&Semantic::TexCoords(*set)) {
+        check_data(&uvs, buffers).map_err(|p| format!("its texture coordinates {p}"))?;
+        let numbers = [DataType::U8, DataType::U16, DataType::F32];
+        if uvs.dimensions() != Dimensions::Vec2 || !numbers.contains(&uvs.data_type()) {
+            return Err("its texture coordinates are not pairs of numbers".to_owned());
+        }
+    }
+    Ok(())
+}
+
+/// Checks that all elements of an accessor, and those that replace some of them, are there.
+fn check_data(accessor: &Accessor<'_>, buffers: &[Vec<u8>]) -> Result<(), String> {
+    let (count, size) = (accessor.count(), accessor.size());
+    let view = accessor.view().ok_or("have no buffer view")?;
+    check_range(&view, accessor.offset(), count, size, buffers)?;
+    let Some(sparse) = accessor.sparse() else {
+        return Ok(());
+    };
+    let replaced = |problem: String| format!("are replaced by some that {problem}");
+    let (indices, values) = (sparse.indices(), sparse.values());
+    let index_size = indices.index_type().size();
+    let places = check_range(
+        &indices.view(),
+        indices.offset(),
+        sparse.count(),
+        index_size,
+        buffers,
+    );
+    places.map_err(replaced)?;
+    check_range(
+        &values.view(),
+        values.offset(),
+        sparse.count(),
+        size,
+        buffers,
+    )
+    .map_err(replaced)
+}
+
+/// Checks that `count` elements of `size` bytes lie in their view, and the view in its buffer.
+fn check_range(
+    view: &View<'_>,
+    offset: usize,
+    count: usize,
+    size: usize,
+    buffers: &[Vec<u8>],
+) -> Result<(), String> {
+    let gaps = count.checked_sub(1).ok_or("are empty")?;
+    let stride = view.stride().unwrap_or(size);
+    if stride < size {
+        return Err(format!("are {size} bytes wide, but {stride} bytes apart"));
+    }
+    let end = |start: usize, length: usize| start.checked_add(length);
+    let last = gaps.checked_mul(stride).and_then(|bytes| end(bytes, size));
+    let fits = last.and_then(|bytes| end(offset, bytes));
+    let buffer = buffers.get(view.buffer().index()).map_or(0, Vec::len);
+    let there = end(view.offset(), view.length()).is_some_and(|end| end <= buffer);
+    if there && fits.is_some_and(|end| end <= view.length()) {
+        return Ok(());
+    }
+    let view = view.index();
+    Err(format!(
+        "are outside their buffer ({count} elements in buffer view {view})"
+    ))
+}

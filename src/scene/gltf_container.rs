@@ -1,0 +1,66 @@
+//! The container of binary glTF (GLB): a header and chunks.
+
+const MAGIC: &[u8] = b"glTF";
+const HEADER_BYTES: usize = 12;
+const JSON: &[u8] = b"JSON";
+const BINARY: &[u8] = b"BIN\0";
+
+/// The JSON text, and the binary chunk if there is one. A file that is no container is all text.
+///
+/// # Errors
+/// The place of the fault (bytes from the beginning), and what it is.
+pub(super) fn split(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), (usize, String)> {
+    if !bytes.starts_with(MAGIC) {
+        return Ok((bytes, None));
+    }
+    let word = |at: usize| {
+        let word = bytes.get(at..).and_then(<[u8]>::first_chunk);
+        let ends_here = || {
+            (
+                bytes.len(),
+                "the file ends in the middle of a header".to_owned(),
+            )
+        };
+        word.map(|word| u32::from_le_bytes(*word) as usize)
+            .ok_or_else(ends_here)
+    };
+    let version = word(4)?;
+    if version != 2 {
+        return Err((
+            4,
+            format!("version {version} of binary glTF; only version 2 can be read"),
+        ));
+    }
+    let length = word(8)?;
+    if !(HEADER_BYTES..=bytes.len()).contains(&length) {
+        let there = bytes.len();
+        return Err((
+            8,
+            format!("{length} bytes are announced, {there} are there"),
+        ));
+    }
+    let (mut json, mut binary) = (None, None);
+    let mut at = HEADER_BYTES;
+    while at < length {
+        let chunk_length = word(at)?;
+        word(at + 4)?;
+        let (kind, rest) = bytes[at + 4..].split_at(4);
+        let chunk = rest.get(..chunk_length).ok_or_else(|| {
+            let there = rest.len();
+            (
+                at,
+                format!("a chunk of {chunk_length} bytes is announced, {there} are there"),
+            )
+        })?;
+        match kind {
+            JSON if json.is_none() && !chunk.starts_with(MAGIC) => json = Some(chunk),
+            BINARY if json.is_some() && binary.is_none() => binary = Some(chunk),
+            // Other kinds are to be passed over, but the first must be the text.
+            _ if json.is_some() => {}
+            _ => return Err((at + 4, "the first chunk is not JSON text".to_owned())),
+        }
+        at += 8 + chunk_length;
+    }
+    let json = json.ok_or((at, "there is no chunk of JSON text".to_owned()))?;
+    Ok((json, binary))
+}

@@ -1,0 +1,87 @@
+//! Words to floats in [0, 1). Judges `to_unit` of `kernels/sampling/sampler.wesl` through
+//! `kernels/stress/conversion.wesl`.
+
+use super::{Figure, NumericsError, U, stage};
+use crate::gpu::{Bindings, Composition, Dispatch, Gpu, UniformValues, groups_for};
+use crate::integrator::with_sampler;
+
+/// Words of one dispatch.
+const PART: u32 = 1 << 22;
+/// Words whose naive conversion is looked at: the largest ones.
+const TOP: u32 = 512;
+
+/// Whether every draw keeps its upper 24 bits and none is 1, over all values of these bits, or over
+/// every 16th of them where it has to be quick.
+pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
+    let stride: u32 = if quick { 1 << 12 } else { 1 << 8 };
+    let words = u32::MAX / stride + 1;
+    let (mut wrong, mut largest) = (0_u64, 0.0_f64);
+    for first in (0..words).step_by(PART as usize) {
+        let count = PART.min(words - first);
+        // The lower bits are all ones: rounding to nearest would carry.
+        let word = |index: u32| (first + index) * stride + (stride - 1);
+        for (index, [unit, _]) in (0..).zip(convert(gpu, word(0), stride, count)?) {
+            let exact = f64::from(word(index) >> 8) * U;
+            wrong += u64::from(f64::from(unit) != exact);
+            largest = largest.max(f64::from(unit));
+        }
+    }
+    let top = convert(gpu, u32::MAX - (TOP - 1), 1, TOP)?;
+    let ones = |column: usize| top.iter().filter(|pair| pair[column] >= 1.0).count();
+    let tried = format!("of {words} words with lower bits of ones");
+    Ok(vec![
+        Figure::checked(
+            "draws that lose one of 24 bits",
+            wrong as f64,
+            0.0,
+            "words",
+            tried,
+        ),
+        Figure::checked(
+            "largest draw",
+            largest,
+            1.0 - U,
+            "",
+            "1 would be outside of all tables",
+        ),
+        Figure::checked(
+            "draws that are 1",
+            ones(0) as f64,
+            0.0,
+            "words",
+            format!("of the {TOP} largest words"),
+        ),
+        Figure::shown(
+            "words that f32(x) · 2⁻³² makes 1",
+            ones(1) as f64,
+            "words",
+            format!(
+                "of the {TOP} largest words, 128 in IEEE arithmetic: why draws take the upper bits"
+            ),
+        ),
+    ])
+}
+
+/// The draw and the naive conversion of `count` words from `first` on.
+fn convert(gpu: &Gpu, first: u32, stride: u32, count: u32) -> Result<Vec<[f32; 2]>, NumericsError> {
+    let sampler = stage::sampler("pixel-hash", 1)?;
+    let kernel = with_sampler(Composition::new("stress/conversion"), &sampler);
+    let pipeline = gpu.pipeline(&kernel, true)?;
+    let units = gpu.zeroed("units", u64::from(count) * 8)?;
+    let conversion = UniformValues::new()
+        .u32("first", first)
+        .u32("stride", stride)
+        .u32("count", count);
+    let mut bindings = Bindings::new();
+    bindings
+        .buffer("units", &units)
+        .uniform("conversion", conversion);
+    gpu.run(&Dispatch {
+        pipeline: &pipeline,
+        bindings: &bindings,
+        groups: groups_for(count),
+    })?;
+    let mut pairs: Vec<[f32; 2]> = gpu.read(&units)?;
+    pairs.truncate(count as usize);
+    Ok(pairs)
+}

@@ -1,0 +1,96 @@
+//! The same seed twice, and in other slices: the same bits. The hashes tell adapters apart.
+
+use super::stage::{self, Stage};
+use super::{Figure, NumericsError};
+use crate::gpu::Gpu;
+use crate::integrator::integrator;
+use crate::measure::image::Image;
+use crate::run::dump_stream;
+use crate::sampling::{Coordinate, dimensions};
+
+const SIZE: u32 = 48;
+const SPP: u32 = 8;
+const SEED: u32 = 5;
+/// Points of the stream.
+const POINTS: u32 = 1 << 16;
+
+/// Renders and draws everything twice.
+pub fn figures(gpu: &Gpu) -> Result<Vec<Figure>, NumericsError> {
+    let mut figures = image(gpu)?;
+    figures.push(stream(gpu)?);
+    Ok(figures)
+}
+
+fn image(gpu: &Gpu) -> Result<Vec<Figure>, NumericsError> {
+    let stage = Stage::new(gpu, &stage::scene("cornell-box")?)?;
+    let (kind, name) = ("integrator", "path");
+    let path = integrator(name).ok_or(NumericsError::Missing { kind, name })?;
+    let entries = crate::integrator::integrator_entries();
+    let params = stage::default_variant(kind, &entries, name)?.params;
+    let sampler = stage::sampler("sobol", path.dimensions(&params))?;
+    let render = |spps: &[u32], seed| -> Result<Image, NumericsError> {
+        let renderer = stage.renderer(gpu, path, &params, &sampler, SIZE)?;
+        let mut snapshots = renderer.render(spps, seed)?;
+        // `render` returns as many as it was asked for, and it was asked for one at least.
+        Ok(snapshots.swap_remove(spps.len() - 1).image)
+    };
+    let first = render(&[SPP], SEED)?;
+    let again = render(&[SPP], SEED)?;
+    let in_slices = render(&[1, 3, SPP], SEED)?;
+    let differing = |other: &Image| {
+        let bits = |p: &[f32; 3]| p.map(f32::to_bits);
+        let pairs = first.pixels.iter().zip(&other.pixels);
+        pairs.filter(|(a, b)| bits(a) != bits(b)).count() as f64
+    };
+    let note = format!(
+        "{SIZE} × {SIZE} pixels at {SPP} spp, hash {}",
+        hash(bytemuck::cast_slice(&first.pixels))
+    );
+    Ok(vec![
+        Figure::checked(
+            "pixels that differ when rendered again",
+            differing(&again),
+            0.0,
+            "pixels",
+            note,
+        ),
+        Figure::checked(
+            "pixels that differ when rendered in slices",
+            differing(&in_slices),
+            0.0,
+            "pixels",
+            "1 + 2 + 5 samples in the place of 8",
+        ),
+    ])
+}
+
+fn stream(gpu: &Gpu) -> Result<Figure, NumericsError> {
+    let sampler = stage::sampler("pixel-hash", dimensions::needed(6))?;
+    let coordinates: Vec<Coordinate> = (0..POINTS)
+        .map(|k| Coordinate {
+            pixel: k % 97,
+            sample: k / 8,
+            dimension: k % 8,
+            seed: SEED,
+        })
+        .collect();
+    let draw = || dump_stream(gpu, &sampler, &coordinates).map_err(NumericsError::Stream);
+    let (first, again) = (draw()?, draw()?);
+    let differing = first.iter().zip(&again).filter(|(a, b)| a != b).count();
+    let note = format!(
+        "{POINTS} words, hash {}",
+        hash(bytemuck::cast_slice(&first))
+    );
+    Ok(Figure::checked(
+        "drawn words that differ when drawn again",
+        differing as f64,
+        0.0,
+        "words",
+        note,
+    ))
+}
+
+/// The beginning of the BLAKE3 hash: the same on two adapters where all bits are.
+fn hash(bytes: &[u8]) -> String {
+    blake3::hash(bytes).to_hex()[..16].to_owned()
+}

@@ -1,0 +1,106 @@
+//! Accumulation and sampling: what f32 sums, conversions, digits, mappings and long paths lose on an
+//! adapter, each figure beside the level from which it is an alarm.
+//!
+//! What the figures mean, and where the levels come from: `docs/stress-numerics.md`.
+
+mod conversion;
+mod determinism;
+mod digits;
+mod energy;
+mod mappings;
+mod stage;
+mod sums;
+
+use crate::accel::AccelError;
+use crate::gpu::{Gpu, GpuError};
+use crate::sampling::SamplerError;
+use crate::scene::SceneError;
+use serde::{Deserialize, Serialize};
+
+/// One thing measured on an adapter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Figure {
+    /// What was measured.
+    pub name: String,
+    /// The figure: the larger, the worse.
+    pub value: f64,
+    /// The largest value that is no alarm; absent where the figure is only there for comparison.
+    pub alarm: Option<f64>,
+    /// Unit of `value` and `alarm`; empty for plain numbers.
+    pub unit: String,
+    /// Whether `value` is a number and not beyond `alarm`.
+    pub passed: bool,
+    /// What the reader should know: how often, where, what follows.
+    pub note: String,
+}
+
+impl Figure {
+    /// A figure that must not exceed `alarm`.
+    fn checked(name: &str, value: f64, alarm: f64, unit: &str, note: impl Into<String>) -> Self {
+        Self {
+            name: name.to_owned(),
+            value,
+            alarm: Some(alarm),
+            unit: unit.to_owned(),
+            passed: value <= alarm,
+            note: note.into(),
+        }
+    }
+
+    /// A figure for comparison.
+    fn shown(name: &str, value: f64, unit: &str, note: impl Into<String>) -> Self {
+        Self {
+            name: name.to_owned(),
+            value,
+            alarm: None,
+            unit: unit.to_owned(),
+            passed: !value.is_nan(),
+            note: note.into(),
+        }
+    }
+}
+
+/// Why the figures cannot be taken.
+#[derive(Debug, thiserror::Error)]
+pub enum NumericsError {
+    /// A kernel does not compile or run.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// A scene cannot be made.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A structure cannot be built.
+    #[error(transparent)]
+    Accel(#[from] AccelError),
+    /// A sampler cannot be made.
+    #[error(transparent)]
+    Sampler(#[from] SamplerError),
+    /// A stream of words cannot be drawn.
+    #[error("{0}")]
+    Stream(String),
+    /// A name that this module uses is not registered.
+    #[error("the numerical checks need {kind} `{name}`, which is not registered")]
+    Missing {
+        /// What it is.
+        kind: &'static str,
+        /// Its name.
+        name: &'static str,
+    },
+}
+
+/// Takes all figures on `gpu`; `quick` leaves out what takes long, at the cost of fewer numbers tried.
+///
+/// # Errors
+/// A kernel does not compile or run, or memory is short.
+pub fn run(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
+    let mut figures = sums::figures(gpu)?;
+    figures.extend(conversion::figures(gpu, quick)?);
+    figures.extend(digits::figures(gpu, quick)?);
+    figures.extend(mappings::figures(gpu, quick)?);
+    figures.extend(energy::figures(gpu, quick)?);
+    figures.extend(determinism::figures(gpu)?);
+    Ok(figures)
+}
+
+/// Half the distance from 1 to the next f32, the unit of rounding errors.
+const U: f64 = 1.0 / (1 << 24) as f64;

@@ -1,0 +1,96 @@
+//! Scenes and samplers for the figures.
+
+use super::NumericsError;
+use crate::accel::{AccelRegistry, BuildLog, TriangleSoup};
+use crate::config::{Entry, Params, Variant};
+use crate::gpu::Gpu;
+use crate::integrator::{Frame, Integrator, RenderJob, Renderer, SceneBuffers, Traced};
+use crate::sampling::{Demand, Sampler, SamplerRegistry};
+use crate::scene::{Camera, LoadOptions, SceneData, builtin_scenes, load};
+
+/// The entry called `name`, all parameters at their defaults.
+pub fn default_variant(
+    kind: &'static str,
+    entries: &[Entry],
+    name: &'static str,
+) -> Result<Variant, NumericsError> {
+    let found = entries.iter().find(|entry| entry.name == name);
+    let entry = found.ok_or(NumericsError::Missing { kind, name })?;
+    Ok(entry.default_variant())
+}
+
+/// A sequence without decorrelation, for so many dimensions.
+pub fn sampler(sequence: &'static str, dimensions: u32) -> Result<Sampler, NumericsError> {
+    let registry = SamplerRegistry::default();
+    let sequence = default_variant("sequence", &registry.sequence_entries(), sequence)?;
+    let none = default_variant("decorrelation", &registry.decorrelation_entries(), "none")?;
+    let demand = Demand {
+        samples: None,
+        dimensions,
+        width: None,
+    };
+    Ok(registry.sampler(&sequence, &none, &demand)?)
+}
+
+/// A built-in scene with default parameters.
+pub fn scene(name: &'static str) -> Result<SceneData, NumericsError> {
+    let variant = default_variant("scene", &builtin_scenes(), name)?;
+    Ok(load(&variant, &LoadOptions::default())?)
+}
+
+/// A scene on the device, traced through the plain BVH.
+pub struct Stage {
+    camera: Camera,
+    buffers: SceneBuffers,
+    traced: Traced,
+}
+
+impl Stage {
+    pub fn new(gpu: &Gpu, scene: &SceneData) -> Result<Self, NumericsError> {
+        let (kind, name) = ("accel", "bvh");
+        let registry = AccelRegistry::default();
+        let bvh = registry
+            .get(name)
+            .ok_or(NumericsError::Missing { kind, name })?;
+        let variant = default_variant(kind, &registry.entries(), name)?;
+        let soup = TriangleSoup::new(scene);
+        let built = bvh.build(&soup, &variant.params, &mut BuildLog::default())?;
+        Ok(Self {
+            camera: scene
+                .camera
+                .unwrap_or_else(|| Camera::frame(&scene.bounds())),
+            buffers: SceneBuffers::upload(gpu, scene, &soup)?,
+            traced: Traced::upload(gpu, &*built)?,
+        })
+    }
+
+    /// A compiled image of `size` × `size` pixels.
+    pub fn renderer<'a>(
+        &'a self,
+        gpu: &'a Gpu,
+        integrator: &'static dyn Integrator,
+        params: &Params,
+        sampler: &Sampler,
+        size: u32,
+    ) -> Result<Renderer<'a>, NumericsError> {
+        let job = RenderJob {
+            frame: Frame {
+                width: size,
+                height: size,
+                camera: self.camera,
+                ao_radius: 0.0,
+            },
+            sampler,
+            integrator,
+            params,
+            runtime_checks: true,
+        };
+        Ok(Renderer::new(
+            gpu,
+            &self.buffers,
+            &self.traced,
+            &job,
+            false,
+        )?)
+    }
+}

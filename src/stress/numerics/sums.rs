@@ -1,0 +1,132 @@
+//! Sums of 2²⁰ terms in f32, in five ways, against exact ones. Judges `kernels/stress/sums.wesl`.
+
+use super::{Figure, NumericsError, U, stage};
+use crate::gpu::{Bindings, Composition, Dispatch, Gpu, UniformValues};
+use crate::integrator::with_sampler;
+use crate::sampling::{Coordinate, Sampler};
+
+/// Terms of a long sum: a million samples per pixel.
+const TERMS: u32 = 1 << 20;
+/// The most samples per pixel of an experiment.
+const MOST_SPP: u32 = 1 << 16;
+/// Sums of noise, each over other terms.
+const LANES: u32 = 16;
+const SEED: u32 = 17;
+
+/// The ways of the kernel in its order: name, alarm as a relative error for n terms, and what is to
+/// be known. The alarms are the a-priori bounds for terms of one sign (N. Higham, "Accuracy and
+/// Stability of Numerical Algorithms", 2nd ed., 2002, section 4.2), doubled for what is of second
+/// order.
+type Way = (&'static str, fn(f64) -> f64, &'static str);
+
+const WAYS: [Way; 5] = [
+    ("plain", |n| n * U, "what the renderer does"),
+    (
+        "Kahan as written",
+        |n| n * U,
+        "compilers may drop the compensation",
+    ),
+    (
+        "Kahan behind barriers",
+        |_| 4.0 * U,
+        "intermediate bits pass through a zero that is loaded",
+    ),
+    (
+        "pairwise",
+        |n| 2.0 * n.log2() * U,
+        "needs a partial sum per power of two",
+    ),
+    (
+        "in blocks of 1024",
+        |n| 2.0 * (1024.0 + n / 1024.0) * U,
+        "needs one sum more",
+    ),
+];
+
+/// The largest relative error of each way, over a constant and over noise.
+pub fn figures(gpu: &Gpu) -> Result<Vec<Figure>, NumericsError> {
+    let sampler = stage::sampler("pixel-hash", 1)?;
+    let long = errors(gpu, &sampler, TERMS)?;
+    let renders = errors(gpu, &sampler, MOST_SPP)?;
+    let figure = |((name, alarm, note), error): (&Way, f64), n: u32, note_of_n: &str| {
+        let name = format!("sum of {n} terms, {name}");
+        let note = format!("{note}{note_of_n}");
+        Figure::checked(&name, error, alarm(f64::from(n)), "relative", note)
+    };
+    let mut figures: Vec<_> = WAYS
+        .iter()
+        .zip(long)
+        .map(|way| figure(way, TERMS, ""))
+        .collect();
+    let most = ", at the most samples per pixel of an experiment";
+    figures.push(figure((&WAYS[0], renders[0]), MOST_SPP, most));
+    Ok(figures)
+}
+
+fn errors(gpu: &Gpu, sampler: &Sampler, terms: u32) -> Result<[f64; 5], NumericsError> {
+    let mut worst = [0.0_f64; 5];
+    for constant in [true, false] {
+        let totals = totals(gpu, sampler, terms, constant)?;
+        for (lane, totals) in (0..).zip(totals) {
+            let exact = match constant {
+                true => f64::from(terms) * f64::from(0.1_f32),
+                false => exact_noise(sampler, terms, lane),
+            };
+            for (worst, total) in worst.iter_mut().zip(totals) {
+                let error = (f64::from(total) / exact - 1.0).abs();
+                // NaN must not be lost.
+                *worst = if error <= *worst { *worst } else { error };
+            }
+        }
+    }
+    Ok(worst)
+}
+
+/// The sum of the noise of a lane: multiples of 2⁻²⁴ have exact sums in 64 bits.
+fn exact_noise(sampler: &Sampler, terms: u32, lane: u32) -> f64 {
+    let word = |sample| {
+        let at = Coordinate {
+            pixel: lane,
+            sample,
+            dimension: 0,
+            seed: SEED,
+        };
+        u64::from(sampler.sample_u32(at) >> 8)
+    };
+    (0..terms).map(word).sum::<u64>() as f64 * U
+}
+
+/// The sums of all lanes in the order of [`WAYS`].
+fn totals(
+    gpu: &Gpu,
+    sampler: &Sampler,
+    terms: u32,
+    constant: bool,
+) -> Result<Vec<[f32; 5]>, NumericsError> {
+    let kernel = with_sampler(Composition::new("stress/sums"), sampler);
+    let pipeline = gpu.pipeline(&kernel, true)?;
+    let output = gpu.zeroed("totals", u64::from(LANES) * 32)?;
+    let sums = UniformValues::new()
+        .u32("count", terms)
+        .u32("constant", u32::from(constant))
+        .u32("seed", SEED)
+        .u32("zero", 0);
+    let mut bindings = Bindings::new();
+    bindings
+        .buffer("totals", &output)
+        .buffer(
+            "sampler_table",
+            &gpu.storage("sampler_table", sampler.table.words())?,
+        )
+        .uniform("sums", sums);
+    gpu.run(&Dispatch {
+        pipeline: &pipeline,
+        bindings: &bindings,
+        groups: [1, 1, 1],
+    })?;
+    let words: Vec<[f32; 8]> = gpu.read(&output)?;
+    Ok(words
+        .iter()
+        .map(|[a, b, c, d, e, ..]| [*a, *b, *c, *d, *e])
+        .collect())
+}

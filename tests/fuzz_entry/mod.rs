@@ -1,0 +1,229 @@
+//! The readers of foreign bytes, one function each: what the fuzz targets in `fuzz/` and
+//! `tests/mutated_files.rs` call, so that neither can rot alone.
+//!
+//! Each takes any bytes and returns what became of them.
+#![allow(dead_code)] // Every fuzz target calls one of them.
+
+use raystone::accel::{AccelRegistry, BuildLog, TriangleSoup};
+use raystone::config::{Catalogue, Experiment, Params, Plan, Variant};
+use raystone::discrepancy::PointSet;
+use raystone::measure::record::Line;
+use raystone::report::data::RunData;
+use raystone::report::read::RECORDS_FILE;
+use raystone::report::{read_records, sections, terminal_tables};
+use raystone::run::Registries;
+use raystone::scene::{self, Bounds, Camera, LoadOptions, MAX_COORDINATE, SceneData};
+use std::path::Path;
+use std::sync::LazyLock;
+
+/// What a reader made of some bytes.
+pub enum Outcome {
+    /// Accepted; to call it is to look at the result, which panics if that is unsound.
+    Accepted(Box<dyn FnOnce()>),
+    /// Refused, with the message that a user gets; it calls the file [`FILE`] with an extension.
+    Refused(String),
+}
+
+impl Outcome {
+    /// Looks at what was accepted.
+    ///
+    /// # Panics
+    /// If it is unsound.
+    pub fn examine(self) {
+        if let Self::Accepted(look) = self {
+            look();
+        }
+    }
+}
+
+/// What messages call the file, records apart, whose name is fixed.
+pub const FILE: &str = "foreign";
+
+type Error = Box<dyn std::error::Error>;
+
+/// Reads some bytes.
+pub type Target = fn(&[u8]) -> Outcome;
+
+/// All readers, by the names of the fuzz targets and of the folders of their corpora.
+pub const TARGETS: [(&str, Target); 6] = [
+    ("experiment", experiment),
+    ("obj", obj),
+    ("gltf", gltf),
+    ("ply", ply),
+    ("points", points),
+    ("records", records),
+];
+
+/// Between the text of an OBJ file and that of its library [`MTL_FILE`].
+pub const OBJ_SEPARATOR: u8 = 0;
+
+/// The library that OBJ texts may name.
+pub const MTL_FILE: &str = "m.mtl";
+
+/// An experiment file: parsed and checked; then planned.
+pub fn experiment(bytes: &[u8]) -> Outcome {
+    static KNOWN: LazyLock<(Registries, Catalogue)> = LazyLock::new(|| {
+        let registries = Registries::default();
+        let catalogue = registries.catalogue();
+        (registries, catalogue)
+    });
+    let (registries, catalogue) = &*KNOWN;
+    in_folder(&[("foreign.toml", bytes)], |folder| {
+        let experiment = Experiment::load(&folder.join("foreign.toml"), &[], catalogue)?;
+        let plan = Plan::new(&experiment, &[], |sequence, decorrelation| {
+            registries.is_randomised(sequence, decorrelation)
+        })?;
+        Ok(Box::new(move || {
+            assert!(!plan.structures.is_empty(), "a plan of nothing");
+            assert!(!plan.describe().is_empty());
+            let again = Experiment::parse(&experiment.text, &experiment.source, &[], catalogue);
+            assert_eq!(again.expect("its own text is accepted"), experiment);
+        }))
+    })
+}
+
+/// An OBJ file, and behind [`OBJ_SEPARATOR`] the library beside it.
+pub fn obj(bytes: &[u8]) -> Outcome {
+    let mut parts = bytes.splitn(2, |byte| *byte == OBJ_SEPARATOR);
+    let text = parts.next().unwrap_or_default();
+    let library = parts.next().unwrap_or_default();
+    in_folder(&[("foreign.obj", text), (MTL_FILE, library)], |folder| {
+        load_scene(&folder.join("foreign.obj"))
+    })
+}
+
+/// A glTF document or a GLB container.
+pub fn gltf(bytes: &[u8]) -> Outcome {
+    in_folder(&[("foreign.gltf", bytes)], |folder| {
+        load_scene(&folder.join("foreign.gltf"))
+    })
+}
+
+/// A PLY file.
+pub fn ply(bytes: &[u8]) -> Outcome {
+    in_folder(&[("foreign.ply", bytes)], |folder| {
+        load_scene(&folder.join("foreign.ply"))
+    })
+}
+
+/// A list of points, as `raystone discrepancy` reads it.
+pub fn points(bytes: &[u8]) -> Outcome {
+    let look = |points: PointSet| {
+        assert!(points.len() > 0 && points.dim() > 0);
+        for point in points.points() {
+            assert_eq!(point.len(), points.dim());
+            assert!(point.iter().all(|x| (0.0..=1.0).contains(x)), "{point:?}");
+        }
+    };
+    match PointSet::from_bytes(bytes) {
+        Ok(points) => Outcome::Accepted(Box::new(move || look(points))),
+        Err(error) => Outcome::Refused(format!("{FILE}.txt: {error}")),
+    }
+}
+
+/// The records of a run.
+pub fn records(bytes: &[u8]) -> Outcome {
+    in_folder(&[(RECORDS_FILE, bytes)], |folder| {
+        let records = read_records(folder)?;
+        Ok(Box::new(move || {
+            assert!(!records.lines.is_empty());
+            for line in &records.lines {
+                let text = serde_json::to_string(line).expect("what was read can be written");
+                let again: Line = serde_json::from_str(&text).expect(&text);
+                assert_eq!(*line, again);
+            }
+            terminal_tables(&records.lines);
+            let data = RunData::new(&records.lines);
+            let document = sections::document(Path::new(""), &data, &records.warnings);
+            assert!(!document.sections.is_empty());
+        }))
+    })
+}
+
+/// Puts files into a folder of their own for `read`.
+fn in_folder(
+    files: &[(&str, &[u8])],
+    read: impl FnOnce(&Path) -> Result<Box<dyn FnOnce()>, Error>,
+) -> Outcome {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    for (name, bytes) in files {
+        std::fs::write(folder.path().join(name), bytes).expect("a temporary file can be written");
+    }
+    match read(folder.path()) {
+        Ok(look) => Outcome::Accepted(look),
+        Err(error) => Outcome::Refused(error.to_string()),
+    }
+}
+
+fn load_scene(path: &Path) -> Result<Box<dyn FnOnce()>, Error> {
+    let variant = Variant {
+        name: path.to_string_lossy().into_owned(),
+        params: Params::default(),
+        label: FILE.to_owned(),
+    };
+    let scene = scene::load(&variant, &LoadOptions::default())?;
+    Ok(Box::new(move || check_scene(&scene)))
+}
+
+/// Everything that structures and kernels take for granted of a scene.
+fn check_scene(scene: &SceneData) {
+    let triangles = scene.triangles.len();
+    assert!(triangles > 0, "no triangle");
+    assert_eq!(scene.material_ids.len(), triangles);
+    assert!(scene.uvs.is_empty() || scene.uvs.len() == triangles);
+    let bounds = Bounds::of(&scene.triangles);
+    let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
+    assert!(largest <= MAX_COORDINATE, "{bounds:?}");
+    assert!(
+        scene
+            .triangles
+            .iter()
+            .flat_map(|t| t.vertices)
+            .all(|v| v.is_finite())
+    );
+    assert!(scene.uvs.iter().flatten().all(|uv| uv.is_finite()));
+    let materials = scene.materials.len();
+    assert!(
+        scene
+            .material_ids
+            .iter()
+            .all(|id| (*id as usize) < materials)
+    );
+    for material in &scene.materials {
+        let color = material.base_color;
+        assert!(
+            color.min_element() >= 0.0 && color.max_element() <= 1.0,
+            "{material:?}"
+        );
+        let emission = material.emission;
+        assert!(
+            emission.is_finite() && emission.min_element() >= 0.0,
+            "{material:?}"
+        );
+        let texture = material.base_color_texture.map_or(0, |id| id as usize + 1);
+        assert!(texture <= scene.textures.len(), "{material:?}");
+    }
+    for texture in &scene.textures {
+        let texels = texture.width as usize * texture.height as usize;
+        assert_eq!(texture.texels.len(), texels, "{}", texture.name);
+    }
+    let camera = scene.camera.unwrap_or_else(|| Camera::frame(&bounds));
+    camera.validate().expect("a camera that sees something");
+    if let Some(assembly) = &scene.assembly {
+        assert_eq!(assembly.triangles(), triangles as u64);
+    }
+    check_structure(scene);
+}
+
+fn check_structure(scene: &SceneData) {
+    let registry = AccelRegistry::default();
+    let (kind, entry) = registry
+        .get("bvh")
+        .zip(registry.entries().into_iter().find(|e| e.name == "bvh"))
+        .expect("there is a structure `bvh`");
+    let soup = TriangleSoup::new(scene);
+    let params = entry.default_variant().params;
+    let built = kind.build(&soup, &params, &mut BuildLog::default());
+    let built = built.expect("a small scene can be built");
+    built.validate(&soup).expect("the structure is valid");
+}
