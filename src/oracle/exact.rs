@@ -352,7 +352,7 @@ mod tests {
             let corners = [0; 3].map(|_| random.point(extent));
             let origin = random.point(extent);
             // Half of the rays are aimed exactly at a corner.
-            let target = if round % 2 == 0 {
+            let target = if round.is_multiple_of(2) {
                 corners[0]
             } else {
                 random.point(extent)

@@ -138,7 +138,10 @@ mod tests {
             assert_eq!(labels.len(), cases.len(), "{}", family.name);
             for case in &cases {
                 assert!(!case.rays.is_empty(), "{} {}", family.name, case.label);
-                let starts = case.rays.iter().all(|ray| !(ray.t_min < 0.0));
+                let starts = case
+                    .rays
+                    .iter()
+                    .all(|ray| ray.t_min >= 0.0 || ray.t_min.is_nan());
                 assert!(starts, "{} {}", family.name, case.label);
                 let finite = |t: &crate::scene::Triangle| t.vertices.iter().all(|v| v.is_finite());
                 assert!(
