@@ -158,9 +158,10 @@ impl Built {
         let (mut children, mut list) = (0, ROOT_LIST);
         let mut next_nearest = 0;
         loop {
-            counters.nodes += 1;
+            let place = child(children, list & SLOT_MASK) as usize;
+            counters.visit(place);
             counters.box_tests += WIDTH as u32;
-            let node = &self.nodes[child(children, list & SLOT_MASK) as usize];
+            let node = &self.nodes[place];
             let rest = list >> SLOT_BITS;
             if rest != EMPTY_LIST {
                 stack.push((children, next_nearest & STACKED_MASK | rest));

@@ -190,11 +190,11 @@ impl Built {
         let mut stack = Vec::with_capacity(self.stack_entries as usize);
         let mut group = (0, ROOT);
         loop {
-            counters.nodes += 1;
             counters.box_tests += WIDTH as u32;
             let places = group.1 >> PLACES_SHIFT;
             let slot = bit_number(places & places.wrapping_neg()) ^ octant;
             let index = group.0 + (group.1 & ((1 << slot) - 1)).count_ones();
+            counters.visit(index as usize);
             let left = places & (places - 1);
             if left != 0 {
                 stack.push((group.0, left << PLACES_SHIFT | group.1 & SLOTS_MASK));

@@ -426,7 +426,7 @@ impl Twin<'_> {
         let mut stack: Vec<(usize, f32)> = Vec::new();
         let mut current = 0;
         loop {
-            counters.nodes += 1;
+            counters.visit(current);
             match self.built.nodes[current].content() {
                 Content::Inner {
                     axis,

@@ -22,6 +22,7 @@ pub mod tree;
 pub mod triangle;
 mod two_level_grid;
 mod uniform_grid;
+pub mod watch;
 mod wide;
 
 pub use brute_force::{BruteForce, brute_force_hits};
@@ -262,6 +263,14 @@ pub struct Counters {
     pub triangle_tests: u32,
     /// Deepest stack, entries.
     pub stack_high_water: u32,
+}
+
+impl Counters {
+    /// Counts the visit of a node or cell, given its place among the structure's own.
+    pub(crate) fn visit(&mut self, place: usize) {
+        self.nodes += 1;
+        watch::note(watch::Event::Node(place as u32));
+    }
 }
 
 /// The traversal of a kernel in scalar Rust: the same hits, the same counters.

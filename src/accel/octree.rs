@@ -482,8 +482,9 @@ impl Twin<'_> {
             if enter > hit.t * END_PAD {
                 return hit;
             }
-            counters.nodes += 1;
-            let word = self.built.nodes[((open >> INNER_SHIFT) * 8 + octant) as usize];
+            let place = ((open >> INNER_SHIFT) * 8 + octant) as usize;
+            counters.visit(place);
+            let word = self.built.nodes[place];
             if word & LEAF != 0 {
                 self.leaf(word & !LEAF, ray, inverse, &mut hit, counters);
                 if any && hit.triangle != NO_HIT {

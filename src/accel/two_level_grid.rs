@@ -319,7 +319,8 @@ impl Twin<'_> {
         let mut parts = resolution.map(|r| r.max(1));
         let mut part = find_part(entry, top, parts);
         loop {
-            counters.nodes += 1;
+            // The place of the cell's first part.
+            counters.visit(first as usize);
             if resolution[0] != 0 {
                 let place = first + (part[2] * parts[1] + part[1]) * parts[0] + part[0];
                 for &id in self.built.list(place as usize) {

@@ -233,8 +233,8 @@ impl Twin<'_> {
         let entry = grid.in_cells(ray, enter);
         let mut cell: [u32; 3] = std::array::from_fn(|a| clamped(entry[a], grid.resolution[a]));
         loop {
-            counters.nodes += 1;
             let index = grid.index(cell) as usize;
+            counters.visit(index);
             for &id in self.built.list(index) {
                 counters.triangle_tests += 1;
                 intersect_triangle(&self.soup.records[id as usize], ray, inverse, &mut hit);

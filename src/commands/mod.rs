@@ -13,8 +13,10 @@ mod points_plot;
 mod render;
 mod report;
 mod run;
+mod stress;
 mod system;
 mod table;
+mod trace;
 mod verify;
 
 use clap::{Parser, Subcommand};
@@ -73,6 +75,10 @@ enum Command {
     Discrepancy(discrepancy::Discrepancy),
     #[command(after_help = EXIT_CODES)]
     Report(report::Report),
+    #[command(after_help = EXIT_CODES)]
+    Stress(stress::Stress),
+    #[command(after_help = EXIT_CODES)]
+    Trace(trace::Trace),
 }
 
 /// Reads the command line and does what it says; clap itself ends the program with 2 on bad usage.
@@ -86,6 +92,8 @@ pub fn main() -> ExitCode {
         Command::Doctor(command) => command.execute(),
         Command::Discrepancy(command) => command.execute(),
         Command::Report(command) => command.execute(),
+        Command::Stress(command) => command.execute(),
+        Command::Trace(command) => command.execute(),
     };
     done.unwrap_or_else(|failure| failure.tell())
 }

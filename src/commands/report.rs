@@ -3,19 +3,28 @@
 use super::failure::Failure;
 use super::output::print;
 use clap::Args;
-use raystone::report::write_report;
+use raystone::report::read::RECORDS_FILE;
+use raystone::report::{write_report, write_stress_page};
+use raystone::stress::record as stress;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Write the report of a run again, from its records
+/// Write the report of a run, or of the stress suite, again from its records
 #[derive(Args)]
 pub struct Report {
-    /// Folder that a run wrote: the one with records.jsonl
+    /// Folder that a run wrote, with records.jsonl, or the stress suite, with stress.jsonl
     dir: PathBuf,
 }
 
 impl Report {
     pub fn execute(self) -> Result<ExitCode, Failure> {
+        let is_suite = self.dir.join(stress::FILE).exists();
+        if is_suite && !self.dir.join(RECORDS_FILE).exists() {
+            let records = stress::read(&self.dir).map_err(Failure::input)?;
+            let page = write_stress_page(&self.dir, &records)?;
+            print(&format!("report: {}\n", page.display()))?;
+            return Ok(ExitCode::SUCCESS);
+        }
         let paths = write_report(&self.dir)?;
         for warning in &paths.warnings {
             eprintln!("warning: {warning}");

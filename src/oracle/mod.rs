@@ -7,7 +7,12 @@
 //! surfaces closer than rounding.
 
 mod brute_force;
+mod exact;
+mod exact_judge;
 mod triangle;
+
+pub use exact::{ExactCrossing, Side};
+pub use exact_judge::{Crossed, ExactTruth, ExactVerdict, exact_truths};
 
 use crate::scene::Triangle;
 use rayon::prelude::*;

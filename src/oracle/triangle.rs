@@ -179,7 +179,7 @@ pub(super) fn cross(a: Vector, b: Vector) -> Vector {
 }
 
 #[inline(always)]
-fn dot(a: Vector, b: Vector) -> f64 {
+pub(super) fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 

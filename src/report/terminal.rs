@@ -37,7 +37,7 @@ pub fn terminal_tables(records: &[Line]) -> String {
 
 /// The table with columns padded to equal width; of figures only the value is kept, since intervals
 /// would not fit a terminal, except in tables of text.
-fn aligned(table: &Table) -> String {
+pub(crate) fn aligned(table: &Table) -> String {
     let wordy = table.columns.iter().filter(|column| column.text).count() > 2;
     let shown = |cell: &Cell| {
         if wordy {

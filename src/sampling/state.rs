@@ -29,6 +29,11 @@ impl SamplerTable {
         Self([&header, sequence, decorrelation].concat())
     }
 
+    /// A table of these words, header included: for faults that kernel and twin share.
+    pub(crate) fn from_words(words: Vec<u32>) -> Self {
+        Self(words)
+    }
+
     /// All words, as the device gets them.
     pub fn words(&self) -> &[u32] {
         &self.0

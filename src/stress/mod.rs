@@ -1,3 +1,223 @@
-//! Numerical stress.
+//! The numerical stress suite: every triangle test and structure on scenes and rays that rounding makes
+//! hard, judged exactly. What is counted and why: `docs/stress.md`.
+//!
+//! Families make cases ([`families`]), a suite traces them on the adapter ([`suite`]) and a million
+//! shots at closed meshes ([`shots`]), the exact oracle judges ([`tally`]), and everything ends up as
+//! records ([`record`]), from which tables and the page of the report derive.
 
+pub mod axes;
+pub mod bench;
+pub mod case;
+pub mod explain;
+pub mod families;
+pub mod mutants;
 pub mod numerics;
+pub mod place;
+pub mod record;
+pub mod shapes;
+pub mod shots;
+pub mod suite;
+pub mod tally;
+pub mod targets;
+
+use crate::accel::triangle::TriangleTest;
+use crate::accel::{AccelRegistry, Intersection};
+use crate::gpu::{Gpu, GpuError, probe_arithmetic};
+use crate::run::environment::capture as capture_environment;
+use record::{Record, SuiteRecord};
+use std::path::PathBuf;
+use std::time::{Instant, SystemTime};
+use suite::{BRUTE_FORCE, Suite};
+use thiserror::Error;
+
+/// Rays a case and shots a mesh: of the whole suite, and of the quick one.
+const RAYS: (usize, usize) = (512, 128);
+const SHOTS: (usize, usize) = (1_000_000, 16_384);
+/// Rays of a timed comparison.
+const TIMED_RAYS: (usize, usize) = (16_384, 8192);
+/// The model among the closed meshes, relative to the working directory.
+const MODEL: &str = "../shared/scenes/stanford-bunny/stanford-bunny.obj";
+
+/// What to do.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Few rungs and shots, for a minute at most.
+    pub quick: bool,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Families; none: all.
+    pub families: Vec<String>,
+    /// Structures; none: all.
+    pub accels: Vec<String>,
+    /// Triangle tests; none: all.
+    pub triangles: Vec<String>,
+    /// Rays a case.
+    pub rays: usize,
+    /// Shots at each closed mesh.
+    pub shots: usize,
+    /// A model to shoot at, its holes closed.
+    pub model: PathBuf,
+}
+
+impl Settings {
+    /// The whole suite, or the quick one.
+    pub fn new(quick: bool) -> Self {
+        let of = |(whole, few): (usize, usize)| if quick { few } else { whole };
+        Self {
+            quick,
+            seed: 1,
+            families: Vec::new(),
+            accels: Vec::new(),
+            triangles: Vec::new(),
+            rays: of(RAYS),
+            shots: of(SHOTS),
+            model: MODEL.into(),
+        }
+    }
+
+    /// Checks every name.
+    ///
+    /// # Errors
+    /// [`StressError::Unknown`].
+    pub fn check(&self) -> Result<(), StressError> {
+        let families = families::FAMILIES.iter().map(|f| f.name);
+        check_names("family", &self.families, families)?;
+        let registry = AccelRegistry::default();
+        let structures: Vec<&str> = registry.iter().map(|kind| kind.name()).collect();
+        check_names("structure", &self.accels, structures.iter().copied())?;
+        let tests = TriangleTest::ALL.iter().map(|t| t.name());
+        check_names("triangle test", &self.triangles, tests)
+    }
+
+    pub(crate) fn wants_family(&self, name: &str) -> bool {
+        self.families.is_empty() || self.families.iter().any(|family| family == name)
+    }
+
+    fn timed_rays(&self) -> usize {
+        if self.quick {
+            TIMED_RAYS.1
+        } else {
+            TIMED_RAYS.0
+        }
+    }
+}
+
+/// Why the suite cannot go on.
+#[derive(Debug, Error)]
+pub enum StressError {
+    /// The adapter.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The figures of accumulation and sampling.
+    #[error(transparent)]
+    Numerics(#[from] numerics::NumericsError),
+    /// A tree that the suite itself needs.
+    #[error("a tree of the suite is not built: {0}")]
+    Build(String),
+    /// A name that nothing has.
+    #[error("unknown {what} `{name}`; there are: {known}")]
+    Unknown {
+        /// Kind of name.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// All names.
+        known: String,
+    },
+}
+
+/// Runs the suite; `progress` is told what is being done.
+///
+/// # Errors
+/// A name that does not exist, or the device is lost or hangs.
+pub fn run(
+    gpu: &Gpu,
+    settings: &Settings,
+    progress: &dyn Fn(&str),
+) -> Result<Vec<Record>, StressError> {
+    let start = Instant::now();
+    check_names(
+        "family",
+        &settings.families,
+        families::FAMILIES.iter().map(|f| f.name),
+    )?;
+    let suite = Suite {
+        gpu,
+        exact: probe_arithmetic(gpu)?.is_exact(),
+        settings,
+        kinds: kinds(settings),
+        tests: tests(settings),
+    };
+    let mut records = vec![Record::Suite(first_record(gpu, settings, suite.exact))];
+    records.extend(suite.cells(progress)?);
+    if settings.shots > 0 {
+        records.extend(suite.shots(progress)?);
+    }
+    if settings.families.is_empty() {
+        records.extend(suite.box_tests(progress)?);
+        records.extend(suite.offsets(progress)?);
+        records.extend(suite.costs(progress)?);
+        progress("accumulation and sampling");
+        let figures = numerics::run(gpu, settings.quick)?;
+        records.extend(figures.into_iter().map(Record::Figure));
+    }
+    let targets = targets::targets(&records);
+    records.extend(targets.into_iter().map(Record::Target));
+    records.push(Record::Finished {
+        wall_s: start.elapsed().as_secs_f64(),
+    });
+    Ok(records)
+}
+
+fn first_record(gpu: &Gpu, settings: &Settings, exact: bool) -> SuiteRecord {
+    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    SuiteRecord {
+        started_unix_s: now.map_or(0, |d| d.as_secs()),
+        environment: capture_environment(gpu),
+        quick: settings.quick,
+        seed: settings.seed,
+        rays: settings.rays,
+        shots: settings.shots,
+        exact_adapter: exact,
+        default_triangle: Intersection::default().triangle.name().to_owned(),
+    }
+}
+
+fn check_names<'a>(
+    what: &'static str,
+    wanted: &[String],
+    known: impl Iterator<Item = &'a str> + Clone,
+) -> Result<(), StressError> {
+    for name in wanted {
+        if !known.clone().any(|k| k == name) {
+            return Err(StressError::Unknown {
+                what,
+                name: name.clone(),
+                known: known.collect::<Vec<_>>().join(", "),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The structures to try, brute force first.
+fn kinds(settings: &Settings) -> Vec<suite::Kind> {
+    let wanted = |name: &str| {
+        let accels = &settings.accels;
+        accels.is_empty() || name == BRUTE_FORCE || accels.iter().any(|a| a == name)
+    };
+    let registry = AccelRegistry::default();
+    let mut kinds: Vec<suite::Kind> = registry.iter().filter(|kind| wanted(kind.name())).collect();
+    kinds.sort_by_key(|kind| kind.name() != BRUTE_FORCE);
+    kinds
+}
+
+/// The triangle tests to try, the default first.
+fn tests(settings: &Settings) -> Vec<TriangleTest> {
+    let wanted = |test: &TriangleTest| {
+        settings.triangles.is_empty() || settings.triangles.iter().any(|t| t == test.name())
+    };
+    let mut tests: Vec<TriangleTest> = TriangleTest::ALL.into_iter().filter(wanted).collect();
+    tests.sort_by_key(|test| *test != Intersection::default().triangle);
+    tests
+}

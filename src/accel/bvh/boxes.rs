@@ -158,7 +158,7 @@ impl Boxes {
 
 impl Nodes for Boxes {
     fn visit(&self, node: u32, query: &mut Query) -> Inner {
-        query.counters.nodes += 1;
+        query.counters.visit(node as usize);
         query.counters.box_tests += 1;
         let node = &self.0[node as usize];
         let mut inner = Inner {
@@ -179,7 +179,7 @@ impl Nodes for Boxes {
     }
 
     fn second_child(&self, node: u32, from: u32, query: &mut Query) -> u32 {
-        query.counters.nodes += 1;
+        query.counters.visit(node as usize);
         let content = self.0[node as usize].content;
         if from & 1 == near_side(content, query.ray) {
             from ^ 1
@@ -193,7 +193,7 @@ impl Nodes for Boxes {
     }
 
     fn child(&self, node: u32, side: u32, counters: &mut Counters) -> u32 {
-        counters.nodes += 1;
+        counters.visit(node as usize);
         (self.0[node as usize].content & CHILD_MASK) + side
     }
 }

@@ -99,7 +99,7 @@ pub(super) fn trace(octants: &Octants, mut query: Query) -> Hit {
         if current == NONE || query.is_answered() {
             return query.hit;
         }
-        query.counters.nodes += 1;
+        query.counters.visit(current as usize);
         query.counters.box_tests += 1;
         let OctantNode { node, ropes } = &octants.0[current as usize];
         let entered = enter_box(&node.bounds(), query.ray, query.inverse, query.hit.t).is_some();

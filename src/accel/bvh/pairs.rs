@@ -146,7 +146,7 @@ impl Pairs {
 
 impl Nodes for Pairs {
     fn visit(&self, node: u32, query: &mut Query) -> Inner {
-        query.counters.nodes += 1;
+        query.counters.visit(node as usize);
         query.counters.box_tests += 2;
         let pair = &self.0[node as usize];
         let (ray, inverse) = (query.ray, query.inverse);
@@ -185,7 +185,7 @@ impl Nodes for Pairs {
     }
 
     fn second_child(&self, node: u32, from: u32, query: &mut Query) -> u32 {
-        query.counters.nodes += 1;
+        query.counters.visit(node as usize);
         query.counters.box_tests += 2;
         let pair = &self.0[node as usize];
         let (ray, inverse) = (query.ray, query.inverse);
@@ -210,7 +210,7 @@ impl Nodes for Pairs {
     }
 
     fn child(&self, node: u32, side: u32, counters: &mut Counters) -> u32 {
-        counters.nodes += 1;
+        counters.visit(node as usize);
         let pair = &self.0[node as usize];
         if side == 0 { pair.left } else { pair.right }
     }

@@ -39,7 +39,7 @@ pub(super) fn trace(boxes: &Boxes, mut query: Query) -> Hit {
         if current == NONE || query.is_answered() {
             return query.hit;
         }
-        query.counters.nodes += 1;
+        query.counters.visit(current as usize);
         query.counters.box_tests += 1;
         let node = &boxes.0[current as usize];
         if enter_box(&node.bounds(), query.ray, query.inverse, query.hit.t).is_none() {

@@ -127,12 +127,12 @@ pub(super) fn leaf(
 
 /// Both children of a node in the order of their distance, with where they are entered.
 pub(super) fn near_and_far(
-    node: &Node,
+    (place, node): (u32, &Node),
     level: &Level,
     t_best: f32,
     counters: &mut Counters,
 ) -> [(Option<f32>, u32); 2] {
-    counters.nodes += 1;
+    counters.visit(place as usize);
     counters.box_tests += 2;
     let [(left, left_box), (right, right_box)] = node.children();
     let enter_left = enter_grown(level, &left_box, t_best);
@@ -166,7 +166,7 @@ pub(super) fn trace_object(
     let mut stack = Vec::new();
     let mut current = entry.node;
     loop {
-        let children = near_and_far(&nodes[current as usize], &level, hit.t, counters);
+        let children = near_and_far((current, &nodes[current as usize]), &level, hit.t, counters);
         let mut next = NOTHING;
         for (enter, reference) in children {
             if !is_open(enter, &level, hit) {

@@ -144,7 +144,7 @@ impl MetaBvhTwin {
         let (mut here, mut floor, mut first_id) = (world, OUTSIDE, 0);
         let mut current = self.root();
         loop {
-            let children = near_and_far(self.node(current), &here, hit.t, counters);
+            let children = near_and_far((current, self.node(current)), &here, hit.t, counters);
             let mut next = NOTHING;
             for (enter, reference) in children {
                 if !is_open(enter, &here, &hit) {

@@ -18,7 +18,7 @@ impl NestedTwin<'_> {
         let mut stack = Vec::new();
         let mut current = built.root();
         loop {
-            let children = near_and_far(built.node(current), &world, hit.t, counters);
+            let children = near_and_far((current, built.node(current)), &world, hit.t, counters);
             let mut next = NOTHING;
             for (enter, reference) in children {
                 if !is_open(enter, &world, &hit) || reference == NOTHING {

@@ -351,8 +351,9 @@ impl Twin<'_> {
         let entry = grid.in_cells(ray, enter);
         let mut voxel: [u32; 3] = std::array::from_fn(|a| clamped(entry[a], grid.resolution[a]));
         loop {
-            counters.nodes += 1;
-            let cell = self.built.load_cell(self.built.find_cell(voxel));
+            let place = self.built.find_cell(voxel);
+            counters.visit(place as usize);
+            let cell = self.built.load_cell(place);
             for id in self.built.list(cell.list) {
                 counters.triangle_tests += 1;
                 intersect_triangle(&self.soup.records[id as usize], ray, inverse, &mut hit);

@@ -25,6 +25,7 @@ pub use compensated::product_error;
 use super::bounds::{Bounds, slabs};
 use super::intersection::Reciprocal;
 use super::ray::{Hit, Ray};
+use super::watch::{self, Event};
 use crate::scene::Triangle;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -263,6 +264,7 @@ pub fn intersect_triangle(
     inverse: Reciprocal,
     hit: &mut Hit,
 ) {
+    watch::note(Event::Triangle(triangle.id));
     let found = inverse.triangle.meet(triangle, ray, &inverse);
     if !(found.area > 0.0) {
         return;
@@ -288,5 +290,6 @@ pub fn intersect_triangle(
             u: found.u.abs() / found.area,
             v: found.v.abs() / found.area,
         };
+        watch::note(Event::Nearest(*hit));
     }
 }

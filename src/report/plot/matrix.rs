@@ -73,7 +73,7 @@ impl PairMatrix {
 }
 
 /// Black or white, whichever contrasts more with the colour (WCAG 2.1: equal at a luminance of 0.179).
-fn legible_on(rgb: [u8; 3]) -> Ink {
+pub(super) fn legible_on(rgb: [u8; 3]) -> Ink {
     let linear = rgb.map(|c| (f64::from(c) / 255.0).powf(2.2));
     let luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
     Ink::solid(if luminance > 0.179 { [0; 3] } else { [255; 3] })

@@ -3,6 +3,7 @@
 pub mod axis;
 pub mod curves;
 pub mod drawing;
+pub mod heat;
 pub mod histogram;
 pub mod marker;
 pub mod matrix;

@@ -1,0 +1,139 @@
+//! `raystone stress`.
+
+use super::arguments::DeviceArguments;
+use super::failure::{FAILED, Failure};
+use super::output::print;
+use anyhow::Context as _;
+use clap::Args;
+use raystone::gpu::{self, KernelLibrary};
+use raystone::measure::atomic::write_atomic;
+use raystone::report::{stress_tables, write_stress_page};
+use raystone::stress::mutants::{self, Options, Outcome};
+use raystone::stress::record::{Record, write};
+use raystone::stress::{Settings, run};
+use std::io::IsTerminal as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Run the numerical stress suite: every triangle test and structure on what rounding makes hard
+///
+/// Prints tables, writes stress.jsonl and a page with pictures, and ends with 1 if the default
+/// configuration misses a target.
+#[derive(Args)]
+pub struct Stress {
+    /// Few rungs and shots: a minute at most
+    #[arg(long)]
+    quick: bool,
+    /// Triangle test; may be given many times [default: all]
+    #[arg(long)]
+    triangle: Vec<String>,
+    /// Structure; may be given many times; brute force always takes part [default: all]
+    #[arg(long)]
+    accel: Vec<String>,
+    /// Family; may be given many times [default: all, and the shots]
+    #[arg(long)]
+    family: Vec<String>,
+    /// Rays a case [default: 512, quick 128]
+    #[arg(long, value_name = "N")]
+    rays: Option<usize>,
+    /// Shots at each closed mesh, 0 for none [default: 1000000, quick 16384]
+    #[arg(long, value_name = "N")]
+    shots: Option<usize>,
+    /// Seed of everything random
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// A model to shoot at from inside, its holes closed [default: the Stanford bunny]
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Run the planted faults instead: each must turn a check red
+    #[arg(long)]
+    mutants: bool,
+    /// Folder for the records and the page
+    #[arg(long, short, value_name = "DIR", default_value = "results/stress")]
+    out: PathBuf,
+    #[command(flatten)]
+    device: DeviceArguments,
+}
+
+impl Stress {
+    pub fn execute(self) -> Result<ExitCode, Failure> {
+        if self.mutants {
+            return self.plant_faults();
+        }
+        let settings = self.settings();
+        settings.check().map_err(Failure::input)?;
+        let mut kernels = KernelLibrary::default();
+        if let Some(folder) = &self.device.kernels {
+            kernels = kernels.with_folder(folder)?;
+        }
+        let gpu = gpu::open(&self.device.adapter.clone().unwrap_or_default(), kernels)?;
+        let shows = std::io::stderr().is_terminal();
+        let progress = |what: &str| {
+            if shows {
+                eprintln!("{what}");
+            }
+        };
+        let records = run(&gpu, &settings, &progress).map_err(Failure::input)?;
+        write(&self.out, &records).map_err(Failure::input)?;
+        let page = write_stress_page(&self.out, &records)?;
+        print(&format!(
+            "{}report: {}\n",
+            stress_tables(&records),
+            page.display()
+        ))?;
+        Ok(match records.iter().any(is_missed_target) {
+            true => ExitCode::from(FAILED),
+            false => ExitCode::SUCCESS,
+        })
+    }
+
+    /// Runs the faults, prints their table and writes `mutants.jsonl`.
+    fn plant_faults(&self) -> Result<ExitCode, Failure> {
+        let options = Options {
+            adapter: self.device.adapter.clone().unwrap_or_default(),
+            folder: self.out.join("mutants"),
+            names: Vec::new(),
+        };
+        std::fs::create_dir_all(&options.folder)
+            .with_context(|| format!("cannot make {}", options.folder.display()))
+            .map_err(Failure::input)?;
+        let shows = std::io::stderr().is_terminal();
+        let progress = |outcome: &Outcome| {
+            if shows {
+                eprintln!("{}: {:?}", outcome.mutant.name, outcome.killed_by());
+            }
+        };
+        let report = mutants::run(&options, &progress).map_err(Failure::input)?;
+        let path = self.out.join("mutants.jsonl");
+        let lines: Result<Vec<String>, _> =
+            report.records().iter().map(serde_json::to_string).collect();
+        let text = lines.map_err(Failure::input)?.join("\n") + "\n";
+        write_atomic(&path, text.as_bytes())
+            .with_context(|| format!("cannot write {}", path.display()))
+            .map_err(Failure::input)?;
+        print(&format!("{}records: {}\n", report.table(), path.display()))?;
+        Ok(match report.is_passed() {
+            true => ExitCode::SUCCESS,
+            false => ExitCode::from(FAILED),
+        })
+    }
+
+    fn settings(&self) -> Settings {
+        let mut settings = Settings::new(self.quick);
+        settings.seed = self.seed;
+        settings.families = self.family.clone();
+        settings.accels = self.accel.clone();
+        settings.triangles = self.triangle.clone();
+        settings.rays = self.rays.unwrap_or(settings.rays);
+        settings.shots = self.shots.unwrap_or(settings.shots);
+        if !self.family.is_empty() && self.shots.is_none() {
+            settings.shots = 0;
+        }
+        settings.model = self.model.clone().unwrap_or(settings.model);
+        settings
+    }
+}
+
+fn is_missed_target(record: &Record) -> bool {
+    matches!(record, Record::Target(target) if target.passed == Some(false))
+}

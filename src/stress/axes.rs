@@ -1,0 +1,362 @@
+//! Box tests, ray offsets and the cost of triangle tests.
+
+use super::StressError;
+use super::bench::{self, Stage};
+use super::case::{self, Random, ray};
+use super::families::Family;
+use super::place::Place;
+use super::record::{BoxTestRecord, CostRecord, OffsetRecord, Record, Worst};
+use super::shapes::{Mesh, cube, sphere};
+use super::suite::{BRUTE_FORCE, Kind, PLAIN, Suite};
+use crate::accel::triangle::TriangleTest;
+use crate::accel::{
+    AccelKind as _, BoxTest, Bvh, Counters, Hit, Intersection, NO_HIT, Ray, TriangleSoup,
+};
+use crate::integrator::RayOffset;
+use crate::integrator::offset::{TransformError, position_error};
+use crate::measure::batch::{Batch, Query, count_work};
+use glam::Vec3;
+
+/// Families whose rays pass near the sides of boxes.
+const BOX_FAMILIES: [&str; 6] = [
+    "edges",
+    "vertices",
+    "axis-parallel",
+    "in-plane",
+    "origins",
+    "needles",
+];
+/// Structures that find triangles by boxes.
+const BOX_STRUCTURES: [&str; 4] = ["bvh", "roped-bvh", "bvh4", "cwbvh"];
+/// Rays a case, times those of the cells.
+const BOX_RAYS: usize = 4;
+
+/// Bounces of a chain, and rays of a series, times those of the cells.
+const BOUNCES: usize = 100;
+const OFFSET_RAYS: usize = 16;
+
+/// Bands of the sphere whose triangles are all tested, and of the one that is traversed.
+const COST_BANDS: (usize, usize) = (24, 64);
+const COST_RAYS: (usize, usize) = (4096, 65_536);
+const COST_ROUNDS: usize = 5;
+
+impl Suite<'_> {
+    /// How many hits each box test loses, with the default triangle test.
+    ///
+    /// # Errors
+    /// The device is lost or hangs.
+    pub fn box_tests(&self, progress: &dyn Fn(&str)) -> Result<Vec<Record>, StressError> {
+        progress("box tests");
+        let kinds: Vec<Kind> = (self.kinds.iter().copied())
+            .filter(|kind| BOX_STRUCTURES.contains(&kind.name()))
+            .collect();
+        let mut records: Vec<BoxTestRecord> = (BoxTest::ALL.iter())
+            .flat_map(|(test, name, _)| kinds.iter().map(|kind| empty_record(*test, name, *kind)))
+            .collect();
+        for family in BOX_FAMILIES.iter().filter_map(|name| Family::named(name)) {
+            let settings = self.settings;
+            for case in family.cases(settings.seed, true, BOX_RAYS * settings.rays) {
+                self.box_case(&case, &kinds, &mut records)?;
+            }
+        }
+        Ok(records.into_iter().map(Record::BoxTest).collect())
+    }
+
+    fn box_case(
+        &self,
+        case: &case::Case,
+        kinds: &[Kind],
+        records: &mut [BoxTestRecord],
+    ) -> Result<(), StressError> {
+        let mut stage = Stage::new(self.gpu, &case.scene, Intersection::default())?;
+        let expected = stage.brute_force(&case.rays);
+        for (place, kind) in kinds.iter().enumerate() {
+            let Ok(built) = bench::build(*kind, &stage.soup) else {
+                continue;
+            };
+            let traced = stage.upload(&*built)?;
+            for (row, (box_test, ..)) in BoxTest::ALL.iter().enumerate() {
+                stage.set(Intersection {
+                    box_test: *box_test,
+                    ..Intersection::default()
+                });
+                let found = stage.closest(&traced, &case.rays)?;
+                let record = &mut records[row * kinds.len() + place];
+                record.rays += case.rays.len();
+                let pairs = found.answers.iter().zip(expected.of(built.space()));
+                for (index, _) in pairs
+                    .enumerate()
+                    .filter(|(_, (hit, truth))| !hit.same_bits(truth))
+                {
+                    record.lost += 1;
+                    record.worst.get_or_insert_with(|| {
+                        let test = Intersection::default().triangle;
+                        let replay = self.replay(case, kind.name(), test, &case.rays[index]);
+                        let replay = format!("{replay} --box-test {}", record.box_test);
+                        Worst {
+                            what: "lost hit".into(),
+                            replay,
+                        }
+                    });
+                }
+            }
+            stage.set(Intersection::default());
+        }
+        Ok(())
+    }
+
+    /// What each offset does to chains of mirror bounces in closed meshes, by the twins on the host.
+    ///
+    /// # Errors
+    /// The tree cannot be built, in words.
+    pub fn offsets(&self, progress: &dyn Fn(&str)) -> Result<Vec<Record>, StressError> {
+        progress("ray offsets");
+        let mut records = Vec::new();
+        let rays = OFFSET_RAYS * self.settings.rays;
+        let places = [1e-6, 1.0, 1e6].map(|scale| Place { scale, shift: 0.0 });
+        for place in places.into_iter().chain([
+            Place {
+                scale: 1.0,
+                shift: 1e4,
+            },
+            Place::FAR,
+        ]) {
+            for (name, mesh) in [("sphere", sphere(12, &place)), ("box", cube(5, &place))] {
+                for offset in RayOffset::ALL {
+                    let mut record = OffsetRecord {
+                        offset: offset.name().into(),
+                        triangle: Intersection::default().triangle.name().into(),
+                        mesh: name.into(),
+                        place,
+                        rays,
+                        self_intersections: 0,
+                        leaks: 0,
+                    };
+                    bounce(&mesh, offset, self.settings.seed, &mut record)?;
+                    records.push(Record::Offset(record));
+                }
+            }
+        }
+        Ok(records)
+    }
+
+    /// What triangle tests cost, alone and in a traversal, by rounds in turns.
+    ///
+    /// # Errors
+    /// The device is lost or hangs.
+    pub fn costs(&self, progress: &dyn Fn(&str)) -> Result<Vec<Record>, StressError> {
+        progress("cost of triangle tests");
+        let all = self.times(BRUTE_FORCE, COST_BANDS.0, COST_RAYS.0)?;
+        let some = self.times(PLAIN, COST_BANDS.1, COST_RAYS.1)?;
+        let plain = some
+            .iter()
+            .find(|t| t.test == TriangleTest::MoellerTrumbore);
+        let plain_ms = plain.map_or(f64::NAN, |t| t.ms);
+        let pairs = all.iter().zip(&some);
+        let record = |(all, some): (&Timed, &Timed)| {
+            Record::Cost(CostRecord {
+                triangle: all.test.name().into(),
+                bytes: all.test.bytes(),
+                ns_per_test: all.ms * 1e6 / (all.tests_per_ray * all.rays as f64),
+                traversal_ratio: some.ms / plain_ms,
+                tests_per_ray: some.tests_per_ray,
+            })
+        };
+        Ok(match plain_ms.is_nan() {
+            true => Vec::new(),
+            false => pairs.map(record).collect(),
+        })
+    }
+
+    /// Least time of each triangle test through a structure over a sphere.
+    fn times(&self, accel: &str, bands: usize, count: usize) -> Result<Vec<Timed>, StressError> {
+        let scene = case::scene(sphere(bands, &Place::ORDINARY), None);
+        let registry = crate::accel::AccelRegistry::default();
+        let Some(kind) = registry.get(accel) else {
+            return Ok(Vec::new());
+        };
+        let mut random = Random::with_stream(self.settings.seed, 79);
+        let mut one = || ray(random.in_cube().as_vec3(), random.direction().as_vec3());
+        let rays: Vec<Ray> = (0..count).map(|_| one()).collect();
+        let mut batches: Vec<(Timed, Batch)> = Vec::new();
+        for test in &self.tests {
+            let stage = Stage::new(self.gpu, &scene, Self::with(*test))?;
+            let Ok(built) = bench::build(kind, &stage.soup) else {
+                continue;
+            };
+            let traced = stage.upload(&*built)?;
+            let work = count_work(self.gpu, &stage.buffers, &traced, Query::Closest, &rays)?;
+            let tests: u64 = work.iter().map(|w| u64::from(w.triangle_tests)).sum();
+            // Brute force counts nothing: it tests all.
+            let tests = if tests == 0 {
+                (scene.triangles.len() * count) as u64
+            } else {
+                tests
+            };
+            let timed = Timed {
+                test: *test,
+                ms: f64::INFINITY,
+                tests_per_ray: tests as f64 / count as f64,
+                rays: count,
+            };
+            let batch = stage.batch(&traced, Query::Closest, &rays)?;
+            batch.trace()?;
+            batches.push((timed, batch));
+        }
+        for _ in 0..COST_ROUNDS {
+            for (timed, batch) in &mut batches {
+                timed.ms = timed.ms.min(batch.trace()?.ms());
+            }
+        }
+        Ok(batches.into_iter().map(|(timed, _)| timed).collect())
+    }
+}
+
+/// A triangle test that was timed.
+struct Timed {
+    test: TriangleTest,
+    ms: f64,
+    tests_per_ray: f64,
+    rays: usize,
+}
+
+fn empty_record(test: BoxTest, name: &str, kind: Kind) -> BoxTestRecord {
+    BoxTestRecord {
+        box_test: name.to_owned(),
+        pad_ulps: test.pad_ulps,
+        accel: kind.name().to_owned(),
+        rays: 0,
+        lost: 0,
+        worst: None,
+    }
+}
+
+/// The smallest pad with a finite reciprocal that loses no hit, nor does any greater one.
+pub fn smallest_sound_pad(records: &[Record]) -> Option<u32> {
+    let tests: Vec<&BoxTestRecord> = records
+        .iter()
+        .filter_map(|r| match r {
+            Record::BoxTest(test) if test.box_test != "plain" => Some(test),
+            _ => None,
+        })
+        .collect();
+    let lossy = tests
+        .iter()
+        .filter(|t| t.lost > 0)
+        .map(|t| t.pad_ulps)
+        .max();
+    let sound = tests
+        .iter()
+        .map(|t| t.pad_ulps)
+        .filter(|pad| lossy.is_none_or(|lossy| *pad > lossy));
+    sound.min()
+}
+
+/// Chains of mirror bounces from inside. A flat triangle that a ray has left cannot be hit by it, and a
+/// closed mesh cannot be left: chains that do either begin anew.
+fn bounce(
+    mesh: &Mesh,
+    offset: RayOffset,
+    seed: u64,
+    record: &mut OffsetRecord,
+) -> Result<(), StressError> {
+    let soup = TriangleSoup::new(&case::scene(mesh.clone(), None));
+    let built = Bvh.build(&soup, &bench::default_params(&Bvh), &mut Default::default());
+    let built = built.map_err(|e| StressError::Build(e.to_string()))?;
+    let Some(twin) = built.cpu_twin(&soup) else {
+        return Ok(());
+    };
+    let mut random = Random::with_stream(seed, 80);
+    let mut traced = 0;
+    while traced < record.rays {
+        let origin = record.place.point(0.4 * random.in_cube());
+        let mut next = ray(origin, random.direction().as_vec3());
+        let mut from = NO_HIT;
+        for _ in 0..BOUNCES {
+            let hit = twin.closest_hit(&next, &mut Counters::default());
+            traced += 1;
+            let left_itself = hit.triangle == from && from != NO_HIT;
+            record.self_intersections += usize::from(left_itself);
+            record.leaks += usize::from(hit.triangle == NO_HIT);
+            if left_itself || hit.triangle == NO_HIT {
+                break;
+            }
+            let Some(mirrored) = mirror(&soup, &next, &hit, offset) else {
+                break;
+            };
+            from = hit.triangle;
+            next = mirrored;
+        }
+    }
+    record.rays = traced;
+    Ok(())
+}
+
+/// The mirrored ray, begun as integrators begin it; `None` where the triangle has no normal.
+fn mirror(soup: &TriangleSoup, incoming: &Ray, hit: &Hit, offset: RayOffset) -> Option<Ray> {
+    let record = soup.records.get(hit.triangle as usize)?;
+    let [v0, v1, v2] = record.vertices().map(Vec3::from);
+    let (e1, e2) = (v0 - v1, v2 - v0);
+    let p = v0 - hit.u * e1 + hit.v * e2;
+    let direction = Vec3::from(incoming.direction);
+    let normal = e1.cross(e2).try_normalize()?;
+    let facing = if normal.dot(direction) > 0.0 {
+        -normal
+    } else {
+        normal
+    };
+    let error = position_error(v0.into(), e1.into(), e2.into(), &TransformError::default());
+    let origin = offset.offset_point(p.into(), facing.into(), error);
+    let mirrored = direction - facing * (2.0 * facing.dot(direction));
+    Some(ray(origin.into(), mirrored.try_normalize()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_an_offset_chains_meet_their_own_triangle_and_with_a_bound_they_do_not() {
+        let count = |offset: RayOffset, place: Place| {
+            let mut record = OffsetRecord {
+                offset: offset.name().into(),
+                triangle: String::new(),
+                mesh: "sphere".into(),
+                place,
+                rays: 3000,
+                self_intersections: 0,
+                leaks: 0,
+            };
+            bounce(&sphere(8, &place), offset, 1, &mut record).unwrap();
+            (record.self_intersections, record.leaks)
+        };
+        let none = count(RayOffset::None, Place::ORDINARY);
+        assert!(none.0 + none.1 > 30, "{none:?}");
+        assert_eq!(count(RayOffset::ErrorBound, Place::ORDINARY), (0, 0));
+    }
+
+    #[test]
+    fn the_smallest_sound_pad_is_above_every_pad_that_loses_hits() {
+        let test = |name: &str, pad_ulps: u32, lost: usize| {
+            Record::BoxTest(BoxTestRecord {
+                box_test: name.into(),
+                pad_ulps,
+                accel: "bvh".into(),
+                rays: 10,
+                lost,
+                worst: None,
+            })
+        };
+        let mut records = vec![
+            test("a", 0, 7),
+            test("b", 2, 0),
+            test("c", 3, 1),
+            test("d", 4, 0),
+            test("plain", 0, 9),
+        ];
+        assert_eq!(smallest_sound_pad(&records), Some(4));
+        records.push(test("e", 16, 0));
+        assert_eq!(smallest_sound_pad(&records), Some(4));
+        assert_eq!(smallest_sound_pad(&[test("a", 0, 1)]), None);
+    }
+}

@@ -1,0 +1,343 @@
+//! One scene with rays that are hard for it.
+
+use super::place::Place;
+use super::shapes::Mesh;
+use crate::accel::Ray;
+use crate::measure::statistics::Pcg32;
+use crate::scene::{Assembly, Material, SceneData, Triangle};
+use glam::{DVec3, Vec3};
+use std::fmt;
+
+/// Longest distance of rays that have no end.
+pub const FAR: f32 = crate::measure::rays::FAR;
+
+/// What the right answers are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Truth {
+    /// What the exact oracle says.
+    Exact,
+    /// What the exact oracle says; the mesh is closed and the rays start inside, so that every miss is
+    /// a crack.
+    Closed,
+    /// Something is hit; what, only brute force knows.
+    Hit,
+    /// These are no rays: nothing may be hit.
+    Miss,
+    /// What brute force says with the same test: numbers overflow, so that nothing else can tell.
+    BruteForce,
+}
+
+/// A scene with rays.
+pub struct Case {
+    /// Family that it belongs to.
+    pub family: &'static str,
+    /// What it is within the family; unique there.
+    pub label: String,
+    /// Where the mesh stands.
+    pub place: Place,
+    /// The triangles in world space, and what they are copies of.
+    pub scene: SceneData,
+    /// The rays.
+    pub rays: Vec<Ray>,
+    /// What is right.
+    pub truth: Truth,
+}
+
+/// Makes the cases of a family, each from a random stream of its own, so that one can be made again
+/// from its label and the seed.
+pub struct Maker {
+    family: &'static str,
+    seed: u64,
+    /// Whether only a few rungs are wanted.
+    pub quick: bool,
+    /// Rays a case.
+    pub rays: usize,
+    /// The cases so far.
+    pub cases: Vec<Case>,
+}
+
+/// Random numbers, points and directions.
+pub struct Random(Pcg32);
+
+impl Random {
+    fn new(seed: u64, family: &str, label: &str, what: u64) -> Self {
+        let bytes = family.bytes().chain([0]).chain(label.bytes());
+        // FNV-1a: the same on every machine.
+        let hash = bytes.fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        });
+        Self(Pcg32::with_stream(seed ^ hash, what))
+    }
+
+    /// A stream that belongs to nothing but its number.
+    pub fn with_stream(seed: u64, stream: u64) -> Self {
+        Self(Pcg32::with_stream(seed, stream))
+    }
+
+    /// 32 random bits.
+    pub fn bits(&mut self) -> u32 {
+        self.0.next_u32()
+    }
+
+    /// An index below `n`.
+    pub fn below(&mut self, n: usize) -> usize {
+        self.0.below(n.max(1))
+    }
+
+    /// One of them.
+    pub fn one_of<T: Copy>(&mut self, of: &[T]) -> T {
+        of[self.below(of.len())]
+    }
+
+    /// A number in [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        self.0.uniform()
+    }
+
+    /// A number in [−1, 1).
+    pub fn signed(&mut self) -> f64 {
+        2.0 * self.unit() - 1.0
+    }
+
+    /// A point of the cube [−1, 1)³.
+    pub fn in_cube(&mut self) -> DVec3 {
+        DVec3::new(self.signed(), self.signed(), self.signed())
+    }
+
+    /// A unit vector.
+    pub fn direction(&mut self) -> DVec3 {
+        let z = self.signed();
+        let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
+        let radius = (1.0 - z * z).max(0.0).sqrt();
+        DVec3::new(radius * cos, radius * sin, z)
+    }
+
+    /// A point of a triangle's plane, inside it.
+    pub fn on(&mut self, [a, b, c]: [Vec3; 3]) -> DVec3 {
+        let root = self.unit().sqrt();
+        let v = self.unit();
+        let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
+        a + (b - a) * (root * (1.0 - v)) + (c - a) * (root * v)
+    }
+}
+
+impl Random {
+    /// A point of a random triangle, rounded.
+    pub fn on_mesh(&mut self, mesh: &[Triangle]) -> Vec3 {
+        let triangle = mesh[self.below(mesh.len())];
+        self.on(triangle.vertices).as_vec3()
+    }
+}
+
+/// A ray without an end.
+pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
+    Ray {
+        origin: origin.to_array(),
+        t_min: 0.0,
+        direction: direction.to_array(),
+        t_max: FAR,
+    }
+}
+
+/// A ray through a point; its direction is the rounded difference.
+pub fn towards(origin: Vec3, target: Vec3) -> Ray {
+    ray(origin, target - origin)
+}
+
+impl Maker {
+    pub(super) fn new(family: &'static str, seed: u64, quick: bool, rays: usize) -> Self {
+        Self {
+            family,
+            seed,
+            quick,
+            rays,
+            cases: Vec::new(),
+        }
+    }
+
+    /// The rungs of the ladder.
+    pub fn places(&self) -> Vec<Place> {
+        Place::ladder(self.quick)
+    }
+
+    /// Adds a case: a mesh, and rays for it, each from random numbers of its own.
+    pub fn add(
+        &mut self,
+        label: impl Into<String>,
+        place: Place,
+        truth: Truth,
+        mesh: impl FnOnce(&mut Random) -> Mesh,
+        rays: impl FnOnce(&[Triangle], &mut Random, usize) -> Vec<Ray>,
+    ) {
+        let label = label.into();
+        let random = |what| Random::new(self.seed, self.family, &label, what);
+        let triangles = mesh(&mut random(0));
+        let rays = rays(&triangles, &mut random(1), self.rays);
+        self.push(label, place, truth, scene(triangles, None), rays);
+    }
+
+    /// Adds a case of placed objects, if they can be placed.
+    pub fn add_placed(
+        &mut self,
+        label: impl Into<String>,
+        assembly: impl FnOnce(&mut Random) -> Option<Assembly>,
+        rays: impl FnOnce(&Assembly, &mut Random, usize) -> Vec<Ray>,
+    ) {
+        let label = label.into();
+        let random = |what| Random::new(self.seed, self.family, &label, what);
+        let Some(assembly) = assembly(&mut random(0)) else {
+            return;
+        };
+        let rays = rays(&assembly, &mut random(1), self.rays);
+        let copies = assembly.instances().iter().flat_map(|i| assembly.copy(i));
+        let triangles = copies.collect();
+        let scene = scene(triangles, Some(assembly));
+        self.push(label, Place::ORDINARY, Truth::Hit, scene, rays);
+    }
+
+    fn push(
+        &mut self,
+        label: String,
+        place: Place,
+        truth: Truth,
+        scene: SceneData,
+        rays: Vec<Ray>,
+    ) {
+        self.cases.push(Case {
+            family: self.family,
+            label,
+            place,
+            scene,
+            rays,
+            truth,
+        });
+    }
+}
+
+/// The scene as a loader would hand it over, without what only shading needs.
+pub fn scene(triangles: Mesh, assembly: Option<Assembly>) -> SceneData {
+    SceneData {
+        name: "stress".into(),
+        material_ids: vec![0; triangles.len()],
+        triangles,
+        uvs: Vec::new(),
+        materials: vec![Material::diffuse("grey", Vec3::splat(0.5))],
+        textures: Vec::new(),
+        assembly,
+        camera: None,
+        environment: Vec3::ONE,
+        hash: String::new(),
+        report: Default::default(),
+    }
+}
+
+/// A case as `raystone trace --scene` takes it: `stress:FAMILY:LABEL:SEED`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Address {
+    /// Family.
+    pub family: String,
+    /// Label of the case.
+    pub label: String,
+    /// Seed of the suite.
+    pub seed: u64,
+}
+
+impl Address {
+    /// What follows `stress:`.
+    const PREFIX: &'static str = "stress:";
+
+    /// Reads an address; `None` if the text is none.
+    pub fn parse(text: &str) -> Option<Self> {
+        let (family, rest) = text.strip_prefix(Self::PREFIX)?.split_once(':')?;
+        let (label, seed) = rest.rsplit_once(':')?;
+        Some(Self {
+            family: family.to_owned(),
+            label: label.to_owned(),
+            seed: seed.parse().ok()?,
+        })
+    }
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}{}:{}:{}",
+            Self::PREFIX,
+            self.family,
+            self.label,
+            self.seed
+        )
+    }
+}
+
+/// A ray as eight numbers, which read back to the same bits: origin, direction, t_min, t_max.
+pub fn ray_text(ray: &Ray) -> String {
+    let [o, d] = [ray.origin, ray.direction].map(|[x, y, z]| format!("{x:?} {y:?} {z:?}"));
+    format!("{o} {d} {:?} {:?}", ray.t_min, ray.t_max)
+}
+
+/// Reads the text of a ray: eight numbers, or six and the whole line.
+///
+/// # Errors
+/// What is not a number, or how many there are, in words.
+pub fn parse_ray(text: &str) -> Result<Ray, String> {
+    let numbers: Result<Vec<f32>, String> = text
+        .split(|c: char| c.is_whitespace() || c == ',')
+        .filter(|word| !word.is_empty())
+        .map(|word| {
+            word.parse()
+                .map_err(|_| format!("`{word}` is not a number"))
+        })
+        .collect();
+    match numbers?[..] {
+        [ox, oy, oz, dx, dy, dz] => Ok(ray(Vec3::new(ox, oy, oz), Vec3::new(dx, dy, dz))),
+        [ox, oy, oz, dx, dy, dz, t_min, t_max] => Ok(Ray {
+            origin: [ox, oy, oz],
+            t_min,
+            direction: [dx, dy, dz],
+            t_max,
+        }),
+        ref others => Err(format!(
+            "a ray is `ox oy oz dx dy dz t_min t_max`, or the first six; there are {} numbers",
+            others.len()
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_and_addresses_read_back_to_the_same_bits() {
+        let mut random = Random::with_stream(5, 0);
+        for _ in 0..2000 {
+            let mut float = || loop {
+                let x = f32::from_bits(random.bits());
+                if !x.is_nan() {
+                    return x;
+                }
+            };
+            let origin = [float(), float(), float()];
+            let direction = [float(), -0.0, float()];
+            let ray = Ray {
+                origin,
+                t_min: float(),
+                direction,
+                t_max: float(),
+            };
+            let back = parse_ray(&ray_text(&ray)).unwrap();
+            assert_eq!(bytemuck::bytes_of(&back), bytemuck::bytes_of(&ray));
+        }
+        assert!(parse_ray("1 2 3").unwrap_err().contains("3 numbers"));
+        assert!(parse_ray("1 2 3 4 5 six").unwrap_err().contains("`six`"));
+        let address = Address {
+            family: "needles".into(),
+            label: "scale 1e-8: a".into(),
+            seed: 7,
+        };
+        assert_eq!(Address::parse(&address.to_string()), Some(address));
+        assert_eq!(Address::parse("cornell-box"), None);
+    }
+}

@@ -1,0 +1,219 @@
+//! What a structure does with one ray, in words: for `raystone trace`.
+
+use super::bench;
+use super::tally::oracle_ray;
+use crate::accel::watch::{Event, watch};
+use crate::accel::{
+    AccelKind, BuildLog, Counters, Hit, NO_HIT, Ray, TriangleSoup, brute_force_hits,
+    brute_force_instances,
+};
+use crate::accel::{BuiltAccel, Space};
+use crate::config::Params;
+use crate::oracle::exact_truths;
+use crate::scene::SceneData;
+use std::fmt::Write as _;
+
+/// Crossed triangles that are told one by one.
+const MOST_CROSSED: usize = 16;
+
+/// Every node that the structure's twin visits, every triangle that it tests, its answer, brute force's
+/// and the exact oracle's; and whether the first two are equal to the bit.
+///
+/// # Errors
+/// The structure cannot be built, is not valid, or has no twin; in words.
+pub fn explain(
+    scene: &SceneData,
+    soup: &TriangleSoup,
+    kind: &dyn AccelKind,
+    params: &Params,
+    ray: &Ray,
+) -> Result<(String, bool), String> {
+    let built = kind.build(soup, params, &mut BuildLog::default());
+    let built = built.map_err(|e| format!("{} is not built: {e}", kind.name()))?;
+    built
+        .validate(soup)
+        .map_err(|e| format!("{} is not valid: {e}", kind.name()))?;
+    let twin = built
+        .cpu_twin(soup)
+        .ok_or_else(|| format!("{} has no twin on the host", kind.name()))?;
+    let mut counters = Counters::default();
+    let (hit, events) = watch(|| twin.closest_hit(ray, &mut counters));
+    let mut text = steps(&events);
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        text,
+        "\n{} nodes or cells, {} box tests, {} triangle tests, stack {}",
+        counters.nodes, counters.box_tests, counters.triangle_tests, counters.stack_high_water
+    );
+    let expected = brute_force(&*built, soup, ray);
+    let equal = hit.same_bits(&expected);
+    let _ = writeln!(text, "{:12} {}", kind.name(), hit_text(&hit));
+    let _ = writeln!(text, "{:12} {}", bench_name(&*built), hit_text(&expected));
+    text += &oracle_text(scene, ray);
+    text += match equal {
+        true => "equal to the bit\n",
+        false => "DIFFERENT: the structure does not answer what brute force does\n",
+    };
+    Ok((text, equal))
+}
+
+fn bench_name(built: &dyn BuiltAccel) -> &'static str {
+    match built.space() {
+        Space::World => "brute force",
+        Space::Instances => "brute force over instances",
+    }
+}
+
+fn brute_force(built: &dyn BuiltAccel, soup: &TriangleSoup, ray: &Ray) -> Hit {
+    let hits = match (built.space(), &soup.placed) {
+        (Space::Instances, Some(placed)) => brute_force_instances(placed, &[*ray]),
+        _ => brute_force_hits(soup, &[*ray]),
+    };
+    hits.first().copied().unwrap_or(Hit::miss(ray))
+}
+
+/// One line a node, with the triangles tested there.
+fn steps(events: &[Event]) -> String {
+    let mut text = String::new();
+    for event in events {
+        let _ = match event {
+            Event::Node(place) => write!(text, "\nnode {place}"),
+            Event::Triangle(id) => write!(text, "\n  triangle {id}"),
+            Event::Nearest(hit) => write!(
+                text,
+                "  nearest so far, t {:?} u {:?} v {:?}",
+                hit.t, hit.u, hit.v
+            ),
+        };
+    }
+    text.trim_start().to_owned() + "\n"
+}
+
+fn hit_text(hit: &Hit) -> String {
+    if hit.triangle == NO_HIT {
+        return "misses".into();
+    }
+    format!(
+        "hits triangle {} at t {:?} u {:?} v {:?}",
+        hit.triangle, hit.t, hit.u, hit.v
+    )
+}
+
+fn oracle_text(scene: &SceneData, ray: &Ray) -> String {
+    let numbers = ray.origin.iter().chain(&ray.direction).chain([&ray.t_min]);
+    if numbers.into_iter().any(|x| !x.is_finite()) || ray.t_max.is_nan() {
+        return format!(
+            "{:12} a ray with numbers that are none hits nothing\n",
+            "oracle"
+        );
+    }
+    let truths = exact_truths(&scene.triangles, &[oracle_ray(ray)]);
+    let hits = truths.first().map_or(&[][..], |truth| &truth.hits);
+    let mut text = match hits.is_empty() {
+        true => format!("{:12} nothing is hit\n", "oracle"),
+        false => format!("{:12} exactly hit, the nearest first:\n", "oracle"),
+    };
+    for hit in hits.iter().take(MOST_CROSSED) {
+        let _ = writeln!(
+            text,
+            "  triangle {} at t {:.12}: {:?}",
+            hit.triangle, hit.t, hit.side
+        );
+    }
+    if hits.len() > MOST_CROSSED {
+        let _ = writeln!(text, "  and {} more", hits.len() - MOST_CROSSED);
+    }
+    text
+}
+
+/// The case of an address, as a scene.
+///
+/// # Errors
+/// No family or no case of that name; in words.
+pub fn scene_of(address: &super::case::Address) -> Result<SceneData, String> {
+    let family = super::families::Family::named(&address.family).ok_or_else(|| {
+        format!(
+            "there is no family `{}`; `raystone stress` lists them",
+            address.family
+        )
+    })?;
+    let cases = family.cases(address.seed, false, 0);
+    let found = cases.into_iter().find(|case| case.label == address.label);
+    let found = found
+        .ok_or_else(|| format!("family {} has no case `{}`", address.family, address.label))?;
+    Ok(found.scene)
+}
+
+/// Every parameter of a structure at its default.
+pub fn defaults(kind: &dyn AccelKind) -> Params {
+    bench::default_params(kind)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::AccelRegistry;
+    use crate::stress::case;
+    use crate::stress::families::Family;
+
+    #[test]
+    fn every_twin_tells_as_many_nodes_and_triangles_as_it_counts_and_ends_with_brute_force() {
+        let cases = Family::named("vertices").unwrap().cases(1, true, 3);
+        let case = cases.first().unwrap();
+        let soup = TriangleSoup::new(&case.scene);
+        for kind in AccelRegistry::default().iter() {
+            for ray in &case.rays {
+                let built = kind
+                    .build(&soup, &defaults(kind), &mut BuildLog::default())
+                    .unwrap();
+                let mut counters = Counters::default();
+                let twin = built.cpu_twin(&soup).unwrap();
+                let (_, events) = watch(|| twin.closest_hit(ray, &mut counters));
+                let count = |is: fn(&Event) -> bool| events.iter().filter(|e| is(e)).count() as u32;
+                assert_eq!(
+                    count(|e| matches!(e, Event::Node(_))),
+                    counters.nodes,
+                    "{}",
+                    kind.name()
+                );
+                assert_eq!(
+                    count(|e| matches!(e, Event::Triangle(_))),
+                    counters.triangle_tests,
+                    "{}",
+                    kind.name()
+                );
+                let (text, equal) =
+                    explain(&case.scene, &soup, kind, &defaults(kind), ray).unwrap();
+                assert!(
+                    equal && text.contains("exactly hit"),
+                    "{}: {text}",
+                    kind.name()
+                );
+            }
+        }
+        assert!(watch(|| ()).1.is_empty());
+    }
+
+    #[test]
+    fn an_address_leads_back_to_its_scene_and_an_unknown_one_says_what_is_missing() {
+        let cases = Family::named("needles").unwrap().cases(4, true, 5);
+        for case in &cases {
+            let address = case::Address {
+                family: "needles".into(),
+                label: case.label.clone(),
+                seed: 4,
+            };
+            assert_eq!(scene_of(&address).unwrap().triangles, case.scene.triangles);
+        }
+        let wrong = |family: &str, label: &str| {
+            let address = case::Address {
+                family: family.into(),
+                label: label.into(),
+                seed: 1,
+            };
+            scene_of(&address).unwrap_err()
+        };
+        assert!(wrong("nails", "x").contains("nails"));
+        assert!(wrong("needles", "x").contains("`x`"));
+    }
+}

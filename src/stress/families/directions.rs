@@ -1,0 +1,131 @@
+//! Ordinary meshes; directions, origins and intervals that are not.
+
+use super::super::case::{FAR, Maker, Random, Truth, ray, towards};
+use super::super::place::Place;
+use super::super::shapes::{RADIUS, cube, sphere};
+use super::closed::{inside, on_edge};
+use crate::accel::Ray;
+use crate::oracle::{ExactCrossing, OracleRay};
+use crate::scene::{Bounds, Triangle};
+use glam::{DVec3, Vec3};
+
+/// Adds a sphere and a box at each place with rays made one by one.
+fn on_every_rung(maker: &mut Maker, one: fn(&Place, &[Triangle], &mut Random) -> Ray) {
+    for place in maker.places() {
+        for (name, mesh) in [("sphere", sphere(8, &place)), ("box", cube(4, &place))] {
+            let label = format!("{name}, {place}");
+            maker.add(
+                label,
+                place,
+                Truth::Exact,
+                |_| mesh,
+                |mesh, random, count| (0..count).map(|_| one(&place, mesh, random)).collect(),
+            );
+        }
+    }
+}
+
+fn some(mesh: &[Triangle], random: &mut Random) -> Triangle {
+    mesh[random.below(mesh.len())]
+}
+
+pub fn axis_parallel(maker: &mut Maker) {
+    on_every_rung(maker, |place, mesh, random| {
+        let triangle = some(mesh, random);
+        let target = match random.below(3) {
+            0 => triangle.vertices[random.below(3)],
+            1 => on_edge(&triangle, random),
+            _ => random.on(triangle.vertices).as_vec3(),
+        };
+        let mut direction = [0; 3].map(|_| random.one_of(&[0.0, -0.0]));
+        let axis = random.below(3);
+        direction[axis] = random.one_of(&[1.0, -1.0]);
+        if random.below(3) == 0 {
+            direction[(axis + 1) % 3] = random.one_of(&[1.0, -1.0, 0.5]);
+        }
+        // Start outside, inside, or somewhere along the line beyond the mesh.
+        let back = (random.one_of(&[0.5, 1.0, 3.0]) * 2.0 * RADIUS * place.scale) as f32;
+        ray(target - back * Vec3::from(direction), direction.into())
+    });
+}
+
+pub fn in_plane(maker: &mut Maker) {
+    on_every_rung(maker, |_, mesh, random| {
+        let triangle = some(mesh, random);
+        let [a, b, _] = triangle.vertices;
+        let target = random.on(triangle.vertices).as_vec3();
+        match random.below(3) {
+            // Along an edge, from beyond it.
+            0 => towards(a + (a - b), b),
+            1 => towards(a, b),
+            // Across the plane: exactly in it on the box, nearly on the sphere.
+            _ => {
+                let from = a.as_dvec3() + (a - b).as_dvec3() * (1.0 + random.unit());
+                towards(from.as_vec3(), target)
+            }
+        }
+    });
+}
+
+/// A point of a plane that cuts the scene's box into equal cells.
+fn on_cell_border(bounds: &Bounds, random: &mut Random) -> Vec3 {
+    let cells = 1 + random.below(8);
+    let size = (bounds.max - bounds.min).as_dvec3();
+    let mut p = bounds.min.as_dvec3() + size * (0.5 * (random.in_cube() + DVec3::ONE));
+    for _ in 0..1 + random.below(3) {
+        let axis = random.below(3);
+        let border = random.below(cells + 1) as f64 / cells as f64;
+        p[axis] = f64::from(bounds.min[axis]) + size[axis] * border;
+    }
+    p.as_vec3()
+}
+
+pub fn origins(maker: &mut Maker) {
+    on_every_rung(maker, |place, mesh, random| {
+        let triangle = some(mesh, random);
+        let bounds = Bounds::of(mesh);
+        let origin = match random.below(5) {
+            0 => triangle.vertices[random.below(3)],
+            1 => on_edge(&triangle, random),
+            2 => random.on(triangle.vertices).as_vec3(),
+            3 => on_cell_border(&bounds, random),
+            _ => inside(random, place),
+        };
+        match random.below(2) {
+            0 => ray(origin, random.direction().as_vec3()),
+            _ => towards(origin, random.on_mesh(mesh)),
+        }
+    });
+}
+
+pub fn interval_ends(maker: &mut Maker) {
+    on_every_rung(maker, |place, mesh, random| {
+        let triangle = some(mesh, random);
+        let whole = towards(
+            inside(random, place),
+            random.on(triangle.vertices).as_vec3(),
+        );
+        let line = OracleRay {
+            origin: whole.origin,
+            t_min: 0.0,
+            direction: whole.direction,
+            t_max: FAR,
+        };
+        let t = ExactCrossing::new(&triangle, &line).t as f32;
+        if !(t > 0.0 && t < FAR) {
+            return whole;
+        }
+        let (t_min, t_max) = match random.below(5) {
+            0 => (0.0, t),
+            1 => (t, FAR),
+            2 => (t, t),
+            3 => (0.0, t.next_down()),
+            _ => (t.next_up(), FAR),
+        };
+        Ray {
+            t_min,
+            t_max,
+            ..whole
+        }
+    });
+}

@@ -1,0 +1,195 @@
+//! Numbers at the ends of f32, and beyond.
+
+use super::super::case::{FAR, Maker, Random, Truth, ray, towards};
+use super::super::place::Place;
+use super::super::shapes::{RADIUS, cube, sphere};
+use super::closed::inside;
+use crate::accel::Ray;
+use crate::scene::{MAX_COORDINATE, Triangle};
+use glam::Vec3;
+
+pub fn denormal(maker: &mut Maker) {
+    for scale in [1e-37, 1e-39, 1e-42] {
+        let place = Place { scale, shift: 0.0 };
+        maker.add(
+            format!("vertices, {place}"),
+            place,
+            Truth::Exact,
+            |_| sphere(8, &place),
+            |mesh, random, count| {
+                let one = |_| {
+                    let target = random.on_mesh(mesh);
+                    towards(inside(random, &place), target)
+                };
+                (0..count).map(one).collect()
+            },
+        );
+    }
+    let place = Place::ORDINARY;
+    let tiny = [1e-30, 1e-38, 1e-40, 1e-45, -1e-45];
+    maker.add(
+        "directions",
+        place,
+        Truth::Exact,
+        |_| cube(4, &place),
+        |_, random, count| {
+            let one = |_| {
+                let mut direction = random.direction().as_vec3();
+                for axis in 0..random.below(4) {
+                    direction[axis] = random.one_of(&tiny);
+                }
+                ray(inside(random, &place), direction)
+            };
+            (0..count).map(one).collect()
+        },
+    );
+    maker.add(
+        "origins",
+        place,
+        Truth::Exact,
+        |_| cube(4, &place),
+        |_, random, count| {
+            let one = |_| {
+                let origin = [0; 3].map(|_| random.one_of(&tiny));
+                ray(origin.into(), random.direction().as_vec3())
+            };
+            (0..count).map(one).collect()
+        },
+    );
+}
+
+/// What is put into a ray.
+const STRANGE: [(&str, [f32; 3]); 2] = [
+    // NaN with either sign and another payload.
+    (
+        "NaN",
+        [
+            f32::NAN,
+            f32::from_bits(0xffc0_0000),
+            f32::from_bits(0x7f80_0001),
+        ],
+    ),
+    (
+        "infinite",
+        [f32::INFINITY, f32::NEG_INFINITY, f32::INFINITY],
+    ),
+];
+
+pub fn non_finite(maker: &mut Maker) {
+    let place = Place::ORDINARY;
+    let mut add = |label: String, truth: Truth, spoil: &dyn Fn(&mut Ray, &mut Random)| {
+        maker.add(
+            label,
+            place,
+            truth,
+            |_| sphere(12, &place),
+            |_, random, count| {
+                let one = |_| {
+                    let mut one = ray(inside(random, &place), random.direction().as_vec3());
+                    spoil(&mut one, random);
+                    one
+                };
+                (0..count).map(one).collect()
+            },
+        );
+    };
+    for (name, values) in STRANGE {
+        add(
+            format!("{name} origin"),
+            Truth::Miss,
+            &move |ray, random| {
+                ray.origin[random.below(3)] = random.one_of(&values);
+            },
+        );
+        add(
+            format!("{name} direction"),
+            Truth::Miss,
+            &move |ray, random| {
+                ray.direction[random.below(3)] = random.one_of(&values);
+            },
+        );
+    }
+    add("NaN t_min".into(), Truth::Miss, &|ray, _| {
+        ray.t_min = f32::NAN
+    });
+    add("NaN t_max".into(), Truth::Miss, &|ray, _| {
+        ray.t_max = f32::NAN
+    });
+    add("zero direction".into(), Truth::Exact, &|ray, random| {
+        ray.direction = [0; 3].map(|_| random.one_of(&[0.0, -0.0]));
+    });
+    add("empty interval".into(), Truth::Exact, &|ray, _| {
+        (ray.t_min, ray.t_max) = (2.0, 1.0);
+    });
+}
+
+/// Random bits that are a number no greater than `limit`.
+fn number(random: &mut Random, limit: f32) -> f32 {
+    loop {
+        let x = f32::from_bits(random.bits());
+        if x.abs() <= limit {
+            return x;
+        }
+    }
+}
+
+pub fn random_bits(maker: &mut Maker) {
+    // Up to 10^9 products stay within f32; up to the loaders' limit they do not.
+    for (name, limit, truth) in [
+        ("up to 1e9", 1e9, Truth::Exact),
+        (
+            "up to the limit of coordinates",
+            MAX_COORDINATE,
+            Truth::BruteForce,
+        ),
+    ] {
+        let vector = move |random: &mut Random| Vec3::from([0; 3].map(|_| number(random, limit)));
+        let mesh = |random: &mut Random| {
+            (0..400)
+                .map(|_| Triangle {
+                    vertices: [0; 3].map(|_| vector(random)),
+                })
+                .collect()
+        };
+        maker.add(name, Place::ORDINARY, truth, mesh, |mesh, random, count| {
+            let one = |i: usize| {
+                let from = vector(random);
+                match i % 4 {
+                    0 => ray(from, vector(random)),
+                    1 => Ray {
+                        t_max: number(random, FAR).abs(),
+                        ..ray(from, vector(random))
+                    },
+                    _ => towards(from, random.on_mesh(mesh)),
+                }
+            };
+            (0..count).map(one).collect()
+        });
+    }
+    // Even numbers of about the same size are rarely random bits, so that these rays often hit.
+    let place = Place {
+        scale: RADIUS,
+        shift: 0.0,
+    };
+    let mesh = |random: &mut Random| {
+        let nearby = |random: &mut Random| f32::from_bits(0x3f00_0000 | random.bits() >> 8);
+        (0..400)
+            .map(|_| Triangle {
+                vertices: [0; 3].map(|_| Vec3::from([0; 3].map(|_| nearby(random)))),
+            })
+            .collect()
+    };
+    maker.add(
+        "random mantissas",
+        place,
+        Truth::Exact,
+        mesh,
+        |mesh, random, count| {
+            let one = |_| {
+                let target = random.on_mesh(mesh);
+                towards(place.point(random.in_cube()), target)
+            };
+            (0..count).map(one).collect()
+        },
+    );
+}

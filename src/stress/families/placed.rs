@@ -1,0 +1,65 @@
+//! Instances under transforms that nearly flatten space.
+
+use super::super::case::{Maker, Random, ray};
+use super::super::place::Place;
+use super::super::shapes::{RADIUS, sphere};
+use crate::scene::{Assembly, Transform};
+use glam::{DMat3, DQuat, DVec3};
+
+/// Instances in a scene.
+const COPIES: usize = 12;
+
+fn rotation(random: &mut Random) -> DMat3 {
+    let turn = std::f64::consts::TAU * random.unit();
+    DMat3::from_quat(DQuat::from_axis_angle(random.direction(), turn))
+}
+
+/// Spheres, squeezed along a random direction to `thickness`, about the origin.
+fn squeezed(random: &mut Random, thickness: f64, spread: f64) -> Option<Assembly> {
+    let mut assembly = Assembly::default();
+    let object = assembly.add_object(sphere(8, &Place::ORDINARY)).ok()?;
+    for copy in 0..COPIES {
+        let mirrored = if copy % 2 == 0 { 1.0 } else { -1.0 };
+        let squeeze = DMat3::from_diagonal(DVec3::new(mirrored, 1.0, thickness));
+        let linear = rotation(random) * squeeze * rotation(random);
+        let columns = [0, 1, 2].map(|k| linear.col(k).as_vec3());
+        let translation = (spread * random.in_cube()).as_vec3();
+        // What the limit on condition numbers refuses is left out.
+        let _ = assembly.place(object, Transform::new(columns, translation));
+    }
+    (!assembly.instances().is_empty()).then_some(assembly)
+}
+
+pub fn instances(maker: &mut Maker) {
+    let thicknesses: &[f64] = match maker.quick {
+        true => &[1.0, 1e-5],
+        false => &[1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5],
+    };
+    for &thickness in thicknesses {
+        // The flat list of triangles is rounded in the world: far off, thinner copies have no inside.
+        let spreads: &[f64] = if thickness < 1e-3 {
+            &[0.0]
+        } else {
+            &[0.0, 100.0]
+        };
+        for &spread in spreads {
+            let label = format!("thickness {thickness:e}, {spread} apart");
+            maker.add_placed(
+                label,
+                |random| squeezed(random, thickness, spread),
+                |assembly, random, count| {
+                    let one = |_| {
+                        let instance =
+                            &assembly.instances()[random.below(assembly.instances().len())];
+                        // Rounding far from the origin may carry any point but the middle outside.
+                        let reach = if spread > 0.0 { 0.0 } else { 0.2 * RADIUS };
+                        let p = (reach * random.in_cube()).as_vec3();
+                        let from = instance.to_world.point(p);
+                        ray(from, random.direction().as_vec3())
+                    };
+                    (0..count).map(one).collect()
+                },
+            );
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! The faults, one row each.
+
+mod binary;
+mod cells;
+mod image;
+mod instanced;
+mod samplers;
+mod wide;
+mod words;
+
+use super::plant::Plant;
+use super::subject::{Changes, Subject};
+use super::{Check, Mutant};
+use crate::accel::GpuBuffers;
+
+/// All faults.
+pub fn mutants() -> Vec<Mutant> {
+    [
+        binary::MUTANTS,
+        wide::MUTANTS,
+        cells::MUTANTS,
+        instanced::MUTANTS,
+        samplers::MUTANTS,
+        image::MUTANTS,
+    ]
+    .concat()
+}
+
+const fn structure(name: &'static str, changes: Changes) -> Subject {
+    Subject::Structure { name, changes }
+}
+
+const fn row(
+    name: &'static str,
+    what: &'static str,
+    plant: Plant,
+    subject: Subject,
+    expected: Check,
+) -> Mutant {
+    Mutant {
+        name,
+        what,
+        plant,
+        subject,
+        expected,
+        equivalent: None,
+    }
+}
+
+/// A text that stands in the kernel once.
+const fn text(file: &'static str, from: &'static str, to: &'static str) -> Plant {
+    texts(file, from, to, 1)
+}
+
+const fn texts(file: &'static str, from: &'static str, to: &'static str, times: usize) -> Plant {
+    Plant::Kernel {
+        file,
+        from,
+        to,
+        times,
+    }
+}
+
+const fn built(part: &'static str, change: fn(&mut GpuBuffers) -> usize) -> Plant {
+    Plant::Built { part, change }
+}

@@ -1,0 +1,110 @@
+//! Where a mesh stands: the ladder of scales and translations that every swept family climbs.
+
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// Direction of translations, by the position of Embree's watertightness test.
+const AWAY: DVec3 = DVec3::new(148_376.0 / 223_423.0, 1234.0 / 223_423.0, -1.0);
+
+/// A scale and a translation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// Factor on all coordinates.
+    pub scale: f64,
+    /// Greatest coordinate of the translation, after scaling.
+    pub shift: f64,
+}
+
+impl Place {
+    /// Where meshes are modelled: about two units around the origin.
+    pub const ORDINARY: Self = Self {
+        scale: 1.0,
+        shift: 0.0,
+    };
+
+    /// The position of Embree's watertightness test, (148376, 1234, −223423).
+    pub const FAR: Self = Self {
+        scale: 1.0,
+        shift: 223_423.0,
+    };
+
+    /// Every rung, or a few that tell most.
+    pub fn ladder(quick: bool) -> Vec<Self> {
+        let scaled = |exponent: i32| Self {
+            scale: 10f64.powi(exponent),
+            shift: 0.0,
+        };
+        let shifted = |exponent: i32| Self {
+            scale: 1.0,
+            shift: 10f64.powi(exponent),
+        };
+        let (scales, shifts): (&[i32], &[i32]) = match quick {
+            true => (&[0, -8, 8], &[]),
+            false => (
+                &[0, -8, -6, -4, -2, 2, 4, 6, 8],
+                &[-8, -6, -4, -2, 0, 2, 4, 6, 8],
+            ),
+        };
+        let scales = scales.iter().copied().map(scaled);
+        let shifts = shifts.iter().copied().map(shifted);
+        scales.chain(shifts).chain([Self::FAR]).collect()
+    }
+
+    /// A modelled point in the scene, rounded once.
+    pub fn point(&self, modelled: DVec3) -> Vec3 {
+        (modelled * self.scale + AWAY * self.shift).as_vec3()
+    }
+
+    /// What a rounded coordinate may be off by, at a mesh of about two units.
+    pub fn resolution(&self) -> f64 {
+        (self.shift + 2.0 * self.scale) * f64::from(f32::EPSILON)
+    }
+
+    /// Whether enough of a mesh is left that it has an inside: two hundred steps of rounding across.
+    pub fn keeps_shape(&self) -> bool {
+        2.0 * self.scale > 100.0 * self.resolution()
+    }
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match (self.scale, self.shift) {
+            (1.0, 0.0) => write!(f, "ordinary"),
+            (1.0, shift) if *self == Self::FAR => write!(f, "far ({shift})"),
+            (scale, 0.0) => write!(f, "scale {scale:e}"),
+            (_, shift) => write!(f, "shift {shift:e}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_far_place_is_that_of_embree() {
+        let centre = Place::FAR.point(DVec3::ZERO);
+        assert_eq!(centre, Vec3::new(148_376.0, 1234.0, -223_423.0));
+    }
+
+    #[test]
+    fn the_ladder_reaches_from_ten_to_the_minus_eight_to_ten_to_the_eight_both_ways() {
+        let ladder = Place::ladder(false);
+        for end in [1e-8, 1e8] {
+            assert!(ladder.iter().any(|p| p.scale == end && p.shift == 0.0));
+            assert!(ladder.iter().any(|p| p.scale == 1.0 && p.shift == end));
+        }
+        assert_eq!(ladder[0], Place::ORDINARY);
+        let names: std::collections::BTreeSet<_> = ladder.iter().map(Place::to_string).collect();
+        assert_eq!(names.len(), ladder.len());
+        assert!(Place::ladder(true).iter().all(|p| ladder.contains(p)));
+    }
+
+    #[test]
+    fn a_mesh_that_rounding_has_crushed_has_no_inside() {
+        assert!(Place::FAR.keeps_shape() && Place::ORDINARY.keeps_shape());
+        let shifted = |shift| Place { scale: 1.0, shift };
+        assert!(!shifted(1e8).keeps_shape() && !shifted(1e6).keeps_shape());
+        assert!(shifted(1e4).keeps_shape());
+    }
+}

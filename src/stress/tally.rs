@@ -1,0 +1,286 @@
+//! What came of each ray, and the sum over a cell.
+
+use super::case::{Case, Truth};
+use super::record::{Quantiles, Rung, Worst};
+use crate::accel::{Hit, NO_HIT, Ray};
+use crate::oracle::{ExactTruth, ExactVerdict, OracleRay, exact_truths};
+use crate::scene::Triangle;
+use rayon::prelude::*;
+
+/// Errors of a right hit: of the distance and of the hit point, in ulp and relative.
+pub type Errors = [f64; 4];
+
+/// What came of a ray.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// What the answer is.
+    pub verdict: ExactVerdict,
+    /// Errors, where the answer is a hit of the triangle that it names.
+    pub errors: Option<Errors>,
+}
+
+/// What is right for every ray of a case: found once, whatever traces the case.
+pub struct Judge<'a> {
+    case: &'a Case,
+    /// Exact truths; empty where there is no exact truth.
+    truths: Vec<ExactTruth>,
+}
+
+pub(super) fn oracle_ray(ray: &Ray) -> OracleRay {
+    OracleRay {
+        origin: ray.origin,
+        t_min: ray.t_min,
+        direction: ray.direction,
+        t_max: ray.t_max,
+    }
+}
+
+impl<'a> Judge<'a> {
+    /// Looks up the truth of every ray.
+    pub fn new(case: &'a Case) -> Self {
+        let truths = match case.truth {
+            Truth::Exact | Truth::Closed => {
+                let rays: Vec<_> = case.rays.iter().map(oracle_ray).collect();
+                exact_truths(&case.scene.triangles, &rays)
+            }
+            _ => Vec::new(),
+        };
+        Self { case, truths }
+    }
+
+    /// Judges one answer.
+    pub fn judge(&self, index: usize, hit: &Hit) -> Outcome {
+        let answer = (hit.triangle != NO_HIT).then_some((hit.triangle, hit.t));
+        let plain = |verdict| Outcome {
+            verdict,
+            errors: None,
+        };
+        match (self.case.truth, answer) {
+            (Truth::Hit, None) => plain(ExactVerdict::FalseMiss { explained: false }),
+            (Truth::Miss, Some(_)) => plain(ExactVerdict::FalseHit { explained: false }),
+            (Truth::Hit | Truth::Miss | Truth::BruteForce, _) => plain(ExactVerdict::Miss),
+            (Truth::Exact | Truth::Closed, _) => {
+                let ray = &self.case.rays[index];
+                let triangles = &self.case.scene.triangles;
+                let verdict = self.truths[index].judge(triangles, &oracle_ray(ray), answer);
+                let errors = match verdict {
+                    ExactVerdict::Hit(t) => {
+                        Some(errors(&triangles[hit.triangle as usize], ray, hit, t))
+                    }
+                    _ => None,
+                };
+                Outcome { verdict, errors }
+            }
+        }
+    }
+
+    /// Judges the answers to all rays, on all cores.
+    pub fn judge_all(&self, hits: &[Hit]) -> Vec<Outcome> {
+        (hits.par_iter().enumerate())
+            .map(|(i, hit)| self.judge(i, hit))
+            .collect()
+    }
+}
+
+/// Distance between neighbouring f32 numbers at `x`.
+pub fn ulp(x: f64) -> f64 {
+    let exponent = (x.abs().max(f64::from(f32::MIN_POSITIVE))).log2().floor();
+    2f64.powi(exponent as i32 - 23)
+}
+
+/// Errors of a hit whose exact distance is `t`. The hit point is what integrators compute from the
+/// barycentrics; its error is the greatest of its coordinates, relative to the way of the ray.
+fn errors(triangle: &Triangle, ray: &Ray, hit: &Hit, t: f64) -> Errors {
+    let [v0, v1, v2] = triangle.vertices;
+    let found = v0 - hit.u * (v0 - v1) + hit.v * (v2 - v0);
+    let [origin, direction] = [ray.origin, ray.direction].map(|v| glam::Vec3::from(v).as_dvec3());
+    let point = origin + direction * t;
+    let size = point.abs().max_element();
+    let way = (direction * t).abs().max_element();
+    let off = (f64::from(hit.t) - t).abs();
+    let point_off = (found.as_dvec3() - point).abs().max_element();
+    // Records hold finite numbers only.
+    let relative = |off: f64, to: f64| {
+        if off == 0.0 {
+            0.0
+        } else {
+            (off / to).min(f64::MAX)
+        }
+    };
+    [
+        off / ulp(t),
+        relative(off, t.abs()),
+        point_off / ulp(size),
+        relative(point_off, way),
+    ]
+}
+
+/// Counts over the rays of a cell.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    /// Rays.
+    pub rays: usize,
+    /// Misses where something is hit exactly.
+    pub false_misses: usize,
+    /// Those that the rounding of one test cannot explain.
+    pub unexplained_misses: usize,
+    /// Those from inside a closed mesh: cracks.
+    pub cracks: usize,
+    /// Hits where nothing is hit exactly.
+    pub false_hits: usize,
+    /// Those that rounding cannot explain.
+    pub unexplained_hits: usize,
+    /// Hits of another triangle than any that is hit exactly.
+    pub wrong_triangle: usize,
+    /// Hits of a triangle behind another by more than rounding.
+    pub not_nearest: usize,
+    /// Rays of which only rounding decides whether the interval holds the hit.
+    pub borderline: usize,
+    /// Answers that differ from brute force with the same test in any bit, and are no ties.
+    pub differing: usize,
+    /// Any-hit answers that differ from brute force.
+    pub any_differing: usize,
+    /// Differences within 4 ulp, on an adapter that does not compute like the host.
+    pub ties: usize,
+    /// Errors of right hits.
+    pub errors: Vec<Errors>,
+    /// The ray to look at first.
+    pub worst: Option<(f64, Worst)>,
+}
+
+/// How bad a verdict is, and what it is called.
+fn badness(outcome: &Outcome) -> (f64, &'static str) {
+    match outcome.verdict {
+        ExactVerdict::FalseMiss { explained: false } => (5e9, "false miss"),
+        ExactVerdict::FalseHit { explained: false } => (4e9, "false hit"),
+        ExactVerdict::NotNearest => (3e9, "not the nearest"),
+        ExactVerdict::FalseMiss { .. } => (2e9, "false miss, within rounding of an edge"),
+        ExactVerdict::WrongTriangle => (1.2e9, "wrong triangle"),
+        ExactVerdict::FalseHit { .. } => (1.1e9, "false hit, within rounding of an edge"),
+        _ => (outcome.errors.map_or(0.0, |e| e[0].min(1e9)), "error of t"),
+    }
+}
+
+impl Tally {
+    /// Adds a ray.
+    pub fn add(&mut self, outcome: &Outcome, closed: bool, replay: impl FnOnce() -> String) {
+        self.rays += 1;
+        match outcome.verdict {
+            ExactVerdict::Miss | ExactVerdict::Hit(_) => {}
+            ExactVerdict::Borderline => self.borderline += 1,
+            ExactVerdict::FalseMiss { explained } => {
+                self.false_misses += 1;
+                self.unexplained_misses += usize::from(!explained);
+                self.cracks += usize::from(closed);
+            }
+            ExactVerdict::FalseHit { explained } => {
+                self.false_hits += 1;
+                self.unexplained_hits += usize::from(!explained);
+            }
+            ExactVerdict::WrongTriangle => self.wrong_triangle += 1,
+            ExactVerdict::NotNearest => self.not_nearest += 1,
+        }
+        self.errors.extend(outcome.errors);
+        let (badness, what) = badness(outcome);
+        self.note(badness, what, replay);
+    }
+
+    /// Notes a ray if it is worse than the worst so far.
+    pub fn note(&mut self, badness: f64, what: &str, replay: impl FnOnce() -> String) {
+        if badness > self.worst.as_ref().map_or(0.0, |worst| worst.0) {
+            let what = what.to_owned();
+            let replay = replay();
+            self.worst = Some((badness, Worst { what, replay }));
+        }
+    }
+
+    /// Adds the sums of another rung.
+    pub fn join(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.false_misses += other.false_misses;
+        self.unexplained_misses += other.unexplained_misses;
+        self.cracks += other.cracks;
+        self.false_hits += other.false_hits;
+        self.unexplained_hits += other.unexplained_hits;
+        self.wrong_triangle += other.wrong_triangle;
+        self.not_nearest += other.not_nearest;
+        self.borderline += other.borderline;
+        self.differing += other.differing;
+        self.any_differing += other.any_differing;
+        self.ties += other.ties;
+        self.errors.extend(other.errors);
+        if other.worst.as_ref().map(|w| w.0) > self.worst.as_ref().map(|w| w.0) {
+            self.worst = other.worst;
+        }
+    }
+
+    /// Median, 99th percentile and maximum of one error.
+    pub fn quantiles(&self, which: usize) -> Option<Quantiles> {
+        let mut errors: Vec<f64> = self.errors.iter().map(|e| e[which]).collect();
+        if errors.is_empty() {
+            return None;
+        }
+        errors.sort_by(f64::total_cmp);
+        let at = |share: f64| errors[((errors.len() - 1) as f64 * share).round() as usize];
+        Some(Quantiles {
+            median: at(0.5),
+            p99: at(0.99),
+            max: at(1.0),
+        })
+    }
+
+    /// The rung that this tally is of.
+    pub fn rung(&self, case: &Case) -> Rung {
+        Rung {
+            label: case.label.clone(),
+            place: case.place,
+            rays: self.rays,
+            false_misses: self.false_misses,
+            differing: self.differing,
+            t_ulp: self.quantiles(0),
+            point_ulp: self.quantiles(2),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_ulp_is_the_distance_to_the_next_number() {
+        for x in [1.0_f32, 1.5, 2.0, 3e-8, 7e20, f32::MIN_POSITIVE] {
+            let next = f64::from(x.next_up()) - f64::from(x);
+            assert_eq!(ulp(f64::from(x)), next, "{x}");
+        }
+        assert_eq!(ulp(0.0), f64::from(f32::from_bits(1)));
+    }
+
+    #[test]
+    fn a_tally_counts_cracks_apart_keeps_the_worst_ray_and_knows_its_quantiles() {
+        let mut tally = Tally::default();
+        for i in 0..100 {
+            let verdict = ExactVerdict::Hit(1.0);
+            let errors = Some([f64::from(i), 0.0, 0.0, 0.0]);
+            tally.add(&Outcome { verdict, errors }, true, || format!("ray {i}"));
+        }
+        let worst = |tally: &Tally| tally.worst.as_ref().map(|w| w.1.replay.clone());
+        assert_eq!(worst(&tally).as_deref(), Some("ray 99"));
+        let quantiles = tally.quantiles(0).unwrap();
+        assert_eq!(
+            (quantiles.median, quantiles.p99, quantiles.max),
+            (50.0, 98.0, 99.0)
+        );
+        let mut other = Tally::default();
+        let miss = Outcome {
+            verdict: ExactVerdict::FalseMiss { explained: true },
+            errors: None,
+        };
+        other.add(&miss, true, || "crack".into());
+        other.add(&miss, false, || "silhouette".into());
+        tally.join(other);
+        assert_eq!((tally.rays, tally.false_misses, tally.cracks), (102, 2, 1));
+        assert_eq!(worst(&tally).as_deref(), Some("crack"));
+        assert_eq!(tally.unexplained_misses, 0);
+    }
+}

@@ -1,0 +1,225 @@
+//! What the default configuration promises, and whether it holds here.
+
+use super::axes::smallest_sound_pad;
+use super::place::Place;
+use super::record::{CellRecord, CostRecord, Record, ShotsRecord, SuiteRecord, TargetRecord};
+use crate::accel::BoxTest;
+
+/// Misses that Embree's own test allows at the far position, as a share of the rays.
+const FAR_MISSES: f64 = 2e-5;
+/// How much longer rays that are no numbers may take.
+const STRANGE_SLOWDOWN: f64 = 2.5;
+/// What the default triangle test may cost against Möller–Trumbore.
+const COST: f64 = 1.15;
+/// Families whose rays a kernel need not answer like the host: WGSL promises nothing of NaN and
+/// infinity.
+const UNPROMISED: &str = "non-finite";
+
+/// Every target, with what the records say of it.
+pub fn targets(records: &[Record]) -> Vec<TargetRecord> {
+    let Some(suite) = suite(records) else {
+        return Vec::new();
+    };
+    let default = &suite.default_triangle;
+    let cells: Vec<&CellRecord> = cells(records).filter(|c| c.triangle == *default).collect();
+    let shots: Vec<&ShotsRecord> = shots(records).filter(|s| s.triangle == *default).collect();
+    let cost = records.iter().find_map(|r| match r {
+        Record::Cost(cost) if cost.triangle == *default => Some(cost),
+        _ => None,
+    });
+    let mut targets = shot_targets(&shots, suite.shots);
+    targets.extend(cell_targets(&cells));
+    targets.extend(pad_target(records));
+    // Times of so few rays tell nothing.
+    targets.extend(cost.filter(|_| !suite.quick).map(cost_target));
+    targets
+}
+
+/// The first record.
+pub fn suite(records: &[Record]) -> Option<&SuiteRecord> {
+    records.iter().find_map(|r| match r {
+        Record::Suite(suite) => Some(suite),
+        _ => None,
+    })
+}
+
+/// The cells.
+pub fn cells(records: &[Record]) -> impl Iterator<Item = &CellRecord> {
+    records.iter().filter_map(|r| match r {
+        Record::Cell(cell) => Some(cell),
+        _ => None,
+    })
+}
+
+/// The series of shots.
+pub fn shots(records: &[Record]) -> impl Iterator<Item = &ShotsRecord> {
+    records.iter().filter_map(|r| match r {
+        Record::Shots(shots) => Some(shots),
+        _ => None,
+    })
+}
+
+/// The greatest of some figures against a limit that it must not exceed.
+fn target(
+    name: impl Into<String>,
+    limit: f64,
+    found: impl Iterator<Item = (f64, String)>,
+) -> TargetRecord {
+    let worst = found.max_by(|a, b| a.0.total_cmp(&b.0));
+    let value = worst.as_ref().map(|w| w.0);
+    TargetRecord {
+        target: name.into(),
+        limit,
+        found: value,
+        passed: value.map(|value| value <= limit),
+        note: match worst {
+            Some((value, place)) if value > 0.0 => place,
+            _ => String::new(),
+        },
+    }
+}
+
+fn shot_targets(shots: &[&ShotsRecord], wanted: usize) -> Vec<TargetRecord> {
+    let name = |s: &ShotsRecord| {
+        format!(
+            "{}, {}, {}, {}: {} of {}",
+            s.accel, s.mesh, s.place, s.aim, s.misses, s.rays
+        )
+    };
+    let at = |place: Place| shots.iter().filter(move |s| s.place == place);
+    let ordinary = |random: bool| {
+        at(Place::ORDINARY)
+            .filter(move |s| (s.aim == "random") == random)
+            .map(|s| (s.misses as f64, name(s)))
+    };
+    let far = at(Place::FAR).map(|s| (s.misses as f64 / s.rays.max(1) as f64, name(s)));
+    vec![
+        target(
+            format!("watertight misses of {wanted} rays a mesh, ordinary scale"),
+            0.0,
+            ordinary(true),
+        ),
+        target(
+            format!("misses at vertices and edges of {wanted} shots"),
+            0.0,
+            ordinary(false),
+        ),
+        target("share of misses at the far position", FAR_MISSES, far),
+    ]
+}
+
+fn cell_targets(cells: &[&CellRecord]) -> Vec<TargetRecord> {
+    let name = |c: &CellRecord, what: &str| format!("{}, {}: {what}", c.accel, c.family);
+    let cracks = cells.iter().map(|c| (c.cracks as f64, name(c, "cracks")));
+    let promised = || cells.iter().filter(|c| c.family != UNPROMISED);
+    let differing = promised().map(|c| {
+        let any = c.any_differing.unwrap_or(0);
+        let replay = c.worst.as_ref().map_or("", |w| w.replay.as_str());
+        ((c.differing + any) as f64, name(c, replay))
+    });
+    let hangs = cells.iter().map(|c| {
+        let raised: Vec<_> = c
+            .failures
+            .iter()
+            .filter(|f| !f.contains("not built"))
+            .collect();
+        let first = raised.first().map_or("", |f| f.as_str());
+        (raised.len() as f64, name(c, first))
+    });
+    let strange = cells.iter().filter(|c| c.family == UNPROMISED);
+    let slowdown = strange.filter_map(|c| Some((c.slowdown?, name(c, "slowdown"))));
+    vec![
+        target(
+            "cracks from inside closed meshes, all families and rungs",
+            0.0,
+            cracks,
+        ),
+        target(
+            "answers that differ from brute force in a bit",
+            0.0,
+            differing,
+        ),
+        target(
+            "cases with an error word, a lost invariant or a hang",
+            0.0,
+            hangs,
+        ),
+        target(
+            "time of NaN and infinite rays against ordinary ones",
+            STRANGE_SLOWDOWN,
+            slowdown,
+        ),
+    ]
+}
+
+fn pad_target(records: &[Record]) -> Option<TargetRecord> {
+    let is_box_test = |r: &Record| matches!(r, Record::BoxTest(_));
+    records.iter().any(is_box_test).then(|| {
+        let found = smallest_sound_pad(records).map(f64::from);
+        let found = found.unwrap_or(f64::MAX);
+        let limit = f64::from(BoxTest::DEFAULT_ULPS);
+        target(
+            "smallest pad of boxes that loses no hit here, ulp",
+            limit,
+            std::iter::once((found, String::new())),
+        )
+    })
+}
+
+fn cost_target(cost: &CostRecord) -> TargetRecord {
+    let name = format!(
+        "time of {} against moeller-trumbore in a traversal",
+        cost.triangle
+    );
+    target(
+        name,
+        COST,
+        std::iter::once((cost.traversal_ratio, String::new())),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shot(misses: usize, place: Place, aim: &str) -> ShotsRecord {
+        ShotsRecord {
+            triangle: "watertight".into(),
+            accel: "bvh".into(),
+            mesh: "sphere".into(),
+            triangles: 10,
+            place,
+            aim: aim.into(),
+            rays: 1000,
+            misses,
+            confirmed: misses,
+            failure: None,
+            worst: None,
+        }
+    }
+
+    #[test]
+    fn one_miss_fails_its_target_and_no_other() {
+        let verdicts = |shots: &[ShotsRecord]| -> Vec<Option<bool>> {
+            let shots: Vec<&ShotsRecord> = shots.iter().collect();
+            shot_targets(&shots, 1000)
+                .iter()
+                .map(|t| t.passed)
+                .collect()
+        };
+        let good = [
+            shot(0, Place::ORDINARY, "random"),
+            shot(0, Place::ORDINARY, "edges"),
+            shot(0, Place::FAR, "random"),
+        ];
+        assert_eq!(verdicts(&good), [Some(true); 3]);
+        for bad in 0..3 {
+            let mut shots = good.clone();
+            shots[bad].misses = 1;
+            let mut expected = [Some(true); 3];
+            expected[bad] = Some(false);
+            assert_eq!(verdicts(&shots), expected);
+        }
+        assert_eq!(verdicts(&[]), [None; 3]);
+    }
+}

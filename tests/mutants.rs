@@ -1,0 +1,133 @@
+//! The checks of the project see what is wrong: faults that are planted on purpose must turn them red,
+//! and nothing else may.
+
+use raystone::gpu::AdapterChoice;
+use raystone::stress::mutants::{
+    self, Check, MutantError, Options, Outcome, Plant, Report, Subject, Verdict, mutants,
+};
+use std::collections::BTreeSet;
+
+/// One fault of each kind, cheap ones.
+const SUBSET: [&str; 13] = [
+    "tie-broken-the-other-way",
+    "child-dropped-by-the-builder",
+    "near-and-far-swapped-in-order-only",
+    "rope-reversed",
+    "wrong-octant-in-the-group",
+    "quantisation-rounded-inwards-4",
+    "dda-exits-early",
+    "kd-near-and-far-swapped",
+    "world-not-restored",
+    "shift-reused-for-two-dimensions",
+    "pair-of-one-number",
+    "wrong-direction-number",
+    "pdf-forgotten",
+];
+
+fn run(names: &[&str]) -> (Report, Vec<String>) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let options = Options {
+        adapter: AdapterChoice::Best,
+        folder: folder.path().to_owned(),
+        names: names.iter().map(|&name| name.to_owned()).collect(),
+    };
+    let told = std::sync::Mutex::new(Vec::new());
+    let note = |outcome: &Outcome| {
+        let name = outcome.mutant.name.to_owned();
+        println!("{name}: {:?}, {:.0} ms", outcome.killed_by(), outcome.ms);
+        told.lock().expect("no panic elsewhere").push(name);
+    };
+    let report = mutants::run(&options, &note).unwrap_or_else(|e| panic!("{e}"));
+    (report, told.into_inner().expect("no panic elsewhere"))
+}
+
+#[test]
+fn every_fault_of_the_table_still_applies() {
+    mutants::check_table().unwrap_or_else(|e| panic!("{e}"));
+    let all = mutants();
+    assert!(all.len() >= 40, "{} faults", all.len());
+    let names: BTreeSet<_> = all.iter().map(|m| m.name).collect();
+    assert_eq!(names.len(), all.len(), "two faults of one name");
+    for mutant in &all {
+        let checks = mutant.subject.checks();
+        assert!(checks.contains(&mutant.expected), "{}", mutant.name);
+        if let Plant::Kernel { from, to, .. } = mutant.plant {
+            assert_ne!(from, to, "{}", mutant.name);
+        }
+    }
+    let structures = raystone::accel::AccelRegistry::default();
+    for kind in structures.iter() {
+        let has =
+            |s: &Subject| matches!(s, Subject::Structure { name, .. } if *name == kind.name());
+        assert!(
+            all.iter().any(|m| has(&m.subject)),
+            "no fault for {}",
+            kind.name()
+        );
+    }
+}
+
+#[test]
+fn a_fault_of_each_kind_is_seen_by_the_check_that_should_see_it_and_the_sound_ones_are_green() {
+    let (report, told) = run(&SUBSET);
+    println!("{}", report.table());
+    assert_eq!(report.mutants.len(), SUBSET.len());
+    assert_eq!(
+        BTreeSet::from_iter(told),
+        BTreeSet::from(SUBSET.map(str::to_owned))
+    );
+    assert!(report.is_passed(), "{}", report.table());
+    for outcome in &report.mutants {
+        let expected = Some(outcome.mutant.expected);
+        assert_eq!(outcome.killed_by(), expected, "{}", outcome.mutant.name);
+    }
+    for control in &report.controls {
+        assert!(!control.green.is_empty(), "{}", control.subject.label());
+    }
+    for record in report.records() {
+        let line = serde_json::to_string(&record).expect("a line");
+        assert!(
+            line.starts_with(r#"{"kind":"mutant","#) && !line.contains('\n'),
+            "{line}"
+        );
+    }
+}
+
+#[test]
+#[ignore = "some minutes: all faults; `raystone stress --mutants` does the same"]
+fn every_fault_of_the_table_is_seen_or_explained() {
+    let (report, _) = run(&[]);
+    println!("{}", report.table());
+    for record in report.records() {
+        println!("{}", serde_json::to_string(&record).expect("a line"));
+    }
+    assert!(report.is_passed());
+}
+
+#[test]
+fn a_run_is_not_passed_with_a_survivor_or_a_red_control() {
+    let (mut report, _) = run(&["tie-broken-the-other-way"]);
+    assert!(report.is_passed(), "{}", report.table());
+    let sound = report.clone();
+    report.mutants[0].verdict = Verdict::Survived;
+    assert!(!report.is_passed(), "an unexplained survivor");
+    let mut report = sound.clone();
+    report.controls[0]
+        .red
+        .push((Check::Gate, "planted".to_owned()));
+    assert!(!report.is_passed(), "a red control");
+    let mut report = sound;
+    report.mutants.clear();
+    assert!(!report.is_passed(), "nothing was run");
+}
+
+#[test]
+fn a_name_that_does_not_exist_is_an_error() {
+    let options = Options {
+        adapter: AdapterChoice::Best,
+        folder: std::env::temp_dir(),
+        names: vec!["no-such-fault".to_owned()],
+    };
+    let error = mutants::run(&options, &|_| {}).expect_err("no such mutant");
+    assert!(matches!(error, MutantError::Unknown(_)), "{error}");
+}

@@ -1,0 +1,215 @@
+//! The stress suite as a whole: its quick form on this adapter, planted faults that it must see, and the
+//! program's commands.
+
+use raystone::accel::triangle::TriangleTest;
+use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
+use raystone::report::{stress_tables, write_stress_page};
+use raystone::stress::record::{CellRecord, Record, read, write};
+use raystone::stress::targets::{cells, shots};
+use raystone::stress::{Settings, run};
+use std::process::Command;
+use std::sync::OnceLock;
+
+fn gpu() -> &'static Gpu {
+    static GPU: OnceLock<Gpu> = OnceLock::new();
+    GPU.get_or_init(|| open(KernelLibrary::default()))
+}
+
+fn open(kernels: KernelLibrary) -> Gpu {
+    raystone::gpu::open(&AdapterChoice::Best, kernels)
+        .unwrap_or_else(|e| panic!("no adapter: run scripts/install-driver ({e})"))
+}
+
+/// A few families through a few structures with the default test and one other.
+fn small() -> Settings {
+    let names = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect();
+    Settings {
+        families: names(&["watertight", "edges", "coincident", "non-finite"]),
+        accels: names(&["bvh", "uniform-grid"]),
+        triangles: names(&["moeller-trumbore", "watertight"]),
+        rays: 64,
+        shots: 2048,
+        ..Settings::new(true)
+    }
+}
+
+fn run_small(gpu: &Gpu) -> Vec<Record> {
+    run(gpu, &small(), &|_| ()).expect("the suite runs")
+}
+
+#[test]
+fn a_small_suite_finds_no_difference_from_brute_force_and_writes_tables_records_and_a_page() {
+    let records = run_small(gpu());
+    let cells: Vec<&CellRecord> = cells(&records).collect();
+    // Four families: the default test through three structures, the other one through two.
+    assert_eq!(cells.len(), 4 * (3 + 2));
+    let exact = probe_arithmetic(gpu()).expect("the probe runs").is_exact();
+    for cell in &cells {
+        assert!(cell.rays > 0 && !cell.rungs.is_empty());
+        if exact && cell.family != "non-finite" {
+            let what = format!("{} {} {}", cell.triangle, cell.accel, cell.family);
+            assert_eq!(cell.differing, 0, "{what}: {:?}", cell.worst);
+        }
+        assert!(cell.failures.is_empty(), "{:?}", cell.failures);
+    }
+    let edges = cells.iter().find(|c| c.family == "edges").expect("a cell");
+    assert!(
+        edges
+            .t_ulp
+            .is_some_and(|q| q.median <= q.p99 && q.p99 <= q.max && q.max > 0.0)
+    );
+    assert!(shots(&records).count() >= 12);
+
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), &records).expect("records");
+    assert_eq!(read(folder.path()).expect("records"), records);
+    let page = write_stress_page(folder.path(), &records).expect("a page");
+    let html = std::fs::read_to_string(page).expect("a page");
+    for text in [
+        "Targets of the default configuration",
+        "Where hits are lost",
+        "uniform-grid",
+        "<svg",
+    ] {
+        assert!(html.contains(text), "{text}");
+    }
+    let tables = stress_tables(&records);
+    assert!(
+        tables.contains("brute-force") && tables.contains("PASS"),
+        "{tables}"
+    );
+}
+
+/// The embedded kernels with one text replaced.
+fn with_fault(file: &str, from: &str, to: &str) -> KernelLibrary {
+    let library = KernelLibrary::default();
+    let text = library.text(file).expect("a kernel").to_owned();
+    assert_eq!(text.matches(from).count(), 1, "{file}: `{from}`");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join(file).with_extension("wesl");
+    std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+    std::fs::write(&path, text.replace(from, to)).expect("a kernel");
+    library.with_folder(folder.path()).expect("the kernels")
+}
+
+#[test]
+fn a_test_that_refuses_rays_through_edges_is_seen_to_leak() {
+    // Zero no longer counts as inside.
+    let gpu = open(with_fault(
+        "accel/triangle/moeller_trumbore",
+        "u >= 0.0",
+        "u > 1e-3 * area",
+    ));
+    let settings = Settings {
+        triangles: vec![TriangleTest::MoellerTrumbore.name().into()],
+        ..small()
+    };
+    let records = run(&gpu, &settings, &|_| ()).expect("the suite runs");
+    let leaks: usize = shots(&records).map(|s| s.misses).sum();
+    assert!(
+        leaks > 0,
+        "no crack was seen in {} series",
+        shots(&records).count()
+    );
+    for series in shots(&records).filter(|s| s.misses > 0) {
+        assert!(series.confirmed > 0 && series.worst.is_some(), "{series:?}");
+    }
+    let edges = cells(&records)
+        .find(|c| c.family == "edges" && c.accel == "bvh")
+        .expect("a cell");
+    assert!(edges.cracks > 0 && edges.differing > 0, "{edges:?}");
+}
+
+fn program(arguments: &[&str]) -> std::process::Output {
+    Command::new(env!("CARGO_BIN_EXE_raystone"))
+        .args(arguments)
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .expect("the program starts")
+}
+
+#[test]
+fn trace_shows_every_node_and_the_answers_of_structure_brute_force_and_oracle() {
+    let ray = "1 1 3 0 0 -1 0 1e30";
+    let output = program(&[
+        "trace",
+        "--scene",
+        "single-triangle",
+        "--accel",
+        "bvh",
+        "--ray",
+        ray,
+    ]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{text} {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    for part in [
+        "node 0",
+        "triangle tests",
+        "brute force",
+        "oracle",
+        "equal to the bit",
+    ] {
+        assert!(text.contains(part), "{part} in {text}");
+    }
+    let case = "stress:needles:scattered, ordinary:1";
+    let output = program(&[
+        "trace",
+        "--scene",
+        case,
+        "--accel",
+        "kd-tree",
+        "--ray",
+        "0 0 9 0 0 -1",
+    ]);
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+}
+
+#[test]
+fn unknown_names_and_broken_rays_are_answered_with_two_and_what_there_is() {
+    for (arguments, part) in [
+        (vec!["stress", "--family", "nails"], "needles"),
+        (vec!["stress", "--triangle", "wet"], "watertight"),
+        (vec!["stress", "--accel", "bhv"], "bvh"),
+        (
+            vec!["trace", "--scene", "cornell-box", "--ray", "1 2 3"],
+            "3 numbers",
+        ),
+        (
+            vec![
+                "trace",
+                "--scene",
+                "stress:nails:a:1",
+                "--ray",
+                "0 0 0 0 0 1",
+            ],
+            "nails",
+        ),
+        (
+            vec![
+                "trace",
+                "--scene",
+                "cornell-box",
+                "--triangle",
+                "x",
+                "--ray",
+                "0 0 0 0 0 1",
+            ],
+            "watertight",
+        ),
+    ] {
+        let output = program(&arguments);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
+        assert!(text.contains(part), "{arguments:?}: {text}");
+    }
+}
