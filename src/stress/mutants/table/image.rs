@@ -121,7 +121,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             "FIRST_BOUNCE + purpose",
         ),
         IMAGES,
-        Check::Bias,
+        Check::Furnace,
     ),
     row(
         "light-points-bunched",
