@@ -165,8 +165,12 @@ fn quality_and_spatial_splits_do_not_depend_on_the_number_of_threads() {
     let soup = sticks(&mut Pcg::new(6), 10_000, 0.2);
     let tree = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let params = with_builder("sbvh", &["epo=true"]);
-        pool.expect("a pool").install(|| build(&soup, &params))
+        let params = with_builder("sbvh", &[]);
+        pool.expect("a pool").install(|| {
+            let mut tree = build(&soup, &params);
+            tree.note_epo(&soup);
+            tree
+        })
     };
     let (one, more) = (tree(1), tree(5));
     assert!(one.has_duplicates(&soup));
@@ -332,10 +336,13 @@ fn coordinates_that_are_no_numbers_neither_hang_nor_panic() {
                 }
             }
             for name in builders() {
-                let params = with_builder(name, &["reinsertion=3", "epo=true"]);
+                let params = with_builder(name, &["reinsertion=3"]);
                 let tree = Tree::build(&soup, &params, &mut BuildLog::default());
                 match tree {
-                    Ok(tree) => assert!(tree.order.len() >= 40, "{name}: {bad}"),
+                    Ok(mut tree) => {
+                        tree.note_epo(&soup);
+                        assert!(tree.order.len() >= 40, "{name}: {bad}");
+                    }
                     Err(e) => {
                         let text = e.to_string();
                         assert!(name.starts_with("ploc"), "{name}: {text}");

@@ -4,7 +4,7 @@ use super::adapters;
 use super::failure::Failure;
 use super::output::print;
 use clap::{Args, ValueEnum};
-use raystone::config::{Axis, Entry};
+use raystone::config::{Axis, Entry, Parameter};
 use raystone::discrepancy::Measure;
 use raystone::measure::image::METRICS;
 use raystone::run::Registries;
@@ -71,17 +71,45 @@ fn axis(axis: Axis, entries: &[Entry]) -> String {
         axis => format!("{axis}\n"),
     };
     // Writing to a string cannot fail.
-    for entry in entries {
+    for (i, entry) in entries.iter().enumerate() {
         let _ = writeln!(text, "  {:width$}  {}", entry.name, entry.description);
-        for parameter in &entry.schema {
+        let (shared, own) = shared_parameters(entry, &entries[..i]);
+        for parameter in own {
             let _ = writeln!(
                 text,
                 "  {:width$}    {} = {}: {} ({})",
                 "", parameter.name, parameter.default, parameter.description, parameter.range,
             );
         }
+        if let Some((from, names)) = shared {
+            let _ = writeln!(text, "  {:width$}    as `{from}`: {}", "", names.join(", "));
+        }
     }
     text
+}
+
+/// Parameters shared with the earlier entry that has most of them, if it has more than a few: its name and
+/// theirs; and the rest.
+fn shared_parameters<'a>(
+    entry: &'a Entry,
+    earlier: &'a [Entry],
+) -> (Option<(&'a str, Vec<&'a str>)>, Vec<&'a Parameter>) {
+    const FEW: usize = 3;
+    let shared = |other: &Entry| -> usize {
+        let with = entry.schema.iter().filter(|p| other.schema.contains(p));
+        with.count()
+    };
+    // The first of those that share most: `max_by_key` alone takes the last.
+    let Some(other) = earlier.iter().rev().max_by_key(|other| shared(other)) else {
+        return (None, entry.schema.iter().collect());
+    };
+    if shared(other) <= FEW {
+        return (None, entry.schema.iter().collect());
+    }
+    let (same, own): (Vec<&Parameter>, Vec<&Parameter>) =
+        entry.schema.iter().partition(|p| other.schema.contains(p));
+    let names = same.iter().map(|p| p.name).collect();
+    (Some((&other.name, names)), own)
 }
 
 fn metrics() -> String {

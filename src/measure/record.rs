@@ -176,7 +176,8 @@ pub struct StructureStats {
     pub depth: Option<u32>,
     /// SAH cost with traversal and intersection constants both 1; absent where not defined.
     pub sah_cost: Option<f64>,
-    /// End-point overlap with both constants 1 (Aila, Karras, Laine 2013); absent unless asked for.
+    /// End-point overlap with both constants 1 (Aila, Karras, Laine 2013), of binary trees; of large ones
+    /// an estimate from a part of the triangles.
     #[serde(default)]
     pub epo: Option<f64>,
     /// Bytes of the structure's GPU buffers (the canonical triangle buffer is not counted).

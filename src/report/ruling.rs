@@ -3,6 +3,9 @@
 use super::format;
 use crate::measure::record::Interval;
 
+/// Names in an answer without a winner; the others are only counted.
+const MOST_NAMES: usize = 5;
+
 /// One competitor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contender {
@@ -74,7 +77,12 @@ impl Ruling {
             Self::Winner(best, _) => best.name.clone(),
             Self::Unclear(close) => {
                 let names: Vec<&str> = close.iter().map(|c| c.name.as_str()).collect();
-                format!("no clear winner: {}", names.join(", "))
+                let shown = &names[..names.len().min(MOST_NAMES)];
+                let more = match names.len() - shown.len() {
+                    0 => String::new(),
+                    more => format!(" and {more} more"),
+                };
+                format!("no clear winner: {}{more}", shown.join(", "))
             }
         }
     }

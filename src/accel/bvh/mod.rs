@@ -118,7 +118,8 @@ impl BuiltBvh {
         log: &mut BuildLog,
     ) -> Result<Self, AccelError> {
         let options = Options::new(params)?;
-        let tree = Tree::build(soup, params, log)?;
+        let mut tree = Tree::build(soup, params, log)?;
+        tree.note_epo(soup);
         let depth = tree.depth();
         options.check_depth(depth)?;
         check_leaves(&tree)?;

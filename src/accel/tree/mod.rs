@@ -55,6 +55,9 @@ pub enum NodeKind {
     },
 }
 
+/// Boxes visited for the end-point overlap of a record, about: some tenths of a second.
+const EPO_VISITS: u64 = 4_000_000;
+
 /// A binary tree over triangles; node 0 is the root, nodes are in depth-first order.
 #[derive(Debug, Clone, Default)]
 pub struct Tree {
@@ -63,7 +66,7 @@ pub struct Tree {
     /// Triangle indices, leaf by leaf in the order of the nodes. After spatial splits a triangle may
     /// stand in several leaves, whose boxes cover its own only together.
     pub order: Vec<u32>,
-    /// End-point overlap, if the parameter `epo` asks for it: see [`Tree::epo`].
+    /// End-point overlap, where [`Tree::note_epo`] took it.
     pub epo: Option<f64>,
 }
 
@@ -88,11 +91,15 @@ impl Tree {
             tree = log.phase("reinsertion", || reinsertion::optimise(tree, &settings));
         }
         let has_duplicates = tree.has_duplicates(soup);
-        let mut tree = log.phase("leaves", || {
+        Ok(log.phase("leaves", || {
             leaves::choose_leaves(tree, has_duplicates, &settings)
-        });
-        tree.epo = params.flag("epo").then(|| tree.epo(soup));
-        Ok(tree)
+        }))
+    }
+
+    /// Takes the end-point overlap ([`Tree::epo`]) for the record, of every triangle where that is quick and of
+    /// a part else. No part of a build, and not timed.
+    pub fn note_epo(&mut self, soup: &TriangleSoup) {
+        self.epo = Some(self.epo(soup, EPO_VISITS));
     }
 
     /// The tree of the builder alone.

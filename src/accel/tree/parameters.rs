@@ -201,12 +201,6 @@ pub fn tree_parameters() -> ParameterSchema {
             0,
             64,
         ),
-        Parameter {
-            name: "epo",
-            description: "whether to compute the end-point overlap for the record (Aila et al. 2013; a second for 262,267 triangles); no part of the build",
-            default: ParamValue::Flag(false),
-            range: ParamRange::Flag,
-        },
         number(
             "reinsertion_share",
             "share of the nodes, largest first, that a round tries to reinsert",

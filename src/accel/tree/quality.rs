@@ -10,7 +10,9 @@ use rayon::prelude::*;
 
 /// Triangles whose overlap one task sums up: a constant, so that the sum does not depend on the
 /// number of threads.
-const TRIANGLES_PER_TASK: usize = 256;
+const TRIANGLES_PER_TASK: usize = 16;
+/// Triangles between two looks at the budget.
+const TRIANGLES_PER_BATCH: usize = 128;
 
 impl Tree {
     /// Deepest leaf; the root has depth 0.
@@ -61,44 +63,98 @@ impl Tree {
     /// Rays that end on that surface visit the node in vain. Triangles are clipped exactly (f64).
     ///
     /// 0 if the triangles have no area. Takes time in proportion to triangles × nodes that overlap
-    /// one.
-    pub fn epo(&self, soup: &TriangleSoup) -> f64 {
-        let mut leaves_of = vec![(0_u32, 0_u32); self.order.len()];
+    /// one; once `most` boxes have been visited, the triangles seen until then, spread over all, stand
+    /// for the rest.
+    pub fn epo(&self, soup: &TriangleSoup, most: u64) -> f64 {
+        if self.nodes.is_empty() {
+            return 0.0;
+        }
+        let leaves_of = self.leaves_of_triangles();
+        let order = spread(soup.records.len());
+        let mut total = Overlap::default();
+        for batch in order.chunks(TRIANGLES_PER_BATCH) {
+            let tasks = batch.par_chunks(TRIANGLES_PER_TASK);
+            let parts: Vec<Overlap> = tasks
+                .map(|part| {
+                    let triangles = part.iter().map(|&place| &soup.records[place]);
+                    self.overlap_of(triangles, &leaves_of)
+                })
+                .collect();
+            // One after the other: the sum must not depend on the threads.
+            for part in parts {
+                total.area += part.area;
+                total.foreign += part.foreign;
+                total.visits += part.visits;
+            }
+            if total.visits >= most {
+                break;
+            }
+        }
+        if total.area > 0.0 {
+            total.foreign / total.area
+        } else {
+            0.0
+        }
+    }
+
+    /// Pairs of a triangle and a leaf that lists it, ascending.
+    fn leaves_of_triangles(&self) -> Vec<(u32, u32)> {
+        let mut pairs = vec![(0_u32, 0_u32); self.order.len()];
         for (index, node) in self.nodes.iter().enumerate() {
             if let NodeKind::Leaf { first, count } = node.kind {
                 for place in first..first + count {
-                    leaves_of[place as usize] = (self.order[place as usize], index as u32);
+                    pairs[place as usize] = (self.order[place as usize], index as u32);
                 }
             }
         }
-        leaves_of.par_sort_unstable();
-        let tasks = soup.records.par_chunks(TRIANGLES_PER_TASK);
-        let parts: Vec<[f64; 2]> = tasks
-            .map(|part| {
-                let mut sums = [0.0; 2];
-                let mut walk = OverlapWalk {
-                    tree: self,
-                    own: Vec::new(),
-                };
-                for triangle in part {
-                    let begin = leaves_of.partition_point(|(id, _)| *id < triangle.id);
-                    let own = leaves_of[begin..]
-                        .iter()
-                        .take_while(|(id, _)| *id == triangle.id);
-                    walk.own = own.map(|(_, leaf)| *leaf).collect();
-                    let polygon = Polygon::new(triangle);
-                    sums[0] += polygon.area();
-                    if !self.nodes.is_empty() {
-                        sums[1] += walk.overlap(0, self.nodes.len() as u32, &polygon);
-                    }
-                }
-                sums
-            })
-            .collect();
-        let area: f64 = parts.iter().map(|p| p[0]).sum();
-        let overlap: f64 = parts.iter().map(|p| p[1]).sum();
-        if area > 0.0 { overlap / area } else { 0.0 }
+        pairs.par_sort_unstable();
+        pairs
     }
+
+    fn overlap_of<'a>(
+        &self,
+        triangles: impl Iterator<Item = &'a TriangleRecord>,
+        leaves_of: &[(u32, u32)],
+    ) -> Overlap {
+        let mut sum = Overlap::default();
+        let mut walk = OverlapWalk {
+            tree: self,
+            own: Vec::new(),
+            visits: 0,
+        };
+        for triangle in triangles {
+            let begin = leaves_of.partition_point(|(id, _)| *id < triangle.id);
+            let own = leaves_of[begin..]
+                .iter()
+                .take_while(|(id, _)| *id == triangle.id);
+            walk.own = own.map(|(_, leaf)| *leaf).collect();
+            let polygon = Polygon::new(triangle);
+            sum.area += polygon.area();
+            sum.foreign += walk.overlap(0, self.nodes.len() as u32, &polygon);
+        }
+        sum.visits = walk.visits;
+        sum
+    }
+}
+
+/// Sums over triangles: their area, the weighted area in foreign boxes, boxes visited.
+#[derive(Default)]
+struct Overlap {
+    area: f64,
+    foreign: f64,
+    visits: u64,
+}
+
+/// All of `0..count`, in an order whose every beginning is spread evenly: steps of about the golden
+/// ratio (Weyl).
+fn spread(count: usize) -> Vec<usize> {
+    let golden = (count as f64 * 0.618_033_988_749_895) as usize;
+    let step = (golden..).find(|&step| gcd(step, count) == 1).unwrap_or(1);
+    (0..count).map(|k| k * step % count).collect()
+}
+
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
 }
 
 /// Cost of a node with both constants 1.
@@ -114,12 +170,14 @@ struct OverlapWalk<'a> {
     tree: &'a Tree,
     /// Leaves that list the triangle, ascending.
     own: Vec<u32>,
+    visits: u64,
 }
 
 impl OverlapWalk<'_> {
     /// Weighted area of the polygon in boxes of the subtree of nodes `node..end` that do not list its
     /// triangle. In depth-first order a subtree is one run of nodes.
-    fn overlap(&self, node: u32, end: u32, polygon: &Polygon) -> f64 {
+    fn overlap(&mut self, node: u32, end: u32, polygon: &Polygon) -> f64 {
+        self.visits += 1;
         let TreeNode { bounds, kind } = self.tree.nodes[node as usize];
         let inside = polygon.clipped(&bounds);
         let area = inside.area();
@@ -275,7 +333,7 @@ mod tests {
         // box; the second triangle touches the first leaf's box in one point.
         let second = Polygon::new(&soup.records[1]).area();
         let expected = 1.0 / (8.0 + second);
-        let found = tree.epo(&soup);
+        let found = tree.epo(&soup, u64::MAX);
         assert!((found - expected).abs() < 1e-12, "{found} for {expected}");
     }
 
@@ -284,7 +342,7 @@ mod tests {
         let (mut tree, soup) = two_leaves();
         tree.order = vec![0, 1, 0];
         tree.nodes[2].kind = NodeKind::Leaf { first: 1, count: 2 };
-        assert_eq!(tree.epo(&soup), 0.0);
-        assert_eq!(Tree::default().epo(&soup), 0.0);
+        assert_eq!(tree.epo(&soup, u64::MAX), 0.0);
+        assert_eq!(Tree::default().epo(&soup, u64::MAX), 0.0);
     }
 }

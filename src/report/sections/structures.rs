@@ -168,9 +168,10 @@ fn shape_table(scene: &SceneGroup) -> Table {
         "references/triangle",
         "depth",
         "SAH cost",
+        "EPO",
     ];
-    let caption =
-        "Size and shape (nodes, leaves: cells where there are cells; SAH with both constants 1)";
+    let caption = "Size and shape (nodes, leaves: cells where there are cells; SAH and end-point overlap with both \
+                   constants 1)";
     let mut table = Table::new(caption, &columns);
     for s in built(scene) {
         let stats = &s.stats;
@@ -188,6 +189,7 @@ fn shape_table(scene: &SceneGroup) -> Table {
                 .map_or(format::ABSENT.into(), |depth| depth.to_string())
                 .into(),
             format::optional(stats.sah_cost).into(),
+            format::optional(stats.epo).into(),
         ]);
     }
     table

@@ -104,8 +104,9 @@ pub fn time_to_image_table(scene: &SceneGroup, view: &View) -> Option<Table> {
         view.integrator, sampler.name
     );
     let mut table = Table::new(caption, &["structure", "build"]);
-    let counts = [1, most_spp];
-    for spp in counts {
+    let mut counts = vec![1, most_spp];
+    counts.dedup();
+    for spp in &counts {
         table.add_column(format!("build + {spp} spp"));
     }
     for name in &structures {
@@ -118,7 +119,7 @@ pub fn time_to_image_table(scene: &SceneGroup, view: &View) -> Option<Table> {
         };
         let total = |spp: u32| format::number(built.build_ms + ms.value * f64::from(spp));
         let mut row = vec![name.clone().into(), format::number(built.build_ms).into()];
-        row.extend(counts.map(|spp| total(spp).into()));
+        row.extend(counts.iter().map(|&spp| total(spp).into()));
         table.rows.push(row);
     }
     Some(table)
