@@ -135,14 +135,14 @@ pub(super) const MUTANTS: &[Mutant] = &[
     ),
     row(
         "voxel-left-behind",
-        "along the axes that it does not leave by, the walk does not follow the ray",
+        "along the axes that it does not leave by, the walk follows the ray late: no other answer",
         text(
             "accel/irregular_grid",
             "select(within, select(",
             "select(voxel, select(",
         ),
         IRREGULAR,
-        Check::Lattice,
+        Check::Work,
     ),
     row(
         "list-ends-at-its-first",
