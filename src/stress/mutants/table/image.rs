@@ -178,9 +178,9 @@ pub(super) const MUTANTS: &[Mutant] = &[
         "offset-inwards",
         "rays start below their surface",
         text(
-            "shading/surface",
-            "let steps = vec3<i32>(256.0 * n);",
-            "let steps = vec3<i32>(-256.0 * n);",
+            "integrator/path",
+            "ray = Ray(offset_point(surface.position, surface.normal",
+            "ray = Ray(offset_point(surface.position, -surface.normal",
         ),
         IMAGES,
         Check::Furnace,
