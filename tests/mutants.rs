@@ -68,6 +68,25 @@ fn every_fault_of_the_table_still_applies() {
 }
 
 #[test]
+fn the_page_lists_every_fault_with_what_goes_wrong() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/mutants.md");
+    let text = std::fs::read_to_string(&path).expect("docs/mutants.md");
+    let mut missing = Vec::new();
+    for mutant in mutants() {
+        let row = format!("| `{}` | {} | ", mutant.name, mutant.what);
+        if !text.contains(&row) {
+            missing.push(row);
+        }
+    }
+    assert!(
+        missing.is_empty(),
+        "docs/mutants.md lacks:\n{}",
+        missing.join("\n")
+    );
+    assert!(!text.contains("| `no-such-fault` |"));
+}
+
+#[test]
 fn a_fault_of_each_kind_is_seen_by_the_check_that_should_see_it_and_the_sound_ones_are_green() {
     let (report, told) = run(&SUBSET);
     println!("{}", report.table());

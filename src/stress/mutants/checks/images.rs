@@ -157,7 +157,7 @@ pub(super) fn furnace(bench: &Bench) -> Finding {
     let stage = Stage::builtin("white-furnace", &[])?;
     let images = render(bench, &stage, path(MAX_DEPTH), ONE)?;
     let pixels = images.iter().flat_map(|i| &i.pixels).flatten();
-    let off = |v: &&f32| !((**v - 1.0).abs() < 1e-5);
+    let off = |v: &&f32| v.is_nan() || (**v - 1.0).abs() >= 1e-5;
     Ok(pixels
         .filter(off)
         .max_by(|a, b| a.total_cmp(b))

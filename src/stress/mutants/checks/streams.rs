@@ -46,7 +46,7 @@ pub(super) fn same_words(bench: &Bench, names: Names) -> Finding {
             1 => most,
             _ => random.below(most as usize + 1) as u32,
         };
-        let (pixels, seeds) = if i % 2 == 0 {
+        let (pixels, seeds) = if i.is_multiple_of(2) {
             (4096, 16)
         } else {
             (u32::MAX, u32::MAX)

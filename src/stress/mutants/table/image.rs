@@ -121,7 +121,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             "FIRST_BOUNCE + purpose",
         ),
         IMAGES,
-        Check::Bias,
+        Check::Furnace,
     ),
     row(
         "light-points-bunched",
@@ -178,9 +178,9 @@ pub(super) const MUTANTS: &[Mutant] = &[
         "offset-inwards",
         "rays start below their surface",
         text(
-            "shading/surface",
-            "let steps = vec3<i32>(256.0 * n);",
-            "let steps = vec3<i32>(-256.0 * n);",
+            "integrator/path",
+            "ray = Ray(offset_point(surface.position, surface.normal",
+            "ray = Ray(offset_point(surface.position, -surface.normal",
         ),
         IMAGES,
         Check::Furnace,

@@ -141,12 +141,12 @@ pub(super) const MUTANTS: &[Mutant] = &[
         Check::Stream,
     ),
     row(
-        "base-of-the-next-dimension",
-        "every dimension but the first takes the base of the next",
+        "one-base-for-all",
+        "every dimension but the first takes the first base",
         text(
             "sampling/hammersley",
             "sequence_word(BASES + s.dimension - 1u)",
-            "sequence_word(BASES + s.dimension)",
+            "sequence_word(BASES)",
         ),
         sampler("hammersley", &[], "disc-rotation"),
         Check::Stream,
