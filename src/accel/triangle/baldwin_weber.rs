@@ -81,7 +81,7 @@ pub(super) fn meet(triangle: &TriangleRecord, ray: &Ray) -> Meeting {
     let o = turned(ray.origin, m.axis);
     let d = turned(ray.direction, m.axis);
     let det = d[2] + m.plane[0] * d[0] + m.plane[1] * d[1];
-    if !(det.abs() > 0.0) {
+    if det.abs() <= 0.0 || det.is_nan() {
         return APART;
     }
     let t = (m.plane[2] - o[2] - m.plane[0] * o[0] - m.plane[1] * o[1]) / det;

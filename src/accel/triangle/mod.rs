@@ -266,7 +266,7 @@ pub fn intersect_triangle(
 ) {
     watch::note(Event::Triangle(triangle.id));
     let found = inverse.triangle.meet(triangle, ray, &inverse);
-    if !(found.area > 0.0) {
+    if found.area <= 0.0 || found.area.is_nan() {
         return;
     }
     let (near, far) = slabs(&triangle.bounds(), ray, *inverse);
