@@ -60,9 +60,9 @@ impl Place {
         (self.shift + 2.0 * self.scale) * f64::from(f32::EPSILON)
     }
 
-    /// Whether enough of a mesh is left that it has an inside: two hundred steps of rounding across.
+    /// Whether enough of a mesh is left that it has an inside: a hundred steps of rounding across.
     pub fn keeps_shape(&self) -> bool {
-        2.0 * self.scale > 100.0 * self.resolution()
+        2.0 * self.scale > 50.0 * self.resolution()
     }
 }
 

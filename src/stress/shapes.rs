@@ -133,21 +133,19 @@ fn close_holes(triangles: &[[DVec3; 3]]) -> Vec<[DVec3; 3]> {
     closed
 }
 
-/// Whether every edge is used as often in one direction as in the other.
+/// Whether every edge belongs to an even number of triangles, whichever way they are turned. Rounding
+/// that joins vertices changes nothing of that.
 pub fn is_closed(mesh: &[Triangle]) -> bool {
-    let mut balance: HashMap<[[u32; 3]; 2], i32> = HashMap::new();
+    let mut uses: HashMap<[[u32; 3]; 2], u32> = HashMap::new();
     let key = |v: Vec3| v.to_array().map(|x| (x + 0.0).to_bits());
     for triangle in mesh {
         for k in 0..3 {
-            let (a, b) = (
-                key(triangle.vertices[k]),
-                key(triangle.vertices[(k + 1) % 3]),
-            );
-            *balance.entry([a, b]).or_default() += 1;
-            *balance.entry([b, a]).or_default() -= 1;
+            let mut edge = [k, (k + 1) % 3].map(|k| key(triangle.vertices[k]));
+            edge.sort_unstable();
+            *uses.entry(edge).or_default() += 1;
         }
     }
-    balance.values().all(|n| *n == 0)
+    uses.values().all(|n| n % 2 == 0)
 }
 
 #[cfg(test)]
