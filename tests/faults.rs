@@ -20,7 +20,7 @@ const FAULTS: &[Fault] = &[
     Fault {
         what: "a ray along a face of a triangle's box hits what lies behind it",
         file: "accel/triangle",
-        from: "abs(t - plane) * area <= terms * DISTANCE_PAD",
+        from: "all(outside <= allowance(triangle, ray, inverse, found))",
         to: "true",
         structures: &["brute-force"],
     },
