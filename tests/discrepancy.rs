@@ -182,13 +182,21 @@ fn python_with_scipy() -> Result<PathBuf, String> {
     };
     if run(Command::new(&python).args(["-c", "import scipy.stats"])).is_err() {
         run(Command::new("python3").args(["-m", "venv"]).arg(&folder))?;
-        run(Command::new(&python).args(["-m", "pip", "install", "-q", "scipy"]))?;
+        run(Command::new(&python).args([
+            // Where no registry answers, the test is skipped soon.
+            "-m",
+            "pip",
+            "install",
+            "-q",
+            "--timeout=10",
+            "--retries=1",
+            "scipy",
+        ]))?;
     }
     Ok(python)
 }
 
 #[test]
-#[ignore = "installs SciPy: cargo test --test discrepancy -- --ignored"]
 fn mean_square_discrepancies_agree_with_scipy() {
     let python = match python_with_scipy() {
         Ok(python) => python,
