@@ -34,7 +34,7 @@ fn small() -> Settings {
 }
 
 fn run_small(gpu: &Gpu) -> Vec<Record> {
-    run(gpu, &small(), &|_| ()).expect("the suite runs")
+    run(std::slice::from_ref(gpu), &small(), &|_| ()).expect("the suite runs")
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn a_test_that_refuses_rays_through_edges_is_seen_to_leak() {
         triangles: vec![TriangleTest::MoellerTrumbore.name().into()],
         ..small()
     };
-    let records = run(&gpu, &settings, &|_| ()).expect("the suite runs");
+    let records = run(&[gpu], &settings, &|_| ()).expect("the suite runs");
     let leaks: usize = shots(&records).map(|s| s.misses).sum();
     assert!(
         leaks > 0,

@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 pub const NO_HIT: u32 = u32::MAX;
 
 /// Direction components smaller than this are replaced by it, sign kept, so that the reciprocal is
-/// finite: WGSL promises no infinity. With scene coordinates below 1e16 (checked when a scene is
+/// finite: WGSL promises no infinity. With scene coordinates below 1e12 (checked when a scene is
 /// loaded) `(bounds - origin) / SMALLEST_DIRECTION` stays below the largest f32.
 pub const SMALLEST_DIRECTION: f32 = 1e-20;
 

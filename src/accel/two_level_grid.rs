@@ -8,7 +8,7 @@
 
 use super::bounds::enter_box;
 use super::grid::lists::{Lists, PartLists, check_lists};
-use super::grid::{Cut, Frame, Grid, areas, check_words, clamped, first_axis, outside};
+use super::grid::{Cut, Frame, Grid, areas, check_words, clamped, finest, first_axis, outside};
 use super::ray::{Hit, NO_HIT, Ray};
 use super::triangle::intersect_triangle;
 use super::{
@@ -76,8 +76,7 @@ fn parts(grid: &Grid, areas: impl ExactSizeIterator<Item = f32>, lambda: f64) ->
     let side = grid.cell.map(f64::from);
     let Cut { wanted, share } = Cut::new(side, areas, lambda);
     std::array::from_fn(|a| {
-        // Smaller parts would be all margin.
-        let most = (side[a] / (4.0 * f64::from(grid.margin))).clamp(1.0, f64::from(MOST_PARTS));
+        let most = finest(side[a], grid.margin).min(f64::from(MOST_PARTS));
         (wanted[a] * share).round().clamp(1.0, most) as u32
     })
 }

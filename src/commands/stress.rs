@@ -5,7 +5,7 @@ use super::failure::{FAILED, Failure};
 use super::output::print;
 use anyhow::Context as _;
 use clap::Args;
-use raystone::gpu::{self, KernelLibrary};
+use raystone::gpu::{self, Gpu, KernelLibrary};
 use raystone::measure::atomic::write_atomic;
 use raystone::report::{stress_tables, write_stress_page};
 use raystone::stress::mutants::{self, Options, Outcome};
@@ -14,6 +14,7 @@ use raystone::stress::{Settings, run};
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Instant;
 
 /// Run the numerical stress suite: every triangle test and structure on what rounding makes hard
 ///
@@ -62,18 +63,15 @@ impl Stress {
         }
         let settings = self.settings();
         settings.check().map_err(Failure::input)?;
-        let mut kernels = KernelLibrary::default();
-        if let Some(folder) = &self.device.kernels {
-            kernels = kernels.with_folder(folder)?;
+        let mut gpus = vec![self.open()?];
+        // The host does most of the work of a software adapter one thread at a time.
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        if gpus[0].is_software() && cores > 1 {
+            gpus.push(self.open()?);
         }
-        let gpu = gpu::open(&self.device.adapter.clone().unwrap_or_default(), kernels)?;
-        let shows = std::io::stderr().is_terminal();
-        let progress = |what: &str| {
-            if shows {
-                eprintln!("{what}");
-            }
-        };
-        let records = run(&gpu, &settings, &progress).map_err(Failure::input)?;
+        let start = Instant::now();
+        let progress = |what: &str| eprintln!("{:6.1} s  {what}", start.elapsed().as_secs_f64());
+        let records = run(&gpus, &settings, &progress).map_err(Failure::input)?;
         write(&self.out, &records).map_err(Failure::input)?;
         let page = write_stress_page(&self.out, &records)?;
         print(&format!(
@@ -85,6 +83,15 @@ impl Stress {
             true => ExitCode::from(FAILED),
             false => ExitCode::SUCCESS,
         })
+    }
+
+    fn open(&self) -> Result<Gpu, Failure> {
+        let mut kernels = KernelLibrary::default();
+        if let Some(folder) = &self.device.kernels {
+            kernels = kernels.with_folder(folder)?;
+        }
+        let choice = self.device.adapter.clone().unwrap_or_default();
+        Ok(gpu::open(&choice, kernels)?)
     }
 
     /// Runs the faults, prints their table and writes `mutants.jsonl`.

@@ -6,9 +6,10 @@ use super::{
 };
 use glam::{Vec2, Vec3};
 
-/// Largest absolute coordinate: distances times 1e20 (the largest reciprocal of a direction
-/// component in the kernels) stay below the largest f32 with room to spare.
-pub const MAX_COORDINATE: f32 = 1e16;
+/// Largest absolute coordinate. Triangle tests multiply three differences of coordinates, and WGSL
+/// promises nothing of what overflows: 8 · (2 · 1e12)³ stays below the largest f32. So do distances times
+/// 1e20, the largest reciprocal of a direction component in the kernels.
+pub const MAX_COORDINATE: f32 = 1e12;
 
 /// Reflectance of surfaces whose file says nothing of it.
 pub const DEFAULT_ALBEDO: f32 = 0.7;

@@ -1,17 +1,18 @@
 //! Box tests, ray offsets and the cost of triangle tests.
 
 use super::StressError;
-use super::bench::{self, Stage};
+use super::bench::{self, Expected, Stage};
 use super::case::{self, Random, ray};
 use super::families::Family;
 use super::place::Place;
 use super::record::{BoxTestRecord, CostRecord, OffsetRecord, Record, Worst};
 use super::shapes::{Mesh, cube, sphere};
-use super::suite::{BRUTE_FORCE, Kind, PLAIN, Suite};
+use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite};
 use crate::accel::triangle::TriangleTest;
 use crate::accel::{
     AccelKind as _, BoxTest, Bvh, Counters, Hit, Intersection, NO_HIT, Ray, TriangleSoup,
 };
+use crate::gpu::Gpu;
 use crate::integrator::RayOffset;
 use crate::integrator::offset::{TransformError, position_error};
 use crate::measure::batch::{Batch, Query, count_work};
@@ -27,7 +28,9 @@ const BOX_FAMILIES: [&str; 6] = [
     "needles",
 ];
 /// Structures that find triangles by boxes.
-const BOX_STRUCTURES: [&str; 4] = ["bvh", "roped-bvh", "bvh4", "cwbvh"];
+const BOX_STRUCTURES: [&str; 4] = ["bvh", "cwbvh", "roped-bvh", "bvh4"];
+/// How many of these if it has to be quick.
+const BOX_STRUCTURES_IF_QUICK: usize = 2;
 /// Rays a case, times those of the cells.
 const BOX_RAYS: usize = 4;
 
@@ -45,62 +48,70 @@ impl Suite<'_> {
     ///
     /// # Errors
     /// The device is lost or hangs.
-    pub fn box_tests(&self, progress: &dyn Fn(&str)) -> Result<Vec<Record>, StressError> {
+    pub fn box_tests(&self, progress: &Progress) -> Result<Vec<Record>, StressError> {
         progress("box tests");
-        let kinds: Vec<Kind> = (self.kinds.iter().copied())
-            .filter(|kind| BOX_STRUCTURES.contains(&kind.name()))
-            .collect();
-        let mut records: Vec<BoxTestRecord> = (BoxTest::ALL.iter())
-            .flat_map(|(test, name, _)| kinds.iter().map(|kind| empty_record(*test, name, *kind)))
+        let structures = match self.settings.quick {
+            true => &BOX_STRUCTURES[..BOX_STRUCTURES_IF_QUICK],
+            false => &BOX_STRUCTURES[..],
+        };
+        let mut columns: Vec<(Kind, Vec<BoxTestRecord>)> = (self.kinds.iter())
+            .filter(|kind| structures.contains(&kind.name()))
+            .map(|kind| {
+                let tests = BoxTest::ALL.iter();
+                let empty = tests.map(|(test, name, _)| empty_record(*test, name, *kind));
+                (*kind, empty.collect())
+            })
             .collect();
         for family in BOX_FAMILIES.iter().filter_map(|name| Family::named(name)) {
             let settings = self.settings;
             for case in family.cases(settings.seed, true, BOX_RAYS * settings.rays) {
-                self.box_case(&case, &kinds, &mut records)?;
+                let soup = TriangleSoup::new(&case.scene);
+                let expected = Expected::new(&soup, &case.rays);
+                self.on_devices(&mut columns, |gpu, (kind, column)| {
+                    self.box_case(gpu, &case, &expected, *kind, column)
+                })?;
             }
         }
-        Ok(records.into_iter().map(Record::BoxTest).collect())
+        let records = (0..BoxTest::ALL.len())
+            .flat_map(|test| columns.iter().map(move |(_, column)| &column[test]));
+        Ok(records.cloned().map(Record::BoxTest).collect())
     }
 
     fn box_case(
         &self,
+        gpu: &Gpu,
         case: &case::Case,
-        kinds: &[Kind],
-        records: &mut [BoxTestRecord],
+        expected: &Expected,
+        kind: Kind,
+        column: &mut [BoxTestRecord],
     ) -> Result<(), StressError> {
-        let mut stage = Stage::new(self.gpu, &case.scene, Intersection::default())?;
-        let expected = stage.brute_force(&case.rays);
-        for (place, kind) in kinds.iter().enumerate() {
-            let Ok(built) = bench::build(*kind, &stage.soup) else {
-                continue;
-            };
-            let traced = stage.upload(&*built)?;
-            for (row, (box_test, ..)) in BoxTest::ALL.iter().enumerate() {
-                stage.set(Intersection {
-                    box_test: *box_test,
-                    ..Intersection::default()
+        let mut stage = Stage::new(gpu, &case.scene, Intersection::default())?;
+        let Ok(built) = bench::build(kind, &stage.soup) else {
+            return Ok(());
+        };
+        let traced = stage.upload(&*built)?;
+        for ((box_test, ..), record) in BoxTest::ALL.iter().zip(column) {
+            stage.set(Intersection {
+                box_test: *box_test,
+                ..Intersection::default()
+            });
+            let found = stage.closest(&traced, &case.rays)?;
+            record.rays += case.rays.len();
+            let pairs = found.answers.iter().zip(expected.of(built.space()));
+            let lost = pairs
+                .enumerate()
+                .filter(|(_, (hit, truth))| !hit.same_bits(truth));
+            for (index, _) in lost {
+                record.lost += 1;
+                record.worst.get_or_insert_with(|| {
+                    let test = Intersection::default().triangle;
+                    let replay = self.replay(case, kind.name(), test, &case.rays[index]);
+                    Worst {
+                        what: "lost hit".into(),
+                        replay: format!("{replay} --box-test {}", record.box_test),
+                    }
                 });
-                let found = stage.closest(&traced, &case.rays)?;
-                let record = &mut records[row * kinds.len() + place];
-                record.rays += case.rays.len();
-                let pairs = found.answers.iter().zip(expected.of(built.space()));
-                for (index, _) in pairs
-                    .enumerate()
-                    .filter(|(_, (hit, truth))| !hit.same_bits(truth))
-                {
-                    record.lost += 1;
-                    record.worst.get_or_insert_with(|| {
-                        let test = Intersection::default().triangle;
-                        let replay = self.replay(case, kind.name(), test, &case.rays[index]);
-                        let replay = format!("{replay} --box-test {}", record.box_test);
-                        Worst {
-                            what: "lost hit".into(),
-                            replay,
-                        }
-                    });
-                }
             }
-            stage.set(Intersection::default());
         }
         Ok(())
     }
@@ -109,7 +120,7 @@ impl Suite<'_> {
     ///
     /// # Errors
     /// The tree cannot be built, in words.
-    pub fn offsets(&self, progress: &dyn Fn(&str)) -> Result<Vec<Record>, StressError> {
+    pub fn offsets(&self, progress: &Progress) -> Result<Vec<Record>, StressError> {
         progress("ray offsets");
         let mut records = Vec::new();
         let rays = OFFSET_RAYS * self.settings.rays;
@@ -144,7 +155,7 @@ impl Suite<'_> {
     ///
     /// # Errors
     /// The device is lost or hangs.
-    pub fn costs(&self, progress: &dyn Fn(&str)) -> Result<Vec<Record>, StressError> {
+    pub fn costs(&self, progress: &Progress) -> Result<Vec<Record>, StressError> {
         progress("cost of triangle tests");
         let all = self.times(BRUTE_FORCE, COST_BANDS.0, COST_RAYS.0)?;
         let some = self.times(PLAIN, COST_BANDS.1, COST_RAYS.1)?;
@@ -180,12 +191,12 @@ impl Suite<'_> {
         let rays: Vec<Ray> = (0..count).map(|_| one()).collect();
         let mut batches: Vec<(Timed, Batch)> = Vec::new();
         for test in &self.tests {
-            let stage = Stage::new(self.gpu, &scene, Self::with(*test))?;
+            let stage = Stage::new(self.gpu(), &scene, Self::with(*test))?;
             let Ok(built) = bench::build(kind, &stage.soup) else {
                 continue;
             };
             let traced = stage.upload(&*built)?;
-            let work = count_work(self.gpu, &stage.buffers, &traced, Query::Closest, &rays)?;
+            let work = count_work(self.gpu(), &stage.buffers, &traced, Query::Closest, &rays)?;
             let tests: u64 = work.iter().map(|w| u64::from(w.triangle_tests)).sum();
             // Brute force counts nothing: it tests all.
             let tests = if tests == 0 {

@@ -72,15 +72,6 @@ impl<'a> Stage<'a> {
         self.buffers.intersection = tests;
     }
 
-    /// What brute force on the host answers in each space.
-    pub fn brute_force(&self, rays: &[Ray]) -> Expected {
-        let placed = self.soup.placed.as_ref();
-        Expected {
-            world: brute_force_hits(&self.soup, rays),
-            instances: placed.map(|placed| brute_force_instances(placed, rays)),
-        }
-    }
-
     /// Uploads a structure.
     ///
     /// # Errors
@@ -136,6 +127,15 @@ pub struct Expected {
 }
 
 impl Expected {
+    /// What brute force on the host answers in each space.
+    pub fn new(soup: &TriangleSoup, rays: &[Ray]) -> Self {
+        let placed = soup.placed.as_ref();
+        Self {
+            world: brute_force_hits(soup, rays),
+            instances: placed.map(|placed| brute_force_instances(placed, rays)),
+        }
+    }
+
     /// Those for a structure that meets triangles in this space.
     pub fn of(&self, space: Space) -> &[Hit] {
         match (space, &self.instances) {

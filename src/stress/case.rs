@@ -23,8 +23,6 @@ pub enum Truth {
     Hit,
     /// These are no rays: nothing may be hit.
     Miss,
-    /// What brute force says with the same test: numbers overflow, so that nothing else can tell.
-    BruteForce,
 }
 
 /// A scene with rays.

@@ -1,6 +1,7 @@
 //! What a structure does with one ray, in words: for `raystone trace`.
 
 use super::bench;
+use super::shot_meshes;
 use super::tally::oracle_ray;
 use crate::accel::watch::{Event, watch};
 use crate::accel::{
@@ -46,9 +47,11 @@ pub fn explain(
         counters.nodes, counters.box_tests, counters.triangle_tests, counters.stack_high_water
     );
     let expected = brute_force(&*built, soup, ray);
-    let equal = hit.same_bits(&expected);
+    let any = twin.any_hit(ray, &mut Counters::default());
+    let equal = hit.same_bits(&expected) && any == (expected.triangle != NO_HIT);
     let _ = writeln!(text, "{:12} {}", kind.name(), hit_text(&hit));
     let _ = writeln!(text, "{:12} {}", bench_name(&*built), hit_text(&expected));
+    let _ = writeln!(text, "{:12} {}", "any hit", if any { "yes" } else { "no" });
     text += &oracle_text(scene, ray);
     text += match equal {
         true => "equal to the bit\n",
@@ -131,6 +134,10 @@ fn oracle_text(scene: &SceneData, ray: &Ray) -> String {
 /// # Errors
 /// No family or no case of that name; in words.
 pub fn scene_of(address: &super::case::Address) -> Result<SceneData, String> {
+    if address.family == shot_meshes::FAMILY {
+        let mesh = shot_meshes::ShotMesh::labelled(&address.label, address.seed)?.mesh;
+        return Ok(super::case::scene(mesh, None));
+    }
     let family = super::families::Family::named(&address.family).ok_or_else(|| {
         format!(
             "there is no family `{}`; `raystone stress` lists them",

@@ -15,6 +15,7 @@ pub mod numerics;
 pub mod place;
 pub mod record;
 pub mod shapes;
+pub mod shot_meshes;
 pub mod shots;
 pub mod suite;
 pub mod tally;
@@ -27,7 +28,7 @@ use crate::run::environment::capture as capture_environment;
 use record::{Record, SuiteRecord};
 use std::path::PathBuf;
 use std::time::{Instant, SystemTime};
-use suite::{BRUTE_FORCE, Suite};
+use suite::{BRUTE_FORCE, Progress, Suite};
 use thiserror::Error;
 
 /// Rays a case and shots a mesh: of the whole suite, and of the quick one.
@@ -126,23 +127,28 @@ pub enum StressError {
     },
 }
 
-/// Runs the suite; `progress` is told what is being done.
+/// Runs the suite on devices of one adapter, one at least: they work at once where nothing is timed.
+/// `progress` is told what is being done.
 ///
 /// # Errors
-/// A name that does not exist, or the device is lost or hangs.
+/// A name that does not exist, or a device is lost or hangs.
+///
+/// # Panics
+/// Without a device.
 pub fn run(
-    gpu: &Gpu,
+    gpus: &[Gpu],
     settings: &Settings,
-    progress: &dyn Fn(&str),
+    progress: &Progress,
 ) -> Result<Vec<Record>, StressError> {
     let start = Instant::now();
+    let gpu = gpus.first().expect("a device");
     check_names(
         "family",
         &settings.families,
         families::FAMILIES.iter().map(|f| f.name),
     )?;
     let suite = Suite {
-        gpu,
+        gpus,
         exact: probe_arithmetic(gpu)?.is_exact(),
         settings,
         kinds: kinds(settings),
@@ -156,7 +162,10 @@ pub fn run(
     if settings.families.is_empty() {
         records.extend(suite.box_tests(progress)?);
         records.extend(suite.offsets(progress)?);
-        records.extend(suite.costs(progress)?);
+        // Times of a few rays tell nothing.
+        if !settings.quick {
+            records.extend(suite.costs(progress)?);
+        }
         progress("accumulation and sampling");
         let figures = numerics::run(gpu, settings.quick)?;
         records.extend(figures.into_iter().map(Record::Figure));

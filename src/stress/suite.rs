@@ -8,12 +8,14 @@ use super::record::{CellRecord, Record, SkippedRecord};
 use super::tally::{Judge, Outcome, Tally};
 use super::{Settings, StressError};
 use crate::accel::triangle::TriangleTest;
-use crate::accel::{AccelKind, BuiltAccel, Hit, Intersection, NO_HIT};
+use crate::accel::{AccelKind, BuiltAccel, Hit, Intersection, NO_HIT, Ray, Space, TriangleSoup};
 use crate::gpu::{Gpu, GpuError};
-use crate::integrator::Traced;
 use crate::measure::gate;
 use crate::measure::rays::RaySet;
 use crate::measure::record::RayClass;
+
+/// Is told what is being done, by any thread.
+pub type Progress<'a> = dyn Fn(&str) + Sync + 'a;
 
 /// A structure under test.
 pub type Kind = &'static dyn AccelKind;
@@ -22,11 +24,13 @@ pub type Kind = &'static dyn AccelKind;
 pub const BRUTE_FORCE: &str = "brute-force";
 /// The structure that stands for all where not all are tried.
 pub const PLAIN: &str = "bvh";
+/// Cases that are timed if it has to be quick.
+const TIMED_IF_QUICK: usize = 3;
 
 /// What the suite runs on and with.
 pub struct Suite<'a> {
-    /// The adapter.
-    pub gpu: &'a Gpu,
+    /// Devices of the adapter, one at least, which work at once where nothing is timed.
+    pub gpus: &'a [Gpu],
     /// Whether it computes like the host.
     pub exact: bool,
     /// What to do.
@@ -56,11 +60,37 @@ impl Suite<'_> {
         }
     }
 
+    /// The device that times are measured on.
+    pub(super) fn gpu(&self) -> &Gpu {
+        &self.gpus[0]
+    }
+
+    /// Deals the items out to the devices, which work at once.
+    pub(super) fn on_devices<T: Send>(
+        &self,
+        items: &mut [T],
+        work: impl Fn(&Gpu, &mut T) -> Result<(), StressError> + Sync,
+    ) -> Result<(), StressError> {
+        let mut hands: Vec<Vec<&mut T>> = self.gpus.iter().map(|_| Vec::new()).collect();
+        for (place, item) in items.iter_mut().enumerate() {
+            hands[place % self.gpus.len()].push(item);
+        }
+        let play = |gpu, hand: Vec<&mut T>| hand.into_iter().try_for_each(|item| work(gpu, item));
+        std::thread::scope(|scope| {
+            let players: Vec<_> = (self.gpus.iter().zip(hands))
+                .map(|(gpu, hand)| scope.spawn(|| play(gpu, hand)))
+                .collect();
+            let ends = players.into_iter().map(|player| player.join());
+            ends.map(|end| end.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+                .collect()
+        })
+    }
+
     /// Runs every family; `progress` is told what is being done.
     ///
     /// # Errors
     /// The device is lost or hangs.
-    pub fn cells(&self, progress: &dyn Fn(&str)) -> Result<Vec<Record>, StressError> {
+    pub fn cells(&self, progress: &Progress) -> Result<Vec<Record>, StressError> {
         let chosen = |family: &&Family| self.settings.wants_family(family.name);
         let mut records = Vec::new();
         for family in FAMILIES.iter().filter(chosen) {
@@ -73,21 +103,23 @@ impl Suite<'_> {
     fn family(&self, family: &Family) -> Result<Vec<Record>, StressError> {
         let settings = self.settings;
         let cases = family.cases(settings.seed, settings.quick, settings.rays);
-        let mut cells: Vec<Vec<Cell>> = (self.tests.iter())
-            .map(|_| self.kinds.iter().map(|_| Cell::default()).collect())
-            .collect();
+        let row = || self.kinds.iter().map(|kind| (*kind, Cell::default()));
+        let mut cells: Vec<Vec<(Kind, Cell)>> =
+            (self.tests.iter()).map(|_| row().collect()).collect();
         let mut timed = 0;
         for case in &cases {
             let judge = Judge::new(case);
-            let is_timed = self.is_timed(case, timed);
-            timed += usize::from(is_timed);
-            for (row, test) in self.tests.iter().enumerate() {
-                self.case(case, &judge, *test, is_timed && row == 0, &mut cells[row])?;
+            for (test, row) in self.tests.iter().zip(&mut cells) {
+                self.case(case, &judge, *test, row)?;
+            }
+            if self.is_timed(case, timed) {
+                timed += 1;
+                self.time(case, &mut cells[0])?;
             }
         }
         let mut records = Vec::new();
         for (test, row) in self.tests.iter().zip(cells) {
-            for (kind, cell) in self.kinds.iter().zip(row) {
+            for (kind, cell) in row {
                 records.push(match cell.rungs.is_empty() && cell.failures.is_empty() {
                     true => Record::Skipped(SkippedRecord {
                         what: format!("{}, {}, {}", test.name(), kind.name(), family.name),
@@ -100,11 +132,14 @@ impl Suite<'_> {
         Ok(records)
     }
 
-    /// Whether this case is timed against ordinary rays: the first of a family, and all that are not
-    /// numbers.
+    /// Whether this case is timed against ordinary rays: the first of a family, and all whose rays are not
+    /// numbers; of these a few if it has to be quick.
     fn is_timed(&self, case: &Case, timed: usize) -> bool {
         let strange = case.family == "non-finite";
-        strange || (timed == 0 && !self.settings.quick)
+        match self.settings.quick {
+            true => strange && timed < TIMED_IF_QUICK,
+            false => strange || timed == 0,
+        }
     }
 
     /// Other tests than the default one climb few rungs through structures other than the plain one.
@@ -115,52 +150,68 @@ impl Suite<'_> {
         is_default || stands_for_all || (coarse && !self.settings.quick)
     }
 
+    /// Whether any hit is asked for: with the default test; through the plain structure only if it has to
+    /// be quick, since every kernel has to be compiled.
+    fn asks_any(&self, test: TriangleTest, kind: Kind) -> bool {
+        let is_default = Some(&test) == self.tests.first();
+        is_default && (!self.settings.quick || kind.name() == PLAIN)
+    }
+
     fn case(
         &self,
         case: &Case,
         judge: &Judge,
         test: TriangleTest,
-        timed: bool,
-        cells: &mut [Cell],
+        cells: &mut [(Kind, Cell)],
     ) -> Result<(), StressError> {
-        let stage = Stage::new(self.gpu, &case.scene, Self::with(test))?;
-        let expected = stage.brute_force(&case.rays);
-        let is_default = Some(&test) == self.tests.first();
+        let soup = TriangleSoup::new(&case.scene).intersecting(Self::with(test));
+        let expected = Expected::new(&soup, &case.rays);
         // Structures mostly answer what brute force does: its answers are judged once.
-        let mut judged: Option<(Vec<Hit>, Vec<Outcome>)> = None;
-        for (kind, cell) in self.kinds.iter().zip(cells) {
+        let known = expected.of(Space::World);
+        let outcomes = judge.judge_all(known);
+        self.on_devices(cells, |gpu, (kind, cell)| {
             if !self.takes(case, test, *kind) {
-                continue;
+                return Ok(());
             }
-            let built = match bench::build(*kind, &stage.soup) {
+            let built = match bench::build(*kind, &soup) {
                 Ok(built) => built,
                 Err(reason) => {
                     cell.failures.push(format!("{}: {reason}", case.label));
-                    continue;
+                    return Ok(());
                 }
             };
+            let stage = Stage::new(gpu, &case.scene, Self::with(test))?;
             let trace = Trace {
                 suite: self,
                 case,
                 judge,
                 stage: &stage,
                 expected: &expected,
+                judged: known.iter().zip(&outcomes).collect(),
                 test,
             };
-            let traced = stage.upload(&*built)?;
-            let outcome = trace.run(*kind, &*built, &traced, is_default, cell, &mut judged);
-            match outcome {
-                Err(error @ (GpuError::Lost(_) | GpuError::Timeout { .. })) => {
-                    return Err(error.into());
+            match trace.run(*kind, &*built, cell) {
+                Err(error @ (GpuError::Lost(_) | GpuError::Timeout { .. })) => Err(error.into()),
+                Err(error) => {
+                    cell.failures.push(format!("{}: {error}", case.label));
+                    Ok(())
                 }
-                Err(error) => cell.failures.push(format!("{}: {error}", case.label)),
-                Ok(()) => {}
+                Ok(()) => Ok(()),
             }
-            if timed {
-                let count = self.settings.timed_rays();
-                let ordinary = bench::ordinary_rays(case, self.settings.seed, count);
-                let rays = bench::repeated(&case.rays, count);
-                let ratio = bench::ratio(&stage, &traced, &rays, &ordinary)?;
+        })
+    }
+
+    /// Times the case with the default test through every structure that can be built; not through brute
+    /// force, which does the same whatever the rays, if it has to be quick.
+    fn time(&self, case: &Case, cells: &mut [(Kind, Cell)]) -> Result<(), StressError> {
+        let stage = Stage::new(self.gpu(), &case.scene, Intersection::default())?;
+        let count = self.settings.timed_rays();
+        let ordinary = bench::ordinary_rays(case, self.settings.seed, count);
+        let rays = bench::repeated(&case.rays, count);
+        let takes = |kind: Kind| !self.settings.quick || kind.name() != BRUTE_FORCE;
+        for (kind, cell) in cells.iter_mut().filter(|(kind, _)| takes(*kind)) {
+            if let Ok(built) = bench::build(*kind, &stage.soup) {
+                let ratio = bench::ratio(&stage, &stage.upload(&*built)?, &rays, &ordinary)?;
                 cell.slowdown = Some(cell.slowdown.map_or(ratio, |s: f64| s.max(ratio)));
             }
         }
@@ -168,21 +219,25 @@ impl Suite<'_> {
     }
 
     /// The command that shows what a structure does with a ray of a case.
-    pub fn replay(
+    pub fn replay(&self, case: &Case, kind: &str, test: TriangleTest, ray: &Ray) -> String {
+        self.replay_at(case.family, &case.label, (kind, test.name()), ray)
+    }
+
+    /// The same with structure and triangle test by name.
+    pub fn replay_at(
         &self,
-        case: &Case,
-        kind: &str,
-        test: TriangleTest,
-        ray: &crate::accel::Ray,
+        family: &str,
+        label: &str,
+        (kind, test): (&str, &str),
+        ray: &Ray,
     ) -> String {
         let address = Address {
-            family: case.family.to_owned(),
-            label: case.label.clone(),
+            family: family.to_owned(),
+            label: label.to_owned(),
             seed: self.settings.seed,
         };
         format!(
-            "raystone trace --scene '{address}' --accel {kind} --triangle {} --ray '{}'",
-            test.name(),
+            "raystone trace --scene '{address}' --accel {kind} --triangle {test} --ray '{}'",
             ray_text(ray)
         )
     }
@@ -195,45 +250,45 @@ struct Trace<'a> {
     judge: &'a Judge<'a>,
     stage: &'a Stage<'a>,
     expected: &'a Expected,
+    /// Answers whose outcomes are known.
+    judged: Vec<(&'a Hit, &'a Outcome)>,
     test: TriangleTest,
 }
 
 impl Trace<'_> {
-    fn run(
-        &self,
-        kind: Kind,
-        built: &dyn BuiltAccel,
-        traced: &Traced,
-        ask_any: bool,
-        cell: &mut Cell,
-        judged: &mut Option<(Vec<Hit>, Vec<Outcome>)>,
-    ) -> Result<(), GpuError> {
+    fn run(&self, kind: Kind, built: &dyn BuiltAccel, cell: &mut Cell) -> Result<(), GpuError> {
         let case = self.case;
-        let found = self.stage.closest(traced, &case.rays)?;
+        let traced = self.stage.upload(built)?;
+        let found = self.stage.closest(&traced, &case.rays)?;
         let expected = self.expected.of(built.space());
+        let replay = |index: usize| {
+            let ray = &case.rays[index];
+            self.suite.replay(case, kind.name(), self.test, ray)
+        };
         let mut errors = found.errors;
-        let (known, outcomes) = judged
-            .get_or_insert_with(|| (found.answers.clone(), self.judge.judge_all(&found.answers)));
         let mut tally = Tally::default();
         let closed = matches!(case.truth, Truth::Closed | Truth::Hit);
-        for (index, (hit, ray)) in found.answers.iter().zip(&case.rays).enumerate() {
-            let outcome = match hit.same_bits(&known[index]) {
-                true => outcomes[index],
+        for (index, hit) in found.answers.iter().enumerate() {
+            let (known, known_outcome) = self.judged[index];
+            let outcome = match hit.same_bits(known) {
+                true => *known_outcome,
                 false => self.judge.judge(index, hit),
             };
-            let replay = || self.suite.replay(case, kind.name(), self.test, ray);
-            tally.add(&outcome, closed, replay);
+            tally.add(&outcome, closed, || replay(index));
             if !hit.same_bits(&expected[index]) {
-                tally.note(6e9, "differs from brute force", replay);
+                tally.note(6e9, "differs from brute force", || replay(index));
             }
         }
         self.compare(built, &found.answers, &mut tally);
-        if ask_any {
-            let any = self.stage.any(traced, &case.rays)?;
+        if self.suite.asks_any(self.test, kind) {
+            let any = self.stage.any(&traced, &case.rays)?;
             errors |= any.errors;
-            let pairs = any.answers.iter().zip(expected);
-            let differ = pairs.filter(|(any, hit)| **any != (hit.triangle != NO_HIT));
-            tally.any_differing = differ.count();
+            for (index, (any, hit)) in any.answers.iter().zip(expected).enumerate() {
+                if *any != (hit.triangle != NO_HIT) {
+                    tally.any_differing += 1;
+                    tally.note(7e9, "any hit differs from brute force", || replay(index));
+                }
+            }
             cell.asked_any = true;
         }
         if let Some(text) = bench::error_text(errors) {

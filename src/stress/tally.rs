@@ -58,7 +58,7 @@ impl<'a> Judge<'a> {
         match (self.case.truth, answer) {
             (Truth::Hit, None) => plain(ExactVerdict::FalseMiss { explained: false }),
             (Truth::Miss, Some(_)) => plain(ExactVerdict::FalseHit { explained: false }),
-            (Truth::Hit | Truth::Miss | Truth::BruteForce, _) => plain(ExactVerdict::Miss),
+            (Truth::Hit | Truth::Miss, _) => plain(ExactVerdict::Miss),
             (Truth::Exact | Truth::Closed, _) => {
                 let ray = &self.case.rays[index];
                 let triangles = &self.case.scene.triangles;

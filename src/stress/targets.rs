@@ -30,8 +30,8 @@ pub fn targets(records: &[Record]) -> Vec<TargetRecord> {
     let mut targets = shot_targets(&shots, suite.shots);
     targets.extend(cell_targets(&cells));
     targets.extend(pad_target(records));
-    // Times of so few rays tell nothing.
-    targets.extend(cost.filter(|_| !suite.quick).map(cost_target));
+    targets.extend(figure_target(records));
+    targets.extend(cost.map(cost_target));
     targets
 }
 
@@ -166,6 +166,26 @@ fn pad_target(records: &[Record]) -> Option<TargetRecord> {
     })
 }
 
+/// Accumulation and sampling: how many figures are beyond their alarm level.
+fn figure_target(records: &[Record]) -> Option<TargetRecord> {
+    let mut figures = (records.iter())
+        .filter_map(|r| match r {
+            Record::Figure(figure) => Some(figure),
+            _ => None,
+        })
+        .peekable();
+    figures.peek()?;
+    let alarms: Vec<&str> = figures
+        .filter(|f| !f.passed)
+        .map(|f| f.name.as_str())
+        .collect();
+    Some(target(
+        "figures of accumulation and sampling beyond their alarm level",
+        0.0,
+        std::iter::once((alarms.len() as f64, alarms.join(", "))),
+    ))
+}
+
 fn cost_target(cost: &CostRecord) -> TargetRecord {
     let name = format!(
         "time of {} against moeller-trumbore in a traversal",
@@ -181,6 +201,26 @@ fn cost_target(cost: &CostRecord) -> TargetRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_figure_beyond_its_alarm_fails_their_target_by_name() {
+        let figure = |name: &str, passed| {
+            Record::Figure(crate::stress::numerics::Figure {
+                name: name.into(),
+                value: 2.0,
+                alarm: Some(1.0),
+                unit: String::new(),
+                passed,
+                note: String::new(),
+            })
+        };
+        let verdict = |records: &[Record]| figure_target(records).map(|t| (t.passed, t.note));
+        assert_eq!(verdict(&[]), None);
+        let good = verdict(&[figure("sum", true)]);
+        assert_eq!(good, Some((Some(true), String::new())));
+        let bad = verdict(&[figure("sum", true), figure("acos", false)]);
+        assert_eq!(bad, Some((Some(false), "acos".into())));
+    }
 
     fn shot(misses: usize, place: Place, aim: &str) -> ShotsRecord {
         ShotsRecord {

@@ -43,6 +43,10 @@ pub struct Frame {
     pub bounds: Bounds,
     /// By how much cells are grown when triangles are listed, scene units. Positions along a ray that
     /// starts within 16 diagonals of the scene are wrong by less.
+    ///
+    /// 2⁻¹⁸ diagonals for what is relative to the way of a ray, and 2⁻²² of the greatest coordinate: half
+    /// an ulp each for the position, the plane that bounds its cell, and the box of a triangle once it is
+    /// grown; differences of positions are exact to their own half ulp.
     pub margin: f32,
     diagonal: f32,
 }
@@ -61,7 +65,7 @@ impl Frame {
         let far = (0..3)
             .map(|a| bounds.min[a].abs().max(bounds.max[a].abs()))
             .fold(0.0, f32::max);
-        let margin = ((diagonal + far) * 2.0_f32.powi(-18)).max(1e-18);
+        let margin = (diagonal * 2.0_f32.powi(-18) + far * 2.0_f32.powi(-22)).max(1e-18);
         for axis in 0..3 {
             bounds.min[axis] -= margin;
             bounds.max[axis] += margin;
@@ -81,9 +85,17 @@ impl Frame {
                 .max(1e-3 * f64::from(self.diagonal))
                 .max(f64::from(self.margin))
         });
-        cleary(side, triangles, lambda)
-            .map(|cells| cells.round().clamp(1.0, f64::from(most)) as u32)
+        let cells = cleary(side, triangles, lambda);
+        std::array::from_fn(|a| {
+            let most = finest(side[a], self.margin).min(f64::from(most));
+            cells[a].round().clamp(1.0, most) as u32
+        })
     }
+}
+
+/// Most cells along a side: smaller ones would be all margin.
+pub fn finest(side: f64, margin: f32) -> f64 {
+    (side / (4.0 * f64::from(margin))).max(1.0)
 }
 
 /// Cells along each axis of a box with these sides: side · cbrt(λ · triangles / volume)

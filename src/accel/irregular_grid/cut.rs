@@ -2,7 +2,7 @@
 //! triangles, and cells of one voxel; empty octants are one cell from the start.
 
 use super::super::grid::lists::{Lists, PartLists};
-use super::super::grid::{Cut, Frame, Grid, areas, check_words};
+use super::super::grid::{Cut, Frame, Grid, areas, check_words, finest};
 use super::super::{AccelError, TriangleSoup};
 use super::voxels::{Block, Cell, Entry, Map};
 use super::{Partition, Settings};
@@ -80,9 +80,8 @@ fn parts_log(
     } else {
         MOST_LOG
     };
-    // Smaller parts would be all margin.
     let longest = side.iter().copied().fold(0.0, f64::max);
-    let finest = (longest / (4.0 * f64::from(fine.margin))).max(1.0);
+    let finest = finest(longest, fine.margin);
     let ceiling = most.log2().ceil() as u32;
     ceiling
         .min(by_copies)

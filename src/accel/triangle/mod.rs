@@ -109,13 +109,13 @@ impl TriangleRecord {
 #[serde(rename_all = "kebab-case")]
 pub enum TriangleTest {
     /// T. Möller, B. Trumbore, "Fast, minimum storage ray/triangle intersection", 1997.
-    #[default]
     MoellerTrumbore,
     /// D. Baldwin, M. Weber, "Fast ray–triangle intersections by coordinate transformation", 2016.
     BaldwinWeber,
     /// Plücker coordinates with Embree's tolerance.
     Pluecker,
     /// S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", 2013.
+    #[default]
     Watertight,
     /// The same with exact edge signs.
     Compensated,

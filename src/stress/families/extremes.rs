@@ -134,14 +134,9 @@ fn number(random: &mut Random, limit: f32) -> f32 {
 }
 
 pub fn random_bits(maker: &mut Maker) {
-    // Up to 10^9 products stay within f32; up to the loaders' limit they do not.
-    for (name, limit, truth) in [
-        ("up to 1e9", 1e9, Truth::Exact),
-        (
-            "up to the limit of coordinates",
-            MAX_COORDINATE,
-            Truth::BruteForce,
-        ),
+    for (name, limit) in [
+        ("up to 1e9", 1e9),
+        ("up to the limit of coordinates", MAX_COORDINATE),
     ] {
         let vector = move |random: &mut Random| Vec3::from([0; 3].map(|_| number(random, limit)));
         let mesh = |random: &mut Random| {
@@ -151,20 +146,26 @@ pub fn random_bits(maker: &mut Maker) {
                 })
                 .collect()
         };
-        maker.add(name, Place::ORDINARY, truth, mesh, |mesh, random, count| {
-            let one = |i: usize| {
-                let from = vector(random);
-                match i % 4 {
-                    0 => ray(from, vector(random)),
-                    1 => Ray {
-                        t_max: number(random, FAR).abs(),
-                        ..ray(from, vector(random))
-                    },
-                    _ => towards(from, random.on_mesh(mesh)),
-                }
-            };
-            (0..count).map(one).collect()
-        });
+        maker.add(
+            name,
+            Place::ORDINARY,
+            Truth::Exact,
+            mesh,
+            |mesh, random, count| {
+                let one = |i: usize| {
+                    let from = vector(random);
+                    match i % 4 {
+                        0 => ray(from, vector(random)),
+                        1 => Ray {
+                            t_max: number(random, FAR).abs(),
+                            ..ray(from, vector(random))
+                        },
+                        _ => towards(from, random.on_mesh(mesh)),
+                    }
+                };
+                (0..count).map(one).collect()
+            },
+        );
     }
     // Even numbers of about the same size are rarely random bits, so that these rays often hit.
     let place = Place {

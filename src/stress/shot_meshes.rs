@@ -1,0 +1,227 @@
+//! The closed meshes that shots are aimed at, with points inside them to shoot from.
+
+use super::case::{Random, ray, towards};
+use super::families::on_edge;
+use super::place::Place;
+use super::shapes::{self, Mesh, RADIUS};
+use super::tally::oracle_ray;
+use crate::accel::Ray;
+use crate::config::{Params, Variant};
+use crate::oracle::{Side, exact_truths};
+use crate::scene::{Bounds, LoadOptions, Triangle, load};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// What stands for a family in the address of one of these meshes.
+pub const FAMILY: &str = "shots";
+/// The sphere and the plane; any other name is the path of a model.
+pub const SPHERE: &str = "sphere";
+/// See [`SPHERE`].
+pub const PLANE: &str = "plane";
+
+/// What is aimed at.
+pub const AIMS: [&str; 3] = ["random", "vertices", "edges"];
+
+/// Bands of the sphere: 16,256 triangles.
+const BANDS: usize = 64;
+/// Cells along an edge of the plane: 8,192 triangles.
+const CELLS: usize = 64;
+/// Side of the plane, as in Embree's test, units.
+const SIDE: f64 = 200.0;
+/// Points tried as origins inside a model, and how many are wanted at least.
+const TRIED: usize = 384;
+const LEAST_ORIGINS: usize = 8;
+
+/// A mesh with points from which every ray that is shot hits it.
+pub struct ShotMesh {
+    name: String,
+    /// Where it stands.
+    pub place: Place,
+    /// Its triangles.
+    pub mesh: Mesh,
+    /// What is aimed at: a plane ends, and past its border lies nothing.
+    aims: Mesh,
+    origins: Vec<Vec3>,
+}
+
+impl ShotMesh {
+    /// The mesh of this name, at this place, with origins by this seed.
+    ///
+    /// # Errors
+    /// A model that cannot be read, or that has hardly an inside; in words.
+    pub fn named(name: &str, place: Place, seed: u64) -> Result<Self, String> {
+        let mut random = Random::with_stream(seed, 77);
+        let mut inside = |reach: f64, above: f64| -> Vec<Vec3> {
+            (0..512)
+                .map(|_| place.point(reach * random.in_cube() + above * glam::DVec3::Y))
+                .collect()
+        };
+        let (mesh, origins) = match name {
+            SPHERE => (shapes::sphere(BANDS, &place), inside(0.45 * RADIUS, 0.0)),
+            PLANE => (
+                shapes::plane(CELLS, SIDE, &place),
+                inside(0.2 * SIDE, 0.3 * SIDE),
+            ),
+            path => model(path, place, seed)?,
+        };
+        Ok(Self {
+            name: name.to_owned(),
+            place,
+            aims: if name == PLANE {
+                within_border(&mesh)
+            } else {
+                mesh.clone()
+            },
+            mesh,
+            origins,
+        })
+    }
+
+    /// The mesh of a label.
+    ///
+    /// # Errors
+    /// As for [`ShotMesh::named`], or the label is none.
+    pub fn labelled(label: &str, seed: u64) -> Result<Self, String> {
+        let place = |place: &Place| label.ends_with(&format!(", {place}"));
+        let place = [Place::ORDINARY, Place::FAR].into_iter().find(place);
+        let split = place.zip(label.rsplit_once(", "));
+        let (place, (name, _)) =
+            split.ok_or_else(|| format!("`{label}` is no mesh and place of shots"))?;
+        Self::named(name, place, seed)
+    }
+
+    /// What it is called in an address.
+    pub fn label(&self) -> String {
+        format!("{}, {}", self.name, self.place)
+    }
+
+    /// What it is called in tables.
+    pub fn short_name(&self) -> &str {
+        match self.name.as_str() {
+            name @ (SPHERE | PLANE) => name,
+            path => {
+                let path = std::path::Path::new(path);
+                let stem = path.file_stem().and_then(|stem| stem.to_str());
+                stem.unwrap_or("model")
+            }
+        }
+    }
+
+    /// Rays at what is aimed at, [`AIMS`], from random numbers of their own.
+    pub fn shots(&self, aim: usize, seed: u64, stream: u64, count: usize) -> Vec<Ray> {
+        const BLOCK: usize = 4096;
+        let block = |block: usize| {
+            let mut random = Random::with_stream(seed, stream << 16 | block as u64);
+            let rays = BLOCK.min(count - block * BLOCK);
+            (0..rays)
+                .map(|_| self.shot(aim, &mut random))
+                .collect::<Vec<_>>()
+        };
+        (0..count.div_ceil(BLOCK))
+            .into_par_iter()
+            .flat_map_iter(block)
+            .collect()
+    }
+
+    fn shot(&self, aim: usize, random: &mut Random) -> Ray {
+        let origin = random.one_of(&self.origins);
+        let triangle = random.one_of(&self.aims);
+        match aim {
+            // Rays from above go down, not anywhere.
+            0 if self.name == PLANE => towards(origin, random.on(triangle.vertices).as_vec3()),
+            0 => ray(origin, random.direction().as_vec3()),
+            1 => towards(origin, triangle.vertices[random.below(3)]),
+            _ => towards(origin, on_edge(&triangle, random)),
+        }
+    }
+}
+
+/// A model with its holes closed, and points inside it.
+fn model(path: &str, place: Place, seed: u64) -> Result<(Mesh, Vec<Vec3>), String> {
+    let variant = Variant {
+        name: path.to_owned(),
+        params: Params::default(),
+        label: path.to_owned(),
+    };
+    let scene = load(&variant, &LoadOptions::default()).map_err(|e| e.to_string())?;
+    let mesh = shapes::model(&scene.triangles, &place);
+    let mut random = Random::with_stream(seed, 78);
+    let tried: Vec<Ray> = (0..TRIED)
+        .map(|_| {
+            ray(
+                place.point(0.7 * RADIUS * random.in_cube()),
+                random.direction().as_vec3(),
+            )
+        })
+        .collect();
+    let origins = inside(&mesh, &tried);
+    if origins.len() < LEAST_ORIGINS {
+        return Err(format!(
+            "only {} of {TRIED} points lie inside it",
+            origins.len()
+        ));
+    }
+    Ok((mesh, origins))
+}
+
+/// The triangles that do not touch the border of a level plane.
+fn within_border(plane: &[Triangle]) -> Mesh {
+    let bounds = Bounds::of(plane);
+    let is_inner = |v: &Vec3| {
+        [0, 2]
+            .iter()
+            .all(|&a| v[a] > bounds.min[a] && v[a] < bounds.max[a])
+    };
+    let inner = plane.iter().filter(|t| t.vertices.iter().all(is_inner));
+    inner.copied().collect()
+}
+
+/// Origins of those rays that leave the mesh an odd number of times, through insides only.
+fn inside(mesh: &[Triangle], rays: &[Ray]) -> Vec<Vec3> {
+    let lines: Vec<_> = rays.iter().map(oracle_ray).collect();
+    let truths = exact_truths(mesh, &lines);
+    let is_inside = |truth: &crate::oracle::ExactTruth| {
+        truth.hits.len() % 2 == 1 && truth.hits.iter().all(|hit| hit.side == Side::Inside)
+    };
+    let pairs = rays.iter().zip(&truths);
+    pairs
+        .filter(|(_, truth)| is_inside(truth))
+        .map(|(ray, _)| Vec3::from(ray.origin))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mesh_is_found_again_by_its_label() {
+        for place in [Place::ORDINARY, Place::FAR] {
+            for name in [SPHERE, PLANE] {
+                let mesh = ShotMesh::named(name, place, 3).unwrap();
+                let again = ShotMesh::labelled(&mesh.label(), 3).unwrap();
+                assert_eq!(again.mesh, mesh.mesh);
+                assert_eq!(again.origins, mesh.origins);
+            }
+        }
+        let wrong = |label: &str| ShotMesh::labelled(label, 3).err().unwrap();
+        assert!(wrong("sphere, somewhere").contains("somewhere"));
+        assert!(wrong("no/such/model.obj, ordinary").contains("no/such/model.obj"));
+    }
+
+    #[test]
+    fn points_inside_a_closed_mesh_are_told_from_points_outside() {
+        let mesh = shapes::sphere(8, &Place::ORDINARY);
+        let mut random = Random::with_stream(1, 0);
+        let mut rays = |radius: f64| -> Vec<Ray> {
+            (0..40)
+                .map(|_| {
+                    let origin = (radius * random.direction()).as_vec3();
+                    ray(origin, random.direction().as_vec3())
+                })
+                .collect()
+        };
+        assert!(inside(&mesh, &rays(0.8 * RADIUS)).len() > 38);
+        assert_eq!(inside(&mesh, &rays(1.1 * RADIUS)).len(), 0);
+    }
+}
