@@ -196,7 +196,8 @@ pub fn brute_force_hits(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
         .zip(rays.par_chunks(RAY_CHUNK))
         .for_each(|(hits, rays)| {
             for (tile, blocks) in blocks.chunks(TILE_BLOCKS).enumerate() {
-                for (ray, hit) in rays.iter().zip(hits.iter_mut()) {
+                let pairs = rays.iter().zip(hits.iter_mut());
+                for (ray, hit) in pairs.filter(|(ray, _)| ray.is_ray()) {
                     let inverse = soup.intersection.inverse(ray.direction);
                     for (index, block) in blocks.iter().enumerate() {
                         let mut mask = block.candidates(ray, &inverse);

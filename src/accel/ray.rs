@@ -38,6 +38,20 @@ pub struct Hit {
     pub v: f32,
 }
 
+impl Ray {
+    /// Whether it is a ray at all: origin and direction finite, a component of the direction at least
+    /// [`SMALLEST_DIRECTION`], ends that are numbers. Anything else hits nothing. Twin: `is_ray` in
+    /// `kernels/integrator/trace_rays.wesl`.
+    pub fn is_ray(&self) -> bool {
+        let greatest = |x: [f32; 3]| x.map(f32::abs).into_iter().fold(0.0, f32::max);
+        let finite = self.origin.iter().chain(&self.direction);
+        finite.into_iter().all(|x| x.is_finite())
+            && greatest(self.direction) >= SMALLEST_DIRECTION
+            && !self.t_min.is_nan()
+            && !self.t_max.is_nan()
+    }
+}
+
 impl Hit {
     /// The answer before anything was hit.
     pub fn miss(ray: &Ray) -> Self {

@@ -76,7 +76,7 @@ fn parts(grid: &Grid, areas: impl ExactSizeIterator<Item = f32>, lambda: f64) ->
     let side = grid.cell.map(f64::from);
     let Cut { wanted, share } = Cut::new(side, areas, lambda);
     std::array::from_fn(|a| {
-        let most = finest(side[a], grid.margin).min(f64::from(MOST_PARTS));
+        let most = finest(side[a], grid.margin[a]).min(f64::from(MOST_PARTS));
         (wanted[a] * share).round().clamp(1.0, most) as u32
     })
 }

@@ -18,13 +18,13 @@ pub mod read;
 pub mod ruling;
 pub mod samplers;
 pub mod sections;
-pub mod stress_page;
+pub mod stress;
 pub mod terminal;
 #[cfg(test)]
 mod tests;
 
 pub use read::{Records, read_records};
-pub use stress_page::{stress_tables, write_stress_page};
+pub use stress::{stress_tables, write_stress_page};
 pub use terminal::terminal_tables;
 
 use crate::measure::atomic::write_atomic;

@@ -4,7 +4,7 @@ use super::place::Place;
 use super::shapes::Mesh;
 use crate::accel::Ray;
 use crate::measure::statistics::Pcg32;
-use crate::scene::{Assembly, Material, SceneData, Triangle};
+use crate::scene::{Assembly, MAX_COORDINATE, Material, SceneData, Triangle};
 use glam::{DVec3, Vec3};
 use std::fmt;
 
@@ -201,6 +201,11 @@ impl Maker {
         scene: SceneData,
         rays: Vec<Ray>,
     ) {
+        // Loaders let no greater ones pass.
+        let [low, high] = [scene.bounds().min, scene.bounds().max].map(|v| v.abs().max_element());
+        if low.max(high) > MAX_COORDINATE {
+            return;
+        }
         self.cases.push(Case {
             family: self.family,
             label,

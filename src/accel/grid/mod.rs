@@ -41,13 +41,13 @@ pub fn check_words(what: &str, needed: u64) -> Result<(), AccelError> {
 pub struct Frame {
     /// Around all triangles, grown by the margin.
     pub bounds: Bounds,
-    /// By how much cells are grown when triangles are listed, scene units. Positions along a ray that
-    /// starts within 16 diagonals of the scene are wrong by less.
+    /// By how much cells are grown along each axis when triangles are listed, scene units. Positions
+    /// along a ray that starts within 16 diagonals of the scene are wrong by less.
     ///
-    /// 2⁻¹⁸ diagonals for what is relative to the way of a ray, and 2⁻²² of the greatest coordinate: half
-    /// an ulp each for the position, the plane that bounds its cell, and the box of a triangle once it is
-    /// grown; differences of positions are exact to their own half ulp.
-    pub margin: f32,
+    /// 2⁻¹⁸ diagonals for what is relative to the way of a ray, and 2⁻²² of the greatest coordinate along
+    /// the axis: half an ulp each for the position, the plane that bounds its cell, and the box of a
+    /// triangle once it is grown; differences of positions are exact to their own half ulp.
+    pub margin: [f32; 3],
     diagonal: f32,
 }
 
@@ -62,11 +62,11 @@ impl Frame {
             };
         }
         let diagonal = bounds.extent().iter().map(|e| e * e).sum::<f32>().sqrt();
-        let far = (0..3)
-            .map(|a| bounds.min[a].abs().max(bounds.max[a].abs()))
-            .fold(0.0, f32::max);
-        let margin = (diagonal * 2.0_f32.powi(-18) + far * 2.0_f32.powi(-22)).max(1e-18);
-        for axis in 0..3 {
+        let margin = std::array::from_fn(|a| {
+            let far = bounds.min[a].abs().max(bounds.max[a].abs());
+            (diagonal * 2.0_f32.powi(-18) + far * 2.0_f32.powi(-22)).max(1e-18)
+        });
+        for (axis, margin) in margin.iter().enumerate() {
             bounds.min[axis] -= margin;
             bounds.max[axis] += margin;
         }
@@ -80,14 +80,15 @@ impl Frame {
     /// Cells along each axis for `lambda` cells a triangle, from 1 to `most`.
     pub fn resolution(&self, triangles: usize, lambda: f64, most: u32) -> [u32; 3] {
         // A flat scene still needs a volume for Cleary's rule.
-        let side = self.bounds.extent().map(|e| {
-            f64::from(e)
+        let extent = self.bounds.extent();
+        let side = std::array::from_fn(|a| {
+            f64::from(extent[a])
                 .max(1e-3 * f64::from(self.diagonal))
-                .max(f64::from(self.margin))
+                .max(f64::from(self.margin[a]))
         });
         let cells = cleary(side, triangles, lambda);
         std::array::from_fn(|a| {
-            let most = finest(side[a], self.margin).min(f64::from(most));
+            let most = finest(side[a], self.margin[a]).min(f64::from(most));
             cells[a].round().clamp(1.0, most) as u32
         })
     }
@@ -178,7 +179,7 @@ pub struct Grid {
     /// Their reciprocals.
     pub inverse_cell: [f32; 3],
     /// See [`Frame::margin`].
-    pub margin: f32,
+    pub margin: [f32; 3],
 }
 
 impl Grid {
@@ -203,7 +204,7 @@ impl Grid {
         )
     }
 
-    fn with_cells(low: [f32; 3], cell: [f32; 3], resolution: [u32; 3], margin: f32) -> Self {
+    fn with_cells(low: [f32; 3], cell: [f32; 3], resolution: [u32; 3], margin: [f32; 3]) -> Self {
         let high = std::array::from_fn(|a| low[a] + resolution[a] as f32 * cell[a]);
         Self {
             bounds: Bounds {

@@ -47,8 +47,8 @@ impl Raster {
     ) {
         let corners = corners(record);
         let [low, high] = extremes(&corners);
-        let first: [u32; 3] = std::array::from_fn(|a| grid.coordinate(a, low[a] - grid.margin));
-        let last: [u32; 3] = std::array::from_fn(|a| grid.coordinate(a, high[a] + grid.margin));
+        let first: [u32; 3] = std::array::from_fn(|a| grid.coordinate(a, low[a] - grid.margin[a]));
+        let last: [u32; 3] = std::array::from_fn(|a| grid.coordinate(a, high[a] + grid.margin[a]));
         let wide: [bool; 3] = std::array::from_fn(|a| first[a] != last[a]);
         let wide_axes = wide.iter().filter(|&&w| w).count();
         // A triangle is in one piece: in a single row of cells it leaves out none.
@@ -122,7 +122,7 @@ impl Shape {
         Self {
             corners: corners
                 .map(|c| std::array::from_fn(|a| (f64::from(c[a]) - low[a]) * scale[a])),
-            grow: scale.map(|s| f64::from(grid.margin) * margins * s),
+            grow: std::array::from_fn(|a| f64::from(grid.margin[a]) * margins * scale[a]),
         }
     }
 }

@@ -15,6 +15,9 @@ use rayon::prelude::*;
 pub fn brute_force_instances(placed: &Placed, rays: &[Ray]) -> Vec<Hit> {
     let closest = |ray: &Ray| {
         let mut hit = Hit::miss(ray);
+        if !ray.is_ray() {
+            return hit;
+        }
         for instance in &placed.instances {
             let local = object_ray(instance, ray);
             let object = &placed.objects[instance.object as usize];

@@ -80,8 +80,11 @@ fn parts_log(
     } else {
         MOST_LOG
     };
+    // Parts are cubes of voxels: the axis that can be cut least decides, but a flat cell may be cut.
     let longest = side.iter().copied().fold(0.0, f64::max);
-    let finest = finest(longest, fine.margin);
+    let finest = (0..3)
+        .map(|a| finest(side[a].max(longest / 16.0), fine.margin[a]))
+        .fold(f64::INFINITY, f64::min);
     let ceiling = most.log2().ceil() as u32;
     ceiling
         .min(by_copies)

@@ -73,6 +73,8 @@ fn draw_cell(drawing: &mut Drawing, corner: (f64, f64), value: f64, marked: bool
     let middle = ((corner.0 + end.0) / 2.0, (corner.1 + end.1) / 2.0);
     let text = match value {
         0.0 => "0".to_owned(),
+        // Wider than a cell otherwise.
+        value if value >= 1e5 => format!("{value:.1e}"),
         value => format::significant(value, 2),
     };
     drawing.text(middle, text, ink, Anchor::Middle);

@@ -5,6 +5,7 @@ use super::super::place::Place;
 use super::super::shapes::{RADIUS, cube, sphere};
 use super::closed::inside;
 use crate::accel::Ray;
+use crate::accel::ray::SMALLEST_DIRECTION;
 use crate::scene::{MAX_COORDINATE, Triangle};
 use glam::Vec3;
 
@@ -19,9 +20,13 @@ pub fn denormal(maker: &mut Maker) {
             |mesh, random, count| {
                 let one = |_| {
                     let target = random.on_mesh(mesh);
-                    towards(inside(random, &place), target)
+                    let from = inside(random, &place);
+                    // The difference itself is too small for a direction.
+                    let direction = (target.as_dvec3() - from.as_dvec3()) / scale;
+                    ray(from, direction.as_vec3())
                 };
-                (0..count).map(one).collect()
+                let rays = (0..).map(one).filter(Ray::is_ray);
+                rays.take(count).collect()
             },
         );
     }
@@ -115,8 +120,11 @@ pub fn non_finite(maker: &mut Maker) {
     add("NaN t_max".into(), Truth::Miss, &|ray, _| {
         ray.t_max = f32::NAN
     });
-    add("zero direction".into(), Truth::Exact, &|ray, random| {
+    add("zero direction".into(), Truth::Miss, &|ray, random| {
         ray.direction = [0; 3].map(|_| random.one_of(&[0.0, -0.0]));
+    });
+    add("direction of nearly zero".into(), Truth::Miss, &|ray, _| {
+        ray.direction = ray.direction.map(|d| d * SMALLEST_DIRECTION.next_down());
     });
     add("empty interval".into(), Truth::Exact, &|ray, _| {
         (ray.t_min, ray.t_max) = (2.0, 1.0);
@@ -163,7 +171,7 @@ pub fn random_bits(maker: &mut Maker) {
                         _ => towards(from, random.on_mesh(mesh)),
                     }
                 };
-                (0..count).map(one).collect()
+                (0..).map(one).filter(Ray::is_ray).take(count).collect()
             },
         );
     }
