@@ -108,7 +108,7 @@ fn grazing_rays(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> Vec<Ray> {
             t_max: scenes::FAR,
         }
     };
-    (0..count).map(ray).collect()
+    (0..).map(ray).filter(Ray::is_ray).take(count).collect()
 }
 
 /// Long thin triangles along the axes, the case for spatial splits; `tilt` turns them away.

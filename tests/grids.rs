@@ -99,7 +99,7 @@ fn cell_rays(rng: &mut Pcg, built: &dyn BuiltAccel, count: usize) -> Vec<Ray> {
             t_max: FAR,
         }
     };
-    (0..count).map(ray).collect()
+    (0..).map(ray).filter(Ray::is_ray).take(count).collect()
 }
 
 /// Rays parallel to the faces of the grid, on them, and one step or a little beside them.
@@ -131,7 +131,7 @@ fn rays_beside(rng: &mut Pcg, built: &dyn BuiltAccel, count: usize) -> Vec<Ray> 
             t_max: FAR,
         }
     };
-    (0..count).map(ray).collect()
+    (0..).map(ray).filter(Ray::is_ray).take(count).collect()
 }
 
 /// All directions of −1, −0, +0 and +1 from points of the scene's box.
@@ -156,7 +156,8 @@ fn signed_axis_rays(rng: &mut Pcg, soup: &TriangleSoup) -> Vec<Ray> {
             t_max: FAR,
         }
     };
-    directions.cycle().take(640).map(ray).collect()
+    let rays = directions.cycle().map(ray).filter(Ray::is_ray);
+    rays.take(640).collect()
 }
 
 /// A scene where the first triangle that a cell lists is hit far behind the cell: long ones, slanted

@@ -76,9 +76,9 @@ fn a_planted_fault_in_each_kernel_raises_an_alarm() {
             "length of directions, off 1",
         ),
         (
-            "shading/surface",
-            "select(steps, -steps,",
-            "select(-steps, steps,",
+            "integrator/offset/error_bound",
+            "let moved = p + step;",
+            "let moved = p - step;",
             "energy lost",
         ),
         (

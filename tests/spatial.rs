@@ -134,7 +134,7 @@ fn rays_in_planes(rng: &mut Pcg, count: usize) -> Vec<Ray> {
             t_max: FAR,
         }
     };
-    let mut rays: Vec<Ray> = (0..count).map(ray).collect();
+    let mut rays: Vec<Ray> = (0..).map(ray).filter(Ray::is_ray).take(count).collect();
     rays.retain(|r| r.direction.iter().any(|d| *d != 0.0));
     rays
 }
@@ -171,7 +171,7 @@ fn rays_at(rng: &mut Pcg, needles: &[[Vec3; 3]], lifts: &[f32], count: usize) ->
             t_max: FAR,
         }
     };
-    (0..count).map(ray).collect()
+    (0..).map(ray).filter(Ray::is_ray).take(count).collect()
 }
 
 #[test]

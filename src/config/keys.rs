@@ -225,7 +225,7 @@ pub const KEYS: &[Key] = &[
     key("camera", "fov", Kind::Number { min: 1.0, max: 179.0 }, Some("40"), "Vertical field of view, degrees."),
     key("intersection", "triangle", Kind::Choice(TRIANGLE_TESTS), Some("\"watertight\""), "Ray-triangle test of all structures and of the judge."),
     key("intersection", "box_test", Kind::Choice(BOX_TESTS), Some("\"padded-16\""), "Ray-box test: reciprocal and pad. Hits are proven for `padded-16` alone; the others are there to be measured."),
-    key("intersection", "offset", Kind::Choice(RAY_OFFSETS), Some("\"integer\""), "How rays that leave a surface are moved off it by integrators."),
+    key("intersection", "offset", Kind::Choice(RAY_OFFSETS), Some("\"error-bound\""), "How rays that leave a surface are moved off it by integrators."),
     key("exclude", "scene", Kind::Patterns(Axis::Scene), None, "Cells of these scenes …"),
     key("exclude", "accel", Kind::Patterns(Axis::Accel), None, "… with these structures …"),
     key("exclude", "sequence", Kind::Patterns(Axis::Sequence), None, "… these sequences …"),

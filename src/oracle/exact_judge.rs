@@ -15,7 +15,7 @@ pub struct Crossed {
     pub side: Side,
     /// Distance in units of the direction, f64.
     pub t: f64,
-    /// What rounding may move the distance by in an f32 test of the Möller–Trumbore kind; infinite
+    /// What rounding may move the distance by in an f32 test; infinite
     /// where the ray grazes the plane.
     pub slack: f64,
     /// Whether every such test must find it.

@@ -88,6 +88,27 @@ fn moeller_trumbore(triangle: &Triangle, ray: &OracleRay) -> Option<f32> {
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > ray.t_min && t < ray.t_max).then_some(t)
 }
 
+/// Sheared vertices, as in Woop, Benthin and Wald 2013, with a reciprocal.
+fn sheared(triangle: &Triangle, ray: &OracleRay) -> Option<f32> {
+    let direction = Vec3::from(ray.direction);
+    let size = direction.abs();
+    let z = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b]))?;
+    let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+    let inverse = 1.0 / direction[z];
+    let (sx, sy) = (direction[x] * inverse, direction[y] * inverse);
+    let [a, b, c] = triangle.vertices.map(|v| {
+        let v = v - Vec3::from(ray.origin);
+        Vec3::new(v[x] - sx * v[z], v[y] - sy * v[z], v[z])
+    });
+    let u = c.x * b.y - c.y * b.x;
+    let v = a.x * c.y - a.y * c.x;
+    let w = b.x * a.y - b.y * a.x;
+    let area = u + v + w;
+    let t = (u * a.z + v * b.z + w * c.z) * inverse / area;
+    let inside = [u, v, w].iter().all(|e| *e >= 0.0) || [u, v, w].iter().all(|e| *e <= 0.0);
+    (inside && area != 0.0 && t > ray.t_min && t < ray.t_max).then_some(t)
+}
+
 fn closest(test: Test32, triangles: &[Triangle], ray: &OracleRay) -> ClosestHit {
     let mut best: ClosestHit = None;
     for (id, triangle) in (0..).zip(triangles) {
@@ -262,7 +283,7 @@ fn straightforward_f32_tests_are_never_wrong_on_random_rays() {
     for (count, size) in [(200, 0.5), (2000, 0.1), (2000, 0.02)] {
         let soup = random.soup(count, size);
         let rays: Vec<_> = (0..10_000).map(|_| random.ray()).collect();
-        for test in [normal_first, moeller_trumbore] {
+        for test in [normal_first, moeller_trumbore, sheared] {
             let (hits, ambiguous) = judge_soup(test, &soup, &rays);
             println!("size {size}: {hits} hits, {ambiguous} ambiguous");
             assert!(hits > 100, "{hits}");
@@ -295,7 +316,7 @@ fn rays_aimed_at_edges_needles_and_far_scenes_are_never_wrong() {
             ray(origin, target - origin)
         };
         let rays: Vec<_> = (0..10_000).map(aimed).collect();
-        for test in [normal_first, moeller_trumbore] {
+        for test in [normal_first, moeller_trumbore, sheared] {
             let (_, ambiguous) = judge_soup(test, &triangles, &rays);
             // Far from the origin the vertices' own spacing keeps most targets off the edges.
             assert!(ambiguous > 3000 || scale > 1.0, "{ambiguous} near edges");

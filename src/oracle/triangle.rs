@@ -19,8 +19,20 @@
 //! leaves room for the products of errors. f64 arithmetic itself errs 2²⁹ times less.
 //!
 //! Everything is compared in the multiplied form (U against 0, T against t·det), which stays
-//! meaningful where the ray grazes the plane and det is smaller than its own error. A test that
-//! first moves the vertices into another frame (shear, per-triangle transform) has other bounds.
+//! meaningful where the ray grazes the plane and det is smaller than its own error.
+//!
+//! # What a shear may get wrong
+//!
+//! A test of the kind of Woop, Benthin and Wald moves the vertices into a frame in which the ray is the
+//! axis along which its direction is longest, say z: with c = v − o, x′ = c.x − (d.x/d.z) c.z and y′
+//! alike. Then U/d.z = x′₀·y′₂ − y′₀·x′₂ and so on, in terms of the vertices and not of the edges. With
+//! X = |c.x| + |d.x/d.z|·|c.z|, x′ errs by at most 9 ε X: a difference, a quotient of 2.5 ulp, two
+//! products, a difference. A product of two errs by 19 ε, their difference by 20 ε of its terms:
+//! [`SHEARED`] = 22 leaves room. The distance is the average of those of the vertices, Σ Uᵢ·tᵢ / Σ Uᵢ, so
+//! that an error of Uᵢ counts only as far as tᵢ is from it; [`AVERAGED`] = 16 roundings are its own.
+//!
+//! The bounds here are those of both kinds, whichever is wider. A test that moves vertices into a frame
+//! of the triangle's own (Baldwin and Weber) has wider ones still, and is wrong by these.
 
 use super::OracleRay;
 use crate::scene::Triangle;
@@ -30,6 +42,10 @@ const EPSILON: f64 = 1.0 / (1u32 << 24) as f64;
 
 /// Roundings of f32 allowed in any quantity.
 pub(super) const ROUNDINGS: f64 = 10.0;
+
+/// Roundings of an edge function of sheared vertices, and of their average distance.
+const SHEARED: f64 = 22.0;
+const AVERAGED: f64 = 16.0;
 
 /// Allowed for products that f32 flushes to zero, where there are products.
 const FLUSHED: f64 = f64::from_bits((1023 - 110) << 52);
@@ -49,9 +65,21 @@ pub(super) struct Bounded {
 /// The triple products of a ray and a triangle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Crossing {
+    /// By the first kind of test.
     det: Bounded,
+    /// By either kind.
     barycentrics: [Bounded; 3],
     t: Bounded,
+    sheared: Sheared,
+}
+
+/// What only a test of sheared vertices gets wrong.
+#[derive(Debug, Clone, Copy)]
+struct Sheared {
+    /// Errors of the barycentrics, which are weights of the vertices.
+    errors: [f64; 3],
+    /// Distances of the vertices along the ray.
+    distances: [f64; 3],
 }
 
 impl Crossing {
@@ -59,7 +87,8 @@ impl Crossing {
         let [v0, v1, v2] = triangle.vertices.map(|v| widen(v.to_array()));
         let d = widen(ray.direction);
         let (e1, e2) = (subtract(v1, v0), subtract(v2, v0));
-        let c = subtract(v0, widen(ray.origin));
+        let origin = widen(ray.origin);
+        let c = subtract(v0, origin);
         let det = triple(d, e1, e2);
         let u = triple(e2, c, d);
         let v = triple(e1, d, c);
@@ -68,17 +97,28 @@ impl Crossing {
             value: det.value - u.value - v.value,
             error: det.error + u.error + v.error + ROUNDINGS * EPSILON * terms,
         };
+        let sheared = Sheared::new([v1, v2, v0].map(|v| subtract(v, origin)), d);
+        let mut barycentrics = [u, v, w];
+        for (barycentric, error) in barycentrics.iter_mut().zip(sheared.errors) {
+            barycentric.error = larger(barycentric.error, error);
+        }
         Self {
             det,
-            barycentrics: [u, v, w],
+            barycentrics,
             t: triple(c, e1, e2),
+            sheared,
         }
+    }
+
+    /// Bound on the error of the determinant by either kind of test.
+    fn det_error(&self) -> f64 {
+        larger(self.det.error, self.sheared.errors.iter().sum())
     }
 
     /// Whether an f32 test may find a hit in the ray's interval.
     pub(super) fn is_possible(&self, ray: &OracleRay) -> bool {
         let facing = |sign: f64| {
-            sign * self.det.value + self.det.error > 0.0
+            sign * self.det.value + self.det_error() > 0.0
                 && (self.barycentrics.iter()).all(|b| sign * b.value + b.error >= 0.0)
         };
         let in_reach = |t: Bounded| {
@@ -99,9 +139,10 @@ impl Crossing {
 
     /// Distance along the ray in units of its direction; `None` if det may be zero or of either sign.
     pub(super) fn distance(&self) -> Option<Bounded> {
-        let least_det = self.det.value.abs() - self.det.error;
+        let least_det = self.det.value.abs() - self.det_error();
         let value = self.t.value / self.det.value;
-        let error = (self.t.error + value.abs() * self.det.error) / least_det;
+        let products = self.t.error + value.abs() * self.det.error;
+        let error = larger(products, self.average_error(value)) / least_det;
         (least_det > 0.0).then(|| Bounded {
             value,
             error: error + ROUNDINGS * EPSILON * value.abs(),
@@ -112,22 +153,60 @@ impl Crossing {
     pub(super) fn accepts(&self, t: f32) -> bool {
         let t = f64::from(t);
         let rounding = ROUNDINGS * EPSILON * (self.det.value.abs() + self.det.error);
-        let error = self.t.error + t.abs() * (self.det.error + rounding);
-        (self.t.value - t * self.det.value).abs() <= error
+        let products = self.t.error + t.abs() * (self.det.error + rounding);
+        (self.t.value - t * self.det.value).abs() <= larger(products, self.average_error(t))
+    }
+
+    /// Error of the average distance of the vertices times det, near the distance `t`.
+    fn average_error(&self, t: f64) -> f64 {
+        let weights = self.barycentrics.map(|b| b.value.abs());
+        let terms = self.sheared.errors.iter().zip(&self.sheared.distances);
+        let terms = terms.zip(weights).map(|((error, distance), weight)| {
+            error * (distance - t).abs() + AVERAGED * EPSILON * (weight + error) * distance.abs()
+        });
+        terms.sum()
+    }
+}
+
+impl Sheared {
+    /// For vertices relative to the origin, in the order of their weights.
+    fn new(vertices: [Vector; 3], d: Vector) -> Self {
+        let z = (0..3).fold(0, |z, a| if d[a].abs() > d[z].abs() { a } else { z });
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        let slope = |axis: usize| (d[axis] / d[z]).abs();
+        let terms = |axis: usize| {
+            vertices.map(|v| {
+                v[axis].abs()
+                    + if d[z] == 0.0 {
+                        0.0
+                    } else {
+                        slope(axis) * v[z].abs()
+                    }
+            })
+        };
+        let (xs, ys) = (terms(x), terms(y));
+        let error = |i: usize| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            SHEARED * EPSILON * d[z].abs() * (xs[j] * ys[k] + ys[j] * xs[k])
+        };
+        Self {
+            errors: [error(0), error(1), error(2)],
+            distances: vertices.map(|v| if d[z] == 0.0 { 0.0 } else { v[z] / d[z] }),
+        }
     }
 }
 
 /// Slack for [`may_cross`], times 1-norms: see there.
 pub(super) fn coarse_slack(direction: Vector) -> f64 {
-    2.0 * ROUNDINGS * EPSILON * norm_1(direction)
+    2.0 * SHEARED * EPSILON * norm_1(direction)
 }
 
 /// A cheap condition without which no hit is possible: U, V and W all non-negative or all
 /// non-positive, to within a slack that bounds their errors from above. It needs of the triangle its
 /// edges, normal e₁×e₂ and `reach` = |e₁|₁ + |e₂|₁.
 ///
-/// A permanent is at most the product of the 1-norms of its rows, so every error here is at most
-/// 2·10 ε |d|₁·reach·(|c|₁ + reach).
+/// A permanent is at most the product of the 1-norms of its rows, and vertices relative to the origin
+/// are no longer than |c|₁ + reach, so every error here is at most 2·22 ε |d|₁·(|c|₁ + reach)².
 #[inline(always)]
 pub(super) fn may_cross(
     [c, e1, e2, normal]: [Vector; 4],
@@ -139,7 +218,8 @@ pub(super) fn may_cross(
     let u = dot(moment, e2);
     let v = -dot(moment, e1);
     let w = dot(normal, direction) - u - v;
-    let slack = slack * reach * (norm_1(c) + reach) + 4.0 * FLUSHED;
+    let far = norm_1(c) + reach;
+    let slack = slack * far * far + 4.0 * FLUSHED;
     smaller(smaller(u, v), w) >= -slack || larger(larger(u, v), w) <= slack
 }
 

@@ -80,9 +80,8 @@ impl Suite<'_> {
             let players: Vec<_> = (self.gpus.iter().zip(hands))
                 .map(|(gpu, hand)| scope.spawn(|| play(gpu, hand)))
                 .collect();
-            let ends = players.into_iter().map(|player| player.join());
-            ends.map(|end| end.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-                .collect()
+            let mut ends = players.into_iter().map(|player| player.join());
+            ends.try_for_each(|end| end.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
         })
     }
 

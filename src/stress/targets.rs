@@ -4,6 +4,7 @@ use super::axes::smallest_sound_pad;
 use super::place::Place;
 use super::record::{CellRecord, CostRecord, Record, ShotsRecord, SuiteRecord, TargetRecord};
 use crate::accel::BoxTest;
+use crate::integrator::RayOffset;
 
 /// Misses that Embree's own test allows at the far position, as a share of the rays.
 const FAR_MISSES: f64 = 2e-5;
@@ -30,6 +31,7 @@ pub fn targets(records: &[Record]) -> Vec<TargetRecord> {
     let mut targets = shot_targets(&shots, suite.shots);
     targets.extend(cell_targets(&cells));
     targets.extend(pad_target(records));
+    targets.extend(offset_target(records));
     targets.extend(figure_target(records));
     targets.extend(cost.map(cost_target));
     targets
@@ -164,6 +166,24 @@ fn pad_target(records: &[Record]) -> Option<TargetRecord> {
             std::iter::once((found, String::new())),
         )
     })
+}
+
+/// Rays begun with the default offset that meet the triangle they leave, or escape.
+fn offset_target(records: &[Record]) -> Option<TargetRecord> {
+    let default = RayOffset::default().name();
+    let mut found = (records.iter())
+        .filter_map(|r| match r {
+            Record::Offset(offset) if offset.offset == default => Some(offset),
+            _ => None,
+        })
+        .map(|o| {
+            let bad = o.self_intersections + o.leaks;
+            (bad as f64, format!("{}, {}", o.mesh, o.place))
+        })
+        .peekable();
+    found.peek()?;
+    let name = format!("rays begun with {default} that meet their own triangle or leak");
+    Some(target(name, 0.0, found))
 }
 
 /// Accumulation and sampling: how many figures are beyond their alarm level.

@@ -237,6 +237,9 @@ pub fn brute_force(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
     let closest = |ray: &Ray| {
         let inverse = soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
+        if !ray.is_ray() {
+            return hit;
+        }
         for triangle in &soup.records {
             intersect_triangle(triangle, ray, inverse, &mut hit);
         }

@@ -75,7 +75,7 @@ pub fn lattice_rays(rng: &mut Pcg, count: usize, extent: i32) -> Vec<Ray> {
             t_max,
         }
     };
-    (0..count).map(ray).collect()
+    (0..).map(ray).filter(Ray::is_ray).take(count).collect()
 }
 
 fn random_triangle(rng: &mut Pcg, centre: Vec3, size: f32) -> [Vec3; 3] {
@@ -238,7 +238,7 @@ pub fn aimed_rays(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> Vec<Ray> 
             _ => towards(at, point_in(rng, &bounds, 2.0), FAR),
         }
     };
-    (0..count).map(ray).collect()
+    (0..).map(ray).filter(Ray::is_ray).take(count).collect()
 }
 
 /// Rays that run in the planes, edges and corners of regular subdivisions of the scene's box, with
@@ -247,15 +247,18 @@ pub fn lattice_plane_rays(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> V
     let tight = box_of(soup);
     let extent = tight.extent();
     let diagonal = extent.iter().map(|e| e * e).sum::<f32>().sqrt();
-    let far = (0..3)
-        .map(|a| tight.min[a].abs().max(tight.max[a].abs()))
-        .fold(0.0, f32::max);
-    let margin = ((diagonal + far) * 2.0_f32.powi(-18)).max(1e-18);
+    let margin = |axis: usize| {
+        let far = tight.min[axis].abs().max(tight.max[axis].abs());
+        (diagonal * 2.0_f32.powi(-18) + far * 2.0_f32.powi(-22)).max(1e-18)
+    };
     let ray = |i: usize| {
-        let pad = if i.is_multiple_of(2) { margin } else { 0.0 };
+        let pad = |axis: usize| match i.is_multiple_of(2) {
+            true => margin(axis),
+            false => 0.0,
+        };
         let divisions = 1 + rng.below(8);
         let origin = std::array::from_fn(|axis| {
-            let [low, high] = [tight.min[axis] - pad, tight.max[axis] + pad];
+            let [low, high] = [tight.min[axis] - pad(axis), tight.max[axis] + pad(axis)];
             let cell = (high - low) / divisions as f32;
             low + rng.below(divisions + 1) as f32 * cell
         });
@@ -264,8 +267,8 @@ pub fn lattice_plane_rays(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> V
         for _ in 0..axes {
             let axis = rng.below(3) as usize;
             // Along the diagonals of the cells as well as along their edges.
-            direction[axis] =
-                (extent[axis] + 2.0 * pad).max(1e-3) * if rng.below(2) == 0 { 1.0 } else { -1.0 };
+            direction[axis] = (extent[axis] + 2.0 * pad(axis)).max(1e-3)
+                * if rng.below(2) == 0 { 1.0 } else { -1.0 };
         }
         Ray {
             origin,
@@ -274,7 +277,7 @@ pub fn lattice_plane_rays(rng: &mut Pcg, soup: &TriangleSoup, count: usize) -> V
             t_max: FAR,
         }
     };
-    (0..count).map(ray).collect()
+    (0..).map(ray).filter(Ray::is_ray).take(count).collect()
 }
 
 /// Each ray that hits three times more: ending exactly at its hit (which counts), just before it,

@@ -8,7 +8,9 @@
 //! holds the ray, some triangle accepts it, and the paper's second test in double precision, which WGSL
 //! has not got, is not needed: without it a ray on an edge may meet both triangles.
 //!
-//! The distance is an average of those of the vertices, so that it stays between them.
+//! The distance is an average of those of the vertices, so that it stays between them. Of a triangle that
+//! is edge-on the weights are nothing but rounding, and would place the hit anywhere in its box: it is
+//! no hit. A closed mesh has others there.
 
 use super::{APART, Meeting, TRIANGLE_PAD, TriangleRecord};
 use crate::accel::ray::Ray;
@@ -68,6 +70,19 @@ pub fn sheared(s: &Shear, vertex: [f32; 3]) -> [f32; 3] {
     [x - s.x * z, y - s.y * z, z]
 }
 
+/// The share of the terms of an area that their rounding makes: what is no larger is edge-on.
+const EDGE_ON: f32 = 5.960_464_5e-8;
+
+/// Twice the area that the weights make; 0 if it is edge-on.
+pub(super) fn area(w: [f32; 3], p: [f32; 3], q: [f32; 3]) -> f32 {
+    let area = w[0] + w[1] + w[2];
+    let terms = [0, 1, 2].map(|i| p[i].abs() + q[i].abs());
+    match area > (terms[0] + terms[1] + terms[2]) * EDGE_ON {
+        true => area,
+        false => 0.0,
+    }
+}
+
 /// Both products of the edge functions opposite to the three vertices.
 pub fn products([a, b, c]: [[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
     (
@@ -84,7 +99,7 @@ pub(super) fn meet(triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> 
         return APART;
     }
     let w = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
-    let area = w[0] + w[1] + w[2];
+    let area = area(w, p, q);
     Meeting {
         area,
         t: (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * s.scale / area,

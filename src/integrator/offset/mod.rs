@@ -21,9 +21,9 @@ pub enum RayOffset {
     /// By the same distance everywhere.
     Fixed,
     /// C. Wächter, N. Binder, "A fast and robust method for avoiding self-intersection", 2019.
-    #[default]
     Integer,
     /// By the bound of the point's error.
+    #[default]
     ErrorBound,
 }
 
@@ -129,6 +129,10 @@ impl TransformError {
 /// Two products and two sums make at most four roundings of |v₀| + |e₁| + |e₂|; a test takes differences
 /// of vertices and shears them, at most four more. A point that is taken to an object's space adds a
 /// transform of four products, forth, and its vertices one back: see [`TransformError`].
+///
+/// A ray that leaves must not meet the triangle either, although its distance to the plane errs by up to
+/// sixteen roundings of the triangle's extent: a plane through 0 along an axis has an exact position, and
+/// one that is nearly so an almost exact one. So twice [`POSITION_ERROR`] of the extent come on top.
 /// Twin of `kernels/integrator/position_error.wesl`.
 pub fn position_error(
     v0: [f32; 3],
@@ -138,7 +142,10 @@ pub fn position_error(
 ) -> [f32; 3] {
     let reach = [0, 1, 2].map(|a| v0[a].abs() + e1[a].abs() + e2[a].abs());
     let far = reach[0].max(reach[1]).max(reach[2]);
-    reach.map(|r| POSITION_ERROR * (r + (transform.scale * far + transform.shift)))
+    let [x, y, z] = [0, 1, 2].map(|a| e1[a].abs() + e2[a].abs());
+    let extent = x.max(y).max(z);
+    let moved = transform.scale * far + transform.shift;
+    reach.map(|r| POSITION_ERROR * (r + (2.0 * extent + moved)))
 }
 
 #[cfg(test)]

@@ -40,7 +40,7 @@ pub fn denormal(maker: &mut Maker) {
         |_, random, count| {
             let one = |_| {
                 let mut direction = random.direction().as_vec3();
-                for axis in 0..random.below(4) {
+                for axis in 0..random.below(3) {
                     direction[axis] = random.one_of(&tiny);
                 }
                 ray(inside(random, &place), direction)

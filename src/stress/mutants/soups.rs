@@ -48,7 +48,8 @@ pub(super) fn lattice_scene(seed: u64) -> SceneData {
 /// Brute force as the judge of rays through a lattice scene.
 pub(super) fn lattice_judge(soup: &TriangleSoup, seed: u64) -> Judge {
     let mut random = Pcg32::with_stream(seed, 1);
-    let mut rays: Vec<Ray> = (0..RAYS).map(|_| lattice_ray(&mut random)).collect();
+    let lattice = (0..).map(|_| lattice_ray(&mut random));
+    let mut rays: Vec<Ray> = lattice.filter(Ray::is_ray).take(RAYS).collect();
     rays.extend((0..RAYS).map(|_| aimed_ray(&mut random, soup)));
     let cut = cut_at_hits(&rays, &brute_force_hits(soup, &rays));
     rays.extend(cut);
