@@ -4,12 +4,14 @@
 mod common;
 
 use common::{Pcg, brute_force, scenes};
-use raystone::accel::triangle::TriangleRecord;
-use raystone::accel::{NO_HIT, Ray, TriangleSoup};
+use raystone::accel::triangle::{TriangleRecord, TriangleTest};
+use raystone::accel::{Intersection, NO_HIT, Ray, TriangleSoup};
 
 /// What exact integer arithmetic says of one ray and one triangle.
 enum Exact {
     Miss,
+    /// The triangle is seen edge-on or has no area: its rounded weights may be anything.
+    EdgeOn,
     /// On an edge or corner: either answer is right.
     Edge,
     /// Strictly inside, at the distance `numerator / denominator`.
@@ -37,7 +39,10 @@ fn exactly(triangle: &TriangleRecord, ray: &Ray) -> Exact {
     let moment = cross(to_origin, direction);
     let u = sign * dot(edge_2, moment);
     let v = sign * -dot(edge_1, moment);
-    if area == 0 || u < 0 || v < 0 || u + v > area {
+    if area == 0 {
+        return Exact::EdgeOn;
+    }
+    if u < 0 || v < 0 || u + v > area {
         return Exact::Miss;
     }
     if u == 0 || v == 0 || u + v == area {
@@ -46,8 +51,42 @@ fn exactly(triangle: &TriangleRecord, ray: &Ray) -> Exact {
     Exact::Inside(t, area)
 }
 
+/// What rounding may make of the distance `t`. The products of edges are exact on a lattice, so that the
+/// quotient alone is rounded; a test that shears averages the distances of the vertices.
+fn tolerance(test: TriangleTest, record: &TriangleRecord, ray: &Ray, t: f64) -> f64 {
+    let size = ray.direction.map(f32::abs);
+    let longest = (0..3).fold(0, |z, a| if size[a] > size[z] { a } else { z });
+    let far = record
+        .vertices()
+        .map(|v| (v[longest] - ray.origin[longest]).abs());
+    let far = f64::from(far.into_iter().fold(0.0, f32::max) / size[longest]);
+    let reach = match test {
+        TriangleTest::MoellerTrumbore => t.abs(),
+        _ => t.abs().max(far),
+    };
+    reach * 2.0_f64.powi(-21)
+}
+
 #[test]
-fn brute_force_agrees_with_exact_integer_arithmetic() {
+fn moeller_trumbore_agrees_with_exact_integer_arithmetic() {
+    agrees_with_integers(TriangleTest::MoellerTrumbore);
+}
+
+#[test]
+fn watertight_agrees_with_exact_integer_arithmetic() {
+    agrees_with_integers(TriangleTest::Watertight);
+}
+
+#[test]
+fn compensated_agrees_with_exact_integer_arithmetic() {
+    agrees_with_integers(TriangleTest::Compensated);
+}
+
+fn agrees_with_integers(triangle: TriangleTest) {
+    let tests = Intersection {
+        triangle,
+        ..Intersection::default()
+    };
     let (mut inside, mut edges) = (0, 0);
     for seed in 0..400 {
         let mut rng = Pcg::new(seed);
@@ -55,22 +94,31 @@ fn brute_force_agrees_with_exact_integer_arithmetic() {
         let soup = scenes::lattice_soup(&mut rng, 24, extent);
         for ray in scenes::lattice_rays(&mut rng, 64, extent) {
             for record in &soup.records {
-                let alone = TriangleSoup::from(vec![*record]);
+                let alone = TriangleSoup::from(vec![*record]).intersecting(tests);
                 let hit = brute_force(&alone, &[ray])[0];
                 let found = hit.triangle != NO_HIT;
                 match exactly(record, &ray) {
                     Exact::Miss => assert!(!found, "{ray:?} misses {record:?}, found {hit:?}"),
+                    // Products of edges are exact here.
+                    Exact::EdgeOn => {
+                        let exact = triangle == TriangleTest::MoellerTrumbore;
+                        assert!(!found || !exact, "{ray:?} grazes {record:?}, found {hit:?}");
+                    }
                     Exact::Edge => edges += 1,
                     Exact::Inside(t, area) => {
                         inside += 1;
                         let t = t as f64 / area as f64;
                         let (low, high) = (f64::from(ray.t_min), f64::from(ray.t_max));
-                        assert_eq!(
-                            found,
-                            (low..=high).contains(&t),
+                        let slack = tolerance(triangle, record, &ray, t);
+                        // A rounded distance may fall to either side of an end.
+                        let near = |end: f64| (t - end).abs() <= slack;
+                        let exact = triangle == TriangleTest::MoellerTrumbore;
+                        assert!(
+                            found == (low..=high).contains(&t)
+                                || !exact && (near(low) || near(high)),
                             "{ray:?} meets {record:?} at {t}"
                         );
-                        let close = (f64::from(hit.t) - t).abs() <= t.abs() * 2.0_f64.powi(-21);
+                        let close = (f64::from(hit.t) - t).abs() <= slack;
                         assert!(!found || close, "{ray:?}: {} is not {t}", hit.t);
                     }
                 }

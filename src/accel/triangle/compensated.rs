@@ -5,7 +5,7 @@
 //! an adapter computes otherwise, signs are as good as the watertight test's:
 //! [`crate::gpu::ArithmeticProbe::exact_products`] tells.
 
-use super::watertight::{area, products, residual, shear, sheared};
+use super::watertight::{area_of, products, residual, shear, sheared};
 use super::{APART, Meeting, TriangleRecord};
 use crate::accel::ray::Ray;
 
@@ -39,7 +39,7 @@ pub(super) fn meet(triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> 
         return APART;
     }
     let w = e.map(f32::abs);
-    let area = area(w, p, q);
+    let area = area_of(w, p, q);
     Meeting {
         area,
         t: (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * s.scale / area,

@@ -17,10 +17,12 @@
 mod baldwin_weber;
 mod compensated;
 mod moeller_trumbore;
+mod plane;
 mod pluecker;
 pub(super) mod watertight;
 
 pub use compensated::product_error;
+pub use plane::DISTANCE_PAD;
 
 use super::bounds::{Bounds, slabs};
 use super::intersection::Reciprocal;
@@ -34,11 +36,6 @@ use serde::{Deserialize, Serialize};
 /// Relative widening of a triangle's own slab interval, 2⁻²¹: four ulp or more, which covers the
 /// subtraction, the reciprocal at WGSL's 2.5 ulp, and the product.
 pub const TRIANGLE_PAD: f32 = 4.768_371_6e-7;
-
-/// Bound on the relative rounding error of the distance to the plane, 2⁻²⁰, in units of the sum of
-/// the magnitudes of all terms that it is made of: twice the seven roundings of 2⁻²⁴ on the longest
-/// way from an edge to numerator or denominator, and the division.
-pub const DISTANCE_PAD: f32 = 9.536_743e-7;
 
 /// A triangle as kernels read it: three `vec4<u32>`, 48 bytes, the vertices as they are in the scene.
 #[repr(C)]
@@ -237,24 +234,6 @@ const APART: Meeting = Meeting {
     u: 0.0,
     v: 0.0,
 };
-
-/// Bound on the rounding error of a distance to the plane that was computed from differences of
-/// vertices, [`DISTANCE_PAD`].
-fn plane_error(triangle: &TriangleRecord, ray: &Ray, found: &Meeting) -> f32 {
-    let TriangleRecord { v0, v1, v2, .. } = triangle;
-    let [e1x, e1y, e1z] = [0, 1, 2].map(|a| v0[a] - v1[a]);
-    let [e2x, e2y, e2z] = [0, 1, 2].map(|a| v2[a] - v0[a]);
-    let [dx, dy, dz] = ray.direction;
-    let nx = e1y * e2z - e1z * e2y;
-    let ny = e1z * e2x - e1x * e2z;
-    let nz = e1x * e2y - e1y * e2x;
-    let det = nx * dx + ny * dy + nz * dz;
-    let reach = |a: usize| (v0[a] - ray.origin[a]).abs() + found.t.abs() * ray.direction[a].abs();
-    let terms = ((e1y * e2z).abs() + (e1z * e2y).abs()) * reach(0)
-        + ((e1z * e2x).abs() + (e1x * e2z).abs()) * reach(1)
-        + ((e1x * e2y).abs() + (e1y * e2x).abs()) * reach(2);
-    terms * DISTANCE_PAD / det.abs()
-}
 
 /// Tests `ray` against `triangle`; a nearer hit, or an equally near one of a lower index, replaces
 /// `hit`.

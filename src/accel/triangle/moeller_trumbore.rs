@@ -2,7 +2,8 @@
 //! Source: T. Möller, B. Trumbore, "Fast, minimum storage ray/triangle intersection", Journal of
 //! Graphics Tools 2(1), 1997; with the unnormalised normal and without a division before the accept.
 
-use super::{APART, Meeting, TriangleRecord, plane_error};
+use super::plane::plane_error;
+use super::{APART, Meeting, TriangleRecord};
 use crate::accel::ray::Ray;
 
 pub(super) fn meet(triangle: &TriangleRecord, ray: &Ray) -> Meeting {

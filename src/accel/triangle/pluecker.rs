@@ -2,7 +2,8 @@
 //! Source: the robust triangle test of Embree 4 (S. Woop and others, Intel), which follows
 //! R. Davidovič and others, "3D rasterization: a bridge between rasterization and ray casting", 2012.
 
-use super::{APART, Meeting, TriangleRecord, plane_error};
+use super::plane::plane_error;
+use super::{APART, Meeting, TriangleRecord};
 use crate::accel::ray::Ray;
 
 /// Embree's tolerance, one ulp of 1.

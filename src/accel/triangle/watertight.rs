@@ -74,7 +74,7 @@ pub fn sheared(s: &Shear, vertex: [f32; 3]) -> [f32; 3] {
 const EDGE_ON: f32 = 5.960_464_5e-8;
 
 /// Twice the area that the weights make; 0 if it is edge-on.
-pub(super) fn area(w: [f32; 3], p: [f32; 3], q: [f32; 3]) -> f32 {
+pub(super) fn area_of(w: [f32; 3], p: [f32; 3], q: [f32; 3]) -> f32 {
     let area = w[0] + w[1] + w[2];
     let terms = [0, 1, 2].map(|i| p[i].abs() + q[i].abs());
     match area > (terms[0] + terms[1] + terms[2]) * EDGE_ON {
@@ -99,7 +99,7 @@ pub(super) fn meet(triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> 
         return APART;
     }
     let w = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
-    let area = area(w, p, q);
+    let area = area_of(w, p, q);
     Meeting {
         area,
         t: (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * s.scale / area,
