@@ -12,9 +12,8 @@ const FAR_MISSES: f64 = 2e-5;
 const STRANGE_SLOWDOWN: f64 = 2.5;
 /// What the default triangle test may cost against Möller–Trumbore.
 const COST: f64 = 1.15;
-/// Families whose rays a kernel need not answer like the host: WGSL promises nothing of NaN and
-/// infinity.
-const UNPROMISED: &str = "non-finite";
+/// The family of rays that are none.
+const NO_RAYS: &str = "non-finite";
 
 /// Every target, with what the records say of it.
 pub fn targets(records: &[Record]) -> Vec<TargetRecord> {
@@ -113,8 +112,7 @@ fn shot_targets(shots: &[&ShotsRecord], wanted: usize) -> Vec<TargetRecord> {
 fn cell_targets(cells: &[&CellRecord]) -> Vec<TargetRecord> {
     let name = |c: &CellRecord, what: &str| format!("{}, {}: {what}", c.accel, c.family);
     let cracks = cells.iter().map(|c| (c.cracks as f64, name(c, "cracks")));
-    let promised = || cells.iter().filter(|c| c.family != UNPROMISED);
-    let differing = promised().map(|c| {
+    let differing = cells.iter().map(|c| {
         let any = c.any_differing.unwrap_or(0);
         let replay = c.worst.as_ref().map_or("", |w| w.replay.as_str());
         ((c.differing + any) as f64, name(c, replay))
@@ -128,7 +126,7 @@ fn cell_targets(cells: &[&CellRecord]) -> Vec<TargetRecord> {
         let first = raised.first().map_or("", |f| f.as_str());
         (raised.len() as f64, name(c, first))
     });
-    let strange = cells.iter().filter(|c| c.family == UNPROMISED);
+    let strange = cells.iter().filter(|c| c.family == NO_RAYS);
     let slowdown = strange.filter_map(|c| Some((c.slowdown?, name(c, "slowdown"))));
     vec![
         target(
