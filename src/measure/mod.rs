@@ -4,9 +4,11 @@ pub mod atomic;
 pub mod batch;
 pub mod bias;
 pub mod gate;
+pub mod hard_rays;
 pub mod hypothesis;
 pub mod image;
 mod instance_judge;
+mod kept_checks;
 pub mod memory;
 pub mod picture;
 pub mod rays;
@@ -16,3 +18,5 @@ pub mod spectrum;
 pub mod statistics;
 pub mod stream;
 pub mod timing;
+
+pub use kept_checks::CACHE_VARIABLE;

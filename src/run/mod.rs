@@ -10,6 +10,7 @@ mod session;
 mod streams;
 mod structures;
 mod times;
+mod trial;
 mod world;
 
 pub use registries::Registries;

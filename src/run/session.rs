@@ -48,6 +48,8 @@ pub(super) struct Session<'a> {
     pub skipped: usize,
     /// Whether a scene could not be loaded.
     pub bad_input: bool,
+    /// The gate's second scene.
+    pub trial: super::trial::Trial,
     /// Cells that have their record: not run again after a lost device.
     done: HashSet<String>,
     /// `None`: nothing is written (gate alone, single images).
@@ -110,6 +112,7 @@ impl<'a> Session<'a> {
             failed: 0,
             skipped: 0,
             bad_input: false,
+            trial: Default::default(),
             done: HashSet::new(),
             records: None,
             records_path: PathBuf::new(),
