@@ -148,7 +148,7 @@ fn missing_answers_are_wrong() {
     let verdict = compare(
         &set,
         &set.truth[..1],
-        &[true, false],
+        &[Some(true), Some(false)],
         &soup(),
         Space::World,
         false,
