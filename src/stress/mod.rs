@@ -147,14 +147,24 @@ pub fn run(
         &settings.families,
         families::FAMILIES.iter().map(|f| f.name),
     )?;
+    let probe = probe_arithmetic(gpu)?;
+    let mut records = vec![Record::Suite(first_record(gpu, settings, probe.is_exact()))];
+    let mut tests = tests(settings);
+    tests.retain(|test| match Suite::with(*test).kept_by(&probe) {
+        Ok(()) => true,
+        Err(reason) => {
+            let what = test.name().to_owned();
+            records.push(Record::Skipped(record::SkippedRecord { what, reason }));
+            false
+        }
+    });
     let suite = Suite {
         gpus,
-        exact: probe_arithmetic(gpu)?.is_exact(),
+        exact: probe.is_exact(),
         settings,
         kinds: kinds(settings),
-        tests: tests(settings),
+        tests,
     };
-    let mut records = vec![Record::Suite(first_record(gpu, settings, suite.exact))];
     records.extend(suite.cells(progress)?);
     if settings.shots > 0 {
         records.extend(suite.shots(progress)?);
