@@ -43,7 +43,7 @@ pub struct Stress {
     /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// A model to shoot at from inside, its holes closed [default: the Stanford bunny]
+    /// A model to shoot at from inside, its holes closed [default: none]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Run the planted faults instead: each must turn a check red
@@ -128,7 +128,7 @@ impl Stress {
         if !self.family.is_empty() && self.shots.is_none() {
             settings.shots = 0;
         }
-        settings.model = self.model.clone().unwrap_or(settings.model);
+        settings.model = self.model.clone();
         settings
     }
 }
