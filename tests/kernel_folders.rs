@@ -161,11 +161,7 @@ fn an_idea_is_compared_with_the_original_and_leaves_a_trace() {
     assert_eq!(run.kernels.len(), 1);
     assert_eq!(run.kernels[0].files[0].file, "integrator/path.wesl");
     let page = std::fs::read_to_string(out.join("index.html")).expect("a page");
-    for text in [
-        "integrator/path.wesl",
-        "bvh @my-idea",
-        "pixel-hash × none @my-idea",
-    ] {
+    for text in ["path.wesl", "bvh @my-idea", "pixel-hash × none @my-idea"] {
         assert!(page.contains(text), "the page lacks {text}");
     }
 }

@@ -35,7 +35,10 @@ impl Suite<'_> {
             }));
         }
         for place in [Place::ORDINARY, Place::FAR] {
-            for name in [SPHERE, PLANE, &model].into_iter().filter(|name| !name.is_empty()) {
+            for name in [SPHERE, PLANE, &model]
+                .into_iter()
+                .filter(|name| !name.is_empty())
+            {
                 if self.settings.quick && name == model && place != Place::ORDINARY {
                     continue;
                 }
