@@ -366,7 +366,7 @@ fn a_tie_over_instances_allows_what_rounding_the_transform_can_do_and_no_more() 
     };
     let verdict = |t: f32| {
         let hit = Hit { t, ..hits[index] };
-        let verdict = compare(&set, &[hit], &[true], &soup, Space::Instances, false);
+        let verdict = compare(&set, &[hit], &[Some(true)], &soup, Space::Instances, false);
         (verdict.ties, verdict.wrong)
     };
     let t = hits[index].t;

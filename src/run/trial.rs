@@ -4,8 +4,8 @@
 use super::session::Session;
 use super::world::World;
 use crate::accel::{AccelError, BuildLog, Intersection, TriangleSoup};
-use crate::config::{Gate, Variant};
-use crate::gpu::GpuError;
+use crate::config::{Gate, StructureCell, Variant};
+use crate::gpu::{Gpu, GpuError};
 use crate::integrator::{SceneBuffers, Traced};
 use crate::measure::gate::{Judge, fault_text, gate};
 use crate::scene::{Camera, LoadOptions, SceneData, builtin_scenes, load};
@@ -62,9 +62,10 @@ impl Stage {
 pub(super) fn fault(
     session: &mut Session,
     world: &World,
-    accel: &Variant,
+    gpu: &Gpu,
+    cell: &StructureCell,
 ) -> Result<Option<String>, GpuError> {
-    let key = serde_json::to_string(accel).unwrap_or_else(|_| accel.label.clone());
+    let key = cell_key(cell);
     if world.variant.name == SCENE || !world.soup.intersection.bears_hard_rays() {
         return Ok(None);
     }
@@ -83,12 +84,18 @@ pub(super) fn fault(
             }
         }
     };
-    let found = session
-        .clock
-        .time("gate", || stage.fault_of(session.registries, world, accel))?;
+    let found = session.clock.time("gate", || {
+        stage.fault_of(session.registries, world, gpu, &cell.accel)
+    })?;
     let found = found.map(|fault| format!("{SCENE}: {fault}"));
     session.trial.outcomes.insert(key, found.clone());
     Ok(found)
+}
+
+/// Structures with the same parameters and kernels are the same.
+fn cell_key(cell: &StructureCell) -> String {
+    let accel = serde_json::to_string(&cell.accel).unwrap_or_default();
+    format!("{accel} {} {:?}", cell.accel.label, cell.kernels)
 }
 
 impl Stage {
@@ -96,6 +103,7 @@ impl Stage {
         &self,
         registries: &super::Registries,
         world: &World,
+        gpu: &Gpu,
         accel: &Variant,
     ) -> Result<Option<String>, GpuError> {
         let Some(kind) = registries.accel.get(&accel.name) else {
@@ -109,12 +117,12 @@ impl Stage {
             Err(AccelError::Invalid(fault)) => return Ok(Some(fault)),
             Err(_) => return Ok(None),
         };
-        let traced = Traced::upload(world.gpu, &*built)?;
-        let buffers = SceneBuffers::upload(world.gpu, &self.scene, &self.soup)?;
+        let traced = Traced::upload(gpu, &*built)?;
+        let buffers = SceneBuffers::upload(gpu, &self.scene, &self.soup)?;
         let thinned = (accel.name == "brute-force").then(|| self.judge.thinned(EVERY));
         let judge = thinned.as_ref().unwrap_or(&self.judge);
         let (soup, probe) = (&self.soup, &world.probe);
-        let verdict = gate(world.gpu, &buffers, soup, &traced, judge, probe, true)?;
+        let verdict = gate(gpu, &buffers, soup, &traced, judge, probe, true)?;
         let judge_fault = judge.of(traced.space).first_wrong.as_deref();
         Ok((!verdict.passed).then(|| fault_text(&verdict, judge_fault)))
     }

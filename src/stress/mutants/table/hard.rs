@@ -1,7 +1,7 @@
 //! Faults that show only at the ends of intervals, next to zero, in long tables, in deep trees, for the
 //! last entries of stacks, for far origins, and in a second dispatch.
 
-use super::{row, structure, text, texts};
+use super::{row, structure, text};
 use crate::stress::mutants::{Check, Mutant, Subject};
 
 const BRUTE: Subject = structure("brute-force", &[]);
@@ -10,10 +10,6 @@ const BOXES: Subject = structure("bvh", &[("node_bytes", "32")]);
 const LARGE_LEAVES: Subject = structure("bvh", &[("leaf_size", "31"), ("min_leaf_size", "31")]);
 const INDEXED: Subject = structure("bvh", &[("triangles", "indexed")]);
 const PARENT: Subject = structure("bvh", &[("traversal", "parent-pointer")]);
-const SHORT: Subject = structure(
-    "bvh",
-    &[("traversal", "short-stack"), ("short_stack_entries", "2")],
-);
 const ROPED: Subject = structure("roped-bvh", &[]);
 const OCTANTS: Subject = structure("bvh", &[("traversal", "octant-roped")]);
 const WIDE4: Subject = structure("bvh4", &[]);
@@ -97,7 +93,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             "return hit.triangle != NO_HIT || ray.t_max < ray.t_min;",
         ),
         BRUTE,
-        Check::Gate,
+        Check::Lattice,
     ),
     row(
         "any-hit-misses-a-point",
@@ -108,7 +104,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             "return ray.t_min != ray.t_max && trace(ray, true).triangle != NO_HIT;",
         ),
         KD,
-        Check::Gate,
+        Check::Lattice,
     ),
     row(
         "any-hit-misses-what-begins-late",
@@ -152,7 +148,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             "clamped(in_cells(ray, ray.t_min), grid.resolution)",
         ),
         UNIFORM,
-        Check::Lattice,
+        Check::Work,
     ),
     row(
         "kd-exit-forgets-the-end",
@@ -163,7 +159,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             "exit = min(exit, plane * 0.99999);",
         ),
         KD,
-        Check::Gate,
+        Check::Lattice,
     ),
     row(
         "kd-ends-too-early",
@@ -359,7 +355,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             "const START_MASK: u32 = 0x00001fffu;",
         ),
         SKIPPING,
-        Check::Gate,
+        Check::Lattice,
     ),
     row(
         "leaf-of-sixteen-and-more",
@@ -370,7 +366,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             "const COUNT_MASK: u32 = 15u;",
         ),
         LARGE_LEAVES,
-        Check::Gate,
+        Check::Lattice,
     ),
     row(
         "leaf-of-the-largest-size",
@@ -381,61 +377,9 @@ pub(super) const MUTANTS: &[Mutant] = &[
             "min((reference >> COUNT_SHIFT) & COUNT_MASK, 30u), ray",
         ),
         LARGE_LEAVES,
-        Check::Gate,
+        Check::Lattice,
     ),
     // Deep trees.
-    row(
-        "trail-of-thirty-two-levels",
-        "level 32 of a trail is kept in the word of level 0",
-        text("accel/bvh/short_stack", "level >= 32u);", "level > 32u);"),
-        SHORT,
-        Check::Gate,
-    ),
-    row(
-        "trail-forgets-its-upper-word",
-        "what is to be visited below level 31 is forgotten",
-        text(
-            "accel/bvh/short_stack",
-            "(trail.pending.x | trail.pending.y) == 0u",
-            "trail.pending.x == 0u",
-        ),
-        SHORT,
-        Check::Gate,
-    ),
-    row(
-        "trail-level-of-the-upper-word",
-        "levels of the upper word are counted from 31",
-        text(
-            "accel/bvh/short_stack",
-            "32u + firstLeadingBit(bits.y)",
-            "31u + firstLeadingBit(bits.y)",
-        ),
-        SHORT,
-        Check::Gate,
-    ),
-    row(
-        "stack-wraps-at-sixteen",
-        "the seventeenth entry of a stack replaces the first",
-        texts(
-            "accel/stack",
-            "@if(!short_stack) let place = (*stack).held;",
-            "@if(!short_stack) let place = (*stack).held & 15u;",
-            2,
-        ),
-        BVH,
-        Check::Gate,
-    ),
-    row(
-        "last-entry-of-the-stack-lost",
-        "what is pushed from the 33rd entry on is dropped without a word",
-        text(
-            "accel/stack",
-            "@if(!short_stack) if ((*stack).held == STACK_ENTRIES) {",
-            "@if(!short_stack) if ((*stack).held == 32u) { return; }\n    @if(!short_stack) if ((*stack).held == STACK_ENTRIES) {",
-        ),
-        META,
-        Check::Gate,
-    ),
     row(
         "octree-stack-wraps",
         "the ninth level of the octree replaces the first on the stack",
@@ -531,7 +475,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             "if (item >= batch.count || (batch.count > 64u && (item | 63u) >= batch.count)) {",
         ),
         BVH,
-        Check::Gate,
+        Check::Lattice,
     ),
     row(
         "second-row-of-workgroups",
