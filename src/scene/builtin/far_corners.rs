@@ -1,5 +1,6 @@
 //! A small scene that leads through the code which otherwise only large or deep scenes reach: rows of
-//! texels beyond the first, triangles that cannot be split apart, trees of nearly thirty levels, needles, empty space around dense spots, and instances whose boxes have to grow.
+//! texels beyond the first, triangles that cannot be split apart, trees of nearly thirty levels, needles, empty
+//! space around dense spots, and instances whose boxes have to grow.
 
 use super::super::builder::{Look, SceneBuilder};
 use super::super::{Camera, Material, Transform, Triangle};
