@@ -218,7 +218,11 @@ impl Gpu {
         composition: &Composition,
         runtime_checks: bool,
     ) -> Result<Arc<Pipeline>, GpuError> {
-        let key = (composition.clone(), runtime_checks);
+        let mut composition = composition.clone();
+        if self.loop_limit.is_some() {
+            composition = composition.feature("loops_cut", true);
+        }
+        let key = (composition, runtime_checks);
         if let Some(known) = self
             .pipelines
             .lock()
@@ -227,7 +231,7 @@ impl Gpu {
         {
             return Ok(known);
         }
-        let kernel = self.kernels.compose(composition)?;
+        let kernel = self.kernels.compose(&key.0)?;
         let pipeline = Arc::new(self.compile(kernel, runtime_checks)?);
         if let Ok(mut cache) = self.pipelines.lock() {
             cache.insert(key, Arc::clone(&pipeline));
