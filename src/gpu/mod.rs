@@ -136,3 +136,11 @@ pub enum GpuError {
         seconds: u64,
     },
 }
+
+impl GpuError {
+    /// Whether the driver cannot run what was asked for, through no fault of it: such a cell is left
+    /// out.
+    pub fn is_refusal(&self) -> bool {
+        matches!(self, Self::LoopsCut { .. })
+    }
+}

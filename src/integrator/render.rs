@@ -352,6 +352,14 @@ impl<'a> Renderer<'a> {
         Ok(())
     }
 
+    /// Whether everything since the last reset is sound.
+    ///
+    /// # Errors
+    /// As for [`Renderer::image`].
+    pub fn check(&self) -> Result<(), GpuError> {
+        self.add_pending(&mut Vec::new())
+    }
+
     /// Adds the sums on the device to those of the blocks before, if they are sound.
     fn add_pending(&self, totals: &mut Vec<[f64; 3]>) -> Result<(), GpuError> {
         self.gpu.check_error_word(self.error_word()?)?;
@@ -400,7 +408,7 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// As for [`Renderer::image`].
     pub fn ray_counts(&self) -> Result<[u64; 4], GpuError> {
-        self.add_pending(&mut Vec::new())?;
+        self.check()?;
         let words: Vec<u32> = self.gpu.read(&self.status)?;
         Ok(std::array::from_fn(|c| {
             u64::from(words[1 + 2 * c]) | u64::from(words[2 + 2 * c]) << 32

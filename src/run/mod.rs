@@ -91,6 +91,8 @@ pub struct Verified {
     pub accel: Variant,
     /// Verdict, or why there is none.
     pub verdict: Result<GateVerdict, String>,
+    /// Whether there is none because the driver ends loops too early for the structure.
+    pub refused: bool,
 }
 
 /// Opens the adapter with the kernels of the options.
@@ -199,11 +201,13 @@ pub fn verify(
             .map(|c| &c.accel);
         let world = World::new(&mut session, &gpu, scene)?;
         for accel in accels {
+            let mut refused = false;
             let verdict = match &world {
                 Err(reason) => Err(reason.clone()),
                 Ok(world) => match structures::build_and_gate(&mut session, world, accel) {
                     Ok((_, record)) => record.gate.ok_or_else(|| "no verdict".to_owned()),
                     Err(record) => {
+                        refused = record.refused;
                         let reason = record.failure.unwrap_or_default();
                         record.gate.ok_or(reason)
                     }
@@ -213,6 +217,7 @@ pub fn verify(
                 scene: scene.clone(),
                 accel: accel.clone(),
                 verdict,
+                refused,
             });
         }
     }

@@ -1,7 +1,7 @@
 //! What lives as long as a run: records, clock, progress, cells already done.
 
 use super::{RunError, RunOptions};
-use crate::config::{Experiment, Plan};
+use crate::config::{Experiment, Plan, Skipped};
 use crate::gpu::Gpu;
 use crate::measure::record::{
     Environment, FinishedRecord, Line, Record, RunRecord, SCHEMA, SkippedRecord,
@@ -48,6 +48,8 @@ pub(super) struct Session<'a> {
     pub skipped: usize,
     /// Whether a scene could not be loaded.
     pub bad_input: bool,
+    /// Cells that need longer loops than the driver runs, with the reason.
+    pub refused: BTreeMap<String, String>,
     /// Cells that have their record: not run again after a lost device.
     done: HashSet<String>,
     /// `None`: nothing is written (gate alone, single images).
@@ -110,6 +112,7 @@ impl<'a> Session<'a> {
             failed: 0,
             skipped: 0,
             bad_input: false,
+            refused: BTreeMap::new(),
             done: HashSet::new(),
             records: None,
             records_path: PathBuf::new(),
@@ -163,14 +166,30 @@ impl<'a> Session<'a> {
         };
         self.write("", Record::Run(record))?;
         for skipped in &self.plan.skipped {
-            let record = SkippedRecord {
-                cell: skipped.cell.clone(),
-                reason: skipped.reason.clone(),
-            };
-            self.write("", Record::Skipped(record))?;
-            self.skipped += skipped.cells;
+            self.write_skipped(skipped)?;
         }
         Ok(())
+    }
+
+    /// Records cells that are left out.
+    pub fn write_skipped(&mut self, skipped: &Skipped) -> Result<(), RunError> {
+        self.skipped += skipped.cells;
+        let record = SkippedRecord {
+            cell: skipped.cell.clone(),
+            reason: skipped.reason.clone(),
+        };
+        self.write("", Record::Skipped(record))
+    }
+
+    /// Records a cell that needs longer loops than the driver runs.
+    pub fn write_refused(&mut self, cell: String, reason: String) -> Result<(), RunError> {
+        self.finish(cell.clone());
+        self.refused.insert(cell.clone(), reason.clone());
+        self.write_skipped(&Skipped {
+            cell,
+            reason,
+            cells: 1,
+        })
     }
 
     /// The last record.

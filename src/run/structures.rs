@@ -87,7 +87,10 @@ pub(super) fn build_and_gate(
     match session.clock.time("gate", || {
         gate_twice(session.experiment.runtime_checks, world, &traced)
     }) {
-        Err(error) => record.failure = Some(error.to_string()),
+        Err(error) => {
+            record.refused = error.is_refusal();
+            record.failure = Some(error.to_string());
+        }
         Ok(mut verdict) => {
             verdict.passed &= structural.is_none();
             verdict.structural = structural;
@@ -181,6 +184,7 @@ fn failure_text(verdict: &GateVerdict, judge_fault: Option<&str>) -> String {
 
 fn empty_record(world: &World, accel: &Variant, runtime_checks: bool) -> StructureRecord {
     StructureRecord {
+        refused: false,
         scene: world.variant.label.clone(),
         accel: accel.clone(),
         features: Vec::new(),
@@ -279,6 +283,9 @@ fn write_failed(
     cell: &StructureCell,
     record: StructureRecord,
 ) -> Result<(), RunError> {
+    if record.refused {
+        return session.write_refused(cell.to_string(), record.failure.unwrap_or_default());
+    }
     session.failed += 1;
     session.finish(cell.to_string());
     session.write(&structure_hash(world, cell), Record::Structure(record))

@@ -30,6 +30,7 @@ impl Measured for Timed<'_> {
     fn measure(&self) -> Result<Elapsed, GpuError> {
         self.renderer.reset();
         self.renderer.add_samples(0, self.spp, self.seed)?;
+        self.renderer.check()?;
         Ok(self.renderer.spent())
     }
 }
@@ -65,6 +66,10 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             continue;
         }
         let Some(structure) = gated.iter().find(|g| g.cell.accel == cell.accel) else {
+            if let Some(reason) = refusal(session, &cell) {
+                session.write_refused(text, reason)?;
+                continue;
+            }
             let record = empty_record(
                 session,
                 world,
@@ -108,6 +113,12 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     let mut shared = Shared::default();
     for (item, samples) in timed.iter().zip(samples) {
         let structure = gated.iter().find(|g| g.cell.accel == item.cell.accel);
+        if let Err(error) = &samples
+            && error.is_refusal()
+        {
+            session.write_refused(item.cell.to_string(), error.to_string())?;
+            continue;
+        }
         let measured = samples.map_err(|e| e.to_string());
         let record = measured
             .and_then(|samples| finish(session, world, structure, item, samples, &mut shared));
@@ -132,6 +143,13 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         }
     }
     Ok(())
+}
+
+/// Why the driver cannot run the structure of a cell, if that is so.
+fn refusal(session: &Session, cell: &TimeCell) -> Option<String> {
+    let mut structures = session.plan.structures.iter();
+    let structure = structures.find(|s| s.scene == cell.scene && s.accel == cell.accel)?;
+    session.refused.get(&structure.to_string()).cloned()
 }
 
 /// Timed are the first samples of the set whose error is measured last: how near the rays of

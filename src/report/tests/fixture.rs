@@ -156,6 +156,7 @@ pub(super) fn structure(scene: &str, accel: &str, mrays: f64, wrong: usize) -> S
         (RayClass::Bounce, 0.45),
     ];
     StructureRecord {
+        refused: false,
         scene: scene.into(),
         accel: variant(accel),
         features: vec!["counters".into()],
