@@ -131,7 +131,7 @@ pub(super) fn probe_loops(gpu: &Gpu) -> Result<Option<u32>, GpuError> {
                 wanted,
             });
         }
-        limit = Some(limit.unwrap_or(taken).min(taken));
+        limit.get_or_insert(taken);
     }
     Ok(limit)
 }

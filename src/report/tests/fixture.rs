@@ -60,6 +60,8 @@ pub(super) fn run() -> Record {
             device_type: "cpu".into(),
             software: true,
             timestamps: true,
+            loop_limit: None,
+            denormals: Some(true),
             os: "Linux x86_64".into(),
             cpu: "Some Processor".into(),
             cpu_threads: 2,
