@@ -104,7 +104,7 @@ pub(super) fn probe_loops(gpu: &Gpu) -> Result<Option<u32>, GpuError> {
     let pipeline = gpu.pipeline(&kernel, true)?;
     let mut limit = None;
     for [outer, inner] in LOOPS {
-        let turns = gpu.zeroed("turns", 64 * 8)?;
+        let turns = gpu.zeroed("turns", 8)?;
         let status = gpu.zeroed("status", 64)?;
         let loops = UniformValues::new().u32("outer", outer).u32("inner", inner);
         let mut bindings = Bindings::new();
@@ -115,10 +115,9 @@ pub(super) fn probe_loops(gpu: &Gpu) -> Result<Option<u32>, GpuError> {
         gpu.run(&Dispatch {
             pipeline: &pipeline,
             bindings: &bindings,
-            groups: groups_for(1),
+            groups: [1, 1, 1],
         })?;
-        let taken: Vec<[u32; 2]> = gpu.read(&turns)?;
-        let taken = taken.iter().map(|[taken, _]| *taken).min().unwrap_or(0);
+        let taken = gpu.read::<u32>(&turns)?[0];
         let noticed = gpu.read::<u32>(&status)?[0] & LOOPS_CUT != 0;
         let wanted = outer * inner;
         if taken == wanted && !noticed {

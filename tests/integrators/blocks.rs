@@ -3,7 +3,7 @@
 
 use crate::MAX_DEPTH;
 use crate::support::*;
-use raystone::gpu::{Gpu, GpuError, KernelLibrary};
+use raystone::gpu::{AdapterChoice, Gpu, GpuError, KernelLibrary};
 use raystone::integrator::{BLOCK_SAMPLES, Renderer, rounding_bound};
 use raystone::measure::image::Image;
 
@@ -144,4 +144,26 @@ fn an_image_too_large_for_one_buffer_is_summed_in_bands() {
         let banded = bits(&renderer.render(&[1, 3], 5).expect("a render")[1].image);
         assert!(whole == banded, "bands change the image");
     });
+}
+
+#[test]
+fn a_driver_that_ends_loops_is_seen_and_what_it_cuts_is_refused() {
+    // As if the closing loop of every kernel had been cut.
+    let cut = open(kernels_with(
+        "common/errors",
+        &[("turns != wanted", "turns == wanted")],
+    ));
+    assert_eq!((cut.loop_limit, gpu().loop_limit), (Some(1_000_000), None));
+    let error = with_renderer(&cut, [16, 16], |renderer| {
+        renderer.render(&[1], 1).expect_err("cut loops")
+    });
+    assert!(error.is_refusal(), "{error}");
+    // Loops that end early where no kernel notices.
+    let silent = kernels_with(
+        "common/loops",
+        &[("k < loops.inner", "k < min(loops.inner, 70000u)")],
+    );
+    let error = raystone::gpu::open(&AdapterChoice::Best, silent).err();
+    let error = error.expect("an unsound driver").to_string();
+    assert!(error.contains("70000 of 1000000"), "{error}");
 }
