@@ -40,7 +40,8 @@ pub struct AdapterSummary {
     pub timestamps: bool,
 }
 
-/// An open device with everything kernels need.
+/// An open device with everything kernels need; a clone is the same device.
+#[derive(Clone)]
 pub struct Gpu {
     /// The device.
     pub device: wgpu::Device,
@@ -57,7 +58,7 @@ pub struct Gpu {
     pub loop_limit: Option<u32>,
     /// Kernel sources.
     pub kernels: KernelLibrary,
-    pub(super) pipelines: Mutex<PipelineCache>,
+    pub(super) pipelines: Arc<Mutex<PipelineCache>>,
     lost: Arc<Mutex<Option<String>>>,
 }
 
@@ -206,7 +207,7 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
         timestamp_period,
         loop_limit: None,
         kernels,
-        pipelines: Mutex::default(),
+        pipelines: Arc::default(),
         lost,
     };
     gpu.loop_limit = super::probe::probe_loops(&gpu)?;
@@ -214,6 +215,16 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
 }
 
 impl Gpu {
+    /// The same device with other kernels: buffers may be bound by both, and what composes to the same
+    /// text is compiled once.
+    #[must_use]
+    pub fn with_kernels(&self, kernels: KernelLibrary) -> Self {
+        Self {
+            kernels,
+            ..self.clone()
+        }
+    }
+
     /// Whether the adapter is a software rasteriser.
     pub fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu
