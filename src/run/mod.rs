@@ -161,6 +161,7 @@ fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Resul
             return session.write_skipped(&session.plan.all_of(variant, reason));
         }
     };
+    session.progress.inc(session::SCENE_STEPS);
     let gated = structures::run(session, &world)?;
     if gpu.lost().is_none() {
         errors::run(session, &world, &gated)?;

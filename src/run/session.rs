@@ -260,12 +260,16 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Rough number of progress steps: builds and gates, timed rounds, renders, streams.
+/// Progress steps that loading and judging a scene count for: as long as so many timed rounds, roughly.
+pub(super) const SCENE_STEPS: u64 = 20;
+
+/// Rough number of progress steps: scenes, builds and gates, compiled and timed cells, renders, streams.
 fn steps(experiment: &Experiment, plan: &Plan) -> u64 {
     let rounds = u64::from(experiment.timing.rounds) + 1;
     let structures = plan.structures.len() as u64 * (2 + 5 * rounds);
-    let times = plan.times.len() as u64 * rounds;
+    let times = plan.times.len() as u64 * (1 + rounds);
+    let scenes = plan.scenes.len() as u64 * SCENE_STEPS;
     let references =
         plan.scenes.len() * experiment.axes.integrator.len() * super::REFERENCE_PARTS as usize;
-    structures + times + (plan.renders_planned + references + plan.streams.len()) as u64
+    scenes + structures + times + (plan.renders_planned + references + plan.streams.len()) as u64
 }

@@ -88,6 +88,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             Ok(item) => timed.push(item),
             Err(reason) => fail(session, world, &cell, reason)?,
         }
+        session.progress.inc(1);
         if world.gpu.lost().is_some() {
             return Ok(());
         }
