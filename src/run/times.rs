@@ -10,12 +10,10 @@ use crate::accel::Space;
 use crate::config::{TimeCell, Variant, cell_hash};
 use crate::gpu::{Elapsed, Gpu, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
-use crate::measure::gate::error_texts;
 use crate::measure::record::{Record, TimeRecord};
 use crate::measure::statistics::bootstrap_median;
 use crate::measure::timing::{Measured, Samples, Watch, interleave};
 use crate::sampling::Sampler;
-use std::cell::Cell;
 use std::collections::BTreeMap;
 
 /// A full cell, compiled.
@@ -27,19 +25,16 @@ struct Timed<'a> {
     runtime_checks: bool,
     space: Space,
     watch: Watch,
-    /// Error words of all turns.
-    errors: Cell<u32>,
 }
 
 impl Measured for Timed<'_> {
     fn measure(&self) -> Result<Elapsed, GpuError> {
         self.renderer.reset();
         self.renderer.add_samples(0, self.spp, self.seed)?;
+        self.renderer.check()?;
         let elapsed = self.renderer.spent();
         let pixels = self.renderer.image()?.pixels;
         self.watch.note(blake3::hash(bytemuck::cast_slice(&pixels)));
-        let errors = self.errors.get() | self.renderer.error_word()?;
-        self.errors.set(errors);
         Ok(elapsed)
     }
 }
@@ -73,6 +68,10 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         }
         let gpu = world.device.of(&cell.kernels)?;
         let Some(structure) = gated.iter().find(|g| g.cell.accel == cell.accel) else {
+            if let Some(reason) = refusal(session, &cell) {
+                session.write_refused(text, reason)?;
+                continue;
+            }
             let record = empty_record(
                 session,
                 world,
@@ -90,6 +89,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             Ok(item) => timed.push(item),
             Err(reason) => fail(session, world, &cell, reason)?,
         }
+        session.progress.inc(1);
         if world.gpu.lost().is_some() {
             return Ok(());
         }
@@ -116,6 +116,12 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     let mut shared = Shared::default();
     for (item, samples) in timed.iter().zip(samples) {
         let structure = gated.iter().find(|g| g.cell.accel == item.cell.accel);
+        if let Err(error) = &samples
+            && error.is_refusal()
+        {
+            session.write_refused(item.cell.to_string(), error.to_string())?;
+            continue;
+        }
         let measured = samples.map_err(|e| e.to_string());
         let record = measured
             .and_then(|samples| finish(session, world, structure, item, samples, &mut shared));
@@ -140,6 +146,14 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         }
     }
     Ok(())
+}
+
+/// Why the driver cannot run the structure of a cell, if that is so.
+fn refusal(session: &Session, cell: &TimeCell) -> Option<String> {
+    let mut structures = session.plan.structures.iter();
+    let structure = structures
+        .find(|s| (&s.scene, &s.accel, &s.kernels) == (&cell.scene, &cell.accel, &cell.kernels))?;
+    session.refused.get(&structure.to_string()).cloned()
 }
 
 /// Timed are the first samples of the set whose error is measured last: how near the rays of
@@ -174,7 +188,6 @@ fn compile<'a>(
         runtime_checks: checks,
         space: structure.traced.space,
         watch: Watch::default(),
-        errors: Cell::default(),
     })
 }
 
@@ -211,8 +224,7 @@ fn finish(
         .map(|ms| total as f64 / ms * 1e-3)
         .collect();
     let equal = hash == first;
-    let mut faults = error_texts(item.errors.get());
-    faults.extend(item.watch.fault());
+    let mut faults: Vec<String> = item.watch.fault().into_iter().collect();
     if !equal && world.probe.is_exact() {
         let text = "its last timed image differs from one that the first structure on this scene (in the same space) rendered into fresh buffers";
         faults.push(text.to_owned());
