@@ -6,6 +6,7 @@
 pub mod environment;
 mod errors;
 mod registries;
+mod render;
 mod session;
 mod streams;
 mod structures;
@@ -13,12 +14,11 @@ mod times;
 mod world;
 
 pub use registries::Registries;
+pub use render::{Rendering, render};
 pub use streams::dump_stream;
 
 use crate::config::{Experiment, Plan, Variant};
 use crate::gpu::{AdapterChoice, Gpu, GpuError};
-use crate::integrator::Renderer;
-use crate::measure::picture::{automatic_exposure, tone_map, write_png};
 use crate::measure::record::GateVerdict;
 use session::Session;
 use std::path::PathBuf;
@@ -68,12 +68,16 @@ pub enum RunError {
     /// Bad usage or input (exit code 2).
     #[error("{0}")]
     Input(String),
+    /// A result that is known to be wrong (exit code 1).
+    #[error("{0}")]
+    Wrong(String),
 }
 
 impl RunError {
-    /// The exit code of the program: 2 bad usage or input, 3 no usable adapter.
+    /// The exit code of the program: 1 a wrong result, 2 bad usage or input, 3 no usable adapter.
     pub fn exit_code(&self) -> u8 {
         match self {
+            Self::Wrong(_) => 1,
             Self::Gpu(
                 GpuError::NoAdapter | GpuError::UnknownAdapter { .. } | GpuError::NoDevice { .. },
             ) => 3,
@@ -218,41 +222,4 @@ pub fn verify(
     }
     session.progress.finish_and_clear();
     Ok(verified)
-}
-
-/// One image for `raystone render`: the first scene, structure, sampler and integrator of the axes,
-/// at `experiment.spp.max()` samples, tone-mapped and written to `file`.
-///
-/// # Errors
-/// No adapter, a scene that does not load, a structure that cannot be built or fails its gate.
-pub fn render(
-    experiment: &Experiment,
-    plan: &Plan,
-    registries: &Registries,
-    options: &RunOptions,
-    file: &std::path::Path,
-) -> Result<(), RunError> {
-    let gpu = open_gpu(options)?;
-    let mut session = Session::unrecorded(experiment, plan, registries, options);
-    let cell = plan
-        .times
-        .first()
-        .ok_or_else(|| RunError::Input("there is nothing to render".to_owned()))?;
-    let world = World::new(&mut session, &gpu, &cell.scene)?.map_err(RunError::Input)?;
-    let built = structures::build_and_gate(&mut session, &world, &cell.accel);
-    let (traced, _) =
-        built.map_err(|record| RunError::Input(record.failure.unwrap_or_default()))?;
-    let pair = (&cell.sequence, &cell.decorrelation);
-    let sampler = errors::sampler_for(&session, pair, &cell.integrator, experiment.spp.max());
-    let sampler = sampler.map_err(RunError::Input)?;
-    let job =
-        errors::job(&session, &world, &sampler, &cell.integrator, true).map_err(RunError::Input)?;
-    let renderer = Renderer::new(&gpu, &world.buffers, &traced, &job, false)?;
-    let snapshots = renderer.render(&[experiment.spp.max()], experiment.seed)?;
-    session.progress.finish_and_clear();
-    let Some(snapshot) = snapshots.first() else {
-        return Ok(());
-    };
-    let picture = tone_map(&snapshot.image, automatic_exposure(&snapshot.image));
-    write_png(file, &picture).map_err(|e| RunError::Input(e.to_string()))
 }

@@ -128,6 +128,21 @@ pub struct LoadReport {
     pub warnings: Vec<String>,
 }
 
+impl LoadReport {
+    /// Everything that makes the scene differ from its file, a line each, for people.
+    pub fn lines(&self) -> Vec<String> {
+        let dropped = match self.dropped_non_finite {
+            0 => None,
+            1 => Some("1 triangle dropped: a vertex is not finite".to_owned()),
+            n => Some(format!("{n} triangles dropped: a vertex is not finite")),
+        };
+        dropped
+            .into_iter()
+            .chain(self.warnings.iter().cloned())
+            .collect()
+    }
+}
+
 /// A loaded scene: flat world-space triangles and what shading needs.
 ///
 /// `triangles`, `uvs` and `material_ids` are parallel; `uvs` is empty when no material is textured.
