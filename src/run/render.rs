@@ -10,7 +10,7 @@ use crate::gpu::{Gpu, probe_arithmetic};
 use crate::integrator::{Frame, RayOffset, RenderJob, Renderer, SceneBuffers, Traced, integrator};
 use crate::measure::formats::FileFormat;
 use crate::measure::image::Image;
-use crate::scene::{self, Camera, LoadOptions, LoadReport, SceneData};
+use crate::scene::{self, LoadOptions, LoadReport, SceneData};
 use indicatif::ProgressStyle;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -163,8 +163,7 @@ fn frame(
     let bounds = scene.bounds();
     let camera = experiment
         .camera
-        .or(scene.camera)
-        .unwrap_or_else(|| Camera::frame(&bounds));
+        .unwrap_or_else(|| scene.view(experiment.aspect()));
     camera.validate().map_err(input)?;
     let [width, height] = experiment.resolution;
     let diagonal = f64::from(2.0 * bounds.radius());
