@@ -2,8 +2,9 @@
 //! there at once; the structure is validated on the host.
 
 use super::errors::sampler_for;
+use super::kernels::{Device, Kernels};
 use super::session::Session;
-use super::{Registries, RunError, RunOptions, open_gpu};
+use super::{Registries, RunError, RunOptions};
 use crate::accel::{BuildLog, Intersection, TriangleSoup};
 use crate::config::{Experiment, Plan, Variant};
 use crate::gpu::{Gpu, probe_arithmetic};
@@ -61,14 +62,16 @@ pub fn render(
         .times
         .first()
         .ok_or_else(|| RunError::Input("there is nothing to render".to_owned()))?;
+    let kernels = Kernels::load(&plan.kernels, registries)?;
     let session = Session::unrecorded(experiment, plan, registries, options);
     session.say(format!("{}: loading", cell.scene));
     let scene = scene::load(&cell.scene, &LoadOptions::default()).map_err(input)?;
-    let gpu = open_gpu(options)?;
-    let (soup, offset) = tested_triangles(&gpu, experiment, &scene)?;
+    let device = Device::open(options, &kernels)?;
+    let gpu = device.of(&cell.kernels)?;
+    let (soup, offset) = tested_triangles(gpu, experiment, &scene)?;
     session.say(format!("{}: building {}", cell.scene, cell.accel));
-    let traced = build(&session, &gpu, &soup, &cell.accel)?;
-    let mut buffers = SceneBuffers::upload(&gpu, &scene, &soup)?;
+    let traced = build(&session, gpu, &soup, &cell.accel)?;
+    let mut buffers = SceneBuffers::upload(gpu, &scene, &soup)?;
     buffers.offset = offset;
     drop(soup);
     session.say("compiling the kernel");
@@ -88,7 +91,7 @@ pub fn render(
         params: &cell.integrator.params,
         runtime_checks: true,
     };
-    let renderer = Renderer::new(&gpu, &buffers, &traced, &job, true)?;
+    let renderer = Renderer::new(gpu, &buffers, &traced, &job, true)?;
     let mut rendering = Rendering {
         triangles: scene.triangles.len(),
         spp,
@@ -128,9 +131,8 @@ fn tested_triangles(
     let chosen = Intersection::named(tests.triangle, tests.box_test).map_err(RunError::Input)?;
     let offset = RayOffset::named(tests.offset)
         .ok_or_else(|| RunError::Input(format!("no ray offset is called {}", tests.offset)))?;
-    if let (_, Some(reason)) = chosen.kept_by(&probe_arithmetic(gpu)?) {
-        return Err(RunError::Input(reason));
-    }
+    let probe = probe_arithmetic(gpu)?;
+    chosen.kept_by(&probe).map_err(RunError::Input)?;
     Ok((TriangleSoup::new(scene).intersecting(chosen), offset))
 }
 
