@@ -48,7 +48,7 @@ pub struct Rendering {
 ///
 /// # Errors
 /// An unknown ending, no adapter, a scene that does not load, a structure that cannot be built or is
-/// not valid, a file that cannot be written; [`RunError::Wrong`] if a kernel raised its error word.
+/// not valid, a file that cannot be written, or an image that is not sound: see [`Renderer::image`].
 pub fn render(
     experiment: &Experiment,
     plan: &Plan,
@@ -204,12 +204,6 @@ fn add_all_samples(
         session.progress.set_position(u64::from(done));
         let due = done >= 2 * shown && last.elapsed() >= REFRESH;
         if shown == 0 || due || done == spp {
-            if renderer.error_word()? != 0 {
-                let word = renderer.error_word()?;
-                return Err(RunError::Wrong(format!(
-                    "a kernel raised error word {word} while rendering: the picture is wrong"
-                )));
-            }
             let image = renderer.image()?;
             show(&image)?;
             (shown, last) = (done, Instant::now());
