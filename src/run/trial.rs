@@ -8,7 +8,7 @@ use crate::config::{Gate, StructureCell, Variant};
 use crate::gpu::{Gpu, GpuError};
 use crate::integrator::{SceneBuffers, Traced};
 use crate::measure::gate::{Judge, fault_text, gate};
-use crate::scene::{Camera, LoadOptions, SceneData, builtin_scenes, load};
+use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -45,9 +45,7 @@ impl Stage {
         let variant = entry.ok_or("it is not registered")?.default_variant();
         let scene = load(&variant, &LoadOptions::default()).map_err(|e| e.to_string())?;
         let soup = TriangleSoup::new(&scene).intersecting(intersection);
-        let camera = scene
-            .camera
-            .unwrap_or_else(|| Camera::frame(&scene.bounds()));
+        let camera = scene.view(1.0);
         let judge =
             Judge::remembered(&scene, &soup, camera, &GATE, 1).map_err(|e| e.to_string())?;
         Ok(Self { scene, soup, judge })
