@@ -27,8 +27,9 @@ impl DeviceArguments {
             out,
             adapter: self.adapter.clone().unwrap_or_default(),
             kernels: self.kernels.clone(),
-            lose_device_at: None,
+            warn: Some(super::output::warn),
             progress: !quiet && std::io::stderr().is_terminal(),
+            ..RunOptions::default()
         }
     }
 }
@@ -44,6 +45,9 @@ pub struct ExperimentArguments {
     /// alternatives
     #[arg(long, value_name = "AXIS=PATTERN,…")]
     pub only: Vec<String>,
+    /// Let glTF models name files outside their folder, and OBJ models absolute paths
+    #[arg(long)]
+    pub allow_outside: bool,
 }
 
 /// An override `key=value` whose value is this text, whatever characters are in it.

@@ -55,6 +55,9 @@ pub struct Render {
     /// Seed [default: 1]
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
+    /// Let a glTF model name files outside its folder, and an OBJ model absolute paths
+    #[arg(long)]
+    allow_outside: bool,
     /// Any other value of an experiment file: `--set camera.eye=[0,1,5]`, `--set
     /// integrator.path.max_depth=3`
     #[arg(long, value_name = "KEY=VALUE")]
@@ -78,7 +81,8 @@ impl Render {
         let plan = Plan::new(&experiment, &[], is_randomised)?;
         check_models(&experiment.axes.scene, &catalogue)?;
         // Only the picture is written: no folder is needed.
-        let options = self.device.options(PathBuf::new(), false);
+        let mut options = self.device.options(PathBuf::new(), false);
+        options.allow_outside = self.allow_outside;
         raystone::run::render(&experiment, &plan, &registries, &options, &self.output)?;
         print(&format!("{}\n", self.output.display()))?;
         Ok(ExitCode::SUCCESS)

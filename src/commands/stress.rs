@@ -2,7 +2,7 @@
 
 use super::arguments::DeviceArguments;
 use super::failure::{FAILED, Failure};
-use super::output::print;
+use super::output::{print, tell};
 use anyhow::Context as _;
 use clap::Args;
 use raystone::gpu::{self, Gpu, KernelLibrary};
@@ -70,7 +70,8 @@ impl Stress {
             gpus.push(self.open()?);
         }
         let start = Instant::now();
-        let progress = |what: &str| eprintln!("{:6.1} s  {what}", start.elapsed().as_secs_f64());
+        let progress =
+            |what: &str| tell(&format!("{:6.1} s  {what}", start.elapsed().as_secs_f64()));
         let records = run(&gpus, &settings, &progress).map_err(Failure::input)?;
         write(&self.out, &records).map_err(Failure::input)?;
         let page = write_stress_page(&self.out, &records)?;
@@ -107,7 +108,11 @@ impl Stress {
         let shows = std::io::stderr().is_terminal();
         let progress = |outcome: &Outcome| {
             if shows {
-                eprintln!("{}: {:?}", outcome.mutant.name, outcome.killed_by());
+                tell(&format!(
+                    "{}: {:?}",
+                    outcome.mutant.name,
+                    outcome.killed_by()
+                ));
             }
         };
         let report = mutants::run(&options, &progress).map_err(Failure::input)?;

@@ -5,6 +5,7 @@
 
 pub mod environment;
 mod errors;
+mod folder;
 mod registries;
 mod session;
 mod streams;
@@ -12,6 +13,7 @@ mod structures;
 mod times;
 mod world;
 
+pub use folder::{Existing, Interrupt, Interrupted};
 pub use registries::Registries;
 pub use streams::dump_stream;
 
@@ -34,10 +36,18 @@ pub(crate) const REFERENCE_PARTS: u32 = 8;
 pub struct RunOptions {
     /// Folder for records, images and the report; made if missing.
     pub out: PathBuf,
+    /// What to do where that folder holds results.
+    pub existing: Existing,
+    /// Ends the run early.
+    pub interrupt: Interrupt,
+    /// Is told what went wrong beside the measuring, at once.
+    pub warn: Option<fn(&str)>,
     /// Which adapter.
     pub adapter: AdapterChoice,
     /// Folder whose kernels replace the embedded ones.
     pub kernels: Option<PathBuf>,
+    /// Whether models may name files outside their folder: see [`crate::scene::LoadOptions`].
+    pub allow_outside: bool,
     /// Whether to draw a progress bar on standard error.
     pub progress: bool,
     /// Destroys the device when the turn of this cell comes: for tests of the recovery.
@@ -53,6 +63,8 @@ pub struct RunSummary {
     pub skipped: usize,
     /// Whether a scene could not be loaded (exit code 2).
     pub bad_input: bool,
+    /// Folder of the records.
+    pub out: PathBuf,
     /// The report's page.
     pub report: Option<PathBuf>,
     /// Tables for the terminal.
@@ -68,6 +80,17 @@ pub enum RunError {
     /// Bad usage or input (exit code 2).
     #[error("{0}")]
     Input(String),
+    /// Something that ended a run before its end; what was measured is kept.
+    #[error("{source}; what was measured is in {}", folder.display())]
+    EndedEarly {
+        /// The folder of the records.
+        folder: PathBuf,
+        /// What ended it.
+        source: Box<RunError>,
+    },
+    /// [`Interrupt::now`] was called.
+    #[error("the run was interrupted")]
+    Interrupted,
 }
 
 impl RunError {
@@ -77,6 +100,7 @@ impl RunError {
             Self::Gpu(
                 GpuError::NoAdapter | GpuError::UnknownAdapter { .. } | GpuError::NoDevice { .. },
             ) => 3,
+            Self::EndedEarly { source, .. } => source.exit_code(),
             _ => 2,
         }
     }
@@ -91,6 +115,8 @@ pub struct Verified {
     pub accel: Variant,
     /// Verdict, or why there is none.
     pub verdict: Result<GateVerdict, String>,
+    /// Whether the scene could not be loaded (exit code 2).
+    pub bad_input: bool,
 }
 
 /// Opens the adapter with the kernels of the options.
@@ -107,49 +133,64 @@ pub fn open_gpu(options: &RunOptions) -> Result<Gpu, RunError> {
     Ok(crate::gpu::open(&options.adapter, kernels)?)
 }
 
-/// Runs a plan, writes `records.jsonl`, images and the report to `options.out`.
+/// Runs a plan, writes `records.jsonl`, images and the report to `options.out`, which another run
+/// cannot write meanwhile. Earlier results there stay until the run has ended.
 ///
 /// # Errors
-/// No adapter, or a folder that cannot be written.
+/// No adapter, or a folder that cannot be written or holds results; the records so far are kept, with a
+/// report.
 pub fn run(
     experiment: &Experiment,
     plan: &Plan,
     registries: &Registries,
     options: &RunOptions,
 ) -> Result<RunSummary, RunError> {
-    let mut gpu = open_gpu(options)?;
+    let gpu = open_gpu(options)?;
     let mut session = Session::new(experiment, plan, registries, options)?;
-    session.write_start(environment::capture(&gpu))?;
-    for scene in &plan.scenes {
-        // A lost device fails the cell that lost it; the rest goes on with a fresh one. Every turn
-        // of this loop finishes at least one cell.
-        loop {
-            run_scene(&mut session, &gpu, scene)?;
-            if gpu.lost().is_none() {
-                break;
-            }
-            gpu = open_gpu(options)?;
+    let out = measure(&mut session, gpu).map_err(|error| {
+        match options.interrupt.now(&error.to_string()) {
+            Interrupted::Kept { folder, .. } => RunError::EndedEarly {
+                folder,
+                source: Box::new(error),
+            },
+            _ => error,
         }
-    }
-    loop {
-        streams::run(&mut session, &gpu)?;
-        if gpu.lost().is_none() {
-            break;
-        }
-        gpu = open_gpu(options)?;
-    }
-    session.write_end()?;
-    let report =
-        crate::report::write_report(&options.out).map_err(|e| RunError::Input(e.to_string()))?;
-    let lines =
-        crate::report::read_records(&options.out).map_err(|e| RunError::Input(e.to_string()))?;
+    })?;
+    let report = crate::report::write_report(&out).map_err(|e| RunError::Input(e.to_string()))?;
+    let lines = crate::report::read_records(&out).map_err(|e| RunError::Input(e.to_string()))?;
     Ok(RunSummary {
         failed: session.failed,
         skipped: session.skipped,
         bad_input: session.bad_input,
         report: Some(report.html),
         tables: crate::report::terminal_tables(&lines.lines),
+        out,
     })
+}
+
+/// Writes every record, and puts them in their place: the folder.
+fn measure(session: &mut Session, mut gpu: Gpu) -> Result<PathBuf, RunError> {
+    session.write_start(environment::capture(&gpu))?;
+    let plan = session.plan;
+    for scene in &plan.scenes {
+        // A lost device fails the cell that lost it; the rest goes on with a fresh one. Every turn
+        // of this loop finishes at least one cell.
+        loop {
+            run_scene(session, &gpu, scene)?;
+            if gpu.lost().is_none() {
+                break;
+            }
+            gpu = open_gpu(session.options)?;
+        }
+    }
+    loop {
+        streams::run(session, &gpu)?;
+        if gpu.lost().is_none() {
+            break;
+        }
+        gpu = open_gpu(session.options)?;
+    }
+    session.write_end()
 }
 
 fn run_scene(session: &mut Session, gpu: &Gpu, variant: &Variant) -> Result<(), RunError> {
@@ -213,6 +254,7 @@ pub fn verify(
                 scene: scene.clone(),
                 accel: accel.clone(),
                 verdict,
+                bad_input: world.is_err(),
             });
         }
     }

@@ -12,6 +12,7 @@ mod error;
 mod gltf;
 mod gltf_accessor;
 mod gltf_container;
+mod gltf_files;
 mod gltf_material;
 mod instances;
 mod mtl;
@@ -19,6 +20,7 @@ mod obj;
 mod ply;
 #[cfg(test)]
 mod tests;
+mod text;
 mod texture;
 
 pub use builder::{DEFAULT_ALBEDO, MAX_COORDINATE};
@@ -128,6 +130,21 @@ pub struct LoadReport {
     pub warnings: Vec<String>,
 }
 
+impl LoadReport {
+    /// Everything that makes the scene differ from its file, a line each, for people.
+    pub fn lines(&self) -> Vec<String> {
+        let dropped = match self.dropped_non_finite {
+            0 => None,
+            1 => Some("1 triangle dropped: a vertex is not finite".to_owned()),
+            n => Some(format!("{n} triangles dropped: a vertex is not finite")),
+        };
+        dropped
+            .into_iter()
+            .chain(self.warnings.iter().cloned())
+            .collect()
+    }
+}
+
 /// A loaded scene: flat world-space triangles and what shading needs.
 ///
 /// `triangles`, `uvs` and `material_ids` are parallel; `uvs` is empty when no material is textured.
@@ -165,6 +182,9 @@ pub struct LoadOptions {
     pub textures: bool,
     /// Largest width and height of a texture, texels; larger ones are reduced, with a warning.
     pub max_texture_size: u32,
+    /// Whether a glTF model may name files outside its folder, and an OBJ model absolute paths: a model
+    /// from elsewhere could read any file of this machine.
+    pub allow_outside: bool,
 }
 
 impl Default for LoadOptions {
@@ -172,6 +192,7 @@ impl Default for LoadOptions {
         Self {
             textures: true,
             max_texture_size: 1024,
+            allow_outside: false,
         }
     }
 }
