@@ -103,6 +103,8 @@ fn subject(record: &Record) -> (String, bool) {
         }
         Record::Skipped(r) => (format!("skipped {}", r.cell), false),
         Record::Failed(r) => (r.cell.clone(), true),
+        Record::Warning(r) => (format!("warning of {}", r.cell), false),
+        Record::Interrupted(_) => ("interrupted".to_owned(), false),
         Record::Finished(_) => ("finished".to_owned(), false),
     }
 }

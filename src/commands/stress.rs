@@ -2,17 +2,19 @@
 
 use super::arguments::DeviceArguments;
 use super::failure::{FAILED, Failure};
-use super::output::{print, tell};
+use super::output::{print, tell, warn};
 use anyhow::Context as _;
 use clap::Args;
+use raystone::config::{Params, Variant};
 use raystone::gpu::{self, Gpu, KernelLibrary};
 use raystone::measure::atomic::write_atomic;
 use raystone::report::{stress_tables, write_stress_page};
+use raystone::scene::{LoadOptions, load};
 use raystone::stress::mutants::{self, Options, Outcome};
 use raystone::stress::record::{Record, write};
 use raystone::stress::{Settings, run};
 use std::io::IsTerminal as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -60,6 +62,9 @@ impl Stress {
     pub fn execute(self) -> Result<ExitCode, Failure> {
         if self.mutants {
             return self.plant_faults();
+        }
+        if let Some(model) = &self.model {
+            check_model(model)?;
         }
         let settings = self.settings();
         settings.check().map_err(Failure::input)?;
@@ -144,6 +149,21 @@ impl Stress {
         settings.model = self.model.clone().unwrap_or(settings.model);
         settings
     }
+}
+
+/// A model that was asked for has to be there; the default one may be missing.
+fn check_model(model: &Path) -> Result<(), Failure> {
+    let name = model.to_string_lossy().into_owned();
+    let variant = Variant {
+        label: name.clone(),
+        name,
+        params: Params::default(),
+    };
+    let scene = load(&variant, &LoadOptions::default())?;
+    for line in scene.report.lines() {
+        warn(&format!("{variant}: {line}"));
+    }
+    Ok(())
 }
 
 fn is_missed_target(record: &Record) -> bool {

@@ -230,8 +230,10 @@ impl Folder {
             records.file.read_to_end(&mut lines)?;
             write_atomic(&target, &lines)?;
         }
-        // The results are in their place; what is left over now is only litter.
-        let _ = remove(&partial);
+        // The results are in their place; what is left over now is only litter, but for images that
+        // could not be moved, which keep the folder.
+        let _ = remove(&partial.join(RECORDS_FILE));
+        let _ = fs::remove_dir(&partial);
         let _ = self.remove_images(&earlier);
         Ok(())
     }
@@ -322,7 +324,8 @@ impl Interrupt {
 
 /// `DIR`, `DIR-2`, `DIR-3`, ….
 fn numbered(out: &Path, number: usize) -> PathBuf {
-    let mut name = out.as_os_str().to_owned();
+    // Without the slash that may end it.
+    let mut name = out.components().as_path().as_os_str().to_owned();
     if number > 1 {
         name.push(format!("-{number}"));
     }

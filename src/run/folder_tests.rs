@@ -90,6 +90,7 @@ fn a_folder_that_is_being_written_is_refused_or_numbered() {
     }
     let second = Folder::open(&out, Existing::Number).unwrap();
     assert_eq!(second.out(), dir.path().join("run-2"));
+    assert_eq!(numbered(Path::new("a/b/"), 3), Path::new("a/b-3"));
     drop(first);
     let again = Folder::open(&out, Existing::Number).unwrap();
     assert_eq!(again.out(), out, "nothing was written there");
