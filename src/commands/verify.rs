@@ -92,6 +92,7 @@ impl Verify {
             }
         }
         overrides.extend(self.rays.map(|rays| format!("gate.rays={rays}")));
+        overrides.extend(self.device.kernels_override());
         overrides.extend(self.experiment.set.iter().cloned());
         overrides
     }
@@ -325,7 +326,7 @@ mod tests {
         let experiment =
             Experiment::parse(&defaults(&catalogue), "test", &overrides, &catalogue).unwrap();
         let mut plan = Plan::new(&experiment, &[], |_, _| Ok(true)).unwrap();
-        assert!(spare_brute_force(&mut plan).is_ok());
+        assert!(spare_brute_force(&mut plan, false).is_ok());
         plan
     }
 
