@@ -150,3 +150,24 @@ fn an_interrupted_run_takes_no_more_records() {
     assert!(matches!(folder.finish(), Err(RunError::Interrupted)));
     assert_eq!(handle.now("again"), Interrupted::Finished);
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_told_with_the_file_and_leaves_whole_lines() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = Folder::open(dir.path(), Existing::Refuse).unwrap();
+    write(&folder, "first");
+    let full = File::options().write(true).open("/dev/full").unwrap();
+    let real = std::mem::replace(&mut folder.records().file, full);
+    let error = folder.append("second\n").unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+    let records = dir.path().join(PARTIAL).join(RECORDS_FILE);
+    assert!(
+        error.to_string().contains(&*records.to_string_lossy()),
+        "{error}"
+    );
+    folder.records().file = real;
+    folder.append("third\n").unwrap();
+    folder.finish().unwrap();
+    assert_eq!(read(dir.path()), "first\nthird\n");
+}
