@@ -134,7 +134,7 @@ fn a_model_that_cannot_be_loaded_ends_every_command_with_2_and_its_name() {
         let ray = "0 0 1 0 0 -1";
         for arguments in [
             &["verify", "--accel", "bvh", "--scene", model][..],
-            &["render", "--spp", "1", "--size", "8x8", "--scene", model],
+            &["render", "--spp", "1", "--size", "16x16", "--scene", model],
             &["trace", "--ray", ray, "--scene", model],
             &["stress", "--quick", "--model", model],
         ] {
@@ -167,7 +167,7 @@ fn what_a_loader_left_out_is_a_warning_of_verify_trace_and_run() {
     let (scene, out) = (text(&model), folder.path().join("run"));
     let set = format!("axes.scene='{scene}'");
     for arguments in [
-        &["verify", "--accel", "bvh", "--rays", "64", "--scene", scene][..],
+        &["verify", "--accel", "bvh", "--rays", "256", "--scene", scene][..],
         &["trace", "--ray", "0 0 1 0 0 -1", "--scene", scene],
         &[
             "run",
