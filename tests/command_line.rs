@@ -167,7 +167,9 @@ fn what_a_loader_left_out_is_a_warning_of_verify_trace_and_run() {
     let (scene, out) = (text(&model), folder.path().join("run"));
     let set = format!("axes.scene='{scene}'");
     for arguments in [
-        &["verify", "--accel", "bvh", "--rays", "256", "--scene", scene][..],
+        &[
+            "verify", "--accel", "bvh", "--rays", "256", "--scene", scene,
+        ][..],
         &["trace", "--ray", "0 0 1 0 0 -1", "--scene", scene],
         &[
             "run",
