@@ -120,6 +120,8 @@ pub struct Verified {
     pub verdict: Result<GateVerdict, String>,
     /// Whether the scene could not be loaded (exit code 2).
     pub bad_input: bool,
+    /// Whether there is none because the driver ends loops too early for the structure.
+    pub refused: bool,
 }
 
 /// Runs a plan, writes `records.jsonl`, images and the report to `options.out`, which another run
@@ -204,6 +206,7 @@ fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Resul
             return session.write_skipped(&session.plan.all_of(variant, reason));
         }
     };
+    session.progress.inc(session::SCENE_STEPS);
     let gated = structures::run(session, &world)?;
     if gpu.lost().is_none() {
         errors::run(session, &world, &gated)?;
@@ -234,11 +237,13 @@ pub fn verify(
     for scene in &plan.scenes {
         let world = World::new(&mut session, &device, scene)?;
         for cell in plan.structures.iter().filter(|c| c.scene == *scene) {
+            let mut refused = false;
             let verdict = match &world {
                 Err(Absent::BadInput(reason) | Absent::NotKept(reason)) => Err(reason.clone()),
                 Ok(world) => match structures::build_and_gate(&mut session, world, cell)? {
                     Ok((_, record)) => record.gate.ok_or_else(|| "no verdict".to_owned()),
                     Err(record) => {
+                        refused = record.refused;
                         let reason = record.failure.unwrap_or_default();
                         record.gate.ok_or(reason)
                     }
@@ -249,6 +254,7 @@ pub fn verify(
                 accel: cell.accel.clone(),
                 verdict,
                 bad_input: matches!(world, Err(Absent::BadInput(_))),
+                refused,
             });
         }
     }
