@@ -8,7 +8,9 @@ mod builder;
 pub mod builtin;
 mod camera;
 mod content;
+mod daylight;
 mod error;
+mod framing;
 mod gltf;
 mod gltf_accessor;
 mod gltf_container;
@@ -26,7 +28,9 @@ mod texture;
 pub use builder::{DEFAULT_ALBEDO, MAX_COORDINATE};
 pub use builtin::builtin_scenes;
 pub use camera::Bounds;
+pub use daylight::Daylight;
 pub use error::SceneError;
+pub use framing::Framing;
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 
 use crate::config::Variant;
@@ -169,6 +173,10 @@ pub struct SceneData {
     pub camera: Option<Camera>,
     /// Constant radiance of the environment, linear RGB; zero is a black sky.
     pub environment: Vec3,
+    /// The sky over a scene that brings no light; its radiance is a multiple of `environment`.
+    pub daylight: Option<Daylight>,
+    /// Where to look from, if the scene brings no camera.
+    pub framing: Option<Framing>,
     /// BLAKE3 of the scene's content (hex), part of every cell's hash.
     pub hash: String,
     /// What was dropped or approximated.
