@@ -13,13 +13,14 @@ mod times;
 mod world;
 
 pub use registries::Registries;
-pub use streams::dump_stream;
+
 
 use crate::config::{Experiment, Plan, Variant};
 use crate::gpu::{AdapterChoice, Gpu, GpuError};
 use crate::integrator::Renderer;
 use crate::measure::picture::{automatic_exposure, tone_map, write_png};
 use crate::measure::record::GateVerdict;
+pub use crate::measure::words::dump_stream;
 use session::Session;
 use std::path::PathBuf;
 use thiserror::Error;
