@@ -246,7 +246,7 @@ pub const KEYS: &[Key] = &[
     key("gate", "ao_length", Kind::Number { min: 0.0, max: 1e16 }, Some("0"), "Length of recorded AO rays, scene units; 0 is a tenth of the scene's diagonal."),
     key("gate", "offset", Kind::Number { min: 0.0, max: 1e16 }, Some("0"), "How far rays that start on a surface are moved off it, scene units; 0 is 1e-5 of the scene's diagonal."),
     key("discrepancy", "points", Kind::PowerOfTwo { min: 2, max: 65_536 }, Some("4096"), "Star discrepancy is taken at N = 2, 4, 8, … up to this many points."),
-    key("discrepancy", "pairs", Kind::DimensionPairs { max: 255 }, Some("[[0, 1], [2, 3], [4, 5]]"), "Pairs of dimensions of the path's table."),
+    key("discrepancy", "pairs", Kind::DimensionPairs { max: 255 }, Some("[[0, 1], [2, 3], [4, 5], [0, 2], [1, 3], [2, 4]]"), "Pairs of dimensions of the path's table; the worst of all pairs that the integrators draw is measured as well."),
     key("discrepancy", "seeds", integer(1, 1024), Some("8"), "Seeds measured where the stream is randomised."),
 ];
 

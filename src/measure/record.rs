@@ -3,7 +3,10 @@
 
 use crate::accel::Space;
 use crate::config::Variant;
+use crate::sampling::to_unit;
 use crate::scene::{Camera, LoadReport};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -123,6 +123,19 @@ pub fn compare(sampler: &Sampler, at: &[Coordinate], words: &[u32]) -> Result<()
     ))
 }
 
+fn composition(sampler: &Sampler) -> Composition {
+    with_sampler(Composition::new("sampling/dump_stream"), sampler)
+}
+
+/// Text of the kernel that is tapped.
+///
+/// # Errors
+/// It does not compose or compile.
+pub fn kernel_text(gpu: &Gpu, sampler: &Sampler) -> Result<String, String> {
+    let pipeline = gpu.pipeline(&composition(sampler), true);
+    Ok(pipeline.map_err(|e| e.to_string())?.kernel.wgsl.clone())
+}
+
 /// Compares the kernel's words with the twin's in all that a run uses, by one dispatch; returns how many.
 ///
 /// # Errors
@@ -151,13 +164,12 @@ pub fn dump_stream(
             sampler.demand.dimensions
         ));
     }
-    let composition = with_sampler(Composition::new("sampling/dump_stream"), sampler);
     let words: Vec<[u32; 4]> = coordinates
         .iter()
         .map(|c| [c.pixel, c.sample, c.dimension, c.seed])
         .collect();
     let run = || {
-        let pipeline = gpu.pipeline(&composition, true)?;
+        let pipeline = gpu.pipeline(&composition(sampler), true)?;
         let stream = gpu.zeroed("stream", words.len() as u64 * 4)?;
         let mut bindings = Bindings::new();
         bindings
@@ -210,10 +222,16 @@ mod tests {
         }
         let places: BTreeSet<_> = at.iter().map(|c| (c.pixel, c.seed)).collect();
         for pixel in [0, 1, 63, 64, 79, 80, 80 * 59, 80 * 60 - 1] {
-            assert!(used.seeds.iter().all(|&s| places.contains(&(pixel, s))), "{pixel}");
+            assert!(
+                used.seeds.iter().all(|&s| places.contains(&(pixel, s))),
+                "{pixel}"
+            );
         }
         let inside = |c: &Coordinate| {
-            c.pixel < 80 * 60 && c.sample < 65_537 && c.dimension < 122 && used.seeds.contains(&c.seed)
+            c.pixel < 80 * 60
+                && c.sample < 65_537
+                && c.dimension < 122
+                && used.seeds.contains(&c.seed)
         };
         assert!(at.iter().all(inside));
     }

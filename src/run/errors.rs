@@ -3,7 +3,7 @@
 use super::session::Session;
 use super::structures::Gated;
 use super::world::World;
-use super::{REFERENCE_PARTS, RunError};
+use super::{REFERENCE_PARTS, RunError, words};
 use crate::config::{SamplerCell, Variant, cell_hash};
 use crate::gpu::GpuError;
 use crate::integrator::{Frame, RenderJob, Renderer, Snapshot, integrator};
@@ -156,15 +156,19 @@ fn reference(
         Err(reason) => return Ok(Err(reason)),
     };
     let seed = pcg_hash(settings.seed);
+    let seeds: Vec<u32> = (0..REFERENCE_PARTS)
+        .map(|part| seed.wrapping_add(part))
+        .collect();
     let rendered = (|| {
+        words::check(session, world.gpu, &sampler, &seeds)?;
         let job = job(session, world, &sampler, variant, true)?;
         let renderer = Renderer::new(world.gpu, &world.buffers, &fastest.traced, &job, false)
             .map_err(|e| e.to_string())?;
         let mut parts = Vec::new();
-        for part in 0..REFERENCE_PARTS {
-            let rendered = session.clock.time("gpu", || {
-                render_checked(&renderer, &[spp], seed.wrapping_add(part))
-            });
+        for &seed in &seeds {
+            let rendered = session
+                .clock
+                .time("gpu", || render_checked(&renderer, &[spp], seed));
             parts.extend(rendered?.into_iter().map(|s| s.image));
             session.progress.inc(1);
         }
@@ -261,14 +265,36 @@ struct Pass<'a> {
 /// What a replicate is rendered in: one pass, unless each number of samples has points of its own,
 /// which makes a pass each.
 fn passes<'a>(
-    session: &Session,
+    session: &mut Session,
     world: &'a World,
     fastest: &Gated,
     cell: &SamplerCell,
 ) -> Result<Vec<Pass<'a>>, String> {
     let pair = (&cell.sequence, &cell.decorrelation);
-    let pass = |spps: Vec<u32>, sampler: &Sampler| {
-        let job = job(session, world, sampler, &cell.integrator, true)?;
+    let seeds: Vec<u32> = session.experiment.replicate_seeds().collect();
+    let spps: Vec<u32> = session.experiment.spp.counts().collect();
+    let whole = sampler_for(
+        session,
+        pair,
+        &cell.integrator,
+        session.experiment.spp.max(),
+    )?;
+    let single = |spp| {
+        Ok((
+            vec![spp],
+            sampler_for(session, pair, &cell.integrator, spp)?,
+        ))
+    };
+    let samplers = match whole.by_count() {
+        true => spps
+            .into_iter()
+            .map(single)
+            .collect::<Result<_, String>>()?,
+        false => vec![(spps, whole)],
+    };
+    let pass = |(spps, sampler): (Vec<u32>, Sampler)| {
+        words::check(session, world.gpu, &sampler, &seeds)?;
+        let job = job(session, world, &sampler, &cell.integrator, true)?;
         let renderer = Renderer::new(world.gpu, &world.buffers, &fastest.traced, &job, false);
         let words = bytemuck::cast_slice(sampler.table.words());
         Ok(Pass {
@@ -277,19 +303,7 @@ fn passes<'a>(
             table: blake3::hash(words).to_hex().to_string(),
         })
     };
-    let spps: Vec<u32> = session.experiment.spp.counts().collect();
-    let most = session.experiment.spp.max();
-    let sampler = sampler_for(session, pair, &cell.integrator, most)?;
-    if !sampler.by_count() {
-        return Ok(vec![pass(spps, &sampler)?]);
-    }
-    let single = |spp| {
-        pass(
-            vec![spp],
-            &sampler_for(session, pair, &cell.integrator, spp)?,
-        )
-    };
-    spps.into_iter().map(single).collect()
+    samplers.into_iter().map(pass).collect()
 }
 
 /// All replicates of one sampler. The inner error concerns this cell alone.

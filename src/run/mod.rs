@@ -10,10 +10,10 @@ mod session;
 mod streams;
 mod structures;
 mod times;
+mod words;
 mod world;
 
 pub use registries::Registries;
-
 
 use crate::config::{Experiment, Plan, Variant};
 use crate::gpu::{AdapterChoice, Gpu, GpuError};

@@ -50,6 +50,8 @@ pub(super) struct Session<'a> {
     pub bad_input: bool,
     /// Cells that have their record: not run again after a lost device.
     done: HashSet<String>,
+    /// Samplers whose words were compared with the twin's.
+    pub compared: HashSet<String>,
     /// `None`: nothing is written (gate alone, single images).
     records: Option<File>,
     records_path: PathBuf,
@@ -111,6 +113,7 @@ impl<'a> Session<'a> {
             skipped: 0,
             bad_input: false,
             done: HashSet::new(),
+            compared: HashSet::new(),
             records: None,
             records_path: PathBuf::new(),
         }

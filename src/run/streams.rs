@@ -60,9 +60,8 @@ pub(super) fn run(session: &mut Session, gpu: &Gpu) -> Result<(), RunError> {
         for pair in pairs(session, gpu, &cell)? {
             match stream_record(session, gpu, &cell, pair) {
                 Ok(record) => session.write("", Record::Stream(record))?,
-                Err(reason) => {
-                    session.write_failure(&format!("stream {cell}, {:?}", pair.dimensions), reason)?
-                }
+                Err(reason) => session
+                    .write_failure(&format!("stream {cell}, {:?}", pair.dimensions), reason)?,
             }
         }
         if gpu.lost().is_none() {
@@ -140,7 +139,9 @@ fn worst_pair(
         })
     };
     let at: Vec<Coordinate> = (0..=highest).flat_map(column).collect();
-    let numbers = session.clock.time("gpu", || dump_numbers(gpu, &sampler, &at))?;
+    let numbers = session
+        .clock
+        .time("gpu", || dump_numbers(gpu, &sampler, &at))?;
     let columns: Vec<&[f64]> = numbers.chunks_exact(samples as usize).collect();
     let star = |&[a, b]: &[u32; 2]| {
         let both = columns[a as usize].iter().zip(columns[b as usize]);
@@ -148,9 +149,15 @@ fn worst_pair(
         star_2d(&points).map_err(|e| e.to_string())
     };
     let stars = session.clock.time("discrepancy", || {
-        candidates.par_iter().map(star).collect::<Result<Vec<f64>, _>>()
+        candidates
+            .par_iter()
+            .map(star)
+            .collect::<Result<Vec<f64>, _>>()
     })?;
-    let worst = candidates.iter().zip(&stars).max_by(|a, b| a.1.total_cmp(b.1));
+    let worst = candidates
+        .iter()
+        .zip(&stars)
+        .max_by(|a, b| a.1.total_cmp(b.1));
     Ok(worst.map(|(pair, _)| (*pair, candidates.len())))
 }
 
@@ -165,7 +172,9 @@ fn tapped(session: &Session, count: u32) -> Vec<(u32, u32)> {
         _ => pcg_hash(k) % pixels,
     };
     let first = session.experiment.seed;
-    (0..count).map(|k| (pixel(k), first.wrapping_add(k))).collect()
+    (0..count)
+        .map(|k| (pixel(k), first.wrapping_add(k)))
+        .collect()
 }
 
 fn stream_record(
@@ -243,17 +252,25 @@ fn check_shared(
     sets: &[(Sampler, Vec<usize>)],
     pair: [u32; 2],
 ) -> Result<(), String> {
-    let pixels: Vec<u32> = tapped(session, SHARED_PIXELS).iter().map(|(p, _)| *p).collect();
+    let pixels: Vec<u32> = tapped(session, SHARED_PIXELS)
+        .iter()
+        .map(|(p, _)| *p)
+        .collect();
     for (sampler, counts) in sets {
         let most = counts.last().map_or(0, |&n| n as u32);
         let seed = session.experiment.seed;
-        let points = session
-            .clock
-            .time("gpu", || dump_points(gpu, sampler, &pixels, most, pair, seed))?;
+        let points = session.clock.time("gpu", || {
+            dump_points(gpu, sampler, &pixels, most, pair, seed)
+        })?;
         let (first, others) = points.split_at(most as usize);
-        if others.chunks_exact(first.len().max(1)).any(|other| other != first) {
+        if others
+            .chunks_exact(first.len().max(1))
+            .any(|other| other != first)
+        {
             let label = sampler.label();
-            return Err(format!("{label} has no seed, and yet pixels {pixels:?} draw different points"));
+            return Err(format!(
+                "{label} has no seed, and yet pixels {pixels:?} draw different points"
+            ));
         }
     }
     Ok(())
@@ -304,7 +321,9 @@ fn pixels_at(
 ) -> Result<PixelsAtCount, String> {
     let width = sampler.demand.width.unwrap_or(TILE).max(TILE);
     let samples = TILE_SAMPLES.min(n as u32);
-    let tile: Vec<u32> = (0..TILE).flat_map(|row| row * width..row * width + TILE).collect();
+    let tile: Vec<u32> = (0..TILE)
+        .flat_map(|row| row * width..row * width + TILE)
+        .collect();
     let tile = dump_points(gpu, sampler, &tile, samples, pair, seed)?;
     let pixels: Vec<u32> = (0..COPIES).collect();
     let copies = dump_points(gpu, sampler, &pixels, n as u32, pair, seed)?;

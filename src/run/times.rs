@@ -1,11 +1,11 @@
 //! Time of full cells, at few samples per pixel, in interleaved rounds; and the proof by hash that
 //! every structure gives the same image.
 
-use super::RunError;
 use super::errors::{image_hash, job, sampler_for};
 use super::session::Session;
 use super::structures::Gated;
 use super::world::World;
+use super::{RunError, words};
 use crate::accel::Space;
 use crate::config::{TimeCell, Variant, cell_hash};
 use crate::gpu::{Elapsed, GpuError};
@@ -150,6 +150,8 @@ fn compile<'a>(
     cell: TimeCell,
 ) -> Result<Timed<'a>, String> {
     let sampler = sampler_of(session, &cell)?;
+    let seeds: Vec<u32> = session.experiment.replicate_seeds().collect();
+    words::check(session, world.gpu, &sampler, &seeds)?;
     let checks = structure.runtime_checks;
     let job = job(session, world, &sampler, &cell.integrator, checks)?;
     let compiled = session.clock.time("gpu", || {

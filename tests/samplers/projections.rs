@@ -83,7 +83,11 @@ fn star_beyond(xs: &[u32], ys: &[u32], bound: f64) -> Option<f64> {
     if worst + 2.0 / CELLS as f64 <= bound {
         return None;
     }
-    let points: Vec<[f64; 2]> = xs.iter().zip(ys).map(|(x, y)| [unit(*x), unit(*y)]).collect();
+    let points: Vec<[f64; 2]> = xs
+        .iter()
+        .zip(ys)
+        .map(|(x, y)| [unit(*x), unit(*y)])
+        .collect();
     let star = star_2d(&points).expect("points in the square");
     (star > bound).then_some(star)
 }
@@ -117,7 +121,11 @@ fn faults_of_pairs(columns: &[Vec<u32>]) -> Vec<(f64, String)> {
 
 /// Pixels and seeds at which a sampler is looked at: one is enough where all draw the same.
 fn places(sampler: &Sampler) -> &'static [[u32; 2]] {
-    if sampler.is_random() { &PLACES } else { &PLACES[1..2] }
+    if sampler.is_random() {
+        &PLACES
+    } else {
+        &PLACES[1..2]
+    }
 }
 
 #[test]
@@ -135,12 +143,18 @@ fn no_pair_of_dimensions_is_locked_together_in_any_sampler() {
             let known = BY_NATURE.iter().position(|(l, ..)| label.starts_with(l));
             match known {
                 Some(k) if *worst <= BY_NATURE[k].1 => excused.push(k),
-                _ => wrong.push(format!("{label}, {place:?}: {text}; {} faults", faults.len())),
+                _ => wrong.push(format!(
+                    "{label}, {place:?}: {text}; {} faults",
+                    faults.len()
+                )),
             }
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     for (k, (label, ..)) in BY_NATURE.iter().enumerate() {
-        assert!(excused.contains(&k), "{label} keeps the bounds: take it off the list");
+        assert!(
+            excused.contains(&k),
+            "{label} keeps the bounds: take it off the list"
+        );
     }
 }

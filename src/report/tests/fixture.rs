@@ -339,13 +339,23 @@ pub(super) fn streams() -> Vec<Record> {
                 decorrelation: variant(decorrelation),
                 dimensions: [2, 3],
                 purpose: "bounce 0: direction".into(),
+                named: true,
+                worst_of: None,
                 randomised,
                 seeds: if randomised { 8 } else { 1 },
+                pixels: (0..if randomised { 8 } else { 1 }).collect(),
                 star: (0..11).map(star).collect(),
                 figures: stream_figures(exponent),
+                points: Some(points()),
             })
         };
     SAMPLERS.iter().map(stream).collect()
+}
+
+/// Two pixels with 16 points each.
+fn points() -> RecordedPoints {
+    let words: Vec<u32> = (0..64_u32).map(|i| i.wrapping_mul(0x9e37_79b9)).collect();
+    RecordedPoints::new([16, 2], 1, &words, vec![1.0; 64])
 }
 
 /// Figures of a stream whose D* falls with this exponent.
