@@ -16,6 +16,7 @@ const fn sampler(sequence: &'static str, changes: Changes, decorrelation: &'stat
 const HASH: Subject = sampler("pixel-hash", &[], "none");
 const SOBOL: Subject = sampler("sobol", &[], "none");
 const HALTON: Subject = sampler("halton", &[], "cranley-patterson");
+const PLAIN: Subject = sampler("halton", &[("digits", "plain")], "none");
 const FAURE: Subject = sampler("halton", &[("digits", "faure")], "none");
 const OWEN: Subject = sampler("sobol", &[], "owen-hash");
 
@@ -145,8 +146,8 @@ pub(super) const MUTANTS: &[Mutant] = &[
         "every dimension but the first takes the first base",
         text(
             "sampling/hammersley",
-            "sequence_word(BASES + s.dimension - 1u)",
-            "sequence_word(BASES)",
+            "BASES + 2u * (s.dimension - 1u)",
+            "BASES",
         ),
         sampler("hammersley", &[], "disc-rotation"),
         Check::Stream,
@@ -286,7 +287,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             "var rest = n;",
             "var rest = n & 0xffffu;",
         ),
-        sampler("halton", &[], "none"),
+        PLAIN,
         Check::Stream,
     ),
     row(
@@ -360,10 +361,10 @@ pub(super) const MUTANTS: &[Mutant] = &[
         "every dimension beyond 30 takes the base of dimension 30",
         text(
             "sampling/halton",
-            "sequence_word(2u * s.dimension);",
-            "sequence_word(2u * min(s.dimension, 30u));",
+            "2u * s.dimension",
+            "2u * min(s.dimension, 30u)",
         ),
-        sampler("halton", &[], "none"),
+        FAURE,
         Check::Stream,
     ),
     row(
@@ -371,8 +372,8 @@ pub(super) const MUTANTS: &[Mutant] = &[
         "dimensions beyond 20 take the base of the one before",
         text(
             "sampling/hammersley",
-            "BASES + s.dimension - 1u",
-            "BASES + s.dimension - select(1u, 2u, s.dimension > 20u)",
+            "(s.dimension - 1u)",
+            "(s.dimension - select(1u, 2u, s.dimension > 20u))",
         ),
         sampler("hammersley", &[], "disc-rotation"),
         Check::Stream,
@@ -503,7 +504,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             part: "the base of dimension 40",
             change: repeat_late_base,
         },
-        sampler("halton", &[], "none"),
+        FAURE,
         Check::Discrepancy,
     ),
     row(
