@@ -127,13 +127,13 @@ fn composition(sampler: &Sampler) -> Composition {
     with_sampler(Composition::new("sampling/dump_stream"), sampler)
 }
 
-/// Text of the kernel that is tapped.
+/// Hash of the kernel that is tapped.
 ///
 /// # Errors
 /// It does not compose or compile.
-pub fn kernel_text(gpu: &Gpu, sampler: &Sampler) -> Result<String, String> {
+pub fn kernel_hash(gpu: &Gpu, sampler: &Sampler) -> Result<String, String> {
     let pipeline = gpu.pipeline(&composition(sampler), true);
-    Ok(pipeline.map_err(|e| e.to_string())?.kernel.wgsl.clone())
+    Ok(pipeline.map_err(|e| e.to_string())?.kernel.hash())
 }
 
 /// Compares the kernel's words with the twin's in all that a run uses, by one dispatch; returns how many.

@@ -2,17 +2,18 @@
 //! ([`crate::measure::words`]) and equal to the twin's, and what drawing costs.
 
 use super::RunError;
+use super::kernels::Device;
 use super::session::Session;
-use crate::config::StreamCell;
+use crate::config::{StreamCell, cell_hash};
 use crate::discrepancy::{Budget, PointSet, radial_spectrum, star_2d};
 use crate::gpu::Gpu;
 use crate::integrator::integrator;
 use crate::measure::record::{
-    PixelsAtCount, Record, RecordedPoints, SamplerCostRecord, StreamRecord,
+    PixelsAtCount, Ran, Record, RecordedPoints, SamplerCostRecord, StreamRecord,
 };
 use crate::measure::sampler_cost::sampler_cost;
 use crate::measure::stream::{COPIES, SeedFigures, coverage, neighbour_angle, over_seeds};
-use crate::measure::words::{compare, dump_stream};
+use crate::measure::words::{compare, dump_stream, kernel_hash};
 use crate::sampling::dimensions::{DIRECTION, FIRST_BOUNCE, PER_BOUNCE, pair_purpose};
 use crate::sampling::hash::pcg_hash;
 use crate::sampling::{Coordinate, Demand, Sampler, to_unit};
@@ -50,23 +51,30 @@ struct Pair {
 }
 
 /// All streams of the plan.
-pub(super) fn run(session: &mut Session, gpu: &Gpu) -> Result<(), RunError> {
+pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError> {
     for cell in session.plan.streams.clone() {
         if session.is_done(&cell.to_string()) {
             continue;
         }
+        let gpu = device.of(&cell.kernels)?;
         session.say(format!("discrepancy of {cell}"));
         session.lose_device_on_request(gpu, &cell.to_string());
         for pair in pairs(session, gpu, &cell)? {
             match stream_record(session, gpu, &cell, pair) {
-                Ok(record) => session.write("", Record::Stream(record))?,
+                Ok(record) => {
+                    let hash = stream_hash(&cell, &record.ran, &format!("{:?}", pair.dimensions));
+                    session.write(&hash, Record::Stream(record))?;
+                }
                 Err(reason) => session
                     .write_failure(&format!("stream {cell}, {:?}", pair.dimensions), reason)?,
             }
         }
         if gpu.lost().is_none() {
             match cost_record(session, gpu, &cell) {
-                Ok(record) => session.write("", Record::SamplerCost(record))?,
+                Ok(record) => {
+                    let hash = stream_hash(&cell, &record.ran, "cost");
+                    session.write(&hash, Record::SamplerCost(record))?;
+                }
                 Err(reason) => session.write_failure(&format!("cost of {cell}"), reason)?,
             }
         }
@@ -177,6 +185,25 @@ fn tapped(session: &Session, count: u32) -> Vec<(u32, u32)> {
         .collect()
 }
 
+/// What a stream ran with: no ray was traced.
+fn ran(cell: &StreamCell, kernel_hash: String) -> Ran {
+    Ran {
+        kernels: cell.kernels.kernels_label().to_owned(),
+        kernel_hash,
+        ..Ran::default()
+    }
+}
+
+fn stream_hash(cell: &StreamCell, ran: &Ran, what: &str) -> String {
+    let sampler = serde_json::to_string(&(&cell.sequence, &cell.decorrelation));
+    cell_hash(&[
+        ("sampler", &sampler.unwrap_or_default()),
+        ("what", what),
+        ("kernel", &ran.kernel_hash),
+        ("version", env!("CARGO_PKG_VERSION")),
+    ])
+}
+
 fn stream_record(
     session: &mut Session,
     gpu: &Gpu,
@@ -232,6 +259,7 @@ fn stream_record(
     Ok(StreamRecord {
         sequence: cell.sequence.clone(),
         decorrelation: cell.decorrelation.clone(),
+        ran: ran(cell, kernel_hash(gpu, &sets[0].0)?),
         dimensions,
         purpose: pair_purpose(dimensions),
         named: pair.named,
@@ -354,6 +382,7 @@ fn cost_record(
     Ok(SamplerCostRecord {
         sequence: cell.sequence.clone(),
         decorrelation: cell.decorrelation.clone(),
+        ran: ran(cell, cost.kernel_hash),
         ns_per_sample: cost.ns_per_sample,
         loop_ns_per_sample: cost.loop_ns_per_sample,
     })

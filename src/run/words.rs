@@ -2,7 +2,7 @@
 
 use super::session::Session;
 use crate::gpu::Gpu;
-use crate::measure::words::{Used, check_words, kernel_text};
+use crate::measure::words::{Used, check_words, kernel_hash};
 use crate::sampling::Sampler;
 
 /// Compares a sampler's kernel with its twin in all that a run draws from it; once for each kernel, table and
@@ -22,11 +22,9 @@ pub(super) fn check(
         size: session.experiment.resolution,
         seeds: seeds.to_vec(),
     };
-    let text = kernel_text(gpu, sampler)?;
-    let mut hash = blake3::Hasher::new();
-    hash.update(text.as_bytes());
-    hash.update(bytemuck::cast_slice(sampler.table.words()));
-    let key = format!("{} {used:?} {}", sampler.label(), hash.finalize());
+    let kernel = kernel_hash(gpu, sampler)?;
+    let table = blake3::hash(bytemuck::cast_slice(sampler.table.words()));
+    let key = format!("{} {used:?} {kernel} {table}", sampler.label());
     if session.compared.contains(&key) {
         return Ok(());
     }
