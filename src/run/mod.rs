@@ -95,6 +95,8 @@ pub struct Verified {
     pub accel: Variant,
     /// Verdict, or why there is none.
     pub verdict: Result<GateVerdict, String>,
+    /// Whether there is none because the driver ends loops too early for the structure.
+    pub refused: bool,
 }
 
 /// Runs a plan, writes `records.jsonl`, images and the report to `options.out`.
@@ -160,6 +162,7 @@ fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Resul
             return session.write_skipped(&session.plan.all_of(variant, reason));
         }
     };
+    session.progress.inc(session::SCENE_STEPS);
     let gated = structures::run(session, &world)?;
     if gpu.lost().is_none() {
         errors::run(session, &world, &gated)?;
@@ -190,11 +193,13 @@ pub fn verify(
     for scene in &plan.scenes {
         let world = World::new(&mut session, &device, scene)?;
         for cell in plan.structures.iter().filter(|c| c.scene == *scene) {
+            let mut refused = false;
             let verdict = match &world {
                 Err(Absent::BadInput(reason) | Absent::NotKept(reason)) => Err(reason.clone()),
                 Ok(world) => match structures::build_and_gate(&mut session, world, cell)? {
                     Ok((_, record)) => record.gate.ok_or_else(|| "no verdict".to_owned()),
                     Err(record) => {
+                        refused = record.refused;
                         let reason = record.failure.unwrap_or_default();
                         record.gate.ok_or(reason)
                     }
@@ -204,6 +209,7 @@ pub fn verify(
                 scene: scene.clone(),
                 accel: cell.accel.clone(),
                 verdict,
+                refused,
             });
         }
     }
