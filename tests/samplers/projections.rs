@@ -20,15 +20,15 @@ const PLACES: [[u32; 2]; 4] = [
 /// What cannot keep the bounds by its nature: what its label contains, the worst D* that was measured, and why.
 const BY_NATURE: [(&str, f64, &str); 2] = [
     (
+        r#""edge": Name("clamp")"#,
+        0.20,
+        "shifts that stop at the edges gather points there: biased by design, 0.1812; wrap is the default",
+    ),
+    (
         r#""digits": Name("plain")"#,
         0.125,
         "plain digits of large bases run along diagonals, which a shift or a later first index lays badly for \
          boxes at the origin: 0.1205; permuted digits are the default",
-    ),
-    (
-        r#""edge": Name("clamp")"#,
-        0.20,
-        "shifts that stop at the edges gather points there: biased by design, 0.1812; wrap is the default",
     ),
 ];
 
