@@ -69,6 +69,7 @@ const NO_TWIN: &[(&str, &str)] = &[
         "judged in src/stress/numerics/mappings.rs",
     ),
     ("stress/sums", "judged in src/stress/numerics/sums.rs"),
+    ("shading/environment", "judged by images, not by a twin"),
     ("shading/hemisphere", "judged by images, not by a twin"),
     ("shading/light", "judged by images, not by a twin"),
     ("shading/material", "judged by images, not by a twin"),

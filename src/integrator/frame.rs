@@ -63,5 +63,8 @@ impl Frame {
             .f32("ao_radius", self.ao_radius)
             .f32("transform_scale", scene.transform_error.scale)
             .f32("transform_shift", scene.transform_error.shift)
+            .vec("sky_up", &scene.daylight.up.to_array())
+            .vec("sky_key", &scene.daylight.key.to_array())
+            .f32("sky_reach", scene.daylight.reach)
     }
 }

@@ -5,8 +5,10 @@
 
 pub mod environment;
 mod errors;
+mod folder;
 mod kernels;
 mod registries;
+mod render;
 mod session;
 mod streams;
 mod structures;
@@ -14,13 +16,13 @@ mod times;
 mod words;
 mod world;
 
+pub use folder::{Existing, Interrupt, Interrupted};
 pub use kernels::{Kernels, kernel_library};
 pub use registries::Registries;
+pub use render::{Rendering, render};
 
 use crate::config::{Experiment, Plan, Variant};
 use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
-use crate::integrator::Renderer;
-use crate::measure::picture::{automatic_exposure, tone_map, write_png};
 use crate::measure::record::GateVerdict;
 pub use crate::measure::words::dump_stream;
 use kernels::Device;
@@ -38,8 +40,16 @@ pub(crate) const REFERENCE_PARTS: u32 = 8;
 pub struct RunOptions {
     /// Folder for records, images and the report; made if missing.
     pub out: PathBuf,
+    /// What to do where that folder holds results.
+    pub existing: Existing,
+    /// Ends the run early.
+    pub interrupt: Interrupt,
+    /// Is told what went wrong beside the measuring, at once.
+    pub warn: Option<fn(&str)>,
     /// Which adapter.
     pub adapter: AdapterChoice,
+    /// Whether models may name files outside their folder: see [`crate::scene::LoadOptions`].
+    pub allow_outside: bool,
     /// Whether to draw a progress bar on standard error.
     pub progress: bool,
     /// Destroys the device when the turn of this cell comes: for tests of the recovery.
@@ -57,6 +67,8 @@ pub struct RunSummary {
     pub skipped: usize,
     /// Whether a scene could not be loaded (exit code 2).
     pub bad_input: bool,
+    /// Folder of the records.
+    pub out: PathBuf,
     /// The report's page.
     pub report: Option<PathBuf>,
     /// Tables for the terminal.
@@ -72,15 +84,34 @@ pub enum RunError {
     /// Bad usage or input (exit code 2).
     #[error("{0}")]
     Input(String),
+    /// Something that ended a run before its end; what was measured is kept.
+    #[error("{source}; what was measured is in {}", folder.display())]
+    EndedEarly {
+        /// The folder of the records.
+        folder: PathBuf,
+        /// What ended it.
+        source: Box<RunError>,
+    },
+    /// [`Interrupt::now`] was called.
+    #[error("the run was interrupted")]
+    Interrupted,
+    /// A result that is known to be wrong (exit code 1).
+    #[error("{0}")]
+    Wrong(String),
 }
 
 impl RunError {
-    /// The exit code of the program: 2 bad usage or input, 3 no usable adapter.
+    /// The exit code of the program: 1 a wrong result, 2 bad usage or input, 3 no usable adapter.
     pub fn exit_code(&self) -> u8 {
         match self {
+            Self::Wrong(_)
+            | Self::Gpu(
+                GpuError::LoopsCut { .. } | GpuError::Kernels(_) | GpuError::Samples { .. },
+            ) => 1,
             Self::Gpu(
                 GpuError::NoAdapter | GpuError::UnknownAdapter { .. } | GpuError::NoDevice { .. },
             ) => 3,
+            Self::EndedEarly { source, .. } => source.exit_code(),
             _ => 2,
         }
     }
@@ -95,14 +126,18 @@ pub struct Verified {
     pub accel: Variant,
     /// Verdict, or why there is none.
     pub verdict: Result<GateVerdict, String>,
+    /// Whether the scene could not be loaded (exit code 2).
+    pub bad_input: bool,
     /// Whether there is none because the driver ends loops too early for the structure.
     pub refused: bool,
 }
 
-/// Runs a plan, writes `records.jsonl`, images and the report to `options.out`.
+/// Runs a plan, writes `records.jsonl`, images and the report to `options.out`, which another run
+/// cannot write meanwhile. Earlier results there stay until the run has ended.
 ///
 /// # Errors
-/// No adapter, kernels that cannot be read, or a folder that cannot be written.
+/// No adapter, kernels that cannot be read, or a folder that cannot be written or holds results; the
+/// records so far are kept, with a report.
 pub fn run(
     experiment: &Experiment,
     plan: &Plan,
@@ -110,39 +145,56 @@ pub fn run(
     options: &RunOptions,
 ) -> Result<RunSummary, RunError> {
     let kernels = Kernels::load(&plan.kernels, registries)?;
-    let mut device = Device::open(options, &kernels)?;
+    let device = Device::open(options, &kernels)?;
     let mut session = Session::new(experiment, plan, registries, options)?;
-    session.write_start(environment::capture(&device.gpu), kernels.folders())?;
-    for scene in &plan.scenes {
-        // A lost device fails the cell that lost it; the rest goes on with a fresh one. Every turn
-        // of this loop finishes at least one cell.
-        loop {
-            run_scene(&mut session, &device, scene)?;
-            if device.gpu.lost().is_none() {
-                break;
-            }
-            device = Device::open(options, &kernels)?;
+    let out = measure(&mut session, device, &kernels).map_err(|error| {
+        match options.interrupt.now(&error.to_string()) {
+            Interrupted::Kept { folder, .. } => RunError::EndedEarly {
+                folder,
+                source: Box::new(error),
+            },
+            _ => error,
         }
-    }
-    loop {
-        streams::run(&mut session, &device)?;
-        if device.gpu.lost().is_none() {
-            break;
-        }
-        device = Device::open(options, &kernels)?;
-    }
-    session.write_end()?;
-    let report =
-        crate::report::write_report(&options.out).map_err(|e| RunError::Input(e.to_string()))?;
-    let lines =
-        crate::report::read_records(&options.out).map_err(|e| RunError::Input(e.to_string()))?;
+    })?;
+    let report = crate::report::write_report(&out).map_err(|e| RunError::Input(e.to_string()))?;
+    let lines = crate::report::read_records(&out).map_err(|e| RunError::Input(e.to_string()))?;
     Ok(RunSummary {
         failed: session.failed,
         skipped: session.skipped,
         bad_input: session.bad_input,
         report: Some(report.html),
         tables: crate::report::terminal_tables(&lines.lines),
+        out,
     })
+}
+
+/// Writes every record, and puts them in their place: the folder.
+fn measure(
+    session: &mut Session,
+    mut device: Device,
+    kernels: &Kernels,
+) -> Result<PathBuf, RunError> {
+    session.write_start(environment::capture(&device.gpu), kernels.folders())?;
+    let (plan, options) = (session.plan, session.options);
+    for scene in &plan.scenes {
+        // A lost device fails the cell that lost it; the rest goes on with a fresh one. Every turn
+        // of this loop finishes at least one cell.
+        loop {
+            run_scene(session, &device, scene)?;
+            if device.gpu.lost().is_none() {
+                break;
+            }
+            device = Device::open(options, kernels)?;
+        }
+    }
+    loop {
+        streams::run(session, &device)?;
+        if device.gpu.lost().is_none() {
+            break;
+        }
+        device = Device::open(options, kernels)?;
+    }
+    session.write_end()
 }
 
 fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Result<(), RunError> {
@@ -209,52 +261,11 @@ pub fn verify(
                 scene: scene.clone(),
                 accel: cell.accel.clone(),
                 verdict,
+                bad_input: matches!(world, Err(Absent::BadInput(_))),
                 refused,
             });
         }
     }
     session.progress.finish_and_clear();
     Ok(verified)
-}
-
-/// One image for `raystone render`: the first scene, structure, sampler and integrator of the axes,
-/// at `experiment.spp.max()` samples, tone-mapped and written to `file`.
-///
-/// # Errors
-/// No adapter, a scene that does not load, a structure that cannot be built or fails its gate.
-pub fn render(
-    experiment: &Experiment,
-    plan: &Plan,
-    registries: &Registries,
-    options: &RunOptions,
-    file: &std::path::Path,
-) -> Result<(), RunError> {
-    let device = Device::open(options, &Kernels::load(&plan.kernels, registries)?)?;
-    let mut session = Session::unrecorded(experiment, plan, registries, options);
-    let cell = plan
-        .times
-        .first()
-        .ok_or_else(|| RunError::Input("there is nothing to render".to_owned()))?;
-    let world = World::new(&mut session, &device, &cell.scene)?;
-    let world = world
-        .map_err(|(Absent::BadInput(reason) | Absent::NotKept(reason))| RunError::Input(reason))?;
-    let structure = plan.structures.iter().find(|s| s.accel == cell.accel);
-    let structure = structure.ok_or_else(|| RunError::Input("no structure is left".to_owned()))?;
-    let built = structures::build_and_gate(&mut session, &world, structure)?;
-    let (traced, _) =
-        built.map_err(|record| RunError::Input(record.failure.unwrap_or_default()))?;
-    let pair = (&cell.sequence, &cell.decorrelation);
-    let sampler = errors::sampler_for(&session, pair, &cell.integrator, experiment.spp.max());
-    let sampler = sampler.map_err(RunError::Input)?;
-    let job =
-        errors::job(&session, &world, &sampler, &cell.integrator, true).map_err(RunError::Input)?;
-    let gpu = device.of(&cell.kernels)?;
-    let renderer = Renderer::new(gpu, &world.buffers, &traced, &job, false)?;
-    let snapshots = renderer.render(&[experiment.spp.max()], experiment.seed)?;
-    session.progress.finish_and_clear();
-    let Some(snapshot) = snapshots.first() else {
-        return Ok(());
-    };
-    let picture = tone_map(&snapshot.image, automatic_exposure(&snapshot.image));
-    write_png(file, &picture).map_err(|e| RunError::Input(e.to_string()))
 }

@@ -50,7 +50,10 @@ impl<'a> World<'a> {
         let gpu = &device.gpu;
         session.say(format!("{variant}: loading"));
         let start = Instant::now();
-        let options = LoadOptions::default();
+        let options = LoadOptions {
+            allow_outside: session.options.allow_outside,
+            ..LoadOptions::default()
+        };
         let loaded = session
             .clock
             .time("load", || scene::load(variant, &options));
@@ -62,13 +65,15 @@ impl<'a> World<'a> {
         let camera = session
             .experiment
             .camera
-            .or(scene.camera)
-            .unwrap_or_else(|| Camera::frame(&scene.bounds()));
+            .unwrap_or_else(|| scene.view(session.experiment.aspect()));
         if let Err(error) = camera.validate() {
             return Ok(Err(Absent::BadInput(error.to_string())));
         }
         let cell = format!("scene {variant}");
         if !session.is_done(&cell) {
+            for line in scene.report.lines() {
+                session.tell_warning(&format!("{variant}: {line}"));
+            }
             session.write(
                 &scene.hash,
                 Record::Scene(scene_record(variant, &scene, camera, load_ms)),

@@ -8,10 +8,13 @@ mod builder;
 pub mod builtin;
 mod camera;
 mod content;
+mod daylight;
 mod error;
+mod framing;
 mod gltf;
 mod gltf_accessor;
 mod gltf_container;
+mod gltf_files;
 mod gltf_material;
 mod instances;
 mod mtl;
@@ -19,12 +22,15 @@ mod obj;
 mod ply;
 #[cfg(test)]
 mod tests;
+mod text;
 mod texture;
 
 pub use builder::{DEFAULT_ALBEDO, MAX_COORDINATE};
 pub use builtin::builtin_scenes;
 pub use camera::Bounds;
+pub use daylight::Daylight;
 pub use error::SceneError;
+pub use framing::Framing;
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 
 use crate::config::Variant;
@@ -129,6 +135,21 @@ pub struct LoadReport {
     pub warnings: Vec<String>,
 }
 
+impl LoadReport {
+    /// Everything that makes the scene differ from its file, a line each, for people.
+    pub fn lines(&self) -> Vec<String> {
+        let dropped = match self.dropped_non_finite {
+            0 => None,
+            1 => Some("1 triangle dropped: a vertex is not finite".to_owned()),
+            n => Some(format!("{n} triangles dropped: a vertex is not finite")),
+        };
+        dropped
+            .into_iter()
+            .chain(self.warnings.iter().cloned())
+            .collect()
+    }
+}
+
 /// A loaded scene: flat world-space triangles and what shading needs.
 ///
 /// `triangles`, `uvs` and `material_ids` are parallel; `uvs` is empty when no material is textured.
@@ -152,6 +173,10 @@ pub struct SceneData {
     pub camera: Option<Camera>,
     /// Constant radiance of the environment, linear RGB; zero is a black sky.
     pub environment: Vec3,
+    /// The sky over a scene that brings no light; its radiance is a multiple of `environment`.
+    pub daylight: Option<Daylight>,
+    /// Where to look from, if the scene brings no camera.
+    pub framing: Option<Framing>,
     /// BLAKE3 of the scene's content (hex), part of every cell's hash.
     pub hash: String,
     /// What was dropped or approximated.
@@ -166,6 +191,9 @@ pub struct LoadOptions {
     pub textures: bool,
     /// Largest width and height of a texture, texels; larger ones are reduced, with a warning.
     pub max_texture_size: u32,
+    /// Whether a glTF model may name files outside its folder, and an OBJ model absolute paths: a model
+    /// from elsewhere could read any file of this machine.
+    pub allow_outside: bool,
 }
 
 impl Default for LoadOptions {
@@ -173,6 +201,7 @@ impl Default for LoadOptions {
         Self {
             textures: true,
             max_texture_size: 1024,
+            allow_outside: false,
         }
     }
 }
