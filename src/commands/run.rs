@@ -66,25 +66,30 @@ fn tell(summary: &RunSummary, out: &Path, quiet: bool) -> Result<ExitCode, Failu
         };
     }
     print(&text)?;
-    if summary.failed == 0 && !summary.bad_input {
+    if summary.failed == 0 && !summary.bad_input && summary.failed_checks.is_empty() {
         return Ok(ExitCode::SUCCESS);
     }
     let lines = read_records(out)?.lines;
     for failure in lines.iter().filter_map(failure) {
         eprintln!("failed: {failure}");
     }
+    for check in &summary.failed_checks {
+        eprintln!("failed: {check}");
+    }
     eprintln!(
-        "{} failed",
-        match summary.failed {
-            1 => "1 gate or cell".to_owned(),
-            failed => format!("{failed} gates or cells"),
-        }
+        "{}, {} failed",
+        plural(summary.failed, "gate or cell", "gates or cells"),
+        plural(summary.failed_checks.len(), "check", "checks")
     );
     Ok(ExitCode::from(if summary.bad_input {
         BAD_INPUT
     } else {
         FAILED
     }))
+}
+
+fn plural(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 /// The cell of a record and why it failed, if it did.

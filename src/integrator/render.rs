@@ -20,6 +20,13 @@ const SLICE_MS: f64 = 250.0;
 /// Samples per millisecond that the first slice assumes: slow, so that it is short.
 const CAUTIOUS_RATE: f64 = 100.0;
 
+/// How far rounding alone may move a pixel of an image of `spp` samples, relative to the mean of the
+/// samples' magnitudes: one rounding per addition, and one of the mean (N. Higham, "Accuracy and
+/// Stability of Numerical Algorithms", 2nd ed., 2002, section 4.2).
+pub fn rounding_bound(spp: u32) -> f64 {
+    f64::from(spp) * 0.5 * f64::from(f32::EPSILON)
+}
+
 /// One image to render.
 pub struct RenderJob<'a> {
     /// Image and camera.

@@ -5,13 +5,14 @@ use crate::measure::record::{Interval, RayClass};
 /// What stands for an absent value.
 pub const ABSENT: &str = "–";
 
-/// A number with `digits` significant digits; scientific below 10⁻³ and from 10⁶ on.
+/// A number with `digits` significant digits; scientific below 10⁻³ and from 10⁶ on, the dash for what
+/// is no number.
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".into();
     }
     if !value.is_finite() {
-        return value.to_string();
+        return ABSENT.into();
     }
     // Let the formatter round first, so that 9.999 counts as 10.0.
     let text = format!("{value:.*e}", digits.saturating_sub(1));
@@ -167,6 +168,7 @@ mod tests {
     fn absent_is_a_dash_and_never_zero() {
         assert_eq!(optional(None), "–");
         assert_eq!(optional(Some(0.0)), "0");
+        assert_eq!(number(f64::NAN), "–");
     }
 
     #[test]

@@ -25,10 +25,6 @@ use std::path::PathBuf;
 use thiserror::Error;
 use world::World;
 
-/// A reference is rendered in this many independent parts: its halves make error estimates
-/// unbiased, its parts are the other side of the bias check.
-pub(crate) const REFERENCE_PARTS: u32 = 8;
-
 /// What an experiment does not say.
 #[derive(Debug, Clone, Default)]
 pub struct RunOptions {
@@ -53,6 +49,8 @@ pub struct RunSummary {
     pub skipped: usize,
     /// Whether a scene could not be loaded (exit code 2).
     pub bad_input: bool,
+    /// Checks of the report that failed, with what they found (exit code 1).
+    pub failed_checks: Vec<String>,
     /// The report's page.
     pub report: Option<PathBuf>,
     /// Tables for the terminal.
@@ -148,6 +146,7 @@ pub fn run(
         skipped: session.skipped,
         bad_input: session.bad_input,
         report: Some(report.html),
+        failed_checks: crate::report::failed_checks(&lines.lines),
         tables: crate::report::terminal_tables(&lines.lines),
     })
 }

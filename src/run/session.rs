@@ -1,7 +1,7 @@
 //! What lives as long as a run: records, clock, progress, cells already done.
 
 use super::{RunError, RunOptions};
-use crate::config::{Experiment, Plan};
+use crate::config::{Experiment, Plan, REFERENCE_PARTS};
 use crate::gpu::Gpu;
 use crate::measure::record::{
     Environment, FinishedRecord, Line, Record, RunRecord, SCHEMA, SkippedRecord,
@@ -242,6 +242,6 @@ fn steps(experiment: &Experiment, plan: &Plan) -> u64 {
     let structures = plan.structures.len() as u64 * (2 + 5 * rounds);
     let times = plan.times.len() as u64 * rounds;
     let references =
-        plan.scenes.len() * experiment.axes.integrator.len() * super::REFERENCE_PARTS as usize;
+        plan.scenes.len() * experiment.axes.integrator.len() * REFERENCE_PARTS as usize;
     structures + times + (plan.renders_planned + references + plan.streams.len()) as u64
 }

@@ -21,7 +21,7 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
     blocks.push(Block::Heading("Structures".into()));
     if let Some(drawing) = rate_plot(data, scene).draw() {
         let name = format!("scene-{index}-{}-rates", file_stem(scene.name));
-        let caption = "Speed per ray class. Bars: median; lines: bootstrap 95 % interval. The same rays for all.";
+        let caption = "Speed per ray class. Bars: median; lines: 95 % interval (of fewer than six rounds: their range). The same rays for all.";
         blocks.push(Block::Figures(vec![Figure::new(name, caption, drawing)]));
     }
     let classes = ray_classes(scene);
