@@ -1,6 +1,7 @@
 //! Numbers as text: three significant digits, units, and a dash for what is absent.
 
 use crate::measure::record::{Interval, RayClass};
+use crate::measure::statistics::LEAST_FOR_MEDIAN;
 
 /// What stands for an absent value.
 pub const ABSENT: &str = "–";
@@ -50,6 +51,16 @@ pub fn interval(interval: &Interval) -> String {
         value
     } else {
         format!("{value} {}", bounds(interval))
+    }
+}
+
+/// What the bounds of medians of so many samples are.
+pub fn median_bounds(samples: impl Iterator<Item = usize>) -> String {
+    match samples.filter(|n| *n > 0).min() {
+        Some(few) if few < LEAST_FOR_MEDIAN => {
+            format!("range of {few} samples, {LEAST_FOR_MEDIAN} are needed for a 95 % interval")
+        }
+        _ => "95 % interval".into(),
     }
 }
 

@@ -227,8 +227,9 @@ pub fn efficiency_table(view: &View) -> Table {
 /// Milliseconds per spp of every cell.
 fn time_table(view: &View) -> Table {
     let caption = format!(
-        "Time of full cells with {}, ms per spp: median [95 % interval]",
-        view.integrator
+        "Time of full cells with {}, ms per spp: median [{}]",
+        view.integrator,
+        format::median_bounds(view.times.iter().map(|time| time.ms.len()))
     );
     let mut table = Table::new(caption, &["structure"]);
     let timed = |sampler: &&Sampler| view.times.iter().any(|time| is_of(time, sampler));

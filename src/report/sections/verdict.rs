@@ -159,24 +159,23 @@ pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
 
 /// Compares the samplers that have no fault at one spp.
 pub fn best_per_sample(view: &View, spp: u32) -> Ruling {
+    let contender = |sampler: &Sampler| {
+        Some(Contender {
+            name: sampler.name.clone(),
+            figure: sampler.mean_error_at(Metric::RelMse, spp)?.error,
+            has_spread: sampler.is_ranked(),
+        })
+    };
     let fair = view.samplers.iter().filter(|s| s.fault().is_none());
-    rank(
-        view,
-        fair.filter_map(|s| Some((s, s.mean_error_at(Metric::RelMse, spp)?.error))),
-    )
+    rank(view, fair.filter_map(contender).collect())
 }
 
 /// Ranks errors, if the reference is good enough for that.
-fn rank<'a>(view: &View, errors: impl Iterator<Item = (&'a Sampler<'a>, Interval)>) -> Ruling {
-    if let Some(reason) = view.reference_fault() {
-        return Ruling::Withheld(reason);
+fn rank(view: &View, contenders: Vec<Contender>) -> Ruling {
+    match view.reference_fault() {
+        Some(reason) => Ruling::Withheld(reason),
+        None => judge(contenders, Better::Lower),
     }
-    let contender = |(sampler, figure): (&Sampler, Interval)| Contender {
-        name: sampler.name.clone(),
-        figure,
-        has_spread: sampler.is_ranked(),
-    };
-    judge(errors.map(contender).collect(), Better::Lower)
 }
 
 /// Samplers at equal time, under the fastest structure.
@@ -192,6 +191,8 @@ pub struct Race<'a> {
 struct Runner<'a> {
     sampler: &'a Sampler<'a>,
     ms_per_spp: Interval,
+    /// How often that was measured.
+    rounds: usize,
     /// Seconds and error, by growing time; resolved ones only.
     curve: Vec<(f64, Interval)>,
 }
@@ -215,7 +216,8 @@ impl<'a> Race<'a> {
     pub fn new(view: &'a View<'a>) -> Option<Self> {
         let structure = view.fastest_structure()?;
         let runner = |sampler: &'a Sampler<'a>| {
-            let ms_per_spp = view.ms_per_spp(&structure, &sampler.name)?;
+            let time = view.time(&structure, &sampler.name)?;
+            let ms_per_spp = time.ms_per_spp?;
             let means = sampler.mean_errors(Metric::RelMse);
             let resolved = means.iter().filter(|mean| mean.resolved);
             let at = |m: &MeanError| (f64::from(m.spp) * ms_per_spp.value / 1000.0, m.error);
@@ -223,6 +225,7 @@ impl<'a> Race<'a> {
             (!curve.is_empty() && sampler.fault().is_none()).then_some(Runner {
                 sampler,
                 ms_per_spp,
+                rounds: time.ms.len(),
                 curve,
             })
         };
@@ -247,10 +250,16 @@ impl<'a> Race<'a> {
 
     /// Who has the least error when the race ends.
     pub fn ruling(&self) -> Ruling {
-        let results = self.runners.iter();
+        let contender = |runner: &Runner| {
+            Some(Contender {
+                name: runner.sampler.name.clone(),
+                figure: runner.error_after(self.seconds)?,
+                has_spread: runner.sampler.is_ranked() && runner.rounds >= LEAST_FOR_MEDIAN,
+            })
+        };
         rank(
             self.view,
-            results.filter_map(|r| Some((r.sampler, r.error_after(self.seconds)?))),
+            self.runners.iter().filter_map(contender).collect(),
         )
     }
 }

@@ -292,8 +292,8 @@ pub(super) fn times(scene: &str, integrator: &str, accels: &[(&str, f64)]) -> Ve
                 integrator: variant(integrator),
                 resolution: [192, 144],
                 spp: 4,
-                ms: vec![10.0; 5],
-                wall_ms: vec![11.0; 5],
+                ms: vec![10.0; 7],
+                wall_ms: vec![11.0; 7],
                 ms_per_spp: Some(around(
                     6.5 * factor * cost * (1.0 + 0.02 * noise.next()),
                     0.02,
