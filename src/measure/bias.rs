@@ -251,7 +251,11 @@ mod tests {
         let error = 0.2 / 3f64.sqrt() / (1056.0f64 * 16.0).sqrt() * 2f64.sqrt();
         for bias in [0.0, 8.0, -8.0] {
             let images = scaled(&images, 1.0 + bias * error);
-            let check = check_bias(&images, &reference, BiasOptions::default()).unwrap();
+            let options = BiasOptions {
+                tile: 2,
+                ..BiasOptions::default()
+            };
+            let check = check_bias(&images, &reference, options).unwrap();
             let whole = check.whole.unwrap();
             assert!((whole.t - bias).abs() < 3.5, "{bias}: {whole:?}");
             assert_eq!(check.rejected.len(), 0, "{bias}");

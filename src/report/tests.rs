@@ -165,7 +165,7 @@ fn what_has_one_replicate_is_shown_and_neither_wins_nor_makes_a_winner() {
     let lines = with_errors(|e| {
         if e.sequence.label == "sobol" && e.decorrelation.label == "none" {
             let metrics = e.errors.iter_mut().flat_map(|at| at.metrics.values_mut());
-            metrics.for_each(|value| *value *= 1e-3);
+            metrics.for_each(|value| *value *= 0.02);
         }
     });
     let data = RunData::new(&lines);
