@@ -58,12 +58,15 @@ impl Metric {
         }
     }
 
-    /// From means of what was recorded. Negative means have no root: 0 stands for them, and they are
-    /// not resolved.
+    /// From means of what was recorded. No true error is negative, so intervals end at 0. Negative means
+    /// have no root: 0 stands for them, and they are not resolved.
     fn shown(self, recorded: Interval) -> Interval {
         let root = |x: f64| x.max(0.0).sqrt();
         match self {
-            Self::RelMse => recorded,
+            Self::RelMse => Interval {
+                low: recorded.low.max(recorded.value.min(0.0)),
+                ..recorded
+            },
             Self::Rmse => Interval {
                 value: root(recorded.value),
                 low: root(recorded.low),

@@ -505,7 +505,7 @@ fn bias_record(
         z: whole.map(|test| test.t).filter(|t| t.is_finite()),
         p: whole.map(|test| test.p),
         degrees_of_freedom: whole.map(|test| test.degrees_of_freedom),
-        by_design: !session.registries.is_unbiased(cell),
+        by_design: cell.randomised && !session.registries.is_unbiased(cell),
         verdict,
     })
 }
