@@ -73,8 +73,8 @@ pub fn table(scene: &SceneGroup) -> Table {
 fn row(question: String, ruling: &Ruling) -> Vec<Cell> {
     let tone = match ruling {
         Ruling::Winner(..) => Tone::Good,
-        Ruling::Nobody | Ruling::Withheld(_) => Tone::Bad,
-        Ruling::Alone(_) | Ruling::Unclear(_) => Tone::Note,
+        Ruling::Nobody => Tone::Bad,
+        Ruling::Withheld(_) | Ruling::Alone(_) | Ruling::Unclear(_) => Tone::Note,
     };
     vec![
         question.into(),
