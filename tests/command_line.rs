@@ -302,10 +302,35 @@ fn verify_ends_with_0_where_hits_are_right_and_with_1_where_a_kernel_skips_a_tri
 }
 
 #[test]
+fn a_dry_run_refuses_models_that_cannot_be_one() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (file, content, says) in [
+        ("model.xyz", &b"v 0 0 0"[..], "unknown model format"),
+        ("empty.obj", b"", "empty"),
+        ("picture.obj", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "not text"),
+        ("text.ply", b"v 0 0 0", "`ply`"),
+        ("text.glb", b"v 0 0 0", "`glTF`"),
+        ("folder.obj/inner", b"v 0 0 0", "directory"),
+    ] {
+        let path = folder.path().join(file);
+        std::fs::create_dir_all(path.parent().expect("a parent")).expect("a folder");
+        std::fs::write(&path, content).expect("a writable folder");
+        let named = match file.split_once('/') {
+            Some((first, _)) => folder.path().join(first),
+            None => path,
+        };
+        let scene = format!("axes.scene=['{}']", named.display());
+        let output = run(&["run", "tests/data/tiny.toml", "--dry-run", "--set", &scene]);
+        let words = error(&output, 2);
+        assert!(words.contains(says), "{file}: {words}");
+    }
+}
+
+#[test]
 fn a_scene_that_cannot_be_loaded_ends_with_2_and_the_rest_goes_on() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let model = folder.path().join("empty.obj");
-    std::fs::write(&model, "").expect("a writable folder");
+    let model = folder.path().join("hollow.obj");
+    std::fs::write(&model, "v 0 0 0\n").expect("a writable folder");
     let scenes = format!("axes.scene=['{}', 'cornell-box']", model.display());
     let out = folder.path().join("run");
     let output = run(&[
@@ -321,7 +346,7 @@ fn a_scene_that_cannot_be_loaded_ends_with_2_and_the_rest_goes_on() {
     let words = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{words}");
     assert!(
-        words.contains("failed: ") && words.contains("empty.obj"),
+        words.contains("failed: ") && words.contains("hollow.obj"),
         "{words}"
     );
     let records = std::fs::read_to_string(out.join("records.jsonl")).expect("records");

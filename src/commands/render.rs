@@ -112,6 +112,7 @@ impl Render {
             // There is no reference image here, but its seeds have to differ all the same.
             overrides.push(format!("reference.seed={}", seed.wrapping_add(1)));
         }
+        overrides.extend(self.device.kernels_override());
         overrides.extend(self.set.iter().cloned());
         overrides
     }

@@ -89,6 +89,7 @@ impl Verify {
             }
         }
         overrides.extend(self.rays.map(|rays| format!("gate.rays={rays}")));
+        overrides.extend(self.device.kernels_override());
         overrides.extend(self.experiment.set.iter().cloned());
         overrides
     }

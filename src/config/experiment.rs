@@ -81,6 +81,8 @@ pub struct Axes {
     pub decorrelation: Vec<Variant>,
     /// Integrators.
     pub integrator: Vec<Variant>,
+    /// Folders of kernels; the name of the embedded ones is empty.
+    pub kernels: Vec<Variant>,
 }
 
 impl Axes {
@@ -92,6 +94,7 @@ impl Axes {
             Axis::Sequence => &self.sequence,
             Axis::Decorrelation => &self.decorrelation,
             Axis::Integrator => &self.integrator,
+            Axis::Kernels => &self.kernels,
         }
     }
 }

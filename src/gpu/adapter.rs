@@ -40,7 +40,8 @@ pub struct AdapterSummary {
     pub timestamps: bool,
 }
 
-/// An open device with everything kernels need.
+/// An open device with everything kernels need; a clone is the same device.
+#[derive(Clone)]
 pub struct Gpu {
     /// The device.
     pub device: wgpu::Device,
@@ -54,7 +55,7 @@ pub struct Gpu {
     pub timestamp_period: Option<f32>,
     /// Kernel sources.
     pub kernels: KernelLibrary,
-    pub(super) pipelines: Mutex<PipelineCache>,
+    pub(super) pipelines: Arc<Mutex<PipelineCache>>,
     lost: Arc<Mutex<Option<String>>>,
 }
 
@@ -188,12 +189,22 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
         limits,
         timestamp_period,
         kernels,
-        pipelines: Mutex::default(),
+        pipelines: Arc::default(),
         lost,
     })
 }
 
 impl Gpu {
+    /// The same device with other kernels: buffers may be bound by both, and what composes to the same
+    /// text is compiled once.
+    #[must_use]
+    pub fn with_kernels(&self, kernels: KernelLibrary) -> Self {
+        Self {
+            kernels,
+            ..self.clone()
+        }
+    }
+
     /// Whether the adapter is a software rasteriser.
     pub fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu

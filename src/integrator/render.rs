@@ -156,6 +156,11 @@ impl<'a> Renderer<'a> {
         &self.pipeline.kernel.wgsl
     }
 
+    /// BLAKE3 of that text.
+    pub fn kernel_hash(&self) -> String {
+        self.pipeline.kernel.hash()
+    }
+
     /// Clears the sum, the error word, the ray counts and the clock.
     pub fn reset(&self) {
         let mut encoder = self

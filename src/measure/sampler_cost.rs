@@ -22,7 +22,7 @@ const DISPATCH_MS: f64 = 25.0;
 const ROUNDS: usize = 9;
 
 /// What a sampler costs on an adapter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SamplerCost {
     /// Nanoseconds of adapter time per two-dimensional sample, loop taken off: median of the rounds with
     /// its 95 % interval. Near zero it may be negative.
@@ -31,6 +31,8 @@ pub struct SamplerCost {
     pub loop_ns_per_sample: Interval,
     /// Two-dimensional samples of one dispatch.
     pub samples: u64,
+    /// BLAKE3 of the kernel that draws.
+    pub kernel_hash: String,
 }
 
 /// The two kernels with what they read.
@@ -113,5 +115,6 @@ pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<SamplerCost, GpuErro
         ns_per_sample: interval(&drawn)?,
         loop_ns_per_sample: interval(&looped)?,
         samples: count,
+        kernel_hash: gpu.pipeline(&drawing, true)?.kernel.hash(),
     })
 }

@@ -49,6 +49,7 @@ fn records(noise: f64, part_noise: f64, replicates: u32, g: &mut Pcg32) -> Vec<E
         integrator: variant("i"),
         sequence: variant("a"),
         decorrelation: variant("b"),
+        ran: crate::measure::record::Ran::default(),
         randomised: true,
         replicate,
         seed: replicate,

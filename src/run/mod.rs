@@ -5,6 +5,7 @@
 
 pub mod environment;
 mod errors;
+mod kernels;
 mod registries;
 mod session;
 mod streams;
@@ -12,18 +13,20 @@ mod structures;
 mod times;
 mod world;
 
+pub use kernels::{Kernels, kernel_library};
 pub use registries::Registries;
 pub use streams::dump_stream;
 
 use crate::config::{Experiment, Plan, Variant};
-use crate::gpu::{AdapterChoice, Gpu, GpuError};
+use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
 use crate::integrator::Renderer;
 use crate::measure::picture::{automatic_exposure, tone_map, write_png};
 use crate::measure::record::GateVerdict;
+use kernels::Device;
 use session::Session;
 use std::path::PathBuf;
 use thiserror::Error;
-use world::World;
+use world::{Absent, World};
 
 /// What an experiment does not say.
 #[derive(Debug, Clone, Default)]
@@ -32,12 +35,12 @@ pub struct RunOptions {
     pub out: PathBuf,
     /// Which adapter.
     pub adapter: AdapterChoice,
-    /// Folder whose kernels replace the embedded ones.
-    pub kernels: Option<PathBuf>,
     /// Whether to draw a progress bar on standard error.
     pub progress: bool,
     /// Destroys the device when the turn of this cell comes: for tests of the recovery.
     pub lose_device_at: Option<String>,
+    /// What to take the adapter's arithmetic for, instead of probing it: for tests of what depends on it.
+    pub arithmetic: Option<ArithmeticProbe>,
 }
 
 /// How a run ended.
@@ -91,50 +94,37 @@ pub struct Verified {
     pub verdict: Result<GateVerdict, String>,
 }
 
-/// Opens the adapter with the kernels of the options.
-///
-/// # Errors
-/// No adapter, or the kernel folder cannot be read.
-pub fn open_gpu(options: &RunOptions) -> Result<Gpu, RunError> {
-    let mut kernels = crate::gpu::KernelLibrary::default();
-    if let Some(folder) = &options.kernels {
-        kernels = kernels
-            .with_folder(folder)
-            .map_err(|e| RunError::Input(e.to_string()))?;
-    }
-    Ok(crate::gpu::open(&options.adapter, kernels)?)
-}
-
 /// Runs a plan, writes `records.jsonl`, images and the report to `options.out`.
 ///
 /// # Errors
-/// No adapter, or a folder that cannot be written.
+/// No adapter, kernels that cannot be read, or a folder that cannot be written.
 pub fn run(
     experiment: &Experiment,
     plan: &Plan,
     registries: &Registries,
     options: &RunOptions,
 ) -> Result<RunSummary, RunError> {
-    let mut gpu = open_gpu(options)?;
+    let kernels = Kernels::load(&plan.kernels, registries)?;
+    let mut device = Device::open(options, &kernels)?;
     let mut session = Session::new(experiment, plan, registries, options)?;
-    session.write_start(environment::capture(&gpu))?;
+    session.write_start(environment::capture(&device.gpu), kernels.folders())?;
     for scene in &plan.scenes {
         // A lost device fails the cell that lost it; the rest goes on with a fresh one. Every turn
         // of this loop finishes at least one cell.
         loop {
-            run_scene(&mut session, &gpu, scene)?;
-            if gpu.lost().is_none() {
+            run_scene(&mut session, &device, scene)?;
+            if device.gpu.lost().is_none() {
                 break;
             }
-            gpu = open_gpu(options)?;
+            device = Device::open(options, &kernels)?;
         }
     }
     loop {
-        streams::run(&mut session, &gpu)?;
-        if gpu.lost().is_none() {
+        streams::run(&mut session, &device)?;
+        if device.gpu.lost().is_none() {
             break;
         }
-        gpu = open_gpu(options)?;
+        device = Device::open(options, &kernels)?;
     }
     session.write_end()?;
     let report =
@@ -151,16 +141,21 @@ pub fn run(
     })
 }
 
-fn run_scene(session: &mut Session, gpu: &Gpu, variant: &Variant) -> Result<(), RunError> {
+fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Result<(), RunError> {
+    let gpu = &device.gpu;
     let cell = format!("scene {variant}: failed");
     if session.is_done(&cell) {
         return Ok(());
     }
-    let world = match World::new(session, gpu, variant)? {
+    let world = match World::new(session, device, variant)? {
         Ok(world) => world,
-        Err(reason) => {
+        Err(Absent::BadInput(reason)) => {
             session.bad_input = true;
             return session.write_failure(&cell, reason);
+        }
+        Err(Absent::NotKept(reason)) => {
+            session.finish(cell);
+            return session.write_skipped(&session.plan.all_of(variant, reason));
         }
     };
     let gated = structures::run(session, &world)?;
@@ -184,23 +179,18 @@ pub fn verify(
     options: &RunOptions,
     rays: u32,
 ) -> Result<Vec<Verified>, RunError> {
-    let gpu = open_gpu(options)?;
+    let device = Device::open(options, &Kernels::load(&plan.kernels, registries)?)?;
     let mut experiment = experiment.clone();
     experiment.gate.rays = rays;
     experiment.timing.rays = rays;
     let mut session = Session::unrecorded(&experiment, plan, registries, options);
     let mut verified = Vec::new();
     for scene in &plan.scenes {
-        let accels = plan
-            .structures
-            .iter()
-            .filter(|c| c.scene == *scene)
-            .map(|c| &c.accel);
-        let world = World::new(&mut session, &gpu, scene)?;
-        for accel in accels {
+        let world = World::new(&mut session, &device, scene)?;
+        for cell in plan.structures.iter().filter(|c| c.scene == *scene) {
             let verdict = match &world {
-                Err(reason) => Err(reason.clone()),
-                Ok(world) => match structures::build_and_gate(&mut session, world, accel) {
+                Err(Absent::BadInput(reason) | Absent::NotKept(reason)) => Err(reason.clone()),
+                Ok(world) => match structures::build_and_gate(&mut session, world, cell)? {
                     Ok((_, record)) => record.gate.ok_or_else(|| "no verdict".to_owned()),
                     Err(record) => {
                         let reason = record.failure.unwrap_or_default();
@@ -210,7 +200,7 @@ pub fn verify(
             };
             verified.push(Verified {
                 scene: scene.clone(),
-                accel: accel.clone(),
+                accel: cell.accel.clone(),
                 verdict,
             });
         }
@@ -231,14 +221,18 @@ pub fn render(
     options: &RunOptions,
     file: &std::path::Path,
 ) -> Result<(), RunError> {
-    let gpu = open_gpu(options)?;
+    let device = Device::open(options, &Kernels::load(&plan.kernels, registries)?)?;
     let mut session = Session::unrecorded(experiment, plan, registries, options);
     let cell = plan
         .times
         .first()
         .ok_or_else(|| RunError::Input("there is nothing to render".to_owned()))?;
-    let world = World::new(&mut session, &gpu, &cell.scene)?.map_err(RunError::Input)?;
-    let built = structures::build_and_gate(&mut session, &world, &cell.accel);
+    let world = World::new(&mut session, &device, &cell.scene)?;
+    let world = world
+        .map_err(|(Absent::BadInput(reason) | Absent::NotKept(reason))| RunError::Input(reason))?;
+    let structure = plan.structures.iter().find(|s| s.accel == cell.accel);
+    let structure = structure.ok_or_else(|| RunError::Input("no structure is left".to_owned()))?;
+    let built = structures::build_and_gate(&mut session, &world, structure)?;
     let (traced, _) =
         built.map_err(|record| RunError::Input(record.failure.unwrap_or_default()))?;
     let pair = (&cell.sequence, &cell.decorrelation);
@@ -246,7 +240,8 @@ pub fn render(
     let sampler = sampler.map_err(RunError::Input)?;
     let job =
         errors::job(&session, &world, &sampler, &cell.integrator, true).map_err(RunError::Input)?;
-    let renderer = Renderer::new(&gpu, &world.buffers, &traced, &job, false)?;
+    let gpu = device.of(&cell.kernels)?;
+    let renderer = Renderer::new(gpu, &world.buffers, &traced, &job, false)?;
     let snapshots = renderer.render(&[experiment.spp.max()], experiment.seed)?;
     session.progress.finish_and_clear();
     let Some(snapshot) = snapshots.first() else {

@@ -1,10 +1,10 @@
 //! What lives as long as a run: records, clock, progress, cells already done.
 
 use super::{RunError, RunOptions};
-use crate::config::{Experiment, Plan, REFERENCE_PARTS};
+use crate::config::{Experiment, Plan, REFERENCE_PARTS, Skipped};
 use crate::gpu::Gpu;
 use crate::measure::record::{
-    Environment, FinishedRecord, Line, Record, RunRecord, SCHEMA, SkippedRecord,
+    Environment, FinishedRecord, KernelFolder, Line, Record, RunRecord, SCHEMA, SkippedRecord,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::{BTreeMap, HashSet};
@@ -148,7 +148,11 @@ impl<'a> Session<'a> {
     }
 
     /// The first record.
-    pub fn write_start(&mut self, environment: Environment) -> Result<(), RunError> {
+    pub fn write_start(
+        &mut self,
+        environment: Environment,
+        kernels: Vec<KernelFolder>,
+    ) -> Result<(), RunError> {
         let seconds = SystemTime::now()
             .duration_since(SystemTime::UNIX_EPOCH)
             .map_or(0, |d| d.as_secs());
@@ -160,17 +164,23 @@ impl<'a> Session<'a> {
             environment,
             renders_full_product: self.plan.renders_full_product,
             renders_planned: self.plan.renders_planned,
+            kernels,
         };
         self.write("", Record::Run(record))?;
         for skipped in &self.plan.skipped {
-            let record = SkippedRecord {
-                cell: skipped.cell.clone(),
-                reason: skipped.reason.clone(),
-            };
-            self.write("", Record::Skipped(record))?;
-            self.skipped += skipped.cells;
+            self.write_skipped(skipped)?;
         }
         Ok(())
+    }
+
+    /// Records cells that are left out.
+    pub fn write_skipped(&mut self, skipped: &Skipped) -> Result<(), RunError> {
+        self.skipped += skipped.cells;
+        let record = SkippedRecord {
+            cell: skipped.cell.clone(),
+            reason: skipped.reason.clone(),
+        };
+        self.write("", Record::Skipped(record))
     }
 
     /// The last record.

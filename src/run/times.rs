@@ -8,7 +8,7 @@ use super::structures::Gated;
 use super::world::World;
 use crate::accel::Space;
 use crate::config::{TimeCell, Variant, cell_hash};
-use crate::gpu::{Elapsed, GpuError};
+use crate::gpu::{Elapsed, Gpu, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
 use crate::measure::record::{Record, TimeRecord};
 use crate::measure::statistics::median_interval;
@@ -64,6 +64,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         if session.is_done(&text) {
             continue;
         }
+        let gpu = world.device.of(&cell.kernels)?;
         let Some(structure) = gated.iter().find(|g| g.cell.accel == cell.accel) else {
             let record = empty_record(
                 session,
@@ -78,7 +79,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         };
         session.say(format!("{cell}: compiling"));
         session.lose_device_on_request(world.gpu, &text);
-        match compile(session, world, structure, cell.clone()) {
+        match compile(session, world, gpu, structure, cell.clone()) {
             Ok(item) => timed.push(item),
             Err(reason) => fail(session, world, &cell, reason)?,
         }
@@ -146,6 +147,7 @@ fn sampler_of(session: &Session, cell: &TimeCell) -> Result<Sampler, String> {
 fn compile<'a>(
     session: &mut Session,
     world: &'a World,
+    gpu: &'a Gpu,
     structure: &Gated,
     cell: TimeCell,
 ) -> Result<Timed<'a>, String> {
@@ -153,7 +155,7 @@ fn compile<'a>(
     let checks = structure.runtime_checks;
     let job = job(session, world, &sampler, &cell.integrator, checks)?;
     let compiled = session.clock.time("gpu", || {
-        Renderer::new(world.gpu, &world.buffers, &structure.traced, &job, false)
+        Renderer::new(gpu, &world.buffers, &structure.traced, &job, false)
     });
     let renderer = compiled.map_err(|e| e.to_string())?;
     let (spp, seed) = (session.experiment.timing.spp, session.experiment.seed);
@@ -232,6 +234,7 @@ fn finish(
     record.image_equal = equal;
     record.runtime_checks = item.runtime_checks;
     record.features = item.renderer.features();
+    record.ran.kernel_hash = item.renderer.kernel_hash();
     Ok(record)
 }
 
@@ -244,8 +247,10 @@ fn count_rays(
 ) -> Result<[u64; 4], String> {
     let sampler = sampler_of(session, &item.cell)?;
     let job = job(session, world, &sampler, &item.cell.integrator, true)?;
+    let gpu = world.device.of(&item.cell.kernels);
+    let gpu = gpu.map_err(|e| e.to_string())?;
     let counted = session.clock.time("gpu", || {
-        let renderer = Renderer::new(world.gpu, &world.buffers, &structure.traced, &job, true)?;
+        let renderer = Renderer::new(gpu, &world.buffers, &structure.traced, &job, true)?;
         renderer.reset();
         renderer.add_samples(0, item.spp, item.seed)?;
         renderer.ray_counts()
@@ -258,6 +263,7 @@ fn empty_record(session: &Session, world: &World, cell: &TimeCell, failure: Stri
     TimeRecord {
         scene: world.variant.label.clone(),
         accel: label(&cell.accel),
+        ran: world.ran(&cell.kernels, String::new()),
         sequence: label(&cell.sequence),
         decorrelation: label(&cell.decorrelation),
         integrator: label(&cell.integrator),

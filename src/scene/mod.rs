@@ -30,6 +30,7 @@ pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 use crate::config::Variant;
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
+use std::io::Read as _;
 use std::path::Path;
 
 /// One triangle in world space, vertices in the order of the file (f32, scene units).
@@ -201,6 +202,45 @@ pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Scene
         }),
     }
 }
+
+/// Looks at the file of a model without loading it: whether its format is known, whether it is a file with
+/// something in it, and whether that begins as the format does.
+///
+/// # Errors
+/// [`SceneError`]: an unknown format, or a file that cannot be read or cannot be a model.
+pub fn check_model(path: &Path) -> Result<(), SceneError> {
+    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    let extension = extension.to_str().unwrap_or_default();
+    let mut start = Vec::new();
+    let read = error::open(path)?.take(MODEL_START).read_to_end(&mut start);
+    read.map_err(|source| SceneError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    let json = || {
+        let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start);
+        text.trim_ascii_start().starts_with(b"{")
+    };
+    let (begins_well, expected) = match extension {
+        "obj" => (!start.contains(&0), "it is not text"),
+        "gltf" | "glb" => (
+            start.starts_with(b"glTF") || json(),
+            "it begins neither with `glTF` nor with `{`",
+        ),
+        "ply" => (start.starts_with(b"ply"), "it does not begin with `ply`"),
+        _ => {
+            let path = path.to_owned();
+            return Err(SceneError::UnknownFormat { path });
+        }
+    };
+    match begins_well {
+        true => Ok(()),
+        false => Err(SceneError::malformed(path, "", expected)),
+    }
+}
+
+/// Bytes of a model that [`check_model`] looks at.
+const MODEL_START: u64 = 512;
 
 /// How many materials a warning names.
 const NAMES_IN_WARNING: usize = 4;
