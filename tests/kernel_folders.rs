@@ -201,6 +201,7 @@ fn a_test_that_the_adapter_cannot_keep_is_skipped_with_its_reason() {
             exact_division: true,
             exact_sqrt: true,
             exact_products: false,
+            denormals: true,
         }),
         ..RunOptions::default()
     };

@@ -239,6 +239,7 @@ mod tests {
             exact_division: true,
             exact_sqrt: true,
             exact_products,
+            denormals: true,
         };
         let tests = Intersection {
             triangle: TriangleTest::Compensated,

@@ -56,6 +56,14 @@ pub struct SppRange {
     pub last: u32,
 }
 
+impl Experiment {
+    /// Width of an image over its height.
+    pub fn aspect(&self) -> f32 {
+        let [width, height] = self.resolution;
+        width as f32 / height as f32
+    }
+}
+
 impl SppRange {
     /// The numbers of samples per pixel, ascending.
     pub fn counts(self) -> impl Iterator<Item = u32> {

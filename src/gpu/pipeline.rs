@@ -218,7 +218,11 @@ impl Gpu {
         composition: &Composition,
         runtime_checks: bool,
     ) -> Result<Arc<Pipeline>, GpuError> {
-        let key = (composition.clone(), runtime_checks);
+        let mut composition = composition.clone();
+        if self.loop_limit.is_some() {
+            composition = composition.feature("loops_cut", true);
+        }
+        let key = (composition, runtime_checks);
         let library = self.kernels.hash();
         let known = |is_it: &dyn Fn(&str, &Pipeline) -> bool| {
             let cache = self.pipelines.lock().ok()?;
@@ -228,7 +232,7 @@ impl Gpu {
         if let Some(pipeline) = known(&|other, _| other == library) {
             return Ok(pipeline);
         }
-        let kernel = self.kernels.compose(composition)?;
+        let kernel = self.kernels.compose(&key.0)?;
         let pipeline = match known(&|_, pipeline| pipeline.kernel.wgsl == kernel.wgsl) {
             Some(pipeline) => pipeline,
             None => Arc::new(self.compile(kernel, runtime_checks)?),

@@ -97,6 +97,12 @@ pub struct Environment {
     pub software: bool,
     /// Whether GPU timestamps are available; wall clock is used, and marked, where not.
     pub timestamps: bool,
+    /// Turns that the loops of an invocation may take in all, on a driver that ends them beyond that.
+    #[serde(default)]
+    pub loop_limit: Option<u32>,
+    /// Whether denormal numbers are kept, when known.
+    #[serde(default)]
+    pub denormals: Option<bool>,
     /// Operating system and architecture.
     pub os: String,
     /// Processor model.
@@ -347,6 +353,10 @@ pub struct ClassTiming {
 /// A structure on a scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StructureRecord {
+    /// Whether the failure is the driver's, which ends loops too early for this structure: the cell then
+    /// counts as skipped.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub refused: bool,
     /// Scene name.
     pub scene: String,
     /// Structure with parameters.

@@ -5,7 +5,6 @@ use super::session::Session;
 use super::structures::{self, Gated};
 use super::world::World;
 use crate::config::{REFERENCE_PARTS, SamplerCell, StructureCell, Variant, cell_hash};
-use crate::gpu::GpuError;
 use crate::integrator::{Frame, RenderJob, Renderer, Snapshot, Traced, integrator, rounding_bound};
 use crate::measure::bias::{BiasOptions, check_bias};
 use crate::measure::image::{Image, Reference, measure};
@@ -88,15 +87,9 @@ pub(super) fn job<'j>(
     })
 }
 
-/// Renders and fails if a kernel raised its error word.
-fn render_checked(renderer: &Renderer, spps: &[u32], seed: u32) -> Result<Vec<Snapshot>, String> {
-    let rendered = renderer
-        .render(spps, seed)
-        .and_then(|s| Ok((s, renderer.error_word()?)));
-    match rendered.map_err(|e: GpuError| e.to_string())? {
-        (snapshots, 0) => Ok(snapshots),
-        (_, word) => Err(format!("a kernel raised error word {word} while rendering")),
-    }
+/// Renders; the error in words.
+fn rendered(renderer: &Renderer, spps: &[u32], seed: u32) -> Result<Vec<Snapshot>, String> {
+    renderer.render(spps, seed).map_err(|e| e.to_string())
 }
 
 /// The fastest gated structure with these kernels.
@@ -216,10 +209,10 @@ fn reference(
             .map_err(|e| e.to_string())?;
         let mut parts = Vec::new();
         for seed in session.experiment.seeds().reference_parts {
-            let rendered = session
+            let shots = session
                 .clock
-                .time("gpu", || render_checked(&renderer, &[spp], seed));
-            parts.extend(rendered?.into_iter().map(|s| s.image));
+                .time("gpu", || rendered(&renderer, &[spp], seed));
+            parts.extend(shots?.into_iter().map(|s| s.image));
             session.progress.inc(1);
         }
         let reference = Reference::from_parts(parts).map_err(|e| e.to_string())?;
@@ -400,7 +393,7 @@ fn sampler_error(
     for (replicate, seed) in seeds.enumerate() {
         let mut snapshots = Vec::new();
         for pass in &passes {
-            let render = || render_checked(&pass.renderer, &pass.spps, seed);
+            let render = || rendered(&pass.renderer, &pass.spps, seed);
             match session.clock.time("gpu", render) {
                 Ok(rendered) => snapshots.extend(rendered),
                 Err(reason) => return Ok(Err(reason)),

@@ -7,6 +7,7 @@ pub mod environment;
 mod errors;
 mod kernels;
 mod registries;
+mod render;
 mod session;
 mod streams;
 mod structures;
@@ -15,12 +16,11 @@ mod world;
 
 pub use kernels::{Kernels, kernel_library};
 pub use registries::Registries;
+pub use render::{Rendering, render};
 pub use streams::dump_stream;
 
 use crate::config::{Experiment, Plan, Variant};
 use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
-use crate::integrator::Renderer;
-use crate::measure::picture::{automatic_exposure, tone_map, write_png};
 use crate::measure::record::GateVerdict;
 use kernels::Device;
 use session::Session;
@@ -69,12 +69,19 @@ pub enum RunError {
     /// Bad usage or input (exit code 2).
     #[error("{0}")]
     Input(String),
+    /// A result that is known to be wrong (exit code 1).
+    #[error("{0}")]
+    Wrong(String),
 }
 
 impl RunError {
-    /// The exit code of the program: 2 bad usage or input, 3 no usable adapter.
+    /// The exit code of the program: 1 a wrong result, 2 bad usage or input, 3 no usable adapter.
     pub fn exit_code(&self) -> u8 {
         match self {
+            Self::Wrong(_)
+            | Self::Gpu(
+                GpuError::LoopsCut { .. } | GpuError::Kernels(_) | GpuError::Samples { .. },
+            ) => 1,
             Self::Gpu(
                 GpuError::NoAdapter | GpuError::UnknownAdapter { .. } | GpuError::NoDevice { .. },
             ) => 3,
@@ -92,6 +99,8 @@ pub struct Verified {
     pub accel: Variant,
     /// Verdict, or why there is none.
     pub verdict: Result<GateVerdict, String>,
+    /// Whether there is none because the driver ends loops too early for the structure.
+    pub refused: bool,
 }
 
 /// Runs a plan, writes `records.jsonl`, images and the report to `options.out`.
@@ -158,6 +167,7 @@ fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Resul
             return session.write_skipped(&session.plan.all_of(variant, reason));
         }
     };
+    session.progress.inc(session::SCENE_STEPS);
     let gated = structures::run(session, &world)?;
     if gpu.lost().is_none() {
         errors::run(session, &world, &gated)?;
@@ -188,11 +198,13 @@ pub fn verify(
     for scene in &plan.scenes {
         let world = World::new(&mut session, &device, scene)?;
         for cell in plan.structures.iter().filter(|c| c.scene == *scene) {
+            let mut refused = false;
             let verdict = match &world {
                 Err(Absent::BadInput(reason) | Absent::NotKept(reason)) => Err(reason.clone()),
                 Ok(world) => match structures::build_and_gate(&mut session, world, cell)? {
                     Ok((_, record)) => record.gate.ok_or_else(|| "no verdict".to_owned()),
                     Err(record) => {
+                        refused = record.refused;
                         let reason = record.failure.unwrap_or_default();
                         record.gate.ok_or(reason)
                     }
@@ -202,51 +214,10 @@ pub fn verify(
                 scene: scene.clone(),
                 accel: cell.accel.clone(),
                 verdict,
+                refused,
             });
         }
     }
     session.progress.finish_and_clear();
     Ok(verified)
-}
-
-/// One image for `raystone render`: the first scene, structure, sampler and integrator of the axes,
-/// at `experiment.spp.max()` samples, tone-mapped and written to `file`.
-///
-/// # Errors
-/// No adapter, a scene that does not load, a structure that cannot be built or fails its gate.
-pub fn render(
-    experiment: &Experiment,
-    plan: &Plan,
-    registries: &Registries,
-    options: &RunOptions,
-    file: &std::path::Path,
-) -> Result<(), RunError> {
-    let device = Device::open(options, &Kernels::load(&plan.kernels, registries)?)?;
-    let mut session = Session::unrecorded(experiment, plan, registries, options);
-    let cell = plan
-        .times
-        .first()
-        .ok_or_else(|| RunError::Input("there is nothing to render".to_owned()))?;
-    let world = World::new(&mut session, &device, &cell.scene)?;
-    let world = world
-        .map_err(|(Absent::BadInput(reason) | Absent::NotKept(reason))| RunError::Input(reason))?;
-    let structure = plan.structures.iter().find(|s| s.accel == cell.accel);
-    let structure = structure.ok_or_else(|| RunError::Input("no structure is left".to_owned()))?;
-    let built = structures::build_and_gate(&mut session, &world, structure)?;
-    let (traced, _) =
-        built.map_err(|record| RunError::Input(record.failure.unwrap_or_default()))?;
-    let pair = (&cell.sequence, &cell.decorrelation);
-    let sampler = errors::sampler_for(&session, pair, &cell.integrator, experiment.spp.max());
-    let sampler = sampler.map_err(RunError::Input)?;
-    let job =
-        errors::job(&session, &world, &sampler, &cell.integrator, true).map_err(RunError::Input)?;
-    let gpu = device.of(&cell.kernels)?;
-    let renderer = Renderer::new(gpu, &world.buffers, &traced, &job, false)?;
-    let snapshots = renderer.render(&[experiment.spp.max()], experiment.seed)?;
-    session.progress.finish_and_clear();
-    let Some(snapshot) = snapshots.first() else {
-        return Ok(());
-    };
-    let picture = tone_map(&snapshot.image, automatic_exposure(&snapshot.image));
-    write_png(file, &picture).map_err(|e| RunError::Input(e.to_string()))
 }

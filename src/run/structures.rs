@@ -129,7 +129,10 @@ fn gate_with(
         Ok::<_, GpuError>((verdict, kernel_hash(gpu, &world.buffers, &traced)?))
     });
     match gated {
-        Err(error) => record.failure = Some(error.to_string()),
+        Err(error) => {
+            record.refused = error.is_refusal();
+            record.failure = Some(error.to_string());
+        }
         Ok((mut verdict, hash)) => {
             record.ran.kernel_hash = hash;
             verdict.passed &= built.structural.is_none();
@@ -224,6 +227,7 @@ fn failure_text(verdict: &GateVerdict, judge_fault: Option<&str>) -> String {
 
 fn empty_record(world: &World, cell: &StructureCell, runtime_checks: bool) -> StructureRecord {
     StructureRecord {
+        refused: false,
         scene: world.variant.label.clone(),
         accel: cell.accel.clone(),
         ran: world.ran(&cell.kernels, String::new()),
@@ -344,6 +348,9 @@ fn write_failed(
     cell: &StructureCell,
     record: StructureRecord,
 ) -> Result<(), RunError> {
+    if record.refused {
+        return session.write_refused(cell.to_string(), record.failure.unwrap_or_default());
+    }
     session.failed += 1;
     session.finish(cell.to_string());
     let hash = structure_hash(world, cell, &record.ran);

@@ -30,6 +30,7 @@ impl Measured for Timed<'_> {
     fn measure(&self) -> Result<Elapsed, GpuError> {
         self.renderer.reset();
         self.renderer.add_samples(0, self.spp, self.seed)?;
+        self.renderer.check()?;
         Ok(self.renderer.spent())
     }
 }
@@ -66,6 +67,10 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         }
         let gpu = world.device.of(&cell.kernels)?;
         let Some(structure) = gated.iter().find(|g| g.cell.accel == cell.accel) else {
+            if let Some(reason) = refusal(session, &cell) {
+                session.write_refused(text, reason)?;
+                continue;
+            }
             let record = empty_record(
                 session,
                 world,
@@ -83,6 +88,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             Ok(item) => timed.push(item),
             Err(reason) => fail(session, world, &cell, reason)?,
         }
+        session.progress.inc(1);
         if world.gpu.lost().is_some() {
             return Ok(());
         }
@@ -109,6 +115,12 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     let mut shared = Shared::default();
     for (item, samples) in timed.iter().zip(samples) {
         let structure = gated.iter().find(|g| g.cell.accel == item.cell.accel);
+        if let Err(error) = &samples
+            && error.is_refusal()
+        {
+            session.write_refused(item.cell.to_string(), error.to_string())?;
+            continue;
+        }
         let measured = samples.map_err(|e| e.to_string());
         let record = measured
             .and_then(|samples| finish(session, world, structure, item, samples, &mut shared));
@@ -133,6 +145,14 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         }
     }
     Ok(())
+}
+
+/// Why the driver cannot run the structure of a cell, if that is so.
+fn refusal(session: &Session, cell: &TimeCell) -> Option<String> {
+    let mut structures = session.plan.structures.iter();
+    let structure = structures
+        .find(|s| (&s.scene, &s.accel, &s.kernels) == (&cell.scene, &cell.accel, &cell.kernels))?;
+    session.refused.get(&structure.to_string()).cloned()
 }
 
 /// Timed are the first samples of the set whose error is measured last: how near the rays of
@@ -178,11 +198,7 @@ fn finish(
     samples: Samples,
     shared: &mut Shared,
 ) -> Result<TimeRecord, String> {
-    let image = item
-        .renderer
-        .image()
-        .and_then(|image| Ok((image, item.renderer.error_word()?)));
-    let (image, error_word) = image.map_err(|e| e.to_string())?;
+    let image = item.renderer.image().map_err(|e| e.to_string())?;
     let hash = image_hash(&image);
     let key = key(&item.cell, item.space);
     let first = shared
@@ -208,14 +224,10 @@ fn finish(
         .map(|ms| total as f64 / ms * 1e-3)
         .collect();
     let equal = hash == first;
-    let failure = match (equal, error_word) {
-        (_, word) if word != 0 => Some(format!("a kernel raised error word {word}")),
-        (false, _) if world.probe.is_exact() => Some(
-            "its image differs from that of the first structure on this scene (in the same space)"
-                .to_owned(),
-        ),
-        _ => None,
-    };
+    let failure = (!equal && world.probe.is_exact()).then(|| {
+        "its image differs from that of the first structure on this scene (in the same space)"
+            .to_owned()
+    });
     let mut record = empty_record(session, world, &item.cell, String::new());
     record.failure = failure;
     if record.failure.is_none() {

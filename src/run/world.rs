@@ -62,8 +62,7 @@ impl<'a> World<'a> {
         let camera = session
             .experiment
             .camera
-            .or(scene.camera)
-            .unwrap_or_else(|| Camera::frame(&scene.bounds()));
+            .unwrap_or_else(|| scene.view(session.experiment.aspect()));
         if let Err(error) = camera.validate() {
             return Ok(Err(Absent::BadInput(error.to_string())));
         }

@@ -8,7 +8,9 @@ mod builder;
 pub mod builtin;
 mod camera;
 mod content;
+mod daylight;
 mod error;
+mod framing;
 mod gltf;
 mod gltf_accessor;
 mod gltf_container;
@@ -24,7 +26,9 @@ mod texture;
 pub use builder::{DEFAULT_ALBEDO, MAX_COORDINATE};
 pub use builtin::builtin_scenes;
 pub use camera::Bounds;
+pub use daylight::Daylight;
 pub use error::SceneError;
+pub use framing::Framing;
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 
 use crate::config::Variant;
@@ -129,6 +133,21 @@ pub struct LoadReport {
     pub warnings: Vec<String>,
 }
 
+impl LoadReport {
+    /// Everything that makes the scene differ from its file, a line each, for people.
+    pub fn lines(&self) -> Vec<String> {
+        let dropped = match self.dropped_non_finite {
+            0 => None,
+            1 => Some("1 triangle dropped: a vertex is not finite".to_owned()),
+            n => Some(format!("{n} triangles dropped: a vertex is not finite")),
+        };
+        dropped
+            .into_iter()
+            .chain(self.warnings.iter().cloned())
+            .collect()
+    }
+}
+
 /// A loaded scene: flat world-space triangles and what shading needs.
 ///
 /// `triangles`, `uvs` and `material_ids` are parallel; `uvs` is empty when no material is textured.
@@ -152,6 +171,10 @@ pub struct SceneData {
     pub camera: Option<Camera>,
     /// Constant radiance of the environment, linear RGB; zero is a black sky.
     pub environment: Vec3,
+    /// The sky over a scene that brings no light; its radiance is a multiple of `environment`.
+    pub daylight: Option<Daylight>,
+    /// Where to look from, if the scene brings no camera.
+    pub framing: Option<Framing>,
     /// BLAKE3 of the scene's content (hex), part of every cell's hash.
     pub hash: String,
     /// What was dropped or approximated.

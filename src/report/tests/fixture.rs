@@ -60,6 +60,8 @@ pub(super) fn run() -> Record {
             device_type: "cpu".into(),
             software: true,
             timestamps: true,
+            loop_limit: None,
+            denormals: Some(true),
             os: "Linux x86_64".into(),
             cpu: "Some Processor".into(),
             cpu_threads: 2,
@@ -157,6 +159,7 @@ pub(super) fn structure(scene: &str, accel: &str, mrays: f64, wrong: usize) -> S
         (RayClass::Bounce, 0.45),
     ];
     StructureRecord {
+        refused: false,
         ran: Ran::default(),
         scene: scene.into(),
         accel: variant(accel),

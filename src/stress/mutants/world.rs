@@ -45,9 +45,7 @@ impl Stage {
     fn new(scene: SceneData) -> Self {
         Self {
             soup: TriangleSoup::new(&scene),
-            camera: scene
-                .camera
-                .unwrap_or_else(|| Camera::frame(&scene.bounds())),
+            camera: scene.view(1.0),
             scene,
         }
     }
