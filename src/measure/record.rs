@@ -49,8 +49,12 @@ pub enum Record {
     Skipped(SkippedRecord),
     /// A cell that failed before it had a record of its own kind, with the reason.
     Failed(SkippedRecord),
+    /// Something that went wrong beside the measuring, which is not touched by it.
+    Warning(SkippedRecord),
     /// Last line: where the wall time went, how many cells failed.
     Finished(FinishedRecord),
+    /// Last line of a run that was ended early.
+    Interrupted(InterruptedRecord),
 }
 
 /// A figure with its 95 % interval, see [`crate::measure::statistics`].
@@ -418,7 +422,7 @@ pub struct ReferenceRecord {
     pub seconds: f64,
     /// Estimated mean squared error of the reference itself, from its two halves.
     pub mse: f64,
-    /// Tone-mapped PNG relative to the run's folder.
+    /// Tone-mapped PNG relative to the run's folder; empty if it could not be written.
     pub image: String,
     /// Mean radiance over pixels and channels.
     pub mean: f64,
@@ -707,7 +711,7 @@ pub struct StarAtCount {
     pub star: Interval,
 }
 
-/// A cell left out, or failed.
+/// A cell left out, or failed, or with a warning.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SkippedRecord {
     /// The cell, in words.
@@ -729,4 +733,13 @@ pub struct FinishedRecord {
     pub failed: usize,
     /// Cells that were skipped.
     pub skipped: usize,
+}
+
+/// Last line of a run that was ended early: what it had not measured by then is missing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct InterruptedRecord {
+    /// What ended it, for instance `SIGINT`.
+    pub reason: String,
+    /// Wall time until then, seconds.
+    pub wall_s: f64,
 }

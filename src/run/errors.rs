@@ -8,7 +8,7 @@ use crate::config::{REFERENCE_PARTS, SamplerCell, StructureCell, Variant, cell_h
 use crate::integrator::{Frame, RenderJob, Renderer, Snapshot, Traced, integrator, rounding_bound};
 use crate::measure::bias::{BiasOptions, check_bias};
 use crate::measure::image::{Image, Reference, measure};
-use crate::measure::picture::{automatic_exposure, error_map, tone_map, write_png};
+use crate::measure::picture::{Picture, automatic_exposure, error_map, tone_map};
 use crate::measure::record::{
     BiasRecord, ErrorAtSpp, ErrorRecord, Ran, Record, ReferenceRecord, SpectrumRecord,
 };
@@ -281,10 +281,9 @@ fn finish_reference(
 ) -> Result<Yardstick, RunError> {
     let exposure = automatic_exposure(reference.image());
     let labels = [&world.variant.label, &record.integrator.label].map(String::as_str);
-    let (relative, path) = session.image_path(&[&["reference"], &labels[..]].concat());
-    write_png(&path, &tone_map(reference.image(), exposure))
-        .map_err(|e| RunError::Input(e.to_string()))?;
-    record.image = relative;
+    let picture = tone_map(reference.image(), exposure);
+    let image = session.picture(&[&["reference"], &labels[..]].concat(), &picture)?;
+    record.image = image.unwrap_or_default();
     let cell = format!("reference {}, {}: done", world.variant, record.integrator);
     if !session.is_done(&cell) {
         let hash = cell_hash(&[
@@ -515,32 +514,22 @@ fn error_record(
         error_map: None,
     };
     if replicate == 0 {
-        let name = |kind| {
-            let labels = [
-                &world.variant.label,
-                &cell.integrator.label,
-                &cell.sequence.label,
-                &cell.decorrelation.label,
-            ];
-            session.image_path(&[&[kind], &labels.map(String::as_str)[..]].concat())
+        let labels = [
+            &world.variant.label,
+            &cell.integrator.label,
+            &cell.sequence.label,
+            &cell.decorrelation.label,
+        ];
+        let draw = |kind, picture: &Picture| {
+            let names = [&[kind], &labels.map(String::as_str)[..]].concat();
+            session.picture(&names, picture)
         };
-        let (relative, path) = name("image");
-        write_png(&path, &tone_map(&last.image, yardstick.exposure))
-            .map_err(|e| RunError::Input(e.to_string()))?;
-        record.image = Some(relative);
-        let (relative, path) = name("error");
-        match error_map(
-            &last.image,
-            &yardstick.reference,
-            ERROR_MAP_FULL_SCALE,
-            viridis,
-        ) {
-            Ok(picture) => {
-                write_png(&path, &picture).map_err(|e| RunError::Input(e.to_string()))?
-            }
+        record.image = draw("image", &tone_map(&last.image, yardstick.exposure))?;
+        let (reference, scale) = (&yardstick.reference, ERROR_MAP_FULL_SCALE);
+        match error_map(&last.image, reference, scale, viridis) {
+            Ok(picture) => record.error_map = draw("error", &picture)?,
             Err(error) => return Ok(Err(error.to_string())),
         }
-        record.error_map = Some(relative);
     }
     Ok(Ok(record))
 }

@@ -273,7 +273,10 @@ fn time_cell(view: &View, structure: &str, sampler: &Sampler) -> Cell {
 
 fn gallery(dir: &Path, view: &View) -> Option<Block> {
     let mut items = Vec::new();
-    if let Some(reference) = view.reference {
+    if let Some(reference) = view
+        .reference
+        .filter(|reference| !reference.image.is_empty())
+    {
         let spp = format::count(u64::from(reference.spp));
         let caption = match reference.exact {
             Some(value) => format!("reference: the exact value, {value}"),
