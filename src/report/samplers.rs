@@ -282,6 +282,13 @@ impl View<'_> {
         let least = errors()
             .map(|mean| mean.error.value.powi(2))
             .reduce(f64::min)?;
+        if reference.mse == 0.0 {
+            // Rounding apart, equal parts are right only of a scene without noise.
+            let noisy = least.sqrt() > 1e-4 * reference.mean;
+            let reason = "the parts of the reference do not differ, so that its noise is unknown: its \
+                          sampler must be one that seeds change";
+            return noisy.then(|| reason.into());
+        }
         let share = reference.mse / least;
         // A share that is no number is a fault, too.
         (share.is_nan() || share > REFERENCE_SHARE).then(|| {

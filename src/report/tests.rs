@@ -226,6 +226,30 @@ fn no_winner_and_no_point_where_the_reference_is_too_noisy() {
 }
 
 #[test]
+fn a_scene_without_noise_is_no_fault_of_its_reference() {
+    let mut lines = full_run();
+    for line in &mut lines {
+        match &mut line.record {
+            Record::Error(e) => {
+                let metrics = e.errors.iter_mut().flat_map(|at| at.metrics.values_mut());
+                metrics.for_each(|value| *value = 0.0);
+            }
+            Record::Reference(r) => r.mse = 0.0,
+            _ => {}
+        }
+    }
+    let failed = failed_checks(&lines);
+    assert!(
+        !failed
+            .iter()
+            .any(|check| check.starts_with("Reference noise")),
+        "{failed:?}"
+    );
+    let (html, _) = report("no-noise", &lines);
+    assert!(!without_pictures(&html).contains("NaN"));
+}
+
+#[test]
 fn a_slow_sampler_wins_per_second_only_if_its_time_is_known_well_enough() {
     let lines = full_run();
     let data = RunData::new(&lines);
@@ -295,7 +319,7 @@ fn every_check_passes_on_a_clean_run_and_fails_on_its_planted_fault() {
             .collect()
     };
     assert_eq!(failing(&clean), Vec::<String>::new());
-    let faults: [(&str, Plant); 9] = [
+    let faults: [(&str, Plant); 10] = [
         ("equal to the bit", |r| {
             if let Record::Structure(s) = r {
                 s.gate = Some(gate(1))
@@ -329,6 +353,11 @@ fn every_check_passes_on_a_clean_run_and_fails_on_its_planted_fault() {
         ("Reference noise", |r| {
             if let Record::Reference(f) = r {
                 f.mse = 1.0
+            }
+        }),
+        ("Reference noise", |r| {
+            if let Record::Reference(f) = r {
+                f.mse = 0.0
             }
         }),
         ("Reference noise", |r| {
