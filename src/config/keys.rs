@@ -246,7 +246,7 @@ pub const KEYS: &[Key] = &[
     key("reference", "spp", integer(2, 1 << 24), Some("4096"), "Samples per pixel of the reference image, both halves together."),
     key("reference", "sequence", Kind::Name(Axis::Sequence), Some("\"pixel-hash\""), "Sequence of the reference, with its default parameters."),
     key("reference", "decorrelation", Kind::Name(Axis::Decorrelation), Some("\"none\""), "Decorrelation of the reference, with its default parameters."),
-    key("reference", "seed", SEED, Some("9001"), "Seed of the reference; no replicate may share it."),
+    key("reference", "seed", SEED, Some("9001"), "What the seeds of the reference's parts are hashed from; none of them may be a replicate's."),
     key("timing", "rounds", integer(3, 1000), Some("9"), "Timed rounds; each times every cell of a scene once, in random order."),
     key("timing", "spp", integer(1, 1024), Some("1"), "Samples per pixel of each timed render."),
     key("timing", "min_warmup_ms", integer(0, 60_000), Some("100"), "Least warm-up of a kernel before it is timed, milliseconds."),

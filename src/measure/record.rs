@@ -61,7 +61,7 @@ pub enum Record {
     Interrupted(InterruptedRecord),
 }
 
-/// A figure with its 95 % bootstrap interval.
+/// A figure with its 95 % interval, see [`crate::measure::statistics`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
     /// The estimate (median for times and rates, mean for errors).
@@ -73,6 +73,15 @@ pub struct Interval {
 }
 
 impl Interval {
+    /// A figure whose interval has no width: it is exact, or nothing is known of its spread.
+    pub fn exact(value: f64) -> Self {
+        Self {
+            value,
+            low: value,
+            high: value,
+        }
+    }
+
     /// Whether two intervals have no point in common: only then is a winner named.
     pub fn is_apart_from(&self, other: &Interval) -> bool {
         self.low > other.high || other.low > self.high
@@ -430,6 +439,10 @@ pub struct ErrorAtSpp {
     pub spp: u32,
     /// Metric id with version → value, for instance `rmse/v1`, `relmse/eps=1e-2/v1`.
     pub metrics: BTreeMap<String, f64>,
+    /// Id of an unbiased metric → its values with each part of the reference left out, those of its
+    /// first half first: the reference's share in the metric's uncertainty.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub without_part: BTreeMap<String, Vec<f64>>,
 }
 
 /// Error of one replicate.
@@ -466,7 +479,8 @@ pub struct ErrorRecord {
     pub error_map: Option<String>,
 }
 
-/// Bias check of one sampler: Welch t per tile of the replicate mean against the reference.
+/// Bias check of one sampler: Welch's t of the replicates against the reference, for the whole image and
+/// per tile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BiasRecord {
     /// Scene name.
@@ -484,16 +498,26 @@ pub struct BiasRecord {
     pub tiles: usize,
     /// Tiles rejected after Benjamini–Hochberg at `alpha`.
     pub rejected: usize,
-    /// False-discovery rate.
+    /// Bound on the probability of calling a sampler without bias biased: half of it is for the whole
+    /// image, half is the false-discovery rate among tiles.
     pub alpha: f64,
-    /// Smallest p-value.
+    /// Smallest p-value of a tile.
     pub min_p: f64,
     /// Histogram of the p-values in ten equal bins: flat when there is no bias.
     pub p_histogram: Vec<usize>,
-    /// Difference of the mean luminance of all replicates from the reference's, in standard errors;
-    /// absent where it is not testable.
+    /// Difference of the mean luminance of all replicates from the reference's beyond what rounding
+    /// explains, in standard errors (Welch's t); absent where it is not testable or has no spread.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub z: Option<f64>,
+    /// p-value of `z`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub p: Option<f64>,
+    /// Degrees of freedom of `z`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub degrees_of_freedom: Option<f64>,
+    /// Whether the sampler is one whose mean over seeds is not the integral, so that a bias is no fault.
+    #[serde(default)]
+    pub by_design: bool,
     /// `no-bias-found`, `biased`, or `not-testable` with the reason.
     pub verdict: String,
 }

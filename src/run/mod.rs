@@ -31,10 +31,6 @@ use std::path::PathBuf;
 use thiserror::Error;
 use world::{Absent, World};
 
-/// A reference is rendered in this many independent parts: its halves make error estimates
-/// unbiased, its parts are the other side of the bias check.
-pub(crate) const REFERENCE_PARTS: u32 = 8;
-
 /// What an experiment does not say.
 #[derive(Debug, Clone, Default)]
 pub struct RunOptions {
@@ -67,6 +63,8 @@ pub struct RunSummary {
     pub skipped: usize,
     /// Whether a scene could not be loaded (exit code 2).
     pub bad_input: bool,
+    /// Checks of the report that failed, with what they found (exit code 1).
+    pub failed_checks: Vec<String>,
     /// Folder of the records.
     pub out: PathBuf,
     /// The report's page.
@@ -163,6 +161,7 @@ pub fn run(
         skipped: session.skipped,
         bad_input: session.bad_input,
         report: Some(report.html),
+        failed_checks: crate::report::failed_checks(&lines.lines),
         tables: crate::report::terminal_tables(&lines.lines),
         out,
     })

@@ -11,7 +11,7 @@ use crate::config::{TimeCell, Variant, cell_hash};
 use crate::gpu::{Elapsed, Gpu, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
 use crate::measure::record::{Record, TimeRecord};
-use crate::measure::statistics::bootstrap_median;
+use crate::measure::statistics::median_interval;
 use crate::measure::timing::{Measured, Samples, interleave};
 use crate::sampling::Sampler;
 use std::collections::BTreeMap;
@@ -172,7 +172,7 @@ fn compile<'a>(
     cell: TimeCell,
 ) -> Result<Timed<'a>, String> {
     let sampler = sampler_of(session, &cell)?;
-    let seeds: Vec<u32> = session.experiment.replicate_seeds().collect();
+    let seeds = session.experiment.seeds().replicates;
     words::check(session, gpu, &sampler, &seeds)?;
     let checks = structure.runtime_checks;
     let job = job(session, world, &sampler, &cell.integrator, checks)?;
@@ -233,8 +233,8 @@ fn finish(
     let mut record = empty_record(session, world, &item.cell, String::new());
     record.failure = failure;
     if record.failure.is_none() {
-        record.ms_per_spp = bootstrap_median(&per_spp);
-        record.mrays_s = bootstrap_median(&rates);
+        record.ms_per_spp = median_interval(&per_spp);
+        record.mrays_s = median_interval(&rates);
         record.ms = samples.ms;
         record.wall_ms = samples.wall_ms;
     }
