@@ -86,23 +86,30 @@ fn tell(summary: &RunSummary, quiet: bool) -> Result<ExitCode, Failure> {
         };
     }
     print(&text)?;
-    if summary.failed == 0 && !summary.bad_input {
+    if summary.failed == 0 && !summary.bad_input && summary.failed_checks.is_empty() {
         return Ok(ExitCode::SUCCESS);
     }
     let lines = read_records(&summary.out)?.lines;
     for failure in lines.iter().filter_map(failure) {
         output::tell(&format!("failed: {failure}"));
     }
-    let count = match summary.failed {
-        1 => "1 gate or cell".to_owned(),
-        failed => format!("{failed} gates or cells"),
-    };
-    output::tell(&format!("{count} failed"));
+    for check in &summary.failed_checks {
+        output::tell(&format!("failed: {check}"));
+    }
+    output::tell(&format!(
+        "{}, {} failed",
+        plural(summary.failed, "gate or cell", "gates or cells"),
+        plural(summary.failed_checks.len(), "check", "checks")
+    ));
     Ok(ExitCode::from(if summary.bad_input {
         BAD_INPUT
     } else {
         FAILED
     }))
+}
+
+fn plural(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 /// The cell of a record and why it failed, if it did.

@@ -19,5 +19,6 @@ pub mod spectrum;
 pub mod statistics;
 pub mod stream;
 pub mod timing;
+pub mod words;
 
 pub use kept_checks::CACHE_VARIABLE;

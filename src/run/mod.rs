@@ -14,26 +14,23 @@ mod streams;
 mod structures;
 mod times;
 mod trial;
+mod words;
 mod world;
 
 pub use folder::{Existing, Interrupt, Interrupted};
 pub use kernels::{Kernels, kernel_library};
 pub use registries::Registries;
 pub use render::{Rendering, render};
-pub use streams::dump_stream;
 
 use crate::config::{Experiment, Plan, Variant};
 use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
 use crate::measure::record::GateVerdict;
+pub use crate::measure::words::dump_stream;
 use kernels::Device;
 use session::Session;
 use std::path::PathBuf;
 use thiserror::Error;
 use world::{Absent, World};
-
-/// A reference is rendered in this many independent parts: its halves make error estimates
-/// unbiased, its parts are the other side of the bias check.
-pub(crate) const REFERENCE_PARTS: u32 = 8;
 
 /// What an experiment does not say.
 #[derive(Debug, Clone, Default)]
@@ -67,6 +64,8 @@ pub struct RunSummary {
     pub skipped: usize,
     /// Whether a scene could not be loaded (exit code 2).
     pub bad_input: bool,
+    /// Checks of the report that failed, with what they found (exit code 1).
+    pub failed_checks: Vec<String>,
     /// Folder of the records.
     pub out: PathBuf,
     /// The report's page.
@@ -163,6 +162,7 @@ pub fn run(
         skipped: session.skipped,
         bad_input: session.bad_input,
         report: Some(report.html),
+        failed_checks: crate::report::failed_checks(&lines.lines),
         tables: crate::report::terminal_tables(&lines.lines),
         out,
     })

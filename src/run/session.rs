@@ -2,7 +2,7 @@
 
 use super::folder::Folder;
 use super::{RunError, RunOptions};
-use crate::config::{Experiment, Plan, Skipped};
+use crate::config::{Experiment, Plan, REFERENCE_PARTS, Skipped};
 use crate::gpu::Gpu;
 use crate::measure::picture::{Picture, write_png};
 use crate::measure::record::{
@@ -55,6 +55,8 @@ pub(super) struct Session<'a> {
     pub refused: BTreeMap<String, String>,
     /// Cells that have their record: not run again after a lost device.
     done: HashSet<String>,
+    /// Samplers whose words were compared with the twin's.
+    pub compared: HashSet<String>,
     /// `None`: nothing is written (gate alone, single images).
     folder: Option<Arc<Folder>>,
 }
@@ -103,6 +105,7 @@ impl<'a> Session<'a> {
             trial: Default::default(),
             refused: BTreeMap::new(),
             done: HashSet::new(),
+            compared: HashSet::new(),
             folder: None,
         }
     }
@@ -272,6 +275,6 @@ fn steps(experiment: &Experiment, plan: &Plan) -> u64 {
     let times = plan.times.len() as u64 * (1 + rounds);
     let scenes = plan.scenes.len() as u64 * SCENE_STEPS;
     let references =
-        plan.scenes.len() * experiment.axes.integrator.len() * super::REFERENCE_PARTS as usize;
+        plan.scenes.len() * experiment.axes.integrator.len() * REFERENCE_PARTS as usize;
     scenes + structures + times + (plan.renders_planned + references + plan.streams.len()) as u64
 }
