@@ -379,12 +379,12 @@ pub(super) const MUTANTS: &[Mutant] = &[
         Check::Stream,
     ),
     row(
-        "quotient-rounded-from-256",
-        "i / N is wrong in its last digits from sample 256 on",
+        "count-ends-at-4096",
+        "i / N grows no more from sample 4096 on",
         text(
             "sampling/hammersley",
-            "s.sample * sequence_word(2u) / count",
-            "min(s.sample, 255u) * sequence_word(2u) / count",
+            "s.sample * sequence_word(1u)",
+            "min(s.sample, 4095u) * sequence_word(1u)",
         ),
         sampler("hammersley", &[], "disc-rotation"),
         Check::Stream,
