@@ -206,13 +206,17 @@ impl Judge {
         self.note_oracle(&pairs, verdicts);
     }
 
-    /// Counts what the oracle thinks of these answers.
+    /// Counts what the oracle thinks of these answers, of which those of hard rays come last.
     pub(super) fn note_oracle(&mut self, pairs: &[(Ray, Hit)], verdicts: Vec<Verdict>) {
+        let hard = self.hard().count().min(pairs.len());
         self.oracle.rays = pairs.len();
-        for ((ray, hit), verdict) in pairs.iter().zip(verdicts) {
+        for (place, ((ray, hit), verdict)) in pairs.iter().zip(verdicts).enumerate() {
             match verdict {
                 Verdict::Agrees => {}
-                Verdict::Ambiguous => self.oracle.ambiguous += 1,
+                Verdict::Ambiguous => {
+                    self.oracle.ambiguous += 1;
+                    self.oracle.hard_ambiguous += usize::from(place >= pairs.len() - hard);
+                }
                 Verdict::Wrong(fault) => {
                     self.oracle.wrong += 1;
                     self.first_wrong.get_or_insert_with(|| {

@@ -309,6 +309,9 @@ pub struct JudgeCheck {
     pub wrong: usize,
     /// Rays that pass within rounding error of an edge or of another surface (oracle only).
     pub ambiguous: usize,
+    /// How many of these are hard rays, made to pass there.
+    #[serde(default)]
+    pub hard_ambiguous: usize,
     /// When it was carried out, if that was before this run: the same rays and answers, found again on disk.
     #[serde(default)]
     pub reused_unix_s: Option<u64>,

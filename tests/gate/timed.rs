@@ -21,7 +21,7 @@ integrator = ["path"]
 [reference]
 spp = 8
 [timing]
-rounds = 2
+rounds = 3
 min_warmup_ms = 0
 max_warmup_ms = 1
 rays = 1024
