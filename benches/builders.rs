@@ -1,7 +1,7 @@
 //! Every builder of the binary tree, on one thread and on two: the built-in displaced sphere, and
 //! Crytek Sponza where it is present.
 //!
-//! `cargo bench --bench builders -- sponza/binned` runs one of them.
+//! `cargo bench -p raystone-benches --bench builders -- sponza/binned` runs one of them.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use raystone::accel::tree::{Tree, tree_parameters};
@@ -81,7 +81,7 @@ fn bench_scene(criterion: &mut Criterion, label: &str, soup: &TriangleSoup) {
 fn builders(criterion: &mut Criterion) {
     bench_scene(criterion, "displaced-sphere", &soup("displaced-sphere"));
     let sponza =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes/sponza-crytek/sponza.obj");
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/scenes/sponza-crytek/sponza.obj");
     if sponza.exists() {
         bench_scene(criterion, "sponza", &soup(&sponza.display().to_string()));
     } else {

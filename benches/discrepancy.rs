@@ -1,4 +1,4 @@
-//! Speed of the exact star discrepancy and of the mean-square ones: `cargo bench --bench discrepancy`.
+//! Speed of the exact star discrepancy and of the mean-square ones: `cargo bench -p raystone-benches --bench discrepancy`.
 //!
 //! Targets on one core: 2-D 10⁵ points 0.2 s, 10⁶ points 2.5 s; 3-D 4096 points 1.0 s; 4-D 1024 points
 //! 1.5 s; 6-D 128 points 0.5 s.

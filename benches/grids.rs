@@ -1,5 +1,5 @@
 //! Building grids: every grid with default parameters, on Sponza (where it is present) and a built-in
-//! scene. `cargo bench --bench grids`.
+//! scene. `cargo bench -p raystone-benches --bench grids`.
 
 use criterion::{BatchSize, Criterion, SamplingMode, criterion_group, criterion_main};
 use raystone::accel::{AccelKind, AccelRegistry, BuildLog, TriangleSoup};
@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::Duration;
 
 /// Sponza, 262,267 triangles, below the folder of shared scenes.
-const SPONZA: &str = "../shared/scenes/sponza-crytek/sponza.obj";
+const SPONZA: &str = "../../shared/scenes/sponza-crytek/sponza.obj";
 
 fn defaults(schema: raystone::config::ParameterSchema) -> Params {
     Params(

@@ -1,5 +1,5 @@
 //! Speed of the builders of `octree` and `kd-tree`, and of the plain `bvh` beside them:
-//! `cargo bench --bench spatial`. Goals on Crytek's Sponza: octree 1 s, kd-tree 2 to 3 s of CPU time.
+//! `cargo bench -p raystone-benches --bench spatial`. Goals on Crytek's Sponza: octree 1 s, kd-tree 2 to 3 s of CPU time.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use raystone::accel::{AccelRegistry, BuildLog, TriangleSoup};
@@ -10,7 +10,7 @@ use raystone::scene::{self, LoadOptions};
 fn soup() -> (&'static str, TriangleSoup) {
     let sponza = concat!(
         env!("CARGO_MANIFEST_DIR"),
-        "/../shared/scenes/sponza-crytek/sponza.obj"
+        "/../../shared/scenes/sponza-crytek/sponza.obj"
     );
     let options = LoadOptions {
         textures: false,
