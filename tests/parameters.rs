@@ -97,7 +97,7 @@ fn a_sampler_completes_its_parameters_and_refuses_what_it_does_not_know() {
     let registry = SamplerRegistry::default();
     let demand = Demand {
         samples: Some(16),
-        dimensions: 2,
+        dimensions: 1,
         width: Some(8),
     };
     let plain = |name: &str| variant(name, Params::default());
