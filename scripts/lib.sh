@@ -101,6 +101,11 @@ ensure_rust() {
 
 # Builds the release program and sets $program to its path.
 build_release() {
+    if [ -x "${CARGO_TARGET_DIR:-$root/target}/release/raystone" ]; then
+        say "Building Raystone: at most the parts that changed."
+    else
+        say "Building Raystone: the first time takes some minutes (about five on two cores)."
+    fi
     cargo build --release --locked --manifest-path "$root/Cargo.toml"
     program=${CARGO_TARGET_DIR:-${prefix}target}/release/raystone
     # A bare relative path would be looked up on the PATH.
@@ -154,6 +159,19 @@ has_vulkan() {
         has_icd "$place" && return 0
     done
     return 1
+}
+
+# Says what to type where Debian 12's own software driver would be used, which is slow and ends the loops
+# of kernels early.
+recommend_driver() {
+    local version
+    [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}${WGPU_BACKEND:-}" ] || return 0
+    [ "$(os_field ID) $(os_field VERSION_ID)" = "debian 12" ] || return 0
+    version=$(dpkg-query -W -f='${Version}' mesa-vulkan-drivers 2>/dev/null) || return 0
+    case $version in
+    22.*) say "Mesa $version, Debian 12's own software driver, ends loops early and takes twice as long or more. For a better one, type:" \
+        $'\n'"  scripts/install-driver --backports" ;;
+    esac
 }
 
 # Sees to a driver that wgpu can use: what is there, else the software driver if it may be

@@ -56,14 +56,15 @@ seed = 2
 fn verdicts(kernels: &Path) -> Vec<GateVerdict> {
     let mut registries = Registries::default();
     registries.accel.register(&SortedSlabs);
-    let experiment = Experiment::parse(EXPERIMENT, "experiment", &[], &registries.catalogue());
+    let kernels = [format!(
+        "axes.kernels=[{:?}]",
+        kernels.display().to_string()
+    )];
+    let experiment = Experiment::parse(EXPERIMENT, "experiment", &kernels, &registries.catalogue());
     let experiment = experiment.unwrap_or_else(|e| panic!("{e}"));
     let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d));
     let plan = plan.unwrap_or_else(|e| panic!("{e}"));
-    let options = RunOptions {
-        kernels: Some(kernels.to_owned()),
-        ..Default::default()
-    };
+    let options = RunOptions::default();
     let verified = verify(&experiment, &plan, &registries, &options, 2000);
     let verified = verified.unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(verified.len(), 4, "two scenes with two lengths");

@@ -207,7 +207,23 @@ fn double_brackets_make_variants_side_by_side_and_none_twice() {
 fn text_that_is_not_toml_names_its_line() {
     assert_says(
         parse("[run]\nseed = 1\nseed = 2\n"),
-        &["dir/trial.toml:7", "duplicate key"],
+        &[
+            "dir/trial.toml:7",
+            "duplicate key `seed`",
+            "first in dir/trial.toml:6",
+        ],
+    );
+    assert_says(
+        parse("[run]\n[gate]\n[run]\n"),
+        &[
+            "dir/trial.toml:7",
+            "duplicate key `run`",
+            "first in dir/trial.toml:5",
+        ],
+    );
+    assert_says(
+        parse("[run]\nname = \"a\\u001bb\"\n"),
+        &["dir/trial.toml:6", "`run.name`", "control characters"],
     );
     assert_says(parse("[run\n"), &["dir/trial.toml:5", "not valid TOML"]);
     assert_says(parse("[run]\nseed = \n"), &["dir/trial.toml:6"]);
@@ -676,7 +692,7 @@ fn every_default_is_accepted_by_the_parser() {
         }
         good(&text);
     }
-    assert_eq!(Axis::ALL.len(), 5);
+    assert_eq!(Axis::ALL.len(), 6);
 }
 
 #[test]

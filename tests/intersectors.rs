@@ -17,7 +17,7 @@ use raystone::gpu::{Bindings, Composition, Dispatch, Gpu, KernelLibrary, groups_
 use raystone::integrator::{RayOffset, SceneBuffers, Traced};
 use raystone::measure::batch::{Batch, Query};
 use raystone::measure::rays::record_rays;
-use raystone::scene::{self, Camera, LoadOptions, Triangle};
+use raystone::scene::{self, LoadOptions, Triangle};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -472,9 +472,7 @@ fn what_tests_cost_in_a_whole_traversal() {
             println!("skipped: {} is not there", path.display());
             continue;
         };
-        let camera = scene
-            .camera
-            .unwrap_or_else(|| Camera::frame(&scene.bounds()));
+        let camera = scene.view(1.0);
         let settings = Gate {
             rays: 1 << 18,
             brute_force_tests: 0,

@@ -130,15 +130,19 @@ impl Intersection {
         })
     }
 
-    /// What an adapter can keep of this choice, and what it cannot: without exact two-products the
-    /// compensated test is the watertight one at a higher price.
-    pub fn kept_by(self, probe: &ArithmeticProbe) -> (Self, Option<String>) {
+    /// Whether an adapter keeps this choice.
+    ///
+    /// # Errors
+    /// Why it does not: without exact two-products the compensated test is another one.
+    pub fn kept_by(self, probe: &ArithmeticProbe) -> Result<(), String> {
         if self.triangle != TriangleTest::Compensated || probe.exact_products {
-            return (self, None);
+            return Ok(());
         }
-        let triangle = TriangleTest::Watertight;
-        let reason = "compensated: this adapter does not keep two-products; watertight instead";
-        (Self { triangle, ..self }, Some(reason.to_owned()))
+        Err(format!(
+            "this adapter does not keep the two-products of the triangle test `{}`; choose `{}`",
+            TriangleTest::Compensated.name(),
+            TriangleTest::Watertight.name()
+        ))
     }
 
     /// `composition` with these tests, unless it chose others before.
@@ -244,15 +248,16 @@ mod tests {
             exact_division: true,
             exact_sqrt: true,
             exact_products,
+            denormals: true,
         };
         let tests = Intersection {
             triangle: TriangleTest::Compensated,
             ..Default::default()
         };
-        assert_eq!(tests.kept_by(&probe(true)), (tests, None));
-        let (kept, reason) = tests.kept_by(&probe(false));
-        assert_eq!(kept.triangle, TriangleTest::Watertight);
-        assert!(reason.is_some_and(|r| r.contains("two-products")));
+        assert_eq!(tests.kept_by(&probe(true)), Ok(()));
+        let reason = tests.kept_by(&probe(false)).unwrap_err();
+        assert!(reason.contains("two-products") && reason.contains("`compensated`"));
+        assert_eq!(Intersection::default().kept_by(&probe(false)), Ok(()));
     }
 
     #[test]

@@ -292,6 +292,10 @@ pub trait AccelKind: Sync {
     fn description(&self) -> &'static str;
     /// Parameters.
     fn parameters(&self) -> ParameterSchema;
+    /// Modules that a folder of kernels may bring for it, beside those of the program.
+    fn kernels(&self) -> Vec<String> {
+        vec![format!("accel/{}", self.name().replace('-', "_"))]
+    }
     /// Builds the structure.
     ///
     /// # Errors

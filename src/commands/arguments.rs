@@ -1,12 +1,13 @@
 //! Arguments that several commands share.
 
+use super::failure::Failure;
 use clap::Args;
 use raystone::config::{Catalogue, Variant};
-use raystone::gpu::AdapterChoice;
-use raystone::run::RunOptions;
-use raystone::scene::SceneError;
+use raystone::gpu::{self, AdapterChoice, Gpu, KernelLibrary};
+use raystone::run::{Registries, RunOptions, kernel_library};
+use raystone::scene::{SceneError, check_model};
 use std::io::IsTerminal as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Where kernels come from and run.
 #[derive(Args)]
@@ -15,7 +16,8 @@ pub struct DeviceArguments {
     /// before integrated before virtual before software]
     #[arg(long, value_name = "INDEX|NAME")]
     pub adapter: Option<AdapterChoice>,
-    /// Folder of kernels (*.wesl) that replace or join the embedded ones
+    /// Folder of kernels (*.wesl) that replace or join the embedded ones; in an experiment short for
+    /// `--set axes.kernels=["DIR"]`
     #[arg(long, value_name = "DIR")]
     pub kernels: Option<PathBuf>,
 }
@@ -26,10 +28,30 @@ impl DeviceArguments {
         RunOptions {
             out,
             adapter: self.adapter.clone().unwrap_or_default(),
-            kernels: self.kernels.clone(),
-            lose_device_at: None,
             progress: !quiet && std::io::stderr().is_terminal(),
+            ..RunOptions::default()
         }
+    }
+
+    /// The folder of kernels as an override of an experiment.
+    pub fn kernels_override(&self) -> Option<String> {
+        let folder = self.kernels.as_ref()?.display().to_string();
+        Some(list_override("axes.kernels", &[folder]))
+    }
+
+    /// Opens the adapter with the kernels.
+    ///
+    /// # Errors
+    /// No adapter, or kernels that cannot be read.
+    pub fn open(&self, registries: &Registries) -> Result<Gpu, Failure> {
+        let kernels = match &self.kernels {
+            Some(folder) => kernel_library(folder, registries)?,
+            None => KernelLibrary::default(),
+        };
+        Ok(gpu::open(
+            &self.adapter.clone().unwrap_or_default(),
+            kernels,
+        )?)
     }
 }
 
@@ -56,19 +78,16 @@ pub fn list_override(key: &str, values: &[String]) -> String {
     format!("{key}={}", toml::Value::from(values.to_vec()))
 }
 
-/// Checks that the models among the scenes can be opened, before minutes are spent on other cells.
+/// Checks that the models among the scenes look like models, before minutes are spent on other cells.
 ///
 /// # Errors
-/// The first model that cannot be read.
+/// The first one that does not.
 pub fn check_models(scenes: &[Variant], catalogue: &Catalogue) -> Result<(), SceneError> {
     for scene in scenes {
         if catalogue.scene.iter().any(|entry| entry.name == scene.name) {
             continue;
         }
-        if let Err(source) = std::fs::File::open(&scene.name) {
-            let path = PathBuf::from(&scene.name);
-            return Err(SceneError::Read { path, source });
-        }
+        check_model(Path::new(&scene.name))?;
     }
     Ok(())
 }

@@ -4,6 +4,7 @@ use super::adapters::{self, bytes, largest_binding, mesa_major};
 use super::failure::Failure;
 use super::output::print;
 use super::system::{self, System};
+use super::table::grouped;
 use clap::Args;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::gpu::{
@@ -119,6 +120,8 @@ fn examine(
         "  dispatch    a kernel ran, and its results came back"
     );
     let _ = writeln!(text, "  arithmetic  {}", arithmetic(probe));
+    let _ = writeln!(text, "  denormals   {}", denormals(probe));
+    let _ = writeln!(text, "  loops       {}", loops(gpu, system));
     let _ = writeln!(text, "  timestamps  {timestamps}");
     let _ = writeln!(
         text,
@@ -126,8 +129,34 @@ fn examine(
         bytes(limit),
     );
     text += &speed(gpu, system);
-    text += "\nEverything that Raystone needs works here.\n";
+    text += match gpu.loop_limit {
+        None => "\nEverything that Raystone needs works here.\n",
+        Some(_) => "\nRaystone works here, but for what loops long: see above.\n",
+    };
     Ok(text)
+}
+
+fn denormals(probe: ArithmeticProbe) -> &'static str {
+    match probe.denormals {
+        true => "kept, as on the host",
+        false => "taken for 0: hits of rays and scenes of such sizes may differ from the host's",
+    }
+}
+
+/// Whether the driver ends loops, and what follows from that.
+fn loops(gpu: &Gpu, system: &System) -> String {
+    let Some(limit) = gpu.loop_limit else {
+        return "run to their end".to_owned();
+    };
+    let remedy = match system.has_backports() {
+        true => "type: scripts/install-driver --backports",
+        false => "install a newer driver",
+    };
+    format!(
+        "END IN SILENCE once an invocation took {} turns in all: kernels check for it,\n              \
+         and what needs more is refused (long brute force). For whole loops, {remedy}",
+        grouped(limit as usize)
+    )
 }
 
 fn arithmetic(probe: ArithmeticProbe) -> String {

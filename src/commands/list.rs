@@ -74,6 +74,10 @@ impl List {
                 ),
                 Topic::Metric => metrics(),
                 Topic::Measure => measures(),
+                // Drivers are loaded, and may print, only where they are asked for.
+                Topic::Adapter if self.what.is_none() => {
+                    "adapter: of this machine, by `raystone list adapter`\n".to_owned()
+                }
                 Topic::Adapter => adapter_list(),
             })
             .collect();

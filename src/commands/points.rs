@@ -7,7 +7,7 @@ use anyhow::anyhow;
 use clap::Args;
 use raystone::config::{Axis, Catalogue, Entry, Experiment, Variant, nearest};
 use raystone::gpu::Gpu;
-use raystone::run::{Registries, dump_stream, open_gpu};
+use raystone::run::{Registries, dump_stream};
 use raystone::sampling::{Coordinate, Demand, Sampler};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -80,7 +80,7 @@ impl Points {
             Failure::input(anyhow!("--pixel {x},{y}: pixels are numbered by 32 bits"))
         })?;
         let gpu = match self.gpu {
-            true => Some(open_gpu(&self.device.options(PathBuf::new(), true))?),
+            true => Some(self.device.open(&registries)?),
             false => None,
         };
         let stream = Stream { sampler, gpu };

@@ -6,8 +6,9 @@ use super::output::print;
 use anyhow::anyhow;
 use clap::Args;
 use raystone::config::{Axis, Experiment, Plan};
-use raystone::run::Registries;
-use std::path::PathBuf;
+use raystone::measure::formats::FileFormat;
+use raystone::run::{Registries, Rendering};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// What is rendered where the command line says nothing: an experiment of one cell, so that one
@@ -59,8 +60,9 @@ pub struct Render {
     /// integrator.path.max_depth=3`
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Picture to write
-    #[arg(long, short, value_name = "FILE.png", default_value = "render.png")]
+    /// Picture to write; the ending chooses the format: tone-mapped .png, or linear radiance in .exr,
+    /// .hdr, .pfm, .npy
+    #[arg(long, short, value_name = "FILE", default_value = "render.png")]
     output: PathBuf,
     #[command(flatten)]
     device: DeviceArguments,
@@ -68,6 +70,7 @@ pub struct Render {
 
 impl Render {
     pub fn execute(self) -> Result<ExitCode, Failure> {
+        check_output(&self.output)?;
         let registries = Registries::default();
         let catalogue = registries.catalogue();
         let experiment =
@@ -79,7 +82,9 @@ impl Render {
         check_models(&experiment.axes.scene, &catalogue)?;
         // Only the picture is written: no folder is needed.
         let options = self.device.options(PathBuf::new(), false);
-        raystone::run::render(&experiment, &plan, &registries, &options, &self.output)?;
+        let rendering =
+            raystone::run::render(&experiment, &plan, &registries, &options, &self.output)?;
+        eprint!("{}", summary(&rendering, experiment.resolution));
         print(&format!("{}\n", self.output.display()))?;
         Ok(ExitCode::SUCCESS)
     }
@@ -112,9 +117,47 @@ impl Render {
             // There is no reference image here, but its seeds have to differ all the same.
             overrides.push(format!("reference.seed={}", seed.wrapping_add(1)));
         }
+        overrides.extend(self.device.kernels_override());
         overrides.extend(self.set.iter().cloned());
         overrides
     }
+}
+
+/// Whether the picture can be written, asked before anything is rendered.
+fn check_output(file: &Path) -> Result<(), Failure> {
+    FileFormat::of(file).map_err(Failure::input)?;
+    let folder = file.parent().filter(|f| !f.as_os_str().is_empty());
+    match folder.is_none_or(Path::is_dir) {
+        true => Ok(()),
+        false => Err(Failure::input(anyhow!(
+            "cannot write {}: its folder does not exist",
+            file.display()
+        ))),
+    }
+}
+
+/// What was approximated, a line each, and how long it took.
+fn summary(rendering: &Rendering, [width, height]: [u32; 2]) -> String {
+    let mut text = String::new();
+    for note in rendering.report.lines() {
+        text += &format!("note: {note}\n");
+    }
+    if rendering.non_finite_pixels > 0 {
+        text += &format!(
+            "warning: {} pixels are NaN or infinite\n",
+            rendering.non_finite_pixels
+        );
+    }
+    text + &format!(
+        "{} triangles, {width}×{height} pixels, {} spp: {:.1} s, first picture after {:.1} s; \
+        {:.1} million rays, {:.2} Mrays/s\n",
+        rendering.triangles,
+        rendering.spp,
+        rendering.total_s,
+        rendering.first_picture_s,
+        rendering.rays as f64 / 1e6,
+        rendering.rays as f64 / 1e6 / rendering.samples_s.max(1e-9),
+    )
 }
 
 /// One picture is one cell.

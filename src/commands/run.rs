@@ -8,7 +8,7 @@ use clap::Args;
 use raystone::config::{Experiment, Plan};
 use raystone::measure::record::{Line, Record};
 use raystone::report::read_records;
-use raystone::run::{Registries, RunSummary};
+use raystone::run::{Kernels, Registries, RunSummary};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -36,12 +36,15 @@ impl Run {
     pub fn execute(self) -> Result<ExitCode, Failure> {
         let registries = Registries::default();
         let catalogue = registries.catalogue();
-        let experiment = Experiment::load(&self.file, &self.experiment.set, &catalogue)?;
+        let mut overrides = Vec::from_iter(self.device.kernels_override());
+        overrides.extend(self.experiment.set.iter().cloned());
+        let experiment = Experiment::load(&self.file, &overrides, &catalogue)?;
         let is_randomised =
             |sequence: &_, decorrelation: &_| registries.is_randomised(sequence, decorrelation);
         let plan = Plan::new(&experiment, &self.experiment.only, is_randomised)?;
         check_models(&plan.scenes, &catalogue)?;
         if self.dry_run {
+            Kernels::load(&plan.kernels, &registries)?;
             let estimate = Estimate::new(&experiment, &plan);
             print(&format!("{}\n{estimate}\n", plan.describe().trim_end()))?;
             return Ok(ExitCode::SUCCESS);

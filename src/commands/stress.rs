@@ -5,9 +5,9 @@ use super::failure::{FAILED, Failure};
 use super::output::print;
 use anyhow::Context as _;
 use clap::Args;
-use raystone::gpu::{self, Gpu, KernelLibrary};
 use raystone::measure::atomic::write_atomic;
 use raystone::report::{stress_tables, write_stress_page};
+use raystone::run::Registries;
 use raystone::stress::mutants::{self, Options, Outcome};
 use raystone::stress::record::{Record, write};
 use raystone::stress::{Settings, run};
@@ -43,7 +43,7 @@ pub struct Stress {
     /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// A model to shoot at from inside, its holes closed [default: the Stanford bunny]
+    /// A model to shoot at from inside, its holes closed [default: none]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Run the planted faults instead: each must turn a check red
@@ -63,11 +63,12 @@ impl Stress {
         }
         let settings = self.settings();
         settings.check().map_err(Failure::input)?;
-        let mut gpus = vec![self.open()?];
+        let registries = Registries::default();
+        let mut gpus = vec![self.device.open(&registries)?];
         // The host does most of the work of a software adapter one thread at a time.
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         if gpus[0].is_software() && cores > 1 {
-            gpus.push(self.open()?);
+            gpus.push(self.device.open(&registries)?);
         }
         let start = Instant::now();
         let progress = |what: &str| eprintln!("{:6.1} s  {what}", start.elapsed().as_secs_f64());
@@ -83,15 +84,6 @@ impl Stress {
             true => ExitCode::from(FAILED),
             false => ExitCode::SUCCESS,
         })
-    }
-
-    fn open(&self) -> Result<Gpu, Failure> {
-        let mut kernels = KernelLibrary::default();
-        if let Some(folder) = &self.device.kernels {
-            kernels = kernels.with_folder(folder)?;
-        }
-        let choice = self.device.adapter.clone().unwrap_or_default();
-        Ok(gpu::open(&choice, kernels)?)
     }
 
     /// Runs the faults, prints their table and writes `mutants.jsonl`.
@@ -136,7 +128,7 @@ impl Stress {
         if !self.family.is_empty() && self.shots.is_none() {
             settings.shots = 0;
         }
-        settings.model = self.model.clone().unwrap_or(settings.model);
+        settings.model = self.model.clone();
         settings
     }
 }

@@ -8,8 +8,10 @@ use std::fmt;
 pub struct StructureCell {
     /// What is traced.
     pub scene: Variant,
-    /// The structure.
+    /// The structure; its label ends with the kernels', unless they are the embedded ones.
     pub accel: Variant,
+    /// The kernels.
+    pub kernels: Variant,
 }
 
 /// A sampler on a scene: its error is measured.
@@ -21,8 +23,10 @@ pub struct SamplerCell {
     pub integrator: Variant,
     /// The sequence.
     pub sequence: Variant,
-    /// The decorrelation.
+    /// The decorrelation; its label ends with the kernels', unless they are the embedded ones.
     pub decorrelation: Variant,
+    /// The kernels.
+    pub kernels: Variant,
     /// Whether each seed gives another image.
     pub randomised: bool,
     /// Renders needed: all replicates, or one if the sampler is deterministic.
@@ -34,14 +38,16 @@ pub struct SamplerCell {
 pub struct TimeCell {
     /// What is traced.
     pub scene: Variant,
-    /// The structure.
+    /// The structure; its label ends with the kernels', unless they are the embedded ones.
     pub accel: Variant,
     /// The sequence.
     pub sequence: Variant,
-    /// The decorrelation.
+    /// The decorrelation, labelled as the structure.
     pub decorrelation: Variant,
     /// What is computed.
     pub integrator: Variant,
+    /// The kernels.
+    pub kernels: Variant,
 }
 
 /// A sampler's stream: its star discrepancy is measured.
@@ -49,8 +55,10 @@ pub struct TimeCell {
 pub struct StreamCell {
     /// The sequence.
     pub sequence: Variant,
-    /// The decorrelation.
+    /// The decorrelation; its label ends with the kernels', unless they are the embedded ones.
     pub decorrelation: Variant,
+    /// The kernels.
+    pub kernels: Variant,
     /// Whether each seed gives another point set.
     pub randomised: bool,
 }
@@ -82,6 +90,7 @@ impl fmt::Display for TimeCell {
             sequence,
             decorrelation,
             integrator,
+            ..
         } = self;
         write!(
             f,

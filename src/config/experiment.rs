@@ -55,6 +55,14 @@ pub struct SppRange {
     pub last: u32,
 }
 
+impl Experiment {
+    /// Width of an image over its height.
+    pub fn aspect(&self) -> f32 {
+        let [width, height] = self.resolution;
+        width as f32 / height as f32
+    }
+}
+
 impl SppRange {
     /// The numbers of samples per pixel, ascending.
     pub fn counts(self) -> impl Iterator<Item = u32> {
@@ -80,6 +88,8 @@ pub struct Axes {
     pub decorrelation: Vec<Variant>,
     /// Integrators.
     pub integrator: Vec<Variant>,
+    /// Folders of kernels; the name of the embedded ones is empty.
+    pub kernels: Vec<Variant>,
 }
 
 impl Axes {
@@ -91,6 +101,7 @@ impl Axes {
             Axis::Sequence => &self.sequence,
             Axis::Decorrelation => &self.decorrelation,
             Axis::Integrator => &self.integrator,
+            Axis::Kernels => &self.kernels,
         }
     }
 }

@@ -16,16 +16,19 @@ pub enum Axis {
     Decorrelation,
     /// What is computed from the hits.
     Integrator,
+    /// The kernels that all this runs with.
+    Kernels,
 }
 
 impl Axis {
     /// All axes, in the order of tables and plans.
-    pub const ALL: [Axis; 5] = [
+    pub const ALL: [Axis; 6] = [
         Axis::Scene,
         Axis::Accel,
         Axis::Sequence,
         Axis::Decorrelation,
         Axis::Integrator,
+        Axis::Kernels,
     ];
 
     /// The key under `[axes]`, and the name of the section with parameters.
@@ -36,6 +39,7 @@ impl Axis {
             Axis::Sequence => "sequence",
             Axis::Decorrelation => "decorrelation",
             Axis::Integrator => "integrator",
+            Axis::Kernels => "kernels",
         }
     }
 
@@ -134,6 +138,12 @@ impl fmt::Display for Kind {
             Self::Names(Axis::Scene) => {
                 write!(f, "a list of built-in scenes and paths of models")
             }
+            Self::Names(Axis::Kernels) => {
+                write!(
+                    f,
+                    "a list of folders with kernels, `\"\"` for the embedded ones"
+                )
+            }
             Self::Names(axis) => write!(f, "a list of {axis} names"),
             Self::Patterns(axis) => write!(f, "one {axis} pattern or a list of them"),
         }
@@ -219,6 +229,7 @@ pub const KEYS: &[Key] = &[
     key("axes", "sequence", Kind::Names(Axis::Sequence), None, "Sample sequences."),
     key("axes", "decorrelation", Kind::Names(Axis::Decorrelation), Some("[\"none\"]"), "How the pixels' sample points are made different."),
     key("axes", "integrator", Kind::Names(Axis::Integrator), Some("[\"path\"]"), "What is computed from the hits."),
+    key("axes", "kernels", Kind::Names(Axis::Kernels), Some("[\"\"]"), "Folders whose kernels (`*.wesl`) replace the embedded ones of the same path, or join them, relative to the current directory; `\"\"` are the embedded ones."),
     key("camera", "eye", Kind::Vector, None, "Position of the pinhole, scene units."),
     key("camera", "target", Kind::Vector, None, "Point that projects to the centre of the image, scene units."),
     key("camera", "up", Kind::Vector, Some("[0, 1, 0]"), "Up direction; not parallel to the viewing direction."),
@@ -230,7 +241,8 @@ pub const KEYS: &[Key] = &[
     key("exclude", "accel", Kind::Patterns(Axis::Accel), None, "… with these structures …"),
     key("exclude", "sequence", Kind::Patterns(Axis::Sequence), None, "… these sequences …"),
     key("exclude", "decorrelation", Kind::Patterns(Axis::Decorrelation), None, "… these decorrelations …"),
-    key("exclude", "integrator", Kind::Patterns(Axis::Integrator), None, "… and these integrators are left out."),
+    key("exclude", "integrator", Kind::Patterns(Axis::Integrator), None, "… these integrators …"),
+    key("exclude", "kernels", Kind::Patterns(Axis::Kernels), None, "… and these kernels are left out."),
     key("reference", "spp", integer(2, 1 << 24), Some("4096"), "Samples per pixel of the reference image, both halves together."),
     key("reference", "sequence", Kind::Name(Axis::Sequence), Some("\"pixel-hash\""), "Sequence of the reference, with its default parameters."),
     key("reference", "decorrelation", Kind::Name(Axis::Decorrelation), Some("\"none\""), "Decorrelation of the reference, with its default parameters."),

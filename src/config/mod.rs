@@ -152,7 +152,7 @@ pub struct Parameter {
 pub type ParameterSchema = Vec<Parameter>;
 
 /// A registry entry with all its parameters set.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Variant {
     /// Name in the registry.
     pub name: String,
@@ -162,6 +162,29 @@ pub struct Variant {
     /// parameters that differ from the default.
     pub label: String,
 }
+
+impl Variant {
+    /// What records call these kernels: nothing if they are the embedded ones.
+    pub fn kernels_label(&self) -> &str {
+        match self.name.as_str() {
+            "" => "",
+            _ => &self.label,
+        }
+    }
+
+    /// This variant run with `kernels`: where they are not the embedded ones, the label ends with theirs.
+    #[must_use]
+    pub fn with_kernels(mut self, kernels: &Variant) -> Self {
+        if !kernels.name.is_empty() {
+            self.label += KERNELS_MARK;
+            self.label += &kernels.label;
+        }
+        self
+    }
+}
+
+/// What stands between a name and its kernels in labels.
+pub const KERNELS_MARK: &str = " @";
 
 impl fmt::Display for Variant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -205,6 +228,7 @@ impl Catalogue {
             Axis::Sequence => &self.sequence,
             Axis::Decorrelation => &self.decorrelation,
             Axis::Integrator => &self.integrator,
+            Axis::Kernels => &[],
         }
     }
 }

@@ -31,6 +31,14 @@ pub(super) fn parse(
         true => run.text("name")?.to_owned(),
         false => file_stem(file),
     };
+    if name.contains(char::is_control) {
+        return Err(ConfigError::OutOfRange {
+            at: run.place("name"),
+            key: "run.name".to_owned(),
+            value: format!("{name:?}"),
+            expected: "a text without control characters".to_owned(),
+        });
+    }
     let axes = reader.axes()?;
     let experiment = Experiment {
         name,
@@ -184,6 +192,7 @@ impl<'t> Reader<'t> {
             sequence: self.axis(Axis::Sequence)?,
             decorrelation: self.axis(Axis::Decorrelation)?,
             integrator: self.axis(Axis::Integrator)?,
+            kernels: self.axis(Axis::Kernels)?,
         })
     }
 
@@ -227,7 +236,7 @@ impl<'t> Reader<'t> {
         }
         let replaced = matches!(axes.place(axis.name()), Place::Override(_));
         check_on_axis(axis, parameters, &used, replaced)?;
-        if axis == Axis::Scene {
+        if matches!(axis, Axis::Scene | Axis::Kernels) {
             variants::shorten_labels(&mut variants);
         }
         Ok(variants)

@@ -28,6 +28,8 @@ pub struct Skipped {
 pub struct Plan {
     /// Scenes that at least one cell needs.
     pub scenes: Vec<Variant>,
+    /// Kernels that at least one cell needs.
+    pub kernels: Vec<Variant>,
     /// Structures to build, gate and trace.
     pub structures: Vec<StructureCell>,
     /// Samplers whose error is measured.
@@ -88,7 +90,7 @@ impl Plan {
             points.retain(|point| point.refusal(&is_randomised).is_none());
             points
         };
-        let structures = points(&[Axis::Scene, Axis::Accel]);
+        let structures = points(&[Axis::Scene, Axis::Accel, Axis::Kernels]);
         let structures: Vec<_> = structures.iter().map(Point::structure).collect();
         let replicates = |cell: &SamplerCell| match cell.randomised {
             true => experiment.replicates,
@@ -98,16 +100,18 @@ impl Plan {
         for point in points(&SAMPLER_AXES) {
             let mut cell = point.sampler(&is_randomised);
             cell.replicates = replicates(&cell);
-            match structures.iter().any(|s| s.scene == cell.scene) {
+            let traces = |s: &StructureCell| s.scene == cell.scene && s.kernels == cell.kernels;
+            match structures.iter().any(traces) {
                 true => samplers.push(cell),
                 false => skipped.push(untraceable(&cell)),
             }
         }
         let times: Vec<_> = points(&Axis::ALL).iter().map(Point::time).collect();
-        let streams = points(&[Axis::Sequence, Axis::Decorrelation]);
+        let streams = points(&[Axis::Sequence, Axis::Decorrelation, Axis::Kernels]);
         let streams = streams.iter().map(|point| point.stream(&is_randomised));
         let mut plan = Self {
             scenes: axes.scene.clone(),
+            kernels: axes.kernels.clone(),
             renders_full_product: full_product(&times, experiment.replicates, &is_randomised),
             renders_planned: samplers.iter().map(|s| s.replicates as usize).sum(),
             structures,
@@ -118,6 +122,12 @@ impl Plan {
         };
         plan.scenes
             .retain(|scene| plan.structures.iter().any(|cell| cell.scene == *scene));
+        plan.kernels.retain(|kernels| {
+            let mut structures = plan.structures.iter();
+            let mut streams = plan.streams.iter();
+            structures.any(|cell| cell.kernels == *kernels)
+                || streams.any(|cell| cell.kernels == *kernels)
+        });
         if let (true, Some(first)) = (plan.times.is_empty(), refused.first()) {
             return Err(ConfigError::NothingLeft {
                 file: experiment.source.clone(),
@@ -135,6 +145,18 @@ impl Plan {
             });
         }
         Ok(plan)
+    }
+
+    /// All cells of a scene, left out for this reason.
+    pub fn all_of(&self, scene: &Variant, reason: String) -> Skipped {
+        let structures = self.structures.iter().filter(|c| c.scene == *scene).count();
+        let samplers = self.samplers.iter().filter(|c| c.scene == *scene).count();
+        let times = self.times.iter().filter(|c| c.scene == *scene).count();
+        Skipped {
+            cell: format!("{scene}: all structures, samplers and times"),
+            reason,
+            cells: structures + samplers + times,
+        }
     }
 
     /// The plan in words, for `--dry-run`.
@@ -210,18 +232,19 @@ fn check_size(experiment: &Experiment) -> Result<(), ConfigError> {
     })
 }
 
-const SAMPLER_AXES: [Axis; 4] = [
+const SAMPLER_AXES: [Axis; 5] = [
     Axis::Scene,
     Axis::Integrator,
     Axis::Sequence,
     Axis::Decorrelation,
+    Axis::Kernels,
 ];
 
 /// A sampler that stays visible although no structure is left for its scene.
 fn untraceable(cell: &SamplerCell) -> Skipped {
     Skipped {
         cell: cell.to_string(),
-        reason: "no structure is left that could trace this scene".to_owned(),
+        reason: "no structure is left that could trace this scene with these kernels".to_owned(),
         cells: 1,
     }
 }
@@ -288,7 +311,7 @@ fn excluded(
 
 /// A point of the product of some axes.
 #[derive(Clone, Copy)]
-struct Point<'a>([Option<&'a Variant>; 5]);
+struct Point<'a>([Option<&'a Variant>; Axis::ALL.len()]);
 
 impl Point<'_> {
     fn get(&self, axis: Axis) -> Option<&Variant> {
@@ -303,10 +326,17 @@ impl Point<'_> {
         }
     }
 
+    /// The same, named after the kernels, too.
+    fn with_kernels(&self, axis: Axis) -> Variant {
+        self.variant(axis)
+            .with_kernels(&self.variant(Axis::Kernels))
+    }
+
     fn structure(&self) -> StructureCell {
         StructureCell {
             scene: self.variant(Axis::Scene),
-            accel: self.variant(Axis::Accel),
+            accel: self.with_kernels(Axis::Accel),
+            kernels: self.variant(Axis::Kernels),
         }
     }
 
@@ -326,6 +356,7 @@ impl Point<'_> {
         let StreamCell {
             sequence,
             decorrelation,
+            kernels,
             randomised,
         } = self.stream(is_randomised);
         SamplerCell {
@@ -333,6 +364,7 @@ impl Point<'_> {
             integrator: self.variant(Axis::Integrator),
             sequence,
             decorrelation,
+            kernels,
             randomised,
             replicates: 1,
         }
@@ -341,10 +373,11 @@ impl Point<'_> {
     fn time(&self) -> TimeCell {
         TimeCell {
             scene: self.variant(Axis::Scene),
-            accel: self.variant(Axis::Accel),
+            accel: self.with_kernels(Axis::Accel),
             sequence: self.variant(Axis::Sequence),
-            decorrelation: self.variant(Axis::Decorrelation),
+            decorrelation: self.with_kernels(Axis::Decorrelation),
             integrator: self.variant(Axis::Integrator),
+            kernels: self.variant(Axis::Kernels),
         }
     }
 
@@ -353,18 +386,19 @@ impl Point<'_> {
         is_randomised: &impl Fn(&Variant, &Variant) -> Result<bool, String>,
     ) -> StreamCell {
         let sequence = self.variant(Axis::Sequence);
-        let decorrelation = self.variant(Axis::Decorrelation);
+        let decorrelation = self.with_kernels(Axis::Decorrelation);
         StreamCell {
             randomised: is_randomised(&sequence, &decorrelation) == Ok(true),
             sequence,
             decorrelation,
+            kernels: self.variant(Axis::Kernels),
         }
     }
 }
 
 /// All points of the product of the axes in `which`, the last one running fastest.
 fn product<'a>(axes: &'a Axes, which: &[Axis]) -> Vec<Point<'a>> {
-    let mut points = vec![Point([None; 5])];
+    let mut points = vec![Point([None; Axis::ALL.len()])];
     for &axis in which {
         points = points
             .iter()

@@ -6,6 +6,7 @@
 
 use super::error::{ConfigError, Place};
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 use toml::de::{DeTable, DeValue};
 
@@ -68,9 +69,38 @@ pub(super) fn parse_file(text: &str, file: &str) -> Result<Table, ConfigError> {
     };
     let table = DeTable::parse(text).map_err(|error| ConfigError::Syntax {
         at: place(error.span().map_or(0, |span| span.start)),
-        message: one_line(error.message()),
+        message: match (error.span(), one_line(error.message())) {
+            (Some(span), message) if message.contains("duplicate key") => {
+                let first = first_of(text, &span).map(&place);
+                let first = first.map_or(String::new(), |at| format!(", given first in {at}"));
+                let name = text.get(span).unwrap_or_default();
+                format!("{message} `{name}`{first}")
+            }
+            (_, message) => message,
+        },
     })?;
     Ok(convert_table(table.get_ref(), &place))
+}
+
+/// Where the key that stands again at `again` was given first: the last key of that name before it.
+fn first_of(text: &str, again: &Range<usize>) -> Option<usize> {
+    let name = text.get(again.clone())?;
+    let line = text[..again.start].rfind('\n').map_or(0, |end| end + 1);
+    let before = DeTable::parse(&text[..line]).ok()?;
+    let mut starts = Vec::new();
+    key_starts(before.get_ref(), name, &mut starts);
+    starts.into_iter().max()
+}
+
+fn key_starts(table: &DeTable<'_>, name: &str, starts: &mut Vec<usize>) {
+    for (key, value) in table {
+        if key.get_ref() == name {
+            starts.push(key.span().start);
+        }
+        if let DeValue::Table(inner) = value.get_ref() {
+            key_starts(inner, name, starts);
+        }
+    }
 }
 
 /// Parses one `section.key=value` override into a tree with a single leaf.

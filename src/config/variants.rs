@@ -63,7 +63,7 @@ impl Entry {
     }
 }
 
-/// The entry called `name`; for scenes, also one made up for the path of a model.
+/// The entry called `name`; also one made up for the path of a model or a folder of kernels.
 pub(super) fn resolve(
     axis: Axis,
     name: &Item,
@@ -74,10 +74,15 @@ pub(super) fn resolve(
     if let Some(entry) = entries.iter().find(|entry| entry.name == text) {
         return Ok(entry.clone());
     }
-    if axis == Axis::Scene && is_path(text) {
+    let path_of = match axis {
+        Axis::Scene if is_path(text) => Some("model file"),
+        Axis::Kernels => Some("folder of kernels"),
+        _ => None,
+    };
+    if let Some(description) = path_of {
         return Ok(Entry {
             name: text.to_owned(),
-            description: "model file".to_owned(),
+            description: description.to_owned(),
             schema: Vec::new(),
         });
     }
@@ -98,6 +103,9 @@ fn is_path(text: &str) -> bool {
     text.contains(['/', '\\'])
         || extension.is_some_and(|e| MODEL_EXTENSIONS.contains(&e.to_lowercase().as_str()))
 }
+
+/// Label of the embedded kernels on their axis.
+const EMBEDDED: &str = "embedded";
 
 /// All variants of `entry`: the product of the values that `section` (one `[axis.NAME]`) lists.
 pub(super) fn expand(
@@ -226,19 +234,23 @@ fn value(key: &str, item: &Item, parameter: &Parameter) -> Result<ParamValue, Co
     })
 }
 
-/// Shortens the labels of scenes that are paths to the last part of the path where that part is
-/// told apart from all other labels.
+/// Shortens labels that are paths to the last part of the path where that part is told apart from all
+/// other labels. The empty path, that of the embedded kernels, is called [`EMBEDDED`].
 pub(super) fn shorten_labels(scenes: &mut [Variant]) {
     let short: Vec<String> = scenes
         .iter()
         .map(|scene| {
             let mut parts = scene.label.split(['/', '\\']);
             let last = parts.rfind(|part| !part.is_empty());
-            last.unwrap_or(&scene.label).to_owned()
+            match scene.label.is_empty() {
+                true => EMBEDDED.to_owned(),
+                false => last.unwrap_or(&scene.label).to_owned(),
+            }
         })
         .collect();
     for (i, scene) in scenes.iter_mut().enumerate() {
-        if short.iter().filter(|other| **other == short[i]).count() == 1 {
+        let is_only = short.iter().filter(|other| **other == short[i]).count() == 1;
+        if is_only || scene.label.is_empty() {
             scene.label.clone_from(&short[i]);
         }
     }

@@ -40,7 +40,8 @@ pub struct AdapterSummary {
     pub timestamps: bool,
 }
 
-/// An open device with everything kernels need.
+/// An open device with everything kernels need; a clone is the same device.
+#[derive(Clone)]
 pub struct Gpu {
     /// The device.
     pub device: wgpu::Device,
@@ -52,18 +53,20 @@ pub struct Gpu {
     pub limits: wgpu::Limits,
     /// Nanoseconds per timestamp tick; `None` where there are no timestamps.
     pub timestamp_period: Option<f32>,
+    /// Turns that the loops of an invocation may take in all: on a driver that ends them in silence
+    /// beyond that. Kernels then check that it did not happen.
+    pub loop_limit: Option<u32>,
     /// Kernel sources.
     pub kernels: KernelLibrary,
-    pub(super) pipelines: Mutex<PipelineCache>,
+    pub(super) pipelines: Arc<Mutex<PipelineCache>>,
     lost: Arc<Mutex<Option<String>>>,
 }
 
-fn instance() -> wgpu::Instance {
-    wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env())
-}
-
-fn backends() -> wgpu::Backends {
-    wgpu::Backends::from_env().unwrap_or(wgpu::Backends::all())
+fn instance(backends: wgpu::Backends) -> wgpu::Instance {
+    wgpu::Instance::new(wgpu::InstanceDescriptor {
+        backends,
+        ..wgpu::InstanceDescriptor::new_without_display_handle_from_env()
+    })
 }
 
 /// Rank of an adapter, best first.
@@ -78,8 +81,23 @@ fn rank(info: &wgpu::AdapterInfo) -> (u8, u8) {
     (device, u8::from(info.backend == wgpu::Backend::Gl))
 }
 
-fn enumerate(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
-    let mut found = pollster::block_on(instance.enumerate_adapters(backends()));
+/// Every adapter with compute shaders, best first. OpenGL is looked for only where nothing else
+/// answers, or `WGPU_BACKEND` asks for it: merely loading it makes some drivers print.
+fn enumerate() -> Vec<wgpu::Adapter> {
+    match wgpu::Backends::from_env() {
+        Some(asked) => enumerate_among(asked),
+        None => {
+            let found = enumerate_among(wgpu::Backends::all() - wgpu::Backends::GL);
+            match found.is_empty() {
+                true => enumerate_among(wgpu::Backends::GL),
+                false => found,
+            }
+        }
+    }
+}
+
+fn enumerate_among(backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
+    let mut found = pollster::block_on(instance(backends).enumerate_adapters(backends));
     found.retain(|a| {
         a.get_downlevel_capabilities()
             .flags
@@ -89,9 +107,10 @@ fn enumerate(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
     found
 }
 
-/// Every adapter with compute shaders, best first. `WGPU_BACKEND` narrows the search.
+/// Every adapter with compute shaders, best first; those of OpenGL only where there are no others.
+/// `WGPU_BACKEND` narrows the search.
 pub fn adapters() -> Vec<AdapterSummary> {
-    enumerate(&instance())
+    enumerate()
         .iter()
         .enumerate()
         .map(|(index, adapter)| AdapterSummary {
@@ -147,10 +166,9 @@ fn limits_to_ask(offer: &wgpu::Limits) -> wgpu::Limits {
 /// Opens the chosen adapter.
 ///
 /// # Errors
-/// No adapter, no such adapter, or the driver refuses a device.
+/// No adapter, no such adapter, the driver refuses a device, or its loops cannot be trusted.
 pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuError> {
-    let instance = instance();
-    let adapter = choose(enumerate(&instance), choice)?;
+    let adapter = choose(enumerate(), choice)?;
     let info = adapter.get_info();
     let limits = limits_to_ask(&adapter.limits());
     let features = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
@@ -181,19 +199,32 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
     let timestamp_period = features
         .contains(wgpu::Features::TIMESTAMP_QUERY)
         .then(|| queue.get_timestamp_period());
-    Ok(Gpu {
+    let mut gpu = Gpu {
         device,
         queue,
         info,
         limits,
         timestamp_period,
+        loop_limit: None,
         kernels,
-        pipelines: Mutex::default(),
+        pipelines: Arc::default(),
         lost,
-    })
+    };
+    gpu.loop_limit = super::probe::probe_loops(&gpu)?;
+    Ok(gpu)
 }
 
 impl Gpu {
+    /// The same device with other kernels: buffers may be bound by both, and what composes to the same
+    /// text is compiled once.
+    #[must_use]
+    pub fn with_kernels(&self, kernels: KernelLibrary) -> Self {
+        Self {
+            kernels,
+            ..self.clone()
+        }
+    }
+
     /// Whether the adapter is a software rasteriser.
     pub fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu

@@ -7,8 +7,10 @@
 use super::GpuError;
 use super::diagnose;
 use crate::accel::Intersection;
+use crate::config::{cell_hash, nearest};
 use crate::integrator::RayOffset;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use wesl::{BasicSourceMap, ModulePath, SourceMap, VirtualResolver, Wesl};
 
@@ -19,72 +21,119 @@ include!(concat!(env!("OUT_DIR"), "/embedded_kernels.rs"));
 pub struct KernelLibrary {
     /// Module path with slashes (`accel/bvh`) → where it came from and its text.
     files: BTreeMap<String, (PathBuf, String)>,
-    overridden: Vec<String>,
+    /// Modules of override folders.
+    overridden: BTreeSet<String>,
+    hash: String,
 }
 
 impl Default for KernelLibrary {
     fn default() -> Self {
+        let file = |name| PathBuf::from(format!("kernels/{name}.wesl"));
         let files = EMBEDDED
             .iter()
-            .map(|(name, text)| {
-                (
-                    (*name).to_owned(),
-                    (
-                        PathBuf::from(format!("kernels/{name}.wesl")),
-                        (*text).to_owned(),
-                    ),
-                )
-            })
+            .map(|(name, text)| ((*name).to_owned(), (file(name), (*text).to_owned())))
             .collect();
         Self {
             files,
-            overridden: Vec::new(),
+            overridden: BTreeSet::new(),
+            hash: String::new(),
         }
     }
 }
 
+/// Deepest folder below an override folder, which ends circles of links.
+const DEEPEST_FOLDER: usize = 8;
+
 impl KernelLibrary {
     /// Adds every `*.wesl` file below `folder`, replacing embedded files of the same relative path.
+    /// Files and folders whose names begin with a dot are passed over.
     ///
     /// # Errors
     /// The folder or a file in it cannot be read, or it holds no kernel.
     pub fn with_folder(mut self, folder: &Path) -> Result<Self, GpuError> {
-        let before = self.overridden.len();
-        self.add_folder(folder, folder)?;
-        if self.overridden.len() == before {
+        let mut found = BTreeMap::new();
+        collect(folder, DEEPEST_FOLDER, &mut found)?;
+        if found.is_empty() {
             return Err(GpuError::Kernel(format!(
                 "{}: no *.wesl file in this kernel folder",
                 folder.display()
             )));
         }
+        for (path, text) in found {
+            let relative = path
+                .strip_prefix(folder)
+                .unwrap_or(&path)
+                .with_extension("");
+            let parts = relative.components();
+            let name: Vec<_> = parts.map(|c| c.as_os_str().to_string_lossy()).collect();
+            self.overridden.insert(name.join("/"));
+            self.files.insert(name.join("/"), (path, text));
+        }
+        let texts = self.overridden.iter();
+        let texts = texts.filter_map(|name| Some((name.as_str(), self.text(name)?)));
+        self.hash = cell_hash(&texts.collect::<Vec<_>>());
         Ok(self)
     }
 
-    fn add_folder(&mut self, root: &Path, folder: &Path) -> Result<(), GpuError> {
-        let unreadable = |e: std::io::Error| GpuError::Kernel(format!("{}: {e}", folder.display()));
-        for entry in std::fs::read_dir(folder).map_err(unreadable)? {
-            let path = entry.map_err(unreadable)?.path();
-            if path.is_dir() {
-                self.add_folder(root, &path)?;
-            } else if path.extension().is_some_and(|e| e == "wesl") {
-                let text = std::fs::read_to_string(&path)
-                    .map_err(|e| GpuError::Kernel(format!("{}: {e}", path.display())))?;
-                let relative = path.strip_prefix(root).unwrap_or(&path).with_extension("");
-                let name: Vec<_> = relative
-                    .components()
-                    .map(|c| c.as_os_str().to_string_lossy())
-                    .collect();
-                let name = name.join("/");
-                self.overridden.push(name.clone());
-                self.files.insert(name, (path, text));
-            }
-        }
-        Ok(())
+    /// Modules that came from override folders, in alphabetical order.
+    pub fn overridden(&self) -> Vec<&str> {
+        self.overridden.iter().map(String::as_str).collect()
     }
 
-    /// Modules that came from override folders.
-    pub fn overridden(&self) -> &[String] {
-        &self.overridden
+    /// Whether a module of this name is in the program.
+    pub fn is_embedded(name: &str) -> bool {
+        EMBEDDED.iter().any(|(known, _)| *known == name)
+    }
+
+    /// BLAKE3 of the names and texts of all files of override folders; empty without any.
+    pub fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// Checks what can be checked of override folders before a kernel is composed.
+    ///
+    /// # Errors
+    /// A file that is no WESL, with its line, and a file that no kernel can be made with: it neither
+    /// replaces an embedded one, nor is it among `wanted`, nor does another file of the folders import it.
+    pub fn check(&self, wanted: &[String]) -> Result<(), GpuError> {
+        let mut imports = BTreeMap::new();
+        for name in &self.overridden {
+            let Some((path, text)) = self.files.get(name) else {
+                continue;
+            };
+            let parsed = diagnose::imports(path, text, name).map_err(GpuError::Kernel)?;
+            imports.insert(name.as_str(), parsed);
+        }
+        let is_root = |name: &&str| Self::is_embedded(name) || wanted.iter().any(|w| w == name);
+        let (mut reached, mut rest): (Vec<&str>, Vec<&str>) =
+            self.overridden().into_iter().partition(is_root);
+        while let Some(name) = reached.pop() {
+            let text = self.text(name).unwrap_or_default();
+            let is_imported = |other: &&str| {
+                let written_out = format!("package::{}::", other.replace('/', "::"));
+                let mut paths = imports.get(name).into_iter().flatten();
+                paths.any(|path| imports_it(path, other)) || text.contains(&written_out)
+            };
+            let (imported, others): (Vec<&str>, Vec<&str>) =
+                rest.into_iter().partition(is_imported);
+            reached.extend(imported);
+            rest = others;
+        }
+        let Some(lost) = rest.first() else {
+            return Ok(());
+        };
+        let known = EMBEDDED.iter().map(|(name, _)| *name);
+        let known = known.chain(wanted.iter().map(String::as_str));
+        let near = nearest(lost, known).unwrap_or_default();
+        let path = self
+            .files
+            .get(*lost)
+            .map(|(path, _)| path.display().to_string());
+        Err(GpuError::Kernel(format!(
+            "{}: this file replaces no kernel, and none imports it; did you mean `{near}.wesl`? \
+             (paths are relative to the folder given, upper and lower case count)",
+            path.unwrap_or_default()
+        )))
     }
 
     /// Names of all modules, with slashes.
@@ -161,6 +210,43 @@ impl KernelLibrary {
     }
 }
 
+/// Finds the kernels below a folder, with their texts.
+fn collect(
+    folder: &Path,
+    levels: usize,
+    found: &mut BTreeMap<PathBuf, String>,
+) -> Result<(), GpuError> {
+    let fault =
+        |path: &Path, what: &dyn Display| GpuError::Kernel(format!("{}: {what}", path.display()));
+    let entries = std::fs::read_dir(folder).map_err(|e| fault(folder, &e))?;
+    for entry in entries {
+        let path = entry.map_err(|e| fault(folder, &e))?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        if name.starts_with('.') {
+            continue;
+        } else if path.is_dir() {
+            let levels = levels.checked_sub(1);
+            let levels = levels.ok_or_else(|| fault(&path, &"too deep a kernel folder"))?;
+            collect(&path, levels, found)?;
+        } else if extension == "wesl" {
+            let text = std::fs::read_to_string(&path).map_err(|e| fault(&path, &e))?;
+            found.insert(path, text);
+        } else if ["wesl", "wgsl"].contains(&extension.to_lowercase().as_str()) {
+            return Err(fault(&path, &"kernels end in `.wesl`; rename or remove it"));
+        }
+    }
+    Ok(())
+}
+
+/// Whether the path of an import leads to this module or to something in it.
+fn imports_it(path: &[String], module: &str) -> bool {
+    let mut parts = path.iter();
+    module
+        .split('/')
+        .all(|part| parts.next().is_some_and(|p| p == part))
+}
+
 fn module_path(name: &str) -> Result<ModulePath, GpuError> {
     format!("package::{}", name.replace('/', "::"))
         .parse()
@@ -229,6 +315,11 @@ pub struct ComposedKernel {
 }
 
 impl ComposedKernel {
+    /// BLAKE3 of the composed text.
+    pub fn hash(&self) -> String {
+        blake3::hash(self.wgsl.as_bytes()).to_hex().to_string()
+    }
+
     /// The name that the author gave to a global, without the composition's mangling.
     pub(super) fn author_name<'a>(&'a self, mangled: &'a str) -> &'a str {
         self.map.get_decl(mangled).map_or(mangled, |(_, item)| item)

@@ -9,6 +9,7 @@ use super::GpuError;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use wesl::syntax::{ImportContent, PathOrigin, TranslationUnit};
 use wesl::{BasicSourceMap, SourceMap};
 
 type Paths = BTreeMap<String, PathBuf>;
@@ -58,6 +59,54 @@ fn import_of_missing_module<'a>(
     let names_it = |line: &str| line.contains("import ") && line.contains(missing);
     let line = source.lines().position(names_it)?;
     Some(format!("{}:{}", path.display(), line + 1))
+}
+
+/// The paths that a file's imports name, from the root of the package; what is imported stands last.
+///
+/// # Errors
+/// The text is no WESL: file, line and what stands there.
+pub(super) fn imports(file: &Path, text: &str, module: &str) -> Result<Vec<Vec<String>>, String> {
+    let unit = text.parse::<TranslationUnit>().map_err(|error| {
+        let start = error.span.range().start.min(text.len());
+        let line = text.as_bytes()[..start]
+            .iter()
+            .filter(|byte| **byte == b'\n')
+            .count();
+        let offending = text.lines().nth(line).unwrap_or_default().trim();
+        let what = error.error.to_string();
+        // The parser lists every token that it would have taken.
+        let what = what.split(", expected").next().unwrap_or_default();
+        format!("{}:{}: {what}\n    {offending}", file.display(), line + 1)
+    })?;
+    let mut paths = Vec::new();
+    for import in &unit.imports {
+        let mut base: Vec<String> = Vec::new();
+        if let Some(path) = &import.path {
+            if let PathOrigin::Relative(up) = path.origin {
+                let parts: Vec<&str> = module.split('/').collect();
+                let kept = parts.len().saturating_sub(up);
+                base.extend(parts[..kept].iter().map(|part| (*part).to_owned()));
+            }
+            base.extend(path.components.iter().cloned());
+        }
+        leaves(base, &import.content, &mut paths);
+    }
+    Ok(paths)
+}
+
+fn leaves(base: Vec<String>, content: &ImportContent, paths: &mut Vec<Vec<String>>) {
+    match content {
+        ImportContent::Item(item) => {
+            let name = item.ident.name().to_string();
+            paths.push(base.into_iter().chain([name]).collect());
+        }
+        ImportContent::Collection(imports) => {
+            for import in imports {
+                let path = base.iter().chain(&import.path).cloned().collect();
+                leaves(path, &import.content, paths);
+            }
+        }
+    }
 }
 
 /// Text without terminal escape sequences, since it goes into records too.

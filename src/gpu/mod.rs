@@ -7,6 +7,7 @@ mod adapter;
 mod compose;
 mod diagnose;
 mod dispatch;
+mod kernel_errors;
 mod pipeline;
 mod probe;
 mod uniform;
@@ -14,6 +15,8 @@ mod uniform;
 pub use adapter::{AdapterChoice, AdapterSummary, Gpu, adapters, open};
 pub use compose::{ComposedKernel, Composition, KernelLibrary};
 pub use dispatch::{Dispatch, Elapsed, groups_for};
+pub(crate) use kernel_errors::LOOPS_CUT;
+pub use kernel_errors::{KERNEL_ERRORS, kernel_errors};
 pub use pipeline::{Bindings, MAX_PARTS, Pipeline, TEXELS_PER_ROW, WORKGROUP_SIZE};
 pub use probe::{ArithmeticProbe, probe_arithmetic};
 pub use uniform::UniformValues;
@@ -81,6 +84,45 @@ pub enum GpuError {
         /// The adapter's limit.
         limit: u64,
     },
+    /// The driver ended loops early, and what was computed is wrong.
+    #[error(
+        "this driver ends loops in silence once an invocation's loops together took {limit} turns, and here they need more: fewer triangles, another structure or a newer driver help (`raystone doctor`)"
+    )]
+    LoopsCut {
+        /// [`Gpu::loop_limit`].
+        limit: u32,
+    },
+    /// The driver ends loops early, and no kernel can see it.
+    #[error(
+        "adapter `{adapter}` ends loops early ({turns} of {wanted} turns) in a way that kernels cannot notice: nothing it computes can be trusted; install another driver"
+    )]
+    LoopsUnsound {
+        /// Adapter name.
+        adapter: String,
+        /// Turns it took.
+        turns: u32,
+        /// Turns asked for.
+        wanted: u32,
+    },
+    /// Kernels raised the error word.
+    #[error("wrong on the device: {0}")]
+    Kernels(String),
+    /// A picture whose pixels did not take the samples that they were to take.
+    #[error(
+        "{wrong} pixels did not take the {wanted} samples of this block; the first is ({x}, {y}), which took {taken}"
+    )]
+    Samples {
+        /// Pixels concerned.
+        wrong: usize,
+        /// Samples asked for since the last sum that was taken over to the host.
+        wanted: u32,
+        /// Column of the first such pixel.
+        x: u32,
+        /// Its row.
+        y: u32,
+        /// Samples it took.
+        taken: f32,
+    },
     /// Validation or out-of-memory error from the driver.
     #[error("the driver refused: {0}")]
     Driver(String),
@@ -93,4 +135,12 @@ pub enum GpuError {
         /// How long was waited.
         seconds: u64,
     },
+}
+
+impl GpuError {
+    /// Whether the driver cannot run what was asked for, through no fault of it: such a cell is left
+    /// out.
+    pub fn is_refusal(&self) -> bool {
+        matches!(self, Self::LoopsCut { .. })
+    }
 }

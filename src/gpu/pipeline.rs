@@ -16,8 +16,8 @@ pub const TEXELS_PER_ROW: u32 = 8192;
 const TEXEL_BYTES: u64 = 16;
 const TEXEL_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
-/// Compiled pipelines by composition and runtime checks.
-pub(super) type PipelineCache = HashMap<(Composition, bool), Arc<Pipeline>>;
+/// Compiled pipelines by composition and runtime checks, then by the hash of the kernel library.
+pub(super) type PipelineCache = HashMap<(Composition, bool), BTreeMap<String, Arc<Pipeline>>>;
 
 #[derive(Debug, Clone, PartialEq)]
 enum BindingKind {
@@ -219,19 +219,28 @@ impl Gpu {
         composition: &Composition,
         runtime_checks: bool,
     ) -> Result<Arc<Pipeline>, GpuError> {
-        let key = (composition.clone(), runtime_checks);
-        if let Some(known) = self
-            .pipelines
-            .lock()
-            .ok()
-            .and_then(|cache| cache.get(&key).cloned())
-        {
-            return Ok(known);
+        let mut composition = composition.clone();
+        if self.loop_limit.is_some() {
+            composition = composition.feature("loops_cut", true);
         }
-        let kernel = self.kernels.compose(composition)?;
-        let pipeline = Arc::new(self.compile(kernel, runtime_checks)?);
+        let key = (composition, runtime_checks);
+        let library = self.kernels.hash();
+        let known = |is_it: &dyn Fn(&str, &Pipeline) -> bool| {
+            let cache = self.pipelines.lock().ok()?;
+            let mut known = cache.get(&key)?.iter();
+            known.find_map(|(library, p)| is_it(library, p).then(|| Arc::clone(p)))
+        };
+        if let Some(pipeline) = known(&|other, _| other == library) {
+            return Ok(pipeline);
+        }
+        let kernel = self.kernels.compose(&key.0)?;
+        let pipeline = match known(&|_, pipeline| pipeline.kernel.wgsl == kernel.wgsl) {
+            Some(pipeline) => pipeline,
+            None => Arc::new(self.compile(kernel, runtime_checks)?),
+        };
         if let Ok(mut cache) = self.pipelines.lock() {
-            cache.insert(key, Arc::clone(&pipeline));
+            let known = cache.entry(key).or_default();
+            known.insert(library.to_owned(), Arc::clone(&pipeline));
         }
         Ok(pipeline)
     }

@@ -1,9 +1,9 @@
-//! What the adapter's arithmetic does, found out at start.
+//! What the adapter's arithmetic and loops do, found out at start.
 
 use super::compose::Composition;
 use super::dispatch::{Dispatch, groups_for};
 use super::pipeline::Bindings;
-use super::{Gpu, GpuError};
+use super::{Gpu, GpuError, LOOPS_CUT, UniformValues};
 use crate::accel::triangle::product_error;
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +20,10 @@ pub struct ArithmeticProbe {
     /// [`crate::accel::triangle::product_error`].
     #[serde(default)]
     pub exact_products: bool,
+    /// Denormal numbers are kept, not taken for 0. Hits do not depend on it but for rays and scenes
+    /// of such sizes.
+    #[serde(default)]
+    pub denormals: bool,
 }
 
 impl ArithmeticProbe {
@@ -44,7 +48,17 @@ pub fn probe_arithmetic(gpu: &Gpu) -> Result<ArithmeticProbe, GpuError> {
             ((state >> 28) + 119) << 23 | (state & 0x007f_ffff) | (state << 4 & 0x8000_0000),
         )
     };
-    let input: Vec<[f32; 4]> = (0..COUNT).map(|_| [next(), next(), next(), 0.0]).collect();
+    // The fourth number is denormal or just not: halves of it are denormal.
+    let input: Vec<[f32; 4]> = (0..COUNT)
+        .map(|_| {
+            [
+                next(),
+                next(),
+                next(),
+                f32::from_bits(next().to_bits() & 0x00ff_ffff),
+            ]
+        })
+        .collect();
     let pipeline = gpu.pipeline(&Composition::new("common/probe"), true)?;
     let output = gpu.zeroed("probe_out", u64::from(COUNT) * 32)?;
     let mut bindings = Bindings::new();
@@ -69,5 +83,54 @@ pub fn probe_arithmetic(gpu: &Gpu) -> Result<ArithmeticProbe, GpuError> {
         exact_sqrt: all(|[a, ..]| a.abs().sqrt(), 3),
         exact_products: all(|[a, b, ..]| product_error(*a, *b, a * b), 4)
             && all(|[_, b, c, _]| product_error(*b, *c, b * c), 5),
+        denormals: all(|[.., d]| d * 0.5, 7),
     })
+}
+
+/// Turns of the loops that [`probe_loops`] runs: outer and inner.
+const LOOPS: [[u32; 2]; 2] = [[1, 1_000_000], [1000, 1000]];
+
+/// Turns that the loops of an invocation may take in all before the driver ends them in silence;
+/// `None` where a million turns are taken, in one loop and in two nested ones.
+///
+/// Mesa's software driver up to 22.3 has such a limit: 65,536 turns over all loops of a vector of
+/// invocations together (`LP_MAX_TGSI_LOOP_ITERATIONS` in its source). After that every loop ends
+/// with its first turn, which `check_loops` of `kernels/common/errors.wesl` notices.
+///
+/// # Errors
+/// The kernel does not run, or loops end early without the kernel's notice.
+pub(super) fn probe_loops(gpu: &Gpu) -> Result<Option<u32>, GpuError> {
+    let kernel = Composition::new("common/loops").feature("loops_cut", true);
+    let pipeline = gpu.pipeline(&kernel, true)?;
+    let mut limit = None;
+    for [outer, inner] in LOOPS {
+        let turns = gpu.zeroed("turns", 8)?;
+        let status = gpu.zeroed("status", 64)?;
+        let loops = UniformValues::new().u32("outer", outer).u32("inner", inner);
+        let mut bindings = Bindings::new();
+        bindings
+            .buffer("turns", &turns)
+            .buffer("status", &status)
+            .uniform("loops", loops);
+        gpu.run(&Dispatch {
+            pipeline: &pipeline,
+            bindings: &bindings,
+            groups: [1, 1, 1],
+        })?;
+        let taken = gpu.read::<u32>(&turns)?[0];
+        let noticed = gpu.read::<u32>(&status)?[0] & LOOPS_CUT != 0;
+        let wanted = outer * inner;
+        if taken == wanted && !noticed {
+            continue;
+        }
+        if !noticed {
+            return Err(GpuError::LoopsUnsound {
+                adapter: gpu.info.name.clone(),
+                turns: taken,
+                wanted,
+            });
+        }
+        limit.get_or_insert(taken);
+    }
+    Ok(limit)
 }

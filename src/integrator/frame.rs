@@ -21,6 +21,8 @@ pub struct Frame {
 /// The rows and samples of one dispatch.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slice {
+    /// First row of the band whose sums are bound.
+    pub band_row: u32,
     pub first_row: u32,
     pub rows: u32,
     pub first_sample: u32,
@@ -49,6 +51,7 @@ impl Frame {
             .vec("environment", &scene.environment)
             .u32("width", self.width)
             .u32("height", self.height)
+            .u32("band_row", slice.band_row)
             .u32("first_row", slice.first_row)
             .u32("rows", slice.rows)
             .u32("first_sample", slice.first_sample)
@@ -60,5 +63,8 @@ impl Frame {
             .f32("ao_radius", self.ao_radius)
             .f32("transform_scale", scene.transform_error.scale)
             .f32("transform_shift", scene.transform_error.shift)
+            .vec("sky_up", &scene.daylight.up.to_array())
+            .vec("sky_key", &scene.daylight.key.to_array())
+            .f32("sky_reach", scene.daylight.reach)
     }
 }

@@ -9,7 +9,9 @@ mod traced;
 
 pub use frame::Frame;
 pub use offset::RayOffset;
-pub use render::{RAY_COUNT_CLASSES, RenderJob, Renderer, Snapshot, with_sampler};
+pub use render::{
+    BLOCK_SAMPLES, RAY_COUNT_CLASSES, RenderJob, Renderer, Snapshot, rounding_bound, with_sampler,
+};
 pub use tables::{SceneBuffers, SceneFeatures};
 pub use traced::Traced;
 

@@ -1,5 +1,8 @@
 //! The renderer: runs an image kernel in slices of about a quarter of a second and keeps the sum at
 //! every power of two of samples, so that one run yields the error at spp = 1, 2, 4, ….
+//!
+//! Every image that it hands out was checked: no kernel raised its error word, and every pixel took
+//! exactly the samples asked for.
 
 use super::Integrator;
 use super::frame::{Frame, Slice};
@@ -9,7 +12,8 @@ use crate::config::Params;
 use crate::gpu::{Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline};
 use crate::measure::image::Image;
 use crate::sampling::Sampler;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Names of the ray classes that image kernels count, in the kernel's order.
@@ -19,6 +23,19 @@ pub const RAY_COUNT_CLASSES: [&str; 4] = ["primary", "shadow", "ao", "bounce"];
 const SLICE_MS: f64 = 250.0;
 /// Samples per millisecond that the first slice assumes: slow, so that it is short.
 const CAUTIOUS_RATE: f64 = 100.0;
+
+/// Samples of a pixel that are summed in f32 on the device before the host adds the sum in f64. Blocks
+/// begin at multiples of it, so that an image does not depend on slices.
+pub const BLOCK_SAMPLES: u32 = 256;
+
+/// How far rounding alone may move a pixel of an image of `spp` samples, relative to the mean of the
+/// samples' magnitudes: one rounding per addition within a block, and one of the mean to f32 (N. Higham,
+/// "Accuracy and Stability of Numerical Algorithms", 2nd ed., 2002, section 4.2). What f64 adds to that
+/// stays below a millionth of it.
+pub fn rounding_bound(spp: u32) -> f64 {
+    let roundings = f64::from(spp.min(BLOCK_SAMPLES));
+    roundings * 0.5 * f64::from(f32::EPSILON) * (1.0 + 1e-6)
+}
 
 /// One image to render.
 pub struct RenderJob<'a> {
@@ -43,6 +60,13 @@ pub struct Snapshot {
     pub image: Image,
 }
 
+/// Rows whose sums fit into one buffer.
+struct Band {
+    rows: Range<u32>,
+    /// Sum of radiance and number of samples, per pixel.
+    sums: wgpu::Buffer,
+}
+
 /// A compiled job on one scene and structure.
 pub struct Renderer<'a> {
     gpu: &'a Gpu,
@@ -50,12 +74,35 @@ pub struct Renderer<'a> {
     frame: Frame,
     pipeline: Arc<Pipeline>,
     bindings: Bindings,
-    accumulation: wgpu::Buffer,
+    bands: Vec<Band>,
     status: wgpu::Buffer,
+    /// Samples per pixel since the last reset.
+    done: Cell<u32>,
+    /// Of these, how many the sums on the device hold.
+    pending: Cell<u32>,
+    /// The sums of the blocks before; empty if there were none.
+    blocks: RefCell<Vec<[f64; 3]>>,
     /// Samples per millisecond seen so far.
     rate: Cell<f64>,
     /// GPU milliseconds and wall milliseconds of all dispatches since the last reset.
     spent: Cell<Elapsed>,
+}
+
+/// Buffers for the sums of a frame, as many rows in each as the adapter can bind.
+fn bands(gpu: &Gpu, frame: &Frame) -> Result<Vec<Band>, GpuError> {
+    let row_bytes = u64::from(frame.width) * 16;
+    // Slices are multiples of eight rows, the height of a workgroup.
+    let fitting = gpu.limits.max_storage_buffer_binding_size / row_bytes.max(1) / 8 * 8;
+    let rows = fitting.clamp(8, 1 << 31) as usize;
+    (0..frame.height)
+        .step_by(rows)
+        .map(|start| {
+            let rows = start..frame.height.min(start + rows as u32);
+            let bytes = u64::from(rows.end - rows.start) * row_bytes;
+            let sums = gpu.zeroed("accumulation", bytes)?;
+            Ok(Band { rows, sums })
+        })
+        .collect()
 }
 
 /// The composition of a job's kernel.
@@ -97,7 +144,8 @@ impl<'a> Renderer<'a> {
     /// Compiles the job's kernel and makes its buffers.
     ///
     /// # Errors
-    /// The kernel does not compose or compile, or a buffer is too large.
+    /// The kernel does not compose or compile, or the scene or one row of the image is too large for a
+    /// buffer.
     pub fn new(
         gpu: &'a Gpu,
         scene: &'a SceneBuffers,
@@ -109,14 +157,10 @@ impl<'a> Renderer<'a> {
             &composition(traced, scene, job, ray_counts),
             job.runtime_checks,
         )?;
-        let pixels = u64::from(job.frame.width) * u64::from(job.frame.height);
-        let accumulation = gpu.zeroed("accumulation", pixels * 16)?;
+        let bands = bands(gpu, &job.frame)?;
         let status = gpu.zeroed("status", 64)?;
         let mut bindings = scene.bindings.merged(&traced.bindings);
-        bindings
-            .buffer("accumulation", &accumulation)
-            .buffer("status", &status);
-        bindings.buffer(
+        bindings.buffer("status", &status).buffer(
             "sampler_table",
             &gpu.storage("sampler_table", job.sampler.table.words())?,
         );
@@ -126,8 +170,11 @@ impl<'a> Renderer<'a> {
             frame: job.frame,
             pipeline,
             bindings,
-            accumulation,
+            bands,
             status,
+            done: Cell::new(0),
+            pending: Cell::new(0),
+            blocks: RefCell::default(),
             rate: Cell::new(CAUTIOUS_RATE),
             spent: Cell::default(),
         })
@@ -149,59 +196,107 @@ impl<'a> Renderer<'a> {
         &self.pipeline.kernel.wgsl
     }
 
+    /// BLAKE3 of that text.
+    pub fn kernel_hash(&self) -> String {
+        self.pipeline.kernel.hash()
+    }
+
     /// Clears the sum, the error word, the ray counts and the clock.
     pub fn reset(&self) {
         let mut encoder = self
             .gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.clear_buffer(&self.accumulation, 0, None);
         encoder.clear_buffer(&self.status, 0, None);
         self.gpu.queue.submit([encoder.finish()]);
+        self.clear_sums();
+        self.done.set(0);
+        self.blocks.borrow_mut().clear();
         self.spent.set(Elapsed {
             gpu_ms: self.gpu.timestamp_period.map(|_| 0.0),
             wall_ms: 0.0,
         });
     }
 
+    fn clear_sums(&self) {
+        let mut encoder = self
+            .gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        for band in &self.bands {
+            encoder.clear_buffer(&band.sums, 0, None);
+        }
+        self.gpu.queue.submit([encoder.finish()]);
+        self.pending.set(0);
+    }
+
     /// Adds samples `first … first + count - 1` to every pixel, in slices.
     ///
     /// # Errors
-    /// The device is lost, hangs, or the driver complains.
+    /// The device is lost, hangs, or the driver complains; a block of samples that ended is not whole.
     pub fn add_samples(&self, first: u32, count: u32, seed: u32) -> Result<(), GpuError> {
-        let row_samples = f64::from(self.frame.width);
         let mut sample = first;
-        while sample < first + count {
-            let mut row = 0;
-            let budget = (self.rate.get() * SLICE_MS / row_samples).max(1.0);
-            let whole = f64::from(self.frame.height);
-            let samples = ((budget / whole) as u32).clamp(1, first + count - sample);
-            while row < self.frame.height {
-                let budget = (self.rate.get() * SLICE_MS / row_samples).max(8.0);
-                let rows = ((budget / f64::from(samples)) as u32 / 8 * 8)
-                    .clamp(8, self.frame.height.max(8));
-                let rows = rows.min(self.frame.height - row);
-                self.run_slice(&Slice {
-                    first_row: row,
-                    rows,
-                    first_sample: sample,
-                    samples,
-                    seed,
-                })?;
-                row += rows;
+        let end = first + count;
+        while sample < end {
+            if sample.is_multiple_of(BLOCK_SAMPLES) && self.pending.get() > 0 {
+                self.close_block()?;
+            }
+            let left_in_block = BLOCK_SAMPLES - sample % BLOCK_SAMPLES;
+            let samples = self.samples_at_once().min(left_in_block).min(end - sample);
+            for band in &self.bands {
+                self.add_to_band(band, sample, samples, seed)?;
             }
             sample += samples;
+            self.done.set(self.done.get() + samples);
+            self.pending.set(self.pending.get() + samples);
         }
         Ok(())
     }
 
-    fn run_slice(&self, slice: &Slice) -> Result<(), GpuError> {
+    /// Samples of all pixels that a dispatch has time for. Where a driver ends loops, one alone, so
+    /// that only a sample that needs more turns than the driver allows is refused.
+    fn samples_at_once(&self) -> u32 {
+        if self.gpu.loop_limit.is_some() {
+            return 1;
+        }
+        let pixels = f64::from(self.frame.width) * f64::from(self.frame.height);
+        ((self.rate.get() * SLICE_MS / pixels) as u32).max(1)
+    }
+
+    fn add_to_band(
+        &self,
+        band: &Band,
+        first_sample: u32,
+        samples: u32,
+        seed: u32,
+    ) -> Result<(), GpuError> {
         let mut bindings = self.bindings.clone();
+        bindings.buffer("accumulation", &band.sums);
+        let mut row = band.rows.start;
+        while row < band.rows.end {
+            let row_samples = f64::from(self.frame.width) * f64::from(samples);
+            let fitting = (self.rate.get() * SLICE_MS / row_samples) as u32;
+            let rows = (fitting / 8 * 8).max(8).min(band.rows.end - row);
+            let slice = Slice {
+                band_row: band.rows.start,
+                first_row: row,
+                rows,
+                first_sample,
+                samples,
+                seed,
+            };
+            self.run_slice(&mut bindings, &slice)?;
+            row += rows;
+        }
+        Ok(())
+    }
+
+    fn run_slice(&self, bindings: &mut Bindings, slice: &Slice) -> Result<(), GpuError> {
         bindings.uniform("frame", self.frame.uniform(self.scene, slice));
         let groups = [self.frame.width.div_ceil(8), slice.rows.div_ceil(8), 1];
         let elapsed = self.gpu.run(&Dispatch {
             pipeline: &self.pipeline,
-            bindings: &bindings,
+            bindings,
             groups,
         })?;
         let work = f64::from(self.frame.width) * f64::from(slice.rows) * f64::from(slice.samples);
@@ -222,7 +317,7 @@ impl<'a> Renderer<'a> {
     /// Renders from nothing and returns the images after each of `spps` (ascending) samples.
     ///
     /// # Errors
-    /// The device is lost, hangs, or the driver complains.
+    /// As for [`Renderer::image`], or the driver complains.
     pub fn render(&self, spps: &[u32], seed: u32) -> Result<Vec<Snapshot>, GpuError> {
         self.reset();
         let mut done = 0;
@@ -241,19 +336,67 @@ impl<'a> Renderer<'a> {
     /// The mean so far.
     ///
     /// # Errors
-    /// The device is lost or hangs.
+    /// A kernel raised its error word, a pixel did not take every sample, or the device is lost or
+    /// hangs.
     pub fn image(&self) -> Result<Image, GpuError> {
-        let sums: Vec<[f32; 4]> = self.gpu.read(&self.accumulation)?;
-        let pixels = sums
-            .iter()
-            .take((self.frame.width * self.frame.height) as usize)
-            .map(|[r, g, b, n]| [r / n, g / n, b / n])
-            .collect();
+        let mut totals = self.blocks.borrow().clone();
+        self.add_pending(&mut totals)?;
+        let count = f64::from(self.done.get());
+        let mean = |total: &[f64; 3]| total.map(|sum| (sum / count) as f32);
         Ok(Image {
             width: self.frame.width,
             height: self.frame.height,
-            pixels,
+            pixels: totals.iter().map(mean).collect(),
         })
+    }
+
+    /// Takes the sums of a whole block over to the host.
+    fn close_block(&self) -> Result<(), GpuError> {
+        self.add_pending(&mut self.blocks.borrow_mut())?;
+        self.clear_sums();
+        Ok(())
+    }
+
+    /// Whether everything since the last reset is sound.
+    ///
+    /// # Errors
+    /// As for [`Renderer::image`].
+    pub fn check(&self) -> Result<(), GpuError> {
+        self.add_pending(&mut Vec::new())
+    }
+
+    /// Adds the sums on the device to those of the blocks before, if they are sound.
+    fn add_pending(&self, totals: &mut Vec<[f64; 3]>) -> Result<(), GpuError> {
+        self.gpu.check_error_word(self.error_word()?)?;
+        let [width, height] = [self.frame.width, self.frame.height].map(|edge| edge as usize);
+        totals.resize(width * height, [0.0; 3]);
+        let wanted = self.pending.get();
+        let (mut wrong, mut first) = (0, None);
+        for band in &self.bands {
+            let sums: Vec<[f32; 4]> = self.gpu.read(&band.sums)?;
+            let [start, end] = [band.rows.start, band.rows.end].map(|row| row as usize * width);
+            let pixels = totals[start..end].iter_mut().zip(&sums);
+            for (pixel, (total, [r, g, b, taken])) in (start..).zip(pixels) {
+                // Exact: a block has far fewer samples than 2²⁴.
+                if *taken != wanted as f32 {
+                    wrong += 1;
+                    first.get_or_insert((pixel, *taken));
+                }
+                for (total, sum) in total.iter_mut().zip([r, g, b]) {
+                    *total += f64::from(*sum);
+                }
+            }
+        }
+        match first {
+            None => Ok(()),
+            Some((pixel, taken)) => Err(GpuError::Samples {
+                wrong,
+                wanted,
+                x: (pixel % width) as u32,
+                y: (pixel / width) as u32,
+                taken,
+            }),
+        }
     }
 
     /// The error word of the kernels since the last reset.
@@ -268,8 +411,9 @@ impl<'a> Renderer<'a> {
     /// kernel was compiled to count.
     ///
     /// # Errors
-    /// The device is lost or hangs.
+    /// As for [`Renderer::image`].
     pub fn ray_counts(&self) -> Result<[u64; 4], GpuError> {
+        self.check()?;
         let words: Vec<u32> = self.gpu.read(&self.status)?;
         Ok(std::array::from_fn(|c| {
             u64::from(words[1 + 2 * c]) | u64::from(words[2 + 2 * c]) << 32

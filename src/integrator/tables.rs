@@ -3,7 +3,7 @@
 use super::offset::{RayOffset, TransformError};
 use crate::accel::{Intersection, TriangleSoup};
 use crate::gpu::{Bindings, Gpu, GpuError};
-use crate::scene::{MaterialKind, SceneData};
+use crate::scene::{Daylight, MaterialKind, SceneData};
 use glam::Vec3;
 
 /// What a scene makes kernels carry; absent features are not in the kernel.
@@ -17,16 +17,19 @@ pub struct SceneFeatures {
     pub mirrors: bool,
     /// The environment is not black.
     pub environment: bool,
+    /// The environment is the sky over a scene without a light.
+    pub daylight: bool,
 }
 
 impl SceneFeatures {
     /// Feature names as kernels write them, with whether they are on.
-    pub fn flags(&self) -> [(&'static str, bool); 4] {
+    pub fn flags(&self) -> [(&'static str, bool); 5] {
         [
             ("textures", self.textures),
             ("emitters", self.emitters),
             ("mirrors", self.mirrors),
             ("environment", self.environment),
+            ("daylight", self.daylight),
         ]
     }
 }
@@ -45,6 +48,8 @@ pub struct SceneBuffers {
     pub features: SceneFeatures,
     /// Radiance of the environment.
     pub environment: [f32; 3],
+    /// The sky; kernels without its feature do not read it.
+    pub daylight: Daylight,
     /// Number of emissive triangles.
     pub lights: u32,
     /// Where they begin in `shading_tables`, in `vec4`.
@@ -99,8 +104,10 @@ impl SceneBuffers {
                     .iter()
                     .any(|m| m.kind == MaterialKind::Mirror),
                 environment: scene.environment != Vec3::ZERO,
+                daylight: scene.daylight.is_some(),
             },
             environment: scene.environment.to_array(),
+            daylight: scene.daylight.unwrap_or_default(),
             lights: lights.len() as u32,
             first_light,
             light_power,

@@ -2,6 +2,7 @@
 
 use super::rays::RaySet;
 use crate::accel::{Counters, Hit, Ray};
+use crate::config::cell_hash;
 use crate::gpu::{
     Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline, UniformValues, groups_for,
 };
@@ -72,14 +73,7 @@ impl<'a> Batch<'a> {
         counters: bool,
     ) -> Result<Self, GpuError> {
         let mut bindings = scene.bindings.merged(&traced.bindings);
-        let composition = traced
-            .compose(
-                scene
-                    .intersection
-                    .activate(Composition::new("integrator/trace_rays")),
-            )
-            .feature("any", query == Query::Any)
-            .feature("counters", counters);
+        let composition = composition(scene, traced, query).feature("counters", counters);
         let pipeline = gpu.pipeline(&bindings.compose(composition), runtime_checks)?;
         let bytes_per_ray = if counters { 32 } else { 16 };
         let output = gpu.zeroed("hits", rays.len() as u64 * bytes_per_ray)?;
@@ -191,6 +185,26 @@ impl<'a> Batch<'a> {
     pub fn error_word(&self) -> Result<u32, GpuError> {
         Ok(self.gpu.read::<u32>(&self.status)?[0])
     }
+}
+
+fn composition(scene: &SceneBuffers, traced: &Traced, query: Query) -> Composition {
+    let kernel = Composition::new("integrator/trace_rays");
+    let kernel = traced.compose(scene.intersection.activate(kernel));
+    kernel.feature("any", query == Query::Any)
+}
+
+/// BLAKE3 of the kernels that answer both queries through a structure.
+///
+/// # Errors
+/// A kernel does not compile.
+pub fn kernel_hash(gpu: &Gpu, scene: &SceneBuffers, traced: &Traced) -> Result<String, GpuError> {
+    let bindings = scene.bindings.merged(&traced.bindings);
+    let hash = |query| {
+        let kernel = bindings.compose(composition(scene, traced, query));
+        Ok::<_, GpuError>(gpu.pipeline(&kernel, true)?.kernel.hash())
+    };
+    let (closest, any) = (hash(Query::Closest)?, hash(Query::Any)?);
+    Ok(cell_hash(&[("closest", &closest), ("any", &any)]))
 }
 
 /// Counted work of every ray, from a kernel of its own.

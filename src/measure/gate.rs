@@ -19,19 +19,10 @@ use crate::accel::{
     brute_force_hits,
 };
 use crate::config::{Gate, Params};
-use crate::gpu::{ArithmeticProbe, Gpu, GpuError};
+use crate::gpu::{ArithmeticProbe, Gpu, GpuError, kernel_errors};
 use crate::integrator::{SceneBuffers, Traced};
 use crate::oracle::{self, OracleRay, Verdict};
 use crate::scene::{Camera, SceneData};
-
-/// Meaning of the bits of the kernels' error word, as in `kernels/common/errors.wesl`.
-pub const KERNEL_ERRORS: [(u32, &str); 2] = [
-    (
-        1,
-        "a traversal took more steps than the structure allows (step fuse)",
-    ),
-    (2, "a traversal stack overflowed"),
-];
 
 /// The judge is compared with brute force on at least this many rays.
 const LEAST_BRUTE_FORCE_RAYS: usize = 2000;
@@ -184,7 +175,7 @@ pub(super) fn oracle_ray(ray: &Ray) -> OracleRay {
 /// the structure meets triangles.
 ///
 /// # Errors
-/// A kernel does not compile, or the device is lost or hangs.
+/// A kernel does not compile, the device is lost or hangs, or its driver cuts the loops short.
 pub fn gate(
     gpu: &Gpu,
     scene: &SceneBuffers,
@@ -219,18 +210,16 @@ pub fn gate(
             probe.is_exact(),
         ));
     }
-    let kernel_errors: Vec<String> = KERNEL_ERRORS
-        .iter()
-        .filter(|(bit, _)| errors & bit != 0)
-        .map(|(_, text)| (*text).to_owned())
-        .collect();
+    if let Err(refused @ GpuError::LoopsCut { .. }) = gpu.check_error_word(errors) {
+        return Err(refused);
+    }
     let right = classes.iter().all(|c| c.wrong == 0);
     Ok(GateVerdict {
         passed: right && errors == 0 && judge.is_sound(),
         classes,
         brute_force: judge.brute_force.clone(),
         oracle: judge.oracle.clone(),
-        kernel_errors,
+        kernel_errors: kernel_errors(errors),
         structural: None,
     })
 }

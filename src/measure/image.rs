@@ -65,8 +65,16 @@ pub enum ImageError {
         /// Why not.
         source: io::Error,
     },
+    /// The ending of a file name belongs to no format.
+    #[error("{}: unknown kind of picture; the file name must end in one of {known}", path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+        /// Endings of all formats.
+        known: String,
+    },
     /// The encoder refused the picture.
-    #[error("cannot encode {} as PNG: {source}", path.display())]
+    #[error("cannot encode {}: {source}", path.display())]
     Encode {
         /// Where it was to go.
         path: PathBuf,

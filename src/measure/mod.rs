@@ -3,6 +3,7 @@
 pub mod atomic;
 pub mod batch;
 pub mod bias;
+pub mod formats;
 pub mod gate;
 pub mod hypothesis;
 pub mod image;

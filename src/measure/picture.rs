@@ -91,6 +91,18 @@ pub fn error_map(
 /// # Errors
 /// [`ImageError::Write`], [`ImageError::Encode`].
 pub fn write_png(path: &Path, picture: &Picture) -> Result<(), ImageError> {
+    let bytes = encode_png(picture).map_err(|source| ImageError::Encode {
+        path: path.to_owned(),
+        source,
+    })?;
+    write_atomic(path, &bytes).map_err(|source| ImageError::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// The bytes of a PNG file.
+pub(super) fn encode_png(picture: &Picture) -> Result<Vec<u8>, image::ImageError> {
     let mut bytes = io::Cursor::new(Vec::new());
     image::write_buffer_with_format(
         &mut bytes,
@@ -99,15 +111,8 @@ pub fn write_png(path: &Path, picture: &Picture) -> Result<(), ImageError> {
         picture.height,
         image::ExtendedColorType::Rgb8,
         image::ImageFormat::Png,
-    )
-    .map_err(|source| ImageError::Encode {
-        path: path.to_owned(),
-        source,
-    })?;
-    write_atomic(path, bytes.get_ref()).map_err(|source| ImageError::Write {
-        path: path.to_owned(),
-        source,
-    })
+    )?;
+    Ok(bytes.into_inner())
 }
 
 /// Clamp and encode (IEC 61966-2-1).

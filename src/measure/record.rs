@@ -2,7 +2,7 @@
 //! derives from these lines alone; an absent value is absent, never 0.
 
 use crate::accel::Space;
-use crate::config::Variant;
+use crate::config::{KERNELS_MARK, Variant};
 use crate::scene::{Camera, LoadReport};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -88,6 +88,12 @@ pub struct Environment {
     pub software: bool,
     /// Whether GPU timestamps are available; wall clock is used, and marked, where not.
     pub timestamps: bool,
+    /// Turns that the loops of an invocation may take in all, on a driver that ends them beyond that.
+    #[serde(default)]
+    pub loop_limit: Option<u32>,
+    /// Whether denormal numbers are kept, when known.
+    #[serde(default)]
+    pub denormals: Option<bool>,
     /// Operating system and architecture.
     pub os: String,
     /// Processor model.
@@ -100,6 +106,63 @@ pub struct Environment {
     pub commit: Option<String>,
     /// Whether the working tree had uncommitted changes when it was built.
     pub dirty: Option<bool>,
+}
+
+/// What a record's figures were taken with, beyond the names of its cell. Records of earlier versions
+/// lack it: their texts are empty.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Ran {
+    /// Kernels in the place of the embedded ones, as on the axis; empty for the embedded ones. Labels
+    /// of the cell end with ` @` and this.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub kernels: String,
+    /// BLAKE3 of the composed text of the kernels that ran; empty if it did not come to that.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub kernel_hash: String,
+    /// The ray-triangle test; empty where no ray is traced.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub triangle: String,
+    /// The ray-box test; empty where no ray is traced.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub box_test: String,
+    /// How rays are moved off the surface that they leave; empty where no ray is traced.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub offset: String,
+}
+
+impl Ran {
+    /// The label of a cell without the kernels that it ends with.
+    pub fn without_kernels<'a>(&self, label: &'a str) -> &'a str {
+        let kernels = self.kernels.as_str();
+        let stem = label.strip_suffix(kernels).filter(|_| !kernels.is_empty());
+        stem.and_then(|stem| stem.strip_suffix(KERNELS_MARK))
+            .unwrap_or(label)
+    }
+}
+
+/// A folder of kernels that a run put in the place of embedded ones.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct KernelFolder {
+    /// Its label, as in [`Ran::kernels`].
+    pub label: String,
+    /// The folder as given.
+    pub folder: String,
+    /// BLAKE3 of the names and texts of all its kernels.
+    pub hash: String,
+    /// Its kernels.
+    pub files: Vec<KernelFile>,
+}
+
+/// A kernel of a folder.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct KernelFile {
+    /// Path below the folder.
+    pub file: String,
+    /// BLAKE3 of its text.
+    pub hash: String,
+    /// Whether it replaces an embedded kernel; if not, another kernel imports it.
+    pub replaces: bool,
 }
 
 /// First line of a run.
@@ -119,6 +182,9 @@ pub struct RunRecord {
     pub renders_full_product: usize,
     /// Renders that this plan needs, since images are equal across structures.
     pub renders_planned: usize,
+    /// Folders of kernels that stood in the place of embedded ones.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub kernels: Vec<KernelFolder>,
 }
 
 /// A loaded scene.
@@ -278,10 +344,17 @@ pub struct ClassTiming {
 /// A structure on a scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StructureRecord {
+    /// Whether the failure is the driver's, which ends loops too early for this structure: the cell then
+    /// counts as skipped.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub refused: bool,
     /// Scene name.
     pub scene: String,
     /// Structure with parameters.
     pub accel: Variant,
+    /// What it ran with.
+    #[serde(default)]
+    pub ran: Ran,
     /// Feature flags of the composed kernel.
     pub features: Vec<String>,
     /// Whether the driver's bounds checks and loop bounds were on.
@@ -322,6 +395,9 @@ pub struct ReferenceRecord {
     pub scene: String,
     /// Integrator with parameters.
     pub integrator: Variant,
+    /// What it ran with.
+    #[serde(default)]
+    pub ran: Ran,
     /// Samples per pixel of both halves together; 0 if nothing had to be rendered.
     pub spp: u32,
     /// The value of every pixel, if it is known: then this is the reference.
@@ -359,6 +435,9 @@ pub struct ErrorRecord {
     pub sequence: Variant,
     /// Decorrelation with parameters.
     pub decorrelation: Variant,
+    /// What it ran with.
+    #[serde(default)]
+    pub ran: Ran,
     /// Whether the pair is randomised by its seed; a deterministic pair has one replicate.
     pub randomised: bool,
     /// Number of this replicate, from 0.
@@ -390,6 +469,9 @@ pub struct BiasRecord {
     pub sequence: Variant,
     /// Decorrelation with parameters.
     pub decorrelation: Variant,
+    /// What it ran with.
+    #[serde(default)]
+    pub ran: Ran,
     /// Tiles tested.
     pub tiles: usize,
     /// Tiles rejected after Benjamini–Hochberg at `alpha`.
@@ -420,6 +502,9 @@ pub struct SpectrumRecord {
     pub sequence: Variant,
     /// Decorrelation with parameters.
     pub decorrelation: Variant,
+    /// What it ran with.
+    #[serde(default)]
+    pub ran: Ran,
     /// Samples per pixel.
     pub spp: u32,
     /// Replicates.
@@ -465,6 +550,9 @@ pub struct TimeRecord {
     pub decorrelation: Variant,
     /// Integrator with parameters.
     pub integrator: Variant,
+    /// What it ran with.
+    #[serde(default)]
+    pub ran: Ran,
     /// Image size in pixels.
     pub resolution: [u32; 2],
     /// Samples per pixel of each timed render.
@@ -501,6 +589,9 @@ pub struct StreamRecord {
     pub sequence: Variant,
     /// Decorrelation with parameters.
     pub decorrelation: Variant,
+    /// What it ran with.
+    #[serde(default)]
+    pub ran: Ran,
     /// The two dimensions of the path's table.
     pub dimensions: [u32; 2],
     /// What the path uses them for, for instance `bounce 0: direction`.
@@ -574,6 +665,9 @@ pub struct SamplerCostRecord {
     pub sequence: Variant,
     /// Decorrelation with parameters.
     pub decorrelation: Variant,
+    /// What it ran with.
+    #[serde(default)]
+    pub ran: Ran,
     /// Nanoseconds of adapter time per two-dimensional sample, median; near zero it may be negative.
     pub ns_per_sample: Interval,
     /// Nanoseconds of the empty loop that was taken off.

@@ -17,12 +17,14 @@ const PIXELS: u32 = 1 << 14;
 const MOST_PAIRS: u32 = 4;
 /// Samples of a pixel in one dispatch, if the sampler has so many.
 const MOST_SAMPLES: u32 = 1 << 12;
+/// Turns of loops that drawing one number takes at most: a digit each of a word.
+const TURNS_PER_DRAW: u32 = 33;
 /// A dispatch should take about so long, milliseconds.
 const DISPATCH_MS: f64 = 25.0;
 const ROUNDS: usize = 9;
 
 /// What a sampler costs on an adapter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SamplerCost {
     /// Nanoseconds of adapter time per two-dimensional sample, loop taken off: median of the rounds with
     /// its 95 % interval. Near zero it may be negative.
@@ -31,6 +33,8 @@ pub struct SamplerCost {
     pub loop_ns_per_sample: Interval,
     /// Two-dimensional samples of one dispatch.
     pub samples: u64,
+    /// BLAKE3 of the kernel that draws.
+    pub kernel_hash: String,
 }
 
 /// The two kernels with what they read.
@@ -92,7 +96,11 @@ pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<SamplerCost, GpuErro
     work.run(&empty, 1)?;
     work.run(&drawing, 1)?;
     let most = sampler.demand.samples.unwrap_or(MOST_SAMPLES);
-    let most = most.clamp(1, MOST_SAMPLES);
+    let turns = 2 * pairs * TURNS_PER_DRAW;
+    let allowed = gpu
+        .loop_limit
+        .map_or(MOST_SAMPLES, |limit| limit / 2 / turns);
+    let most = most.min(allowed).clamp(1, MOST_SAMPLES);
     let per_sample = work.run(&drawing, most.min(8))? / f64::from(most.min(8));
     let samples = ((DISPATCH_MS / per_sample.max(1e-6)) as u32).clamp(1, most);
     let count = u64::from(PIXELS) * u64::from(pairs) * u64::from(samples);
@@ -113,5 +121,6 @@ pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<SamplerCost, GpuErro
         ns_per_sample: interval(&drawn)?,
         loop_ns_per_sample: interval(&looped)?,
         samples: count,
+        kernel_hash: gpu.pipeline(&drawing, true)?.kernel.hash(),
     })
 }

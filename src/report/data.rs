@@ -68,6 +68,19 @@ pub fn structure_name(accel: &Variant, runtime_checks: bool) -> String {
     }
 }
 
+/// Name of the structure of a timed cell, without the kernels: they are in the sampler's name, so that
+/// the same structure stands in one row whatever kernels traced it.
+pub fn timed_structure(time: &TimeRecord) -> String {
+    without_kernels(&time.accel, &time.ran, time.runtime_checks)
+}
+
+/// [`structure_name`] without the kernels.
+pub fn without_kernels(accel: &Variant, ran: &Ran, runtime_checks: bool) -> String {
+    let mut accel = accel.clone();
+    accel.label = ran.without_kernels(&accel.label).to_owned();
+    structure_name(&accel, runtime_checks)
+}
+
 impl<'a> RunData<'a> {
     /// Sorts the lines. Of two lines on the same thing the later one holds.
     pub fn new(lines: &'a [Line]) -> Self {
@@ -216,10 +229,7 @@ impl<'a> View<'a> {
 
     /// Names of the structures that were timed, in the order measured.
     pub fn timed_structures(&self) -> Vec<String> {
-        let names = self
-            .times
-            .iter()
-            .map(|time| structure_name(&time.accel, time.runtime_checks));
+        let names = self.times.iter().map(|time| timed_structure(time));
         without_repeats(names.collect())
     }
 
@@ -227,7 +237,7 @@ impl<'a> View<'a> {
     pub fn time(&self, structure: &str, sampler: &str) -> Option<&'a TimeRecord> {
         let matches = |time: &&&TimeRecord| {
             is_valid_time(time)
-                && structure_name(&time.accel, time.runtime_checks) == structure
+                && timed_structure(time) == structure
                 && sampler_name(&time.sequence, &time.decorrelation) == sampler
         };
         self.times.iter().find(matches).copied()

@@ -205,6 +205,15 @@ fn every_check_passes_on_a_clean_run_and_fails_on_its_planted_fault() {
             }
         }),
     ];
+    // An image that no other structure rendered proves nothing.
+    let mut lone = clean.clone();
+    lone.retain(|line| !matches!(&line.record, Record::Time(t) if t.accel.name != "bvh"));
+    assert!(lone.len() < clean.len());
+    let checks = sections::belief::checks(&RunData::new(&lone));
+    let images = checks
+        .iter()
+        .find(|c| c.title.contains("across structures"));
+    assert_eq!(images.map(|check| check.word()), Some("OPEN"));
     for (title, plant) in faults {
         let mut lines = clean.clone();
         lines.iter_mut().for_each(|line| plant(&mut line.record));

@@ -1,6 +1,6 @@
 //! Where a run happens.
 
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, probe_arithmetic};
 use crate::measure::record::Environment;
 
 /// Machine, adapter, driver and program.
@@ -13,6 +13,8 @@ pub fn capture(gpu: &Gpu) -> Environment {
         device_type: device_type(gpu.info.device_type).to_owned(),
         software: gpu.is_software(),
         timestamps: gpu.timestamp_period.is_some(),
+        loop_limit: gpu.loop_limit,
+        denormals: probe_arithmetic(gpu).ok().map(|probe| probe.denormals),
         os: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
         cpu: cpu_model(),
         cpu_threads: std::thread::available_parallelism().map_or(1, usize::from),

@@ -1,17 +1,16 @@
 //! Error: once per scene, integrator and sampler, through the fastest gated structure.
 
 use super::session::Session;
-use super::structures::Gated;
+use super::structures::{self, Gated};
 use super::world::World;
 use super::{REFERENCE_PARTS, RunError};
-use crate::config::{SamplerCell, Variant, cell_hash};
-use crate::gpu::GpuError;
-use crate::integrator::{Frame, RenderJob, Renderer, Snapshot, integrator};
+use crate::config::{SamplerCell, StructureCell, Variant, cell_hash};
+use crate::integrator::{Frame, RenderJob, Renderer, Snapshot, Traced, integrator};
 use crate::measure::bias::{BiasOptions, check_bias};
 use crate::measure::image::{Image, Reference, measure};
 use crate::measure::picture::{automatic_exposure, error_map, tone_map, write_png};
 use crate::measure::record::{
-    BiasRecord, ErrorAtSpp, ErrorRecord, Record, ReferenceRecord, SpectrumRecord,
+    BiasRecord, ErrorAtSpp, ErrorRecord, Ran, Record, ReferenceRecord, SpectrumRecord,
 };
 use crate::measure::spectrum::{
     ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power,
@@ -24,6 +23,8 @@ use std::time::Instant;
 
 /// Relative error per pixel at the top of the colour scale of error maps.
 const ERROR_MAP_FULL_SCALE: f32 = 1.0;
+/// What references are rendered through where no structure ran with the embedded kernels.
+const REFERENCE_STRUCTURE: &str = "bvh";
 
 /// The reference of one integrator with its parts and the exposure of all its pictures.
 struct Yardstick {
@@ -82,22 +83,51 @@ pub(super) fn job<'j>(
     })
 }
 
-/// Renders and fails if a kernel raised its error word.
-fn render_checked(renderer: &Renderer, spps: &[u32], seed: u32) -> Result<Vec<Snapshot>, String> {
-    let rendered = renderer
-        .render(spps, seed)
-        .and_then(|s| Ok((s, renderer.error_word()?)));
-    match rendered.map_err(|e: GpuError| e.to_string())? {
-        (snapshots, 0) => Ok(snapshots),
-        (_, word) => Err(format!("a kernel raised error word {word} while rendering")),
+/// Renders; the error in words.
+fn rendered(renderer: &Renderer, spps: &[u32], seed: u32) -> Result<Vec<Snapshot>, String> {
+    renderer.render(spps, seed).map_err(|e| e.to_string())
+}
+
+/// The fastest gated structure with these kernels.
+fn fastest<'a>(gated: &'a [Gated], kernels: &Variant) -> Option<&'a Gated> {
+    let same = gated.iter().filter(|g| g.cell.kernels == *kernels);
+    same.max_by(|a, b| a.speed.total_cmp(&b.speed))
+}
+
+/// What references are rendered through: the fastest structure that passed with the embedded kernels, so
+/// that a fault of other kernels is not in both images. A run of other kernels alone gets a plain BVH.
+fn reference_structure(
+    session: &mut Session,
+    world: &World,
+    gated: &[Gated],
+) -> Result<Result<Traced, String>, RunError> {
+    let embedded = gated.iter().filter(|g| g.cell.kernels.name.is_empty());
+    if let Some(fastest) = embedded.max_by(|a, b| a.speed.total_cmp(&b.speed)) {
+        return Ok(Ok(fastest.traced.clone()));
     }
+    let mut entries = session.registries.accel.entries().into_iter();
+    let Some(plain) = entries.find(|entry| entry.name == REFERENCE_STRUCTURE) else {
+        return Ok(Err(format!("no structure is called {REFERENCE_STRUCTURE}")));
+    };
+    let cell = StructureCell {
+        scene: world.variant.clone(),
+        accel: plain.default_variant(),
+        kernels: Variant::default(),
+    };
+    session.say(format!("{cell}: build and gate, for the reference"));
+    let gated = structures::build_and_gate(session, world, &cell)?;
+    let gated = gated.map(|(traced, _)| traced);
+    Ok(gated.map_err(|record| {
+        let failure = record.failure.unwrap_or_default();
+        format!("{} with the embedded kernels: {failure}", cell.accel)
+    }))
 }
 
 /// All samplers of a scene.
 pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Result<(), RunError> {
-    let Some(fastest) = gated.iter().max_by(|a, b| a.speed.total_cmp(&b.speed)) else {
+    if gated.is_empty() {
         return Ok(());
-    };
+    }
     let cells: Vec<SamplerCell> = session
         .plan
         .samplers
@@ -105,13 +135,22 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         .filter(|c| c.scene == *world.variant)
         .cloned()
         .collect();
+    let mut traced = None;
     for variant in session.experiment.axes.integrator.clone() {
         let wanted = |c: &&SamplerCell| c.integrator == variant && !session.is_done(&c.to_string());
         let cells: Vec<SamplerCell> = cells.iter().filter(wanted).cloned().collect();
         if cells.is_empty() {
             continue;
         }
-        let yardstick = match reference(session, world, fastest, &variant)? {
+        let traced = match &traced {
+            Some(known) => known,
+            None => traced.insert(reference_structure(session, world, gated)?),
+        };
+        let made = match traced {
+            Ok(traced) => reference(session, world, traced, &variant)?,
+            Err(reason) => Err(reason.clone()),
+        };
+        let yardstick = match made {
             Ok(yardstick) => yardstick,
             Err(reason) => {
                 for cell in cells {
@@ -124,6 +163,11 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             }
         };
         for cell in cells {
+            let Some(fastest) = fastest(gated, &cell.kernels) else {
+                let reason = "no structure passed the gate with these kernels";
+                session.write_failure(&cell.to_string(), reason.to_owned())?;
+                continue;
+            };
             session.lose_device_on_request(world.gpu, &cell.to_string());
             if let Err(reason) = sampler_error(session, world, fastest, &cell, &yardstick)? {
                 session.write_failure(&cell.to_string(), reason)?;
@@ -139,7 +183,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
 fn reference(
     session: &mut Session,
     world: &World,
-    fastest: &Gated,
+    traced: &Traced,
     variant: &Variant,
 ) -> Result<Result<Yardstick, String>, RunError> {
     session.say(format!("{}, {variant}: reference", world.variant));
@@ -158,20 +202,20 @@ fn reference(
     let seed = pcg_hash(settings.seed);
     let rendered = (|| {
         let job = job(session, world, &sampler, variant, true)?;
-        let renderer = Renderer::new(world.gpu, &world.buffers, &fastest.traced, &job, false)
+        let renderer = Renderer::new(world.gpu, &world.buffers, traced, &job, false)
             .map_err(|e| e.to_string())?;
         let mut parts = Vec::new();
         for part in 0..REFERENCE_PARTS {
-            let rendered = session.clock.time("gpu", || {
-                render_checked(&renderer, &[spp], seed.wrapping_add(part))
+            let shots = session.clock.time("gpu", || {
+                rendered(&renderer, &[spp], seed.wrapping_add(part))
             });
-            parts.extend(rendered?.into_iter().map(|s| s.image));
+            parts.extend(shots?.into_iter().map(|s| s.image));
             session.progress.inc(1);
         }
         let reference = Reference::from_parts(&parts).map_err(|e| e.to_string())?;
-        Ok::<_, String>((reference, parts))
+        Ok::<_, String>((reference, parts, renderer.kernel_hash()))
     })();
-    let (reference, parts) = match rendered {
+    let (reference, parts, kernel) = match rendered {
         Ok(rendered) => rendered,
         Err(reason) => return Ok(Err(reason)),
     };
@@ -179,6 +223,7 @@ fn reference(
         spp: spp * REFERENCE_PARTS,
         sampler: sampler.label(),
         seconds: start.elapsed().as_secs_f64(),
+        ran: world.ran(&Variant::default(), kernel),
         ..reference_record(world, variant, &reference)
     };
     finish_reference(session, world, record, reference, parts).map(Ok)
@@ -214,6 +259,7 @@ fn reference_record(world: &World, variant: &Variant, reference: &Reference) -> 
     ReferenceRecord {
         scene: world.variant.label.clone(),
         integrator: variant.clone(),
+        ran: Ran::default(),
         spp: 0,
         exact: None,
         sampler: "exact".to_owned(),
@@ -240,7 +286,20 @@ fn finish_reference(
     record.image = relative;
     let cell = format!("reference {}, {}: done", world.variant, record.integrator);
     if !session.is_done(&cell) {
-        session.write(&world.scene.hash, Record::Reference(record))?;
+        let hash = cell_hash(&[
+            ("scene", &world.scene.hash),
+            (
+                "integrator",
+                &serde_json::to_string(&record.integrator).unwrap_or_default(),
+            ),
+            (
+                "sampler",
+                &format!("{}, {} spp", record.sampler, record.spp),
+            ),
+            ("kernel", &record.ran.kernel_hash),
+            ("version", env!("CARGO_PKG_VERSION")),
+        ]);
+        session.write(&hash, Record::Reference(record))?;
         session.finish(cell);
     }
     Ok(Yardstick {
@@ -267,9 +326,11 @@ fn passes<'a>(
     cell: &SamplerCell,
 ) -> Result<Vec<Pass<'a>>, String> {
     let pair = (&cell.sequence, &cell.decorrelation);
+    let gpu = world.device.of(&cell.kernels);
+    let gpu = gpu.map_err(|e| e.to_string())?;
     let pass = |spps: Vec<u32>, sampler: &Sampler| {
         let job = job(session, world, sampler, &cell.integrator, true)?;
-        let renderer = Renderer::new(world.gpu, &world.buffers, &fastest.traced, &job, false);
+        let renderer = Renderer::new(gpu, &world.buffers, &fastest.traced, &job, false);
         let words = bytemuck::cast_slice(sampler.table.words());
         Ok(Pass {
             renderer: renderer.map_err(|e| e.to_string())?,
@@ -305,7 +366,14 @@ fn sampler_error(
         Ok(passes) => passes,
         Err(reason) => return Ok(Err(reason)),
     };
-    let kernel = passes.iter().map(|pass| pass.renderer.kernel_text());
+    let ran = {
+        let mut hashes: Vec<_> = passes
+            .iter()
+            .map(|pass| pass.renderer.kernel_hash())
+            .collect();
+        hashes.dedup();
+        world.ran(&cell.kernels, hashes.join("+"))
+    };
     let tables: String = passes.iter().map(|pass| pass.table.as_str()).collect();
     let hash = cell_hash(&[
         ("scene", &world.scene.hash),
@@ -314,7 +382,7 @@ fn sampler_error(
             &serde_json::to_string(&(&cell.sequence, &cell.decorrelation, &cell.integrator))
                 .unwrap_or_default(),
         ),
-        ("kernel", kernel.last().unwrap_or_default()),
+        ("kernel", &ran.kernel_hash),
         ("sampler table", &tables),
         ("version", env!("CARGO_PKG_VERSION")),
     ]);
@@ -327,13 +395,13 @@ fn sampler_error(
     for (replicate, seed) in seeds.into_iter().enumerate() {
         let mut snapshots = Vec::new();
         for pass in &passes {
-            let render = || render_checked(&pass.renderer, &pass.spps, seed);
+            let render = || rendered(&pass.renderer, &pass.spps, seed);
             match session.clock.time("gpu", render) {
                 Ok(rendered) => snapshots.extend(rendered),
                 Err(reason) => return Ok(Err(reason)),
             }
         }
-        let record = match error_record(
+        let mut record = match error_record(
             session,
             world,
             cell,
@@ -350,17 +418,24 @@ fn sampler_error(
                 record.non_finite_pixels
             )));
         }
+        record.ran = ran.clone();
         session.write(&hash, Record::Error(record))?;
         finals.extend(snapshots.into_iter().last().map(|s| s.image));
         session.progress.inc(1);
     }
     session.finish(cell.to_string());
     match bias_record(session, cell, world, &finals, yardstick) {
-        Ok(record) => session.write(&hash, Record::Bias(record))?,
+        Ok(mut record) => {
+            record.ran = ran.clone();
+            session.write(&hash, Record::Bias(record))?;
+        }
         Err(reason) => return Ok(Err(reason)),
     }
     match spectrum_record(session, cell, world, &finals, yardstick) {
-        Ok(record) => session.write(&hash, Record::Spectrum(record)).map(Ok),
+        Ok(mut record) => {
+            record.ran = ran;
+            session.write(&hash, Record::Spectrum(record)).map(Ok)
+        }
         Err(reason) => Ok(Err(reason)),
     }
 }
@@ -389,6 +464,7 @@ fn spectrum_record(
         integrator: cell.integrator.clone(),
         sequence: cell.sequence.clone(),
         decorrelation: cell.decorrelation.clone(),
+        ran: Ran::default(),
         spp: session.experiment.spp.max(),
         replicates: spectra.len(),
         power: mean_power(&spectra),
@@ -428,6 +504,7 @@ fn error_record(
         integrator: cell.integrator.clone(),
         sequence: cell.sequence.clone(),
         decorrelation: cell.decorrelation.clone(),
+        ran: Ran::default(),
         randomised: cell.randomised,
         replicate,
         seed,
@@ -498,6 +575,7 @@ fn bias_record(
         integrator: cell.integrator.clone(),
         sequence: cell.sequence.clone(),
         decorrelation: cell.decorrelation.clone(),
+        ran: Ran::default(),
         tiles: check.tiles,
         rejected: check.rejected.len(),
         alpha: check.alpha,

@@ -5,25 +5,28 @@
 
 pub mod environment;
 mod errors;
+mod kernels;
 mod registries;
+mod render;
 mod session;
 mod streams;
 mod structures;
 mod times;
 mod world;
 
+pub use kernels::{Kernels, kernel_library};
 pub use registries::Registries;
+pub use render::{Rendering, render};
 pub use streams::dump_stream;
 
 use crate::config::{Experiment, Plan, Variant};
-use crate::gpu::{AdapterChoice, Gpu, GpuError};
-use crate::integrator::Renderer;
-use crate::measure::picture::{automatic_exposure, tone_map, write_png};
+use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
 use crate::measure::record::GateVerdict;
+use kernels::Device;
 use session::Session;
 use std::path::PathBuf;
 use thiserror::Error;
-use world::World;
+use world::{Absent, World};
 
 /// A reference is rendered in this many independent parts: its halves make error estimates
 /// unbiased, its parts are the other side of the bias check.
@@ -36,12 +39,12 @@ pub struct RunOptions {
     pub out: PathBuf,
     /// Which adapter.
     pub adapter: AdapterChoice,
-    /// Folder whose kernels replace the embedded ones.
-    pub kernels: Option<PathBuf>,
     /// Whether to draw a progress bar on standard error.
     pub progress: bool,
     /// Destroys the device when the turn of this cell comes: for tests of the recovery.
     pub lose_device_at: Option<String>,
+    /// What to take the adapter's arithmetic for, instead of probing it: for tests of what depends on it.
+    pub arithmetic: Option<ArithmeticProbe>,
 }
 
 /// How a run ended.
@@ -68,12 +71,19 @@ pub enum RunError {
     /// Bad usage or input (exit code 2).
     #[error("{0}")]
     Input(String),
+    /// A result that is known to be wrong (exit code 1).
+    #[error("{0}")]
+    Wrong(String),
 }
 
 impl RunError {
-    /// The exit code of the program: 2 bad usage or input, 3 no usable adapter.
+    /// The exit code of the program: 1 a wrong result, 2 bad usage or input, 3 no usable adapter.
     pub fn exit_code(&self) -> u8 {
         match self {
+            Self::Wrong(_)
+            | Self::Gpu(
+                GpuError::LoopsCut { .. } | GpuError::Kernels(_) | GpuError::Samples { .. },
+            ) => 1,
             Self::Gpu(
                 GpuError::NoAdapter | GpuError::UnknownAdapter { .. } | GpuError::NoDevice { .. },
             ) => 3,
@@ -91,52 +101,41 @@ pub struct Verified {
     pub accel: Variant,
     /// Verdict, or why there is none.
     pub verdict: Result<GateVerdict, String>,
-}
-
-/// Opens the adapter with the kernels of the options.
-///
-/// # Errors
-/// No adapter, or the kernel folder cannot be read.
-pub fn open_gpu(options: &RunOptions) -> Result<Gpu, RunError> {
-    let mut kernels = crate::gpu::KernelLibrary::default();
-    if let Some(folder) = &options.kernels {
-        kernels = kernels
-            .with_folder(folder)
-            .map_err(|e| RunError::Input(e.to_string()))?;
-    }
-    Ok(crate::gpu::open(&options.adapter, kernels)?)
+    /// Whether there is none because the driver ends loops too early for the structure.
+    pub refused: bool,
 }
 
 /// Runs a plan, writes `records.jsonl`, images and the report to `options.out`.
 ///
 /// # Errors
-/// No adapter, or a folder that cannot be written.
+/// No adapter, kernels that cannot be read, or a folder that cannot be written.
 pub fn run(
     experiment: &Experiment,
     plan: &Plan,
     registries: &Registries,
     options: &RunOptions,
 ) -> Result<RunSummary, RunError> {
-    let mut gpu = open_gpu(options)?;
+    let kernels = Kernels::load(&plan.kernels, registries)?;
+    let mut device = Device::open(options, &kernels)?;
     let mut session = Session::new(experiment, plan, registries, options)?;
-    session.write_start(environment::capture(&gpu))?;
+    session.write_start(environment::capture(&device.gpu), kernels.folders())?;
     for scene in &plan.scenes {
         // A lost device fails the cell that lost it; the rest goes on with a fresh one. Every turn
         // of this loop finishes at least one cell.
         loop {
-            run_scene(&mut session, &gpu, scene)?;
-            if gpu.lost().is_none() {
+            run_scene(&mut session, &device, scene)?;
+            if device.gpu.lost().is_none() {
                 break;
             }
-            gpu = open_gpu(options)?;
+            device = Device::open(options, &kernels)?;
         }
     }
     loop {
-        streams::run(&mut session, &gpu)?;
-        if gpu.lost().is_none() {
+        streams::run(&mut session, &device)?;
+        if device.gpu.lost().is_none() {
             break;
         }
-        gpu = open_gpu(options)?;
+        device = Device::open(options, &kernels)?;
     }
     session.write_end()?;
     let report =
@@ -152,18 +151,24 @@ pub fn run(
     })
 }
 
-fn run_scene(session: &mut Session, gpu: &Gpu, variant: &Variant) -> Result<(), RunError> {
+fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Result<(), RunError> {
+    let gpu = &device.gpu;
     let cell = format!("scene {variant}: failed");
     if session.is_done(&cell) {
         return Ok(());
     }
-    let world = match World::new(session, gpu, variant)? {
+    let world = match World::new(session, device, variant)? {
         Ok(world) => world,
-        Err(reason) => {
+        Err(Absent::BadInput(reason)) => {
             session.bad_input = true;
             return session.write_failure(&cell, reason);
         }
+        Err(Absent::NotKept(reason)) => {
+            session.finish(cell);
+            return session.write_skipped(&session.plan.all_of(variant, reason));
+        }
     };
+    session.progress.inc(session::SCENE_STEPS);
     let gated = structures::run(session, &world)?;
     if gpu.lost().is_none() {
         errors::run(session, &world, &gated)?;
@@ -185,25 +190,22 @@ pub fn verify(
     options: &RunOptions,
     rays: u32,
 ) -> Result<Vec<Verified>, RunError> {
-    let gpu = open_gpu(options)?;
+    let device = Device::open(options, &Kernels::load(&plan.kernels, registries)?)?;
     let mut experiment = experiment.clone();
     experiment.gate.rays = rays;
     experiment.timing.rays = rays;
     let mut session = Session::unrecorded(&experiment, plan, registries, options);
     let mut verified = Vec::new();
     for scene in &plan.scenes {
-        let accels = plan
-            .structures
-            .iter()
-            .filter(|c| c.scene == *scene)
-            .map(|c| &c.accel);
-        let world = World::new(&mut session, &gpu, scene)?;
-        for accel in accels {
+        let world = World::new(&mut session, &device, scene)?;
+        for cell in plan.structures.iter().filter(|c| c.scene == *scene) {
+            let mut refused = false;
             let verdict = match &world {
-                Err(reason) => Err(reason.clone()),
-                Ok(world) => match structures::build_and_gate(&mut session, world, accel) {
+                Err(Absent::BadInput(reason) | Absent::NotKept(reason)) => Err(reason.clone()),
+                Ok(world) => match structures::build_and_gate(&mut session, world, cell)? {
                     Ok((_, record)) => record.gate.ok_or_else(|| "no verdict".to_owned()),
                     Err(record) => {
+                        refused = record.refused;
                         let reason = record.failure.unwrap_or_default();
                         record.gate.ok_or(reason)
                     }
@@ -211,48 +213,12 @@ pub fn verify(
             };
             verified.push(Verified {
                 scene: scene.clone(),
-                accel: accel.clone(),
+                accel: cell.accel.clone(),
                 verdict,
+                refused,
             });
         }
     }
     session.progress.finish_and_clear();
     Ok(verified)
-}
-
-/// One image for `raystone render`: the first scene, structure, sampler and integrator of the axes,
-/// at `experiment.spp.max()` samples, tone-mapped and written to `file`.
-///
-/// # Errors
-/// No adapter, a scene that does not load, a structure that cannot be built or fails its gate.
-pub fn render(
-    experiment: &Experiment,
-    plan: &Plan,
-    registries: &Registries,
-    options: &RunOptions,
-    file: &std::path::Path,
-) -> Result<(), RunError> {
-    let gpu = open_gpu(options)?;
-    let mut session = Session::unrecorded(experiment, plan, registries, options);
-    let cell = plan
-        .times
-        .first()
-        .ok_or_else(|| RunError::Input("there is nothing to render".to_owned()))?;
-    let world = World::new(&mut session, &gpu, &cell.scene)?.map_err(RunError::Input)?;
-    let built = structures::build_and_gate(&mut session, &world, &cell.accel);
-    let (traced, _) =
-        built.map_err(|record| RunError::Input(record.failure.unwrap_or_default()))?;
-    let pair = (&cell.sequence, &cell.decorrelation);
-    let sampler = errors::sampler_for(&session, pair, &cell.integrator, experiment.spp.max());
-    let sampler = sampler.map_err(RunError::Input)?;
-    let job =
-        errors::job(&session, &world, &sampler, &cell.integrator, true).map_err(RunError::Input)?;
-    let renderer = Renderer::new(&gpu, &world.buffers, &traced, &job, false)?;
-    let snapshots = renderer.render(&[experiment.spp.max()], experiment.seed)?;
-    session.progress.finish_and_clear();
-    let Some(snapshot) = snapshots.first() else {
-        return Ok(());
-    };
-    let picture = tone_map(&snapshot.image, automatic_exposure(&snapshot.image));
-    write_png(file, &picture).map_err(|e| RunError::Input(e.to_string()))
 }

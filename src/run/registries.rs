@@ -26,6 +26,11 @@ impl Registries {
         }
     }
 
+    /// Modules that a folder of kernels may bring for what is registered, beside those of the program.
+    pub fn kernels(&self) -> Vec<String> {
+        self.accel.iter().flat_map(|kind| kind.kernels()).collect()
+    }
+
     /// Whether seeds change what this pair draws.
     ///
     /// # Errors

@@ -1,10 +1,10 @@
 //! What lives as long as a run: records, clock, progress, cells already done.
 
 use super::{RunError, RunOptions};
-use crate::config::{Experiment, Plan};
+use crate::config::{Experiment, Plan, Skipped};
 use crate::gpu::Gpu;
 use crate::measure::record::{
-    Environment, FinishedRecord, Line, Record, RunRecord, SCHEMA, SkippedRecord,
+    Environment, FinishedRecord, KernelFolder, Line, Record, RunRecord, SCHEMA, SkippedRecord,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::{BTreeMap, HashSet};
@@ -48,6 +48,8 @@ pub(super) struct Session<'a> {
     pub skipped: usize,
     /// Whether a scene could not be loaded.
     pub bad_input: bool,
+    /// Cells that need longer loops than the driver runs, with the reason.
+    pub refused: BTreeMap<String, String>,
     /// Cells that have their record: not run again after a lost device.
     done: HashSet<String>,
     /// `None`: nothing is written (gate alone, single images).
@@ -110,6 +112,7 @@ impl<'a> Session<'a> {
             failed: 0,
             skipped: 0,
             bad_input: false,
+            refused: BTreeMap::new(),
             done: HashSet::new(),
             records: None,
             records_path: PathBuf::new(),
@@ -148,7 +151,11 @@ impl<'a> Session<'a> {
     }
 
     /// The first record.
-    pub fn write_start(&mut self, environment: Environment) -> Result<(), RunError> {
+    pub fn write_start(
+        &mut self,
+        environment: Environment,
+        kernels: Vec<KernelFolder>,
+    ) -> Result<(), RunError> {
         let seconds = SystemTime::now()
             .duration_since(SystemTime::UNIX_EPOCH)
             .map_or(0, |d| d.as_secs());
@@ -160,17 +167,34 @@ impl<'a> Session<'a> {
             environment,
             renders_full_product: self.plan.renders_full_product,
             renders_planned: self.plan.renders_planned,
+            kernels,
         };
         self.write("", Record::Run(record))?;
         for skipped in &self.plan.skipped {
-            let record = SkippedRecord {
-                cell: skipped.cell.clone(),
-                reason: skipped.reason.clone(),
-            };
-            self.write("", Record::Skipped(record))?;
-            self.skipped += skipped.cells;
+            self.write_skipped(skipped)?;
         }
         Ok(())
+    }
+
+    /// Records cells that are left out.
+    pub fn write_skipped(&mut self, skipped: &Skipped) -> Result<(), RunError> {
+        self.skipped += skipped.cells;
+        let record = SkippedRecord {
+            cell: skipped.cell.clone(),
+            reason: skipped.reason.clone(),
+        };
+        self.write("", Record::Skipped(record))
+    }
+
+    /// Records a cell that needs longer loops than the driver runs.
+    pub fn write_refused(&mut self, cell: String, reason: String) -> Result<(), RunError> {
+        self.finish(cell.clone());
+        self.refused.insert(cell.clone(), reason.clone());
+        self.write_skipped(&Skipped {
+            cell,
+            reason,
+            cells: 1,
+        })
     }
 
     /// The last record.
@@ -236,12 +260,16 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Rough number of progress steps: builds and gates, timed rounds, renders, streams.
+/// Progress steps that loading and judging a scene count for: as long as so many timed rounds, roughly.
+pub(super) const SCENE_STEPS: u64 = 20;
+
+/// Rough number of progress steps: scenes, builds and gates, compiled and timed cells, renders, streams.
 fn steps(experiment: &Experiment, plan: &Plan) -> u64 {
     let rounds = u64::from(experiment.timing.rounds) + 1;
     let structures = plan.structures.len() as u64 * (2 + 5 * rounds);
-    let times = plan.times.len() as u64 * rounds;
+    let times = plan.times.len() as u64 * (1 + rounds);
+    let scenes = plan.scenes.len() as u64 * SCENE_STEPS;
     let references =
         plan.scenes.len() * experiment.axes.integrator.len() * super::REFERENCE_PARTS as usize;
-    structures + times + (plan.renders_planned + references + plan.streams.len()) as u64
+    scenes + structures + times + (plan.renders_planned + references + plan.streams.len()) as u64
 }

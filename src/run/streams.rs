@@ -1,11 +1,12 @@
 //! Figures of the streams that the path really consumes, dumped from the kernel, and what drawing costs.
 
 use super::RunError;
+use super::kernels::Device;
 use super::session::Session;
-use crate::config::StreamCell;
+use crate::config::{StreamCell, cell_hash};
 use crate::gpu::{Bindings, Composition, Dispatch, Gpu, UniformValues, groups_for};
 use crate::integrator::with_sampler;
-use crate::measure::record::{PixelsAtCount, Record, SamplerCostRecord, StreamRecord};
+use crate::measure::record::{PixelsAtCount, Ran, Record, SamplerCostRecord, StreamRecord};
 use crate::measure::sampler_cost::sampler_cost;
 use crate::measure::stream::{COPIES, SeedFigures, coverage, neighbour_angle, over_seeds};
 use crate::sampling::dimensions::{DIRECTION, FIRST_BOUNCE, PER_BOUNCE, pair_purpose};
@@ -22,16 +23,20 @@ const TILE: u32 = 8;
 const TILE_SAMPLES: u32 = 32;
 
 /// All streams of the plan.
-pub(super) fn run(session: &mut Session, gpu: &Gpu) -> Result<(), RunError> {
+pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError> {
     for cell in session.plan.streams.clone() {
         if session.is_done(&cell.to_string()) {
             continue;
         }
+        let gpu = device.of(&cell.kernels)?;
         session.say(format!("discrepancy of {cell}"));
         session.lose_device_on_request(gpu, &cell.to_string());
         for pair in session.experiment.discrepancy.pairs.clone() {
             match stream_record(session, gpu, &cell, pair) {
-                Ok(record) => session.write("", Record::Stream(record))?,
+                Ok(record) => {
+                    let hash = stream_hash(&cell, &record.ran, &format!("{pair:?}"));
+                    session.write(&hash, Record::Stream(record))?;
+                }
                 Err(reason) => {
                     session.write_failure(&format!("stream {cell}, {pair:?}"), reason)?
                 }
@@ -39,7 +44,10 @@ pub(super) fn run(session: &mut Session, gpu: &Gpu) -> Result<(), RunError> {
         }
         if gpu.lost().is_none() {
             match cost_record(session, gpu, &cell) {
-                Ok(record) => session.write("", Record::SamplerCost(record))?,
+                Ok(record) => {
+                    let hash = stream_hash(&cell, &record.ran, "cost");
+                    session.write(&hash, Record::SamplerCost(record))?;
+                }
                 Err(reason) => session.write_failure(&format!("cost of {cell}"), reason)?,
             }
         }
@@ -50,6 +58,25 @@ pub(super) fn run(session: &mut Session, gpu: &Gpu) -> Result<(), RunError> {
         }
     }
     Ok(())
+}
+
+/// What a stream ran with: no ray was traced.
+fn ran(cell: &StreamCell, kernel_hash: String) -> Ran {
+    Ran {
+        kernels: cell.kernels.kernels_label().to_owned(),
+        kernel_hash,
+        ..Ran::default()
+    }
+}
+
+fn stream_hash(cell: &StreamCell, ran: &Ran, what: &str) -> String {
+    let sampler = serde_json::to_string(&(&cell.sequence, &cell.decorrelation));
+    cell_hash(&[
+        ("sampler", &sampler.unwrap_or_default()),
+        ("what", what),
+        ("kernel", &ran.kernel_hash),
+        ("version", env!("CARGO_PKG_VERSION")),
+    ])
 }
 
 fn stream_record(
@@ -96,9 +123,12 @@ fn stream_record(
             figures.pixels.push(pixels);
         }
     }
+    let kernel = gpu.pipeline(&dump_kernel(&sets[0].0), true);
+    let kernel = kernel.map_err(|e| e.to_string())?.kernel.hash();
     Ok(StreamRecord {
         sequence: cell.sequence.clone(),
         decorrelation: cell.decorrelation.clone(),
+        ran: ran(cell, kernel),
         dimensions: pair,
         purpose: pair_purpose(pair),
         randomised: cell.randomised,
@@ -156,6 +186,7 @@ fn cost_record(
     Ok(SamplerCostRecord {
         sequence: cell.sequence.clone(),
         decorrelation: cell.decorrelation.clone(),
+        ran: ran(cell, cost.kernel_hash),
         ns_per_sample: cost.ns_per_sample,
         loop_ns_per_sample: cost.loop_ns_per_sample,
     })
@@ -224,6 +255,10 @@ fn dump_points(
         .collect())
 }
 
+fn dump_kernel(sampler: &Sampler) -> Composition {
+    with_sampler(Composition::new("sampling/dump_stream"), sampler)
+}
+
 /// The u32 of every coordinate, as the kernel computes it.
 ///
 /// # Errors
@@ -241,7 +276,7 @@ pub fn dump_stream(
             sampler.demand.dimensions
         ));
     }
-    let composition = with_sampler(Composition::new("sampling/dump_stream"), sampler);
+    let composition = dump_kernel(sampler);
     let words: Vec<[u32; 4]> = coordinates
         .iter()
         .map(|c| [c.pixel, c.sample, c.dimension, c.seed])

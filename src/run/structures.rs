@@ -4,16 +4,16 @@ use super::RunError;
 use super::session::Session;
 use super::world::World;
 use crate::accel::{AccelError, BuildLog, BuiltAccel, Counters, Space};
-use crate::config::{StructureCell, Variant, cell_hash};
-use crate::gpu::{Elapsed, GpuError};
+use crate::config::{StructureCell, cell_hash};
+use crate::gpu::{Elapsed, Gpu, GpuError};
 use crate::integrator::Traced;
-use crate::measure::batch::{Batch, Query, count_work};
+use crate::measure::batch::{Batch, Query, count_work, kernel_hash};
 use crate::measure::gate::gate;
 use crate::measure::memory::peak_bytes;
 use crate::measure::picture::{Picture, write_png};
 use crate::measure::rays::{RaySet, primary_pixels, primary_rays};
 use crate::measure::record::{
-    ClassTiming, CountersPerRay, GateVerdict, Record, StructureRecord, StructureStats,
+    ClassTiming, CountersPerRay, GateVerdict, Ran, Record, StructureRecord, StructureStats,
 };
 use crate::measure::timing::{
     Measured, empty_ms, interleave, millions_per_second, without_overhead,
@@ -35,13 +35,34 @@ pub(super) struct Gated {
     costs: Vec<f32>,
 }
 
+/// A structure that was built and uploaded, but not gated.
+struct Built {
+    traced: Traced,
+    /// What `validate` says.
+    structural: Option<String>,
+    record: StructureRecord,
+}
+
 /// Builds, validates, uploads and gates one structure.
 pub(super) fn build_and_gate(
     session: &mut Session,
     world: &World,
-    accel: &Variant,
-) -> Result<(Traced, StructureRecord), Box<StructureRecord>> {
-    let mut record = empty_record(world, accel, session.experiment.runtime_checks);
+    cell: &StructureCell,
+) -> Result<Result<(Traced, StructureRecord), Box<StructureRecord>>, RunError> {
+    match build(session, world, cell) {
+        Ok(built) => gate_with(session, world, &built, cell),
+        Err(record) => Ok(Err(record)),
+    }
+}
+
+/// Builds, validates and uploads: what does not depend on kernels.
+fn build(
+    session: &mut Session,
+    world: &World,
+    cell: &StructureCell,
+) -> Result<Built, Box<StructureRecord>> {
+    let accel = &cell.accel;
+    let mut record = empty_record(world, cell, session.experiment.runtime_checks);
     let Some(kind) = session.registries.accel.get(&accel.name) else {
         record.failure = Some(format!("no structure is called {accel}"));
         return Err(Box::new(record));
@@ -83,14 +104,39 @@ pub(super) fn build_and_gate(
             return Err(Box::new(record));
         }
     };
-    drop(built);
-    match session.clock.time("gate", || {
-        gate_twice(session.experiment.runtime_checks, world, &traced)
-    }) {
-        Err(error) => record.failure = Some(error.to_string()),
-        Ok(mut verdict) => {
-            verdict.passed &= structural.is_none();
-            verdict.structural = structural;
+    Ok(Built {
+        traced,
+        structural,
+        record,
+    })
+}
+
+/// Gates what was built with the kernels of a cell.
+fn gate_with(
+    session: &mut Session,
+    world: &World,
+    built: &Built,
+    cell: &StructureCell,
+) -> Result<Result<(Traced, StructureRecord), Box<StructureRecord>>, RunError> {
+    let gpu = world.device.of(&cell.kernels)?;
+    let traced = built.traced.clone();
+    let mut record = built.record.clone();
+    record.accel = cell.accel.clone();
+    record.ran = world.ran(&cell.kernels, String::new());
+    let checks = session.experiment.runtime_checks;
+    let gated = session.clock.time("gate", || {
+        let verdict = gate_twice(checks, world, gpu, &traced)?;
+        Ok::<_, GpuError>((verdict, kernel_hash(gpu, &world.buffers, &traced)?))
+    });
+    match gated {
+        Err(error) => {
+            record.refused = error.is_refusal();
+            record.failure = Some(error.to_string());
+        }
+        Ok((mut verdict, hash)) => {
+            record.ran.kernel_hash = hash;
+            verdict.passed &= built.structural.is_none();
+            verdict.structural.clone_from(&built.structural);
             if !verdict.passed {
                 let judge_fault = world.judge.of(traced.space).first_wrong.as_deref();
                 record.failure = Some(failure_text(&verdict, judge_fault));
@@ -98,11 +144,10 @@ pub(super) fn build_and_gate(
             record.gate = Some(verdict);
         }
     }
-    if record.failure.is_some() {
-        Err(Box::new(record))
-    } else {
-        Ok((traced, record))
-    }
+    Ok(match record.failure {
+        Some(_) => Err(Box::new(record)),
+        None => Ok((traced, record)),
+    })
 }
 
 /// Updates of which the median is taken.
@@ -131,11 +176,12 @@ fn update_ms(built: &mut dyn BuiltAccel, world: &World) -> Result<Option<f64>, A
 fn gate_twice(
     runtime_checks: bool,
     world: &World,
+    gpu: &Gpu,
     traced: &Traced,
 ) -> Result<GateVerdict, GpuError> {
     let run = |checks| {
         gate(
-            world.gpu,
+            gpu,
             &world.buffers,
             &world.soup,
             traced,
@@ -179,10 +225,12 @@ fn failure_text(verdict: &GateVerdict, judge_fault: Option<&str>) -> String {
     parts.join("; ")
 }
 
-fn empty_record(world: &World, accel: &Variant, runtime_checks: bool) -> StructureRecord {
+fn empty_record(world: &World, cell: &StructureCell, runtime_checks: bool) -> StructureRecord {
     StructureRecord {
+        refused: false,
         scene: world.variant.label.clone(),
-        accel: accel.clone(),
+        accel: cell.accel.clone(),
+        ran: world.ran(&cell.kernels, String::new()),
         features: Vec::new(),
         runtime_checks,
         space: Space::World,
@@ -222,17 +270,31 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
         .cloned()
         .collect();
     let mut gated = Vec::new();
+    // The last structure that was built: it serves all kernels.
+    let mut last: Option<(StructureCell, Result<Built, Box<StructureRecord>>)> = None;
     for cell in cells {
         if session.is_done(&cell.to_string()) && !session.is_done(&passed(&cell)) {
             continue;
         }
         session.say(format!("{cell}: build and gate"));
         session.lose_device_on_request(world.gpu, &cell.to_string());
-        match build_and_gate(session, world, &cell.accel) {
+        let built = match last.take() {
+            Some((other, built)) if is_same_structure(&other, &cell) => built,
+            _ => build(session, world, &cell),
+        };
+        let outcome = match &built {
+            Ok(built) => gate_with(session, world, built, &cell)?,
+            Err(record) => Err(Box::new(StructureRecord {
+                accel: cell.accel.clone(),
+                ran: world.ran(&cell.kernels, String::new()),
+                ..StructureRecord::clone(record)
+            })),
+        };
+        match outcome {
             Ok((traced, record)) => gated.push(Gated {
-                hash: structure_hash(world, &cell),
+                hash: structure_hash(world, &cell, &record.ran),
                 runtime_checks: record.runtime_checks,
-                cell,
+                cell: cell.clone(),
                 traced,
                 speed: 0.0,
                 record,
@@ -240,11 +302,13 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
             }),
             Err(record) => write_failed(session, world, &cell, *record)?,
         }
+        last = Some((cell, built));
         session.progress.inc(2);
         if world.gpu.lost().is_some() {
             return Ok(Vec::new());
         }
     }
+    drop(last);
     time_all(session, world, &mut gated)?;
     draw_heat_maps(session, world, &mut gated)?;
     for structure in &gated {
@@ -263,12 +327,17 @@ fn passed(cell: &StructureCell) -> String {
     format!("{cell}: passed")
 }
 
-fn structure_hash(world: &World, cell: &StructureCell) -> String {
+fn is_same_structure(a: &StructureCell, b: &StructureCell) -> bool {
+    a.accel.name == b.accel.name && a.accel.params == b.accel.params
+}
+
+fn structure_hash(world: &World, cell: &StructureCell, ran: &Ran) -> String {
     let params = serde_json::to_string(&cell.accel).unwrap_or_default();
     cell_hash(&[
         ("scene", &world.scene.hash),
         ("accel", &params),
         ("intersection", &format!("{:?}", world.soup.intersection)),
+        ("kernel", &ran.kernel_hash),
         ("version", env!("CARGO_PKG_VERSION")),
     ])
 }
@@ -279,9 +348,13 @@ fn write_failed(
     cell: &StructureCell,
     record: StructureRecord,
 ) -> Result<(), RunError> {
+    if record.refused {
+        return session.write_refused(cell.to_string(), record.failure.unwrap_or_default());
+    }
     session.failed += 1;
     session.finish(cell.to_string());
-    session.write(&structure_hash(world, cell), Record::Structure(record))
+    let hash = structure_hash(world, cell, &record.ran);
+    session.write(&hash, Record::Structure(record))
 }
 
 /// Records the structure under which the device was lost; the others get their turn on a new one.
@@ -304,6 +377,7 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
     let mut failures: Vec<Option<String>> = vec![None; gated.len()];
     let mut timed = Vec::new();
     for structure in 0..gated.len() {
+        let gpu = world.device.of(&gated[structure].cell.kernels)?;
         for set in &world.judge.of(gated[structure].traced.space).sets {
             let Gated {
                 traced,
@@ -311,7 +385,7 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
                 ..
             } = &gated[structure];
             let (query, checks) = (Query::of(set), *runtime_checks);
-            match Batch::new(world.gpu, &world.buffers, traced, query, &set.rays, checks) {
+            match Batch::new(gpu, &world.buffers, traced, query, &set.rays, checks) {
                 Ok(batch) => timed.push(Timed {
                     structure,
                     set,
@@ -340,13 +414,14 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
     for (item, result) in timed.iter().zip(samples) {
         let set = item.set;
         let structure = &mut gated[item.structure];
+        let gpu = world.device.of(&structure.cell.kernels)?;
         let outcome = result.and_then(|samples| {
             let empty = session
                 .clock
                 .time("gpu", || empty_ms(|| item.batch.trace_nothing()))?;
             let work = session.clock.time("gpu", || {
                 count_work(
-                    world.gpu,
+                    gpu,
                     &world.buffers,
                     &structure.traced,
                     Query::of(set),
@@ -415,9 +490,10 @@ fn draw_heat_maps(
     let rays = primary_rays(world.camera, width, height);
     let pixels = primary_pixels(width, height);
     for structure in gated.iter_mut() {
+        let gpu = world.device.of(&structure.cell.kernels)?;
         let work = session.clock.time("gpu", || {
             count_work(
-                world.gpu,
+                gpu,
                 &world.buffers,
                 &structure.traced,
                 Query::Closest,

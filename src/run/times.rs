@@ -8,7 +8,7 @@ use super::structures::Gated;
 use super::world::World;
 use crate::accel::Space;
 use crate::config::{TimeCell, Variant, cell_hash};
-use crate::gpu::{Elapsed, GpuError};
+use crate::gpu::{Elapsed, Gpu, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
 use crate::measure::record::{Record, TimeRecord};
 use crate::measure::statistics::bootstrap_median;
@@ -30,6 +30,7 @@ impl Measured for Timed<'_> {
     fn measure(&self) -> Result<Elapsed, GpuError> {
         self.renderer.reset();
         self.renderer.add_samples(0, self.spp, self.seed)?;
+        self.renderer.check()?;
         Ok(self.renderer.spent())
     }
 }
@@ -64,7 +65,12 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         if session.is_done(&text) {
             continue;
         }
+        let gpu = world.device.of(&cell.kernels)?;
         let Some(structure) = gated.iter().find(|g| g.cell.accel == cell.accel) else {
+            if let Some(reason) = refusal(session, &cell) {
+                session.write_refused(text, reason)?;
+                continue;
+            }
             let record = empty_record(
                 session,
                 world,
@@ -78,10 +84,11 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         };
         session.say(format!("{cell}: compiling"));
         session.lose_device_on_request(world.gpu, &text);
-        match compile(session, world, structure, cell.clone()) {
+        match compile(session, world, gpu, structure, cell.clone()) {
             Ok(item) => timed.push(item),
             Err(reason) => fail(session, world, &cell, reason)?,
         }
+        session.progress.inc(1);
         if world.gpu.lost().is_some() {
             return Ok(());
         }
@@ -108,6 +115,12 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     let mut shared = Shared::default();
     for (item, samples) in timed.iter().zip(samples) {
         let structure = gated.iter().find(|g| g.cell.accel == item.cell.accel);
+        if let Err(error) = &samples
+            && error.is_refusal()
+        {
+            session.write_refused(item.cell.to_string(), error.to_string())?;
+            continue;
+        }
         let measured = samples.map_err(|e| e.to_string());
         let record = measured
             .and_then(|samples| finish(session, world, structure, item, samples, &mut shared));
@@ -134,6 +147,14 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     Ok(())
 }
 
+/// Why the driver cannot run the structure of a cell, if that is so.
+fn refusal(session: &Session, cell: &TimeCell) -> Option<String> {
+    let mut structures = session.plan.structures.iter();
+    let structure = structures
+        .find(|s| (&s.scene, &s.accel, &s.kernels) == (&cell.scene, &cell.accel, &cell.kernels))?;
+    session.refused.get(&structure.to_string()).cloned()
+}
+
 /// Timed are the first samples of the set whose error is measured last: how near the rays of
 /// neighbouring pixels lie may depend on how many there are.
 fn sampler_of(session: &Session, cell: &TimeCell) -> Result<Sampler, String> {
@@ -146,6 +167,7 @@ fn sampler_of(session: &Session, cell: &TimeCell) -> Result<Sampler, String> {
 fn compile<'a>(
     session: &mut Session,
     world: &'a World,
+    gpu: &'a Gpu,
     structure: &Gated,
     cell: TimeCell,
 ) -> Result<Timed<'a>, String> {
@@ -153,7 +175,7 @@ fn compile<'a>(
     let checks = structure.runtime_checks;
     let job = job(session, world, &sampler, &cell.integrator, checks)?;
     let compiled = session.clock.time("gpu", || {
-        Renderer::new(world.gpu, &world.buffers, &structure.traced, &job, false)
+        Renderer::new(gpu, &world.buffers, &structure.traced, &job, false)
     });
     let renderer = compiled.map_err(|e| e.to_string())?;
     let (spp, seed) = (session.experiment.timing.spp, session.experiment.seed);
@@ -176,11 +198,7 @@ fn finish(
     samples: Samples,
     shared: &mut Shared,
 ) -> Result<TimeRecord, String> {
-    let image = item
-        .renderer
-        .image()
-        .and_then(|image| Ok((image, item.renderer.error_word()?)));
-    let (image, error_word) = image.map_err(|e| e.to_string())?;
+    let image = item.renderer.image().map_err(|e| e.to_string())?;
     let hash = image_hash(&image);
     let key = key(&item.cell, item.space);
     let first = shared
@@ -206,14 +224,10 @@ fn finish(
         .map(|ms| total as f64 / ms * 1e-3)
         .collect();
     let equal = hash == first;
-    let failure = match (equal, error_word) {
-        (_, word) if word != 0 => Some(format!("a kernel raised error word {word}")),
-        (false, _) if world.probe.is_exact() => Some(
-            "its image differs from that of the first structure on this scene (in the same space)"
-                .to_owned(),
-        ),
-        _ => None,
-    };
+    let failure = (!equal && world.probe.is_exact()).then(|| {
+        "its image differs from that of the first structure on this scene (in the same space)"
+            .to_owned()
+    });
     let mut record = empty_record(session, world, &item.cell, String::new());
     record.failure = failure;
     if record.failure.is_none() {
@@ -232,6 +246,7 @@ fn finish(
     record.image_equal = equal;
     record.runtime_checks = item.runtime_checks;
     record.features = item.renderer.features();
+    record.ran.kernel_hash = item.renderer.kernel_hash();
     Ok(record)
 }
 
@@ -244,8 +259,10 @@ fn count_rays(
 ) -> Result<[u64; 4], String> {
     let sampler = sampler_of(session, &item.cell)?;
     let job = job(session, world, &sampler, &item.cell.integrator, true)?;
+    let gpu = world.device.of(&item.cell.kernels);
+    let gpu = gpu.map_err(|e| e.to_string())?;
     let counted = session.clock.time("gpu", || {
-        let renderer = Renderer::new(world.gpu, &world.buffers, &structure.traced, &job, true)?;
+        let renderer = Renderer::new(gpu, &world.buffers, &structure.traced, &job, true)?;
         renderer.reset();
         renderer.add_samples(0, item.spp, item.seed)?;
         renderer.ray_counts()
@@ -258,6 +275,7 @@ fn empty_record(session: &Session, world: &World, cell: &TimeCell, failure: Stri
     TimeRecord {
         scene: world.variant.label.clone(),
         accel: label(&cell.accel),
+        ran: world.ran(&cell.kernels, String::new()),
         sequence: label(&cell.sequence),
         decorrelation: label(&cell.decorrelation),
         integrator: label(&cell.integrator),

@@ -1,18 +1,21 @@
 //! A scene made ready: loaded, uploaded, judged.
 
 use super::RunError;
+use super::kernels::Device;
 use super::session::Session;
 use crate::accel::{Intersection, TriangleSoup};
 use crate::config::Variant;
 use crate::gpu::{ArithmeticProbe, Gpu};
 use crate::integrator::{RayOffset, SceneBuffers};
 use crate::measure::gate::Judge;
-use crate::measure::record::{Record, SceneRecord};
+use crate::measure::record::{Ran, Record, SceneRecord};
 use crate::scene::{self, Camera, LoadOptions, SceneData};
 use std::time::Instant;
 
 /// A scene with everything that its cells share.
 pub(super) struct World<'a> {
+    pub device: &'a Device,
+    /// The device with the embedded kernels.
     pub gpu: &'a Gpu,
     pub probe: ArithmeticProbe,
     pub variant: &'a Variant,
@@ -23,13 +26,28 @@ pub(super) struct World<'a> {
     pub judge: Judge,
 }
 
+/// Why there is no world.
+pub(super) enum Absent {
+    /// The scene is at fault.
+    BadInput(String),
+    /// The adapter does not keep what the experiment asks for: its cells are left out.
+    NotKept(String),
+}
+
+impl From<String> for Absent {
+    fn from(reason: String) -> Self {
+        Self::BadInput(reason)
+    }
+}
+
 impl<'a> World<'a> {
     /// Loads, uploads and judges a scene. The inner error concerns this scene alone.
     pub fn new(
         session: &mut Session,
-        gpu: &'a Gpu,
+        device: &'a Device,
         variant: &'a Variant,
-    ) -> Result<Result<Self, String>, RunError> {
+    ) -> Result<Result<Self, Absent>, RunError> {
+        let gpu = &device.gpu;
         session.say(format!("{variant}: loading"));
         let start = Instant::now();
         let options = LoadOptions::default();
@@ -38,16 +56,15 @@ impl<'a> World<'a> {
             .time("load", || scene::load(variant, &options));
         let scene = match loaded {
             Ok(scene) => scene,
-            Err(error) => return Ok(Err(error.to_string())),
+            Err(error) => return Ok(Err(Absent::BadInput(error.to_string()))),
         };
         let load_ms = start.elapsed().as_secs_f64() * 1e3;
         let camera = session
             .experiment
             .camera
-            .or(scene.camera)
-            .unwrap_or_else(|| Camera::frame(&scene.bounds()));
+            .unwrap_or_else(|| scene.view(session.experiment.aspect()));
         if let Err(error) = camera.validate() {
-            return Ok(Err(error.to_string()));
+            return Ok(Err(Absent::BadInput(error.to_string())));
         }
         let cell = format!("scene {variant}");
         if !session.is_done(&cell) {
@@ -60,19 +77,22 @@ impl<'a> World<'a> {
         session.say(format!("{variant}: checking the judge"));
         let tests = session.experiment.tests;
         let chosen = Intersection::named(tests.triangle, tests.box_test);
-        let probe = session
-            .clock
-            .time("gate", || crate::gpu::probe_arithmetic(gpu));
-        let (intersection, offset) = match (&probe, chosen, RayOffset::named(tests.offset)) {
-            (Ok(probe), Ok(chosen), Some(offset)) => (chosen.kept_by(probe), offset),
-            (Err(error), ..) => return Ok(Err(error.to_string())),
-            (_, Err(error), _) => return Ok(Err(error)),
-            (.., None) => return Ok(Err(format!("no ray offset is called {}", tests.offset))),
+        let probe = match session.options.arithmetic {
+            Some(known) => Ok(known),
+            None => session
+                .clock
+                .time("gate", || crate::gpu::probe_arithmetic(gpu)),
         };
-        let (intersection, reason) = intersection;
-        if let Some(reason) = reason {
-            session.say(reason);
-        }
+        let fault = |reason: String| Ok(Err(Absent::BadInput(reason)));
+        let (intersection, offset) = match (&probe, chosen, RayOffset::named(tests.offset)) {
+            (Ok(probe), Ok(chosen), Some(offset)) => match chosen.kept_by(probe) {
+                Ok(()) => (chosen, offset),
+                Err(reason) => return Ok(Err(Absent::NotKept(reason))),
+            },
+            (Err(error), ..) => return fault(error.to_string()),
+            (_, Err(error), _) => return fault(error),
+            (.., None) => return fault(format!("no ray offset is called {}", tests.offset)),
+        };
         let soup = session.clock.time("load", || {
             TriangleSoup::new(&scene).intersecting(intersection)
         });
@@ -91,6 +111,7 @@ impl<'a> World<'a> {
             let judge = judged.map_err(|e| e.to_string())?;
             let probe = probe.map_err(|e| e.to_string())?;
             Ok(Self {
+                device,
                 gpu,
                 probe,
                 variant,
@@ -101,6 +122,18 @@ impl<'a> World<'a> {
                 judge,
             })
         })())
+    }
+
+    /// What something ran with on this scene.
+    pub fn ran(&self, kernels: &Variant, kernel_hash: String) -> Ran {
+        let tests = self.soup.intersection;
+        Ran {
+            kernels: kernels.kernels_label().to_owned(),
+            kernel_hash,
+            triangle: tests.triangle.name().to_owned(),
+            box_test: tests.box_test.name().to_owned(),
+            offset: self.buffers.offset.name().to_owned(),
+        }
     }
 }
 

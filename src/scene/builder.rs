@@ -1,8 +1,8 @@
 //! Gathers triangles from a loader and turns them into a checked [`SceneData`].
 
 use super::{
-    Assembly, Camera, InstanceError, LoadReport, Material, MaterialKind, MaterialSource, SceneData,
-    SceneError, Texture, Transform, Triangle,
+    Assembly, Camera, Daylight, Framing, InstanceError, LoadReport, Material, MaterialKind,
+    MaterialSource, SceneData, SceneError, Texture, Transform, Triangle,
 };
 use glam::{Vec2, Vec3};
 
@@ -158,7 +158,8 @@ impl SceneBuilder {
         (whole && !assembly.instances().is_empty()).then_some(assembly)
     }
 
-    /// Checks the whole, puts a white sky over a scene without any light, and hashes it.
+    /// Checks the whole, puts a sky over a scene without any light, finds a place to look from if there
+    /// is no camera, and hashes the scene.
     ///
     /// # Errors
     /// [`SceneError::NoTriangles`], [`SceneError::TooLarge`], [`SceneError::Instance`], and
@@ -208,13 +209,21 @@ impl SceneBuilder {
             assembly,
             camera: look.camera,
             environment: look.environment,
+            daylight: None,
+            framing: None,
             hash: String::new(),
             report: self.report,
         };
-        if scene.environment == Vec3::ZERO && scene.emitters().is_empty() {
-            scene.environment = Vec3::ONE;
-            let warning = "the scene has no light: lit by a white sky of radiance 1".to_owned();
-            scene.report.warnings.push(warning);
+        let unlit = scene.environment == Vec3::ZERO && scene.emitters().is_empty();
+        if unlit || scene.camera.is_none() {
+            let framing = Framing::of(&scene);
+            if unlit {
+                let sky = Daylight::over(&framing);
+                scene.report.warnings.push(sky.note());
+                scene.environment = Vec3::ONE;
+                scene.daylight = Some(sky);
+            }
+            scene.framing = Some(framing);
         }
         scene.hash = scene.content_hash();
         Ok(scene)

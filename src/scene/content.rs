@@ -95,6 +95,9 @@ impl SceneData {
             hash.vectors(&[camera.eye, camera.target, camera.up, lens]);
         }
         hash.vectors(&[self.environment]);
+        if let Some(sky) = &self.daylight {
+            hash.vectors(&[sky.up, sky.key, Vec3::splat(sky.reach)]);
+        }
         if let Some(assembly) = &self.assembly {
             for object in assembly.objects() {
                 hash.bytes(bytemuck::cast_slice::<Triangle, u8>(object));
@@ -123,13 +126,14 @@ impl Hash {
 
 #[cfg(test)]
 mod tests {
+    use crate::scene::Daylight;
     use crate::scene::builtin::tests::load_default;
 
     #[test]
     fn the_hash_sees_every_part_of_the_scene() {
         let scene = load_default("cornell-box");
         type Change = fn(&mut crate::scene::SceneData);
-        let changes: [(&str, Change); 7] = [
+        let changes: [(&str, Change); 8] = [
             ("vertex", |s| s.triangles[3].vertices[1].x += 1e-3),
             ("material id", |s| s.material_ids[0] = 1),
             ("reflectance", |s| s.materials[0].base_color.y += 1e-3),
@@ -137,6 +141,7 @@ mod tests {
             ("source", |s| s.materials[0].source.ior = Some(1.5)),
             ("camera", |s| s.camera = None),
             ("environment", |s| s.environment.x += 1e-3),
+            ("daylight", |s| s.daylight = Some(Daylight::default())),
         ];
         for (what, change) in changes {
             let mut changed = scene.clone();

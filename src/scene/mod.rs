@@ -8,7 +8,9 @@ mod builder;
 pub mod builtin;
 mod camera;
 mod content;
+mod daylight;
 mod error;
+mod framing;
 mod gltf;
 mod gltf_accessor;
 mod gltf_container;
@@ -24,12 +26,15 @@ mod texture;
 pub use builder::{DEFAULT_ALBEDO, MAX_COORDINATE};
 pub use builtin::builtin_scenes;
 pub use camera::Bounds;
+pub use daylight::Daylight;
 pub use error::SceneError;
+pub use framing::Framing;
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 
 use crate::config::Variant;
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
+use std::io::Read as _;
 use std::path::Path;
 
 /// One triangle in world space, vertices in the order of the file (f32, scene units).
@@ -128,6 +133,21 @@ pub struct LoadReport {
     pub warnings: Vec<String>,
 }
 
+impl LoadReport {
+    /// Everything that makes the scene differ from its file, a line each, for people.
+    pub fn lines(&self) -> Vec<String> {
+        let dropped = match self.dropped_non_finite {
+            0 => None,
+            1 => Some("1 triangle dropped: a vertex is not finite".to_owned()),
+            n => Some(format!("{n} triangles dropped: a vertex is not finite")),
+        };
+        dropped
+            .into_iter()
+            .chain(self.warnings.iter().cloned())
+            .collect()
+    }
+}
+
 /// A loaded scene: flat world-space triangles and what shading needs.
 ///
 /// `triangles`, `uvs` and `material_ids` are parallel; `uvs` is empty when no material is textured.
@@ -151,6 +171,10 @@ pub struct SceneData {
     pub camera: Option<Camera>,
     /// Constant radiance of the environment, linear RGB; zero is a black sky.
     pub environment: Vec3,
+    /// The sky over a scene that brings no light; its radiance is a multiple of `environment`.
+    pub daylight: Option<Daylight>,
+    /// Where to look from, if the scene brings no camera.
+    pub framing: Option<Framing>,
     /// BLAKE3 of the scene's content (hex), part of every cell's hash.
     pub hash: String,
     /// What was dropped or approximated.
@@ -201,6 +225,45 @@ pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Scene
         }),
     }
 }
+
+/// Looks at the file of a model without loading it: whether its format is known, whether it is a file with
+/// something in it, and whether that begins as the format does.
+///
+/// # Errors
+/// [`SceneError`]: an unknown format, or a file that cannot be read or cannot be a model.
+pub fn check_model(path: &Path) -> Result<(), SceneError> {
+    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    let extension = extension.to_str().unwrap_or_default();
+    let mut start = Vec::new();
+    let read = error::open(path)?.take(MODEL_START).read_to_end(&mut start);
+    read.map_err(|source| SceneError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    let json = || {
+        let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start);
+        text.trim_ascii_start().starts_with(b"{")
+    };
+    let (begins_well, expected) = match extension {
+        "obj" => (!start.contains(&0), "it is not text"),
+        "gltf" | "glb" => (
+            start.starts_with(b"glTF") || json(),
+            "it begins neither with `glTF` nor with `{`",
+        ),
+        "ply" => (start.starts_with(b"ply"), "it does not begin with `ply`"),
+        _ => {
+            let path = path.to_owned();
+            return Err(SceneError::UnknownFormat { path });
+        }
+    };
+    match begins_well {
+        true => Ok(()),
+        false => Err(SceneError::malformed(path, "", expected)),
+    }
+}
+
+/// Bytes of a model that [`check_model`] looks at.
+const MODEL_START: u64 = 512;
 
 /// How many materials a warning names.
 const NAMES_IN_WARNING: usize = 4;

@@ -6,10 +6,9 @@ use crate::accel::{
     brute_force_instances,
 };
 use crate::config::Params;
-use crate::gpu::{Gpu, GpuError};
+use crate::gpu::{Gpu, GpuError, kernel_errors};
 use crate::integrator::{SceneBuffers, Traced};
 use crate::measure::batch::{Batch, Query};
-use crate::measure::gate::KERNEL_ERRORS;
 use crate::scene::SceneData;
 
 /// A scene on the adapter, met by one choice of tests.
@@ -50,9 +49,7 @@ pub fn build(kind: &dyn AccelKind, soup: &TriangleSoup) -> Result<Box<dyn BuiltA
 
 /// The error word in words; `None` if there is no error.
 pub fn error_text(errors: u32) -> Option<String> {
-    let known = KERNEL_ERRORS.iter().filter(|(bit, _)| errors & bit != 0);
-    let texts: Vec<&str> = known.map(|(_, text)| *text).collect();
-    (errors != 0).then(|| texts.join("; "))
+    (errors != 0).then(|| kernel_errors(errors).join("; "))
 }
 
 impl<'a> Stage<'a> {

@@ -229,6 +229,8 @@ pub fn scene(triangles: Mesh, assembly: Option<Assembly>) -> SceneData {
         assembly,
         camera: None,
         environment: Vec3::ONE,
+        daylight: None,
+        framing: None,
         hash: String::new(),
         report: Default::default(),
     }

@@ -36,8 +36,6 @@ const RAYS: (usize, usize) = (512, 128);
 const SHOTS: (usize, usize) = (1_000_000, 16_384);
 /// Rays of a timed comparison.
 const TIMED_RAYS: (usize, usize) = (16_384, 8192);
-/// The model among the closed meshes, relative to the working directory.
-const MODEL: &str = "../shared/scenes/stanford-bunny/stanford-bunny.obj";
 
 /// What to do.
 #[derive(Debug, Clone)]
@@ -56,8 +54,8 @@ pub struct Settings {
     pub rays: usize,
     /// Shots at each closed mesh.
     pub shots: usize,
-    /// A model to shoot at, its holes closed.
-    pub model: PathBuf,
+    /// A model to shoot at, its holes closed; `None` leaves the shots at a model out.
+    pub model: Option<PathBuf>,
 }
 
 impl Settings {
@@ -72,7 +70,7 @@ impl Settings {
             triangles: Vec::new(),
             rays: of(RAYS),
             shots: of(SHOTS),
-            model: MODEL.into(),
+            model: None,
         }
     }
 
@@ -147,14 +145,24 @@ pub fn run(
         &settings.families,
         families::FAMILIES.iter().map(|f| f.name),
     )?;
+    let probe = probe_arithmetic(gpu)?;
+    let mut records = vec![Record::Suite(first_record(gpu, settings, probe.is_exact()))];
+    let mut tests = tests(settings);
+    tests.retain(|test| match Suite::with(*test).kept_by(&probe) {
+        Ok(()) => true,
+        Err(reason) => {
+            let what = test.name().to_owned();
+            records.push(Record::Skipped(record::SkippedRecord { what, reason }));
+            false
+        }
+    });
     let suite = Suite {
         gpus,
-        exact: probe_arithmetic(gpu)?.is_exact(),
+        exact: probe.is_exact(),
         settings,
         kinds: kinds(settings),
-        tests: tests(settings),
+        tests,
     };
-    let mut records = vec![Record::Suite(first_record(gpu, settings, suite.exact))];
     records.extend(suite.cells(progress)?);
     if settings.shots > 0 {
         records.extend(suite.shots(progress)?);

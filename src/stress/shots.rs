@@ -25,9 +25,20 @@ impl Suite<'_> {
     /// The device is lost or hangs.
     pub fn shots(&self, progress: &Progress) -> Result<Vec<Record>, StressError> {
         let mut records = Vec::new();
-        let model = self.settings.model.to_string_lossy().into_owned();
+        let model = self.settings.model.as_ref();
+        let model = model.map(|path| path.to_string_lossy().into_owned());
+        let model = model.unwrap_or_default();
+        if model.is_empty() {
+            records.push(Record::Skipped(SkippedRecord {
+                what: "shots at a model".into(),
+                reason: "none was given".into(),
+            }));
+        }
         for place in [Place::ORDINARY, Place::FAR] {
-            for name in [SPHERE, PLANE, &model] {
+            for name in [SPHERE, PLANE, &model]
+                .into_iter()
+                .filter(|name| !name.is_empty())
+            {
                 if self.settings.quick && name == model && place != Place::ORDINARY {
                     continue;
                 }

@@ -111,9 +111,9 @@ impl Suite<'_> {
             for (test, row) in self.tests.iter().zip(&mut cells) {
                 self.case(case, &judge, *test, row)?;
             }
-            if self.is_timed(case, timed) {
+            if let Some(row) = cells.first_mut().filter(|_| self.is_timed(case, timed)) {
                 timed += 1;
-                self.time(case, &mut cells[0])?;
+                self.time(case, row)?;
             }
         }
         let mut records = Vec::new();

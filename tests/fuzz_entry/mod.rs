@@ -12,7 +12,7 @@ use raystone::report::data::RunData;
 use raystone::report::read::RECORDS_FILE;
 use raystone::report::{read_records, sections, terminal_tables};
 use raystone::run::Registries;
-use raystone::scene::{self, Bounds, Camera, LoadOptions, MAX_COORDINATE, SceneData};
+use raystone::scene::{self, Bounds, LoadOptions, MAX_COORDINATE, SceneData};
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -207,7 +207,7 @@ fn check_scene(scene: &SceneData) {
         let texels = texture.width as usize * texture.height as usize;
         assert_eq!(texture.texels.len(), texels, "{}", texture.name);
     }
-    let camera = scene.camera.unwrap_or_else(|| Camera::frame(&bounds));
+    let camera = scene.view(1.0);
     camera.validate().expect("a camera that sees something");
     if let Some(assembly) = &scene.assembly {
         assert_eq!(assembly.triangles(), triangles as u64);

@@ -5,7 +5,8 @@ use crate::support::*;
 use crate::{judge, verdict, wrong};
 use raystone::accel::{NO_HIT, Ray, TriangleSoup, brute_force_hits};
 use raystone::config::ParamValue;
-use raystone::measure::gate::{Judge, KERNEL_ERRORS};
+use raystone::gpu::KERNEL_ERRORS;
+use raystone::measure::gate::Judge;
 use raystone::measure::record::GateVerdict;
 use raystone::scene::SceneData;
 
@@ -141,7 +142,7 @@ fn a_kernel_that_ignores_ties_is_wrong_on_every_hit_of_a_scene_made_of_ties() {
 
 #[test]
 fn a_blown_step_fuse_and_a_stack_overflow_are_named() {
-    let [(_, fuse), (_, overflow)] = KERNEL_ERRORS;
+    let [(_, fuse), (_, overflow), _] = KERNEL_ERRORS;
     let impatient = open(kernels_with(
         "accel/bvh/roped",
         &[(

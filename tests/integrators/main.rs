@@ -2,6 +2,7 @@
 //! scenes; and against themselves: seeds, slices, structures, with and without direct light.
 
 mod bits;
+mod blocks;
 mod direct_light;
 mod furnace;
 mod model;

@@ -138,8 +138,9 @@ fn a_texture_lies_on_its_quad_the_right_way_up_in_linear_colours() {
         .save(folder.path().join("picture.png"))
         .expect("a picture");
     let materials = "newmtl picture\nKd 1 1 1\nmap_Kd picture.png\n";
-    let scene = load(folder.path(), QUAD, materials);
-    // A plane sees nothing but the white sky of a scene without lights: its radiance is its colour.
+    let mut scene = load(folder.path(), QUAD, materials);
+    // Under a white sky, and a plane sees nothing else, radiance is the colour.
+    assert!(scene.daylight.take().is_some());
     assert_eq!((scene.textures.len(), scene.environment), (1, Vec3::ONE));
     let image = render(&Stage::new(gpu(), scene), 1, 256);
     let last = SIZE - 1;
@@ -156,3 +157,64 @@ fn a_texture_lies_on_its_quad_the_right_way_up_in_linear_colours() {
         assert!(difference > 0.5, "{what}: {difference}");
     }
 }
+
+#[test]
+fn a_scene_without_a_light_is_under_a_grey_sky_with_a_key_light() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut scene = load(folder.path(), QUAD, "newmtl picture\nKd 1 1 1\n");
+    let sky = scene.daylight.expect("a sky");
+    let side = sky.up.cross(sky.key).normalize();
+    for towards in [
+        sky.up,
+        -sky.up,
+        sky.key,
+        -sky.key,
+        side,
+        (side + sky.key).normalize(),
+    ] {
+        // From above the square, away from it.
+        scene.camera = Some(Camera {
+            eye: Vec3::new(0.0, 0.0, 9.0),
+            target: Vec3::new(0.0, 0.0, 9.0) + towards,
+            up: if towards.cross(sky.up).length() > 0.1 {
+                sky.up
+            } else {
+                side
+            },
+            vertical_fov_degrees: 0.1,
+        });
+        let height = f64::from(towards.dot(sky.up));
+        let step = ((height + 0.6) / 1.4).clamp(0.0, 1.0);
+        let grey = 0.12 + 0.38 * step * step * (3.0 - 2.0 * step);
+        let key = 10.0 * f64::from(towards.dot(sky.key).max(0.0)).powi(16);
+        let expected = [1.0, 0.96, 0.9].map(|warm| grey + key * warm);
+        let image = render(&Stage::new(gpu(), scene.clone()), 2, 16);
+        for (found, expected) in image.pixels[0].iter().zip(expected) {
+            let error = (f64::from(*found) / expected - 1.0).abs();
+            assert!(error < 0.01, "{towards}: {found} for {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_bounced_ray_that_reaches_far_in_a_room_sees_the_sky() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut scene = load(folder.path(), CUBE, "newmtl picture\nKd 0.5 0.5 0.5\n");
+    let sky = scene.daylight.as_mut().expect("a sky");
+    assert!(sky.reach <= 1.0, "the inside of the cube is a room");
+    let mean = |scene: &SceneData| render(&Stage::new(gpu(), scene.clone()), 4, 16).mean();
+    sky.reach = 100.0;
+    assert_eq!(mean(&scene), 0.0, "there is no hole in the cube");
+    scene.daylight.as_mut().expect("a sky").reach = 0.5;
+    assert!(mean(&scene) > 0.1);
+    // The camera sees the walls all the same, and not the sky behind them.
+    let dark = scene.materials.iter_mut();
+    dark.for_each(|material| material.base_color = Vec3::ZERO);
+    assert_eq!(mean(&scene), 0.0);
+}
+
+/// Faces inwards.
+const CUBE: &str = "
+v -2 -2 -2\nv 2 -2 -2\nv 2 2 -2\nv -2 2 -2\nv -2 -2 2.5\nv 2 -2 2.5\nv 2 2 2.5\nv -2 2 2.5
+usemtl picture
+f 1 2 3 4\nf 5 8 7 6\nf 1 5 6 2\nf 4 3 7 8\nf 1 4 8 5\nf 2 6 7 3\n";

@@ -89,9 +89,7 @@ impl Stage {
     /// `scene` as it is, seen by its own camera.
     pub fn new(gpu: &Gpu, scene: SceneData) -> Self {
         let soup = TriangleSoup::new(&scene);
-        let camera = scene
-            .camera
-            .unwrap_or_else(|| Camera::frame(&scene.bounds()));
+        let camera = scene.view(1.0);
         let buffers = SceneBuffers::upload(gpu, &scene, &soup).expect("buffers that fit");
         Self {
             scene,

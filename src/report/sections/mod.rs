@@ -14,6 +14,7 @@ pub mod verdict;
 use super::data::{RunData, SceneGroup};
 use super::document::*;
 use super::format;
+use crate::measure::record::KernelFolder;
 use std::path::Path;
 
 /// Builds the whole report. `dir` is where the pictures lie; `warnings` come from reading.
@@ -84,6 +85,9 @@ fn banners(data: &RunData, warnings: &[String]) -> Vec<Banner> {
             "The first record of the run is missing: where and what it ran is unknown.",
         );
     }
+    for folder in data.run.iter().flat_map(|run| &run.kernels) {
+        add(Tone::Note, &kernels_banner(folder));
+    }
     if data.finished.is_none() {
         add(
             Tone::Bad,
@@ -94,6 +98,31 @@ fn banners(data: &RunData, warnings: &[String]) -> Vec<Banner> {
         add(Tone::Note, warning);
     }
     banners
+}
+
+/// Digits of a hash that tell two kernels apart.
+const SHORT_HASH: usize = 12;
+
+/// Which files a folder put in the place of embedded kernels.
+fn kernels_banner(folder: &KernelFolder) -> String {
+    let short = |hash: &str| hash.chars().take(SHORT_HASH).collect::<String>();
+    let list = |replaces: bool| {
+        let files = folder.files.iter().filter(|file| file.replaces == replaces);
+        let files = files.map(|file| format!("{} ({})", file.file, short(&file.hash)));
+        files.collect::<Vec<_>>().join(", ")
+    };
+    let mut text = format!(
+        "Not the program's own kernels: what is marked @{} ran with those of the folder {} ({})",
+        folder.label,
+        folder.folder,
+        short(&folder.hash)
+    );
+    for (what, files) in [("replaced", list(true)), ("added", list(false))] {
+        if !files.is_empty() {
+            text += &format!("; {what}: {files}");
+        }
+    }
+    text + ". References are rendered with the program's own."
 }
 
 fn scene_section(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> Section {

@@ -171,7 +171,15 @@ fn environment(data: &RunData) -> Option<Section> {
             }
         )
     });
-    let rows: [(&str, String); 12] = [
+    let denormals = match e.denormals {
+        Some(kept) => if kept { "kept" } else { "taken for 0" }.to_owned(),
+        None => format::ABSENT.into(),
+    };
+    let loops = e.loop_limit.map_or("run to their end".into(), |limit| {
+        let limit = count(u64::from(limit));
+        format!("END IN SILENCE after {limit} turns in all; kernels check for it")
+    });
+    let rows: [(&str, String); 14] = [
         ("experiment", run.experiment.clone()),
         ("started", format::utc(run.started_unix_s)),
         ("adapter", e.adapter.clone()),
@@ -180,6 +188,8 @@ fn environment(data: &RunData) -> Option<Section> {
         ("driver", format!("{} {}", e.driver, e.driver_info)),
         ("software adapter", yes_no(e.software).into()),
         ("GPU timestamps", yes_no(e.timestamps).into()),
+        ("loops", loops),
+        ("denormal numbers", denormals),
         (
             "processor",
             format!("{}, {}", e.cpu, format::plural(e.cpu_threads, "thread")),

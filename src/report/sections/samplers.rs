@@ -4,7 +4,7 @@ use super::sampler_plots::{error_figures, histograms, pareto_plot};
 use super::spectrum;
 use super::verdict::Race;
 use crate::measure::record::{BiasRecord, Interval, TimeRecord};
-use crate::report::data::{RunData, View, sampler_name, structure_name};
+use crate::report::data::{RunData, View, sampler_name, timed_structure};
 use crate::report::document::*;
 use crate::report::plot::histogram;
 use crate::report::plot::pareto::letter;
@@ -235,9 +235,8 @@ fn time_cell(view: &View, structure: &str, sampler: &Sampler) -> Cell {
     if let Some(ms) = view.ms_per_spp(structure, &sampler.name) {
         return Cell::with_detail(format::number(ms.value), format::bounds(&ms));
     }
-    let of_structure = |time: &&&TimeRecord| {
-        structure_name(&time.accel, time.runtime_checks) == structure && is_of(time, sampler)
-    };
+    let of_structure =
+        |time: &&&TimeRecord| timed_structure(time) == structure && is_of(time, sampler);
     match view.times.iter().find(of_structure) {
         Some(time) if !time.image_equal && time.failure.is_none() => {
             Cell::from("image differs").toned(Tone::Bad)

@@ -263,6 +263,7 @@ fn cost_table(data: &RunData) -> Table {
             decorrelation,
             ns_per_sample,
             loop_ns_per_sample,
+            ran: _,
         } = cost;
         table.rows.push(vec![
             sampler_name(sequence, decorrelation).into(),

@@ -1,7 +1,7 @@
 //! What a build costs against what it gains: break-even in rays, and time to an image.
 
 use crate::measure::record::{Interval, RayClass, StructureRecord};
-use crate::report::data::{SceneGroup, View, structure_name};
+use crate::report::data::{SceneGroup, View, structure_name, without_kernels};
 use crate::report::document::*;
 use crate::report::format;
 
@@ -110,11 +110,15 @@ pub fn time_to_image_table(scene: &SceneGroup, view: &View) -> Option<Table> {
         table.add_column(format!("build + {spp} spp"));
     }
     for name in &structures {
-        let built = scene
-            .structures
-            .iter()
-            .find(|s| structure_name(&s.accel, s.runtime_checks) == *name);
-        let (Some(built), Some(ms)) = (built, view.ms_per_spp(name, &sampler.name)) else {
+        let Some(time) = view.time(name, &sampler.name) else {
+            continue;
+        };
+        let is_it = |s: &&&StructureRecord| {
+            s.ran.kernels == time.ran.kernels
+                && without_kernels(&s.accel, &s.ran, s.runtime_checks) == *name
+        };
+        let built = scene.structures.iter().find(is_it);
+        let (Some(built), Some(ms)) = (built, time.ms_per_spp) else {
             continue;
         };
         let total = |spp: u32| format::number(built.build_ms + ms.value * f64::from(spp));

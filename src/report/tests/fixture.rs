@@ -60,6 +60,8 @@ pub(super) fn run() -> Record {
             device_type: "cpu".into(),
             software: true,
             timestamps: true,
+            loop_limit: None,
+            denormals: Some(true),
             os: "Linux x86_64".into(),
             cpu: "Some Processor".into(),
             cpu_threads: 2,
@@ -69,6 +71,7 @@ pub(super) fn run() -> Record {
         },
         renders_full_product: 560,
         renders_planned: 152,
+        kernels: Vec::new(),
     })
 }
 
@@ -156,6 +159,8 @@ pub(super) fn structure(scene: &str, accel: &str, mrays: f64, wrong: usize) -> S
         (RayClass::Bounce, 0.45),
     ];
     StructureRecord {
+        refused: false,
+        ran: Ran::default(),
         scene: scene.into(),
         accel: variant(accel),
         features: vec!["counters".into()],
@@ -230,6 +235,7 @@ pub(super) fn errors(scene: &str, integrator: &str, replicates: u32) -> Vec<Reco
                 })
             };
             records.push(Record::Error(ErrorRecord {
+                ran: Ran::default(),
                 scene: scene.into(),
                 integrator: variant(integrator),
                 sequence: variant(sequence),
@@ -254,6 +260,7 @@ pub(super) fn bias(scene: &str, integrator: &str, index: usize, verdict: &str) -
     let testable = !verdict.starts_with("not-testable");
     let biased = verdict == "biased";
     Record::Bias(BiasRecord {
+        ran: Ran::default(),
         scene: scene.into(),
         integrator: variant(integrator),
         sequence: variant(sequence),
@@ -278,6 +285,7 @@ pub(super) fn times(scene: &str, integrator: &str, accels: &[(&str, f64)]) -> Ve
     for &(accel, factor) in accels {
         for (sequence, decorrelation, .., cost) in SAMPLERS {
             records.push(Record::Time(TimeRecord {
+                ran: Ran::default(),
                 scene: scene.into(),
                 accel: variant(accel),
                 sequence: variant(sequence),
@@ -306,6 +314,7 @@ pub(super) fn times(scene: &str, integrator: &str, accels: &[(&str, f64)]) -> Ve
 
 pub(super) fn reference(scene: &str, integrator: &str) -> Record {
     Record::Reference(ReferenceRecord {
+        ran: Ran::default(),
         scene: scene.into(),
         integrator: variant(integrator),
         spp: 4096,
@@ -335,6 +344,7 @@ pub(super) fn streams() -> Vec<Record> {
                 }
             };
             Record::Stream(StreamRecord {
+                ran: Ran::default(),
                 sequence: variant(sequence),
                 decorrelation: variant(decorrelation),
                 dimensions: [2, 3],
@@ -381,6 +391,7 @@ fn stream_figures(exponent: f64) -> StreamFigures {
 pub(super) fn costs() -> Vec<Record> {
     let cost = |&(sequence, decorrelation, ..): &(&str, &str, f64, f64, bool, f64)| {
         Record::SamplerCost(SamplerCostRecord {
+            ran: Ran::default(),
             sequence: variant(sequence),
             decorrelation: variant(decorrelation),
             ns_per_sample: around(12.5, 0.1),
@@ -403,6 +414,7 @@ pub(super) fn spectra(scene: &str, integrator: &str) -> Vec<Record> {
                 rmse: around(0.02 / (1.0 + sigma), 0.05),
             };
             Record::Spectrum(SpectrumRecord {
+                ran: Ran::default(),
                 scene: scene.into(),
                 integrator: variant(integrator),
                 sequence: variant(sequence),

@@ -40,6 +40,8 @@ pub(super) fn lattice_scene(seed: u64) -> SceneData {
         assembly: None,
         camera: None,
         environment: Vec3::ONE,
+        daylight: None,
+        framing: None,
         hash: String::new(),
         report: LoadReport::default(),
     }

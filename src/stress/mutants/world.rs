@@ -46,9 +46,7 @@ impl Stage {
     pub fn new(scene: SceneData) -> Self {
         Self {
             soup: TriangleSoup::new(&scene),
-            camera: scene
-                .camera
-                .unwrap_or_else(|| Camera::frame(&scene.bounds())),
+            camera: scene.view(1.0),
             scene,
         }
     }

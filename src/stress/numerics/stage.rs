@@ -56,9 +56,7 @@ impl Stage {
         let soup = TriangleSoup::new(scene);
         let built = bvh.build(&soup, &variant.params, &mut BuildLog::default())?;
         Ok(Self {
-            camera: scene
-                .camera
-                .unwrap_or_else(|| Camera::frame(&scene.bounds())),
+            camera: scene.view(1.0),
             buffers: SceneBuffers::upload(gpu, scene, &soup)?,
             traced: Traced::upload(gpu, &*built)?,
         })

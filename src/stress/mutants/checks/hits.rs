@@ -21,6 +21,7 @@ pub(super) fn same_hits(bench: &Bench, name: &str, changes: Changes, cases: &[Ca
         exact_division: bench.exact,
         exact_sqrt: bench.exact,
         exact_products: bench.exact,
+        denormals: bench.exact,
     };
     for Case { stage, judge } in cases {
         let built = build(name, changes, &stage.soup)?;

@@ -1,0 +1,44 @@
+//! The kernels' error word in words.
+
+use super::{Gpu, GpuError};
+
+/// Bit that is set where the driver ended the loops of an invocation early: [`super::Gpu::loop_limit`].
+pub(crate) const LOOPS_CUT: u32 = 4;
+
+/// Meaning of the bits of the kernels' error word, as in `kernels/common/errors.wesl`.
+pub const KERNEL_ERRORS: [(u32, &str); 3] = [
+    (
+        1,
+        "a traversal took more steps than the structure allows (step fuse)",
+    ),
+    (2, "a traversal stack overflowed"),
+    (LOOPS_CUT, "the driver ended loops before their end"),
+];
+
+/// What the bits of an error word mean; nothing for 0.
+pub fn kernel_errors(word: u32) -> Vec<String> {
+    let known = KERNEL_ERRORS.iter().filter(|(bit, _)| word & bit != 0);
+    let mut texts: Vec<String> = known.map(|(_, text)| (*text).to_owned()).collect();
+    let unknown = KERNEL_ERRORS
+        .iter()
+        .fold(word, |left, (bit, _)| left & !bit);
+    if unknown != 0 {
+        texts.push(format!("unknown bits {unknown:#x} of the error word"));
+    }
+    texts
+}
+
+impl Gpu {
+    /// An error if kernels raised their error word.
+    ///
+    /// # Errors
+    /// [`GpuError::LoopsCut`] where the driver ended loops, whatever else it led to;
+    /// [`GpuError::Kernels`] for any other bit.
+    pub fn check_error_word(&self, word: u32) -> Result<(), GpuError> {
+        match self.loop_limit {
+            _ if word == 0 => Ok(()),
+            Some(limit) if word & LOOPS_CUT != 0 => Err(GpuError::LoopsCut { limit }),
+            _ => Err(GpuError::Kernels(kernel_errors(word).join("; "))),
+        }
+    }
+}

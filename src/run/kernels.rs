@@ -1,0 +1,93 @@
+//! The kernels of a run: a library for each folder on the axis, and a device that composes from each.
+
+use super::{Registries, RunError, RunOptions};
+use crate::config::Variant;
+use crate::gpu::{self, Gpu, KernelLibrary};
+use crate::measure::record::{KernelFile, KernelFolder};
+use std::path::Path;
+
+/// The embedded kernels with those of `folder` on top, checked as far as can be without composing.
+///
+/// # Errors
+/// The folder cannot be read, a file in it is no WESL, or no kernel could be made with it.
+pub fn kernel_library(folder: &Path, registries: &Registries) -> Result<KernelLibrary, RunError> {
+    let library = KernelLibrary::default().with_folder(folder);
+    let checked = library.and_then(|library| {
+        library.check(&registries.kernels())?;
+        Ok(library)
+    });
+    checked.map_err(|e| RunError::Input(format!("kernels {}: {e}", folder.display())))
+}
+
+/// The libraries of an axis of kernels.
+pub struct Kernels(Vec<(Variant, KernelLibrary)>);
+
+impl Kernels {
+    /// Reads and checks the folders; the variant of the empty name stands for the embedded kernels.
+    ///
+    /// # Errors
+    /// As [`kernel_library`].
+    pub fn load(axis: &[Variant], registries: &Registries) -> Result<Self, RunError> {
+        let folders = axis.iter().filter(|kernels| !kernels.name.is_empty());
+        let library = |kernels: &Variant| {
+            let library = kernel_library(Path::new(&kernels.name), registries)?;
+            Ok((kernels.clone(), library))
+        };
+        folders.map(library).collect::<Result<_, _>>().map(Self)
+    }
+
+    /// What is recorded of them.
+    pub(super) fn folders(&self) -> Vec<KernelFolder> {
+        let folder = |(kernels, library): &(Variant, KernelLibrary)| KernelFolder {
+            label: kernels.label.clone(),
+            folder: kernels.name.clone(),
+            hash: library.hash().to_owned(),
+            files: library
+                .overridden()
+                .into_iter()
+                .map(|name| file(library, name))
+                .collect(),
+        };
+        self.0.iter().map(folder).collect()
+    }
+}
+
+fn file(library: &KernelLibrary, name: &str) -> KernelFile {
+    let text = library.text(name).unwrap_or_default();
+    KernelFile {
+        file: format!("{name}.wesl"),
+        hash: blake3::hash(text.as_bytes()).to_hex().to_string(),
+        replaces: KernelLibrary::is_embedded(name),
+    }
+}
+
+/// An open device, which composes kernels from every library of a run.
+pub(super) struct Device {
+    /// With the embedded kernels.
+    pub gpu: Gpu,
+    views: Vec<(Variant, Gpu)>,
+}
+
+impl Device {
+    /// Opens the adapter of the options.
+    pub fn open(options: &RunOptions, kernels: &Kernels) -> Result<Self, RunError> {
+        let gpu = gpu::open(&options.adapter, KernelLibrary::default())?;
+        let views = kernels.0.iter();
+        let views =
+            views.map(|(kernels, library)| (kernels.clone(), gpu.with_kernels(library.clone())));
+        let views = views.collect();
+        Ok(Self { gpu, views })
+    }
+
+    /// The device with these kernels; an error if the plan was made for others.
+    pub fn of(&self, kernels: &Variant) -> Result<&Gpu, RunError> {
+        if kernels.name.is_empty() {
+            return Ok(&self.gpu);
+        }
+        let view = self.views.iter().find(|(known, _)| known == kernels);
+        let view = view.map(|(_, gpu)| gpu);
+        view.ok_or_else(|| {
+            RunError::Input(format!("the kernels {kernels} are not those of the plan"))
+        })
+    }
+}

@@ -1,0 +1,215 @@
+//! One picture, for `raystone render`. Nothing is judged or recorded, so that the first picture is
+//! there at once; the structure is validated on the host.
+
+use super::errors::sampler_for;
+use super::kernels::{Device, Kernels};
+use super::session::Session;
+use super::{Registries, RunError, RunOptions};
+use crate::accel::{BuildLog, Intersection, TriangleSoup};
+use crate::config::{Experiment, Plan, Variant};
+use crate::gpu::{Gpu, probe_arithmetic};
+use crate::integrator::{Frame, RayOffset, RenderJob, Renderer, SceneBuffers, Traced, integrator};
+use crate::measure::formats::FileFormat;
+use crate::measure::image::Image;
+use crate::scene::{self, LoadOptions, LoadReport, SceneData};
+use indicatif::ProgressStyle;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Samples are added for about so long before the progress is shown.
+const STEP: Duration = Duration::from_millis(500);
+/// Least time between two writes of an unfinished picture.
+const REFRESH: Duration = Duration::from_secs(2);
+
+/// What was rendered, how fast, and what was approximated.
+#[derive(Debug, Clone)]
+pub struct Rendering {
+    /// Triangles of the scene.
+    pub triangles: usize,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Seconds from the start until the first picture was written.
+    pub first_picture_s: f64,
+    /// Seconds that the samples took, compilation of the kernel not included.
+    pub samples_s: f64,
+    /// Seconds from the start to the end.
+    pub total_s: f64,
+    /// Rays of all classes.
+    pub rays: u64,
+    /// What the loader dropped or approximated.
+    pub report: LoadReport,
+    /// Pixels that are NaN or infinite: a fault of the renderer.
+    pub non_finite_pixels: usize,
+}
+
+/// Renders the first scene, structure, sampler and integrator of the axes at `experiment.spp.max()`
+/// samples into `file`, whose ending chooses the format. The file is there after the first sample
+/// and is written again while more are added.
+///
+/// # Errors
+/// An unknown ending, no adapter, a scene that does not load, a structure that cannot be built or is
+/// not valid, a file that cannot be written, or an image that is not sound: see [`Renderer::image`].
+pub fn render(
+    experiment: &Experiment,
+    plan: &Plan,
+    registries: &Registries,
+    options: &RunOptions,
+    file: &Path,
+) -> Result<Rendering, RunError> {
+    let start = Instant::now();
+    let format = FileFormat::of(file).map_err(input)?;
+    let cell = plan
+        .times
+        .first()
+        .ok_or_else(|| RunError::Input("there is nothing to render".to_owned()))?;
+    let kernels = Kernels::load(&plan.kernels, registries)?;
+    let session = Session::unrecorded(experiment, plan, registries, options);
+    session.say(format!("{}: loading", cell.scene));
+    let scene = scene::load(&cell.scene, &LoadOptions::default()).map_err(input)?;
+    let device = Device::open(options, &kernels)?;
+    let gpu = device.of(&cell.kernels)?;
+    let (soup, offset) = tested_triangles(gpu, experiment, &scene)?;
+    session.say(format!("{}: building {}", cell.scene, cell.accel));
+    let traced = build(&session, gpu, &soup, &cell.accel)?;
+    let mut buffers = SceneBuffers::upload(gpu, &scene, &soup)?;
+    buffers.offset = offset;
+    drop(soup);
+    session.say("compiling the kernel");
+    let spp = experiment.spp.max();
+    let pair = (&cell.sequence, &cell.decorrelation);
+    let sampler = sampler_for(&session, pair, &cell.integrator, spp).map_err(RunError::Input)?;
+    let integrator = integrator(&cell.integrator.name)
+        .ok_or_else(|| RunError::Input(format!("no integrator is called {}", cell.integrator)))?;
+    let job = RenderJob {
+        frame: frame(
+            experiment,
+            &scene,
+            integrator.ao_radius(&cell.integrator.params),
+        )?,
+        sampler: &sampler,
+        integrator,
+        params: &cell.integrator.params,
+        runtime_checks: true,
+    };
+    let renderer = Renderer::new(gpu, &buffers, &traced, &job, true)?;
+    let mut rendering = Rendering {
+        triangles: scene.triangles.len(),
+        spp,
+        first_picture_s: 0.0,
+        samples_s: 0.0,
+        total_s: 0.0,
+        rays: 0,
+        report: scene.report,
+        non_finite_pixels: 0,
+    };
+    let compiled = Instant::now();
+    let image = add_all_samples(&session, &renderer, spp, |image| {
+        if rendering.first_picture_s == 0.0 {
+            rendering.first_picture_s = start.elapsed().as_secs_f64();
+        }
+        format.write(file, image).map_err(input)
+    })?;
+    rendering.samples_s = compiled.elapsed().as_secs_f64();
+    rendering.rays = renderer.ray_counts()?.iter().sum();
+    rendering.non_finite_pixels = image.non_finite_pixels();
+    rendering.total_s = start.elapsed().as_secs_f64();
+    session.progress.finish_and_clear();
+    Ok(rendering)
+}
+
+fn input(error: impl ToString) -> RunError {
+    RunError::Input(error.to_string())
+}
+
+/// The triangles with the tests that the experiment asks for, and where rays start.
+fn tested_triangles(
+    gpu: &Gpu,
+    experiment: &Experiment,
+    scene: &SceneData,
+) -> Result<(TriangleSoup, RayOffset), RunError> {
+    let tests = experiment.tests;
+    let chosen = Intersection::named(tests.triangle, tests.box_test).map_err(RunError::Input)?;
+    let offset = RayOffset::named(tests.offset)
+        .ok_or_else(|| RunError::Input(format!("no ray offset is called {}", tests.offset)))?;
+    let probe = probe_arithmetic(gpu)?;
+    chosen.kept_by(&probe).map_err(RunError::Input)?;
+    Ok((TriangleSoup::new(scene).intersecting(chosen), offset))
+}
+
+fn build(
+    session: &Session,
+    gpu: &Gpu,
+    soup: &TriangleSoup,
+    accel: &Variant,
+) -> Result<Traced, RunError> {
+    let kind = session
+        .registries
+        .accel
+        .get(&accel.name)
+        .ok_or_else(|| RunError::Input(format!("no structure is called {accel}")))?;
+    let built = kind
+        .build(soup, &accel.params, &mut BuildLog::default())
+        .map_err(input)?;
+    built
+        .validate(soup)
+        .map_err(|e| RunError::Wrong(format!("{accel} is not valid: {e}")))?;
+    Ok(Traced::upload(gpu, &*built)?)
+}
+
+/// What is seen: the camera of the experiment, of the scene, or one that frames the scene.
+fn frame(
+    experiment: &Experiment,
+    scene: &SceneData,
+    ao_radius: Option<f64>,
+) -> Result<Frame, RunError> {
+    let bounds = scene.bounds();
+    let camera = experiment
+        .camera
+        .unwrap_or_else(|| scene.view(experiment.aspect()));
+    camera.validate().map_err(input)?;
+    let [width, height] = experiment.resolution;
+    let diagonal = f64::from(2.0 * bounds.radius());
+    Ok(Frame {
+        width,
+        height,
+        camera,
+        ao_radius: (ao_radius.unwrap_or(0.0) * diagonal) as f32,
+    })
+}
+
+/// Adds `spp` samples in steps of about [`STEP`]. `show` gets the image after the first, whenever the
+/// samples have doubled and [`REFRESH`] is over, and at the end.
+fn add_all_samples(
+    session: &Session,
+    renderer: &Renderer,
+    spp: u32,
+    mut show: impl FnMut(&Image) -> Result<(), RunError>,
+) -> Result<Image, RunError> {
+    let seed = session.experiment.seed;
+    let style =
+        ProgressStyle::with_template("{bar:32} {pos}/{len} spp · {elapsed} · about {eta} left");
+    if let Ok(style) = style {
+        session.progress.set_style(style);
+    }
+    session.progress.set_length(u64::from(spp));
+    renderer.reset();
+    let start = Instant::now();
+    let (mut done, mut shown, mut last) = (0, 0, start);
+    loop {
+        let speed = f64::from(done) / start.elapsed().as_secs_f64().max(1e-6);
+        let step = (speed * STEP.as_secs_f64()).max(1.0) as u32;
+        let step = step.min(spp - done);
+        renderer.add_samples(done, step, seed)?;
+        done += step;
+        session.progress.set_position(u64::from(done));
+        let due = done >= 2 * shown && last.elapsed() >= REFRESH;
+        if shown == 0 || due || done == spp {
+            let image = renderer.image()?;
+            show(&image)?;
+            (shown, last) = (done, Instant::now());
+            if done == spp {
+                return Ok(image);
+            }
+        }
+    }
+}

@@ -1,0 +1,626 @@
+//! Where a scene without a camera is looked at from: objects from outside, rooms from inside.
+//!
+//! A room is what surrounds most points in its box with surfaces that face them. (The inside of a
+//! closed object is surrounded, too, but by backs of surfaces.) Rays are cast on the host, among the
+//! largest triangles if there are many. The answer depends on the triangles alone.
+
+use super::{Bounds, Camera, SceneData, Triangle};
+use glam::{DVec3, Vec3, Vec3A};
+use obvhs::bvh2::Bvh2;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use obvhs::ray::{Ray, RayHit};
+
+/// Vertical field of view outside, degrees.
+const OUTSIDE_FOV: f32 = 35.0;
+/// Vertical field of view inside a room, degrees.
+const INSIDE_FOV: f32 = 60.0;
+/// Share of the image, in width or height, that an object takes.
+const FILL: f32 = 0.9;
+/// Most triangles that rays are cast among; of more, the largest ones.
+const MOST_TRIANGLES: usize = 1 << 19;
+/// A point is inside a room if this share of all directions meets the front of a surface.
+const ENCLOSED: f32 = 0.7;
+/// A scene is a room if this share of the points in its box is inside one.
+const ROOM: f32 = 0.4;
+/// A side of a room is open if one leaves through it from this share of the points inside.
+const OPEN_SIDE: f32 = 0.6;
+/// An extent of a box below this share of the largest one is none.
+const FLAT: f32 = 0.01;
+
+/// How an automatic camera looks at a scene; the aspect of the image decides the rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Framing {
+    bounds: Bounds,
+    up: Vec3,
+    place: Place,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Place {
+    /// So far in this direction that everything is in the image.
+    Outside { towards_eye: Vec3, room: bool },
+    /// In a room.
+    Inside { eye: Vec3, forward: Vec3 },
+}
+
+impl SceneData {
+    /// The camera of the file; without one, a camera that shows the whole scene in an image of this
+    /// aspect (width over height), or the inside of a room.
+    pub fn view(&self, aspect: f32) -> Camera {
+        self.camera.unwrap_or_else(|| {
+            let framing = self.framing.unwrap_or_else(|| Framing::of(self));
+            framing.camera(&self.triangles, aspect)
+        })
+    }
+}
+
+impl Default for Framing {
+    /// The view of an object around the origin that stands on the y axis.
+    fn default() -> Self {
+        Self {
+            bounds: Bounds {
+                min: -Vec3::ONE,
+                max: Vec3::ONE,
+            },
+            up: Vec3::Y,
+            place: Place::Outside {
+                towards_eye: three_quarter(Vec3::Y, 1.0, 1.0),
+                room: false,
+            },
+        }
+    }
+}
+
+impl Framing {
+    /// Looks for the best place. glTF says that y is up; elsewhere the triangles tell.
+    pub(super) fn of(scene: &SceneData) -> Self {
+        let name = scene.name.to_ascii_lowercase();
+        let says_y = name.ends_with(".gltf") || name.ends_with(".glb");
+        let bounds = scene.bounds();
+        if bounds.is_empty() {
+            return Self::default();
+        }
+        let (up, place) = Stage::new(&scene.triangles, &bounds).place(says_y);
+        Self { bounds, up, place }
+    }
+
+    /// Whether the scene is a room.
+    pub fn is_room(&self) -> bool {
+        !matches!(self.place, Place::Outside { room: false, .. })
+    }
+
+    /// To the right, upwards and to the front of the scene: unit vectors.
+    pub fn axes(&self) -> [Vec3; 3] {
+        let front = if self.up == Vec3::Z {
+            -Vec3::Y
+        } else {
+            Vec3::Z
+        };
+        [Vec3::X, self.up, front]
+    }
+
+    /// Least edge of the scene's box.
+    pub(super) fn least_extent(&self) -> f32 {
+        (self.bounds.max - self.bounds.min).min_element()
+    }
+
+    /// The camera for an image of this aspect. `triangles` are those of the scene.
+    fn camera(&self, triangles: &[Triangle], aspect: f32) -> Camera {
+        let (center, radius) = sphere_around(&self.bounds);
+        let (eye, forward, fov) = match self.place {
+            Place::Inside { eye, forward } => (eye, 0.5 * forward, INSIDE_FOV),
+            Place::Outside { towards_eye, .. } => {
+                let local = |v: Vec3| to_unit(v, center, radius);
+                let vertices = triangles.iter().flat_map(|t| t.vertices).map(local);
+                let (eye, distance) = fit(vertices, towards_eye, self.up, aspect);
+                (eye, -distance * towards_eye, OUTSIDE_FOV)
+            }
+        };
+        Camera {
+            eye: center + radius * eye,
+            target: center + radius * (eye + forward),
+            up: self.up,
+            vertical_fov_degrees: fov,
+        }
+    }
+}
+
+/// Centre and radius of a sphere around the box. Of a single point, too, it has an inside.
+fn sphere_around(bounds: &Bounds) -> (Vec3, f32) {
+    let center = bounds.center();
+    let least = 1e-3 * center.abs().max_element();
+    (center, bounds.radius().max(least).max(1e-6))
+}
+
+/// Moves the sphere to the unit sphere.
+fn to_unit(v: Vec3, center: Vec3, radius: f32) -> Vec3 {
+    ((v.as_dvec3() - center.as_dvec3()) / f64::from(radius)).as_vec3()
+}
+
+/// From the front (or back), the right (or left) and above.
+fn three_quarter(up: Vec3, right: f32, front: f32) -> Vec3 {
+    let [x, above, z] = [0.55 * right, 0.4, 0.75 * front];
+    let direction = match up == Vec3::Z {
+        true => Vec3::new(x, -z, above),
+        false => Vec3::new(x, above, z),
+    };
+    direction.normalize()
+}
+
+/// The eye nearest to the vertices that looks from `towards_eye` and has all in its image, and how far
+/// ahead the origin is.
+///
+/// With a, b, c the coordinates of a vertex to the right, upwards and ahead, those of the eye have to
+/// satisfy |a − aₑ| ≤ k (c − cₑ), and the same with b: four planes that touch the vertices.
+fn fit(
+    vertices: impl Iterator<Item = Vec3>,
+    towards_eye: Vec3,
+    up: Vec3,
+    aspect: f32,
+) -> (Vec3, f32) {
+    let [forward, right, up] = basis(-towards_eye, up);
+    let tangent = FILL * (0.5 * OUTSIDE_FOV.to_radians()).tan();
+    let slopes = [tangent * aspect, tangent];
+    let [mut low, mut high] = [[f32::NEG_INFINITY; 2]; 2];
+    for v in vertices {
+        for (i, axis) in [right, up].into_iter().enumerate() {
+            let (along, ahead) = (v.dot(axis), slopes[i] * v.dot(forward));
+            high[i] = high[i].max(along - ahead);
+            low[i] = low[i].max(-along - ahead);
+        }
+    }
+    let aside = [0, 1].map(|i| 0.5 * (high[i] - low[i]));
+    let ahead = [0, 1].map(|i| -0.5 * (high[i] + low[i]) / slopes[i]);
+    // Never nearer than a small step, for points and flat scenes.
+    let ahead = ahead[0].min(ahead[1]).min(-0.05);
+    (aside[0] * right + aside[1] * up + ahead * forward, -ahead)
+}
+
+/// Forward, right and up of an image.
+fn basis(forward: Vec3, up: Vec3) -> [Vec3; 3] {
+    let right = forward.cross(up).normalize_or(Vec3::X);
+    [forward, right, right.cross(forward)]
+}
+
+/// The scene moved to the unit sphere.
+struct Stage {
+    bounds: Bounds,
+    up: Vec3,
+    solid: Vec<obvhs::triangle::Triangle>,
+    bvh: Bvh2,
+}
+
+/// What a ray meets.
+#[derive(Clone, Copy, PartialEq)]
+enum Seen {
+    Nothing,
+    Back,
+    Front(f32),
+}
+
+impl Stage {
+    fn new(triangles: &[Triangle], bounds: &Bounds) -> Self {
+        let (center, radius) = sphere_around(bounds);
+        let local = |v: Vec3| to_unit(v, center, radius);
+        let to_local = |t: &Triangle| {
+            let [v0, v1, v2] = t.vertices.map(|v| local(v).into());
+            obvhs::triangle::Triangle { v0, v1, v2 }
+        };
+        let mut solid: Vec<_> = triangles.iter().map(to_local).collect();
+        if solid.len() > MOST_TRIANGLES {
+            let area = |t: &obvhs::triangle::Triangle| (t.v1 - t.v0).cross(t.v2 - t.v0).length();
+            solid.select_nth_unstable_by(MOST_TRIANGLES, |a, b| area(b).total_cmp(&area(a)));
+            solid.truncate(MOST_TRIANGLES);
+        }
+        let ids = (0..solid.len() as u32).collect();
+        let bvh = PlocBuilder::new().build(
+            PlocSearchDistance::Minimum,
+            &solid,
+            ids,
+            SortPrecision::U64,
+            0,
+        );
+        let bounds = Bounds {
+            min: local(bounds.min),
+            max: local(bounds.max),
+        };
+        Self {
+            bounds,
+            up: Vec3::Y,
+            solid,
+            bvh,
+        }
+    }
+
+    /// What is up, and where to look from.
+    fn place(mut self, says_y: bool) -> (Vec3, Place) {
+        if !says_y && self.stands_on_z() {
+            self.up = Vec3::Z;
+        }
+        let mut points = self.enclosed_points();
+        if !says_y && self.up == Vec3::Y && points.as_ref().is_some_and(|p| self.is_open_to_z(p)) {
+            self.up = Vec3::Z;
+            points = self.enclosed_points().or(points);
+        }
+        let place = match points {
+            Some(points) => self
+                .open_side(&points)
+                .unwrap_or_else(|| self.inside(&points)),
+            None => Place::Outside {
+                towards_eye: self.side(),
+                room: false,
+            },
+        };
+        (self.up, place)
+    }
+
+    /// The direction from which an object is looked at.
+    fn side(&self) -> Vec3 {
+        let flat = (self.bounds.max - self.bounds.min).cmplt(Vec3::splat(FLAT));
+        // A picture in a plane is looked at from the front.
+        match (flat.x, flat.y, flat.z) {
+            (false, false, true) => return Vec3::Z,
+            (true, false, false) => return Vec3::X,
+            _ => {}
+        }
+        // Not at the backs of walls, if another side shows their fronts.
+        let sides = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+        let sides = sides.map(|(right, front)| three_quarter(self.up, right, front));
+        let backs = sides.map(|side| self.look(4.0 * side, -side, OUTSIDE_FOV).backs);
+        let least = backs.into_iter().fold(1.0, f32::min);
+        let chosen = backs.iter().position(|&share| share <= least + 0.2);
+        sides[chosen.unwrap_or(0)]
+    }
+
+    /// Points in rooms, if the scene is one.
+    fn enclosed_points(&self) -> Option<Vec<Vec3>> {
+        const EDGE: usize = 7;
+        const HEIGHTS: [f32; 3] = [0.25, 0.4, 0.55];
+        let size = self.bounds.max - self.bounds.min;
+        let needed = (ROOM * (EDGE * EDGE * HEIGHTS.len()) as f32) as usize;
+        let mut points = Vec::new();
+        let mut left = EDGE * EDGE * HEIGHTS.len();
+        for height in HEIGHTS {
+            for i in 0..EDGE * EDGE {
+                let at = |k: usize| (k as f32 + 0.5) / EDGE as f32;
+                let (u, v) = (at(i % EDGE), at(i / EDGE));
+                let share = match self.up == Vec3::Z {
+                    true => Vec3::new(u, v, height),
+                    false => Vec3::new(u, height, v),
+                };
+                let point = self.bounds.min + share * size;
+                if self.is_enclosed(point) {
+                    points.push(point);
+                }
+                left -= 1;
+                if points.len() + left < needed {
+                    return None;
+                }
+            }
+        }
+        Some(points)
+    }
+
+    fn is_enclosed(&self, point: Vec3) -> bool {
+        const RAYS: usize = 96;
+        const MOST_OTHERS: usize = ((1.0 - ENCLOSED) * RAYS as f32) as usize;
+        let others = sphere(RAYS).filter(|&d| !matches!(self.cast(point, d), Seen::Front(_)));
+        others.take(MOST_OTHERS + 1).count() <= MOST_OTHERS
+    }
+
+    /// Horizontal directions, the four axes among them.
+    fn horizontal(&self, count: usize) -> impl Iterator<Item = Vec3> {
+        let z_up = self.up == Vec3::Z;
+        (0..count).map(move |k| {
+            let (sin, cos) = (std::f32::consts::TAU * k as f32 / count as f32).sin_cos();
+            if z_up {
+                Vec3::new(sin, cos, 0.0)
+            } else {
+                Vec3::new(sin, 0.0, -cos)
+            }
+        })
+    }
+
+    /// The view into a room without a wall on one side, such as the Cornell box.
+    fn open_side(&self, points: &[Vec3]) -> Option<Place> {
+        let open = self
+            .horizontal(4)
+            .find(|&d| self.openness(points, -d) > OPEN_SIDE)?;
+        Some(Place::Outside {
+            towards_eye: -open,
+            room: true,
+        })
+    }
+
+    /// Share of the points from which one leaves the scene in this direction.
+    fn openness(&self, points: &[Vec3], direction: Vec3) -> f32 {
+        let out = points
+            .iter()
+            .filter(|&&p| self.cast(p, direction) == Seen::Nothing);
+        out.count() as f32 / points.len().max(1) as f32
+    }
+
+    /// Whether the open roof of a building is at the end of the z axis. More open than a roof is a
+    /// missing wall.
+    fn is_open_to_z(&self, points: &[Vec3]) -> bool {
+        let roof = self.openness(points, Vec3::Z);
+        (0.2..OPEN_SIDE).contains(&roof) && self.openness(points, Vec3::Y) < 0.02
+    }
+
+    /// The view from near a wall, or what else is behind, that sees farthest.
+    fn inside(&self, points: &[Vec3]) -> Place {
+        let mut best = f32::NEG_INFINITY;
+        let mut place = Place::Outside {
+            towards_eye: three_quarter(self.up, 1.0, 1.0),
+            room: true,
+        };
+        for &point in points {
+            for forward in self.horizontal(8) {
+                let Seen::Front(back) = self.cast(point, -forward) else {
+                    continue;
+                };
+                let eye = point - 0.8 * back * forward;
+                let depth = self.look(eye, forward, INSIDE_FOV).depth;
+                if depth > best {
+                    best = depth;
+                    place = Place::Inside { eye, forward };
+                }
+            }
+        }
+        place
+    }
+
+    /// What is seen on a grid of pixels of an image of 4:3.
+    fn look(&self, eye: Vec3, forward: Vec3, fov: f32) -> Look {
+        const EDGE: usize = 7;
+        let [forward, right, up] = basis(forward, self.up);
+        let tangent = (0.5 * fov.to_radians()).tan();
+        let (mut backs, mut fronts, mut depth) = (0.0, 0.0, 0.0);
+        for i in 0..EDGE * EDGE {
+            let ndc = |k: usize| (2 * k + 1) as f32 / EDGE as f32 - 1.0;
+            let (x, y) = (4.0 / 3.0 * ndc(i % EDGE), ndc(i / EDGE));
+            let direction = forward + tangent * (x * right + y * up);
+            // What is straight ahead counts most.
+            let weight = (-2.0 * (x * x + y * y)).exp();
+            let distance: f32 = match self.cast(eye, direction.normalize()) {
+                Seen::Front(t) => {
+                    fronts += 1.0;
+                    t.max(0.02)
+                }
+                Seen::Back => {
+                    backs += 1.0;
+                    0.01
+                }
+                Seen::Nothing => 0.1,
+            };
+            depth += weight * distance.ln();
+        }
+        Look {
+            backs: backs / f32::max(backs + fronts, 1.0),
+            depth,
+        }
+    }
+
+    /// Whether there is flat ground at the lower end of the z axis, and hardly any at that of the y axis.
+    fn stands_on_z(&self) -> bool {
+        let size = self.bounds.max - self.bounds.min;
+        // Share of the lower face of the box that is covered by surfaces in it.
+        let ground = |axis: usize| {
+            let low = self.bounds.min[axis] + 0.02 * size[axis];
+            let lies_low =
+                |t: &&obvhs::triangle::Triangle| [t.v0, t.v1, t.v2].iter().all(|v| v[axis] <= low);
+            let area = |t: &obvhs::triangle::Triangle| {
+                0.5 * f64::from((t.v1 - t.v0).cross(t.v2 - t.v0)[axis].abs())
+            };
+            let covered: f64 = self.solid.iter().filter(lies_low).map(area).sum();
+            let face = f64::from(size[(axis + 1) % 3]) * f64::from(size[(axis + 2) % 3]);
+            covered / face.max(1e-12)
+        };
+        let (y, z) = (ground(1), ground(2));
+        z > 0.1 && z > 3.0 * y && size.min_element() > FLAT
+    }
+
+    fn cast(&self, origin: Vec3, direction: Vec3) -> Seen {
+        let ray = Ray::new(origin.into(), direction.into(), 1e-5, f32::INFINITY);
+        let mut hit = RayHit::none();
+        self.bvh.ray_traverse(ray, &mut hit, |ray, slot| {
+            self.solid[self.bvh.primitive_indices[slot] as usize].intersect(ray)
+        });
+        if !hit.t.is_finite() {
+            return Seen::Nothing;
+        }
+        let id = self.bvh.primitive_indices[hit.primitive_id as usize];
+        let triangle = &self.solid[id as usize];
+        let normal = (triangle.v1 - triangle.v0).cross(triangle.v2 - triangle.v0);
+        match normal.dot(Vec3A::from(direction)) < 0.0 {
+            true => Seen::Front(hit.t),
+            false => Seen::Back,
+        }
+    }
+}
+
+/// What is seen in an image.
+struct Look {
+    /// Share of the surfaces that turn their back.
+    backs: f32,
+    /// Sum of the logarithms of distances: high where much is far away and nothing very near.
+    depth: f32,
+}
+
+/// Unit vectors spread over the sphere: a Fibonacci lattice.
+fn sphere(count: usize) -> impl Iterator<Item = Vec3> {
+    const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+    (0..count).map(move |k| {
+        let z = 1.0 - (2 * k + 1) as f64 / count as f64;
+        let (sin, cos) = (GOLDEN_ANGLE * k as f64).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        DVec3::new(r * cos, r * sin, z).as_vec3()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Material;
+    use crate::scene::builder::{Look as SceneLook, SceneBuilder};
+
+    /// Corner `i` of the box from −`half` to `half`.
+    fn corner(half: Vec3, i: usize) -> Vec3 {
+        let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        half * Vec3::new(sign(0), sign(1), sign(2))
+    }
+
+    /// A box without the sides in `missing` (0 … 5: −x, x, −y, y, −z, z), faces inwards or outwards.
+    fn walls(half: Vec3, missing: &[usize], inwards: bool) -> SceneData {
+        // Seen from outside, counterclockwise.
+        let sides = [
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+        ];
+        let mut builder = SceneBuilder::new(false, 12);
+        for (_, side) in sides
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| !missing.contains(i))
+        {
+            let mut quad = side.map(|i| corner(half, i));
+            if inwards {
+                quad.reverse();
+            }
+            builder.push_quad(quad, 0);
+        }
+        finish(builder)
+    }
+
+    fn finish(builder: SceneBuilder) -> SceneData {
+        let look = SceneLook {
+            materials: vec![Material::diffuse("grey", Vec3::splat(0.5))],
+            textures: Vec::new(),
+            camera: None,
+            environment: Vec3::ZERO,
+        };
+        builder.finish("test.obj", look).unwrap()
+    }
+
+    /// Largest coordinate of a vertex in the image, 1 at its border; infinite behind the camera.
+    fn extent(scene: &SceneData, camera: &Camera, aspect: f32) -> f32 {
+        let [forward, right, up] = basis((camera.target - camera.eye).normalize(), camera.up);
+        let tangent = (0.5 * camera.vertical_fov_degrees.to_radians()).tan();
+        let vertices = scene.triangles.iter().flat_map(|t| t.vertices);
+        let coordinates = vertices.map(|v| {
+            let to = v - camera.eye;
+            let ahead = to.dot(forward);
+            let x = to.dot(right).abs() / (aspect * tangent * ahead);
+            let y = to.dot(up).abs() / (tangent * ahead);
+            if ahead > 0.0 { x.max(y) } else { f32::INFINITY }
+        });
+        coordinates.fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn an_object_fills_images_of_any_aspect_at_any_scale() {
+        for half in [
+            Vec3::new(1.0, 2.0, 0.5),
+            Vec3::splat(1e-4),
+            Vec3::splat(1e11),
+        ] {
+            let scene = walls(half, &[], false);
+            for aspect in [0.3, 1.0, 16.0 / 9.0, 4.0] {
+                let camera = scene.view(aspect);
+                camera.validate().unwrap();
+                let extent = extent(&scene, &camera, aspect);
+                assert!((extent - FILL).abs() < 0.01, "{half}, {aspect}: {extent}");
+            }
+            let sky = scene.daylight.unwrap();
+            assert_eq!(sky.reach, f32::MAX, "an object is no room");
+        }
+    }
+
+    #[test]
+    fn a_room_is_seen_from_inside_along_its_length() {
+        for (half, along) in [
+            (Vec3::new(8.0, 2.0, 3.0), Vec3::X),
+            (Vec3::new(3.0, 2.0, 8.0), Vec3::Z),
+        ] {
+            let scene = walls(half, &[], true);
+            let camera = scene.view(1.0);
+            assert!(camera.eye.abs().cmplt(half).all(), "{camera:?}");
+            let forward = (camera.target - camera.eye).normalize();
+            assert!(forward.dot(along).abs() > 0.9, "{camera:?}");
+            assert!(
+                camera.eye.dot(forward) < -0.5 * half.max_element(),
+                "{camera:?}"
+            );
+            assert_eq!(
+                scene.daylight.unwrap().reach,
+                1.0,
+                "a quarter of the height"
+            );
+        }
+    }
+
+    #[test]
+    fn a_room_without_a_wall_is_seen_through_the_gap() {
+        for (missing, towards_eye) in [(5, Vec3::Z), (4, -Vec3::Z), (1, Vec3::X), (0, -Vec3::X)] {
+            let scene = walls(Vec3::ONE, &[missing], true);
+            let camera = scene.view(1.0);
+            let towards = (camera.eye - camera.target).normalize();
+            assert!(towards.dot(towards_eye) > 0.9999, "{camera:?}");
+            assert!((extent(&scene, &camera, 1.0) - FILL).abs() < 0.01);
+        }
+    }
+
+    #[test]
+    fn two_walls_and_a_floor_are_seen_from_where_their_fronts_are() {
+        let scene = walls(Vec3::ONE, &[1, 3, 4], true);
+        let camera = scene.view(1.0);
+        assert!(camera.eye.x > 0.0 && camera.eye.z < 0.0, "{camera:?}");
+    }
+
+    #[test]
+    fn what_stands_on_the_z_axis_is_seen_upright_unless_the_format_says_that_y_is_up() {
+        // A pyramid on the ground z = 0.
+        let mut builder = SceneBuilder::new(false, 6);
+        let base = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)];
+        let base = base.map(|(x, y)| Vec3::new(x, y, 0.0));
+        builder.push_quad(base, 0);
+        for i in 0..4 {
+            builder.push([base[(i + 1) % 4], base[i], 2.0 * Vec3::Z], 0);
+        }
+        let mut scene = finish(builder);
+        assert_eq!(scene.view(1.0).up, Vec3::Z);
+        assert_eq!(scene.daylight.unwrap().up, Vec3::Z);
+        scene.name = "pyramid.glb".into();
+        assert_eq!(Framing::of(&scene).up, Vec3::Y);
+    }
+
+    #[test]
+    fn points_lines_and_planes_still_give_a_camera() {
+        for size in [
+            Vec3::ZERO,
+            Vec3::X,
+            Vec3::new(1.0, 1.0, 0.0),
+            Vec3::new(0.0, 3.0, 2.0),
+        ] {
+            for center in [Vec3::ZERO, Vec3::splat(1e6), Vec3::splat(-1e11)] {
+                let mut builder = SceneBuilder::new(false, 3);
+                let corners = [0, 1, 2, 3].map(|i| center + corner(size, [0, 1, 7, 6][i]));
+                builder.push_quad(corners, 0);
+                let camera = finish(builder).view(1.5);
+                camera
+                    .validate()
+                    .unwrap_or_else(|e| panic!("{size}, {center}: {e}"));
+            }
+        }
+    }
+
+    #[test]
+    fn a_scene_with_a_light_gets_no_sky() {
+        let lit = crate::scene::builtin::tests::load_default("cornell-box");
+        assert_eq!((lit.daylight, lit.framing), (None, None));
+    }
+}
