@@ -99,7 +99,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             "if (false)",
         ),
         IMAGES,
-        Check::Bias,
+        Check::ThinWalls,
     ),
     row(
         "one-bounce-short",
