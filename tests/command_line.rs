@@ -105,6 +105,94 @@ fn a_missing_model_ends_with_2_before_anything_is_run() {
     }
 }
 
+/// Models that cannot be loaded, by what is wrong with them.
+fn bad_models(folder: &Path) -> Vec<String> {
+    std::fs::create_dir(folder.join("folder.obj")).expect("a folder");
+    let truncated = "ply\nformat ascii 1.0\nelement vertex 3\n";
+    for (name, text) in [
+        ("empty.obj", ""),
+        ("broken.obj", "v 0 0 0\nv 1 0 x\n"),
+        ("no-faces.obj", "v 0 0 0\n"),
+        ("broken.gltf", "{\"asset\":"),
+        ("truncated.ply", truncated),
+        ("model.xyz", "1 2 3\n"),
+    ] {
+        std::fs::write(folder.join(name), text).expect("a model");
+    }
+    let names = std::fs::read_dir(folder).expect("the folder");
+    let paths = names.map(|entry| entry.expect("a name").path().display().to_string());
+    let missing = folder.join("missing.obj").display().to_string();
+    paths.chain([missing]).collect()
+}
+
+#[test]
+fn a_model_that_cannot_be_loaded_ends_every_command_with_2_and_its_name() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let models = bad_models(folder.path());
+    assert_eq!(models.len(), 8);
+    for model in &models {
+        let ray = "0 0 1 0 0 -1";
+        for arguments in [
+            &["verify", "--accel", "bvh", "--scene", model][..],
+            &["render", "--spp", "1", "--size", "16x16", "--scene", model],
+            &["trace", "--ray", ray, "--scene", model],
+            &["stress", "--quick", "--model", model],
+        ] {
+            let output = run(arguments);
+            let words = [
+                stdout(&output),
+                String::from_utf8_lossy(&output.stderr).into(),
+            ]
+            .concat();
+            assert_eq!(output.status.code(), Some(2), "{arguments:?}: {words}");
+            let name = Path::new(model).file_name().expect("a name");
+            assert!(
+                words.contains(text(Path::new(name))),
+                "{arguments:?}: {words}"
+            );
+            assert!(!words.contains("panicked"), "{words}");
+        }
+    }
+}
+
+#[test]
+fn what_a_loader_left_out_is_a_warning_of_verify_trace_and_run() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let model = folder.path().join("model.obj");
+    std::fs::write(
+        &model,
+        "mtllib no-such.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+    )
+    .expect("a model");
+    let (scene, out) = (text(&model), folder.path().join("run"));
+    let set = format!("axes.scene='{scene}'");
+    for arguments in [
+        &[
+            "verify", "--accel", "bvh", "--rays", "256", "--scene", scene,
+        ][..],
+        &["trace", "--ray", "0 0 1 0 0 -1", "--scene", scene],
+        &[
+            "run",
+            "tests/data/tiny.toml",
+            "--set",
+            &set,
+            "--out",
+            text(&out),
+        ],
+    ] {
+        let output = run(arguments);
+        let words = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{words}");
+        let mut lines = words.lines();
+        assert!(
+            lines.any(|line| line.starts_with("warning: ") && line.contains("no-such.mtl")),
+            "{arguments:?}: {words}"
+        );
+    }
+    let page = std::fs::read_to_string(out.join("index.html")).expect("a page");
+    assert!(page.contains("no-such.mtl"));
+}
+
 #[test]
 fn a_folder_that_cannot_be_written_ends_with_2_and_its_name() {
     let folder = tempfile::tempdir().expect("a temporary folder");

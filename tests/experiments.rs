@@ -123,7 +123,7 @@ fn a_minimal_file_gets_the_documented_defaults() {
     assert_eq!(experiment.timing.rounds, 9);
     assert_eq!(experiment.gate.rays, 32768);
     assert_eq!(experiment.discrepancy.pairs, [[0, 1], [2, 3], [4, 5]]);
-    assert_eq!(experiment.replicate_seeds().collect::<Vec<_>>().len(), 8);
+    assert_eq!(experiment.seeds().replicates.len(), 8);
 }
 
 #[test]
@@ -138,7 +138,7 @@ fn every_section_is_read() {
          [discrepancy]\npoints = 64\npairs = [[4, 9]]\nseeds = 3\n",
     );
     assert_eq!(experiment.name, "n");
-    assert_eq!(experiment.replicate_seeds().collect::<Vec<_>>(), [7, 8]);
+    assert_eq!(experiment.seeds().replicates, [7, 8]);
     assert_eq!(experiment.resolution, [64, 48]);
     assert_eq!(experiment.spp.counts().collect::<Vec<_>>(), [2, 4, 8]);
     assert!(!experiment.runtime_checks);
@@ -428,14 +428,39 @@ fn a_value_out_of_range_is_answered_with_the_range() {
             "[accel.uniform-grid]\nlambda = nan\n",
             [":6", "lambda` = NaN", "[0.1, 100]"],
         ),
-        (
-            "[reference]\nseed = 8\n",
-            [":6", "`reference.seed` = 8", "replicates"],
-        ),
     ] {
         assert_says(parse(more), &pieces);
     }
-    assert!(parse("[reference]\nseed = 9\n").is_ok());
+}
+
+#[test]
+fn seeds_that_renders_share_are_refused_and_equal_numbers_that_do_not_meet_are_not() {
+    let with = |run: u32, reference: u32| {
+        parse(&format!(
+            "[run]\nseed = {run}\n[reference]\nseed = {reference}\n"
+        ))
+    };
+    let seeds = with(1, 9001).expect("no seed is shared").seeds();
+    // PCG's hash of 9001, worked by hand.
+    let first = 2_772_611_379;
+    assert_eq!(seeds.replicates, (1..=8).collect::<Vec<u32>>());
+    let parts: Vec<u32> = (first..first + 8).collect();
+    assert_eq!(seeds.reference_parts, parts);
+    for shared in [first - 7, first, first + 7] {
+        let name = if shared < first { first } else { shared };
+        assert_says(
+            with(shared, 9001),
+            &[
+                ":8",
+                "`reference.seed` = 9001",
+                &name.to_string(),
+                "replicates",
+            ],
+        );
+    }
+    for apart in [first - 8, first + 8, 9001, 9000, 8994] {
+        assert!(with(apart, 9001).is_ok(), "{apart}");
+    }
 }
 
 #[test]

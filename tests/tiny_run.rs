@@ -9,15 +9,75 @@ const EXPERIMENT: &str = "tests/data/tiny.toml";
 const STRUCTURES: [&str; 2] = ["bvh", "uniform-grid"];
 const REPLICATES: u32 = 2;
 
-fn run(out: &Path) -> Vec<Line> {
+/// Runs the experiment: exit code and standard error.
+fn program(out: &Path, more: &[&str]) -> (Option<i32>, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_raystone"))
         .args(["run", EXPERIMENT, "--quiet", "--out"])
         .arg(out)
+        .args(more)
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .output()
         .expect("the program starts");
     let words = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{words}");
+    (output.status.code(), words)
+}
+
+/// Options for a run of integrands alone.
+const INTEGRANDS: [&str; 6] = [
+    "--set",
+    "axes.integrator=integrand:disk",
+    "--set",
+    "axes.accel=bvh",
+    "--set",
+    "run.replicates=8",
+];
+
+#[test]
+fn a_reference_too_noisy_for_the_errors_fails_the_run() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (code, words) = program(folder.path(), &["--set", "reference.spp=8"]);
+    assert_eq!(code, Some(1), "{words}");
+    assert!(words.contains("failed: Reference noise below"), "{words}");
+    assert!(
+        words.contains("0 gates or cells, 1 check failed"),
+        "{words}"
+    );
+    let summary = std::fs::read_to_string(folder.path().join("summary.md")).expect("a summary");
+    assert!(summary.contains("no winner: "), "{summary}");
+}
+
+#[test]
+fn a_biased_sampler_fails_the_run_unless_it_is_so_by_design() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let design = [
+        "--set",
+        "axes.sequence=halton",
+        "--set",
+        "axes.decorrelation=disc-rotation",
+    ];
+    let (code, words) = program(folder.path(), &[&INTEGRANDS[..], &design[..]].concat());
+    assert_eq!(code, Some(0), "{words}");
+    let records = std::fs::read_to_string(folder.path().join("records.jsonl")).expect("records");
+    assert!(records.contains(r#""by_design":true,"verdict":"biased""#));
+    // The program's own kernel, twenty percent brighter.
+    let kernel = "kernels/integrator/integrand.wesl";
+    let text = std::fs::read_to_string(kernel).expect("a kernel");
+    let faulty = text.replace("vec3<f32>(", "vec3<f32>(1.2 * ");
+    assert_ne!(text, faulty);
+    let kernels = folder.path().join("mine/integrator");
+    std::fs::create_dir_all(&kernels).expect("a folder");
+    std::fs::write(kernels.join("integrand.wesl"), faulty).expect("a kernel file");
+    let mine = folder.path().join("mine");
+    let fault = ["--kernels", mine.to_str().expect("a name in UTF-8")];
+    let out = folder.path().join("faulty");
+    let (code, words) = program(&out, &[&INTEGRANDS[..], &fault[..]].concat());
+    assert_eq!(code, Some(1), "{words}");
+    assert!(words.contains("failed: Samplers without bias: "), "{words}");
+}
+
+fn run(out: &Path) -> Vec<Line> {
+    let (code, words) = program(out, &[]);
+    assert_eq!(code, Some(0), "{words}");
     assert!(!words.contains("panicked"), "{words}");
     let records = std::fs::read_to_string(out.join("records.jsonl")).expect("records");
     let parse = |(i, line): (usize, &str)| {

@@ -28,6 +28,7 @@ impl DeviceArguments {
         RunOptions {
             out,
             adapter: self.adapter.clone().unwrap_or_default(),
+            warn: Some(super::output::warn),
             progress: !quiet && std::io::stderr().is_terminal(),
             ..RunOptions::default()
         }
@@ -66,6 +67,9 @@ pub struct ExperimentArguments {
     /// alternatives
     #[arg(long, value_name = "AXIS=PATTERN,…")]
     pub only: Vec<String>,
+    /// Let glTF models name files outside their folder, and OBJ models absolute paths
+    #[arg(long)]
+    pub allow_outside: bool,
 }
 
 /// An override `key=value` whose value is this text, whatever characters are in it.

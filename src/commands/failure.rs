@@ -1,5 +1,6 @@
 //! How a command fails: one sentence on standard error and an exit code.
 
+use super::output::tell;
 use raystone::config::ConfigError;
 use raystone::gpu::GpuError;
 use raystone::report::ReportError;
@@ -40,7 +41,7 @@ impl Failure {
 
     /// Writes `error: …` to standard error; the exit code to end with.
     pub fn tell(self) -> ExitCode {
-        eprintln!("error: {}", sentence(&self.cause));
+        tell(&format!("error: {}", sentence(&self.cause)));
         ExitCode::from(self.code)
     }
 }

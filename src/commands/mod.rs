@@ -13,6 +13,7 @@ mod points_plot;
 mod render;
 mod report;
 mod run;
+mod signals;
 mod stress;
 mod system;
 mod table;
@@ -28,7 +29,8 @@ Exit codes:
   0  done
   1  done, but a gate or a cell failed
   2  bad usage or input
-  3  no usable adapter";
+  3  no usable adapter
+  130, 143  interrupted by SIGINT or SIGTERM; what was measured is kept";
 
 const EXAMPLES: &str = "\
 Examples:

@@ -1,4 +1,4 @@
-//! Standard output.
+//! Standard output and standard error.
 
 use super::failure::Failure;
 use anyhow::Context as _;
@@ -19,4 +19,15 @@ pub fn print(text: &str) -> Result<(), Failure> {
     }
     .context("cannot write to standard output")
     .map_err(Failure::input)
+}
+
+/// Writes a line to standard error. A terminal that went away is no reason to end: what is measured
+/// counts.
+pub fn tell(text: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
+/// Writes `warning: …` to standard error.
+pub fn warn(text: &str) {
+    tell(&format!("warning: {text}"));
 }

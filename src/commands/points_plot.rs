@@ -36,8 +36,10 @@ impl Points {
         let page = PointPage {
             label: stream.sampler.label(),
             origin: format!(
-                "pixel {x},{y} of an image {} wide, seed {}",
-                self.width, self.seed
+                "pixel {x},{y} of an image {} wide, seed {}; drawn by raystone {}",
+                self.width,
+                self.seed,
+                env!("CARGO_PKG_VERSION")
             ),
             dims: self.dims.clone(),
             points,

@@ -56,6 +56,9 @@ pub struct Render {
     /// Seed [default: 1]
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
+    /// Let a glTF model name files outside its folder, and an OBJ model absolute paths
+    #[arg(long)]
+    allow_outside: bool,
     /// Any other value of an experiment file: `--set camera.eye=[0,1,5]`, `--set
     /// integrator.path.max_depth=3`
     #[arg(long, value_name = "KEY=VALUE")]
@@ -81,10 +84,11 @@ impl Render {
         let plan = Plan::new(&experiment, &[], is_randomised)?;
         check_models(&experiment.axes.scene, &catalogue)?;
         // Only the picture is written: no folder is needed.
-        let options = self.device.options(PathBuf::new(), false);
+        let mut options = self.device.options(PathBuf::new(), false);
+        options.allow_outside = self.allow_outside;
         let rendering =
             raystone::run::render(&experiment, &plan, &registries, &options, &self.output)?;
-        eprint!("{}", summary(&rendering, experiment.resolution));
+        super::output::tell(summary(&rendering, experiment.resolution).trim_end());
         print(&format!("{}\n", self.output.display()))?;
         Ok(ExitCode::SUCCESS)
     }

@@ -1,9 +1,9 @@
 //! `raystone report`.
 
 use super::failure::Failure;
-use super::output::print;
+use super::output::{print, warn};
 use clap::Args;
-use raystone::report::read::RECORDS_FILE;
+use raystone::report::read::{PARTIAL, RECORDS_FILE};
 use raystone::report::{write_report, write_stress_page};
 use raystone::stress::record as stress;
 use std::path::PathBuf;
@@ -25,9 +25,12 @@ impl Report {
             print(&format!("report: {}\n", page.display()))?;
             return Ok(ExitCode::SUCCESS);
         }
-        let paths = write_report(&self.dir)?;
+        let partial = self.dir.join(PARTIAL);
+        let is_partial = !self.dir.join(RECORDS_FILE).exists() && partial.is_dir();
+        let dir = if is_partial { &partial } else { &self.dir };
+        let paths = write_report(dir)?;
         for warning in &paths.warnings {
-            eprintln!("warning: {warning}");
+            warn(warning);
         }
         print(&format!("report: {}\n", paths.html.display()))?;
         Ok(ExitCode::SUCCESS)

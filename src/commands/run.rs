@@ -3,13 +3,14 @@
 use super::arguments::{DeviceArguments, ExperimentArguments, check_models};
 use super::estimate::Estimate;
 use super::failure::{BAD_INPUT, FAILED, Failure};
-use super::output::print;
+use super::output::{self, print};
+use super::signals;
 use clap::Args;
 use raystone::config::{Experiment, Plan};
 use raystone::measure::record::{Line, Record};
 use raystone::report::read_records;
-use raystone::run::{Kernels, Registries, RunSummary};
-use std::path::{Path, PathBuf};
+use raystone::run::{Existing, Kernels, Registries, RunError, RunSummary};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Run an experiment file and write its records and report
@@ -17,9 +18,15 @@ use std::process::ExitCode;
 pub struct Run {
     /// Experiment file (TOML), see docs/experiments.md
     file: PathBuf,
-    /// Folder for records, images and the report [default: results/NAME of the run]
+    /// Folder for records, images and the report [default: results/NAME of the run, numbered]
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Replace the results that the folder holds, once the new ones are whole
+    #[arg(long, conflicts_with = "number")]
+    force: bool,
+    /// Where the folder holds results or is being written, take the first free one of DIR-2, DIR-3, …
+    #[arg(long)]
+    number: bool,
     #[command(flatten)]
     experiment: ExperimentArguments,
     /// Print the cells and an estimate of the time; start nothing
@@ -49,14 +56,24 @@ impl Run {
             print(&format!("{}\n{estimate}\n", plan.describe().trim_end()))?;
             return Ok(ExitCode::SUCCESS);
         }
+        let existing = match (self.force, self.number || self.out.is_none()) {
+            (true, _) => Existing::Replace,
+            (_, true) => Existing::Number,
+            _ => Existing::Refuse,
+        };
         let out = self.out.unwrap_or_else(|| default_folder(&experiment.name));
-        let options = self.device.options(out, self.quiet);
-        let summary = raystone::run::run(&experiment, &plan, &registries, &options)?;
-        tell(&summary, &options.out, self.quiet)
+        let mut options = self.device.options(out, self.quiet);
+        options.existing = existing;
+        options.allow_outside = self.experiment.allow_outside;
+        signals::watch(options.interrupt.clone()).map_err(Failure::input)?;
+        match raystone::run::run(&experiment, &plan, &registries, &options) {
+            Err(RunError::Interrupted) => signals::wait_for_end(),
+            summary => tell(&summary?, self.quiet),
+        }
     }
 }
 
-fn tell(summary: &RunSummary, out: &Path, quiet: bool) -> Result<ExitCode, Failure> {
+fn tell(summary: &RunSummary, quiet: bool) -> Result<ExitCode, Failure> {
     let mut text = String::new();
     if !quiet && !summary.tables.is_empty() {
         text += summary.tables.trim_end();
@@ -69,25 +86,30 @@ fn tell(summary: &RunSummary, out: &Path, quiet: bool) -> Result<ExitCode, Failu
         };
     }
     print(&text)?;
-    if summary.failed == 0 && !summary.bad_input {
+    if summary.failed == 0 && !summary.bad_input && summary.failed_checks.is_empty() {
         return Ok(ExitCode::SUCCESS);
     }
-    let lines = read_records(out)?.lines;
+    let lines = read_records(&summary.out)?.lines;
     for failure in lines.iter().filter_map(failure) {
-        eprintln!("failed: {failure}");
+        output::tell(&format!("failed: {failure}"));
     }
-    eprintln!(
-        "{} failed",
-        match summary.failed {
-            1 => "1 gate or cell".to_owned(),
-            failed => format!("{failed} gates or cells"),
-        }
-    );
+    for check in &summary.failed_checks {
+        output::tell(&format!("failed: {check}"));
+    }
+    output::tell(&format!(
+        "{}, {} failed",
+        plural(summary.failed, "gate or cell", "gates or cells"),
+        plural(summary.failed_checks.len(), "check", "checks")
+    ));
     Ok(ExitCode::from(if summary.bad_input {
         BAD_INPUT
     } else {
         FAILED
     }))
+}
+
+fn plural(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 /// The cell of a record and why it failed, if it did.
@@ -127,6 +149,7 @@ fn default_folder(name: &str) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
 
     #[test]
     fn the_default_folder_lies_below_results() {

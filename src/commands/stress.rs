@@ -2,17 +2,19 @@
 
 use super::arguments::DeviceArguments;
 use super::failure::{FAILED, Failure};
-use super::output::print;
+use super::output::{print, tell, warn};
 use anyhow::Context as _;
 use clap::Args;
+use raystone::config::{Params, Variant};
 use raystone::measure::atomic::write_atomic;
 use raystone::report::{stress_tables, write_stress_page};
 use raystone::run::Registries;
+use raystone::scene::{LoadOptions, load};
 use raystone::stress::mutants::{self, Options, Outcome};
 use raystone::stress::record::{Record, write};
 use raystone::stress::{Settings, run};
 use std::io::IsTerminal as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -61,6 +63,9 @@ impl Stress {
         if self.mutants {
             return self.plant_faults();
         }
+        if let Some(model) = &self.model {
+            check_model(model)?;
+        }
         let settings = self.settings();
         settings.check().map_err(Failure::input)?;
         let registries = Registries::default();
@@ -71,7 +76,8 @@ impl Stress {
             gpus.push(self.device.open(&registries)?);
         }
         let start = Instant::now();
-        let progress = |what: &str| eprintln!("{:6.1} s  {what}", start.elapsed().as_secs_f64());
+        let progress =
+            |what: &str| tell(&format!("{:6.1} s  {what}", start.elapsed().as_secs_f64()));
         let records = run(&gpus, &settings, &progress).map_err(Failure::input)?;
         write(&self.out, &records).map_err(Failure::input)?;
         let page = write_stress_page(&self.out, &records)?;
@@ -99,7 +105,11 @@ impl Stress {
         let shows = std::io::stderr().is_terminal();
         let progress = |outcome: &Outcome| {
             if shows {
-                eprintln!("{}: {:?}", outcome.mutant.name, outcome.killed_by());
+                tell(&format!(
+                    "{}: {:?}",
+                    outcome.mutant.name,
+                    outcome.killed_by()
+                ));
             }
         };
         let report = mutants::run(&options, &progress).map_err(Failure::input)?;
@@ -131,6 +141,21 @@ impl Stress {
         settings.model = self.model.clone();
         settings
     }
+}
+
+/// A model that was asked for has to be there; the default one may be missing.
+fn check_model(model: &Path) -> Result<(), Failure> {
+    let name = model.to_string_lossy().into_owned();
+    let variant = Variant {
+        label: name.clone(),
+        name,
+        params: Params::default(),
+    };
+    let scene = load(&variant, &LoadOptions::default())?;
+    for line in scene.report.lines() {
+        warn(&format!("{variant}: {line}"));
+    }
+    Ok(())
 }
 
 fn is_missed_target(record: &Record) -> bool {

@@ -2,7 +2,7 @@
 
 use super::arguments::list_override;
 use super::failure::{FAILED, Failure};
-use super::output::print;
+use super::output::{print, warn};
 use anyhow::anyhow;
 use clap::Args;
 use raystone::accel::triangle::TriangleTest;
@@ -36,6 +36,9 @@ pub struct Trace {
     /// Box test [default: the one of runs]
     #[arg(long)]
     box_test: Option<String>,
+    /// Let a glTF model name files outside its folder, and an OBJ model absolute paths
+    #[arg(long)]
+    allow_outside: bool,
     /// Parameter as in an experiment file: `--set accel.bvh.traversal=short-stack`
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -114,9 +117,14 @@ impl Trace {
         }
         let options = LoadOptions {
             textures: false,
+            allow_outside: self.allow_outside,
             ..LoadOptions::default()
         };
-        Ok(load(variant, &options)?)
+        let scene = load(variant, &options)?;
+        for line in scene.report.lines() {
+            warn(&format!("{variant}: {line}"));
+        }
+        Ok(scene)
     }
 }
 

@@ -1,8 +1,8 @@
 //! `raystone verify`.
 
 use super::arguments::{DeviceArguments, ExperimentArguments, check_models, list_override};
-use super::failure::{FAILED, Failure};
-use super::output::print;
+use super::failure::{BAD_INPUT, FAILED, Failure};
+use super::output::{print, tell};
 use super::table::{Table, grouped};
 use clap::Args;
 use raystone::config::{Catalogue, Experiment, Plan, Skipped};
@@ -62,13 +62,14 @@ impl Verify {
         let mut plan = Plan::new(&experiment, &self.experiment.only, is_randomised)?;
         check_models(&plan.scenes, &catalogue)?;
         if self.file.is_none() {
-            spare_brute_force(&mut plan)?;
+            spare_brute_force(&mut plan, self.experiment.allow_outside)?;
         }
         for skipped in &plan.skipped {
-            eprintln!("left out: {}: {}", skipped.cell, skipped.reason);
+            tell(&format!("left out: {}: {}", skipped.cell, skipped.reason));
         }
         // Nothing is written: no folder is needed.
-        let options = self.device.options(PathBuf::new(), false);
+        let mut options = self.device.options(PathBuf::new(), false);
+        options.allow_outside = self.experiment.allow_outside;
         let rays = experiment.gate.rays;
         let verified = raystone::run::verify(&experiment, &plan, &registries, &options, rays)?;
         print(&table(&verified))?;
@@ -81,8 +82,10 @@ impl Verify {
                 "{refused} left out: the driver ends their loops\n"
             ))?;
         }
+        let bad_input = verified.iter().any(|v| v.bad_input);
         Ok(match failed {
             0 => ExitCode::SUCCESS,
+            _ if bad_input => ExitCode::from(BAD_INPUT),
             _ => ExitCode::from(FAILED),
         })
     }
@@ -118,7 +121,7 @@ fn defaults(catalogue: &Catalogue) -> String {
 }
 
 /// Leaves out brute force on scenes with many triangles, where other structures are checked.
-fn spare_brute_force(plan: &mut Plan) -> Result<(), Failure> {
+fn spare_brute_force(plan: &mut Plan, allow_outside: bool) -> Result<(), Failure> {
     let mut large = Vec::new();
     for scene in &plan.scenes {
         let cells = || plan.structures.iter().filter(|cell| cell.scene == *scene);
@@ -128,6 +131,7 @@ fn spare_brute_force(plan: &mut Plan) -> Result<(), Failure> {
         }
         let options = LoadOptions {
             textures: false,
+            allow_outside,
             ..LoadOptions::default()
         };
         let triangles = load(scene, &options)?.triangles.len();
@@ -296,6 +300,7 @@ mod tests {
             scene: variant("cornell-box"),
             accel: variant("bvh"),
             verdict,
+            bad_input: false,
             refused: false,
         };
         let good = one(Ok(verdict(0)));
@@ -329,7 +334,7 @@ mod tests {
         let experiment =
             Experiment::parse(&defaults(&catalogue), "test", &overrides, &catalogue).unwrap();
         let mut plan = Plan::new(&experiment, &[], |_, _| Ok(true)).unwrap();
-        assert!(spare_brute_force(&mut plan).is_ok());
+        assert!(spare_brute_force(&mut plan, false).is_ok());
         plan
     }
 

@@ -4,6 +4,7 @@ use super::error::Place;
 use super::keys::Axis;
 use super::pattern::Pattern;
 use super::{Catalogue, ConfigError, Variant, parse};
+use crate::sampling::hash::pcg_hash;
 use crate::scene::Camera;
 use std::fmt;
 use std::path::Path;
@@ -129,6 +130,27 @@ impl fmt::Display for Exclude {
     }
 }
 
+/// A reference is rendered in this many independent parts: its halves make error estimates
+/// unbiased, its parts are the other side of the bias check.
+pub const REFERENCE_PARTS: u32 = 8;
+
+/// Every seed that images of an experiment are rendered with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Seeds {
+    /// Of the replicates, in their order.
+    pub replicates: Vec<u32>,
+    /// Of the parts of every reference, in their order.
+    pub reference_parts: Vec<u32>,
+}
+
+impl Seeds {
+    /// The first seed that a replicate shares with a part of the reference.
+    pub fn shared(&self) -> Option<u32> {
+        let shared = |seed: &&u32| self.reference_parts.contains(seed);
+        self.replicates.iter().find(shared).copied()
+    }
+}
+
 /// How the reference image is rendered.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {
@@ -138,7 +160,7 @@ pub struct Reference {
     pub sequence: Variant,
     /// Its decorrelation, with default parameters.
     pub decorrelation: Variant,
-    /// Its seed; the second half has the next one.
+    /// What the seeds of its parts are made from, see [`Experiment::seeds`].
     pub seed: u32,
 }
 
@@ -239,9 +261,14 @@ impl Experiment {
         parse::parse(text, file, overrides, catalogue)
     }
 
-    /// Seeds of the replicates: consecutive integers from `run.seed` on (modulo 2³²).
-    pub fn replicate_seeds(&self) -> impl Iterator<Item = u32> {
-        let first = self.seed;
-        (0..self.replicates).map(move |replicate| first.wrapping_add(replicate))
+    /// The seeds that renders use, modulo 2³²: consecutive integers from `run.seed` on for replicates,
+    /// from a hash of `reference.seed` on for the parts of a reference, so that neighbouring numbers in
+    /// the file do not meet.
+    pub fn seeds(&self) -> Seeds {
+        let from = |first: u32, count| (0..count).map(|i| first.wrapping_add(i)).collect();
+        Seeds {
+            replicates: from(self.seed, self.replicates),
+            reference_parts: from(pcg_hash(self.reference.seed), REFERENCE_PARTS),
+        }
     }
 }

@@ -246,7 +246,7 @@ pub const KEYS: &[Key] = &[
     key("reference", "spp", integer(2, 1 << 24), Some("4096"), "Samples per pixel of the reference image, both halves together."),
     key("reference", "sequence", Kind::Name(Axis::Sequence), Some("\"pixel-hash\""), "Sequence of the reference, with its default parameters."),
     key("reference", "decorrelation", Kind::Name(Axis::Decorrelation), Some("\"none\""), "Decorrelation of the reference, with its default parameters."),
-    key("reference", "seed", SEED, Some("9001"), "Seed of the reference; no replicate may share it."),
+    key("reference", "seed", SEED, Some("9001"), "What the seeds of the reference's parts are hashed from; none of them may be a replicate's."),
     key("timing", "rounds", integer(3, 1000), Some("9"), "Timed rounds; each times every cell of a scene once, in random order."),
     key("timing", "spp", integer(1, 1024), Some("1"), "Samples per pixel of each timed render."),
     key("timing", "min_warmup_ms", integer(0, 60_000), Some("100"), "Least warm-up of a kernel before it is timed, milliseconds."),
@@ -258,7 +258,7 @@ pub const KEYS: &[Key] = &[
     key("gate", "ao_length", Kind::Number { min: 0.0, max: 1e16 }, Some("0"), "Length of recorded AO rays, scene units; 0 is a tenth of the scene's diagonal."),
     key("gate", "offset", Kind::Number { min: 0.0, max: 1e16 }, Some("0"), "How far rays that start on a surface are moved off it, scene units; 0 is 1e-5 of the scene's diagonal."),
     key("discrepancy", "points", Kind::PowerOfTwo { min: 2, max: 65_536 }, Some("4096"), "Star discrepancy is taken at N = 2, 4, 8, … up to this many points."),
-    key("discrepancy", "pairs", Kind::DimensionPairs { max: 255 }, Some("[[0, 1], [2, 3], [4, 5]]"), "Pairs of dimensions of the path's table."),
+    key("discrepancy", "pairs", Kind::DimensionPairs { max: 255 }, Some("[[0, 1], [2, 3], [4, 5], [0, 2], [1, 3], [2, 4]]"), "Pairs of dimensions of the path's table; the worst of all pairs that the integrators draw is measured as well."),
     key("discrepancy", "seeds", integer(1, 1024), Some("8"), "Seeds measured where the stream is randomised."),
 ];
 

@@ -23,7 +23,8 @@ pub use cells::{SamplerCell, StreamCell, StructureCell, TimeCell};
 pub use complete::ParamError;
 pub use error::{ConfigError, Place, nearest};
 pub use experiment::{
-    Axes, Discrepancy, Exclude, Experiment, Gate, Reference, SppRange, Tests, Timing,
+    Axes, Discrepancy, Exclude, Experiment, Gate, REFERENCE_PARTS, Reference, Seeds, SppRange,
+    Tests, Timing,
 };
 pub use hash::cell_hash;
 pub use keys::Axis;

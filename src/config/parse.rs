@@ -136,24 +136,24 @@ fn file_stem(file: &str) -> String {
     stem.map_or_else(|| file.to_owned(), |stem| stem.to_string_lossy().into())
 }
 
-/// No replicate may share its seed with either half of the reference: their errors would be
-/// correlated, and a hash sampler would compare an image with itself.
+/// No replicate may share its seed with a part of the reference: their errors would be correlated,
+/// and a hash sampler would compare an image with itself.
 fn check_reference_seed(experiment: &Experiment, reader: &Reader) -> Result<(), ConfigError> {
-    let first = experiment.reference.seed;
-    let halves = [first, first.wrapping_add(1)];
-    if !experiment
-        .replicate_seeds()
-        .any(|seed| halves.contains(&seed))
-    {
+    let seeds = experiment.seeds();
+    let Some(shared) = seeds.shared() else {
         return Ok(());
-    }
+    };
     Err(ConfigError::OutOfRange {
         at: reader.section("reference")?.place("seed"),
         key: "reference.seed".to_owned(),
-        value: first.to_string(),
+        value: experiment.reference.seed.to_string(),
         expected: format!(
-            "such that it and the next integer are none of the replicates' seeds ({} from {} on)",
-            experiment.replicates, experiment.seed
+            "another number: hashed, it gives the {} parts of the reference the seeds from {} on, and \
+             {shared} is one of the {} replicates' seeds from {} on",
+            seeds.reference_parts.len(),
+            seeds.reference_parts[0],
+            experiment.replicates,
+            experiment.seed
         ),
     })
 }

@@ -239,10 +239,6 @@ impl Integrator for Integrand {
         dimensions::FIRST_BOUNCE
     }
 
-    fn dimension_pairs(&self) -> Vec<[u32; 2]> {
-        vec![[0, 1]]
-    }
-
     fn exact(&self, params: &Params) -> Option<f64> {
         Some(self.function(params).integral())
     }

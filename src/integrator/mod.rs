@@ -44,9 +44,24 @@ pub trait Integrator: Sync {
     fn ao_radius(&self, _params: &Params) -> Option<f64> {
         None
     }
-    /// Pairs of dimensions whose discrepancy tells something about this integrator.
-    fn dimension_pairs(&self) -> Vec<[u32; 2]>;
+    /// Whether it draws this dimension, one below [`Integrator::dimensions`], in any sample.
+    fn draws(&self, _dimension: u32) -> bool {
+        true
+    }
+    /// Pairs of dimensions that one sample draws both of: among these is a sampler's worst pair looked for.
+    fn dimension_pairs(&self, params: &Params) -> Vec<[u32; 2]> {
+        let mut drawn: Vec<u32> = (0..self.dimensions(params)).collect();
+        drawn.retain(|&dimension| self.draws(dimension));
+        let mut pairs = Vec::new();
+        for (i, &a) in drawn.iter().enumerate() {
+            pairs.extend(drawn[i + 1..].iter().map(|&b| [a, b]));
+        }
+        pairs
+    }
 }
+
+/// Bounces before roulette: `ROULETTE_DEPTH` of `kernels/integrator/path.wesl`.
+const ROULETTE_DEPTH: u32 = 3;
 
 struct Primary;
 struct AmbientOcclusion;
@@ -67,10 +82,6 @@ impl Integrator for Primary {
 
     fn dimensions(&self, _: &Params) -> u32 {
         dimensions::FIRST_BOUNCE
-    }
-
-    fn dimension_pairs(&self) -> Vec<[u32; 2]> {
-        vec![[0, 1]]
     }
 }
 
@@ -106,10 +117,6 @@ impl Integrator for AmbientOcclusion {
     fn ao_radius(&self, params: &Params) -> Option<f64> {
         Some(params.number("radius"))
     }
-
-    fn dimension_pairs(&self) -> Vec<[u32; 2]> {
-        vec![[0, 1], [2, 3]]
-    }
 }
 
 impl Integrator for Path {
@@ -142,8 +149,9 @@ impl Integrator for Path {
         dimensions::needed(params.integer("max_depth") as u32)
     }
 
-    fn dimension_pairs(&self) -> Vec<[u32; 2]> {
-        vec![[0, 1], [2, 3], [4, 5], [8, 9]]
+    fn draws(&self, dimension: u32) -> bool {
+        let roulette = |bounce| dimensions::at_bounce(bounce, dimensions::ROULETTE);
+        !(0..ROULETTE_DEPTH).any(|bounce| roulette(bounce) == dimension)
     }
 }
 

@@ -2,26 +2,23 @@
 
 use std::fs::{self, File};
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Writes a file whole or not at all: temporary file in the same folder, sync, rename. A file that
-/// was there keeps its content if anything fails.
+/// was there keeps its content if anything fails; a link that was there is replaced, not followed.
+/// What is no file but takes bytes, such as `/dev/null` or a pipe, is written to.
 ///
 /// # Errors
 /// Those of the file system; the temporary file is removed.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    static COUNTER: AtomicU32 = AtomicU32::new(0);
-    let name = path.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
-    let unique = format!(
-        ".{}.{}.{}.tmp",
-        name.to_string_lossy(),
-        std::process::id(),
-        COUNTER.fetch_add(1, Ordering::Relaxed)
-    );
-    let temporary = path.with_file_name(unique);
-    let write = || {
-        let mut file = File::create(&temporary)?;
+    let is_file = |meta: fs::Metadata| meta.is_file() || meta.is_dir();
+    if !fs::metadata(path).map_or(true, is_file) {
+        return File::options().write(true).open(path)?.write_all(bytes);
+    }
+    path.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
+    let (mut file, temporary) = new_file_beside(path)?;
+    let mut write = || {
         file.write_all(bytes)?;
         file.sync_all()?;
         fs::rename(&temporary, path)
@@ -30,6 +27,22 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
         // The first error is the one to tell; a leftover is only litter.
         let _ = fs::remove_file(&temporary);
     })
+}
+
+/// A file that was not there before, in the folder of `path`. Its name is short: that of `path` may be
+/// as long as names can be.
+fn new_file_beside(path: &Path) -> io::Result<(File, PathBuf)> {
+    static COUNTER: AtomicU32 = AtomicU32::new(0);
+    loop {
+        let count = COUNTER.fetch_add(1, Ordering::Relaxed);
+        let temporary = path.with_file_name(format!(".{}.{count}.tmp", std::process::id()));
+        match File::create_new(&temporary) {
+            Ok(file) => return Ok((file, temporary)),
+            // Left by an earlier process of the same number.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(error),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -51,5 +64,30 @@ mod tests {
         assert_eq!(fs::read(occupied.join("kept")).unwrap(), b"kept");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "litter");
         assert!(write_atomic(Path::new("/"), b"").is_err());
+    }
+
+    #[test]
+    fn a_name_as_long_as_names_can_be_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x".repeat(255));
+        write_atomic(&path, b"long").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"long");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_is_replaced_and_a_device_written_to() {
+        use std::os::unix::fs::{FileTypeExt as _, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let (target, link) = (folder.path().join("target"), folder.path().join("link"));
+        fs::write(&target, "kept").unwrap();
+        symlink(&target, &link).unwrap();
+        write_atomic(&link, b"new").unwrap();
+        assert_eq!(fs::read(&target).unwrap(), b"kept");
+        assert_eq!(fs::read(&link).unwrap(), b"new");
+        let device = folder.path().join("device");
+        symlink("/dev/null", &device).unwrap();
+        write_atomic(&device, b"gone").unwrap();
+        assert!(fs::metadata(&device).unwrap().file_type().is_char_device());
     }
 }

@@ -61,6 +61,46 @@ pub fn student_t_two_sided(t: f64, degrees_of_freedom: f64) -> f64 {
     beta_regularised(0.5 * n, 0.5, n / (n + tt), tt / (n + tt))
 }
 
+/// The t that `|T|` exceeds with probability `p` in (0, 1): the inverse of [`student_t_two_sided`].
+pub fn student_t_quantile(p: f64, degrees_of_freedom: f64) -> f64 {
+    let (mut low, mut high) = (-30.0f64, 60.0f64);
+    // Bisection of ln t: 90·2⁻⁶⁰ is below the last digit.
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        match student_t_two_sided(middle.exp(), degrees_of_freedom) > p {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    (0.5 * (low + high)).exp()
+}
+
+/// Probability that a two-sided t-test at level `alpha` finds a difference of `effect` standard
+/// errors, with the sign it has: the upper tail of the noncentral t distribution, integrated over the
+/// distribution of the sample's standard deviation (error below 1e-4).
+pub fn t_test_power(effect: f64, alpha: f64, degrees_of_freedom: f64) -> f64 {
+    const STEPS: u32 = 400;
+    let n = degrees_of_freedom;
+    let critical = student_t_quantile(alpha, n);
+    let log_scale = std::f64::consts::LN_2 + 0.5 * n * (0.5 * n).ln() - ln_gamma(0.5 * n);
+    // s, the standard deviation over its expectation: n s² is distributed as χ².
+    let density = |s: f64| (log_scale + (n - 1.0) * s.ln() - 0.5 * n * s * s).exp();
+    let widest = 1.0 + 8.0 / n.sqrt();
+    let width = widest / f64::from(STEPS);
+    let found = |i| {
+        let s = (f64::from(i) + 0.5) * width;
+        density(s) * width * normal_above(critical * s - effect)
+    };
+    (0..STEPS).map(found).sum()
+}
+
+/// Probability that a standard normal number lies above `x`.
+fn normal_above(x: f64) -> f64 {
+    // Student's t with so many degrees of freedom is normal to nine digits.
+    let tail = 0.5 * student_t_two_sided(x, 1e9);
+    if x > 0.0 { tail } else { 1.0 - tail }
+}
+
 /// Which hypotheses to reject so that the expected share of false ones among the rejected is at most
 /// `alpha` (Benjamini and Hochberg 1995, step-up). Same order as `p_values`.
 pub fn benjamini_hochberg(p_values: &[f64], alpha: f64) -> Vec<bool> {
@@ -258,6 +298,37 @@ mod tests {
             .map(|_| welch_t_test(&normal(0.0), &normal(2.0)).unwrap().p)
             .collect();
         assert!(share_below(&apart, 0.05) > 0.9);
+    }
+
+    #[test]
+    fn quantiles_of_t_are_tabled_ones() {
+        for (p, n, t) in [
+            (0.05, 1.0, 12.706204736174698),
+            (0.05, 7.0, 2.364624251592784),
+            (0.01, 7.0, 3.4994832973505026),
+            (0.001, 30.0, 3.6459586350420214),
+        ] {
+            assert_close(student_t_quantile(p, n), t, 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_power_of_a_t_test_is_what_trials_have() {
+        let mut generator = Pcg32::new(4);
+        let trials = 4000;
+        for (effect, alpha) in [(5.0, 0.005), (2.0, 0.05), (0.0, 0.05)] {
+            let found = (0..trials).filter(|_| {
+                let mut normal = || {
+                    (0..12).map(|_| generator.uniform()).sum::<f64>() - 6.0 + effect / 8f64.sqrt()
+                };
+                let samples: Vec<f64> = (0..8).map(|_| normal()).collect();
+                let error = (variance(&samples).unwrap() / 8.0).sqrt();
+                mean(&samples).unwrap() / error > student_t_quantile(alpha, 7.0)
+            });
+            let share = found.count() as f64 / f64::from(trials);
+            let power = t_test_power(effect, alpha, 7.0);
+            assert!((share - power).abs() < 0.025, "{share}, not {power}");
+        }
     }
 
     #[test]

@@ -160,12 +160,13 @@ impl Image {
     }
 }
 
-/// What an image is measured against: the mean of a reference, and its two independent halves if
-/// there are.
+/// What an image is measured against: the mean of a reference, and its independent parts and their
+/// two halves if there are.
 #[derive(Debug, Clone)]
 pub struct Reference {
     mean: Image,
     halves: Option<[Image; 2]>,
+    parts: Vec<Image>,
 }
 
 impl Reference {
@@ -181,7 +182,11 @@ impl Reference {
                 y: i / mean.width as usize,
             });
         }
-        Ok(Self { mean, halves: None })
+        Ok(Self {
+            mean,
+            halves: None,
+            parts: Vec::new(),
+        })
     }
 
     /// A reference from independent renders of equal sample counts (other seeds): the first half of
@@ -190,15 +195,32 @@ impl Reference {
     /// # Errors
     /// [`ImageError::TooFew`] below two parts, [`ImageError::SizeMismatch`],
     /// [`ImageError::NonFiniteReference`].
-    pub fn from_parts(parts: &[Image]) -> Result<Self, ImageError> {
+    pub fn from_parts(mut parts: Vec<Image>) -> Result<Self, ImageError> {
         let half = parts.len() / 2;
         if half == 0 {
             return Err(ImageError::TooFew { needed: 2 });
         }
-        let mut reference = Self::single(Image::mean_of(&parts[..2 * half])?)?;
-        let (a, b) = (&parts[..half], &parts[half..2 * half]);
+        parts.truncate(2 * half);
+        let mut reference = Self::single(Image::mean_of(&parts)?)?;
+        let (a, b) = parts.split_at(half);
         reference.halves = Some([Image::mean_of(a)?, Image::mean_of(b)?]);
+        reference.parts = parts;
         Ok(reference)
+    }
+
+    /// The independent parts, those of the first half first; none if it is known as one image.
+    pub fn parts(&self) -> &[Image] {
+        &self.parts
+    }
+
+    /// How many estimates [`ErrorReport::without_part`] has: halves of one part have none left without
+    /// it.
+    fn estimates(&self) -> usize {
+        if self.parts.len() < 4 {
+            0
+        } else {
+            self.parts.len()
+        }
     }
 
     /// The reference image itself.
@@ -300,6 +322,10 @@ impl Sample {
 pub struct ErrorReport {
     /// Metric id → value, over the finite pixels; metrics that cannot be computed are absent.
     pub metrics: BTreeMap<String, f64>,
+    /// Id of a metric that needs halves → its values against the reference without its first part,
+    /// without its second, …: how they differ tells what the reference's own noise makes of the
+    /// metric. Empty without at least two parts in each half.
+    pub without_part: BTreeMap<String, Vec<f64>>,
     /// Pixels that were NaN or infinite and are in no mean. Any is a failure of the renderer.
     pub non_finite_pixels: usize,
 }
@@ -311,6 +337,7 @@ pub struct ErrorReport {
 pub fn measure(image: &Image, reference: &Reference) -> Result<ErrorReport, ImageError> {
     reference.mean.check_size(image, "the measured image")?;
     let mut sums = [0.0; METRICS.len()];
+    let mut without = vec![[0.0; METRICS.len()]; reference.estimates()];
     let mut finite = 0usize;
     for (i, pixel) in image.pixels.iter().enumerate() {
         if !is_finite(pixel) {
@@ -322,17 +349,33 @@ pub fn measure(image: &Image, reference: &Reference) -> Result<ErrorReport, Imag
             for (sum, metric) in sums.iter_mut().zip(METRICS) {
                 *sum += (metric.term)(&sample);
             }
+            for (part, sums) in without.iter_mut().enumerate() {
+                let sample = reference.without(part, i, c, &sample);
+                for (sum, metric) in sums.iter_mut().zip(METRICS).filter(|(_, m)| m.needs_halves) {
+                    *sum += (metric.term)(&sample);
+                }
+            }
         }
     }
     let present = |m: &Metric| finite > 0 && (!m.needs_halves || reference.halves.is_some());
-    let metrics = METRICS
+    let value = |m: &Metric, sum: f64| (m.finish)(sum / (3 * finite) as f64);
+    let metrics = METRICS.iter().zip(sums).filter(|(m, _)| present(m));
+    let by_part = METRICS
         .iter()
-        .zip(sums)
-        .filter(|(metric, _)| present(metric))
-        .map(|(m, sum)| (m.id.to_owned(), (m.finish)(sum / (3 * finite) as f64)))
-        .collect();
+        .enumerate()
+        .filter(|(_, m)| m.needs_halves && present(m) && !without.is_empty());
     Ok(ErrorReport {
-        metrics,
+        metrics: metrics
+            .map(|(m, sum)| (m.id.to_owned(), value(m, sum)))
+            .collect(),
+        without_part: by_part
+            .map(|(k, m)| {
+                (
+                    m.id.to_owned(),
+                    without.iter().map(|sums| value(m, sums[k])).collect(),
+                )
+            })
+            .collect(),
         non_finite_pixels: image.pixels.len() - finite,
     })
 }
@@ -348,6 +391,25 @@ impl Reference {
         Sample {
             value: f64::from(value),
             reference,
+            half_a,
+            half_b,
+        }
+    }
+}
+
+impl Reference {
+    /// The sample against the reference without one of its parts.
+    fn without(&self, part: usize, pixel: usize, channel: usize, sample: &Sample) -> Sample {
+        let half = (self.parts.len() / 2) as f64;
+        let value = f64::from(self.parts[part].pixels[pixel][channel]);
+        let rest = |mean: f64| mean + (mean - value) / (half - 1.0);
+        let (half_a, half_b) = match 2 * part < self.parts.len() {
+            true => (rest(sample.half_a), sample.half_b),
+            false => (sample.half_a, rest(sample.half_b)),
+        };
+        Sample {
+            value: sample.value,
+            reference: 0.5 * (half_a + half_b),
             half_a,
             half_b,
         }

@@ -13,7 +13,7 @@ fn grey(values: &[f32]) -> Image {
 #[test]
 fn every_metric_has_its_value_worked_by_hand() {
     // r = 2, 0; v = 3, 0.5; halves 1.5 and 2.5, -0.5 and 0.5.
-    let reference = Reference::from_parts(&[grey(&[1.5, -0.5]), grey(&[2.5, 0.5])]).unwrap();
+    let reference = Reference::from_parts(vec![grey(&[1.5, -0.5]), grey(&[2.5, 0.5])]).unwrap();
     let report = measure(&grey(&[3.0, 0.5]), &reference).unwrap();
     let expected = [
         ("mse/v1", (1.0 + 0.25) / 2.0),
@@ -31,6 +31,50 @@ fn every_metric_has_its_value_worked_by_hand() {
     }
     assert_eq!(report.non_finite_pixels, 0);
     assert_eq!(reference.own_mse(), Some(0.25));
+}
+
+#[test]
+fn estimates_without_a_part_are_those_of_a_reference_without_it() {
+    let parts: Vec<Image> = [
+        [1.0, 0.2],
+        [1.5, 0.1],
+        [2.5, 0.4],
+        [0.5, 0.3],
+        [1.25, 0.5],
+        [2.0, 0.0],
+    ]
+    .map(|values| grey(&values))
+    .to_vec();
+    let picture = grey(&[3.0, 0.7]);
+    let reference = Reference::from_parts(parts.clone()).unwrap();
+    let report = measure(&picture, &reference).unwrap();
+    let ids = ["mse-unbiased/v1", "relmse-unbiased/eps=1e-2/v1"];
+    assert!(report.without_part.keys().eq(ids), "{report:?}");
+    for left_out in 0..6 {
+        let mean = |of: std::ops::Range<usize>, channel: usize| {
+            let kept: Vec<f64> = of
+                .filter(|&i| i != left_out)
+                .map(|i| f64::from(parts[i].pixels[channel][0]))
+                .collect();
+            kept.iter().sum::<f64>() / kept.len() as f64
+        };
+        let [mut mse, mut relmse] = [0.0; 2];
+        for (i, v) in [3.0, f64::from(0.7f32)].into_iter().enumerate() {
+            let (a, b) = (mean(0..3, i), mean(3..6, i));
+            mse += (v - a) * (v - b) / 2.0;
+            relmse += (v - a) * (v - b) / ((a + b).powi(2) / 4.0 + 0.01) / 2.0;
+        }
+        for (id, expected) in ids.into_iter().zip([mse, relmse]) {
+            let found = report.without_part[id][left_out];
+            // Means of halves are rounded to f32.
+            assert!(
+                (found / expected - 1.0).abs() < 1e-5,
+                "{id}: {found} {expected}"
+            );
+        }
+    }
+    let two = Reference::from_parts(parts[..2].to_vec()).unwrap();
+    assert!(measure(&picture, &two).unwrap().without_part.is_empty());
 }
 
 #[test]
@@ -84,6 +128,6 @@ fn sizes_that_do_not_fit_are_errors() {
     let reference = Reference::single(grey(&[1.0, 1.0])).unwrap();
     let error = measure(&grey(&[1.0]), &reference).unwrap_err();
     assert!(error.to_string().contains("1×1"), "{error}");
-    assert!(Reference::from_parts(&[grey(&[1.0])]).is_err());
-    assert!(Reference::from_parts(&[grey(&[1.0]), grey(&[1.0, 2.0])]).is_err());
+    assert!(Reference::from_parts(vec![grey(&[1.0])]).is_err());
+    assert!(Reference::from_parts(vec![grey(&[1.0]), grey(&[1.0, 2.0])]).is_err());
 }

@@ -17,3 +17,4 @@ pub mod spectrum;
 pub mod statistics;
 pub mod stream;
 pub mod timing;
+pub mod words;

@@ -3,7 +3,10 @@
 
 use crate::accel::Space;
 use crate::config::{KERNELS_MARK, Variant};
+use crate::sampling::to_unit;
 use crate::scene::{Camera, LoadReport};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -41,7 +44,8 @@ pub enum Record {
     Spectrum(SpectrumRecord),
     /// Time of a full cell (structure × sampler × integrator).
     Time(TimeRecord),
-    /// Star discrepancy of the stream that a dimension pair of the path really consumed.
+    /// Star discrepancy of the words of a pair of dimensions, read back from a dump kernel that imports the
+    /// renderer's modules.
     Stream(StreamRecord),
     /// What drawing from a sampler costs.
     SamplerCost(SamplerCostRecord),
@@ -49,11 +53,15 @@ pub enum Record {
     Skipped(SkippedRecord),
     /// A cell that failed before it had a record of its own kind, with the reason.
     Failed(SkippedRecord),
+    /// Something that went wrong beside the measuring, which is not touched by it.
+    Warning(SkippedRecord),
     /// Last line: where the wall time went, how many cells failed.
     Finished(FinishedRecord),
+    /// Last line of a run that was ended early.
+    Interrupted(InterruptedRecord),
 }
 
-/// A figure with its 95 % bootstrap interval.
+/// A figure with its 95 % interval, see [`crate::measure::statistics`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
     /// The estimate (median for times and rates, mean for errors).
@@ -65,6 +73,15 @@ pub struct Interval {
 }
 
 impl Interval {
+    /// A figure whose interval has no width: it is exact, or nothing is known of its spread.
+    pub fn exact(value: f64) -> Self {
+        Self {
+            value,
+            low: value,
+            high: value,
+        }
+    }
+
     /// Whether two intervals have no point in common: only then is a winner named.
     pub fn is_apart_from(&self, other: &Interval) -> bool {
         self.low > other.high || other.low > self.high
@@ -409,7 +426,7 @@ pub struct ReferenceRecord {
     pub seconds: f64,
     /// Estimated mean squared error of the reference itself, from its two halves.
     pub mse: f64,
-    /// Tone-mapped PNG relative to the run's folder.
+    /// Tone-mapped PNG relative to the run's folder; empty if it could not be written.
     pub image: String,
     /// Mean radiance over pixels and channels.
     pub mean: f64,
@@ -422,6 +439,10 @@ pub struct ErrorAtSpp {
     pub spp: u32,
     /// Metric id with version → value, for instance `rmse/v1`, `relmse/eps=1e-2/v1`.
     pub metrics: BTreeMap<String, f64>,
+    /// Id of an unbiased metric → its values with each part of the reference left out, those of its
+    /// first half first: the reference's share in the metric's uncertainty.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub without_part: BTreeMap<String, Vec<f64>>,
 }
 
 /// Error of one replicate.
@@ -458,7 +479,8 @@ pub struct ErrorRecord {
     pub error_map: Option<String>,
 }
 
-/// Bias check of one sampler: Welch t per tile of the replicate mean against the reference.
+/// Bias check of one sampler: Welch's t of the replicates against the reference, for the whole image and
+/// per tile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BiasRecord {
     /// Scene name.
@@ -476,16 +498,26 @@ pub struct BiasRecord {
     pub tiles: usize,
     /// Tiles rejected after Benjamini–Hochberg at `alpha`.
     pub rejected: usize,
-    /// False-discovery rate.
+    /// Bound on the probability of calling a sampler without bias biased: half of it is for the whole
+    /// image, half is the false-discovery rate among tiles.
     pub alpha: f64,
-    /// Smallest p-value.
+    /// Smallest p-value of a tile.
     pub min_p: f64,
     /// Histogram of the p-values in ten equal bins: flat when there is no bias.
     pub p_histogram: Vec<usize>,
-    /// Difference of the mean luminance of all replicates from the reference's, in standard errors;
-    /// absent where it is not testable.
+    /// Difference of the mean luminance of all replicates from the reference's beyond what rounding
+    /// explains, in standard errors (Welch's t); absent where it is not testable or has no spread.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub z: Option<f64>,
+    /// p-value of `z`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub p: Option<f64>,
+    /// Degrees of freedom of `z`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub degrees_of_freedom: Option<f64>,
+    /// Whether the sampler is one whose mean over seeds is not the integral, so that a bias is no fault.
+    #[serde(default)]
+    pub by_design: bool,
     /// `no-bias-found`, `biased`, or `not-testable` with the reason.
     pub verdict: String,
 }
@@ -596,15 +628,74 @@ pub struct StreamRecord {
     pub dimensions: [u32; 2],
     /// What the path uses them for, for instance `bounce 0: direction`.
     pub purpose: String,
+    /// Whether the experiment names the pair.
+    #[serde(default = "yes")]
+    pub named: bool,
+    /// Among how many pairs that the integrators draw this one has the sampler's greatest D*; absent where it
+    /// is not the worst.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub worst_of: Option<usize>,
     /// Whether each seed gives another point set.
     pub randomised: bool,
     /// Seeds measured (one for a deterministic stream).
     pub seeds: usize,
+    /// Linear index of the pixel whose words were read for each seed.
+    #[serde(default)]
+    pub pixels: Vec<u32>,
     /// `(N, D*)` for the first N points: mean over seeds with interval.
     pub star: Vec<StarAtCount>,
     /// Everything else, see [`crate::measure::stream`].
     #[serde(default)]
     pub figures: StreamFigures,
+    /// Points for pictures, of one pair of each sampler.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<RecordedPoints>,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// The words of a stream, for pictures.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RecordedPoints {
+    /// Samples of each pixel; the sampler was made for so many.
+    pub samples: u32,
+    /// Pixels 0, 1, … to this, excluded.
+    pub pixels: u32,
+    /// Seed.
+    pub seed: u32,
+    /// The kernel's words in Base64, low byte first: pixel by pixel, sample by sample, dimension by
+    /// dimension.
+    pub words: String,
+    /// Mean power of 1024 points of pixel 0 by length of the frequency, 1 first, white noise being 1; empty
+    /// if it was not computed.
+    pub spectrum: Vec<f64>,
+}
+
+impl RecordedPoints {
+    /// `words` of so many samples of so many pixels.
+    pub fn new([samples, pixels]: [u32; 2], seed: u32, words: &[u32], spectrum: Vec<f64>) -> Self {
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        Self {
+            samples,
+            pixels,
+            seed,
+            words: STANDARD.encode(bytes),
+            spectrum,
+        }
+    }
+
+    /// The points of each pixel as the renderer's floats; `None` if the text does not hold them.
+    pub fn points(&self) -> Option<Vec<Vec<[f64; 2]>>> {
+        let bytes = STANDARD.decode(&self.words).ok()?;
+        let number = |b: &[u8]| f64::from(to_unit(u32::from_le_bytes([b[0], b[1], b[2], b[3]])));
+        let points = bytes.chunks_exact(8).map(|b| [number(b), number(&b[4..])]);
+        let points: Vec<[f64; 2]> = points.collect();
+        let [samples, pixels] = [self.samples, self.pixels].map(|n| n as usize);
+        let whole = samples > 0 && points.len() == samples * pixels;
+        whole.then(|| points.chunks_exact(samples).map(<[_]>::to_vec).collect())
+    }
 }
 
 /// Figures of a dumped stream beside its star discrepancy.
@@ -683,7 +774,7 @@ pub struct StarAtCount {
     pub star: Interval,
 }
 
-/// A cell left out, or failed.
+/// A cell left out, or failed, or with a warning.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SkippedRecord {
     /// The cell, in words.
@@ -705,4 +796,13 @@ pub struct FinishedRecord {
     pub failed: usize,
     /// Cells that were skipped.
     pub skipped: usize,
+}
+
+/// Last line of a run that was ended early: what it had not measured by then is missing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct InterruptedRecord {
+    /// What ended it, for instance `SIGINT`.
+    pub reason: String,
+    /// Wall time until then, seconds.
+    pub wall_s: f64,
 }

@@ -6,7 +6,7 @@
 //! not a latency.
 
 use super::record::Interval;
-use super::statistics::bootstrap_median;
+use super::statistics::median_interval;
 use crate::gpu::{Bindings, Composition, Dispatch, Gpu, GpuError, UniformValues, groups_for};
 use crate::integrator::with_sampler;
 use crate::sampling::Sampler;
@@ -114,7 +114,7 @@ pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<SamplerCost, GpuErro
         looped.push(ns(without));
     }
     let interval = |values: &[f64]| {
-        bootstrap_median(values)
+        median_interval(values)
             .ok_or_else(|| GpuError::Driver("a clock returned what is no time".to_owned()))
     };
     Ok(SamplerCost {

@@ -7,7 +7,7 @@
 
 use super::image::{Image, ImageError, luminance};
 use super::record::{FilteredError, PowerAt};
-use super::statistics::bootstrap_mean;
+use super::statistics::mean_interval;
 use std::f64::consts::TAU;
 
 /// Standard deviations of the Gaussian filters, pixels; 0 is no filter.
@@ -233,7 +233,7 @@ pub fn mean_power(spectra: &[ErrorSpectrum]) -> Vec<PowerAt> {
     };
     let at = |(i, &(frequency, _)): (usize, &(f64, f64))| {
         let values: Vec<f64> = with_power.iter().map(|s| s.power[i].1).collect();
-        bootstrap_mean(&values).map(|power| PowerAt { frequency, power })
+        mean_interval(&values).map(|power| PowerAt { frequency, power })
     };
     first.power.iter().enumerate().filter_map(at).collect()
 }
@@ -242,7 +242,7 @@ pub fn mean_power(spectra: &[ErrorSpectrum]) -> Vec<PowerAt> {
 pub fn mean_filtered(spectra: &[ErrorSpectrum]) -> Vec<FilteredError> {
     let at = |(i, sigma): (usize, f64)| {
         let values: Vec<f64> = spectra.iter().map(|s| s.filtered[i]).collect();
-        bootstrap_mean(&values).map(|rmse| FilteredError { sigma, rmse })
+        mean_interval(&values).map(|rmse| FilteredError { sigma, rmse })
     };
     SIGMAS.into_iter().enumerate().filter_map(at).collect()
 }

@@ -1,16 +1,23 @@
-//! Statistics of measured samples: location, spread, bootstrap intervals, slopes and Pareto fronts.
+//! Statistics of measured samples: location, spread, intervals, slopes and Pareto fronts.
 //! Tests of hypotheses are in [`super::hypothesis`].
 //!
 //! A figure that does not exist is `None`, never NaN: every function here answers `None` for an
-//! empty slice and for samples that are not all finite.
+//! empty slice and for samples that are not all finite. Intervals are those of Student's t and of
+//! order statistics, because replicates are few: of eight samples a percentile bootstrap covers the
+//! mean in 89 % of all cases and not in 95 %.
 
+use super::hypothesis::student_t_quantile;
 use super::record::Interval;
 
-/// Resamples behind every bootstrap interval.
-pub const BOOTSTRAP_RESAMPLES: usize = 1000;
+/// Share of intervals that miss the truth.
+const ALPHA: f64 = 0.05;
 
-/// Seed of every bootstrap, so that a report made twice from the same records is the same.
-const BOOTSTRAP_SEED: u64 = 0x5EED_0B00;
+/// From so many samples on there is a 95 % interval of a median: the range of fewer covers it in
+/// 2^(1−n) of all cases less than always, which is 94 % for five.
+pub const LEAST_FOR_MEDIAN: usize = 6;
+
+/// A line through fewer points has no residuals that could speak against it.
+pub const LEAST_FOR_SLOPE: usize = 3;
 
 /// PCG32 (XSH RR 64/32; O'Neill 2014): small, seeded, the same on every machine.
 #[derive(Debug, Clone)]
@@ -82,49 +89,111 @@ pub fn variance(samples: &[f64]) -> Option<f64> {
     (samples.len() > 1).then(|| sum / (samples.len() - 1) as f64)
 }
 
-/// `estimator` of the samples with its 95 % percentile-bootstrap interval (Efron 1979),
-/// [`BOOTSTRAP_RESAMPLES`] resamples with a fixed seed. The interval of a single sample has no
-/// width: nothing is known of its spread.
+/// 95 % interval of an estimate with several independent sources of noise. Each source gives the
+/// estimates that leave out one of its `n` parts (the delete-one jackknife, Quenouille 1956, Tukey
+/// 1958); variances add, and Student's t has the degrees of freedom of Welch and Satterthwaite. Noise
+/// that two sources only make together counts for both, so the interval is rather too wide.
 ///
-/// `estimator` gets a non-empty slice in no particular order.
-pub fn bootstrap_interval(samples: &[f64], estimator: impl Fn(&[f64]) -> f64) -> Option<Interval> {
-    if !finite(samples) {
+/// A source of fewer than two estimates says nothing; without any the interval has no width. `None`
+/// if something is not finite.
+pub fn jackknife_interval(value: f64, sources: &[Vec<f64>]) -> Option<Interval> {
+    let spread = |estimates: &Vec<f64>| {
+        let n = estimates.len() as f64;
+        Some((variance(estimates)? * (n - 1.0).powi(2) / n, n - 1.0))
+    };
+    if !value.is_finite() || !sources.iter().flatten().all(|x| x.is_finite()) {
         return None;
     }
-    let mut resample = vec![0.0; samples.len()];
-    let estimates = resampled(samples.len(), |draw| {
-        resample.iter_mut().for_each(|x| *x = samples[draw()]);
-        Some(estimator(&resample))
-    });
-    percentile_interval(estimator(samples), estimates)
+    let spreads: Vec<(f64, f64)> = sources.iter().filter_map(spread).collect();
+    let whole: f64 = spreads.iter().map(|s| s.0).sum();
+    // Estimates that differ by the rounding of their sums are equal.
+    if whole.sqrt() <= 4.0 * f64::EPSILON * value.abs() {
+        return Some(Interval::exact(value));
+    }
+    // As shares of the whole variance, so that tiny variances do not underflow when squared.
+    let shares = spreads
+        .iter()
+        .map(|(v, freedom)| (v / whole).powi(2) / freedom);
+    let half = student_t_quantile(ALPHA, 1.0 / shares.sum::<f64>()) * whole.sqrt();
+    Some(Interval {
+        value,
+        low: value - half,
+        high: value + half,
+    })
 }
 
-/// [`mean`] with its interval.
-pub fn bootstrap_mean(samples: &[f64]) -> Option<Interval> {
-    bootstrap_interval(samples, raw_mean)
+/// The samples without the first, without the second, …: what [`jackknife_interval`] is made from.
+/// Nothing for a single sample.
+pub fn leave_one_out<T: Clone>(samples: &[T]) -> impl Iterator<Item = Vec<T>> {
+    let count = if samples.len() > 1 { samples.len() } else { 0 };
+    (0..count).map(|left_out| [&samples[..left_out], &samples[left_out + 1..]].concat())
 }
 
-/// [`median`] with its interval.
-pub fn bootstrap_median(samples: &[f64]) -> Option<Interval> {
-    bootstrap_interval(samples, raw_median)
+/// `estimator` of the samples with its 95 % interval by the jackknife; of one sample without width.
+fn interval_of(samples: &[f64], estimator: fn(&[f64]) -> f64) -> Option<Interval> {
+    let estimates = leave_one_out(samples).map(|rest| estimator(&rest));
+    finite(samples).then(|| jackknife_interval(estimator(samples), &[estimates.collect()]))?
+}
+
+/// [`mean`] with its 95 % interval, which is Student's; the interval of one sample has no width.
+pub fn mean_interval(samples: &[f64]) -> Option<Interval> {
+    interval_of(samples, raw_mean)
+}
+
+/// Root of the mean of squares with its 95 % interval, not below 0; of one square without width.
+pub fn root_mean_interval(squares: &[f64]) -> Option<Interval> {
+    let interval = interval_of(squares, |squares| raw_mean(squares).sqrt())?;
+    Some(Interval {
+        low: interval.low.max(0.0),
+        ..interval
+    })
+}
+
+/// [`median`] with the 95 % interval of its order statistics, between two of which it interpolates
+/// (Hettmansperger and Sheather 1986); nothing is assumed of the distribution but that it is
+/// continuous. Of fewer than [`LEAST_FOR_MEDIAN`] samples it is their range, which covers less.
+pub fn median_interval(samples: &[f64]) -> Option<Interval> {
+    let value = median(samples)?;
+    let mut sorted = samples.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let n = sorted.len();
+    // Coverage of the interval from the k-th least to the k-th greatest: 1 − 2 P(X < k), where X is
+    // binomial with n throws of a coin.
+    let mut log_chance = -(n as f64) * std::f64::consts::LN_2;
+    let mut coverage = 1.0 - 2.0 * log_chance.exp();
+    let (mut k, mut share) = (1, 0.0);
+    while coverage >= 1.0 - ALPHA {
+        log_chance += ((n - k + 1) as f64 / k as f64).ln();
+        let next = coverage - 2.0 * log_chance.exp();
+        if next < 1.0 - ALPHA {
+            let part = (coverage - (1.0 - ALPHA)) / (coverage - next);
+            share = (n - k) as f64 * part / (k as f64 + (n as f64 - 2.0 * k as f64) * part);
+            break;
+        }
+        (coverage, k) = (next, k + 1);
+    }
+    let between = |outer: f64, inner: f64| outer + share * (inner - outer);
+    Some(Interval {
+        value,
+        low: between(sorted[k - 1], sorted[k.min(n - 1)]),
+        high: between(sorted[n - k], sorted[(n - k).saturating_sub(1)]),
+    })
 }
 
 /// Slope of the least-squares line through (ln x, ln ȳ), where ȳ is the mean over replicates of y at
-/// that x, with its 95 % interval by a bootstrap over whole replicates. −0.5 is the slope of an RMSE
+/// that x, with its 95 % interval by a jackknife over whole replicates. −0.5 is the slope of an RMSE
 /// under plain Monte Carlo.
 ///
 /// Each curve is one replicate as (x, y) pairs. Points where x or y is not a positive finite number
-/// are left out. `None` if fewer than two different x remain. A single curve gives an interval of no
-/// width.
+/// are left out. `None` if fewer than [`LEAST_FOR_SLOPE`] different x remain. A single curve gives an
+/// interval of no width.
 pub fn log_log_slope(curves: &[Vec<(f64, f64)>]) -> Option<Interval> {
     let all: Vec<&[(f64, f64)]> = curves.iter().map(Vec::as_slice).collect();
     let slope = slope_of_mean_curve(&all)?;
-    let mut resample = all.clone();
-    let estimates = resampled(all.len(), |draw| {
-        resample.iter_mut().for_each(|c| *c = all[draw()]);
-        slope_of_mean_curve(&resample)
-    });
-    percentile_interval(slope, estimates)
+    let estimates: Option<Vec<f64>> = leave_one_out(&all)
+        .map(|rest| slope_of_mean_curve(&rest))
+        .collect();
+    jackknife_interval(slope, &[estimates?])
 }
 
 /// Indices of the points that no other point beats, smaller being better in both coordinates, by
@@ -167,33 +236,9 @@ fn raw_median(samples: &[f64]) -> f64 {
     }
 }
 
-/// Runs `estimate` [`BOOTSTRAP_RESAMPLES`] times; it draws indices below `n` from its argument.
-fn resampled(
-    n: usize,
-    mut estimate: impl FnMut(&mut dyn FnMut() -> usize) -> Option<f64>,
-) -> Vec<f64> {
-    let mut generator = Pcg32::new(BOOTSTRAP_SEED);
-    (0..BOOTSTRAP_RESAMPLES)
-        .filter_map(|_| estimate(&mut || generator.below(n)))
-        .collect()
-}
-
-/// The 2.5 % and 97.5 % quantiles of the estimates around `value`.
-fn percentile_interval(value: f64, mut estimates: Vec<f64>) -> Option<Interval> {
-    estimates.retain(|x| x.is_finite());
-    estimates.sort_unstable_by(f64::total_cmp);
-    let last = estimates.len().checked_sub(1)?;
-    let quantile = |p: f64| {
-        let position = p * last as f64;
-        let (k, fraction) = (position as usize, position.fract());
-        estimates[k] + fraction * (estimates[(k + 1).min(last)] - estimates[k])
-    };
-    value.is_finite().then(|| Interval {
-        value,
-        // An estimator need not lie inside its own percentile interval; a figure must.
-        low: quantile(0.025).min(value),
-        high: quantile(0.975).max(value),
-    })
+/// Slope of the least-squares line through (ln x, ln y), as in [`log_log_slope`], without an interval.
+pub fn log_log_fit(points: &[(f64, f64)]) -> Option<f64> {
+    slope_of_mean_curve(&[points])
 }
 
 fn slope_of_mean_curve(curves: &[&[(f64, f64)]]) -> Option<f64> {
@@ -213,7 +258,7 @@ fn slope_of_mean_curve(curves: &[&[(f64, f64)]]) -> Option<f64> {
     let mean_y = logs.iter().map(|p| p.1).sum::<f64>() / n;
     let xx: f64 = logs.iter().map(|p| (p.0 - mean_x).powi(2)).sum();
     let xy: f64 = logs.iter().map(|p| (p.0 - mean_x) * (p.1 - mean_y)).sum();
-    (logs.len() > 1 && xx > 0.0).then(|| xy / xx)
+    (logs.len() >= LEAST_FOR_SLOPE && xx > 0.0).then(|| xy / xx)
 }
 
 #[cfg(test)]
@@ -239,7 +284,8 @@ mod tests {
             assert_eq!(median(bad), None);
             assert_eq!(variance(bad), None);
             assert_eq!(median_absolute_deviation(bad), None);
-            assert_eq!(bootstrap_median(bad), None);
+            assert_eq!(median_interval(bad), None);
+            assert_eq!(mean_interval(bad), None);
         }
         assert_eq!(variance(&[1.0]), None);
     }
@@ -258,33 +304,99 @@ mod tests {
         assert!((variance(&uniform).unwrap() - 1.0 / 12.0).abs() < 0.003);
     }
 
+    /// About normal, mean 0, variance 1.
+    fn normal(generator: &mut Pcg32) -> f64 {
+        (0..12).map(|_| generator.uniform()).sum::<f64>() - 6.0
+    }
+
+    /// Share of 2,000 trials whose interval holds `truth`.
+    fn coverage(truth: f64, mut trial: impl FnMut(&mut Pcg32) -> Interval) -> f64 {
+        let mut generator = Pcg32::new(11);
+        let covers = |i: Interval| i.low <= truth && truth <= i.high;
+        let covered = (0..2000).filter(|_| covers(trial(&mut generator))).count();
+        covered as f64 / 2000.0
+    }
+
+    #[track_caller]
+    fn assert_95(share: f64) {
+        assert!((0.93..=0.97).contains(&share), "{share} of the intervals");
+    }
+
     #[test]
-    fn a_bootstrap_interval_has_the_width_that_theory_gives() {
-        let mut generator = Pcg32::new(7);
-        let samples: Vec<f64> = (0..400).map(|_| generator.uniform()).collect();
-        let interval = bootstrap_mean(&samples).unwrap();
-        let theory = 2.0 * 1.96 * (1.0f64 / 12.0 / 400.0).sqrt();
-        let width = interval.high - interval.low;
-        assert!((width / theory - 1.0).abs() < 0.15, "{width} vs {theory}");
-        assert!(interval.low < 0.5 && 0.5 < interval.high, "{interval:?}");
-        assert_eq!(bootstrap_mean(&samples), Some(interval), "not repeatable");
-        let single = bootstrap_median(&[4.0]).unwrap();
+    fn the_interval_of_a_mean_is_students() {
+        let interval = mean_interval(&[1.0, 2.0, 6.0]).unwrap();
+        // t of 2 degrees of freedom at 97.5 % is 4.302653; variance 7.
+        let half = 4.302652729911275 * (7.0f64 / 3.0).sqrt();
+        assert_eq!(interval.value, 3.0);
+        assert!((interval.high - 3.0 - half).abs() < 1e-9, "{interval:?}");
+        assert!((3.0 - interval.low - half).abs() < 1e-9, "{interval:?}");
+        let single = mean_interval(&[4.0]).unwrap();
         assert_eq!((single.low, single.value, single.high), (4.0, 4.0, 4.0));
     }
 
     #[test]
-    fn intervals_of_the_mean_cover_the_truth_about_as_often_as_promised() {
-        let mut generator = Pcg32::new(11);
-        let trials = 300;
-        let covered = (0..trials)
-            .filter(|_| {
-                let samples: Vec<f64> = (0..30).map(|_| generator.uniform()).collect();
-                let interval = bootstrap_mean(&samples).unwrap();
-                interval.low <= 0.5 && 0.5 <= interval.high
-            })
-            .count();
-        let fraction = covered as f64 / f64::from(trials);
-        assert!((0.88..0.99).contains(&fraction), "{fraction}");
+    fn intervals_of_means_cover_the_truth_as_often_as_promised() {
+        for n in [2, 4, 8, 30] {
+            assert_95(coverage(5.0, |g| {
+                let samples: Vec<f64> = (0..n).map(|_| 5.0 + normal(g)).collect();
+                mean_interval(&samples).unwrap()
+            }));
+        }
+    }
+
+    #[test]
+    fn intervals_of_medians_cover_the_truth_as_often_as_promised() {
+        // Times have a tail on one side: ln 2 is the median of −ln u.
+        for n in [6, 7, 9, 12, 31] {
+            assert_95(coverage(2.0f64.ln(), |g| {
+                let samples: Vec<f64> = (0..n).map(|_| -(1.0 - g.uniform()).ln()).collect();
+                median_interval(&samples).unwrap()
+            }));
+        }
+        let few = median_interval(&[4.0, 1.0, 2.0]).unwrap();
+        assert_eq!((few.low, few.value, few.high), (1.0, 2.0, 4.0));
+        let same = median_interval(&[3.0; 9]).unwrap();
+        assert_eq!((same.low, same.value, same.high), (3.0, 3.0, 3.0));
+    }
+
+    #[test]
+    fn intervals_of_slopes_cover_the_truth_as_often_as_promised() {
+        assert_95(coverage(-1.0, |g| {
+            let curve = |_| -> Vec<(f64, f64)> {
+                let y = |x: f64, noise: f64| (x, (1.0 + 0.1 * noise) / x);
+                (0..5).map(|k| y(2f64.powi(k), normal(g))).collect()
+            };
+            let curves: Vec<_> = (0..8).map(curve).collect();
+            log_log_slope(&curves).unwrap()
+        }));
+    }
+
+    #[test]
+    fn noise_of_two_sources_adds_up() {
+        // A mean of eight, less a mean of four that is noisier.
+        assert_95(coverage(0.0, |g| {
+            let a: Vec<f64> = (0..8).map(|_| normal(g)).collect();
+            let b: Vec<f64> = (0..4).map(|_| 2.0 * normal(g)).collect();
+            let value = raw_mean(&a) - raw_mean(&b);
+            let without_a = leave_one_out(&a).map(|rest| raw_mean(&rest) - raw_mean(&b));
+            let without_b = leave_one_out(&b).map(|rest| raw_mean(&a) - raw_mean(&rest));
+            jackknife_interval(value, &[without_a.collect(), without_b.collect()]).unwrap()
+        }));
+        let exact = jackknife_interval(2.0, &[vec![], vec![2.0, 2.0]]).unwrap();
+        assert_eq!((exact.low, exact.value, exact.high), (2.0, 2.0, 2.0));
+        assert_eq!(jackknife_interval(2.0, &[vec![1.0, f64::NAN]]), None);
+    }
+
+    #[test]
+    fn a_root_of_a_mean_of_squares_has_an_interval_that_is_not_negative() {
+        let interval = root_mean_interval(&[0.0, 0.0, 4.0, 0.0]).unwrap();
+        assert_eq!((interval.low, interval.value), (0.0, 1.0));
+        let share = coverage(1.0, |g| {
+            let squares: Vec<f64> = (0..16).map(|_| normal(g).powi(2)).collect();
+            root_mean_interval(&squares).unwrap()
+        });
+        // Squares are skewed: somewhat less than 95 %.
+        assert!((0.91..=0.97).contains(&share), "{share}");
     }
 
     #[test]
@@ -314,10 +426,13 @@ mod tests {
             (2.0, 0.0),
             (4.0, 0.25),
             (8.0, f64::NAN),
+            (16.0, 0.0625),
             (0.0, 3.0),
         ];
-        let slope = log_log_slope(&[curve]).unwrap();
+        let slope = log_log_slope(std::slice::from_ref(&curve)).unwrap();
         assert!((slope.value + 1.0).abs() < 1e-12);
+        let line_through_two = curve[..4].to_vec();
+        assert_eq!(log_log_slope(&[line_through_two]), None);
         assert_eq!(log_log_slope(&[]), None);
         assert_eq!(log_log_slope(&[vec![(2.0, 1.0), (2.0, 3.0)]]), None);
     }

@@ -2,7 +2,7 @@
 //! integrands, coherence between pixels and coverage by many pixels.
 
 use super::record::{FigureAtCount, IntegrandFigures, Interval, StarAtCount, StreamFigures};
-use super::statistics::{bootstrap_interval, bootstrap_mean, log_log_slope};
+use super::statistics::{log_log_slope, mean_interval, root_mean_interval};
 use crate::discrepancy::{
     Budget, DiscrepancyError, PointSet, Quadratic, quadratic, star_2d_prefixes,
 };
@@ -91,7 +91,7 @@ type Column = fn(&SeedFigures) -> &Vec<f64>;
 fn means(counts: &[usize], seeds: &[SeedFigures], column: Column) -> Vec<FigureAtCount> {
     let mean = |(i, &n): (usize, &usize)| {
         let values: Option<Vec<f64>> = seeds.iter().map(|s| column(s).get(i).copied()).collect();
-        bootstrap_mean(&values?).map(|value| FigureAtCount { n, value })
+        mean_interval(&values?).map(|value| FigureAtCount { n, value })
     };
     counts.iter().enumerate().filter_map(mean).collect()
 }
@@ -115,8 +115,7 @@ fn integrands(counts: &[usize], seeds: &[SeedFigures]) -> Vec<IntegrandFigures> 
         let errors: Vec<&Vec<f64>> = seeds.iter().map(|s| &s.squared_errors[k]).collect();
         let rmse = counts.iter().enumerate().filter_map(|(i, &n)| {
             let squares: Vec<f64> = errors.iter().map(|e| e[i]).collect();
-            let root = |s: &[f64]| (s.iter().sum::<f64>() / s.len() as f64).sqrt();
-            bootstrap_interval(&squares, root).map(|value| FigureAtCount { n, value })
+            root_mean_interval(&squares).map(|value| FigureAtCount { n, value })
         });
         let least = RESOLUTION.powi(2);
         let resolved = |i: usize| {

@@ -2,7 +2,7 @@
 //! random order, so that drift of the machine hits all alike.
 
 use super::record::Interval;
-use super::statistics::{Pcg32, bootstrap_median, median};
+use super::statistics::{Pcg32, median, median_interval};
 use crate::config::Timing;
 use crate::gpu::{Elapsed, GpuError};
 use std::time::Instant;
@@ -113,5 +113,5 @@ pub fn empty_ms(mut measure: impl FnMut() -> Result<Elapsed, GpuError>) -> Resul
 /// Rate in millions per second from milliseconds for `items`, median with interval.
 pub fn millions_per_second(ms: &[f64], items: f64) -> Option<Interval> {
     let rates: Vec<f64> = ms.iter().map(|ms| items / ms * 1e-3).collect();
-    bootstrap_median(&rates)
+    median_interval(&rates)
 }

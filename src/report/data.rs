@@ -12,6 +12,10 @@ pub struct RunData<'a> {
     pub run: Option<&'a RunRecord>,
     /// Last line, if the run ended.
     pub finished: Option<&'a FinishedRecord>,
+    /// Last line of a run that was ended early.
+    pub interrupted: Option<&'a InterruptedRecord>,
+    /// What went wrong beside the measuring.
+    pub warnings: Vec<&'a SkippedRecord>,
     /// Scenes in the order in which they first appear.
     pub scenes: Vec<SceneGroup<'a>>,
     /// Dumped streams.
@@ -89,6 +93,8 @@ impl<'a> RunData<'a> {
             match &line.record {
                 Record::Run(record) => data.run = Some(record),
                 Record::Finished(record) => data.finished = Some(record),
+                Record::Interrupted(record) => data.interrupted = Some(record),
+                Record::Warning(record) => data.warnings.push(record),
                 Record::Skipped(record) => data.skipped.push(record),
                 Record::Failed(record) => data.failed.push(record),
                 Record::Stream(record) => put(&mut data.streams, record, |a, b| {

@@ -1,17 +1,19 @@
 //! Numbers as text: three significant digits, units, and a dash for what is absent.
 
 use crate::measure::record::{Interval, RayClass};
+use crate::measure::statistics::LEAST_FOR_MEDIAN;
 
 /// What stands for an absent value.
 pub const ABSENT: &str = "–";
 
-/// A number with `digits` significant digits; scientific below 10⁻³ and from 10⁶ on.
+/// A number with `digits` significant digits; scientific below 10⁻³ and from 10⁶ on, the dash for what
+/// is no number.
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".into();
     }
     if !value.is_finite() {
-        return value.to_string();
+        return ABSENT.into();
     }
     // Let the formatter round first, so that 9.999 counts as 10.0.
     let text = format!("{value:.*e}", digits.saturating_sub(1));
@@ -49,6 +51,16 @@ pub fn interval(interval: &Interval) -> String {
         value
     } else {
         format!("{value} {}", bounds(interval))
+    }
+}
+
+/// What the bounds of medians of so many samples are.
+pub fn median_bounds(samples: impl Iterator<Item = usize>) -> String {
+    match samples.filter(|n| *n > 0).min() {
+        Some(few) if few < LEAST_FOR_MEDIAN => {
+            format!("range of {few} samples, {LEAST_FOR_MEDIAN} are needed for a 95 % interval")
+        }
+        _ => "95 % interval".into(),
     }
 }
 
@@ -167,6 +179,7 @@ mod tests {
     fn absent_is_a_dash_and_never_zero() {
         assert_eq!(optional(None), "–");
         assert_eq!(optional(Some(0.0)), "0");
+        assert_eq!(number(f64::NAN), "–");
     }
 
     #[test]

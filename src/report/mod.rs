@@ -25,7 +25,7 @@ mod tests;
 
 pub use read::{Records, read_records};
 pub use stress::{stress_tables, write_stress_page};
-pub use terminal::terminal_tables;
+pub use terminal::{failed_checks, terminal_tables};
 
 use crate::measure::atomic::write_atomic;
 use data::RunData;

@@ -8,6 +8,10 @@ use std::path::Path;
 /// Name of the records in a run's folder.
 pub const RECORDS_FILE: &str = "records.jsonl";
 
+/// Folder, below that of a run, that holds records and images until the run ends; what a killed run
+/// leaves.
+pub const PARTIAL: &str = "partial";
+
 /// What a folder's records say.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Records {

@@ -13,7 +13,7 @@ pub struct Contender {
     pub name: String,
     /// Its figure.
     pub figure: Interval,
-    /// Whether the spread is known; without it nobody can be told apart from it.
+    /// Whether the spread is known; without it it is not ranked, neither as winner nor as beaten.
     pub has_spread: bool,
 }
 
@@ -31,6 +31,8 @@ pub enum Better {
 pub enum Ruling {
     /// Nothing was measured.
     Nobody,
+    /// There are figures that may not be ranked, for this reason.
+    Withheld(String),
     /// There was no competition.
     Alone(Contender),
     /// The winner and the next one, whose intervals are apart.
@@ -42,6 +44,11 @@ pub enum Ruling {
 /// Judges the contenders.
 pub fn judge(mut contenders: Vec<Contender>, better: Better) -> Ruling {
     contenders.retain(|c| c.figure.value.is_finite());
+    let measured = contenders.len();
+    contenders.retain(|c| c.has_spread);
+    if contenders.is_empty() && measured > 0 {
+        return Ruling::Withheld("too few measurements to know their spread".into());
+    }
     contenders.sort_by(|a, b| {
         let by_value = a.figure.value.total_cmp(&b.figure.value);
         if better == Better::Higher {
@@ -53,12 +60,9 @@ pub fn judge(mut contenders: Vec<Contender>, better: Better) -> Ruling {
     let Some(best) = contenders.first().cloned() else {
         return Ruling::Nobody;
     };
-    let apart = |other: &Contender| {
-        best.has_spread && other.has_spread && best.figure.is_apart_from(&other.figure)
-    };
     let close: Vec<Contender> = contenders[1..]
         .iter()
-        .filter(|c| !apart(c))
+        .filter(|c| !best.figure.is_apart_from(&c.figure))
         .cloned()
         .collect();
     match contenders.get(1) {
@@ -73,6 +77,7 @@ impl Ruling {
     pub fn answer(&self) -> String {
         match self {
             Self::Nobody => "nothing measured".into(),
+            Self::Withheld(reason) => format!("no winner: {reason}"),
             Self::Alone(only) => format!("{} (alone)", only.name),
             Self::Winner(best, _) => best.name.clone(),
             Self::Unclear(close) => {
@@ -90,7 +95,7 @@ impl Ruling {
     /// The best figure.
     pub fn figure(&self) -> String {
         match self {
-            Self::Nobody => format::ABSENT.into(),
+            Self::Nobody | Self::Withheld(_) => format::ABSENT.into(),
             Self::Alone(best) | Self::Winner(best, _) => format::interval(&best.figure),
             Self::Unclear(close) => close
                 .first()
@@ -98,20 +103,19 @@ impl Ruling {
         }
     }
 
-    /// The next one with its figure and the ratio of the two.
+    /// The next one with its figure and, of positive figures, the ratio of the two.
     pub fn runner_up(&self) -> String {
         let (best, next) = match self {
             Self::Winner(best, next) => (best, next),
             Self::Unclear(close) if close.len() > 1 => (&close[0], &close[1]),
             _ => return format::ABSENT.into(),
         };
+        let text = format!("{} {}", next.name, format::interval(&next.figure));
+        if best.figure.value <= 0.0 || next.figure.value <= 0.0 {
+            return text;
+        }
         let ratio = best.figure.value / next.figure.value;
-        let times = format::number(ratio.max(1.0 / ratio));
-        format!(
-            "{} {} ({times}×)",
-            next.name,
-            format::interval(&next.figure)
-        )
+        format!("{text} ({}×)", format::number(ratio.max(1.0 / ratio)))
     }
 }
 
@@ -154,15 +158,59 @@ mod tests {
     }
 
     #[test]
-    fn without_spread_nobody_wins() {
-        let mut pair = vec![contender("a", 1.0, 0.0), contender("b", 9.0, 0.0)];
-        assert_eq!(judge(pair.clone(), Better::Lower).answer(), "a");
-        pair[0].has_spread = false;
-        assert!(
-            judge(pair, Better::Lower)
-                .answer()
-                .starts_with("no clear winner")
+    fn without_spread_nobody_wins_or_is_beaten() {
+        let mut three = vec![
+            contender("a", 1.0, 0.0),
+            contender("b", 8.0, 0.1),
+            contender("c", 9.0, 0.1),
+        ];
+        assert_eq!(judge(three.clone(), Better::Lower).answer(), "a");
+        three[0].has_spread = false;
+        assert_eq!(judge(three.clone(), Better::Lower).answer(), "b");
+        three[1].has_spread = false;
+        assert_eq!(judge(three.clone(), Better::Lower).answer(), "c (alone)");
+        three[2].has_spread = false;
+        let nobody = judge(three, Better::Lower);
+        assert!(nobody.answer().starts_with("no winner: "), "{nobody:?}");
+        assert_eq!(
+            (nobody.figure(), nobody.runner_up()),
+            ("–".into(), "–".into())
         );
+    }
+
+    #[test]
+    fn ties_have_no_winner_and_errors_of_nothing_no_ratio() {
+        let tie = vec![contender("a", 2.0, 0.0), contender("b", 2.0, 0.0)];
+        assert_eq!(judge(tie, Better::Lower).answer(), "no clear winner: a, b");
+        let exact = vec![contender("a", 0.0, 0.0), contender("b", 0.0, 0.0)];
+        assert_eq!(judge(exact, Better::Lower).runner_up(), "b 0");
+        let below = vec![contender("a", -1.0, 0.1), contender("b", 2.0, 0.1)];
+        let next = judge(below, Better::Lower).runner_up();
+        assert_eq!(next, "b 2.00 [1.90, 2.10]");
+    }
+
+    #[test]
+    fn among_equals_a_winner_is_rare() {
+        use crate::measure::statistics::{Pcg32, mean_interval};
+        let mut generator = Pcg32::new(21);
+        let wins = (0..300).filter(|_| {
+            let mut figure = || {
+                let mut normal = || 20.0 + (0..12).map(|_| generator.uniform()).sum::<f64>();
+                let samples: Vec<f64> = (0..8).map(|_| normal()).collect();
+                mean_interval(&samples).unwrap()
+            };
+            let mut equals: Vec<Contender> = Vec::new();
+            for i in 0..10 {
+                let figure = figure();
+                equals.push(Contender {
+                    figure,
+                    ..contender(&i.to_string(), 0.0, 0.0)
+                });
+            }
+            matches!(judge(equals, Better::Lower), Ruling::Winner(..))
+        });
+        let wins = wins.count();
+        assert!(wins <= 3, "{wins} winners in 300 draws of ten equals");
     }
 
     #[test]

@@ -1,8 +1,15 @@
 //! What the replicates of a sampler say together.
 
 use super::data::View;
+use super::format;
 use crate::measure::record::{BiasRecord, ErrorRecord, Interval, SpectrumRecord};
-use crate::measure::statistics::{bootstrap_mean, log_log_slope};
+use crate::measure::statistics::{jackknife_interval, log_log_fit, mean};
+
+/// What an error is that its reference is too noisy for: its estimate is not clearly above 0.
+pub const UNRESOLVED: &str = "below what the reference can resolve";
+
+/// The part of the least measured error that the reference's own may be.
+pub const REFERENCE_SHARE: f64 = 0.1;
 
 /// A sampler under one scene and integrator.
 #[derive(Debug)]
@@ -17,12 +24,12 @@ pub struct Sampler<'a> {
     pub spectrum: Option<&'a SpectrumRecord>,
 }
 
-/// An error metric that the report shows.
+/// An error metric that the report shows: free of the reference's own noise on average.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Metric {
     /// Relative mean squared error: what samplers are ranked by.
     RelMse,
-    /// Root of the mean squared error.
+    /// Root of the mean squared error, the mean being over replicates, too.
     Rmse,
 }
 
@@ -30,16 +37,41 @@ impl Metric {
     /// How tables and axes name it.
     pub fn name(self) -> &'static str {
         match self {
-            Self::RelMse => "relMSE",
-            Self::Rmse => "RMSE",
+            Self::RelMse => "unbiased relMSE",
+            Self::Rmse => "unbiased RMSE",
         }
     }
 
-    /// What the metric's versioned id starts with.
+    /// How files are named after it.
+    pub fn stem(self) -> &'static str {
+        match self {
+            Self::RelMse => "relmse",
+            Self::Rmse => "rmse",
+        }
+    }
+
+    /// What the recorded metric's versioned id starts with.
     fn prefix(self) -> &'static str {
         match self {
-            Self::RelMse => "relmse/",
-            Self::Rmse => "rmse/",
+            Self::RelMse => "relmse-unbiased/",
+            Self::Rmse => "mse-unbiased/",
+        }
+    }
+
+    /// From means of what was recorded. No true error is negative, so intervals end at 0. Negative means
+    /// have no root: 0 stands for them, and they are not resolved.
+    fn shown(self, recorded: Interval) -> Interval {
+        let root = |x: f64| x.max(0.0).sqrt();
+        match self {
+            Self::RelMse => Interval {
+                low: recorded.low.max(recorded.value.min(0.0)),
+                ..recorded
+            },
+            Self::Rmse => Interval {
+                value: root(recorded.value),
+                low: root(recorded.low),
+                high: root(recorded.high),
+            },
         }
     }
 }
@@ -49,8 +81,20 @@ impl Metric {
 pub struct MeanError {
     /// Samples per pixel.
     pub spp: u32,
-    /// Mean over replicates; the interval has no width for a single replicate.
+    /// Mean over replicates. The interval follows from their spread and from that of the reference's
+    /// parts; it has no width for a single replicate.
     pub error: Interval,
+    /// Whether the estimate is clearly above 0 for the noise of this reference. Otherwise only the upper
+    /// end says something.
+    pub resolved: bool,
+}
+
+/// What an estimate leaves out, to see what it depends on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Without {
+    Nothing,
+    Replicate(usize),
+    Part(usize),
 }
 
 impl<'a> Sampler<'a> {
@@ -61,9 +105,10 @@ impl<'a> Sampler<'a> {
             .is_some_and(|replicate| !replicate.randomised)
     }
 
-    /// Whether the spread over replicates is unknown: randomised, but measured once.
-    pub fn lacks_spread(&self) -> bool {
-        !self.is_deterministic() && self.replicates.len() < 2
+    /// Whether it may be compared with others: from one image nothing is known of the spread, not even
+    /// of a deterministic sampler, which is lucky or not in this one scene.
+    pub fn is_ranked(&self) -> bool {
+        self.replicates.len() > 1
     }
 
     /// Why it may not win, however small its error.
@@ -76,9 +121,21 @@ impl<'a> Sampler<'a> {
         if bad > 0 {
             return Some(format!("{bad} NaN or infinite pixels"));
         }
-        self.bias
-            .filter(|bias| bias.verdict == "biased")
-            .map(|bias| format!("biased: {} of {} tiles rejected", bias.rejected, bias.tiles))
+        let bias = self.bias.filter(|bias| bias.verdict == "biased")?;
+        let kind = if bias.by_design {
+            "biased by design"
+        } else {
+            "biased"
+        };
+        let tiles = format!("{kind}: {} of {} tiles rejected", bias.rejected, bias.tiles);
+        Some(match bias.p {
+            Some(p) => format!(
+                "{tiles}, image z = {} (p = {})",
+                format::optional(bias.z),
+                format::number(p)
+            ),
+            None => tiles,
+        })
     }
 
     /// The full id of a metric as recorded.
@@ -97,51 +154,102 @@ impl<'a> Sampler<'a> {
         let Some(id) = self.metric_id(metric) else {
             return Vec::new();
         };
-        let mut spps: Vec<u32> = self
-            .replicates
-            .iter()
-            .flat_map(|r| &r.errors)
-            .map(|e| e.spp)
-            .collect();
+        let errors = self.replicates.iter().flat_map(|r| &r.errors);
+        let mut spps: Vec<u32> = errors.map(|e| e.spp).collect();
         spps.sort_unstable();
         spps.dedup();
         let mean_at = |spp| {
-            let values: Vec<f64> = self
-                .replicates
-                .iter()
-                .filter_map(|r| value(r, spp, id))
-                .collect();
-            bootstrap_mean(&values).map(|error| MeanError { spp, error })
+            let estimate = |without| self.recorded_mean(id, spp, without);
+            let value = estimate(Without::Nothing)?;
+            let by_reference = jackknife_interval(value, &self.reference_estimates(id, estimate)?)?;
+            let exact = by_reference.low == by_reference.high;
+            Some(MeanError {
+                spp,
+                error: metric.shown(self.interval(id, value, estimate)?),
+                resolved: by_reference.low > 0.0 || exact && value >= 0.0,
+            })
         };
         spps.into_iter().filter_map(mean_at).collect()
     }
 
     /// Mean error at this spp.
-    pub fn mean_error_at(&self, metric: Metric, spp: u32) -> Option<Interval> {
+    pub fn mean_error_at(&self, metric: Metric, spp: u32) -> Option<MeanError> {
         self.mean_errors(metric)
             .into_iter()
             .find(|mean| mean.spp == spp)
-            .map(|mean| mean.error)
     }
 
-    /// Slope of log error against log spp, over the spp that every replicate has.
+    /// Slope of log error against log spp, over the spp that every replicate has and the reference
+    /// resolves.
     pub fn slope(&self, metric: Metric) -> Option<Interval> {
         let id = self.metric_id(metric)?;
-        let first = self.replicates.first()?;
-        let common: Vec<u32> = first
-            .errors
-            .iter()
-            .map(|error| error.spp)
-            .filter(|&spp| self.replicates.iter().all(|r| value(r, spp, id).is_some()))
-            .collect();
-        let curve = |r: &&ErrorRecord| -> Vec<(f64, f64)> {
-            common
-                .iter()
-                .filter_map(|&spp| Some((f64::from(spp), value(r, spp, id)?)))
-                .collect()
+        let everywhere = |spp| self.replicates.iter().all(|r| value(r, spp, id).is_some());
+        let means = self.mean_errors(metric);
+        let fitted = means.iter().filter(|m| m.resolved && everywhere(m.spp));
+        let spps: Vec<u32> = fitted.map(|mean| mean.spp).collect();
+        let estimate = |without| {
+            let point = |&spp: &u32| {
+                let mean = self.recorded_mean(id, spp, without)?;
+                Some((f64::from(spp), mean))
+            };
+            let points: Vec<(f64, f64)> = spps.iter().filter_map(point).collect();
+            let slope = log_log_fit(&points)?;
+            // The root's slope is half of the square's.
+            Some(if metric == Metric::Rmse {
+                0.5 * slope
+            } else {
+                slope
+            })
         };
-        let curves: Vec<_> = self.replicates.iter().map(curve).collect();
-        log_log_slope(&curves)
+        self.interval(id, estimate(Without::Nothing)?, estimate)
+    }
+
+    /// Mean of a recorded metric over replicates.
+    fn recorded_mean(&self, id: &str, spp: u32, without: Without) -> Option<f64> {
+        let kept = self.replicates.iter().enumerate();
+        let kept = kept.filter(|(i, _)| without != Without::Replicate(*i));
+        let values = kept.filter_map(|(_, r)| match without {
+            Without::Part(part) => {
+                let at = r.errors.iter().find(|error| error.spp == spp)?;
+                at.without_part.get(id)?.get(part).copied()
+            }
+            _ => value(r, spp, id),
+        });
+        mean(&values.collect::<Vec<f64>>())
+    }
+
+    /// `value`, which is `estimate(Nothing)`, with its interval.
+    fn interval(
+        &self,
+        id: &str,
+        value: f64,
+        estimate: impl Fn(Without) -> Option<f64>,
+    ) -> Option<Interval> {
+        if !self.is_ranked() {
+            return Some(Interval::exact(value));
+        }
+        let mut sources = self.reference_estimates(id, &estimate)?;
+        let replicates = 0..self.replicates.len();
+        let by_replicate: Option<_> = replicates
+            .map(|i| estimate(Without::Replicate(i)))
+            .collect();
+        sources.push(by_replicate?);
+        jackknife_interval(value, &sources)
+    }
+
+    /// Estimates without each part of the reference, its halves apart; empty where parts are unknown.
+    fn reference_estimates(
+        &self,
+        id: &str,
+        estimate: impl Fn(Without) -> Option<f64>,
+    ) -> Option<Vec<Vec<f64>>> {
+        let errors = self.replicates.iter().flat_map(|r| &r.errors);
+        let known = errors.map(|e| e.without_part.get(id).map_or(0, Vec::len));
+        let half = known.min().unwrap_or(0) / 2;
+        let of = |parts: std::ops::Range<usize>| -> Option<Vec<f64>> {
+            parts.map(|part| estimate(Without::Part(part))).collect()
+        };
+        Some(vec![of(0..half)?, of(half..2 * half)?])
     }
 }
 
@@ -154,6 +262,44 @@ fn value(replicate: &ErrorRecord, spp: u32, id: &str) -> Option<f64> {
 }
 
 impl View<'_> {
+    /// Why the errors of this view may not be ranked: the reference is absent, or too noisy for the
+    /// least of them.
+    pub fn reference_fault(&self) -> Option<String> {
+        let errors = || {
+            let of = |s: &Sampler| s.mean_errors(Metric::Rmse);
+            self.samplers.iter().flat_map(of)
+        };
+        errors().next()?;
+        let Some(reference) = self.reference else {
+            return Some("the reference has no record".into());
+        };
+        if reference.exact.is_some() {
+            return None;
+        }
+        if let Some(mean) = errors().find(|mean| !mean.resolved) {
+            return Some(format!("an error at {} spp is {UNRESOLVED}", mean.spp));
+        }
+        let least = errors()
+            .map(|mean| mean.error.value.powi(2))
+            .reduce(f64::min)?;
+        if reference.mse == 0.0 {
+            // Rounding apart, equal parts are right only of a scene without noise.
+            let noisy = least.sqrt() > 1e-4 * reference.mean;
+            let reason = "the parts of the reference do not differ, so that its noise is unknown: its \
+                          sampler must be one that seeds change";
+            return noisy.then(|| reason.into());
+        }
+        let share = reference.mse / least;
+        // A share that is no number is a fault, too.
+        (share.is_nan() || share > REFERENCE_SHARE).then(|| {
+            format!(
+                "the reference has {} of the least mean squared error, more than {}",
+                format::percent(share),
+                format::percent(REFERENCE_SHARE)
+            )
+        })
+    }
+
     /// The highest spp at which every measured sampler has an error.
     pub fn common_spp(&self) -> Option<u32> {
         let measured = self
@@ -174,7 +320,7 @@ impl View<'_> {
 }
 
 /// Error after `seconds`, from a curve of `(seconds, error)`: log–log interpolation between the
-/// neighbours, `None` outside the curve.
+/// neighbours, `None` outside the curve. An end of an interval below 0 counts as 0.
 pub fn error_after(curve: &[(f64, Interval)], seconds: f64) -> Option<Interval> {
     let exact = |&&(x, _): &&(f64, Interval)| (x / seconds - 1.0).abs() < 1e-9;
     if let Some(&(_, error)) = curve.iter().find(exact) {
@@ -184,7 +330,7 @@ pub fn error_after(curve: &[(f64, Interval)], seconds: f64) -> Option<Interval> 
         .windows(2)
         .find(|pair| pair[0].0 < seconds && seconds < pair[1].0)?;
     let share = (seconds / pair[0].0).ln() / (pair[1].0 / pair[0].0).ln();
-    let between = |a: f64, b: f64| a.powf(1.0 - share) * b.powf(share);
+    let between = |a: f64, b: f64| a.max(0.0).powf(1.0 - share) * b.max(0.0).powf(share);
     let (a, b) = (pair[0].1, pair[1].1);
     Some(Interval {
         value: between(a.value, b.value),
@@ -194,19 +340,5 @@ pub fn error_after(curve: &[(f64, Interval)], seconds: f64) -> Option<Interval> 
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn interpolation_follows_a_power_law_and_ends_with_the_curve() {
-        let exact = |value| Interval {
-            value,
-            low: value,
-            high: value,
-        };
-        let curve = [(1.0, exact(8.0)), (4.0, exact(2.0))];
-        assert!((error_after(&curve, 2.0).unwrap().value - 4.0).abs() < 1e-12);
-        assert_eq!(error_after(&curve, 4.0).unwrap().value, 2.0);
-        assert!(error_after(&curve, 5.0).is_none());
-    }
-}
+#[path = "samplers_tests.rs"]
+mod tests;

@@ -1,7 +1,7 @@
 //! The essence of a report for the end of a run.
 
 use super::data::RunData;
-use super::document::{Cell, Table};
+use super::document::{Cell, Table, Tone};
 use super::samplers::Metric;
 use super::sections::{belief, run, samplers, structures, verdict};
 use crate::measure::record::Line;
@@ -33,6 +33,15 @@ pub fn terminal_tables(records: &[Line]) -> String {
         out += &format!("{}  {}: {}\n", check.word(), check.title, check.detail);
     }
     out
+}
+
+/// The checks that failed, each with what it found: any is a failure of the run.
+pub fn failed_checks(records: &[Line]) -> Vec<String> {
+    let checks = belief::checks(&RunData::new(records)).into_iter();
+    let failed = checks.filter(|check| check.tone == Tone::Bad);
+    failed
+        .map(|c| format!("{}: {}", c.title, c.detail))
+        .collect()
 }
 
 /// The table with columns padded to equal width; of figures only the value is kept, since intervals

@@ -145,6 +145,157 @@ fn a_biased_sampler_and_a_failed_structure_never_win() {
     );
 }
 
+/// The run with the figures of one integrator on the second scene changed.
+fn with_errors(change: impl Fn(&mut ErrorRecord)) -> Vec<Line> {
+    let mut lines = full_run();
+    for line in &mut lines {
+        match &mut line.record {
+            Record::Error(e) if e.scene == "displaced-sphere" && e.integrator.label == "path" => {
+                change(e);
+            }
+            _ => {}
+        }
+    }
+    lines
+}
+
+#[test]
+fn what_has_one_replicate_is_shown_and_neither_wins_nor_makes_a_winner() {
+    // The deterministic one is far better than all others.
+    let lines = with_errors(|e| {
+        if e.sequence.label == "sobol" && e.decorrelation.label == "none" {
+            let metrics = e.errors.iter_mut().flat_map(|at| at.metrics.values_mut());
+            metrics.for_each(|value| *value *= 0.02);
+        }
+    });
+    let data = RunData::new(&lines);
+    let ruling = sections::verdict::best_per_sample(&data.scenes[1].views[0], 32);
+    assert_eq!(ruling.answer(), "sobol × cranley-patterson");
+    let next = ruling.runner_up();
+    assert!(next.starts_with("pixel-hash × none"), "{next}");
+    let (html, _) = report("single", &lines);
+    assert!(html.contains("not ranked on displaced-sphere"));
+    // All but one have one replicate: the one with many has beaten nobody.
+    let mut few = lines.clone();
+    few.retain(|line| match &line.record {
+        Record::Error(e) => e.replicate == 0 || e.sequence.label == "pixel-hash",
+        _ => true,
+    });
+    let data = RunData::new(&few);
+    let ruling = sections::verdict::best_per_sample(&data.scenes[1].views[0], 32);
+    assert_eq!(ruling.answer(), "pixel-hash × none (alone)");
+}
+
+#[test]
+fn no_winner_and_no_point_where_the_reference_is_too_noisy() {
+    // An estimate about 0, as noise makes it from an error below the reference's own.
+    let lines = with_errors(|e| {
+        if e.sequence.label == "sobol" && e.randomised {
+            let negative = -1e-7 * (1.0 + f64::from(e.replicate));
+            let last = e.errors.last_mut().unwrap();
+            last.metrics
+                .values_mut()
+                .for_each(|value| *value = negative);
+        }
+    });
+    let data = RunData::new(&lines);
+    let view = &data.scenes[1].views[0];
+    let ruling = sections::verdict::best_per_sample(view, 32);
+    assert!(
+        ruling
+            .answer()
+            .contains("below what the reference can resolve")
+    );
+    assert_eq!(ruling.figure(), "–");
+    let race = sections::verdict::Race::new(view).unwrap();
+    assert!(race.ruling().answer().starts_with("no winner"));
+    let (html, summary) = report("unresolved", &lines);
+    assert!(html.contains("Not drawn: 1 point below what the reference can resolve."));
+    assert!(
+        summary.contains("<0") || summary.contains("&lt;0"),
+        "the table says that it is not resolved"
+    );
+    assert!(!without_pictures(&html).contains("NaN"));
+    let failed = failed_checks(&lines);
+    assert!(
+        failed
+            .iter()
+            .any(|check| check.starts_with("Reference noise")),
+        "{failed:?}"
+    );
+}
+
+#[test]
+fn a_scene_without_noise_is_no_fault_of_its_reference() {
+    let mut lines = full_run();
+    for line in &mut lines {
+        match &mut line.record {
+            Record::Error(e) => {
+                let metrics = e.errors.iter_mut().flat_map(|at| at.metrics.values_mut());
+                metrics.for_each(|value| *value = 0.0);
+            }
+            Record::Reference(r) => r.mse = 0.0,
+            _ => {}
+        }
+    }
+    let failed = failed_checks(&lines);
+    assert!(
+        !failed
+            .iter()
+            .any(|check| check.starts_with("Reference noise")),
+        "{failed:?}"
+    );
+    let (html, _) = report("no-noise", &lines);
+    assert!(!without_pictures(&html).contains("NaN"));
+}
+
+#[test]
+fn a_slow_sampler_wins_per_second_only_if_its_time_is_known_well_enough() {
+    let lines = full_run();
+    let data = RunData::new(&lines);
+    let race = sections::verdict::Race::new(&data.scenes[1].views[0]).unwrap();
+    let sharp = race.error_of("sobol × cranley-patterson").unwrap();
+    let mut vague = full_run();
+    for line in &mut vague {
+        if let Record::Time(time) = &mut line.record
+            && let Some(ms) = &mut time.ms_per_spp
+        {
+            (ms.low, ms.high) = (0.5 * ms.value, 2.0 * ms.value);
+        }
+    }
+    let data = RunData::new(&vague);
+    let race = sections::verdict::Race::new(&data.scenes[1].views[0]).unwrap();
+    let wide = race.error_of("sobol × cranley-patterson").unwrap();
+    assert_eq!(wide.value, sharp.value);
+    assert!(wide.low < 0.6 * sharp.low && wide.high > 1.8 * sharp.high);
+    assert!(race.ruling().answer().starts_with("no clear winner"));
+}
+
+#[test]
+fn a_bias_by_design_never_wins_and_is_no_failure() {
+    let mut lines = full_run();
+    for line in &mut lines {
+        if let Record::Bias(b) = &mut line.record
+            && b.verdict == "biased"
+        {
+            b.by_design = true;
+        }
+    }
+    let checks = sections::belief::checks(&RunData::new(&lines));
+    let bias = checks
+        .iter()
+        .find(|c| c.title.contains("without bias"))
+        .unwrap();
+    assert_eq!(bias.word(), "PASS", "{bias:?}");
+    assert!(
+        bias.detail.contains("2 biased by design"),
+        "{}",
+        bias.detail
+    );
+    let (html, _) = report("by-design", &lines);
+    assert!(html.contains("biased by design: 57 of 432 tiles rejected, image z = "));
+}
+
 #[test]
 fn every_check_passes_on_a_clean_run_and_fails_on_its_planted_fault() {
     let clean: Vec<Line> = full_run()
@@ -168,7 +319,7 @@ fn every_check_passes_on_a_clean_run_and_fails_on_its_planted_fault() {
             .collect()
     };
     assert_eq!(failing(&clean), Vec::<String>::new());
-    let faults: [(&str, Plant); 7] = [
+    let faults: [(&str, Plant); 10] = [
         ("equal to the bit", |r| {
             if let Record::Structure(s) = r {
                 s.gate = Some(gate(1))
@@ -202,6 +353,21 @@ fn every_check_passes_on_a_clean_run_and_fails_on_its_planted_fault() {
         ("Reference noise", |r| {
             if let Record::Reference(f) = r {
                 f.mse = 1.0
+            }
+        }),
+        ("Reference noise", |r| {
+            if let Record::Reference(f) = r {
+                f.mse = 0.0
+            }
+        }),
+        ("Reference noise", |r| {
+            if let Record::Reference(f) = r {
+                f.integrator.label = "another".into()
+            }
+        }),
+        ("Reference noise", |r| {
+            if let Record::Error(e) = r {
+                e.errors[5].metrics.values_mut().for_each(|v| *v = -1e-9)
             }
         }),
     ];

@@ -3,21 +3,20 @@
 use super::session::Session;
 use super::structures::{self, Gated};
 use super::world::World;
-use super::{REFERENCE_PARTS, RunError};
-use crate::config::{SamplerCell, StructureCell, Variant, cell_hash};
-use crate::integrator::{Frame, RenderJob, Renderer, Snapshot, Traced, integrator};
+use super::{RunError, words};
+use crate::config::{REFERENCE_PARTS, SamplerCell, StructureCell, Variant, cell_hash};
+use crate::integrator::{Frame, RenderJob, Renderer, Snapshot, Traced, integrator, rounding_bound};
 use crate::measure::bias::{BiasOptions, check_bias};
 use crate::measure::image::{Image, Reference, measure};
-use crate::measure::picture::{automatic_exposure, error_map, tone_map, write_png};
+use crate::measure::picture::{Picture, automatic_exposure, error_map, tone_map};
 use crate::measure::record::{
     BiasRecord, ErrorAtSpp, ErrorRecord, Ran, Record, ReferenceRecord, SpectrumRecord,
 };
 use crate::measure::spectrum::{
     ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power,
 };
-use crate::measure::statistics::bootstrap_mean;
+use crate::measure::statistics::mean_interval;
 use crate::report::color::viridis;
-use crate::sampling::hash::pcg_hash;
 use crate::sampling::{Demand, Sampler};
 use std::time::Instant;
 
@@ -26,10 +25,15 @@ const ERROR_MAP_FULL_SCALE: f32 = 1.0;
 /// What references are rendered through where no structure ran with the embedded kernels.
 const REFERENCE_STRUCTURE: &str = "bvh";
 
-/// The reference of one integrator with its parts and the exposure of all its pictures.
+/// What the host's exact values of integrands and their samples in f32 may differ by, relative: some
+/// functions of the device's library, a few units of the last place each.
+const EVALUATION: f64 = 32.0 * f32::EPSILON as f64;
+
+/// The reference of one integrator and the exposure of all its pictures.
 struct Yardstick {
     reference: Reference,
-    parts: Vec<Image>,
+    /// How far rounding alone may move it, relative.
+    rounding: f64,
     exposure: f32,
 }
 
@@ -199,23 +203,24 @@ fn reference(
         Ok(sampler) => sampler,
         Err(reason) => return Ok(Err(reason)),
     };
-    let seed = pcg_hash(settings.seed);
+    let seeds = session.experiment.seeds().reference_parts;
     let rendered = (|| {
+        words::check(session, world.gpu, &sampler, &seeds)?;
         let job = job(session, world, &sampler, variant, true)?;
         let renderer = Renderer::new(world.gpu, &world.buffers, traced, &job, false)
             .map_err(|e| e.to_string())?;
         let mut parts = Vec::new();
-        for part in 0..REFERENCE_PARTS {
-            let shots = session.clock.time("gpu", || {
-                rendered(&renderer, &[spp], seed.wrapping_add(part))
-            });
+        for &seed in &seeds {
+            let shots = session
+                .clock
+                .time("gpu", || rendered(&renderer, &[spp], seed));
             parts.extend(shots?.into_iter().map(|s| s.image));
             session.progress.inc(1);
         }
-        let reference = Reference::from_parts(&parts).map_err(|e| e.to_string())?;
-        Ok::<_, String>((reference, parts, renderer.kernel_hash()))
+        let reference = Reference::from_parts(parts).map_err(|e| e.to_string())?;
+        Ok::<_, String>((reference, renderer.kernel_hash()))
     })();
-    let (reference, parts, kernel) = match rendered {
+    let (reference, kernel) = match rendered {
         Ok(rendered) => rendered,
         Err(reason) => return Ok(Err(reason)),
     };
@@ -226,7 +231,7 @@ fn reference(
         ran: world.ran(&Variant::default(), kernel),
         ..reference_record(world, variant, &reference)
     };
-    finish_reference(session, world, record, reference, parts).map(Ok)
+    finish_reference(session, world, record, reference, rounding_bound(spp)).map(Ok)
 }
 
 /// The constant image of a known value: nothing is rendered.
@@ -238,11 +243,9 @@ fn exact_reference(
 ) -> Result<Result<Yardstick, String>, RunError> {
     let [width, height] = session.experiment.resolution;
     let pixels = vec![[value as f32; 3]; width as usize * height as usize];
-    let made = Image::new(width, height, pixels).and_then(|image| {
-        let parts = vec![image; REFERENCE_PARTS as usize];
-        Ok((Reference::from_parts(&parts)?, parts))
-    });
-    let (reference, parts) = match made {
+    let made = Image::new(width, height, pixels)
+        .and_then(|image| Reference::from_parts(vec![image; REFERENCE_PARTS as usize]));
+    let reference = match made {
         Ok(made) => made,
         Err(error) => return Ok(Err(error.to_string())),
     };
@@ -251,7 +254,7 @@ fn exact_reference(
         exact: Some(value),
         ..reference_record(world, variant, &reference)
     };
-    finish_reference(session, world, record, reference, parts).map(Ok)
+    finish_reference(session, world, record, reference, EVALUATION).map(Ok)
 }
 
 /// The record of a reference that was not rendered; what was rendered sets more.
@@ -276,14 +279,13 @@ fn finish_reference(
     world: &World,
     mut record: ReferenceRecord,
     reference: Reference,
-    parts: Vec<Image>,
+    rounding: f64,
 ) -> Result<Yardstick, RunError> {
     let exposure = automatic_exposure(reference.image());
     let labels = [&world.variant.label, &record.integrator.label].map(String::as_str);
-    let (relative, path) = session.image_path(&[&["reference"], &labels[..]].concat());
-    write_png(&path, &tone_map(reference.image(), exposure))
-        .map_err(|e| RunError::Input(e.to_string()))?;
-    record.image = relative;
+    let picture = tone_map(reference.image(), exposure);
+    let image = session.picture(&[&["reference"], &labels[..]].concat(), &picture)?;
+    record.image = image.unwrap_or_default();
     let cell = format!("reference {}, {}: done", world.variant, record.integrator);
     if !session.is_done(&cell) {
         let hash = cell_hash(&[
@@ -304,7 +306,7 @@ fn finish_reference(
     }
     Ok(Yardstick {
         reference,
-        parts,
+        rounding,
         exposure,
     })
 }
@@ -320,7 +322,7 @@ struct Pass<'a> {
 /// What a replicate is rendered in: one pass, unless each number of samples has points of its own,
 /// which makes a pass each.
 fn passes<'a>(
-    session: &Session,
+    session: &mut Session,
     world: &'a World,
     fastest: &Gated,
     cell: &SamplerCell,
@@ -328,8 +330,30 @@ fn passes<'a>(
     let pair = (&cell.sequence, &cell.decorrelation);
     let gpu = world.device.of(&cell.kernels);
     let gpu = gpu.map_err(|e| e.to_string())?;
-    let pass = |spps: Vec<u32>, sampler: &Sampler| {
-        let job = job(session, world, sampler, &cell.integrator, true)?;
+    let seeds = session.experiment.seeds().replicates;
+    let spps: Vec<u32> = session.experiment.spp.counts().collect();
+    let whole = sampler_for(
+        session,
+        pair,
+        &cell.integrator,
+        session.experiment.spp.max(),
+    )?;
+    let single = |spp| {
+        Ok((
+            vec![spp],
+            sampler_for(session, pair, &cell.integrator, spp)?,
+        ))
+    };
+    let samplers = match whole.by_count() {
+        true => spps
+            .into_iter()
+            .map(single)
+            .collect::<Result<_, String>>()?,
+        false => vec![(spps, whole)],
+    };
+    let pass = |(spps, sampler): (Vec<u32>, Sampler)| {
+        words::check(session, gpu, &sampler, &seeds)?;
+        let job = job(session, world, &sampler, &cell.integrator, true)?;
         let renderer = Renderer::new(gpu, &world.buffers, &fastest.traced, &job, false);
         let words = bytemuck::cast_slice(sampler.table.words());
         Ok(Pass {
@@ -338,19 +362,7 @@ fn passes<'a>(
             table: blake3::hash(words).to_hex().to_string(),
         })
     };
-    let spps: Vec<u32> = session.experiment.spp.counts().collect();
-    let most = session.experiment.spp.max();
-    let sampler = sampler_for(session, pair, &cell.integrator, most)?;
-    if !sampler.by_count() {
-        return Ok(vec![pass(spps, &sampler)?]);
-    }
-    let single = |spp| {
-        pass(
-            vec![spp],
-            &sampler_for(session, pair, &cell.integrator, spp)?,
-        )
-    };
-    spps.into_iter().map(single).collect()
+    samplers.into_iter().map(pass).collect()
 }
 
 /// All replicates of one sampler. The inner error concerns this cell alone.
@@ -386,13 +398,10 @@ fn sampler_error(
         ("sampler table", &tables),
         ("version", env!("CARGO_PKG_VERSION")),
     ]);
-    let seeds: Vec<u32> = session
-        .experiment
-        .replicate_seeds()
-        .take(cell.replicates as usize)
-        .collect();
+    let seeds = session.experiment.seeds().replicates;
+    let seeds = seeds.into_iter().take(cell.replicates as usize);
     let mut finals = Vec::new();
-    for (replicate, seed) in seeds.into_iter().enumerate() {
+    for (replicate, seed) in seeds.enumerate() {
         let mut snapshots = Vec::new();
         for pass in &passes {
             let render = || rendered(&pass.renderer, &pass.spps, seed);
@@ -457,7 +466,7 @@ fn spectrum_record(
     let spectra = spectra.map_err(|e| e.to_string())?;
     let mean = |figure: fn(&ErrorSpectrum) -> Option<f64>| {
         let values: Vec<f64> = spectra.iter().filter_map(figure).collect();
-        bootstrap_mean(&values)
+        mean_interval(&values)
     };
     Ok(SpectrumRecord {
         scene: world.variant.label.clone(),
@@ -491,6 +500,7 @@ fn error_record(
                 errors.push(ErrorAtSpp {
                     spp: snapshot.spp,
                     metrics: report.metrics,
+                    without_part: report.without_part,
                 });
             }
             Err(error) => return Ok(Err(error.to_string())),
@@ -516,38 +526,28 @@ fn error_record(
         error_map: None,
     };
     if replicate == 0 {
-        let name = |kind| {
-            let labels = [
-                &world.variant.label,
-                &cell.integrator.label,
-                &cell.sequence.label,
-                &cell.decorrelation.label,
-            ];
-            session.image_path(&[&[kind], &labels.map(String::as_str)[..]].concat())
+        let labels = [
+            &world.variant.label,
+            &cell.integrator.label,
+            &cell.sequence.label,
+            &cell.decorrelation.label,
+        ];
+        let draw = |kind, picture: &Picture| {
+            let names = [&[kind], &labels.map(String::as_str)[..]].concat();
+            session.picture(&names, picture)
         };
-        let (relative, path) = name("image");
-        write_png(&path, &tone_map(&last.image, yardstick.exposure))
-            .map_err(|e| RunError::Input(e.to_string()))?;
-        record.image = Some(relative);
-        let (relative, path) = name("error");
-        match error_map(
-            &last.image,
-            &yardstick.reference,
-            ERROR_MAP_FULL_SCALE,
-            viridis,
-        ) {
-            Ok(picture) => {
-                write_png(&path, &picture).map_err(|e| RunError::Input(e.to_string()))?
-            }
+        record.image = draw("image", &tone_map(&last.image, yardstick.exposure))?;
+        let (reference, scale) = (&yardstick.reference, ERROR_MAP_FULL_SCALE);
+        match error_map(&last.image, reference, scale, viridis) {
+            Ok(picture) => record.error_map = draw("error", &picture)?,
             Err(error) => return Ok(Err(error.to_string())),
         }
-        record.error_map = Some(relative);
     }
     Ok(Ok(record))
 }
 
-/// The false-discovery rate is shared out among all randomised samplers of the run, so that a run of
-/// many sound samplers does not cry wolf.
+/// The probability of a false alarm is shared out among all samplers of the run that claim to have no
+/// bias, so that a run of many sound samplers does not cry wolf.
 fn bias_record(
     session: &Session,
     cell: &SamplerCell,
@@ -555,21 +555,22 @@ fn bias_record(
     images: &[Image],
     yardstick: &Yardstick,
 ) -> Result<BiasRecord, String> {
-    let tested = session
-        .plan
-        .samplers
-        .iter()
-        .filter(|s| s.randomised)
-        .count()
-        .max(1);
-    let mut options = BiasOptions::default();
-    options.alpha /= tested as f64;
-    let check = check_bias(images, &yardstick.parts, options).map_err(|e| e.to_string())?;
+    let claims = |s: &SamplerCell| s.randomised && session.registries.is_unbiased(s);
+    let tested = session.plan.samplers.iter().filter(|s| claims(s)).count();
+    let defaults = BiasOptions::default();
+    let options = BiasOptions {
+        alpha: defaults.alpha / tested.max(1) as f64,
+        rounding: rounding_bound(session.experiment.spp.max()) + yardstick.rounding,
+        ..defaults
+    };
+    let check = check_bias(images, yardstick.reference.parts(), options);
+    let check = check.map_err(|e| e.to_string())?;
     let verdict = if cell.randomised {
         check.verdict.to_string()
     } else {
         "not-testable: the sampler is deterministic, its error is not noise".to_owned()
     };
+    let whole = check.whole.filter(|_| cell.randomised);
     Ok(BiasRecord {
         scene: world.variant.label.clone(),
         integrator: cell.integrator.clone(),
@@ -581,7 +582,10 @@ fn bias_record(
         alpha: check.alpha,
         min_p: check.min_p,
         p_histogram: check.p_histogram.to_vec(),
-        z: check.z,
+        z: whole.map(|test| test.t).filter(|t| t.is_finite()),
+        p: whole.map(|test| test.p),
+        degrees_of_freedom: whole.map(|test| test.degrees_of_freedom),
+        by_design: cell.randomised && !session.registries.is_unbiased(cell),
         verdict,
     })
 }

@@ -5,6 +5,7 @@
 
 pub mod environment;
 mod errors;
+mod folder;
 mod kernels;
 mod registries;
 mod render;
@@ -12,33 +13,39 @@ mod session;
 mod streams;
 mod structures;
 mod times;
+mod words;
 mod world;
 
+pub use folder::{Existing, Interrupt, Interrupted};
 pub use kernels::{Kernels, kernel_library};
 pub use registries::Registries;
 pub use render::{Rendering, render};
-pub use streams::dump_stream;
 
 use crate::config::{Experiment, Plan, Variant};
 use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
 use crate::measure::record::GateVerdict;
+pub use crate::measure::words::dump_stream;
 use kernels::Device;
 use session::Session;
 use std::path::PathBuf;
 use thiserror::Error;
 use world::{Absent, World};
 
-/// A reference is rendered in this many independent parts: its halves make error estimates
-/// unbiased, its parts are the other side of the bias check.
-pub(crate) const REFERENCE_PARTS: u32 = 8;
-
 /// What an experiment does not say.
 #[derive(Debug, Clone, Default)]
 pub struct RunOptions {
     /// Folder for records, images and the report; made if missing.
     pub out: PathBuf,
+    /// What to do where that folder holds results.
+    pub existing: Existing,
+    /// Ends the run early.
+    pub interrupt: Interrupt,
+    /// Is told what went wrong beside the measuring, at once.
+    pub warn: Option<fn(&str)>,
     /// Which adapter.
     pub adapter: AdapterChoice,
+    /// Whether models may name files outside their folder: see [`crate::scene::LoadOptions`].
+    pub allow_outside: bool,
     /// Whether to draw a progress bar on standard error.
     pub progress: bool,
     /// Destroys the device when the turn of this cell comes: for tests of the recovery.
@@ -56,6 +63,10 @@ pub struct RunSummary {
     pub skipped: usize,
     /// Whether a scene could not be loaded (exit code 2).
     pub bad_input: bool,
+    /// Checks of the report that failed, with what they found (exit code 1).
+    pub failed_checks: Vec<String>,
+    /// Folder of the records.
+    pub out: PathBuf,
     /// The report's page.
     pub report: Option<PathBuf>,
     /// Tables for the terminal.
@@ -71,6 +82,17 @@ pub enum RunError {
     /// Bad usage or input (exit code 2).
     #[error("{0}")]
     Input(String),
+    /// Something that ended a run before its end; what was measured is kept.
+    #[error("{source}; what was measured is in {}", folder.display())]
+    EndedEarly {
+        /// The folder of the records.
+        folder: PathBuf,
+        /// What ended it.
+        source: Box<RunError>,
+    },
+    /// [`Interrupt::now`] was called.
+    #[error("the run was interrupted")]
+    Interrupted,
     /// A result that is known to be wrong (exit code 1).
     #[error("{0}")]
     Wrong(String),
@@ -87,6 +109,7 @@ impl RunError {
             Self::Gpu(
                 GpuError::NoAdapter | GpuError::UnknownAdapter { .. } | GpuError::NoDevice { .. },
             ) => 3,
+            Self::EndedEarly { source, .. } => source.exit_code(),
             _ => 2,
         }
     }
@@ -101,14 +124,18 @@ pub struct Verified {
     pub accel: Variant,
     /// Verdict, or why there is none.
     pub verdict: Result<GateVerdict, String>,
+    /// Whether the scene could not be loaded (exit code 2).
+    pub bad_input: bool,
     /// Whether there is none because the driver ends loops too early for the structure.
     pub refused: bool,
 }
 
-/// Runs a plan, writes `records.jsonl`, images and the report to `options.out`.
+/// Runs a plan, writes `records.jsonl`, images and the report to `options.out`, which another run
+/// cannot write meanwhile. Earlier results there stay until the run has ended.
 ///
 /// # Errors
-/// No adapter, kernels that cannot be read, or a folder that cannot be written.
+/// No adapter, kernels that cannot be read, or a folder that cannot be written or holds results; the
+/// records so far are kept, with a report.
 pub fn run(
     experiment: &Experiment,
     plan: &Plan,
@@ -116,39 +143,57 @@ pub fn run(
     options: &RunOptions,
 ) -> Result<RunSummary, RunError> {
     let kernels = Kernels::load(&plan.kernels, registries)?;
-    let mut device = Device::open(options, &kernels)?;
+    let device = Device::open(options, &kernels)?;
     let mut session = Session::new(experiment, plan, registries, options)?;
-    session.write_start(environment::capture(&device.gpu), kernels.folders())?;
-    for scene in &plan.scenes {
-        // A lost device fails the cell that lost it; the rest goes on with a fresh one. Every turn
-        // of this loop finishes at least one cell.
-        loop {
-            run_scene(&mut session, &device, scene)?;
-            if device.gpu.lost().is_none() {
-                break;
-            }
-            device = Device::open(options, &kernels)?;
+    let out = measure(&mut session, device, &kernels).map_err(|error| {
+        match options.interrupt.now(&error.to_string()) {
+            Interrupted::Kept { folder, .. } => RunError::EndedEarly {
+                folder,
+                source: Box::new(error),
+            },
+            _ => error,
         }
-    }
-    loop {
-        streams::run(&mut session, &device)?;
-        if device.gpu.lost().is_none() {
-            break;
-        }
-        device = Device::open(options, &kernels)?;
-    }
-    session.write_end()?;
-    let report =
-        crate::report::write_report(&options.out).map_err(|e| RunError::Input(e.to_string()))?;
-    let lines =
-        crate::report::read_records(&options.out).map_err(|e| RunError::Input(e.to_string()))?;
+    })?;
+    let report = crate::report::write_report(&out).map_err(|e| RunError::Input(e.to_string()))?;
+    let lines = crate::report::read_records(&out).map_err(|e| RunError::Input(e.to_string()))?;
     Ok(RunSummary {
         failed: session.failed,
         skipped: session.skipped,
         bad_input: session.bad_input,
         report: Some(report.html),
+        failed_checks: crate::report::failed_checks(&lines.lines),
         tables: crate::report::terminal_tables(&lines.lines),
+        out,
     })
+}
+
+/// Writes every record, and puts them in their place: the folder.
+fn measure(
+    session: &mut Session,
+    mut device: Device,
+    kernels: &Kernels,
+) -> Result<PathBuf, RunError> {
+    session.write_start(environment::capture(&device.gpu), kernels.folders())?;
+    let (plan, options) = (session.plan, session.options);
+    for scene in &plan.scenes {
+        // A lost device fails the cell that lost it; the rest goes on with a fresh one. Every turn
+        // of this loop finishes at least one cell.
+        loop {
+            run_scene(session, &device, scene)?;
+            if device.gpu.lost().is_none() {
+                break;
+            }
+            device = Device::open(options, kernels)?;
+        }
+    }
+    loop {
+        streams::run(session, &device)?;
+        if device.gpu.lost().is_none() {
+            break;
+        }
+        device = Device::open(options, kernels)?;
+    }
+    session.write_end()
 }
 
 fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Result<(), RunError> {
@@ -215,6 +260,7 @@ pub fn verify(
                 scene: scene.clone(),
                 accel: cell.accel.clone(),
                 verdict,
+                bad_input: matches!(world, Err(Absent::BadInput(_))),
                 refused,
             });
         }

@@ -1,7 +1,7 @@
 //! All registries together.
 
 use crate::accel::AccelRegistry;
-use crate::config::{Catalogue, Variant};
+use crate::config::{Catalogue, SamplerCell, Variant};
 use crate::integrator::integrator_entries;
 use crate::sampling::SamplerRegistry;
 
@@ -42,5 +42,10 @@ impl Registries {
     ) -> Result<bool, String> {
         let random = self.samplers.is_random(sequence, decorrelation);
         random.map_err(|e| e.to_string())
+    }
+
+    /// Whether the mean over seeds of what this sampler estimates is claimed to be the integral.
+    pub fn is_unbiased(&self, cell: &SamplerCell) -> bool {
+        (self.samplers).is_unbiased(&cell.sequence, &cell.decorrelation)
     }
 }

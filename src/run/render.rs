@@ -65,7 +65,11 @@ pub fn render(
     let kernels = Kernels::load(&plan.kernels, registries)?;
     let session = Session::unrecorded(experiment, plan, registries, options);
     session.say(format!("{}: loading", cell.scene));
-    let scene = scene::load(&cell.scene, &LoadOptions::default()).map_err(input)?;
+    let load = LoadOptions {
+        allow_outside: options.allow_outside,
+        ..LoadOptions::default()
+    };
+    let scene = scene::load(&cell.scene, &load).map_err(input)?;
     let device = Device::open(options, &kernels)?;
     let gpu = device.of(&cell.kernels)?;
     let (soup, offset) = tested_triangles(gpu, experiment, &scene)?;

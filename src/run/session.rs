@@ -1,16 +1,17 @@
 //! What lives as long as a run: records, clock, progress, cells already done.
 
+use super::folder::Folder;
 use super::{RunError, RunOptions};
-use crate::config::{Experiment, Plan, Skipped};
+use crate::config::{Experiment, Plan, REFERENCE_PARTS, Skipped};
 use crate::gpu::Gpu;
+use crate::measure::picture::{Picture, write_png};
 use crate::measure::record::{
     Environment, FinishedRecord, KernelFolder, Line, Record, RunRecord, SCHEMA, SkippedRecord,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::{BTreeMap, HashSet};
-use std::fs::{File, OpenOptions};
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
 /// Where the wall time goes; what no part claims is the harness's own overhead.
@@ -52,9 +53,10 @@ pub(super) struct Session<'a> {
     pub refused: BTreeMap<String, String>,
     /// Cells that have their record: not run again after a lost device.
     done: HashSet<String>,
+    /// Samplers whose words were compared with the twin's.
+    pub compared: HashSet<String>,
     /// `None`: nothing is written (gate alone, single images).
-    records: Option<File>,
-    records_path: PathBuf,
+    folder: Option<Arc<Folder>>,
 }
 
 impl<'a> Session<'a> {
@@ -65,24 +67,10 @@ impl<'a> Session<'a> {
         registries: &'a super::Registries,
         options: &'a RunOptions,
     ) -> Result<Self, RunError> {
-        let unwritable = |path: &Path, e: std::io::Error| {
-            RunError::Input(format!(
-                "cannot write {}: {e}; choose another folder with --out",
-                path.display()
-            ))
-        };
+        let folder = Arc::new(Folder::open(&options.out, options.existing)?);
+        options.interrupt.begin(&folder);
         let mut session = Self::unrecorded(experiment, plan, registries, options);
-        let images = options.out.join("images");
-        std::fs::create_dir_all(&images).map_err(|e| unwritable(&images, e))?;
-        let records_path = options.out.join("records.jsonl");
-        let records = OpenOptions::new()
-            .create(true)
-            .write(true)
-            .truncate(true)
-            .open(&records_path)
-            .map_err(|e| unwritable(&records_path, e))?;
-        session.records = Some(records);
-        session.records_path = records_path;
+        session.folder = Some(folder);
         Ok(session)
     }
 
@@ -114,8 +102,8 @@ impl<'a> Session<'a> {
             bad_input: false,
             refused: BTreeMap::new(),
             done: HashSet::new(),
-            records: None,
-            records_path: PathBuf::new(),
+            compared: HashSet::new(),
+            folder: None,
         }
     }
 
@@ -127,8 +115,8 @@ impl<'a> Session<'a> {
     }
 
     /// Appends one record as one whole line and flushes it to the disk.
-    pub fn write(&mut self, hash: &str, record: Record) -> Result<(), RunError> {
-        let Some(records) = &mut self.records else {
+    pub fn write(&self, hash: &str, record: Record) -> Result<(), RunError> {
+        let Some(folder) = &self.folder else {
             return Ok(());
         };
         let line = Line {
@@ -139,15 +127,26 @@ impl<'a> Session<'a> {
         let mut text = serde_json::to_string(&line)
             .map_err(|e| RunError::Input(format!("a record cannot be written: {e}")))?;
         text.push('\n');
-        let written = records
-            .write_all(text.as_bytes())
-            .and_then(|()| records.sync_data());
-        written.map_err(|e| {
-            RunError::Input(format!(
-                "cannot write {}: {e}; the records before this one are kept",
-                self.records_path.display()
-            ))
-        })
+        folder.append(&text)
+    }
+
+    /// Tells what went wrong beside the measuring: now, and in the report.
+    pub fn warn(&self, about: &str, reason: String) -> Result<(), RunError> {
+        self.tell_warning(&format!("{about}: {reason}"));
+        self.write(
+            "",
+            Record::Warning(SkippedRecord {
+                cell: about.to_owned(),
+                reason,
+            }),
+        )
+    }
+
+    /// Hands a warning on, above the progress bar.
+    pub fn tell_warning(&self, text: &str) {
+        if let Some(tell) = self.options.warn {
+            self.progress.suspend(|| tell(text));
+        }
     }
 
     /// The first record.
@@ -197,8 +196,8 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// The last record.
-    pub fn write_end(&mut self) -> Result<(), RunError> {
+    /// The last record; puts the results in their place, and tells where that is.
+    pub fn write_end(&mut self) -> Result<PathBuf, RunError> {
         let wall_s = self.clock.start.elapsed().as_secs_f64();
         let parts_s = self.clock.parts_s.clone();
         let overhead_s = (wall_s - parts_s.values().sum::<f64>()).max(0.0);
@@ -210,7 +209,12 @@ impl<'a> Session<'a> {
             skipped: self.skipped,
         };
         self.progress.finish_and_clear();
-        self.write("", Record::Finished(record))
+        self.write("", Record::Finished(record))?;
+        let Some(folder) = &self.folder else {
+            return Ok(self.options.out.clone());
+        };
+        folder.finish()?;
+        Ok(folder.out().to_owned())
     }
 
     /// Whether a cell has its record.
@@ -241,22 +245,20 @@ impl<'a> Session<'a> {
         self.progress.set_message(message.into());
     }
 
-    /// A file name under `images/` and its absolute path.
-    pub fn image_path(&self, parts: &[&str]) -> (String, PathBuf) {
-        let slug: String = parts
-            .join("-")
-            .chars()
-            .map(|c| {
-                if c.is_ascii_alphanumeric() || c == '.' {
-                    c.to_ascii_lowercase()
-                } else {
-                    '-'
-                }
-            })
-            .collect();
-        let relative = format!("images/{slug}.png");
-        let path = self.options.out.join(&relative);
-        (relative, path)
+    /// Writes a picture of what `parts` name: its path relative to the run's folder. One that cannot be
+    /// written is a warning, and costs no figure.
+    pub fn picture(&self, parts: &[&str], picture: &Picture) -> Result<Option<String>, RunError> {
+        let Some(folder) = &self.folder else {
+            return Ok(None);
+        };
+        let (relative, path) = folder.image(parts);
+        match write_png(&path, picture) {
+            Ok(()) => Ok(Some(relative)),
+            Err(error) => {
+                self.warn(&parts.join(", "), error.to_string())?;
+                Ok(None)
+            }
+        }
     }
 }
 
@@ -270,6 +272,6 @@ fn steps(experiment: &Experiment, plan: &Plan) -> u64 {
     let times = plan.times.len() as u64 * (1 + rounds);
     let scenes = plan.scenes.len() as u64 * SCENE_STEPS;
     let references =
-        plan.scenes.len() * experiment.axes.integrator.len() * super::REFERENCE_PARTS as usize;
+        plan.scenes.len() * experiment.axes.integrator.len() * REFERENCE_PARTS as usize;
     scenes + structures + times + (plan.renders_planned + references + plan.streams.len()) as u64
 }

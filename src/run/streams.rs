@@ -1,17 +1,24 @@
-//! Figures of the streams that the path really consumes, dumped from the kernel, and what drawing costs.
+//! Figures of the words that samplers draw, dumped from a kernel that imports the renderer's modules
+//! ([`crate::measure::words`]) and equal to the twin's, and what drawing costs.
 
 use super::RunError;
 use super::kernels::Device;
 use super::session::Session;
 use crate::config::{StreamCell, cell_hash};
-use crate::gpu::{Bindings, Composition, Dispatch, Gpu, UniformValues, groups_for};
-use crate::integrator::with_sampler;
-use crate::measure::record::{PixelsAtCount, Ran, Record, SamplerCostRecord, StreamRecord};
+use crate::discrepancy::{Budget, PointSet, radial_spectrum, star_2d};
+use crate::gpu::Gpu;
+use crate::integrator::integrator;
+use crate::measure::record::{
+    PixelsAtCount, Ran, Record, RecordedPoints, SamplerCostRecord, StreamRecord,
+};
 use crate::measure::sampler_cost::sampler_cost;
 use crate::measure::stream::{COPIES, SeedFigures, coverage, neighbour_angle, over_seeds};
+use crate::measure::words::{compare, dump_stream, kernel_hash};
 use crate::sampling::dimensions::{DIRECTION, FIRST_BOUNCE, PER_BOUNCE, pair_purpose};
+use crate::sampling::hash::pcg_hash;
 use crate::sampling::{Coordinate, Demand, Sampler, to_unit};
-use std::ops::Range;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
 
 /// Fewest points whose discrepancy is taken.
 const FEWEST_POINTS: u32 = 16;
@@ -21,6 +28,27 @@ const MOST_SAMPLES: usize = 1024;
 const TILE: u32 = 8;
 /// … at this many samples at most.
 const TILE_SAMPLES: u32 = 32;
+/// Points at which the worst pair of dimensions is looked for, at most.
+const WORST_POINTS: u32 = 1024;
+/// Pixels in which all seeds' points have to be the same where no seed changes them.
+const SHARED_PIXELS: u32 = 4;
+/// Points of each pixel that are recorded for pictures, and the number of pixels.
+const RECORDED: u32 = 64;
+const RECORDED_PIXELS: u32 = 8;
+/// Points and frequencies of the recorded spectrum, and the seconds that it may take.
+const SPECTRUM_POINTS: u32 = 1024;
+const FREQUENCIES: usize = 64;
+const SPECTRUM_SECONDS: f64 = 10.0;
+
+/// A pair of dimensions to be measured.
+#[derive(Clone, Copy)]
+struct Pair {
+    dimensions: [u32; 2],
+    /// Whether the experiment names it.
+    named: bool,
+    /// Among how many pairs of the integrators it is the sampler's worst.
+    worst_of: Option<usize>,
+}
 
 /// All streams of the plan.
 pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError> {
@@ -31,15 +59,14 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
         let gpu = device.of(&cell.kernels)?;
         session.say(format!("discrepancy of {cell}"));
         session.lose_device_on_request(gpu, &cell.to_string());
-        for pair in session.experiment.discrepancy.pairs.clone() {
+        for pair in pairs(session, gpu, &cell)? {
             match stream_record(session, gpu, &cell, pair) {
                 Ok(record) => {
-                    let hash = stream_hash(&cell, &record.ran, &format!("{pair:?}"));
+                    let hash = stream_hash(&cell, &record.ran, &format!("{:?}", pair.dimensions));
                     session.write(&hash, Record::Stream(record))?;
                 }
-                Err(reason) => {
-                    session.write_failure(&format!("stream {cell}, {pair:?}"), reason)?
-                }
+                Err(reason) => session
+                    .write_failure(&format!("stream {cell}, {:?}", pair.dimensions), reason)?,
             }
         }
         if gpu.lost().is_none() {
@@ -58,6 +85,104 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
         }
     }
     Ok(())
+}
+
+/// The pairs of the experiment and the worst of those that its integrators draw.
+fn pairs(session: &mut Session, gpu: &Gpu, cell: &StreamCell) -> Result<Vec<Pair>, RunError> {
+    let named = |&dimensions: &[u32; 2]| Pair {
+        dimensions,
+        named: true,
+        worst_of: None,
+    };
+    let settings = &session.experiment.discrepancy;
+    let mut pairs: Vec<Pair> = settings.pairs.iter().map(named).collect();
+    let worst = match worst_pair(session, gpu, cell) {
+        Ok(worst) => worst,
+        // The named pairs fail for the same reason.
+        Err(_) if gpu.lost().is_some() => None,
+        Err(reason) => {
+            session.write_failure(&format!("worst pair of {cell}"), reason)?;
+            None
+        }
+    };
+    if let Some((dimensions, of)) = worst {
+        let known = pairs.iter_mut().find(|p| p.dimensions == dimensions);
+        match known {
+            Some(pair) => pair.worst_of = Some(of),
+            None => pairs.push(Pair {
+                dimensions,
+                named: false,
+                worst_of: Some(of),
+            }),
+        }
+    }
+    Ok(pairs)
+}
+
+/// The pair of dimensions with the greatest D* among all that an integrator of the experiment draws, in one
+/// pixel and with one seed, and how many there are; `None` where there is but one.
+fn worst_pair(
+    session: &mut Session,
+    gpu: &Gpu,
+    cell: &StreamCell,
+) -> Result<Option<([u32; 2], usize)>, String> {
+    let integrators = session.experiment.axes.integrator.iter();
+    let drawn = integrators
+        .filter_map(|v| Some(integrator(&v.name)?.dimension_pairs(&v.params)))
+        .flatten();
+    let candidates: Vec<[u32; 2]> = drawn.collect::<BTreeSet<_>>().into_iter().collect();
+    let highest = candidates.iter().flatten().max().copied().unwrap_or(0);
+    if candidates.len() < 2 {
+        return Ok(None);
+    }
+    let samples = session.experiment.discrepancy.points.min(WORST_POINTS);
+    let sampler = sampler_of(session, cell, samples, highest)?;
+    let (pixel, seed) = tapped(session, 1)[0];
+    let column = |dimension| {
+        (0..samples).map(move |sample| Coordinate {
+            pixel,
+            sample,
+            dimension,
+            seed,
+        })
+    };
+    let at: Vec<Coordinate> = (0..=highest).flat_map(column).collect();
+    let numbers = session
+        .clock
+        .time("gpu", || dump_numbers(gpu, &sampler, &at))?;
+    let columns: Vec<&[f64]> = numbers.chunks_exact(samples as usize).collect();
+    let star = |&[a, b]: &[u32; 2]| {
+        let both = columns[a as usize].iter().zip(columns[b as usize]);
+        let points: Vec<[f64; 2]> = both.map(|(x, y)| [*x, *y]).collect();
+        star_2d(&points).map_err(|e| e.to_string())
+    };
+    let stars = session.clock.time("discrepancy", || {
+        candidates
+            .par_iter()
+            .map(star)
+            .collect::<Result<Vec<f64>, _>>()
+    })?;
+    let worst = candidates
+        .iter()
+        .zip(&stars)
+        .max_by(|a, b| a.1.total_cmp(b.1));
+    Ok(worst.map(|(pair, _)| (*pair, candidates.len())))
+}
+
+/// Pixels that are tapped, one for each seed: the first one, the last one, and others in between. The seeds
+/// begin with those of the replicates; streams are cheap and may have more.
+fn tapped(session: &Session, count: u32) -> Vec<(u32, u32)> {
+    let [width, height] = session.experiment.resolution;
+    let pixels = width * height;
+    let pixel = |k: u32| match k {
+        0 => 0,
+        1 => pixels - 1,
+        _ => pcg_hash(k) % pixels,
+    };
+    let first = session.experiment.seed;
+    (0..count)
+        .map(|k| (pixel(k), first.wrapping_add(k)))
+        .collect()
 }
 
 /// What a stream ran with: no ray was traced.
@@ -83,26 +208,24 @@ fn stream_record(
     session: &mut Session,
     gpu: &Gpu,
     cell: &StreamCell,
-    pair: [u32; 2],
+    pair: Pair,
 ) -> Result<StreamRecord, String> {
     let settings = session.experiment.discrepancy.clone();
-    let first = session.experiment.seed;
-    let count = if cell.randomised { settings.seeds } else { 1 };
-    // The first ones are the seeds of the replicates; streams are cheap and may have more.
-    let seeds: Vec<u32> = (0..count).map(|i| first.wrapping_add(i)).collect();
+    let dimensions = pair.dimensions;
+    let places = tapped(session, if cell.randomised { settings.seeds } else { 1 });
     let smallest = FEWEST_POINTS.min(settings.points).trailing_zeros();
     let counts: Vec<usize> = (smallest..=settings.points.trailing_zeros())
         .map(|k| 1 << k)
         .collect();
-    let sets = point_sets(session, cell, pair, &counts)?;
+    let sets = point_sets(session, cell, dimensions, &counts)?;
     let mut per_seed = Vec::new();
-    for &seed in &seeds {
+    for &(pixel, seed) in &places {
         let mut figures = SeedFigures::default();
         for (sampler, counts) in &sets {
             let most = counts.last().map_or(0, |&n| n as u32);
-            let points = session
-                .clock
-                .time("gpu", || dump_points(gpu, sampler, 0..1, most, pair, seed))?;
+            let points = session.clock.time("gpu", || {
+                dump_points(gpu, sampler, &[pixel], most, dimensions, seed)
+            })?;
             let measured = session
                 .clock
                 .time("discrepancy", || figures.add(&points, counts));
@@ -110,8 +233,12 @@ fn stream_record(
         }
         per_seed.push(figures);
     }
+    if !cell.randomised {
+        check_shared(session, gpu, &sets, dimensions)?;
+    }
     let (star, mut figures) = over_seeds(&counts, &per_seed);
-    if is_direction(pair) {
+    let (_, seed) = places[0];
+    if is_direction(dimensions) {
         let counts = counts.iter().filter(|&&n| n <= MOST_SAMPLES);
         // Powers of four have whole roots.
         for &n in counts.filter(|n| n.trailing_zeros() % 2 == 0) {
@@ -119,23 +246,92 @@ fn stream_record(
             let (sampler, _) = set.unwrap_or(&sets[0]);
             let pixels = session
                 .clock
-                .time("gpu", || pixels_at(gpu, sampler, n, pair, seeds[0]))?;
+                .time("gpu", || pixels_at(gpu, sampler, n, dimensions, seed))?;
             figures.pixels.push(pixels);
         }
     }
-    let kernel = gpu.pipeline(&dump_kernel(&sets[0].0), true);
-    let kernel = kernel.map_err(|e| e.to_string())?.kernel.hash();
+    let drawn = settings.pairs.iter().find(|p| is_direction(**p));
+    let is_drawn = drawn.or(settings.pairs.first()) == Some(&dimensions);
+    let points = match is_drawn {
+        true => Some(recorded_points(session, gpu, cell, dimensions, seed)?),
+        false => None,
+    };
     Ok(StreamRecord {
         sequence: cell.sequence.clone(),
         decorrelation: cell.decorrelation.clone(),
-        ran: ran(cell, kernel),
-        dimensions: pair,
-        purpose: pair_purpose(pair),
+        ran: ran(cell, kernel_hash(gpu, &sets[0].0)?),
+        dimensions,
+        purpose: pair_purpose(dimensions),
+        named: pair.named,
+        worst_of: pair.worst_of,
         randomised: cell.randomised,
-        seeds: seeds.len(),
+        seeds: places.len(),
+        pixels: places.iter().map(|(pixel, _)| *pixel).collect(),
         star,
         figures,
+        points,
     })
+}
+
+/// That pixels draw the same where no seed changes anything: one of them stands for all.
+fn check_shared(
+    session: &mut Session,
+    gpu: &Gpu,
+    sets: &[(Sampler, Vec<usize>)],
+    pair: [u32; 2],
+) -> Result<(), String> {
+    let pixels: Vec<u32> = tapped(session, SHARED_PIXELS)
+        .iter()
+        .map(|(p, _)| *p)
+        .collect();
+    for (sampler, counts) in sets {
+        let most = counts.last().map_or(0, |&n| n as u32);
+        let seed = session.experiment.seed;
+        let points = session.clock.time("gpu", || {
+            dump_points(gpu, sampler, &pixels, most, pair, seed)
+        })?;
+        let (first, others) = points.split_at(most as usize);
+        if others
+            .chunks_exact(first.len().max(1))
+            .any(|other| other != first)
+        {
+            let label = sampler.label();
+            return Err(format!(
+                "{label} has no seed, and yet pixels {pixels:?} draw different points"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// What pictures of a sampler's points need.
+fn recorded_points(
+    session: &mut Session,
+    gpu: &Gpu,
+    cell: &StreamCell,
+    pair: [u32; 2],
+    seed: u32,
+) -> Result<RecordedPoints, String> {
+    let [few, many] = [RECORDED, SPECTRUM_POINTS]
+        .map(|samples| sampler_of(session, cell, samples, pair[0].max(pair[1])));
+    let (few, many) = (few?, many?);
+    let pixels: Vec<u32> = (0..RECORDED_PIXELS).collect();
+    let at = coordinates(&pixels, RECORDED, pair, seed);
+    let words = session.clock.time("gpu", || dump_checked(gpu, &few, &at))?;
+    let points = session.clock.time("gpu", || {
+        dump_points(gpu, &many, &pixels[..1], SPECTRUM_POINTS, pair, seed)
+    })?;
+    let spectrum = session.clock.time("discrepancy", || {
+        let set = PointSet::from_points(&points)?;
+        radial_spectrum(&set, FREQUENCIES, &Budget::seconds(SPECTRUM_SECONDS))
+    });
+    Ok(RecordedPoints::new(
+        [RECORDED, RECORDED_PIXELS],
+        seed,
+        &words,
+        // Left out where it takes too long: a picture is no reason to fail.
+        spectrum.unwrap_or_default(),
+    ))
 }
 
 /// Whether the path makes a direction of these dimensions.
@@ -153,12 +349,12 @@ fn pixels_at(
 ) -> Result<PixelsAtCount, String> {
     let width = sampler.demand.width.unwrap_or(TILE).max(TILE);
     let samples = TILE_SAMPLES.min(n as u32);
-    let mut tile = Vec::new();
-    for row in 0..TILE {
-        let pixels = row * width..row * width + TILE;
-        tile.extend(dump_points(gpu, sampler, pixels, samples, pair, seed)?);
-    }
-    let copies = dump_points(gpu, sampler, 0..COPIES, n as u32, pair, seed)?;
+    let tile: Vec<u32> = (0..TILE)
+        .flat_map(|row| row * width..row * width + TILE)
+        .collect();
+    let tile = dump_points(gpu, sampler, &tile, samples, pair, seed)?;
+    let pixels: Vec<u32> = (0..COPIES).collect();
+    let copies = dump_points(gpu, sampler, &pixels, n as u32, pair, seed)?;
     let angle = neighbour_angle(&tile, TILE as usize, samples as usize);
     Ok(PixelsAtCount {
         n,
@@ -228,16 +424,9 @@ fn point_sets(
         .collect()
 }
 
-/// The first `count` points of each pixel, pixel by pixel, as the kernel draws them.
-fn dump_points(
-    gpu: &Gpu,
-    sampler: &Sampler,
-    pixels: Range<u32>,
-    count: u32,
-    pair: [u32; 2],
-    seed: u32,
-) -> Result<Vec<[f64; 2]>, String> {
-    let of_pixel = |pixel: u32| {
+/// Both dimensions of the first `count` samples of each pixel, pixel by pixel.
+fn coordinates(pixels: &[u32], count: u32, pair: [u32; 2], seed: u32) -> Vec<Coordinate> {
+    let of_pixel = |&pixel: &u32| {
         (0..count).flat_map(move |sample| {
             pair.map(|dimension| Coordinate {
                 pixel,
@@ -247,63 +436,31 @@ fn dump_points(
             })
         })
     };
-    let coordinates: Vec<Coordinate> = pixels.flat_map(of_pixel).collect();
-    let words = dump_stream(gpu, sampler, &coordinates)?;
-    Ok(words
-        .chunks_exact(2)
-        .map(|p| [f64::from(to_unit(p[0])), f64::from(to_unit(p[1]))])
-        .collect())
+    pixels.iter().flat_map(of_pixel).collect()
 }
 
-fn dump_kernel(sampler: &Sampler) -> Composition {
-    with_sampler(Composition::new("sampling/dump_stream"), sampler)
+/// The kernel's words; an error if one of them is not the twin's.
+fn dump_checked(gpu: &Gpu, sampler: &Sampler, at: &[Coordinate]) -> Result<Vec<u32>, String> {
+    let words = dump_stream(gpu, sampler, at)?;
+    compare(sampler, at, &words)?;
+    Ok(words)
 }
 
-/// The u32 of every coordinate, as the kernel computes it.
-///
-/// # Errors
-/// A dimension beyond those that the sampler was made for, or the kernel does not run.
-pub fn dump_stream(
+/// The kernel's numbers, as the renderer makes them of words.
+fn dump_numbers(gpu: &Gpu, sampler: &Sampler, at: &[Coordinate]) -> Result<Vec<f64>, String> {
+    let words = dump_checked(gpu, sampler, at)?;
+    Ok(words.into_iter().map(|x| f64::from(to_unit(x))).collect())
+}
+
+/// The first `count` points of each pixel, pixel by pixel, as the kernel draws them.
+fn dump_points(
     gpu: &Gpu,
     sampler: &Sampler,
-    coordinates: &[Coordinate],
-) -> Result<Vec<u32>, String> {
-    let highest = coordinates.iter().map(|c| c.dimension).max().unwrap_or(0);
-    if highest >= sampler.demand.dimensions {
-        return Err(format!(
-            "dimension {highest} is asked for, {} was made for {}",
-            sampler.label(),
-            sampler.demand.dimensions
-        ));
-    }
-    let composition = dump_kernel(sampler);
-    let words: Vec<[u32; 4]> = coordinates
-        .iter()
-        .map(|c| [c.pixel, c.sample, c.dimension, c.seed])
-        .collect();
-    let run = || {
-        let pipeline = gpu.pipeline(&composition, true)?;
-        let stream = gpu.zeroed("stream", words.len() as u64 * 4)?;
-        let mut bindings = Bindings::new();
-        bindings
-            .buffer("coordinates", &gpu.storage("coordinates", &words)?)
-            .buffer(
-                "sampler_table",
-                &gpu.storage("sampler_table", sampler.table.words())?,
-            )
-            .buffer("stream", &stream)
-            .uniform(
-                "dump",
-                UniformValues::new().u32("count", words.len() as u32),
-            );
-        gpu.run(&Dispatch {
-            pipeline: &pipeline,
-            bindings: &bindings,
-            groups: groups_for(words.len() as u32),
-        })?;
-        let mut out: Vec<u32> = gpu.read(&stream)?;
-        out.truncate(words.len());
-        Ok::<_, crate::gpu::GpuError>(out)
-    };
-    run().map_err(|e| e.to_string())
+    pixels: &[u32],
+    count: u32,
+    pair: [u32; 2],
+    seed: u32,
+) -> Result<Vec<[f64; 2]>, String> {
+    let numbers = dump_numbers(gpu, sampler, &coordinates(pixels, count, pair, seed))?;
+    Ok(numbers.chunks_exact(2).map(|p| [p[0], p[1]]).collect())
 }

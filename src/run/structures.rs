@@ -10,7 +10,7 @@ use crate::integrator::Traced;
 use crate::measure::batch::{Batch, Query, count_work, kernel_hash};
 use crate::measure::gate::gate;
 use crate::measure::memory::peak_bytes;
-use crate::measure::picture::{Picture, write_png};
+use crate::measure::picture::Picture;
 use crate::measure::rays::{RaySet, primary_pixels, primary_rays};
 use crate::measure::record::{
     ClassTiming, CountersPerRay, GateVerdict, Ran, Record, StructureRecord, StructureStats,
@@ -519,10 +519,8 @@ fn draw_heat_maps(
             height,
             pixels: structure.costs.iter().map(|c| viridis(c / scale)).collect(),
         };
-        let (relative, path) =
-            session.image_path(&["heat", &world.variant.label, &structure.cell.accel.label]);
-        write_png(&path, &picture).map_err(|e| RunError::Input(e.to_string()))?;
-        structure.record.heat_map = Some(relative);
+        let names = ["heat", &world.variant.label, &structure.cell.accel.label];
+        structure.record.heat_map = session.picture(&names, &picture)?;
         structure.record.heat_map_max = Some(f64::from(scale));
     }
     Ok(())

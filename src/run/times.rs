@@ -1,17 +1,17 @@
 //! Time of full cells, at few samples per pixel, in interleaved rounds; and the proof by hash that
 //! every structure gives the same image.
 
-use super::RunError;
 use super::errors::{image_hash, job, sampler_for};
 use super::session::Session;
 use super::structures::Gated;
 use super::world::World;
+use super::{RunError, words};
 use crate::accel::Space;
 use crate::config::{TimeCell, Variant, cell_hash};
 use crate::gpu::{Elapsed, Gpu, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
 use crate::measure::record::{Record, TimeRecord};
-use crate::measure::statistics::bootstrap_median;
+use crate::measure::statistics::median_interval;
 use crate::measure::timing::{Measured, Samples, interleave};
 use crate::sampling::Sampler;
 use std::collections::BTreeMap;
@@ -172,6 +172,8 @@ fn compile<'a>(
     cell: TimeCell,
 ) -> Result<Timed<'a>, String> {
     let sampler = sampler_of(session, &cell)?;
+    let seeds = session.experiment.seeds().replicates;
+    words::check(session, gpu, &sampler, &seeds)?;
     let checks = structure.runtime_checks;
     let job = job(session, world, &sampler, &cell.integrator, checks)?;
     let compiled = session.clock.time("gpu", || {
@@ -231,8 +233,8 @@ fn finish(
     let mut record = empty_record(session, world, &item.cell, String::new());
     record.failure = failure;
     if record.failure.is_none() {
-        record.ms_per_spp = bootstrap_median(&per_spp);
-        record.mrays_s = bootstrap_median(&rates);
+        record.ms_per_spp = median_interval(&per_spp);
+        record.mrays_s = median_interval(&rates);
         record.ms = samples.ms;
         record.wall_ms = samples.wall_ms;
     }

@@ -50,7 +50,10 @@ impl<'a> World<'a> {
         let gpu = &device.gpu;
         session.say(format!("{variant}: loading"));
         let start = Instant::now();
-        let options = LoadOptions::default();
+        let options = LoadOptions {
+            allow_outside: session.options.allow_outside,
+            ..LoadOptions::default()
+        };
         let loaded = session
             .clock
             .time("load", || scene::load(variant, &options));
@@ -68,6 +71,9 @@ impl<'a> World<'a> {
         }
         let cell = format!("scene {variant}");
         if !session.is_done(&cell) {
+            for line in scene.report.lines() {
+                session.tell_warning(&format!("{variant}: {line}"));
+            }
             session.write(
                 &scene.hash,
                 Record::Scene(scene_record(variant, &scene, camera, load_ms)),

@@ -64,6 +64,12 @@ pub trait Decorrelation: Sync {
     fn is_random(&self) -> bool {
         true
     }
+    /// Whether the mean over seeds of an estimate by a fixed sequence is the integral, at any number of
+    /// samples: every number that it makes is uniform in [0, 1). One that is not, by design, may be
+    /// found to be biased without being at fault.
+    fn is_unbiased(&self, _params: &Params) -> bool {
+        self.is_random()
+    }
     /// Whether it depends on how many samples are drawn.
     fn by_count(&self, _params: &Params) -> bool {
         false

@@ -29,6 +29,11 @@ impl Decorrelation for DiscRotation {
         vec![Seeding::parameter()]
     }
 
+    /// No radius is moved.
+    fn is_unbiased(&self, _: &Params) -> bool {
+        false
+    }
+
     fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
         let flat = partner.facts.dimensions == Some(1);
         let reason = || format!("{} has one dimension, a disc has two", partner.name);

@@ -3,12 +3,12 @@
 //!
 //! Source: J. Hammersley, "Monte Carlo methods for solving multivariable problems", Ann. New York Acad.
 //! Sci. 86, 1960. The set is made for N points: a part of it is biased, so a run draws a set of its own
-//! for every number of samples. Words: N, the quotient and the remainder of 2³² / N, the bases.
+//! for every number of samples. Words: N, the quotient and the remainder of 2³² / N, then those of Halton's
+//! sequence for the dimensions after the first.
 
-use super::primes::primes;
-use super::radical_inverse::radical_inverse;
+use super::halton::{digit_table, digits_parameter, inverse_at, is_permuted};
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
-use crate::config::Params;
+use crate::config::{ParameterSchema, Params};
 
 /// The registry entry.
 pub struct Hammersley;
@@ -28,6 +28,14 @@ impl Sequence for Hammersley {
         "sampling/hammersley"
     }
 
+    fn parameters(&self) -> ParameterSchema {
+        vec![digits_parameter()]
+    }
+
+    fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {
+        vec![("PERMUTED", u32::from(is_permuted(params)))]
+    }
+
     fn facts(&self, _: &Params) -> Facts {
         Facts {
             by_count: true,
@@ -38,16 +46,20 @@ impl Sequence for Hammersley {
         }
     }
 
-    fn table(&self, _: &Params, demand: &Demand) -> Vec<u32> {
+    fn table(&self, params: &Params, demand: &Demand) -> Vec<u32> {
         let count = u64::from(demand.samples.unwrap_or(1).max(1));
         let whole = 1_u64 << 32;
         let mut words = vec![count as u32, (whole / count) as u32, (whole % count) as u32];
-        words.extend(primes(demand.dimensions.saturating_sub(1) as usize));
+        words.extend(digit_table(
+            params,
+            demand.dimensions.saturating_sub(1),
+            BASES,
+        ));
         words
     }
 
     /// i / N rounded down: i · 2³² / N in two parts.
-    fn sequence(&self, _: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
+    fn sequence(&self, params: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
         if at.dimension == 0 {
             let count = table.sequence_word(0);
             let part = at.sample.wrapping_mul(table.sequence_word(2)) / count;
@@ -56,6 +68,6 @@ impl Sequence for Hammersley {
                 .wrapping_mul(table.sequence_word(1))
                 .wrapping_add(part);
         }
-        radical_inverse(at.sample, table.sequence_word(BASES + at.dimension - 1))
+        inverse_at(params, table, at.sample, BASES + 2 * (at.dimension - 1))
     }
 }

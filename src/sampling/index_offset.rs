@@ -42,6 +42,11 @@ impl Decorrelation for IndexOffset {
         vec![offsets, Seeding::parameter()]
     }
 
+    /// The mean is that of the first points of the sequence, as many as there are offsets.
+    fn is_unbiased(&self, _: &Params) -> bool {
+        false
+    }
+
     fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
         partner
             .without_structure()

@@ -78,6 +78,11 @@ impl Decorrelation for MicroJitter {
         true
     }
 
+    /// Shifts smaller than the square keep a part of the error of the points.
+    fn is_unbiased(&self, _: &Params) -> bool {
+        false
+    }
+
     fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
         partner.without_structure()
     }

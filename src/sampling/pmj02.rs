@@ -1,9 +1,10 @@
 //! `pmj02`: progressive multi-jittered (0, 2) points from a table. Twin of `kernels/sampling/pmj02.wesl`.
 //!
 //! Every prefix of 2^m points has one point in each elementary interval of area 2^-m. Words: the number
-//! of points less one, then for each pair of dimensions a set of its own, x and y by turns.
+//! of points less one, then for each pair of dimensions a set of its own in an order of its own, x and y by
+//! turns.
 
-use super::pmj02_points::pmj02_points;
+use super::pmj02_points::shuffled_points;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
@@ -16,7 +17,7 @@ impl Sequence for Pmj02 {
     }
 
     fn description(&self) -> &'static str {
-        "progressive multi-jittered (0,2) points, a random set for each pair of dimensions (Christensen et al. 2018)"
+        "progressive multi-jittered (0,2) points, a random set in a random order for each pair of dimensions (Christensen et al. 2018)"
     }
 
     fn kernel(&self) -> &'static str {
@@ -49,7 +50,7 @@ impl Sequence for Pmj02 {
         let set = params.integer("set") as u32;
         let mut words = vec![count - 1];
         for pair in 0..demand.dimensions.div_ceil(2) {
-            let points = pmj02_points(count, set << 8 | pair);
+            let points = shuffled_points(count, set << 8 | pair);
             words.extend(points.into_iter().flatten());
         }
         words

@@ -86,8 +86,43 @@ fn place(occupied: &Occupancy, corner: [u32; 2], x_bits: u32, random: &mut Rando
     point
 }
 
+/// Nested uniform shuffle: the halves of every block, down to single points, change places or not at
+/// random.
+fn shuffle(block: &mut [[u32; 2]], random: &mut Random) {
+    if block.len() < 2 {
+        return;
+    }
+    let (first, second) = block.split_at_mut(block.len() / 2);
+    if random.next() >> 31 == 1 {
+        first.swap_with_slice(second);
+    }
+    shuffle(first, random);
+    shuffle(second, random);
+}
+
+/// The points of one pair of dimensions, to be combined with those of other pairs at the same index.
+///
+/// In the generator's order the quarter of the square follows from the index modulo 4, for the point that
+/// is added lies opposite of another: two sets in that order leave half of the quadrants of (x, x') empty.
+/// So the order is shuffled within each block from 2^k to 2^(k+1), which keeps every prefix of 2^m points.
+/// A set for fewer points is a prefix of one for more.
+///
+/// Source: the nested uniform shuffle of A. Helmer, P. Christensen, A. Kensler, "Stochastic generation of
+/// (t, s) sample sequences", EGSR 2021. That of all indices at once, by hashing, needs sequences whose every
+/// aligned block is a net; here only prefixes are.
+pub(super) fn shuffled_points(count: u32, seed: u32) -> Vec<[u32; 2]> {
+    let mut points = pmj02_points(count, seed);
+    let mut random = Random(u64::from(seed) << 32 | 1);
+    let mut first = 1;
+    while first < points.len() {
+        shuffle(&mut points[first..2 * first], &mut random);
+        first *= 2;
+    }
+    points
+}
+
 /// `count` points (a power of two), of which every prefix of 2^m is a (0, m, 2)-net in base 2.
-pub(super) fn pmj02_points(count: u32, seed: u32) -> Vec<[u32; 2]> {
+fn pmj02_points(count: u32, seed: u32) -> Vec<[u32; 2]> {
     let mut random = Random(u64::from(seed) << 32);
     let mut points = vec![[random.next(), random.next()]];
     let mut k = 0;

@@ -3,12 +3,21 @@
 //! Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018:
 //! x_j(i) = ½ + (i + 1) φ_d^(−j−1) modulo 1, where φ_d is the positive root of x^(d+1) = x + 1. The
 //! powers are fractions of 2³², so point i is off by less than (i + 1) / 2³³.
+//!
+//! The more dimensions, the nearer φ_d is to 1 and the more alike its powers are: with d = 20 a pair of
+//! dimensions has D* = 0.124 after 1024 points. Beyond [`GOLDEN`] dimensions the steps are therefore the
+//! square roots of primes (R. Richtmyer, "The evaluation of definite integrals, and a quasi-Monte-Carlo
+//! method based on the properties of algebraic numbers", 1951), whose worst pair of 20 has 0.032.
 
+use super::primes::primes;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// The registry entry.
 pub struct R2;
+
+/// Most dimensions that take powers of the ratio.
+const GOLDEN: u32 = 8;
 
 /// φ_d by Newton's method from above, with nothing but products: the same on every machine.
 fn generalised_golden_ratio(dimensions: u32) -> f64 {
@@ -27,7 +36,7 @@ impl Sequence for R2 {
     }
 
     fn description(&self) -> &'static str {
-        "additive recurrence with powers of a generalised golden ratio (Roberts 2018)"
+        "additive recurrence: powers of a generalised golden ratio (Roberts 2018), beyond 8 dimensions square roots of primes (Richtmyer 1951)"
     }
 
     fn kernel(&self) -> &'static str {
@@ -37,7 +46,7 @@ impl Sequence for R2 {
     fn parameters(&self) -> ParameterSchema {
         vec![Parameter {
             name: "dimensions",
-            description: "d of the ratio's equation x^(d+1) = x + 1: all dimensions that are drawn",
+            description: "all dimensions that are drawn; up to 8 it is the d of the ratio's equation x^(d+1) = x + 1",
             default: ParamValue::Integer(2),
             range: ParamRange::Integer { min: 1, max: 256 },
         }]
@@ -52,13 +61,15 @@ impl Sequence for R2 {
     }
 
     fn table(&self, params: &Params, demand: &Demand) -> Vec<u32> {
-        let step = 1.0 / generalised_golden_ratio(params.integer("dimensions") as u32);
-        let mut power = 2.0_f64.powi(32);
-        let mut next = |_| {
-            power *= step;
-            power.round() as u32
-        };
-        (0..demand.dimensions).map(&mut next).collect()
+        let dimensions = params.integer("dimensions") as u32;
+        let word = |step: f64| (step.fract() * 2.0_f64.powi(32)).round() as u32;
+        if dimensions > GOLDEN {
+            let roots = primes(demand.dimensions as usize).into_iter();
+            return roots.map(|p| word(f64::from(p).sqrt())).collect();
+        }
+        let step = 1.0 / generalised_golden_ratio(dimensions);
+        let powers = std::iter::successors(Some(step), |power| Some(power * step));
+        powers.take(demand.dimensions as usize).map(word).collect()
     }
 
     fn sequence(&self, _: &Params, table: &SamplerTable, at: Coordinate) -> u32 {

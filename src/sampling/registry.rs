@@ -116,6 +116,15 @@ impl SamplerRegistry {
         }
     }
 
+    /// Whether the mean over seeds is the integral at any number of samples: the sequence is random by
+    /// itself, or the decorrelation sees to it. False for unknown names.
+    pub fn is_unbiased(&self, sequence: &Variant, decorrelation: &Variant) -> bool {
+        let claims = |(first, second): (&dyn Sequence, &dyn Decorrelation)| {
+            first.facts(&sequence.params).random || second.is_unbiased(&decorrelation.params)
+        };
+        self.find(sequence, decorrelation).is_ok_and(claims)
+    }
+
     /// The sampler of two variants, with tables for what is demanded.
     ///
     /// # Errors

@@ -5,10 +5,10 @@ use super::builder::{Look, SceneBuilder};
 use super::error::{guarded, open, read_regular};
 use super::gltf_accessor::check_accessors;
 use super::gltf_container;
+use super::gltf_files::Files;
 use super::gltf_material::{self, TextureUse};
 use super::texture::decode_all;
 use super::{Camera, InstanceError, LoadOptions, SceneData, SceneError, Transform, Triangle};
-use base64::Engine;
 use glam::{Mat4, Vec2, Vec3};
 use gltf::mesh::Mode;
 use std::borrow::Cow;
@@ -35,8 +35,9 @@ pub(super) fn load(
         let document = parse(json).map_err(|problem| SceneError::malformed(path, "", problem))?;
         let blob = blob.map(<[u8]>::to_vec);
         drop(bytes);
-        let buffers = read_buffers(path, &document, blob)?;
-        build(path, name, options, &document, &buffers)
+        let files = Files::new(path, options);
+        let buffers = read_buffers(path, &files, &document, blob)?;
+        build(path, name, options, &files, &document, &buffers)
     })
 }
 
@@ -45,6 +46,13 @@ pub(super) fn load(
 fn parse(json: &[u8]) -> Result<gltf::Document, String> {
     let unchecked = gltf::Gltf::from_slice_without_validation(json).map_err(|e| e.to_string())?;
     let root = unchecked.document.into_json();
+    if let Some(problem) = root
+        .extensions_required
+        .iter()
+        .find_map(|name| compressed(name))
+    {
+        return Err(problem);
+    }
     for (m, mesh) in root.meshes.iter().enumerate() {
         for (p, primitive) in mesh.primitives.iter().enumerate() {
             let mut accessors = primitive.attributes.values().map(|index| index.value());
@@ -57,14 +65,29 @@ fn parse(json: &[u8]) -> Result<gltf::Document, String> {
     gltf::Document::from_json(root).map_err(|e| e.to_string())
 }
 
+/// What to do about geometry in a coding that is not read here.
+fn compressed(extension: &str) -> Option<String> {
+    let command = match extension {
+        "EXT_meshopt_compression" | "KHR_meshopt_compression" | "MESHOPT_compression" => {
+            "gltfpack -i IN -o OUT"
+        }
+        "KHR_draco_mesh_compression" => "gltf-transform copy IN OUT",
+        _ => return None,
+    };
+    Some(format!(
+        "the geometry is compressed with {extension}; decode it first, for instance with `{command}`"
+    ))
+}
+
 fn build(
     path: &Path,
     name: &str,
     options: &LoadOptions,
+    files: &Files,
     document: &gltf::Document,
     buffers: &[Vec<u8>],
 ) -> Result<SceneData, SceneError> {
-    let mut palette = gltf_material::read(path, document, buffers, options.textures);
+    let mut palette = gltf_material::read(files, document, buffers, options.textures);
     let mut geometry = Geometry {
         path,
         buffers,
@@ -101,6 +124,7 @@ fn build(
 /// The bytes of every buffer: the binary chunk, a data URI or a file beside the model.
 fn read_buffers(
     path: &Path,
+    files: &Files,
     document: &gltf::Document,
     mut blob: Option<Vec<u8>>,
 ) -> Result<Vec<Vec<u8>>, SceneError> {
@@ -113,7 +137,7 @@ fn read_buffers(
                 gltf::buffer::Source::Bin => blob
                     .take()
                     .ok_or_else(|| error("the binary chunk is missing".to_owned()))?,
-                gltf::buffer::Source::Uri(uri) => read_uri(path, uri).map_err(error)?,
+                gltf::buffer::Source::Uri(uri) => files.read(uri).map_err(error)?,
             };
             if data.len() < buffer.length() {
                 return Err(error(format!(
@@ -125,34 +149,6 @@ fn read_buffers(
             Ok(data)
         })
         .collect()
-}
-
-/// Bytes of a data URI or of a file relative to the model.
-pub(super) fn read_uri(model: &Path, uri: &str) -> Result<Vec<u8>, String> {
-    if let Some(data) = uri.strip_prefix("data:") {
-        let (_, encoded) = data
-            .split_once(";base64,")
-            .ok_or("the data URI is not base64")?;
-        return base64::engine::general_purpose::STANDARD
-            .decode(encoded)
-            .map_err(|error| format!("the data URI cannot be decoded: {error}"));
-    }
-    let file = uri_file(model, uri);
-    read_regular(&file).map_err(|error| format!("{}: {error}", file.display()))
-}
-
-/// The file a relative URI names, `%20` and the like decoded.
-pub(super) fn uri_file(model: &Path, uri: &str) -> std::path::PathBuf {
-    let mut decoded = Vec::with_capacity(uri.len());
-    let mut rest = uri.as_bytes();
-    while let Some((&byte, after)) = rest.split_first() {
-        let hex = (byte == b'%').then(|| after.get(..2)).flatten();
-        let value = hex.and_then(|h| u8::from_str_radix(std::str::from_utf8(h).ok()?, 16).ok());
-        decoded.push(value.unwrap_or(byte));
-        rest = &after[if value.is_some() { 2 } else { 0 }..];
-    }
-    let name = String::from_utf8_lossy(&decoded).into_owned();
-    model.parent().unwrap_or(Path::new("")).join(name)
 }
 
 /// Walks the nodes of a scene and gathers triangles and the first camera.

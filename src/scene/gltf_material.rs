@@ -1,13 +1,12 @@
 //! Materials and images of glTF documents.
 
 use super::builder::DEFAULT_ALBEDO;
-use super::gltf::{read_uri, uri_file};
+use super::gltf_files::Files;
 use super::mtl::{emitted, reflectance};
 use super::texture::{Encoded, ImageSource};
 use super::{Material, MaterialKind, MaterialSource, approximation_warning};
 use glam::{Mat2, Vec2, Vec3, Vec4, Vec4Swizzles};
 use std::borrow::Cow;
-use std::path::Path;
 
 /// Metalness from which, and roughness up to which, a surface is a perfect mirror.
 const MIRROR_METALLIC: f32 = 0.99;
@@ -49,7 +48,7 @@ impl TextureTransform {
 
 /// Reads all materials; images are found here and decoded later.
 pub(super) fn read<'a>(
-    path: &Path,
+    files: &Files,
     document: &gltf::Document,
     buffers: &'a [Vec<u8>],
     with_textures: bool,
@@ -69,7 +68,7 @@ pub(super) fn read<'a>(
             Some(info) if found.kind == MaterialKind::Diffuse => {
                 let image = info.texture().source();
                 let id = image_ids[image.index()].get_or_insert_with(|| {
-                    palette.images.push(image_source(path, &image, buffers));
+                    palette.images.push(image_source(files, &image, buffers));
                     palette.images.len() as u32 - 1
                 });
                 found.base_color_texture = Some(*id);
@@ -171,7 +170,7 @@ fn mapping(info: &gltf::texture::Info<'_>) -> TextureUse {
 }
 
 fn image_source<'a>(
-    path: &Path,
+    files: &Files,
     image: &gltf::Image<'_>,
     buffers: &'a [Vec<u8>],
 ) -> ImageSource<'a> {
@@ -189,13 +188,16 @@ fn image_source<'a>(
             (None, encoded)
         }
         gltf::image::Source::Uri { uri, .. } if uri.starts_with("data:") => {
-            let encoded = match read_uri(path, uri) {
+            let encoded = match files.read(uri) {
                 Ok(bytes) => Encoded::Memory(Cow::Owned(bytes)),
                 Err(problem) => Encoded::Missing(problem),
             };
             (None, encoded)
         }
-        gltf::image::Source::Uri { uri, .. } => (Some(uri), Encoded::File(uri_file(path, uri))),
+        gltf::image::Source::Uri { uri, .. } => (
+            Some(uri),
+            files.find(uri).map_or_else(Encoded::Missing, Encoded::File),
+        ),
     };
     ImageSource {
         name: image

@@ -14,6 +14,7 @@ mod framing;
 mod gltf;
 mod gltf_accessor;
 mod gltf_container;
+mod gltf_files;
 mod gltf_material;
 mod instances;
 mod mtl;
@@ -21,6 +22,7 @@ mod obj;
 mod ply;
 #[cfg(test)]
 mod tests;
+mod text;
 mod texture;
 
 pub use builder::{DEFAULT_ALBEDO, MAX_COORDINATE};
@@ -189,6 +191,9 @@ pub struct LoadOptions {
     pub textures: bool,
     /// Largest width and height of a texture, texels; larger ones are reduced, with a warning.
     pub max_texture_size: u32,
+    /// Whether a glTF model may name files outside its folder, and an OBJ model absolute paths: a model
+    /// from elsewhere could read any file of this machine.
+    pub allow_outside: bool,
 }
 
 impl Default for LoadOptions {
@@ -196,6 +201,7 @@ impl Default for LoadOptions {
         Self {
             textures: true,
             max_texture_size: 1024,
+            allow_outside: false,
         }
     }
 }

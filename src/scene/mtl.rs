@@ -2,8 +2,9 @@
 
 use super::builder::DEFAULT_ALBEDO;
 use super::error::read_regular;
+use super::text::normalised;
 use super::texture::{Encoded, ImageSource};
-use super::{Material, MaterialKind, MaterialSource};
+use super::{LoadOptions, Material, MaterialKind, MaterialSource};
 use glam::Vec3;
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
@@ -21,7 +22,7 @@ const ILLUM_REFRACTS: [u8; 4] = [4, 6, 7, 9];
 /// `tobj` numbers materials in the order in which it reads them; `contents` follows that order.
 pub(super) struct Library {
     folder: PathBuf,
-    with_textures: bool,
+    options: LoadOptions,
     contents: RefCell<Contents>,
     /// The libraries so far: each is read once, however often the model names it.
     loaded: RefCell<HashSet<PathBuf>>,
@@ -39,19 +40,13 @@ pub(super) struct Contents {
 
 impl Library {
     /// Libraries are looked for beside the OBJ file `obj`.
-    pub fn new(obj: &Path, with_textures: bool) -> Self {
+    pub fn new(obj: &Path, options: &LoadOptions) -> Self {
         Self {
             folder: obj.parent().unwrap_or(Path::new("")).to_owned(),
-            with_textures,
+            options: *options,
             contents: RefCell::default(),
             loaded: RefCell::default(),
         }
-    }
-
-    /// Forgets everything: `tobj` starts again.
-    pub fn forget(&self) {
-        self.contents.take();
-        self.loaded.take();
     }
 
     /// Loads one library for `tobj`. A missing or broken one is a warning.
@@ -61,14 +56,15 @@ impl Library {
             return Ok(Default::default());
         }
         let mut contents = self.contents.borrow_mut();
-        let bytes = read_regular(&path).map_err(|error| {
+        let bytes = relative(file, &self.options).and_then(|()| read_regular(&path));
+        let bytes = bytes.map_err(|error| {
             contents.warnings.push(format!(
                 "material library {}: {error}; its materials are drawn grey",
                 path.display()
             ));
             LoadError::OpenFileFailed
         })?;
-        let text = readable_lines(&bytes, &path, &mut contents.warnings);
+        let text = readable_lines(&normalised(bytes), &path, &mut contents.warnings);
         let (materials, names) =
             tobj::load_mtl_buf(&mut Cursor::new(text)).inspect_err(|error| {
                 contents.warnings.push(format!(
@@ -78,7 +74,7 @@ impl Library {
             })?;
         let folder = path.parent().unwrap_or(Path::new(""));
         for material in &materials {
-            contents.add(material, folder, self.with_textures);
+            contents.add(material, folder, &self.options);
         }
         Ok((materials, names))
     }
@@ -99,12 +95,12 @@ impl Library {
 }
 
 impl Contents {
-    fn add(&mut self, material: &tobj::Material, folder: &Path, with_textures: bool) {
+    fn add(&mut self, material: &tobj::Material, folder: &Path, options: &LoadOptions) {
         let texture = material
             .diffuse_texture
             .as_deref()
-            .filter(|_| with_textures)
-            .map(|statement| self.texture(folder.join(texture_path(statement))));
+            .filter(|_| options.textures)
+            .map(|statement| self.texture(folder, &texture_path(statement), options));
         // The standard's default for a surface with a texture is to show it as it is.
         let unstated = if material.diffuse_texture.is_some() {
             1.0
@@ -128,16 +124,31 @@ impl Contents {
         });
     }
 
-    /// Index of the texture in `path`, each file once.
-    fn texture(&mut self, path: PathBuf) -> u32 {
+    /// Index of the texture in `file`, each one once.
+    fn texture(&mut self, folder: &Path, file: &str, options: &LoadOptions) -> u32 {
         let next = self.textures.len() as u32;
+        let path = folder.join(file);
         *self.texture_ids.entry(path).or_insert_with_key(|path| {
             self.textures.push(ImageSource {
                 name: path.display().to_string(),
-                encoded: Encoded::File(path.clone()),
+                encoded: match relative(Path::new(file), options) {
+                    Ok(()) => Encoded::File(path.clone()),
+                    Err(error) => Encoded::Missing(error.to_string()),
+                },
             });
             next
         })
+    }
+}
+
+/// Refuses an absolute path: it belongs to the machine that wrote the file. Relative ones may leave the
+/// folder, as textures in `../textures` do in many models.
+fn relative(file: &Path, options: &LoadOptions) -> std::io::Result<()> {
+    match file.has_root() && !options.allow_outside {
+        true => Err(std::io::Error::other(
+            "an absolute path, which is read with --allow-outside only",
+        )),
+        false => Ok(()),
     }
 }
 
@@ -206,8 +217,7 @@ fn texture_path(statement: &str) -> String {
 
 /// The text without the lines that would make `tobj` reject (or panic on) the whole library; a
 /// colour given as one number becomes three.
-fn readable_lines(bytes: &[u8], path: &Path, warnings: &mut Vec<String>) -> String {
-    let text = String::from_utf8_lossy(bytes);
+fn readable_lines(text: &str, path: &Path, warnings: &mut Vec<String>) -> String {
     let mut out = String::with_capacity(text.len());
     for (number, line) in (1..).zip(text.lines()) {
         let mut words = line.split('#').next().unwrap_or("").split_whitespace();
@@ -270,7 +280,7 @@ mod tests {
 
     #[test]
     fn broken_statements_are_dropped_with_their_line_and_the_rest_is_kept() {
-        let text = b"newmtl a\nKd 0.5\nKs 1 x 1\nNs\nillum 999\nKe 1 2 3\n";
+        let text = "newmtl a\nKd 0.5\nKs 1 x 1\nNs\nillum 999\nKe 1 2 3\n";
         let mut warnings = Vec::new();
         let kept = readable_lines(text, Path::new("m.mtl"), &mut warnings);
         assert_eq!(kept, "newmtl a\nKd 0.5 0.5 0.5\nKe 1 2 3\n");

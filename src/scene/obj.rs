@@ -2,11 +2,10 @@
 
 use super::builder::{DEFAULT_ALBEDO, Look, SceneBuilder};
 use super::error::{guarded, open, panic_text, read_regular};
+use super::text::normalised;
 use super::texture::decode_all;
 use super::{LoadOptions, Material, SceneData, SceneError, mtl};
 use glam::{Vec2, Vec3};
-use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use tobj::LoadError;
@@ -28,29 +27,26 @@ pub(super) fn load(
     name: &str,
     options: &LoadOptions,
 ) -> Result<SceneData, SceneError> {
-    let file = open(path)?;
+    open(path)?;
+    let bytes = read_regular(path).map_err(|source| SceneError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
     guarded(path, || {
-        let library = mtl::Library::new(path, options.textures);
-        let models = parse(path, file, &library)?;
-        build(name, options, models, library)
-    })
-}
-
-fn parse(path: &Path, file: File, library: &mtl::Library) -> Result<Vec<tobj::Model>, SceneError> {
-    let mut reader = BufReader::with_capacity(1 << 16, file);
-    let mut result = read(&mut reader, library);
-    if matches!(result, Err(Failure::Refused(LoadError::ReadError))) {
-        // Old exporters write names in Latin-1; the geometry is ASCII all the same.
-        let text = lossy_text(path)?;
-        library.forget();
-        result = read(&mut Cursor::new(text), library);
-    }
-    result.map_err(|failure| {
-        let (place, problem) = match lossy_text(path).map(|text| first_broken_line(&text)) {
-            Ok(Some((line, problem))) => (format!("line {line}"), problem),
-            _ => (String::new(), failure.to_string()),
-        };
-        SceneError::malformed(path, place, problem)
+        let text = normalised(bytes);
+        let library = mtl::Library::new(path, options);
+        let models = read(&text, &library).map_err(|failure| {
+            let (place, problem) = match first_broken_line(&text) {
+                Some((line, problem)) => (format!("line {line}"), problem),
+                None => (String::new(), failure.to_string()),
+            };
+            SceneError::malformed(path, place, problem)
+        })?;
+        let mut warnings = Vec::new();
+        warnings.extend(too_few_corners(&text));
+        warnings.extend(cut_off(&text));
+        drop(text);
+        build(name, options, models, library, warnings)
     })
 }
 
@@ -64,8 +60,8 @@ enum Failure {
     Panicked(String),
 }
 
-fn read(source: &mut impl BufRead, library: &mtl::Library) -> Result<Vec<tobj::Model>, Failure> {
-    let load = || tobj::load_obj_buf(source, &OPTIONS, |file| library.load(file));
+fn read(text: &str, library: &mtl::Library) -> Result<Vec<tobj::Model>, Failure> {
+    let load = || tobj::load_obj_buf(&mut text.as_bytes(), &OPTIONS, |file| library.load(file));
     match catch_unwind(AssertUnwindSafe(load)) {
         Ok(Ok((models, _))) => Ok(models),
         Ok(Err(error)) => Err(Failure::Refused(error)),
@@ -78,13 +74,15 @@ fn build(
     options: &LoadOptions,
     models: Vec<tobj::Model>,
     library: mtl::Library,
+    mut warnings: Vec<String>,
 ) -> Result<SceneData, SceneError> {
     let mtl::Contents {
         mut materials,
         textures,
-        warnings,
+        warnings: of_materials,
         ..
     } = library.into_contents();
+    warnings.extend(of_materials);
     let count = models.iter().map(|m| m.mesh.indices.len() / 3).sum();
     let mut builder = SceneBuilder::new(!textures.is_empty(), count);
     builder.report.warnings = warnings;
@@ -137,13 +135,32 @@ fn push_mesh(builder: &mut SceneBuilder, mesh: &tobj::Mesh, material: u32) {
     }
 }
 
-fn lossy_text(path: &Path) -> Result<String, SceneError> {
-    let bytes = read_regular(path).map_err(|source| SceneError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
-    Ok(String::from_utf8(bytes)
-        .unwrap_or_else(|error| String::from_utf8_lossy(error.as_bytes()).into_owned()))
+/// Faces that `tobj` takes for lines or points and leaves out.
+fn too_few_corners(text: &str) -> Option<String> {
+    let is_short = |(_, line): &(usize, &str)| {
+        let mut words = line.split_ascii_whitespace();
+        words.next() == Some("f") && words.take_while(|word| !word.starts_with('#')).count() < 3
+    };
+    let mut short = (1..).zip(text.lines()).filter(is_short);
+    let (first, _) = short.next()?;
+    let count = 1 + short.count();
+    Some(match count {
+        1 => format!("line {first}: a face with fewer than three corners, left out"),
+        _ => format!(
+            "{count} faces with fewer than three corners, left out; the first in line {first}"
+        ),
+    })
+}
+
+/// A file that ends within a statement lacks the end of its last line. A number that lacks its last
+/// digits is a number, so that is all there is to see.
+fn cut_off(text: &str) -> Option<String> {
+    let last = text.lines().next_back().filter(|_| !text.ends_with('\n'))?;
+    let keyword = last.split_ascii_whitespace().next()?;
+    ["v", "vt", "vn", "f"].contains(&keyword).then(|| {
+        let number = text.lines().count();
+        format!("line {number}, the last, has no line end: the file may be cut off there")
+    })
 }
 
 /// `tobj` tells what is wrong, not where: reads the statements again, only after a failure, and

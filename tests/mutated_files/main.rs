@@ -121,6 +121,29 @@ fn run(target: &str, read: Target) {
     );
 }
 
+/// Files cut off after each of their bytes, as a broken copy leaves them.
+#[test]
+fn files_cut_off_at_any_byte_are_refused_with_a_place_or_sound() {
+    let mut faults = Vec::new();
+    let mut files = 0;
+    for (target, read) in TARGETS {
+        let judge = Judge::new(bound(target));
+        for (name, bytes) in seeds(target).iter().filter(|(_, b)| b.len() <= 4000) {
+            for end in 1..bytes.len() {
+                let judged = judge.read(
+                    &format!("{target} {name}, cut at {end}"),
+                    &bytes[..end],
+                    read,
+                );
+                faults.extend(judged.err());
+                files += 1;
+            }
+        }
+    }
+    println!("{files} files");
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
 /// Large files that make the most of every byte: without them the fixed part of the bound would hide
 /// the multiple.
 #[test]

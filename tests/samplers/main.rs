@@ -6,6 +6,8 @@ mod common;
 mod decorrelations;
 mod known;
 mod nets;
+mod pinned;
+mod projections;
 mod refusals;
 mod streams;
 

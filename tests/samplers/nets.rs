@@ -16,7 +16,7 @@ fn is_net(points: &[[u32; 2]], m: u32) -> bool {
 }
 
 /// Whether every prefix of 2^m points is a net.
-fn has_nets(points: &[[u32; 2]]) -> bool {
+pub fn has_nets(points: &[[u32; 2]]) -> bool {
     (0..=points.len().ilog2()).all(|m| is_net(&points[..1 << m], m))
 }
 

@@ -3,6 +3,7 @@
 use super::common::{self, Pcg};
 use super::*;
 use raystone::measure::sampler_cost::sampler_cost;
+use raystone::measure::words::{Used, check_words, compare};
 use raystone::run::dump_stream;
 
 /// Coordinates of every sequence and of every decorrelation, with each of their parameters.
@@ -121,6 +122,52 @@ fn streams_of_all_kernels_equal_their_twins_and_seeds_count_where_they_should() 
         });
         assert_eq!(differs, sampler.is_random(), "{}", sampler.label());
     }
+}
+
+#[test]
+fn kernels_equal_their_twins_in_all_that_a_long_run_uses() {
+    let registry = SamplerRegistry::default();
+    let mut compared = 0;
+    for sequence in registry
+        .sequence_entries()
+        .iter()
+        .map(Entry::default_variant)
+    {
+        let entry = registry.sequences().find(|s| s.name() == sequence.name);
+        let facts = entry.expect("registered").facts(&sequence.params);
+        let at_most = |wanted: u32, limit: Option<u32>| limit.map_or(wanted, |l| wanted.min(l));
+        let demand = demand(
+            at_most(1 << 17, facts.samples),
+            at_most(122, facts.dimensions),
+        );
+        for decorrelation in registry
+            .decorrelation_entries()
+            .iter()
+            .map(Entry::default_variant)
+        {
+            let Ok(sampler) = registry.sampler(&sequence, &decorrelation, &demand) else {
+                continue;
+            };
+            let used = Used {
+                samples: demand.samples.unwrap_or(1),
+                dimensions: demand.dimensions,
+                size: [WIDTH, 144],
+                seeds: vec![0, 1, 8, 9001, 0x8000_0001, u32::MAX],
+            };
+            let words = check_words(common::gpu(), &sampler, &used);
+            compared += words.unwrap_or_else(|e| panic!("{e}"));
+            // One bit of one word must be seen, and the message says which.
+            let coordinates = used.coordinates();
+            let mut words: Vec<u32> = coordinates.iter().map(|c| sampler.sample_u32(*c)).collect();
+            words[40_000] ^= 1;
+            let error = compare(&sampler, &coordinates, &words).expect_err("a wrong bit");
+            assert!(
+                error.starts_with("1 of ") && error.contains("dimension: "),
+                "{error}"
+            );
+        }
+    }
+    assert!(compared > 40 << 16, "{compared} words");
 }
 
 #[test]

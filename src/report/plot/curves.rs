@@ -90,7 +90,9 @@ impl CurvePlot {
             .iter()
             .flat_map(|guide| ends.map(|x| guide.at(x)));
         let y = Axis::log10(
-            points().flat_map(|p| [p.y, p.low, p.high]).chain(guide_ys),
+            points()
+                .flat_map(|p| [p.y, shown_low(p), p.high])
+                .chain(guide_ys),
             &self.y_title,
         )?;
         let rows = self.curves.len() + self.guides.len();
@@ -176,6 +178,11 @@ fn curve_line(drawing: &mut Drawing, points: &[(f64, f64)], ink: Ink, exact: boo
 fn guide_line(drawing: &mut Drawing, points: &[(f64, f64)], index: usize) {
     let dash = 2.0 + 6.0 * index as f64;
     drawing.dashed_line(points, DIM, 1.1, dash, 3.0);
+}
+
+/// How far down an axis has to reach for a point: not to an end that happens to lie close to 0.
+fn shown_low(point: &CurvePoint) -> f64 {
+    point.low.max(point.y / 30.0)
 }
 
 fn drawable(point: &CurvePoint) -> bool {

@@ -16,7 +16,7 @@ pub struct CellPoint {
     pub sampler: usize,
     /// Seconds per image.
     pub seconds: Interval,
-    /// Error of the image.
+    /// Error of the image, positive.
     pub error: Interval,
 }
 
@@ -72,10 +72,14 @@ impl ParetoPlot {
             .points
             .iter()
             .flat_map(|p| [p.seconds.value, p.seconds.low, p.seconds.high]);
-        let errors = self
-            .points
-            .iter()
-            .flat_map(|p| [p.error.value, p.error.low, p.error.high]);
+        let errors = self.points.iter().flat_map(|p| {
+            // Not down to an end that happens to lie close to 0.
+            [
+                p.error.value,
+                p.error.low.max(p.error.value / 30.0),
+                p.error.high,
+            ]
+        });
         let x = Axis::log10(times, &self.x_title)?;
         let y = Axis::log10(errors, &self.y_title)?;
         let front = self.front();

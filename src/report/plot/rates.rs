@@ -51,10 +51,7 @@ impl RatePlot {
             .sum();
         let bottom = height + 12.0;
         let mut drawing = Drawing::new(WIDTH, bottom + 56.0);
-        let title = format!(
-            "million rays per second ({}; median, 95 % interval)",
-            self.clock
-        );
+        let title = format!("million rays per second ({}; median)", self.clock);
         let axis = Axis::linear(max, &title);
         if max > 0.0 {
             axis.draw_below(&mut drawing, left, right, 8.0, bottom);

@@ -1,10 +1,10 @@
 //! Why to believe the figures: every check of the run, with what it rests on.
 
-use crate::measure::record::{GateVerdict, JudgeCheck, TimeRecord};
+use crate::measure::record::{BiasRecord, GateVerdict, JudgeCheck, TimeRecord};
 use crate::report::data::{RunData, SceneGroup, structure_name};
 use crate::report::document::*;
 use crate::report::format::{self, count, plural};
-use crate::report::samplers::Metric;
+use crate::report::samplers::REFERENCE_SHARE;
 
 /// The section.
 pub fn section(data: &RunData) -> Section {
@@ -178,22 +178,30 @@ fn bias(data: &RunData) -> Check {
         .flat_map(|(scene, view)| view.samplers.iter().map(move |s| (scene, view, s)))
         .filter_map(|(scene, view, s)| Some((scene, view, s, s.bias?)))
         .collect();
-    let with = |verdict: &str| records.iter().filter(|r| r.3.verdict == verdict).count();
-    let (clean, biased) = (with("no-bias-found"), with("biased"));
+    let with = |verdict: &str, by_design: bool| {
+        let is_it = |r: &&BiasRecord| r.verdict == verdict && r.by_design == by_design;
+        records.iter().map(|r| r.3).filter(is_it).count()
+    };
+    let clean = with("no-bias-found", false) + with("no-bias-found", true);
+    let (biased, by_design) = (with("biased", false), with("biased", true));
     let mut detail = format!(
-        "{} without a bias found, {} biased, {} not testable",
-        clean,
-        biased,
-        records.len() - clean - biased
+        "{clean} without a bias found, {biased} biased, {by_design} biased by design, {} not testable",
+        records.len() - clean - biased - by_design
     );
     if let Some((.., record)) = records.first() {
         detail += &format!(
-            " (Welch t per tile, Benjamini–Hochberg at {})",
-            record.alpha
+            " (Welch's t of the whole image and, with Benjamini and Hochberg's correction, per tile, each at half of {})",
+            format::number(record.alpha)
         );
     }
     for (scene, view, sampler, _) in records.iter().filter(|r| r.3.verdict == "biased") {
-        detail += &format!("; {} on {}, {}", sampler.name, scene.name, view.integrator);
+        detail += &format!(
+            "; {} on {}, {}: {}",
+            sampler.name,
+            scene.name,
+            view.integrator,
+            sampler.fault().unwrap_or_default()
+        );
     }
     check("Samplers without bias", clean > 0, biased > 0, detail + ".")
 }
@@ -223,48 +231,37 @@ fn finite_pixels(data: &RunData) -> Check {
 
 /// A reference that is itself noisy bounds from below what errors can be told apart.
 fn reference_noise(data: &RunData) -> Check {
-    const ALLOWED: f64 = 0.1;
     let mut details = Vec::new();
-    let mut worst: Option<f64> = None;
+    let (mut tested, mut wrong) = (false, false);
     for (scene, view) in data.views() {
-        let Some(reference) = view.reference else {
-            continue;
-        };
-        let errors = view
-            .samplers
-            .iter()
-            .filter_map(|s| s.mean_errors(Metric::Rmse).last().copied());
-        let least = errors
-            .map(|mean| mean.error.value.powi(2))
-            .filter(|mse| *mse > 0.0)
-            .reduce(f64::min);
-        if reference.exact.is_some() {
-            worst = Some(worst.unwrap_or(0.0));
-            details.push(format!("{}, {}: exact", scene.name, view.integrator));
-            continue;
-        }
-        let noise = format!(
-            "{}, {}: MSE {} at {} spp",
-            scene.name,
-            view.integrator,
-            format::number(reference.mse),
-            count(u64::from(reference.spp))
-        );
-        details.push(match least {
-            Some(least) => {
-                let share = reference.mse / least;
-                worst = Some(worst.map_or(share, |old: f64| old.max(share)));
-                format!("{noise}, {} of the least measured", format::percent(share))
+        let fault = view.reference_fault();
+        wrong |= fault.is_some();
+        let known = match view.reference {
+            None if fault.is_none() => continue,
+            None => "no reference".into(),
+            Some(reference) => {
+                tested = true;
+                match reference.exact {
+                    Some(_) => "exact".into(),
+                    None => format!(
+                        "MSE {} at {} spp",
+                        format::number(reference.mse),
+                        count(u64::from(reference.spp))
+                    ),
+                }
             }
-            None => noise,
-        });
+        };
+        let fault = fault.map_or(String::new(), |fault| format!(": {fault}"));
+        details.push(format!(
+            "{}, {}: {known}{fault}",
+            scene.name, view.integrator
+        ));
     }
     let title = format!(
         "Reference noise below {} of every error",
-        format::percent(ALLOWED)
+        format::percent(REFERENCE_SHARE)
     );
-    let noisy = worst.is_some_and(|share| share > ALLOWED);
-    check(title, worst.is_some(), noisy, join(details))
+    check(title, tested, wrong, join(details))
 }
 
 fn complete(data: &RunData) -> Check {

@@ -88,7 +88,14 @@ fn banners(data: &RunData, warnings: &[String]) -> Vec<Banner> {
     for folder in data.run.iter().flat_map(|run| &run.kernels) {
         add(Tone::Note, &kernels_banner(folder));
     }
-    if data.finished.is_none() {
+    if let Some(ended) = data.interrupted {
+        let text = format!(
+            "The run was interrupted after {} s ({}): this report shows what was recorded until then.",
+            format::number(ended.wall_s),
+            ended.reason
+        );
+        add(Tone::Bad, &text);
+    } else if data.finished.is_none() {
         add(
             Tone::Bad,
             "The run did not finish: this report shows what was recorded until then.",
@@ -154,21 +161,15 @@ fn facts(scene: &SceneGroup) -> Vec<Block> {
         format::number(record.load_ms),
     );
     let report = &record.report;
-    if report.dropped_non_finite > 0 {
-        text += &format!(
-            " {} dropped: a vertex is not finite.",
-            format::plural(report.dropped_non_finite, "triangle")
-        );
-    }
     if report.zero_area > 0 {
         text += &format!(
             " {} of zero area kept.",
             format::plural(report.zero_area, "triangle")
         );
     }
-    let warning = |w: &String| Block::Paragraph(format!("Loader: {w}"));
+    let warning = |w: String| Block::Paragraph(format!("Loader: {w}"));
     std::iter::once(Block::Paragraph(text))
-        .chain(report.warnings.iter().map(warning))
+        .chain(report.lines().into_iter().map(warning))
         .collect()
 }
 

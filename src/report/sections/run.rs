@@ -151,6 +151,14 @@ fn failures(data: &RunData) -> Option<Section> {
             skipped.reason.clone(),
         );
     }
+    for warning in &data.warnings {
+        add(
+            warning.cell.clone(),
+            "warning",
+            Tone::Note,
+            warning.reason.clone(),
+        );
+    }
     let mut section = Section::new("failures", "Failed and skipped");
     let none = || Block::Paragraph("No cell failed and none was skipped.".into());
     section.blocks.push(table.into_block().unwrap_or_else(none));

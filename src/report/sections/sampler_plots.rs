@@ -7,7 +7,22 @@ use crate::report::format;
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::report::plot::histogram::Histogram;
 use crate::report::plot::pareto::{CellPoint, ParetoPlot};
-use crate::report::samplers::{Metric, Sampler};
+use crate::report::samplers::{Metric, Sampler, UNRESOLVED};
+
+/// What a caption says of points that a logarithmic plot cannot show.
+fn not_drawn(count: usize) -> String {
+    match count {
+        0 => String::new(),
+        1 => format!(" Not drawn: 1 point {UNRESOLVED}."),
+        n => format!(" Not drawn: {n} points {UNRESOLVED}."),
+    }
+}
+
+/// Points of all samplers that the reference does not resolve.
+fn unresolved(view: &View, metric: Metric) -> usize {
+    let means = view.samplers.iter().flat_map(|s| s.mean_errors(metric));
+    means.filter(|mean| !mean.resolved).count()
+}
 
 /// Error against samples and against seconds, in both metrics.
 pub fn error_figures(data: &RunData, stem: &str, view: &View) -> Vec<Figure> {
@@ -16,6 +31,7 @@ pub fn error_figures(data: &RunData, stem: &str, view: &View) -> Vec<Figure> {
     for metric in [Metric::RelMse, Metric::Rmse] {
         let name = metric.name();
         let y_title = format!("{name} (mean over replicates)");
+        let hidden = not_drawn(unresolved(view, metric));
         let by_spp = CurvePlot {
             x_title: "samples per pixel".into(),
             x_ticks: Ticks::PowersOfTwo,
@@ -29,10 +45,10 @@ pub fn error_figures(data: &RunData, stem: &str, view: &View) -> Vec<Figure> {
         };
         if let Some(drawing) = by_spp.draw() {
             let caption = format!(
-                "{name} against samples. Bands: 95 % interval of the mean; dashed: deterministic."
+                "{name} against samples. Bands: 95 % interval, of replicates and reference; dashed: deterministic.{hidden}"
             );
             figures.push(Figure::new(
-                format!("{stem}-{}-spp", name.to_lowercase()),
+                format!("{stem}-{}-spp", metric.stem()),
                 caption,
                 drawing,
             ));
@@ -52,10 +68,11 @@ pub fn error_figures(data: &RunData, stem: &str, view: &View) -> Vec<Figure> {
             guides: Vec::new(),
         };
         if let Some(drawing) = by_seconds.draw() {
-            let caption =
-                format!("{name} against time: samples × measured ms per spp with {structure}.");
+            let caption = format!(
+                "{name} against time: samples × measured ms per spp with {structure}.{hidden}"
+            );
             figures.push(Figure::new(
-                format!("{stem}-{}-seconds", name.to_lowercase()),
+                format!("{stem}-{}-seconds", metric.stem()),
                 caption,
                 drawing,
             ));
@@ -98,6 +115,7 @@ fn curve(
     let points: Vec<CurvePoint> = sampler
         .mean_errors(metric)
         .iter()
+        .filter(|mean| mean.resolved)
         .map(|mean| CurvePoint {
             x: f64::from(mean.spp) * x_per_spp,
             y: mean.error.value,
@@ -114,8 +132,8 @@ fn curve(
     })
 }
 
-/// Run time against error at the common spp; `None` without one.
-pub fn pareto_plot(data: &RunData, view: &View) -> Option<ParetoPlot> {
+/// Run time against error at the common spp, and what its caption has to add; `None` without one.
+pub fn pareto_plot(data: &RunData, view: &View) -> Option<(ParetoPlot, String)> {
     let spp = view.common_spp()?;
     let with_look = |names: Vec<String>, look: &dyn Fn(&str) -> usize| -> Vec<(String, usize)> {
         names
@@ -132,14 +150,19 @@ pub fn pareto_plot(data: &RunData, view: &View) -> Option<ParetoPlot> {
     let names = fair.iter().map(|s| s.name.clone()).collect();
     let samplers = with_look(names, &|name| data.sampler_look(name));
     let mut points = Vec::new();
+    let mut hidden = 0;
     for (structure, (name, _)) in structures.iter().enumerate() {
         for (index, sampler) in fair.iter().enumerate() {
             let Some(t) = view.ms_per_spp(name, &sampler.name) else {
                 continue;
             };
-            let Some(error) = sampler.mean_error_at(Metric::RelMse, spp) else {
+            let Some(mean) = sampler.mean_error_at(Metric::RelMse, spp) else {
                 continue;
             };
+            if !mean.resolved || mean.error.value <= 0.0 {
+                hidden += 1;
+                continue;
+            }
             let scale = f64::from(spp) / 1000.0;
             let seconds = Interval {
                 value: t.value * scale,
@@ -150,17 +173,18 @@ pub fn pareto_plot(data: &RunData, view: &View) -> Option<ParetoPlot> {
                 structure,
                 sampler: index,
                 seconds,
-                error,
+                error: mean.error,
             });
         }
     }
-    Some(ParetoPlot {
+    let plot = ParetoPlot {
         x_title: format!("render time for {spp} spp, seconds"),
-        y_title: format!("relMSE at {spp} spp"),
+        y_title: format!("{} at {spp} spp", Metric::RelMse.name()),
         structures,
         samplers,
         points,
-    })
+    };
+    Some((plot, not_drawn(hidden)))
 }
 
 /// The p-values of every sampler that was checked.

@@ -8,7 +8,7 @@ use crate::report::data::{RunData, View, sampler_name, timed_structure};
 use crate::report::document::*;
 use crate::report::plot::histogram;
 use crate::report::plot::pareto::letter;
-use crate::report::samplers::{Metric, Sampler};
+use crate::report::samplers::{MeanError, Metric, Sampler, UNRESOLVED};
 use crate::report::{format, pictures};
 use std::path::Path;
 
@@ -23,11 +23,14 @@ pub fn blocks(dir: &Path, data: &RunData, stem: &str, view: &View) -> Vec<Block>
     blocks.extend(error_table(view, Metric::Rmse).into_block());
     blocks.extend(spectrum::blocks(data, stem, view));
     blocks.extend(efficiency_table(view).into_block());
-    if let Some(pareto) = pareto_plot(data, view)
+    if let Some((pareto, hidden)) = pareto_plot(data, view)
         && let Some(drawing) = pareto.draw()
     {
-        let caption = "Run time against error, one point per cell without a fault; lines: 95 % intervals. \
-                           Images are equal across structures, so a structure moves a sampler only sideways.";
+        let caption = format!(
+            "Run time against {}, one point per cell without a fault; lines: 95 % intervals. \
+             Images are equal across structures, so a structure moves a sampler only sideways.{hidden}",
+            Metric::RelMse.name()
+        );
         blocks.push(Block::Figures(vec![Figure::new(
             format!("{stem}-pareto"),
             caption,
@@ -58,10 +61,19 @@ pub fn error_table(view: &View, metric: Metric) -> Table {
         .iter()
         .find_map(|s| s.metric_id(metric))
         .unwrap_or(metric.name());
+    let means = || view.samplers.iter().flat_map(|s| s.mean_errors(metric));
+    let root = match metric {
+        Metric::RelMse => "",
+        Metric::Rmse => "root of ",
+    };
     let caption = format!(
-        "{} with {}: mean [95 % interval] at each spp; metric {id}",
+        "{} with {}: mean [95 % interval] at each spp; metric {root}{id}{}",
         metric.name(),
-        view.integrator
+        view.integrator,
+        match means().all(|mean| mean.resolved) {
+            true => String::new(),
+            false => format!("; <: {UNRESOLVED}"),
+        }
     );
     let mut table = Table::new(caption, &["sampler", "replicates"]);
     let measured: Vec<&Sampler> = view
@@ -69,11 +81,7 @@ pub fn error_table(view: &View, metric: Metric) -> Table {
         .iter()
         .filter(|s| !s.replicates.is_empty())
         .collect();
-    let mut spps: Vec<u32> = measured
-        .iter()
-        .flat_map(|s| s.mean_errors(metric))
-        .map(|mean| mean.spp)
-        .collect();
+    let mut spps: Vec<u32> = means().map(|mean| mean.spp).collect();
     spps.sort_unstable();
     spps.dedup();
     if spps.is_empty() {
@@ -87,10 +95,7 @@ pub fn error_table(view: &View, metric: Metric) -> Table {
         let mut row = vec![Cell::from(sampler.name.clone()), replicates(sampler)];
         row.extend(spps.iter().map(|spp| {
             let mean = means.iter().find(|mean| mean.spp == *spp);
-            mean.map_or_else(
-                || format::ABSENT.into(),
-                |mean| error_cell(sampler, &mean.error),
-            )
+            mean.map_or_else(|| format::ABSENT.into(), |mean| error_cell(sampler, mean))
         }));
         row.push(slope_cell(sampler.slope(metric)));
         table.rows.push(row);
@@ -107,12 +112,18 @@ fn replicates(sampler: &Sampler) -> Cell {
     }
 }
 
-fn error_cell(sampler: &Sampler, error: &Interval) -> Cell {
+fn error_cell(sampler: &Sampler, mean: &MeanError) -> Cell {
+    match mean.resolved {
+        true => interval_cell(sampler, &mean.error),
+        false => format!("<{}", format::number(mean.error.high.max(0.0))).into(),
+    }
+}
+
+fn interval_cell(sampler: &Sampler, error: &Interval) -> Cell {
     let value = format::number(error.value);
-    if sampler.is_deterministic() || sampler.lacks_spread() {
-        value.into()
-    } else {
-        Cell::with_detail(value, format::bounds(error))
+    match sampler.is_ranked() {
+        true => Cell::with_detail(value, format::bounds(error)),
+        false => value.into(),
     }
 }
 
@@ -129,19 +140,28 @@ fn slope_cell(slope: Option<Interval>) -> Cell {
 
 /// Verdict on the bias of every sampler.
 pub fn bias_table(view: &View) -> Table {
-    let caption = format!("Bias check with {}", view.integrator);
+    let levels = view.samplers.iter().filter_map(|s| s.bias);
+    let level = levels.map(|bias| bias.alpha).reduce(f64::min);
+    let caption = format!(
+        "Bias check with {}: biased if the p of the image is at most half of {}, or tiles are rejected \
+         at the other half",
+        view.integrator,
+        format::optional(level)
+    );
     let columns = [
         "sampler",
         ":verdict",
         "tiles",
         "rejected",
-        "smallest p",
-        "z",
+        "smallest p of a tile",
+        "z of the image",
+        "p of the image",
+        "degrees of freedom",
     ];
     let mut table = Table::new(caption, &columns);
     for sampler in view.samplers.iter().filter(|s| !s.replicates.is_empty()) {
         let name = sampler.name.clone().into();
-        let testable = |bias: &&&BiasRecord| !bias.verdict.starts_with("not-testable");
+        let testable = |bias: &&&BiasRecord| bias.p.is_some();
         let bias = sampler.bias.as_ref().filter(testable);
         let count = |n: Option<usize>| n.map_or(format::ABSENT.into(), |n| format::count(n as u64));
         table.rows.push(vec![
@@ -151,6 +171,8 @@ pub fn bias_table(view: &View) -> Table {
             count(bias.map(|bias| bias.rejected)).into(),
             format::optional(bias.map(|bias| bias.min_p)).into(),
             format::optional(bias.and_then(|bias| bias.z)).into(),
+            format::optional(bias.and_then(|bias| bias.p)).into(),
+            format::optional(bias.and_then(|bias| bias.degrees_of_freedom)).into(),
         ]);
     }
     table
@@ -178,8 +200,9 @@ pub fn efficiency_table(view: &View) -> Table {
         "Error per second with {}, {}",
         view.integrator, race.structure
     );
-    let product = format!("relMSE × seconds at {spp} spp");
-    let equal_time = format!("relMSE after {} s", format::number(race.seconds));
+    let name = Metric::RelMse.name();
+    let product = format!("{name} × seconds at {spp} spp");
+    let equal_time = format!("{name} after {} s", format::number(race.seconds));
     let mut table = Table::new(caption, &["sampler", "ms per spp", &product, &equal_time]);
     for sampler in &view.samplers {
         let Some(per_spp) = view.ms_per_spp(&race.structure, &sampler.name) else {
@@ -188,13 +211,14 @@ pub fn efficiency_table(view: &View) -> Table {
         let seconds = f64::from(spp) * per_spp.value / 1000.0;
         let product = sampler
             .mean_error_at(Metric::RelMse, spp)
-            .map(|error| error.value * seconds);
+            .filter(|mean| mean.resolved)
+            .map(|mean| mean.error.value * seconds);
         table.rows.push(vec![
             sampler.name.clone().into(),
             Cell::with_detail(format::number(per_spp.value), format::bounds(&per_spp)),
             format::optional(product).into(),
             race.error_of(&sampler.name)
-                .map_or_else(|| format::ABSENT.into(), |e| error_cell(sampler, &e)),
+                .map_or_else(|| format::ABSENT.into(), |e| interval_cell(sampler, &e)),
         ]);
     }
     table
@@ -203,8 +227,9 @@ pub fn efficiency_table(view: &View) -> Table {
 /// Milliseconds per spp of every cell.
 fn time_table(view: &View) -> Table {
     let caption = format!(
-        "Time of full cells with {}, ms per spp: median [95 % interval]",
-        view.integrator
+        "Time of full cells with {}, ms per spp: median [{}]",
+        view.integrator,
+        format::median_bounds(view.times.iter().map(|time| time.ms.len()))
     );
     let mut table = Table::new(caption, &["structure"]);
     let timed = |sampler: &&Sampler| view.times.iter().any(|time| is_of(time, sampler));
@@ -248,7 +273,10 @@ fn time_cell(view: &View, structure: &str, sampler: &Sampler) -> Cell {
 
 fn gallery(dir: &Path, view: &View) -> Option<Block> {
     let mut items = Vec::new();
-    if let Some(reference) = view.reference {
+    if let Some(reference) = view
+        .reference
+        .filter(|reference| !reference.image.is_empty())
+    {
         let spp = format::count(u64::from(reference.spp));
         let caption = match reference.exact {
             Some(value) => format!("reference: the exact value, {value}"),

@@ -1,5 +1,5 @@
-//! Figures of what the path consumed: discrepancies, errors of integrands, what several pixels draw, and
-//! what drawing costs.
+//! Figures of the words that samplers draw: discrepancies, errors of integrands, what several pixels draw,
+//! and what drawing costs.
 
 use super::file_stem;
 use crate::measure::record::{FigureAtCount, Interval, SamplerCostRecord, StreamRecord};
@@ -10,6 +10,12 @@ use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
 
 /// Columns of a table over N at most.
 const COLUMNS: usize = 8;
+/// What the figures are of.
+const TAPPED: &str = "Tapped are a sampler's 32-bit words for (pixel, sample, dimension, seed), read back from a \
+                      kernel that imports the renderer's modules and does nothing but draw; each was compared with \
+                      the scalar twin. Every seed was taken in a pixel of its own: the first of the image, the last, \
+                      and others in between, as the records say; where no seed changes anything, four pixels were \
+                      found to draw the same.";
 /// Functions that are plotted; all are in the table: a smooth one, and one with an edge.
 const PLOTTED: [&str; 2] = ["exponential", "disk"];
 
@@ -19,8 +25,10 @@ pub fn section(data: &RunData) -> Option<Section> {
         return None;
     }
     let mut section = Section::new("discrepancy", "Streams: discrepancy and integration error");
+    section.blocks.push(Block::Paragraph(TAPPED.into()));
+    section.blocks.extend(worst_table(data).into_block());
     let mut pairs: Vec<(&str, [u32; 2])> = Vec::new();
-    for stream in &data.streams {
+    for stream in data.streams.iter().filter(|s| s.named) {
         if !pairs.contains(&(&stream.purpose, stream.dimensions)) {
             pairs.push((&stream.purpose, stream.dimensions));
         }
@@ -250,6 +258,29 @@ impl<'a> Pair<'a> {
         }
         table
     }
+}
+
+/// The pair of dimensions with the greatest D* of each sampler.
+fn worst_table(data: &RunData) -> Table {
+    let caption = "The worst pair of dimensions of each sampler, by D* in one pixel among all pairs that the \
+                   integrators draw: mean D* over seeds [95 % interval]";
+    let columns = ["sampler", "dimensions", "purpose", "of pairs", "N", "D*"];
+    let mut table = Table::new(caption, &columns);
+    for stream in &data.streams {
+        let (Some(of), Some(last)) = (stream.worst_of, stream.star.last()) else {
+            continue;
+        };
+        let [a, b] = stream.dimensions;
+        table.rows.push(vec![
+            name(stream).into(),
+            format!("{a} and {b}").into(),
+            stream.purpose.as_str().into(),
+            of.to_string().into(),
+            last.n.to_string().into(),
+            interval_cell(Some(last.star)),
+        ]);
+    }
+    table
 }
 
 /// What drawing costs.

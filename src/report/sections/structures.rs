@@ -21,7 +21,10 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
     blocks.push(Block::Heading("Structures".into()));
     if let Some(drawing) = rate_plot(data, scene).draw() {
         let name = format!("scene-{index}-{}-rates", file_stem(scene.name));
-        let caption = "Speed per ray class. Bars: median; lines: bootstrap 95 % interval. The same rays for all.";
+        let caption = format!(
+            "Speed per ray class. Bars: median; lines: {}. The same rays for all.",
+            speed_bounds(scene)
+        );
         blocks.push(Block::Figures(vec![Figure::new(name, caption, drawing)]));
     }
     let classes = ray_classes(scene);
@@ -33,6 +36,11 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
     blocks.extend(tables.into_iter().filter_map(Table::into_block));
     blocks.extend(heat_maps(dir, scene));
     blocks
+}
+
+fn speed_bounds(scene: &SceneGroup) -> String {
+    let timings = scene.structures.iter().flat_map(|s| &s.timings);
+    format::median_bounds(timings.map(|timing| timing.ms.len()))
 }
 
 fn name(structure: &StructureRecord) -> String {
@@ -79,7 +87,11 @@ fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
 
 /// Mrays/s, one row per structure and one column per ray class.
 pub fn speed_table(scene: &SceneGroup) -> Table {
-    let caption = format!("Speed on {}, Mrays/s: median [95 % interval]", scene.name);
+    let caption = format!(
+        "Speed on {}, Mrays/s: median [{}]",
+        scene.name,
+        speed_bounds(scene)
+    );
     let mut table = Table::new(caption, &["structure", ":gate"]);
     let classes = ray_classes(scene);
     classes

@@ -1,6 +1,7 @@
 //! What a build costs against what it gains: break-even in rays, and time to an image.
 
 use crate::measure::record::{Interval, RayClass, StructureRecord};
+use crate::measure::statistics::LEAST_FOR_MEDIAN;
 use crate::report::data::{SceneGroup, View, structure_name, without_kernels};
 use crate::report::document::*;
 use crate::report::format;
@@ -41,9 +42,10 @@ impl BreakEven {
     }
 }
 
+/// Speed in a class, if it was measured often enough to have a 95 % interval.
 fn rate(structure: &StructureRecord, class: RayClass) -> Option<&Interval> {
     let timing = structure.timings.iter().find(|t| t.class == class)?;
-    Some(&timing.mrays_s)
+    (timing.ms.len() >= LEAST_FOR_MEDIAN).then_some(&timing.mrays_s)
 }
 
 /// Rays after which each structure has caught up with the one that is built fastest, per class.

@@ -1,11 +1,12 @@
 //! Who wins, per scene.
 
 use crate::measure::record::{ClassTiming, Interval, RayClass};
+use crate::measure::statistics::LEAST_FOR_MEDIAN;
 use crate::report::data::{RunData, SceneGroup, View, structure_name};
 use crate::report::document::*;
 use crate::report::format;
 use crate::report::ruling::{Better, Contender, Ruling, judge};
-use crate::report::samplers::{Metric, Sampler, error_after};
+use crate::report::samplers::{MeanError, Metric, Sampler, error_after};
 
 /// The verdict box.
 pub fn section(data: &RunData) -> Section {
@@ -15,6 +16,7 @@ pub fn section(data: &RunData) -> Section {
         let none = || Block::Paragraph(format!("On {} nothing could be compared.", scene.name));
         section.blocks.push(verdicts.unwrap_or_else(none));
         section.blocks.extend(left_out(scene).map(Block::Paragraph));
+        section.blocks.extend(unranked(scene).map(Block::Paragraph));
     }
     if section.blocks.is_empty() {
         section
@@ -49,16 +51,18 @@ pub fn table(scene: &SceneGroup) -> Table {
     for view in &scene.views {
         if let Some(spp) = view.common_spp() {
             let question = format!(
-                "least error per sample: {}, relMSE at {spp} spp",
-                view.integrator
+                "least error per sample: {}, {} at {spp} spp",
+                view.integrator,
+                Metric::RelMse.name()
             );
             table.rows.push(row(question, &best_per_sample(view, spp)));
         }
         if let Some(race) = Race::new(view) {
             let seconds = format::number(race.seconds);
             let question = format!(
-                "least error per second: {}, relMSE after {seconds} s",
-                view.integrator
+                "least error per second: {}, {} after {seconds} s",
+                view.integrator,
+                Metric::RelMse.name()
             );
             table.rows.push(row(question, &race.ruling()));
         }
@@ -70,7 +74,7 @@ fn row(question: String, ruling: &Ruling) -> Vec<Cell> {
     let tone = match ruling {
         Ruling::Winner(..) => Tone::Good,
         Ruling::Nobody => Tone::Bad,
-        Ruling::Alone(_) | Ruling::Unclear(_) => Tone::Note,
+        Ruling::Withheld(_) | Ruling::Alone(_) | Ruling::Unclear(_) => Tone::Note,
     };
     vec![
         question.into(),
@@ -110,6 +114,22 @@ fn left_out(scene: &SceneGroup) -> Option<String> {
     })
 }
 
+/// Who is shown without being ranked.
+fn unranked(scene: &SceneGroup) -> Option<String> {
+    let samplers = scene.views.iter().flat_map(|view| {
+        let single = view.samplers.iter().filter(|s| s.replicates.len() == 1);
+        single.map(|s| format!("{} with {}", s.name, view.integrator))
+    });
+    let names: Vec<String> = samplers.collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "Shown, but not ranked on {}, since one image tells nothing of their spread: {}.",
+            scene.name,
+            names.join("; ")
+        )
+    })
+}
+
 /// Ray classes that some structure was timed on.
 pub fn ray_classes(scene: &SceneGroup) -> Vec<RayClass> {
     let timings = scene.structures.iter().flat_map(|s| &s.timings);
@@ -124,7 +144,7 @@ pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
     let contender = |s: &&crate::measure::record::StructureRecord| {
         let timing: &ClassTiming = s.timings.iter().find(|timing| timing.class == class)?;
         let name = structure_name(&s.accel, s.runtime_checks);
-        let has_spread = timing.ms.len() > 1;
+        let has_spread = timing.ms.len() >= LEAST_FOR_MEDIAN;
         s.fault().is_none().then_some(Contender {
             name,
             figure: timing.mrays_s,
@@ -139,19 +159,23 @@ pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
 
 /// Compares the samplers that have no fault at one spp.
 pub fn best_per_sample(view: &View, spp: u32) -> Ruling {
-    let contender = |sampler: &&Sampler| {
-        let figure = sampler.mean_error_at(Metric::RelMse, spp)?;
+    let contender = |sampler: &Sampler| {
         Some(Contender {
             name: sampler.name.clone(),
-            figure,
-            has_spread: !sampler.lacks_spread(),
+            figure: sampler.mean_error_at(Metric::RelMse, spp)?.error,
+            has_spread: sampler.is_ranked(),
         })
     };
-    let fair = view
-        .samplers
-        .iter()
-        .filter(|sampler| sampler.fault().is_none());
-    judge(fair.filter_map(|s| contender(&s)).collect(), Better::Lower)
+    let fair = view.samplers.iter().filter(|s| s.fault().is_none());
+    rank(view, fair.filter_map(contender).collect())
+}
+
+/// Ranks errors, if the reference is good enough for that.
+fn rank(view: &View, contenders: Vec<Contender>) -> Ruling {
+    match view.reference_fault() {
+        Some(reason) => Ruling::Withheld(reason),
+        None => judge(contenders, Better::Lower),
+    }
 }
 
 /// Samplers at equal time, under the fastest structure.
@@ -160,12 +184,31 @@ pub struct Race<'a> {
     pub seconds: f64,
     /// The structure under which all were timed.
     pub structure: String,
+    view: &'a View<'a>,
     runners: Vec<Runner<'a>>,
 }
 
 struct Runner<'a> {
     sampler: &'a Sampler<'a>,
+    ms_per_spp: Interval,
+    /// How often that was measured.
+    rounds: usize,
+    /// Seconds and error, by growing time; resolved ones only.
     curve: Vec<(f64, Interval)>,
+}
+
+impl Runner<'_> {
+    /// The error after so many seconds. Its interval also holds what the time per sample leaves open:
+    /// errors fall about as one over the number of samples, which the time decides on.
+    fn error_after(&self, seconds: f64) -> Option<Interval> {
+        let error = error_after(&self.curve, seconds)?;
+        let ms = self.ms_per_spp;
+        Some(Interval {
+            low: error.low * ms.low / ms.value,
+            high: error.high * ms.high / ms.value,
+            ..error
+        })
+    }
 }
 
 impl<'a> Race<'a> {
@@ -173,13 +216,18 @@ impl<'a> Race<'a> {
     pub fn new(view: &'a View<'a>) -> Option<Self> {
         let structure = view.fastest_structure()?;
         let runner = |sampler: &'a Sampler<'a>| {
-            let per_spp = view.ms_per_spp(&structure, &sampler.name)?.value / 1000.0;
+            let time = view.time(&structure, &sampler.name)?;
+            let ms_per_spp = time.ms_per_spp?;
             let means = sampler.mean_errors(Metric::RelMse);
-            let curve: Vec<_> = means
-                .iter()
-                .map(|m| (f64::from(m.spp) * per_spp, m.error))
-                .collect();
-            (!curve.is_empty() && sampler.fault().is_none()).then_some(Runner { sampler, curve })
+            let resolved = means.iter().filter(|mean| mean.resolved);
+            let at = |m: &MeanError| (f64::from(m.spp) * ms_per_spp.value / 1000.0, m.error);
+            let curve: Vec<_> = resolved.map(at).collect();
+            (!curve.is_empty() && sampler.fault().is_none()).then_some(Runner {
+                sampler,
+                ms_per_spp,
+                rounds: time.ms.len(),
+                curve,
+            })
         };
         let runners: Vec<Runner> = view.samplers.iter().filter_map(runner).collect();
         let seconds = runners
@@ -189,33 +237,29 @@ impl<'a> Race<'a> {
         Some(Self {
             seconds,
             structure,
+            view,
             runners,
         })
     }
 
     /// Error of a sampler when the race ends.
     pub fn error_of(&self, sampler: &str) -> Option<Interval> {
-        let runner = self
-            .runners
-            .iter()
-            .find(|runner| runner.sampler.name == sampler)?;
-        error_after(&runner.curve, self.seconds)
+        let is_it = |runner: &&Runner| runner.sampler.name == sampler;
+        self.runners.iter().find(is_it)?.error_after(self.seconds)
     }
 
     /// Who has the least error when the race ends.
     pub fn ruling(&self) -> Ruling {
         let contender = |runner: &Runner| {
-            let figure = error_after(&runner.curve, self.seconds)?;
-            let has_spread = !runner.sampler.lacks_spread();
             Some(Contender {
                 name: runner.sampler.name.clone(),
-                figure,
-                has_spread,
+                figure: runner.error_after(self.seconds)?,
+                has_spread: runner.sampler.is_ranked() && runner.rounds >= LEAST_FOR_MEDIAN,
             })
         };
-        judge(
+        rank(
+            self.view,
             self.runners.iter().filter_map(contender).collect(),
-            Better::Lower,
         )
     }
 }

@@ -142,8 +142,8 @@ pub(super) fn structure(scene: &str, accel: &str, mrays: f64, wrong: usize) -> S
         class,
         rays: 32_768,
         hit_fraction: 0.55,
-        ms: vec![1.0, 1.1, 0.9],
-        wall_ms: vec![1.2, 1.3, 1.1],
+        ms: vec![1.0, 1.1, 0.9, 1.0, 1.05, 0.95, 1.0],
+        wall_ms: vec![1.2, 1.3, 1.1, 1.2, 1.25, 1.15, 1.2],
         mrays_s: around(mrays * factor, 0.03),
         counters: CountersPerRay {
             nodes: 40.0 / factor,
@@ -223,10 +223,14 @@ pub(super) fn errors(scene: &str, integrator: &str, replicates: u32) -> Vec<Reco
                 let relmse = start * f64::from(spp).powf(exponent) * (1.0 + 0.25 * noise.next());
                 ErrorAtSpp {
                     spp,
+                    // The reference's noise in the plain figures must not show anywhere.
                     metrics: BTreeMap::from([
-                        ("relmse/eps=1e-2/v1".into(), relmse),
-                        ("rmse/v1".into(), relmse.sqrt() * 0.3),
+                        ("relmse/eps=1e-2/v1".into(), relmse + 7.0),
+                        ("rmse/v1".into(), relmse.sqrt() * 0.3 + 7.0),
+                        ("mse-unbiased/v1".into(), relmse * 0.09),
+                        ("relmse-unbiased/eps=1e-2/v1".into(), relmse),
                     ]),
+                    without_part: BTreeMap::new(),
                 }
             };
             let picture = |kind: &str| {
@@ -269,7 +273,10 @@ pub(super) fn bias(scene: &str, integrator: &str, index: usize, verdict: &str) -
         rejected: if biased { 57 } else { 0 },
         alpha: 0.01,
         min_p: 0.003,
-        z: Some(0.4),
+        z: testable.then_some(0.4),
+        p: testable.then_some(0.7),
+        degrees_of_freedom: testable.then_some(9.5),
+        by_design: false,
         p_histogram: match (testable, biased) {
             (false, _) => vec![0; 10],
             (true, false) => vec![44, 41, 39, 47, 42, 40, 45, 46, 44, 44],
@@ -293,8 +300,8 @@ pub(super) fn times(scene: &str, integrator: &str, accels: &[(&str, f64)]) -> Ve
                 integrator: variant(integrator),
                 resolution: [192, 144],
                 spp: 4,
-                ms: vec![10.0; 5],
-                wall_ms: vec![11.0; 5],
+                ms: vec![10.0; 7],
+                wall_ms: vec![11.0; 7],
                 ms_per_spp: Some(around(
                     6.5 * factor * cost * (1.0 + 0.02 * noise.next()),
                     0.02,
@@ -349,13 +356,23 @@ pub(super) fn streams() -> Vec<Record> {
                 decorrelation: variant(decorrelation),
                 dimensions: [2, 3],
                 purpose: "bounce 0: direction".into(),
+                named: true,
+                worst_of: None,
                 randomised,
                 seeds: if randomised { 8 } else { 1 },
+                pixels: (0..if randomised { 8 } else { 1 }).collect(),
                 star: (0..11).map(star).collect(),
                 figures: stream_figures(exponent),
+                points: Some(points()),
             })
         };
     SAMPLERS.iter().map(stream).collect()
+}
+
+/// Two pixels with 16 points each.
+fn points() -> RecordedPoints {
+    let words: Vec<u32> = (0..64_u32).map(|i| i.wrapping_mul(0x9e37_79b9)).collect();
+    RecordedPoints::new([16, 2], 1, &words, vec![1.0; 64])
 }
 
 /// Figures of a stream whose D* falls with this exponent.

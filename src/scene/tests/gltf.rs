@@ -11,6 +11,7 @@ fn textures_are_reduced_aloud_or_left_out_as_the_options_say() {
         let options = LoadOptions {
             textures,
             max_texture_size,
+            ..LoadOptions::default()
         };
         load(&variant(path.to_str().unwrap()), &options).unwrap()
     };

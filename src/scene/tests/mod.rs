@@ -4,6 +4,7 @@
 mod gltf;
 mod obj;
 mod real;
+mod text;
 
 use super::builtin::numeric::Pcg;
 use super::*;

@@ -106,11 +106,19 @@ pub(super) fn build(
 /// Samples and dimensions that samplers are made for, and the width of the image.
 pub(super) const DEMAND: Demand = Demand {
     samples: Some(1024),
-    dimensions: 16,
+    dimensions: 48,
     width: Some(64),
 };
 
-/// The sampler of these names, with the fault in its table if it belongs there.
+/// The same where words are compared: beyond 2¹⁶ samples and several tiles of a mask.
+pub(super) const LONG_DEMAND: Demand = Demand {
+    samples: Some(1 << 17),
+    dimensions: 48,
+    width: Some(192),
+};
+
+/// The sampler of these names for `demand` or as much of it as there is, with the fault in its table if it
+/// belongs there.
 pub(super) fn sampler(
     (sequence, changes): (&str, Changes),
     decorrelation: &str,
@@ -120,6 +128,14 @@ pub(super) fn sampler(
     let registry = SamplerRegistry::default();
     let sequence = variant(&registry.sequence_entries(), sequence, changes)?;
     let decorrelation = variant(&registry.decorrelation_entries(), decorrelation, &[])?;
-    let made = registry.sampler(&sequence, &decorrelation, demand);
+    let kind = registry.sequences().find(|s| s.name() == sequence.name);
+    let facts = kind.map(|s| s.facts(&sequence.params)).unwrap_or_default();
+    let at_most = |wanted: u32, limit: Option<u32>| limit.map_or(wanted, |most| wanted.min(most));
+    let demand = Demand {
+        samples: demand.samples.map(|n| at_most(n, facts.samples)),
+        dimensions: at_most(demand.dimensions, facts.dimensions),
+        ..*demand
+    };
+    let made = registry.sampler(&sequence, &decorrelation, &demand);
     plant.in_table(made.map_err(|e| CheckError::Other(e.to_string()))?)
 }

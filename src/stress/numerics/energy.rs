@@ -41,10 +41,6 @@ impl Integrator for Walk {
     fn dimensions(&self, _: &Params) -> u32 {
         dimensions::needed(DEPTH)
     }
-
-    fn dimension_pairs(&self) -> Vec<[u32; 2]> {
-        Vec::new()
-    }
 }
 
 static WALK: Walk = Walk;

@@ -2,7 +2,7 @@
 
 use super::NumericsError;
 use crate::accel::{AccelRegistry, BuildLog, TriangleSoup};
-use crate::config::{Entry, Params, Variant};
+use crate::config::{Entry, ParamValue, Params, Variant};
 use crate::gpu::Gpu;
 use crate::integrator::{Frame, Integrator, RenderJob, Renderer, SceneBuffers, Traced};
 use crate::sampling::{Demand, Sampler, SamplerRegistry};
@@ -22,7 +22,10 @@ pub fn default_variant(
 /// A sequence without decorrelation, for so many dimensions.
 pub fn sampler(sequence: &'static str, dimensions: u32) -> Result<Sampler, NumericsError> {
     let registry = SamplerRegistry::default();
-    let sequence = default_variant("sequence", &registry.sequence_entries(), sequence)?;
+    let mut sequence = default_variant("sequence", &registry.sequence_entries(), sequence)?;
+    if let Some(digits) = sequence.params.0.get_mut("digits") {
+        *digits = ParamValue::Name("plain".to_owned());
+    }
     let none = default_variant("decorrelation", &registry.decorrelation_entries(), "none")?;
     let demand = Demand {
         samples: None,

@@ -250,7 +250,7 @@ pub(super) fn bias(bench: &Bench) -> Finding {
     let images = cornell_images(bench, CORNELL)?;
     let check = check_bias(&images, &bench.world.reference, BiasOptions::default());
     let check = check.map_err(|e| CheckError::Other(e.to_string()))?;
-    let z = check.z.unwrap_or(0.0);
+    let z = check.whole.map_or(0.0, |whole| whole.t);
     let rejected = check.rejected.len();
     let tiles = format!("{rejected} of {} tiles rejected, z = {z:.1}", check.tiles);
     match check.verdict {

@@ -2,6 +2,7 @@
 
 mod hits;
 mod images;
+mod projections;
 mod streams;
 
 pub(super) use images::{REFERENCE, cornell_images, plain_path_tracing};
@@ -26,7 +27,7 @@ pub enum Check {
     Stream,
     /// The image of an integrand equals that of the twins to the bit.
     Integrand,
-    /// Star discrepancy and net quality of the stream are those of good points.
+    /// Star discrepancy, net quality and projections of the stream are those of good points.
     Discrepancy,
     /// The mean of an integrand over seeds and pixels is its integral.
     Integral,

@@ -1,22 +1,33 @@
 //! Checks of samplers: words, images of integrands, evenness, means.
 
 use super::super::CheckError;
-use super::super::subject::{Changes, DEMAND, build, sampler};
+use super::super::subject::{Changes, DEMAND, LONG_DEMAND, build, sampler};
 use super::super::world::Stage;
-use super::{Bench, Finding};
+use super::{Bench, Finding, projections};
 use crate::config::Params;
 use crate::discrepancy::{Budget, PointSet, net_quality, star_2d};
 use crate::integrator::integrand::functions;
 use crate::integrator::{Frame, Integrator, RenderJob, Renderer, SceneBuffers, Traced, integrator};
 use crate::measure::image::Image;
 use crate::measure::statistics::{Pcg32, mean, variance};
-use crate::run::dump_stream;
-use crate::sampling::{Coordinate, Sampler, to_unit};
+use crate::measure::words::{Used, compare, dump_stream};
+use crate::sampling::{Coordinate, Demand, Sampler, to_unit};
 
 type Names<'a> = (&'a str, Changes, &'a str);
 
-/// Coordinates whose words are compared.
+/// Coordinates anywhere whose words are compared, besides those that a run would compare.
 const WORDS: usize = 1 << 14;
+/// Seeds of the latter: small ones and every part of a word.
+const SEEDS: [u32; 8] = [
+    0,
+    1,
+    2,
+    9001,
+    0x0001_0000,
+    0x00ab_cdef,
+    0x8000_0000,
+    u32::MAX,
+];
 /// Points whose evenness is measured: all that the samplers are made for.
 const POINTS: u32 = 1024;
 /// Samples per pixel of the image that is compared with the twins', and its edge.
@@ -32,41 +43,41 @@ const UNBIASED: [&str; 3] = ["cranley-patterson", "digital-shift", "owen-hash"];
 /// The smooth function that images show.
 const INTEGRAND: &str = "integrand:exponential";
 
-fn make(bench: &Bench, (sequence, changes, decorrelation): Names) -> Result<Sampler, CheckError> {
-    sampler((sequence, changes), decorrelation, &DEMAND, bench.plant)
+fn make(bench: &Bench, names: Names, demand: &Demand) -> Result<Sampler, CheckError> {
+    let (sequence, changes, decorrelation) = names;
+    sampler((sequence, changes), decorrelation, demand, bench.plant)
 }
 
-/// Words at random coordinates and at small ones, against the twin.
+/// Words that a long run would use and words at coordinates anywhere, against the twin.
 pub(super) fn same_words(bench: &Bench, names: Names) -> Finding {
-    let sampler = make(bench, names)?;
-    let mut random = Pcg32::new(11);
-    let coordinate = |i: usize| {
-        let mut number = |most: u32| match random.below(8) {
-            0 => 0,
-            1 => most,
-            _ => random.below(most as usize + 1) as u32,
-        };
-        let (pixels, seeds) = if i.is_multiple_of(2) {
-            (4096, 16)
-        } else {
-            (u32::MAX, u32::MAX)
-        };
-        Coordinate {
-            pixel: number(pixels),
-            sample: number(POINTS - 1),
-            dimension: number(sampler.demand.dimensions - 1),
-            seed: number(seeds),
-        }
+    let sampler = make(bench, names, &LONG_DEMAND)?;
+    let Demand {
+        samples,
+        dimensions,
+        width,
+    } = sampler.demand;
+    let (samples, width) = (samples.unwrap_or(1), width.unwrap_or(1));
+    let used = Used {
+        samples,
+        dimensions,
+        size: [width, width],
+        seeds: SEEDS.into(),
     };
-    let coordinates: Vec<Coordinate> = (0..WORDS).map(coordinate).collect();
+    let mut random = Pcg32::new(11);
+    let mut number = |most: u32| match random.below(8) {
+        0 => 0,
+        1 => most,
+        _ => random.below(most as usize + 1) as u32,
+    };
+    let mut coordinates = used.coordinates();
+    coordinates.extend((0..WORDS).map(|_| Coordinate {
+        pixel: number(u32::MAX),
+        sample: number(samples - 1),
+        dimension: number(dimensions - 1),
+        seed: number(u32::MAX),
+    }));
     let words = dump(bench, &sampler, &coordinates)?;
-    let differs = |(at, word): &(&Coordinate, &u32)| sampler.sample_u32(**at) != **word;
-    let wrong: Vec<_> = coordinates.iter().zip(&words).filter(differs).collect();
-    Ok(wrong.first().map(|(at, word)| {
-        let expected = sampler.sample_u32(**at);
-        let count = wrong.len();
-        format!("{count} of {WORDS} words differ; first: {at:?}: twin {expected:#010x}, kernel {word:#010x}")
-    }))
+    Ok(compare(&sampler, &coordinates, &words).err())
 }
 
 fn dump(bench: &Bench, sampler: &Sampler, at: &[Coordinate]) -> Result<Vec<u32>, CheckError> {
@@ -101,7 +112,7 @@ fn images(bench: &Bench, sampler: &Sampler, seeds: &[u32]) -> Result<Vec<Image>,
 
 /// The image of the integrand against that of the twins: sums of floats in the same order.
 pub(super) fn same_image(bench: &Bench, names: Names) -> Finding {
-    let sampler = make(bench, names)?;
+    let sampler = make(bench, names, &DEMAND)?;
     let name = INTEGRAND.trim_start_matches("integrand:");
     let known = functions().into_iter().find(|(n, _)| *n == name);
     let unknown = || CheckError::Stale(format!("there is no integrand `{name}`"));
@@ -131,11 +142,12 @@ pub(super) fn same_image(bench: &Bench, names: Names) -> Finding {
 }
 
 /// D* of 1024 points of a pixel is at most 1.5 log2(N) / N where the sequence promises low discrepancy
-/// (random points have about twice as much), and digital points in base 2 are a (0, m, 2)-net.
+/// (random points have about twice as much), digital points in base 2 are a (0, m, 2)-net, and the
+/// projections of all dimensions are sound.
 pub(super) fn discrepancy(bench: &Bench, names: Names) -> Finding {
-    let sampler = make(bench, names)?;
+    let sampler = make(bench, names, &DEMAND)?;
     let facts = sampler.sequence.facts(&sampler.sequence_variant.params);
-    if facts.independent {
+    if facts.independent && !facts.base_2 {
         return Ok(None);
     }
     let at = |k: u32| Coordinate {
@@ -165,12 +177,17 @@ pub(super) fn discrepancy(bench: &Bench, names: Names) -> Finding {
             return Ok(Some(format!("a ({}, {}, 2)-net, not t = 0", net.t, net.m)));
         }
     }
-    Ok(None)
+    if let Some(fault) = projections::fault(&sampler, POINTS) {
+        return Ok(Some(fault));
+    }
+    let long = make(bench, names, &LONG_DEMAND)?;
+    let keeps = facts.base_2 && KEEP_NETS.contains(&long.decorrelation.name());
+    Ok(keeps.then(|| projections::fault_of_axes(&long)).flatten())
 }
 
 /// The mean of the integrand over replicates, where that must be the integral.
 pub(super) fn integral(bench: &Bench, names: Names) -> Finding {
-    let sampler = make(bench, names)?;
+    let sampler = make(bench, names, &DEMAND)?;
     let facts = sampler.sequence.facts(&sampler.sequence_variant.params);
     if !(facts.random || UNBIASED.contains(&sampler.decorrelation.name())) {
         return Ok(None);

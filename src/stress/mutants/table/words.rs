@@ -185,6 +185,38 @@ pub fn repeat_point(table: &mut [u32]) -> usize {
     copy(table, HEADER + 3, HEADER + 1) + copy(table, HEADER + 4, HEADER + 2)
 }
 
+/// Column 15 of dimension 20 becomes that of column 14: no sooner than at sample 32768.
+pub fn repeat_late_direction_number(table: &mut [u32]) -> usize {
+    let first = HEADER + 20 * 32;
+    copy(table, first + 15, first + 14)
+}
+
+/// Base 127 is that of dimension 30: its digit 100 becomes what 101 becomes.
+pub fn repeat_late_digit(table: &mut [u32]) -> usize {
+    let first = table
+        .get(HEADER + 61)
+        .map_or(usize::MAX / 2, |&w| HEADER + w as usize);
+    copy(table, first + 100, first + 101)
+}
+
+/// Dimension 40 takes the base of dimension 39.
+pub fn repeat_late_base(table: &mut [u32]) -> usize {
+    copy(table, HEADER + 80, HEADER + 78)
+}
+
+/// Dimension 19 takes the component of dimension 18.
+pub fn repeat_late_component(table: &mut [u32]) -> usize {
+    copy(table, HEADER + 19, HEADER + 18)
+}
+
+/// The ninth set of points is the first one.
+pub fn repeat_set(table: &mut [u32]) -> usize {
+    let words = 2 * (table.get(HEADER).map_or(0, |&last| last as usize) + 1);
+    let first = HEADER + 1;
+    let changed = (0..words).map(|i| copy(table, first + 8 * words + i, first + i));
+    changed.sum()
+}
+
 /// Overwrites word `to` by word `from`; 1 if that changes anything.
 fn copy(table: &mut [u32], to: usize, from: usize) -> usize {
     match (table.get(to).copied(), table.get(from).copied()) {

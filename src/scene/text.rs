@@ -1,0 +1,83 @@
+//! Text formats as the wild has them: a byte order mark, lines that end in `\r` alone or go on after a
+//! `\`, names in Latin-1.
+
+/// Text in UTF-8 whose lines end in `\n` and that begins with no byte order mark. A line that ends in
+/// `\`, unless it is a comment, goes on in the next; empty lines in place of the joined ones keep the
+/// numbers of all others. Bytes that are no UTF-8 become U+FFFD: they stand in names only.
+pub(super) fn normalised(mut bytes: Vec<u8>) -> String {
+    let mut from = if bytes.starts_with(b"\xef\xbb\xbf") {
+        3
+    } else {
+        0
+    };
+    // Writing never overtakes reading: what is written is at most as long as what was read.
+    let (mut to, mut line, mut joined) = (0, 0, 0);
+    while from < bytes.len() {
+        let length = line_end(&bytes, from);
+        match bytes[from] {
+            b'\\' if line_end(&bytes, from + 1) > 0 && !is_comment(&bytes[line..to]) => {
+                bytes[to] = b' ';
+                to += 1;
+                joined += 1;
+                from += 1 + line_end(&bytes, from + 1);
+            }
+            _ if length > 0 => {
+                let end = to + 1 + joined;
+                bytes[to..end].fill(b'\n');
+                (to, line, joined) = (end, end, 0);
+                from += length;
+            }
+            byte => {
+                bytes[to] = byte;
+                to += 1;
+                from += 1;
+            }
+        }
+    }
+    bytes.truncate(to);
+    String::from_utf8(bytes)
+        .unwrap_or_else(|error| String::from_utf8_lossy(error.as_bytes()).into_owned())
+}
+
+/// Bytes of the line end at `at`: 0 if there is none.
+fn line_end(bytes: &[u8], at: usize) -> usize {
+    match (bytes.get(at), bytes.get(at + 1)) {
+        (Some(b'\r'), Some(b'\n')) => 2,
+        (Some(b'\r' | b'\n'), _) => 1,
+        _ => 0,
+    }
+}
+
+fn is_comment(line: &[u8]) -> bool {
+    line.trim_ascii_start().starts_with(b"#")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_line_ends_and_continuations_become_plain_lines() {
+        for (given, expected) in [
+            (&b"\xef\xbb\xbfmtllib a.mtl\n"[..], "mtllib a.mtl\n"),
+            (b"v 1\rv 2\r\nv 3\n\rv 4", "v 1\nv 2\nv 3\n\nv 4"),
+            (b"f 1 \\\n2 \\\r\n3\nf 4\n", "f 1  2  3\n\n\nf 4\n"),
+            (b"f 1 \\\r2\rf 3\r", "f 1  2\n\nf 3\n"),
+            (b"map_Kd a\\b.png\n", "map_Kd a\\b.png\n"),
+            (b" # c:\\models\\\nv 1\n", " # c:\\models\\\nv 1\n"),
+            (b"f 1 2 \\", "f 1 2 \\"),
+            (b"f 1 2 \\\n", "f 1 2  "),
+            (b"\\\n\\\n\\\n", "   "),
+            (b"usemtl M\xfcll\n", "usemtl M\u{fffd}ll\n"),
+            (b"", ""),
+        ] {
+            assert_eq!(normalised(given.to_vec()), expected);
+        }
+    }
+
+    #[test]
+    fn numbers_of_lines_are_kept() {
+        let text = normalised(b"# one\r\nf 1 \\\n 2\\\n 3\nbroken\n".to_vec());
+        assert_eq!(text.lines().position(|line| line == "broken"), Some(4));
+    }
+}

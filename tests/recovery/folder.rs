@@ -1,0 +1,255 @@
+//! The folder of a run through the program: reruns, kills, signals, two runs at once, odd names.
+
+use raystone::measure::record::{Line, Record};
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// Longer than any step of the tiny experiment takes, on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+fn program(out: &Path, more: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_raystone"));
+    command
+        .args(["run", "tests/data/tiny.toml", "--quiet", "--out"])
+        .arg(out)
+        .args(more)
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+fn run(out: &Path, more: &[&str]) -> Output {
+    program(out, more).output().expect("the program starts")
+}
+
+/// A run into a fresh folder that ends well.
+fn whole_run(out: &Path, more: &[&str]) {
+    let output = run(out, more);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Waits until `is_so`; panics if it never is.
+fn wait_until(what: &str, is_so: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !is_so() {
+        assert!(start.elapsed() < PATIENCE, "waited too long: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Starts a run and waits until it has written some records into `partial/`.
+fn started(out: &Path, more: &[&str]) -> Child {
+    let child = program(out, more).spawn().expect("the program starts");
+    let partial = out.join("partial/records.jsonl");
+    wait_until("records", || {
+        std::fs::read_to_string(&partial).is_ok_and(|text| text.lines().count() >= 2)
+    });
+    child
+}
+
+/// Every record of a folder, each line whole.
+fn records(folder: &Path) -> Vec<Record> {
+    let text = std::fs::read_to_string(folder.join("records.jsonl")).expect("records");
+    let parse = |line: &str| serde_json::from_str::<Line>(line).map(|line| line.record);
+    let records: Result<Vec<_>, _> = text.lines().map(parse).collect();
+    records.unwrap_or_else(|e| panic!("{e} in {text}"))
+}
+
+/// The pictures that the records name.
+fn pictures(folder: &Path) -> Vec<PathBuf> {
+    let names = records(folder).into_iter().flat_map(|record| match record {
+        Record::Structure(r) => vec![r.heat_map],
+        Record::Error(r) => vec![r.image, r.error_map],
+        Record::Reference(r) => vec![Some(r.image)],
+        _ => Vec::new(),
+    });
+    names.flatten().map(|name| folder.join(name)).collect()
+}
+
+fn report(folder: &Path) -> String {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_raystone"));
+    let output = command.arg("report").arg(folder).output().expect("a start");
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let words = String::from_utf8_lossy(&output.stdout).into_owned();
+    let page = words.trim().trim_start_matches("report: ").to_owned();
+    std::fs::read_to_string(&page).unwrap_or_else(|e| panic!("{page}: {e}"))
+}
+
+#[test]
+fn results_of_another_run_are_kept_unless_force_replaces_them() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("run");
+    whole_run(&out, &[]);
+    let before = std::fs::read(out.join("records.jsonl")).expect("records");
+    let number = pictures(&out).len();
+    assert!(number >= 5, "{number} pictures");
+
+    let refused = run(&out, &[]);
+    assert_eq!(refused.status.code(), Some(2));
+    let words = stderr(&refused);
+    assert!(
+        words.contains("records.jsonl") && words.contains("--force"),
+        "{words}"
+    );
+
+    // Killed at the worst moments: everything of the earlier run is as it was.
+    for _ in 0..2 {
+        let mut child = started(&out, &["--force"]);
+        child.kill().expect("a kill");
+        child.wait().expect("an end");
+        let kept = std::fs::read(out.join("records.jsonl")).expect("records");
+        assert!(kept == before, "the records changed");
+        assert!(pictures(&out).iter().all(|picture| picture.is_file()));
+        assert!(!records(&out.join("partial")).is_empty());
+    }
+    assert!(report(&out.join("partial")).contains("did not finish"));
+
+    whole_run(&out, &["--number"]);
+    assert_eq!(pictures(&folder.path().join("run-2")).len(), number);
+    whole_run(&out, &["--force"]);
+    assert!(std::fs::read(out.join("records.jsonl")).expect("records") != before);
+    let replaced = pictures(&out);
+    assert!(replaced.len() == number && replaced.iter().all(|picture| picture.is_file()));
+    assert!(!out.join("partial").exists() && !out.join("images").exists());
+    assert!(!report(&out).contains("is missing"));
+}
+
+#[test]
+fn what_a_killed_run_measured_can_be_read_and_is_not_thrown_away() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut child = started(folder.path(), &[]);
+    child.kill().expect("a kill");
+    child.wait().expect("an end");
+    assert!(report(folder.path()).contains("did not finish"));
+    let refused = run(folder.path(), &[]);
+    assert_eq!(refused.status.code(), Some(2), "{}", stderr(&refused));
+    assert!(stderr(&refused).contains("partial"), "{}", stderr(&refused));
+}
+
+#[test]
+fn of_two_runs_into_one_folder_the_second_ends_at_once() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let first = started(folder.path(), &[]);
+    for more in [&[][..], &["--force"]] {
+        let second = run(folder.path(), more);
+        assert_eq!(second.status.code(), Some(2));
+        let words = stderr(&second);
+        assert!(words.contains("another run is writing"), "{words}");
+    }
+    let first = first.wait_with_output().expect("an end");
+    assert_eq!(first.status.code(), Some(0), "{}", stderr(&first));
+    let lines = records(folder.path());
+    let ends = lines.iter().filter(|r| matches!(r, Record::Finished(_)));
+    assert_eq!(ends.count(), 1);
+    assert!(matches!(lines.last(), Some(Record::Finished(_))));
+}
+
+#[cfg(unix)]
+#[test]
+fn signals_end_a_run_with_its_records_and_a_report() {
+    for (signal, code) in [("INT", 130), ("TERM", 143)] {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let child = started(folder.path(), &[]);
+        send(signal, &child);
+        let ended = child.wait_with_output().expect("an end");
+        let words = stderr(&ended);
+        assert_eq!(ended.status.code(), Some(code), "{words}");
+        assert!(words.contains("report so far"), "{words}");
+        match records(folder.path()).last() {
+            Some(Record::Interrupted(end)) => assert_eq!(end.reason, format!("SIG{signal}")),
+            other => panic!("the last record is {other:?}"),
+        }
+        let page = std::fs::read_to_string(folder.path().join("index.html")).expect("a page");
+        assert!(page.contains("The run was interrupted"));
+        assert!(!folder.path().join("partial").exists());
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_rerun_leaves_the_earlier_results() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    whole_run(folder.path(), &["--set", "axes.accel=bvh"]);
+    let before = std::fs::read(folder.path().join("records.jsonl")).expect("records");
+    let child = started(folder.path(), &["--force"]);
+    send("INT", &child);
+    send("INT", &child);
+    let ended = child.wait_with_output().expect("an end");
+    assert_eq!(ended.status.code(), Some(130), "{}", stderr(&ended));
+    let after = std::fs::read(folder.path().join("records.jsonl")).expect("records");
+    assert!(before == after);
+    assert!(!records(&folder.path().join("partial")).is_empty());
+}
+
+#[cfg(unix)]
+fn send(signal: &str, child: &Child) {
+    let sent = Command::new("kill")
+        .args([format!("-{signal}"), child.id().to_string()])
+        .status();
+    assert!(sent.is_ok_and(|status| status.success()), "no signal sent");
+}
+
+/// A model below folders with long names, as `tests/data/tiny.toml` takes it.
+fn model(path: &Path) -> String {
+    std::fs::create_dir_all(path.parent().expect("a folder")).expect("folders");
+    std::fs::write(path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("a model");
+    format!("axes.scene=['{}']", path.display())
+}
+
+#[test]
+fn long_labels_and_names_that_differ_in_case_have_pictures_of_their_own() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let deep = folder.path().join("x".repeat(200)).join("y".repeat(200));
+    let [upper, lower] = ["Scene.obj", "scene.obj"].map(|name| deep.join(name));
+    model(&upper);
+    let scenes = model(&lower).replace("=[", &format!("=['{}', ", upper.display()));
+    let out = folder.path().join("run");
+    whole_run(&out, &["--set", &scenes]);
+    let names = pictures(&out);
+    let distinct: std::collections::BTreeSet<String> = names
+        .iter()
+        .map(|name| name.to_string_lossy().to_lowercase())
+        .collect();
+    assert!(
+        names.len() >= 10 && distinct.len() == names.len(),
+        "{names:?}"
+    );
+    assert!(names.iter().all(|picture| picture.is_file()));
+}
+
+#[test]
+fn a_picture_that_cannot_be_written_is_a_warning() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut child = program(folder.path(), &[]).spawn().expect("a start");
+    let images = folder.path().join("partial/images");
+    wait_until("images", || images.is_dir());
+    std::fs::remove_dir(&images).expect("an empty folder");
+    std::fs::write(&images, "in the way").expect("a file");
+    let status = child.wait().expect("an end");
+    let mut words = String::new();
+    let mut stderr = child.stderr.take().expect("a pipe");
+    stderr.read_to_string(&mut words).expect("text");
+    assert_eq!(status.code(), Some(0), "{words}");
+    assert!(
+        words.contains("warning: ") && words.contains("heat"),
+        "{words}"
+    );
+    let lines = records(folder.path());
+    let warnings = lines.iter().filter(|r| matches!(r, Record::Warning(_)));
+    assert!(warnings.count() >= 5);
+    assert!(
+        lines
+            .iter()
+            .any(|r| matches!(r, Record::Time(t) if t.failure.is_none()))
+    );
+    let page = std::fs::read_to_string(folder.path().join("index.html")).expect("a page");
+    assert!(page.contains("warning"));
+}
