@@ -31,9 +31,10 @@ impl AccelKind for BruteForce {
     fn build(
         &self,
         soup: &TriangleSoup,
-        _: &Params,
+        params: &Params,
         _: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        params.completed(&self.parameters())?;
         Ok(Box::new(Built {
             triangles: soup.records.len() as u32,
         }))
@@ -85,6 +86,7 @@ struct Twin<'a> {
 
 impl CpuTwin for Twin<'_> {
     fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
+        let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         for triangle in &self.soup.records {
@@ -95,6 +97,7 @@ impl CpuTwin for Twin<'_> {
     }
 
     fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         for triangle in &self.soup.records {
@@ -198,6 +201,7 @@ pub fn brute_force_hits(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
             for (tile, blocks) in blocks.chunks(TILE_BLOCKS).enumerate() {
                 let pairs = rays.iter().zip(hits.iter_mut());
                 for (ray, hit) in pairs.filter(|(ray, _)| ray.is_ray()) {
+                    let ray = &soup.intersection.raised(ray);
                     let inverse = soup.intersection.inverse(ray.direction);
                     for (index, block) in blocks.iter().enumerate() {
                         let mut mask = block.candidates(ray, &inverse);
