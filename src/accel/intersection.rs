@@ -130,6 +130,15 @@ impl Intersection {
         })
     }
 
+    /// Whether the gate asks hard rays: with triangle tests that are not watertight the oracle's bounds and
+    /// the cells of grids say nothing of rays in planes of triangles, and with boxes padded by less than the
+    /// proof needs hits are lost by intention.
+    pub fn bears_hard_rays(&self) -> bool {
+        let watertight = [TriangleTest::Watertight, TriangleTest::Compensated];
+        let padded = self.box_test.finite && self.box_test.pad_ulps >= BoxTest::PROVEN_ULPS;
+        padded && watertight.contains(&self.triangle)
+    }
+
     /// Whether an adapter keeps this choice.
     ///
     /// # Errors

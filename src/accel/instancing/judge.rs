@@ -1,7 +1,7 @@
 //! The truth for structures that transform rays: every instance is looked at, whatever its world box.
 
 use super::super::bounds::{Bounds, enter_box};
-use super::super::triangle::{TriangleRecord, intersect_triangle};
+use super::super::brute_force::EveryTriangle;
 use super::super::{
     AccelError, BuildLog, BuiltAccel, BuiltBvh, Counters, CpuTwin, Hit, NO_HIT, Ray, TriangleSoup,
 };
@@ -12,19 +12,15 @@ use rayon::prelude::*;
 
 /// Nearest hits by testing every triangle of every instance, in parallel over the rays.
 pub fn brute_force_instances(placed: &Placed, rays: &[Ray]) -> Vec<Hit> {
+    let object = |soup| EveryTriangle::new(soup, true);
+    let objects: Vec<_> = placed.objects.iter().map(object).collect();
     let closest = |ray: &Ray| {
         let mut hit = Hit::miss(ray);
-        if !ray.is_ray() {
-            return hit;
-        }
-        for instance in &placed.instances {
-            let object = &placed.objects[instance.object as usize];
-            let tests = object.intersection;
-            let local = tests.raised(&object_ray(instance, &tests.raised(ray)));
-            let inverse = tests.inverse(local.direction);
-            for record in &object.records {
-                let id = record.id + instance.first;
-                intersect_triangle(&TriangleRecord { id, ..*record }, &local, inverse, &mut hit);
+        if ray.is_ray() {
+            for instance in &placed.instances {
+                let tests = placed.objects[instance.object as usize].intersection;
+                let local = object_ray(instance, &tests.raised(ray));
+                objects[instance.object as usize].intersect(&local, instance.first, &mut hit);
             }
         }
         hit

@@ -4,6 +4,7 @@
 
 mod cornell_box;
 mod displaced_sphere;
+mod far_corners;
 mod furnace;
 mod instances;
 pub(super) mod numeric;
@@ -26,7 +27,7 @@ struct Builtin {
 }
 
 /// The registry.
-const BUILTINS: [Builtin; 8] = [
+const BUILTINS: [Builtin; 9] = [
     cornell_box::SCENE,
     displaced_sphere::SCENE,
     triangle_soup::SCENE,
@@ -35,6 +36,7 @@ const BUILTINS: [Builtin; 8] = [
     furnace::FURNACE_BOX,
     furnace::WHITE_FURNACE,
     single_triangle::SCENE,
+    far_corners::SCENE,
 ];
 
 /// The built-in scenes with their parameters, for the parser, lists and docs.
