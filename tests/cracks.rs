@@ -32,9 +32,13 @@ fn sphere(seam: f64) -> Vec<Triangle> {
     let clean = |x: f64| if x.abs() < 1e-9 { seam } else { x };
     let point = |i: usize, j: usize| {
         let (polar, around) = (turn(i, BANDS), turn(j % (2 * BANDS), BANDS));
-        let across = if i % BANDS == 0 { seam } else { polar.sin() };
+        let across = if i.is_multiple_of(BANDS) {
+            seam
+        } else {
+            polar.sin()
+        };
         let p = DVec3::new(across * around.cos(), across * around.sin(), polar.cos());
-        let p = if i % BANDS == 0 {
+        let p = if i.is_multiple_of(BANDS) {
             DVec3::new(seam, seam, p.z)
         } else {
             p

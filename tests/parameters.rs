@@ -128,7 +128,7 @@ fn a_sampler_completes_its_parameters_and_refuses_what_it_does_not_know() {
         for (params, name) in hostile(&decorrelation.schema) {
             let moved = variant(&decorrelation.name, params);
             let error = registry.is_random(&plain("halton"), &moved);
-            let error = error.err().expect("an error").to_string();
+            let error = error.expect_err("an error").to_string();
             assert!(error.contains(&format!("`{name}`")), "{error}");
         }
     }
@@ -149,7 +149,7 @@ fn a_built_in_scene_completes_its_parameters_and_refuses_what_it_does_not_know()
             entry.name
         );
         for (params, name) in hostile(&entry.schema) {
-            let error = load(params).err().expect("an error").to_string();
+            let error = load(params).expect_err("an error").to_string();
             assert!(error.contains(&format!("`{name}`")), "{error}");
         }
         scenes += 1;
