@@ -343,7 +343,9 @@ fn the_gate_judges_each_structure_in_its_space_and_sees_the_difference() {
     // The flat judge would call instances wrong, bit for bit; as ties none of it is hidden.
     let rounded = judge.sets.iter().zip(&over_instances.sets);
     let wrong = rounded.map(|(flat, set)| {
-        let found: Vec<bool> = set.truth.iter().map(|h| h.triangle != NO_HIT).collect();
+        let found: Vec<_> = (set.truth.iter())
+            .map(|h| Some(h.triangle != NO_HIT))
+            .collect();
         compare(flat, &set.truth, &found, &stage.soup, Space::World, true).wrong
     });
     let wrong: usize = wrong.sum();
@@ -364,7 +366,7 @@ fn a_tie_over_instances_allows_what_rounding_the_transform_can_do_and_no_more() 
     };
     let verdict = |t: f32| {
         let hit = Hit { t, ..hits[index] };
-        let verdict = compare(&set, &[hit], &[true], &soup, Space::Instances, false);
+        let verdict = compare(&set, &[hit], &[Some(true)], &soup, Space::Instances, false);
         (verdict.ties, verdict.wrong)
     };
     let t = hits[index].t;

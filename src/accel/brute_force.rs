@@ -10,6 +10,7 @@ use super::{
 };
 use crate::config::{ParameterSchema, Params};
 use crate::measure::record::StructureStats;
+use crate::oracle::{GROUP, Groups, Line};
 use rayon::prelude::*;
 
 /// The registry entry.
@@ -31,9 +32,10 @@ impl AccelKind for BruteForce {
     fn build(
         &self,
         soup: &TriangleSoup,
-        _: &Params,
+        params: &Params,
         _: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        params.completed(&self.parameters())?;
         Ok(Box::new(Built {
             triangles: soup.records.len() as u32,
         }))
@@ -85,6 +87,7 @@ struct Twin<'a> {
 
 impl CpuTwin for Twin<'_> {
     fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
+        let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         for triangle in &self.soup.records {
@@ -95,6 +98,7 @@ impl CpuTwin for Twin<'_> {
     }
 
     fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         for triangle in &self.soup.records {
@@ -108,11 +112,10 @@ impl CpuTwin for Twin<'_> {
     }
 }
 
-/// Triangles side by side, so that the compiler tests several at once.
-const LANES: usize = 16;
-/// Blocks of triangles that stay in the cache while a chunk of rays passes over them.
-const TILE_BLOCKS: usize = 64;
-const RAY_CHUNK: usize = 64;
+/// Triangles side by side, so that the compiler tests several at once: a group of neighbours.
+const LANES: usize = GROUP;
+/// From so many rays on it pays to bring neighbours together.
+const MANY: usize = 256;
 
 /// `LANES` triangles, vertex by vertex and component by component; missing ones are degenerate.
 struct Block {
@@ -120,12 +123,11 @@ struct Block {
 }
 
 impl Block {
-    fn new(records: &[TriangleRecord]) -> Self {
+    fn new(records: &[TriangleRecord], ids: &[u32]) -> Self {
         let lanes = |vertex: usize, axis: usize| {
             std::array::from_fn(|lane| {
-                records
-                    .get(lane)
-                    .map_or(0.0, |r| r.vertices()[vertex][axis])
+                let record = ids.get(lane).and_then(|id| records.get(*id as usize));
+                record.map_or(0.0, |r| r.vertices()[vertex][axis])
             })
         };
         Self {
@@ -188,30 +190,67 @@ fn mask(inside: [u32; LANES]) -> u32 {
     lanes.fold(0, |mask, (lane, bit)| mask | bit << lane)
 }
 
-/// Nearest hits of many rays by testing every triangle, on all cores: what judges are judged by.
-pub fn brute_force_hits(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
-    let blocks: Vec<Block> = soup.records.chunks(LANES).map(Block::new).collect();
-    let mut hits: Vec<Hit> = rays.iter().map(Hit::miss).collect();
-    hits.par_chunks_mut(RAY_CHUNK)
-        .zip(rays.par_chunks(RAY_CHUNK))
-        .for_each(|(hits, rays)| {
-            for (tile, blocks) in blocks.chunks(TILE_BLOCKS).enumerate() {
-                let pairs = rays.iter().zip(hits.iter_mut());
-                for (ray, hit) in pairs.filter(|(ray, _)| ray.is_ray()) {
-                    let inverse = soup.intersection.inverse(ray.direction);
-                    for (index, block) in blocks.iter().enumerate() {
-                        let mut mask = block.candidates(ray, &inverse);
-                        while mask != 0 {
-                            let lane = mask.trailing_zeros() as usize;
-                            mask &= mask - 1;
-                            let id = (tile * TILE_BLOCKS + index) * LANES + lane;
-                            if let Some(triangle) = soup.records.get(id) {
-                                intersect_triangle(triangle, ray, inverse, hit);
-                            }
-                        }
+/// Every triangle of a soup, ready to be tested: what judges are judged by.
+///
+/// A triangle is passed over only if its test cannot accept it. Hits are clamped into the slabs of the
+/// triangle's box, so the slabs of a wider box around its group, widened further, hold every hit; what is
+/// left has to pass the sign tests by the same products as the test; and the test itself decides.
+pub struct EveryTriangle<'a> {
+    soup: &'a TriangleSoup,
+    groups: Groups,
+    blocks: Vec<Block>,
+}
+
+impl<'a> EveryTriangle<'a> {
+    /// `many` rays are worth the time that it takes to put triangles in order.
+    pub fn new(soup: &'a TriangleSoup, many: bool) -> Self {
+        let records = &soup.records;
+        let groups = Groups::new(records.len(), many, |id| records[id].vertices());
+        let block = |group| Block::new(records, groups.members(group));
+        Self {
+            soup,
+            blocks: (0..groups.len()).into_par_iter().map(block).collect(),
+            groups,
+        }
+    }
+
+    /// Tests all triangles, whose indices count from `first`; a nearer hit replaces `hit`.
+    pub fn intersect(&self, ray: &Ray, first: u32, hit: &mut Hit) {
+        let ray = &self.soup.intersection.raised(ray);
+        let inverse = self.soup.intersection.inverse(ray.direction);
+        // With infinite reciprocals nothing can be said of a slab.
+        let bounded = self.soup.intersection.box_test.finite;
+        let line = match bounded {
+            true => Line::new(ray.origin, *inverse, [ray.t_min, hit.t]),
+            false => Line::new([0.0; 3], [0.0; 3], [f32::NEG_INFINITY, f32::INFINITY]),
+        };
+        self.groups.visit(&line, |group| {
+            if let Some(block) = self.blocks.get(group) {
+                let mut mask = block.candidates(ray, &inverse);
+                while mask != 0 {
+                    let lane = mask.trailing_zeros() as usize;
+                    mask &= mask - 1;
+                    if let Some(&index) = self.groups.members(group).get(lane) {
+                        let record = &self.soup.records[index as usize];
+                        let id = record.id + first;
+                        intersect_triangle(&TriangleRecord { id, ..*record }, ray, inverse, hit);
                     }
                 }
             }
+            if bounded { hit.t } else { f32::INFINITY }
         });
-    hits
+    }
+}
+
+/// Nearest hits of many rays by testing every triangle, on all cores.
+pub fn brute_force_hits(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
+    let all = EveryTriangle::new(soup, rays.len() >= MANY);
+    let closest = |ray: &Ray| {
+        let mut hit = Hit::miss(ray);
+        if ray.is_ray() {
+            all.intersect(ray, 0, &mut hit);
+        }
+        hit
+    };
+    rays.par_iter().map(closest).collect()
 }

@@ -260,7 +260,7 @@ pub fn enter_four(near: [u32; 3], frame: &Frame, t_min: f32) -> [f32; 4] {
         std::array::from_fn(|axis| planes(near[axis], frame.scale[axis], frame.near[axis]));
     std::array::from_fn(|i| {
         let [x, y, z] = distances.map(|d| d[i]);
-        later(later(later(x, y), z), t_min)
+        later(later(later(x, y), z), t_min.abs())
     })
 }
 

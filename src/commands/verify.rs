@@ -194,15 +194,24 @@ fn table(verified: &[Verified]) -> String {
         }
     }
     let legend = "brute force: the judge against it, wrong of rays; \
-                  oracle: the judge against double precision, agree / ambiguous / wrong\n";
+                  oracle: the judge against double precision, agree / ambiguous / wrong; \
+                  kept: found on disk, checked before\n";
     format!("{}{legend}{details}", table.text())
 }
 
 /// The rows of one structure; names and the judge's own checks stand in the first.
 fn rows(table: &mut Table, head: Vec<String>, verdict: &GateVerdict) {
     let brute_force = &verdict.brute_force;
+    let kept = match brute_force.reused_unix_s {
+        Some(_) => " (kept)",
+        None => "",
+    };
     let judge = [
-        format!("{} of {}", brute_force.wrong, grouped(brute_force.rays)),
+        format!(
+            "{} of {}{kept}",
+            brute_force.wrong,
+            grouped(brute_force.rays)
+        ),
         oracle(&verdict.oracle),
     ];
     for (i, class) in verdict.classes.iter().enumerate() {
@@ -224,6 +233,7 @@ fn counts(class: &ClassVerdict) -> [String; 4] {
         RayClass::Ao => "ao",
         RayClass::Bounce => "bounce",
         RayClass::Chord => "chord",
+        RayClass::Hard => "hard",
     };
     let [rays, wrong, ties] = [class.rays, class.wrong, class.ties].map(grouped);
     [name.to_owned(), rays, wrong, ties]
@@ -252,7 +262,12 @@ fn faults(verdict: &Result<GateVerdict, String>) -> Vec<String> {
         .kernel_errors
         .iter()
         .map(|error| format!("kernel: {error}"));
-    wrong.chain(structural).chain(kernel).collect()
+    let elsewhere = verdict.elsewhere.iter().cloned();
+    wrong
+        .chain(structural)
+        .chain(kernel)
+        .chain(elsewhere)
+        .collect()
 }
 
 #[cfg(test)]
@@ -281,16 +296,17 @@ mod tests {
             }],
             brute_force: JudgeCheck {
                 rays: 2000,
-                wrong: 0,
-                ambiguous: 0,
+                ..JudgeCheck::default()
             },
             oracle: JudgeCheck {
                 rays: 2048,
                 wrong: 1,
                 ambiguous: 7,
+                ..JudgeCheck::default()
             },
             kernel_errors: Vec::new(),
             structural: None,
+            elsewhere: None,
         }
     }
 

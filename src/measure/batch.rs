@@ -29,6 +29,13 @@ impl Query {
     }
 }
 
+/// What stands in the output before a trace; no answer of either query begins with it (as a distance it is
+/// NaN), so that a ray which a dispatch leaves out is seen.
+const POISON: u32 = 0xffff_dead;
+
+/// Workgroups in a row of [`Batch::trace_in_rows`].
+const NARROW_ROW: u32 = 3;
+
 /// No dispatch should run longer than this.
 const SLICE_MS: f64 = 250.0;
 /// Rays of the first dispatch through an unknown structure: few, it may be brute force over a million
@@ -41,8 +48,12 @@ pub struct Batch<'a> {
     pipeline: Arc<Pipeline>,
     bindings: Bindings,
     output: wgpu::Buffer,
+    /// As large as `output`, copied over it before each trace.
+    poison: wgpu::Buffer,
     status: wgpu::Buffer,
     rays: u32,
+    /// Most workgroups in a row.
+    row: std::cell::Cell<u32>,
     /// Rays per dispatch, grown until a dispatch takes about [`SLICE_MS`].
     slice: std::cell::Cell<u32>,
 }
@@ -77,6 +88,7 @@ impl<'a> Batch<'a> {
         let pipeline = gpu.pipeline(&bindings.compose(composition), runtime_checks)?;
         let bytes_per_ray = if counters { 32 } else { 16 };
         let output = gpu.zeroed("hits", rays.len() as u64 * bytes_per_ray)?;
+        let poison = gpu.storage("poison", &vec![POISON; output.size() as usize / 4])?;
         let status = gpu.zeroed("status", 64)?;
         bindings
             .buffer("rays", &gpu.storage("rays", rays)?)
@@ -88,8 +100,10 @@ impl<'a> Batch<'a> {
             pipeline,
             bindings,
             output,
+            poison,
             status,
             rays: rays.len() as u32,
+            row: std::cell::Cell::new(u32::MAX),
             slice,
         })
     }
@@ -110,11 +124,13 @@ impl<'a> Batch<'a> {
         &self.pipeline.kernel.wgsl
     }
 
-    /// Traces all rays, in as many dispatches as needed to keep each short.
+    /// Traces all rays, in as many dispatches as needed to keep each short. Answers of earlier traces are
+    /// wiped out before the clock starts; the error word is kept.
     ///
     /// # Errors
     /// The device is lost, hangs, or the driver complains.
     pub fn trace(&self) -> Result<Elapsed, GpuError> {
+        self.wipe()?;
         let mut total = Elapsed {
             gpu_ms: self.gpu.timestamp_period.map(|_| 0.0),
             wall_ms: 0.0,
@@ -134,6 +150,25 @@ impl<'a> Batch<'a> {
         Ok(total)
     }
 
+    fn wipe(&self) -> Result<(), GpuError> {
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(&self.poison, 0, &self.output, 0, self.output.size());
+        self.gpu.queue.submit([encoder.finish()]);
+        self.gpu.wait()
+    }
+
+    /// Traces all rays again in dispatches of narrow rows of workgroups, as dispatches of millions of rays
+    /// are cut by the limit on a row.
+    ///
+    /// # Errors
+    /// The device is lost, hangs, or the driver complains.
+    pub fn trace_in_rows(&self) -> Result<(), GpuError> {
+        self.row.set(NARROW_ROW);
+        let traced = self.trace();
+        self.row.set(u32::MAX);
+        traced.map(|_| ())
+    }
+
     /// A dispatch that traces nothing: the fixed cost of a measurement.
     ///
     /// # Errors
@@ -148,10 +183,14 @@ impl<'a> Batch<'a> {
             "batch",
             UniformValues::new().u32("first", first).u32("count", count),
         );
+        let [mut x, mut y, z] = groups_for(count);
+        if x > self.row.get() {
+            (x, y) = (self.row.get(), y * x.div_ceil(self.row.get()));
+        }
         self.gpu.run(&Dispatch {
             pipeline: &self.pipeline,
             bindings: &bindings,
-            groups: groups_for(count),
+            groups: [x, y, z],
         })
     }
 
@@ -165,17 +204,22 @@ impl<'a> Batch<'a> {
         Ok(hits)
     }
 
-    /// Answers of the last trace of an any-hit query.
+    /// Answers of the last trace of an any-hit query; `None` where there is no answer.
     ///
     /// # Errors
     /// The device is lost or hangs.
-    pub fn found(&self) -> Result<Vec<bool>, GpuError> {
+    pub fn found(&self) -> Result<Vec<Option<bool>>, GpuError> {
         let words: Vec<[u32; 4]> = self.gpu.read(&self.output)?;
-        Ok(words
-            .iter()
-            .take(self.rays as usize)
-            .map(|w| w[0] != 0)
-            .collect())
+        let answer = |w: &[u32; 4]| (w[0] <= 1).then_some(w[0] == 1);
+        Ok(words.iter().take(self.rays as usize).map(answer).collect())
+    }
+
+    /// Hash of what the last trace left in the output.
+    ///
+    /// # Errors
+    /// The device is lost or hangs.
+    pub fn digest(&self) -> Result<blake3::Hash, GpuError> {
+        Ok(blake3::hash(&self.gpu.read::<u8>(&self.output)?))
     }
 
     /// The error word of the kernels.

@@ -10,6 +10,7 @@
 
 use super::batch::{Batch, Query};
 use super::instance_judge;
+use super::kept_checks::KeptChecks;
 use super::rays::{RaySet, record_rays};
 use super::record::{ClassVerdict, GateVerdict, JudgeCheck};
 use crate::accel::AccelKind;
@@ -26,8 +27,6 @@ use crate::scene::{Camera, SceneData};
 
 /// The judge is compared with brute force on at least this many rays.
 const LEAST_BRUTE_FORCE_RAYS: usize = 2000;
-/// Triangle tests that the f64 oracle may spend on a scene.
-pub(super) const ORACLE_TESTS: usize = 300_000_000;
 /// Two distances within this many ulp are the same on an adapter with inexact arithmetic.
 const TIE_ULPS: f64 = 4.0;
 
@@ -57,30 +56,90 @@ impl Judge {
         settings: &Gate,
         seed: u64,
     ) -> Result<Self, AccelError> {
-        let mut params = Params::default();
-        for parameter in Bvh.parameters() {
-            params
-                .0
-                .insert(parameter.name.to_owned(), parameter.default);
+        let mut judge = Self::unchecked(scene, soup, camera, settings, seed)?;
+        judge.check(scene, soup, settings);
+        Ok(judge)
+    }
+
+    /// [`Judge::new`], but what was checked before and is the same to the bit is not checked again.
+    ///
+    /// # Errors
+    /// As [`Judge::new`].
+    pub fn remembered(
+        scene: &SceneData,
+        soup: &TriangleSoup,
+        camera: Camera,
+        settings: &Gate,
+        seed: u64,
+    ) -> Result<Self, AccelError> {
+        let mut judge = Self::unchecked(scene, soup, camera, settings, seed)?;
+        let kept = KeptChecks::of(&judge, &scene.hash, soup.intersection, settings);
+        if !kept.as_ref().is_some_and(|kept| kept.restore(&mut judge)) {
+            judge.check(scene, soup, settings);
+            if let Some(kept) = kept {
+                kept.keep(&judge);
+            }
         }
+        Ok(judge)
+    }
+
+    fn unchecked(
+        scene: &SceneData,
+        soup: &TriangleSoup,
+        camera: Camera,
+        settings: &Gate,
+        seed: u64,
+    ) -> Result<Self, AccelError> {
+        let schema = Bvh.parameters().into_iter();
+        let params = Params(schema.map(|p| (p.name.to_owned(), p.default)).collect());
         let tree = BuiltBvh::build(soup, &params, &mut BuildLog::default())?;
         tree.validate(soup)?;
         let twin = tree.twin(soup);
         let sets = record_rays(scene, soup, camera, &twin, settings, seed);
         drop(tree);
-        let mut judge = Self {
+        let mut judge = Self::of_sets(sets);
+        judge.instances = instance_judge::new(soup, &judge.sets, seed)?.map(Box::new);
+        Ok(judge)
+    }
+
+    /// A judge of these answers, as yet unchecked.
+    pub(super) fn of_sets(sets: Vec<RaySet>) -> Self {
+        Self {
             sets,
             brute_force: JudgeCheck::default(),
             oracle: JudgeCheck::default(),
             first_wrong: None,
             instances: None,
-        };
-        judge.check_brute_force(settings.brute_force_tests, soup.records.len(), |rays| {
+        }
+    }
+
+    fn check(&mut self, scene: &SceneData, soup: &TriangleSoup, settings: &Gate) {
+        self.check_brute_force(settings.brute_force_tests, soup.records.len(), |rays| {
             brute_force_hits(soup, rays)
         });
-        judge.check_oracle(scene, settings.oracle_rays as usize);
-        judge.instances = instance_judge::new(soup, &judge.sets, settings)?.map(Box::new);
-        Ok(judge)
+        self.check_oracle(scene, settings.oracle_rays as usize);
+        if let (Some(judge), Some(placed)) = (&mut self.instances, &soup.placed) {
+            instance_judge::check(judge, placed, soup.records.len(), settings);
+        }
+    }
+
+    /// The same judge with every so many of its rays.
+    pub fn thinned(&self, every: usize) -> Self {
+        let thin = |set: &RaySet| RaySet {
+            class: set.class,
+            rays: set.rays.iter().step_by(every).copied().collect(),
+            truth: set.truth.iter().step_by(every).copied().collect(),
+        };
+        Self {
+            sets: self.sets.iter().map(thin).collect(),
+            brute_force: self.brute_force.clone(),
+            oracle: self.oracle.clone(),
+            first_wrong: self.first_wrong.clone(),
+            instances: self
+                .instances
+                .as_ref()
+                .map(|judge| Box::new(judge.thinned(every))),
+        }
     }
 
     /// The judge of structures that meet triangles in this space.
@@ -91,18 +150,25 @@ impl Judge {
         }
     }
 
-    /// `count` rays (or all, if there are fewer) spread evenly over all classes.
+    fn pairs(&self, timed: bool) -> impl Iterator<Item = (Ray, Hit)> {
+        let sets = self.sets.iter().filter(move |s| s.is_timed() == timed);
+        sets.flat_map(|s| s.rays.iter().copied().zip(s.truth.iter().copied()))
+    }
+
+    /// All hard rays.
+    pub(super) fn hard(&self) -> impl Iterator<Item = (Ray, Hit)> {
+        self.pairs(false)
+    }
+
+    /// `count` rays (or all, if there are fewer) spread evenly over all classes but the hard one.
     pub(super) fn subset(&self, count: usize) -> Vec<(Ray, Hit)> {
-        let pairs = self
-            .sets
-            .iter()
-            .flat_map(|s| s.rays.iter().copied().zip(s.truth.iter().copied()));
-        let all: Vec<(Ray, Hit)> = pairs.collect();
+        let all: Vec<(Ray, Hit)> = self.pairs(true).collect();
         let count = count.min(all.len());
         (0..count).map(|i| all[i * all.len() / count]).collect()
     }
 
-    /// Compares with `brute_force`, which costs a ray `triangles` tests, as far as `tests` reach.
+    /// Compares with `brute_force`, which costs a ray `triangles` tests, as far as `tests` reach, and on
+    /// all hard rays.
     pub(super) fn check_brute_force(
         &mut self,
         tests: u64,
@@ -110,7 +176,8 @@ impl Judge {
         brute_force: impl FnOnce(&[Ray]) -> Vec<Hit>,
     ) {
         let affordable = (tests / triangles.max(1) as u64) as usize;
-        let pairs = self.subset(affordable.max(LEAST_BRUTE_FORCE_RAYS));
+        let mut pairs = self.subset(affordable.max(LEAST_BRUTE_FORCE_RAYS));
+        pairs.extend(self.hard());
         let rays: Vec<Ray> = pairs.iter().map(|(ray, _)| *ray).collect();
         let truth = brute_force(&rays);
         self.brute_force.rays = rays.len();
@@ -124,8 +191,8 @@ impl Judge {
     }
 
     fn check_oracle(&mut self, scene: &SceneData, rays: usize) {
-        let affordable = (ORACLE_TESTS / scene.triangles.len().max(1)).max(64);
-        let pairs = self.subset(rays.min(affordable));
+        let mut pairs = self.subset(rays);
+        pairs.extend(self.hard());
         let questions: Vec<_> = pairs
             .iter()
             .map(|(ray, hit)| {
@@ -200,6 +267,11 @@ pub fn gate(
         closest.trace()?;
         let any = Batch::new(gpu, scene, traced, Query::Any, &set.rays, runtime_checks)?;
         any.trace()?;
+        if !set.is_timed() {
+            // What is timed is looked at again; here a second turn shows what a first one left behind.
+            closest.trace_in_rows()?;
+            any.trace_in_rows()?;
+        }
         errors |= closest.error_word()? | any.error_word()?;
         classes.push(compare(
             set,
@@ -221,14 +293,73 @@ pub fn gate(
         oracle: judge.oracle.clone(),
         kernel_errors: kernel_errors(errors),
         structural: None,
+        elsewhere: None,
     })
+}
+
+/// What is wrong with the answers that a timed batch left behind, all of them looked at, and with the
+/// error word of all its dispatches; nothing if nothing is.
+///
+/// # Errors
+/// The device is lost or hangs.
+pub fn timed_fault(
+    batch: &Batch,
+    set: &RaySet,
+    soup: &TriangleSoup,
+    space: Space,
+    exact: bool,
+) -> Result<Option<String>, GpuError> {
+    let mut hits = set.truth.clone();
+    let mut found: Vec<_> = hits.iter().map(|h| Some(h.triangle != NO_HIT)).collect();
+    match Query::of(set) {
+        Query::Closest => hits = batch.hits()?,
+        Query::Any => found = batch.found()?,
+    }
+    let mut faults = kernel_errors(batch.error_word()?);
+    let verdict = compare(set, &hits, &found, soup, space, exact);
+    if let Some(first) = verdict.first_wrong {
+        faults.push(format!(
+            "{} of {} rays of the last timed turn differ from the judge; first: {first}",
+            verdict.wrong, verdict.rays
+        ));
+    }
+    Ok((!faults.is_empty()).then(|| faults.join("; ")))
+}
+
+/// What is wrong, in words.
+pub fn fault_text(verdict: &GateVerdict, judge_fault: Option<&str>) -> String {
+    let mut parts = Vec::new();
+    let wrong: usize = verdict.classes.iter().map(|c| c.wrong).sum();
+    if wrong > 0 {
+        let rays: usize = verdict.classes.iter().map(|c| c.rays).sum();
+        let first = verdict
+            .classes
+            .iter()
+            .find_map(|c| c.first_wrong.as_deref())
+            .unwrap_or_default();
+        parts.push(format!(
+            "{wrong} of {rays} rays differ from the judge; first: {first}"
+        ));
+    }
+    parts.extend(verdict.kernel_errors.iter().cloned());
+    parts.extend(verdict.structural.clone());
+    parts.extend(verdict.elsewhere.clone());
+    if verdict.brute_force.wrong + verdict.oracle.wrong > 0 {
+        parts.push(format!(
+            "the judge itself is wrong on {} rays against brute force and {} against f64; first: {}",
+            verdict.brute_force.wrong,
+            verdict.oracle.wrong,
+            judge_fault.unwrap_or_default()
+        ));
+    }
+    parts.join("; ")
 }
 
 /// Compares the answers of a structure with the judge's.
 pub fn compare(
     set: &RaySet,
     hits: &[Hit],
-    found: &[bool],
+    found: &[Option<bool>],
     soup: &TriangleSoup,
     space: Space,
     exact: bool,
@@ -247,7 +378,7 @@ pub fn compare(
             u: 0.0,
             v: 0.0,
         });
-        let any_right = found.get(index) == Some(&(truth.triangle != NO_HIT));
+        let any_right = found.get(index) == Some(&Some(truth.triangle != NO_HIT));
         if hit.same_bits(truth) && any_right {
             continue;
         }

@@ -3,9 +3,9 @@
 //! equal to the bit here too; flat triangles in world space round otherwise and judge flat
 //! structures only.
 
-use super::gate::{Judge, Meeting, ORACLE_TESTS, oracle_ray};
+use super::gate::{Judge, Meeting, oracle_ray};
 use super::rays::RaySet;
-use super::record::JudgeCheck;
+use super::record::RayClass;
 use crate::accel::{
     AccelError, Hit, InstanceJudge, Placed, Ray, TriangleSoup, brute_force_instances,
 };
@@ -17,39 +17,39 @@ use glam::DVec3;
 /// Answers of the oracle that are held at a time, one for each ray and instance.
 const ORACLE_QUESTIONS: usize = 1_000_000;
 
-/// The judge of the same rays in the spaces of the objects; `None` if no ray is transformed.
+/// The judge of the same rays in the spaces of the objects, as yet unchecked; `None` if no ray is
+/// transformed.
 ///
 /// # Errors
 /// An object has too many triangles for a BVH.
 pub(super) fn new(
     soup: &TriangleSoup,
     sets: &[RaySet],
-    settings: &Gate,
+    seed: u64,
 ) -> Result<Option<Judge>, AccelError> {
     let placed = soup.placed.as_ref();
     let Some(placed) = placed.filter(|p| !p.instances.iter().all(Instance::is_identity)) else {
         return Ok(None);
     };
     let twin = InstanceJudge::new(placed)?;
-    let sets = sets.iter();
-    let mut judge = Judge {
-        sets: sets.map(|set| set.judged_by(&twin)).collect(),
-        brute_force: JudgeCheck::default(),
-        oracle: JudgeCheck::default(),
-        first_wrong: None,
-        instances: None,
+    // The intervals of hard rays end where this judge finds hits.
+    let of_class = |set: &RaySet| match set.class {
+        RayClass::Hard => RaySet::hard(soup, &twin, seed),
+        _ => set.judged_by(&twin),
     };
-    let triangles = soup.records.len();
+    Ok(Some(Judge::of_sets(sets.iter().map(of_class).collect())))
+}
+
+/// Compares this judge of a scene of so many triangles with brute force and the oracle.
+pub(super) fn check(judge: &mut Judge, placed: &Placed, triangles: usize, settings: &Gate) {
     judge.check_brute_force(settings.brute_force_tests, triangles, |rays| {
         brute_force_instances(placed, rays)
     });
-    let affordable = (ORACLE_TESTS / triangles.max(1)).max(64);
     let at_once = (ORACLE_QUESTIONS / placed.instances.len()).max(64);
-    let rays = (settings.oracle_rays as usize).min(affordable).min(at_once);
-    let pairs = judge.subset(rays);
+    let mut pairs = judge.subset((settings.oracle_rays as usize).min(at_once));
+    pairs.extend(judge.hard().take(at_once));
     let verdicts = oracle_verdicts(placed, &pairs);
     judge.note_oracle(&pairs, verdicts);
-    Ok(Some(judge))
 }
 
 /// What the oracle thinks of each answer. Every instance is asked with the ray as it is in its

@@ -5,9 +5,11 @@ pub mod batch;
 pub mod bias;
 pub mod formats;
 pub mod gate;
+pub mod hard_rays;
 pub mod hypothesis;
 pub mod image;
 mod instance_judge;
+mod kept_checks;
 pub mod memory;
 pub mod picture;
 pub mod rays;
@@ -18,3 +20,5 @@ pub mod statistics;
 pub mod stream;
 pub mod timing;
 pub mod words;
+
+pub use kept_checks::CACHE_VARIABLE;

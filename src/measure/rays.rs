@@ -4,6 +4,7 @@
 //! 8×8 tiles, then shadow, ambient-occlusion and bounce rays from the first hits in the same order,
 //! and chords between random points of the bounding box.
 
+use super::hard_rays::hard_rays;
 use super::record::RayClass;
 use super::statistics::Pcg32;
 use crate::accel::{Counters, CpuTwin, Hit, NO_HIT, Ray, TriangleSoup};
@@ -33,7 +34,7 @@ pub struct RaySet {
 }
 
 impl RaySet {
-    fn new(class: RayClass, rays: Vec<Ray>, judge: &dyn CpuTwin) -> Self {
+    pub(super) fn new(class: RayClass, rays: Vec<Ray>, judge: &dyn CpuTwin) -> Self {
         let truth = rays
             .par_iter()
             .map(|ray| judge.closest_hit(ray, &mut Counters::default()))
@@ -41,9 +42,19 @@ impl RaySet {
         Self { class, rays, truth }
     }
 
+    /// The hard rays of the scene.
+    pub(super) fn hard(soup: &TriangleSoup, judge: &dyn CpuTwin, seed: u64) -> Self {
+        Self::new(RayClass::Hard, hard_rays(soup, judge, seed), judge)
+    }
+
     /// The same rays with the answers of another judge.
     pub fn judged_by(&self, judge: &dyn CpuTwin) -> Self {
         Self::new(self.class, self.rays.clone(), judge)
+    }
+
+    /// Whether the class is timed.
+    pub fn is_timed(&self) -> bool {
+        self.class != RayClass::Hard
     }
 
     /// Whether the class asks for any hit instead of the nearest.
@@ -128,7 +139,7 @@ fn surface_points(primary: &RaySet, soup: &TriangleSoup) -> Vec<(Vec3, Vec3)> {
 }
 
 /// Records all classes with about `settings.rays` rays each. Classes that start on surfaces are missing when
-/// no primary ray hits anything.
+/// no primary ray hits anything. The hard rays, of which there is a fixed number, come last.
 pub fn record_rays(
     scene: &SceneData,
     soup: &TriangleSoup,
@@ -188,6 +199,9 @@ pub fn record_rays(
         ray(from, direction, FAR)
     });
     sets.push(RaySet::new(RayClass::Chord, chords.collect(), judge));
+    if soup.intersection.bears_hard_rays() {
+        sets.push(RaySet::hard(soup, judge, seed));
+    }
     sets.insert(0, primary);
     sets
 }

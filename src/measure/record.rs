@@ -281,6 +281,8 @@ pub enum RayClass {
     Bounce,
     /// Rays between random points of the bounding box; closest hit.
     Chord,
+    /// Rays that faults hide behind (see [`super::hard_rays`]); both queries, never timed.
+    Hard,
 }
 
 /// Gate result for one ray class.
@@ -307,6 +309,9 @@ pub struct JudgeCheck {
     pub wrong: usize,
     /// Rays that pass within rounding error of an edge or of another surface (oracle only).
     pub ambiguous: usize,
+    /// When it was carried out, if that was before this run: the same rays and answers, found again on disk.
+    #[serde(default)]
+    pub reused_unix_s: Option<u64>,
 }
 
 /// The verdict of the gate on one structure and scene.
@@ -324,6 +329,9 @@ pub struct GateVerdict {
     pub kernel_errors: Vec<String>,
     /// Structural faults found by `validate`.
     pub structural: Option<String>,
+    /// What is wrong on the gate's second scene.
+    #[serde(default)]
+    pub elsewhere: Option<String>,
 }
 
 /// Work counted per ray, means over a class.

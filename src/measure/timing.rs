@@ -5,6 +5,7 @@ use super::record::Interval;
 use super::statistics::{Pcg32, median, median_interval};
 use crate::config::Timing;
 use crate::gpu::{Elapsed, GpuError};
+use std::cell::{Cell, OnceCell};
 use std::time::Instant;
 
 /// Two warm-up runs within this fraction of each other are stable.
@@ -17,6 +18,34 @@ pub trait Measured {
     /// # Errors
     /// It failed; it is not measured again.
     fn measure(&self) -> Result<Elapsed, GpuError>;
+}
+
+/// What a measured thing answered, turn by turn: it must be the same each time, or the time is that of
+/// something else.
+#[derive(Debug, Default)]
+pub struct Watch {
+    first: OnceCell<blake3::Hash>,
+    turns: Cell<u32>,
+    differed: OnceCell<u32>,
+}
+
+impl Watch {
+    /// Takes the hash of one turn's answers.
+    pub fn note(&self, answers: blake3::Hash) {
+        self.turns.set(self.turns.get() + 1);
+        if *self.first.get_or_init(|| answers) != answers {
+            self.differed.get_or_init(|| self.turns.get());
+        }
+    }
+
+    /// The first turn that differed from the first of all, in words.
+    pub fn fault(&self) -> Option<String> {
+        let turn = self.differed.get()?;
+        Some(format!(
+            "dispatches do not repeat: timed turn {turn} of {} answered otherwise than the first",
+            self.turns.get()
+        ))
+    }
 }
 
 /// Samples of one measured thing.

@@ -1,7 +1,8 @@
-//! The oracle: the answer to a ray in f64, over every triangle, with the rounding of f32 allowed for.
+//! The oracle: the answer to a ray in f64, over every triangle near it, with the rounding of f32 allowed
+//! for.
 //!
-//! It is slow, uses no acceleration structure and shares no code with the structures, so it can judge
-//! them. A verdict is [`Verdict::Wrong`] only if no f32 test of products of edges (Möller–Trumbore) or of
+//! It passes over triangles far from the ray by the group ([`Groups`]) and shares no code with the
+//! structures, so it can judge them. A verdict is [`Verdict::Wrong`] only if no f32 test of products of edges (Möller–Trumbore) or of
 //! sheared vertices (Woop, Benthin, Wald) could have given the answer (the bounds are derived in `triangle.rs`), and [`Verdict::Agrees`] only if every such
 //! test gives it; [`Verdict::Ambiguous`] is the small rest: near edges, at grazing angles, between
 //! surfaces closer than rounding.
@@ -9,10 +10,12 @@
 mod brute_force;
 mod exact;
 mod exact_judge;
+mod groups;
 mod triangle;
 
 pub use exact::{ExactCrossing, Side};
 pub use exact_judge::{Crossed, ExactTruth, ExactVerdict, exact_truths};
+pub use groups::{GROUP, Groups, Line};
 
 use crate::scene::Triangle;
 use rayon::prelude::*;

@@ -196,33 +196,6 @@ impl Sheared {
     }
 }
 
-/// Slack for [`may_cross`], times 1-norms: see there.
-pub(super) fn coarse_slack(direction: Vector) -> f64 {
-    2.0 * SHEARED * EPSILON * norm_1(direction)
-}
-
-/// A cheap condition without which no hit is possible: U, V and W all non-negative or all
-/// non-positive, to within a slack that bounds their errors from above. It needs of the triangle its
-/// edges, normal e₁×e₂ and `reach` = |e₁|₁ + |e₂|₁.
-///
-/// A permanent is at most the product of the 1-norms of its rows, and vertices relative to the origin
-/// are no longer than |c|₁ + reach, so every error here is at most 2·22 ε |d|₁·(|c|₁ + reach)².
-#[inline(always)]
-pub(super) fn may_cross(
-    [c, e1, e2, normal]: [Vector; 4],
-    reach: f64,
-    direction: Vector,
-    slack: f64,
-) -> bool {
-    let moment = cross(c, direction);
-    let u = dot(moment, e2);
-    let v = -dot(moment, e1);
-    let w = dot(normal, direction) - u - v;
-    let far = norm_1(c) + reach;
-    let slack = slack * far * far + 4.0 * FLUSHED;
-    smaller(smaller(u, v), w) >= -slack || larger(larger(u, v), w) <= slack
-}
-
 /// a·(b×c) with the bound of its f32 counterpart. A product of which every term has a zero factor is
 /// zero in f32 as well.
 fn triple(a: Vector, b: Vector, c: Vector) -> Bounded {
@@ -263,17 +236,7 @@ pub(super) fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-#[inline(always)]
-pub(super) fn norm_1(v: Vector) -> f64 {
-    v[0].abs() + v[1].abs() + v[2].abs()
-}
-
-/// One instruction, unlike `f64::min`; the order of NaN does not matter here.
-#[inline(always)]
-fn smaller(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
+/// One instruction, unlike `f64::max`; the order of NaN does not matter here.
 #[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }

@@ -134,6 +134,7 @@ pub fn ray_class(class: RayClass) -> &'static str {
         RayClass::Ao => "ambient occlusion",
         RayClass::Bounce => "bounce",
         RayClass::Chord => "chord",
+        RayClass::Hard => "hard",
     }
 }
 

@@ -13,6 +13,7 @@ mod session;
 mod streams;
 mod structures;
 mod times;
+mod trial;
 mod words;
 mod world;
 

@@ -49,6 +49,8 @@ pub(super) struct Session<'a> {
     pub skipped: usize,
     /// Whether a scene could not be loaded.
     pub bad_input: bool,
+    /// The gate's second scene.
+    pub trial: super::trial::Trial,
     /// Cells that need longer loops than the driver runs, with the reason.
     pub refused: BTreeMap<String, String>,
     /// Cells that have their record: not run again after a lost device.
@@ -100,6 +102,7 @@ impl<'a> Session<'a> {
             failed: 0,
             skipped: 0,
             bad_input: false,
+            trial: Default::default(),
             refused: BTreeMap::new(),
             done: HashSet::new(),
             compared: HashSet::new(),

@@ -8,7 +8,7 @@ use crate::config::{StructureCell, cell_hash};
 use crate::gpu::{Elapsed, Gpu, GpuError};
 use crate::integrator::Traced;
 use crate::measure::batch::{Batch, Query, count_work, kernel_hash};
-use crate::measure::gate::gate;
+use crate::measure::gate::{fault_text, gate, timed_fault};
 use crate::measure::memory::peak_bytes;
 use crate::measure::picture::Picture;
 use crate::measure::rays::{RaySet, primary_pixels, primary_rays};
@@ -16,7 +16,7 @@ use crate::measure::record::{
     ClassTiming, CountersPerRay, GateVerdict, Ran, Record, StructureRecord, StructureStats,
 };
 use crate::measure::timing::{
-    Measured, empty_ms, interleave, millions_per_second, without_overhead,
+    Measured, Watch, empty_ms, interleave, millions_per_second, without_overhead,
 };
 use crate::report::color::viridis;
 use std::time::Instant;
@@ -137,9 +137,14 @@ fn gate_with(
             record.ran.kernel_hash = hash;
             verdict.passed &= built.structural.is_none();
             verdict.structural.clone_from(&built.structural);
+            if verdict.passed {
+                verdict.elsewhere = super::trial::fault(session, world, gpu, cell)
+                    .unwrap_or_else(|e| Some(e.to_string()));
+                verdict.passed = verdict.elsewhere.is_none();
+            }
             if !verdict.passed {
                 let judge_fault = world.judge.of(traced.space).first_wrong.as_deref();
-                record.failure = Some(failure_text(&verdict, judge_fault));
+                record.failure = Some(fault_text(&verdict, judge_fault));
             }
             record.gate = Some(verdict);
         }
@@ -198,33 +203,6 @@ fn gate_twice(
     }
 }
 
-fn failure_text(verdict: &GateVerdict, judge_fault: Option<&str>) -> String {
-    let mut parts = Vec::new();
-    let wrong: usize = verdict.classes.iter().map(|c| c.wrong).sum();
-    if wrong > 0 {
-        let rays: usize = verdict.classes.iter().map(|c| c.rays).sum();
-        let first = verdict
-            .classes
-            .iter()
-            .find_map(|c| c.first_wrong.as_deref())
-            .unwrap_or_default();
-        parts.push(format!(
-            "{wrong} of {rays} rays differ from the judge; first: {first}"
-        ));
-    }
-    parts.extend(verdict.kernel_errors.iter().cloned());
-    parts.extend(verdict.structural.clone());
-    if verdict.brute_force.wrong + verdict.oracle.wrong > 0 {
-        parts.push(format!(
-            "the judge itself is wrong on {} rays against brute force and {} against f64; first: {}",
-            verdict.brute_force.wrong,
-            verdict.oracle.wrong,
-            judge_fault.unwrap_or_default()
-        ));
-    }
-    parts.join("; ")
-}
-
 fn empty_record(world: &World, cell: &StructureCell, runtime_checks: bool) -> StructureRecord {
     StructureRecord {
         refused: false,
@@ -252,11 +230,24 @@ struct Timed<'a> {
     structure: usize,
     set: &'a RaySet,
     batch: Batch<'a>,
+    watch: Watch,
 }
 
 impl Measured for Timed<'_> {
     fn measure(&self) -> Result<Elapsed, GpuError> {
-        self.batch.trace()
+        let elapsed = self.batch.trace()?;
+        self.watch.note(self.batch.digest()?);
+        Ok(elapsed)
+    }
+}
+
+impl Timed<'_> {
+    /// What is wrong with the timed answers; no figure is printed then.
+    fn fault(&self, world: &World, space: Space) -> Result<Option<String>, GpuError> {
+        let exact = world.probe.is_exact();
+        let last = timed_fault(&self.batch, self.set, &world.soup, space, exact)?;
+        let fault = self.watch.fault().into_iter().chain(last);
+        Ok(fault.reduce(|a, b| format!("{a}; {b}")))
     }
 }
 
@@ -278,9 +269,13 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
         }
         session.say(format!("{cell}: build and gate"));
         session.lose_device_on_request(world.gpu, &cell.to_string());
-        let built = match last.take() {
-            Some((other, built)) if is_same_structure(&other, &cell) => built,
-            _ => build(session, world, &cell),
+        // What cannot serve goes before the next is built.
+        let same = last
+            .take()
+            .filter(|(other, _)| is_same_structure(other, &cell));
+        let built = match same {
+            Some((_, built)) => built,
+            None => build(session, world, &cell),
         };
         let outcome = match &built {
             Ok(built) => gate_with(session, world, built, &cell)?,
@@ -378,7 +373,8 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
     let mut timed = Vec::new();
     for structure in 0..gated.len() {
         let gpu = world.device.of(&gated[structure].cell.kernels)?;
-        for set in &world.judge.of(gated[structure].traced.space).sets {
+        let sets = &world.judge.of(gated[structure].traced.space).sets;
+        for set in sets.iter().filter(|set| set.is_timed()) {
             let Gated {
                 traced,
                 runtime_checks,
@@ -390,6 +386,7 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
                     structure,
                     set,
                     batch,
+                    watch: Watch::default(),
                 }),
                 Err(error) if world.gpu.lost().is_some() => {
                     return fail_lost(session, world, gated, structure, error);
@@ -415,6 +412,10 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
         let set = item.set;
         let structure = &mut gated[item.structure];
         let gpu = world.device.of(&structure.cell.kernels)?;
+        let fault = match item.fault(world, structure.traced.space) {
+            Ok(fault) => fault.map(|fault| format!("{:?} rays: {fault}", set.class)),
+            Err(error) => Some(error.to_string()),
+        };
         let outcome = result.and_then(|samples| {
             let empty = session
                 .clock
@@ -440,9 +441,10 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
                 counters: per_ray(&work),
             }))
         });
-        match outcome {
-            Ok(timing) => structure.record.timings.extend(timing),
-            Err(error) => failures[item.structure] = Some(error.to_string()),
+        match (outcome, fault) {
+            (Ok(timing), None) => structure.record.timings.extend(timing),
+            (Ok(_), Some(fault)) => failures[item.structure] = Some(fault),
+            (Err(error), _) => failures[item.structure] = Some(error.to_string()),
         }
         structure.record.features = item.batch.features();
     }

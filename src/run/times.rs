@@ -12,7 +12,7 @@ use crate::gpu::{Elapsed, Gpu, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
 use crate::measure::record::{Record, TimeRecord};
 use crate::measure::statistics::median_interval;
-use crate::measure::timing::{Measured, Samples, interleave};
+use crate::measure::timing::{Measured, Samples, Watch, interleave};
 use crate::sampling::Sampler;
 use std::collections::BTreeMap;
 
@@ -24,6 +24,7 @@ struct Timed<'a> {
     seed: u32,
     runtime_checks: bool,
     space: Space,
+    watch: Watch,
 }
 
 impl Measured for Timed<'_> {
@@ -31,17 +32,17 @@ impl Measured for Timed<'_> {
         self.renderer.reset();
         self.renderer.add_samples(0, self.spp, self.seed)?;
         self.renderer.check()?;
-        Ok(self.renderer.spent())
+        let elapsed = self.renderer.spent();
+        let pixels = self.renderer.image()?.pixels;
+        self.watch.note(blake3::hash(bytemuck::cast_slice(&pixels)));
+        Ok(elapsed)
     }
 }
 
-/// What does not depend on the structure: counted rays and the image, per sampler, integrator and
-/// space in which structures meet triangles.
-#[derive(Default)]
-struct Shared {
-    rays: BTreeMap<String, [u64; 4]>,
-    image: BTreeMap<String, String>,
-}
+/// What does not depend on the structure, per sampler, integrator and space in which structures meet
+/// triangles: the counted rays, and the hash of the image of the run that counted them, which was
+/// rendered once into fresh buffers.
+type Shared = BTreeMap<String, ([u64; 4], String)>;
 
 fn key(cell: &TimeCell, space: Space) -> String {
     format!(
@@ -188,6 +189,7 @@ fn compile<'a>(
         seed,
         runtime_checks: checks,
         space: structure.traced.space,
+        watch: Watch::default(),
     })
 }
 
@@ -200,21 +202,19 @@ fn finish(
     samples: Samples,
     shared: &mut Shared,
 ) -> Result<TimeRecord, String> {
-    let image = item.renderer.image().map_err(|e| e.to_string())?;
-    let hash = image_hash(&image);
+    let hash = image_hash(&item.renderer.image().map_err(|e| e.to_string())?);
     let key = key(&item.cell, item.space);
-    let first = shared
-        .image
-        .entry(key.clone())
-        .or_insert_with(|| hash.clone())
-        .clone();
-    let rays = match shared.rays.get(&key) {
-        Some(rays) => *rays,
+    let (rays, first) = match shared.get(&key) {
+        Some(known) => known.clone(),
         None => {
             let structure = structure.ok_or("its structure is gone")?;
-            let rays = count_rays(session, world, structure, item)?;
-            shared.rays.insert(key, rays);
-            rays
+            let (rays, mut image) = count_rays(session, world, structure, item)?;
+            if !world.probe.is_exact() {
+                // Another kernel, and so rounded otherwise.
+                image.clone_from(&hash);
+            }
+            shared.insert(key, (rays, image.clone()));
+            (rays, image)
         }
     };
     let total: u64 = rays.iter().sum();
@@ -226,10 +226,12 @@ fn finish(
         .map(|ms| total as f64 / ms * 1e-3)
         .collect();
     let equal = hash == first;
-    let failure = (!equal && world.probe.is_exact()).then(|| {
-        "its image differs from that of the first structure on this scene (in the same space)"
-            .to_owned()
-    });
+    let mut faults: Vec<String> = item.watch.fault().into_iter().collect();
+    if !equal && world.probe.is_exact() {
+        let text = "its last timed image differs from one that the first structure on this scene (in the same space) rendered into fresh buffers";
+        faults.push(text.to_owned());
+    }
+    let failure = (!faults.is_empty()).then(|| faults.join("; "));
     let mut record = empty_record(session, world, &item.cell, String::new());
     record.failure = failure;
     if record.failure.is_none() {
@@ -252,13 +254,13 @@ fn finish(
     Ok(record)
 }
 
-/// Rays per class, from a separate counting run of the same seed.
+/// Rays per class, from a separate counting run of the same seed, and the hash of its image.
 fn count_rays(
     session: &mut Session,
     world: &World,
     structure: &Gated,
     item: &Timed,
-) -> Result<[u64; 4], String> {
+) -> Result<([u64; 4], String), String> {
     let sampler = sampler_of(session, &item.cell)?;
     let job = job(session, world, &sampler, &item.cell.integrator, true)?;
     let gpu = world.device.of(&item.cell.kernels);
@@ -267,9 +269,9 @@ fn count_rays(
         let renderer = Renderer::new(gpu, &world.buffers, &structure.traced, &job, true)?;
         renderer.reset();
         renderer.add_samples(0, item.spp, item.seed)?;
-        renderer.ray_counts()
+        Ok((renderer.ray_counts()?, image_hash(&renderer.image()?)))
     });
-    counted.map_err(|e| e.to_string())
+    counted.map_err(|e: GpuError| e.to_string())
 }
 
 fn empty_record(session: &Session, world: &World, cell: &TimeCell, failure: String) -> TimeRecord {

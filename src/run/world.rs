@@ -109,7 +109,7 @@ impl<'a> World<'a> {
         let mut settings = experiment.gate;
         settings.rays = settings.rays.max(experiment.timing.rays);
         let judged = session.clock.time("judge", || {
-            Judge::new(&scene, &soup, camera, &settings, u64::from(experiment.seed))
+            Judge::remembered(&scene, &soup, camera, &settings, u64::from(experiment.seed))
         });
         Ok((|| {
             let mut buffers = uploaded.map_err(|e| e.to_string())?;

@@ -111,7 +111,8 @@ impl<'a> Stage<'a> {
         let batch = self.batch(traced, Query::Any, rays)?;
         batch.trace()?;
         Ok(Answers {
-            answers: batch.found()?,
+            // A ray without an answer is seen by the closest hit.
+            answers: batch.found()?.iter().map(|a| *a == Some(true)).collect(),
             errors: batch.error_word()?,
         })
     }

@@ -301,7 +301,9 @@ impl Trace<'_> {
     /// Counts differences from brute force, and ties among them where the adapter computes otherwise.
     fn compare(&self, built: &dyn BuiltAccel, hits: &[Hit], tally: &mut Tally) {
         let truth = self.expected.of(built.space()).to_vec();
-        let found: Vec<bool> = truth.iter().map(|hit| hit.triangle != NO_HIT).collect();
+        let found: Vec<_> = (truth.iter())
+            .map(|hit| Some(hit.triangle != NO_HIT))
+            .collect();
         let set = RaySet {
             class: RayClass::Chord,
             rays: self.case.rays.clone(),

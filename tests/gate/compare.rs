@@ -56,7 +56,14 @@ fn with(change: impl Fn(&mut Hit), exact: bool) -> ClassVerdict {
     let set = set();
     let mut hits = set.truth.clone();
     change(&mut hits[0]);
-    compare(&set, &hits, &[true, false], &soup(), Space::World, exact)
+    compare(
+        &set,
+        &hits,
+        &[Some(true), Some(false)],
+        &soup(),
+        Space::World,
+        exact,
+    )
 }
 
 fn wrong_and_ties(verdict: &ClassVerdict) -> [usize; 2] {
@@ -120,7 +127,7 @@ fn a_triangle_elsewhere_in_the_same_plane_is_no_tie() {
 fn a_wrong_any_hit_answer_is_wrong_on_every_adapter() {
     let set = set();
     for exact in [true, false] {
-        for found in [[false, false], [true, true]] {
+        for found in [[Some(false); 2], [Some(true); 2], [Some(true), None]] {
             let verdict = compare(&set, &set.truth, &found, &soup(), Space::World, exact);
             assert_eq!(
                 wrong_and_ties(&verdict),
@@ -141,7 +148,7 @@ fn missing_answers_are_wrong() {
     let verdict = compare(
         &set,
         &set.truth[..1],
-        &[true, false],
+        &[Some(true), Some(false)],
         &soup(),
         Space::World,
         false,

@@ -6,8 +6,10 @@ mod faults;
 mod faulty;
 mod passes;
 mod records;
+
 #[path = "../support/mod.rs"]
 mod support;
+mod timed;
 
 use raystone::accel::AccelKind;
 use raystone::config::Gate;

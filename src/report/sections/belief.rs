@@ -119,6 +119,9 @@ fn judge(data: &RunData, title: &str, pick: fn(&GateVerdict) -> &JudgeCheck) -> 
                 count(check.ambiguous as u64)
             );
         }
+        if let Some(when) = check.reused_unix_s {
+            text += &format!(", found on disk: checked {}", format::utc(when));
+        }
         details.push(text);
     }
     check(title, rays > 0, wrong > 0, join(details))

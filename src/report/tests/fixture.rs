@@ -124,16 +124,16 @@ pub(super) fn gate(wrong: usize) -> GateVerdict {
             .to_vec(),
         brute_force: JudgeCheck {
             rays: 4_096,
-            wrong: 0,
-            ambiguous: 0,
+            ..JudgeCheck::default()
         },
         oracle: JudgeCheck {
             rays: 1_024,
-            wrong: 0,
             ambiguous: 3,
+            ..JudgeCheck::default()
         },
         kernel_errors: Vec::new(),
         structural: None,
+        elsewhere: None,
     }
 }
 

@@ -4,6 +4,7 @@
 
 mod cornell_box;
 mod displaced_sphere;
+mod far_corners;
 mod furnace;
 mod instances;
 pub(super) mod numeric;
@@ -26,7 +27,7 @@ struct Builtin {
 }
 
 /// The registry.
-const BUILTINS: [Builtin; 8] = [
+const BUILTINS: [Builtin; 9] = [
     cornell_box::SCENE,
     displaced_sphere::SCENE,
     triangle_soup::SCENE,
@@ -35,6 +36,7 @@ const BUILTINS: [Builtin; 8] = [
     furnace::FURNACE_BOX,
     furnace::WHITE_FURNACE,
     single_triangle::SCENE,
+    far_corners::SCENE,
 ];
 
 /// The built-in scenes with their parameters, for the parser, lists and docs.
@@ -52,8 +54,11 @@ pub fn builtin_scenes() -> Vec<Entry> {
 /// The built-in scene that `variant` names, if it names one.
 pub(super) fn build(variant: &Variant) -> Option<Result<SceneData, SceneError>> {
     let scene = BUILTINS.iter().find(|scene| scene.name == variant.name)?;
-    let (builder, look) = (scene.build)(&variant.params);
-    Some(builder.finish(&variant.name, look))
+    let params = variant.params.completed(&(scene.schema)());
+    Some(params.map_err(SceneError::from).and_then(|params| {
+        let (builder, look) = (scene.build)(&params);
+        builder.finish(&variant.name, look)
+    }))
 }
 
 /// What to type instead of `name`: the nearest built-in name, else all of them.

@@ -13,11 +13,13 @@ use crate::scene::{Camera, LoadOptions, SceneData, builtin_scenes, load};
 /// Seeds of the integer-grid soups.
 const SOUPS: [u64; 3] = [40, 41, 42];
 
-/// Scenes of the gate: walls that meet in edges, a closed mesh, copies that are moved and turned.
+/// Scenes of the gate: walls that meet in edges, a closed mesh, copies that are moved and turned, and its
+/// second scene.
 const SCENES: &[(&str, &[(&str, i64)])] = &[
     ("cornell-box", &[]),
     ("displaced-sphere", &[("triangles", 800)]),
     ("instances", &[("count", 12), ("detail", 80)]),
+    ("far-corners", &[]),
 ];
 
 const GATE: Gate = Gate {
@@ -42,7 +44,8 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    fn new(scene: SceneData) -> Self {
+    /// A scene made here.
+    pub fn new(scene: SceneData) -> Self {
         Self {
             soup: TriangleSoup::new(&scene),
             camera: scene.view(1.0),

@@ -2,6 +2,7 @@
 
 mod binary;
 mod cells;
+mod hard;
 mod image;
 mod instanced;
 mod samplers;
@@ -20,6 +21,7 @@ pub fn mutants() -> Vec<Mutant> {
         wide::MUTANTS,
         cells::MUTANTS,
         instanced::MUTANTS,
+        hard::MUTANTS,
         samplers::MUTANTS,
         image::MUTANTS,
     ]

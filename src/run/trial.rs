@@ -1,0 +1,127 @@
+//! The gate's second scene: small, and made to lead through the code that otherwise only large or deep
+//! scenes reach. Every structure of a run is put through it once.
+
+use super::session::Session;
+use super::world::World;
+use crate::accel::{AccelError, BuildLog, Intersection, TriangleSoup};
+use crate::config::{Gate, StructureCell, Variant};
+use crate::gpu::{Gpu, GpuError};
+use crate::integrator::{SceneBuffers, Traced};
+use crate::measure::gate::{Judge, fault_text, gate};
+use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The scene.
+const SCENE: &str = "far-corners";
+/// Its rays: of each class, of those compared with brute force, and of those decided in double precision
+/// (besides the hard ones).
+const GATE: Gate = Gate {
+    rays: 1024,
+    brute_force_tests: 1,
+    oracle_rays: 512,
+    ao_length: 0.0,
+    offset: 0.0,
+};
+/// Brute force takes each of so many rays.
+const EVERY: usize = 8;
+
+/// The scene with its judge, made once a run, and what structures were found to do on it.
+#[derive(Default)]
+pub(super) struct Trial {
+    stage: Option<Arc<Stage>>,
+    outcomes: BTreeMap<String, Option<String>>,
+}
+
+struct Stage {
+    scene: SceneData,
+    soup: TriangleSoup,
+    judge: Judge,
+}
+
+impl Stage {
+    fn new(intersection: Intersection) -> Result<Self, String> {
+        let entry = builtin_scenes().into_iter().find(|e| e.name == SCENE);
+        let variant = entry.ok_or("it is not registered")?.default_variant();
+        let scene = load(&variant, &LoadOptions::default()).map_err(|e| e.to_string())?;
+        let soup = TriangleSoup::new(&scene).intersecting(intersection);
+        let camera = scene.view(1.0);
+        let judge =
+            Judge::remembered(&scene, &soup, camera, &GATE, 1).map_err(|e| e.to_string())?;
+        Ok(Self { scene, soup, judge })
+    }
+}
+
+/// What is wrong with a structure on the second scene; nothing if nothing is, if the scene of the run is
+/// that one, or with tests that hard rays are not asked of.
+///
+/// # Errors
+/// A kernel does not compile, or the device is lost or hangs.
+pub(super) fn fault(
+    session: &mut Session,
+    world: &World,
+    gpu: &Gpu,
+    cell: &StructureCell,
+) -> Result<Option<String>, GpuError> {
+    let key = cell_key(cell);
+    if world.variant.name == SCENE || !world.soup.intersection.bears_hard_rays() {
+        return Ok(None);
+    }
+    if let Some(known) = session.trial.outcomes.get(&key) {
+        return Ok(known.clone());
+    }
+    let stage = match &session.trial.stage {
+        Some(stage) => stage.clone(),
+        None => {
+            let made = session
+                .clock
+                .time("judge", || Stage::new(world.soup.intersection));
+            match made {
+                Ok(stage) => session.trial.stage.insert(Arc::new(stage)).clone(),
+                Err(reason) => return Ok(Some(format!("{SCENE}: {reason}"))),
+            }
+        }
+    };
+    let found = session.clock.time("gate", || {
+        stage.fault_of(session.registries, world, gpu, &cell.accel)
+    })?;
+    let found = found.map(|fault| format!("{SCENE}: {fault}"));
+    session.trial.outcomes.insert(key, found.clone());
+    Ok(found)
+}
+
+/// Structures with the same parameters and kernels are the same.
+fn cell_key(cell: &StructureCell) -> String {
+    let accel = serde_json::to_string(&cell.accel).unwrap_or_default();
+    format!("{accel} {} {:?}", cell.accel.label, cell.kernels)
+}
+
+impl Stage {
+    fn fault_of(
+        &self,
+        registries: &super::Registries,
+        world: &World,
+        gpu: &Gpu,
+        accel: &Variant,
+    ) -> Result<Option<String>, GpuError> {
+        let Some(kind) = registries.accel.get(&accel.name) else {
+            return Ok(None);
+        };
+        let built = kind.build(&self.soup, &accel.params, &mut BuildLog::default());
+        let built = built.and_then(|built| built.validate(&self.soup).map(|()| built));
+        let built = match built {
+            Ok(built) => built,
+            // Parameters that suit the scene of the run may be too small or too large for this one.
+            Err(AccelError::Invalid(fault)) => return Ok(Some(fault)),
+            Err(_) => return Ok(None),
+        };
+        let traced = Traced::upload(gpu, &*built)?;
+        let buffers = SceneBuffers::upload(gpu, &self.scene, &self.soup)?;
+        let thinned = (accel.name == "brute-force").then(|| self.judge.thinned(EVERY));
+        let judge = thinned.as_ref().unwrap_or(&self.judge);
+        let (soup, probe) = (&self.soup, &world.probe);
+        let verdict = gate(gpu, &buffers, soup, &traced, judge, probe, true)?;
+        let judge_fault = judge.of(traced.space).first_wrong.as_deref();
+        Ok((!verdict.passed).then(|| fault_text(&verdict, judge_fault)))
+    }
+}

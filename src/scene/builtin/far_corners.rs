@@ -1,0 +1,175 @@
+//! A small scene that leads through the code which otherwise only large or deep scenes reach: rows of
+//! texels beyond the first, triangles that cannot be split apart, trees of nearly thirty levels, needles, empty
+//! space around dense spots, and instances whose boxes have to grow.
+
+use super::super::builder::{Look, SceneBuilder};
+use super::super::{Camera, Material, Transform, Triangle};
+use super::Builtin;
+use super::numeric::{Pcg, sin_cos_turns};
+use super::sphere::SphereGrid;
+use glam::Vec3;
+
+pub(super) const SCENE: Builtin = Builtin {
+    name: "far-corners",
+    description: "what only large or deep scenes reach, in little: the gate's second scene",
+    schema: Vec::new,
+    build,
+};
+
+/// Quadrilaterals along each edge of the sheet: its triangles fill rows of texels.
+const SHEET: usize = 64;
+/// Nested shells, each half as large as the one around it: levels of a tree.
+const SHELLS: i32 = 44;
+/// Triangles in the same place.
+const COPIES: usize = 72;
+/// Long thin triangles through everything.
+const NEEDLES: usize = 48;
+/// Triangles in a spot of a thousandth of the scene.
+const SPOT: usize = 300;
+
+fn build(_: &crate::config::Params) -> (SceneBuilder, Look) {
+    let mut builder = SceneBuilder::new(false, 2 * SHEET * SHEET + 2048);
+    builder.add_object(ground());
+    builder.add_object(bumpy());
+    let unmoved = Transform::new([Vec3::X, Vec3::Y, Vec3::Z], Vec3::ZERO);
+    builder.place(0, unmoved, 0);
+    for to_world in places() {
+        builder.place(1, to_world, 1);
+    }
+    let look = Look {
+        materials: [(0.7, 0.7, 0.65), (0.75, 0.4, 0.3)]
+            .map(|color| Material::diffuse("corner", color.into()))
+            .into(),
+        textures: Vec::new(),
+        camera: Some(Camera {
+            eye: Vec3::new(2.6, 1.9, 3.1),
+            target: Vec3::new(0.4, 0.3, 0.4),
+            up: Vec3::Y,
+            vertical_fov_degrees: 40.0,
+        }),
+        environment: Vec3::ONE,
+    };
+    (builder, look)
+}
+
+/// Everything that is not an instance of something else.
+fn ground() -> Vec<Triangle> {
+    let mut builder = SceneBuilder::new(false, 0);
+    let mut pcg = Pcg::new(1);
+    let mut point = || Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());
+    sheet(&mut builder);
+    // Shells around a corner: all hold the origin, so that the small ones are reached past the large ones.
+    for level in 0..SHELLS {
+        let s = 2.0_f32.powi(-level);
+        let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| s * axis);
+        builder.push([x, y, z], 0);
+        builder.push([x + 0.25 * y, y + 0.25 * z, Vec3::splat(0.125 * s)], 0);
+    }
+    let copy = [
+        Vec3::new(-0.5, 0.25, -0.5),
+        Vec3::new(-0.25, 0.5, -0.5),
+        Vec3::new(-0.5, 0.5, -0.25),
+    ];
+    for turn in 0..COPIES {
+        let mut vertices = copy;
+        vertices.rotate_left(turn % 3);
+        builder.push(vertices, 0);
+    }
+    for _ in 0..NEEDLES {
+        let (from, to) = (2.0 * point() - 1.0, 2.0 * point() - 1.0);
+        builder.push([from, to, to + 1e-5 * point()], 0);
+    }
+    for _ in 0..SPOT {
+        let at = Vec3::splat(0.9375) + 0.001 * point();
+        builder.push([at, at + 2e-4 * point(), at + 2e-4 * point()], 0);
+    }
+    builder.into_triangles()
+}
+
+/// Half of it lies in a plane of coordinates and is cut at binary fractions, half is wavy.
+fn sheet(builder: &mut SceneBuilder) {
+    let corner = |i: usize, k: usize| {
+        let [x, z] = [i, k].map(|n| n as f32 / SHEET as f32);
+        let wave = f64::from(x) * 3.0;
+        let y = if k > SHEET / 2 {
+            (sin_cos_turns(wave).0 * f64::from(z - 0.5) * 0.2) as f32
+        } else {
+            0.0
+        };
+        Vec3::new(2.0 * x - 1.0, y - 0.5, 2.0 * z - 1.0)
+    };
+    for i in 0..SHEET {
+        for k in 0..SHEET {
+            let quad = [(i, k), (i, k + 1), (i + 1, k + 1), (i + 1, k)];
+            builder.push_quad(quad.map(|(i, k)| corner(i, k)), 0);
+        }
+    }
+}
+
+/// A closed object, uneven and not around its origin.
+fn bumpy() -> Vec<Triangle> {
+    let mut builder = SceneBuilder::new(false, 0);
+    SphereGrid::with_at_most(72).push(&mut builder, 0, |direction| {
+        let radius = 1.0 + 0.3 * sin_cos_turns(direction.x + 0.7 * direction.y).0;
+        (radius * direction).as_vec3() + Vec3::new(0.5, -0.25, 2.0)
+    });
+    builder.into_triangles()
+}
+
+/// Turned, tiny, mirrored, flat, and far away and large.
+fn places() -> [Transform; 6] {
+    let turned = |axis: f64, scale: Vec3, offset: Vec3| {
+        let (s, c) = sin_cos_turns(axis);
+        let (s, c) = (s as f32, c as f32);
+        let columns = [
+            Vec3::new(c, s, 0.0),
+            Vec3::new(-s * 0.6, c * 0.6, 0.8),
+            Vec3::new(s * 0.8, -c * 0.8, 0.6),
+        ];
+        let [x, y, z] = columns;
+        Transform::new([x * scale.x, y * scale.y, z * scale.z], offset)
+    };
+    let even = Vec3::splat;
+    [
+        turned(0.125, even(0.2), Vec3::new(0.4, 0.3, -0.6)),
+        turned(0.37, even(1e-3), Vec3::new(0.7, 0.2, 0.7)),
+        turned(0.8, Vec3::new(-0.15, 0.2, 0.1), Vec3::new(-0.4, 0.5, 0.3)),
+        turned(0.6, Vec3::new(0.3, 0.004, 0.2), Vec3::new(0.1, 0.6, 0.4)),
+        turned(0.05, even(0.25), Vec3::new(0.35, 0.35, -0.5)),
+        turned(0.27, even(9.0), Vec3::new(-60.0, 35.0, -80.0)),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::load_default;
+    use super::*;
+    use crate::accel::{AccelRegistry, BuildLog, TriangleSoup};
+
+    #[test]
+    fn trees_over_it_are_deep_and_tables_take_more_than_one_row_of_texels() {
+        let scene = load_default(SCENE.name);
+        assert!(scene.triangles.len() < 12_000);
+        let soup = TriangleSoup::new(&scene);
+        let registry = AccelRegistry::default();
+        let built = |name: &str| {
+            let kind = registry.get(name).expect("a structure");
+            let variants = registry.entries();
+            let entry = variants.iter().find(|e| e.name == name).expect("an entry");
+            let params = entry.default_variant().params;
+            let built = kind.build(&soup, &params, &mut BuildLog::default());
+            built.unwrap_or_else(|e| panic!("{name}: {e}"))
+        };
+        let row = 8192 * 16;
+        for kind in registry.iter() {
+            let bytes = built(kind.name()).stats().bytes;
+            assert!(
+                kind.name() == "brute-force" || bytes > row,
+                "{}",
+                kind.name()
+            );
+        }
+        let depth = built("bvh").stats().depth.expect("a depth");
+        assert!(depth > 24, "{depth}");
+    }
+}
