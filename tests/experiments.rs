@@ -122,7 +122,10 @@ fn a_minimal_file_gets_the_documented_defaults() {
     assert_eq!(experiment.reference.sequence.params.name("hash"), "pcg");
     assert_eq!(experiment.timing.rounds, 9);
     assert_eq!(experiment.gate.rays, 32768);
-    assert_eq!(experiment.discrepancy.pairs, [[0, 1], [2, 3], [4, 5]]);
+    assert_eq!(
+        experiment.discrepancy.pairs,
+        [[0, 1], [2, 3], [4, 5], [0, 2], [1, 3], [2, 4]]
+    );
     assert_eq!(experiment.seeds().replicates.len(), 8);
 }
 

@@ -138,6 +138,7 @@ fn kernel_and_twin_of_every_test_agree_to_the_bit_on_pairs() {
         let soup = scenes::soup(triangles.iter().copied()).intersecting(tests_of(triangle));
         let closest = |(ray, record): (&Ray, &TriangleRecord)| {
             let mut hit = Hit::miss(ray);
+            let ray = &soup.intersection.raised(ray);
             let inverse = soup.intersection.inverse(ray.direction);
             intersect_triangle(record, ray, inverse, &mut hit);
             hit

@@ -113,6 +113,11 @@ fn an_idea_is_compared_with_the_original_and_leaves_a_trace() {
         assert_eq!(ran.triangle == "watertight", is_traced, "{line:?}");
         assert_eq!(ran.box_test == "padded-16", is_traced, "{line:?}");
         assert_eq!(ran.offset == "error-bound", is_traced, "{line:?}");
+        // Records of earlier versions lack it, and are read.
+        let mut old = serde_json::to_value(line).expect("JSON");
+        let fields = old["record"].as_object_mut().expect("a record");
+        assert!(fields.remove("ran").is_some(), "{line:?}");
+        serde_json::from_value::<Line>(old).expect("a record without it");
         let kind = std::mem::discriminant(&line.record);
         seen.insert((format!("{kind:?}"), ran.kernels.clone()));
     }

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Pcg, assert_same_hits, brute_force, build, default_params, scenes, trace};
-use raystone::accel::{AccelKind, AccelRegistry, Counters};
+use raystone::accel::{AccelKind, AccelRegistry, Counters, TriangleSoup, brute_force_hits};
 use raystone::config::{ParamValue, Params};
 
 const WIDE: [&str; 2] = ["bvh4", "cwbvh"];
@@ -64,4 +64,54 @@ fn wide_nodes_of_eight_and_of_four_are_smaller_than_binary_ones() {
         eight < four && 2 * four < binary,
         "{eight}, {four}, {binary}"
     );
+}
+
+#[test]
+fn triangles_in_a_texture_are_not_bound_by_the_limit_of_buffers() {
+    use raystone::integrator::{SceneBuffers, Traced};
+    use raystone::measure::batch::{Batch, Query};
+    let catalogue = raystone::run::Registries::default().catalogue();
+    let mut entries = catalogue.scene.iter();
+    let sphere = entries.find(|e| e.name == "displaced-sphere");
+    let variant = sphere.expect("a built-in scene").default_variant();
+    let scene = raystone::scene::load(&variant, &Default::default()).expect("a scene");
+    let soup = TriangleSoup::new(&scene);
+    let rays = scenes::aimed_rays(&mut Pcg::new(4), &soup, 1000);
+    let mut gpu = common::open(raystone::gpu::KernelLibrary::default());
+    if !common::is_exact(&gpu) {
+        return;
+    }
+    // The canonical triangles come in parts; those of the leaves, at least as many, in one texture.
+    let bytes = 48 * soup.records.len() as u64;
+    gpu.limits.max_storage_buffer_binding_size = bytes / 3;
+    let buffers = SceneBuffers::upload(&gpu, &scene, &soup).expect("scene buffers");
+    for name in WIDE {
+        let kind = kind(name);
+        let built = build(kind, &soup, &default_params(&kind.parameters()));
+        let expected = brute_force_hits(&soup, &rays);
+        let traced = Traced::upload(&gpu, &*built).expect("a texture");
+        let batch = Batch::new(&gpu, &buffers, &traced, Query::Closest, &rays, true).expect(name);
+        batch.trace().expect(name);
+        assert_eq!(batch.error_word().expect("the error word"), 0, "{name}");
+        assert_same_hits(name, &rays, &expected, &batch.hits().expect("hits"));
+
+        // What fits into neither is refused with both numbers.
+        let refused = |gpu: &raystone::gpu::Gpu, built: &dyn raystone::accel::BuiltAccel| {
+            let traced = Traced::upload(gpu, built).expect("it is uploaded");
+            let batch = Batch::new(gpu, &buffers, &traced, Query::Closest, &rays, true);
+            let traced = batch.and_then(|batch| batch.trace());
+            traced.expect_err("it is bound").to_string()
+        };
+        let dimension = gpu.limits.max_texture_dimension_2d;
+        gpu.limits.max_texture_dimension_2d = 8191;
+        let told = refused(&gpu, &*built);
+        gpu.limits.max_texture_dimension_2d = dimension;
+        assert!(
+            told.contains("texture") && told.contains(&(8191_u64 << 17).to_string()),
+            "{told}"
+        );
+        let in_buffers = build(kind, &soup, &with(kind, "texels", ParamValue::Flag(false)));
+        let told = refused(&gpu, &*in_buffers);
+        assert!(told.contains(&(bytes / 3).to_string()), "{told}");
+    }
 }

@@ -32,9 +32,10 @@ impl AccelKind for BruteForce {
     fn build(
         &self,
         soup: &TriangleSoup,
-        _: &Params,
+        params: &Params,
         _: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        params.completed(&self.parameters())?;
         Ok(Box::new(Built {
             triangles: soup.records.len() as u32,
         }))
@@ -86,6 +87,7 @@ struct Twin<'a> {
 
 impl CpuTwin for Twin<'_> {
     fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
+        let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         for triangle in &self.soup.records {
@@ -96,6 +98,7 @@ impl CpuTwin for Twin<'_> {
     }
 
     fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         for triangle in &self.soup.records {
@@ -213,6 +216,7 @@ impl<'a> EveryTriangle<'a> {
 
     /// Tests all triangles, whose indices count from `first`; a nearer hit replaces `hit`.
     pub fn intersect(&self, ray: &Ray, first: u32, hit: &mut Hit) {
+        let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         // With infinite reciprocals nothing can be said of a slab.
         let bounded = self.soup.intersection.box_test.finite;

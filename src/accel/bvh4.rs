@@ -57,6 +57,7 @@ impl AccelKind for Bvh4 {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        let params = &params.completed(&self.parameters())?;
         let tree = wide_tree(soup, params, log)?;
         let settings = CollapseSettings::new(WIDTH, params);
         let wide = log.phase("collapse", || {
@@ -339,11 +340,13 @@ struct Twin<'a>(&'a Built, Intersection);
 
 impl CpuTwin for Twin<'_> {
     fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
+        let ray = &self.1.raised(ray);
         let inverse = self.1.inverse(ray.direction);
         self.0.trace(ray, inverse, false, counters)
     }
 
     fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        let ray = &self.1.raised(ray);
         let inverse = self.1.inverse(ray.direction);
         let hit = self.0.trace(ray, inverse, true, counters);
         hit.triangle != NO_HIT

@@ -1,7 +1,7 @@
 //! How rays meet triangles and boxes: the choice that every structure follows, on the device by
 //! composition and on the host through [`Reciprocal`].
 
-use super::ray::safe_inverse;
+use super::ray::{Ray, raised, safe_inverse};
 use super::triangle::TriangleTest;
 use crate::config::nearest;
 use crate::gpu::{ArithmeticProbe, Composition};
@@ -23,8 +23,8 @@ pub struct Intersection {
 /// A slab test: which reciprocal of the direction it uses, and how far it is padded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct BoxTest {
-    /// Whether components near 0 get a finite reciprocal ([`super::ray::SMALLEST_DIRECTION`]) in place of 1/d, whose
-    /// infinity and 0 · ∞ WGSL does not define.
+    /// Whether components near 0 are raised ([`super::ray::raised`]), so that 1/d is finite: infinity and 0 · ∞ WGSL
+    /// does not define.
     pub finite: bool,
     /// A box is entered if `enter <= exit * (1 + pad_ulps · 2⁻²³)`.
     pub pad_ulps: u32,
@@ -168,7 +168,16 @@ impl Intersection {
         composition
     }
 
-    /// What the tests need of a direction, computed once a ray.
+    /// The ray as it is traced. Twin: `raised` in `kernels/accel/ray.wesl`.
+    pub fn raised(&self, ray: &Ray) -> Ray {
+        if self.box_test.finite {
+            raised(ray)
+        } else {
+            *ray
+        }
+    }
+
+    /// What the tests need of a raised ray's direction, computed once a ray.
     pub fn inverse(&self, direction: [f32; 3]) -> Reciprocal {
         Reciprocal {
             inverse: if self.box_test.finite {
@@ -207,7 +216,7 @@ impl Deref for Reciprocal {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::ray::SMALLEST_DIRECTION;
+    use crate::accel::ray::SMALLEST_SLOPE;
 
     #[test]
     fn the_default_pad_is_two_to_the_minus_nineteen_and_names_are_found_again() {
@@ -269,7 +278,7 @@ mod tests {
             };
             tests.inverse([0.0, -0.0, 2.0])
         };
-        let limit = 1.0 / SMALLEST_DIRECTION;
+        let limit = 0.5 / SMALLEST_SLOPE;
         assert_eq!(*of(BoxTest::default()), [limit, -limit, 0.5]);
         let plain = BoxTest::named("plain").expect("a known name");
         assert_eq!(*of(plain), [f32::INFINITY, f32::NEG_INFINITY, 0.5]);

@@ -93,6 +93,7 @@ impl AccelKind for KdTree {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        let params = &params.completed(&self.parameters())?;
         let bounds = if soup.records.is_empty() {
             Bounds {
                 min: [0.0; 3],
@@ -413,6 +414,7 @@ struct Twin<'a> {
 
 impl Twin<'_> {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
+        let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         counters.box_tests += 1;

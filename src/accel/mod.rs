@@ -39,7 +39,7 @@ pub use registry::AccelRegistry;
 pub use two_level_grid::TwoLevelGrid;
 pub use uniform_grid::UniformGrid;
 
-use crate::config::{ParameterSchema, Params};
+use crate::config::{ParamError, ParameterSchema, Params};
 use crate::gpu::{Composition, UniformValues};
 use crate::measure::record::{Phase, StructureStats};
 use crate::scene::SceneData;
@@ -62,6 +62,9 @@ pub enum AccelError {
         /// What the structure allows.
         limit: u64,
     },
+    /// A parameter that the structure does not have, or a value that it does not allow.
+    #[error(transparent)]
+    Parameter(#[from] ParamError),
     /// Parameters that contradict each other, with the reason.
     #[error("{0}")]
     Contradiction(String),

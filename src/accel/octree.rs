@@ -94,6 +94,7 @@ impl AccelKind for Octree {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        let params = &params.completed(&self.parameters())?;
         let space = Space::around(soup);
         let tree = log.phase("levels", || build::build(soup, &space, params))?;
         Ok(Box::new(Built {
@@ -453,6 +454,7 @@ impl Twin<'_> {
     }
 
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
+        let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         let mirror = inverse.map(|i| u32::from(i < 0.0));
         let flip = mirror[0] | mirror[1] << 1 | mirror[2] << 2;

@@ -5,10 +5,18 @@ use bytemuck::{Pod, Zeroable};
 /// Triangle index of a miss.
 pub const NO_HIT: u32 = u32::MAX;
 
-/// Direction components smaller than this are replaced by it, sign kept, so that the reciprocal is
-/// finite: WGSL promises no infinity. With scene coordinates below 1e12 (checked when a scene is
-/// loaded) `(bounds - origin) / SMALLEST_DIRECTION` stays below the largest f32.
-pub const SMALLEST_DIRECTION: f32 = 1e-20;
+/// A direction needs a component of this length, 2⁻⁵⁶: what [`SMALLEST_COMPONENT`] adds to a shorter one
+/// would be more than rounding.
+pub const SMALLEST_DIRECTION: f32 = 1.387_778_8e-17;
+
+/// The least component of a raised direction, 2⁻⁸⁴, so that the reciprocal is finite: WGSL promises no
+/// infinity. With coordinates up to 1e12 (checked when a scene is loaded), twice that for a cell around
+/// them, `(bounds - origin) / SMALLEST_COMPONENT` stays below the largest f32.
+pub const SMALLEST_COMPONENT: f32 = 5.169_879e-26;
+
+/// The least component of a raised direction against its longest, 2⁻⁶⁰: far less than rounding, and its
+/// square is not yet denormal.
+pub const SMALLEST_SLOPE: f32 = 8.673_617_4e-19;
 
 /// A ray segment, 32 bytes, the layout of the ray buffers.
 #[repr(C)]
@@ -69,13 +77,83 @@ impl Hit {
     }
 }
 
-/// Finite, sign-keeping reciprocal of each component of a direction.
-pub fn safe_inverse(direction: [f32; 3]) -> [f32; 3] {
-    direction.map(|d| {
-        if d.abs() < SMALLEST_DIRECTION {
-            f32::from_bits((1.0 / SMALLEST_DIRECTION).to_bits() | (d.to_bits() & 0x8000_0000))
+/// The direction with components that are too short raised to the shortest, sign kept: to
+/// [`SMALLEST_SLOPE`] of the longest, and at least to [`SMALLEST_COMPONENT`].
+fn raised_direction(d: [f32; 3]) -> [f32; 3] {
+    let [x, y, z] = d.map(f32::abs);
+    let shortest = (x.max(y).max(z) * SMALLEST_SLOPE).max(SMALLEST_COMPONENT);
+    d.map(|d| {
+        if d.abs() < shortest {
+            shortest.copysign(d)
         } else {
-            1.0 / d
+            d
         }
     })
+}
+
+/// The ray as it is traced: no component of its direction is 0, or next to the longest as good as 0.
+///
+/// Boxes and triangles have to be tested with the *same* direction. Were a component 0 for a triangle's
+/// edges and a finite stand-in for its slabs, a vertex could lie on one side of the ray for the edges and
+/// on the other for the slabs, if it is as near to the ray's plane as the stand-in leads the ray away
+/// from it: both neighbours along an edge would then drop the hit, and a closed surface would have a
+/// crack. Raising changes nothing that is raised already.
+pub fn raised(ray: &Ray) -> Ray {
+    Ray {
+        direction: raised_direction(ray.direction),
+        ..*ray
+    }
+}
+
+/// Finite, sign-keeping reciprocal of each component of a direction.
+pub fn safe_inverse(direction: [f32; 3]) -> [f32; 3] {
+    raised_direction(direction).map(|d| 1.0 / d)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn along(direction: [f32; 3]) -> Ray {
+        Ray {
+            origin: [0.0; 3],
+            t_min: 0.0,
+            direction,
+            t_max: 1.0,
+        }
+    }
+
+    #[test]
+    fn what_is_raised_has_a_finite_reciprocal_keeps_signs_and_stays() {
+        let lengths = [SMALLEST_DIRECTION, 1e-10, 1.0, 1e10, 1e30, f32::MAX];
+        let parts = [0.0, -0.0, 1e-45, -1e-38, 1e-30, -1e-20, 1e-10, 0.5];
+        for length in lengths {
+            for (a, b) in parts.iter().flat_map(|a| parts.iter().map(move |b| (a, b))) {
+                let ray = along([a * length, -length, *b]);
+                let once = raised(&ray);
+                assert_eq!(raised(&once), once, "{ray:?}");
+                let farthest = 4e12 * 1.1;
+                for (was, (is, inverse)) in ray
+                    .direction
+                    .iter()
+                    .zip(once.direction.into_iter().zip(safe_inverse(ray.direction)))
+                {
+                    assert!(
+                        inverse == 1.0 / is && (inverse * farthest).is_finite(),
+                        "{ray:?}"
+                    );
+                    assert_eq!(was.is_sign_negative(), is.is_sign_negative(), "{ray:?}");
+                    // A change below rounding, relative to the longest component.
+                    let longest = length.max(b.abs());
+                    assert!((was - is).abs() <= longest * f32::EPSILON / 16.0, "{ray:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_direction_without_a_long_enough_component_is_no_ray() {
+        assert!(along([0.0, -SMALLEST_DIRECTION, 0.0]).is_ray());
+        assert!(!along([SMALLEST_DIRECTION.next_down(); 3]).is_ray());
+    }
 }

@@ -61,6 +61,7 @@ impl AccelKind for TwoLevelGrid {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        let params = &params.completed(&self.parameters())?;
         let frame = log.phase("bounds", || Frame::new(soup));
         let resolution = frame.resolution(soup.records.len(), params.number("lambda1"), 4096);
         let grid = Grid::new(&frame, resolution);
@@ -305,6 +306,7 @@ fn find_part(place: [f32; 3], top: [u32; 3], parts: [u32; 3]) -> [u32; 3] {
 impl Twin<'_> {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
         let grid = &self.built.grid;
+        let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         counters.box_tests += 1;

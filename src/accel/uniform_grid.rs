@@ -71,6 +71,7 @@ impl AccelKind for UniformGrid {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        let params = &params.completed(&self.parameters())?;
         let frame = log.phase("bounds", || Frame::new(soup));
         let resolution = frame.resolution(soup.records.len(), params.number("lambda"), 4096);
         let grid = Grid::new(&frame, resolution);
@@ -223,6 +224,7 @@ struct Twin<'a> {
 impl Twin<'_> {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
         let grid = &self.built.grid;
+        let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         counters.box_tests += 1;

@@ -7,6 +7,7 @@
 
 mod cells;
 mod check;
+mod complete;
 mod error;
 mod experiment;
 mod hash;
@@ -19,6 +20,7 @@ mod tree;
 mod variants;
 
 pub use cells::{SamplerCell, StreamCell, StructureCell, TimeCell};
+pub use complete::ParamError;
 pub use error::{ConfigError, Place, nearest};
 pub use experiment::{
     Axes, Discrepancy, Exclude, Experiment, Gate, REFERENCE_PARTS, Reference, Seeds, SppRange,

@@ -48,14 +48,36 @@ pub fn groups_for(items: u32) -> [u32; 3] {
     }
 }
 
+/// Refuses what needs more bytes than `limit`.
+pub(super) fn check(name: &str, needed: u64, limit: u64) -> Result<(), GpuError> {
+    if needed > limit {
+        return Err(GpuError::TooLarge {
+            name: name.to_owned(),
+            needed,
+            limit,
+        });
+    }
+    Ok(())
+}
+
 impl Gpu {
     /// A storage buffer with this content, at least 16 bytes long.
     ///
     /// # Errors
     /// It is larger than the adapter can bind, or the device is lost or out of memory.
     pub fn storage<T: Pod>(&self, name: &str, content: &[T]) -> Result<wgpu::Buffer, GpuError> {
+        self.check_size(name, size_of_val(content) as u64)?;
+        self.array(name, content)
+    }
+
+    /// The same, but only as a kernel binds it decides whether it is too large: as a texture
+    /// ([`super::Bindings::buffer`]) it may be larger than a storage buffer.
+    ///
+    /// # Errors
+    /// It is larger than any buffer, or the device is lost or out of memory.
+    pub fn array<T: Pod>(&self, name: &str, content: &[T]) -> Result<wgpu::Buffer, GpuError> {
         let bytes: &[u8] = bytemuck::cast_slice(content);
-        self.check_size(name, bytes.len() as u64)?;
+        check(name, bytes.len() as u64, self.limits.max_buffer_size)?;
         let padding;
         let contents = if bytes.len() < 16 {
             padding = [bytes, &[0u8; 16][bytes.len()..]].concat();
@@ -146,15 +168,7 @@ impl Gpu {
     }
 
     fn check_size(&self, name: &str, needed: u64) -> Result<(), GpuError> {
-        let limit = self.limits.max_storage_buffer_binding_size;
-        if needed > limit {
-            return Err(GpuError::TooLarge {
-                name: name.to_owned(),
-                needed,
-                limit,
-            });
-        }
-        Ok(())
+        check(name, needed, self.limits.max_storage_buffer_binding_size)
     }
 
     /// Runs one dispatch to its end and measures it.

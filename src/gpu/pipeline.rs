@@ -3,6 +3,7 @@
 use super::GpuError;
 use super::adapter::Gpu;
 use super::compose::{ComposedKernel, Composition};
+use super::dispatch::check;
 use super::uniform::UniformValues;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, OnceLock};
@@ -391,17 +392,8 @@ impl Gpu {
         name: &str,
         array: &'a Array,
     ) -> Result<wgpu::BindingResource<'a>, GpuError> {
-        let (needed, limit) = (
-            array.buffer.size(),
-            self.limits.max_storage_buffer_binding_size,
-        );
-        if needed > limit {
-            return Err(GpuError::TooLarge {
-                name: name.to_owned(),
-                needed,
-                limit,
-            });
-        }
+        let limit = self.limits.max_storage_buffer_binding_size;
+        check(name, array.buffer.size(), limit)?;
         Ok(array.buffer.as_entire_binding())
     }
 

@@ -19,7 +19,7 @@ impl Traced {
     /// Uploads a built structure.
     ///
     /// # Errors
-    /// An array exceeds what the adapter can bind.
+    /// An array needs more parts, or more bytes, than the adapter offers.
     pub fn upload(gpu: &Gpu, built: &dyn BuiltAccel) -> Result<Self, GpuError> {
         let buffers = built.buffers();
         let mut bindings = Bindings::new();
@@ -27,7 +27,8 @@ impl Traced {
             if built.divisible().contains(&array.name) {
                 bindings.parts(array.name, &gpu.storage_parts(array.name, &array.words)?);
             } else {
-                bindings.buffer(array.name, &gpu.storage(array.name, &array.words)?);
+                // What a kernel reads as a texture may exceed what it can bind as a buffer.
+                bindings.buffer(array.name, &gpu.array(array.name, &array.words)?);
             }
         }
         for (name, values) in buffers.uniforms {

@@ -269,9 +269,13 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
         }
         session.say(format!("{cell}: build and gate"));
         session.lose_device_on_request(world.gpu, &cell.to_string());
-        let built = match last.take() {
-            Some((other, built)) if is_same_structure(&other, &cell) => built,
-            _ => build(session, world, &cell),
+        // What cannot serve goes before the next is built.
+        let same = last
+            .take()
+            .filter(|(other, _)| is_same_structure(other, &cell));
+        let built = match same {
+            Some((_, built)) => built,
+            None => build(session, world, &cell),
         };
         let outcome = match &built {
             Ok(built) => gate_with(session, world, built, &cell)?,

@@ -1,10 +1,11 @@
 //! Why a sampler cannot be had.
 
+use crate::config::ParamError;
 use thiserror::Error;
 
 /// Why a sequence and a decorrelation do not make a sampler; every message names the limit or what to
 /// take instead.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, PartialEq, Error)]
 pub enum SamplerError {
     /// A name that is not registered.
     #[error("no {axis} is called `{name}`")]
@@ -13,6 +14,14 @@ pub enum SamplerError {
         axis: &'static str,
         /// What was asked for.
         name: String,
+    },
+    /// A parameter that one of the two does not have, or a value that it does not allow.
+    #[error("{name}: {error}")]
+    Parameter {
+        /// The sequence or decorrelation.
+        name: String,
+        /// What is wrong.
+        error: ParamError,
     },
     /// The two make no sense together.
     #[error("{pair} makes no sense: {reason}")]

@@ -6,7 +6,7 @@ use super::{
     Pmj02, R2, Rank1Lattice, Sampler, SamplerError, SamplerTable, Seeding, Sequence, Sobol,
     VanDerCorput,
 };
-use crate::config::{Entry, Variant};
+use crate::config::{Entry, Parameter, Variant};
 
 /// Everything that can be named on the `sequence` and `decorrelation` axes.
 #[derive(Clone)]
@@ -46,6 +46,18 @@ impl Default for SamplerRegistry {
 /// `sequence × decorrelation`, for messages.
 fn pair(sequence: &Variant, decorrelation: &Variant) -> String {
     format!("{sequence} × {decorrelation}")
+}
+
+/// A variant with the defaults of its entry for the parameters that it lacks.
+fn completed(variant: &Variant, schema: &[Parameter]) -> Result<Variant, SamplerError> {
+    let params = variant.params.completed(schema);
+    Ok(Variant {
+        params: params.map_err(|error| SamplerError::Parameter {
+            name: variant.name.clone(),
+            error,
+        })?,
+        ..variant.clone()
+    })
 }
 
 impl SamplerRegistry {
@@ -88,6 +100,8 @@ impl SamplerRegistry {
         decorrelation: &Variant,
     ) -> Result<bool, SamplerError> {
         let (first, second) = self.find(sequence, decorrelation)?;
+        let sequence = &completed(sequence, &first.parameters())?;
+        let decorrelation = &completed(decorrelation, &second.parameters())?;
         let facts = first.facts(&sequence.params);
         let partner = Partner {
             name: &sequence.name,
@@ -124,6 +138,8 @@ impl SamplerRegistry {
     ) -> Result<Sampler, SamplerError> {
         self.is_random(sequence, decorrelation)?;
         let (first, second) = self.find(sequence, decorrelation)?;
+        let sequence = &completed(sequence, &first.parameters())?;
+        let decorrelation = &completed(decorrelation, &second.parameters())?;
         let partner = Partner {
             name: &sequence.name,
             facts: first.facts(&sequence.params),

@@ -1,5 +1,6 @@
 //! What can go wrong between a scene's name and its triangles.
 
+use crate::config::ParamError;
 use std::any::Any;
 use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -77,6 +78,9 @@ pub enum SceneError {
         /// Which, and why.
         source: super::InstanceError,
     },
+    /// A parameter that the built-in scene does not have, or a value that it does not allow.
+    #[error(transparent)]
+    Parameter(#[from] ParamError),
     /// A camera that sees nothing.
     #[error("camera: {problem}; {advice}")]
     Camera {

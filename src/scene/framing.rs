@@ -17,7 +17,10 @@ const INSIDE_FOV: f32 = 60.0;
 /// Share of the image, in width or height, that an object takes.
 const FILL: f32 = 0.9;
 /// Most triangles that rays are cast among; of more, the largest ones.
-const MOST_TRIANGLES: usize = 1 << 19;
+const MOST_TRIANGLES: usize = 1 << 16;
+/// No rays are cast where a random ray through the scene would meet more boxes than this: thousands of
+/// triangles in one place.
+const MOST_BOXES: f32 = 2000.0;
 /// A point is inside a room if this share of all directions meets the front of a surface.
 const ENCLOSED: f32 = 0.7;
 /// A scene is a room if this share of the points in its box is inside one.
@@ -80,7 +83,11 @@ impl Framing {
         if bounds.is_empty() {
             return Self::default();
         }
-        let (up, place) = Stage::new(&scene.triangles, &bounds).place(says_y);
+        let stage = Stage::new(&scene.triangles, &bounds);
+        let (up, place) = match stage.boxes_per_ray() <= MOST_BOXES {
+            true => stage.place(says_y),
+            false => (Vec3::Y, Self::default().place),
+        };
         Self { bounds, up, place }
     }
 
@@ -206,12 +213,21 @@ impl Stage {
             let [v0, v1, v2] = t.vertices.map(|v| local(v).into());
             obvhs::triangle::Triangle { v0, v1, v2 }
         };
-        let mut solid: Vec<_> = triangles.iter().map(to_local).collect();
-        if solid.len() > MOST_TRIANGLES {
-            let area = |t: &obvhs::triangle::Triangle| (t.v1 - t.v0).cross(t.v2 - t.v0).length();
-            solid.select_nth_unstable_by(MOST_TRIANGLES, |a, b| area(b).total_cmp(&area(a)));
-            solid.truncate(MOST_TRIANGLES);
-        }
+        let solid: Vec<_> = if triangles.len() <= MOST_TRIANGLES {
+            triangles.iter().map(to_local).collect()
+        } else {
+            let area = |t: &Triangle| {
+                let [v0, v1, v2] = t.vertices.map(local);
+                (v1 - v0).cross(v2 - v0).length()
+            };
+            let mut areas: Vec<_> = triangles.iter().map(area).zip(0_u32..).collect();
+            areas.select_nth_unstable_by(MOST_TRIANGLES, |a, b| b.0.total_cmp(&a.0));
+            let largest = &areas[..MOST_TRIANGLES];
+            largest
+                .iter()
+                .map(|&(_, i)| to_local(&triangles[i as usize]))
+                .collect()
+        };
         let ids = (0..solid.len() as u32).collect();
         let bvh = PlocBuilder::new().build(
             PlocSearchDistance::Minimum,
@@ -229,6 +245,16 @@ impl Stage {
             up: Vec3::Y,
             solid,
             bvh,
+        }
+    }
+
+    /// Boxes that a random ray through the scene meets: the SAH cost of the boxes alone.
+    fn boxes_per_ray(&self) -> f32 {
+        let mut areas = self.bvh.nodes.iter().map(|node| node.aabb().half_area());
+        let root = areas.next().unwrap_or(0.0);
+        match root > 0.0 {
+            true => areas.sum::<f32>() / root,
+            false => f32::INFINITY,
         }
     }
 

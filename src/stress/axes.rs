@@ -142,6 +142,7 @@ impl Suite<'_> {
                         rays,
                         self_intersections: 0,
                         leaks: 0,
+                        farthest: 0.0,
                     };
                     bounce(&mesh, offset, self.settings.seed, &mut record)?;
                     records.push(Record::Offset(record));
@@ -318,9 +319,10 @@ fn bounce(
             if left_itself || hit.triangle == NO_HIT {
                 break;
             }
-            let Some(mirrored) = mirror(&soup, &next, &hit, offset) else {
+            let Some((mirrored, moved)) = mirror(&soup, &next, &hit, offset) else {
                 break;
             };
+            record.farthest = record.farthest.max(moved);
             from = hit.triangle;
             next = mirrored;
         }
@@ -329,8 +331,9 @@ fn bounce(
     Ok(())
 }
 
-/// The mirrored ray, begun as integrators begin it; `None` where the triangle has no normal.
-fn mirror(soup: &TriangleSoup, incoming: &Ray, hit: &Hit, offset: RayOffset) -> Option<Ray> {
+/// The mirrored ray, begun as integrators begin it, and how many bounds of the point's error it was moved;
+/// `None` where the triangle has no normal.
+fn mirror(soup: &TriangleSoup, incoming: &Ray, hit: &Hit, offset: RayOffset) -> Option<(Ray, f64)> {
     let record = soup.records.get(hit.triangle as usize)?;
     let [v0, v1, v2] = record.vertices().map(Vec3::from);
     let (e1, e2) = (v0 - v1, v2 - v0);
@@ -344,8 +347,12 @@ fn mirror(soup: &TriangleSoup, incoming: &Ray, hit: &Hit, offset: RayOffset) -> 
     };
     let error = position_error(v0.into(), e1.into(), e2.into(), &TransformError::default());
     let origin = offset.offset_point(p.into(), facing.into(), error);
+    let moved = (Vec3::from(origin) - p).as_dvec3().length();
+    let unit = f64::from(p.abs().max_element() * f32::EPSILON);
+    let bound = f64::from(facing.abs().dot(error.into())) + 2.0 * unit;
     let mirrored = direction - facing * (2.0 * facing.dot(direction));
-    Some(ray(origin.into(), mirrored.try_normalize()?))
+    let next = ray(origin.into(), mirrored.try_normalize()?);
+    Some((next, moved / bound.max(f64::MIN_POSITIVE)))
 }
 
 #[cfg(test)]
@@ -364,6 +371,7 @@ mod tests {
                     rays: 3000,
                     self_intersections: 0,
                     leaks: 0,
+                    farthest: 0.0,
                 };
                 bounce(&mesh, offset, 1, &mut record).unwrap();
                 (record.self_intersections, record.leaks)

@@ -222,6 +222,10 @@ pub struct OffsetRecord {
     pub self_intersections: usize,
     /// Rays that left the closed mesh.
     pub leaks: usize,
+    /// Greatest distance between a ray's origin and the point it leaves, in bounds of the point's error
+    /// (its box along the normal, and a unit of each coordinate).
+    #[serde(default)]
+    pub farthest: f64,
 }
 
 /// What a triangle test costs.

@@ -12,6 +12,8 @@ const FAR_MISSES: f64 = 2e-5;
 const STRANGE_SLOWDOWN: f64 = 2.5;
 /// What the default triangle test may cost against Möller–Trumbore.
 const COST: f64 = 1.15;
+/// How many bounds of a point's error a ray may begin from it: one, and the rounding of that.
+const FARTHEST: f64 = 2.0;
 /// The family of rays that are none.
 const NO_RAYS: &str = "non-finite";
 
@@ -31,6 +33,7 @@ pub fn targets(records: &[Record]) -> Vec<TargetRecord> {
     targets.extend(cell_targets(&cells));
     targets.extend(pad_target(records));
     targets.extend(offset_target(records));
+    targets.extend(far_offset_target(records));
     targets.extend(figure_target(records));
     targets.extend(cost.map(cost_target));
     targets
@@ -182,6 +185,21 @@ fn offset_target(records: &[Record]) -> Option<TargetRecord> {
     found.peek()?;
     let name = format!("rays begun with {default} that meet their own triangle or leak");
     Some(target(name, 0.0, found))
+}
+
+/// How far rays begin from the points they leave: contact shadows and thin gaps end there.
+fn far_offset_target(records: &[Record]) -> Option<TargetRecord> {
+    let default = RayOffset::default().name();
+    let mut found = (records.iter())
+        .filter_map(|r| match r {
+            Record::Offset(offset) if offset.offset == default => Some(offset),
+            _ => None,
+        })
+        .map(|o| (o.farthest, format!("{}, {}", o.mesh, o.place)))
+        .peekable();
+    found.peek()?;
+    let name = format!("farthest begin of a ray with {default}, in bounds of the point's error");
+    Some(target(name, FARTHEST, found))
 }
 
 /// Accumulation and sampling: how many figures are beyond their alarm level.

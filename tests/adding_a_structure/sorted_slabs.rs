@@ -146,6 +146,7 @@ struct Twin<'a> {
 
 impl Twin<'_> {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
+        let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         for run in &self.built.runs {

@@ -235,6 +235,7 @@ fn unpack(words: &[[u32; 4]], counted: bool) -> Batch {
 /// The judge: every triangle for every ray.
 pub fn brute_force(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
     let closest = |ray: &Ray| {
+        let ray = &soup.intersection.raised(ray);
         let inverse = soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         if !ray.is_ray() {

@@ -59,7 +59,8 @@ impl AccelKind for Bvh {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        Ok(Box::new(BuiltBvh::build(soup, params, log)?))
+        let params = params.completed(&self.parameters())?;
+        Ok(Box::new(BuiltBvh::build(soup, &params, log)?))
     }
 }
 
@@ -87,7 +88,8 @@ impl AccelKind for RopedBvh {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        Ok(Box::new(BuiltBvh::build(soup, params, log)?))
+        let params = params.completed(&self.parameters())?;
+        Ok(Box::new(BuiltBvh::build(soup, &params, log)?))
     }
 }
 
@@ -117,6 +119,8 @@ impl BuiltBvh {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Self, AccelError> {
+        // `roped-bvh` has fewer parameters; those it lacks keep to their defaults.
+        let params = &params.completed(&Bvh.parameters())?;
         let options = Options::new(params)?;
         let mut tree = Tree::build(soup, params, log)?;
         tree.note_epo(soup);
@@ -249,6 +253,7 @@ impl BvhTwin<'_> {
             leaves: &self.built.leaves,
             soup: self.soup,
         };
+        let ray = &self.soup.intersection.raised(ray);
         let query = Query::new(ray, any, leaves, counters);
         let options = &self.built.options;
         let entries = options.stack_entries(self.built.depth) as usize;

@@ -84,10 +84,11 @@ pub(super) struct Level {
 /// The level of the boxes that are tested with `ray`, grown by `growth` for each unit of the origin's
 /// greatest coordinate.
 pub(super) fn level(ray: &Ray, growth: f32, tests: Intersection) -> Level {
+    let ray = tests.raised(ray);
     let [x, y, z] = ray.origin.map(f32::abs);
     let grown = growth * x.max(y).max(z);
     Level {
-        ray: *ray,
+        ray,
         inverse: tests.inverse(ray.direction),
         low_origin: ray.origin.map(|x| x + grown),
         high_origin: ray.origin.map(|x| x - grown),

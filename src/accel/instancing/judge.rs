@@ -3,8 +3,7 @@
 use super::super::bounds::{Bounds, enter_box};
 use super::super::brute_force::EveryTriangle;
 use super::super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, BuiltBvh, Bvh, Counters, CpuTwin, Hit, NO_HIT,
-    Ray, TriangleSoup,
+    AccelError, BuildLog, BuiltAccel, BuiltBvh, Counters, CpuTwin, Hit, NO_HIT, Ray, TriangleSoup,
 };
 use super::instance::object_ray;
 use super::placed::Placed;
@@ -19,7 +18,8 @@ pub fn brute_force_instances(placed: &Placed, rays: &[Ray]) -> Vec<Hit> {
         let mut hit = Hit::miss(ray);
         if ray.is_ray() {
             for instance in &placed.instances {
-                let local = object_ray(instance, ray);
+                let tests = placed.objects[instance.object as usize].intersection;
+                let local = object_ray(instance, &tests.raised(ray));
                 objects[instance.object as usize].intersect(&local, instance.first, &mut hit);
             }
         }
@@ -41,12 +41,10 @@ impl<'a> InstanceJudge<'a> {
     /// # Errors
     /// An object has too many triangles for a BVH.
     pub fn new(placed: &'a Placed) -> Result<Self, AccelError> {
-        let schema = Bvh.parameters().into_iter();
-        let params = Params(schema.map(|p| (p.name.to_owned(), p.default)).collect());
         let build = |object: &TriangleSoup| {
-            let built = BuiltBvh::build(object, &params, &mut BuildLog::default())?;
+            let built = BuiltBvh::build(object, &Params::default(), &mut BuildLog::default())?;
             built.validate(object)?;
-            Ok((object.bounds(), built))
+            Ok::<_, AccelError>((object.bounds(), built))
         };
         Ok(Self {
             placed,
@@ -59,12 +57,13 @@ impl CpuTwin for InstanceJudge<'_> {
     fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
         let mut best = Hit::miss(ray);
         for instance in &self.placed.instances {
-            let mut local = object_ray(instance, ray);
+            let object = &self.placed.objects[instance.object as usize];
+            let tests = object.intersection;
+            let mut local = tests.raised(&object_ray(instance, &tests.raised(ray)));
             // A hit at the same distance counts: its triangle may have the lower index.
             local.t_max = best.t;
-            let object = &self.placed.objects[instance.object as usize];
             let (bounds, built) = &self.objects[instance.object as usize];
-            let inverse = object.intersection.inverse(local.direction);
+            let inverse = tests.inverse(local.direction);
             if enter_box(bounds, &local, inverse, best.t).is_none() {
                 continue;
             }

@@ -62,6 +62,7 @@ impl AccelKind for MetaBvh {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        let params = &params.completed(&self.parameters())?;
         let base = Base::build(soup, params, log)?;
         let rebraid = params.integer("rebraid") as usize;
         check_entries(base.instances.len(), rebraid)?;
@@ -136,6 +137,7 @@ impl MetaBvhTwin {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
         let triangles = &self.base.forest.triangles;
         let tests = self.base.forest.intersection;
+        let ray = &tests.raised(ray);
         let world = level(ray, self.top.growth, tests);
         let mut hit = Hit::miss(ray);
         let mut stack: Vec<u32> = Vec::new();

@@ -13,6 +13,7 @@ impl NestedTwin<'_> {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
         let built = self.0;
         let forest = &built.base.forest;
+        let ray = &forest.intersection.raised(ray);
         let world = level(ray, built.top.growth, forest.intersection);
         let mut hit = Hit::miss(ray);
         let mut stack = Vec::new();

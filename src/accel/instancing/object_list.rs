@@ -41,6 +41,7 @@ impl AccelKind for ObjectList {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        let params = &params.completed(&self.parameters())?;
         let base = Base::build(soup, params, log)?;
         let mut built = Built {
             base,
@@ -197,6 +198,7 @@ struct Twin<'a>(&'a Built);
 impl Twin<'_> {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
         let forest = &self.0.base.forest;
+        let ray = &forest.intersection.raised(ray);
         let world = level(ray, self.0.growth, forest.intersection);
         let mut hit = Hit::miss(ray);
         for (entry, world_box) in self.0.entries.iter().zip(&self.0.boxes) {

@@ -100,8 +100,8 @@ fn hits_and_culled(seeds: std::ops::Range<u64>, pad: Option<f64>) -> (usize, usi
             let map = pad.map_or(BoxMap::new(&instance), |p| BoxMap::with_pad(&instance, p));
             let world_box = map.world_box(&record.bounds());
             for _ in 0..20 {
-                let ray = ray(&mut rng, &instance, &target);
-                let local = object_ray(&instance, &ray);
+                let ray = tests.raised(&ray(&mut rng, &instance, &target));
+                let local = tests.raised(&object_ray(&instance, &ray));
                 let mut hit = Hit::miss(&ray);
                 intersect_triangle(&record, &local, tests.inverse(local.direction), &mut hit);
                 if hit.triangle == NO_HIT {

@@ -14,8 +14,8 @@
 //!    sums of four and three products.
 //! 2. The test clamps t into the slab interval of the triangle's bounds, padded by 2⁻²¹ = 8ε. The
 //!    computed ends carry a difference, a product and a reciprocal (WGSL: 2.5 ulp = 5ε), the pad two
-//!    more roundings: o' + t·d' lies in B up to 17ε (β + |o'|). Where a component of d' is replaced by
-//!    ±10⁻²⁰ this adds at most 10⁻²⁰ t.
+//!    more roundings: o' + t·d' lies in B up to 17ε (β + |o'|). Where components of d' are raised, by at
+//!    most 2⁻⁶⁰|d'| or 2⁻⁸⁴, the hit lies on the raised ray, which differs by as much times t.
 //! 3. |t·d| = |x − o| ≤ |x| + |o|. Together, M·x + c lies in B up to
 //!    ε (17β + 21|c| + 24‖M‖|o| + 3‖M‖|x|), and so x in M⁻¹(B) up to ‖M⁻¹‖ times that.
 //! 4. |x| ≤ X + pad, X being the greatest coordinate of M⁻¹(B). With κ ≤ 2²⁰ the term 3εκ·pad is
@@ -23,8 +23,8 @@
 //!    32ε (‖M⁻¹‖(β + |c|) + κX) + 32ε κ|o| covers everything with room for 2εκ(|x| + |o|).
 //!    The first part is in W; the second depends on the ray: the *growth* κ·2⁻¹⁹ times |o|.
 //! 5. The ray's own slab test of a box that holds x has relative errors of 7ε, a seventh of what
-//!    `BOX_PAD` allows; the rounding of the two grown origins (ε|o|) and the replacement of
-//!    components of d below 10⁻²⁰ take the room of step 4, if |d| ≥ 10⁻¹² max(1, 1/‖M‖). The four
+//!    `BOX_PAD` allows; the rounding of the two grown origins (ε|o|) and the raising of
+//!    components of d and d' take the room of step 4, if |d| ≥ 2⁻⁵⁶ max(1, 1/‖M‖). The four
 //!    inequalities of the plain theorem follow, and monotony carries them to boxes around W. ∎
 //!
 //! Where spatial splits list a triangle in several leaves, only together covering its bounds, the clamped

@@ -109,6 +109,7 @@ impl AccelKind for IrregularGrid {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
+        let params = &params.completed(&self.parameters())?;
         let settings = Settings {
             lambda1: params.number("lambda1"),
             lambda2: params.number("lambda2"),
@@ -341,6 +342,7 @@ struct Twin<'a> {
 impl Twin<'_> {
     fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
         let grid = &self.built.fine;
+        let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
         let mut hit = Hit::miss(ray);
         counters.box_tests += 1;

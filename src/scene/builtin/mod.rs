@@ -54,8 +54,11 @@ pub fn builtin_scenes() -> Vec<Entry> {
 /// The built-in scene that `variant` names, if it names one.
 pub(super) fn build(variant: &Variant) -> Option<Result<SceneData, SceneError>> {
     let scene = BUILTINS.iter().find(|scene| scene.name == variant.name)?;
-    let (builder, look) = (scene.build)(&variant.params);
-    Some(builder.finish(&variant.name, look))
+    let params = variant.params.completed(&(scene.schema)());
+    Some(params.map_err(SceneError::from).and_then(|params| {
+        let (builder, look) = (scene.build)(&params);
+        builder.finish(&variant.name, look)
+    }))
 }
 
 /// What to type instead of `name`: the nearest built-in name, else all of them.

@@ -26,7 +26,7 @@ fn meshes() -> [(&'static str, MakeMesh); 2] {
 }
 
 /// A mesh that rounding has crushed is as closed as before, but has no inside.
-fn truth(place: &Place) -> Truth {
+pub fn truth(place: &Place) -> Truth {
     match place.keeps_shape() {
         true => Truth::Closed,
         false => Truth::Exact,

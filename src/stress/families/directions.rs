@@ -3,7 +3,7 @@
 use super::super::case::{FAR, Maker, Random, Truth, ray, towards};
 use super::super::place::Place;
 use super::super::shapes::{RADIUS, cube, sphere};
-use super::closed::{inside, on_edge};
+use super::closed::{inside, on_edge, truth};
 use crate::accel::Ray;
 use crate::oracle::{ExactCrossing, OracleRay};
 use crate::scene::{Bounds, Triangle};
@@ -128,4 +128,85 @@ pub fn interval_ends(maker: &mut Maker) {
             ..whole
         }
     });
+}
+
+/// What stands in a direction where 0 is meant: zeros of both signs, sin π in f32 and in f64, and less.
+const NOTHINGS: [f32; 8] = [
+    0.0,
+    -0.0,
+    -8.742_278e-8,
+    1.224_646_8e-16,
+    -1e-20,
+    1e-30,
+    -1e-38,
+    1e-44,
+];
+
+/// A ray of any length from 10⁻¹⁰ to 10¹⁰, most often with a component or two that are next to nothing,
+/// and from the coordinates of a vertex along those.
+pub fn of_any_length(from: Vec3, mesh: &[Triangle], random: &mut Random) -> Ray {
+    let mut from = from;
+    let mut direction = random.direction().as_vec3();
+    let vertex = some(mesh, random).vertices[random.below(3)];
+    let first = random.below(3);
+    for k in 0..random.below(3) {
+        let axis = (first + k) % 3;
+        direction[axis] = random.one_of(&NOTHINGS);
+        if (vertex[axis] - from[axis]).abs() < 0.25 * from.distance(vertex) {
+            from[axis] = vertex[axis];
+        }
+    }
+    let length = 10_f64.powf(10.0 * random.signed()) as f32;
+    ray(from, length * direction)
+}
+
+pub fn lengths(maker: &mut Maker) {
+    for place in maker.places() {
+        for (name, mesh) in [("sphere", sphere(12, &place)), ("box", cube(4, &place))] {
+            let one = |mesh: &[Triangle], random: &mut Random| {
+                of_any_length(place.point(0.2 * RADIUS * random.in_cube()), mesh, random)
+            };
+            maker.add(
+                format!("{name}, {place}"),
+                place,
+                truth(&place),
+                |_| mesh,
+                |mesh, random, count| (0..count).map(|_| one(mesh, random)).collect(),
+            );
+        }
+    }
+}
+
+pub fn seams(maker: &mut Maker) {
+    let place = Place::ORDINARY;
+    for seam in [
+        8.742_278e-8,
+        -8.742_278e-8,
+        1.224_646_8e-16,
+        -5.42e-20,
+        1e-30,
+    ] {
+        let noisy = |x: f32| if x.abs() < 1e-6 { seam } else { x };
+        let mesh = sphere(12, &place).into_iter().map(|t| Triangle {
+            vertices: t
+                .vertices
+                .map(|v| Vec3::from_array(v.to_array().map(noisy))),
+        });
+        maker.add(
+            format!("{seam:e} for 0"),
+            place,
+            Truth::Closed,
+            |_| mesh.collect(),
+            |mesh, random, count| {
+                let one = |_| {
+                    let mut from = place.point(0.2 * RADIUS * random.in_cube());
+                    for _ in 0..random.below(4) {
+                        from[random.below(3)] = random.one_of(&NOTHINGS);
+                    }
+                    of_any_length(from, mesh, random)
+                };
+                (0..count).map(one).collect()
+            },
+        );
+    }
 }

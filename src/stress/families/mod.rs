@@ -22,7 +22,7 @@ pub struct Family {
 }
 
 /// Every family.
-pub const FAMILIES: [Family; 17] = [
+pub const FAMILIES: [Family; 19] = [
     Family {
         name: "watertight",
         description: "closed meshes from inside, random directions",
@@ -47,6 +47,16 @@ pub const FAMILIES: [Family; 17] = [
         name: "axis-parallel",
         description: "directions along axes and in planes of axes, zeros of both signs",
         make: directions::axis_parallel,
+    },
+    Family {
+        name: "lengths",
+        description: "closed meshes from inside, directions of length 1e-10 to 1e10, with next to nothing in them",
+        make: directions::lengths,
+    },
+    Family {
+        name: "seams",
+        description: "the same with sin π and less for the 0 of a sphere's seams",
+        make: directions::seams,
     },
     Family {
         name: "in-plane",
@@ -105,7 +115,7 @@ pub const FAMILIES: [Family; 17] = [
     },
     Family {
         name: "instances",
-        description: "closed objects under nearly degenerate transforms, from inside",
+        description: "closed objects under nearly degenerate transforms and scales up to a million, from inside",
         make: placed::instances,
     },
 ];

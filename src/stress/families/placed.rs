@@ -3,8 +3,9 @@
 use super::super::case::{Maker, Random, ray};
 use super::super::place::Place;
 use super::super::shapes::{RADIUS, sphere};
+use super::directions::of_any_length;
 use crate::scene::{Assembly, Transform};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3, Vec3};
 
 /// Instances in a scene.
 const COPIES: usize = 12;
@@ -30,7 +31,34 @@ fn squeezed(random: &mut Random, thickness: f64, spread: f64) -> Option<Assembly
     (!assembly.instances().is_empty()).then_some(assembly)
 }
 
+/// One sphere, scaled about the origin, and directions of every length.
+fn scaled(maker: &mut Maker) {
+    for scale in [1e-6, 1e6] {
+        let place = Place { scale, shift: 0.0 };
+        maker.add_placed(
+            format!("{place}"),
+            |_| {
+                let mut assembly = Assembly::default();
+                let object = assembly.add_object(sphere(12, &Place::ORDINARY)).ok()?;
+                let columns = [0, 1, 2].map(|k| (DMat3::IDENTITY.col(k) * scale).as_vec3());
+                let to_world = Transform::new(columns, Vec3::ZERO);
+                assembly.place(object, to_world).ok()?;
+                Some(assembly)
+            },
+            |_, random, count| {
+                let mesh = sphere(12, &place);
+                let one = |_| {
+                    let from = place.point(0.2 * RADIUS * random.in_cube());
+                    of_any_length(from, &mesh, random)
+                };
+                (0..count).map(one).collect()
+            },
+        );
+    }
+}
+
 pub fn instances(maker: &mut Maker) {
+    scaled(maker);
     let thicknesses: &[f64] = match maker.quick {
         true => &[1.0, 1e-5],
         false => &[1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5],

@@ -60,7 +60,12 @@ impl Subject {
                 Check::Discrepancy,
                 Check::Integral,
             ],
-            Self::Integrators => &[Check::Furnace, Check::Occlusion, Check::Bias],
+            Self::Integrators => &[
+                Check::Furnace,
+                Check::Occlusion,
+                Check::ThinWalls,
+                Check::Bias,
+            ],
         }
     }
 }

@@ -44,7 +44,8 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    fn new(scene: SceneData) -> Self {
+    /// A scene made here.
+    pub fn new(scene: SceneData) -> Self {
         Self {
             soup: TriangleSoup::new(&scene),
             camera: scene.view(1.0),

@@ -14,6 +14,11 @@ use crate::measure::bias::{BiasOptions, BiasVerdict, check_bias};
 use crate::measure::image::Image;
 use crate::measure::statistics::{mean, variance};
 use crate::sampling::{Demand, Sampler, dimensions};
+use crate::scene::{Camera, Material, Triangle};
+use crate::stress::case::scene;
+use crate::stress::place::Place;
+use crate::stress::shapes::{RADIUS, cube};
+use glam::Vec3;
 use std::path::Path;
 
 const SIZE: u32 = 16;
@@ -180,6 +185,51 @@ pub(super) fn occlusion(bench: &Bench) -> Finding {
             let scene = &stage.scene.name;
             return Ok(Some(format!(
                 "{scene}: {found} of the rays of length {radius} are free, not {least} to {most}"
+            )));
+        }
+    }
+    Ok(None)
+}
+
+/// Height of the thin box: five times the default offset of a ray from its walls.
+const GAP: f64 = 2e-5;
+
+/// A closed box of 4 × 4 units and [`GAP`], seen from its middle, below a lamp and a white sky: an upper
+/// bound of ray offsets. Rays that begin farther off their wall than the box is high are outside.
+fn thin_box() -> Stage {
+    let mut mesh = cube(2, &Place::ORDINARY);
+    for vertex in mesh.iter_mut().flat_map(|t| &mut t.vertices) {
+        vertex.y *= (GAP / (2.0 * RADIUS)) as f32;
+    }
+    let walls = mesh.len();
+    let lamp = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+    let [a, b, c, d] = lamp.map(|(x, z)| Vec3::new(x, 1.0, z));
+    mesh.extend([[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices }));
+    let mut scene = scene(mesh, None);
+    let shining = Material::diffuse("lamp", Vec3::splat(0.5)).emitting(Vec3::ONE);
+    scene.materials.push(shining);
+    scene.material_ids[walls..].fill(1);
+    scene.camera = Some(Camera {
+        eye: Vec3::new(0.1, 0.0, 0.2),
+        target: Vec3::new(1.1, 0.0, 0.5),
+        up: Vec3::Y,
+        vertical_fov_degrees: 60.0,
+    });
+    Stage::new(scene)
+}
+
+/// The thin box is dark inside, to the last bit.
+pub(super) fn thin_walls(bench: &Bench) -> Finding {
+    let stage = thin_box();
+    let long = ("ao", ("radius", ParamValue::Number(2.0)));
+    for what in [path(MAX_DEPTH), long] {
+        let name = what.0;
+        let images = render(bench, &stage, what, ONE)?;
+        let pixels = images.iter().flat_map(|i| &i.pixels).flatten();
+        let lit = pixels.filter(|v| **v != 0.0).count();
+        if lit > 0 {
+            return Ok(Some(format!(
+                "{name}: {lit} values in a dark box are not 0"
             )));
         }
     }

@@ -35,6 +35,8 @@ pub enum Check {
     Furnace,
     /// Nothing is occluded before a convex body, everything in a closed box.
     Occlusion,
+    /// No light comes through the walls of a closed box as thin as a few ray offsets.
+    ThinWalls,
     /// The image of the Cornell box has the mean of plain path tracing, tile by tile.
     Bias,
 }
@@ -52,6 +54,7 @@ impl Check {
             Self::Integral => "integral",
             Self::Furnace => "furnace",
             Self::Occlusion => "occlusion",
+            Self::ThinWalls => "thin-walls",
             Self::Bias => "bias",
         }
     }
@@ -120,6 +123,7 @@ impl<'a> Bench<'a> {
             Subject::Integrators => match check {
                 Check::Furnace => images::furnace(self),
                 Check::Occlusion => images::occlusion(self),
+                Check::ThinWalls => images::thin_walls(self),
                 Check::Bias => images::bias(self),
                 _ => Ok(None),
             },

@@ -72,8 +72,19 @@ pub(super) const MUTANTS: &[Mutant] = &[
         "the reciprocal of a direction of 0 is 0",
         text(
             "accel/ray",
-            "select(1.0 / d, small,",
-            "select(1.0 / d, 0.0,",
+            "return 1.0 / raised_direction(direction);",
+            "return select(1.0 / direction, vec3<f32>(0.0), abs(direction) < vec3<f32>(1e-15));",
+        ),
+        BVH,
+        Check::Lattice,
+    ),
+    row(
+        "edges-see-another-direction",
+        "directions are raised for slabs, not for edges",
+        text(
+            "accel/ray",
+            "raised_direction(ray.direction), ray.t_max)",
+            "ray.direction, ray.t_max)",
         ),
         BVH,
         Check::Lattice,

@@ -99,7 +99,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             "if (false)",
         ),
         IMAGES,
-        Check::Bias,
+        Check::ThinWalls,
     ),
     row(
         "one-bounce-short",
@@ -184,6 +184,72 @@ pub(super) const MUTANTS: &[Mutant] = &[
         ),
         IMAGES,
         Check::Furnace,
+    ),
+    row(
+        "offset-sixteenfold",
+        "rays start sixteen times as far from their surface",
+        text(
+            "integrator/offset/error_bound",
+            "let step = n * distance;",
+            "let step = n * (16.0 * distance);",
+        ),
+        IMAGES,
+        Check::ThinWalls,
+    ),
+    row(
+        "position-error-thousandfold",
+        "the bound of a point's error is a thousand times too large",
+        text(
+            "integrator/position_error",
+            "return POSITION_ERROR *",
+            "return 1000.0 * POSITION_ERROR *",
+        ),
+        IMAGES,
+        Check::ThinWalls,
+    ),
+    row(
+        "offset-along-another-axis",
+        "rays start beside their surface instead of above it",
+        text(
+            "integrator/offset/error_bound",
+            "let step = n * distance;",
+            "let step = n.yzx * distance;",
+        ),
+        IMAGES,
+        Check::Furnace,
+    ),
+    row(
+        "offset-of-the-other-side",
+        "rays start behind their surface",
+        text(
+            "integrator/offset/error_bound",
+            "let step = n * distance;",
+            "let step = -n * distance;",
+        ),
+        IMAGES,
+        Check::Furnace,
+    ),
+    row(
+        "shadow-rays-start-far-off",
+        "only shadow rays start too far from their surface",
+        text(
+            "integrator/path",
+            "let origin = offset_point(surface.position, surface.normal, surface.error);",
+            "let origin = offset_point(surface.position, surface.normal, 64.0 * surface.error);",
+        ),
+        IMAGES,
+        Check::ThinWalls,
+    ),
+    row(
+        "occlusion-rays-start-far-off",
+        "only rays of ambient occlusion start too far from their surface",
+        text(
+            "integrator/ao",
+            "offset_point(surface.position, surface.normal, surface.error)",
+            "offset_point(surface.position, surface.normal, 64.0 * surface.error)",
+        ),
+        IMAGES,
+        Check::ThinWalls,
     ),
     row(
         "camera-upside-down",
