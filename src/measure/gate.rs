@@ -117,7 +117,7 @@ impl Judge {
         self.check_brute_force(settings.brute_force_tests, soup.records.len(), |rays| {
             brute_force_hits(soup, rays)
         });
-        self.check_oracle(scene, settings.oracle_rays as usize);
+        self.check_oracle(scene, soup, settings.oracle_rays as usize);
         if let (Some(judge), Some(placed)) = (&mut self.instances, &soup.placed) {
             instance_judge::check(judge, placed, soup.records.len(), settings);
         }
@@ -190,14 +190,14 @@ impl Judge {
         }
     }
 
-    fn check_oracle(&mut self, scene: &SceneData, rays: usize) {
+    fn check_oracle(&mut self, scene: &SceneData, soup: &TriangleSoup, rays: usize) {
         let mut pairs = self.subset(rays);
         pairs.extend(self.hard());
         let questions: Vec<_> = pairs
             .iter()
             .map(|(ray, hit)| {
                 (
-                    oracle_ray(ray),
+                    oracle_ray(&soup.intersection.raised(ray)),
                     (hit.triangle != NO_HIT).then_some((hit.triangle, hit.t)),
                 )
             })
@@ -233,6 +233,7 @@ impl Judge {
     }
 }
 
+/// A ray for the oracle: as it is traced, since what is raised next to 0 decides at edges.
 pub(super) fn oracle_ray(ray: &Ray) -> OracleRay {
     OracleRay {
         origin: ray.origin,
@@ -440,7 +441,7 @@ impl Meeting {
                 instance_judge::meeting(placed, ray, hit.triangle, hit.t)
             }
             _ => Some(Self {
-                ray: *ray,
+                ray: soup.intersection.raised(ray),
                 record: *soup.records.get(hit.triangle as usize)?,
                 transform_error: 0.0,
             }),

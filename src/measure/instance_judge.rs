@@ -64,7 +64,9 @@ fn oracle_verdicts(placed: &Placed, pairs: &[(Ray, Hit)]) -> Vec<Verdict> {
         for instance in placed.instances.iter().filter(of_object) {
             let ids = instance.first..instance.first + object.records.len() as u32;
             for (pair, (ray, hit)) in pairs.iter().enumerate() {
-                let local = oracle_ray(&placed.object_ray(instance, ray));
+                let tests = object.intersection;
+                let local = placed.object_ray(instance, &tests.raised(ray));
+                let local = oracle_ray(&tests.raised(&local));
                 questions.push(if ids.contains(&hit.triangle) {
                     (local, Some((hit.triangle - instance.first, hit.t)))
                 } else {
