@@ -4,7 +4,7 @@
 mod common;
 
 use common::{Pcg, brute_force, build, default_params, differences, scenes, trace};
-use raystone::accel::{AccelRegistry, Hit, Ray, TriangleSoup};
+use raystone::accel::{AccelRegistry, Hit, Intersection, Ray, TriangleSoup};
 use raystone::gpu::{Gpu, KernelLibrary};
 
 /// One fault: replace `from` by `to` in the kernel `file`; structures whose answers must go wrong.
@@ -13,6 +13,8 @@ struct Fault {
     file: &'static str,
     from: &'static str,
     to: &'static str,
+    /// The triangle test under which it shows.
+    triangle: &'static str,
     structures: &'static [&'static str],
 }
 
@@ -22,6 +24,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/triangle",
         from: "all(outside <= allowance(triangle, ray, inverse, found))",
         to: "true",
+        triangle: "moeller-trumbore",
         structures: &["brute-force"],
     },
     Fault {
@@ -29,6 +32,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/triangle",
         from: "t < (*hit).t || (t == (*hit).t && triangle.v0.w < (*hit).triangle)",
         to: "t < (*hit).t",
+        triangle: "watertight",
         structures: &["bvh", "roped-bvh"],
     },
     Fault {
@@ -36,6 +40,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/bounds",
         from: "enter <= min(span.y, t_best) * BOX_PAD",
         to: "enter < min(span.y, t_best)",
+        triangle: "watertight",
         structures: &["bvh", "roped-bvh"],
     },
     Fault {
@@ -43,6 +48,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/bvh/pairs",
         from: "far_enter <= (*hit).t * BOX_PAD",
         to: "far_enter < (*hit).t",
+        triangle: "watertight",
         structures: &["bvh"],
     },
     Fault {
@@ -50,6 +56,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/bvh/stack",
         from: "push(&stack, inner.second);",
         to: "",
+        triangle: "watertight",
         structures: &["bvh"],
     },
     Fault {
@@ -57,6 +64,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/bvh/roped",
         from: "let rope = high.w;",
         to: "let rope = select(NONE, high.w, enter == MISSED || low.w < LEAF);",
+        triangle: "watertight",
         structures: &["roped-bvh"],
     },
     Fault {
@@ -64,6 +72,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/uniform_grid",
         from: "if (hit.t * BOX_PAD < leave)",
         to: "if (hit.triangle != NO_HIT || hit.t < leave)",
+        triangle: "watertight",
         structures: &["uniform-grid"],
     },
     Fault {
@@ -71,6 +80,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/meta_bvh",
         from: "push(&stack, children.far);",
         to: "",
+        triangle: "watertight",
         structures: &["meta-bvh"],
     },
     Fault {
@@ -78,6 +88,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/object_list",
         from: "i < limits.elements; i++",
         to: "i + 1u < limits.elements; i++",
+        triangle: "watertight",
         structures: &["object-list"],
     },
     Fault {
@@ -85,6 +96,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/kd_tree",
         from: "if (enter > hit.t * END_PAD)",
         to: "if (hit.triangle != NO_HIT)",
+        triangle: "watertight",
         structures: &["kd-tree"],
     },
     Fault {
@@ -92,6 +104,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/kd_tree",
         from: "enter > plane * BOX_PAD",
         to: "enter >= plane",
+        triangle: "watertight",
         structures: &["kd-tree"],
     },
     Fault {
@@ -99,6 +112,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/octree",
         from: "if (enter > hit.t * END_PAD)",
         to: "if (hit.triangle != NO_HIT)",
+        triangle: "watertight",
         structures: &["octree"],
     },
     Fault {
@@ -106,6 +120,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/octree",
         from: "enter <= p.x",
         to: "enter < m.x",
+        triangle: "watertight",
         structures: &["octree"],
     },
     Fault {
@@ -113,6 +128,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/wide",
         from: "base - slack, base + slack",
         to: "base + slack, base - slack",
+        triangle: "watertight",
         structures: &["bvh4", "cwbvh"],
     },
     Fault {
@@ -120,6 +136,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/cwbvh",
         from: "entries += select(0u, 1u, left != 0u);",
         to: "",
+        triangle: "watertight",
         structures: &["cwbvh"],
     },
     Fault {
@@ -127,6 +144,7 @@ const FAULTS: &[Fault] = &[
         file: "accel/bvh4",
         from: "> hit.t * BOX_PAD",
         to: "> hit.t * 0.9",
+        triangle: "watertight",
         structures: &["bvh4"],
     },
     Fault {
@@ -134,15 +152,17 @@ const FAULTS: &[Fault] = &[
         file: "accel/brute_force",
         from: "i < limits.elements; i++",
         to: "i + 1u < limits.elements; i++",
+        triangle: "watertight",
         structures: &["brute-force"],
     },
 ];
 
-/// Scenes full of ties and touching boxes.
-fn cases() -> Vec<(TriangleSoup, Vec<Ray>, Vec<Hit>)> {
+/// Scenes full of ties and touching boxes, with a triangle test.
+fn cases(triangle: &str) -> Vec<(TriangleSoup, Vec<Ray>, Vec<Hit>)> {
     let case = |seed| {
         let mut rng = Pcg::new(seed);
-        let soup = scenes::lattice_soup(&mut rng, 200, 6);
+        let tests = Intersection::named(triangle, "padded-16").expect("two tests");
+        let soup = scenes::lattice_soup(&mut rng, 200, 6).intersecting(tests);
         let mut rays = scenes::lattice_rays(&mut rng, 2048, 6);
         rays.extend(scenes::aimed_rays(&mut rng, &soup, 2048));
         let hits = brute_force(&soup, &rays);
@@ -183,8 +203,8 @@ fn planted_faults_turn_the_comparison_red_and_unchanged_overrides_do_not() {
     if !common::is_exact(common::gpu()) {
         return;
     }
-    let cases = cases();
     for fault in FAULTS {
+        let cases = cases(fault.triangle);
         let sound = common::open(with_override(fault.file, str::to_owned));
         let faulty = common::open(with_override(fault.file, |text| {
             let times = text.matches(fault.from).count();

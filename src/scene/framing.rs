@@ -17,7 +17,7 @@ const INSIDE_FOV: f32 = 60.0;
 /// Share of the image, in width or height, that an object takes.
 const FILL: f32 = 0.9;
 /// Most triangles that rays are cast among; of more, the largest ones.
-const MOST_TRIANGLES: usize = 1 << 16;
+const MOST_TRIANGLES: usize = 1 << 15;
 /// No rays are cast where a random ray through the scene would meet more boxes than this: thousands of
 /// triangles in one place.
 const MOST_BOXES: f32 = 2000.0;
