@@ -67,17 +67,6 @@ fn part(ray: &Ray, t: f32, turn: usize) -> Ray {
     }
 }
 
-/// A direction with a component that is nearly 0, of ordinary length, scaled by a power of two: what stands
-/// in for 0 has a length of its own.
-fn lengthened(direction: Vec3) -> Vec3 {
-    let sizes = direction.abs();
-    let longest = sizes.max_element();
-    if sizes.min_element() > 1e-9 * longest || longest >= 0.25 || longest <= 0.0 {
-        return direction;
-    }
-    direction * 2.0_f32.powi(-longest.log2().floor() as i32)
-}
-
 /// Makes rays of one scene.
 struct Maker<'a> {
     soup: &'a TriangleSoup,
@@ -121,7 +110,6 @@ impl<'a> Maker<'a> {
             }
             _ => self.towards_a_triangle(),
         };
-        let direction = lengthened(direction);
         let usable = direction.is_finite() && direction.abs().max_element() > 1e-16;
         Ray {
             origin: origin.to_array(),

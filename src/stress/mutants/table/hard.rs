@@ -190,7 +190,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         text(
             "accel/uniform_grid",
             "let forward = inverse >= vec3<f32>(0.0);",
-            "let forward = ray.direction > vec3<f32>(0.0);",
+            "let forward = given.direction > vec3<f32>(0.0);",
         ),
         UNIFORM,
         Check::Lattice,
@@ -201,7 +201,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         text(
             "accel/two_level_grid",
             "let forward = inverse >= vec3<f32>(0.0);",
-            "let forward = ray.direction > vec3<f32>(0.0);",
+            "let forward = given.direction > vec3<f32>(0.0);",
         ),
         TWO_LEVEL,
         Check::Lattice,
@@ -212,7 +212,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         text(
             "accel/irregular_grid",
             "let forward = inverse >= vec3<f32>(0.0);",
-            "let forward = ray.direction > vec3<f32>(0.0);",
+            "let forward = given.direction > vec3<f32>(0.0);",
         ),
         IRREGULAR,
         Check::Lattice,
@@ -223,7 +223,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         text(
             "accel/uniform_grid",
             "let forward = inverse >= vec3<f32>(0.0);",
-            "let forward = ray.direction >= vec3<f32>(0.0);",
+            "let forward = given.direction >= vec3<f32>(0.0);",
         ),
         UNIFORM,
         Check::Lattice,
@@ -234,7 +234,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         text(
             "accel/bvh4",
             "let backward = inverse < vec3<f32>(0.0);",
-            "let backward = ray.direction < vec3<f32>(0.0);",
+            "let backward = given.direction < vec3<f32>(0.0);",
         ),
         WIDE4,
         Check::Lattice,
@@ -245,7 +245,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         text(
             "accel/cwbvh",
             "let backward = inverse < vec3<f32>(0.0);",
-            "let backward = ray.direction < vec3<f32>(0.0);",
+            "let backward = given.direction < vec3<f32>(0.0);",
         ),
         WIDE8,
         Check::Lattice,
@@ -259,7 +259,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
             "let side = u32(slope < 0.0 && abs(slope) < 1e19);",
         ),
         KD,
-        Check::Lattice,
+        Check::Gate,
     ),
     row(
         "octree-mirror-of-minus-zero",
@@ -267,7 +267,7 @@ pub(super) const MUTANTS: &[Mutant] = &[
         text(
             "accel/octree",
             "let mirror = vec3<u32>(inverse < vec3<f32>(0.0));",
-            "let mirror = vec3<u32>(ray.direction < vec3<f32>(0.0));",
+            "let mirror = vec3<u32>(given.direction < vec3<f32>(0.0));",
         ),
         OCTREE,
         Check::Lattice,
