@@ -17,7 +17,7 @@ const INSIDE_FOV: f32 = 60.0;
 /// Share of the image, in width or height, that an object takes.
 const FILL: f32 = 0.9;
 /// Most triangles that rays are cast among; of more, the largest ones.
-const MOST_TRIANGLES: usize = 1 << 15;
+const MOST_TRIANGLES: usize = 1 << 14;
 /// No rays are cast where a random ray through the scene would meet more boxes than this: thousands of
 /// triangles in one place.
 const MOST_BOXES: f32 = 2000.0;
@@ -216,17 +216,17 @@ impl Stage {
         let solid: Vec<_> = if triangles.len() <= MOST_TRIANGLES {
             triangles.iter().map(to_local).collect()
         } else {
-            let area = |t: &Triangle| {
+            let area = |t: &&Triangle| {
                 let [v0, v1, v2] = t.vertices.map(local);
                 (v1 - v0).cross(v2 - v0).length()
             };
-            let mut areas: Vec<_> = triangles.iter().map(area).zip(0_u32..).collect();
-            areas.select_nth_unstable_by(MOST_TRIANGLES, |a, b| b.0.total_cmp(&a.0));
-            let largest = &areas[..MOST_TRIANGLES];
-            largest
-                .iter()
-                .map(|&(_, i)| to_local(&triangles[i as usize]))
-                .collect()
+            // The least area of the largest ones, from a sample.
+            let step = triangles.len() / MOST_TRIANGLES;
+            let mut sample: Vec<_> = triangles.iter().step_by(step).map(|t| area(&t)).collect();
+            let rank = MOST_TRIANGLES / step;
+            let (_, &mut least, _) = sample.select_nth_unstable_by(rank, |a, b| b.total_cmp(a));
+            let largest = triangles.iter().filter(|t| area(t) >= least);
+            largest.take(MOST_TRIANGLES).map(to_local).collect()
         };
         let ids = (0..solid.len() as u32).collect();
         let bvh = PlocBuilder::new().build(
