@@ -1,0 +1,233 @@
+//! What is measured stays what it is: hits, counted work, images and discrepancies of every structure,
+//! integrator and sampler, as hashes that were taken once and are compared with what comes out today.
+//!
+//! A change on purpose writes the table anew, `RAYSTONE_WRITE_HASHES=1 scripts/test --test unchanged`, and
+//! says in the change log which figures do not compare any more.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+use blake3::Hasher;
+use raystone::config::Gate;
+use raystone::discrepancy::{Budget, Measure, PointSet, measure};
+use raystone::measure::batch::{Batch, Query, count_work};
+use raystone::measure::gate::Judge;
+use raystone::sampling::{Coordinate, to_unit};
+use std::collections::BTreeMap;
+use std::path::Path;
+use support::*;
+
+/// `kind what hash`, one a line, in alphabetical order.
+const HASHES: &str = include_str!("hashes.txt");
+/// Images depend on the driver's sine and cosine: they are compared where the adapter is this one, which
+/// the table names in a line of its own.
+const ADAPTER: &str = "adapter";
+
+/// What was computed, by kind and subject.
+type Found = BTreeMap<String, String>;
+
+fn short(hash: blake3::Hash) -> String {
+    hash.to_hex()[..16].to_owned()
+}
+
+/// Compares with the table, or writes its lines of these kinds anew.
+fn compare(kinds: &[&str], found: &Found) {
+    let is_ours = |line: &str| kinds.iter().any(|k| line.split(' ').next() == Some(k));
+    let line = |(k, v): (&String, &String)| format!("{k} {v}").trim_end().to_owned();
+    let lines: Vec<String> = found.iter().map(line).collect();
+    assert!(lines.len() > 20 && lines.iter().all(|line| is_ours(line)));
+    if std::env::var_os("RAYSTONE_WRITE_HASHES").is_some() {
+        static ONE_AT_A_TIME: std::sync::Mutex<()> = std::sync::Mutex::new(());
+        let _guard = ONE_AT_A_TIME.lock();
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/unchanged/hashes.txt");
+        let old = std::fs::read_to_string(&path).expect("the table");
+        let others = old.lines().filter(|line| !is_ours(line)).map(str::to_owned);
+        let mut all: Vec<String> = others.chain(lines).collect();
+        all.sort();
+        return std::fs::write(&path, all.join("\n") + "\n").expect("the table is written");
+    }
+    if let Err(differences) = differences(HASHES, kinds, &lines) {
+        panic!("{differences}");
+    }
+}
+
+/// What is in one of the two and not in the other.
+fn differences(table: &str, kinds: &[&str], lines: &[String]) -> Result<(), String> {
+    let ours = |line: &&str| kinds.iter().any(|k| line.split(' ').next() == Some(k));
+    let known: Vec<&str> = table.lines().filter(ours).collect();
+    let is_new = |line: &&String| !known.contains(&line.as_str());
+    let new: Vec<_> = lines.iter().filter(is_new).collect();
+    let is_gone = |known: &&&str| !lines.iter().any(|line| line == **known);
+    let gone: Vec<_> = known.iter().filter(is_gone).collect();
+    match new.is_empty() && gone.is_empty() {
+        true => Ok(()),
+        false => Err(format!(
+            "changed or new: {new:#?}\nchanged or no longer there: {gone:#?}"
+        )),
+    }
+}
+
+#[test]
+fn a_changed_a_new_and_a_missing_line_are_seen() {
+    let table = "hits a 1\nhits b 2\nimage c 3\n";
+    let lines = |texts: &[&str]| -> Vec<String> { texts.iter().map(|t| (*t).to_owned()).collect() };
+    let check = |texts: &[&str]| differences(table, &["hits"], &lines(texts));
+    assert_eq!(check(&["hits a 1", "hits b 2"]), Ok(()));
+    assert!(check(&["hits a 1", "hits b 3"]).is_err());
+    assert!(check(&["hits a 1"]).is_err());
+    assert!(check(&["hits a 1", "hits b 2", "hits d 4"]).is_err());
+}
+
+fn adapter() -> String {
+    let info = &gpu().info;
+    format!("{ADAPTER} {} {}", info.name, info.driver_info)
+        .replace(", ", " ")
+        .trim_end()
+        .to_owned()
+}
+
+/// Small scenes that lead through all there is: emitters, mirrors, the sky, instances, hard triangles.
+fn scenes() -> Vec<(&'static str, Stage)> {
+    use raystone::config::ParamValue::Integer;
+    let sphere = [("triangles", Integer(2000))];
+    let known: [(&str, &[_]); 5] = [
+        ("cornell-box", &[]),
+        ("displaced-sphere", &sphere),
+        ("far-corners", &[]),
+        ("furnace-box", &[]),
+        ("instances", &[]),
+    ];
+    let stage =
+        |(name, changes): (&'static str, &[_])| (name, Stage::builtin(gpu(), name, changes));
+    known.into_iter().map(stage).collect()
+}
+
+const GATE: Gate = Gate {
+    rays: 256,
+    brute_force_tests: 1,
+    oracle_rays: 1,
+    ao_length: 0.0,
+    offset: 0.0,
+};
+
+#[test]
+fn hits_and_counted_work() {
+    if !is_exact(gpu()) {
+        return;
+    }
+    let mut found = Found::new();
+    for (scene, stage) in scenes() {
+        let judge = Judge::remembered(&stage.scene, &stage.soup, stage.camera, &GATE, 1);
+        let judge = judge.expect("a judge");
+        for kind in structures() {
+            let traced = stage.traced(gpu(), kind);
+            let (mut hits, mut work) = (Hasher::new(), Hasher::new());
+            for set in &judge.of(traced.space).sets {
+                for query in [Query::Closest, Query::Any] {
+                    let rays = &set.rays;
+                    let batch = Batch::new(gpu(), &stage.buffers, &traced, query, rays, true);
+                    let batch = batch.expect("a batch");
+                    batch.trace().expect("answers");
+                    hits.update(batch.digest().expect("answers").as_bytes());
+                    assert_eq!(batch.error_word().expect("a status"), 0);
+                    let counted = count_work(gpu(), &stage.buffers, &traced, query, rays);
+                    for c in counted.expect("counters") {
+                        for word in [c.nodes, c.box_tests, c.triangle_tests, c.stack_high_water] {
+                            work.update(&word.to_le_bytes());
+                        }
+                    }
+                }
+            }
+            let name = kind.name();
+            found.insert(format!("hits {scene}/{name}"), short(hits.finalize()));
+            found.insert(format!("work {scene}/{name}"), short(work.finalize()));
+        }
+    }
+    compare(&["hits", "work"], &found);
+}
+
+fn image_hash(
+    stage: &Stage,
+    traced: &raystone::integrator::Traced,
+    sampler: &raystone::sampling::Sampler,
+    what: &raystone::config::Variant,
+) -> String {
+    let renderer = stage.renderer(gpu(), traced, sampler, what, [24, 16], false);
+    let mut hash = Hasher::new();
+    for shot in renderer.render(&[1, 4], 9).expect("a render") {
+        hash.update(bytemuck::cast_slice(&shot.image.pixels));
+    }
+    short(hash.finalize())
+}
+
+#[test]
+fn images() {
+    if !HASHES.lines().any(|line| line == adapter())
+        && std::env::var_os("RAYSTONE_WRITE_HASHES").is_none()
+    {
+        return println!(
+            "skipped: the images of the table were not made by this {}",
+            adapter()
+        );
+    }
+    let integrators = ["primary", "ao", "path"].map(|name| integrator_variant(name, &[]));
+    let one = sampler("sobol", "cranley-patterson");
+    let mut found = Found::new();
+    found.insert(adapter(), String::new());
+    for (scene, stage) in scenes() {
+        for kind in structures() {
+            let traced = stage.traced(gpu(), kind);
+            for what in &integrators {
+                let subject = format!("image {scene}/{}/{what}", kind.name());
+                found.insert(subject, image_hash(&stage, &traced, &one, what));
+            }
+        }
+        if scene == "cornell-box" {
+            let traced = stage.traced(gpu(), structure("bvh"));
+            for sampler in samplers(4) {
+                let subject = format!("image {scene}/{}/path", sampler.label().replace(' ', ""));
+                found.insert(subject, image_hash(&stage, &traced, &sampler, &path(3)));
+            }
+            for entry in raystone::integrator::integrator_entries() {
+                if entry.name.starts_with("integrand") {
+                    let subject = format!("image {scene}/bvh/{}", entry.name);
+                    let hash = image_hash(&stage, &traced, &one, &entry.default_variant());
+                    found.insert(subject, hash);
+                }
+            }
+        }
+    }
+    compare(&["image", ADAPTER], &found);
+}
+
+#[test]
+fn discrepancies() {
+    let measures = Measure::ALL;
+    let mut found = Found::new();
+    for sampler in samplers(256) {
+        let word = |sample, dimension| {
+            f64::from(to_unit(sampler.sample_u32(Coordinate {
+                pixel: 3,
+                sample,
+                dimension,
+                seed: 7,
+            })))
+        };
+        for (count, dimensions) in [(256, [4, 5].as_slice()), (32, &[4, 5, 6])] {
+            let coordinates = (0..count).flat_map(|i| dimensions.iter().map(move |d| word(i, *d)));
+            let points = PointSet::new(dimensions.len(), coordinates.collect()).expect("points");
+            let mut hash = Hasher::new();
+            for kind in measures {
+                let value = measure(&points, kind, &Budget::seconds(60.0));
+                hash.update(format!("{kind:?} {value:?}").as_bytes());
+            }
+            let subject = format!(
+                "discrepancy {}/{}d",
+                sampler.label().replace(' ', ""),
+                dimensions.len()
+            );
+            found.insert(subject, short(hash.finalize()));
+        }
+    }
+    compare(&["discrepancy"], &found);
+}
