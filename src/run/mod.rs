@@ -6,6 +6,7 @@
 pub mod environment;
 mod errors;
 mod folder;
+mod images;
 mod kernels;
 mod registries;
 mod render;

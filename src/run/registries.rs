@@ -2,7 +2,7 @@
 
 use crate::accel::AccelRegistry;
 use crate::config::{Catalogue, SamplerCell, Variant};
-use crate::integrator::integrator_entries;
+use crate::integrator::IntegratorRegistry;
 use crate::sampling::SamplerRegistry;
 
 /// Everything that can be named.
@@ -12,6 +12,8 @@ pub struct Registries {
     pub accel: AccelRegistry,
     /// Sequences and decorrelations.
     pub samplers: SamplerRegistry,
+    /// Integrators.
+    pub integrators: IntegratorRegistry,
 }
 
 impl Registries {
@@ -22,13 +24,17 @@ impl Registries {
             accel: self.accel.entries(),
             sequence: self.samplers.sequence_entries(),
             decorrelation: self.samplers.decorrelation_entries(),
-            integrator: integrator_entries(),
+            integrator: self.integrators.entries(),
         }
     }
 
     /// Modules that a folder of kernels may bring for what is registered, beside those of the program.
     pub fn kernels(&self) -> Vec<String> {
-        self.accel.iter().flat_map(|kind| kind.kernels()).collect()
+        let mut kernels: Vec<String> = self.accel.iter().flat_map(|kind| kind.kernels()).collect();
+        kernels.extend(self.samplers.sequences().map(|s| s.kernel().to_owned()));
+        kernels.extend(self.samplers.decorrelations().map(|d| d.kernel().to_owned()));
+        kernels.extend(self.integrators.iter().map(|i| i.kernel().to_owned()));
+        kernels
     }
 
     /// Whether seeds change what this pair draws.

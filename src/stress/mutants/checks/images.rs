@@ -5,11 +5,9 @@ use super::super::plant::Plant;
 use super::super::subject::{build, sampler};
 use super::super::world::Stage;
 use super::{Bench, Finding};
-use crate::config::{Entry, ParamValue, Variant};
+use crate::config::{ParamValue, Params, Variant};
 use crate::gpu::KernelLibrary;
-use crate::integrator::{
-    Frame, RenderJob, Renderer, SceneBuffers, Traced, integrator, integrator_entries,
-};
+use crate::integrator::{IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced};
 use crate::measure::bias::{BiasOptions, BiasVerdict, check_bias};
 use crate::measure::image::Image;
 use crate::measure::statistics::{mean, variance};
@@ -89,18 +87,6 @@ fn independent() -> Result<Sampler, CheckError> {
     sampler(("pixel-hash", &[]), "none", &demand, &Plant::Nothing)
 }
 
-fn variant(
-    entries: &[Entry],
-    name: &str,
-    change: (&str, ParamValue),
-) -> Result<Variant, CheckError> {
-    let unknown = || CheckError::Stale(format!("there is no integrator `{name}`"));
-    let entry = entries.iter().find(|e| e.name == name);
-    let mut variant = entry.ok_or_else(unknown)?.default_variant();
-    variant.params.0.insert(change.0.to_owned(), change.1);
-    Ok(variant)
-}
-
 /// Images of a scene, or the error word that a kernel raised.
 fn render(
     bench: &Bench,
@@ -108,24 +94,22 @@ fn render(
     (name, change): (&str, (&str, ParamValue)),
     replicates: Replicates,
 ) -> Result<Vec<Image>, CheckError> {
-    let unknown = || CheckError::Stale(format!("there is no integrator `{name}`"));
-    let kind = integrator(name).ok_or_else(unknown)?;
-    let what = variant(&integrator_entries(), name, change)?;
+    let variant = Variant {
+        name: name.to_owned(),
+        params: Params([(change.0.to_owned(), change.1)].into()),
+        ..Variant::default()
+    };
+    let integrator = IntegratorRegistry::default().configured(&variant);
+    let integrator = integrator.map_err(|e| CheckError::Stale(e.to_string()))?;
     let built = build("bvh", &[], &stage.soup)?;
     let traced = Traced::upload(bench.gpu, &*built)?;
     let buffers = SceneBuffers::upload(bench.gpu, &stage.scene, &stage.soup)?;
-    let diagonal = f64::from(2.0 * stage.scene.bounds().radius());
     let sampler = independent()?;
     let job = RenderJob {
-        frame: Frame {
-            width: SIZE,
-            height: SIZE,
-            camera: stage.camera,
-            ao_radius: (kind.ao_radius(&what.params).unwrap_or(0.0) * diagonal) as f32,
-        },
+        size: [SIZE; 2],
+        camera: stage.camera,
         sampler: &sampler,
-        integrator: kind,
-        params: &what.params,
+        integrator: &integrator,
         runtime_checks: true,
     };
     let renderer = Renderer::new(bench.gpu, &buffers, &traced, &job, false)?;
