@@ -8,12 +8,12 @@ use super::kind::ConfiguredIntegrator;
 use super::slice::{Slice, job_uniform};
 use super::tables::SceneBuffers;
 use super::traced::Traced;
+use crate::geometry::Camera;
 use crate::gpu::{
     Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline, UniformValues,
 };
-use crate::measure::image::Image;
+use crate::image::Image;
 use crate::sampling::Sampler;
-use crate::scene::Camera;
 use std::cell::{Cell, RefCell};
 use std::ops::Range;
 use std::sync::Arc;

@@ -1,15 +1,16 @@
 //! Error: once per scene, integrator and sampler, through the fastest gated structure.
 
+use super::RunError;
+use super::images::Estimator;
 use super::session::Session;
 use super::structures::{self, Gated};
 use super::world::World;
-use super::RunError;
-use super::images::Estimator;
-use crate::config::{REFERENCE_PARTS, SamplerCell, StructureCell, Variant, cell_hash};
+use crate::config::{REFERENCE_PARTS, SamplerCell, StructureCell, Variant};
+use crate::image::{Image, Picture, automatic_exposure, tone_map, viridis};
 use crate::integrator::{Renderer, Snapshot, Traced, rounding_bound};
 use crate::measure::bias::{BiasOptions, check_bias};
-use crate::measure::image::{Image, Reference, measure};
-use crate::measure::picture::{Picture, automatic_exposure, error_map, tone_map};
+use crate::measure::metrics::error_map;
+use crate::measure::metrics::{Reference, measure};
 use crate::measure::record::{
     BiasRecord, ErrorAtSpp, ErrorRecord, Ran, Record, ReferenceRecord, SpectrumRecord,
 };
@@ -17,7 +18,7 @@ use crate::measure::spectrum::{
     ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power,
 };
 use crate::measure::statistics::mean_interval;
-use crate::report::color::viridis;
+use crate::text::cell_hash;
 use std::time::Instant;
 
 /// Relative error per pixel at the top of the colour scale of error maps.
@@ -284,7 +285,9 @@ fn passes<'a>(
             let estimator = Estimator::new(session, pair, &cell.integrator, spp)?;
             Ok((vec![spp], estimator))
         };
-        spps.into_iter().map(single).collect::<Result<_, String>>()?
+        spps.into_iter()
+            .map(single)
+            .collect::<Result<_, String>>()?
     } else {
         vec![(spps, whole)]
     };

@@ -5,9 +5,9 @@ use super::session::Session;
 use super::words;
 use super::world::World;
 use crate::config::Variant;
+use crate::geometry::Camera;
 use crate::integrator::{ConfiguredIntegrator, RenderJob, Renderer, Traced};
 use crate::sampling::Sampler;
-use crate::scene::Camera;
 
 /// What is computed per sample, and what draws the samples.
 pub(super) struct Estimator {

@@ -32,7 +32,11 @@ impl Registries {
     pub fn kernels(&self) -> Vec<String> {
         let mut kernels: Vec<String> = self.accel.iter().flat_map(|kind| kind.kernels()).collect();
         kernels.extend(self.samplers.sequences().map(|s| s.kernel().to_owned()));
-        kernels.extend(self.samplers.decorrelations().map(|d| d.kernel().to_owned()));
+        kernels.extend(
+            self.samplers
+                .decorrelations()
+                .map(|d| d.kernel().to_owned()),
+        );
         kernels.extend(self.integrators.iter().map(|i| i.kernel().to_owned()));
         kernels
     }

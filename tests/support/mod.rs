@@ -4,15 +4,14 @@
 
 use raystone::accel::{AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, TriangleSoup};
 use raystone::config::{Entry, Experiment, ParamValue, Params, Plan, Variant};
+use raystone::geometry::Camera;
 use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
-use raystone::integrator::{
-    IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced,
-};
+use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced};
 use raystone::measure::record::{Line, Record, SCHEMA};
 use raystone::measure::statistics::{mean, variance};
 use raystone::run::{Registries, RunOptions, RunSummary};
 use raystone::sampling::{Demand, Sampler, SamplerRegistry, dimensions};
-use raystone::scene::{Camera, LoadOptions, SceneData, builtin_scenes, load};
+use raystone::scene::{LoadOptions, SceneData, builtin_scenes, load};
 use std::path::Path;
 use std::sync::OnceLock;
 

@@ -3,7 +3,7 @@
 use super::stage::{self, Stage};
 use super::{Figure, NumericsError};
 use crate::gpu::Gpu;
-use crate::measure::image::Image;
+use crate::image::Image;
 use crate::run::dump_stream;
 use crate::sampling::{Coordinate, dimensions};
 

@@ -6,11 +6,11 @@ use super::super::world::Stage;
 use super::{Bench, Finding, projections};
 use crate::config::Variant;
 use crate::discrepancy::{Budget, PointSet, net_quality, star_2d};
+use crate::image::Image;
 use crate::integrator::integrand::functions;
 use crate::integrator::{
     ConfiguredIntegrator, IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced,
 };
-use crate::measure::image::Image;
 use crate::measure::statistics::{Pcg32, mean, variance};
 use crate::measure::words::{Used, compare, dump_stream};
 use crate::sampling::{Coordinate, Demand, Sampler, to_unit};
