@@ -10,12 +10,9 @@ mod support;
 use facing::Facing;
 use raystone::measure::record::Record;
 use raystone::run::Registries;
+use raystone::sampling::Sequence;
 use samplers::{Rotation, Weyl};
-use std::path::{Path, PathBuf};
-
-fn kernel_folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/adding_an_integrator/kernels")
-}
+use std::path::Path;
 
 fn registries() -> Registries {
     let mut registries = Registries::default();
@@ -25,13 +22,11 @@ fn registries() -> Registries {
     registries
 }
 
-/// A tiny run with these kernels.
-fn records(kernels: &Path) -> Vec<Record> {
+/// A tiny run, with the kernels of a folder if there is one.
+fn records(kernels: Option<&Path>) -> Vec<Record> {
     let text = std::fs::read_to_string("tests/data/tiny.toml").expect("the experiment");
-    let axes = format!(
-        "kernels = [{:?}]\ndecorrelation = [\"rotation\"]\nsequence = [\"weyl\"]",
-        kernels.display().to_string()
-    );
+    let folder = kernels.map(|folder| format!("kernels = [{:?}]\n", folder.display().to_string()));
+    let axes = folder.unwrap_or_default() + "sequence = [\"weyl\"]\ndecorrelation = [\"rotation\"]";
     let text = text
         .replace("sequence = [\"pixel-hash\"]", &axes)
         .replace("\"path\"", "\"facing\"");
@@ -54,7 +49,7 @@ fn samplers_and_integrators_from_outside_run_like_those_of_the_program() {
     if !support::is_exact(support::gpu()) {
         return;
     }
-    let records = records(&kernel_folder());
+    let records = records(None);
     assert_eq!(failures(&records), [""; 0]);
     let (mut errors, mut streams, mut times) = (0, 0, 0);
     for record in &records {
@@ -89,16 +84,13 @@ fn a_sequence_whose_kernel_is_not_its_twin_is_not_rendered_with() {
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
-    for name in ["sampling/weyl", "sampling/rotation", "integrator/facing"] {
-        let from = kernel_folder().join(name).with_extension("wesl");
-        let text = std::fs::read_to_string(&from).expect("a kernel");
-        let changed = text.replace("0x9e3779b9u", "0x9e3779bbu");
-        assert_eq!(changed != text, name == "sampling/weyl", "{name}");
-        let to = folder.path().join(name).with_extension("wesl");
-        std::fs::create_dir_all(to.parent().expect("a folder")).expect("a folder");
-        std::fs::write(to, changed).expect("a written kernel");
-    }
-    let records = records(folder.path());
+    let (name, text) = Weyl.sources()[0];
+    let changed = text.replace("0x9e3779b9u", "0x9e3779bbu");
+    assert_ne!(changed, text);
+    let file = folder.path().join(name).with_extension("wesl");
+    std::fs::create_dir(folder.path().join("sampling")).expect("a folder");
+    std::fs::write(file, changed).expect("a written kernel");
+    let records = records(Some(folder.path()));
     let failures = failures(&records);
     assert!(!failures.is_empty());
     let words = |failure: &String| failure.contains("weyl") && failure.contains("twin");

@@ -2,6 +2,7 @@
 
 use crate::accel::AccelRegistry;
 use crate::config::{Catalogue, SamplerCell, Variant};
+use crate::gpu::KernelLibrary;
 use crate::integrator::IntegratorRegistry;
 use crate::sampling::SamplerRegistry;
 
@@ -39,6 +40,16 @@ impl Registries {
         );
         kernels.extend(self.integrators.iter().map(|i| i.kernel().to_owned()));
         kernels
+    }
+
+    /// The kernels of the program, and those that came with what was registered.
+    pub fn library(&self) -> KernelLibrary {
+        let sequences = self.samplers.sequences().map(|s| s.sources());
+        let decorrelations = self.samplers.decorrelations().map(|d| d.sources());
+        let integrators = self.integrators.iter().map(|i| i.sources());
+        let sources = sequences.chain(decorrelations).chain(integrators);
+        let sources: Vec<_> = sources.flatten().copied().collect();
+        KernelLibrary::default().with_sources(&sources)
     }
 
     /// Whether seeds change what this pair draws.

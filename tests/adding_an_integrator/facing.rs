@@ -20,6 +20,13 @@ impl Integrator for Facing {
         "integrator/facing"
     }
 
+    fn sources(&self) -> &'static [(&'static str, &'static str)] {
+        &[(
+            "integrator/facing",
+            include_str!("kernels/integrator/facing.wesl"),
+        )]
+    }
+
     fn parameters(&self) -> ParameterSchema {
         vec![Parameter {
             name: "brightness",

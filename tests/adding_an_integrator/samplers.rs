@@ -20,6 +20,10 @@ impl Sequence for Weyl {
         "sampling/weyl"
     }
 
+    fn sources(&self) -> &'static [(&'static str, &'static str)] {
+        &[("sampling/weyl", include_str!("kernels/sampling/weyl.wesl"))]
+    }
+
     fn facts(&self, _: &Params) -> Facts {
         Facts {
             extensible: true,
@@ -48,6 +52,13 @@ impl Decorrelation for Rotation {
 
     fn kernel(&self) -> &'static str {
         "sampling/rotation"
+    }
+
+    fn sources(&self) -> &'static [(&'static str, &'static str)] {
+        &[(
+            "sampling/rotation",
+            include_str!("kernels/sampling/rotation.wesl"),
+        )]
     }
 
     fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
