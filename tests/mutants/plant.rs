@@ -1,9 +1,9 @@
 //! Where faults are planted: texts of kernels, what builders hand out, tables of samplers.
 
 use crate::CheckError;
+use raystone::accel::StructureStats;
 use raystone::accel::{AccelError, BuiltAccel, GpuBuffers, Space, TriangleSoup};
 use raystone::gpu::KernelLibrary;
-use raystone::measure::record::StructureStats;
 use raystone::sampling::{Sampler, SamplerTable};
 use std::path::Path;
 

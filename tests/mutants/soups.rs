@@ -4,11 +4,12 @@
 use crate::world::plain_scene;
 use glam::Vec3;
 use raystone::accel::{Hit, NO_HIT, Ray, TriangleSoup, brute_force_hits};
+use raystone::geometry::Triangle;
 use raystone::measure::gate::Judge;
 use raystone::measure::rays::{FAR, RaySet};
 use raystone::measure::record::{JudgeCheck, RayClass};
 use raystone::measure::statistics::Pcg32;
-use raystone::scene::{SceneData, Triangle};
+use raystone::scene::SceneData;
 
 const TRIANGLES: usize = 240;
 const RAYS: usize = 3072;

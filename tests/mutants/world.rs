@@ -6,12 +6,11 @@ use crate::{CheckError, Mutant, Options, Plant, Subject, checks};
 use glam::Vec3;
 use raystone::accel::TriangleSoup;
 use raystone::config::{Gate, ParamValue};
+use raystone::geometry::{Camera, Triangle};
 use raystone::gpu::KernelLibrary;
+use raystone::image::Image;
 use raystone::measure::gate::Judge;
-use raystone::measure::image::Image;
-use raystone::scene::{
-    Camera, LoadOptions, LoadReport, Material, SceneData, Triangle, builtin_scenes, load,
-};
+use raystone::scene::{LoadOptions, LoadReport, Material, SceneData, builtin_scenes, load};
 
 /// Seeds of the integer-grid soups.
 const SOUPS: [u64; 3] = [40, 41, 42];

@@ -8,15 +8,16 @@ use crate::world::Stage;
 use crate::world::plain_scene;
 use glam::Vec3;
 use raystone::config::{Entry, ParamValue, Variant};
+use raystone::geometry::{Camera, Triangle};
 use raystone::gpu::KernelLibrary;
+use raystone::image::Image;
 use raystone::integrator::{
     Frame, RenderJob, Renderer, SceneBuffers, Traced, integrator, integrator_entries,
 };
 use raystone::measure::bias::{BiasOptions, BiasVerdict, check_bias};
-use raystone::measure::image::Image;
 use raystone::measure::statistics::{mean, variance};
 use raystone::sampling::{Demand, Sampler, dimensions};
-use raystone::scene::{Camera, Material, Triangle};
+use raystone::scene::Material;
 use std::path::Path;
 
 const SIZE: u32 = 16;

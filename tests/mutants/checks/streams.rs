@@ -6,11 +6,11 @@ use crate::subject::{Changes, DEMAND, LONG_DEMAND, build, sampler};
 use crate::world::Stage;
 use raystone::config::Params;
 use raystone::discrepancy::{Budget, PointSet, net_quality, star_2d};
+use raystone::image::Image;
 use raystone::integrator::integrand::functions;
 use raystone::integrator::{
     Frame, Integrator, RenderJob, Renderer, SceneBuffers, Traced, integrator,
 };
-use raystone::measure::image::Image;
 use raystone::measure::statistics::{Pcg32, mean, variance};
 use raystone::measure::words::{Used, compare, dump_stream};
 use raystone::sampling::{Coordinate, Demand, Sampler, to_unit};
