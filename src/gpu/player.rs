@@ -28,11 +28,15 @@ struct Kept {
     staging: BTreeMap<String, wgpu::Buffer>,
     /// By the place of the run in the recording, group and binding: the buffer with what it holds.
     uniforms: HashMap<(usize, u32, u32), (wgpu::Buffer, Vec<u8>)>,
-    /// By the address of the pipeline, which is kept with them, and what they bind.
-    groups: HashMap<(usize, Vec<Resource>), (Arc<Pipeline>, Vec<wgpu::BindGroup>)>,
+    groups: HashMap<GroupKey, KeptGroups>,
     clock: Option<Clock>,
     made: usize,
 }
+
+/// The address of a pipeline and what it binds.
+type GroupKey = (usize, Vec<Resource>);
+/// Bind groups with their pipeline, whose address is no other's while it is kept.
+type KeptGroups = (Arc<Pipeline>, Vec<wgpu::BindGroup>);
 
 /// A query set with two timestamps for each run.
 struct Clock {
