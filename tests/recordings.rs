@@ -173,8 +173,8 @@ fn the_first_use_of_a_kernel_is_told_on_its_own() {
     assert_eq!(pipeline.cold_ms(), None);
     let mut bindings = Bindings::new();
     bindings
-        .buffer("turns", &Storage::scratch("turns", 8))
-        .buffer("status", &Storage::scratch("status", 64))
+        .buffer("turns", Storage::scratch("turns", 8))
+        .buffer("status", Storage::scratch("status", 64))
         .uniform(
             "loops",
             UniformValues::new().u32("outer", 1).u32("inner", 1),
