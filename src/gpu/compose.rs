@@ -127,7 +127,11 @@ impl KernelLibrary {
             let parsed = diagnose::imports(path, text, name).map_err(GpuError::Kernel)?;
             imports.insert(name.as_str(), parsed);
         }
-        let is_root = |name: &&str| Self::is_embedded(name) || wanted.iter().any(|w| w == name);
+        let is_root = |name: &&str| {
+            Self::is_embedded(name)
+                || self.registered.contains(*name)
+                || wanted.iter().any(|w| w == name)
+        };
         let (mut reached, mut rest): (Vec<&str>, Vec<&str>) =
             self.overridden().into_iter().partition(is_root);
         while let Some(name) = reached.pop() {

@@ -31,15 +31,7 @@ impl Registries {
 
     /// Modules that a folder of kernels may bring for what is registered, beside those of the program.
     pub fn kernels(&self) -> Vec<String> {
-        let mut kernels: Vec<String> = self.accel.iter().flat_map(|kind| kind.kernels()).collect();
-        kernels.extend(self.samplers.sequences().map(|s| s.kernel().to_owned()));
-        kernels.extend(
-            self.samplers
-                .decorrelations()
-                .map(|d| d.kernel().to_owned()),
-        );
-        kernels.extend(self.integrators.iter().map(|i| i.kernel().to_owned()));
-        kernels
+        self.accel.iter().flat_map(|kind| kind.kernels()).collect()
     }
 
     /// The kernels of the program, and those that came with what was registered.
