@@ -4,7 +4,7 @@ use super::*;
 use crate::config::{Params, Variant};
 use crate::measure::image::{Image, Reference, measure};
 use crate::measure::record::ErrorAtSpp;
-use crate::measure::statistics::Pcg32;
+use crate::random::Pcg32;
 
 const PIXELS: usize = 40;
 /// What every pixel should have.

@@ -5,7 +5,7 @@ use crate::accel::{Hit, NO_HIT, Ray, TriangleSoup, brute_force_hits};
 use crate::measure::gate::Judge;
 use crate::measure::rays::{FAR, RaySet};
 use crate::measure::record::{JudgeCheck, RayClass};
-use crate::measure::statistics::Pcg32;
+use crate::random::Pcg32;
 use crate::scene::{LoadReport, Material, SceneData, Triangle};
 use glam::Vec3;
 

@@ -9,8 +9,9 @@ use crate::discrepancy::{Budget, PointSet, net_quality, star_2d};
 use crate::integrator::integrand::functions;
 use crate::integrator::{Frame, Integrator, RenderJob, Renderer, SceneBuffers, Traced, integrator};
 use crate::measure::image::Image;
-use crate::measure::statistics::{Pcg32, mean, variance};
+use crate::measure::statistics::{mean, variance};
 use crate::measure::words::{Used, compare, dump_stream};
+use crate::random::Pcg32;
 use crate::sampling::{Coordinate, Demand, Sampler, to_unit};
 
 type Names<'a> = (&'a str, Changes, &'a str);
