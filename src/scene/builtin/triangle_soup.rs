@@ -1,9 +1,10 @@
 //! Random triangles: the worst case for every hierarchy, and a quick test of any structure.
 
+use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material};
 use super::Builtin;
 use crate::config::{ParamRange, ParamValue, Parameter, Params};
+use crate::geometry::Camera;
 use crate::random::Pcg32;
 use glam::Vec3;
 
