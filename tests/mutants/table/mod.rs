@@ -2,17 +2,18 @@
 
 mod binary;
 mod cells;
+mod ends;
 mod hard;
 mod image;
 mod instanced;
+mod late_samples;
 mod samplers;
 mod wide;
 mod words;
 
-use super::plant::Plant;
-use super::subject::{Changes, Subject};
-use super::{Check, Mutant};
-use crate::accel::GpuBuffers;
+use crate::subject::Changes;
+use crate::{Check, Mutant, Plant, Subject};
+use raystone::accel::GpuBuffers;
 
 /// All faults.
 pub fn mutants() -> Vec<Mutant> {
@@ -21,8 +22,10 @@ pub fn mutants() -> Vec<Mutant> {
         wide::MUTANTS,
         cells::MUTANTS,
         instanced::MUTANTS,
+        ends::MUTANTS,
         hard::MUTANTS,
         samplers::MUTANTS,
+        late_samples::MUTANTS,
         image::MUTANTS,
     ]
     .concat()

@@ -9,28 +9,18 @@
 //! Kernels are changed through an override folder, as a user would with `--kernels`: the folder of
 //! each mutant stays behind, so that a survivor can be looked at with every other command.
 
-mod checks;
-mod plant;
-mod report;
-mod soups;
-mod subject;
-mod table;
-mod world;
-
-pub use checks::Check;
-pub use plant::Plant;
-pub use report::{ControlOutcome, MutantRecord, Outcome, Report, Verdict};
-pub use subject::Subject;
-pub use table::mutants;
-
-use crate::accel::AccelError;
-use crate::gpu::{AdapterChoice, Gpu, GpuError, KernelLibrary, probe_arithmetic};
-use checks::Bench;
+use crate::checks::{Bench, Check};
+use crate::plant::Plant;
+use crate::report::{ControlOutcome, Outcome, Report, Verdict};
+use crate::subject::Subject;
+use crate::table::mutants;
+use crate::world::World;
+use raystone::accel::AccelError;
+use raystone::gpu::{AdapterChoice, Gpu, GpuError, KernelLibrary, probe_arithmetic};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 use thiserror::Error;
-use world::World;
 
 /// At least this part of the faults must be killed.
 pub const LEAST_KILLED: f64 = 0.95;
@@ -57,7 +47,7 @@ pub struct Mutant {
 pub enum MutantError {
     /// The fault does not apply any more.
     #[error(
-        "stale mutant `{name}`: {problem}; adapt its row in src/stress/mutants/table to what stands there now"
+        "stale mutant `{name}`: {problem}; adapt its row in tests/mutants/table to what stands there now"
     )]
     Stale {
         /// Which one.
@@ -88,7 +78,7 @@ pub enum MutantError {
 
 /// Why a check was not carried out.
 #[derive(Debug, Error)]
-enum CheckError {
+pub enum CheckError {
     #[error(transparent)]
     Gpu(#[from] GpuError),
     #[error(transparent)]
@@ -241,8 +231,8 @@ fn subjects_of(mutants: &[Mutant]) -> Vec<Subject> {
 }
 
 /// A device with these kernels, and whether it computes like the host.
-fn open(options: &Options, kernels: KernelLibrary) -> Result<(Gpu, bool), GpuError> {
-    let gpu = crate::gpu::open(&options.adapter, kernels)?;
+pub fn open(options: &Options, kernels: KernelLibrary) -> Result<(Gpu, bool), GpuError> {
+    let gpu = raystone::gpu::open(&options.adapter, kernels)?;
     let exact = probe_arithmetic(&gpu)?.is_exact();
     Ok((gpu, exact))
 }

@@ -1,15 +1,16 @@
 //! What all mutants are put through, made once: scenes with rays and answers, and reference images.
 
-use super::plant::Plant;
-use super::soups::{lattice_judge, lattice_scene};
-use super::{CheckError, Mutant, Options, Subject, checks, open};
-use crate::accel::TriangleSoup;
-use crate::config::{Gate, ParamValue};
-use crate::geometry::Camera;
-use crate::gpu::KernelLibrary;
-use crate::image::Image;
-use crate::measure::gate::Judge;
-use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
+use crate::plan::open;
+use crate::soups::{lattice_judge, lattice_scene};
+use crate::{CheckError, Mutant, Options, Plant, Subject, checks};
+use glam::Vec3;
+use raystone::accel::TriangleSoup;
+use raystone::config::{Gate, ParamValue};
+use raystone::geometry::{Camera, Triangle};
+use raystone::gpu::KernelLibrary;
+use raystone::image::Image;
+use raystone::measure::gate::Judge;
+use raystone::scene::{LoadOptions, LoadReport, Material, SceneData, builtin_scenes, load};
 
 /// Seeds of the integer-grid soups.
 const SOUPS: [u64; 3] = [40, 41, 42];
@@ -32,13 +33,13 @@ const GATE: Gate = Gate {
 };
 
 /// A scene with rays and answers.
-pub(super) struct Case {
+pub struct Case {
     pub stage: Stage,
     pub judge: Judge,
 }
 
 /// A scene on the host.
-pub(super) struct Stage {
+pub struct Stage {
     pub scene: SceneData,
     pub soup: TriangleSoup,
     pub camera: Camera,
@@ -71,7 +72,7 @@ impl Stage {
 }
 
 /// Everything that is made once.
-pub(super) struct World {
+pub struct World {
     /// Integer-grid soups, judged by brute force.
     pub soups: Vec<Case>,
     /// Built-in scenes, judged by the gate's judge.
@@ -107,6 +108,25 @@ impl World {
             world.reference = images;
         }
         Ok(world)
+    }
+}
+
+/// A scene of these triangles, one grey, under a white sky.
+pub fn plain_scene(name: String, triangles: Vec<Triangle>) -> SceneData {
+    SceneData {
+        name,
+        material_ids: vec![0; triangles.len()],
+        triangles,
+        uvs: Vec::new(),
+        materials: vec![Material::diffuse("grey", Vec3::splat(0.5))],
+        textures: Vec::new(),
+        assembly: None,
+        camera: None,
+        environment: Vec3::ONE,
+        daylight: None,
+        framing: None,
+        hash: String::new(),
+        report: LoadReport::default(),
     }
 }
 

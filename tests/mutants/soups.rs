@@ -1,14 +1,15 @@
 //! Integer-grid soups: corners, origins and directions are small integers, so that ties, touching boxes
 //! and zeros of both signs are common instead of rare.
 
-use crate::accel::{Hit, NO_HIT, Ray, TriangleSoup, brute_force_hits};
-use crate::geometry::Triangle;
-use crate::measure::gate::Judge;
-use crate::measure::rays::{FAR, RaySet};
-use crate::measure::record::{JudgeCheck, RayClass};
-use crate::measure::statistics::Pcg32;
-use crate::scene::{LoadReport, Material, SceneData};
+use crate::world::plain_scene;
 use glam::Vec3;
+use raystone::accel::{Hit, NO_HIT, Ray, TriangleSoup, brute_force_hits};
+use raystone::geometry::Triangle;
+use raystone::measure::gate::Judge;
+use raystone::measure::rays::{FAR, RaySet};
+use raystone::measure::record::{JudgeCheck, RayClass};
+use raystone::measure::statistics::Pcg32;
+use raystone::scene::SceneData;
 
 const TRIANGLES: usize = 240;
 const RAYS: usize = 3072;
@@ -17,7 +18,7 @@ const EXTENT: i32 = 6;
 
 /// A scene of triangles between points of the integer lattice: one in eight is a copy, one in two lies
 /// in a plane of the lattice.
-pub(super) fn lattice_scene(seed: u64) -> SceneData {
+pub fn lattice_scene(seed: u64) -> SceneData {
     let mut random = Pcg32::new(seed);
     let mut triangles: Vec<Triangle> = Vec::with_capacity(TRIANGLES);
     for _ in 0..TRIANGLES {
@@ -31,25 +32,11 @@ pub(super) fn lattice_scene(seed: u64) -> SceneData {
         }
         triangles.push(Triangle { vertices });
     }
-    SceneData {
-        name: format!("lattice soup {seed}"),
-        material_ids: vec![0; triangles.len()],
-        triangles,
-        uvs: Vec::new(),
-        materials: vec![Material::diffuse("white", Vec3::ONE)],
-        textures: Vec::new(),
-        assembly: None,
-        camera: None,
-        environment: Vec3::ONE,
-        daylight: None,
-        framing: None,
-        hash: String::new(),
-        report: LoadReport::default(),
-    }
+    plain_scene(format!("lattice soup {seed}"), triangles)
 }
 
 /// Brute force as the judge of rays through a lattice scene.
-pub(super) fn lattice_judge(soup: &TriangleSoup, seed: u64) -> Judge {
+pub fn lattice_judge(soup: &TriangleSoup, seed: u64) -> Judge {
     let mut random = Pcg32::with_stream(seed, 1);
     let lattice = (0..).map(|_| lattice_ray(&mut random));
     let mut rays: Vec<Ray> = lattice.filter(Ray::is_ray).take(RAYS).collect();

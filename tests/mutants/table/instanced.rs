@@ -2,13 +2,13 @@
 
 use super::words::*;
 use super::{built, row, structure, text};
-use crate::stress::mutants::{Check, Mutant, Subject};
+use crate::{Check, Mutant, Subject};
 
 const LIST: Subject = structure("object-list", &[]);
 const META: Subject = structure("meta-bvh", &[]);
 const NESTED: Subject = structure("meta-bvh", &[("loop", "nested")]);
 
-pub(super) const MUTANTS: &[Mutant] = &[
+pub const MUTANTS: &[Mutant] = &[
     row(
         "last-instance-forgotten",
         "the loop over instances ends one short",

@@ -5,16 +5,16 @@ mod images;
 mod projections;
 mod streams;
 
-pub(super) use images::{REFERENCE, cornell_images, plain_path_tracing};
+pub use images::{REFERENCE, cornell_images, plain_path_tracing};
 
-use super::world::World;
-use super::{CheckError, Plant, Subject};
-use crate::gpu::Gpu;
-use serde::{Deserialize, Serialize};
+use crate::world::World;
+use crate::{CheckError, Plant, Subject};
+use raystone::gpu::Gpu;
+use serde::Serialize;
 use std::fmt;
 
 /// A check of the project.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Check {
     /// Hits on integer-grid soups equal those of brute force to the bit.
@@ -61,7 +61,7 @@ impl Check {
 
     /// Whether an adapter can pass it: where `a*b + c` is fused or division is inexact, work and images
     /// do not equal the host's to the bit.
-    pub(super) fn is_possible(self, exact: bool) -> bool {
+    pub fn is_possible(self, exact: bool) -> bool {
         exact || !matches!(self, Self::Work | Self::Integrand)
     }
 }
@@ -76,7 +76,7 @@ impl fmt::Display for Check {
 type Finding = Result<Option<String>, CheckError>;
 
 /// A device with the kernels of one mutant, and where else its fault is planted.
-pub(super) struct Bench<'a> {
+pub struct Bench<'a> {
     pub gpu: &'a Gpu,
     /// Whether the adapter computes like the host.
     pub exact: bool,

@@ -2,7 +2,7 @@
 
 use super::words::*;
 use super::{built, row, structure, text, texts};
-use crate::stress::mutants::{Check, Mutant, Subject};
+use crate::{Check, Mutant, Subject};
 
 const BRUTE: Subject = structure("brute-force", &[]);
 const BVH: Subject = structure("bvh", &[]);
@@ -15,7 +15,7 @@ const SHORT: Subject = structure(
 const ROPED: Subject = structure("roped-bvh", &[]);
 const OCTANTS: Subject = structure("bvh", &[("traversal", "octant-roped")]);
 
-pub(super) const MUTANTS: &[Mutant] = &[
+pub const MUTANTS: &[Mutant] = &[
     row(
         "distance-not-compared",
         "the last triangle that is hit wins, not the nearest",

@@ -1,11 +1,28 @@
 //! The checks of the project see what is wrong: faults that are planted on purpose must turn them red,
 //! and nothing else may.
+//!
+//! `raystone stress --mutants` runs the ignored test, which plants all of them.
 
+mod checks;
+mod command;
+mod plan;
+mod plant;
+mod report;
+mod soups;
+mod subject;
+mod table;
+mod world;
+
+use checks::Check;
+use plan::{CheckError, Mutant, MutantError, Options};
+use plant::Plant;
 use raystone::gpu::AdapterChoice;
-use raystone::stress::mutants::{
-    self, Check, MutantError, Options, Outcome, Plant, Report, Subject, Verdict, mutants,
-};
+use report::{Outcome, Report, Verdict};
 use std::collections::BTreeSet;
+use std::io::IsTerminal as _;
+use std::path::PathBuf;
+use subject::Subject;
+use table::mutants;
 
 /// One fault of each kind, cheap ones.
 const SUBSET: [&str; 13] = [
@@ -37,13 +54,13 @@ fn run(names: &[&str]) -> (Report, Vec<String>) {
         println!("{name}: {:?}, {:.0} ms", outcome.killed_by(), outcome.ms);
         told.lock().expect("no panic elsewhere").push(name);
     };
-    let report = mutants::run(&options, &note).unwrap_or_else(|e| panic!("{e}"));
+    let report = plan::run(&options, &note).unwrap_or_else(|e| panic!("{e}"));
     (report, told.into_inner().expect("no panic elsewhere"))
 }
 
 #[test]
 fn every_fault_of_the_table_still_applies() {
-    mutants::check_table().unwrap_or_else(|e| panic!("{e}"));
+    plan::check_table().unwrap_or_else(|e| panic!("{e}"));
     let all = mutants();
     assert!(all.len() >= 40, "{} faults", all.len());
     let names: BTreeSet<_> = all.iter().map(|m| m.name).collect();
@@ -112,15 +129,37 @@ fn a_fault_of_each_kind_is_seen_by_the_check_that_should_see_it_and_the_sound_on
     }
 }
 
+/// Reads what the command hands over: where kernels, records and table go, and which adapter.
 #[test]
-#[ignore = "some minutes: all faults; `raystone stress --mutants` does the same"]
+#[ignore = "some minutes: all faults; `raystone stress --mutants` runs this"]
 fn every_fault_of_the_table_is_seen_or_explained() {
-    let (report, _) = run(&[]);
+    let temporary = tempfile::tempdir().expect("a temporary folder");
+    let out = std::env::var_os("RAYSTONE_MUTANTS_OUT").map(PathBuf::from);
+    let adapter = std::env::var("RAYSTONE_MUTANTS_ADAPTER").unwrap_or_default();
+    let options = Options {
+        adapter: match adapter.as_str() {
+            "" => AdapterChoice::Best,
+            name => name.parse().unwrap_or_default(),
+        },
+        folder: match &out {
+            Some(out) => out.join("mutants"),
+            None => temporary.path().to_owned(),
+        },
+        names: Vec::new(),
+    };
+    let shows = std::io::stderr().is_terminal();
+    let progress = |outcome: &Outcome| {
+        if shows {
+            eprintln!("{}: {:?}", outcome.mutant.name, outcome.killed_by());
+        }
+    };
+    let report = plan::run(&options, &progress).unwrap_or_else(|e| panic!("{e}"));
+    let out = out.unwrap_or(options.folder);
+    report
+        .write(&out)
+        .unwrap_or_else(|e| panic!("{}: {e}", out.display()));
     println!("{}", report.table());
-    for record in report.records() {
-        println!("{}", serde_json::to_string(&record).expect("a line"));
-    }
-    assert!(report.is_passed());
+    assert!(report.is_passed(), "{}", report.verdict());
 }
 
 #[test]
@@ -147,6 +186,6 @@ fn a_name_that_does_not_exist_is_an_error() {
         folder: std::env::temp_dir(),
         names: vec!["no-such-fault".to_owned()],
     };
-    let error = mutants::run(&options, &|_| {}).expect_err("no such mutant");
+    let error = plan::run(&options, &|_| {}).expect_err("no such mutant");
     assert!(matches!(error, MutantError::Unknown(_)), "{error}");
 }

@@ -1,9 +1,11 @@
 //! What a mutation run found.
 
-use super::world::World;
-use super::{Check, LEAST_KILLED, Mutant, Subject};
-use serde::{Deserialize, Serialize};
+use crate::plan::LEAST_KILLED;
+use crate::world::World;
+use crate::{Check, Mutant, Subject};
+use serde::Serialize;
 use std::fmt::Write;
+use std::path::Path;
 
 /// What became of a mutant.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,7 +38,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    pub(super) fn new(mutant: &Mutant, verdict: Verdict, ms: f64) -> Self {
+    pub fn new(mutant: &Mutant, verdict: Verdict, ms: f64) -> Self {
         Self {
             mutant: *mutant,
             verdict,
@@ -78,7 +80,7 @@ impl Outcome {
 }
 
 /// One mutant as a line of JSON.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MutantRecord {
     /// Always `mutant`.
     pub kind: String,
@@ -118,7 +120,7 @@ pub struct ControlOutcome {
 }
 
 impl ControlOutcome {
-    pub(super) fn new(subject: &Subject) -> Self {
+    pub fn new(subject: &Subject) -> Self {
         Self {
             subject: *subject,
             green: Vec::new(),
@@ -142,7 +144,7 @@ pub struct Report {
 }
 
 impl Report {
-    pub(super) fn new(world: &World) -> Self {
+    pub fn new(world: &World) -> Self {
         Self {
             adapter: world.adapter.clone(),
             controls: Vec::new(),
@@ -152,7 +154,7 @@ impl Report {
     }
 
     /// Takes back every kill by a check that is red without a fault.
-    pub(super) fn distrust_red_controls(&mut self) {
+    pub fn distrust_red_controls(&mut self) {
         for outcome in &mut self.mutants {
             let Verdict::Killed { by, .. } = &outcome.verdict else {
                 continue;
@@ -234,15 +236,30 @@ impl Report {
                 let _ = writeln!(out, "{subject} without a fault: {check} is red: {evidence}");
             }
         }
+        let _ = writeln!(out, "{}", self.verdict());
+    }
+
+    /// How many were killed, and whether that is enough.
+    pub fn verdict(&self) -> String {
         let (killed, all) = (self.killed(), self.mutants.len());
         let verdict = if self.is_passed() { "passed" } else { "failed" };
-        let _ = writeln!(
-            out,
+        format!(
             "{killed} of {all} faults killed, {} subjects green without a fault, {:.0} s on {}: {verdict}",
             self.controls.iter().filter(|c| c.red.is_empty()).count(),
             self.seconds,
             self.adapter
-        );
+        )
+    }
+
+    /// Writes the records to `mutants.jsonl` and, last of all, the table to `mutants.txt`.
+    pub fn write(&self, folder: &Path) -> std::io::Result<()> {
+        let mut lines = String::new();
+        for record in self.records() {
+            lines += &serde_json::to_string(&record)?;
+            lines.push('\n');
+        }
+        std::fs::write(folder.join("mutants.jsonl"), lines)?;
+        std::fs::write(folder.join("mutants.txt"), self.table())
     }
 
     /// Records, one for each mutant.

@@ -1,25 +1,23 @@
 //! Checks of integrators: images whose pixels are known, and the Cornell box against plain path tracing.
 
-use super::super::CheckError;
-use super::super::plant::Plant;
-use super::super::subject::{build, sampler};
-use super::super::world::Stage;
 use super::{Bench, Finding};
-use crate::config::{Entry, ParamValue, Variant};
-use crate::geometry::{Camera, Triangle};
-use crate::gpu::KernelLibrary;
-use crate::image::Image;
-use crate::integrator::{
+use crate::CheckError;
+use crate::plant::Plant;
+use crate::subject::{build, sampler};
+use crate::world::Stage;
+use crate::world::plain_scene;
+use glam::Vec3;
+use raystone::config::{Entry, ParamValue, Variant};
+use raystone::geometry::{Camera, Triangle};
+use raystone::gpu::KernelLibrary;
+use raystone::image::Image;
+use raystone::integrator::{
     Frame, RenderJob, Renderer, SceneBuffers, Traced, integrator, integrator_entries,
 };
-use crate::measure::bias::{BiasOptions, BiasVerdict, check_bias};
-use crate::measure::statistics::{mean, variance};
-use crate::sampling::{Demand, Sampler, dimensions};
-use crate::scene::Material;
-use crate::stress::case::scene;
-use crate::stress::place::Place;
-use crate::stress::shapes::{RADIUS, cube};
-use glam::Vec3;
+use raystone::measure::bias::{BiasOptions, BiasVerdict, check_bias};
+use raystone::measure::statistics::{mean, variance};
+use raystone::sampling::{Demand, Sampler, dimensions};
+use raystone::scene::Material;
 use std::path::Path;
 
 const SIZE: u32 = 16;
@@ -32,14 +30,14 @@ const ROUNDING: f64 = 1e-5;
 
 /// Replicates and samples per pixel of each, and the first seed.
 #[derive(Clone, Copy)]
-pub(in super::super) struct Replicates {
+pub struct Replicates {
     count: u32,
     spp: u32,
     seed: u32,
 }
 
 /// Of the reference.
-pub(in super::super) const REFERENCE: Replicates = Replicates {
+pub const REFERENCE: Replicates = Replicates {
     count: 12,
     spp: 192,
     seed: 500_000,
@@ -61,7 +59,7 @@ const ONE: Replicates = Replicates {
 };
 
 /// Kernels without next-event estimation: the simplest estimator of the same image.
-pub(in super::super) fn plain_path_tracing(folder: &Path) -> Result<KernelLibrary, CheckError> {
+pub fn plain_path_tracing(folder: &Path) -> Result<KernelLibrary, CheckError> {
     let text = "result += throughput * direct_light(surface, depth, sampler);";
     let weight = "weight = density / (density + light_pdf(surface, hit.t));";
     let file = "integrator/path";
@@ -142,7 +140,7 @@ fn path(depth: i64) -> (&'static str, (&'static str, ParamValue)) {
 }
 
 /// The box of walls that emit what they absorb, and the white sphere under a white sky.
-pub(super) fn furnace(bench: &Bench) -> Finding {
+pub fn furnace(bench: &Bench) -> Finding {
     let albedo = 0.8;
     let stage = Stage::builtin("furnace-box", &[("albedo", ParamValue::Number(albedo))])?;
     let images = render(bench, &stage, path(MAX_DEPTH), BOX)?;
@@ -171,7 +169,7 @@ pub(super) fn furnace(bench: &Bench) -> Finding {
 }
 
 /// Ambient occlusion of a closed box, long and short rays, and of a convex body.
-pub(super) fn occlusion(bench: &Bench) -> Finding {
+pub fn occlusion(bench: &Bench) -> Finding {
     let inside = Stage::builtin("furnace-box", &[])?;
     let outside = Stage::builtin("white-furnace", &[])?;
     for (stage, radius, least, most) in [
@@ -193,20 +191,27 @@ pub(super) fn occlusion(bench: &Bench) -> Finding {
 }
 
 /// Height of the thin box: five times the default offset of a ray from its walls.
-const GAP: f64 = 2e-5;
+const GAP: f32 = 2e-5;
+/// Of a square of 2 × 2 units, in turn.
+const CORNERS: [(f32, f32); 4] = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
 
 /// A closed box of 4 × 4 units and [`GAP`], seen from its middle, below a lamp and a white sky: an upper
 /// bound of ray offsets. Rays that begin farther off their wall than the box is high are outside.
 fn thin_box() -> Stage {
-    let mut mesh = cube(2, &Place::ORDINARY);
-    for vertex in mesh.iter_mut().flat_map(|t| &mut t.vertices) {
-        vertex.y *= (GAP / (2.0 * RADIUS)) as f32;
+    let mut mesh = Vec::new();
+    for (axis, end) in (0..3).flat_map(|axis| [(axis, -1.0), (axis, 1.0)]) {
+        let corner = |(u, v): (f32, f32)| {
+            let mut p = Vec3::splat(end);
+            [p[(axis + 1) % 3], p[(axis + 2) % 3]] = [u, v];
+            p * Vec3::new(2.0, GAP / 2.0, 2.0)
+        };
+        let [a, b, c, d] = CORNERS.map(corner);
+        mesh.extend([[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices }));
     }
     let walls = mesh.len();
-    let lamp = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-    let [a, b, c, d] = lamp.map(|(x, z)| Vec3::new(x, 1.0, z));
+    let [a, b, c, d] = CORNERS.map(|(x, z)| Vec3::new(x, 1.0, z));
     mesh.extend([[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices }));
-    let mut scene = scene(mesh, None);
+    let mut scene = plain_scene("thin box".to_owned(), mesh);
     let shining = Material::diffuse("lamp", Vec3::splat(0.5)).emitting(Vec3::ONE);
     scene.materials.push(shining);
     scene.material_ids[walls..].fill(1);
@@ -220,7 +225,7 @@ fn thin_box() -> Stage {
 }
 
 /// The thin box is dark inside, to the last bit.
-pub(super) fn thin_walls(bench: &Bench) -> Finding {
+pub fn thin_walls(bench: &Bench) -> Finding {
     let stage = thin_box();
     let long = ("ao", ("radius", ParamValue::Number(2.0)));
     for what in [path(MAX_DEPTH), long] {
@@ -238,16 +243,13 @@ pub(super) fn thin_walls(bench: &Bench) -> Finding {
 }
 
 /// Images of the Cornell box.
-pub(in super::super) fn cornell_images(
-    bench: &Bench,
-    replicates: Replicates,
-) -> Result<Vec<Image>, CheckError> {
+pub fn cornell_images(bench: &Bench, replicates: Replicates) -> Result<Vec<Image>, CheckError> {
     let stage = Stage::builtin("cornell-box", &[])?;
     render(bench, &stage, path(MAX_DEPTH), replicates)
 }
 
 /// The bias check against the reference, per tile and for the whole image.
-pub(super) fn bias(bench: &Bench) -> Finding {
+pub fn bias(bench: &Bench) -> Finding {
     let images = cornell_images(bench, CORNELL)?;
     let check = check_bias(&images, &bench.world.reference, BiasOptions::default());
     let check = check.map_err(|e| CheckError::Other(e.to_string()))?;

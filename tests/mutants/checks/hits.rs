@@ -1,21 +1,21 @@
 //! Checks of structures: hits and counted work.
 
-use super::super::plant::Faulty;
-use super::super::subject::{Changes, build};
-use super::super::world::Case;
 use super::{Bench, Finding};
-use crate::accel::{Counters, Ray};
-use crate::gpu::ArithmeticProbe;
-use crate::integrator::{SceneBuffers, Traced};
-use crate::measure::batch::{Query, count_work};
-use crate::measure::gate::gate;
-use crate::measure::record::GateVerdict;
+use crate::plant::Faulty;
+use crate::subject::{Changes, build};
+use crate::world::Case;
+use raystone::accel::{Counters, Ray};
+use raystone::gpu::ArithmeticProbe;
+use raystone::integrator::{SceneBuffers, Traced};
+use raystone::measure::batch::{Query, count_work};
+use raystone::measure::gate::gate;
+use raystone::measure::record::GateVerdict;
 
 /// Rays whose work is counted, of each scene.
 const COUNTED_RAYS: usize = 2048;
 
 /// The gate on these cases, whose judges are as strict as the case is.
-pub(super) fn same_hits(bench: &Bench, name: &str, changes: Changes, cases: &[Case]) -> Finding {
+pub fn same_hits(bench: &Bench, name: &str, changes: Changes, cases: &[Case]) -> Finding {
     let probe = ArithmeticProbe {
         unfused: bench.exact,
         exact_division: bench.exact,
@@ -52,7 +52,7 @@ fn evidence(verdict: &GateVerdict) -> String {
 
 /// Counted work of closest-hit and any-hit queries against the twin's, ray by ray, on one soup and one
 /// scene.
-pub(super) fn same_work(bench: &Bench, name: &str, changes: Changes) -> Finding {
+pub fn same_work(bench: &Bench, name: &str, changes: Changes) -> Finding {
     let soups = bench.world.soups.iter().take(1);
     for Case { stage, judge } in soups.chain(bench.world.scenes.iter().skip(2).take(1)) {
         let built = build(name, changes, &stage.soup)?;

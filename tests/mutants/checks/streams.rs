@@ -1,17 +1,19 @@
 //! Checks of samplers: words, images of integrands, evenness, means.
 
-use super::super::CheckError;
-use super::super::subject::{Changes, DEMAND, LONG_DEMAND, build, sampler};
-use super::super::world::Stage;
 use super::{Bench, Finding, projections};
-use crate::config::Params;
-use crate::discrepancy::{Budget, PointSet, net_quality, star_2d};
-use crate::image::Image;
-use crate::integrator::integrand::functions;
-use crate::integrator::{Frame, Integrator, RenderJob, Renderer, SceneBuffers, Traced, integrator};
-use crate::measure::statistics::{Pcg32, mean, variance};
-use crate::measure::words::{Used, compare, dump_stream};
-use crate::sampling::{Coordinate, Demand, Sampler, to_unit};
+use crate::CheckError;
+use crate::subject::{Changes, DEMAND, LONG_DEMAND, build, sampler};
+use crate::world::Stage;
+use raystone::config::Params;
+use raystone::discrepancy::{Budget, PointSet, net_quality, star_2d};
+use raystone::image::Image;
+use raystone::integrator::integrand::functions;
+use raystone::integrator::{
+    Frame, Integrator, RenderJob, Renderer, SceneBuffers, Traced, integrator,
+};
+use raystone::measure::statistics::{Pcg32, mean, variance};
+use raystone::measure::words::{Used, compare, dump_stream};
+use raystone::sampling::{Coordinate, Demand, Sampler, to_unit};
 
 type Names<'a> = (&'a str, Changes, &'a str);
 
@@ -49,7 +51,7 @@ fn make(bench: &Bench, names: Names, demand: &Demand) -> Result<Sampler, CheckEr
 }
 
 /// Words that a long run would use and words at coordinates anywhere, against the twin.
-pub(super) fn same_words(bench: &Bench, names: Names) -> Finding {
+pub fn same_words(bench: &Bench, names: Names) -> Finding {
     let sampler = make(bench, names, &LONG_DEMAND)?;
     let Demand {
         samples,
@@ -111,7 +113,7 @@ fn images(bench: &Bench, sampler: &Sampler, seeds: &[u32]) -> Result<Vec<Image>,
 }
 
 /// The image of the integrand against that of the twins: sums of floats in the same order.
-pub(super) fn same_image(bench: &Bench, names: Names) -> Finding {
+pub fn same_image(bench: &Bench, names: Names) -> Finding {
     let sampler = make(bench, names, &DEMAND)?;
     let name = INTEGRAND.trim_start_matches("integrand:");
     let known = functions().into_iter().find(|(n, _)| *n == name);
@@ -144,7 +146,7 @@ pub(super) fn same_image(bench: &Bench, names: Names) -> Finding {
 /// D* of 1024 points of a pixel is at most 1.5 log2(N) / N where the sequence promises low discrepancy
 /// (random points have about twice as much), digital points in base 2 are a (0, m, 2)-net, and the
 /// projections of all dimensions are sound.
-pub(super) fn discrepancy(bench: &Bench, names: Names) -> Finding {
+pub fn discrepancy(bench: &Bench, names: Names) -> Finding {
     let sampler = make(bench, names, &DEMAND)?;
     let facts = sampler.sequence.facts(&sampler.sequence_variant.params);
     if facts.independent && !facts.base_2 {
@@ -162,7 +164,7 @@ pub(super) fn discrepancy(bench: &Bench, names: Names) -> Finding {
         .chunks_exact(2)
         .map(|pair| [pair[0], pair[1]].map(|x| f64::from(to_unit(x))))
         .collect();
-    let other = |e: crate::discrepancy::DiscrepancyError| CheckError::Other(e.to_string());
+    let other = |e: raystone::discrepancy::DiscrepancyError| CheckError::Other(e.to_string());
     let n = f64::from(POINTS);
     let (found, most) = (star_2d(&points).map_err(other)?, 1.5 * n.log2() / n);
     if found > most {
@@ -186,7 +188,7 @@ pub(super) fn discrepancy(bench: &Bench, names: Names) -> Finding {
 }
 
 /// The mean of the integrand over replicates, where that must be the integral.
-pub(super) fn integral(bench: &Bench, names: Names) -> Finding {
+pub fn integral(bench: &Bench, names: Names) -> Finding {
     let sampler = make(bench, names, &DEMAND)?;
     let facts = sampler.sequence.facts(&sampler.sequence_variant.params);
     if !(facts.random || UNBIASED.contains(&sampler.decorrelation.name())) {

@@ -1,11 +1,11 @@
 //! Faults of integrators and shading.
 
 use super::{row, text};
-use crate::stress::mutants::{Check, Mutant, Subject};
+use crate::{Check, Mutant, Subject};
 
 const IMAGES: Subject = Subject::Integrators;
 
-pub(super) const MUTANTS: &[Mutant] = &[
+pub const MUTANTS: &[Mutant] = &[
     row(
         "pdf-forgotten",
         "the density of a light sample is left over area",

@@ -2,7 +2,7 @@
 
 use super::words::*;
 use super::{built, equivalent, row, structure, text};
-use crate::stress::mutants::{Check, Mutant, Subject};
+use crate::{Check, Mutant, Subject};
 
 const GRID: Subject = structure("uniform-grid", &[]);
 const SKIP: Subject = structure("uniform-grid", &[("skip", "chebyshev")]);
@@ -11,7 +11,7 @@ const IRREGULAR: Subject = structure("irregular-grid", &[]);
 const OCTREE: Subject = structure("octree", &[]);
 const KD_TREE: Subject = structure("kd-tree", &[]);
 
-pub(super) const MUTANTS: &[Mutant] = &[
+pub const MUTANTS: &[Mutant] = &[
     row(
         "dda-exits-early",
         "the walk ends in the first cell with a hit, which may lie behind the cell",

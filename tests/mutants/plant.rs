@@ -1,10 +1,10 @@
 //! Where faults are planted: texts of kernels, what builders hand out, tables of samplers.
 
-use super::CheckError;
-use crate::accel::StructureStats;
-use crate::accel::{AccelError, BuiltAccel, GpuBuffers, Space, TriangleSoup};
-use crate::gpu::KernelLibrary;
-use crate::sampling::{Sampler, SamplerTable};
+use crate::CheckError;
+use raystone::accel::StructureStats;
+use raystone::accel::{AccelError, BuiltAccel, GpuBuffers, Space, TriangleSoup};
+use raystone::gpu::KernelLibrary;
+use raystone::sampling::{Sampler, SamplerTable};
 use std::path::Path;
 
 /// Where a fault is planted.
@@ -54,7 +54,7 @@ impl Plant {
     ///
     /// # Errors
     /// The text to be replaced does not stand there as often as it should.
-    pub(super) fn changed_text(
+    pub fn changed_text(
         &self,
         library: &KernelLibrary,
     ) -> Result<Option<(&'static str, String)>, CheckError> {
@@ -84,7 +84,7 @@ impl Plant {
     ///
     /// # Errors
     /// The fault is stale, or the folder cannot be written.
-    pub(super) fn library(&self, folder: &Path) -> Result<KernelLibrary, CheckError> {
+    pub fn library(&self, folder: &Path) -> Result<KernelLibrary, CheckError> {
         self.library_over(&KernelLibrary::default(), folder)
     }
 
@@ -92,7 +92,7 @@ impl Plant {
     ///
     /// # Errors
     /// As [`Plant::library`].
-    pub(super) fn library_over(
+    pub fn library_over(
         &self,
         library: &KernelLibrary,
         folder: &Path,
@@ -112,20 +112,21 @@ impl Plant {
     ///
     /// # Errors
     /// There is nothing left to change.
-    pub(super) fn in_table(&self, mut sampler: Sampler) -> Result<Sampler, CheckError> {
+    pub fn in_table(&self, mut sampler: Sampler) -> Result<Sampler, CheckError> {
         if let Self::Table { part, change } = self {
             let mut words = sampler.table.words().to_vec();
             if change(&mut words) == 0 {
                 return Err(CheckError::Stale(format!("no {part} is left to change")));
             }
-            sampler.table = SamplerTable::from_words(words);
+            let (sequence, decorrelation) = words.split_at(words[0] as usize);
+            sampler.table = SamplerTable::new(&sequence[1..], decorrelation);
         }
         Ok(sampler)
     }
 }
 
 /// A built structure that hands out something else than it built.
-pub(super) struct Faulty<'a> {
+pub struct Faulty<'a> {
     inner: &'a dyn BuiltAccel,
     plant: &'a Plant,
 }

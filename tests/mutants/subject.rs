@@ -1,10 +1,9 @@
 //! What is put through the checks.
 
-use super::checks::Check;
-use super::{CheckError, Plant};
-use crate::accel::{AccelKind, AccelRegistry, BuildLog, BuiltAccel, TriangleSoup};
-use crate::config::{Entry, ParamValue, Variant};
-use crate::sampling::{Demand, Sampler, SamplerRegistry};
+use crate::{Check, CheckError, Plant};
+use raystone::accel::{AccelKind, AccelRegistry, BuildLog, BuiltAccel, TriangleSoup};
+use raystone::config::{Entry, ParamValue, Variant};
+use raystone::sampling::{Demand, Sampler, SamplerRegistry};
 
 /// Parameters that are not at their defaults, as a user would write them.
 pub type Changes = &'static [(&'static str, &'static str)];
@@ -89,7 +88,7 @@ fn variant(entries: &[Entry], name: &str, changes: Changes) -> Result<Variant, C
 }
 
 /// Builds the structure `name` and checks it.
-pub(super) fn build(
+pub fn build(
     name: &str,
     changes: Changes,
     soup: &TriangleSoup,
@@ -104,14 +103,14 @@ pub(super) fn build(
 }
 
 /// Samples and dimensions that samplers are made for, and the width of the image.
-pub(super) const DEMAND: Demand = Demand {
+pub const DEMAND: Demand = Demand {
     samples: Some(1024),
     dimensions: 48,
     width: Some(64),
 };
 
 /// The same where words are compared: beyond 2¹⁶ samples and several tiles of a mask.
-pub(super) const LONG_DEMAND: Demand = Demand {
+pub const LONG_DEMAND: Demand = Demand {
     samples: Some(1 << 17),
     dimensions: 48,
     width: Some(192),
@@ -119,7 +118,7 @@ pub(super) const LONG_DEMAND: Demand = Demand {
 
 /// The sampler of these names for `demand` or as much of it as there is, with the fault in its table if it
 /// belongs there.
-pub(super) fn sampler(
+pub fn sampler(
     (sequence, changes): (&str, Changes),
     decorrelation: &str,
     demand: &Demand,

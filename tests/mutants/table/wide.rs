@@ -2,12 +2,12 @@
 
 use super::words::*;
 use super::{built, row, structure, text};
-use crate::stress::mutants::{Check, Mutant, Subject};
+use crate::{Check, Mutant, Subject};
 
 const BVH4: Subject = structure("bvh4", &[]);
 const CWBVH: Subject = structure("cwbvh", &[]);
 
-pub(super) const MUTANTS: &[Mutant] = &[
+pub const MUTANTS: &[Mutant] = &[
     row(
         "quantised-planes-moved-inwards",
         "the slack of quantised planes makes boxes smaller",

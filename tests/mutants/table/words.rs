@@ -1,8 +1,8 @@
 //! Faults of builders: words that are changed in what they hand out. Each tells how many places it
 //! changed; 0 means that the layout is no longer what the fault supposes.
 
-use crate::accel::GpuBuffers;
-use crate::gpu::UniformValues;
+use raystone::accel::GpuBuffers;
+use raystone::gpu::UniformValues;
 
 /// A reference to a leaf, and the bits of its count (`kernels/accel/leaf.wesl`).
 const LEAF: u32 = 0x8000_0000;

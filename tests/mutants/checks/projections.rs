@@ -1,8 +1,8 @@
 //! Projections of a sampler's points on single dimensions and on pairs of them, by the twin: faults of tables,
 //! which the kernel reads as well.
 
-use crate::discrepancy::star_2d;
-use crate::sampling::{Coordinate, Sampler, to_unit};
+use raystone::discrepancy::star_2d;
+use raystone::sampling::{Coordinate, Sampler, to_unit};
 use std::collections::HashSet;
 
 /// Dimensions whose pairs are all measured, and what none of them may exceed at 1024 points; random ones have
@@ -30,7 +30,7 @@ fn columns(sampler: &Sampler, samples: u32) -> Vec<Vec<u32>> {
 
 /// What is wrong with the first `samples` points: a number that a dimension draws twice, a dimension that is
 /// another one, or two that are locked together.
-pub(super) fn fault(sampler: &Sampler, samples: u32) -> Option<String> {
+pub fn fault(sampler: &Sampler, samples: u32) -> Option<String> {
     let columns = columns(sampler, samples);
     for (i, xs) in columns.iter().enumerate() {
         if xs.iter().map(|x| x >> UNSEEN).collect::<HashSet<_>>().len() < xs.len() {
@@ -63,7 +63,7 @@ pub(super) fn fault(sampler: &Sampler, samples: u32) -> Option<String> {
 }
 
 /// The first dimension in which 2^m points, the most that there are, do not take one place each of 2^m.
-pub(super) fn fault_of_axes(sampler: &Sampler) -> Option<String> {
+pub fn fault_of_axes(sampler: &Sampler) -> Option<String> {
     let m = sampler.demand.samples?.checked_ilog2()?;
     let columns = columns(sampler, 1 << m);
     let even = |column: &Vec<u32>| {
