@@ -167,7 +167,7 @@ fn add_all_samples(
         session.progress.set_style(style);
     }
     session.progress.set_length(u64::from(spp));
-    renderer.reset();
+    renderer.reset()?;
     let start = Instant::now();
     let (mut done, mut shown, mut last) = (0, 0, start);
     loop {

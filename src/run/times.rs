@@ -30,7 +30,7 @@ struct Timed<'a> {
 
 impl Measured for Timed<'_> {
     fn measure(&self) -> Result<Elapsed, GpuError> {
-        self.renderer.reset();
+        self.renderer.reset()?;
         self.renderer.add_samples(0, self.spp, self.seed)?;
         self.renderer.check()?;
         let elapsed = self.renderer.spent();
@@ -134,7 +134,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
                         &serde_json::to_string(&(&record.accel, &record.integrator))
                             .unwrap_or_default(),
                     ),
-                    ("kernel", item.renderer.kernel_text()),
+                    ("kernel", &item.renderer.kernel_text()),
                     ("device", &format!("{:?}", world.gpu.info)),
                     ("version", env!("CARGO_PKG_VERSION")),
                 ]);
@@ -262,7 +262,7 @@ fn count_rays(
 ) -> Result<([u64; 4], String), String> {
     let renderer = renderer(session, world, structure, &item.cell, [true, true])?;
     let counted = session.clock.time("gpu", || {
-        renderer.reset();
+        renderer.reset()?;
         renderer.add_samples(0, item.spp, item.seed)?;
         Ok((renderer.ray_counts()?, image_hash(&renderer.image()?)))
     });
