@@ -4,16 +4,17 @@ mod frame;
 pub mod integrand;
 pub mod offset;
 mod render;
+mod stage;
 mod tables;
-mod traced;
 
+pub use crate::accel::Traced;
 pub use frame::Frame;
 pub use offset::RayOffset;
 pub use render::{
     BLOCK_SAMPLES, RAY_COUNT_CLASSES, RenderJob, Renderer, Snapshot, rounding_bound, with_sampler,
 };
+pub use stage::{Stage, StageError};
 pub use tables::{SceneBuffers, SceneFeatures};
-pub use traced::Traced;
 
 use crate::config::{Entry, ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::sampling::dimensions;

@@ -7,7 +7,7 @@
 use super::Integrator;
 use super::frame::{Frame, Slice};
 use super::tables::SceneBuffers;
-use super::traced::Traced;
+use crate::accel::Traced;
 use crate::config::Params;
 use crate::gpu::{Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline};
 use crate::image::Image;
@@ -113,6 +113,7 @@ fn composition(
     ray_counts: bool,
 ) -> Composition {
     let kernel = scene
+        .triangles
         .intersection
         .activate(Composition::new("integrator/render"));
     let kernel = traced.compose(scene.offset.activate(kernel));
