@@ -8,9 +8,10 @@ mod passes;
 mod registry;
 mod render;
 mod slice;
+mod stage;
 mod tables;
-mod traced;
 
+pub use crate::accel::Traced;
 pub use kind::{
     ConfiguredIntegrator, CountedRays, Integrator, IntegratorError, IntegratorFacts,
     RAY_COUNT_CLASSES,
@@ -19,5 +20,5 @@ pub use offset::RayOffset;
 pub use passes::ImageSteps;
 pub use registry::IntegratorRegistry;
 pub use render::{BLOCK_SAMPLES, RenderJob, Renderer, Snapshot, rounding_bound, with_sampler};
+pub use stage::{Stage, StageError};
 pub use tables::{SceneBuffers, SceneFeatures};
-pub use traced::Traced;

@@ -4,6 +4,8 @@ use super::render::with_sampler;
 use super::slice::Slice;
 use super::tables::SceneBuffers;
 use super::{RenderJob, Traced};
+use crate::accel::tracer::RayBuffers;
+use crate::accel::{Ask, Query, Tracer, TriangleBuffers};
 use crate::gpu::{
     Bindings, Composition, Gpu, GpuError, Groups, Pipeline, Recording, Storage, UniformValues,
 };
@@ -17,8 +19,12 @@ pub(super) struct Passes {
     /// Everything that is chosen but the entry.
     chosen: Composition,
     bindings: Bindings,
+    triangles: TriangleBuffers,
+    traced: Traced,
     runtime_checks: bool,
     pipelines: RefCell<BTreeMap<String, Arc<Pipeline>>>,
+    /// What answers buffers of rays, by the name of the query.
+    tracers: RefCell<BTreeMap<String, Arc<Tracer>>>,
 }
 
 impl Passes {
@@ -32,7 +38,7 @@ impl Passes {
     ) -> Result<Self, GpuError> {
         let table = gpu.storage("sampler_table", job.sampler.table.words())?;
         let mut bindings = scene.bindings.clone();
-        let chosen = scene.intersection.activate(Composition::new(""));
+        let chosen = scene.triangles.intersection.activate(Composition::new(""));
         let mut chosen = scene.offset.activate(chosen);
         // Kernels that call no structure are the same with all of them.
         if job.integrator.facts.needs_inline {
@@ -54,8 +60,11 @@ impl Passes {
             gpu: gpu.clone(),
             chosen,
             bindings,
+            triangles: scene.triangles.clone(),
+            traced: traced.clone(),
             runtime_checks: job.runtime_checks,
             pipelines: RefCell::default(),
+            tracers: RefCell::default(),
         })
     }
 
@@ -74,11 +83,29 @@ impl Passes {
         Ok(pipeline)
     }
 
+    fn tracer(&self, query: Query) -> Result<Arc<Tracer>, GpuError> {
+        let name = format!("trace {query:?}").to_lowercase();
+        if let Some(tracer) = self.tracers.borrow().get(&name) {
+            return Ok(Arc::clone(tracer));
+        }
+        let ask = Ask {
+            runtime_checks: self.runtime_checks,
+            ..query.into()
+        };
+        let tracer = Tracer::new(&self.gpu, &self.triangles, &self.traced, ask)?;
+        let tracer = Arc::new(tracer);
+        self.tracers.borrow_mut().insert(name, Arc::clone(&tracer));
+        Ok(tracer)
+    }
+
     /// Feature flags of the kernels.
     pub fn features(&self) -> Vec<String> {
         let mut all = BTreeSet::new();
         for pipeline in self.pipelines.borrow().values() {
             all.extend(pipeline.kernel.composition.features.iter().cloned());
+        }
+        for tracer in self.tracers.borrow().values() {
+            all.extend(tracer.features());
         }
         all.into_iter().collect()
     }
@@ -86,10 +113,15 @@ impl Passes {
     /// Text of every composed kernel, by the name of its pass.
     pub fn texts(&self) -> Vec<(String, String)> {
         let pipelines = self.pipelines.borrow();
-        let texts = pipelines.iter();
-        texts
+        let mut texts: Vec<_> = pipelines
+            .iter()
             .map(|(pass, pipeline)| (pass.clone(), pipeline.kernel.wgsl.clone()))
-            .collect()
+            .collect();
+        for (name, tracer) in self.tracers.borrow().iter() {
+            let of_passes = tracer.kernel_texts().into_iter();
+            texts.extend(of_passes.map(|text| (name.clone(), text)));
+        }
+        texts
     }
 }
 
@@ -159,6 +191,26 @@ impl<'a> ImageSteps<'a> {
                 "a pass names the buffer `{name}`, which is neither scratch nor of the scene"
             ))
         })
+    }
+
+    /// Answers the first `count` rays of a buffer (32 bytes each: origin, `t_min`, direction, `t_max`), inline
+    /// or in the structure's own passes. Answers have 16 bytes: a hit, or 1 or 0 where any hit is asked for.
+    ///
+    /// # Errors
+    /// A kernel does not compose or compile, or there is no such buffer.
+    pub fn trace(
+        &mut self,
+        query: Query,
+        (rays, answers): (&str, &str),
+        count: u32,
+    ) -> Result<(), GpuError> {
+        let buffers = RayBuffers {
+            rays: self.storage(rays)?,
+            answers: self.storage(answers)?,
+            status: self.storage("status")?,
+        };
+        let tracer = self.passes.tracer(query)?;
+        tracer.record(self.recording, &buffers, 0..count)
     }
 
     /// Runs a kernel, composed with the job's sampler, scene, constants and, where the integrator needs it

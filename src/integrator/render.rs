@@ -8,7 +8,7 @@ use super::kind::ConfiguredIntegrator;
 use super::passes::{ImageSteps, Passes};
 use super::slice::{Slice, job_uniform};
 use super::tables::SceneBuffers;
-use super::traced::Traced;
+use crate::accel::Traced;
 use crate::geometry::Camera;
 use crate::gpu::{Composition, Elapsed, Gpu, GpuError, Player, Recording, Slices, UniformValues};
 use crate::image::Image;
@@ -305,11 +305,9 @@ impl<'a> Renderer<'a> {
         let row_samples = u64::from(self.size[0]) * u64::from(slice.samples);
         self.slices
             .learn(row_samples * u64::from(slice.rows), elapsed);
-        let spent = self.spent.get();
-        self.spent.set(Elapsed {
-            gpu_ms: spent.gpu_ms.zip(elapsed.gpu_ms).map(|(a, b)| a + b),
-            wall_ms: spent.wall_ms + elapsed.wall_ms,
-        });
+        let mut spent = self.spent.get();
+        spent += elapsed;
+        self.spent.set(spent);
         Ok(())
     }
 

@@ -11,9 +11,8 @@ mod mappings;
 mod stage;
 mod sums;
 
-use crate::accel::AccelError;
 use crate::gpu::{Gpu, GpuError};
-use crate::integrator::IntegratorError;
+use crate::integrator::{IntegratorError, StageError};
 use crate::sampling::SamplerError;
 use crate::scene::SceneError;
 use serde::{Deserialize, Serialize};
@@ -70,9 +69,9 @@ pub enum NumericsError {
     /// A scene cannot be made.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A structure cannot be built.
+    /// A structure is not on the device.
     #[error(transparent)]
-    Accel(#[from] AccelError),
+    Stage(#[from] StageError),
     /// A sampler cannot be made.
     #[error(transparent)]
     Sampler(#[from] SamplerError),
