@@ -8,8 +8,8 @@ use super::triangle::{TriangleRecord, TriangleTest, intersect_triangle};
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, TriangleSoup,
 };
+use crate::accel::StructureStats;
 use crate::config::{ParameterSchema, Params};
-use crate::measure::record::StructureStats;
 use crate::oracle::{GROUP, Groups, Line};
 use rayon::prelude::*;
 

@@ -5,7 +5,6 @@
 //! draw conclusions, [`sections`] writes them into a [`document::Document`], and [`html`],
 //! [`markdown`] and [`terminal`] show that document.
 
-pub mod color;
 pub mod data;
 pub mod document;
 pub mod format;
@@ -25,7 +24,7 @@ mod tests;
 pub use stress::{stress_tables, write_stress_page};
 pub use terminal::{failed_checks, terminal_tables};
 
-use crate::measure::atomic::write_atomic;
+use crate::atomic::write_atomic;
 use crate::measure::record::{RecordError, read_records};
 use data::RunData;
 use document::{Block, Document};

@@ -1,7 +1,8 @@
 //! Errors over replicates against simulations of known truth.
 
 use super::*;
-use crate::measure::image::{Image, Reference, measure};
+use crate::image::Image;
+use crate::measure::metrics::{Reference, measure};
 use crate::measure::record::ErrorAtSpp;
 use crate::measure::statistics::Pcg32;
 

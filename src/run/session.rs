@@ -3,11 +3,10 @@
 use super::folder::Folder;
 use super::{RunError, RunOptions};
 use crate::config::{Experiment, Plan, REFERENCE_PARTS, Skipped};
+use crate::gpu::Environment;
 use crate::gpu::Gpu;
-use crate::measure::picture::{Picture, write_png};
-use crate::measure::record::{
-    Body, Environment, FinishedRecord, KernelFolder, Line, RunRecord, SkippedRecord,
-};
+use crate::image::{Picture, write_png};
+use crate::measure::record::{Body, FinishedRecord, KernelFolder, Line, RunRecord, SkippedRecord};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::{BTreeMap, HashSet};
 use std::path::PathBuf;

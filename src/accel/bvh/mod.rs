@@ -22,8 +22,8 @@ use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
     TriangleSoup,
 };
+use crate::accel::StructureStats;
 use crate::config::{ParameterSchema, Params};
-use crate::measure::record::StructureStats;
 use boxes::Boxes;
 use layout::Query;
 use octant_roped::Octants;

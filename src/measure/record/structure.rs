@@ -1,43 +1,9 @@
 //! What is recorded of a structure on a scene, and of full cells.
 
 use super::Interval;
-use crate::accel::Space;
+use crate::accel::{Phase, Space, StructureStats};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-
-/// A timed phase of a build.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Phase {
-    /// For instance `bounds`, `binned-sah`, `layout`.
-    pub name: String,
-    /// Milliseconds of wall time.
-    pub ms: f64,
-}
-
-/// Static figures of a built structure.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct StructureStats {
-    /// Nodes (inner and leaf) or cells.
-    pub nodes: u64,
-    /// Leaves or non-empty cells.
-    pub leaves: u64,
-    /// Triangle references held by leaves or cells.
-    pub references: u64,
-    /// `[k]` is the number of leaves or cells that hold k references; what holds more than the last
-    /// index is counted there. Empty where not known.
-    #[serde(default)]
-    pub leaf_histogram: Vec<u64>,
-    /// Deepest leaf (root = 0); absent for flat structures.
-    pub depth: Option<u32>,
-    /// SAH cost with traversal and intersection constants both 1; absent where not defined.
-    pub sah_cost: Option<f64>,
-    /// End-point overlap with both constants 1 (Aila, Karras, Laine 2013), of binary trees; of large ones
-    /// an estimate from a part of the triangles.
-    #[serde(default)]
-    pub epo: Option<f64>,
-    /// Bytes of the structure's GPU buffers (the canonical triangle buffer is not counted).
-    pub bytes: u64,
-}
 
 /// Ray classes of the recorded ray sets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
