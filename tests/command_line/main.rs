@@ -275,7 +275,7 @@ fn verify_ends_with_0_where_hits_are_right_and_with_1_where_a_kernel_skips_a_tri
     let right = run(&arguments);
     assert_eq!(right.status.code(), Some(0), "{}", stdout(&right));
     assert!(stdout(&right).contains("1 of 1 structures passed"));
-    let kernel = include_str!("../kernels/accel/brute_force.wesl");
+    let kernel = include_str!("../../kernels/accel/brute_force.wesl");
     assert!(kernel.contains("var i = 0u"));
     let folder = tempfile::tempdir().expect("a temporary folder");
     let accel = folder.path().join("accel");
