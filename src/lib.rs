@@ -19,6 +19,7 @@ pub mod gpu;
 pub mod integrator;
 pub mod measure;
 pub mod oracle;
+pub mod params;
 pub mod report;
 pub mod run;
 pub mod sampling;

@@ -128,8 +128,9 @@ pub(super) fn sampler(
     let registry = SamplerRegistry::default();
     let sequence = variant(&registry.sequence_entries(), sequence, changes)?;
     let decorrelation = variant(&registry.decorrelation_entries(), decorrelation, &[])?;
-    let kind = registry.sequences().find(|s| s.name() == sequence.name);
-    let facts = kind.map(|s| s.facts(&sequence.params)).unwrap_or_default();
+    let kind = registry.sequences.find(&sequence.name);
+    let made = kind.and_then(|kind| kind.make(&sequence.params).ok());
+    let facts = made.map(|s| s.facts()).unwrap_or_default();
     let at_most = |wanted: u32, limit: Option<u32>| limit.map_or(wanted, |most| wanted.min(most));
     let demand = Demand {
         samples: demand.samples.map(|n| at_most(n, facts.samples)),

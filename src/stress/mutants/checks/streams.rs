@@ -146,7 +146,7 @@ pub(super) fn same_image(bench: &Bench, names: Names) -> Finding {
 /// projections of all dimensions are sound.
 pub(super) fn discrepancy(bench: &Bench, names: Names) -> Finding {
     let sampler = make(bench, names, &DEMAND)?;
-    let facts = sampler.sequence.facts(&sampler.sequence_variant.params);
+    let facts = sampler.sequence.facts();
     if facts.independent && !facts.base_2 {
         return Ok(None);
     }
@@ -188,7 +188,7 @@ pub(super) fn discrepancy(bench: &Bench, names: Names) -> Finding {
 /// The mean of the integrand over replicates, where that must be the integral.
 pub(super) fn integral(bench: &Bench, names: Names) -> Finding {
     let sampler = make(bench, names, &DEMAND)?;
-    let facts = sampler.sequence.facts(&sampler.sequence_variant.params);
+    let facts = sampler.sequence.facts();
     if !(facts.random || UNBIASED.contains(&sampler.decorrelation.name())) {
         return Ok(None);
     }
