@@ -7,12 +7,12 @@ mod common;
 use common::scenes::{self, FAR};
 use common::{Pcg, assert_same_hits, brute_force, build, default_params, trace};
 use glam::Vec3;
+use raystone::accel::StructureStats;
 use raystone::accel::{
     AccelError, AccelKind, AccelRegistry, BuiltAccel, Counters, CpuTwin, GpuBuffers, Hit, NO_HIT,
     Ray, TriangleSoup,
 };
-use raystone::config::{ParamValue, Params};
-use raystone::measure::record::StructureStats;
+use raystone::params::{ParamValue, Params};
 use raystone::scene::{self, LoadOptions};
 
 const KINDS: [&str; 2] = ["octree", "kd-tree"];
@@ -371,7 +371,7 @@ fn real_scenes_are_seen_as_the_judge_sees_them() {
             continue;
         }
         seen += 1;
-        let variant = raystone::config::Variant {
+        let variant = raystone::params::Variant {
             name: path.clone(),
             params: Params::default(),
             label: model.to_owned(),

@@ -8,9 +8,9 @@ use super::triangle::{TriangleRecord, TriangleTest, intersect_triangle};
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, TriangleSoup,
 };
-use crate::config::{ParameterSchema, Params};
-use crate::measure::record::StructureStats;
+use crate::accel::StructureStats;
 use crate::oracle::{GROUP, Groups, Line};
+use crate::params::{ParameterSchema, Params};
 use rayon::prelude::*;
 
 /// The registry entry.

@@ -17,8 +17,8 @@ use super::wide::{
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, TriangleSoup,
 };
-use crate::config::{ParameterSchema, Params};
-use crate::measure::record::StructureStats;
+use crate::accel::StructureStats;
+use crate::params::{ParameterSchema, Params};
 use bytemuck::{Pod, Zeroable};
 
 const WIDTH: usize = 4;

@@ -19,9 +19,9 @@ use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
     TriangleSoup,
 };
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::accel::StructureStats;
 use crate::gpu::UniformValues;
-use crate::measure::record::StructureStats;
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// Marks the word of a leaf; the other bits are its first place in the references.
 const LEAF: u32 = 0x8000_0000;

@@ -15,8 +15,8 @@ use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
     TriangleSoup,
 };
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
-use crate::measure::record::StructureStats;
+use crate::accel::StructureStats;
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use rayon::prelude::*;
 
 /// Most parts of a top cell along an axis: its resolution takes ten bits an axis.

@@ -18,8 +18,8 @@ use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
     TriangleSoup,
 };
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
-use crate::measure::record::StructureStats;
+use crate::accel::StructureStats;
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use rayon::prelude::*;
 
 /// Bits of a cell's word that hold the begin of its list; the others hold the distance.

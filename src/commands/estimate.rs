@@ -1,7 +1,8 @@
 //! How long a plan would take, roughly.
 
-use raystone::config::{Experiment, Plan, Variant};
+use raystone::config::{Experiment, Plan};
 use raystone::integrator::integrators;
+use raystone::params::Variant;
 use raystone::sampling::dimensions::{FIRST_BOUNCE, PER_BOUNCE};
 use std::collections::BTreeSet;
 use std::fmt;

@@ -9,7 +9,6 @@ mod cells;
 mod check;
 mod error;
 mod experiment;
-mod hash;
 pub mod keys;
 mod parse;
 mod pattern;
@@ -19,20 +18,16 @@ mod tree;
 mod variants;
 
 pub use cells::{SamplerCell, StreamCell, StructureCell, TimeCell};
-pub use error::{ConfigError, Place, nearest};
+pub use error::{ConfigError, Place};
 pub use experiment::{
     Axes, Discrepancy, Exclude, Experiment, Gate, REFERENCE_PARTS, Reference, Seeds, SppRange,
     Tests, Timing,
 };
-pub use hash::cell_hash;
 pub use keys::Axis;
 pub use pattern::Pattern;
 pub use plan::{Plan, Skipped};
 
-pub use crate::params::{
-    Entry, KERNELS_MARK, ParamError, ParamRange, ParamValue, Parameter, ParameterSchema, Params,
-    Variant,
-};
+use crate::params::Entry;
 
 /// Every name that an experiment may use, by axis. Built from the registries, so that a new entry
 /// is known to the parser, `raystone list` and the docs without another edit.

@@ -1,9 +1,10 @@
 //! From names and parameter lists to the variants of an axis.
 
+use super::Catalogue;
 use super::error::ConfigError;
 use super::keys::Axis;
 use super::tree::{Item, Table, Value};
-use super::{Catalogue, Entry, ParamRange, ParamValue, Parameter, Variant};
+use crate::params::{Entry, ParamRange, ParamValue, Parameter, Variant};
 use std::path::Path;
 
 /// Ends of file names that make a scene name a path.

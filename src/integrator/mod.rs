@@ -15,7 +15,7 @@ pub use render::{
 pub use tables::{SceneBuffers, SceneFeatures};
 pub use traced::Traced;
 
-use crate::config::{Entry, ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::params::{Entry, ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::sampling::dimensions;
 
 /// An integrator; one static per integrator, one line in the registry.

@@ -36,6 +36,11 @@ impl<T: ?Sized> Registered<T> {
         }
     }
 
+    /// Name as a user types it.
+    pub fn name(&self) -> &str {
+        &self.entry.name
+    }
+
     /// This kind with these parameters, and the defaults of those that are missing.
     ///
     /// # Errors
@@ -62,7 +67,7 @@ impl<T: ?Sized> Registry<T> {
 
     /// Adds a kind; one of the same name is replaced.
     pub fn add(&mut self, kind: Registered<T>) {
-        self.0.retain(|k| k.entry.name != kind.entry.name);
+        self.0.retain(|k| k.name() != kind.name());
         self.0.push(kind);
     }
 
@@ -73,7 +78,7 @@ impl<T: ?Sized> Registry<T> {
 
     /// The kind of this name.
     pub fn find(&self, name: &str) -> Option<&Registered<T>> {
-        self.iter().find(|kind| kind.entry.name == name)
+        self.iter().find(|kind| kind.name() == name)
     }
 
     /// Names, descriptions and parameters, for parser, help and docs.

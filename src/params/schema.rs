@@ -1,7 +1,7 @@
 //! What values parameters may take, and why some do not fit.
 
 use super::{ParamValue, Params};
-use crate::config::nearest;
+use crate::text::nearest;
 use std::fmt;
 use thiserror::Error;
 

@@ -2,8 +2,8 @@
 
 use super::format;
 use super::samplers::Sampler;
-use crate::config::Variant;
 use crate::measure::record::*;
+use crate::params::Variant;
 
 /// Everything a run recorded.
 #[derive(Debug, Default)]

@@ -1,10 +1,11 @@
 //! Errors over replicates against simulations of known truth.
 
 use super::*;
-use crate::config::{Params, Variant};
-use crate::measure::image::{Image, Reference, measure};
+use crate::image::Image;
+use crate::measure::metrics::{Reference, measure};
 use crate::measure::record::ErrorAtSpp;
 use crate::measure::statistics::Pcg32;
+use crate::params::{Params, Variant};
 
 const PIXELS: usize = 40;
 /// What every pixel should have.

@@ -3,7 +3,6 @@
 //! config → scene → accel → gpu → integrator → measure → records; the report is made from the
 //! records alone.
 
-pub mod environment;
 mod errors;
 mod folder;
 mod kernels;
@@ -22,10 +21,11 @@ pub use kernels::{Kernels, kernel_library};
 pub use registries::Registries;
 pub use render::{Rendering, render};
 
-use crate::config::{Experiment, Plan, Variant};
+use crate::config::{Experiment, Plan};
 use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
 use crate::measure::record::GateVerdict;
 pub use crate::measure::words::dump_stream;
+use crate::params::Variant;
 use kernels::Device;
 use session::Session;
 use std::path::PathBuf;
@@ -174,7 +174,7 @@ fn measure(
     mut device: Device,
     kernels: &Kernels,
 ) -> Result<PathBuf, RunError> {
-    session.write_start(environment::capture(&device.gpu), kernels.folders())?;
+    session.write_start(crate::gpu::capture(&device.gpu), kernels.folders())?;
     let (plan, options) = (session.plan, session.options);
     for scene in &plan.scenes {
         // A lost device fails the cell that lost it; the rest goes on with a fresh one. Every turn

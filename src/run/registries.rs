@@ -1,8 +1,9 @@
 //! All registries together.
 
 use crate::accel::AccelRegistry;
-use crate::config::{Catalogue, SamplerCell, Variant};
+use crate::config::{Catalogue, SamplerCell};
 use crate::integrator::integrator_entries;
+use crate::params::Variant;
 use crate::sampling::SamplerRegistry;
 
 /// Everything that can be named.

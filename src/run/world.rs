@@ -4,12 +4,13 @@ use super::RunError;
 use super::kernels::Device;
 use super::session::Session;
 use crate::accel::{Intersection, TriangleSoup};
-use crate::config::Variant;
+use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu};
 use crate::integrator::{RayOffset, SceneBuffers};
 use crate::measure::gate::Judge;
 use crate::measure::record::{Ran, Record, SceneRecord};
-use crate::scene::{self, Camera, LoadOptions, SceneData};
+use crate::params::Variant;
+use crate::scene::{self, LoadOptions, SceneData};
 use std::time::Instant;
 
 /// A scene with everything that its cells share.

@@ -1,7 +1,7 @@
 //! The registries of sequences and decorrelations: one line each.
 
 use super::{
-    BlueNoise, CranleyPatterson, Decorrelation, Demand, DigitalShift, DiscRotation, Halton,
+    BlueNoise, CranleyPatterson, Decorrelation, Demand, DigitalShift, DiscRotation, Facts, Halton,
     Hammersley, IndexOffset, MicroJitter, NoDecorrelation, OwenHash, OwenSobol, Partner, PixelHash,
     Pmj02, R2, Rank1Lattice, Sampler, SamplerError, SamplerTable, Seeding, Sequence, Sobol,
     VanDerCorput,
@@ -99,6 +99,14 @@ impl SamplerRegistry {
             });
         }
         Ok(((first, second), [sequence, decorrelation]))
+    }
+
+    /// What is to be known of a sequence.
+    ///
+    /// # Errors
+    /// An unknown name or parameter, or a value out of its range.
+    pub fn facts(&self, sequence: &Variant) -> Result<Facts, SamplerError> {
+        Ok(configured(&self.sequences, "sequence", sequence)?.0.facts())
     }
 
     /// Whether seeds change what this pair draws. No table is made.

@@ -9,8 +9,8 @@ use crate::accel::{
     brute_force_instances,
 };
 use crate::accel::{BuiltAccel, Space};
-use crate::config::Params;
 use crate::oracle::exact_truths;
+use crate::params::Params;
 use crate::scene::SceneData;
 use std::fmt::Write as _;
 

@@ -10,7 +10,6 @@ pub mod bench;
 pub mod case;
 pub mod explain;
 pub mod families;
-pub mod mutants;
 pub mod numerics;
 pub mod place;
 pub mod record;
@@ -23,8 +22,8 @@ pub mod targets;
 
 use crate::accel::triangle::TriangleTest;
 use crate::accel::{AccelRegistry, Intersection};
+use crate::gpu::capture as capture_environment;
 use crate::gpu::{Gpu, GpuError, probe_arithmetic};
-use crate::run::environment::capture as capture_environment;
 use record::{Record, SuiteRecord};
 use std::path::PathBuf;
 use std::time::{Instant, SystemTime};

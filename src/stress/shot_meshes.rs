@@ -6,9 +6,10 @@ use super::place::Place;
 use super::shapes::{self, Mesh, RADIUS};
 use super::tally::oracle_ray;
 use crate::accel::Ray;
-use crate::config::{Params, Variant};
+use crate::geometry::Triangle;
 use crate::oracle::{Side, exact_truths};
-use crate::scene::{Bounds, LoadOptions, Triangle, load};
+use crate::params::{Params, Variant};
+use crate::scene::{Bounds, LoadOptions, load};
 use glam::Vec3;
 use rayon::prelude::*;
 

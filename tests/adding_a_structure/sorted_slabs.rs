@@ -1,14 +1,14 @@
 //! `sorted-slabs`: triangles sorted along x, cut into runs of equal length, one box a run; a ray
 //! tests every box. The example of `docs/adding-a-structure.md`.
 
+use raystone::accel::StructureStats;
 use raystone::accel::bounds::{Bounds, enter_box};
 use raystone::accel::triangle::intersect_triangle;
 use raystone::accel::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, Hit, NO_HIT,
     NamedWords, Ray, TriangleSoup, limits,
 };
-use raystone::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
-use raystone::measure::record::StructureStats;
+use raystone::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// The registry entry.
 pub struct SortedSlabs;

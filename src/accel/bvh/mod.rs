@@ -22,8 +22,8 @@ use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
     TriangleSoup,
 };
-use crate::config::{ParameterSchema, Params};
-use crate::measure::record::StructureStats;
+use crate::accel::StructureStats;
+use crate::params::{ParameterSchema, Params};
 use boxes::Boxes;
 use layout::Query;
 use octant_roped::Octants;

@@ -26,9 +26,9 @@ use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
     TriangleSoup,
 };
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::accel::StructureStats;
 use crate::gpu::UniformValues;
-use crate::measure::record::StructureStats;
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// Bits of an entry that hold the logarithm of its block's side; 0: the rest is a cell.
 const LOG_BITS: u32 = 2;
@@ -408,7 +408,7 @@ impl CpuTwin for Twin<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Triangle;
+    use crate::geometry::Triangle;
     use glam::Vec3;
 
     /// Triangles of all sizes, bunched in one corner.

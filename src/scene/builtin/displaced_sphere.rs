@@ -1,10 +1,11 @@
 //! A bumpy closed surface of any number of triangles of about the same size.
 
+use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material};
 use super::BuiltinScene;
 use super::numeric::sin_cos_turns;
 use super::sphere::SphereGrid;
+use crate::geometry::Camera;
 use crate::parameters;
 use glam::{DVec3, Vec3};
 
@@ -54,7 +55,7 @@ fn radius(direction: DVec3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{is_closed, load_with};
-    use super::*;
+    use crate::params::ParamValue;
 
     #[test]
     fn the_surface_is_closed_at_every_size_and_open_without_one_triangle() {

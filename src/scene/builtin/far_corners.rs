@@ -3,10 +3,11 @@
 //! space around dense spots, and instances whose boxes have to grow.
 
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material, Transform, Triangle};
+use super::super::{Material, Transform};
 use super::BuiltinScene;
 use super::numeric::{Pcg, sin_cos_turns};
 use super::sphere::SphereGrid;
+use crate::geometry::{Camera, Triangle};
 use crate::parameters;
 use glam::Vec3;
 
@@ -153,7 +154,7 @@ mod tests {
 
     #[test]
     fn trees_over_it_are_deep_and_tables_take_more_than_one_row_of_texels() {
-        let scene = load_default(SCENE.name);
+        let scene = load_default(FarCorners::NAME);
         assert!(scene.triangles.len() < 12_000);
         let soup = TriangleSoup::new(&scene);
         let registry = AccelRegistry::default();

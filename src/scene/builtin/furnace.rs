@@ -1,9 +1,10 @@
 //! Scenes whose image is known exactly: any bias of an integrator shows.
 
+use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material};
 use super::BuiltinScene;
 use super::sphere::SphereGrid;
+use crate::geometry::Camera;
 use crate::parameters;
 use glam::{DVec3, Vec3};
 
@@ -89,6 +90,7 @@ impl BuiltinScene for WhiteFurnace {
 mod tests {
     use super::super::tests::{is_closed, load_default, load_with};
     use super::*;
+    use crate::params::ParamValue;
 
     #[test]
     fn both_furnaces_are_closed() {

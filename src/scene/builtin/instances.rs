@@ -2,10 +2,11 @@
 //! and then mirrored: what two-level structures are compared on.
 
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material, Transform, Triangle};
+use super::super::{Material, Transform};
 use super::BuiltinScene;
 use super::numeric::{Pcg, sin_cos_turns};
 use super::sphere::SphereGrid;
+use crate::geometry::{Camera, Triangle};
 use crate::parameters;
 use glam::{DMat3, DVec3, Mat3, Vec3};
 
@@ -138,6 +139,7 @@ fn rotation([a, b, c]: [f64; 3]) -> DMat3 {
 mod tests {
     use super::super::tests::load_with;
     use super::*;
+    use crate::params::ParamValue;
     use crate::scene::{Bounds, SceneData};
 
     fn scene(count: i64, overlap: f64) -> SceneData {

@@ -1,8 +1,9 @@
 //! The least scene that a structure can be built of: for integrators that trace nothing.
 
+use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material};
 use super::BuiltinScene;
+use crate::geometry::Camera;
 use crate::parameters;
 use glam::Vec3;
 

@@ -1,9 +1,10 @@
 //! Random triangles: the worst case for every hierarchy, and a quick test of any structure.
 
+use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material};
 use super::BuiltinScene;
 use super::numeric::Pcg;
+use crate::geometry::Camera;
 use crate::parameters;
 use glam::Vec3;
 
@@ -56,6 +57,7 @@ impl BuiltinScene for TriangleSoup {
 mod tests {
     use super::super::tests::{load_default, load_with};
     use super::*;
+    use crate::params::ParamValue;
 
     #[test]
     fn triangles_fill_the_unit_cube_and_stay_within_their_size() {

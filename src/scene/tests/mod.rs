@@ -8,7 +8,7 @@ mod text;
 
 use super::builtin::numeric::Pcg;
 use super::*;
-use crate::config::Params;
+use crate::params::Params;
 use std::fs;
 use tempfile::TempDir;
 

@@ -2,10 +2,10 @@
 
 use super::stage::{self, Stage};
 use super::{Figure, NumericsError};
-use crate::config::{ParamValue, Params};
 use crate::gpu::Gpu;
 use crate::integrator::{Integrator, integrator};
 use crate::measure::statistics::{mean, variance};
+use crate::params::{ParamValue, Params};
 use crate::sampling::dimensions;
 use crate::scene::SceneData;
 use glam::Vec3;

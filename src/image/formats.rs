@@ -1,0 +1,320 @@
+//! Files for rendered images. The ending of the file name decides: PNG is a picture to look at, the
+//! others keep the linear radiance of every pixel.
+
+use super::{Image, ImageError, automatic_exposure, encode_png, tone_map};
+use crate::atomic::write_atomic;
+use ::image::{ExtendedColorType, ImageFormat};
+use std::io::Cursor;
+use std::path::Path;
+
+/// A kind of file that an image can be written to.
+pub struct FileFormat {
+    /// Ending of the file name, lower case, without the dot.
+    pub ending: &'static str,
+    /// One line: what the file holds.
+    pub description: &'static str,
+    encode: fn(&Image) -> Result<Vec<u8>, image::ImageError>,
+}
+
+/// Every format, in the order in which messages name them.
+pub const FILE_FORMATS: [FileFormat; 5] = [
+    FileFormat {
+        ending: "png",
+        description: "tone-mapped sRGB with 8 bits",
+        encode: |image| encode_png(&tone_map(image, automatic_exposure(image))),
+    },
+    FileFormat {
+        ending: "exr",
+        description: "OpenEXR, linear radiance as 32-bit floats",
+        encode: |image| Ok(encode_exr(image)),
+    },
+    FileFormat {
+        ending: "hdr",
+        description: "Radiance RGBE, linear radiance to 1 %",
+        encode: encode_hdr,
+    },
+    FileFormat {
+        ending: "pfm",
+        description: "portable float map, linear radiance as 32-bit floats",
+        encode: |image| Ok(encode_pfm(image)),
+    },
+    FileFormat {
+        ending: "npy",
+        description: "NumPy array [height, width, 3] of 32-bit floats, linear radiance",
+        encode: |image| Ok(encode_npy(image)),
+    },
+];
+
+impl FileFormat {
+    /// The format of a file of this name; upper and lower case are the same.
+    ///
+    /// # Errors
+    /// [`ImageError::UnknownFormat`] with the known endings.
+    pub fn of(path: &Path) -> Result<&'static Self, ImageError> {
+        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let found = FILE_FORMATS.iter().find(|f| ending == f.ending);
+        found.ok_or_else(|| ImageError::UnknownFormat {
+            path: path.to_owned(),
+            known: FILE_FORMATS.map(|f| format!(".{}", f.ending)).join(", "),
+        })
+    }
+
+    /// Writes an image, whole or not at all. Radiance is kept as it is, NaN too, except by RGBE,
+    /// which has neither that nor negative numbers: it takes 0.
+    ///
+    /// # Errors
+    /// [`ImageError::Encode`], [`ImageError::Write`].
+    pub fn write(&self, path: &Path, image: &Image) -> Result<(), ImageError> {
+        let bytes = (self.encode)(image).map_err(|source| ImageError::Encode {
+            path: path.to_owned(),
+            source,
+        })?;
+        write_atomic(path, &bytes).map_err(|source| ImageError::Write {
+            path: path.to_owned(),
+            source,
+        })
+    }
+}
+
+fn encode_hdr(image: &Image) -> Result<Vec<u8>, image::ImageError> {
+    let values = image.pixels.as_flattened();
+    let values: Vec<f32> = values.iter().copied().map(in_range_of_rgbe).collect();
+    let mut bytes = Cursor::new(Vec::new());
+    image::write_buffer_with_format(
+        &mut bytes,
+        bytemuck::cast_slice(&values),
+        image.width,
+        image.height,
+        ExtendedColorType::Rgb32F,
+        ImageFormat::Hdr,
+    )?;
+    Ok(bytes.into_inner())
+}
+
+/// What a shared exponent of eight bits can express (Ward 1991): outside of it the encoder of the
+/// library wraps around. NaN becomes 0.
+fn in_range_of_rgbe(value: f32) -> f32 {
+    match value > 1e-32 {
+        true => value.min(1.6e38),
+        false => 0.0,
+    }
+}
+
+/// OpenEXR: one part of uncompressed scan lines, after "OpenEXR File Layout" of the Academy Software
+/// Foundation. Written here because the crate for it takes longer to build than all other formats.
+fn encode_exr(image: &Image) -> Vec<u8> {
+    const MAGIC_AND_VERSION: [u8; 8] = [0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0];
+    const FLOAT: u8 = 2;
+    // Channels in the order of the alphabet, and where they are in a pixel.
+    const CHANNELS: [(u8, usize); 3] = [(b'B', 2), (b'G', 1), (b'R', 0)];
+    let [right, bottom] = [image.width - 1, image.height - 1];
+    let window: Vec<u8> = [0, 0, right, bottom]
+        .iter()
+        .flat_map(|v| v.to_le_bytes())
+        .collect();
+    let mut channels = Vec::new();
+    for (name, _) in CHANNELS {
+        // Name, type, "perceptually linear" and three reserved bytes, sampling in x and y.
+        channels.extend([name, 0, FLOAT, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]);
+    }
+    channels.push(0);
+    let one = 1f32.to_le_bytes();
+    let attributes: [(&str, &str, &[u8]); 8] = [
+        ("channels", "chlist", &channels),
+        ("compression", "compression", &[0]),
+        ("dataWindow", "box2i", &window),
+        ("displayWindow", "box2i", &window),
+        ("lineOrder", "lineOrder", &[0]),
+        ("pixelAspectRatio", "float", &one),
+        ("screenWindowCenter", "v2f", &[0; 8]),
+        ("screenWindowWidth", "float", &one),
+    ];
+    let mut bytes = MAGIC_AND_VERSION.to_vec();
+    for (name, kind, value) in attributes {
+        bytes.extend_from_slice(format!("{name}\0{kind}\0").as_bytes());
+        bytes.extend_from_slice(&(value.len() as u32).to_le_bytes());
+        bytes.extend_from_slice(value);
+    }
+    bytes.push(0);
+    // Where each row begins, then the rows: number, bytes, one channel after the other.
+    let row_bytes = 12 * image.width;
+    let first_row = bytes.len() as u64 + 8 * u64::from(image.height);
+    for row in 0..u64::from(image.height) {
+        bytes.extend((first_row + row * (8 + u64::from(row_bytes))).to_le_bytes());
+    }
+    for (y, row) in (0u32..).zip(image.pixels.chunks(image.width as usize)) {
+        bytes.extend(y.to_le_bytes());
+        bytes.extend(row_bytes.to_le_bytes());
+        for (_, channel) in CHANNELS {
+            bytes.extend(row.iter().flat_map(|pixel| pixel[channel].to_le_bytes()));
+        }
+    }
+    bytes
+}
+
+/// Portable float map: rows from the bottom up; the negative scale says little endian.
+fn encode_pfm(image: &Image) -> Vec<u8> {
+    let mut bytes = format!("PF\n{} {}\n-1.0\n", image.width, image.height).into_bytes();
+    for row in image.pixels.rchunks(image.width as usize) {
+        push_floats(&mut bytes, row);
+    }
+    bytes
+}
+
+/// NumPy's format 1.0: magic, length of the header, a Python literal padded so that the data begins
+/// at a multiple of 64, then the array in C order, rows from the top.
+fn encode_npy(image: &Image) -> Vec<u8> {
+    const PREFIX: usize = 10;
+    let shape = format!("({}, {}, 3)", image.height, image.width);
+    let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}");
+    let padded = (PREFIX + header.len() + 1).next_multiple_of(64) - PREFIX;
+    header = format!("{header:<width$}\n", width = padded - 1);
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend_from_slice(&(padded as u16).to_le_bytes());
+    bytes.extend_from_slice(header.as_bytes());
+    push_floats(&mut bytes, &image.pixels);
+    bytes
+}
+
+fn push_floats(bytes: &mut Vec<u8>, pixels: &[[f32; 3]]) {
+    bytes.extend(pixels.as_flattened().iter().flat_map(|v| v.to_le_bytes()));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Odd sizes, no symmetry: a flip or a swap of axes or channels changes something.
+    fn sample() -> Image {
+        let value = |i: usize| match i {
+            4 => 1.5e5,
+            7 => 1e-4,
+            _ => 0.25 + i as f32 / 3.0,
+        };
+        let pixels = (0..15).map(|p| [0, 1, 2].map(|c| value(3 * p + c)));
+        Image::new(5, 3, pixels.collect()).unwrap()
+    }
+
+    fn written(ending: &str, image: &Image) -> Vec<u8> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(format!("picture.{ending}"));
+        FileFormat::of(&path).unwrap().write(&path, image).unwrap();
+        std::fs::read(&path).unwrap()
+    }
+
+    #[test]
+    fn every_format_begins_with_its_own_signature() {
+        let signatures: [(&str, &[u8]); 5] = [
+            ("png", b"\x89PNG\r\n"),
+            ("exr", &[0x76, 0x2f, 0x31, 0x01]),
+            ("hdr", b"#?RADIANCE\n"),
+            ("PFM", b"PF\n5 3\n-1.0\n"),
+            ("npy", b"\x93NUMPY\x01\x00"),
+        ];
+        assert_eq!(signatures.len(), FILE_FORMATS.len());
+        for (ending, signature) in signatures {
+            let bytes = written(ending, &sample());
+            assert!(bytes.starts_with(signature), "{ending}");
+        }
+    }
+
+    #[test]
+    fn an_unknown_ending_is_refused_with_the_known_ones() {
+        for name in ["a.jpg", "a", "a.png.bak", ".png", "exr"] {
+            let error = FileFormat::of(Path::new(name)).err().unwrap().to_string();
+            assert!(error.contains(name), "{error}");
+            for format in &FILE_FORMATS {
+                assert!(error.contains(&format!(".{}", format.ending)), "{error}");
+            }
+        }
+    }
+
+    /// The value of an attribute of an EXR header.
+    fn attribute<'a>(bytes: &'a [u8], name: &str, kind: &str) -> &'a [u8] {
+        let key = format!("{name}\0{kind}\0").into_bytes();
+        let at = bytes.windows(key.len()).position(|w| w == key).unwrap() + key.len();
+        let size = u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+        &bytes[at + 4..][..size as usize]
+    }
+
+    #[test]
+    fn exr_keeps_every_bit_also_of_what_is_no_number() {
+        let mut image = sample();
+        image.pixels[6] = [f32::INFINITY, -2.5, 1e-40];
+        image.pixels[2][1] = f32::NAN;
+        let bytes = written("exr", &image);
+        let window: Vec<u8> = [0u32, 0, 4, 2]
+            .iter()
+            .flat_map(|v| v.to_le_bytes())
+            .collect();
+        assert_eq!(attribute(&bytes, "dataWindow", "box2i"), window);
+        assert_eq!(attribute(&bytes, "displayWindow", "box2i"), window);
+        assert_eq!(attribute(&bytes, "compression", "compression"), [0]);
+        let channels = attribute(&bytes, "channels", "chlist");
+        assert_eq!(channels.len(), 3 * 18 + 1);
+        // The table of rows follows the header, whose last attribute is a float, and a zero.
+        let table = bytes.len() - 3 * (8 + 60) - 3 * 8;
+        assert_eq!(bytes[table - 5..table], [0, 0, 0x80, 0x3f, 0]);
+        for (y, row) in image.pixels.chunks(5).enumerate() {
+            let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+            let at = word(table + 8 * y) as usize;
+            assert_eq!((word(at), word(at + 4)), (y as u32, 60));
+            for (channel, offset) in [(2, 0), (1, 20), (0, 40)] {
+                for (x, pixel) in row.iter().enumerate() {
+                    let bits = word(at + 8 + offset + 4 * x);
+                    assert_eq!(bits, pixel[channel].to_bits(), "{x}, {y}, {channel}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn hdr_keeps_what_a_shared_exponent_can() {
+        let mut image = sample();
+        let odd = [f32::NAN, -1.0, 1e-39, 1e-30, f32::INFINITY, 3e38];
+        image.pixels[0] = [odd[0], odd[1], odd[2]];
+        image.pixels[1] = [odd[3]; 3];
+        image.pixels[2] = [odd[4], odd[5], odd[5]];
+        let read = image::load_from_memory_with_format(&written("hdr", &image), ImageFormat::Hdr);
+        let read = read.unwrap().into_rgb32f();
+        let read: Vec<[f32; 3]> = read.pixels().map(|p| p.0).collect();
+        assert_eq!(read[0], [0.0; 3]);
+        assert!(read[2].iter().all(|v| (1e38..2e38).contains(v)), "{read:?}");
+        for (read, pixel) in read[1..].iter().zip(&image.pixels[1..]) {
+            let expected = pixel.map(in_range_of_rgbe);
+            let brightest = expected.into_iter().fold(0.0, f32::max);
+            for (value, expected) in read.iter().zip(expected) {
+                let error = (value - expected).abs() / brightest;
+                assert!(error <= 1.0 / 128.0, "{value} for {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn pfm_is_bottom_up_and_little_endian() {
+        let image = sample();
+        let bytes = written("pfm", &image);
+        let data = &bytes[b"PF\n5 3\n-1.0\n".len()..];
+        assert_eq!(data.len(), 5 * 3 * 12);
+        let first = f32::from_le_bytes(data[..4].try_into().unwrap());
+        assert_eq!(first, image.pixels[10][0], "the last row comes first");
+        let last = f32::from_le_bytes(data[data.len() - 4..].try_into().unwrap());
+        assert_eq!(last, image.pixels[4][2]);
+    }
+
+    #[test]
+    fn npy_has_its_shape_and_begins_at_a_multiple_of_64() {
+        for width in [5, 12345] {
+            let pixels = vec![[1.0, 2.0, 3.0]; width];
+            let image = Image::new(width as u32, 1, pixels).unwrap();
+            let bytes = written("npy", &image);
+            let header = u16::from_le_bytes([bytes[8], bytes[9]]) as usize;
+            assert_eq!((10 + header) % 64, 0);
+            let text = std::str::from_utf8(&bytes[10..10 + header]).unwrap();
+            let shape = format!("'descr': '<f4', 'fortran_order': False, 'shape': (1, {width}, 3)");
+            assert!(text.contains(&shape) && text.ends_with('\n'), "{text:?}");
+            assert_eq!(bytes.len(), 10 + header + 12 * width);
+            assert_eq!(bytes[10 + header..][..4], 1.0f32.to_le_bytes());
+        }
+    }
+}
