@@ -23,6 +23,7 @@ pub mod integrator;
 pub mod measure;
 pub mod oracle;
 pub mod params;
+pub mod random;
 pub mod report;
 pub mod run;
 pub mod sampling;

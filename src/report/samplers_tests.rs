@@ -4,8 +4,8 @@ use super::*;
 use crate::image::Image;
 use crate::measure::metrics::{Reference, measure};
 use crate::measure::record::ErrorAtSpp;
-use crate::measure::statistics::Pcg32;
 use crate::params::{Params, Variant};
+use crate::random::Pcg32;
 
 const PIXELS: usize = 40;
 /// What every pixel should have.

@@ -5,10 +5,11 @@
 use super::super::builder::{Look, SceneBuilder};
 use super::super::{Material, Transform};
 use super::BuiltinScene;
-use super::numeric::{Pcg, sin_cos_turns};
+use super::numeric::sin_cos_turns;
 use super::sphere::SphereGrid;
 use crate::geometry::{Camera, Triangle};
 use crate::parameters;
+use crate::random::Pcg32;
 use glam::Vec3;
 
 parameters! {
@@ -61,8 +62,8 @@ impl BuiltinScene for FarCorners {
 /// Everything that is not an instance of something else.
 fn ground() -> Vec<Triangle> {
     let mut builder = SceneBuilder::new(false, 0);
-    let mut pcg = Pcg::new(1);
-    let mut point = || Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());
+    let mut pcg = Pcg32::with_stream(1, Pcg32::DEFAULT_STREAM);
+    let mut point = || Vec3::new(pcg.uniform_f32(), pcg.uniform_f32(), pcg.uniform_f32());
     sheet(&mut builder);
     // Shells around a corner: all hold the origin, so that the small ones are reached past the large ones.
     for level in 0..SHELLS {

@@ -3,9 +3,9 @@
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
 use super::BuiltinScene;
-use super::numeric::Pcg;
 use crate::geometry::Camera;
 use crate::parameters;
+use crate::random::Pcg32;
 use glam::Vec3;
 
 parameters! {
@@ -28,8 +28,8 @@ impl BuiltinScene for TriangleSoup {
     fn build(&self) -> (SceneBuilder, Look) {
         let count = self.triangles;
         let size = self.size;
-        let mut pcg = Pcg::new(self.seed);
-        let mut point = || Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());
+        let mut pcg = Pcg32::with_stream(self.seed, Pcg32::DEFAULT_STREAM);
+        let mut point = || Vec3::new(pcg.uniform_f32(), pcg.uniform_f32(), pcg.uniform_f32());
         let mut builder = SceneBuilder::new(false, count);
         for index in 0..count {
             let corner = point() - 0.5 * size;

@@ -61,7 +61,7 @@ const ONE: Replicates = Replicates {
 /// Kernels without next-event estimation: the simplest estimator of the same image.
 pub fn plain_path_tracing(folder: &Path) -> Result<KernelLibrary, CheckError> {
     let text = "result += throughput * direct_light(surface, depth, sampler);";
-    let weight = "weight = found_weight(ray, hit.t, surface, cosine_pdf);";
+    let weight = "weight = density / (density + light_pdf(surface, hit.t));";
     let file = "integrator/path";
     let no_direct_light = Plant::Kernel {
         file,
