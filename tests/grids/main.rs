@@ -14,12 +14,7 @@ use raystone::accel::{
     AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, Counters, Hit, NO_HIT, Ray,
     TriangleSoup,
 };
-<<<<<<< HEAD:tests/grids.rs
-use raystone::gpu::{Gpu, KernelLibrary};
 use raystone::params::{ParamValue, Params};
-=======
-use raystone::params::{ParamValue, Params};
->>>>>>> main:tests/grids/main.rs
 
 /// The grids; every name is registered.
 fn grids() -> Vec<&'static dyn AccelKind> {
