@@ -8,7 +8,7 @@ mod samplers;
 mod support;
 
 use facing::Facing;
-use raystone::measure::record::Record;
+use raystone::measure::record::{Body, Line, axis};
 use raystone::run::Registries;
 use raystone::sampling::Sequence;
 use samplers::{Rotation, Weyl};
@@ -23,7 +23,7 @@ fn registries() -> Registries {
 }
 
 /// A tiny run, with the kernels of a folder if there is one.
-fn records(kernels: Option<&Path>) -> Vec<Record> {
+fn records(kernels: Option<&Path>) -> Vec<Line> {
     let text = std::fs::read_to_string("tests/data/tiny.toml").expect("the experiment");
     let folder = kernels.map(|folder| format!("kernels = [{:?}]\n", folder.display().to_string()));
     let axes = folder.unwrap_or_default() + "sequence = [\"weyl\"]\ndecorrelation = [\"rotation\"]";
@@ -35,10 +35,10 @@ fn records(kernels: Option<&Path>) -> Vec<Record> {
     support::run(&text, &registries(), &out.path().join("run"), None).1
 }
 
-fn failures(records: &[Record]) -> Vec<String> {
-    let reason = |record: &Record| match record {
-        Record::Failed(failed) => Some(format!("{}: {}", failed.cell, failed.reason)),
-        Record::Time(time) => time.failure.clone(),
+fn failures(records: &[Line]) -> Vec<String> {
+    let reason = |line: &Line| match &line.body {
+        Body::Failed(failed) => Some(format!("{}: {}", failed.cell, failed.reason)),
+        Body::Time(time) => time.failure.clone(),
         _ => None,
     };
     records.iter().filter_map(reason).collect()
@@ -52,22 +52,22 @@ fn samplers_and_integrators_from_outside_run_like_those_of_the_program() {
     let records = records(None);
     assert_eq!(failures(&records), [""; 0]);
     let (mut errors, mut streams, mut times) = (0, 0, 0);
-    for record in &records {
-        match record {
-            Record::Error(error) => {
-                let names = [&error.sequence, &error.decorrelation, &error.integrator];
-                let names = names.map(|variant| variant.name.as_str());
+    for line in &records {
+        match &line.body {
+            Body::Error(_) => {
+                let names = [axis::SEQUENCE, axis::DECORRELATION, axis::INTEGRATOR];
+                let names = names.map(|axis| line.key.name(axis));
                 assert_eq!(names, ["weyl", "rotation", "facing"]);
                 errors += 1;
             }
-            Record::Time(time) => {
+            Body::Time(time) => {
                 assert!(time.image_equal, "{time:?}");
                 let classes: Vec<_> = time.rays.keys().map(String::as_str).collect();
                 assert_eq!(classes, ["primary"]);
                 times += 1;
             }
-            Record::Stream(stream) => {
-                assert_eq!(stream.sequence.name, "weyl");
+            Body::Stream(_) => {
+                assert_eq!(line.key.name(axis::SEQUENCE), "weyl");
                 streams += 1;
             }
             _ => {}
@@ -95,5 +95,5 @@ fn a_sequence_whose_kernel_is_not_its_twin_is_not_rendered_with() {
     assert!(!failures.is_empty());
     let words = |failure: &String| failure.contains("weyl") && failure.contains("twin");
     assert!(failures.iter().any(words), "{failures:?}");
-    assert!(!records.iter().any(|r| matches!(r, Record::Error(_))));
+    assert!(!records.iter().any(|r| matches!(r.body, Body::Error(_))));
 }

@@ -8,10 +8,10 @@ use super::session::Session;
 use super::structures::Gated;
 use super::world::World;
 use crate::accel::Space;
-use crate::config::{TimeCell, Variant};
+use crate::config::TimeCell;
 use crate::gpu::{Elapsed, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
-use crate::measure::record::{Record, TimeRecord};
+use crate::measure::record::{Body, Line, Ran, TimeRecord, axis};
 use crate::measure::statistics::median_interval;
 use crate::measure::timing::{Measured, Samples, Watch, interleave};
 use crate::text::cell_hash;
@@ -80,7 +80,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             );
             session.failed += 1;
             session.finish(text);
-            session.write("", Record::Time(record))?;
+            session.write(&record.with_body(Body::Time))?;
             continue;
         };
         session.say(format!("{cell}: compiling"));
@@ -131,16 +131,16 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
                     ("scene", &world.scene.hash),
                     (
                         "cell",
-                        &serde_json::to_string(&(&record.accel, &record.integrator))
+                        &serde_json::to_string(&(&item.cell.accel, &item.cell.integrator))
                             .unwrap_or_default(),
                     ),
                     ("kernel", item.renderer.kernel_text()),
                     ("device", &format!("{:?}", world.gpu.info)),
                     ("version", env!("CARGO_PKG_VERSION")),
                 ]);
-                session.failed += usize::from(record.failure.is_some());
+                session.failed += usize::from(record.body.failure.is_some());
                 session.finish(item.cell.to_string());
-                session.write(&hash, Record::Time(record))?;
+                session.write(&record.hashed(hash).with_body(Body::Time))?;
             }
             Err(reason) => fail(session, world, &item.cell, reason)?,
         }
@@ -200,7 +200,7 @@ fn finish(
     item: &Timed,
     samples: Samples,
     shared: &mut Shared,
-) -> Result<TimeRecord, String> {
+) -> Result<Line<TimeRecord>, String> {
     let hash = image_hash(&item.renderer.image().map_err(|e| e.to_string())?);
     let key = key(&item.cell, item.space);
     let (rays, first) = match shared.get(&key) {
@@ -231,7 +231,8 @@ fn finish(
         faults.push(text.to_owned());
     }
     let failure = (!faults.is_empty()).then(|| faults.join("; "));
-    let mut record = empty_record(session, world, &item.cell, String::new());
+    let mut line = empty_record(session, world, &item.cell, String::new());
+    let record = &mut line.body;
     record.failure = failure;
     if record.failure.is_none() {
         record.ms_per_spp = median_interval(&per_spp);
@@ -247,10 +248,12 @@ fn finish(
         .collect();
     record.image_hash = hash;
     record.image_equal = equal;
-    record.runtime_checks = item.runtime_checks;
-    record.features = item.renderer.features();
-    record.ran.kernel_hash = item.renderer.kernel_hash();
-    Ok(record)
+    line.ran = Ran {
+        kernel_hash: item.renderer.kernel_hash(),
+        features: item.renderer.features(),
+        unchecked: !item.runtime_checks,
+    };
+    Ok(line)
 }
 
 /// Rays per class, from a separate counting run of the same seed, and the hash of its image.
@@ -269,15 +272,22 @@ fn count_rays(
     counted.map_err(|e: GpuError| e.to_string())
 }
 
-fn empty_record(session: &Session, world: &World, cell: &TimeCell, failure: String) -> TimeRecord {
-    let label = |v: &Variant| v.clone();
-    TimeRecord {
-        scene: world.variant.label.clone(),
-        accel: label(&cell.accel),
-        ran: world.ran(&cell.kernels, String::new()),
-        sequence: label(&cell.sequence),
-        decorrelation: label(&cell.decorrelation),
-        integrator: label(&cell.integrator),
+fn empty_record(
+    session: &Session,
+    world: &World,
+    cell: &TimeCell,
+    failure: String,
+) -> Line<TimeRecord> {
+    let key = (world.key(&cell.kernels))
+        .with_variant(axis::ACCEL, &cell.accel)
+        .with_variant(axis::SEQUENCE, &cell.sequence)
+        .with_variant(axis::DECORRELATION, &cell.decorrelation)
+        .with_variant(axis::INTEGRATOR, &cell.integrator);
+    let ran = Ran {
+        unchecked: !session.experiment.runtime_checks,
+        ..Ran::default()
+    };
+    let record = TimeRecord {
         resolution: session.experiment.resolution,
         spp: session.experiment.timing.spp,
         ms: Vec::new(),
@@ -287,10 +297,9 @@ fn empty_record(session: &Session, world: &World, cell: &TimeCell, failure: Stri
         mrays_s: None,
         image_hash: String::new(),
         image_equal: false,
-        runtime_checks: session.experiment.runtime_checks,
-        features: Vec::new(),
         failure: Some(failure),
-    }
+    };
+    Line::new(key, ran, record)
 }
 
 fn fail(
@@ -302,5 +311,5 @@ fn fail(
     session.failed += 1;
     session.finish(cell.to_string());
     let record = empty_record(session, world, cell, reason);
-    session.write("", Record::Time(record))
+    session.write(&record.with_body(Body::Time))
 }

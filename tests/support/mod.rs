@@ -7,7 +7,7 @@ use raystone::config::{Entry, Experiment, ParamValue, Params, Plan, Variant};
 use raystone::geometry::Camera;
 use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
 use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced};
-use raystone::measure::record::{Line, Record, SCHEMA};
+use raystone::measure::record::{Line, SCHEMA};
 use raystone::measure::statistics::{mean, variance};
 use raystone::run::{Registries, RunOptions, RunSummary};
 use raystone::sampling::{Demand, Sampler, SamplerRegistry, dimensions};
@@ -283,13 +283,14 @@ pub fn replicate_means(renderer: &Renderer, spp: u32, count: u32) -> Vec<f64> {
     (0..count).map(|k| one(1000 + 77 * k)).collect()
 }
 
-/// Runs an experiment to its end and reads its records back. Panics if a line of them is broken.
+/// Runs an experiment to its end, reads its records back and writes the report. Panics if a line of them is
+/// broken.
 pub fn run(
     experiment: &str,
     registries: &Registries,
     out: &Path,
     lose_device_at: Option<&str>,
-) -> (RunSummary, Vec<Record>) {
+) -> (RunSummary, Vec<Line>) {
     let options = RunOptions {
         out: out.to_owned(),
         lose_device_at: lose_device_at.map(str::to_owned),
@@ -298,6 +299,7 @@ pub fn run(
     let (experiment, plan) = plan(experiment, registries);
     let summary = raystone::run::run(&experiment, &plan, registries, &options)
         .unwrap_or_else(|e| panic!("the run ends early: {e}"));
+    raystone::report::write_report(out).unwrap_or_else(|e| panic!("no report: {e}"));
     (summary, records(out))
 }
 
@@ -311,13 +313,13 @@ pub fn plan(text: &str, registries: &Registries) -> (Experiment, Plan) {
 }
 
 /// Every record of a folder, none broken.
-pub fn records(out: &Path) -> Vec<Record> {
+pub fn records(out: &Path) -> Vec<Line> {
     let text = std::fs::read_to_string(out.join("records.jsonl")).expect("records");
     assert!(text.ends_with('\n'), "the last line is not whole");
     let parse = |line: &str| {
         let line: Line = serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line}"));
         assert_eq!(line.schema, SCHEMA);
-        line.record
+        line
     };
     text.lines().map(parse).collect()
 }
