@@ -57,9 +57,9 @@ impl Verify {
                 &catalogue,
             )?,
         };
-        let is_randomised =
-            |sequence: &_, decorrelation: &_| registries.is_randomised(sequence, decorrelation);
-        let mut plan = Plan::new(&experiment, &self.experiment.only, is_randomised)?;
+        let mut plan = Plan::new(&experiment, &self.experiment.only, |s, d| {
+            registries.is_randomised(s, d)
+        })?;
         check_models(&plan.scenes, &catalogue)?;
         if self.file.is_none() {
             spare_brute_force(&mut plan, self.experiment.allow_outside)?;

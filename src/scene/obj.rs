@@ -1,7 +1,7 @@
 //! Wavefront OBJ by `tobj`; materials are in [`super::mtl`].
 
 use super::builder::{DEFAULT_ALBEDO, Look, SceneBuilder};
-use super::error::{guarded, open, panic_text, read_regular};
+use super::error::{self, guarded, panic_text};
 use super::text::normalised;
 use super::texture::decode_all;
 use super::{LoadOptions, Material, SceneData, SceneError, mtl};
@@ -27,11 +27,7 @@ pub(super) fn load(
     name: &str,
     options: &LoadOptions,
 ) -> Result<SceneData, SceneError> {
-    open(path)?;
-    let bytes = read_regular(path).map_err(|source| SceneError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
+    let bytes = error::read(path)?;
     guarded(path, || {
         let text = normalised(bytes);
         let library = mtl::Library::new(path, options);
@@ -115,8 +111,7 @@ fn build(
     let look = Look {
         materials,
         textures,
-        camera: None,
-        environment: Vec3::ZERO,
+        ..Look::default()
     };
     builder.finish(name, look)
 }

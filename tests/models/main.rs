@@ -3,6 +3,7 @@
 
 mod gltf;
 mod obj;
+mod ply;
 mod real;
 mod text;
 
