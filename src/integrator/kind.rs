@@ -1,8 +1,8 @@
 //! What an integrator is, and what the others have to know of it.
 
 use super::{ImageSteps, Traced};
-use crate::config::{ParamError, ParameterSchema, Params, Variant};
 use crate::gpu::{Bindings, Composition, GpuError};
+use crate::params::{ParamError, ParameterSchema, Params, Variant};
 use crate::sampling::Demand;
 use thiserror::Error;
 

@@ -17,15 +17,16 @@ mod trial;
 mod words;
 mod world;
 
-pub use folder::{Existing, Interrupt, Interrupted};
+pub use folder::{Existing, Interrupt, Interrupted, lock_folder};
 pub use kernels::{Kernels, kernel_library};
 pub use registries::Registries;
 pub use render::{Rendering, render};
 
-use crate::config::{Experiment, Plan, Variant};
+use crate::config::{Experiment, Plan};
 use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
 use crate::measure::record::GateVerdict;
 pub use crate::measure::words::dump_stream;
+use crate::params::Variant;
 use kernels::Device;
 use session::Session;
 use std::path::PathBuf;

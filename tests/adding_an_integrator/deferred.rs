@@ -2,9 +2,9 @@
 //! `docs/adding-an-integrator.md`.
 
 use raystone::accel::Query;
-use raystone::config::Params;
 use raystone::gpu::{Bindings, Composition, GpuError};
 use raystone::integrator::{CountedRays, ImageSteps, Integrator, IntegratorFacts};
+use raystone::params::Params;
 use raystone::sampling::dimensions::FIRST_BOUNCE;
 
 /// The registry entry.

@@ -4,8 +4,8 @@ use raystone::accel::{
     AccelError, AccelKind, AccelRegistry, Access, BuildLog, BuiltAccel, CpuTwin, GpuBuffers,
     StructureStats, TracePasses, TraceSteps, TriangleSoup,
 };
-use raystone::config::{ParameterSchema, Params};
 use raystone::gpu::{Bindings, Composition, GpuError};
+use raystone::params::{ParameterSchema, Params};
 use std::sync::Arc;
 
 /// The registry entry.
