@@ -12,11 +12,12 @@ use raystone::accel::{
     AccelRegistry, Ask, BuildLog, BuiltBvh, Bvh, Counters, CpuTwin, Hit, Intersection, NO_HIT, Ray,
     Traced, Tracer, TriangleBuffers, TriangleSoup,
 };
-use raystone::config::{Gate, Params, Variant};
+use raystone::config::Gate;
 use raystone::geometry::Triangle;
 use raystone::gpu::{Bindings, Composition, Dispatch, Gpu, KernelLibrary, groups_for};
 use raystone::integrator::RayOffset;
 use raystone::measure::rays::record_rays;
+use raystone::params::{Params, Variant};
 use raystone::scene::{self, LoadOptions};
 use std::path::Path;
 use std::sync::OnceLock;

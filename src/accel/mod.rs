@@ -45,8 +45,8 @@ pub use tracer::{
 pub use two_level_grid::TwoLevelGrid;
 pub use uniform_grid::UniformGrid;
 
-use crate::config::{ParamError, ParameterSchema, Params};
 use crate::gpu::{Composition, UniformValues};
+use crate::params::{ParamError, ParameterSchema, Params};
 use crate::scene::SceneData;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;

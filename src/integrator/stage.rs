@@ -6,8 +6,8 @@ use crate::accel::{
     AccelError, AccelKind, AccelRegistry, Answers, Ask, BuildLog, BuiltAccel, Counters, Hit,
     Intersection, Query, Ray, Traced, Tracer, TriangleSoup,
 };
-use crate::config::Params;
 use crate::gpu::{Gpu, GpuError};
+use crate::params::Params;
 use crate::scene::SceneData;
 use std::sync::Arc;
 use thiserror::Error;

@@ -5,13 +5,13 @@ use crate::accel::{
     AccelKind, BuildLog, BuiltAccel, Hit, Query, Ray, Space, Traced, TriangleSoup,
     brute_force_hits, brute_force_instances,
 };
-use crate::config::Params;
 use crate::gpu::{GpuError, kernel_errors};
 use crate::integrator::Stage;
+use crate::params::Params;
 
 /// Every parameter at its default.
 pub fn default_params(kind: &dyn AccelKind) -> Params {
-    let value = |p: &crate::config::Parameter| (p.name.to_owned(), p.default.clone());
+    let value = |p: &crate::params::Parameter| (p.name.to_owned(), p.default.clone());
     Params(kind.parameters().iter().map(value).collect())
 }
 

@@ -9,8 +9,8 @@ use raystone::accel::{
     AccelKind, Ask, BuildLog, BuiltAccel, Counters, Hit, Query, Ray, Traced, Tracer,
     TriangleBuffers, TriangleSoup,
 };
-use raystone::config::{ParamRange, ParamValue, ParameterSchema, Params};
 use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
+use raystone::params::{ParamRange, ParamValue, ParameterSchema, Params};
 use std::sync::OnceLock;
 
 /// The device that all tests of one program share, with the embedded kernels.
@@ -79,7 +79,7 @@ impl Pcg {
 
 /// Every parameter at its default.
 pub fn default_params(schema: &ParameterSchema) -> Params {
-    let value = |p: &raystone::config::Parameter| (p.name.to_owned(), p.default.clone());
+    let value = |p: &raystone::params::Parameter| (p.name.to_owned(), p.default.clone());
     Params(schema.iter().map(value).collect())
 }
 

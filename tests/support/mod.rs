@@ -5,12 +5,13 @@
 use raystone::accel::{
     AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, Intersection, Traced,
 };
-use raystone::config::{Entry, Experiment, ParamValue, Params, Plan, Variant};
+use raystone::config::{Experiment, Plan};
 use raystone::geometry::Camera;
 use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
 use raystone::integrator::{self, IntegratorRegistry, RenderJob, Renderer};
 use raystone::measure::record::{Line, SCHEMA};
 use raystone::measure::statistics::{mean, variance};
+use raystone::params::{Entry, ParamValue, Params, Variant};
 use raystone::run::{Registries, RunOptions, RunSummary};
 use raystone::sampling::{Demand, Sampler, SamplerRegistry, dimensions};
 use raystone::scene::{LoadOptions, SceneData, builtin_scenes, load};
@@ -223,8 +224,8 @@ pub fn sampler_of(sequence: &str, decorrelation: &str, samples: u32) -> Sampler 
 /// never none. Kernels and twins of all pairs are compared in `samplers.rs`.
 pub fn samplers(samples: u32) -> Vec<Sampler> {
     let registry = SamplerRegistry::default();
-    let sequences = registry.sequences().map(|s| (s.name(), "none"));
-    let decorrelations = registry.decorrelations().map(|d| ("sobol", d.name()));
+    let sequences = registry.sequences.iter().map(|s| (s.name(), "none"));
+    let decorrelations = registry.decorrelations.iter().map(|d| ("sobol", d.name()));
     let pairs = sequences.chain(decorrelations);
     let usable = pairs.filter(|pair| pair.0 != "van-der-corput" && *pair != ("sobol", "none"));
     let mut found: Vec<_> = usable.map(|(s, d)| sampler_of(s, d, samples)).collect();

@@ -2,10 +2,10 @@
 
 use super::NumericsError;
 use crate::accel::{AccelRegistry, Intersection, Traced};
-use crate::config::{Entry, ParamValue, Variant};
 use crate::geometry::Camera;
 use crate::gpu::Gpu;
 use crate::integrator::{self, ConfiguredIntegrator, IntegratorRegistry, RenderJob, Renderer};
+use crate::params::{Entry, ParamValue, Variant};
 use crate::sampling::{Demand, Sampler, SamplerRegistry};
 use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
 
