@@ -11,6 +11,7 @@ pub mod format;
 pub mod html;
 pub mod markdown;
 pub mod pictures;
+pub mod pivot;
 pub mod plot;
 pub mod point_page;
 pub mod ruling;
@@ -18,6 +19,7 @@ pub mod samplers;
 pub mod sections;
 pub mod stress;
 pub mod terminal;
+pub mod values;
 #[cfg(test)]
 mod tests;
 
@@ -59,13 +61,15 @@ pub struct ReportPaths {
     pub html: PathBuf,
     /// The summary in Markdown.
     pub summary: PathBuf,
+    /// Every figure as comma-separated values.
+    pub figures: PathBuf,
     /// Every plot, SVG and PNG.
     pub plots: Vec<PathBuf>,
     /// What was left out while reading the records, in words.
     pub warnings: Vec<String>,
 }
 
-/// Writes `index.html`, `summary.md` and `plots/*.{svg,png}` beside the `records.jsonl` in `dir`.
+/// Writes `index.html`, `summary.md`, `figures.csv` and `plots/*.{svg,png}` beside the `records.jsonl` in `dir`.
 /// Each file is whole or absent: it is written under another name and renamed.
 ///
 /// # Errors
@@ -77,9 +81,12 @@ pub fn write_report(dir: &Path) -> Result<ReportPaths, ReportError> {
     let (html, plots) = write_page(dir, &mut document)?;
     let summary = dir.join("summary.md");
     write_file(&summary, markdown::summary(&document).as_bytes())?;
+    let figures = dir.join("figures.csv");
+    write_file(&figures, values::csv(&values::values(&data)).as_bytes())?;
     Ok(ReportPaths {
         html,
         summary,
+        figures,
         plots,
         warnings: records.warnings,
     })

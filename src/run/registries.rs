@@ -3,6 +3,7 @@
 use crate::accel::AccelRegistry;
 use crate::config::{Catalogue, SamplerCell, Variant};
 use crate::integrator::integrator_entries;
+use crate::measure::figure::FigureRegistry;
 use crate::sampling::SamplerRegistry;
 
 /// Everything that can be named.
@@ -12,6 +13,8 @@ pub struct Registries {
     pub accel: AccelRegistry,
     /// Sequences and decorrelations.
     pub samplers: SamplerRegistry,
+    /// Figures beside those of the crate.
+    pub figures: FigureRegistry,
 }
 
 impl Registries {

@@ -96,6 +96,7 @@ fn build(
     };
     record.body.space = built.space();
     record.body.stats = built.stats();
+    record.body.figures = (session.registries.figures).of_structure(&*built, &world.soup);
     let structural = session
         .clock
         .time("gate", || built.validate(&world.soup))
@@ -227,6 +228,7 @@ fn empty_record(
         build_peak_bytes: None,
         update_ms: None,
         stats: StructureStats::default(),
+        figures: Default::default(),
         gate: None,
         timings: Vec::new(),
         heat_map: None,
