@@ -44,6 +44,9 @@ struct Built {
     record: Line<StructureRecord>,
 }
 
+/// What a build came to, or the record alone of one that failed.
+type Tried = Result<Built, Box<Line<StructureRecord>>>;
+
 /// A structure with its record, or the record alone of one that failed.
 type Outcome = Result<(Traced, Line<StructureRecord>), Box<Line<StructureRecord>>>;
 
@@ -60,11 +63,7 @@ pub(super) fn build_and_gate(
 }
 
 /// Builds, validates and uploads: what does not depend on kernels.
-fn build(
-    session: &mut Session,
-    world: &World,
-    cell: &StructureCell,
-) -> Result<Built, Box<Line<StructureRecord>>> {
+fn build(session: &mut Session, world: &World, cell: &StructureCell) -> Tried {
     let accel = &cell.accel;
     let mut record = empty_record(world, cell, session.experiment.runtime_checks);
     let Some(kind) = session.registries.accel.get(&accel.name) else {
@@ -275,7 +274,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
         .collect();
     let mut gated = Vec::new();
     // The last structure that was built: it serves all kernels.
-    let mut last: Option<(StructureCell, Result<Built, Box<Line<StructureRecord>>>)> = None;
+    let mut last: Option<(StructureCell, Tried)> = None;
     for cell in cells {
         if session.is_done(&cell.to_string()) && !session.is_done(&passed(&cell)) {
             continue;
