@@ -28,27 +28,30 @@ impl Pivot<'_> {
     /// The table; a figure or part without a value has no column, a row may have dashes alone.
     pub fn table(self, values: &[Value]) -> Table {
         let part = |value: &Value| self.across.map_or(String::new(), |part| part(&value.key));
-        let mut columns: Vec<(&str, String, String)> = Vec::new();
+        let mut columns: Vec<(&Value, String)> = Vec::new();
         for id in self.figures {
             for value in values.iter().filter(|value| value.figure.id == *id) {
-                let part = part(value);
-                if columns.iter().all(|known| (known.0, &known.1) != (id, &part)) {
-                    let title = value.figure.heading();
-                    let head = match (part.is_empty(), self.figures.len()) {
-                        (true, _) => title,
-                        (false, 1) => part.clone(),
-                        _ => format!("{}, {part}", value.figure.title),
-                    };
-                    columns.push((id, part, head));
+                let column = (value, part(value));
+                if (columns.iter()).all(|c| c.0.figure.id != *id || c.1 != column.1) {
+                    columns.push(column);
                 }
             }
         }
         let mut table = Table::new(self.caption, self.heads);
-        columns.iter().for_each(|column| table.add_column(&column.2));
+        for (value, part) in &columns {
+            let shared = columns.iter().filter(|(_, other)| other == part).count() > 1;
+            table.add_column(match (part.is_empty(), shared) {
+                (true, _) => value.figure.heading(),
+                (false, false) => part.clone(),
+                (false, true) => format!("{}, {part}", value.figure.title),
+            });
+        }
         for (name, mut cells) in self.rows {
             let of_row: Vec<&Value> = values.iter().filter(|v| (self.row)(&v.key) == name).collect();
-            cells.extend(columns.iter().map(|(id, column, _)| {
-                let is_it = |value: &&&Value| value.figure.id == *id && part(value) == *column;
+            cells.extend(columns.iter().map(|(first, column)| {
+                let is_it = |value: &&&Value| {
+                    value.figure.id == first.figure.id && part(value) == *column
+                };
                 let found = of_row.iter().find(is_it);
                 found.map_or_else(|| format::ABSENT.into(), |value| value.cell())
             }));
@@ -97,7 +100,7 @@ mod tests {
         assert_eq!(heads(&one), ["structure", "x", "y"]);
         assert_eq!(texts(&one), [["a", "2.00 [1.00, 3.00]", "–"], ["b", "–", "4.00"]]);
         let two = pivot(&["mrays-per-s/v1", "nodes-per-ray/v1"]);
-        assert_eq!(heads(&two), ["structure", "speed, x", "speed, y", "nodes/ray, y"]);
+        assert_eq!(heads(&two), ["structure", "x", "speed, y", "nodes/ray, y"]);
         assert!(pivot(&["epo/v1"]).rows.is_empty());
     }
 }
