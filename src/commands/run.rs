@@ -52,7 +52,7 @@ impl Run {
         check_models(&plan.scenes, &catalogue)?;
         if self.dry_run {
             Kernels::load(&plan.kernels, &registries)?;
-            let estimate = Estimate::new(&experiment, &plan);
+            let estimate = Estimate::new(&experiment, &plan, &registries);
             print(&format!("{}\n{estimate}\n", plan.describe().trim_end()))?;
             return Ok(ExitCode::SUCCESS);
         }

@@ -218,10 +218,14 @@ impl FigureRegistry {
     pub fn add(&mut self, figure: Figure, measure: OfStructure) -> Result<(), String> {
         let id = &figure.id;
         if !id.contains("/v") {
-            return Err(format!("the id of the figure {id:?} needs a version, as in \"{id}/v1\""));
+            return Err(format!(
+                "the id of the figure {id:?} needs a version, as in \"{id}/v1\""
+            ));
         }
         if self.rows().chain(&FIGURES).any(|known| known.id == *id) {
-            return Err(format!("there is a figure {id:?} already: choose another id or version"));
+            return Err(format!(
+                "there is a figure {id:?} already: choose another id or version"
+            ));
         }
         self.0.push((figure, measure));
         Ok(())

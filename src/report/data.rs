@@ -154,7 +154,10 @@ impl<'a> RunData<'a> {
     /// A row of the table of figures; of one that nobody describes only the id is known.
     pub fn figure(&self, id: &str) -> Cow<'a, Figure> {
         let from_outside = self.run.iter().flat_map(|run| &run.figures);
-        let known = FIGURES.iter().chain(from_outside).find(|figure| figure.id == id);
+        let known = FIGURES
+            .iter()
+            .chain(from_outside)
+            .find(|figure| figure.id == id);
         known.map(Cow::Borrowed).unwrap_or_else(|| {
             Cow::Owned(Figure {
                 id: id.to_owned().into(),
@@ -226,7 +229,10 @@ impl<'a> RunData<'a> {
 impl<'a> View<'a> {
     /// Times that may be used.
     pub fn valid_times(&self) -> impl Iterator<Item = Recorded<'a, TimeRecord>> {
-        self.times.iter().copied().filter(|time| is_valid_time(time))
+        self.times
+            .iter()
+            .copied()
+            .filter(|time| is_valid_time(time))
     }
 
     /// Names of the structures that were timed, in the order measured.

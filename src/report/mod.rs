@@ -19,9 +19,9 @@ pub mod samplers;
 pub mod sections;
 pub mod stress;
 pub mod terminal;
-pub mod values;
 #[cfg(test)]
 mod tests;
+pub mod values;
 
 pub use stress::{stress_tables, write_stress_page};
 pub use terminal::{failed_checks, terminal_tables};

@@ -47,11 +47,13 @@ impl Pivot<'_> {
             });
         }
         for (name, mut cells) in self.rows {
-            let of_row: Vec<&Value> = values.iter().filter(|v| (self.row)(&v.key) == name).collect();
+            let of_row: Vec<&Value> = values
+                .iter()
+                .filter(|v| (self.row)(&v.key) == name)
+                .collect();
             cells.extend(columns.iter().map(|(first, column)| {
-                let is_it = |value: &&&Value| {
-                    value.figure.id == first.figure.id && part(value) == *column
-                };
+                let is_it =
+                    |value: &&&Value| value.figure.id == first.figure.id && part(value) == *column;
                 let found = of_row.iter().find(is_it);
                 found.map_or_else(|| format::ABSENT.into(), |value| value.cell())
             }));
@@ -72,10 +74,20 @@ mod tests {
     #[test]
     fn a_pivot_puts_each_value_where_its_key_says_and_a_dash_where_there_is_none() {
         let key = |accel: &str, rays: &str| {
-            Key::default().with(axis::ACCEL, accel).with(axis::RAYS, rays)
+            Key::default()
+                .with(axis::ACCEL, accel)
+                .with(axis::RAYS, rays)
         };
         let values = [
-            Value::new(&key("a", "x"), "mrays-per-s/v1", Interval { value: 2.0, low: 1.0, high: 3.0 }),
+            Value::new(
+                &key("a", "x"),
+                "mrays-per-s/v1",
+                Interval {
+                    value: 2.0,
+                    low: 1.0,
+                    high: 3.0,
+                },
+            ),
             Value::exact(&key("b", "y"), "mrays-per-s/v1", 4.0),
             Value::exact(&key("b", "y"), "nodes-per-ray/v1", 9.0),
         ];
@@ -83,7 +95,9 @@ mod tests {
             Pivot {
                 caption: "t".into(),
                 heads: &["structure"],
-                rows: ["a", "b"].map(|name| (name.into(), vec![name.into()])).to_vec(),
+                rows: ["a", "b"]
+                    .map(|name| (name.into(), vec![name.into()]))
+                    .to_vec(),
                 row: |key| key.label(axis::ACCEL).into(),
                 figures,
                 across: Some(|key| key.label(axis::RAYS).into()),
@@ -91,14 +105,21 @@ mod tests {
             .table(&values)
         };
         let texts = |table: &Table| -> Vec<Vec<String>> {
-            table.rows.iter().map(|row| row.iter().map(Cell::flat).collect()).collect()
+            table
+                .rows
+                .iter()
+                .map(|row| row.iter().map(Cell::flat).collect())
+                .collect()
         };
         let heads = |table: &Table| -> Vec<String> {
             table.columns.iter().map(|c| c.title.clone()).collect()
         };
         let one = pivot(&["mrays-per-s/v1"]);
         assert_eq!(heads(&one), ["structure", "x", "y"]);
-        assert_eq!(texts(&one), [["a", "2.00 [1.00, 3.00]", "–"], ["b", "–", "4.00"]]);
+        assert_eq!(
+            texts(&one),
+            [["a", "2.00 [1.00, 3.00]", "–"], ["b", "–", "4.00"]]
+        );
         let two = pivot(&["mrays-per-s/v1", "nodes-per-ray/v1"]);
         assert_eq!(heads(&two), ["structure", "x", "speed, y", "nodes/ray, y"]);
         assert!(pivot(&["epo/v1"]).rows.is_empty());

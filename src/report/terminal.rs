@@ -3,8 +3,8 @@
 use super::data::RunData;
 use super::document::{Cell, Table};
 use super::samplers::Metric;
-use super::values::of_structures;
 use super::sections::{belief, run, samplers, structures, verdict};
+use super::values::of_structures;
 use crate::measure::record::{Line, Verdict};
 
 /// Verdicts, speeds, errors and checks as aligned plain text.

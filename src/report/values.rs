@@ -52,9 +52,10 @@ impl Value<'_> {
         let text = |value| format::figure(&self.figure, value);
         match self.reading {
             Reading::Below(bound) => format!("<{}", text(bound)).into(),
-            Reading::Known(i) if i.low < i.high => {
-                Cell::with_detail(text(i.value), format!("[{}, {}]", text(i.low), text(i.high)))
-            }
+            Reading::Known(i) if i.low < i.high => Cell::with_detail(
+                text(i.value),
+                format!("[{}, {}]", text(i.low), text(i.high)),
+            ),
             Reading::Known(i) => text(i.value).into(),
         }
     }
@@ -69,7 +70,9 @@ pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
             values.extend(of_view(view));
         }
     }
-    values.extend(data.streams.iter().flat_map(of_stream));
+    for stream in &data.streams {
+        values.extend(of_stream(stream));
+    }
     for cost in &data.costs {
         values.push(Value::new(cost.key, "ns-per-sample/v1", cost.ns_per_sample));
     }
@@ -123,7 +126,9 @@ fn of_build(key: &Key, s: &StructureRecord, triangles: usize) -> Vec<Value<'stat
 fn of_rays(key: &Key, s: &StructureRecord) -> Vec<Value<'static>> {
     let mut values = Vec::new();
     for timing in &s.timings {
-        let key = key.clone().with(axis::RAYS, format::ray_class(timing.class));
+        let key = key
+            .clone()
+            .with(axis::RAYS, format::ray_class(timing.class));
         let work = &timing.counters;
         values.push(Value::new(&key, "mrays-per-s/v1", timing.mrays_s));
         for (id, value) in [
@@ -161,20 +166,29 @@ pub fn of_view(view: &View) -> Vec<Value<'static>> {
         values.extend(z.map(|z| Value::exact(key, "bias-z/v1", z)));
         if let Some(s) = sampler.spectrum {
             let key = &key.clone().with(axis::SPP, s.spp);
-            let power = s.low_frequency.map(|x| Value::new(key, "low-frequency-power/v1", x));
-            let next = s.autocorrelation.map(|x| Value::new(key, "neighbour-correlation/v1", x));
+            let power = s
+                .low_frequency
+                .map(|x| Value::new(key, "low-frequency-power/v1", x));
+            let next = s
+                .autocorrelation
+                .map(|x| Value::new(key, "neighbour-correlation/v1", x));
             values.extend(power.into_iter().chain(next));
         }
     }
     for time in view.valid_times() {
         let key = time.key.clone().with(axis::ACCEL, timed_structure(time));
-        let ms = time.ms_per_spp.map(|ms| Value::new(&key, "ms-per-spp/v1", ms));
-        let rate = time.mrays_s.map(|rate| Value::new(&key, "cell-mrays-per-s/v1", rate));
+        let ms = time
+            .ms_per_spp
+            .map(|ms| Value::new(&key, "ms-per-spp/v1", ms));
+        let rate = time
+            .mrays_s
+            .map(|rate| Value::new(&key, "cell-mrays-per-s/v1", rate));
         values.extend(ms.into_iter().chain(rate));
     }
-    values.extend(view.reference.map(|reference| {
-        Value::exact(reference.key, "reference-mse/v1", reference.mse)
-    }));
+    values.extend(
+        view.reference
+            .map(|reference| Value::exact(reference.key, "reference-mse/v1", reference.mse)),
+    );
     values
 }
 
@@ -185,7 +199,8 @@ pub fn of_stream(stream: &Recorded<StreamRecord>) -> Vec<Value<'static>> {
     let key = stream.key.clone().with(axis::DIMENSIONS, what);
     let figures = &stream.figures;
     let at = |key: &Key, id: &str, counts: &[FigureAtCount]| -> Vec<Value> {
-        let at = |at: &FigureAtCount| Value::new(&key.clone().with(axis::POINTS, at.n), id, at.value);
+        let at =
+            |at: &FigureAtCount| Value::new(&key.clone().with(axis::POINTS, at.n), id, at.value);
         counts.iter().map(at).collect()
     };
     let mut values = at(&key, "star-discrepancy/v1", &stream.star);
@@ -222,17 +237,28 @@ pub fn csv(values: &[Value]) -> String {
     }
     let place = |axis: &&str| axis::ALL.iter().position(|known| known == axis);
     axes.sort_by_key(|axis| place(axis).unwrap_or(axis::ALL.len()));
-    let named = ["figure", "title", "unit", "value", "low", "high", "interval"];
+    let named = [
+        "figure", "title", "unit", "value", "low", "high", "interval",
+    ];
     let mut text = line(axes.iter().chain(&named).map(|head| (*head).to_owned()));
     for value in values {
-        let Figure { id, title, unit, spread, .. } = &*value.figure;
+        let Figure {
+            id,
+            title,
+            unit,
+            spread,
+            ..
+        } = &*value.figure;
         let numbers = match value.reading {
             Reading::Known(i) => [i.value, i.low, i.high].map(|x| x.to_string()),
             Reading::Below(bound) => [String::new(), String::new(), bound.to_string()],
         };
         let labels = axes.iter().map(|axis| value.key.label(axis).to_owned());
         let row = [id, title, unit].map(ToString::to_string);
-        let row = row.into_iter().chain(numbers).chain([spread.words().to_owned()]);
+        let row = row
+            .into_iter()
+            .chain(numbers)
+            .chain([spread.words().to_owned()]);
         text += &line(labels.chain(row));
     }
     text
@@ -254,7 +280,15 @@ mod tests {
     fn a_line_of_the_export_holds_every_axis_and_quotes_what_needs_it() {
         let key = Key::default().with(axis::SCENE, "a,\"b\"");
         let other = Key::default().with(axis::ACCEL, "bvh");
-        let known = Value::new(&key, "build-ms/v1", Interval { value: 2.0, low: 1.0, high: 3.0 });
+        let known = Value::new(
+            &key,
+            "build-ms/v1",
+            Interval {
+                value: 2.0,
+                low: 1.0,
+                high: 3.0,
+            },
+        );
         let mut below = Value::exact(&other, "rmse-unbiased/v1", 0.0);
         below.reading = Reading::Below(0.5);
         assert_eq!(

@@ -1,14 +1,13 @@
 //! Error: once per scene, integrator and sampler, through the fastest gated structure.
 
+use super::RunError;
+use super::images::Estimator;
 use super::session::Session;
 use super::structures::{self, Gated};
 use super::world::World;
-use super::{RunError, words};
 use crate::config::{REFERENCE_PARTS, SamplerCell, StructureCell, Variant};
-use crate::image::Image;
-use crate::image::viridis;
-use crate::image::{Picture, automatic_exposure, tone_map};
-use crate::integrator::{Frame, RenderJob, Renderer, Snapshot, Traced, integrator, rounding_bound};
+use crate::image::{Image, Picture, automatic_exposure, tone_map, viridis};
+use crate::integrator::{Renderer, Snapshot, Traced, rounding_bound};
 use crate::measure::bias::{BiasOptions, BiasVerdict, check_bias};
 use crate::measure::metrics::error_map;
 use crate::measure::metrics::{Reference, measure};
@@ -20,7 +19,6 @@ use crate::measure::spectrum::{
     ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power,
 };
 use crate::measure::statistics::mean_interval;
-use crate::sampling::{Demand, Sampler};
 use crate::text::cell_hash;
 use std::time::Instant;
 
@@ -39,56 +37,6 @@ struct Yardstick {
     /// How far rounding alone may move it, relative.
     rounding: f64,
     exposure: f32,
-}
-
-/// The sampler that draws `samples` samples a pixel for an integrator.
-///
-/// # Errors
-/// A name is not registered, or the sampler has too few dimensions or samples.
-pub(super) fn sampler_for(
-    session: &Session,
-    (sequence, decorrelation): (&Variant, &Variant),
-    variant: &Variant,
-    samples: u32,
-) -> Result<Sampler, String> {
-    let integrator =
-        integrator(&variant.name).ok_or_else(|| format!("no integrator is called {variant}"))?;
-    let demand = Demand {
-        samples: Some(samples),
-        dimensions: integrator.dimensions(&variant.params),
-        width: Some(session.experiment.resolution[0]),
-    };
-    let samplers = &session.registries.samplers;
-    let made = samplers.sampler(sequence, decorrelation, &demand);
-    made.map_err(|e| e.to_string())
-}
-
-/// A job for this world; an error if the integrator is not registered.
-pub(super) fn job<'j>(
-    session: &Session,
-    world: &World,
-    sampler: &'j Sampler,
-    variant: &'j Variant,
-    runtime_checks: bool,
-) -> Result<RenderJob<'j>, String> {
-    let integrator =
-        integrator(&variant.name).ok_or_else(|| format!("no integrator is called {variant}"))?;
-    let [width, height] = session.experiment.resolution;
-    let diagonal = f64::from(2.0 * world.scene.bounds().radius());
-    let ao_radius = (integrator.ao_radius(&variant.params).unwrap_or(0.0) * diagonal) as f32;
-    let frame = Frame {
-        width,
-        height,
-        camera: world.camera,
-        ao_radius,
-    };
-    Ok(RenderJob {
-        frame,
-        sampler,
-        integrator,
-        params: &variant.params,
-        runtime_checks,
-    })
 }
 
 /// Renders; the error in words.
@@ -195,24 +143,22 @@ fn reference(
     variant: &Variant,
 ) -> Result<Result<Yardstick, String>, RunError> {
     session.say(format!("{}, {variant}: reference", world.variant));
-    let known = integrator(&variant.name).and_then(|i| i.exact(&variant.params));
-    if let Some(value) = known {
-        return exact_reference(session, world, variant, value);
-    }
     let settings = &session.experiment.reference;
     let start = Instant::now();
     let spp = (settings.spp / REFERENCE_PARTS).max(1);
     let pair = (&settings.sequence, &settings.decorrelation);
-    let sampler = match sampler_for(session, pair, variant, spp) {
-        Ok(sampler) => sampler,
+    let integrator = session.registries.integrators.configured(variant);
+    if let Some(value) = integrator.ok().and_then(|i| i.facts.exact) {
+        return exact_reference(session, world, variant, value);
+    }
+    let estimator = match Estimator::new(session, pair, variant, spp) {
+        Ok(estimator) => estimator,
         Err(reason) => return Ok(Err(reason)),
     };
-    let seeds = session.experiment.seeds().reference_parts;
     let rendered = (|| {
-        words::check(session, world.gpu, &sampler, &seeds)?;
-        let job = job(session, world, &sampler, variant, true)?;
-        let renderer = Renderer::new(world.gpu, &world.buffers, traced, &job, false)
-            .map_err(|e| e.to_string())?;
+        let seeds = session.experiment.seeds().reference_parts;
+        let embedded = (&Variant::default(), traced);
+        let renderer = estimator.renderer(session, world, embedded, &seeds, [true, false])?;
         let mut parts = Vec::new();
         for &seed in &seeds {
             let shots = session
@@ -230,7 +176,7 @@ fn reference(
     };
     let record = ReferenceRecord {
         spp: spp * REFERENCE_PARTS,
-        sampler: sampler.label(),
+        sampler: estimator.sampler.label(),
         seconds: start.elapsed().as_secs_f64(),
         ..reference_record(&reference)
     };
@@ -334,41 +280,31 @@ fn passes<'a>(
     cell: &SamplerCell,
 ) -> Result<Vec<Pass<'a>>, String> {
     let pair = (&cell.sequence, &cell.decorrelation);
-    let gpu = world.device.of(&cell.kernels);
-    let gpu = gpu.map_err(|e| e.to_string())?;
-    let seeds = session.experiment.seeds().replicates;
     let spps: Vec<u32> = session.experiment.spp.counts().collect();
-    let whole = sampler_for(
-        session,
-        pair,
-        &cell.integrator,
-        session.experiment.spp.max(),
-    )?;
-    let single = |spp| {
-        Ok((
-            vec![spp],
-            sampler_for(session, pair, &cell.integrator, spp)?,
-        ))
-    };
-    let samplers = match whole.by_count() {
-        true => spps
-            .into_iter()
+    let most = session.experiment.spp.max();
+    let whole = Estimator::new(session, pair, &cell.integrator, most)?;
+    let estimators = if whole.sampler.by_count() {
+        let single = |spp| {
+            let estimator = Estimator::new(session, pair, &cell.integrator, spp)?;
+            Ok((vec![spp], estimator))
+        };
+        spps.into_iter()
             .map(single)
-            .collect::<Result<_, String>>()?,
-        false => vec![(spps, whole)],
+            .collect::<Result<_, String>>()?
+    } else {
+        vec![(spps, whole)]
     };
-    let pass = |(spps, sampler): (Vec<u32>, Sampler)| {
-        words::check(session, gpu, &sampler, &seeds)?;
-        let job = job(session, world, &sampler, &cell.integrator, true)?;
-        let renderer = Renderer::new(gpu, &world.buffers, &fastest.traced, &job, false);
-        let words = bytemuck::cast_slice(sampler.table.words());
+    let seeds = session.experiment.seeds().replicates;
+    let with = (&cell.kernels, &fastest.traced);
+    let pass = |(spps, estimator): (Vec<u32>, Estimator)| {
+        let words = bytemuck::cast_slice(estimator.sampler.table.words());
         Ok(Pass {
-            renderer: renderer.map_err(|e| e.to_string())?,
+            renderer: estimator.renderer(session, world, with, &seeds, [true, false])?,
             spps,
             table: blake3::hash(words).to_hex().to_string(),
         })
     };
-    samplers.into_iter().map(pass).collect()
+    estimators.into_iter().map(pass).collect()
 }
 
 /// All replicates of one sampler. The inner error concerns this cell alone.

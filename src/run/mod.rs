@@ -5,6 +5,7 @@
 
 mod errors;
 mod folder;
+mod images;
 mod kernels;
 mod registries;
 mod render;

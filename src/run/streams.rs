@@ -7,7 +7,6 @@ use super::session::Session;
 use crate::config::StreamCell;
 use crate::discrepancy::{Budget, PointSet, radial_spectrum, star_2d};
 use crate::gpu::Gpu;
-use crate::integrator::integrator;
 use crate::measure::record::{
     Body, Key, Line, PixelsAtCount, Ran, RecordedPoints, SamplerCostRecord, StreamRecord, axis,
 };
@@ -126,11 +125,13 @@ fn worst_pair(
     gpu: &Gpu,
     cell: &StreamCell,
 ) -> Result<Option<([u32; 2], usize)>, String> {
-    let integrators = session.experiment.axes.integrator.iter();
-    let drawn = integrators
-        .filter_map(|v| Some(integrator(&v.name)?.dimension_pairs(&v.params)))
-        .flatten();
-    let candidates: Vec<[u32; 2]> = drawn.collect::<BTreeSet<_>>().into_iter().collect();
+    let mut drawn = BTreeSet::new();
+    for variant in &session.experiment.axes.integrator {
+        let integrator = session.registries.integrators.configured(variant);
+        let integrator = integrator.map_err(|e| e.to_string())?;
+        drawn.extend(integrator.facts.dimension_pairs());
+    }
+    let candidates: Vec<[u32; 2]> = drawn.into_iter().collect();
     let highest = candidates.iter().flatten().max().copied().unwrap_or(0);
     if candidates.len() < 2 {
         return Ok(None);

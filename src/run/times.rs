@@ -1,19 +1,19 @@
 //! Time of full cells, at few samples per pixel, in interleaved rounds; and the proof by hash that
 //! every structure gives the same image.
 
-use super::errors::{image_hash, job, sampler_for};
+use super::RunError;
+use super::errors::image_hash;
+use super::images::Estimator;
 use super::session::Session;
 use super::structures::Gated;
 use super::world::World;
-use super::{RunError, words};
 use crate::accel::Space;
 use crate::config::TimeCell;
-use crate::gpu::{Elapsed, Gpu, GpuError};
+use crate::gpu::{Elapsed, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
 use crate::measure::record::{Body, Line, Ran, TimeRecord, axis};
 use crate::measure::statistics::median_interval;
 use crate::measure::timing::{Measured, Samples, Watch, interleave};
-use crate::sampling::Sampler;
 use crate::text::cell_hash;
 use std::collections::BTreeMap;
 
@@ -67,7 +67,6 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         if session.is_done(&text) {
             continue;
         }
-        let gpu = world.device.of(&cell.kernels)?;
         let Some(structure) = gated.iter().find(|g| g.cell.accel == cell.accel) else {
             if let Some(reason) = refusal(session, &cell) {
                 session.write_refused(text, reason)?;
@@ -86,7 +85,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         };
         session.say(format!("{cell}: compiling"));
         session.lose_device_on_request(world.gpu, &text);
-        match compile(session, world, gpu, structure, cell.clone()) {
+        match compile(session, world, structure, cell.clone()) {
             Ok(item) => timed.push(item),
             Err(reason) => fail(session, world, &cell, reason)?,
         }
@@ -159,35 +158,34 @@ fn refusal(session: &Session, cell: &TimeCell) -> Option<String> {
 
 /// Timed are the first samples of the set whose error is measured last: how near the rays of
 /// neighbouring pixels lie may depend on how many there are.
-fn sampler_of(session: &Session, cell: &TimeCell) -> Result<Sampler, String> {
+fn renderer<'a>(
+    session: &mut Session,
+    world: &'a World,
+    structure: &Gated,
+    cell: &TimeCell,
+    checks_and_counts: [bool; 2],
+) -> Result<Renderer<'a>, String> {
     let experiment = &session.experiment;
     let samples = experiment.spp.max().max(experiment.timing.spp);
     let pair = (&cell.sequence, &cell.decorrelation);
-    sampler_for(session, pair, &cell.integrator, samples)
+    let seeds = experiment.seeds().replicates;
+    let estimator = Estimator::new(session, pair, &cell.integrator, samples)?;
+    let with = (&cell.kernels, &structure.traced);
+    estimator.renderer(session, world, with, &seeds, checks_and_counts)
 }
 
 fn compile<'a>(
     session: &mut Session,
     world: &'a World,
-    gpu: &'a Gpu,
     structure: &Gated,
     cell: TimeCell,
 ) -> Result<Timed<'a>, String> {
-    let sampler = sampler_of(session, &cell)?;
-    let seeds = session.experiment.seeds().replicates;
-    words::check(session, gpu, &sampler, &seeds)?;
     let checks = structure.runtime_checks;
-    let job = job(session, world, &sampler, &cell.integrator, checks)?;
-    let compiled = session.clock.time("gpu", || {
-        Renderer::new(gpu, &world.buffers, &structure.traced, &job, false)
-    });
-    let renderer = compiled.map_err(|e| e.to_string())?;
-    let (spp, seed) = (session.experiment.timing.spp, session.experiment.seed);
     Ok(Timed {
+        renderer: renderer(session, world, structure, &cell, [checks, false])?,
         cell,
-        renderer,
-        spp,
-        seed,
+        spp: session.experiment.timing.spp,
+        seed: session.experiment.seed,
         runtime_checks: checks,
         space: structure.traced.space,
         watch: Watch::default(),
@@ -265,12 +263,8 @@ fn count_rays(
     structure: &Gated,
     item: &Timed,
 ) -> Result<([u64; 4], String), String> {
-    let sampler = sampler_of(session, &item.cell)?;
-    let job = job(session, world, &sampler, &item.cell.integrator, true)?;
-    let gpu = world.device.of(&item.cell.kernels);
-    let gpu = gpu.map_err(|e| e.to_string())?;
+    let renderer = renderer(session, world, structure, &item.cell, [true, true])?;
     let counted = session.clock.time("gpu", || {
-        let renderer = Renderer::new(gpu, &world.buffers, &structure.traced, &job, true)?;
         renderer.reset();
         renderer.add_samples(0, item.spp, item.seed)?;
         Ok((renderer.ray_counts()?, image_hash(&renderer.image()?)))

@@ -6,9 +6,7 @@ use raystone::accel::{AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel
 use raystone::config::{Entry, Experiment, ParamValue, Params, Plan, Variant};
 use raystone::geometry::Camera;
 use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
-use raystone::integrator::{
-    Frame, RenderJob, Renderer, SceneBuffers, Traced, integrator, integrator_entries,
-};
+use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced};
 use raystone::measure::record::{Line, SCHEMA};
 use raystone::measure::statistics::{mean, variance};
 use raystone::run::{Registries, RunOptions, RunSummary};
@@ -126,22 +124,15 @@ impl Stage {
         traced: &Traced,
         sampler: &Sampler,
         what: &Variant,
-        [width, height]: [u32; 2],
+        size: [u32; 2],
         ray_counts: bool,
     ) -> Renderer<'a> {
-        let integrator = integrator(&what.name).expect("a known integrator");
-        let diagonal = f64::from(2.0 * self.scene.bounds().radius());
-        let ao_radius = integrator.ao_radius(&what.params).unwrap_or(0.0) * diagonal;
+        let integrator = IntegratorRegistry::default().configured(what);
         let job = RenderJob {
-            frame: Frame {
-                width,
-                height,
-                camera: self.camera,
-                ao_radius: ao_radius as f32,
-            },
+            size,
+            camera: self.camera,
             sampler,
-            integrator,
-            params: &what.params,
+            integrator: &integrator.unwrap_or_else(|e| panic!("{e}")),
             runtime_checks: true,
         };
         Renderer::new(gpu, &self.buffers, traced, &job, ray_counts)
@@ -233,7 +224,7 @@ pub fn samplers(samples: u32) -> Vec<Sampler> {
 
 /// An integrator with some parameters changed from their defaults.
 pub fn integrator_variant(name: &str, changes: &[(&str, ParamValue)]) -> Variant {
-    variant(&integrator_entries(), name, changes)
+    variant(&IntegratorRegistry::default().entries(), name, changes)
 }
 
 /// The path integrator with this many bounces.

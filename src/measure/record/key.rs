@@ -169,8 +169,14 @@ impl Key {
     /// The same key with these axes alone.
     #[must_use]
     pub fn only(&self, axes: &[&str]) -> Self {
-        let kept = self.0.iter().filter(|(axis, _)| axes.contains(&axis.as_str()));
-        Self(kept.map(|(axis, written)| (axis.clone(), written.clone())).collect())
+        let kept = self
+            .0
+            .iter()
+            .filter(|(axis, _)| axes.contains(&axis.as_str()));
+        Self(
+            kept.map(|(axis, written)| (axis.clone(), written.clone()))
+                .collect(),
+        )
     }
 
     /// Label of the structure, with the kernels.

@@ -2,8 +2,8 @@
 
 use crate::geometry::Camera;
 use crate::gpu::Environment;
-use crate::scene::LoadReport;
 use crate::measure::figure::Figure;
+use crate::scene::LoadReport;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -6,12 +6,12 @@ use super::verdict::Race;
 use crate::measure::bias::BiasVerdict;
 use crate::measure::record::{BiasRecord, Interval, Key, axis};
 use crate::report::data::{RunData, View, is_valid_time, timed_structure};
-use crate::report::pivot::Pivot;
-use crate::report::values::{Value, of_view};
 use crate::report::document::*;
+use crate::report::pivot::Pivot;
 use crate::report::plot::histogram;
 use crate::report::plot::pareto::letter;
 use crate::report::samplers::{Metric, Sampler, UNRESOLVED};
+use crate::report::values::{Value, of_view};
 use crate::report::{format, pictures};
 use std::path::Path;
 

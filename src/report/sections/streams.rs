@@ -8,8 +8,8 @@ use crate::report::data::RunData;
 use crate::report::document::*;
 use crate::report::format;
 use crate::report::pivot::Pivot;
-use crate::report::values::{Value, of_stream};
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
+use crate::report::values::{Value, of_stream};
 
 /// Columns of a table over N at most.
 const COLUMNS: usize = 8;

@@ -98,7 +98,9 @@ fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
 fn rows<'a>(
     structures: impl Iterator<Item = &'a Recorded<'a, StructureRecord>>,
 ) -> Vec<(String, Vec<Cell>)> {
-    structures.map(|s| (name(s), vec![name(s).into()])).collect()
+    structures
+        .map(|s| (name(s), vec![name(s).into()]))
+        .collect()
 }
 
 /// Mrays/s, one row per structure and one column per ray class.
@@ -153,9 +155,7 @@ fn build_table(scene: &SceneGroup, values: &[Value]) -> Table {
     .table(values)
 }
 
-fn built<'a>(
-    scene: &'a SceneGroup,
-) -> impl Iterator<Item = &'a Recorded<'a, StructureRecord>> {
+fn built<'a>(scene: &'a SceneGroup) -> impl Iterator<Item = &'a Recorded<'a, StructureRecord>> {
     scene.structures.iter().filter(|s| s.is_built())
 }
 

@@ -1,11 +1,11 @@
 //! Who wins, per scene.
 
+use crate::measure::figure::figure;
 use crate::measure::record::{ClassTiming, Interval, RayClass, Recorded, StructureRecord};
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
 use crate::report::data::{RunData, SceneGroup, View, structure_name};
 use crate::report::document::*;
 use crate::report::format;
-use crate::measure::figure::figure;
 use crate::report::ruling::{Contender, Ruling, judge};
 use crate::report::samplers::{MeanError, Metric, Sampler, error_after};
 
