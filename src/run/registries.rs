@@ -4,6 +4,7 @@ use crate::accel::AccelRegistry;
 use crate::config::{Catalogue, SamplerCell, Variant};
 use crate::gpu::KernelLibrary;
 use crate::integrator::IntegratorRegistry;
+use crate::measure::figure::FigureRegistry;
 use crate::sampling::SamplerRegistry;
 
 /// Everything that can be named.
@@ -15,6 +16,8 @@ pub struct Registries {
     pub samplers: SamplerRegistry,
     /// Integrators.
     pub integrators: IntegratorRegistry,
+    /// Figures beside those of the crate.
+    pub figures: FigureRegistry,
 }
 
 impl Registries {
