@@ -51,18 +51,10 @@ impl Integrator for Deferred {
 
     fn record(&self, steps: &mut ImageSteps) -> Result<(), GpuError> {
         let (pixels, nothing) = (steps.pixels(), Bindings::new());
-        steps.run(
-            "camera",
-            Composition::new("deferred/camera"),
-            pixels,
-            &nothing,
-        )?;
+        let camera = Composition::new("deferred/camera");
+        steps.run("camera", camera, pixels, &nothing)?;
         steps.trace(Query::Closest, ("rays", "hits"), steps.count())?;
-        steps.run(
-            "shade",
-            Composition::new("deferred/shade"),
-            pixels,
-            &nothing,
-        )
+        let shade = Composition::new("deferred/shade");
+        steps.run("shade", shade, pixels, &nothing)
     }
 }
