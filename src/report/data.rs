@@ -324,7 +324,8 @@ impl StructureRecord {
     }
 }
 
-fn without_repeats(names: Vec<String>) -> Vec<String> {
+/// The names, each once, in their order.
+pub fn without_repeats(names: Vec<String>) -> Vec<String> {
     let mut kept: Vec<String> = Vec::new();
     for name in names {
         if !kept.contains(&name) {
