@@ -112,13 +112,8 @@ fn failures(data: &RunData) -> Option<Section> {
 
 fn failed_structures(scene: &SceneGroup) -> Vec<Failure> {
     let failure = |s: &Recorded<StructureRecord>| {
-        let mut fault = s.fault()?;
-        let classes = s.gate.iter().flat_map(|gate| &gate.classes);
-        for (class, ray) in classes.filter_map(|c| Some((c.class, c.first_wrong.as_ref()?))) {
-            fault += &format!("; first wrong {} ray: {ray}", format::ray_class(class));
-        }
         let cell = format!("{} · {}", scene.name, structure_name(*s));
-        Some((cell, "FAILED", fault))
+        Some((cell, "FAILED", s.fault()?))
     };
     scene.structures.iter().filter_map(failure).collect()
 }
