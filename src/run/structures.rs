@@ -95,6 +95,7 @@ fn build(session: &mut Session, world: &World, cell: &StructureCell) -> Tried {
     };
     record.body.space = built.space();
     record.body.stats = built.stats();
+    record.body.figures = (session.registries.figures).of_structure(&*built, &world.soup);
     let structural = session
         .clock
         .time("gate", || built.validate(&world.soup))
@@ -226,6 +227,7 @@ fn empty_record(
         build_peak_bytes: None,
         update_ms: None,
         stats: StructureStats::default(),
+        figures: Default::default(),
         gate: None,
         timings: Vec::new(),
         heat_map: None,

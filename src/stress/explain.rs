@@ -5,8 +5,8 @@ use super::shot_meshes;
 use super::tally::oracle_ray;
 use crate::accel::watch::{Event, watch};
 use crate::accel::{AccelKind, BuiltAccel, Counters, Hit, NO_HIT, Ray, Space, TriangleSoup};
-use crate::config::Params;
 use crate::oracle::exact_truths;
+use crate::params::Params;
 use crate::scene::SceneData;
 use std::fmt::Write as _;
 

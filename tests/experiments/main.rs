@@ -3,10 +3,8 @@
 
 mod mistakes;
 
-use raystone::config::{
-    Axis, Catalogue, ConfigError, Entry, Experiment, ParamRange, ParamValue, Parameter, Plan,
-    Variant, keys,
-};
+use raystone::config::{Axis, Catalogue, ConfigError, Experiment, Plan, keys};
+use raystone::params::{Entry, ParamRange, ParamValue, Parameter, Variant};
 use raystone::run::Registries;
 use std::path::Path;
 

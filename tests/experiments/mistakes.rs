@@ -1,6 +1,6 @@
 //! What every kind of mistake is answered with.
 
-use crate::{AXES, assert_says, good, labels, parse, parse_with};
+use crate::{AXES, assert_says, labels, parse, parse_with};
 
 #[test]
 fn text_that_is_not_toml_names_its_line() {
