@@ -1,6 +1,5 @@
 //! Measuring: the gate, the timing protocol, image metrics, statistics, records.
 
-pub mod batch;
 pub mod bias;
 pub mod figure;
 pub mod gate;
