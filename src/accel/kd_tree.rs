@@ -9,14 +9,11 @@
 mod build;
 
 use super::bounds::{Bounds, slab};
-use super::ray::{Hit, NO_HIT, Ray};
+use super::ray::Hit;
 use super::spatial::{corners, touches};
 use super::tree::Coverage;
-use super::triangle::intersect_triangle;
-use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
-    TriangleSoup,
-};
+use super::twin::{CpuTwin, Query, Traverse, Twin};
+use super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, TriangleSoup};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
 use crate::measure::record::StructureStats;
@@ -377,16 +374,8 @@ impl BuiltAccel for Built {
             kernel: "accel/kd_tree",
             features: Vec::new(),
             arrays: vec![
-                NamedWords {
-                    name: "nodes",
-                    words: bytemuck::cast_slice(&self.nodes).into(),
-                    element_bytes: 8,
-                },
-                NamedWords {
-                    name: "references",
-                    words: self.references.as_slice().into(),
-                    element_bytes: 4,
-                },
+                NamedWords::new("nodes", &self.nodes),
+                NamedWords::new("references", &self.references),
             ],
             uniforms: vec![
                 ("tree", tree),
@@ -403,33 +392,27 @@ impl BuiltAccel for Built {
     }
 
     fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin { built: self, soup }))
+        Some(Box::new(Twin(self, soup)))
     }
 }
 
-struct Twin<'a> {
-    built: &'a Built,
-    soup: &'a TriangleSoup,
-}
-
-impl Twin<'_> {
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let ray = &self.soup.intersection.raised(ray);
-        let inverse = self.soup.intersection.inverse(ray.direction);
-        let mut hit = Hit::miss(ray);
-        counters.box_tests += 1;
-        let (enter, end) = slab(&self.built.bounds, ray, *inverse);
+impl Traverse for Built {
+    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+        let ray = query.ray;
+        let inverse = query.inverse;
+        query.counters.box_tests += 1;
+        let (enter, end) = slab(&self.bounds, &ray, *inverse);
         let mut enter = enter.max(ray.t_min);
-        let mut exit = end.min(hit.t);
+        let mut exit = end.min(query.hit.t);
         if enter > exit * inverse.pad {
-            return hit;
+            return query.hit;
         }
         // Far sides that wait, with the distance where the ray enters them.
         let mut stack: Vec<(usize, f32)> = Vec::new();
         let mut current = 0;
         loop {
-            counters.visit(current);
-            match self.built.nodes[current].content() {
+            query.visit(current);
+            match self.nodes[current].content() {
                 Content::Inner {
                     axis,
                     position,
@@ -444,41 +427,28 @@ impl Twin<'_> {
                         current = far;
                     } else {
                         stack.push((far, enter.max(plane)));
-                        counters.stack_high_water =
-                            counters.stack_high_water.max(stack.len() as u32);
+                        query.count_stack(stack.len());
                         exit = exit.min(plane);
                         current = near;
                     }
                 }
                 Content::Leaf { first, count } => {
-                    for &id in &self.built.references[first..first + count] {
-                        counters.triangle_tests += 1;
-                        intersect_triangle(&self.soup.records[id as usize], ray, inverse, &mut hit);
-                    }
-                    if any && hit.triangle != NO_HIT {
-                        return hit;
+                    let ids = &self.references[first..first + count];
+                    query.test_list(soup, ids.iter().copied());
+                    if query.is_answered() {
+                        return query.hit;
                     }
                     match stack.pop() {
-                        Some((far, distance)) if distance <= hit.t * END_PAD => {
+                        Some((far, distance)) if distance <= query.hit.t * END_PAD => {
                             (current, enter) = (far, distance);
                         }
-                        _ => return hit,
+                        _ => return query.hit,
                     }
                     // A cell ends where the one waiting below it begins.
-                    exit = stack.last().map_or(end, |(_, next)| *next).min(hit.t);
+                    exit = stack.last().map_or(end, |(_, next)| *next).min(query.hit.t);
                 }
             }
         }
-    }
-}
-
-impl CpuTwin for Twin<'_> {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.trace(ray, false, counters)
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.trace(ray, true, counters).triangle != NO_HIT
     }
 }
 

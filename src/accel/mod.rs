@@ -20,13 +20,14 @@ mod registry;
 mod spatial;
 pub mod tree;
 pub mod triangle;
+pub mod twin;
 mod two_level_grid;
 mod uniform_grid;
 pub mod watch;
 mod wide;
 
 pub use brute_force::{BruteForce, brute_force_hits};
-pub use bvh::{BuiltBvh, Bvh, BvhTwin, RopedBvh};
+pub use bvh::{BuiltBvh, Bvh, RopedBvh};
 pub use bvh4::Bvh4;
 pub use cwbvh::Cwbvh;
 pub use instancing::{InstanceJudge, MetaBvh, ObjectList, Placed, brute_force_instances};
@@ -36,6 +37,7 @@ pub use kd_tree::KdTree;
 pub use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::AccelRegistry;
+pub use twin::{Counters, CpuTwin};
 pub use two_level_grid::TwoLevelGrid;
 pub use uniform_grid::UniformGrid;
 
@@ -43,6 +45,7 @@ use crate::config::{ParamError, ParameterSchema, Params};
 use crate::gpu::{Composition, UniformValues};
 use crate::measure::record::{Phase, StructureStats};
 use crate::scene::SceneData;
+use bytemuck::NoUninit;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::time::Instant;
@@ -208,6 +211,17 @@ pub struct NamedWords<'a> {
     pub element_bytes: u32,
 }
 
+impl<'a> NamedWords<'a> {
+    /// An array whose memory is laid out like the GPU's; a record names the size of its elements.
+    pub fn new<T: NoUninit>(name: &'static str, elements: &'a [T]) -> Self {
+        Self {
+            name,
+            words: bytemuck::cast_slice(elements).into(),
+            element_bytes: size_of::<T>() as u32,
+        }
+    }
+}
+
 /// What a structure hands to the GPU.
 #[derive(Debug, Clone, Default)]
 pub struct GpuBuffers<'a> {
@@ -253,35 +267,6 @@ impl GpuBuffers<'_> {
     pub fn bytes(&self) -> u64 {
         self.arrays.iter().map(|a| a.words.len() as u64 * 4).sum()
     }
-}
-
-/// Counted work of one ray. Twin of `kernels/common/counters.wesl`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Counters {
-    /// Nodes or cells visited.
-    pub nodes: u32,
-    /// Ray–box tests.
-    pub box_tests: u32,
-    /// Ray–triangle tests.
-    pub triangle_tests: u32,
-    /// Deepest stack, entries.
-    pub stack_high_water: u32,
-}
-
-impl Counters {
-    /// Counts the visit of a node or cell, given its place among the structure's own.
-    pub(crate) fn visit(&mut self, place: usize) {
-        self.nodes += 1;
-        watch::note(watch::Event::Node(place as u32));
-    }
-}
-
-/// The traversal of a kernel in scalar Rust: the same hits, the same counters.
-pub trait CpuTwin: Sync {
-    /// Nearest hit, ties decided for the lowest triangle index.
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit;
-    /// Whether anything is hit.
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool;
 }
 
 /// A kind of structure: one static per structure, one line in the registry.

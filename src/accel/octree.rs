@@ -10,15 +10,11 @@
 mod build;
 
 use super::bounds::Bounds;
-use super::intersection::Reciprocal;
-use super::ray::{Hit, NO_HIT, Ray};
+use super::ray::{Hit, Ray};
 use super::spatial::{corners, touches};
 use super::tree::Coverage;
-use super::triangle::intersect_triangle;
-use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
-    TriangleSoup,
-};
+use super::twin::{CpuTwin, Query, Traverse, Twin};
+use super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, TriangleSoup};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
 use crate::measure::record::StructureStats;
@@ -331,16 +327,8 @@ impl BuiltAccel for Built {
             kernel: "accel/octree",
             features: Vec::new(),
             arrays: vec![
-                NamedWords {
-                    name: "nodes",
-                    words: self.nodes.as_slice().into(),
-                    element_bytes: 4,
-                },
-                NamedWords {
-                    name: "references",
-                    words: self.references.as_slice().into(),
-                    element_bytes: 4,
-                },
+                NamedWords::new("nodes", &self.nodes),
+                NamedWords::new("references", &self.references),
             ],
             uniforms: vec![
                 ("space", space),
@@ -383,13 +371,8 @@ impl BuiltAccel for Built {
     }
 
     fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin { built: self, soup }))
+        Some(Box::new(Twin(self, soup)))
     }
-}
-
-struct Twin<'a> {
-    built: &'a Built,
-    soup: &'a TriangleSoup,
 }
 
 /// A bit for each child; bit `i` stands for octant `i ^ flip`, so that lower bits come first along
@@ -428,19 +411,11 @@ fn visited(enter: f32, exit: f32, middle: [f32; 3], pad: f32) -> u32 {
     out & 0xff
 }
 
-impl Twin<'_> {
-    fn leaf(
-        &self,
-        first: u32,
-        ray: &Ray,
-        inverse: Reciprocal,
-        hit: &mut Hit,
-        counters: &mut Counters,
-    ) {
-        for reference in &self.built.references[first as usize..] {
-            counters.triangle_tests += 1;
-            let id = (reference & !LAST) as usize;
-            intersect_triangle(&self.soup.records[id], ray, inverse, hit);
+impl Built {
+    /// Tests the triangles of the leaf that begins at `first`.
+    fn leaf(&self, first: u32, soup: &TriangleSoup, query: &mut Query) {
+        for reference in &self.references[first as usize..] {
+            query.test(&soup.records[(reference & !LAST) as usize]);
             if reference & LAST != 0 {
                 return;
             }
@@ -449,26 +424,27 @@ impl Twin<'_> {
 
     /// Distances of the three planes `k` of cells of this size.
     fn distances(&self, k: [u32; 3], size: [f32; 3], ray: &Ray, inverse: [f32; 3]) -> [f32; 3] {
-        let plane = |a| self.built.space.plane(a, k[a], size[a]);
+        let plane = |a| self.space.plane(a, k[a], size[a]);
         std::array::from_fn(|a| (plane(a) - ray.origin[a]) * inverse[a])
     }
+}
 
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let ray = &self.soup.intersection.raised(ray);
-        let inverse = self.soup.intersection.inverse(ray.direction);
+impl Traverse for Built {
+    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+        let ray = query.ray;
+        let inverse = query.inverse;
         let mirror = inverse.map(|i| u32::from(i < 0.0));
         let flip = mirror[0] | mirror[1] << 1 | mirror[2] << 2;
-        let mut hit = Hit::miss(ray);
         // The cell whose children are being visited: its block and the children to come. At first one
         // of twice the size, of which the root is the only child.
         let mut open = 1 << flip;
         let mut position = [0; 3];
-        let mut size = self.built.space.extent.map(|e| 2.0 * e);
+        let mut size = self.space.extent.map(|e| 2.0 * e);
         let mut stack = Vec::new();
         loop {
             while open & FILLED_MASK == 0 {
                 let Some(parent) = stack.pop() else {
-                    return hit;
+                    return query.hit;
                 };
                 open = parent;
                 position = position.map(|p| p >> 1);
@@ -479,46 +455,36 @@ impl Twin<'_> {
             let child = Space::child(position, octant);
             let half = size.map(|s| 0.5 * s);
             let first: [u32; 3] = std::array::from_fn(|a| child[a] + mirror[a]);
-            let near = self.distances(first, half, ray, *inverse);
+            let near = self.distances(first, half, &ray, *inverse);
             let enter = near[0].max(near[1]).max(near[2]).max(ray.t_min);
-            if enter > hit.t * END_PAD {
-                return hit;
+            if enter > query.hit.t * END_PAD {
+                return query.hit;
             }
             let place = ((open >> INNER_SHIFT) * 8 + octant) as usize;
-            counters.visit(place);
-            let word = self.built.nodes[place];
+            query.visit(place);
+            let word = self.nodes[place];
             if word & LEAF != 0 {
-                self.leaf(word & !LEAF, ray, inverse, &mut hit, counters);
-                if any && hit.triangle != NO_HIT {
-                    return hit;
+                self.leaf(word & !LEAF, soup, &mut query);
+                if query.is_answered() {
+                    return query.hit;
                 }
                 continue;
             }
             let last = std::array::from_fn(|a| child[a] + 1 - mirror[a]);
-            let far = self.distances(last, half, ray, *inverse);
-            let exit = far[0].min(far[1]).min(far[2]).min(hit.t);
+            let far = self.distances(last, half, &ray, *inverse);
+            let exit = far[0].min(far[1]).min(far[2]).min(query.hit.t);
             let middle = self.distances(
                 child.map(|c| 2 * c + 1),
                 half.map(|h| 0.5 * h),
-                ray,
+                &ray,
                 *inverse,
             );
             stack.push(open);
-            counters.stack_high_water = counters.stack_high_water.max(stack.len() as u32);
+            query.count_stack(stack.len());
             let filled = mirrored(word & FILLED_MASK, flip);
             open = word & !FILLED_MASK | visited(enter, exit, middle, inverse.pad) & filled;
             (position, size) = (child, half);
         }
-    }
-}
-
-impl CpuTwin for Twin<'_> {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.trace(ray, false, counters)
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.trace(ray, true, counters).triangle != NO_HIT
     }
 }
 

@@ -1,4 +1,5 @@
-//! Boxes of eight bits a plane in the frame of their node. Twin of `kernels/accel/wide.wesl`.
+//! What the wide structures `bvh4` and `cwbvh` share: build, validation, buffers, and boxes of eight
+//! bits a plane on the grid of planes of their node. Twin of `kernels/accel/wide.wesl`.
 //!
 //! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
 //! compressed wide BVHs", HPG 2017, sections 3.1 and 4.1.
@@ -6,7 +7,7 @@
 //! A plane lies at `low + q · 2^e` for a whole q in 0..256. `low` is a multiple of `2^e`, and `e` is
 //! so large that all planes are multiples of `2^e` below `2^24 · 2^e`: they are floats, their decoding
 //! is exact however an adapter rounds, and a box of planes contains what it was made for by integer
-//! arithmetic ([`Grid::new`]).
+//! arithmetic ([`Quantisation::new`]).
 //!
 //! **No hit is lost.** The proof in `docs/design.md` needs of a box B that its computed distances
 //! enclose those of every coordinate in it: n(B) ≤ d(y) ≤ f(B) with `d(y) = (y − origin) · inverse` as
@@ -19,12 +20,17 @@
 //! same reciprocal, whose own error does not count.
 
 use super::bounds::Bounds;
+use super::collapse::{CollapseSettings, WideChild, WideTree};
 use super::intersection::Reciprocal;
-use super::tree::{NodeKind, Tree, tree_parameters};
+use super::ray::Hit;
+use super::tree::{Coverage, NodeKind, Tree, tree_parameters};
 use super::triangle::TriangleRecord;
-use super::{AccelError, BuildLog, GpuBuffers, NamedWords, TriangleSoup};
+use super::twin::{CpuTwin, Query, Traverse, Twin};
+use super::{AccelError, BuildLog, BuiltAccel, GpuBuffers, NamedWords, TriangleSoup};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::measure::record::StructureStats;
 use bytemuck::Pod;
+use std::ops::Range;
 
 /// Relative slack of the distances to quantised planes, 2⁻²⁰.
 pub const FRAME_PAD: f32 = 9.536_743e-7;
@@ -57,14 +63,7 @@ pub fn wide_parameters(max_leaf: u32) -> ParameterSchema {
 }
 
 /// The binary tree to collapse, one triangle a leaf: the collapse decides about leaves.
-///
-/// # Errors
-/// The tree cannot be built.
-pub fn wide_tree(
-    soup: &TriangleSoup,
-    params: &Params,
-    log: &mut BuildLog,
-) -> Result<Tree, AccelError> {
+fn wide_tree(soup: &TriangleSoup, params: &Params, log: &mut BuildLog) -> Result<Tree, AccelError> {
     let mut params = params.clone();
     params
         .0
@@ -84,52 +83,196 @@ pub fn wide_tree(
     }
 }
 
-/// Fails if there are more nodes than `limit`.
-///
-/// # Errors
-/// There are, with both numbers.
-pub fn node_limit(structure: &str, nodes: usize, limit: u32) -> Result<(), AccelError> {
-    if nodes as u64 > u64::from(limit) {
-        return Err(AccelError::Limit {
-            what: format!("nodes of a {structure}"),
-            needed: nodes as u64,
-            limit: limit.into(),
-        });
-    }
-    Ok(())
+/// A node of a wide structure, as what the structures share sees it.
+pub trait WideNode: Pod + Send + Sync {
+    /// Name of the structure.
+    const STRUCTURE: &'static str;
+    /// Module of the kernel.
+    const KERNEL: &'static str;
+    /// Most children.
+    const WIDTH: usize;
+    /// Most nodes.
+    const MOST_NODES: u32;
+
+    /// Moves the children of a node with this box to the slots they are to have.
+    fn arrange(_bounds: &Bounds, _children: &mut Vec<WideChild>) {}
+    /// The node with these children in its slots.
+    fn pack(slots: &[WideChild]) -> Self;
+    /// Box of a slot, as kernels decode it.
+    fn bounds(&self, slot: usize) -> Bounds;
+    /// Node and triangles in a slot; at most one of them, if the structure is valid.
+    fn content(&self, slot: usize) -> (Option<usize>, Option<Range<usize>>);
+    /// Twin of the kernel's `trace`.
+    fn trace(built: &Wide<Self>, query: Query) -> Hit;
 }
 
-/// Nodes and triangles of a wide structure as its kernel binds them.
-pub fn wide_arrays<'a, N: Pod>(
-    nodes: &'a [N],
-    leaf_triangles: &'a [TriangleRecord],
+/// A built wide structure.
+pub struct Wide<N> {
+    /// The root first.
+    pub nodes: Vec<N>,
+    /// Triangle records, leaf by leaf.
+    pub leaf_triangles: Vec<TriangleRecord>,
+    stats: StructureStats,
     texels: bool,
-) -> GpuBuffers<'a> {
-    GpuBuffers {
-        features: if texels { vec!["texels"] } else { Vec::new() },
-        arrays: vec![
-            NamedWords {
-                name: "nodes",
-                words: bytemuck::cast_slice(nodes).into(),
-                element_bytes: size_of::<N>() as u32,
+}
+
+impl<N: WideNode> Wide<N> {
+    /// Builds the binary tree and collapses it.
+    ///
+    /// # Errors
+    /// The tree cannot be built, or there are more nodes than an index can name.
+    pub fn build(
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Box<dyn BuiltAccel>, AccelError>
+    where
+        N: 'static,
+    {
+        let tree = wide_tree(soup, params, log)?;
+        let settings = CollapseSettings::new(N::WIDTH, params);
+        let wide = log.phase("collapse", || {
+            WideTree::collapse(&tree, &settings, N::arrange)
+        });
+        if wide.nodes.len() as u64 > u64::from(N::MOST_NODES) {
+            return Err(AccelError::Limit {
+                what: format!("nodes of a {}", N::STRUCTURE),
+                needed: wide.nodes.len() as u64,
+                limit: N::MOST_NODES.into(),
+            });
+        }
+        Ok(Box::new(log.phase("layout", || {
+            let nodes: Vec<N> = wide.nodes.iter().map(|slots| N::pack(slots)).collect();
+            let leaf_triangles = wide.records(soup);
+            let bytes = size_of_val(&nodes[..]) + size_of_val(&leaf_triangles[..]);
+            Self {
+                stats: StructureStats {
+                    bytes: bytes as u64,
+                    ..wide.stats()
+                },
+                nodes,
+                leaf_triangles,
+                texels: params.flag("texels"),
+            }
+        })))
+    }
+
+    /// Groups on the stack at most: a level leaves one behind.
+    fn depth(&self) -> u32 {
+        self.stats.depth.unwrap_or(0)
+    }
+}
+
+impl<N: WideNode> BuiltAccel for Wide<N> {
+    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
+        let invalid = |index, what: &str| Err(AccelError::Invalid(format!("node {index}: {what}")));
+        let mut coverage = Coverage::new(soup, self.nodes.len());
+        let mut open = vec![(0, Bounds::EVERYTHING, 1)];
+        while let Some((index, around, depth)) = open.pop() {
+            coverage.node(index)?;
+            if depth > self.depth() {
+                return invalid(index, &format!("deeper than the stack of {}", self.depth()));
+            }
+            let node = &self.nodes[index];
+            for slot in 0..N::WIDTH {
+                // What is below must lie in every decoded box on the way.
+                let bounds = around.intersection(&node.bounds(slot));
+                match node.content(slot) {
+                    (Some(_), Some(_)) => {
+                        return invalid(index, &format!("slot {slot} is a leaf and a node"));
+                    }
+                    (Some(child), None) => open.push((child, bounds, depth + 1)),
+                    (None, Some(leaf)) => coverage.leaf(self.leaf_triangles.get(leaf), &bounds)?,
+                    (None, None) => {}
+                }
+            }
+        }
+        coverage.is_complete()
+    }
+
+    fn buffers(&self) -> GpuBuffers<'_> {
+        GpuBuffers {
+            kernel: N::KERNEL,
+            features: if self.texels {
+                vec!["texels"]
+            } else {
+                Vec::new()
             },
-            NamedWords {
-                name: "leaf_triangles",
-                words: bytemuck::cast_slice(leaf_triangles).into(),
-                element_bytes: size_of::<TriangleRecord>() as u32,
-            },
-        ],
-        ..Default::default()
+            arrays: vec![
+                NamedWords::new("nodes", &self.nodes),
+                NamedWords::new("leaf_triangles", &self.leaf_triangles),
+            ],
+            uniforms: vec![super::limits(self.nodes.len(), self.nodes.len())],
+            // A multiple of 8, so that scenes of like depth share a kernel, and one to spare.
+            constants: vec![("STACK_ENTRIES", (self.depth() + 1).next_multiple_of(8))],
+        }
+    }
+
+    fn stats(&self) -> StructureStats {
+        self.stats.clone()
+    }
+
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(Twin(self, soup)))
+    }
+}
+
+impl<N: WideNode> Traverse for Wide<N> {
+    fn trace(&self, _: &TriangleSoup, query: Query) -> Hit {
+        N::trace(self, query)
     }
 }
 
 /// The planes of a node: where the first one lies and how far they are apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grid {
+pub struct Quantisation {
     /// First plane on each axis.
     pub low: [f32; 3],
     /// Biased exponents of the distance between planes.
     pub exponents: [u8; 3],
+}
+
+impl Quantisation {
+    /// That of a node with these children, and the planes of each slot at the minimum and the maximum
+    /// of each axis; zeros if there are no children.
+    pub fn of_children<const WIDTH: usize>(
+        children: &[WideChild],
+    ) -> (Self, [[[u8; WIDTH]; 3]; 2]) {
+        let present = || children.iter().enumerate().filter(|(_, c)| !c.is_nothing());
+        let around = present().fold(Bounds::EMPTY, |b, (_, child)| b.union(&child.bounds));
+        let mut planes = [[[0; WIDTH]; 3]; 2];
+        if present().next().is_none() {
+            let nothing = Self {
+                low: [0.0; 3],
+                exponents: [0; 3],
+            };
+            return (nothing, planes);
+        }
+        let quantisation = Self::new(&around);
+        for (slot, child) in present() {
+            let Planes { low, high } = quantisation.around(&child.bounds);
+            for axis in 0..3 {
+                planes[0][axis][slot] = low[axis];
+                planes[1][axis][slot] = high[axis];
+            }
+        }
+        (quantisation, planes)
+    }
+
+    /// The box of a slot of a node with this first plane and these exponents.
+    pub fn slot_bounds<const WIDTH: usize>(
+        low: [f32; 3],
+        exponents: u32,
+        [lows, highs]: [&[[u8; WIDTH]; 3]; 2],
+        slot: usize,
+    ) -> Bounds {
+        let [x, y, z, _] = exponents.to_le_bytes();
+        let exponents = [x, y, z];
+        Self { low, exponents }.bounds(&Planes {
+            low: lows.map(|q| q[slot]),
+            high: highs.map(|q| q[slot]),
+        })
+    }
 }
 
 /// A box by plane numbers.
@@ -141,8 +284,8 @@ pub struct Planes {
     pub high: [u8; 3],
 }
 
-impl Grid {
-    /// The finest grid that covers `bounds`.
+impl Quantisation {
+    /// The finest that covers `bounds`.
     pub fn new(bounds: &Bounds) -> Self {
         let mut grid = Self {
             low: [0.0; 3],
@@ -166,7 +309,7 @@ impl Grid {
         grid
     }
 
-    /// The smallest box of planes around `bounds`, which must lie in the grid.
+    /// The smallest box of planes around `bounds`, which must lie between them.
     pub fn around(&self, bounds: &Bounds) -> Planes {
         let mut planes = Planes::default();
         for axis in 0..3 {
@@ -333,7 +476,7 @@ mod tests {
         let mut random = Pcg32::new(1);
         for _ in 0..20_000 {
             let whole = random_box(&mut random);
-            let grid = Grid::new(&whole);
+            let grid = Quantisation::new(&whole);
             for inner in [whole, part(&whole, &mut random)] {
                 let planes = grid.around(&inner);
                 let decoded = grid.bounds(&planes);
@@ -362,7 +505,7 @@ mod tests {
         for _ in 0..20_000 {
             let whole = random_box(&mut random);
             let inner = part(&whole, &mut random);
-            let grid = Grid::new(&whole);
+            let grid = Quantisation::new(&whole);
             let planes = grid.around(&inner);
             let ray = Ray {
                 origin: std::array::from_fn(|_| number(&mut random)),

@@ -6,18 +6,17 @@
 
 use super::super::bounds::Bounds;
 use super::super::leaf::{FIRST_MASK, LEAF, leaf_reference};
-use super::super::ray::{Hit, NO_HIT, Ray};
+use super::super::ray::Hit;
 use super::super::tree::tree_parameters;
+use super::super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords, Space,
-    TriangleSoup,
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, Space, TriangleSoup,
 };
 use super::forest::Node;
 use super::instance::{Entry, NOTHING, is_open, leaf, level, near_and_far};
-use super::meta_bvh_nested::NestedTwin;
 use super::top::Top;
 use super::world_box::BoxMap;
-use super::{Base, clamped};
+use super::{Base, clamped, meta_bvh_nested};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
 use crate::measure::record::StructureStats;
@@ -69,7 +68,7 @@ impl AccelKind for MetaBvh {
         let top = log.phase("upper level", || {
             Top::build(&base.instances, &base.forest, rebraid)
         });
-        Ok(Box::new(MetaBvhTwin {
+        Ok(Box::new(Built {
             base,
             top,
             rebraid,
@@ -91,15 +90,14 @@ fn check_entries(instances: usize, rebraid: usize) -> Result<(), AccelError> {
     })
 }
 
-/// The built structure; it is its own CPU twin.
-pub(super) struct MetaBvhTwin {
+pub(super) struct Built {
     pub(super) base: Base,
     pub(super) top: Top,
     rebraid: usize,
     nested: bool,
 }
 
-impl MetaBvhTwin {
+impl Built {
     /// The root of the upper level, behind the nodes of all objects.
     pub(super) fn root(&self) -> u32 {
         self.base.forest.nodes.len() as u32
@@ -132,54 +130,6 @@ impl MetaBvhTwin {
             roots[instance.object as usize].nodes.len() as u64
         });
         clamped(1 + self.top.nodes.len() as u64 + below.sum::<u64>())
-    }
-
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let triangles = &self.base.forest.triangles;
-        let tests = self.base.forest.intersection;
-        let ray = &tests.raised(ray);
-        let world = level(ray, self.top.growth, tests);
-        let mut hit = Hit::miss(ray);
-        let mut stack: Vec<u32> = Vec::new();
-        // The level that is traversed: the world, or the object that was entered with `floor` entries
-        // on the stack.
-        let (mut here, mut floor, mut first_id) = (world, OUTSIDE, 0);
-        let mut current = self.root();
-        loop {
-            let children = near_and_far((current, self.node(current)), &here, hit.t, counters);
-            let mut next = NOTHING;
-            for (enter, reference) in children {
-                if !is_open(enter, &here, &hit) {
-                    continue;
-                }
-                if floor != OUTSIDE && reference >= LEAF {
-                    leaf(triangles, reference, first_id, &here, &mut hit, counters);
-                    if any && hit.triangle != NO_HIT {
-                        return hit;
-                    }
-                } else if next == NOTHING {
-                    next = reference;
-                } else if reference != NOTHING {
-                    stack.push(reference);
-                    counters.stack_high_water = counters.stack_high_water.max(stack.len() as u32);
-                }
-            }
-            if next == NOTHING {
-                if stack.len() as u32 == floor {
-                    (here, floor) = (world, OUTSIDE);
-                }
-                match stack.pop() {
-                    Some(reference) => next = reference,
-                    None => return hit,
-                }
-            }
-            if floor == OUTSIDE && next >= LEAF {
-                let entry = self.load_entry(next);
-                here = level(&entry.object_ray(ray), 0.0, tests);
-                (floor, first_id, next) = (stack.len() as u32, entry.first_id, entry.node);
-            }
-            current = next;
-        }
     }
 
     /// Checks the tree of the upper level: boxes, and that every entry is reached once.
@@ -277,7 +227,7 @@ impl MetaBvhTwin {
     }
 }
 
-impl BuiltAccel for MetaBvhTwin {
+impl BuiltAccel for Built {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
         self.base.validate(soup)?;
         self.validate_parts()?;
@@ -305,11 +255,7 @@ impl BuiltAccel for MetaBvhTwin {
                     words: [nodes, top, entries].concat().into(),
                     element_bytes: 64,
                 },
-                NamedWords {
-                    name: "leaf_triangles",
-                    words: bytemuck::cast_slice(&forest.triangles).into(),
-                    element_bytes: 48,
-                },
+                NamedWords::new("leaf_triangles", &forest.triangles),
             ],
             uniforms: vec![
                 super::super::limits(self.step_fuse(), self.top.entries.len()),
@@ -355,22 +301,59 @@ impl BuiltAccel for MetaBvhTwin {
         }))
     }
 
-    fn cpu_twin<'a>(&'a self, _: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        if self.nested {
-            Some(Box::new(NestedTwin(self)))
-        } else {
-            Some(Box::new(self))
-        }
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(Twin(self, soup)))
     }
 }
 
-impl CpuTwin for &MetaBvhTwin {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.trace(ray, false, counters)
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.trace(ray, true, counters).triangle != NO_HIT
+impl Traverse for Built {
+    fn trace(&self, _: &TriangleSoup, mut query: Query) -> Hit {
+        if self.nested {
+            return meta_bvh_nested::trace(self, query);
+        }
+        let triangles = &self.base.forest.triangles;
+        let tests = self.base.forest.intersection;
+        let world = level(&query.ray, self.top.growth, tests);
+        let mut stack: Vec<u32> = Vec::new();
+        // The level that is traversed: the world, or the object that was entered with `floor` entries
+        // on the stack.
+        let (mut here, mut floor, mut first_id) = (world, OUTSIDE, 0);
+        let mut current = self.root();
+        loop {
+            let children = near_and_far((current, self.node(current)), &here, &mut query);
+            let mut next = NOTHING;
+            for (enter, reference) in children {
+                if !is_open(enter, &here, &query.hit) {
+                    continue;
+                }
+                if floor != OUTSIDE && reference >= LEAF {
+                    leaf(triangles, reference, first_id, &here, &mut query);
+                    if query.is_answered() {
+                        return query.hit;
+                    }
+                } else if next == NOTHING {
+                    next = reference;
+                } else if reference != NOTHING {
+                    stack.push(reference);
+                    query.count_stack(stack.len());
+                }
+            }
+            if next == NOTHING {
+                if stack.len() as u32 == floor {
+                    (here, floor) = (world, OUTSIDE);
+                }
+                match stack.pop() {
+                    Some(reference) => next = reference,
+                    None => return query.hit,
+                }
+            }
+            if floor == OUTSIDE && next >= LEAF {
+                let entry = self.load_entry(next);
+                here = level(&entry.object_ray(&query.ray), 0.0, tests);
+                (floor, first_id, next) = (stack.len() as u32, entry.first_id, entry.node);
+            }
+            current = next;
+        }
     }
 }
 

@@ -5,11 +5,11 @@
 //! J. Dufay's thesis (2017), where the meta-BVH replaces the list.
 
 use super::super::bounds::Bounds;
-use super::super::ray::{Hit, NO_HIT, Ray};
+use super::super::ray::Hit;
 use super::super::tree::tree_parameters;
+use super::super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords, Space,
-    TriangleSoup,
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, Space, TriangleSoup,
 };
 use super::Base;
 use super::instance::{Entry, enter_grown, level, trace_object};
@@ -144,11 +144,7 @@ impl BuiltAccel for Built {
                     words: [nodes, entries, boxes].concat().into(),
                     element_bytes: 64,
                 },
-                NamedWords {
-                    name: "leaf_triangles",
-                    words: bytemuck::cast_slice(&forest.triangles).into(),
-                    element_bytes: 48,
-                },
+                NamedWords::new("leaf_triangles", &forest.triangles),
             ],
             uniforms: vec![
                 super::super::limits(forest.nodes.len() + 1, self.entries.len()),
@@ -188,39 +184,25 @@ impl BuiltAccel for Built {
         Some(self.base.update(soup).map(|()| self.list()))
     }
 
-    fn cpu_twin<'a>(&'a self, _: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin(self)))
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(Twin(self, soup)))
     }
 }
 
-struct Twin<'a>(&'a Built);
-
-impl Twin<'_> {
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let forest = &self.0.base.forest;
-        let ray = &forest.intersection.raised(ray);
-        let world = level(ray, self.0.growth, forest.intersection);
-        let mut hit = Hit::miss(ray);
-        for (entry, world_box) in self.0.entries.iter().zip(&self.0.boxes) {
-            counters.box_tests += 1;
-            if enter_grown(&world, &world_box.bounds(), hit.t).is_none() {
+impl Traverse for Built {
+    fn trace(&self, _: &TriangleSoup, mut query: Query) -> Hit {
+        let forest = &self.base.forest;
+        let world = level(&query.ray, self.growth, forest.intersection);
+        for (entry, world_box) in self.entries.iter().zip(&self.boxes) {
+            query.counters.box_tests += 1;
+            if enter_grown(&world, &world_box.bounds(), query.hit.t).is_none() {
                 continue;
             }
-            trace_object(forest, entry, ray, any, &mut hit, counters);
-            if any && hit.triangle != NO_HIT {
+            trace_object(forest, entry, &mut query);
+            if query.is_answered() {
                 break;
             }
         }
-        hit
-    }
-}
-
-impl CpuTwin for Twin<'_> {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.trace(ray, false, counters)
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.trace(ray, true, counters).triangle != NO_HIT
+        query.hit
     }
 }
