@@ -13,9 +13,12 @@
 #![warn(missing_docs)]
 
 pub mod accel;
+pub mod atomic;
 pub mod config;
 pub mod discrepancy;
+pub mod geometry;
 pub mod gpu;
+pub mod image;
 pub mod integrator;
 pub mod measure;
 pub mod oracle;
@@ -24,3 +27,4 @@ pub mod run;
 pub mod sampling;
 pub mod scene;
 pub mod stress;
+pub mod text;

@@ -10,7 +10,8 @@ use raystone::accel::tree::{NodeKind, Tree, tree_parameters};
 use raystone::accel::triangle::TriangleRecord;
 use raystone::accel::{AccelKind, BuildLog, Bvh, Counters, Hit, Ray, TriangleSoup};
 use raystone::config::{ParamRange, ParamValue, Params, Variant};
-use raystone::scene::{LoadOptions, Triangle, load};
+use raystone::geometry::Triangle;
+use raystone::scene::{LoadOptions, load};
 use std::path::Path;
 
 const SPONZA: &str = "../shared/scenes/sponza-crytek/sponza.obj";

@@ -1,7 +1,7 @@
 //! The program as a user meets it: exit codes, messages, lists.
 
 use raystone::discrepancy::Measure;
-use raystone::measure::image::METRICS;
+use raystone::measure::metrics::METRICS;
 use raystone::run::Registries;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

@@ -10,7 +10,8 @@ use raystone::accel::{
     AccelRegistry, BuiltAccel, Counters, Hit, Intersection, NO_HIT, Placed, Ray, Space,
     TriangleSoup, brute_force_hits, brute_force_instances,
 };
-use raystone::scene::{Assembly, Transform, Triangle};
+use raystone::geometry::Triangle;
+use raystone::scene::{Assembly, Transform};
 
 /// Lengths of directions: what integrators use, and far beyond.
 const LENGTHS: [f32; 10] = [1e-15, 1e-10, 1e-7, 1e-5, 1e-4, 1e-2, 1.0, 1e4, 1e10, 1e20];

@@ -11,12 +11,13 @@ use raystone::accel::{
     Space, TriangleSoup, brute_force_hits, brute_force_instances,
 };
 use raystone::config::{Gate, ParamValue, Params};
+use raystone::geometry::Triangle;
 use raystone::gpu::probe_arithmetic;
 use raystone::measure::gate::{Judge, compare, gate};
 use raystone::measure::hard_rays::HARD_RAYS;
 use raystone::measure::record::Record;
 use raystone::run::Registries;
-use raystone::scene::{Assembly, Transform, Triangle};
+use raystone::scene::{Assembly, Transform};
 use support::Stage;
 
 const KINDS: [&dyn AccelKind; 2] = [&ObjectList, &MetaBvh];

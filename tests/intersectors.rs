@@ -13,11 +13,12 @@ use raystone::accel::{
     TriangleSoup,
 };
 use raystone::config::{Gate, Params, Variant};
+use raystone::geometry::Triangle;
 use raystone::gpu::{Bindings, Composition, Dispatch, Gpu, KernelLibrary, groups_for};
 use raystone::integrator::{RayOffset, SceneBuffers, Traced};
 use raystone::measure::batch::{Batch, Query};
 use raystone::measure::rays::record_rays;
-use raystone::scene::{self, LoadOptions, Triangle};
+use raystone::scene::{self, LoadOptions};
 use std::path::Path;
 use std::sync::OnceLock;
 

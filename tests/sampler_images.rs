@@ -5,7 +5,7 @@ mod support;
 
 use raystone::config::{ParamValue, Variant};
 use raystone::gpu::Gpu;
-use raystone::measure::image::Image;
+use raystone::image::Image;
 use raystone::sampling::Sampler;
 use support::*;
 

@@ -7,12 +7,12 @@ mod common;
 use common::scenes::{self, FAR};
 use common::{Pcg, assert_same_hits, brute_force, build, default_params, trace};
 use glam::Vec3;
+use raystone::accel::StructureStats;
 use raystone::accel::{
     AccelError, AccelKind, AccelRegistry, BuiltAccel, Counters, CpuTwin, GpuBuffers, Hit, NO_HIT,
     Ray, TriangleSoup,
 };
 use raystone::config::{ParamValue, Params};
-use raystone::measure::record::StructureStats;
 use raystone::scene::{self, LoadOptions};
 
 const KINDS: [&str; 2] = ["octree", "kd-tree"];

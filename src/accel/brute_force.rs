@@ -6,9 +6,10 @@ use super::ray::{Hit, Ray};
 use super::triangle::watertight::{Shear, products, shear, sheared};
 use super::triangle::{TriangleRecord, TriangleTest, intersect_triangle};
 use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, TriangleSoup};
+use super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, StructureStats, TriangleSoup,
+};
 use crate::config::{ParameterSchema, Params};
-use crate::measure::record::StructureStats;
 use crate::oracle::{GROUP, Groups, Line};
 use rayon::prelude::*;
 

@@ -8,8 +8,8 @@ use super::TriangleSoup;
 use super::bounds::Bounds;
 use super::tree::{NodeKind, Tree};
 use super::triangle::TriangleRecord;
+use crate::accel::StructureStats;
 use crate::config::Params;
-use crate::measure::record::StructureStats;
 
 /// Most children of a node here; the cost table of a node has one entry less.
 const MAX_WIDTH: usize = 8;

@@ -3,8 +3,8 @@
 
 use super::ray::{Ray, raised, safe_inverse};
 use super::triangle::TriangleTest;
-use crate::config::nearest;
 use crate::gpu::{ArithmeticProbe, Composition};
+use crate::text::nearest;
 use serde::{Deserialize, Serialize};
 use std::ops::Deref;
 

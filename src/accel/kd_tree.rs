@@ -13,10 +13,12 @@ use super::ray::Hit;
 use super::spatial::{corners, touches};
 use super::tree::Coverage;
 use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, TriangleSoup};
+use super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
+    TriangleSoup,
+};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
-use crate::measure::record::StructureStats;
 use bytemuck::{Pod, Zeroable};
 
 /// Low bits of [`Node::link`]: the axis of the plane, or [`LEAF`].

@@ -18,6 +18,7 @@ mod octree;
 pub mod ray;
 mod registry;
 mod spatial;
+mod stats;
 pub mod tree;
 pub mod triangle;
 pub mod twin;
@@ -37,18 +38,17 @@ pub use kd_tree::KdTree;
 pub use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::AccelRegistry;
+pub use stats::{BuildLog, LEAF_HISTOGRAM_END, Phase, StructureStats, leaf_histogram};
 pub use twin::{Counters, CpuTwin};
 pub use two_level_grid::TwoLevelGrid;
 pub use uniform_grid::UniformGrid;
 
 use crate::config::{ParamError, ParameterSchema, Params};
 use crate::gpu::{Composition, UniformValues};
-use crate::measure::record::{Phase, StructureStats};
 use crate::scene::SceneData;
 use bytemuck::NoUninit;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
-use std::time::Instant;
 use thiserror::Error;
 use triangle::TriangleRecord;
 
@@ -157,47 +157,6 @@ impl TriangleSoup {
             .iter()
             .fold(bounds::Bounds::EMPTY, |b, r| b.union(&r.bounds()))
     }
-}
-
-/// Timed phases of a build.
-#[derive(Debug, Clone, Default)]
-pub struct BuildLog {
-    /// What was timed so far.
-    pub phases: Vec<Phase>,
-}
-
-impl BuildLog {
-    /// Runs `work` and notes how long it took.
-    pub fn phase<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> T {
-        let start = Instant::now();
-        let result = work();
-        self.phases.push(Phase {
-            name: name.to_owned(),
-            ms: start.elapsed().as_secs_f64() * 1e3,
-        });
-        result
-    }
-
-    /// Sum of all phases, milliseconds.
-    pub fn total_ms(&self) -> f64 {
-        // Not sum(): that of nothing is −0.
-        self.phases.iter().fold(0.0, |sum, p| sum + p.ms)
-    }
-}
-
-/// Longest entry of a leaf histogram; more references than this are counted there.
-pub const LEAF_HISTOGRAM_END: usize = 32;
-
-/// How many leaves or cells hold 0, 1, 2, … references; see [`StructureStats::leaf_histogram`].
-pub fn leaf_histogram(counts: impl Iterator<Item = usize>) -> Vec<u64> {
-    let mut histogram = Vec::new();
-    for count in counts.map(|c| c.min(LEAF_HISTOGRAM_END)) {
-        if histogram.len() <= count {
-            histogram.resize(count + 1, 0);
-        }
-        histogram[count] += 1;
-    }
-    histogram
 }
 
 /// One array of words for the GPU.

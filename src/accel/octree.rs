@@ -14,10 +14,12 @@ use super::ray::{Hit, Ray};
 use super::spatial::{corners, touches};
 use super::tree::Coverage;
 use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, TriangleSoup};
+use super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
+    TriangleSoup,
+};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
-use crate::measure::record::StructureStats;
 
 /// Marks the word of a leaf; the other bits are its first place in the references.
 const LEAF: u32 = 0x8000_0000;

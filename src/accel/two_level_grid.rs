@@ -10,9 +10,11 @@ use super::grid::lists::{Lists, PartLists, check_lists};
 use super::grid::{Cut, Frame, Grid, areas, check_words, clamped, finest, first_axis, outside};
 use super::ray::Hit;
 use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, TriangleSoup};
+use super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
+    TriangleSoup,
+};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
-use crate::measure::record::StructureStats;
 use rayon::prelude::*;
 
 /// Most parts of a top cell along an axis: its resolution takes ten bits an axis.

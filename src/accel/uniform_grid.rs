@@ -13,9 +13,11 @@ use super::grid::lists::{Lists, check_lists};
 use super::grid::{Frame, Grid, check_words, clamped, distance, first_axis, outside};
 use super::ray::{Hit, Ray};
 use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, TriangleSoup};
+use super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
+    TriangleSoup,
+};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
-use crate::measure::record::StructureStats;
 use rayon::prelude::*;
 
 /// Bits of a cell's word that hold the begin of its list; the others hold the distance.

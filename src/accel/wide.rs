@@ -19,6 +19,7 @@
 //! With `slack ≥ 16uM(1 − 4u)` ([`FRAME_PAD`] = 16u) there is a factor of two left. Both sides use the
 //! same reciprocal, whose own error does not count.
 
+use super::StructureStats;
 use super::bounds::Bounds;
 use super::collapse::{CollapseSettings, WideChild, WideTree};
 use super::intersection::Reciprocal;
@@ -28,7 +29,6 @@ use super::triangle::TriangleRecord;
 use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{AccelError, BuildLog, BuiltAccel, GpuBuffers, NamedWords, TriangleSoup};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
-use crate::measure::record::StructureStats;
 use bytemuck::Pod;
 use std::ops::Range;
 

@@ -9,7 +9,7 @@ use raystone::accel::triangle::TriangleTest;
 use raystone::config::{Axis, Entry, Parameter, keys};
 use raystone::discrepancy::Measure;
 use raystone::integrator::RayOffset;
-use raystone::measure::image::METRICS;
+use raystone::measure::metrics::METRICS;
 use raystone::run::Registries;
 use std::fmt::Write as _;
 use std::process::ExitCode;

@@ -6,7 +6,7 @@ use super::output::print;
 use anyhow::anyhow;
 use clap::Args;
 use raystone::config::{Axis, Experiment, Plan};
-use raystone::measure::formats::FileFormat;
+use raystone::image::FileFormat;
 use raystone::run::{Registries, Rendering};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

@@ -1,6 +1,7 @@
 //! Parameters as a library user hands them over: checked against their schema, and completed from it.
 
-use super::{ParamRange, ParamValue, Parameter, Params, nearest};
+use super::{ParamRange, ParamValue, Parameter, Params};
+use crate::text::nearest;
 use thiserror::Error;
 
 /// Why parameters do not fit their schema.

@@ -1,5 +1,6 @@
 //! What can be wrong with an experiment, said with the key, the place and what to do.
 
+use crate::text::nearest;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -196,27 +197,6 @@ pub enum ConfigError {
     },
 }
 
-/// Characters of names that are compared: the time and the memory that it takes are their product.
-const COMPARED: usize = 64;
-
-/// The known name nearest to `name`, if any are known.
-///
-/// Nearness is the normalised Damerau–Levenshtein similarity; a name that contains the other one
-/// counts as a near one, so that `grid` finds `uniform-grid`.
-pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let beginning = |text: &str| text.chars().take(COMPARED).collect::<String>();
-    let name = beginning(name).to_lowercase();
-    let score = |candidate: &str| {
-        let candidate = beginning(candidate);
-        let contained = name.len() >= 3 && (candidate.contains(&name) || name.contains(&candidate));
-        strsim::normalized_damerau_levenshtein(&name, &candidate)
-            + if contained { 0.5 } else { 0.0 }
-    };
-    known
-        .into_iter()
-        .max_by(|a, b| score(a).total_cmp(&score(b)))
-}
-
 /// Longest list of known names that an error message spells out.
 const LIST_LIMIT: usize = 16;
 
@@ -236,15 +216,6 @@ fn quoted(names: &[String]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn nearest_prefers_a_transposition_and_finds_a_part_of_a_name() {
-        let known = ["brute-force", "bvh", "roped-bvh", "uniform-grid"];
-        assert_eq!(nearest("bhv", known), Some("bvh"));
-        assert_eq!(nearest("grid", known), Some("uniform-grid"));
-        assert_eq!(nearest("Roped_BVH", known), Some("roped-bvh"));
-        assert_eq!(nearest("bvh", []), None);
-    }
 
     #[test]
     fn a_long_list_of_known_names_is_not_spelled_out() {

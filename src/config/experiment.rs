@@ -4,8 +4,8 @@ use super::error::Place;
 use super::keys::Axis;
 use super::pattern::Pattern;
 use super::{Catalogue, ConfigError, Variant, parse};
+use crate::geometry::Camera;
 use crate::sampling::hash::pcg_hash;
-use crate::scene::Camera;
 use std::fmt;
 use std::path::Path;
 

@@ -10,7 +10,6 @@ mod check;
 mod complete;
 mod error;
 mod experiment;
-mod hash;
 pub mod keys;
 mod parse;
 mod pattern;
@@ -21,12 +20,11 @@ mod variants;
 
 pub use cells::{SamplerCell, StreamCell, StructureCell, TimeCell};
 pub use complete::ParamError;
-pub use error::{ConfigError, Place, nearest};
+pub use error::{ConfigError, Place};
 pub use experiment::{
     Axes, Discrepancy, Exclude, Experiment, Gate, REFERENCE_PARTS, Reference, Seeds, SppRange,
     Tests, Timing,
 };
-pub use hash::cell_hash;
 pub use keys::Axis;
 pub use pattern::Pattern;
 pub use plan::{Plan, Skipped};

@@ -9,7 +9,7 @@ use super::keys::{Axis, KEYS, OPTIONAL_SECTIONS};
 use super::section::{Section, texts};
 use super::tree::{self, Item, Table, Value};
 use super::{Catalogue, Variant, variants};
-use crate::scene::Camera;
+use crate::geometry::Camera;
 use std::path::Path;
 
 /// Parses and checks an experiment; see [`Experiment::parse`].

@@ -9,7 +9,8 @@ use super::error::Place;
 use super::experiment::{Axes, Exclude, Experiment};
 use super::keys::Axis;
 use super::pattern::Pattern;
-use super::{ConfigError, Variant, nearest};
+use super::{ConfigError, Variant};
+use crate::text::nearest;
 use std::fmt::{self, Write as _};
 
 /// Cells left out, with the reason.

@@ -7,8 +7,8 @@
 use super::GpuError;
 use super::diagnose;
 use crate::accel::Intersection;
-use crate::config::{cell_hash, nearest};
 use crate::integrator::RayOffset;
+use crate::text::{cell_hash, nearest};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};

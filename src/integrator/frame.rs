@@ -1,8 +1,8 @@
 //! Camera and image numbers for `kernels/integrator/frame.wesl`.
 
 use super::tables::SceneBuffers;
+use crate::geometry::Camera;
 use crate::gpu::UniformValues;
-use crate::scene::Camera;
 use glam::Vec3;
 
 /// What is rendered.

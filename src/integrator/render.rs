@@ -10,7 +10,7 @@ use super::tables::SceneBuffers;
 use super::traced::Traced;
 use crate::config::Params;
 use crate::gpu::{Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline};
-use crate::measure::image::Image;
+use crate::image::Image;
 use crate::sampling::Sampler;
 use std::cell::{Cell, RefCell};
 use std::ops::Range;

@@ -2,11 +2,11 @@
 
 use super::rays::RaySet;
 use crate::accel::{Counters, Hit, Ray};
-use crate::config::cell_hash;
 use crate::gpu::{
     Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline, UniformValues, groups_for,
 };
 use crate::integrator::{SceneBuffers, Traced};
+use crate::text::cell_hash;
 use std::sync::Arc;
 
 /// What is asked of each ray.

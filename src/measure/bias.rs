@@ -11,7 +11,7 @@
 //! few, fireflies skew them and very small p-values come up too often.
 
 use super::hypothesis::{WelchTest, benjamini_hochberg, t_test_power, welch_t_test_beyond};
-use super::image::{Image, ImageError, luminance};
+use crate::image::{Image, ImageError, luminance};
 use std::fmt;
 
 /// A sampler may be said to have no bias found only if one of so many standard errors of the mean

@@ -20,10 +20,11 @@ use crate::accel::{
     brute_force_hits,
 };
 use crate::config::{Gate, Params};
+use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu, GpuError, kernel_errors};
 use crate::integrator::{SceneBuffers, Traced};
 use crate::oracle::{self, OracleRay, Verdict};
-use crate::scene::{Camera, SceneData};
+use crate::scene::SceneData;
 
 /// The judge is compared with brute force on at least this many rays.
 const LEAST_BRUTE_FORCE_RAYS: usize = 2000;

@@ -10,8 +10,9 @@ use crate::accel::{
     AccelError, Hit, InstanceJudge, Placed, Ray, TriangleSoup, brute_force_instances,
 };
 use crate::config::Gate;
+use crate::geometry::Triangle;
 use crate::oracle::{self, OracleRay, Verdict};
-use crate::scene::{Instance, Triangle};
+use crate::scene::Instance;
 use glam::DVec3;
 
 /// Answers of the oracle that are held at a time, one for each ray and instance.

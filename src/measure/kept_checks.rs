@@ -5,10 +5,10 @@
 //! program, so that a wrong answer never finds the checks of a right one. Only checks without a fault are
 //! kept; a file that is not whole, or stands under another's name, counts for nothing.
 
-use super::atomic::write_atomic;
 use super::gate::Judge;
 use super::record::JudgeCheck;
 use crate::accel::Intersection;
+use crate::atomic::write_atomic;
 use crate::config::Gate;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

@@ -1,17 +1,14 @@
 //! Measuring: the gate, the timing protocol, image metrics, statistics, records.
 
-pub mod atomic;
 pub mod batch;
 pub mod bias;
-pub mod formats;
 pub mod gate;
 pub mod hard_rays;
 pub mod hypothesis;
-pub mod image;
 mod instance_judge;
 mod kept_checks;
 pub mod memory;
-pub mod picture;
+pub mod metrics;
 pub mod rays;
 pub mod record;
 pub mod sampler_cost;

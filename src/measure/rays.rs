@@ -9,8 +9,9 @@ use super::record::RayClass;
 use super::statistics::Pcg32;
 use crate::accel::{Counters, CpuTwin, Hit, NO_HIT, Ray, TriangleSoup};
 use crate::config::Gate;
+use crate::geometry::Camera;
 use crate::integrator::Frame;
-use crate::scene::{Bounds, Camera, SceneData};
+use crate::scene::{Bounds, SceneData};
 use glam::Vec3;
 use rayon::prelude::*;
 

@@ -1,10 +1,12 @@
 //! Records: one JSON line per thing measured, schema `raystone/1`. Every table, plot and export
 //! derives from these lines alone; an absent value is absent, never 0.
 
-use crate::accel::Space;
+use crate::accel::{Phase, Space, StructureStats};
 use crate::config::{KERNELS_MARK, Variant};
+use crate::geometry::Camera;
+use crate::gpu::Environment;
 use crate::sampling::to_unit;
-use crate::scene::{Camera, LoadReport};
+use crate::scene::LoadReport;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};
@@ -86,43 +88,6 @@ impl Interval {
     pub fn is_apart_from(&self, other: &Interval) -> bool {
         self.low > other.high || other.low > self.high
     }
-}
-
-/// Machine, adapter, driver and program that produced a result.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Environment {
-    /// Adapter name as the driver gives it.
-    pub adapter: String,
-    /// `vulkan`, `gl`, `metal`, `dx12`.
-    pub backend: String,
-    /// Driver name.
-    pub driver: String,
-    /// Driver version text.
-    pub driver_info: String,
-    /// `discrete-gpu`, `integrated-gpu`, `virtual-gpu`, `cpu`, `other`.
-    pub device_type: String,
-    /// Whether the adapter is a software rasteriser: its times compare structures on it only.
-    pub software: bool,
-    /// Whether GPU timestamps are available; wall clock is used, and marked, where not.
-    pub timestamps: bool,
-    /// Turns that the loops of an invocation may take in all, on a driver that ends them beyond that.
-    #[serde(default)]
-    pub loop_limit: Option<u32>,
-    /// Whether denormal numbers are kept, when known.
-    #[serde(default)]
-    pub denormals: Option<bool>,
-    /// Operating system and architecture.
-    pub os: String,
-    /// Processor model.
-    pub cpu: String,
-    /// Hardware threads of the host.
-    pub cpu_threads: usize,
-    /// Version of this program.
-    pub version: String,
-    /// Commit the program was built from, when known.
-    pub commit: Option<String>,
-    /// Whether the working tree had uncommitted changes when it was built.
-    pub dirty: Option<bool>,
 }
 
 /// What a record's figures were taken with, beyond the names of its cell. Records of earlier versions
@@ -231,40 +196,6 @@ pub struct SceneRecord {
     pub report: LoadReport,
     /// BLAKE3 of the content.
     pub scene_hash: String,
-}
-
-/// A timed phase of a build.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Phase {
-    /// For instance `bounds`, `binned-sah`, `layout`.
-    pub name: String,
-    /// Milliseconds of wall time.
-    pub ms: f64,
-}
-
-/// Static figures of a built structure.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct StructureStats {
-    /// Nodes (inner and leaf) or cells.
-    pub nodes: u64,
-    /// Leaves or non-empty cells.
-    pub leaves: u64,
-    /// Triangle references held by leaves or cells.
-    pub references: u64,
-    /// `[k]` is the number of leaves or cells that hold k references; what holds more than the last
-    /// index is counted there. Empty where not known.
-    #[serde(default)]
-    pub leaf_histogram: Vec<u64>,
-    /// Deepest leaf (root = 0); absent for flat structures.
-    pub depth: Option<u32>,
-    /// SAH cost with traversal and intersection constants both 1; absent where not defined.
-    pub sah_cost: Option<f64>,
-    /// End-point overlap with both constants 1 (Aila, Karras, Laine 2013), of binary trees; of large ones
-    /// an estimate from a part of the triangles.
-    #[serde(default)]
-    pub epo: Option<f64>,
-    /// Bytes of the structure's GPU buffers (the canonical triangle buffer is not counted).
-    pub bytes: u64,
 }
 
 /// Ray classes of the recorded ray sets.

@@ -5,9 +5,9 @@
 //! "Quantifying the error of light transport algorithms", EGSR 2019 (spectra of error images);
 //! Georgiev & Fajardo 2016 and the filter curves of OpenQMC (error after a Gaussian).
 
-use super::image::{Image, ImageError, luminance};
 use super::record::{FilteredError, PowerAt};
 use super::statistics::mean_interval;
+use crate::image::{Image, ImageError, luminance};
 use std::f64::consts::TAU;
 
 /// Standard deviations of the Gaussian filters, pixels; 0 is no filter.

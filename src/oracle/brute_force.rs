@@ -2,7 +2,7 @@
 
 use super::OracleRay;
 use super::groups::{Groups, Line};
-use crate::scene::Triangle;
+use crate::geometry::Triangle;
 use rayon::prelude::*;
 
 /// From so many rays on it pays to bring neighbours together.

@@ -21,7 +21,7 @@
 
 use super::OracleRay;
 use super::triangle::{Vector, cross, dot, subtract, widen};
-use crate::scene::Triangle;
+use crate::geometry::Triangle;
 
 /// Half an ulp of 1 in f64.
 const EPSILON: f64 = f64::EPSILON / 2.0;

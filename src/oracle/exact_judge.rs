@@ -3,7 +3,7 @@
 use super::exact::{ExactCrossing, Side};
 use super::triangle::Crossing;
 use super::{ClosestHit, OracleRay, brute_force};
-use crate::scene::Triangle;
+use crate::geometry::Triangle;
 use rayon::prelude::*;
 
 /// A triangle that a ray meets within its interval, exactly.

@@ -17,7 +17,7 @@ pub use exact::{ExactCrossing, Side};
 pub use exact_judge::{Crossed, ExactTruth, ExactVerdict, exact_truths};
 pub use groups::{GROUP, Groups, Line};
 
-use crate::scene::Triangle;
+use crate::geometry::Triangle;
 use rayon::prelude::*;
 use std::fmt;
 use thiserror::Error;

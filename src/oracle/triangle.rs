@@ -35,7 +35,7 @@
 //! of the triangle's own (Baldwin and Weber) has wider ones still, and is wrong by these.
 
 use super::OracleRay;
-use crate::scene::Triangle;
+use crate::geometry::Triangle;
 
 /// Half an ulp of 1 in f32.
 const EPSILON: f64 = 1.0 / (1u32 << 24) as f64;

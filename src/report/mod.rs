@@ -5,7 +5,6 @@
 //! draw conclusions, [`sections`] writes them into a [`document::Document`], and [`html`],
 //! [`markdown`] and [`terminal`] show that document.
 
-pub mod color;
 pub mod data;
 pub mod document;
 pub mod format;
@@ -27,7 +26,7 @@ pub use read::{Records, read_records};
 pub use stress::{stress_tables, write_stress_page};
 pub use terminal::{failed_checks, terminal_tables};
 
-use crate::measure::atomic::write_atomic;
+use crate::atomic::write_atomic;
 use data::RunData;
 use document::{Block, Document};
 use std::path::{Path, PathBuf};

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::config::{Params, Variant};
-use crate::measure::image::{Image, Reference, measure};
+use crate::image::Image;
+use crate::measure::metrics::{Reference, measure};
 use crate::measure::record::ErrorAtSpp;
 use crate::measure::statistics::Pcg32;
 

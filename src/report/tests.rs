@@ -24,7 +24,8 @@ fn folder(lines: &[Line]) -> tempfile::TempDir {
         .split('"')
         .filter(|part| part.starts_with("images/") && part.contains("cornell"));
     for path in named.collect::<std::collections::BTreeSet<_>>() {
-        let colour = |x: u32, y: u32| image::Rgb(color::viridis((x * y) as f32 / (96.0 * 72.0)));
+        let colour =
+            |x: u32, y: u32| image::Rgb(crate::image::viridis((x * y) as f32 / (96.0 * 72.0)));
         image::RgbImage::from_fn(96, 72, colour)
             .save(dir.path().join(path))
             .unwrap();

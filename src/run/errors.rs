@@ -4,11 +4,14 @@ use super::session::Session;
 use super::structures::{self, Gated};
 use super::world::World;
 use super::{RunError, words};
-use crate::config::{REFERENCE_PARTS, SamplerCell, StructureCell, Variant, cell_hash};
+use crate::config::{REFERENCE_PARTS, SamplerCell, StructureCell, Variant};
+use crate::image::Image;
+use crate::image::viridis;
+use crate::image::{Picture, automatic_exposure, tone_map};
 use crate::integrator::{Frame, RenderJob, Renderer, Snapshot, Traced, integrator, rounding_bound};
 use crate::measure::bias::{BiasOptions, check_bias};
-use crate::measure::image::{Image, Reference, measure};
-use crate::measure::picture::{Picture, automatic_exposure, error_map, tone_map};
+use crate::measure::metrics::error_map;
+use crate::measure::metrics::{Reference, measure};
 use crate::measure::record::{
     BiasRecord, ErrorAtSpp, ErrorRecord, Ran, Record, ReferenceRecord, SpectrumRecord,
 };
@@ -16,8 +19,8 @@ use crate::measure::spectrum::{
     ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power,
 };
 use crate::measure::statistics::mean_interval;
-use crate::report::color::viridis;
 use crate::sampling::{Demand, Sampler};
+use crate::text::cell_hash;
 use std::time::Instant;
 
 /// Relative error per pixel at the top of the colour scale of error maps.

@@ -7,7 +7,7 @@
 //! file that is written are replaced, never followed.
 
 use super::RunError;
-use crate::measure::atomic::write_atomic;
+use crate::atomic::write_atomic;
 use crate::measure::record::{InterruptedRecord, Line, Record, SCHEMA};
 use crate::report::read::{PARTIAL, RECORDS_FILE};
 use crate::stress::record::FILE as STRESS_FILE;

@@ -3,7 +3,6 @@
 //! config → scene → accel → gpu → integrator → measure → records; the report is made from the
 //! records alone.
 
-pub mod environment;
 mod errors;
 mod folder;
 mod kernels;
@@ -174,7 +173,7 @@ fn measure(
     mut device: Device,
     kernels: &Kernels,
 ) -> Result<PathBuf, RunError> {
-    session.write_start(environment::capture(&device.gpu), kernels.folders())?;
+    session.write_start(crate::gpu::capture(&device.gpu), kernels.folders())?;
     let (plan, options) = (session.plan, session.options);
     for scene in &plan.scenes {
         // A lost device fails the cell that lost it; the rest goes on with a fresh one. Every turn

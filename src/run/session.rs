@@ -3,10 +3,11 @@
 use super::folder::Folder;
 use super::{RunError, RunOptions};
 use crate::config::{Experiment, Plan, REFERENCE_PARTS, Skipped};
+use crate::gpu::Environment;
 use crate::gpu::Gpu;
-use crate::measure::picture::{Picture, write_png};
+use crate::image::{Picture, write_png};
 use crate::measure::record::{
-    Environment, FinishedRecord, KernelFolder, Line, Record, RunRecord, SCHEMA, SkippedRecord,
+    FinishedRecord, KernelFolder, Line, Record, RunRecord, SCHEMA, SkippedRecord,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::{BTreeMap, HashSet};

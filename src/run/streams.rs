@@ -4,7 +4,7 @@
 use super::RunError;
 use super::kernels::Device;
 use super::session::Session;
-use crate::config::{StreamCell, cell_hash};
+use crate::config::StreamCell;
 use crate::discrepancy::{Budget, PointSet, radial_spectrum, star_2d};
 use crate::gpu::Gpu;
 use crate::integrator::integrator;
@@ -17,6 +17,7 @@ use crate::measure::words::{compare, dump_stream, kernel_hash};
 use crate::sampling::dimensions::{DIRECTION, FIRST_BOUNCE, PER_BOUNCE, pair_purpose};
 use crate::sampling::hash::pcg_hash;
 use crate::sampling::{Coordinate, Demand, Sampler, to_unit};
+use crate::text::cell_hash;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 

@@ -3,22 +3,24 @@
 use super::RunError;
 use super::session::Session;
 use super::world::World;
+use crate::accel::StructureStats;
 use crate::accel::{AccelError, BuildLog, BuiltAccel, Counters, Space};
-use crate::config::{StructureCell, cell_hash};
+use crate::config::StructureCell;
 use crate::gpu::{Elapsed, Gpu, GpuError};
+use crate::image::Picture;
+use crate::image::viridis;
 use crate::integrator::Traced;
 use crate::measure::batch::{Batch, Query, count_work, kernel_hash};
 use crate::measure::gate::{fault_text, gate, timed_fault};
 use crate::measure::memory::peak_bytes;
-use crate::measure::picture::Picture;
 use crate::measure::rays::{RaySet, primary_pixels, primary_rays};
 use crate::measure::record::{
-    ClassTiming, CountersPerRay, GateVerdict, Ran, Record, StructureRecord, StructureStats,
+    ClassTiming, CountersPerRay, GateVerdict, Ran, Record, StructureRecord,
 };
 use crate::measure::timing::{
     Measured, Watch, empty_ms, interleave, millions_per_second, without_overhead,
 };
-use crate::report::color::viridis;
+use crate::text::cell_hash;
 use std::time::Instant;
 
 /// A structure that passed its gate.

@@ -7,13 +7,14 @@ use super::structures::Gated;
 use super::world::World;
 use super::{RunError, words};
 use crate::accel::Space;
-use crate::config::{TimeCell, Variant, cell_hash};
+use crate::config::{TimeCell, Variant};
 use crate::gpu::{Elapsed, Gpu, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
 use crate::measure::record::{Record, TimeRecord};
 use crate::measure::statistics::median_interval;
 use crate::measure::timing::{Measured, Samples, Watch, interleave};
 use crate::sampling::Sampler;
+use crate::text::cell_hash;
 use std::collections::BTreeMap;
 
 /// A full cell, compiled.

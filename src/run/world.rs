@@ -5,11 +5,12 @@ use super::kernels::Device;
 use super::session::Session;
 use crate::accel::{Intersection, TriangleSoup};
 use crate::config::Variant;
+use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu};
 use crate::integrator::{RayOffset, SceneBuffers};
 use crate::measure::gate::Judge;
 use crate::measure::record::{Ran, Record, SceneRecord};
-use crate::scene::{self, Camera, LoadOptions, SceneData};
+use crate::scene::{self, LoadOptions, SceneData};
 use std::time::Instant;
 
 /// A scene with everything that its cells share.

@@ -1,9 +1,10 @@
 //! Gathers triangles from a loader and turns them into a checked [`SceneData`].
 
 use super::{
-    Assembly, Camera, Daylight, Framing, InstanceError, LoadReport, Material, MaterialKind,
-    MaterialSource, SceneData, SceneError, Texture, Transform, Triangle,
+    Assembly, Daylight, Framing, InstanceError, LoadReport, Material, MaterialKind, MaterialSource,
+    SceneData, SceneError, Texture, Transform,
 };
+use crate::geometry::{Camera, Triangle};
 use glam::{Vec2, Vec3};
 
 /// Largest absolute coordinate. Triangle tests multiply three differences of coordinates, and WGSL

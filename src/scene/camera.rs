@@ -1,6 +1,7 @@
 //! Where the image is taken from: boxes around scenes, and cameras that see something.
 
-use super::{Camera, SceneError, Triangle};
+use super::SceneError;
+use crate::geometry::{Camera, Triangle};
 use glam::Vec3;
 
 /// An axis-aligned box, scene units.

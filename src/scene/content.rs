@@ -1,6 +1,7 @@
 //! Questions asked of a loaded scene: extent, size in bytes, emitters, content hash.
 
-use super::{Bounds, InstanceError, SceneData, Transform, Triangle};
+use super::{Bounds, InstanceError, SceneData, Transform};
+use crate::geometry::Triangle;
 use glam::{Vec2, Vec3};
 use std::mem::size_of_val;
 

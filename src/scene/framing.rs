@@ -4,7 +4,8 @@
 //! closed object is surrounded, too, but by backs of surfaces.) Rays are cast on the host, among the
 //! largest triangles if there are many. The answer depends on the triangles alone.
 
-use super::{Bounds, Camera, SceneData, Triangle};
+use super::{Bounds, SceneData};
+use crate::geometry::{Camera, Triangle};
 use glam::{DVec3, Vec3, Vec3A};
 use obvhs::bvh2::Bvh2;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};

@@ -5,7 +5,7 @@
 //! world space: the copies of all instances, one after the other. An [`Assembly`] says in addition
 //! which objects they are copies of; two-level structures trace those.
 
-use super::Triangle;
+use crate::geometry::Triangle;
 use glam::{DMat3, DVec3, Mat4, Vec3};
 use thiserror::Error;
 

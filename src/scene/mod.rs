@@ -34,31 +34,11 @@ pub use framing::Framing;
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 
 use crate::config::Variant;
+use crate::geometry::{Camera, Triangle};
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::io::Read as _;
 use std::path::Path;
-
-/// One triangle in world space, vertices in the order of the file (f32, scene units).
-#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub struct Triangle {
-    /// The three corners.
-    pub vertices: [Vec3; 3],
-}
-
-/// A pinhole camera. Rays start at `eye`; pixel (0, 0) is the top left one.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Camera {
-    /// Position of the pinhole, scene units.
-    pub eye: Vec3,
-    /// Point that projects to the centre of the image.
-    pub target: Vec3,
-    /// Up direction; need not be normalised or orthogonal to the viewing direction.
-    pub up: Vec3,
-    /// Vertical field of view, degrees, in (0, 180).
-    pub vertical_fov_degrees: f32,
-}
 
 /// How light leaves a surface, as far as the kernels render it today.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]

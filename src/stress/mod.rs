@@ -23,8 +23,8 @@ pub mod targets;
 
 use crate::accel::triangle::TriangleTest;
 use crate::accel::{AccelRegistry, Intersection};
+use crate::gpu::capture as capture_environment;
 use crate::gpu::{Gpu, GpuError, probe_arithmetic};
-use crate::run::environment::capture as capture_environment;
 use record::{Record, SuiteRecord};
 use std::path::PathBuf;
 use std::time::{Instant, SystemTime};

@@ -1,7 +1,7 @@
 //! Records of the suite: one JSON line per cell, shot series, target and so on, in `stress.jsonl`.
 
 use super::place::Place;
-use crate::measure::record::Environment;
+use crate::gpu::Environment;
 use serde::{Deserialize, Serialize};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -318,7 +318,7 @@ pub fn write(dir: &Path, records: &[Record]) -> Result<PathBuf, RecordError> {
         serde_json::to_writer(&mut text, &line).map_err(|e| failed(e.into()))?;
         writeln!(text).map_err(failed)?;
     }
-    crate::measure::atomic::write_atomic(&path, &text).map_err(failed)?;
+    crate::atomic::write_atomic(&path, &text).map_err(failed)?;
     Ok(path)
 }
 

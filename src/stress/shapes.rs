@@ -1,7 +1,7 @@
 //! Meshes of the suite, modelled about two units around the origin in f64 and rounded once.
 
 use super::place::Place;
-use crate::scene::Triangle;
+use crate::geometry::Triangle;
 use glam::{DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
 

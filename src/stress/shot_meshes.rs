@@ -7,8 +7,9 @@ use super::shapes::{self, Mesh, RADIUS};
 use super::tally::oracle_ray;
 use crate::accel::Ray;
 use crate::config::{Params, Variant};
+use crate::geometry::Triangle;
 use crate::oracle::{Side, exact_truths};
-use crate::scene::{Bounds, LoadOptions, Triangle, load};
+use crate::scene::{Bounds, LoadOptions, load};
 use glam::Vec3;
 use rayon::prelude::*;
 

@@ -3,8 +3,8 @@
 use super::case::{Case, Truth};
 use super::record::{Quantiles, Rung, Worst};
 use crate::accel::{Hit, NO_HIT, Ray};
+use crate::geometry::Triangle;
 use crate::oracle::{ExactTruth, ExactVerdict, OracleRay, exact_truths};
-use crate::scene::Triangle;
 use rayon::prelude::*;
 
 /// Errors of a right hit: of the distance and of the hit point, in ulp and relative.

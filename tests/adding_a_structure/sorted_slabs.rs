@@ -5,10 +5,9 @@ use raystone::accel::bounds::Bounds;
 use raystone::accel::twin::{Query, Traverse, Twin};
 use raystone::accel::{
     AccelError, AccelKind, BuildLog, BuiltAccel, CpuTwin, GpuBuffers, Hit, NamedWords,
-    TriangleSoup, limits,
+    StructureStats, TriangleSoup, limits,
 };
 use raystone::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
-use raystone::measure::record::StructureStats;
 
 /// The registry entry.
 pub struct SortedSlabs;

@@ -6,7 +6,7 @@ use glam::Vec3;
 use raystone::accel::bounds::Bounds;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::accel::{NO_HIT, Ray, TriangleSoup};
-use raystone::scene::Triangle;
+use raystone::geometry::Triangle;
 
 /// `t_max` of a ray without an end.
 pub const FAR: f32 = 1.0e30;

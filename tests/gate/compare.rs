@@ -3,10 +3,10 @@
 use glam::Vec3;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::accel::{Hit, NO_HIT, Ray, Space, TriangleSoup};
+use raystone::geometry::Triangle;
 use raystone::measure::gate::compare;
 use raystone::measure::rays::RaySet;
 use raystone::measure::record::{ClassVerdict, RayClass};
-use raystone::scene::Triangle;
 
 /// Triangle 0 and its copy 1 in the plane z = 1, triangle 2 beside them in the same plane, and
 /// triangle 3 far behind.

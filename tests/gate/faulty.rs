@@ -1,10 +1,10 @@
 //! Structures that wrap a real one and plant a fault in it.
 
+use raystone::accel::StructureStats;
 use raystone::accel::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Bvh, GpuBuffers, RopedBvh, TriangleSoup,
 };
 use raystone::config::{ParameterSchema, Params};
-use raystone::measure::record::StructureStats;
 
 /// What is planted.
 #[derive(Clone, Copy)]

@@ -4,8 +4,8 @@
 use crate::MAX_DEPTH;
 use crate::support::*;
 use raystone::gpu::{AdapterChoice, Gpu, GpuError, KernelLibrary};
+use raystone::image::Image;
 use raystone::integrator::{BLOCK_SAMPLES, Renderer, rounding_bound};
-use raystone::measure::image::Image;
 
 fn bits(image: &Image) -> Vec<[u32; 3]> {
     image.pixels.iter().map(|p| p.map(f32::to_bits)).collect()

@@ -2,8 +2,9 @@
 
 use crate::support::*;
 use glam::Vec3;
-use raystone::measure::image::Image;
-use raystone::scene::{Camera, MaterialKind, SceneData};
+use raystone::geometry::Camera;
+use raystone::image::Image;
+use raystone::scene::{MaterialKind, SceneData};
 use std::path::Path;
 
 const SIZE: u32 = 16;

@@ -4,6 +4,7 @@
 
 use raystone::accel::{AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, TriangleSoup};
 use raystone::config::{Entry, Experiment, ParamValue, Params, Plan, Variant};
+use raystone::geometry::Camera;
 use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
 use raystone::integrator::{
     Frame, RenderJob, Renderer, SceneBuffers, Traced, integrator, integrator_entries,
@@ -12,7 +13,7 @@ use raystone::measure::record::{Line, Record, SCHEMA};
 use raystone::measure::statistics::{mean, variance};
 use raystone::run::{Registries, RunOptions, RunSummary};
 use raystone::sampling::{Demand, Sampler, SamplerRegistry, dimensions};
-use raystone::scene::{Camera, LoadOptions, SceneData, builtin_scenes, load};
+use raystone::scene::{LoadOptions, SceneData, builtin_scenes, load};
 use std::path::Path;
 use std::sync::OnceLock;
 

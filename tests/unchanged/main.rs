@@ -102,6 +102,43 @@ fn scenes() -> Vec<(&'static str, Stage)> {
     known.into_iter().map(stage).collect()
 }
 
+/// A mirror, a tilted picture and a floor.
+const MODEL: &str = "mtllib model.mtl
+v -3 -1 3\nv 3 -1 3\nv 3 -1 -3\nv -3 -1 -3
+v -2 -1 -1\nv 0 -1 -2\nv 0 1.5 -2\nv -2 1.5 -1
+v 0.2 -1 0\nv 1.9 -1 -0.7\nv 1.7 1 -1.4\nv 0 1 -0.8
+v -1 3 -1\nv 1 3 -1\nv 1 3 1\nv -1 3 1
+vt 0 0\nvt 2.5 0\nvt 2.5 1.5\nvt 0 1.5
+usemtl floor\nf 1 2 3 4\nusemtl mirror\nf 5 6 7 8\nusemtl picture\nf 9/1 10/2 11/3 12/4\n";
+const LAMP: &str = "usemtl lamp\nf 13 14 15 16\n";
+const MATERIALS: &str = "newmtl floor\nKd 0.6 0.5 0.4
+newmtl mirror\nillum 3\nKd 0 0 0\nKs 0.9 0.8 0.7\nNs 1000
+newmtl picture\nKd 0.9 1 0.8\nmap_Kd picture.png
+newmtl lamp\nKd 0.1 0.1 0.1\nKe 7 6 5\n";
+
+/// Models with mirror and texture, lit by a lamp and by the sky; and a scene under a plain sky. Images
+/// alone: to rays they are nothing new.
+fn looks() -> Vec<(&'static str, Stage)> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let picture = image::RgbImage::from_fn(5, 3, |x, y| {
+        image::Rgb([40 * x as u8 + 60, 100 * y as u8 + 30, 255 - 50 * x as u8])
+    });
+    let write = |name: &str, text: String| {
+        std::fs::write(folder.path().join(name), text).expect("a writable folder");
+    };
+    let file = folder.path().join("picture.png");
+    picture.save(file).expect("a picture");
+    write("model.mtl", MATERIALS.to_owned());
+    write("lit.obj", format!("{MODEL}{LAMP}"));
+    write("unlit.obj", MODEL.to_owned());
+    let load = |name: &str| Stage::new(gpu(), from_file(&folder.path().join(name)));
+    vec![
+        ("mirror-and-texture", load("lit.obj")),
+        ("mirror-and-texture-under-the-sky", load("unlit.obj")),
+        ("white-furnace", Stage::builtin(gpu(), "white-furnace", &[])),
+    ]
+}
+
 const GATE: Gate = Gate {
     rays: 256,
     brute_force_tests: 1,
@@ -195,6 +232,13 @@ fn images() {
                     found.insert(subject, hash);
                 }
             }
+        }
+    }
+    for (scene, stage) in looks() {
+        let traced = stage.traced(gpu(), structure("bvh"));
+        for what in &integrators {
+            let subject = format!("image {scene}/bvh/{what}");
+            found.insert(subject, image_hash(&stage, &traced, &one, what));
         }
     }
     compare(&["image", ADAPTER], &found);

@@ -19,9 +19,11 @@ use super::leaf::{COUNT_MASK, LeafReader, Leaves};
 use super::ray::Hit;
 use super::tree::{NodeKind, Tree, tree_parameters};
 use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, TriangleSoup};
+use super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
+    TriangleSoup,
+};
 use crate::config::{ParameterSchema, Params};
-use crate::measure::record::StructureStats;
 use boxes::Boxes;
 use octant_roped::Octants;
 use options::{Options, Traversal};

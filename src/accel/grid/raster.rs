@@ -247,7 +247,7 @@ mod tests {
     use super::super::{Frame, Grid};
     use super::*;
     use crate::accel::TriangleSoup;
-    use crate::scene::Triangle;
+    use crate::geometry::Triangle;
     use glam::Vec3;
     use std::collections::BTreeSet;
 

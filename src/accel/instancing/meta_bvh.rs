@@ -17,9 +17,9 @@ use super::instance::{Entry, NOTHING, is_open, leaf, level, near_and_far};
 use super::top::Top;
 use super::world_box::BoxMap;
 use super::{Base, clamped, meta_bvh_nested};
+use crate::accel::StructureStats;
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
-use crate::measure::record::StructureStats;
 
 /// Stands for the size of the stack when an object was entered, outside of any.
 const OUTSIDE: u32 = u32::MAX;

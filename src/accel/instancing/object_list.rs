@@ -14,9 +14,9 @@ use super::super::{
 use super::Base;
 use super::instance::{Entry, enter_grown, level, trace_object};
 use super::world_box::BoxMap;
+use crate::accel::StructureStats;
 use crate::config::{ParameterSchema, Params};
 use crate::gpu::UniformValues;
-use crate::measure::record::StructureStats;
 use bytemuck::{Pod, Zeroable};
 
 /// The registry entry.

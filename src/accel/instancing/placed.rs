@@ -3,7 +3,8 @@
 use super::super::triangle::TriangleRecord;
 use super::super::{Ray, TriangleSoup};
 use super::instance::object_ray;
-use crate::scene::{Assembly, Instance, Transform, Triangle};
+use crate::geometry::Triangle;
+use crate::scene::{Assembly, Instance, Transform};
 use std::borrow::Cow;
 
 /// Canonical records of each object in its own space, and where the objects stand.

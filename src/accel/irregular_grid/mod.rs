@@ -21,10 +21,12 @@ use super::grid::lists::check_lists;
 use super::grid::{Grid, check_words, clamped, first_axis, outside};
 use super::ray::Hit;
 use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, TriangleSoup};
+use super::{
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
+    TriangleSoup,
+};
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
-use crate::measure::record::StructureStats;
 
 /// Bits of an entry that hold the logarithm of its block's side; 0: the rest is a cell.
 const LOG_BITS: u32 = 2;
@@ -376,7 +378,7 @@ impl Traverse for Built {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Triangle;
+    use crate::geometry::Triangle;
     use glam::Vec3;
 
     /// Triangles of all sizes, bunched in one corner.

@@ -1,7 +1,7 @@
 //! Faults in a built tree that `validate()` must find.
 
 use super::*;
-use crate::scene::Triangle;
+use crate::geometry::Triangle;
 use glam::Vec3;
 
 /// A 6 × 6 × 2 lattice of triangles, two layers of each of which cross the planes between cells.

@@ -1,7 +1,7 @@
 //! Faults in a built tree that `validate()` must find, and the arithmetic of octants.
 
 use super::*;
-use crate::scene::Triangle;
+use crate::geometry::Triangle;
 use glam::Vec3;
 
 fn soup() -> TriangleSoup {

@@ -161,7 +161,7 @@ fn covers(boxes: &[Bounds], whole: &Bounds) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Triangle;
+    use crate::geometry::Triangle;
     use glam::Vec3;
 
     fn soup() -> TriangleSoup {

@@ -1,10 +1,10 @@
 //! Figures that tell how good a tree is: SAH cost and end-point overlap.
 
 use super::{NodeKind, Tree, TreeNode};
+use crate::accel::StructureStats;
 use crate::accel::TriangleSoup;
 use crate::accel::bounds::Bounds;
 use crate::accel::triangle::TriangleRecord;
-use crate::measure::record::StructureStats;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -274,7 +274,7 @@ impl Polygon {
 mod tests {
     use super::*;
     use crate::accel::tree::TreeNode;
-    use crate::scene::Triangle;
+    use crate::geometry::Triangle;
     use glam::Vec3;
 
     fn record(id: u32, vertices: [[f32; 3]; 3]) -> TriangleRecord {

@@ -28,7 +28,7 @@ use super::bounds::{Bounds, slabs};
 use super::intersection::Reciprocal;
 use super::ray::{Hit, Ray, SMALLEST_COMPONENT, SMALLEST_SLOPE};
 use super::watch::{self, Event};
-use crate::scene::Triangle;
+use crate::geometry::Triangle;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

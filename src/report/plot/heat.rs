@@ -3,7 +3,7 @@
 use super::drawing::{Anchor, Drawing, FAILED, INK, Ink};
 use super::matrix::legible_on;
 use super::paint::text_width;
-use crate::report::color::viridis;
+use crate::image::viridis;
 use crate::report::format;
 
 /// Width and height of a cell, pixels.

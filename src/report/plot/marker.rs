@@ -1,7 +1,7 @@
 //! What tells categories apart: colour and marker shape, and dashes for what is exact.
 
 use super::drawing::{Drawing, Ink, Point};
-use crate::report::color::categorical;
+use crate::image::categorical;
 use std::f64::consts::PI;
 
 /// Number of different marker shapes.

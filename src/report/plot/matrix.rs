@@ -2,7 +2,7 @@
 
 use super::drawing::{Anchor, Drawing, INK, Ink};
 use super::paint::text_width;
-use crate::report::color::viridis;
+use crate::image::viridis;
 use crate::report::format;
 
 /// Width and height of a cell, pixels.

@@ -5,7 +5,7 @@ use super::marker;
 use super::panels::{Area, Content};
 use super::raster::Raster;
 use crate::discrepancy::Periodogram;
-use crate::report::color::viridis;
+use crate::image::viridis;
 
 /// Ends of the scale of powers, as powers of ten.
 const DECADES: [f64; 2] = [-2.0, 2.0];

@@ -1,9 +1,12 @@
 //! Synthetic but realistic records.
 
 use crate::accel::Space;
+use crate::accel::{Phase, StructureStats};
 use crate::config::{Params, Variant};
+use crate::geometry::Camera;
+use crate::gpu::Environment;
 use crate::measure::record::*;
-use crate::scene::{Camera, LoadReport};
+use crate::scene::LoadReport;
 use std::collections::BTreeMap;
 
 /// Uniform noise in [-1, 1], the same in every run.

@@ -4,10 +4,11 @@
 //! Reflectances and the radiance of the light are the usual linear RGB conversions of the
 //! published spectra. The ceiling is a frame around the light, so that no two surfaces coincide.
 
+use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material};
 use super::Builtin;
 use crate::config::Params;
+use crate::geometry::Camera;
 use glam::Vec3;
 
 pub(super) const SCENE: Builtin = Builtin {

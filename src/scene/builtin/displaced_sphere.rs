@@ -1,11 +1,12 @@
 //! A bumpy closed surface of any number of triangles of about the same size.
 
+use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material};
 use super::Builtin;
 use super::numeric::sin_cos_turns;
 use super::sphere::SphereGrid;
 use crate::config::{ParamRange, ParamValue, Parameter, Params};
+use crate::geometry::Camera;
 use glam::{DVec3, Vec3};
 
 pub(super) const SCENE: Builtin = Builtin {

@@ -3,10 +3,11 @@
 //! space around dense spots, and instances whose boxes have to grow.
 
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material, Transform, Triangle};
+use super::super::{Material, Transform};
 use super::Builtin;
 use super::numeric::{Pcg, sin_cos_turns};
 use super::sphere::SphereGrid;
+use crate::geometry::{Camera, Triangle};
 use glam::Vec3;
 
 pub(super) const SCENE: Builtin = Builtin {

@@ -1,10 +1,11 @@
 //! Scenes whose image is known exactly: any bias of an integrator shows.
 
+use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material};
 use super::Builtin;
 use super::sphere::SphereGrid;
 use crate::config::{ParamRange, ParamValue, Parameter, Params};
+use crate::geometry::Camera;
 use glam::{DVec3, Vec3};
 
 pub(super) const FURNACE_BOX: Builtin = Builtin {

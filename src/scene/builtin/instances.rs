@@ -2,11 +2,12 @@
 //! and then mirrored: what two-level structures are compared on.
 
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material, Transform, Triangle};
+use super::super::{Material, Transform};
 use super::Builtin;
 use super::numeric::{Pcg, sin_cos_turns};
 use super::sphere::SphereGrid;
 use crate::config::{ParamRange, ParamValue, Parameter, Params};
+use crate::geometry::{Camera, Triangle};
 use glam::{DMat3, DVec3, Mat3, Vec3};
 
 /// Different objects.

@@ -1,9 +1,10 @@
 //! The least scene that a structure can be built of: for integrators that trace nothing.
 
+use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material};
 use super::Builtin;
 use crate::config::Params;
+use crate::geometry::Camera;
 use glam::Vec3;
 
 pub(super) const SCENE: Builtin = Builtin {

@@ -1,12 +1,13 @@
 //! Teapot in a stadium: a small detailed object in a scene a thousand times larger, the case that
 //! breaks uniform grids (Haines, Ray Tracing News 1988).
 
+use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material};
 use super::Builtin;
 use super::numeric::sin_cos_turns;
 use super::teapot_patches::tessellate;
 use crate::config::{ParamRange, ParamValue, Parameter, Params};
+use crate::geometry::Camera;
 use glam::Vec3;
 
 pub(super) const SCENE: Builtin = Builtin {
@@ -108,7 +109,8 @@ fn push_rows(builder: &mut SceneBuilder) {
 mod tests {
     use super::super::tests::{load_default, load_with};
     use super::*;
-    use crate::scene::{Bounds, Triangle};
+    use crate::geometry::Triangle;
+    use crate::scene::Bounds;
 
     fn teapot(subdivision: usize) -> Vec<Triangle> {
         let triangles = tessellate(subdivision).into_iter();

@@ -1,10 +1,11 @@
 //! Random triangles: the worst case for every hierarchy, and a quick test of any structure.
 
+use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::super::{Camera, Material};
 use super::Builtin;
 use super::numeric::Pcg;
 use crate::config::{ParamRange, ParamValue, Parameter, Params};
+use crate::geometry::Camera;
 use glam::Vec3;
 
 pub(super) const SCENE: Builtin = Builtin {

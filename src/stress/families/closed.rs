@@ -4,7 +4,7 @@ use super::super::case::{Maker, Random, Truth, ray, towards};
 use super::super::place::Place;
 use super::super::shapes::{Mesh, RADIUS, cube, sphere};
 use crate::accel::Ray;
-use crate::scene::Triangle;
+use crate::geometry::Triangle;
 use glam::{DVec3, Vec3};
 
 /// Bands of the sphere: 528 triangles.

@@ -6,7 +6,8 @@ use super::super::shapes::{Mesh, RADIUS, cube, plane, sphere};
 use super::closed::{inside, on_edge};
 use crate::accel::Ray;
 use crate::config::{ParamValue, Params, Variant};
-use crate::scene::{LoadOptions, Triangle, load};
+use crate::geometry::Triangle;
+use crate::scene::{LoadOptions, load};
 use glam::{DVec3, Vec3};
 
 /// Rays at insides, edges and vertices of random triangles, from about the mesh.

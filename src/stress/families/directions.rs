@@ -5,8 +5,9 @@ use super::super::place::Place;
 use super::super::shapes::{RADIUS, cube, sphere};
 use super::closed::{inside, on_edge, truth};
 use crate::accel::Ray;
+use crate::geometry::Triangle;
 use crate::oracle::{ExactCrossing, OracleRay};
-use crate::scene::{Bounds, Triangle};
+use crate::scene::Bounds;
 use glam::{DVec3, Vec3};
 
 /// Adds a sphere and a box at each place with rays made one by one.

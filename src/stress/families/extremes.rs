@@ -6,7 +6,8 @@ use super::super::shapes::{RADIUS, cube, sphere};
 use super::closed::inside;
 use crate::accel::Ray;
 use crate::accel::ray::SMALLEST_DIRECTION;
-use crate::scene::{MAX_COORDINATE, Triangle};
+use crate::geometry::Triangle;
+use crate::scene::MAX_COORDINATE;
 use glam::Vec3;
 
 pub fn denormal(maker: &mut Maker) {

@@ -153,7 +153,8 @@ mod tests {
                     .iter()
                     .all(|ray| ray.t_min >= 0.0 || ray.t_min.is_nan());
                 assert!(starts, "{} {}", family.name, case.label);
-                let finite = |t: &crate::scene::Triangle| t.vertices.iter().all(|v| v.is_finite());
+                let finite =
+                    |t: &crate::geometry::Triangle| t.vertices.iter().all(|v| v.is_finite());
                 assert!(
                     case.scene.triangles.iter().all(finite),
                     "{} {}",

@@ -1,9 +1,9 @@
 //! Where faults are planted: texts of kernels, what builders hand out, tables of samplers.
 
 use super::CheckError;
+use crate::accel::StructureStats;
 use crate::accel::{AccelError, BuiltAccel, GpuBuffers, Space, TriangleSoup};
 use crate::gpu::KernelLibrary;
-use crate::measure::record::StructureStats;
 use crate::sampling::{Sampler, SamplerTable};
 use std::path::Path;
 

@@ -2,11 +2,12 @@
 //! and zeros of both signs are common instead of rare.
 
 use crate::accel::{Hit, NO_HIT, Ray, TriangleSoup, brute_force_hits};
+use crate::geometry::Triangle;
 use crate::measure::gate::Judge;
 use crate::measure::rays::{FAR, RaySet};
 use crate::measure::record::{JudgeCheck, RayClass};
 use crate::measure::statistics::Pcg32;
-use crate::scene::{LoadReport, Material, SceneData, Triangle};
+use crate::scene::{LoadReport, Material, SceneData};
 use glam::Vec3;
 
 const TRIANGLES: usize = 240;

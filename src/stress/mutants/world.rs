@@ -5,10 +5,11 @@ use super::soups::{lattice_judge, lattice_scene};
 use super::{CheckError, Mutant, Options, Subject, checks, open};
 use crate::accel::TriangleSoup;
 use crate::config::{Gate, ParamValue};
+use crate::geometry::Camera;
 use crate::gpu::KernelLibrary;
+use crate::image::Image;
 use crate::measure::gate::Judge;
-use crate::measure::image::Image;
-use crate::scene::{Camera, LoadOptions, SceneData, builtin_scenes, load};
+use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
 
 /// Seeds of the integer-grid soups.
 const SOUPS: [u64; 3] = [40, 41, 42];

@@ -3,8 +3,8 @@
 use super::stage::{self, Stage};
 use super::{Figure, NumericsError};
 use crate::gpu::Gpu;
+use crate::image::Image;
 use crate::integrator::integrator;
-use crate::measure::image::Image;
 use crate::run::dump_stream;
 use crate::sampling::{Coordinate, dimensions};
 

@@ -3,10 +3,11 @@
 use super::NumericsError;
 use crate::accel::{AccelRegistry, BuildLog, TriangleSoup};
 use crate::config::{Entry, ParamValue, Params, Variant};
+use crate::geometry::Camera;
 use crate::gpu::Gpu;
 use crate::integrator::{Frame, Integrator, RenderJob, Renderer, SceneBuffers, Traced};
 use crate::sampling::{Demand, Sampler, SamplerRegistry};
-use crate::scene::{Camera, LoadOptions, SceneData, builtin_scenes, load};
+use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
 
 /// The entry called `name`, all parameters at their defaults.
 pub fn default_variant(

@@ -6,15 +6,16 @@ use super::super::subject::{build, sampler};
 use super::super::world::Stage;
 use super::{Bench, Finding};
 use crate::config::{Entry, ParamValue, Variant};
+use crate::geometry::{Camera, Triangle};
 use crate::gpu::KernelLibrary;
+use crate::image::Image;
 use crate::integrator::{
     Frame, RenderJob, Renderer, SceneBuffers, Traced, integrator, integrator_entries,
 };
 use crate::measure::bias::{BiasOptions, BiasVerdict, check_bias};
-use crate::measure::image::Image;
 use crate::measure::statistics::{mean, variance};
 use crate::sampling::{Demand, Sampler, dimensions};
-use crate::scene::{Camera, Material, Triangle};
+use crate::scene::Material;
 use crate::stress::case::scene;
 use crate::stress::place::Place;
 use crate::stress::shapes::{RADIUS, cube};

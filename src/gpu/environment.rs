@@ -1,7 +1,44 @@
 //! Where a run happens.
 
-use crate::gpu::{Gpu, probe_arithmetic};
-use crate::measure::record::Environment;
+use super::{Gpu, probe_arithmetic};
+use serde::{Deserialize, Serialize};
+
+/// Machine, adapter, driver and program that produced a result.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Environment {
+    /// Adapter name as the driver gives it.
+    pub adapter: String,
+    /// `vulkan`, `gl`, `metal`, `dx12`.
+    pub backend: String,
+    /// Driver name.
+    pub driver: String,
+    /// Driver version text.
+    pub driver_info: String,
+    /// `discrete-gpu`, `integrated-gpu`, `virtual-gpu`, `cpu`, `other`.
+    pub device_type: String,
+    /// Whether the adapter is a software rasteriser: its times compare structures on it only.
+    pub software: bool,
+    /// Whether GPU timestamps are available; wall clock is used, and marked, where not.
+    pub timestamps: bool,
+    /// Turns that the loops of an invocation may take in all, on a driver that ends them beyond that.
+    #[serde(default)]
+    pub loop_limit: Option<u32>,
+    /// Whether denormal numbers are kept, when known.
+    #[serde(default)]
+    pub denormals: Option<bool>,
+    /// Operating system and architecture.
+    pub os: String,
+    /// Processor model.
+    pub cpu: String,
+    /// Hardware threads of the host.
+    pub cpu_threads: usize,
+    /// Version of this program.
+    pub version: String,
+    /// Commit the program was built from, when known.
+    pub commit: Option<String>,
+    /// Whether the working tree had uncommitted changes when it was built.
+    pub dirty: Option<bool>,
+}
 
 /// Machine, adapter, driver and program.
 pub fn capture(gpu: &Gpu) -> Environment {

@@ -1,10 +1,9 @@
 //! Files for rendered images. The ending of the file name decides: PNG is a picture to look at, the
 //! others keep the linear radiance of every pixel.
 
-use super::atomic::write_atomic;
-use super::image::{Image, ImageError};
-use super::picture::{automatic_exposure, encode_png, tone_map};
-use image::{ExtendedColorType, ImageFormat};
+use super::{Image, ImageError, automatic_exposure, encode_png, tone_map};
+use crate::atomic::write_atomic;
+use ::image::{ExtendedColorType, ImageFormat};
 use std::io::Cursor;
 use std::path::Path;
 

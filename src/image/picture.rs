@@ -1,7 +1,7 @@
 //! Pictures to look at: tone mapping, error maps and PNG files.
 
-use super::atomic::write_atomic;
-use super::image::{Image, ImageError, Reference, is_finite, luminance};
+use super::{Image, ImageError, is_finite, luminance};
+use crate::atomic::write_atomic;
 use std::io;
 use std::path::Path;
 
@@ -54,36 +54,6 @@ pub fn tone_map(image: &Image, exposure: f32) -> Picture {
         height: image.height,
         pixels: image.pixels.iter().map(map).collect(),
     }
-}
-
-/// Picture of the error: per pixel √ of the mean over channels of (v − r)² / (r² + 0.01), over
-/// `full_scale`, clamped to `[0, 1]` and coloured by `colour`.
-///
-/// # Errors
-/// [`ImageError::SizeMismatch`].
-pub fn error_map(
-    image: &Image,
-    reference: &Reference,
-    full_scale: f32,
-    colour: impl Fn(f32) -> [u8; 3],
-) -> Result<Picture, ImageError> {
-    reference.image().check_size(image, "the measured image")?;
-    let map = |(i, pixel): (usize, &[f32; 3])| {
-        let term = |c: usize| {
-            let sample = reference.sample(i, c, pixel[c]);
-            sample.relative_squared_error()
-        };
-        let error = ((term(0) + term(1) + term(2)) / 3.0).sqrt() as f32;
-        match error.is_finite() {
-            true => colour((error / full_scale).clamp(0.0, 1.0)),
-            false => NON_FINITE_COLOUR,
-        }
-    };
-    Ok(Picture {
-        width: image.width,
-        height: image.height,
-        pixels: image.pixels.iter().enumerate().map(map).collect(),
-    })
 }
 
 /// Writes a picture as PNG, whole or not at all.
@@ -148,15 +118,6 @@ mod tests {
         let exposure = automatic_exposure(&grey(&[0.18, 0.72, 0.0, f32::NAN]));
         assert!((exposure - 1.0).abs() < 1e-5, "{exposure}");
         assert_eq!(automatic_exposure(&grey(&[0.0])), 1.0);
-    }
-
-    #[test]
-    fn the_error_map_shows_where_the_error_is() {
-        let reference = Reference::single(grey(&[0.0, 0.0, 0.0, 0.0])).unwrap();
-        let picture = grey(&[0.0, 0.05, 7.0, f32::NAN]);
-        let shade = |v: f32| [(v * 100.0).round() as u8; 3];
-        let map = error_map(&picture, &reference, 1.0, shade).unwrap();
-        assert_eq!(map.pixels, [[0; 3], [50; 3], [100; 3], NON_FINITE_COLOUR]);
     }
 
     #[test]

@@ -131,3 +131,12 @@ fn sizes_that_do_not_fit_are_errors() {
     assert!(Reference::from_parts(vec![grey(&[1.0])]).is_err());
     assert!(Reference::from_parts(vec![grey(&[1.0]), grey(&[1.0, 2.0])]).is_err());
 }
+
+#[test]
+fn the_error_map_shows_where_the_error_is() {
+    let reference = Reference::single(grey(&[0.0, 0.0, 0.0, 0.0])).unwrap();
+    let picture = grey(&[0.0, 0.05, 7.0, f32::NAN]);
+    let shade = |v: f32| [(v * 100.0).round() as u8; 3];
+    let map = error_map(&picture, &reference, 1.0, shade).unwrap();
+    assert_eq!(map.pixels, [[0; 3], [50; 3], [100; 3], NON_FINITE_COLOUR]);
+}

@@ -1,0 +1,79 @@
+//! What building a structure took, and static figures of what was built.
+
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// A timed phase of a build.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Phase {
+    /// For instance `bounds`, `binned-sah`, `layout`.
+    pub name: String,
+    /// Milliseconds of wall time.
+    pub ms: f64,
+}
+
+/// Static figures of a built structure.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct StructureStats {
+    /// Nodes (inner and leaf) or cells.
+    pub nodes: u64,
+    /// Leaves or non-empty cells.
+    pub leaves: u64,
+    /// Triangle references held by leaves or cells.
+    pub references: u64,
+    /// `[k]` is the number of leaves or cells that hold k references; what holds more than the last
+    /// index is counted there. Empty where not known.
+    #[serde(default)]
+    pub leaf_histogram: Vec<u64>,
+    /// Deepest leaf (root = 0); absent for flat structures.
+    pub depth: Option<u32>,
+    /// SAH cost with traversal and intersection constants both 1; absent where not defined.
+    pub sah_cost: Option<f64>,
+    /// End-point overlap with both constants 1 (Aila, Karras, Laine 2013), of binary trees; of large ones
+    /// an estimate from a part of the triangles.
+    #[serde(default)]
+    pub epo: Option<f64>,
+    /// Bytes of the structure's GPU buffers (the canonical triangle buffer is not counted).
+    pub bytes: u64,
+}
+
+/// Timed phases of a build.
+#[derive(Debug, Clone, Default)]
+pub struct BuildLog {
+    /// What was timed so far.
+    pub phases: Vec<Phase>,
+}
+
+impl BuildLog {
+    /// Runs `work` and notes how long it took.
+    pub fn phase<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let result = work();
+        self.phases.push(Phase {
+            name: name.to_owned(),
+            ms: start.elapsed().as_secs_f64() * 1e3,
+        });
+        result
+    }
+
+    /// Sum of all phases, milliseconds.
+    pub fn total_ms(&self) -> f64 {
+        // Not sum(): that of nothing is −0.
+        self.phases.iter().fold(0.0, |sum, p| sum + p.ms)
+    }
+}
+
+/// Longest entry of a leaf histogram; more references than this are counted there.
+pub const LEAF_HISTOGRAM_END: usize = 32;
+
+/// How many leaves or cells hold 0, 1, 2, … references; see [`StructureStats::leaf_histogram`].
+pub fn leaf_histogram(counts: impl Iterator<Item = usize>) -> Vec<u64> {
+    let mut histogram = Vec::new();
+    for count in counts.map(|c| c.min(LEAF_HISTOGRAM_END)) {
+        if histogram.len() <= count {
+            histogram.resize(count + 1, 0);
+        }
+        histogram[count] += 1;
+    }
+    histogram
+}
