@@ -104,7 +104,7 @@ impl WideNode for Node {
     const STRUCTURE: &'static str = "bvh4";
     const KERNEL: &'static str = "accel/bvh4";
     const WIDTH: usize = WIDTH;
-    const MOST_NODES: u32 = INDEX_MASK;
+    const MOST_NODES: u64 = INDEX_MASK as u64;
 
     fn pack(children: &[WideChild]) -> Self {
         let (quantisation, [lows, highs]) = Quantisation::of_children(children);

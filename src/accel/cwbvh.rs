@@ -97,7 +97,7 @@ impl WideNode for Node {
     const STRUCTURE: &'static str = "cwbvh";
     const KERNEL: &'static str = "accel/cwbvh";
     const WIDTH: usize = WIDTH;
-    const MOST_NODES: u32 = INDEX_MASK;
+    const MOST_NODES: u64 = INDEX_MASK as u64;
 
     /// Moves children to slots such that visiting slots in ascending order of `slot ^ octant of the
     /// ray` is about front to back: greedily, the child and the slot of best agreement first. Slots

@@ -44,13 +44,7 @@ impl Leaves {
     /// # Errors
     /// More entries than a reference can address, with both numbers.
     pub fn new(soup: &TriangleSoup, order: &[u32], indexed: bool) -> Result<Self, AccelError> {
-        if order.len() as u64 > u64::from(FIRST_MASK) {
-            return Err(AccelError::Limit {
-                what: "triangles in the leaves".into(),
-                needed: order.len() as u64,
-                limit: FIRST_MASK.into(),
-            });
-        }
+        AccelError::check_limit("triangles in the leaves", order.len() as u64, FIRST_MASK)?;
         let record = |&id: &u32| soup.records[id as usize];
         Ok(if indexed {
             Self::Indexed(order.to_vec())

@@ -76,6 +76,39 @@ pub enum AccelError {
     Invalid(String),
 }
 
+impl AccelError {
+    /// [`AccelError::Limit`] if `needed` is more than `limit`.
+    ///
+    /// # Errors
+    /// It is, with both numbers.
+    pub fn check_limit(
+        what: impl Into<String>,
+        needed: impl Into<u64>,
+        limit: impl Into<u64>,
+    ) -> Result<(), Self> {
+        let (what, needed, limit) = (what.into(), needed.into(), limit.into());
+        if needed <= limit {
+            return Ok(());
+        }
+        Err(Self::Limit {
+            what,
+            needed,
+            limit,
+        })
+    }
+
+    /// [`AccelError::Invalid`] unless `holds`.
+    ///
+    /// # Errors
+    /// It does not; `what` says what is violated.
+    pub(crate) fn ensure(holds: bool, what: impl FnOnce() -> String) -> Result<(), Self> {
+        match holds {
+            true => Ok(()),
+            false => Err(Self::Invalid(what())),
+        }
+    }
+}
+
 /// The triangles of a scene as structures see them: the canonical records.
 #[derive(Debug, Clone, Default)]
 pub struct TriangleSoup {

@@ -272,12 +272,9 @@ impl BuiltAccel for Built {
         let parts = (self.cells.len() - self.first_part() - 1) as u64;
         StructureStats {
             nodes: self.grid.cells() + parts,
-            leaves: self.lengths().filter(|&l| l > 0).count() as u64,
-            references: self.references.len() as u64,
-            leaf_histogram: super::leaf_histogram(self.lengths()),
             depth: Some(1),
             bytes: self.buffers().bytes(),
-            ..Default::default()
+            ..StructureStats::of_cells(self.lengths())
         }
     }
 

@@ -125,18 +125,20 @@ impl Built {
     }
 
     fn check_order(&self) -> Result<(), AccelError> {
-        let wrong = |text: String| Err(AccelError::Invalid(text));
         let cells = self.grid.cells() as usize;
-        if self.cells.len() != cells + 1 || self.start(cells) != self.references.len() {
-            return wrong("the cells do not cover the references".to_owned());
-        }
+        let is_covered =
+            self.cells.len() == cells + 1 && self.start(cells) == self.references.len();
+        AccelError::ensure(is_covered, || {
+            "the cells do not cover the references".into()
+        })?;
         for cell in 0..cells {
-            if self.start(cell) > self.start(cell + 1) {
-                return wrong(format!("cell {cell}: its list runs backwards"));
-            }
-            if self.skip && self.list(cell).is_empty() == (self.cells[cell] >> START_BITS == 0) {
-                return wrong(format!("cell {cell}: its distance contradicts its list"));
-            }
+            AccelError::ensure(self.start(cell) <= self.start(cell + 1), || {
+                format!("cell {cell}: its list runs backwards")
+            })?;
+            let is_near = self.cells[cell] >> START_BITS == 0;
+            AccelError::ensure(!self.skip || self.list(cell).is_empty() != is_near, || {
+                format!("cell {cell}: its distance contradicts its list")
+            })?;
         }
         Ok(())
     }
@@ -171,15 +173,11 @@ impl BuiltAccel for Built {
     }
 
     fn stats(&self) -> StructureStats {
-        let cells = self.grid.cells() as usize;
-        let lengths = || (0..cells).map(|cell| self.list(cell).len());
+        let lengths = (0..self.grid.cells() as usize).map(|cell| self.list(cell).len());
         StructureStats {
-            nodes: cells as u64,
-            leaves: lengths().filter(|&l| l > 0).count() as u64,
-            references: self.references.len() as u64,
-            leaf_histogram: super::leaf_histogram(lengths()),
+            nodes: self.grid.cells(),
             bytes: self.buffers().bytes(),
-            ..Default::default()
+            ..StructureStats::of_cells(lengths)
         }
     }
 

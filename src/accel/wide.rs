@@ -73,14 +73,9 @@ fn wide_tree(soup: &TriangleSoup, params: &Params, log: &mut BuildLog) -> Result
         NodeKind::Leaf { count, .. } => count,
         NodeKind::Inner { .. } => 0,
     });
-    match largest.max() {
-        Some(count) if count > 1 => Err(AccelError::Limit {
-            what: "triangles of a leaf before the collapse".into(),
-            needed: count.into(),
-            limit: 1,
-        }),
-        _ => Ok(tree),
-    }
+    let largest = largest.max().unwrap_or(0);
+    AccelError::check_limit("triangles of a leaf before the collapse", largest, 1_u64)?;
+    Ok(tree)
 }
 
 /// A node of a wide structure, as what the structures share sees it.
@@ -92,7 +87,7 @@ pub trait WideNode: Pod + Send + Sync {
     /// Most children.
     const WIDTH: usize;
     /// Most nodes.
-    const MOST_NODES: u32;
+    const MOST_NODES: u64;
 
     /// Moves the children of a node with this box to the slots they are to have.
     fn arrange(_bounds: &Bounds, _children: &mut Vec<WideChild>) {}
@@ -134,13 +129,8 @@ impl<N: WideNode> Wide<N> {
         let wide = log.phase("collapse", || {
             WideTree::collapse(&tree, &settings, N::arrange)
         });
-        if wide.nodes.len() as u64 > u64::from(N::MOST_NODES) {
-            return Err(AccelError::Limit {
-                what: format!("nodes of a {}", N::STRUCTURE),
-                needed: wide.nodes.len() as u64,
-                limit: N::MOST_NODES.into(),
-            });
-        }
+        let what = format!("nodes of a {}", N::STRUCTURE);
+        AccelError::check_limit(what, wide.nodes.len() as u64, N::MOST_NODES)?;
         Ok(Box::new(log.phase("layout", || {
             let nodes: Vec<N> = wide.nodes.iter().map(|slots| N::pack(slots)).collect();
             let leaf_triangles = wide.records(soup);

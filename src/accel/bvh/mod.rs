@@ -178,14 +178,7 @@ pub(super) fn check_leaves(tree: &Tree) -> Result<(), AccelError> {
         NodeKind::Leaf { count, .. } => *count,
     };
     let fullest = tree.nodes.iter().map(|n| count(&n.kind)).max().unwrap_or(0);
-    if fullest > COUNT_MASK {
-        return Err(AccelError::Limit {
-            what: "triangles in one leaf of a bvh".into(),
-            needed: fullest.into(),
-            limit: COUNT_MASK.into(),
-        });
-    }
-    Ok(())
+    AccelError::check_limit("triangles in one leaf of a bvh", fullest, COUNT_MASK)
 }
 
 impl BuiltAccel for BuiltBvh {

@@ -80,14 +80,8 @@ impl AccelKind for MetaBvh {
 /// Refuses more entries than references can address: like triangles, by `FIRST_MASK`.
 fn check_entries(instances: usize, rebraid: usize) -> Result<(), AccelError> {
     let needed = instances as u64 * rebraid.max(1) as u64;
-    if needed <= u64::from(FIRST_MASK) {
-        return Ok(());
-    }
-    Err(AccelError::Limit {
-        what: "entries of the upper level of a meta-bvh".into(),
-        needed,
-        limit: FIRST_MASK.into(),
-    })
+    let what = "entries of the upper level of a meta-bvh";
+    AccelError::check_limit(what, needed, FIRST_MASK)
 }
 
 pub(super) struct Built {

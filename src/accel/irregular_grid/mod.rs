@@ -305,17 +305,11 @@ impl BuiltAccel for Built {
     }
 
     fn stats(&self) -> StructureStats {
-        let mut lengths = vec![0usize; self.count()];
-        for (number, length) in lengths.iter_mut().enumerate() {
-            *length = self.list(self.cells[4 * number + 3]).count();
-        }
+        let lists = self.cells.chunks_exact(4).map(|words| words[3]);
         StructureStats {
-            nodes: lengths.len() as u64,
-            leaves: lengths.iter().filter(|&&l| l > 0).count() as u64,
-            references: (self.words.len() - self.first_reference) as u64,
-            leaf_histogram: super::leaf_histogram(lengths.into_iter()),
+            nodes: self.count() as u64,
             bytes: self.buffers().bytes(),
-            ..Default::default()
+            ..StructureStats::of_cells(lists.map(|list| self.list(list).count()))
         }
     }
 
