@@ -13,7 +13,7 @@ fn composition(structure: &str) -> Composition {
         .constant("SHARED_SEQUENCE", 0)
         .constant("SHARED_DECORRELATION", 0)
         .constant("MAX_DEPTH", 4);
-    for feature in ["textures", "emitters", "mirrors", "environment", "daylight"] {
+    for feature in ["textures", "lights", "mirror", "daylight"] {
         out = out.feature(feature, true);
     }
     out
@@ -112,7 +112,7 @@ fn faults_of_all_kinds_are_told_with_file_and_line() {
         ),
         (
             "a fault in a shader",
-            "shading/light",
+            "shading/light/triangles",
             "let root = sqrt(point.x)",
             "let root = sqrt(point.w)",
             "",

@@ -121,9 +121,7 @@ fn with_features(mut kernel: Composition, names: &[&str], mask: usize) -> Compos
     for (bit, name) in names.iter().enumerate() {
         kernel = kernel.feature(name, mask >> bit & 1 == 1);
     }
-    // Daylight is a kind of environment, never without one.
-    let daylight = kernel.features.contains("daylight");
-    kernel.feature("environment", daylight)
+    kernel
 }
 
 /// Why the kernel breaks WebGPU's default limits, if it does.

@@ -6,6 +6,7 @@ mod discrepancy;
 mod doctor;
 mod estimate;
 mod failure;
+mod faults;
 mod list;
 mod output;
 mod points;

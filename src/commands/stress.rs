@@ -2,18 +2,15 @@
 
 use super::arguments::DeviceArguments;
 use super::failure::{FAILED, Failure};
+use super::faults::plant_faults;
 use super::output::{print, tell, warn};
-use anyhow::Context as _;
 use clap::Args;
-use raystone::atomic::write_atomic;
 use raystone::config::{Params, Variant};
 use raystone::report::{stress_tables, write_stress_page};
 use raystone::run::Registries;
 use raystone::scene::{LoadOptions, load};
-use raystone::stress::mutants::{self, Options, Outcome};
 use raystone::stress::record::{Record, write};
 use raystone::stress::{Settings, run};
-use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -48,7 +45,7 @@ pub struct Stress {
     /// A model to shoot at from inside, its holes closed [default: none]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Run the planted faults instead: each must turn a check red
+    /// In a checkout, run the planted faults instead: each must turn a check red; takes --out and --adapter
     #[arg(long)]
     mutants: bool,
     /// Folder for the records and the page
@@ -61,7 +58,7 @@ pub struct Stress {
 impl Stress {
     pub fn execute(self) -> Result<ExitCode, Failure> {
         if self.mutants {
-            return self.plant_faults();
+            return plant_faults(&self.out, self.device.adapter.as_ref());
         }
         if let Some(model) = &self.model {
             check_model(model)?;
@@ -89,41 +86,6 @@ impl Stress {
         Ok(match records.iter().any(is_missed_target) {
             true => ExitCode::from(FAILED),
             false => ExitCode::SUCCESS,
-        })
-    }
-
-    /// Runs the faults, prints their table and writes `mutants.jsonl`.
-    fn plant_faults(&self) -> Result<ExitCode, Failure> {
-        let options = Options {
-            adapter: self.device.adapter.clone().unwrap_or_default(),
-            folder: self.out.join("mutants"),
-            names: Vec::new(),
-        };
-        std::fs::create_dir_all(&options.folder)
-            .with_context(|| format!("cannot make {}", options.folder.display()))
-            .map_err(Failure::input)?;
-        let shows = std::io::stderr().is_terminal();
-        let progress = |outcome: &Outcome| {
-            if shows {
-                tell(&format!(
-                    "{}: {:?}",
-                    outcome.mutant.name,
-                    outcome.killed_by()
-                ));
-            }
-        };
-        let report = mutants::run(&options, &progress).map_err(Failure::input)?;
-        let path = self.out.join("mutants.jsonl");
-        let lines: Result<Vec<String>, _> =
-            report.records().iter().map(serde_json::to_string).collect();
-        let text = lines.map_err(Failure::input)?.join("\n") + "\n";
-        write_atomic(&path, text.as_bytes())
-            .with_context(|| format!("cannot write {}", path.display()))
-            .map_err(Failure::input)?;
-        print(&format!("{}records: {}\n", report.table(), path.display()))?;
-        Ok(match report.is_passed() {
-            true => ExitCode::SUCCESS,
-            false => ExitCode::from(FAILED),
         })
     }
 

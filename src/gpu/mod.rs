@@ -4,23 +4,31 @@
 //! to the variable of the same name, so that no binding number, struct offset or size is typed twice.
 
 mod adapter;
+mod bindings;
+mod buffers;
 mod compose;
 mod diagnose;
-mod dispatch;
 mod environment;
 mod kernel_errors;
 mod pipeline;
+mod player;
 mod probe;
+mod recording;
+mod slices;
 mod uniform;
 
 pub use adapter::{AdapterChoice, AdapterSummary, Gpu, adapters, open};
+pub use bindings::{Bindings, MAX_PARTS, Storage};
+pub use buffers::Elapsed;
 pub use compose::{ComposedKernel, Composition, KernelLibrary};
-pub use dispatch::{Dispatch, Elapsed, groups_for};
 pub use environment::{Environment, capture, cpu_model, device_type};
 pub(crate) use kernel_errors::LOOPS_CUT;
 pub use kernel_errors::{KERNEL_ERRORS, kernel_errors};
-pub use pipeline::{Bindings, MAX_PARTS, Pipeline, TEXELS_PER_ROW, WORKGROUP_SIZE};
+pub use pipeline::{Pipeline, TEXELS_PER_ROW, WORKGROUP_SIZE};
+pub use player::Player;
 pub use probe::{ArithmeticProbe, probe_arithmetic};
+pub use recording::{Dispatch, Groups, Played, Recording, groups_for};
+pub use slices::Slices;
 pub use uniform::UniformValues;
 
 use thiserror::Error;
@@ -85,6 +93,18 @@ pub enum GpuError {
         needed: u64,
         /// The adapter's limit.
         limit: u64,
+    },
+    /// A step of a recording asks for more workgroups than the adapter runs.
+    #[error(
+        "step `{step}` asks for {groups:?} workgroups, but this adapter runs at most {limit} in each direction"
+    )]
+    TooManyGroups {
+        /// Name of the step.
+        step: String,
+        /// Workgroups in x, y, z.
+        groups: [u32; 3],
+        /// The adapter's limit.
+        limit: u32,
     },
     /// The driver ended loops early, and what was computed is wrong.
     #[error(

@@ -1,26 +1,24 @@
-//! Pipelines and bind groups, by reflection of the composed kernel.
+//! Pipelines, by reflection of the composed kernel.
 
 use super::GpuError;
 use super::adapter::Gpu;
 use super::compose::{ComposedKernel, Composition};
-use super::dispatch::check;
-use super::uniform::UniformValues;
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, OnceLock};
+use std::time::Instant;
 
 /// Invocations per workgroup of every one-dimensional kernel.
 pub const WORKGROUP_SIZE: u32 = 64;
 
 /// Texels in a row of an array that is read as a texture; twin of `kernels/common/texels.wesl`.
 pub const TEXELS_PER_ROW: u32 = 8192;
-const TEXEL_BYTES: u64 = 16;
-const TEXEL_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
+pub(super) const TEXEL_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
 /// Compiled pipelines by composition and runtime checks, then by the hash of the kernel library.
 pub(super) type PipelineCache = HashMap<(Composition, bool), BTreeMap<String, Arc<Pipeline>>>;
 
 #[derive(Debug, Clone, PartialEq)]
-enum BindingKind {
+pub(super) enum BindingKind {
     Storage {
         writable: bool,
     },
@@ -28,16 +26,16 @@ enum BindingKind {
         size: u32,
         members: Vec<(String, u32)>,
     },
-    /// A storage array read as texels of `rgba32uint`, see [`Bindings::buffer`].
+    /// A storage array read as texels of `rgba32uint`, see [`super::Bindings::buffer`].
     Texels,
 }
 
 #[derive(Debug, Clone)]
-struct Binding {
-    group: u32,
-    binding: u32,
-    name: String,
-    kind: BindingKind,
+pub(super) struct Binding {
+    pub group: u32,
+    pub binding: u32,
+    pub name: String,
+    pub kind: BindingKind,
 }
 
 /// A compute pipeline with what it binds.
@@ -45,98 +43,12 @@ pub struct Pipeline {
     /// The kernel.
     pub kernel: ComposedKernel,
     pub(super) compute: wgpu::ComputePipeline,
-    layouts: Vec<wgpu::BindGroupLayout>,
-    bindings: Vec<Binding>,
-}
-
-/// A storage buffer, and its copy in a texture once a kernel asked for that.
-#[derive(Clone)]
-struct Array {
-    buffer: wgpu::Buffer,
-    texels: Arc<OnceLock<wgpu::TextureView>>,
-}
-
-/// Buffers and uniform values by the names that kernels give them.
-#[derive(Default, Clone)]
-pub struct Bindings {
-    buffers: BTreeMap<String, Array>,
-    uniforms: BTreeMap<String, UniformValues>,
-    /// Arrays in several parts: how many parts, and `vec4`s in all but the last.
-    parts: BTreeMap<String, (usize, u32)>,
-}
-
-/// Parts that an array may have at most; kernels declare as many.
-pub const MAX_PARTS: usize = 4;
-
-impl Bindings {
-    /// Nothing bound.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Binds a storage buffer to the kernel variable `name`. A kernel that declares the variable as
-    /// `texture_storage_2d<rgba32uint, read>` gets a copy in rows of [`TEXELS_PER_ROW`], made when it
-    /// is first bound: the buffer must have its content by then, and must keep it.
-    pub fn buffer(&mut self, name: &str, buffer: &wgpu::Buffer) -> &mut Self {
-        let array = Array {
-            buffer: buffer.clone(),
-            texels: Arc::default(),
-        };
-        self.buffers.insert(name.to_owned(), array);
-        self
-    }
-
-    /// Sets the members of the uniform variable `name`.
-    pub fn uniform(&mut self, name: &str, values: UniformValues) -> &mut Self {
-        self.uniforms.insert(name.to_owned(), values);
-        self
-    }
-
-    /// Binds an array of `vec4` in parts (see [`Gpu::storage_parts`]): the kernel variables `name`,
-    /// `name_1`, …
-    pub fn parts(&mut self, name: &str, (buffers, vec4s): &(Vec<wgpu::Buffer>, u32)) -> &mut Self {
-        for (index, buffer) in buffers.iter().enumerate() {
-            self.buffer(&part_name(name, index), buffer);
-        }
-        if buffers.len() > 1 {
-            self.parts.insert(name.to_owned(), (buffers.len(), *vec4s));
-        }
-        self
-    }
-
-    /// `composition` with what arrays in several parts ask of kernels: the features `name_1`, … and
-    /// the constant `NAME_PART`.
-    #[must_use]
-    pub fn compose(&self, mut composition: Composition) -> Composition {
-        for (name, (count, vec4s)) in &self.parts {
-            for index in 1..*count {
-                composition = composition.feature(&part_name(name, index), true);
-            }
-            composition = composition.constant(&format!("{}_PART", name.to_uppercase()), *vec4s);
-        }
-        composition
-    }
-
-    /// Everything of `other` on top of this.
-    #[must_use]
-    pub fn merged(&self, other: &Bindings) -> Bindings {
-        let mut out = self.clone();
-        out.buffers
-            .extend(other.buffers.iter().map(|(k, v)| (k.clone(), v.clone())));
-        out.uniforms
-            .extend(other.uniforms.iter().map(|(k, v)| (k.clone(), v.clone())));
-        out.parts
-            .extend(other.parts.iter().map(|(k, v)| (k.clone(), *v)));
-        out
-    }
-}
-
-/// Name of the kernel variable that binds a part of an array.
-fn part_name(name: &str, index: usize) -> String {
-    match index {
-        0 => name.to_owned(),
-        _ => format!("{name}_{index}"),
-    }
+    pub(super) layouts: Vec<wgpu::BindGroupLayout>,
+    pub(super) bindings: Vec<Binding>,
+    /// Milliseconds of composition and of the driver's front end.
+    made_ms: f64,
+    /// Milliseconds of its first dispatch, which did nothing: drivers compile then, if not before.
+    pub(super) first_ms: OnceLock<f64>,
 }
 
 fn reflect(kernel: &ComposedKernel) -> Vec<Binding> {
@@ -233,10 +145,11 @@ impl Gpu {
         if let Some(pipeline) = known(&|other, _| other == library) {
             return Ok(pipeline);
         }
+        let start = Instant::now();
         let kernel = self.kernels.compose(&key.0)?;
         let pipeline = match known(&|_, pipeline| pipeline.kernel.wgsl == kernel.wgsl) {
             Some(pipeline) => pipeline,
-            None => Arc::new(self.compile(kernel, runtime_checks)?),
+            None => Arc::new(self.compile(kernel, runtime_checks, start)?),
         };
         if let Ok(mut cache) = self.pipelines.lock() {
             let known = cache.entry(key).or_default();
@@ -245,7 +158,12 @@ impl Gpu {
         Ok(pipeline)
     }
 
-    fn compile(&self, kernel: ComposedKernel, runtime_checks: bool) -> Result<Pipeline, GpuError> {
+    fn compile(
+        &self,
+        kernel: ComposedKernel,
+        runtime_checks: bool,
+        start: Instant,
+    ) -> Result<Pipeline, GpuError> {
         let bindings = reflect(&kernel);
         let storage = |b: &&Binding| matches!(b.kind, BindingKind::Storage { .. });
         let needed = bindings.iter().filter(storage).count() as u64;
@@ -321,158 +239,25 @@ impl Gpu {
             compute,
             layouts,
             bindings,
+            made_ms: start.elapsed().as_secs_f64() * 1e3,
+            first_ms: OnceLock::new(),
         })
-    }
-
-    /// Bind groups of `pipeline` with the buffers and values of `given`.
-    ///
-    /// # Errors
-    /// The kernel wants a name that was not given, a buffer exceeds the adapter's limit, or the
-    /// device is lost.
-    pub(super) fn bind(
-        &self,
-        pipeline: &Pipeline,
-        given: &Bindings,
-    ) -> Result<Vec<wgpu::BindGroup>, GpuError> {
-        let mut uniforms = BTreeMap::new();
-        for binding in &pipeline.bindings {
-            if let BindingKind::Uniform { size, members } = &binding.kind {
-                let unbound = |what: String| pipeline.unbound(&what, given.uniforms.keys());
-                let values = given
-                    .uniforms
-                    .get(&binding.name)
-                    .ok_or_else(|| unbound(binding.name.clone()))?;
-                let bytes = values
-                    .pack(*size, members)
-                    .map_err(|member| unbound(format!("{}.{member}", binding.name)))?;
-                let buffer = self.filled(&binding.name, &bytes, wgpu::BufferUsages::UNIFORM)?;
-                uniforms.insert(binding.name.clone(), buffer);
-            }
-        }
-        let mut groups = Vec::new();
-        for (group, layout) in pipeline.layouts.iter().enumerate() {
-            let mut entries = Vec::new();
-            for binding in pipeline
-                .bindings
-                .iter()
-                .filter(|b| b.group as usize == group)
-            {
-                let resource = match binding.kind {
-                    BindingKind::Uniform { .. } => uniforms
-                        .get(&binding.name)
-                        .map(wgpu::Buffer::as_entire_binding),
-                    BindingKind::Storage { .. } => given
-                        .buffers
-                        .get(&binding.name)
-                        .map(|array| self.bound_buffer(&binding.name, array))
-                        .transpose()?,
-                    BindingKind::Texels => given
-                        .buffers
-                        .get(&binding.name)
-                        .map(|array| self.bound_texels(&binding.name, array))
-                        .transpose()?,
-                };
-                entries.push(wgpu::BindGroupEntry {
-                    binding: binding.binding,
-                    resource: resource
-                        .ok_or_else(|| pipeline.unbound(&binding.name, given.buffers.keys()))?,
-                });
-            }
-            groups.push(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: None,
-                layout,
-                entries: &entries,
-            }));
-        }
-        Ok(groups)
-    }
-
-    fn bound_buffer<'a>(
-        &self,
-        name: &str,
-        array: &'a Array,
-    ) -> Result<wgpu::BindingResource<'a>, GpuError> {
-        let limit = self.limits.max_storage_buffer_binding_size;
-        check(name, array.buffer.size(), limit)?;
-        Ok(array.buffer.as_entire_binding())
-    }
-
-    fn bound_texels<'a>(
-        &self,
-        name: &str,
-        array: &'a Array,
-    ) -> Result<wgpu::BindingResource<'a>, GpuError> {
-        let rows = (array.buffer.size() / TEXEL_BYTES).div_ceil(u64::from(TEXELS_PER_ROW));
-        let limit = u64::from(self.limits.max_texture_dimension_2d);
-        if rows.max(u64::from(TEXELS_PER_ROW)) > limit {
-            return Err(GpuError::TooLarge {
-                name: format!("{name}, as a texture"),
-                needed: array.buffer.size(),
-                limit: limit * u64::from(TEXELS_PER_ROW) * TEXEL_BYTES,
-            });
-        }
-        let view = array
-            .texels
-            .get_or_init(|| self.texels(name, &array.buffer, rows as u32));
-        Ok(wgpu::BindingResource::TextureView(view))
-    }
-
-    /// The content of `buffer` as a texture.
-    fn texels(&self, name: &str, buffer: &wgpu::Buffer, rows: u32) -> wgpu::TextureView {
-        let texels = (buffer.size() / TEXEL_BYTES) as u32;
-        let extent = |width, height| wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        };
-        let texture = self.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(name),
-            size: extent(TEXELS_PER_ROW, rows.max(1)),
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: TEXEL_FORMAT,
-            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        });
-        let mut encoder = self
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let (whole, rest) = (texels / TEXELS_PER_ROW, texels % TEXELS_PER_ROW);
-        for (first, size) in [(0, extent(TEXELS_PER_ROW, whole)), (whole, extent(rest, 1))] {
-            if size.width == 0 || size.height == 0 {
-                continue;
-            }
-            let row_bytes = TEXELS_PER_ROW * TEXEL_BYTES as u32;
-            encoder.copy_buffer_to_texture(
-                wgpu::TexelCopyBufferInfo {
-                    buffer,
-                    layout: wgpu::TexelCopyBufferLayout {
-                        offset: u64::from(first) * u64::from(row_bytes),
-                        bytes_per_row: Some(row_bytes),
-                        rows_per_image: None,
-                    },
-                },
-                wgpu::TexelCopyTextureInfo {
-                    texture: &texture,
-                    mip_level: 0,
-                    origin: wgpu::Origin3d {
-                        x: 0,
-                        y: first,
-                        z: 0,
-                    },
-                    aspect: wgpu::TextureAspect::All,
-                },
-                size,
-            );
-        }
-        self.queue.submit([encoder.finish()]);
-        texture.create_view(&wgpu::TextureViewDescriptor::default())
     }
 }
 
 impl Pipeline {
-    fn unbound<'a>(&self, binding: &str, known: impl Iterator<Item = &'a String>) -> GpuError {
+    /// Milliseconds that the first use of this kernel cost: composition, the driver's front end, and a
+    /// dispatch of no workgroups, in which drivers compile that did not so before. `None` until then; no
+    /// other time contains it.
+    pub fn cold_ms(&self) -> Option<f64> {
+        Some(self.made_ms + self.first_ms.get()?)
+    }
+
+    pub(super) fn unbound<'a>(
+        &self,
+        binding: &str,
+        known: impl Iterator<Item = &'a String>,
+    ) -> GpuError {
         GpuError::Unbound {
             kernel: self.kernel.composition.entry.clone(),
             binding: binding.to_owned(),

@@ -1,9 +1,7 @@
 //! What the adapter's arithmetic and loops do, found out at start.
 
 use super::compose::Composition;
-use super::dispatch::{Dispatch, groups_for};
-use super::pipeline::Bindings;
-use super::{Gpu, GpuError, LOOPS_CUT, UniformValues};
+use super::{Bindings, Dispatch, Gpu, GpuError, LOOPS_CUT, UniformValues, groups_for};
 use crate::accel::triangle::product_error;
 use serde::{Deserialize, Serialize};
 

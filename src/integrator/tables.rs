@@ -11,24 +11,21 @@ use glam::Vec3;
 pub struct SceneFeatures {
     /// Some material has a base-colour texture.
     pub textures: bool,
-    /// Some material emits.
-    pub emitters: bool,
+    /// There are lights that can be sampled: materials that emit.
+    pub lights: bool,
     /// Some material is a mirror.
-    pub mirrors: bool,
-    /// The environment is not black.
-    pub environment: bool,
+    pub mirror: bool,
     /// The environment is the sky over a scene without a light.
     pub daylight: bool,
 }
 
 impl SceneFeatures {
     /// Feature names as kernels write them, with whether they are on.
-    pub fn flags(&self) -> [(&'static str, bool); 5] {
+    pub fn flags(&self) -> [(&'static str, bool); 4] {
         [
             ("textures", self.textures),
-            ("emitters", self.emitters),
-            ("mirrors", self.mirrors),
-            ("environment", self.environment),
+            ("lights", self.lights),
+            ("mirror", self.mirror),
             ("daylight", self.daylight),
         ]
     }
@@ -98,12 +95,11 @@ impl SceneBuffers {
             transform_error: TransformError::of(soup),
             features: SceneFeatures {
                 textures: textured,
-                emitters: !lights.is_empty(),
-                mirrors: scene
+                lights: !lights.is_empty(),
+                mirror: scene
                     .materials
                     .iter()
                     .any(|m| m.kind == MaterialKind::Mirror),
-                environment: scene.environment != Vec3::ZERO,
                 daylight: scene.daylight.is_some(),
             },
             environment: scene.environment.to_array(),

@@ -24,14 +24,10 @@ const HEADER: u32 = 1;
 pub struct SamplerTable(Vec<u32>);
 
 impl SamplerTable {
-    pub(super) fn new(sequence: &[u32], decorrelation: &[u32]) -> Self {
+    /// A table of the words of a sequence and those of a decorrelation.
+    pub fn new(sequence: &[u32], decorrelation: &[u32]) -> Self {
         let header = [HEADER + sequence.len() as u32];
         Self([&header, sequence, decorrelation].concat())
-    }
-
-    /// A table of these words, header included: for faults that kernel and twin share.
-    pub(crate) fn from_words(words: Vec<u32>) -> Self {
-        Self(words)
     }
 
     /// All words, as the device gets them.

@@ -4,7 +4,7 @@ use super::Framing;
 use glam::Vec3;
 
 /// A sky over a scene without a light: grey from below to above, and a soft key light from above, left
-/// and in front, so that shapes show. Its radiance is `kernels/shading/environment.wesl` times
+/// and in front, so that shapes show. Its radiance is `kernels/shading/light/sky.wesl` times
 /// [`super::SceneData::environment`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Daylight {

@@ -10,7 +10,6 @@ pub mod bench;
 pub mod case;
 pub mod explain;
 pub mod families;
-pub mod mutants;
 pub mod numerics;
 pub mod place;
 pub mod record;

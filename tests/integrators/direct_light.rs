@@ -5,7 +5,7 @@ use crate::support::*;
 use raystone::gpu::Gpu;
 
 const DIRECT: &str = "result += throughput * direct_light(surface, depth, sampler);";
-const WEIGHT: &str = "weight = found_weight(ray, hit.t, surface, cosine_pdf);";
+const WEIGHT: &str = "weight = density / (density + light_pdf(surface, hit.t));";
 
 fn estimate(gpu: &Gpu, spp: u32) -> Estimate {
     let stage = Stage::builtin(gpu, "cornell-box", &[]);

@@ -1,0 +1,249 @@
+//! What kernels bind: buffers and uniform values by the names that kernels give them.
+
+use super::GpuError;
+use super::adapter::Gpu;
+use super::buffers::check;
+use super::compose::Composition;
+use super::pipeline::{Binding, BindingKind, Pipeline, TEXEL_FORMAT, TEXELS_PER_ROW};
+use super::uniform::UniformValues;
+use std::collections::BTreeMap;
+use std::sync::{Arc, OnceLock};
+
+const TEXEL_BYTES: u64 = 16;
+
+/// Parts that an array may have at most; kernels declare as many.
+pub const MAX_PARTS: usize = 4;
+
+/// A storage buffer: one that the caller keeps, or one of the player's own.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Storage {
+    /// The caller's.
+    Own(wgpu::Buffer),
+    /// One that the [`super::Player`] makes when it is first asked for, and lends out again under the same
+    /// name. What it holds at first is unspecified.
+    Scratch {
+        /// Its name, which all recordings of a player share.
+        name: String,
+        /// Bytes that are needed; it may have more.
+        bytes: u64,
+    },
+}
+
+impl Storage {
+    /// A buffer of the player's.
+    pub fn scratch(name: &str, bytes: u64) -> Self {
+        Self::Scratch {
+            name: name.to_owned(),
+            bytes,
+        }
+    }
+}
+
+impl From<&wgpu::Buffer> for Storage {
+    fn from(buffer: &wgpu::Buffer) -> Self {
+        Self::Own(buffer.clone())
+    }
+}
+
+impl From<&Storage> for Storage {
+    fn from(storage: &Storage) -> Self {
+        storage.clone()
+    }
+}
+
+/// A storage buffer, and its copy in a texture once a kernel asked for that.
+#[derive(Clone)]
+struct Array {
+    storage: Storage,
+    texels: Arc<OnceLock<wgpu::TextureView>>,
+}
+
+/// Buffers and uniform values by the names that kernels give them.
+#[derive(Default, Clone)]
+pub struct Bindings {
+    buffers: BTreeMap<String, Array>,
+    pub(super) uniforms: BTreeMap<String, UniformValues>,
+    /// Arrays in several parts: how many parts, and `vec4`s in all but the last.
+    parts: BTreeMap<String, (usize, u32)>,
+}
+
+/// What a binding of a kernel is bound to.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) enum Resource {
+    Buffer(wgpu::Buffer),
+    Texels(wgpu::TextureView),
+}
+
+impl Resource {
+    pub(super) fn binding(&self) -> wgpu::BindingResource<'_> {
+        match self {
+            Self::Buffer(buffer) => buffer.as_entire_binding(),
+            Self::Texels(view) => wgpu::BindingResource::TextureView(view),
+        }
+    }
+}
+
+impl Bindings {
+    /// Nothing bound.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Binds a storage buffer to the kernel variable `name`. A kernel that declares the variable as
+    /// `texture_storage_2d<rgba32uint, read>` gets a copy in rows of [`TEXELS_PER_ROW`], made when it
+    /// is first bound: the buffer must have its content by then, and must keep it.
+    pub fn buffer(&mut self, name: &str, storage: impl Into<Storage>) -> &mut Self {
+        let array = Array {
+            storage: storage.into(),
+            texels: Arc::default(),
+        };
+        self.buffers.insert(name.to_owned(), array);
+        self
+    }
+
+    /// What is bound to the kernel variable `name`.
+    pub fn storage(&self, name: &str) -> Option<&Storage> {
+        self.buffers.get(name).map(|array| &array.storage)
+    }
+
+    /// Every buffer.
+    pub(super) fn storages(&self) -> impl Iterator<Item = &Storage> {
+        self.buffers.values().map(|array| &array.storage)
+    }
+
+    /// Sets the members of the uniform variable `name`.
+    pub fn uniform(&mut self, name: &str, values: UniformValues) -> &mut Self {
+        self.uniforms.insert(name.to_owned(), values);
+        self
+    }
+
+    /// Binds an array of `vec4` in parts (see [`Gpu::storage_parts`]): the kernel variables `name`,
+    /// `name_1`, …
+    pub fn parts(&mut self, name: &str, (buffers, vec4s): &(Vec<wgpu::Buffer>, u32)) -> &mut Self {
+        for (index, buffer) in buffers.iter().enumerate() {
+            self.buffer(&part_name(name, index), buffer);
+        }
+        if buffers.len() > 1 {
+            self.parts.insert(name.to_owned(), (buffers.len(), *vec4s));
+        }
+        self
+    }
+
+    /// `composition` with what arrays in several parts ask of kernels: the features `name_1`, … and
+    /// the constant `NAME_PART`.
+    #[must_use]
+    pub fn compose(&self, mut composition: Composition) -> Composition {
+        for (name, (count, vec4s)) in &self.parts {
+            for index in 1..*count {
+                composition = composition.feature(&part_name(name, index), true);
+            }
+            composition = composition.constant(&format!("{}_PART", name.to_uppercase()), *vec4s);
+        }
+        composition
+    }
+
+    /// Everything of `other` on top of this.
+    #[must_use]
+    pub fn merged(&self, other: &Bindings) -> Bindings {
+        let (mut out, other) = (self.clone(), other.clone());
+        out.buffers.extend(other.buffers);
+        out.uniforms.extend(other.uniforms);
+        out.parts.extend(other.parts);
+        out
+    }
+
+    /// What a storage binding of a kernel is bound to; `lend` finds the buffer.
+    pub(super) fn resource<'a>(
+        &self,
+        gpu: &Gpu,
+        pipeline: &Pipeline,
+        binding: &Binding,
+        lend: impl Fn(&Storage) -> Option<&'a wgpu::Buffer>,
+    ) -> Result<Resource, GpuError> {
+        let name = &binding.name;
+        let unbound = || pipeline.unbound(name, self.buffers.keys());
+        let array = self.buffers.get(name).ok_or_else(unbound)?;
+        let buffer = match &array.storage {
+            Storage::Own(buffer) => buffer,
+            scratch => lend(scratch).ok_or_else(unbound)?,
+        };
+        if binding.kind == BindingKind::Texels {
+            return texels_of(gpu, name, array, buffer).map(Resource::Texels);
+        }
+        let limit = gpu.limits.max_storage_buffer_binding_size;
+        check(name, buffer.size(), limit)?;
+        Ok(Resource::Buffer(buffer.clone()))
+    }
+}
+
+/// Name of the kernel variable that binds a part of an array.
+fn part_name(name: &str, index: usize) -> String {
+    match index {
+        0 => name.to_owned(),
+        _ => format!("{name}_{index}"),
+    }
+}
+
+/// The copy of an array in a texture.
+fn texels_of(
+    gpu: &Gpu,
+    name: &str,
+    array: &Array,
+    buffer: &wgpu::Buffer,
+) -> Result<wgpu::TextureView, GpuError> {
+    if matches!(array.storage, Storage::Scratch { .. }) {
+        let text = format!("`{name}` is scratch, whose content changes: it cannot be a texture");
+        return Err(GpuError::Driver(text));
+    }
+    let rows = (buffer.size() / TEXEL_BYTES).div_ceil(u64::from(TEXELS_PER_ROW));
+    let limit = u64::from(gpu.limits.max_texture_dimension_2d);
+    if rows.max(u64::from(TEXELS_PER_ROW)) > limit {
+        return Err(GpuError::TooLarge {
+            name: format!("{name}, as a texture"),
+            needed: buffer.size(),
+            limit: limit * u64::from(TEXELS_PER_ROW) * TEXEL_BYTES,
+        });
+    }
+    let made = array
+        .texels
+        .get_or_init(|| copy_to_texture(gpu, name, buffer, rows as u32));
+    Ok(made.clone())
+}
+
+/// The content of `buffer` as a texture.
+fn copy_to_texture(gpu: &Gpu, name: &str, buffer: &wgpu::Buffer, rows: u32) -> wgpu::TextureView {
+    let texels = (buffer.size() / TEXEL_BYTES) as u32;
+    let extent = |width, height| wgpu::Extent3d {
+        width,
+        height,
+        depth_or_array_layers: 1,
+    };
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(name),
+        size: extent(TEXELS_PER_ROW, rows.max(1)),
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: TEXEL_FORMAT,
+        usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let (whole, rest) = (texels / TEXELS_PER_ROW, texels % TEXELS_PER_ROW);
+    for (first, size) in [(0, extent(TEXELS_PER_ROW, whole)), (whole, extent(rest, 1))] {
+        if size.width == 0 || size.height == 0 {
+            continue;
+        }
+        let row_bytes = TEXELS_PER_ROW * TEXEL_BYTES as u32;
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: u64::from(first) * u64::from(row_bytes),
+            bytes_per_row: Some(row_bytes),
+            rows_per_image: None,
+        };
+        let mut target = texture.as_image_copy();
+        target.origin.y = first;
+        encoder.copy_buffer_to_texture(wgpu::TexelCopyBufferInfo { buffer, layout }, target, size);
+    }
+    gpu.queue.submit([encoder.finish()]);
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}

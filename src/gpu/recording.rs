@@ -1,0 +1,216 @@
+//! What the device is to do, step by step, written down before anything is done; a [`Player`] plays it.
+
+use super::adapter::Gpu;
+use super::bindings::{Bindings, Storage};
+use super::buffers::Elapsed;
+use super::pipeline::{Pipeline, WORKGROUP_SIZE};
+use super::{GpuError, Player};
+use bytemuck::Pod;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// WebGPU's limit on workgroups per dimension.
+const MAX_GROUPS: u32 = 65535;
+
+/// How many workgroups a kernel runs in.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Groups {
+    /// So many in x, y, z.
+    Direct([u32; 3]),
+    /// As many as three words of this buffer say when the step's turn has come, from this byte on.
+    Indirect(Storage, u64),
+}
+
+impl From<[u32; 3]> for Groups {
+    fn from(groups: [u32; 3]) -> Self {
+        Self::Direct(groups)
+    }
+}
+
+/// Workgroups for `items` invocations of a one-dimensional kernel; kernels compute their index as
+/// `x + y * WORKGROUP_SIZE * num_workgroups.x`.
+pub fn groups_for(items: u32) -> [u32; 3] {
+    let groups = items.div_ceil(WORKGROUP_SIZE).max(1);
+    if groups <= MAX_GROUPS {
+        [groups, 1, 1]
+    } else {
+        [MAX_GROUPS, groups.div_ceil(MAX_GROUPS), 1]
+    }
+}
+
+/// A kernel that runs.
+#[derive(Clone)]
+pub(super) struct Run {
+    pub name: String,
+    pub pipeline: Arc<Pipeline>,
+    pub bindings: Bindings,
+    pub groups: Groups,
+}
+
+#[derive(Clone)]
+pub(super) enum Step {
+    Clear(Storage),
+    Copy { from: Storage, to: Storage },
+    Run(Box<Run>),
+    Download { name: String, from: Storage },
+}
+
+/// A list of steps for the device. Nothing happens before it is played: [`Player::play`].
+#[derive(Clone, Default)]
+pub struct Recording {
+    pub(super) steps: Vec<Step>,
+}
+
+impl Recording {
+    /// No steps yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Whether there are no steps.
+    pub fn is_empty(&self) -> bool {
+        self.steps.is_empty()
+    }
+
+    /// Fills a buffer with zeros.
+    pub fn clear(&mut self, buffer: impl Into<Storage>) -> &mut Self {
+        self.steps.push(Step::Clear(buffer.into()));
+        self
+    }
+
+    /// Copies the whole of one buffer over the beginning of another.
+    pub fn copy(&mut self, from: impl Into<Storage>, to: impl Into<Storage>) -> &mut Self {
+        let (from, to) = (from.into(), to.into());
+        self.steps.push(Step::Copy { from, to });
+        self
+    }
+
+    /// Runs a kernel. Its time is told under `name`.
+    pub fn run(
+        &mut self,
+        name: &str,
+        pipeline: &Arc<Pipeline>,
+        bindings: &Bindings,
+        groups: impl Into<Groups>,
+    ) -> &mut Self {
+        self.steps.push(Step::Run(Box::new(Run {
+            name: name.to_owned(),
+            pipeline: Arc::clone(pipeline),
+            bindings: bindings.clone(),
+            groups: groups.into(),
+        })));
+        self
+    }
+
+    /// Brings what a buffer holds by then to the host, under `name`.
+    pub fn download(&mut self, name: &str, from: impl Into<Storage>) -> &mut Self {
+        let (name, from) = (name.to_owned(), from.into());
+        self.steps.push(Step::Download { name, from });
+        self
+    }
+
+    /// The runs among the steps.
+    pub(super) fn runs(&self) -> impl Iterator<Item = &Run> {
+        self.steps.iter().filter_map(|step| match step {
+            Step::Run(run) => Some(&**run),
+            _ => None,
+        })
+    }
+
+    /// Every buffer that a step names.
+    pub(super) fn storages(&self) -> impl Iterator<Item = &Storage> {
+        self.steps.iter().flat_map(|step| {
+            let mut all: Vec<&Storage> = Vec::new();
+            match step {
+                Step::Clear(buffer) | Step::Download { from: buffer, .. } => all.push(buffer),
+                Step::Copy { from, to } => all.extend([from, to]),
+                Step::Run(run) => {
+                    all.extend(run.bindings.storages());
+                    if let Groups::Indirect(buffer, _) = &run.groups {
+                        all.push(buffer);
+                    }
+                }
+            }
+            all
+        })
+    }
+
+    /// The kernels that it runs, each once, in order: milliseconds that the first use of each cost, in
+    /// composition and in the driver, once it was played. See [`Pipeline::cold_ms`].
+    pub fn cold_ms(&self) -> Vec<(String, Option<f64>)> {
+        let mut seen: Vec<&Arc<Pipeline>> = Vec::new();
+        for run in self.runs() {
+            if !seen.iter().any(|known| Arc::ptr_eq(known, &run.pipeline)) {
+                seen.push(&run.pipeline);
+            }
+        }
+        let entry = |p: &Arc<Pipeline>| p.kernel.composition.entry.clone();
+        seen.iter().map(|p| (entry(p), p.cold_ms())).collect()
+    }
+}
+
+/// What a recording took and brought back.
+#[derive(Debug, Clone, Default)]
+pub struct Played {
+    /// Milliseconds by the wall clock from submission to completion.
+    pub wall_ms: f64,
+    /// Names of the runs, each with the milliseconds between the GPU timestamps around it; `None` where
+    /// there are none.
+    pub runs: Vec<(String, Option<f64>)>,
+    pub(super) downloads: BTreeMap<String, Vec<u8>>,
+}
+
+impl Played {
+    /// The sum over all runs, and the wall clock.
+    pub fn elapsed(&self) -> Elapsed {
+        let add = |sum: Option<f64>, (_, ms): &(String, Option<f64>)| Some(sum? + (*ms)?);
+        Elapsed {
+            gpu_ms: self.runs.iter().fold(Some(0.0), add),
+            wall_ms: self.wall_ms,
+        }
+    }
+
+    /// What was downloaded under `name`.
+    ///
+    /// # Errors
+    /// Nothing was.
+    pub fn download<T: Pod>(&self, name: &str) -> Result<Vec<T>, GpuError> {
+        let bytes = self.downloads.get(name);
+        let bytes = bytes.ok_or_else(|| {
+            GpuError::Driver(format!("the recording downloads nothing called `{name}`"))
+        })?;
+        Ok(bytemuck::pod_collect_to_vec(bytes))
+    }
+}
+
+/// One dispatch: which kernel, over what.
+pub struct Dispatch<'a> {
+    /// The kernel.
+    pub pipeline: &'a Arc<Pipeline>,
+    /// Its buffers and values.
+    pub bindings: &'a Bindings,
+    /// Workgroups in x, y, z.
+    pub groups: [u32; 3],
+}
+
+impl Gpu {
+    /// Runs one dispatch to its end and measures it.
+    ///
+    /// # Errors
+    /// As [`Player::play`].
+    pub fn run(&self, dispatch: &Dispatch) -> Result<Elapsed, GpuError> {
+        let mut recording = Recording::new();
+        recording.run("", dispatch.pipeline, dispatch.bindings, dispatch.groups);
+        Ok(Player::new(self).play(&recording)?.elapsed())
+    }
+
+    /// Copies a buffer to the host.
+    ///
+    /// # Errors
+    /// The device is lost or does not finish in time.
+    pub fn read<T: Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
+        let mut recording = Recording::new();
+        recording.download("", buffer);
+        Player::new(self).play(&recording)?.download("")
+    }
+}

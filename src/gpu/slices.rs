@@ -1,0 +1,95 @@
+//! Work in slices: no dispatch should run for longer than a fraction of a second, so that no driver's
+//! watchdog strikes and progress moves.
+
+use super::Elapsed;
+use std::cell::Cell;
+
+/// A slice should take about so long, milliseconds.
+const SLICE_MS: f64 = 250.0;
+/// A slice is at most so many times as large as the one before.
+const GROWTH: u64 = 8;
+
+/// How many items (rays, samples of pixels) fit into a slice, learnt from the slices before.
+#[derive(Debug)]
+pub struct Slices {
+    fitting: Cell<u64>,
+    least: u64,
+}
+
+impl Slices {
+    /// Begins with `first` items, which should be few: what a slice takes is as yet unknown.
+    pub fn starting_with(first: u64) -> Self {
+        Self {
+            fitting: Cell::new(first.max(1)),
+            least: 1,
+        }
+    }
+
+    /// Never hands out fewer than `least` items.
+    #[must_use]
+    pub fn at_least(mut self, least: u64) -> Self {
+        self.least = least.max(1);
+        self
+    }
+
+    /// Items that fit into a slice.
+    pub fn fitting(&self) -> u64 {
+        self.fitting.get().max(self.least)
+    }
+
+    /// The slice that begins at `first`, of what ends at `end`.
+    pub fn next(&self, first: u32, end: u32) -> u32 {
+        self.fitting().min(u64::from(end.saturating_sub(first))) as u32
+    }
+
+    /// Learns from a slice of `items`. A short remainder says little and makes no slice smaller.
+    pub fn learn(&self, items: u64, elapsed: Elapsed) {
+        let was = self.fitting();
+        let ms = elapsed.ms().max(0.1);
+        if 2 * items >= was || ms > SLICE_MS {
+            let now = (items as f64 * SLICE_MS / ms) as u64;
+            self.fitting.set(now.min(was.saturating_mul(GROWTH)).max(1));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The slices of `total` items of which one takes `ms_per_item`.
+    fn slices(slices: &Slices, total: u32, ms_per_item: f64) -> Vec<u32> {
+        let (mut first, mut out) = (0, Vec::new());
+        while first < total {
+            let count = slices.next(first, total);
+            slices.learn(
+                u64::from(count),
+                Elapsed {
+                    gpu_ms: None,
+                    wall_ms: f64::from(count) * ms_per_item,
+                },
+            );
+            out.push(count);
+            first += count;
+        }
+        out
+    }
+
+    #[test]
+    fn slices_cover_everything_grow_by_steps_and_end_at_a_quarter_of_a_second() {
+        let known = Slices::starting_with(64);
+        let first = slices(&known, 100_000, 0.1);
+        assert_eq!(first[..4], [64, 512, 2500, 2500]);
+        assert_eq!(first.iter().sum::<u32>(), 100_000);
+        assert!(first.iter().all(|n| f64::from(*n) * 0.1 <= SLICE_MS));
+        // The remainder of the turn before made no slice smaller.
+        assert_eq!(slices(&known, 2_600, 0.1), [2500, 100]);
+        assert_eq!(known.fitting(), 2500);
+    }
+
+    #[test]
+    fn a_slice_that_took_too_long_is_followed_by_a_small_one() {
+        let slow = Slices::starting_with(64).at_least(8);
+        assert_eq!(slices(&slow, 80, 1000.0), [64, 8, 8]);
+    }
+}

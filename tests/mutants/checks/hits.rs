@@ -1,0 +1,89 @@
+//! Checks of structures: hits and counted work.
+
+use super::{Bench, Finding};
+use crate::plant::Faulty;
+use crate::subject::{Changes, build};
+use crate::world::Case;
+use raystone::accel::{Counters, Ray};
+use raystone::gpu::ArithmeticProbe;
+use raystone::integrator::{SceneBuffers, Traced};
+use raystone::measure::batch::{Query, count_work};
+use raystone::measure::gate::gate;
+use raystone::measure::record::GateVerdict;
+
+/// Rays whose work is counted, of each scene.
+const COUNTED_RAYS: usize = 2048;
+
+/// The gate on these cases, whose judges are as strict as the case is.
+pub fn same_hits(bench: &Bench, name: &str, changes: Changes, cases: &[Case]) -> Finding {
+    let probe = ArithmeticProbe {
+        unfused: bench.exact,
+        exact_division: bench.exact,
+        exact_sqrt: bench.exact,
+        exact_products: bench.exact,
+        denormals: bench.exact,
+    };
+    for Case { stage, judge } in cases {
+        let built = build(name, changes, &stage.soup)?;
+        let traced = Traced::upload(bench.gpu, &Faulty::new(&*built, bench.plant)?)?;
+        let buffers = SceneBuffers::upload(bench.gpu, &stage.scene, &stage.soup)?;
+        let soup = &stage.soup;
+        let verdict = gate(bench.gpu, &buffers, soup, &traced, judge, &probe, true)?;
+        if !verdict.passed {
+            let what = evidence(&verdict);
+            return Ok(Some(format!("{}: {what}", stage.scene.name)));
+        }
+    }
+    Ok(None)
+}
+
+fn evidence(verdict: &GateVerdict) -> String {
+    if let Some(error) = verdict.kernel_errors.first() {
+        return error.clone();
+    }
+    let wrong: usize = verdict.classes.iter().map(|c| c.wrong).sum();
+    let rays: usize = verdict.classes.iter().map(|c| c.rays).sum();
+    let first = verdict.classes.iter().find_map(|c| c.first_wrong.clone());
+    format!(
+        "{wrong} of {rays} rays differ; first: {}",
+        first.unwrap_or_default()
+    )
+}
+
+/// Counted work of closest-hit and any-hit queries against the twin's, ray by ray, on one soup and one
+/// scene.
+pub fn same_work(bench: &Bench, name: &str, changes: Changes) -> Finding {
+    let soups = bench.world.soups.iter().take(1);
+    for Case { stage, judge } in soups.chain(bench.world.scenes.iter().skip(2).take(1)) {
+        let built = build(name, changes, &stage.soup)?;
+        let Some(twin) = built.cpu_twin(&stage.soup) else {
+            continue;
+        };
+        let traced = Traced::upload(bench.gpu, &Faulty::new(&*built, bench.plant)?)?;
+        let buffers = SceneBuffers::upload(bench.gpu, &stage.scene, &stage.soup)?;
+        let all = judge.sets.iter().flat_map(|set| &set.rays);
+        let count = all.clone().count();
+        let rays: Vec<Ray> = all
+            .step_by((count / COUNTED_RAYS).max(1))
+            .copied()
+            .collect();
+        for query in [Query::Closest, Query::Any] {
+            let found = count_work(bench.gpu, &buffers, &traced, query, &rays)?;
+            for (index, (ray, found)) in rays.iter().zip(&found).enumerate() {
+                let mut expected = Counters::default();
+                if query == Query::Any {
+                    twin.any_hit(ray, &mut expected);
+                } else {
+                    twin.closest_hit(ray, &mut expected);
+                }
+                if *found != expected {
+                    return Ok(Some(format!(
+                        "{}: ray {index}, {query:?}: {found:?}, twin {expected:?}",
+                        stage.scene.name
+                    )));
+                }
+            }
+        }
+    }
+    Ok(None)
+}

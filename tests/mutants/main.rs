@@ -1,0 +1,191 @@
+//! The checks of the project see what is wrong: faults that are planted on purpose must turn them red,
+//! and nothing else may.
+//!
+//! `raystone stress --mutants` runs the ignored test, which plants all of them.
+
+mod checks;
+mod command;
+mod plan;
+mod plant;
+mod report;
+mod soups;
+mod subject;
+mod table;
+mod world;
+
+use checks::Check;
+use plan::{CheckError, Mutant, MutantError, Options};
+use plant::Plant;
+use raystone::gpu::AdapterChoice;
+use report::{Outcome, Report, Verdict};
+use std::collections::BTreeSet;
+use std::io::IsTerminal as _;
+use std::path::PathBuf;
+use subject::Subject;
+use table::mutants;
+
+/// One fault of each kind, cheap ones.
+const SUBSET: [&str; 13] = [
+    "tie-broken-the-other-way",
+    "child-dropped-by-the-builder",
+    "near-and-far-swapped-in-order-only",
+    "rope-reversed",
+    "wrong-octant-in-the-group",
+    "quantisation-rounded-inwards-4",
+    "dda-exits-early",
+    "kd-near-and-far-swapped",
+    "world-not-restored",
+    "shift-reused-for-two-dimensions",
+    "pair-of-one-number",
+    "wrong-direction-number",
+    "pdf-forgotten",
+];
+
+fn run(names: &[&str]) -> (Report, Vec<String>) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let options = Options {
+        adapter: AdapterChoice::Best,
+        folder: folder.path().to_owned(),
+        names: names.iter().map(|&name| name.to_owned()).collect(),
+    };
+    let told = std::sync::Mutex::new(Vec::new());
+    let note = |outcome: &Outcome| {
+        let name = outcome.mutant.name.to_owned();
+        println!("{name}: {:?}, {:.0} ms", outcome.killed_by(), outcome.ms);
+        told.lock().expect("no panic elsewhere").push(name);
+    };
+    let report = plan::run(&options, &note).unwrap_or_else(|e| panic!("{e}"));
+    (report, told.into_inner().expect("no panic elsewhere"))
+}
+
+#[test]
+fn every_fault_of_the_table_still_applies() {
+    plan::check_table().unwrap_or_else(|e| panic!("{e}"));
+    let all = mutants();
+    assert!(all.len() >= 40, "{} faults", all.len());
+    let names: BTreeSet<_> = all.iter().map(|m| m.name).collect();
+    assert_eq!(names.len(), all.len(), "two faults of one name");
+    for mutant in &all {
+        let checks = mutant.subject.checks();
+        assert!(checks.contains(&mutant.expected), "{}", mutant.name);
+        if let Plant::Kernel { from, to, .. } = mutant.plant {
+            assert_ne!(from, to, "{}", mutant.name);
+        }
+    }
+    let structures = raystone::accel::AccelRegistry::default();
+    for kind in structures.iter() {
+        let has =
+            |s: &Subject| matches!(s, Subject::Structure { name, .. } if *name == kind.name());
+        assert!(
+            all.iter().any(|m| has(&m.subject)),
+            "no fault for {}",
+            kind.name()
+        );
+    }
+}
+
+#[test]
+fn the_page_lists_every_fault_with_what_goes_wrong() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/mutants.md");
+    let text = std::fs::read_to_string(&path).expect("docs/mutants.md");
+    let mut missing = Vec::new();
+    for mutant in mutants() {
+        let row = format!("| `{}` | {} | ", mutant.name, mutant.what);
+        if !text.contains(&row) {
+            missing.push(row);
+        }
+    }
+    assert!(
+        missing.is_empty(),
+        "docs/mutants.md lacks:\n{}",
+        missing.join("\n")
+    );
+    assert!(!text.contains("| `no-such-fault` |"));
+}
+
+#[test]
+fn a_fault_of_each_kind_is_seen_by_the_check_that_should_see_it_and_the_sound_ones_are_green() {
+    let (report, told) = run(&SUBSET);
+    println!("{}", report.table());
+    assert_eq!(report.mutants.len(), SUBSET.len());
+    assert_eq!(
+        BTreeSet::from_iter(told),
+        BTreeSet::from(SUBSET.map(str::to_owned))
+    );
+    assert!(report.is_passed(), "{}", report.table());
+    for outcome in &report.mutants {
+        let expected = Some(outcome.mutant.expected);
+        assert_eq!(outcome.killed_by(), expected, "{}", outcome.mutant.name);
+    }
+    for control in &report.controls {
+        assert!(!control.green.is_empty(), "{}", control.subject.label());
+    }
+    for record in report.records() {
+        let line = serde_json::to_string(&record).expect("a line");
+        assert!(
+            line.starts_with(r#"{"kind":"mutant","#) && !line.contains('\n'),
+            "{line}"
+        );
+    }
+}
+
+/// Reads what the command hands over: where kernels, records and table go, and which adapter.
+#[test]
+#[ignore = "some minutes: all faults; `raystone stress --mutants` runs this"]
+fn every_fault_of_the_table_is_seen_or_explained() {
+    let temporary = tempfile::tempdir().expect("a temporary folder");
+    let out = std::env::var_os("RAYSTONE_MUTANTS_OUT").map(PathBuf::from);
+    let adapter = std::env::var("RAYSTONE_MUTANTS_ADAPTER").unwrap_or_default();
+    let options = Options {
+        adapter: match adapter.as_str() {
+            "" => AdapterChoice::Best,
+            name => name.parse().unwrap_or_default(),
+        },
+        folder: match &out {
+            Some(out) => out.join("mutants"),
+            None => temporary.path().to_owned(),
+        },
+        names: Vec::new(),
+    };
+    let shows = std::io::stderr().is_terminal();
+    let progress = |outcome: &Outcome| {
+        if shows {
+            eprintln!("{}: {:?}", outcome.mutant.name, outcome.killed_by());
+        }
+    };
+    let report = plan::run(&options, &progress).unwrap_or_else(|e| panic!("{e}"));
+    let out = out.unwrap_or(options.folder);
+    report
+        .write(&out)
+        .unwrap_or_else(|e| panic!("{}: {e}", out.display()));
+    println!("{}", report.table());
+    assert!(report.is_passed(), "{}", report.verdict());
+}
+
+#[test]
+fn a_run_is_not_passed_with_a_survivor_or_a_red_control() {
+    let (mut report, _) = run(&["tie-broken-the-other-way"]);
+    assert!(report.is_passed(), "{}", report.table());
+    let sound = report.clone();
+    report.mutants[0].verdict = Verdict::Survived;
+    assert!(!report.is_passed(), "an unexplained survivor");
+    let mut report = sound.clone();
+    report.controls[0]
+        .red
+        .push((Check::Gate, "planted".to_owned()));
+    assert!(!report.is_passed(), "a red control");
+    let mut report = sound;
+    report.mutants.clear();
+    assert!(!report.is_passed(), "nothing was run");
+}
+
+#[test]
+fn a_name_that_does_not_exist_is_an_error() {
+    let options = Options {
+        adapter: AdapterChoice::Best,
+        folder: std::env::temp_dir(),
+        names: vec!["no-such-fault".to_owned()],
+    };
+    let error = plan::run(&options, &|_| {}).expect_err("no such mutant");
+    assert!(matches!(error, MutantError::Unknown(_)), "{error}");
+}

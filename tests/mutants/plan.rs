@@ -1,0 +1,293 @@
+//! The gate tests itself: named faults are planted one at a time in kernels, in what builders hand
+//! out, and in the tables of samplers, and the project's own checks must turn red for each of them
+//! (mutation testing: R. DeMillo, R. Lipton, F. Sayward, "Hints on test data selection", 1978).
+//!
+//! A check that no fault can turn red proves nothing, and neither does one that is red without a
+//! fault: the same run therefore puts every sound subject through every check, and a mutant counts as
+//! killed only if its sound subject is green.
+//!
+//! Kernels are changed through an override folder, as a user would with `--kernels`: the folder of
+//! each mutant stays behind, so that a survivor can be looked at with every other command.
+
+use crate::checks::{Bench, Check};
+use crate::plant::Plant;
+use crate::report::{ControlOutcome, Outcome, Report, Verdict};
+use crate::subject::Subject;
+use crate::table::mutants;
+use crate::world::World;
+use raystone::accel::AccelError;
+use raystone::gpu::{AdapterChoice, Gpu, GpuError, KernelLibrary, probe_arithmetic};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+use thiserror::Error;
+
+/// At least this part of the faults must be killed.
+pub const LEAST_KILLED: f64 = 0.95;
+
+/// A named fault.
+#[derive(Debug, Clone, Copy)]
+pub struct Mutant {
+    /// Name as a user types it.
+    pub name: &'static str,
+    /// One line: what goes wrong.
+    pub what: &'static str,
+    /// What it is planted in.
+    pub plant: Plant,
+    /// What is put through the checks.
+    pub subject: Subject,
+    /// The check that should turn red.
+    pub expected: Check,
+    /// Why no check can see it, if none can.
+    pub equivalent: Option<&'static str>,
+}
+
+/// Why a mutation run ends without a verdict.
+#[derive(Debug, Error)]
+pub enum MutantError {
+    /// The fault does not apply any more.
+    #[error(
+        "stale mutant `{name}`: {problem}; adapt its row in tests/mutants/table to what stands there now"
+    )]
+    Stale {
+        /// Which one.
+        name: String,
+        /// What was looked for and what was found.
+        problem: String,
+    },
+    /// No mutant of this name.
+    #[error("there is no mutant `{0}`; `raystone stress --mutants` without names runs all of them")]
+    Unknown(String),
+    /// The mutated kernel cannot be run at all, or the device is gone: nothing is proven.
+    #[error("mutant `{name}`: {source}")]
+    Gpu {
+        /// Which one.
+        name: String,
+        /// What happened.
+        source: GpuError,
+    },
+    /// Checks could not be carried out, with the reason.
+    #[error("mutant `{name}`: {problem}")]
+    Failed {
+        /// Which one.
+        name: String,
+        /// What happened.
+        problem: String,
+    },
+}
+
+/// Why a check was not carried out.
+#[derive(Debug, Error)]
+pub enum CheckError {
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    #[error(transparent)]
+    Accel(#[from] AccelError),
+    #[error("{0}")]
+    Stale(String),
+    #[error("{0}")]
+    Other(String),
+}
+
+impl CheckError {
+    fn of(self, name: &str) -> MutantError {
+        let name = name.to_owned();
+        match self {
+            Self::Gpu(source) => MutantError::Gpu { name, source },
+            Self::Stale(problem) => MutantError::Stale { name, problem },
+            other => MutantError::Failed {
+                name,
+                problem: other.to_string(),
+            },
+        }
+    }
+}
+
+/// What to run.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Which adapter.
+    pub adapter: AdapterChoice,
+    /// Where the changed kernels are written, one folder for each mutant.
+    pub folder: PathBuf,
+    /// Names of mutants; none stands for all.
+    pub names: Vec<String>,
+}
+
+/// Plants the faults one after the other (in parallel, a device each) and tells which checks turn
+/// red. `progress` hears of each mutant as soon as it is decided.
+///
+/// # Errors
+/// An unknown name, a fault that no longer applies (whatever is selected: the whole table is
+/// checked), no adapter, or a check that cannot be carried out.
+pub fn run(options: &Options, progress: &(dyn Fn(&Outcome) + Sync)) -> Result<Report, MutantError> {
+    let start = Instant::now();
+    check_table()?;
+    let selected = select(&options.names)?;
+    let subjects = subjects_of(&selected);
+    let world = World::new(options, &selected).map_err(|e| e.of("(none)"))?;
+    let jobs: Vec<Job> = subjects
+        .into_iter()
+        .map(Job::Control)
+        .chain(selected.into_iter().map(Job::Mutant))
+        .collect();
+    let done = in_parallel(&jobs, |job| match job {
+        Job::Control(subject) => control(options, &world, *subject).map(Done::Control),
+        Job::Mutant(mutant) => {
+            let outcome = decide(options, &world, mutant)?;
+            progress(&outcome);
+            Ok(Done::Mutant(outcome))
+        }
+    })?;
+    let mut report = Report::new(&world);
+    for one in done {
+        match one {
+            Done::Control(outcome) => report.controls.push(outcome),
+            Done::Mutant(outcome) => report.mutants.push(outcome),
+        }
+    }
+    report.distrust_red_controls();
+    report.seconds = start.elapsed().as_secs_f64();
+    Ok(report)
+}
+
+/// Does all jobs on as many threads as there are, and returns the results in the order of the jobs.
+/// Not by rayon: builders use it, and a thread that waits for a builder's part would meanwhile begin
+/// another job, whose time would count for both.
+fn in_parallel<T: Sync, R: Send>(
+    jobs: &[T],
+    work: impl Fn(&T) -> Result<R, MutantError> + Sync,
+) -> Result<Vec<R>, MutantError> {
+    let next = AtomicUsize::new(0);
+    let one_thread = || {
+        let mut done = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(job) = jobs.get(index) else {
+                return Ok(done);
+            };
+            let result = work(job).inspect_err(|_| next.store(jobs.len(), Ordering::Relaxed))?;
+            done.push((index, result));
+        }
+    };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut done = Vec::with_capacity(jobs.len());
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..threads).map(|_| scope.spawn(one_thread)).collect();
+        for thread in threads {
+            let part = thread.join();
+            done.extend(part.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
+        }
+        Ok(())
+    })?;
+    done.sort_by_key(|(index, _)| *index);
+    Ok(done.into_iter().map(|(_, result)| result).collect())
+}
+
+enum Job {
+    Control(Subject),
+    Mutant(Mutant),
+}
+
+enum Done {
+    Control(ControlOutcome),
+    Mutant(Outcome),
+}
+
+/// Checks that every fault of the table still applies to the embedded kernels, without running any.
+///
+/// # Errors
+/// The first stale mutant.
+pub fn check_table() -> Result<(), MutantError> {
+    let library = KernelLibrary::default();
+    for mutant in mutants() {
+        let stale = |e: CheckError| e.of(mutant.name);
+        mutant.plant.changed_text(&library).map_err(stale)?;
+    }
+    Ok(())
+}
+
+fn select(names: &[String]) -> Result<Vec<Mutant>, MutantError> {
+    let all = mutants();
+    if names.is_empty() {
+        return Ok(all);
+    }
+    let find = |name: &String| all.iter().find(|m| m.name == name).copied();
+    let found = names.iter().map(|name| {
+        let unknown = || MutantError::Unknown(name.clone());
+        find(name).ok_or_else(unknown)
+    });
+    found.collect()
+}
+
+fn subjects_of(mutants: &[Mutant]) -> Vec<Subject> {
+    let mut subjects: Vec<Subject> = Vec::new();
+    for mutant in mutants {
+        if !subjects.contains(&mutant.subject) {
+            subjects.push(mutant.subject);
+        }
+    }
+    subjects
+}
+
+/// A device with these kernels, and whether it computes like the host.
+pub fn open(options: &Options, kernels: KernelLibrary) -> Result<(Gpu, bool), GpuError> {
+    let gpu = raystone::gpu::open(&options.adapter, kernels)?;
+    let exact = probe_arithmetic(&gpu)?.is_exact();
+    Ok((gpu, exact))
+}
+
+/// Puts a sound subject through every check.
+fn control(
+    options: &Options,
+    world: &World,
+    subject: Subject,
+) -> Result<ControlOutcome, MutantError> {
+    let start = Instant::now();
+    let label = subject.label();
+    let failed = |e: CheckError| e.of(&format!("none, {label}"));
+    let (gpu, exact) = open(options, KernelLibrary::default()).map_err(|e| failed(e.into()))?;
+    let bench = Bench::new(&gpu, exact, world, &Plant::Nothing);
+    let mut outcome = ControlOutcome::new(&subject);
+    for check in subject.checks() {
+        match bench.carry_out(*check, &subject).map_err(failed)? {
+            _ if !check.is_possible(exact) => {}
+            None => outcome.green.push(*check),
+            Some(evidence) => outcome.red.push((*check, evidence)),
+        }
+    }
+    outcome.ms = start.elapsed().as_secs_f64() * 1e3;
+    Ok(outcome)
+}
+
+/// Runs the checks of a mutant, cheapest first, until one turns red.
+fn decide(options: &Options, world: &World, mutant: &Mutant) -> Result<Outcome, MutantError> {
+    let start = Instant::now();
+    let failed = |e: CheckError| e.of(mutant.name);
+    let folder = options.folder.join(mutant.name);
+    let library = mutant.plant.library(&folder).map_err(failed)?;
+    let (gpu, exact) = open(options, library).map_err(|e| failed(e.into()))?;
+    let bench = Bench::new(&gpu, exact, world, &mutant.plant);
+    let mut verdict = Verdict::Survived;
+    for check in mutant.subject.checks() {
+        if !check.is_possible(exact) {
+            continue;
+        }
+        let finding = match bench.carry_out(*check, &mutant.subject) {
+            // A kernel that does not come to its end is seen by whoever waits for it.
+            Err(CheckError::Gpu(e @ (GpuError::Timeout { .. } | GpuError::Lost(_)))) => {
+                Some(e.to_string())
+            }
+            other => other.map_err(failed)?,
+        };
+        if let Some(evidence) = finding {
+            verdict = Verdict::Killed {
+                by: *check,
+                evidence,
+            };
+            break;
+        }
+    }
+    let ms = start.elapsed().as_secs_f64() * 1e3;
+    Ok(Outcome::new(mutant, verdict, ms))
+}

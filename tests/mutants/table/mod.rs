@@ -1,0 +1,79 @@
+//! The faults, one row each.
+
+mod binary;
+mod cells;
+mod ends;
+mod hard;
+mod image;
+mod instanced;
+mod late_samples;
+mod samplers;
+mod wide;
+mod words;
+
+use crate::subject::Changes;
+use crate::{Check, Mutant, Plant, Subject};
+use raystone::accel::GpuBuffers;
+
+/// All faults.
+pub fn mutants() -> Vec<Mutant> {
+    [
+        binary::MUTANTS,
+        wide::MUTANTS,
+        cells::MUTANTS,
+        instanced::MUTANTS,
+        ends::MUTANTS,
+        hard::MUTANTS,
+        samplers::MUTANTS,
+        late_samples::MUTANTS,
+        image::MUTANTS,
+    ]
+    .concat()
+}
+
+const fn structure(name: &'static str, changes: Changes) -> Subject {
+    Subject::Structure { name, changes }
+}
+
+const fn row(
+    name: &'static str,
+    what: &'static str,
+    plant: Plant,
+    subject: Subject,
+    expected: Check,
+) -> Mutant {
+    Mutant {
+        name,
+        what,
+        plant,
+        subject,
+        expected,
+        equivalent: None,
+    }
+}
+
+/// A fault that no check can be relied on to see, and why.
+const fn equivalent(mutant: Mutant, why: &'static str) -> Mutant {
+    Mutant {
+        equivalent: Some(why),
+        ..mutant
+    }
+}
+
+/// A text that stands in the kernel once.
+const fn text(file: &'static str, from: &'static str, to: &'static str) -> Plant {
+    texts(file, from, to, 1)
+}
+
+const fn texts(file: &'static str, from: &'static str, to: &'static str, times: usize) -> Plant {
+    Plant::Kernel {
+        file,
+        from,
+        to,
+        times,
+    }
+}
+
+const fn built(part: &'static str, change: fn(&mut GpuBuffers) -> usize) -> Plant {
+    Plant::Built { part, change }
+}

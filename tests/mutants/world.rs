@@ -1,0 +1,151 @@
+//! What all mutants are put through, made once: scenes with rays and answers, and reference images.
+
+use crate::plan::open;
+use crate::soups::{lattice_judge, lattice_scene};
+use crate::{CheckError, Mutant, Options, Plant, Subject, checks};
+use glam::Vec3;
+use raystone::accel::TriangleSoup;
+use raystone::config::{Gate, ParamValue};
+use raystone::geometry::{Camera, Triangle};
+use raystone::gpu::KernelLibrary;
+use raystone::image::Image;
+use raystone::measure::gate::Judge;
+use raystone::scene::{LoadOptions, LoadReport, Material, SceneData, builtin_scenes, load};
+
+/// Seeds of the integer-grid soups.
+const SOUPS: [u64; 3] = [40, 41, 42];
+
+/// Scenes of the gate: walls that meet in edges, a closed mesh, copies that are moved and turned, and its
+/// second scene.
+const SCENES: &[(&str, &[(&str, i64)])] = &[
+    ("cornell-box", &[]),
+    ("displaced-sphere", &[("triangles", 800)]),
+    ("instances", &[("count", 12), ("detail", 80)]),
+    ("far-corners", &[]),
+];
+
+const GATE: Gate = Gate {
+    rays: 1600,
+    brute_force_tests: 4_000_000,
+    oracle_rays: 64,
+    ao_length: 0.0,
+    offset: 0.0,
+};
+
+/// A scene with rays and answers.
+pub struct Case {
+    pub stage: Stage,
+    pub judge: Judge,
+}
+
+/// A scene on the host.
+pub struct Stage {
+    pub scene: SceneData,
+    pub soup: TriangleSoup,
+    pub camera: Camera,
+}
+
+impl Stage {
+    /// A scene made here.
+    pub fn new(scene: SceneData) -> Self {
+        Self {
+            soup: TriangleSoup::new(&scene),
+            camera: scene.view(1.0),
+            scene,
+        }
+    }
+
+    /// A built-in scene.
+    pub fn builtin(name: &str, changes: &[(&str, ParamValue)]) -> Result<Self, CheckError> {
+        let entries = builtin_scenes();
+        let found = entries.iter().find(|e| e.name == name);
+        let unknown = || CheckError::Stale(format!("there is no scene `{name}`"));
+        let mut variant = found.ok_or_else(unknown)?.default_variant();
+        for (key, value) in changes {
+            variant.params.0.insert((*key).to_owned(), value.clone());
+        }
+        let scene = load(&variant, &LoadOptions::default());
+        Ok(Self::new(
+            scene.map_err(|e| CheckError::Other(e.to_string()))?,
+        ))
+    }
+}
+
+/// Everything that is made once.
+pub struct World {
+    /// Integer-grid soups, judged by brute force.
+    pub soups: Vec<Case>,
+    /// Built-in scenes, judged by the gate's judge.
+    pub scenes: Vec<Case>,
+    /// Images of the Cornell box by plain path tracing; empty if nothing asks for them.
+    pub reference: Vec<Image>,
+    /// The adapter's name.
+    pub adapter: String,
+}
+
+impl World {
+    /// Makes what the checks of these mutants need.
+    pub fn new(options: &Options, mutants: &[Mutant]) -> Result<Self, CheckError> {
+        let has = |wanted: fn(&Subject) -> bool| mutants.iter().any(|m| wanted(&m.subject));
+        let (gpu, exact) = open(options, KernelLibrary::default())?;
+        let mut world = Self {
+            soups: Vec::new(),
+            scenes: Vec::new(),
+            reference: Vec::new(),
+            adapter: gpu.info.name.clone(),
+        };
+        if has(|s| matches!(s, Subject::Structure { .. })) {
+            world.soups = SOUPS.map(soup).into();
+            let scenes: Result<_, CheckError> = SCENES.iter().map(scene).collect();
+            world.scenes = scenes?;
+        }
+        if has(|s| matches!(s, Subject::Integrators)) {
+            let folder = options.folder.join("reference");
+            let library = checks::plain_path_tracing(&folder)?;
+            let (gpu, _) = open(options, library)?;
+            let bench = checks::Bench::new(&gpu, exact, &world, &Plant::Nothing);
+            let images = checks::cornell_images(&bench, checks::REFERENCE)?;
+            world.reference = images;
+        }
+        Ok(world)
+    }
+}
+
+/// A scene of these triangles, one grey, under a white sky.
+pub fn plain_scene(name: String, triangles: Vec<Triangle>) -> SceneData {
+    SceneData {
+        name,
+        material_ids: vec![0; triangles.len()],
+        triangles,
+        uvs: Vec::new(),
+        materials: vec![Material::diffuse("grey", Vec3::splat(0.5))],
+        textures: Vec::new(),
+        assembly: None,
+        camera: None,
+        environment: Vec3::ONE,
+        daylight: None,
+        framing: None,
+        hash: String::new(),
+        report: LoadReport::default(),
+    }
+}
+
+fn soup(seed: u64) -> Case {
+    let stage = Stage::new(lattice_scene(seed));
+    let judge = lattice_judge(&stage.soup, seed);
+    Case { stage, judge }
+}
+
+fn scene((name, changes): &(&str, &[(&str, i64)])) -> Result<Case, CheckError> {
+    let changes: Vec<_> = changes
+        .iter()
+        .map(|&(key, value)| (key, ParamValue::Integer(value)))
+        .collect();
+    let stage = Stage::builtin(name, &changes)?;
+    let judge = Judge::new(&stage.scene, &stage.soup, stage.camera, &GATE, 1)?;
+    if judge.is_sound() {
+        return Ok(Case { stage, judge });
+    }
+    let wrong = judge.first_wrong.unwrap_or_default();
+    Err(CheckError::Other(format!("the judge is wrong: {wrong}")))
+}
