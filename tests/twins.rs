@@ -17,6 +17,9 @@ const OTHER_FILE: &[(&str, &str)] = &[
         "src/accel/instancing/meta_bvh_nested.rs",
     ),
     ("accel/object_list", "src/accel/instancing/object_list.rs"),
+    ("accel/wide", "src/accel/wide/quantise.rs"),
+    ("accel/kd_tree", "src/accel/kd_tree/mod.rs"),
+    ("accel/octree", "src/accel/octree/mod.rs"),
     ("sampling/sampler", "src/sampling/mod.rs"),
 ];
 
@@ -163,11 +166,6 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
         "products",
         "two expressions of the kernel",
     ),
-    ("accel/wide", "exponent", "build"),
-    ("accel/wide", "wide_parameters", "parameters"),
-    ("accel/wide", "wide_tree", "build"),
-    ("accel/kd_tree", "halves", "figures and validation"),
-    ("accel/kd_tree", "lacking_in_leaf", "validation"),
     ("accel/leaf", "leaf_reference", "build"),
     ("accel/leaf", "leaf_range", "unpacks in one place"),
     ("accel/bvh/boxes", "split_axis", "build"),

@@ -5,10 +5,12 @@
 //! compressed wide BVHs", HPG 2017.
 
 use super::bounds::Bounds;
-use super::collapse::{WideChild, WideKind};
 use super::ray::Hit;
 use super::twin::Query;
-use super::wide::{Quantisation, Wide, WideNode, enter_four, frame, leave_four, wide_parameters};
+use super::wide::{
+    Quantisation, Wide, WideChild, WideKind, WideNode, enter_four, frame, leave_four,
+    wide_parameters,
+};
 use super::{AccelError, AccelKind, BuildLog, BuiltAccel, TriangleSoup};
 use crate::config::{ParameterSchema, Params};
 use bytemuck::{Pod, Zeroable};

@@ -6,7 +6,6 @@ pub mod bounds;
 mod brute_force;
 mod bvh;
 mod bvh4;
-mod collapse;
 mod cwbvh;
 mod grid;
 pub mod instancing;

@@ -9,17 +9,14 @@ use super::super::leaf::{FIRST_MASK, LEAF, leaf_reference};
 use super::super::ray::Hit;
 use super::super::tree::tree_parameters;
 use super::super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, Space, TriangleSoup,
-};
+use super::super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, Space, TriangleSoup};
 use super::forest::Node;
 use super::instance::{Entry, NOTHING, is_open, leaf, level, near_and_far};
 use super::top::Top;
 use super::world_box::BoxMap;
-use super::{Base, clamped, meta_bvh_nested};
+use super::{Base, Upper, clamped, meta_bvh_nested};
 use crate::accel::StructureStats;
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
-use crate::gpu::UniformValues;
 
 /// Stands for the size of the stack when an object was entered, outside of any.
 const OUTSIDE: u32 = u32::MAX;
@@ -129,53 +126,54 @@ impl Built {
     /// Checks the tree of the upper level: boxes, and that every entry is reached once.
     fn validate_top(&self) -> Result<(), AccelError> {
         let maps: Vec<BoxMap> = self.base.instances.iter().map(BoxMap::new).collect();
-        let invalid = |text: String| Err(AccelError::Invalid(format!("upper level: {text}")));
+        let ensure = |holds, what: &dyn Fn() -> String| {
+            AccelError::ensure(holds, || format!("upper level: {}", what()))
+        };
         let first = self.root();
         let mut nodes = vec![false; self.top.nodes.len()];
         let mut entries = vec![false; self.top.entries.len()];
         let mut stack = vec![(first, Bounds::EVERYTHING, 1)];
         while let Some((index, around, depth)) = stack.pop() {
             let place = index.wrapping_sub(first) as usize;
-            if depth > self.top_stack_entries() {
-                return invalid(format!("node {place} is deeper than the stack"));
-            }
-            if nodes.get(place) != Some(&false) {
-                return invalid(format!("node {place} is missing or reached twice"));
-            }
+            let fits = depth <= self.top_stack_entries();
+            ensure(fits, &|| format!("node {place} is deeper than the stack"))?;
+            let is_new = nodes.get(place) == Some(&false);
+            ensure(is_new, &|| {
+                format!("node {place} is missing or reached twice")
+            })?;
             nodes[place] = true;
             for (reference, bounds) in self.top.nodes[place].children() {
                 if reference == NOTHING {
                     continue;
                 }
-                if !around.contains(&bounds) {
-                    return invalid(format!("node {place}: a child's box leaves its own"));
-                }
+                let what = || format!("node {place}: a child's box leaves its own");
+                ensure(around.contains(&bounds), &what)?;
                 if reference < LEAF {
                     stack.push((reference, bounds, depth + 1));
                     continue;
                 }
                 let entry = (reference & FIRST_MASK) as usize;
-                if reference != leaf_reference(entry as u32, 1)
-                    || entries.get(entry) != Some(&false)
-                {
-                    return invalid(format!("entry {entry} is missing or reached twice"));
-                }
+                let is_new = reference == leaf_reference(entry as u32, 1)
+                    && entries.get(entry) == Some(&false);
+                ensure(is_new, &|| {
+                    format!("entry {entry} is missing or reached twice")
+                })?;
                 entries[entry] = true;
                 let part = &self.top.entries[entry];
                 let object_box = self.base.forest.nodes[part.node as usize].bounds();
                 let map = &maps[part.instance as usize];
-                if !bounds.contains(&map.world_box(&object_box)) {
-                    return invalid(format!("entry {entry} sticks out of its box"));
-                }
-                if map.growth() > self.top.growth {
-                    return invalid(format!("entry {entry} needs more growth of boxes"));
-                }
+                let inside = bounds.contains(&map.world_box(&object_box));
+                ensure(inside, &|| format!("entry {entry} sticks out of its box"))?;
+                let grown = map.growth() <= self.top.growth;
+                ensure(grown, &|| {
+                    format!("entry {entry} needs more growth of boxes")
+                })?;
             }
         }
-        match (nodes.iter().chain(&entries)).position(|seen| !seen) {
-            Some(_) => invalid("a node or entry is never reached".to_owned()),
-            None => Ok(()),
-        }
+        let all_reached = nodes.iter().chain(&entries).all(|seen| *seen);
+        ensure(all_reached, &|| {
+            "a node or entry is never reached".to_owned()
+        })
     }
 
     /// Checks that the entries of each instance make up its object, each part once.
@@ -184,12 +182,13 @@ impl Built {
         let mut parts: Vec<Vec<u32>> = vec![Vec::new(); instances.len()];
         for (index, entry) in self.top.entries.iter().enumerate() {
             let instance = instances.get(entry.instance as usize);
-            if instance.map(|i| Entry::new(entry.instance, i, entry.node)) != Some(*entry) {
-                return Err(AccelError::Invalid(format!(
+            let expected = instance.map(|i| Entry::new(entry.instance, i, entry.node));
+            AccelError::ensure(expected == Some(*entry), || {
+                format!(
                     "entry {index} is not instance {} as it stands",
                     entry.instance
-                )));
-            }
+                )
+            })?;
             parts[entry.instance as usize].push(entry.node);
         }
         for (index, (instance, parts)) in instances.iter().zip(&mut parts).enumerate() {
@@ -203,19 +202,15 @@ impl Built {
                     continue;
                 }
                 let children = self.base.forest.nodes[node as usize].children();
-                if children.iter().any(|(child, _)| *child >= LEAF) {
-                    return Err(AccelError::Invalid(format!(
-                        "instance {index}: triangles below node {node} are in no entry"
-                    )));
-                }
+                AccelError::ensure(children.iter().all(|(child, _)| *child < LEAF), || {
+                    format!("instance {index}: triangles below node {node} are in no entry")
+                })?;
                 stack.extend(children.map(|(child, _)| child));
             }
-            if found != parts.len() {
-                return Err(AccelError::Invalid(format!(
-                    "instance {index}: {} entries, of which {found} are parts of their own",
-                    parts.len()
-                )));
-            }
+            let all = parts.len();
+            AccelError::ensure(found == all, || {
+                format!("instance {index}: {all} entries, of which {found} are parts of their own")
+            })?;
         }
         Ok(())
     }
@@ -229,41 +224,26 @@ impl BuiltAccel for Built {
     }
 
     fn buffers(&self) -> GpuBuffers<'_> {
-        let forest = &self.base.forest;
-        let nodes = bytemuck::cast_slice(&forest.nodes);
-        let top = bytemuck::cast_slice(&self.top.nodes);
-        let entries = bytemuck::cast_slice(&self.top.entries);
-        let first_entry = forest.nodes.len() + self.top.nodes.len();
-        let (objects, top_entries) = (forest.stack_entries(), self.top_stack_entries());
+        let nodes = self.base.forest.nodes.len();
+        let (objects, upper) = (self.base.forest.stack_entries(), self.top_stack_entries());
         // Nested loops have a stack each, of the same size.
         let (kernel, stack_entries) = match self.nested {
-            true => ("accel/meta_bvh_nested", objects.max(top_entries)),
-            false => ("accel/meta_bvh", objects + top_entries),
+            true => ("accel/meta_bvh_nested", objects.max(upper)),
+            false => ("accel/meta_bvh", objects + upper),
         };
-        GpuBuffers {
+        self.base.buffers(&Upper {
             kernel,
-            features: Vec::new(),
-            arrays: vec![
-                NamedWords {
-                    name: "nodes",
-                    words: [nodes, top, entries].concat().into(),
-                    element_bytes: 64,
-                },
-                NamedWords::new("leaf_triangles", &forest.triangles),
+            parts: [
+                bytemuck::cast_slice(&self.top.nodes),
+                bytemuck::cast_slice(&self.top.entries),
             ],
-            uniforms: vec![
-                super::super::limits(self.step_fuse(), self.top.entries.len()),
-                (
-                    "instancing",
-                    UniformValues::new()
-                        .u32("root", self.root())
-                        .u32("first_entry", first_entry as u32)
-                        .f32("growth", self.top.growth),
-                ),
-            ],
-            // Rounded up, so that scenes of like depth share a kernel.
-            constants: vec![("STACK_ENTRIES", stack_entries.next_multiple_of(8))],
-        }
+            step_fuse: self.step_fuse(),
+            entries: self.top.entries.len(),
+            root: nodes,
+            first_entry: nodes + self.top.nodes.len(),
+            growth: self.top.growth,
+            stack_entries,
+        })
     }
 
     fn divisible(&self) -> &'static [&'static str] {
@@ -272,13 +252,9 @@ impl BuiltAccel for Built {
 
     fn stats(&self) -> StructureStats {
         let forest = &self.base.forest;
-        let bytes = size_of_val(&forest.nodes[..])
-            + size_of_val(&forest.triangles[..])
-            + size_of_val(&self.top.nodes[..])
-            + size_of_val(&self.top.entries[..]);
         let below = forest.stats.depth.unwrap_or(0);
         StructureStats {
-            bytes: bytes as u64,
+            bytes: self.buffers().bytes(),
             nodes: forest.stats.nodes + self.top.nodes.len() as u64,
             depth: Some(self.top.depth + below),
             ..forest.stats.clone()

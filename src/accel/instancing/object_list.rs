@@ -8,15 +8,12 @@ use super::super::bounds::Bounds;
 use super::super::ray::Hit;
 use super::super::tree::tree_parameters;
 use super::super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, Space, TriangleSoup,
-};
-use super::Base;
+use super::super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, Space, TriangleSoup};
 use super::instance::{Entry, enter_grown, level, trace_object};
 use super::world_box::BoxMap;
+use super::{Base, Upper};
 use crate::accel::StructureStats;
 use crate::config::{ParameterSchema, Params};
-use crate::gpu::UniformValues;
 use bytemuck::{Pod, Zeroable};
 
 /// The registry entry.
@@ -115,50 +112,33 @@ impl BuiltAccel for Built {
             let listed = self.entries.get(index) == Some(&expected);
             let world_box = map.world_box(&root.bounds);
             let boxed = self.boxes.get(index).map(BoxWords::bounds);
-            if !listed || !boxed.is_some_and(|b| b.contains(&world_box)) {
-                return Err(AccelError::Invalid(format!(
-                    "instance {index} is not listed as it stands"
-                )));
-            }
-            if map.growth() > self.growth {
-                return Err(AccelError::Invalid(format!(
-                    "instance {index}: boxes grow by {}, its transform needs {}",
-                    self.growth,
-                    map.growth()
-                )));
-            }
+            AccelError::ensure(
+                listed && boxed.is_some_and(|b| b.contains(&world_box)),
+                || format!("instance {index} is not listed as it stands"),
+            )?;
+            AccelError::ensure(map.growth() <= self.growth, || {
+                let (growth, needed) = (self.growth, map.growth());
+                format!("instance {index}: boxes grow by {growth}, its transform needs {needed}")
+            })?;
         }
         Ok(())
     }
 
     fn buffers(&self) -> GpuBuffers<'_> {
-        let forest = &self.base.forest;
-        let nodes = bytemuck::cast_slice(&forest.nodes);
-        let entries = bytemuck::cast_slice(&self.entries);
-        let boxes = bytemuck::cast_slice(&self.boxes);
-        GpuBuffers {
+        let nodes = self.base.forest.nodes.len();
+        self.base.buffers(&Upper {
             kernel: "accel/object_list",
-            arrays: vec![
-                NamedWords {
-                    name: "nodes",
-                    words: [nodes, entries, boxes].concat().into(),
-                    element_bytes: 64,
-                },
-                NamedWords::new("leaf_triangles", &forest.triangles),
+            parts: [
+                bytemuck::cast_slice(&self.entries),
+                bytemuck::cast_slice(&self.boxes),
             ],
-            uniforms: vec![
-                super::super::limits(forest.nodes.len() + 1, self.entries.len()),
-                (
-                    "instancing",
-                    UniformValues::new()
-                        .u32("root", 0)
-                        .u32("first_entry", forest.nodes.len() as u32)
-                        .f32("growth", self.growth),
-                ),
-            ],
-            constants: vec![("STACK_ENTRIES", forest.stack_entries().next_multiple_of(8))],
-            ..Default::default()
-        }
+            step_fuse: nodes + 1,
+            entries: self.entries.len(),
+            root: 0,
+            first_entry: nodes,
+            growth: self.growth,
+            stack_entries: self.base.forest.stack_entries(),
+        })
     }
 
     fn divisible(&self) -> &'static [&'static str] {
@@ -166,12 +146,8 @@ impl BuiltAccel for Built {
     }
 
     fn stats(&self) -> StructureStats {
-        let bytes = size_of_val(&self.base.forest.nodes[..])
-            + size_of_val(&self.base.forest.triangles[..])
-            + size_of_val(&self.entries[..])
-            + size_of_val(&self.boxes[..]);
         StructureStats {
-            bytes: bytes as u64,
+            bytes: self.buffers().bytes(),
             ..self.base.forest.stats.clone()
         }
     }

@@ -8,11 +8,10 @@
 //! [`super::spatial`]; a level is three splits, one along each axis.
 
 mod build;
+mod validate;
 
 use super::bounds::Bounds;
 use super::ray::{Hit, Ray};
-use super::spatial::{corners, touches};
-use super::tree::Coverage;
 use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
@@ -209,116 +208,9 @@ impl Built {
     }
 }
 
-/// `validate()` on its way down: cells, and which triangles they must list.
-struct Validation<'a> {
-    built: &'a Built,
-    soup: &'a TriangleSoup,
-    blocks: Coverage<'a>,
-    listed: usize,
-}
-
-impl Validation<'_> {
-    fn cell(
-        &mut self,
-        word: u32,
-        position: [u32; 3],
-        depth: u32,
-        triangles: &[u32],
-    ) -> Result<(), AccelError> {
-        let wrong = |text: String| {
-            Err(AccelError::Invalid(format!(
-                "cell {position:?} at depth {depth}: {text}"
-            )))
-        };
-        if word & LEAF != 0 {
-            let Some(list) = self.built.list(word & !LEAF) else {
-                return wrong("its references lie outside the array".to_owned());
-            };
-            self.listed += list.len();
-            let ids: Vec<u32> = list.iter().map(|r| r & !LAST).collect();
-            if let Some(id) = ids
-                .iter()
-                .find(|id| **id as usize >= self.soup.records.len())
-            {
-                return wrong(format!("triangle {id} does not exist"));
-            }
-            if !ids.is_sorted_by(|a, b| a < b) {
-                return wrong("its references do not ascend".to_owned());
-            }
-            let lost = triangles.iter().find(|id| ids.binary_search(id).is_err());
-            return match lost {
-                Some(id) => wrong(format!("triangle {id} touches it and is not listed")),
-                None => Ok(()),
-            };
-        }
-        if depth > self.built.depth {
-            return wrong("deeper than the tree".to_owned());
-        }
-        let block = (word >> INNER_SHIFT) as usize;
-        self.blocks.node(block)?;
-        let middle = self.built.space.middle(position, depth);
-        for octant in 0..8 {
-            let child = Space::child(position, octant);
-            let inside: Vec<u32> = triangles
-                .iter()
-                .copied()
-                .filter(|&id| self.needs(id, middle, octant, child, depth + 1))
-                .collect();
-            if word >> octant & 1 == 1 {
-                self.cell(
-                    self.built.nodes[8 * block + octant as usize],
-                    child,
-                    depth + 1,
-                    &inside,
-                )?;
-            } else if let Some(id) = inside.first() {
-                return wrong(format!(
-                    "triangle {id} touches octant {octant}, which is empty"
-                ));
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether a child of a cell that must list a triangle must list it, too.
-    fn needs(&self, id: u32, middle: [f32; 3], octant: u32, child: [u32; 3], depth: u32) -> bool {
-        let record = &self.soup.records[id as usize];
-        build::by_box(&record.bounds(), middle) >> octant & 1 == 1
-            && (!self.built.clipped
-                || touches(&corners(record), &self.built.space.cell(child, depth)))
-    }
-}
-
 impl BuiltAccel for Built {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
-        let wrong = |text: String| Err(AccelError::Invalid(text));
-        let root = self.space.cell([0; 3], 0);
-        for record in &soup.records {
-            if !root.contains(&record.bounds()) {
-                return wrong(format!("triangle {} lies outside the tree", record.id));
-            }
-        }
-        if soup.records.is_empty() && self.nodes[0] == 0 && self.references.is_empty() {
-            return Ok(());
-        }
-        let no_triangles = TriangleSoup::default();
-        let mut validation = Validation {
-            built: self,
-            soup,
-            blocks: Coverage::new(&no_triangles, self.nodes.len() / 8),
-            listed: 0,
-        };
-        validation.blocks.node(0)?;
-        let all: Vec<u32> = (0..soup.records.len() as u32).collect();
-        validation.cell(self.nodes[0], [0; 3], 0, &all)?;
-        if validation.listed != self.references.len() {
-            return wrong(format!(
-                "leaves list {} of {} references",
-                validation.listed,
-                self.references.len()
-            ));
-        }
-        validation.blocks.is_complete()
+        validate::validate(self, soup)
     }
 
     fn buffers(&self) -> GpuBuffers<'_> {
