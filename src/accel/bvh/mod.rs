@@ -9,7 +9,7 @@ mod layout;
 mod octant_roped;
 mod options;
 mod order;
-mod pairs;
+pub(super) mod pairs;
 mod parent_pointer;
 mod roped;
 mod short_stack;
@@ -17,7 +17,7 @@ mod stack;
 
 use super::leaf::{COUNT_MASK, LeafReader, Leaves};
 use super::ray::Hit;
-use super::tree::{NodeKind, Tree, tree_parameters};
+use super::tree::{Coverage, NodeKind, Tree, tree_parameters};
 use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
@@ -185,7 +185,15 @@ impl BuiltAccel for BuiltBvh {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
         let (leaves, depth) = (&self.leaves, self.depth);
         match &self.nodes {
-            NodeArray::Pairs(pairs) => pairs.validate(soup, leaves, depth),
+            NodeArray::Pairs(pairs) => {
+                let coverage = Coverage::new(soup, pairs.0.len());
+                pairs::validate(
+                    (ROOT, &pairs.0),
+                    depth,
+                    coverage,
+                    |coverage, leaf, bounds| leaves.cover(coverage, soup, leaf, bounds),
+                )
+            }
             NodeArray::Octants(octants) => octants.validate(soup, leaves, depth),
             NodeArray::Boxes(boxes) if self.options.traversal == Traversal::Roped => {
                 let rope = |link, _, child| roped::rope_of(link, child);

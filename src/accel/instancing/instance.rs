@@ -2,12 +2,13 @@
 //! boxes grown for the ray, and the traversal of one object. Twin of `kernels/accel/instance.wesl`.
 
 use super::super::bounds::Bounds;
+use super::super::bvh::pairs::Pair;
 use super::super::intersection::{Intersection, Reciprocal};
 use super::super::leaf::{LEAF, leaf_range};
 use super::super::ray::{Hit, Ray};
 use super::super::triangle::{TriangleRecord, intersect_triangle};
 use super::super::twin::Query;
-use super::forest::{Forest, Node};
+use super::forest::Forest;
 use crate::scene::{Instance, Transform};
 use bytemuck::{Pod, Zeroable};
 
@@ -127,7 +128,7 @@ pub(super) fn leaf(
 
 /// Both children of a node in the order of their distance, with where they are entered.
 pub(super) fn near_and_far(
-    (place, node): (u32, &Node),
+    (place, node): (u32, &Pair),
     level: &Level,
     query: &mut Query,
 ) -> [(Option<f32>, u32); 2] {
