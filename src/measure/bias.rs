@@ -215,8 +215,8 @@ fn count_tiles(check: &mut BiasCheck, p_values: &[f64], width: u32, options: Bia
 
 #[cfg(test)]
 mod tests {
-    use super::super::statistics::Pcg32;
     use super::*;
+    use crate::random::Pcg32;
 
     const WIDTH: u32 = 44; // not a multiple of the tile
     const HEIGHT: u32 = 24;

@@ -6,11 +6,11 @@
 
 use super::hard_rays::hard_rays;
 use super::record::RayClass;
-use super::statistics::Pcg32;
 use crate::accel::{Counters, CpuTwin, Hit, NO_HIT, Ray, TriangleSoup};
 use crate::config::Gate;
 use crate::geometry::Camera;
 use crate::integrator::Frame;
+use crate::random::Pcg32;
 use crate::scene::{Bounds, SceneData};
 use glam::Vec3;
 use rayon::prelude::*;

@@ -190,8 +190,8 @@ pub fn coverage(points: &[[f64; 2]], n: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::statistics::Pcg32;
     use super::*;
+    use crate::random::Pcg32;
 
     #[test]
     fn errors_of_a_midpoint_grid_have_the_slope_of_its_theory() {

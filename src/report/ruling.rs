@@ -191,7 +191,8 @@ mod tests {
 
     #[test]
     fn among_equals_a_winner_is_rare() {
-        use crate::measure::statistics::{Pcg32, mean_interval};
+        use crate::measure::statistics::mean_interval;
+        use crate::random::Pcg32;
         let mut generator = Pcg32::new(21);
         let wins = (0..300).filter(|_| {
             let mut figure = || {

@@ -5,7 +5,7 @@ use crate::config::{Params, Variant};
 use crate::image::Image;
 use crate::measure::metrics::{Reference, measure};
 use crate::measure::record::ErrorAtSpp;
-use crate::measure::statistics::Pcg32;
+use crate::random::Pcg32;
 
 const PIXELS: usize = 40;
 /// What every pixel should have.

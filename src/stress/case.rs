@@ -4,7 +4,7 @@ use super::place::Place;
 use super::shapes::Mesh;
 use crate::accel::Ray;
 use crate::geometry::Triangle;
-use crate::measure::statistics::Pcg32;
+use crate::random::Pcg32;
 use crate::scene::{Assembly, MAX_COORDINATE, Material, SceneData};
 use glam::{DVec3, Vec3};
 use std::fmt;

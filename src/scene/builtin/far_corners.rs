@@ -5,9 +5,10 @@
 use super::super::builder::{Look, SceneBuilder};
 use super::super::{Material, Transform};
 use super::Builtin;
-use super::numeric::{Pcg, sin_cos_turns};
+use super::numeric::sin_cos_turns;
 use super::sphere::SphereGrid;
 use crate::geometry::{Camera, Triangle};
+use crate::random::Pcg32;
 use glam::Vec3;
 
 pub(super) const SCENE: Builtin = Builtin {
@@ -56,8 +57,8 @@ fn build(_: &crate::config::Params) -> (SceneBuilder, Look) {
 /// Everything that is not an instance of something else.
 fn ground() -> Vec<Triangle> {
     let mut builder = SceneBuilder::new(false, 0);
-    let mut pcg = Pcg::new(1);
-    let mut point = || Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());
+    let mut pcg = Pcg32::with_stream(1, Pcg32::DEFAULT_STREAM);
+    let mut point = || Vec3::new(pcg.uniform_f32(), pcg.uniform_f32(), pcg.uniform_f32());
     sheet(&mut builder);
     // Shells around a corner: all hold the origin, so that the small ones are reached past the large ones.
     for level in 0..SHELLS {

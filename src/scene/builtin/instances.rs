@@ -4,10 +4,11 @@
 use super::super::builder::{Look, SceneBuilder};
 use super::super::{Material, Transform};
 use super::Builtin;
-use super::numeric::{Pcg, sin_cos_turns};
+use super::numeric::sin_cos_turns;
 use super::sphere::SphereGrid;
 use crate::config::{ParamRange, ParamValue, Parameter, Params};
 use crate::geometry::{Camera, Triangle};
+use crate::random::Pcg32;
 use glam::{DMat3, DVec3, Mat3, Vec3};
 
 /// Different objects.
@@ -45,7 +46,7 @@ pub(super) const SCENE: Builtin = Builtin {
 fn build(params: &Params) -> (SceneBuilder, Look) {
     let count = usize::try_from(params.integer("count")).unwrap_or(1);
     let detail = usize::try_from(params.integer("detail")).unwrap_or(8);
-    let mut pcg = Pcg::new(params.integer("seed") as u64);
+    let mut pcg = Pcg32::with_stream(params.integer("seed") as u64, Pcg32::DEFAULT_STREAM);
     let mut builder = SceneBuilder::new(false, count * detail);
     for index in 0..OBJECTS {
         builder.add_object(object(index, detail));
@@ -93,8 +94,8 @@ fn object(index: u32, detail: usize) -> Vec<Triangle> {
 
 /// Where a copy stands in its cell of the unit cube, how it is turned and scaled; one of eight is
 /// mirrored.
-fn transform(pcg: &mut Pcg, cell: [usize; 3], cells: usize, overlap: f64) -> Transform {
-    let mut uniform = || f64::from(pcg.next_f32());
+fn transform(pcg: &mut Pcg32, cell: [usize; 3], cells: usize, overlap: f64) -> Transform {
+    let mut uniform = || f64::from(pcg.uniform_f32());
     let edge = 1.0 / cells as f64;
     let fitting = 0.5 * edge / OBJECT_RADIUS;
     let mut scale = [0.0; 3].map(|_| fitting * (0.5 + 0.5 * uniform()));

@@ -3,9 +3,9 @@
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
 use super::Builtin;
-use super::numeric::Pcg;
 use crate::config::{ParamRange, ParamValue, Parameter, Params};
 use crate::geometry::Camera;
+use crate::random::Pcg32;
 use glam::Vec3;
 
 pub(super) const SCENE: Builtin = Builtin {
@@ -48,8 +48,8 @@ pub(super) const SCENE: Builtin = Builtin {
 fn build(params: &Params) -> (SceneBuilder, Look) {
     let count = usize::try_from(params.integer("triangles")).unwrap_or(1);
     let size = params.number("size") as f32;
-    let mut pcg = Pcg::new(params.integer("seed") as u64);
-    let mut point = || Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());
+    let mut pcg = Pcg32::with_stream(params.integer("seed") as u64, Pcg32::DEFAULT_STREAM);
+    let mut point = || Vec3::new(pcg.uniform_f32(), pcg.uniform_f32(), pcg.uniform_f32());
     let mut builder = SceneBuilder::new(false, count);
     for index in 0..count {
         let corner = point() - 0.5 * size;

@@ -6,9 +6,9 @@ mod obj;
 mod real;
 mod text;
 
-use super::builtin::numeric::Pcg;
 use super::*;
 use crate::config::Params;
+use crate::random::Pcg32;
 use std::fs;
 use tempfile::TempDir;
 
@@ -166,7 +166,7 @@ fn damaged_files_never_panic() {
         ("a.gltf", square_json(0).into_bytes()),
     ];
     let folder = TempDir::new().unwrap();
-    let mut pcg = Pcg::new(1);
+    let mut pcg = Pcg32::with_stream(1, Pcg32::DEFAULT_STREAM);
     let mut outcomes = [0, 0];
     for (file, bytes) in &cases {
         // The library and the texture are seen through the OBJ file.

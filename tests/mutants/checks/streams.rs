@@ -11,8 +11,9 @@ use raystone::integrator::integrand::functions;
 use raystone::integrator::{
     Frame, Integrator, RenderJob, Renderer, SceneBuffers, Traced, integrator,
 };
-use raystone::measure::statistics::{Pcg32, mean, variance};
+use raystone::measure::statistics::{mean, variance};
 use raystone::measure::words::{Used, compare, dump_stream};
+use raystone::random::Pcg32;
 use raystone::sampling::{Coordinate, Demand, Sampler, to_unit};
 
 type Names<'a> = (&'a str, Changes, &'a str);
