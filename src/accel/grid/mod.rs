@@ -13,6 +13,7 @@ pub mod raster;
 
 use super::bounds::Bounds;
 use super::ray::Ray;
+use super::spatial::cross;
 use super::triangle::TriangleRecord;
 use super::{AccelError, TriangleSoup};
 use crate::gpu::UniformValues;
@@ -138,12 +139,7 @@ impl Cut {
 pub fn areas(soup: &TriangleSoup) -> Vec<f32> {
     let area = |record: &TriangleRecord| {
         let [e, f] = record.edges();
-        let normal = [
-            e[1] * f[2] - e[2] * f[1],
-            e[2] * f[0] - e[0] * f[2],
-            e[0] * f[1] - e[1] * f[0],
-        ];
-        0.5 * normal.iter().map(|n| n * n).sum::<f64>().sqrt() as f32
+        0.5 * cross(e, f).iter().map(|n| n * n).sum::<f64>().sqrt() as f32
     };
     soup.records.par_iter().map(area).collect()
 }
