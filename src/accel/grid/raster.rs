@@ -236,7 +236,7 @@ impl Plane {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Frame, Grid};
+    use super::super::{Grid, GridBox};
     use super::*;
     use crate::accel::TriangleSoup;
     use crate::accel::spatial::dot;
@@ -292,7 +292,7 @@ mod tests {
                 records: vec![record, far],
                 ..Default::default()
             };
-            let grid = Grid::new(&Frame::new(&soup), [9, 7, 8]);
+            let grid = Grid::new(&GridBox::new(&soup), [9, 7, 8]);
             let listed = |exact: bool| {
                 let mut cells = BTreeSet::new();
                 Raster::default().rows(&grid, &record, exact, |first, count| {

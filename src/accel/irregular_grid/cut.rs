@@ -2,7 +2,7 @@
 //! triangles, and cells of one voxel; empty octants are one cell from the start.
 
 use super::super::grid::lists::{Lists, PartLists};
-use super::super::grid::{Cut, Frame, Grid, areas, check_words, finest};
+use super::super::grid::{Cut, Grid, GridBox, areas, check_words, finest};
 use super::super::{AccelError, TriangleSoup};
 use super::voxels::{Block, Cell, Entry, Map};
 use super::{Partition, Settings};
@@ -27,10 +27,10 @@ pub fn cut(
     settings: &Settings,
     log: &mut BuildLog,
 ) -> Result<Partition, AccelError> {
-    let frame = log.phase("bounds", || Frame::new(soup));
-    let top = frame.resolution(soup.records.len(), settings.lambda1, MOST_TOP);
+    let grid_box = log.phase("bounds", || GridBox::new(soup));
+    let top = grid_box.resolution(soup.records.len(), settings.lambda1, MOST_TOP);
     let shift = (65_535 / top[0].max(top[1]).max(top[2])).ilog2();
-    let coarse = Grid::new(&frame, top);
+    let coarse = Grid::new(&grid_box, top);
     let fine = coarse.part([0; 3], top, top.map(|n| n << shift));
     let lists = Lists::new(name, &coarse, soup, true, log)?;
     log.phase("build", || {

@@ -24,7 +24,7 @@ fn built(soup: &TriangleSoup, clip: bool) -> Built {
     params
         .0
         .insert("leaf_size".to_owned(), ParamValue::Integer(4));
-    let space = Space::around(soup);
+    let space = RootCell::around(soup);
     let tree = build::build(soup, &space, &params).expect("it builds");
     Built {
         space,
