@@ -61,6 +61,19 @@ fn completed(variant: &Variant, schema: &[Parameter]) -> Result<Variant, Sampler
 }
 
 impl SamplerRegistry {
+    /// Adds a sequence; it replaces one of the same name.
+    pub fn register_sequence(&mut self, sequence: &'static dyn Sequence) {
+        self.sequences.retain(|s| s.name() != sequence.name());
+        self.sequences.push(sequence);
+    }
+
+    /// Adds a decorrelation; it replaces one of the same name.
+    pub fn register_decorrelation(&mut self, decorrelation: &'static dyn Decorrelation) {
+        self.decorrelations
+            .retain(|d| d.name() != decorrelation.name());
+        self.decorrelations.push(decorrelation);
+    }
+
     /// All sequences.
     pub fn sequences(&self) -> impl Iterator<Item = &'static dyn Sequence> + '_ {
         self.sequences.iter().copied()

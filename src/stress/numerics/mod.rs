@@ -13,6 +13,7 @@ mod sums;
 
 use crate::accel::AccelError;
 use crate::gpu::{Gpu, GpuError};
+use crate::integrator::IntegratorError;
 use crate::sampling::SamplerError;
 use crate::scene::SceneError;
 use serde::{Deserialize, Serialize};
@@ -75,6 +76,9 @@ pub enum NumericsError {
     /// A sampler cannot be made.
     #[error(transparent)]
     Sampler(#[from] SamplerError),
+    /// An integrator cannot be had.
+    #[error(transparent)]
+    Integrator(#[from] IntegratorError),
     /// A stream of words cannot be drawn.
     #[error("{0}")]
     Stream(String),
