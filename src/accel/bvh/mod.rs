@@ -161,14 +161,6 @@ impl BuiltBvh {
             NodeArray::Octants(octants) => NamedWords::new("nodes", &octants.0),
         }
     }
-
-    fn node_count(&self) -> usize {
-        match &self.nodes {
-            NodeArray::Pairs(pairs) => pairs.0.len(),
-            NodeArray::Boxes(boxes) => boxes.0.len(),
-            NodeArray::Octants(octants) => octants.0.len(),
-        }
-    }
 }
 
 /// Whether every leaf fits into a reference.
@@ -207,14 +199,15 @@ impl BuiltAccel for BuiltBvh {
         let mut features = self.options.features();
         features.extend(self.leaves.features());
         let stack_entries = self.options.stack_entries(self.depth);
-        let nodes = self.node_count();
+        let nodes = self.node_words();
+        let count = 4 * nodes.words.len() / nodes.element_bytes as usize;
         GpuBuffers {
             kernel: self.options.kernel(),
             features,
-            arrays: vec![self.node_words(), self.leaves.words()],
+            arrays: vec![nodes, self.leaves.words()],
             uniforms: vec![super::limits(
-                self.options.step_fuse(nodes, self.depth),
-                nodes,
+                self.options.step_fuse(count, self.depth),
+                count,
             )],
             constants: (stack_entries > 0)
                 .then_some(("STACK_ENTRIES", stack_entries))
