@@ -70,7 +70,7 @@ impl Pair {
     pub fn moved_by(self, nodes: u32, triangles: u32) -> Self {
         let moved = |reference| match reference {
             NONE => NONE,
-            LEAF.. => reference + triangles,
+            _ if reference >= LEAF => reference + triangles,
             _ => reference + nodes,
         };
         Self {
