@@ -36,3 +36,15 @@ pub struct Camera {
     /// Vertical field of view, degrees, in (0, 180).
     pub vertical_fov_degrees: f32,
 }
+
+impl Camera {
+    /// A camera for which y is up.
+    pub fn upright(eye: Vec3, target: Vec3, vertical_fov_degrees: f32) -> Self {
+        Self {
+            eye,
+            target,
+            up: Vec3::Y,
+            vertical_fov_degrees,
+        }
+    }
+}

@@ -8,20 +8,20 @@ use raystone::gpu::{Gpu, probe_arithmetic};
 use raystone::report::{stress_tables, write_stress_page};
 use raystone::stress::record::{CellRecord, Record, read, write};
 use raystone::stress::targets::{cells, shots};
-use raystone::stress::{Settings, run};
+use raystone::stress::{StressOptions, run};
 use std::process::Command;
 use support::{gpu, kernels_with, open};
 
 /// A few families through a few structures with the default test and one other.
-fn small() -> Settings {
+fn small() -> StressOptions {
     let names = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect();
-    Settings {
+    StressOptions {
         families: names(&["watertight", "edges", "coincident", "non-finite"]),
         accels: names(&["bvh", "uniform-grid"]),
         triangles: names(&["moeller-trumbore", "watertight"]),
         rays: 64,
         shots: 2048,
-        ..Settings::new(true)
+        ..StressOptions::new(true)
     }
 }
 
@@ -77,7 +77,7 @@ fn a_test_that_refuses_rays_through_edges_is_seen_to_leak() {
     // Zero no longer counts as inside.
     let leaky = [("u >= 0.0", "u > 1e-3 * area")];
     let gpu = open(kernels_with("accel/triangle/moeller_trumbore", &leaky));
-    let settings = Settings {
+    let settings = StressOptions {
         triangles: vec![TriangleTest::MoellerTrumbore.name().into()],
         ..small()
     };
@@ -189,4 +189,17 @@ fn unknown_names_and_broken_rays_are_answered_with_two_and_what_there_is() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
         assert!(text.contains(part), "{arguments:?}: {text}");
     }
+}
+
+#[test]
+fn a_folder_that_another_run_writes_is_left_to_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().to_str().expect("a path in UTF-8");
+    let lock = raystone::run::lock_folder(folder.path()).expect("nobody writes it");
+    let output = program(&["stress", "--family", "seams", "--out", out]);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("another run is writing"), "{text}");
+    drop(lock);
+    raystone::run::lock_folder(folder.path()).expect("nobody writes it any more");
 }

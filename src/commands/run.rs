@@ -46,9 +46,9 @@ impl Run {
         let mut overrides = Vec::from_iter(self.device.kernels_override());
         overrides.extend(self.experiment.set.iter().cloned());
         let experiment = Experiment::load(&self.file, &overrides, &catalogue)?;
-        let is_randomised =
-            |sequence: &_, decorrelation: &_| registries.is_randomised(sequence, decorrelation);
-        let plan = Plan::new(&experiment, &self.experiment.only, is_randomised)?;
+        let plan = Plan::new(&experiment, &self.experiment.only, |s, d| {
+            registries.is_randomised(s, d)
+        })?;
         check_models(&plan.scenes, &catalogue)?;
         if self.dry_run {
             Kernels::load(&plan.kernels, &registries)?;

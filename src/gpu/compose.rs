@@ -215,24 +215,27 @@ impl KernelLibrary {
         for feature in &composition.features {
             compiler.set_feature(feature, true);
         }
-        let result = compiler
-            .compile(&module_path(&composition.entry)?)
-            .map_err(|e| {
-                let sources = self
-                    .files
-                    .values()
-                    .map(|(path, text)| (path.as_path(), text.as_str()));
-                GpuError::Kernel(diagnose::wesl_error(&e.to_string(), &paths, sources))
-            })?;
+        let entry = &module_path(&composition.entry)?;
+        let result = compiler.compile(entry).map_err(|e| {
+            let sources = self
+                .files
+                .values()
+                .map(|(path, text)| (path.as_path(), text.as_str()));
+            GpuError::Kernel(diagnose::wesl_error(&e.to_string(), &paths, sources))
+        })?;
         let wgsl = result.to_string();
-        let map = result.sourcemap.unwrap_or_default();
-        let (module, info) = diagnose::parse_and_validate(&wgsl, &map, &paths)?;
+        let (module, info) = diagnose::parse_and_validate(&diagnose::Composed {
+            wgsl: &wgsl,
+            result: &result,
+            entry,
+            paths: &paths,
+        })?;
         Ok(ComposedKernel {
             composition: composition.clone(),
             wgsl,
             module,
             info,
-            map,
+            map: result.sourcemap.unwrap_or_default(),
         })
     }
 }

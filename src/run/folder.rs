@@ -347,6 +347,19 @@ fn promote(out: &Path) -> io::Result<()> {
     fs::rename(partial.join(RECORDS_FILE), out.join(RECORDS_FILE))
 }
 
+/// Makes and locks a folder that something else than a run writes: until the file is dropped, `None` where
+/// the file system knows no locks.
+///
+/// # Errors
+/// A folder that cannot be written, or that is being written.
+pub fn lock_folder(out: &Path) -> Result<Option<File>, RunError> {
+    fs::create_dir_all(out).map_err(|error| unwritable(out, &error))?;
+    lock(out).map_err(|refusal| match refusal {
+        Refusal::Taken(reason) => RunError::Input(reason),
+        Refusal::Unwritable(error) => error,
+    })
+}
+
 fn lock(out: &Path) -> Result<Option<File>, Refusal> {
     let path = out.join(LOCK_FILE);
     let failed = |error| Refusal::Unwritable(unwritable(&path, &error));

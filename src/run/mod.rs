@@ -17,7 +17,7 @@ mod trial;
 mod words;
 mod world;
 
-pub use folder::{Existing, Interrupt, Interrupted};
+pub use folder::{Existing, Interrupt, Interrupted, lock_folder};
 pub use kernels::{Kernels, kernel_library};
 pub use registries::Registries;
 pub use render::{Rendering, render};

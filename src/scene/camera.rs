@@ -110,12 +110,7 @@ mod tests {
 
     #[test]
     fn cameras_that_see_nothing_are_refused() {
-        let good = Camera {
-            eye: Vec3::ONE,
-            target: Vec3::ZERO,
-            up: Vec3::Y,
-            vertical_fov_degrees: 40.0,
-        };
+        let good = Camera::upright(Vec3::ONE, Vec3::ZERO, 40.0);
         good.validate().unwrap();
         let bad: [fn(&mut Camera); 7] = [
             |c| c.vertical_fov_degrees = 0.0,

@@ -126,7 +126,6 @@ fn build(_: &Params) -> (SceneBuilder, Look) {
             Material::diffuse("green", Vec3::new(0.14, 0.45, 0.091)),
             Material::diffuse("light", Vec3::splat(0.78)).emitting(Vec3::new(18.4, 15.6, 8.0)),
         ],
-        textures: Vec::new(),
         camera: Some(Camera {
             eye: Vec3::new(278.0, 273.0, -800.0),
             target: Vec3::new(278.0, 273.0, 0.0),
@@ -134,7 +133,7 @@ fn build(_: &Params) -> (SceneBuilder, Look) {
             // A focal length of 35 mm behind a film of 25 mm.
             vertical_fov_degrees: 39.3077,
         }),
-        environment: Vec3::ZERO,
+        ..Look::default()
     };
     (builder, look)
 }
