@@ -11,6 +11,7 @@ use super::{
 };
 use crate::config::{ParameterSchema, Params};
 use crate::oracle::{GROUP, Groups, Line};
+use crate::params::{ParameterSchema, Params};
 use rayon::prelude::*;
 
 /// The registry entry.

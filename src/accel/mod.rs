@@ -42,8 +42,8 @@ pub use twin::{Counters, CpuTwin};
 pub use two_level_grid::TwoLevelGrid;
 pub use uniform_grid::UniformGrid;
 
-use crate::config::{ParamError, ParameterSchema, Params};
 use crate::gpu::{Composition, UniformValues};
+use crate::params::{ParamError, ParameterSchema, Params};
 use crate::scene::SceneData;
 use bytemuck::NoUninit;
 use serde::{Deserialize, Serialize};

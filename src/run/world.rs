@@ -4,12 +4,12 @@ use super::RunError;
 use super::kernels::Device;
 use super::session::Session;
 use crate::accel::{Intersection, TriangleSoup};
-use crate::config::Variant;
 use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu};
 use crate::integrator::{RayOffset, SceneBuffers};
 use crate::measure::gate::Judge;
 use crate::measure::record::{Body, Key, Line, Ran, SceneRecord, axis};
+use crate::params::Variant;
 use crate::scene::{self, LoadOptions, SceneData};
 use std::time::Instant;
 

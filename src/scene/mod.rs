@@ -31,8 +31,8 @@ pub use error::SceneError;
 pub use framing::Framing;
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 
-use crate::config::Variant;
 use crate::geometry::{Camera, Triangle};
+use crate::params::Variant;
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::io::Read as _;

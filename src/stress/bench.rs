@@ -5,10 +5,10 @@ use crate::accel::{
     AccelKind, BuildLog, BuiltAccel, Hit, Intersection, Ray, Space, TriangleSoup, brute_force_hits,
     brute_force_instances,
 };
-use crate::config::Params;
 use crate::gpu::{Gpu, GpuError, kernel_errors};
 use crate::integrator::{SceneBuffers, Traced};
 use crate::measure::batch::{Batch, Query};
+use crate::params::Params;
 use crate::scene::SceneData;
 
 /// A scene on the adapter, met by one choice of tests.
@@ -30,7 +30,7 @@ pub struct Answers<T> {
 
 /// Every parameter at its default.
 pub fn default_params(kind: &dyn AccelKind) -> Params {
-    let value = |p: &crate::config::Parameter| (p.name.to_owned(), p.default.clone());
+    let value = |p: &crate::params::Parameter| (p.name.to_owned(), p.default.clone());
     Params(kind.parameters().iter().map(value).collect())
 }
 

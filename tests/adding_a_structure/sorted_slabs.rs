@@ -7,7 +7,7 @@ use raystone::accel::{
     AccelError, AccelKind, BuildLog, BuiltAccel, CpuTwin, GpuBuffers, Hit, NamedWords,
     StructureStats, TriangleSoup, limits,
 };
-use raystone::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use raystone::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// The registry entry.
 pub struct SortedSlabs;

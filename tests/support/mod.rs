@@ -3,12 +3,13 @@
 #![allow(dead_code)] // Every test program uses its own part of this.
 
 use raystone::accel::{AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, TriangleSoup};
-use raystone::config::{Entry, Experiment, ParamValue, Params, Plan, Variant};
+use raystone::config::{Experiment, Plan};
 use raystone::geometry::Camera;
 use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
 use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced};
 use raystone::measure::record::{Line, SCHEMA};
 use raystone::measure::statistics::{mean, variance};
+use raystone::params::{Entry, ParamValue, Params, Variant};
 use raystone::run::{Registries, RunOptions, RunSummary};
 use raystone::sampling::{Demand, Sampler, SamplerRegistry, dimensions};
 use raystone::scene::{LoadOptions, SceneData, builtin_scenes, load};
@@ -212,8 +213,8 @@ pub fn sampler_of(sequence: &str, decorrelation: &str, samples: u32) -> Sampler 
 /// never none. Kernels and twins of all pairs are compared in `samplers.rs`.
 pub fn samplers(samples: u32) -> Vec<Sampler> {
     let registry = SamplerRegistry::default();
-    let sequences = registry.sequences().map(|s| (s.name(), "none"));
-    let decorrelations = registry.decorrelations().map(|d| ("sobol", d.name()));
+    let sequences = registry.sequences.iter().map(|s| (s.name(), "none"));
+    let decorrelations = registry.decorrelations.iter().map(|d| ("sobol", d.name()));
     let pairs = sequences.chain(decorrelations);
     let usable = pairs.filter(|pair| pair.0 != "van-der-corput" && *pair != ("sobol", "none"));
     let mut found: Vec<_> = usable.map(|(s, d)| sampler_of(s, d, samples)).collect();

@@ -18,6 +18,7 @@ use super::{
 };
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use bytemuck::{Pod, Zeroable};
 
 /// Low bits of [`Node::link`]: the axis of the plane, or [`LEAF`].

@@ -19,6 +19,7 @@ use super::{
 };
 use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// Marks the word of a leaf; the other bits are its first place in the references.
 const LEAF: u32 = 0x8000_0000;

@@ -1,6 +1,6 @@
 //! What a figure is of: a value on each of some axes.
 
-use crate::config::{KERNELS_MARK, Params, Variant};
+use crate::params::{KERNELS_MARK, Params, Variant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -213,7 +213,7 @@ mod tests {
         let mut grid = plain("grid");
         grid.params
             .0
-            .insert("lambda".into(), crate::config::ParamValue::Number(3.0));
+            .insert("lambda".into(), crate::params::ParamValue::Number(3.0));
         grid.label = "grid(lambda=3) @idea".into();
         let key = Key::default()
             .with(axis::KERNELS, "idea")

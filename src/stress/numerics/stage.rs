@@ -2,12 +2,12 @@
 
 use super::NumericsError;
 use crate::accel::{AccelRegistry, BuildLog, TriangleSoup};
-use crate::config::{Entry, ParamValue, Variant};
 use crate::geometry::Camera;
 use crate::gpu::Gpu;
 use crate::integrator::{
     ConfiguredIntegrator, IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced,
 };
+use crate::params::{Entry, ParamValue, Variant};
 use crate::sampling::{Demand, Sampler, SamplerRegistry};
 use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
 
