@@ -9,7 +9,6 @@ use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, StructureStats, TriangleSoup,
 };
-use crate::config::{ParameterSchema, Params};
 use crate::oracle::{GROUP, Groups, Line};
 use crate::params::{ParameterSchema, Params};
 use rayon::prelude::*;

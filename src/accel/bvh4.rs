@@ -12,7 +12,7 @@ use super::wide::{
     wide_parameters,
 };
 use super::{AccelError, AccelKind, BuildLog, BuiltAccel, TriangleSoup};
-use crate::config::{ParameterSchema, Params};
+use crate::params::{ParameterSchema, Params};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 

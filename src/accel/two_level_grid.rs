@@ -14,7 +14,7 @@ use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
     TriangleSoup,
 };
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use rayon::prelude::*;
 
 /// Most parts of a top cell along an axis: its resolution takes ten bits an axis.

@@ -23,7 +23,7 @@ use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
     TriangleSoup,
 };
-use crate::config::{ParameterSchema, Params};
+use crate::params::{ParameterSchema, Params};
 use boxes::Boxes;
 use octant_roped::Octants;
 use options::{Options, Traversal};

@@ -9,7 +9,7 @@ use super::super::tree::{Coverage, Tree};
 use super::super::triangle::TriangleRecord;
 use super::super::{AccelError, BuildLog, TriangleSoup};
 use crate::accel::StructureStats;
-use crate::config::Params;
+use crate::params::Params;
 use rayon::prelude::*;
 use std::ops::Range;
 

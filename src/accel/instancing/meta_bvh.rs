@@ -16,7 +16,7 @@ use super::top::Top;
 use super::world_box::BoxMap;
 use super::{Base, Upper, clamped, meta_bvh_nested};
 use crate::accel::StructureStats;
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// Stands for the size of the stack when an object was entered, outside of any.
 const OUTSIDE: u32 = u32::MAX;

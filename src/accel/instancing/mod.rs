@@ -29,8 +29,8 @@ pub use placed::Placed;
 
 use super::bvh::pairs::Pair;
 use super::{AccelError, BuildLog, GpuBuffers, NamedWords, Space, TriangleSoup, limits};
-use crate::config::Params;
 use crate::gpu::UniformValues;
+use crate::params::Params;
 use crate::scene::Instance;
 use forest::Forest;
 use placed::View;

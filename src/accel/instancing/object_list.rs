@@ -13,7 +13,7 @@ use super::instance::{Entry, enter_grown, level, trace_object};
 use super::world_box::BoxMap;
 use super::{Base, Upper};
 use crate::accel::StructureStats;
-use crate::config::{ParameterSchema, Params};
+use crate::params::{ParameterSchema, Params};
 use bytemuck::{Pod, Zeroable};
 
 /// The registry entry.

@@ -8,7 +8,7 @@ use crate::accel::bounds::Bounds;
 use crate::accel::tree::{NodeKind, Tree};
 use crate::accel::triangle::TriangleRecord;
 use crate::accel::{StructureStats, TriangleSoup, leaf_histogram};
-use crate::config::Params;
+use crate::params::Params;
 
 /// Most children of a node here; the cost table of a node has one entry less.
 const MAX_WIDTH: usize = 8;

@@ -15,7 +15,7 @@ use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
     AccelError, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats, TriangleSoup,
 };
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use bytemuck::Pod;
 use collapse::{CollapseSettings, WideTree};
 use std::ops::Range;
