@@ -9,6 +9,7 @@ mod support;
 
 use facing::Facing;
 use raystone::measure::record::{Body, Line, axis};
+use raystone::params::Registered;
 use raystone::run::Registries;
 use raystone::sampling::Sequence;
 use samplers::{Rotation, Weyl};
@@ -16,8 +17,10 @@ use std::path::Path;
 
 fn registries() -> Registries {
     let mut registries = Registries::default();
-    registries.samplers.register_sequence(&Weyl);
-    registries.samplers.register_decorrelation(&Rotation);
+    let weyl = Registered::sequence::<Weyl>();
+    registries.samplers.sequences.add(weyl);
+    let rotation = Registered::decorrelation::<Rotation>();
+    registries.samplers.decorrelations.add(rotation);
     registries.integrators.register(&Facing);
     registries
 }
@@ -84,7 +87,7 @@ fn a_sequence_whose_kernel_is_not_its_twin_is_not_rendered_with() {
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let (name, text) = Weyl.sources()[0];
+    let (name, text) = Weyl::default().sources()[0];
     let changed = text.replace("0x9e3779b9u", "0x9e3779bbu");
     assert_ne!(changed, text);
     let file = folder.path().join(name).with_extension("wesl");

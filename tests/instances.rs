@@ -10,12 +10,13 @@ use raystone::accel::{
     AccelKind, Counters, CpuTwin, Hit, InstanceJudge, MetaBvh, NO_HIT, ObjectList, Placed, Ray,
     Space, TriangleSoup, brute_force_hits, brute_force_instances,
 };
-use raystone::config::{Gate, ParamValue, Params};
+use raystone::config::Gate;
 use raystone::geometry::Triangle;
 use raystone::gpu::probe_arithmetic;
 use raystone::measure::gate::{Judge, compare, gate};
 use raystone::measure::hard_rays::HARD_RAYS;
 use raystone::measure::record::{StructureRecord, TimeRecord, all_of, axis};
+use raystone::params::{ParamValue, Params};
 use raystone::run::Registries;
 use raystone::scene::{Assembly, Transform};
 use support::Stage;
@@ -343,7 +344,15 @@ fn the_gate_judges_each_structure_in_its_space_and_sees_the_difference() {
     for kind in support::structures() {
         let traced = stage.traced(gpu, kind);
         let soup = &stage.soup;
-        let verdict = gate(gpu, &stage.buffers, soup, &traced, &judge, &probe, true);
+        let verdict = gate(
+            gpu,
+            &stage.buffers.triangles,
+            soup,
+            &traced,
+            &judge,
+            &probe,
+            true,
+        );
         let verdict = verdict.unwrap_or_else(|e| panic!("{}: {e}", kind.name()));
         assert!(verdict.passed, "{}: {verdict:?}", kind.name());
     }

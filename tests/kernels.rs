@@ -8,9 +8,9 @@ use common::{Pcg, build, default_params, param_variants, scenes};
 use rayon::prelude::*;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::accel::{AccelRegistry, Counters, Hit, Ray};
-use raystone::config::{Entry, Variant};
 use raystone::gpu::{Composition, KernelLibrary};
 use raystone::integrator::{IntegratorRegistry, SceneFeatures, with_sampler};
+use raystone::params::{Entry, Variant};
 use raystone::sampling::{Demand, Sampler, SamplerRegistry};
 use std::mem::{offset_of, size_of};
 

@@ -9,7 +9,7 @@ use super::bounds::Bounds;
 use super::tree::{NodeKind, Tree};
 use super::triangle::TriangleRecord;
 use crate::accel::StructureStats;
-use crate::config::Params;
+use crate::params::Params;
 
 /// Most children of a node here; the cost table of a node has one entry less.
 const MAX_WIDTH: usize = 8;

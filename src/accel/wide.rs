@@ -23,7 +23,7 @@ use super::intersection::Reciprocal;
 use super::tree::{NodeKind, Tree, tree_parameters};
 use super::triangle::TriangleRecord;
 use super::{AccelError, BuildLog, GpuBuffers, NamedWords, TriangleSoup};
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use bytemuck::Pod;
 
 /// Relative slack of the distances to quantised planes, 2⁻²⁰.

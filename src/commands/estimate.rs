@@ -1,6 +1,7 @@
 //! How long a plan would take, roughly.
 
-use raystone::config::{Experiment, Plan, Variant};
+use raystone::config::{Experiment, Plan};
+use raystone::params::Variant;
 use raystone::run::Registries;
 use raystone::sampling::dimensions::{FIRST_BOUNCE, PER_BOUNCE};
 use std::collections::BTreeSet;

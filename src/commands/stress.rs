@@ -5,7 +5,7 @@ use super::failure::{FAILED, Failure};
 use super::faults::plant_faults;
 use super::output::{print, tell, warn};
 use clap::Args;
-use raystone::config::{Params, Variant};
+use raystone::params::{Params, Variant};
 use raystone::report::{stress_tables, write_stress_page};
 use raystone::run::{Registries, lock_folder};
 use raystone::scene::{LoadOptions, load};

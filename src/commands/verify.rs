@@ -272,8 +272,8 @@ fn faults(verdict: &Result<GateVerdict, String>) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use raystone::config::{Params, Variant};
     use raystone::measure::record::RayClass;
+    use raystone::params::{Params, Variant};
 
     fn variant(name: &str) -> Variant {
         Variant {

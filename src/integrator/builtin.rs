@@ -2,7 +2,7 @@
 
 use super::kind::CountedRays::{Ao, Bounce, Primary as Camera, Shadow};
 use super::{Integrator, IntegratorFacts};
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::sampling::dimensions;
 
 /// Bounces before roulette: `ROULETTE_DEPTH` of `kernels/integrator/path.wesl`.

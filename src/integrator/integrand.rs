@@ -7,7 +7,7 @@
 //! points, Owen's lectures "Monte Carlo theory, methods and examples", ch. 17).
 
 use super::{Integrator, IntegratorFacts};
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::sampling::dimensions;
 
 /// Square of the radius of the disk, so that its quarter has about the area 1/2.

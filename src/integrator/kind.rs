@@ -1,6 +1,6 @@
 //! What an integrator is, and what the others have to know of it.
 
-use crate::config::{ParamError, ParameterSchema, Params, Variant};
+use crate::params::{ParamError, ParameterSchema, Params, Variant};
 use crate::sampling::Demand;
 use thiserror::Error;
 

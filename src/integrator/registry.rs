@@ -3,7 +3,7 @@
 use super::builtin::{AmbientOcclusion, Path, Primary};
 use super::integrand::INTEGRANDS;
 use super::{ConfiguredIntegrator, Integrator, IntegratorError};
-use crate::config::{Entry, Variant};
+use crate::params::{Entry, Variant};
 use crate::text::nearest;
 
 /// Everything that can be named on the `integrator` axis.

@@ -5,7 +5,7 @@ use super::images::Estimator;
 use super::session::Session;
 use super::structures::{self, Gated};
 use super::world::World;
-use crate::config::{REFERENCE_PARTS, SamplerCell, StructureCell, Variant};
+use crate::config::{REFERENCE_PARTS, SamplerCell, StructureCell};
 use crate::image::{Image, Picture, automatic_exposure, tone_map, viridis};
 use crate::integrator::{Renderer, Snapshot, Traced, rounding_bound};
 use crate::measure::bias::{BiasOptions, BiasVerdict, check_bias};
@@ -19,6 +19,7 @@ use crate::measure::spectrum::{
     ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power,
 };
 use crate::measure::statistics::mean_interval;
+use crate::params::Variant;
 use crate::text::cell_hash;
 use std::time::Instant;
 

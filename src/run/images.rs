@@ -4,9 +4,9 @@ use super::kernels::Device;
 use super::session::Session;
 use super::words;
 use super::world::World;
-use crate::config::Variant;
 use crate::geometry::Camera;
 use crate::integrator::{ConfiguredIntegrator, RenderJob, Renderer, Traced};
+use crate::params::Variant;
 use crate::sampling::Sampler;
 
 /// What is computed per sample, and what draws the samples.

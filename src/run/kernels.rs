@@ -1,9 +1,9 @@
 //! The kernels of a run: a library for each folder on the axis, and a device that composes from each.
 
 use super::{Registries, RunError, RunOptions};
-use crate::config::Variant;
 use crate::gpu::{self, Gpu, KernelLibrary};
 use crate::measure::record::{KernelFile, KernelFolder};
+use crate::params::Variant;
 use std::path::Path;
 
 /// The embedded kernels with those of `folder` on top, checked as far as can be without composing.

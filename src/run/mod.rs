@@ -22,10 +22,11 @@ pub use kernels::{Kernels, kernel_library};
 pub use registries::Registries;
 pub use render::{Rendering, render};
 
-use crate::config::{Experiment, Plan, Variant};
+use crate::config::{Experiment, Plan};
 use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
 use crate::measure::record::GateVerdict;
 pub use crate::measure::words::dump_stream;
+use crate::params::Variant;
 use kernels::Device;
 use session::Session;
 use std::path::PathBuf;

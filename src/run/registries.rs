@@ -1,9 +1,11 @@
 //! All registries together.
 
 use crate::accel::AccelRegistry;
-use crate::config::{Catalogue, SamplerCell, Variant};
+use crate::config::{Catalogue, SamplerCell};
 use crate::gpu::KernelLibrary;
 use crate::integrator::IntegratorRegistry;
+use crate::measure::figure::FigureRegistry;
+use crate::params::Variant;
 use crate::sampling::SamplerRegistry;
 
 /// Everything that can be named.
@@ -15,6 +17,8 @@ pub struct Registries {
     pub samplers: SamplerRegistry,
     /// Integrators.
     pub integrators: IntegratorRegistry,
+    /// Figures beside those of the crate.
+    pub figures: FigureRegistry,
 }
 
 impl Registries {
@@ -36,8 +40,9 @@ impl Registries {
 
     /// The kernels of the program, and those that came with what was registered.
     pub fn library(&self) -> KernelLibrary {
-        let sequences = self.samplers.sequences().map(|s| s.sources());
-        let decorrelations = self.samplers.decorrelations().map(|d| d.sources());
+        let sequences = self.samplers.sequences.defaults().map(|s| s.sources());
+        let decorrelations = self.samplers.decorrelations.defaults();
+        let decorrelations = decorrelations.map(|d| d.sources());
         let integrators = self.integrators.iter().map(|i| i.sources());
         let sources = sequences.chain(decorrelations).chain(integrators);
         let sources: Vec<_> = sources.flatten().copied().collect();

@@ -1,6 +1,6 @@
 //! What can go wrong between a scene's name and its triangles.
 
-use crate::config::ParamError;
+use crate::params::ParamError;
 use std::any::Any;
 use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};

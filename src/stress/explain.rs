@@ -8,8 +8,8 @@ use crate::accel::{
     AccelKind, BuiltAccel, Counters, Hit, NO_HIT, Ray, Space, TriangleSoup, brute_force_hits,
     brute_force_instances,
 };
-use crate::config::Params;
 use crate::oracle::exact_truths;
+use crate::params::Params;
 use crate::scene::SceneData;
 use std::fmt::Write as _;
 

@@ -1,7 +1,7 @@
 //! `facing`: an integrator of one kernel.
 
-use raystone::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use raystone::integrator::{CountedRays, Integrator, IntegratorFacts};
+use raystone::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use raystone::sampling::dimensions::FIRST_BOUNCE;
 
 /// The registry entry.

@@ -1,11 +1,13 @@
 //! A sequence and a decorrelation of a library user.
 
-use raystone::config::Params;
+use raystone::parameters;
 use raystone::sampling::hash::dimension_number;
 use raystone::sampling::{Coordinate, Decorrelation, Facts, Partner, SamplerTable, Sequence};
 
-/// The registry entry of the sequence.
-pub struct Weyl;
+parameters! {
+    /// The registry entry of the sequence.
+    pub struct Weyl {}
+}
 
 impl Sequence for Weyl {
     fn name(&self) -> &'static str {
@@ -24,22 +26,24 @@ impl Sequence for Weyl {
         &[("sampling/weyl", include_str!("kernels/sampling/weyl.wesl"))]
     }
 
-    fn facts(&self, _: &Params) -> Facts {
+    fn facts(&self) -> Facts {
         Facts {
             extensible: true,
             ..Facts::default()
         }
     }
 
-    fn sequence(&self, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn sequence(&self, _: &SamplerTable, at: Coordinate) -> u32 {
         let multiple = at.sample.wrapping_add(1);
         let odd = at.dimension.wrapping_mul(2).wrapping_add(1);
         multiple.wrapping_mul(odd).wrapping_mul(0x9e37_79b9)
     }
 }
 
-/// The registry entry of the decorrelation.
-pub struct Rotation;
+parameters! {
+    /// The registry entry of the decorrelation.
+    pub struct Rotation {}
+}
 
 impl Decorrelation for Rotation {
     fn name(&self) -> &'static str {
@@ -61,15 +65,15 @@ impl Decorrelation for Rotation {
         )]
     }
 
-    fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
+    fn refusal(&self, partner: &Partner) -> Option<String> {
         partner.without_structure()
     }
 
-    fn index(&self, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn index(&self, _: &SamplerTable, at: Coordinate) -> u32 {
         at.sample
     }
 
-    fn decorrelate(&self, x: u32, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn decorrelate(&self, x: u32, _: &SamplerTable, at: Coordinate) -> u32 {
         x.wrapping_add(dimension_number(at))
     }
 }

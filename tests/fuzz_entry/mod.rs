@@ -5,9 +5,10 @@
 #![allow(dead_code)] // Every fuzz target calls one of them.
 
 use raystone::accel::{AccelRegistry, BuildLog, TriangleSoup};
-use raystone::config::{Catalogue, Experiment, Params, Plan, Variant};
+use raystone::config::{Catalogue, Experiment, Plan};
 use raystone::discrepancy::PointSet;
 use raystone::measure::record::{Line, RECORDS_FILE, read_records};
+use raystone::params::{Params, Variant};
 use raystone::report::data::RunData;
 use raystone::report::{sections, terminal_tables};
 use raystone::run::Registries;

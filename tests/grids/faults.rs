@@ -3,8 +3,8 @@
 use crate::common::scenes;
 use crate::common::{self, Pcg, brute_force, build, default_params, trace};
 use crate::{grid, slanted, with};
-use raystone::config::ParamValue;
 use raystone::gpu::{Gpu, KernelLibrary};
+use raystone::params::ParamValue;
 
 /// A fault in a kernel: where, what stands there, what replaces it.
 struct Fault {

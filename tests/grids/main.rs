@@ -14,7 +14,7 @@ use raystone::accel::{
     AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, Counters, Hit, NO_HIT, Ray,
     TriangleSoup,
 };
-use raystone::config::{ParamValue, Params};
+use raystone::params::{ParamValue, Params};
 
 /// The grids; every name is registered.
 fn grids() -> Vec<&'static dyn AccelKind> {

@@ -2,8 +2,8 @@
 
 use crate::MAX_DEPTH;
 use crate::support::*;
-use raystone::config::ParamValue;
 use raystone::gpu::Gpu;
+use raystone::params::ParamValue;
 use raystone::sampling::Sampler;
 
 const SIZE: [u32; 2] = [16, 16];

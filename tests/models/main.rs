@@ -8,7 +8,7 @@ mod real;
 mod text;
 
 use glam::{Vec2, Vec3};
-use raystone::config::{Params, Variant};
+use raystone::params::{Params, Variant};
 use raystone::random::Pcg32;
 use raystone::scene::{
     DEFAULT_ALBEDO, LoadOptions, Material, MaterialKind, SceneData, SceneError, load,

@@ -1,6 +1,6 @@
 //! What a figure is of: a value on each of some axes.
 
-use crate::config::{KERNELS_MARK, Params, Variant};
+use crate::params::{KERNELS_MARK, Params, Variant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -166,6 +166,24 @@ impl Key {
         known.chain(others).map(|axis| (axis, self.label(axis)))
     }
 
+    /// The same key with these axes alone.
+    #[must_use]
+    pub fn only(&self, axes: &[&str]) -> Self {
+        let kept = self
+            .0
+            .iter()
+            .filter(|(axis, _)| axes.contains(&axis.as_str()));
+        Self(
+            kept.map(|(axis, written)| (axis.clone(), written.clone()))
+                .collect(),
+        )
+    }
+
+    /// Label of the structure, with the kernels.
+    pub fn structure(&self) -> String {
+        format!("{}{}", self.label(axis::ACCEL), self.kernels_mark())
+    }
+
     /// Whether two keys have the same labels on these axes.
     pub fn agrees(&self, other: &Self, axes: &[&str]) -> bool {
         axes.iter()
@@ -213,7 +231,7 @@ mod tests {
         let mut grid = plain("grid");
         grid.params
             .0
-            .insert("lambda".into(), crate::config::ParamValue::Number(3.0));
+            .insert("lambda".into(), crate::params::ParamValue::Number(3.0));
         grid.label = "grid(lambda=3) @idea".into();
         let key = Key::default()
             .with(axis::KERNELS, "idea")

@@ -1,7 +1,7 @@
 //! Lines of `raystone/1`, whose bodies each held their own names of axes.
 
 use super::{SCHEMA, axis};
-use crate::config::KERNELS_MARK;
+use crate::params::KERNELS_MARK;
 use serde_json::{Map, Value, json};
 
 /// The version before this one.

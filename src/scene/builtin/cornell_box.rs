@@ -6,17 +6,15 @@
 
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::Builtin;
-use crate::config::Params;
+use super::BuiltinScene;
 use crate::geometry::Camera;
+use crate::parameters;
 use glam::Vec3;
 
-pub(super) const SCENE: Builtin = Builtin {
-    name: "cornell-box",
-    description: "the original Cornell box: measured room, two blocks, light in the ceiling (mm)",
-    schema: Vec::new,
-    build,
-};
+parameters! {
+    /// `cornell-box`.
+    pub(super) struct CornellBox {}
+}
 
 const WHITE: u32 = 0;
 const RED: u32 = 1;
@@ -97,45 +95,51 @@ const BLOCKS: [([[f32; 2]; 4], f32); 2] = [
     ),
 ];
 
-fn build(_: &Params) -> (SceneBuilder, Look) {
-    let mut builder = SceneBuilder::default();
-    let quad = |builder: &mut SceneBuilder, corners: Quad, material| {
-        builder.push_quad(corners.map(Vec3::from), material);
-    };
-    for (material, corners) in ROOM {
-        quad(&mut builder, corners, material);
-    }
-    for k in 0..4 {
-        let next = (k + 1) % 4;
-        let side = [CEILING[k], CEILING[next], LAMP[next], LAMP[k]];
-        quad(&mut builder, side, WHITE);
-    }
-    quad(&mut builder, LAMP, LIGHT);
-    for (top, height) in BLOCKS {
-        let at = |k: usize, y: f32| [top[k % 4][0], y, top[k % 4][1]];
-        quad(&mut builder, [0, 1, 2, 3].map(|k| at(k, height)), WHITE);
+impl BuiltinScene for CornellBox {
+    const NAME: &'static str = "cornell-box";
+    const DESCRIPTION: &'static str =
+        "the original Cornell box: measured room, two blocks, light in the ceiling (mm)";
+
+    fn build(&self) -> (SceneBuilder, Look) {
+        let mut builder = SceneBuilder::default();
+        let quad = |builder: &mut SceneBuilder, corners: Quad, material| {
+            builder.push_quad(corners.map(Vec3::from), material);
+        };
+        for (material, corners) in ROOM {
+            quad(&mut builder, corners, material);
+        }
         for k in 0..4 {
-            let side = [at(k, 0.0), at(k, height), at(k + 1, height), at(k + 1, 0.0)];
+            let next = (k + 1) % 4;
+            let side = [CEILING[k], CEILING[next], LAMP[next], LAMP[k]];
             quad(&mut builder, side, WHITE);
         }
+        quad(&mut builder, LAMP, LIGHT);
+        for (top, height) in BLOCKS {
+            let at = |k: usize, y: f32| [top[k % 4][0], y, top[k % 4][1]];
+            quad(&mut builder, [0, 1, 2, 3].map(|k| at(k, height)), WHITE);
+            for k in 0..4 {
+                let side = [at(k, 0.0), at(k, height), at(k + 1, height), at(k + 1, 0.0)];
+                quad(&mut builder, side, WHITE);
+            }
+        }
+        let look = Look {
+            materials: vec![
+                Material::diffuse("white", Vec3::new(0.725, 0.71, 0.68)),
+                Material::diffuse("red", Vec3::new(0.63, 0.065, 0.05)),
+                Material::diffuse("green", Vec3::new(0.14, 0.45, 0.091)),
+                Material::diffuse("light", Vec3::splat(0.78)).emitting(Vec3::new(18.4, 15.6, 8.0)),
+            ],
+            camera: Some(Camera {
+                eye: Vec3::new(278.0, 273.0, -800.0),
+                target: Vec3::new(278.0, 273.0, 0.0),
+                up: Vec3::Y,
+                // A focal length of 35 mm behind a film of 25 mm.
+                vertical_fov_degrees: 39.3077,
+            }),
+            ..Look::default()
+        };
+        (builder, look)
     }
-    let look = Look {
-        materials: vec![
-            Material::diffuse("white", Vec3::new(0.725, 0.71, 0.68)),
-            Material::diffuse("red", Vec3::new(0.63, 0.065, 0.05)),
-            Material::diffuse("green", Vec3::new(0.14, 0.45, 0.091)),
-            Material::diffuse("light", Vec3::splat(0.78)).emitting(Vec3::new(18.4, 15.6, 8.0)),
-        ],
-        camera: Some(Camera {
-            eye: Vec3::new(278.0, 273.0, -800.0),
-            target: Vec3::new(278.0, 273.0, 0.0),
-            up: Vec3::Y,
-            // A focal length of 35 mm behind a film of 25 mm.
-            vertical_fov_degrees: 39.3077,
-        }),
-        ..Look::default()
-    };
-    (builder, look)
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@ use super::super::place::Place;
 use super::super::shapes::{Mesh, RADIUS, cube, plane, sphere};
 use super::closed::inside;
 use crate::accel::Ray;
-use crate::config::{ParamValue, Params, Variant};
 use crate::geometry::Triangle;
+use crate::params::{ParamValue, Params, Variant};
 use crate::scene::{LoadOptions, load};
 use glam::{DVec3, Vec3};
 

@@ -2,10 +2,10 @@
 
 use super::stage::{self, Stage};
 use super::{Figure, NumericsError};
-use crate::config::{Params, Variant};
 use crate::gpu::Gpu;
 use crate::integrator::{ConfiguredIntegrator, CountedRays, Integrator, IntegratorFacts};
 use crate::measure::statistics::{mean, variance};
+use crate::params::{Params, Variant};
 use crate::sampling::dimensions;
 use crate::scene::SceneData;
 use glam::Vec3;

@@ -4,7 +4,6 @@ use super::{Bench, Finding, projections};
 use crate::CheckError;
 use crate::subject::{Changes, DEMAND, LONG_DEMAND, build, sampler};
 use crate::world::Stage;
-use raystone::config::Variant;
 use raystone::discrepancy::{Budget, PointSet, net_quality, star_2d};
 use raystone::image::Image;
 use raystone::integrator::integrand::functions;
@@ -13,6 +12,7 @@ use raystone::integrator::{
 };
 use raystone::measure::statistics::{mean, variance};
 use raystone::measure::words::{Used, compare, dump_stream};
+use raystone::params::Variant;
 use raystone::random::Pcg32;
 use raystone::sampling::{Coordinate, Demand, Sampler, to_unit};
 
@@ -152,7 +152,7 @@ pub fn same_image(bench: &Bench, names: Names) -> Finding {
 /// projections of all dimensions are sound.
 pub fn discrepancy(bench: &Bench, names: Names) -> Finding {
     let sampler = make(bench, names, &DEMAND)?;
-    let facts = sampler.sequence.facts(&sampler.sequence_variant.params);
+    let facts = sampler.sequence.facts();
     if facts.independent && !facts.base_2 {
         return Ok(None);
     }
@@ -194,7 +194,7 @@ pub fn discrepancy(bench: &Bench, names: Names) -> Finding {
 /// The mean of the integrand over replicates, where that must be the integral.
 pub fn integral(bench: &Bench, names: Names) -> Finding {
     let sampler = make(bench, names, &DEMAND)?;
-    let facts = sampler.sequence.facts(&sampler.sequence_variant.params);
+    let facts = sampler.sequence.facts();
     if !(facts.random || UNBIASED.contains(&sampler.decorrelation.name())) {
         return Ok(None);
     }
