@@ -107,9 +107,9 @@ fn gltf(buffer: &str, image: &str) -> String {
     )
 }
 
+/// A folder `models` with buffers and images in it and beside it, and links both ways.
 #[cfg(unix)]
-#[test]
-fn gltf_reads_files_of_its_own_folder_only() {
+fn models_and_links() -> TempDir {
     use std::os::unix::fs::symlink;
     let folder = tempfile::tempdir().unwrap();
     let inside = folder.path().join("models");
@@ -127,6 +127,14 @@ fn gltf_reads_files_of_its_own_folder_only() {
     symlink("../outside.bin", inside.join("link.bin")).unwrap();
     symlink("parts/a.bin", inside.join("within.bin")).unwrap();
     symlink("..", inside.join("up")).unwrap();
+    folder
+}
+
+#[cfg(unix)]
+#[test]
+fn gltf_reads_files_of_its_own_folder_only() {
+    let folder = models_and_links();
+    let inside = folder.path().join("models");
     let model = inside.join("a.gltf");
     let load_with = |buffer: &str, image: &str, allow_outside| {
         fs::write(&model, gltf(buffer, image)).unwrap();

@@ -1,0 +1,4 @@
+//! Statistics of samples: what their docstrings promise.
+
+mod hypotheses;
+mod intervals;
