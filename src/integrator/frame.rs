@@ -59,6 +59,7 @@ impl Frame {
             .u32("seed", slice.seed)
             .u32("lights", scene.lights)
             .u32("first_light", scene.first_light)
+            .u32("first_uv", scene.first_uv)
             .f32("light_power", scene.light_power)
             .f32("ao_radius", self.ao_radius)
             .f32("transform_scale", scene.transform_error.scale)

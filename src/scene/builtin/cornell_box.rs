@@ -4,17 +4,25 @@
 //! Reflectances and the radiance of the light are the usual linear RGB conversions of the
 //! published spectra. The ceiling is a frame around the light, so that no two surfaces coincide.
 
-use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
+use super::super::{DEFAULT_IOR, Material};
 use super::Builtin;
-use crate::config::Params;
+use super::sphere::SphereGrid;
+use crate::config::{ParamRange, ParamValue, Parameter, Params};
 use crate::geometry::Camera;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "cornell-box",
     description: "the original Cornell box: measured room, two blocks, light in the ceiling (mm)",
-    schema: Vec::new,
+    schema: || {
+        vec![Parameter {
+            name: "glass",
+            description: "a ball of glass in the place of the short block",
+            default: ParamValue::Flag(false),
+            range: ParamRange::Flag,
+        }]
+    },
     build,
 };
 
@@ -22,6 +30,7 @@ const WHITE: u32 = 0;
 const RED: u32 = 1;
 const GREEN: u32 = 2;
 const LIGHT: u32 = 3;
+const GLASS: u32 = 4;
 
 type Quad = [[f32; 3]; 4];
 
@@ -97,7 +106,14 @@ const BLOCKS: [([[f32; 2]; 4], f32); 2] = [
     ),
 ];
 
-fn build(_: &Params) -> (SceneBuilder, Look) {
+/// The ball: centre and radius. It stands clear of floor and walls, and shows no facets at usual sizes.
+const BALL: ([f64; 3], f64) = ([186.0, 91.0, 169.0], 90.0);
+const BALL_GRID: SphereGrid = SphereGrid {
+    bands: 96,
+    sectors: 192,
+};
+
+fn build(params: &Params) -> (SceneBuilder, Look) {
     let mut builder = SceneBuilder::default();
     let quad = |builder: &mut SceneBuilder, corners: Quad, material| {
         builder.push_quad(corners.map(Vec3::from), material);
@@ -111,7 +127,13 @@ fn build(_: &Params) -> (SceneBuilder, Look) {
         quad(&mut builder, side, WHITE);
     }
     quad(&mut builder, LAMP, LIGHT);
-    for (top, height) in BLOCKS {
+    let glass = params.flag("glass");
+    if glass {
+        let (centre, radius) = BALL;
+        let place = |v: DVec3| (DVec3::from(centre) + radius * v).as_vec3();
+        BALL_GRID.push(&mut builder, GLASS, place);
+    }
+    for (top, height) in BLOCKS.into_iter().skip(usize::from(glass)) {
         let at = |k: usize, y: f32| [top[k % 4][0], y, top[k % 4][1]];
         quad(&mut builder, [0, 1, 2, 3].map(|k| at(k, height)), WHITE);
         for k in 0..4 {
@@ -119,13 +141,17 @@ fn build(_: &Params) -> (SceneBuilder, Look) {
             quad(&mut builder, side, WHITE);
         }
     }
+    let mut materials = vec![
+        Material::diffuse("white", Vec3::new(0.725, 0.71, 0.68)),
+        Material::diffuse("red", Vec3::new(0.63, 0.065, 0.05)),
+        Material::diffuse("green", Vec3::new(0.14, 0.45, 0.091)),
+        Material::diffuse("light", Vec3::splat(0.78)).emitting(Vec3::new(18.4, 15.6, 8.0)),
+    ];
+    if glass {
+        materials.push(Material::dielectric("glass", Vec3::ONE, DEFAULT_IOR));
+    }
     let look = Look {
-        materials: vec![
-            Material::diffuse("white", Vec3::new(0.725, 0.71, 0.68)),
-            Material::diffuse("red", Vec3::new(0.63, 0.065, 0.05)),
-            Material::diffuse("green", Vec3::new(0.14, 0.45, 0.091)),
-            Material::diffuse("light", Vec3::splat(0.78)).emitting(Vec3::new(18.4, 15.6, 8.0)),
-        ],
+        materials,
         textures: Vec::new(),
         camera: Some(Camera {
             eye: Vec3::new(278.0, 273.0, -800.0),
@@ -141,7 +167,24 @@ fn build(_: &Params) -> (SceneBuilder, Look) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::load_default;
+    use super::super::tests::{load_default, load_with};
+    use super::*;
+    use crate::scene::DIELECTRIC;
+
+    #[test]
+    fn a_ball_of_glass_takes_the_place_of_one_block_and_stands_clear_of_all_else() {
+        let scene = load_with("cornell-box", &[("glass", ParamValue::Flag(true))]);
+        let plain = load_default("cornell-box");
+        let kind = |id: &u32| scene.materials[*id as usize].kind;
+        let others = scene
+            .material_ids
+            .iter()
+            .filter(|id| kind(id) != &DIELECTRIC);
+        assert_eq!(others.count(), plain.triangles.len() - 10);
+        let ([_, height, _], radius) = BALL;
+        assert!(height > radius);
+        assert_eq!(scene.bounds(), plain.bounds());
+    }
 
     #[test]
     fn the_box_has_the_published_extent_and_its_ceiling_leaves_room_for_the_light() {
