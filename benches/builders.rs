@@ -6,7 +6,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use raystone::accel::tree::{Tree, tree_parameters};
 use raystone::accel::{BuildLog, TriangleSoup};
-use raystone::config::{ParamRange, ParamValue, Params, Variant};
+use raystone::params::{ParamRange, ParamValue, Params, Variant};
 use raystone::scene::{LoadOptions, builtin_scenes, load};
 use std::hint::black_box;
 use std::path::Path;

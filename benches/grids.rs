@@ -3,7 +3,7 @@
 
 use criterion::{BatchSize, Criterion, SamplingMode, criterion_group, criterion_main};
 use raystone::accel::{AccelKind, AccelRegistry, BuildLog, TriangleSoup};
-use raystone::config::{Params, Variant};
+use raystone::params::{Params, Variant};
 use raystone::scene::{LoadOptions, builtin_scenes, load};
 use std::path::Path;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use std::time::Duration;
 /// Sponza, 262,267 triangles, below the folder of shared scenes.
 const SPONZA: &str = "../../shared/scenes/sponza-crytek/sponza.obj";
 
-fn defaults(schema: raystone::config::ParameterSchema) -> Params {
+fn defaults(schema: raystone::params::ParameterSchema) -> Params {
     Params(
         schema
             .into_iter()

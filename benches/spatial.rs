@@ -3,7 +3,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use raystone::accel::{AccelRegistry, BuildLog, TriangleSoup};
-use raystone::config::{ParamValue, Params, Variant};
+use raystone::params::{ParamValue, Params, Variant};
 use raystone::scene::{self, LoadOptions};
 
 /// Crytek's Sponza where it is at hand, else a built-in sphere.

@@ -22,6 +22,8 @@ pub mod image;
 pub mod integrator;
 pub mod measure;
 pub mod oracle;
+pub mod params;
+pub mod random;
 pub mod report;
 pub mod run;
 pub mod sampling;

@@ -9,8 +9,8 @@ use glam::Vec3;
 use raystone::accel::tree::{NodeKind, Tree, tree_parameters};
 use raystone::accel::triangle::TriangleRecord;
 use raystone::accel::{AccelKind, BuildLog, Bvh, Counters, Hit, Ray, TriangleSoup};
-use raystone::config::{ParamRange, ParamValue, Params, Variant};
 use raystone::geometry::Triangle;
+use raystone::params::{ParamRange, ParamValue, Params, Variant};
 use raystone::scene::{LoadOptions, load};
 use std::path::Path;
 

@@ -1,10 +1,8 @@
 //! Experiment files, through the public interface: what is accepted, and what every kind of
 //! mistake is answered with.
 
-use raystone::config::{
-    Axis, Catalogue, ConfigError, Entry, Experiment, ParamRange, ParamValue, Parameter, Plan,
-    Variant, keys,
-};
+use raystone::config::{Axis, Catalogue, ConfigError, Experiment, Plan, keys};
+use raystone::params::{Entry, ParamRange, ParamValue, Parameter, Variant};
 use raystone::run::Registries;
 use std::path::Path;
 

@@ -12,12 +12,13 @@ use raystone::accel::{
     AccelRegistry, BuildLog, BuiltBvh, Bvh, Counters, CpuTwin, Hit, Intersection, NO_HIT, Ray,
     TriangleSoup,
 };
-use raystone::config::{Gate, Params, Variant};
+use raystone::config::Gate;
 use raystone::geometry::Triangle;
 use raystone::gpu::{Bindings, Composition, Dispatch, Gpu, KernelLibrary, groups_for};
 use raystone::integrator::{RayOffset, SceneBuffers, Traced};
 use raystone::measure::batch::{Batch, Query};
 use raystone::measure::rays::record_rays;
+use raystone::params::{Params, Variant};
 use raystone::scene::{self, LoadOptions};
 use std::path::Path;
 use std::sync::OnceLock;

@@ -5,7 +5,7 @@ mod common;
 
 use common::{Pcg, default_params, scenes};
 use raystone::accel::{AccelRegistry, BuildLog, BuiltBvh, TriangleSoup};
-use raystone::config::{ParamRange, ParamValue, ParameterSchema, Params, Variant};
+use raystone::params::{ParamRange, ParamValue, ParameterSchema, Params, Variant};
 use raystone::sampling::{Demand, SamplerRegistry};
 use raystone::scene::{LoadOptions, load};
 

@@ -3,9 +3,9 @@
 
 mod support;
 
-use raystone::config::{ParamValue, Variant};
 use raystone::gpu::Gpu;
 use raystone::image::Image;
+use raystone::params::{ParamValue, Variant};
 use raystone::sampling::Sampler;
 use support::*;
 

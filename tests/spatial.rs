@@ -12,7 +12,7 @@ use raystone::accel::{
     AccelError, AccelKind, AccelRegistry, BuiltAccel, Counters, CpuTwin, GpuBuffers, Hit, NO_HIT,
     Ray, TriangleSoup,
 };
-use raystone::config::{ParamValue, Params};
+use raystone::params::{ParamValue, Params};
 use raystone::scene::{self, LoadOptions};
 
 const KINDS: [&str; 2] = ["octree", "kd-tree"];
@@ -371,7 +371,7 @@ fn real_scenes_are_seen_as_the_judge_sees_them() {
             continue;
         }
         seen += 1;
-        let variant = raystone::config::Variant {
+        let variant = raystone::params::Variant {
             name: path.clone(),
             params: Params::default(),
             label: model.to_owned(),

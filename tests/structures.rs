@@ -11,7 +11,7 @@ use raystone::accel::triangle::TriangleRecord;
 use raystone::accel::{
     AccelKind, AccelRegistry, BuildLog, Counters, Hit, NO_HIT, Ray, TriangleSoup,
 };
-use raystone::config::Params;
+use raystone::params::Params;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 fn kinds() -> Vec<&'static dyn AccelKind> {

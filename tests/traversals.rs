@@ -8,7 +8,7 @@ use common::{Pcg, assert_same_hits, brute_force, build, default_params, trace};
 use raystone::accel::{
     AccelError, AccelKind, BuildLog, Bvh, Counters, Hit, Ray, RopedBvh, TriangleSoup,
 };
-use raystone::config::{ParamRange, ParamValue, Params};
+use raystone::params::{ParamRange, ParamValue, Params};
 
 /// Parameters of `bvh` with some of them set.
 fn params(changes: &[(&str, &str)]) -> Params {
@@ -472,7 +472,7 @@ fn skip_pointers_visit_at_most_three_times_the_nodes_of_the_ordered_traversal_on
             println!("skipped: {} is absent", at.display());
             continue;
         }
-        let variant = raystone::config::Variant {
+        let variant = raystone::params::Variant {
             name: at.display().to_string(),
             params: Params::default(),
             label: path.to_owned(),

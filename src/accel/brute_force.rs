@@ -9,8 +9,8 @@ use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, TriangleSoup,
 };
 use crate::accel::StructureStats;
-use crate::config::{ParameterSchema, Params};
 use crate::oracle::{GROUP, Groups, Line};
+use crate::params::{ParameterSchema, Params};
 use rayon::prelude::*;
 
 /// The registry entry.

@@ -18,7 +18,7 @@ use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, TriangleSoup,
 };
 use crate::accel::StructureStats;
-use crate::config::{ParameterSchema, Params};
+use crate::params::{ParameterSchema, Params};
 use bytemuck::{Pod, Zeroable};
 
 const WIDTH: usize = 4;

@@ -9,7 +9,7 @@ use super::bounds::Bounds;
 use super::tree::{NodeKind, Tree};
 use super::triangle::TriangleRecord;
 use crate::accel::StructureStats;
-use crate::config::Params;
+use crate::params::Params;
 
 /// Most children of a node here; the cost table of a node has one entry less.
 const MAX_WIDTH: usize = 8;
@@ -325,7 +325,7 @@ impl<'a> Costs<'a> {
 mod tests {
     use super::*;
     use crate::accel::tree::TreeNode;
-    use crate::measure::statistics::Pcg32;
+    use crate::random::Pcg32;
 
     fn around(x: f32, size: f32) -> Bounds {
         Bounds {

@@ -18,8 +18,8 @@ use super::{
     TriangleSoup,
 };
 use crate::accel::StructureStats;
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use bytemuck::{Pod, Zeroable};
 
 /// Low bits of [`Node::link`]: the axis of the plane, or [`LEAF`].

@@ -41,8 +41,8 @@ pub use stats::{BuildLog, LEAF_HISTOGRAM_END, Phase, StructureStats, leaf_histog
 pub use two_level_grid::TwoLevelGrid;
 pub use uniform_grid::UniformGrid;
 
-use crate::config::{ParamError, ParameterSchema, Params};
 use crate::gpu::{Composition, UniformValues};
+use crate::params::{ParamError, ParameterSchema, Params};
 use crate::scene::SceneData;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;

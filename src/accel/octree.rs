@@ -20,8 +20,8 @@ use super::{
     TriangleSoup,
 };
 use crate::accel::StructureStats;
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// Marks the word of a leaf; the other bits are its first place in the references.
 const LEAF: u32 = 0x8000_0000;

@@ -1,7 +1,7 @@
 //! The registry of structures: one line each.
 
 use super::{AccelKind, BruteForce, KdTree, Octree, RopedBvh, UniformGrid};
-use crate::config::Entry;
+use crate::params::Entry;
 
 /// Everything that can be named on the `accel` axis.
 #[derive(Clone)]

@@ -16,7 +16,7 @@ use super::{
     TriangleSoup,
 };
 use crate::accel::StructureStats;
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use rayon::prelude::*;
 
 /// Most parts of a top cell along an axis: its resolution takes ten bits an axis.

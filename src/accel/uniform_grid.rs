@@ -19,7 +19,7 @@ use super::{
     TriangleSoup,
 };
 use crate::accel::StructureStats;
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use rayon::prelude::*;
 
 /// Bits of a cell's word that hold the begin of its list; the others hold the distance.

@@ -23,7 +23,7 @@ use super::intersection::Reciprocal;
 use super::tree::{NodeKind, Tree, tree_parameters};
 use super::triangle::TriangleRecord;
 use super::{AccelError, BuildLog, GpuBuffers, NamedWords, TriangleSoup};
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use bytemuck::Pod;
 
 /// Relative slack of the distances to quantised planes, 2⁻²⁰.
@@ -280,7 +280,7 @@ mod tests {
     use crate::accel::Intersection;
     use crate::accel::bounds::slab;
     use crate::accel::ray::Ray;
-    use crate::measure::statistics::Pcg32;
+    use crate::random::Pcg32;
 
     /// Numbers of all sizes, both signs, zero and neighbours of powers of two among them.
     fn number(random: &mut Pcg32) -> f32 {

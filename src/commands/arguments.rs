@@ -2,8 +2,9 @@
 
 use super::failure::Failure;
 use clap::Args;
-use raystone::config::{Catalogue, Variant};
+use raystone::config::Catalogue;
 use raystone::gpu::{self, AdapterChoice, Gpu, KernelLibrary};
+use raystone::params::Variant;
 use raystone::run::{Registries, RunOptions, kernel_library};
 use raystone::scene::{SceneError, check_model};
 use std::io::IsTerminal as _;

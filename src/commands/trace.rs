@@ -7,7 +7,8 @@ use anyhow::anyhow;
 use clap::Args;
 use raystone::accel::triangle::TriangleTest;
 use raystone::accel::{BoxTest, Intersection, TriangleSoup};
-use raystone::config::{Catalogue, Experiment, Plan, Variant};
+use raystone::config::{Catalogue, Experiment, Plan};
+use raystone::params::Variant;
 use raystone::run::Registries;
 use raystone::scene::{LoadOptions, SceneData, load};
 use raystone::stress::case::{Address, parse_ray};
@@ -100,9 +101,7 @@ impl Trace {
         overrides.extend(self.set.iter().cloned());
         let experiment =
             Experiment::parse(&text(&catalogue), "raystone trace", &overrides, &catalogue)?;
-        let is_randomised =
-            |sequence: &_, decorrelation: &_| registries.is_randomised(sequence, decorrelation);
-        let plan = Plan::new(&experiment, &[], is_randomised)?;
+        let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d))?;
         match (plan.scenes.first(), plan.structures.first()) {
             (Some(scene), Some(cell)) => Ok((scene.clone(), cell.accel.clone())),
             _ => Err(Failure::input(anyhow!(

@@ -1,6 +1,6 @@
 //! The cells of a plan.
 
-use super::Variant;
+use crate::params::Variant;
 use std::fmt;
 
 /// A structure on a scene: built, gated and timed with the recorded rays.

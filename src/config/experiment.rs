@@ -3,8 +3,9 @@
 use super::error::Place;
 use super::keys::Axis;
 use super::pattern::Pattern;
-use super::{Catalogue, ConfigError, Variant, parse};
+use super::{Catalogue, ConfigError, parse};
 use crate::geometry::Camera;
+use crate::params::Variant;
 use crate::sampling::hash::pcg_hash;
 use std::fmt;
 use std::path::Path;

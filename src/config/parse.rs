@@ -8,8 +8,9 @@ use super::experiment::{Axes, Discrepancy, Exclude, Experiment, Gate, Reference,
 use super::keys::{Axis, KEYS, OPTIONAL_SECTIONS};
 use super::section::{Section, texts};
 use super::tree::{self, Item, Table, Value};
-use super::{Catalogue, Variant, variants};
+use super::{Catalogue, variants};
 use crate::geometry::Camera;
+use crate::params::Variant;
 use std::path::Path;
 
 /// Parses and checks an experiment; see [`Experiment::parse`].

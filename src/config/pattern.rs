@@ -1,6 +1,6 @@
 //! Patterns that choose variants: names with `*`, optionally negated.
 
-use super::Variant;
+use crate::params::Variant;
 use std::fmt;
 
 /// Chooses variants of one axis: a name, a label, or either with `*` for any text; a leading `!`
@@ -59,7 +59,7 @@ fn glob_matches(glob: &str, text: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Params;
+    use crate::params::Params;
 
     #[test]
     fn a_star_stands_for_any_text() {

@@ -4,12 +4,13 @@
 //! error is measured once per scene, integrator and sampler, with all replicates. Time is measured
 //! for every full cell, at few samples per pixel. The plan counts what this saves.
 
+use super::ConfigError;
 use super::cells::{SamplerCell, StreamCell, StructureCell, TimeCell};
 use super::error::Place;
 use super::experiment::{Axes, Exclude, Experiment};
 use super::keys::Axis;
 use super::pattern::Pattern;
-use super::{ConfigError, Variant};
+use crate::params::Variant;
 use crate::text::nearest;
 use std::fmt::{self, Write as _};
 

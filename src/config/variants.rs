@@ -1,67 +1,14 @@
 //! From names and parameter lists to the variants of an axis.
 
+use super::Catalogue;
 use super::error::ConfigError;
-use super::keys::{Axis, Kind};
+use super::keys::Axis;
 use super::tree::{Item, Table, Value};
-use super::{Catalogue, Entry, ParamRange, ParamValue, Parameter, Params, Variant};
-use std::fmt;
+use crate::params::{Entry, ParamRange, ParamValue, Parameter, Variant};
 use std::path::Path;
 
 /// Ends of file names that make a scene name a path.
 const MODEL_EXTENSIONS: [&str; 4] = ["obj", "gltf", "glb", "ply"];
-
-impl fmt::Display for ParamRange {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Number { min, max } => Kind::Number {
-                min: *min,
-                max: *max,
-            }
-            .fmt(f),
-            Self::Integer { min, max } => Kind::Integer {
-                min: *min,
-                max: *max,
-            }
-            .fmt(f),
-            Self::Flag => Kind::Flag.fmt(f),
-            Self::Choice(names) => write!(f, "one of {}", names.join(", ")),
-            Self::Text => f.write_str("a text"),
-        }
-    }
-}
-
-impl Entry {
-    /// This entry with every parameter at its default.
-    pub fn default_variant(&self) -> Variant {
-        self.variant(Vec::new())
-    }
-
-    /// This entry with some parameters set; the label shows those that differ from the default.
-    fn variant(&self, set: Vec<(&'static str, ParamValue)>) -> Variant {
-        let value_of = |parameter: &Parameter| {
-            let set = set.iter().find(|(name, _)| *name == parameter.name);
-            set.map_or(&parameter.default, |(_, value)| value).clone()
-        };
-        let mut params = Params::default();
-        let mut shown = Vec::new();
-        for parameter in &self.schema {
-            let value = value_of(parameter);
-            if value != parameter.default {
-                shown.push(format!("{}={value}", parameter.name));
-            }
-            params.0.insert(parameter.name.to_owned(), value);
-        }
-        let label = match shown.as_slice() {
-            [] => self.name.clone(),
-            shown => format!("{}({})", self.name, shown.join(",")),
-        };
-        Variant {
-            name: self.name.clone(),
-            params,
-            label,
-        }
-    }
-}
 
 /// The entry called `name`; also one made up for the path of a model or a folder of kernels.
 pub(super) fn resolve(
@@ -143,7 +90,10 @@ pub(super) fn expand(
             })
             .collect();
     }
-    Ok(products.into_iter().map(|set| entry.variant(set)).collect())
+    Ok(products
+        .into_iter()
+        .map(|set| entry.variant(&set))
+        .collect())
 }
 
 /// Variants that one axis may have.
@@ -190,30 +140,12 @@ fn values(key: &str, item: &Item, parameter: &Parameter) -> Result<Vec<ParamValu
 
 fn value(key: &str, item: &Item, parameter: &Parameter) -> Result<ParamValue, ConfigError> {
     let range = &parameter.range;
-    let (value, allowed) = match (range, &item.value) {
-        (ParamRange::Number { min, max }, Value::Number(x)) => {
-            (ParamValue::Number(*x), (min..=max).contains(&x))
-        }
-        (ParamRange::Number { min, max }, Value::Integer(x)) => {
-            let x = *x as f64;
-            (ParamValue::Number(x), (*min..=*max).contains(&x))
-        }
-        (ParamRange::Integer { min, max }, Value::Integer(x)) => {
-            (ParamValue::Integer(*x), (min..=max).contains(&x))
-        }
-        (ParamRange::Flag, Value::Flag(x)) => (ParamValue::Flag(*x), true),
-        (ParamRange::Choice(names), Value::Text(x)) => {
-            if !names.contains(&x.as_str()) {
-                return Err(ConfigError::Unknown {
-                    at: item.at.clone(),
-                    what: format!("value of `{key}`"),
-                    name: x.clone(),
-                    known: names.iter().map(|name| (*name).to_owned()).collect(),
-                });
-            }
-            (ParamValue::Name(x.clone()), true)
-        }
-        (ParamRange::Text, Value::Text(x)) => (ParamValue::Name(x.clone()), true),
+    let value = match (range, &item.value) {
+        (ParamRange::Number { .. }, Value::Number(x)) => ParamValue::Number(*x),
+        (ParamRange::Number { .. }, Value::Integer(x)) => ParamValue::Number(*x as f64),
+        (ParamRange::Integer { .. }, Value::Integer(x)) => ParamValue::Integer(*x),
+        (ParamRange::Flag, Value::Flag(x)) => ParamValue::Flag(*x),
+        (ParamRange::Choice(_) | ParamRange::Text, Value::Text(x)) => ParamValue::Name(x.clone()),
         (_, found) => {
             return Err(ConfigError::WrongType {
                 at: item.at.clone(),
@@ -223,15 +155,21 @@ fn value(key: &str, item: &Item, parameter: &Parameter) -> Result<ParamValue, Co
             });
         }
     };
-    if allowed {
-        return Ok(value);
+    match range {
+        _ if range.allows(&value) => Ok(value),
+        ParamRange::Choice(names) => Err(ConfigError::Unknown {
+            at: item.at.clone(),
+            what: format!("value of `{key}`"),
+            name: value.to_string(),
+            known: names.iter().map(|name| (*name).to_owned()).collect(),
+        }),
+        _ => Err(ConfigError::OutOfRange {
+            at: item.at.clone(),
+            key: key.to_owned(),
+            value: value.to_string(),
+            expected: range.to_string(),
+        }),
     }
-    Err(ConfigError::OutOfRange {
-        at: item.at.clone(),
-        key: key.to_owned(),
-        value: value.to_string(),
-        expected: range.to_string(),
-    })
 }
 
 /// Shortens labels that are paths to the last part of the path where that part is told apart from all
@@ -259,35 +197,7 @@ pub(super) fn shorten_labels(scenes: &mut [Variant]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn entry() -> Entry {
-        let number = |name, default| Parameter {
-            name,
-            description: "",
-            default: ParamValue::Number(default),
-            range: ParamRange::Number {
-                min: 0.0,
-                max: 10.0,
-            },
-        };
-        Entry {
-            name: "grid".into(),
-            description: String::new(),
-            schema: vec![number("b", 1.0), number("a", 2.0)],
-        }
-    }
-
-    #[test]
-    fn labels_show_only_what_differs_from_the_default() {
-        let entry = entry();
-        assert_eq!(entry.default_variant().label, "grid");
-        let variant = entry.variant(vec![
-            ("a", ParamValue::Number(2.0)),
-            ("b", ParamValue::Number(0.5)),
-        ]);
-        assert_eq!(variant.label, "grid(b=0.5)");
-        assert_eq!(variant.params.number("a"), 2.0);
-    }
+    use crate::params::Params;
 
     #[test]
     fn short_labels_stay_distinct() {

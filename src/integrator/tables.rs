@@ -58,6 +58,8 @@ pub struct SceneBuffers {
     pub light_power: f32,
     /// Where texture coordinates begin in `shading_tables`, in words.
     pub first_uv: u32,
+    /// Length of the diagonal of the scene's box, scene units.
+    pub diagonal: f64,
 }
 
 /// Relative luminance of linear sRGB, as in `kernels/shading/light/triangles.wesl`.
@@ -104,6 +106,7 @@ impl SceneBuffers {
             first_light: tables.first_light,
             light_power,
             first_uv: tables.first_uv,
+            diagonal: f64::from(2.0 * scene.bounds().radius()),
         })
     }
 }

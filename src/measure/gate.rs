@@ -19,11 +19,12 @@ use crate::accel::{
     AccelError, BuildLog, BuiltAccel, BuiltBvh, Bvh, Hit, NO_HIT, Ray, Space, TriangleSoup,
     brute_force_hits,
 };
-use crate::config::{Gate, Params};
+use crate::config::Gate;
 use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu, GpuError, kernel_errors};
 use crate::integrator::{SceneBuffers, Traced};
 use crate::oracle::{self, OracleRay, Verdict};
+use crate::params::Params;
 use crate::scene::SceneData;
 
 /// The judge is compared with brute force on at least this many rays.

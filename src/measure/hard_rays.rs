@@ -9,8 +9,8 @@
 //! They are made from the scene and a seed alone, and never timed.
 
 use super::rays::FAR;
-use super::statistics::Pcg32;
 use crate::accel::{Counters, CpuTwin, NO_HIT, Ray, TriangleSoup};
+use crate::random::Pcg32;
 use glam::Vec3;
 
 /// How many there are: no multiple of a workgroup.

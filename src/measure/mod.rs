@@ -2,6 +2,7 @@
 
 pub mod batch;
 pub mod bias;
+pub mod figure;
 pub mod gate;
 pub mod hard_rays;
 pub mod hypothesis;

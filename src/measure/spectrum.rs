@@ -249,8 +249,8 @@ pub fn mean_filtered(spectra: &[ErrorSpectrum]) -> Vec<FilteredError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::statistics::Pcg32;
     use super::*;
+    use crate::random::Pcg32;
 
     const SIZE: [usize; 2] = [96, 64];
 

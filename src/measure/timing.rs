@@ -2,9 +2,10 @@
 //! random order, so that drift of the machine hits all alike.
 
 use super::record::Interval;
-use super::statistics::{Pcg32, median, median_interval};
+use super::statistics::{median, median_interval};
 use crate::config::Timing;
 use crate::gpu::{Elapsed, GpuError};
+use crate::random::Pcg32;
 use std::cell::{Cell, OnceCell};
 use std::time::Instant;
 

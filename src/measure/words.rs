@@ -5,9 +5,9 @@
 //! from a buffer and imports the same modules as the renderer, under the same constants and with the same
 //! table.
 
-use super::statistics::Pcg32;
 use crate::gpu::{Bindings, Composition, Dispatch, Gpu, GpuError, UniformValues, groups_for};
 use crate::integrator::with_sampler;
+use crate::random::Pcg32;
 use crate::sampling::{Coordinate, Sampler};
 
 /// Coordinates that are compared in all: those on borders, and random ones for the rest.

@@ -1,7 +1,7 @@
 //! Reports: plots, tables, `index.html`, `summary.md` and the terminal's tables, all derived from a
 //! run's records alone.
 //!
-//! Data flows one way: [`read`] parses the lines, [`data`] sorts them, [`samplers`] and [`ruling`]
+//! Data flows one way: [`crate::measure::record`] parses the lines, [`data`] sorts them, [`samplers`] and [`ruling`]
 //! draw conclusions, [`sections`] writes them into a [`document::Document`], and [`html`],
 //! [`markdown`] and [`terminal`] show that document.
 
@@ -11,9 +11,9 @@ pub mod format;
 pub mod html;
 pub mod markdown;
 pub mod pictures;
+pub mod pivot;
 pub mod plot;
 pub mod point_page;
-pub mod read;
 pub mod ruling;
 pub mod samplers;
 pub mod sections;
@@ -21,12 +21,13 @@ pub mod stress;
 pub mod terminal;
 #[cfg(test)]
 mod tests;
+pub mod values;
 
-pub use read::{Records, read_records};
 pub use stress::{stress_tables, write_stress_page};
 pub use terminal::{failed_checks, terminal_tables};
 
 use crate::atomic::write_atomic;
+use crate::measure::record::{RecordError, read_records};
 use data::RunData;
 use document::{Block, Document};
 use std::path::{Path, PathBuf};
@@ -35,43 +36,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The records cannot be read.
-    #[error("cannot read {}: {source}; give the folder that a run wrote", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The file holds no record.
-    #[error("{} holds no record: the run wrote nothing before it ended", path.display())]
-    NoRecords {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The records are of another version.
-    #[error(
-        "{}:{line}: schema {found:?}, but this program reads {:?}; use the version that wrote it",
-        path.display(),
-        crate::measure::record::SCHEMA
-    )]
-    Schema {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// The schema found.
-        found: String,
-    },
-    /// A line is no record.
-    #[error("{}:{line}: not a record: {source}; remove the line to read the rest", path.display())]
-    Parse {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Why.
-        source: serde_json::Error,
-    },
+    #[error(transparent)]
+    Records(#[from] RecordError),
     /// A file of the report cannot be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
@@ -95,13 +61,15 @@ pub struct ReportPaths {
     pub html: PathBuf,
     /// The summary in Markdown.
     pub summary: PathBuf,
+    /// Every figure as comma-separated values.
+    pub figures: PathBuf,
     /// Every plot, SVG and PNG.
     pub plots: Vec<PathBuf>,
     /// What was left out while reading the records, in words.
     pub warnings: Vec<String>,
 }
 
-/// Writes `index.html`, `summary.md` and `plots/*.{svg,png}` beside the `records.jsonl` in `dir`.
+/// Writes `index.html`, `summary.md`, `figures.csv` and `plots/*.{svg,png}` beside the `records.jsonl` in `dir`.
 /// Each file is whole or absent: it is written under another name and renamed.
 ///
 /// # Errors
@@ -113,9 +81,12 @@ pub fn write_report(dir: &Path) -> Result<ReportPaths, ReportError> {
     let (html, plots) = write_page(dir, &mut document)?;
     let summary = dir.join("summary.md");
     write_file(&summary, markdown::summary(&document).as_bytes())?;
+    let figures = dir.join("figures.csv");
+    write_file(&figures, values::csv(&values::values(&data)).as_bytes())?;
     Ok(ReportPaths {
         html,
         summary,
+        figures,
         plots,
         warnings: records.warnings,
     })

@@ -4,10 +4,11 @@
 use super::session::Session;
 use super::world::World;
 use crate::accel::{AccelError, BuildLog, Intersection, TriangleSoup};
-use crate::config::{Gate, StructureCell, Variant};
+use crate::config::{Gate, StructureCell};
 use crate::gpu::{Gpu, GpuError};
 use crate::integrator::{SceneBuffers, Traced};
 use crate::measure::gate::{Judge, fault_text, gate};
+use crate::params::Variant;
 use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
 use std::collections::BTreeMap;
 use std::sync::Arc;

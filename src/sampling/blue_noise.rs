@@ -13,11 +13,16 @@
 
 use super::hash::pcg_hash;
 use super::{Coordinate, Decorrelation, Demand, Partner, SamplerTable, void_and_cluster};
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
 use std::path::Path;
 
-/// The registry entry.
-pub struct BlueNoise;
+parameters! {
+    /// The registry entry.
+    pub struct BlueNoise {
+        /// folder with the tables of Heitz et al. 2019, whose points then replace those of sobol; none is the mask
+        tables: String = String::new();
+    }
+}
 
 const MASK: u32 = 1;
 const MASK_SIZE: u32 = 64;
@@ -28,9 +33,11 @@ const TILE_SIZE: u32 = 128;
 /// Dimensions and samples of Heitz's points.
 const HEITZ_LIMIT: u32 = 256;
 
-/// The folder of Heitz's tables, if they are asked for.
-fn folder(params: &Params) -> Option<&str> {
-    Some(params.name("tables")).filter(|folder| !folder.is_empty())
+impl BlueNoise {
+    /// The folder of Heitz's tables, if they are asked for.
+    fn folder(&self) -> Option<&str> {
+        Some(self.tables.as_str()).filter(|folder| !folder.is_empty())
+    }
 }
 
 /// Where the pixel lies in a tile that repeats every `size` pixels and is moved at random by `key`.
@@ -107,30 +114,21 @@ impl Decorrelation for BlueNoise {
         "sampling/blue_noise"
     }
 
-    fn parameters(&self) -> ParameterSchema {
-        vec![Parameter {
-            name: "tables",
-            description: "folder with the tables of Heitz et al. 2019, whose points then replace those of sobol; none is the mask",
-            default: ParamValue::Name(String::new()),
-            range: ParamRange::Text,
-        }]
-    }
-
-    fn by_count(&self, params: &Params) -> bool {
-        folder(params).is_some()
+    fn by_count(&self) -> bool {
+        self.folder().is_some()
     }
 
     fn by_width(&self) -> bool {
         true
     }
 
-    fn limits(&self, params: &Params) -> [Option<u32>; 2] {
-        let limit = folder(params).map(|_| HEITZ_LIMIT);
+    fn limits(&self) -> [Option<u32>; 2] {
+        let limit = self.folder().map(|_| HEITZ_LIMIT);
         [limit, limit]
     }
 
-    fn refusal(&self, params: &Params, partner: &Partner) -> Option<String> {
-        if folder(params).is_some() && partner.name != "sobol" {
+    fn refusal(&self, partner: &Partner) -> Option<String> {
+        if self.folder().is_some() && partner.name != "sobol" {
             return Some(
                 "the tables of Heitz et al. bring points of Sobol's sequence; take sobol"
                     .to_owned(),
@@ -139,9 +137,9 @@ impl Decorrelation for BlueNoise {
         partner.without_structure()
     }
 
-    fn table(&self, params: &Params, _: &Partner, demand: &Demand) -> Result<Vec<u32>, String> {
+    fn table(&self, _: &Partner, demand: &Demand) -> Result<Vec<u32>, String> {
         let mut words = vec![demand.width.unwrap_or(1).max(1)];
-        match folder(params) {
+        match self.folder() {
             Some(folder) => {
                 words.extend(read_tables(Path::new(folder), demand.samples.unwrap_or(1))?)
             }
@@ -155,16 +153,16 @@ impl Decorrelation for BlueNoise {
         Ok(words)
     }
 
-    fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {
-        vec![("HEITZ", u32::from(folder(params).is_some()))]
+    fn constants(&self) -> Vec<(&'static str, u32)> {
+        vec![("HEITZ", u32::from(self.folder().is_some()))]
     }
 
-    fn index(&self, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn index(&self, _: &SamplerTable, at: Coordinate) -> u32 {
         at.sample
     }
 
-    fn decorrelate(&self, x: u32, params: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
-        if folder(params).is_some() {
+    fn decorrelate(&self, x: u32, table: &SamplerTable, at: Coordinate) -> u32 {
+        if self.folder().is_some() {
             return heitz_point(table, at);
         }
         x.wrapping_add(

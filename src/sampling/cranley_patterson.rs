@@ -5,11 +5,16 @@
 //! integration", SIAM J. Numer. Anal. 13, 1976. On fractions of 2³² the wrap is exact.
 
 use super::hash::dimension_number;
-use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeding};
-use crate::config::{ParameterSchema, Params};
+use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
+use crate::parameters;
 
-/// The registry entry.
-pub struct CranleyPatterson;
+parameters! {
+    /// The registry entry.
+    pub struct CranleyPatterson {
+        /// Whether pixels differ.
+        seeded: Seeded;
+    }
+}
 
 impl Decorrelation for CranleyPatterson {
     fn name(&self) -> &'static str {
@@ -24,19 +29,19 @@ impl Decorrelation for CranleyPatterson {
         "sampling/cranley_patterson"
     }
 
-    fn parameters(&self) -> ParameterSchema {
-        vec![Seeding::parameter()]
+    fn seeding(&self) -> Seeding {
+        self.seeded.seeding
     }
 
-    fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
+    fn refusal(&self, partner: &Partner) -> Option<String> {
         partner.without_structure()
     }
 
-    fn index(&self, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn index(&self, _: &SamplerTable, at: Coordinate) -> u32 {
         at.sample
     }
 
-    fn decorrelate(&self, x: u32, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn decorrelate(&self, x: u32, _: &SamplerTable, at: Coordinate) -> u32 {
         x.wrapping_add(dimension_number(at))
     }
 }

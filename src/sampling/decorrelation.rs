@@ -1,7 +1,8 @@
 //! What a decorrelation is.
 
-use super::{Coordinate, Demand, Facts, SamplerTable};
-use crate::config::{ParameterSchema, Params};
+use super::{Coordinate, Demand, Facts, SamplerTable, Seeding};
+use crate::params::{Parameters, Registered};
+use std::sync::Arc;
 
 /// The sequence that a decorrelation is to work on.
 #[derive(Debug, Clone, Copy)]
@@ -48,17 +49,21 @@ impl Partner<'_> {
     }
 }
 
-/// A decorrelation of pixels; one static per scheme, one line in the registry.
-pub trait Decorrelation: Sync {
+/// A decorrelation of pixels: the struct of its parameters, one line in the registry.
+pub trait Decorrelation: Send + Sync {
     /// Name as a user types it.
     fn name(&self) -> &'static str;
     /// One line: what it is and where it comes from.
     fn description(&self) -> &'static str;
     /// Module of the kernel, relative to the kernel folder.
     fn kernel(&self) -> &'static str;
-    /// Parameters.
-    fn parameters(&self) -> ParameterSchema {
-        Vec::new()
+    /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
+    fn sources(&self) -> &'static [(&'static str, &'static str)] {
+        &[]
+    }
+    /// Whether pixels draw different numbers from it.
+    fn seeding(&self) -> Seeding {
+        Seeding::PixelSample
     }
     /// Whether another seed gives other points.
     fn is_random(&self) -> bool {
@@ -67,11 +72,11 @@ pub trait Decorrelation: Sync {
     /// Whether the mean over seeds of an estimate by a fixed sequence is the integral, at any number of
     /// samples: every number that it makes is uniform in [0, 1). One that is not, by design, may be
     /// found to be biased without being at fault.
-    fn is_unbiased(&self, _params: &Params) -> bool {
+    fn is_unbiased(&self) -> bool {
         self.is_random()
     }
     /// Whether it depends on how many samples are drawn.
-    fn by_count(&self, _params: &Params) -> bool {
+    fn by_count(&self) -> bool {
         false
     }
     /// Whether it depends on where the pixel lies in the image.
@@ -79,29 +84,34 @@ pub trait Decorrelation: Sync {
         false
     }
     /// Dimensions and samples it has; `None` is any number.
-    fn limits(&self, _params: &Params) -> [Option<u32>; 2] {
+    fn limits(&self) -> [Option<u32>; 2] {
         [None, None]
     }
     /// Why it makes no sense with this sequence, if so.
-    fn refusal(&self, params: &Params, partner: &Partner) -> Option<String>;
+    fn refusal(&self, partner: &Partner) -> Option<String>;
     /// Words that the kernel reads by `decorrelation_word`.
     ///
     /// # Errors
     /// A file cannot be read or holds something else, or the demand cannot be met: in words.
-    fn table(
-        &self,
-        _params: &Params,
-        _partner: &Partner,
-        _demand: &Demand,
-    ) -> Result<Vec<u32>, String> {
+    fn table(&self, _partner: &Partner, _demand: &Demand) -> Result<Vec<u32>, String> {
         Ok(Vec::new())
     }
     /// Constants of `package::active::constants` that the kernel imports.
-    fn constants(&self, _params: &Params) -> Vec<(&'static str, u32)> {
+    fn constants(&self) -> Vec<(&'static str, u32)> {
         Vec::new()
     }
     /// Twin of the kernel's `index`: which point of the sequence the sample takes.
-    fn index(&self, params: &Params, table: &SamplerTable, at: Coordinate) -> u32;
+    fn index(&self, table: &SamplerTable, at: Coordinate) -> u32;
     /// Twin of the kernel's `decorrelate`: moves the fraction `x` of 2³².
-    fn decorrelate(&self, x: u32, params: &Params, table: &SamplerTable, at: Coordinate) -> u32;
+    fn decorrelate(&self, x: u32, table: &SamplerTable, at: Coordinate) -> u32;
+}
+
+impl Registered<dyn Decorrelation> {
+    /// The decorrelation that `D` declares.
+    pub fn decorrelation<D: Decorrelation + Parameters + 'static>() -> Self {
+        let default = D::default();
+        Self::new::<D>(default.name(), default.description(), |params| {
+            Ok(Arc::new(D::from_params(params)?))
+        })
+    }
 }

@@ -6,11 +6,16 @@
 //! not, and leaves other structure in ruins.
 
 use super::hash::dimension_number;
-use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeding};
-use crate::config::{ParameterSchema, Params};
+use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
+use crate::parameters;
 
-/// The registry entry.
-pub struct DigitalShift;
+parameters! {
+    /// The registry entry.
+    pub struct DigitalShift {
+        /// Whether pixels differ.
+        seeded: Seeded;
+    }
+}
 
 impl Decorrelation for DigitalShift {
     fn name(&self) -> &'static str {
@@ -25,19 +30,19 @@ impl Decorrelation for DigitalShift {
         "sampling/digital_shift"
     }
 
-    fn parameters(&self) -> ParameterSchema {
-        vec![Seeding::parameter()]
+    fn seeding(&self) -> Seeding {
+        self.seeded.seeding
     }
 
-    fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
+    fn refusal(&self, partner: &Partner) -> Option<String> {
         partner.without_structure().or_else(|| partner.not_base_2())
     }
 
-    fn index(&self, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn index(&self, _: &SamplerTable, at: Coordinate) -> u32 {
         at.sample
     }
 
-    fn decorrelate(&self, x: u32, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn decorrelate(&self, x: u32, _: &SamplerTable, at: Coordinate) -> u32 {
         x ^ dimension_number(at)
     }
 }

@@ -6,11 +6,16 @@
 //! since no radius changes.
 
 use super::hash::dimension_number;
-use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeding};
-use crate::config::{ParameterSchema, Params};
+use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
+use crate::parameters;
 
-/// The registry entry.
-pub struct DiscRotation;
+parameters! {
+    /// The registry entry.
+    pub struct DiscRotation {
+        /// Whether pixels differ.
+        seeded: Seeded;
+    }
+}
 
 impl Decorrelation for DiscRotation {
     fn name(&self) -> &'static str {
@@ -25,26 +30,26 @@ impl Decorrelation for DiscRotation {
         "sampling/disc_rotation"
     }
 
-    fn parameters(&self) -> ParameterSchema {
-        vec![Seeding::parameter()]
+    fn seeding(&self) -> Seeding {
+        self.seeded.seeding
     }
 
     /// No radius is moved.
-    fn is_unbiased(&self, _: &Params) -> bool {
+    fn is_unbiased(&self) -> bool {
         false
     }
 
-    fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
+    fn refusal(&self, partner: &Partner) -> Option<String> {
         let flat = partner.facts.dimensions == Some(1);
         let reason = || format!("{} has one dimension, a disc has two", partner.name);
         partner.without_structure().or_else(|| flat.then(reason))
     }
 
-    fn index(&self, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn index(&self, _: &SamplerTable, at: Coordinate) -> u32 {
         at.sample
     }
 
-    fn decorrelate(&self, x: u32, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn decorrelate(&self, x: u32, _: &SamplerTable, at: Coordinate) -> u32 {
         if at.dimension & 1 == 0 {
             return x;
         }

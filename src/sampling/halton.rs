@@ -8,10 +8,33 @@
 use super::primes::{faure_permutation, primes, random_permutation};
 use super::radical_inverse::radical_inverse;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
 
-/// The registry entry.
-pub struct Halton;
+parameters! {
+    /// The registry entry.
+    pub struct Halton {
+        /// What becomes of digits.
+        rule: DigitRule;
+    }
+
+    /// The parameter of sequences in prime bases. Plain digits of large bases run along diagonals: with a
+    /// shift D* of the bases 59 and 61 is 0.121 after 1024 points, and 0.029 is the worst of the first 20
+    /// dimensions with Faure's.
+    pub struct DigitRule {
+        /// digits as they are, permuted by Faure's rule (1992), or at random once and for all
+        digits: Digits = Digits::Faure;
+    }
+
+    /// What becomes of digits.
+    pub enum Digits {
+        /// They stay as they are.
+        Plain = "plain",
+        /// Faure's permutations (1992).
+        Faure = "faure",
+        /// Permutations drawn once and for all.
+        Random = "random",
+    }
+}
 
 /// The radical inverse whose digits d are replaced by the words `first + d`.
 fn permuted_inverse(table: &SamplerTable, n: u32, base: u32, first: u32) -> u32 {
@@ -26,49 +49,40 @@ fn permuted_inverse(table: &SamplerTable, n: u32, base: u32, first: u32) -> u32 
     x
 }
 
-/// The parameter of sequences in prime bases. Plain digits of large bases run along diagonals: with a shift
-/// D* of the bases 59 and 61 is 0.121 after 1024 points, and 0.029 is the worst of the first 20 dimensions
-/// with Faure's.
-pub(super) fn digits_parameter() -> Parameter {
-    Parameter {
-        name: "digits",
-        description: "digits as they are, permuted by Faure's rule (1992), or at random once and for all",
-        default: ParamValue::Name("faure".to_owned()),
-        range: ParamRange::Choice(&["plain", "faure", "random"]),
+impl DigitRule {
+    /// The constant of the kernel that tells whether digits are permuted.
+    pub(super) fn constants(&self) -> Vec<(&'static str, u32)> {
+        vec![("PERMUTED", u32::from(self.digits != Digits::Plain))]
     }
-}
 
-pub(super) fn is_permuted(params: &Params) -> bool {
-    params.name("digits") != "plain"
-}
-
-/// For each of the first primes the base and where its permutation begins, then the permutations; all of it
-/// stands behind `before` words.
-pub(super) fn digit_table(params: &Params, count: u32, before: u32) -> Vec<u32> {
-    let bases = primes(count as usize);
-    let permutation = match params.name("digits") {
-        "faure" => faure_permutation,
-        "random" => random_permutation,
-        _ => |_| Vec::new(),
-    };
-    let mut words = Vec::new();
-    let mut permutations = Vec::new();
-    for base in &bases {
-        let place = before as usize + 2 * bases.len() + permutations.len();
-        words.extend([*base, place as u32]);
-        permutations.extend(permutation(*base));
+    /// For each of the first primes the base and where its permutation begins, then the permutations; all of it
+    /// stands behind `before` words.
+    pub(super) fn digit_table(&self, count: u32, before: u32) -> Vec<u32> {
+        let bases = primes(count as usize);
+        let permutation = match self.digits {
+            Digits::Faure => faure_permutation,
+            Digits::Random => random_permutation,
+            Digits::Plain => |_| Vec::new(),
+        };
+        let mut words = Vec::new();
+        let mut permutations = Vec::new();
+        for base in &bases {
+            let place = before as usize + 2 * bases.len() + permutations.len();
+            words.extend([*base, place as u32]);
+            permutations.extend(permutation(*base));
+        }
+        words.extend(permutations);
+        words
     }
-    words.extend(permutations);
-    words
-}
 
-/// The radical inverse in the base that word `place` holds, by the permutation that the next one leads to.
-pub(super) fn inverse_at(params: &Params, table: &SamplerTable, n: u32, place: u32) -> u32 {
-    let base = table.sequence_word(place);
-    if base > 2 && is_permuted(params) {
-        return permuted_inverse(table, n, base, table.sequence_word(place + 1));
+    /// The radical inverse in the base that word `place` holds, by the permutation that the next one leads to.
+    pub(super) fn inverse_at(&self, table: &SamplerTable, n: u32, place: u32) -> u32 {
+        let base = table.sequence_word(place);
+        if base > 2 && self.digits != Digits::Plain {
+            return permuted_inverse(table, n, base, table.sequence_word(place + 1));
+        }
+        radical_inverse(n, base)
     }
-    radical_inverse(n, base)
 }
 
 impl Sequence for Halton {
@@ -84,11 +98,7 @@ impl Sequence for Halton {
         "sampling/halton"
     }
 
-    fn parameters(&self) -> ParameterSchema {
-        vec![digits_parameter()]
-    }
-
-    fn facts(&self, _: &Params) -> Facts {
+    fn facts(&self) -> Facts {
         Facts {
             extensible: true,
             dimensions: Some(256),
@@ -96,15 +106,15 @@ impl Sequence for Halton {
         }
     }
 
-    fn table(&self, params: &Params, demand: &Demand) -> Vec<u32> {
-        digit_table(params, demand.dimensions, 0)
+    fn table(&self, demand: &Demand) -> Vec<u32> {
+        self.rule.digit_table(demand.dimensions, 0)
     }
 
-    fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {
-        vec![("PERMUTED", u32::from(is_permuted(params)))]
+    fn constants(&self) -> Vec<(&'static str, u32)> {
+        self.rule.constants()
     }
 
-    fn sequence(&self, params: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
-        inverse_at(params, table, at.sample, 2 * at.dimension)
+    fn sequence(&self, table: &SamplerTable, at: Coordinate) -> u32 {
+        self.rule.inverse_at(table, at.sample, 2 * at.dimension)
     }
 }

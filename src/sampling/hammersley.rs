@@ -6,12 +6,17 @@
 //! for every number of samples. Words: N, the quotient and the remainder of 2³² / N, then those of Halton's
 //! sequence for the dimensions after the first.
 
-use super::halton::{digit_table, digits_parameter, inverse_at, is_permuted};
+use super::halton::DigitRule;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
-use crate::config::{ParameterSchema, Params};
+use crate::parameters;
 
-/// The registry entry.
-pub struct Hammersley;
+parameters! {
+    /// The registry entry.
+    pub struct Hammersley {
+        /// What becomes of digits.
+        rule: DigitRule;
+    }
+}
 
 const BASES: u32 = 3;
 
@@ -28,15 +33,11 @@ impl Sequence for Hammersley {
         "sampling/hammersley"
     }
 
-    fn parameters(&self) -> ParameterSchema {
-        vec![digits_parameter()]
+    fn constants(&self) -> Vec<(&'static str, u32)> {
+        self.rule.constants()
     }
 
-    fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {
-        vec![("PERMUTED", u32::from(is_permuted(params)))]
-    }
-
-    fn facts(&self, _: &Params) -> Facts {
+    fn facts(&self) -> Facts {
         Facts {
             by_count: true,
             dimensions: Some(256),
@@ -46,20 +47,19 @@ impl Sequence for Hammersley {
         }
     }
 
-    fn table(&self, params: &Params, demand: &Demand) -> Vec<u32> {
+    fn table(&self, demand: &Demand) -> Vec<u32> {
         let count = u64::from(demand.samples.unwrap_or(1).max(1));
         let whole = 1_u64 << 32;
         let mut words = vec![count as u32, (whole / count) as u32, (whole % count) as u32];
-        words.extend(digit_table(
-            params,
-            demand.dimensions.saturating_sub(1),
-            BASES,
-        ));
+        words.extend(
+            self.rule
+                .digit_table(demand.dimensions.saturating_sub(1), BASES),
+        );
         words
     }
 
     /// i / N rounded down: i · 2³² / N in two parts.
-    fn sequence(&self, params: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
+    fn sequence(&self, table: &SamplerTable, at: Coordinate) -> u32 {
         if at.dimension == 0 {
             let count = table.sequence_word(0);
             let part = at.sample.wrapping_mul(table.sequence_word(2)) / count;
@@ -68,6 +68,7 @@ impl Sequence for Hammersley {
                 .wrapping_mul(table.sequence_word(1))
                 .wrapping_add(part);
         }
-        inverse_at(params, table, at.sample, BASES + 2 * (at.dimension - 1))
+        self.rule
+            .inverse_at(table, at.sample, BASES + 2 * (at.dimension - 1))
     }
 }

@@ -6,14 +6,17 @@
 
 use super::fixed_point::mul_high;
 use super::hash::pixel_number;
-use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeding};
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
+use crate::parameters;
 
-/// The registry entry.
-pub struct IndexOffset;
-
-fn offsets(params: &Params) -> u32 {
-    params.integer("offsets") as u32
+parameters! {
+    /// The registry entry.
+    pub struct IndexOffset {
+        /// offsets are drawn from 0 to this, excluded
+        offsets: u32 = 65_536, in 2..=1 << 24;
+        /// Whether pixels differ.
+        seeded: Seeded;
+    }
 }
 
 impl Decorrelation for IndexOffset {
@@ -29,40 +32,31 @@ impl Decorrelation for IndexOffset {
         "sampling/index_offset"
     }
 
-    fn parameters(&self) -> ParameterSchema {
-        let offsets = Parameter {
-            name: "offsets",
-            description: "offsets are drawn from 0 to this, excluded",
-            default: ParamValue::Integer(65_536),
-            range: ParamRange::Integer {
-                min: 2,
-                max: 1 << 24,
-            },
-        };
-        vec![offsets, Seeding::parameter()]
+    fn seeding(&self) -> Seeding {
+        self.seeded.seeding
     }
 
     /// The mean is that of the first points of the sequence, as many as there are offsets.
-    fn is_unbiased(&self, _: &Params) -> bool {
+    fn is_unbiased(&self) -> bool {
         false
     }
 
-    fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
+    fn refusal(&self, partner: &Partner) -> Option<String> {
         partner
             .without_structure()
             .or_else(|| partner.not_extensible())
     }
 
-    fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {
-        vec![("OFFSETS", offsets(params))]
+    fn constants(&self) -> Vec<(&'static str, u32)> {
+        vec![("OFFSETS", self.offsets)]
     }
 
-    fn index(&self, params: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn index(&self, _: &SamplerTable, at: Coordinate) -> u32 {
         at.sample
-            .wrapping_add(mul_high(pixel_number(at), offsets(params)))
+            .wrapping_add(mul_high(pixel_number(at), self.offsets))
     }
 
-    fn decorrelate(&self, x: u32, _: &Params, _: &SamplerTable, _: Coordinate) -> u32 {
+    fn decorrelate(&self, x: u32, _: &SamplerTable, _: Coordinate) -> u32 {
         x
     }
 }

@@ -7,31 +7,52 @@
 
 use super::fixed_point::mul_high;
 use super::hash::dimension_number;
-use super::{Coordinate, Decorrelation, Demand, Partner, SamplerTable, Seeding};
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use super::{Coordinate, Decorrelation, Demand, Partner, SamplerTable, Seeded, Seeding};
+use crate::parameters;
 
-/// The registry entry.
-pub struct MicroJitter;
+parameters! {
+    /// The registry entry.
+    pub struct MicroJitter {
+        /// K of the amplitude; 0 takes Dufay's: 1.5 for hammersley, 2.5 else
+        k: f64 = 0.0, in 0.0..=64.0;
+        /// s of the amplitude; Dufay takes 2 whatever the dimensions
+        s: u32 = 2, in 1..=64;
+        /// what a shift beyond 0 or 1 does; clamp is biased
+        edge: Edge = Edge::Wrap;
+        /// Whether pixels differ.
+        seeded: Seeded;
+    }
+
+    /// What a shift beyond the ends of [0, 1) does.
+    pub enum Edge {
+        /// It comes in again at the other end.
+        Wrap = "wrap",
+        /// It stops there.
+        Clamp = "clamp",
+    }
+}
 
 /// Dufay's K for Halton points, also taken for sequences that he did not fit.
 const HALTON_K: f64 = 2.5;
 const HAMMERSLEY_K: f64 = 1.5;
 
-/// The width 2μ of the shifts as a fraction of 2³².
-fn width(params: &Params, sequence: &str, samples: u32) -> u32 {
-    let k = match params.number("k") {
-        0.0 if sequence == "hammersley" => HAMMERSLEY_K,
-        0.0 => HALTON_K,
-        k => k,
-    };
-    let samples = f64::from(samples.max(1));
-    let root = match params.integer("s") {
-        1 => samples,
-        2 => samples.sqrt(),
-        s => samples.powf(1.0 / s as f64),
-    };
-    // The cast saturates where μ would be ½ or more.
-    (2.0 * k / root * 2.0_f64.powi(32)) as u32
+impl MicroJitter {
+    /// The width 2μ of the shifts as a fraction of 2³².
+    fn width(&self, sequence: &str, samples: u32) -> u32 {
+        let k = match self.k {
+            0.0 if sequence == "hammersley" => HAMMERSLEY_K,
+            0.0 => HALTON_K,
+            k => k,
+        };
+        let samples = f64::from(samples.max(1));
+        let root = match self.s {
+            1 => samples,
+            2 => samples.sqrt(),
+            s => samples.powf(1.0 / f64::from(s)),
+        };
+        // The cast saturates where μ would be ½ or more.
+        (2.0 * k / root * 2.0_f64.powi(32)) as u32
+    }
 }
 
 impl Decorrelation for MicroJitter {
@@ -47,73 +68,41 @@ impl Decorrelation for MicroJitter {
         "sampling/micro_jitter"
     }
 
-    fn parameters(&self) -> ParameterSchema {
-        vec![
-            Parameter {
-                name: "k",
-                description: "K of the amplitude; 0 takes Dufay's: 1.5 for hammersley, 2.5 else",
-                default: ParamValue::Number(0.0),
-                range: ParamRange::Number {
-                    min: 0.0,
-                    max: 64.0,
-                },
-            },
-            Parameter {
-                name: "s",
-                description: "s of the amplitude; Dufay takes 2 whatever the dimensions",
-                default: ParamValue::Integer(2),
-                range: ParamRange::Integer { min: 1, max: 64 },
-            },
-            Parameter {
-                name: "edge",
-                description: "what a shift beyond 0 or 1 does; clamp is biased",
-                default: ParamValue::Name("wrap".to_owned()),
-                range: ParamRange::Choice(&["wrap", "clamp"]),
-            },
-            Seeding::parameter(),
-        ]
+    fn seeding(&self) -> Seeding {
+        self.seeded.seeding
     }
 
-    fn by_count(&self, _: &Params) -> bool {
+    fn by_count(&self) -> bool {
         true
     }
 
     /// Shifts smaller than the square keep a part of the error of the points.
-    fn is_unbiased(&self, _: &Params) -> bool {
+    fn is_unbiased(&self) -> bool {
         false
     }
 
-    fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
+    fn refusal(&self, partner: &Partner) -> Option<String> {
         partner.without_structure()
     }
 
-    fn table(
-        &self,
-        params: &Params,
-        partner: &Partner,
-        demand: &Demand,
-    ) -> Result<Vec<u32>, String> {
-        Ok(vec![width(
-            params,
-            partner.name,
-            demand.samples.unwrap_or(1),
-        )])
+    fn table(&self, partner: &Partner, demand: &Demand) -> Result<Vec<u32>, String> {
+        Ok(vec![self.width(partner.name, demand.samples.unwrap_or(1))])
     }
 
-    fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {
-        vec![("CLAMP", u32::from(params.name("edge") == "clamp"))]
+    fn constants(&self) -> Vec<(&'static str, u32)> {
+        vec![("CLAMP", u32::from(self.edge == Edge::Clamp))]
     }
 
-    fn index(&self, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn index(&self, _: &SamplerTable, at: Coordinate) -> u32 {
         at.sample
     }
 
-    fn decorrelate(&self, x: u32, params: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
+    fn decorrelate(&self, x: u32, table: &SamplerTable, at: Coordinate) -> u32 {
         let width = table.decorrelation_word(0);
         let up = mul_high(dimension_number(at), width);
         let down = width >> 1;
         let moved = x.wrapping_add(up).wrapping_sub(down);
-        let clamp = params.name("edge") == "clamp";
+        let clamp = self.edge == Edge::Clamp;
         if clamp && up < down && moved > x {
             return 0;
         }
@@ -130,8 +119,6 @@ mod tests {
 
     #[test]
     fn widths_are_those_of_the_thesis() {
-        let schema = MicroJitter.parameters().into_iter();
-        let params = Params(schema.map(|p| (p.name.to_owned(), p.default)).collect());
         for (sequence, samples, mu) in [
             ("halton", 64, 0.3125),
             ("halton", 1024, 0.078_125),
@@ -139,7 +126,8 @@ mod tests {
             ("hammersley", 8, 0.5),
             ("halton", 1, 0.5),
         ] {
-            let found = f64::from(width(&params, sequence, samples)) * 2.0_f64.powi(-33);
+            let found =
+                f64::from(MicroJitter::default().width(sequence, samples)) * 2.0_f64.powi(-33);
             assert!(
                 (found - f64::min(mu, 0.5)).abs() < 0.031 * f64::from(samples == 8) + 1e-9,
                 "{sequence} {samples}: {found}"

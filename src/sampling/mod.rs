@@ -55,12 +55,13 @@ pub use pmj02::Pmj02;
 pub use r2::R2;
 pub use rank1_lattice::Rank1Lattice;
 pub use registry::SamplerRegistry;
-pub use sequence::{Facts, Seeding, Sequence};
+pub use sequence::{Facts, Seeded, Seeding, Sequence};
 pub use sobol::Sobol;
 pub use state::{Coordinate, SamplerTable};
 pub use van_der_corput::VanDerCorput;
 
-use crate::config::Variant;
+use crate::params::Variant;
+use std::sync::Arc;
 
 /// What will be drawn: tables are made for it, and no longer than it needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,11 +78,11 @@ pub struct Demand {
 #[derive(Clone)]
 pub struct Sampler {
     /// The sequence.
-    pub sequence: &'static dyn Sequence,
+    pub sequence: Arc<dyn Sequence>,
     /// Its parameters.
     pub sequence_variant: Variant,
     /// The decorrelation.
-    pub decorrelation: &'static dyn Decorrelation,
+    pub decorrelation: Arc<dyn Decorrelation>,
     /// Its parameters.
     pub decorrelation_variant: Variant,
     /// What it was made for.
@@ -95,16 +96,13 @@ pub struct Sampler {
 impl Sampler {
     /// Whether seeds give different points; a deterministic sampler has one replicate.
     pub fn is_random(&self) -> bool {
-        let facts = self.sequence.facts(&self.sequence_variant.params);
-        facts.random || self.decorrelation.is_random()
+        self.sequence.facts().random || self.decorrelation.is_random()
     }
 
     /// Whether each number of samples has points of its own: the first half of the points for 2N is not
     /// the set for N.
     pub fn by_count(&self) -> bool {
-        let facts = self.sequence.facts(&self.sequence_variant.params);
-        let decorrelation = &self.decorrelation_variant.params;
-        facts.by_count || self.decorrelation.by_count(decorrelation)
+        self.sequence.facts().by_count || self.decorrelation.by_count()
     }
 
     /// `sequence × decorrelation`, for people.
@@ -118,11 +116,8 @@ impl Sampler {
     /// Constants of `package::active::constants`.
     pub fn constants(&self) -> Vec<(&'static str, u32)> {
         let [sequence, decorrelation] = self.shared_by_pixels.map(u32::from);
-        let mut out = self.sequence.constants(&self.sequence_variant.params);
-        out.extend(
-            self.decorrelation
-                .constants(&self.decorrelation_variant.params),
-        );
+        let mut out = self.sequence.constants();
+        out.extend(self.decorrelation.constants());
         out.push(("SHARED_SEQUENCE", sequence));
         out.push(("SHARED_DECORRELATION", decorrelation));
         out
@@ -141,12 +136,9 @@ impl Sampler {
         if decorrelation {
             own.pixel = 0;
         }
-        let moves = &self.decorrelation_variant.params;
-        point.sample = self.decorrelation.index(moves, &self.table, own);
-        let x = self
-            .sequence
-            .sequence(&self.sequence_variant.params, &self.table, point);
-        self.decorrelation.decorrelate(x, moves, &self.table, own)
+        point.sample = self.decorrelation.index(&self.table, own);
+        let x = self.sequence.sequence(&self.table, point);
+        self.decorrelation.decorrelate(x, &self.table, own)
     }
 }
 

@@ -2,10 +2,12 @@
 //! `kernels/sampling/no_decorrelation.wesl`.
 
 use super::{Coordinate, Decorrelation, Partner, SamplerTable};
-use crate::config::Params;
+use crate::parameters;
 
-/// The registry entry.
-pub struct NoDecorrelation;
+parameters! {
+    /// The registry entry.
+    pub struct NoDecorrelation {}
+}
 
 impl Decorrelation for NoDecorrelation {
     fn name(&self) -> &'static str {
@@ -24,15 +26,15 @@ impl Decorrelation for NoDecorrelation {
         false
     }
 
-    fn refusal(&self, _: &Params, _: &Partner) -> Option<String> {
+    fn refusal(&self, _: &Partner) -> Option<String> {
         None
     }
 
-    fn index(&self, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn index(&self, _: &SamplerTable, at: Coordinate) -> u32 {
         at.sample
     }
 
-    fn decorrelate(&self, x: u32, _: &Params, _: &SamplerTable, _: Coordinate) -> u32 {
+    fn decorrelate(&self, x: u32, _: &SamplerTable, _: Coordinate) -> u32 {
         x
     }
 }

@@ -7,11 +7,16 @@
 
 use super::hash::{dimension_number, pixel_number};
 use super::owen::owen_scramble;
-use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeding};
-use crate::config::{ParameterSchema, Params};
+use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
+use crate::parameters;
 
-/// The registry entry.
-pub struct OwenHash;
+parameters! {
+    /// The registry entry.
+    pub struct OwenHash {
+        /// Whether pixels differ.
+        seeded: Seeded;
+    }
+}
 
 impl Decorrelation for OwenHash {
     fn name(&self) -> &'static str {
@@ -26,22 +31,22 @@ impl Decorrelation for OwenHash {
         "sampling/owen_hash"
     }
 
-    fn parameters(&self) -> ParameterSchema {
-        vec![Seeding::parameter()]
+    fn seeding(&self) -> Seeding {
+        self.seeded.seeding
     }
 
-    fn refusal(&self, _: &Params, partner: &Partner) -> Option<String> {
+    fn refusal(&self, partner: &Partner) -> Option<String> {
         let refused = partner.without_structure();
         refused
             .or_else(|| partner.not_base_2())
             .or_else(|| partner.not_extensible())
     }
 
-    fn index(&self, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn index(&self, _: &SamplerTable, at: Coordinate) -> u32 {
         owen_scramble(at.sample, pixel_number(at))
     }
 
-    fn decorrelate(&self, x: u32, _: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
+    fn decorrelate(&self, x: u32, _: &SamplerTable, at: Coordinate) -> u32 {
         owen_scramble(x, dimension_number(at))
     }
 }

@@ -9,11 +9,16 @@
 use super::hash::pixel_number;
 use super::owen::{owen_key, scramble_reversed};
 use super::sobol::direction_numbers;
-use super::{Coordinate, Demand, Facts, SamplerTable, Seeding, Sequence};
-use crate::config::{ParameterSchema, Params};
+use super::{Coordinate, Demand, Facts, SamplerTable, Seeded, Seeding, Sequence};
+use crate::parameters;
 
-/// The registry entry.
-pub struct OwenSobol;
+parameters! {
+    /// The registry entry.
+    pub struct OwenSobol {
+        /// Whether pixels differ.
+        seeded: Seeded;
+    }
+}
 
 const BITS: usize = 16;
 const INDEX_KEY: u32 = 0x79c6_8e4a;
@@ -32,14 +37,14 @@ impl Sequence for OwenSobol {
         "sampling/owen_sobol"
     }
 
-    fn parameters(&self) -> ParameterSchema {
-        vec![Seeding::parameter()]
+    fn seeding(&self) -> Seeding {
+        self.seeded.seeding
     }
 
-    fn facts(&self, params: &Params) -> Facts {
+    fn facts(&self) -> Facts {
         Facts {
             random: true,
-            independent: Seeding::of(params) == Seeding::PixelSample,
+            independent: self.seeded.seeding == Seeding::PixelSample,
             base_2: true,
             dimensions: Some(256),
             samples: Some(1 << BITS),
@@ -47,12 +52,12 @@ impl Sequence for OwenSobol {
         }
     }
 
-    fn table(&self, _: &Params, demand: &Demand) -> Vec<u32> {
+    fn table(&self, demand: &Demand) -> Vec<u32> {
         let numbers = direction_numbers(demand.dimensions, BITS);
         numbers.into_iter().map(u32::reverse_bits).collect()
     }
 
-    fn sequence(&self, _: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
+    fn sequence(&self, table: &SamplerTable, at: Coordinate) -> u32 {
         let seed = pixel_number(at);
         let index = scramble_reversed(at.sample.reverse_bits(), owen_key(seed ^ INDEX_KEY));
         let mut rest = index & 0xffff_0000;

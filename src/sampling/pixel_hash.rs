@@ -3,13 +3,29 @@
 
 use super::hash::{pcg_hash, wang_hash};
 use super::trig_hash::trig_hash;
-use super::{Coordinate, Facts, SamplerTable, Seeding, Sequence};
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use super::{Coordinate, Facts, SamplerTable, Seeded, Seeding, Sequence};
+use crate::parameters;
 
-/// The registry entry.
-pub struct PixelHash;
+parameters! {
+    /// The registry entry.
+    pub struct PixelHash {
+        /// which hash; trig is a negative control
+        hash: Hash = Hash::Pcg;
+        /// Whether pixels differ.
+        seeded: Seeded;
+    }
 
-const HASHES: &[&str] = &["pcg", "wang", "trig"];
+    /// How numbers are hashed.
+    pub enum Hash {
+        /// PCG's output permutation (Jarzynski & Olano 2020).
+        Pcg = "pcg",
+        /// Wang's integer hash (1997).
+        Wang = "wang",
+        /// The fraction of a large sine.
+        Trig = "trig",
+    }
+}
+
 const WANG: u32 = 1;
 const TRIG: u32 = 2;
 
@@ -26,19 +42,11 @@ impl Sequence for PixelHash {
         "sampling/pixel_hash"
     }
 
-    fn parameters(&self) -> ParameterSchema {
-        vec![
-            Parameter {
-                name: "hash",
-                description: "which hash; trig is a negative control",
-                default: ParamValue::Name("pcg".to_owned()),
-                range: ParamRange::Choice(HASHES),
-            },
-            Seeding::parameter(),
-        ]
+    fn seeding(&self) -> Seeding {
+        self.seeded.seeding
     }
 
-    fn facts(&self, _: &Params) -> Facts {
+    fn facts(&self) -> Facts {
         Facts {
             random: true,
             independent: true,
@@ -46,20 +54,20 @@ impl Sequence for PixelHash {
         }
     }
 
-    fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {
-        let hash = match params.name("hash") {
-            "wang" => WANG,
-            "trig" => TRIG,
-            _ => 0,
+    fn constants(&self) -> Vec<(&'static str, u32)> {
+        let hash = match self.hash {
+            Hash::Pcg => 0,
+            Hash::Wang => WANG,
+            Hash::Trig => TRIG,
         };
         vec![("HASH", hash)]
     }
 
-    fn sequence(&self, params: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
-        let hash = match params.name("hash") {
-            "trig" => return trig_hash(at),
-            "wang" => wang_hash,
-            _ => pcg_hash,
+    fn sequence(&self, _: &SamplerTable, at: Coordinate) -> u32 {
+        let hash = match self.hash {
+            Hash::Trig => return trig_hash(at),
+            Hash::Wang => wang_hash,
+            Hash::Pcg => pcg_hash,
         };
         let pixel = hash(at.pixel.wrapping_add(hash(at.seed)));
         hash(

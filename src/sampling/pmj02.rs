@@ -6,10 +6,15 @@
 
 use super::pmj02_points::shuffled_points;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
 
-/// The registry entry.
-pub struct Pmj02;
+parameters! {
+    /// The registry entry.
+    pub struct Pmj02 {
+        /// seed of the generator: which of the random sets
+        set: u32 = 1, in 0..=65_535;
+    }
+}
 
 impl Sequence for Pmj02 {
     fn name(&self) -> &'static str {
@@ -24,19 +29,7 @@ impl Sequence for Pmj02 {
         "sampling/pmj02"
     }
 
-    fn parameters(&self) -> ParameterSchema {
-        vec![Parameter {
-            name: "set",
-            description: "seed of the generator: which of the random sets",
-            default: ParamValue::Integer(1),
-            range: ParamRange::Integer {
-                min: 0,
-                max: 65_535,
-            },
-        }]
-    }
-
-    fn facts(&self, _: &Params) -> Facts {
+    fn facts(&self) -> Facts {
         Facts {
             base_2: true,
             dimensions: Some(128),
@@ -45,18 +38,17 @@ impl Sequence for Pmj02 {
         }
     }
 
-    fn table(&self, params: &Params, demand: &Demand) -> Vec<u32> {
+    fn table(&self, demand: &Demand) -> Vec<u32> {
         let count = demand.samples.unwrap_or(4096).max(1).next_power_of_two();
-        let set = params.integer("set") as u32;
         let mut words = vec![count - 1];
         for pair in 0..demand.dimensions.div_ceil(2) {
-            let points = shuffled_points(count, set << 8 | pair);
+            let points = shuffled_points(count, self.set << 8 | pair);
             words.extend(points.into_iter().flatten());
         }
         words
     }
 
-    fn sequence(&self, _: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
+    fn sequence(&self, table: &SamplerTable, at: Coordinate) -> u32 {
         let last = table.sequence_word(0);
         let point = (at.dimension >> 1) * (last + 1) + (at.sample & last);
         table.sequence_word(1 + 2 * point + (at.dimension & 1))

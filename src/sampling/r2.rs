@@ -11,10 +11,15 @@
 
 use super::primes::primes;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
 
-/// The registry entry.
-pub struct R2;
+parameters! {
+    /// The registry entry.
+    pub struct R2 {
+        /// all dimensions that are drawn; up to 8 it is the d of the ratio's equation x^(d+1) = x + 1
+        dimensions: u32 = 2, in 1..=256;
+    }
+}
 
 /// Most dimensions that take powers of the ratio.
 const GOLDEN: u32 = 8;
@@ -43,36 +48,26 @@ impl Sequence for R2 {
         "sampling/r2"
     }
 
-    fn parameters(&self) -> ParameterSchema {
-        vec![Parameter {
-            name: "dimensions",
-            description: "all dimensions that are drawn; up to 8 it is the d of the ratio's equation x^(d+1) = x + 1",
-            default: ParamValue::Integer(2),
-            range: ParamRange::Integer { min: 1, max: 256 },
-        }]
-    }
-
-    fn facts(&self, params: &Params) -> Facts {
+    fn facts(&self) -> Facts {
         Facts {
             extensible: true,
-            dimensions: Some(params.integer("dimensions") as u32),
+            dimensions: Some(self.dimensions),
             ..Facts::default()
         }
     }
 
-    fn table(&self, params: &Params, demand: &Demand) -> Vec<u32> {
-        let dimensions = params.integer("dimensions") as u32;
+    fn table(&self, demand: &Demand) -> Vec<u32> {
         let word = |step: f64| (step.fract() * 2.0_f64.powi(32)).round() as u32;
-        if dimensions > GOLDEN {
+        if self.dimensions > GOLDEN {
             let roots = primes(demand.dimensions as usize).into_iter();
             return roots.map(|p| word(f64::from(p).sqrt())).collect();
         }
-        let step = 1.0 / generalised_golden_ratio(dimensions);
+        let step = 1.0 / generalised_golden_ratio(self.dimensions);
         let powers = std::iter::successors(Some(step), |power| Some(power * step));
         powers.take(demand.dimensions as usize).map(word).collect()
     }
 
-    fn sequence(&self, _: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
+    fn sequence(&self, table: &SamplerTable, at: Coordinate) -> u32 {
         let multiple = at
             .sample
             .wrapping_add(1)

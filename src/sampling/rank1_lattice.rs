@@ -7,10 +7,12 @@
 
 use super::lattice_search::generating_vector;
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
-use crate::config::Params;
+use crate::parameters;
 
-/// The registry entry.
-pub struct Rank1Lattice;
+parameters! {
+    /// The registry entry.
+    pub struct Rank1Lattice {}
+}
 
 impl Sequence for Rank1Lattice {
     fn name(&self) -> &'static str {
@@ -25,7 +27,7 @@ impl Sequence for Rank1Lattice {
         "sampling/rank1_lattice"
     }
 
-    fn facts(&self, _: &Params) -> Facts {
+    fn facts(&self) -> Facts {
         Facts {
             dimensions: Some(super::lattice_search::DIMENSIONS as u32),
             samples: Some(1 << super::lattice_search::LAST_LEVEL),
@@ -33,11 +35,11 @@ impl Sequence for Rank1Lattice {
         }
     }
 
-    fn table(&self, _: &Params, demand: &Demand) -> Vec<u32> {
+    fn table(&self, demand: &Demand) -> Vec<u32> {
         generating_vector()[..demand.dimensions as usize].to_vec()
     }
 
-    fn sequence(&self, _: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
+    fn sequence(&self, table: &SamplerTable, at: Coordinate) -> u32 {
         at.sample
             .reverse_bits()
             .wrapping_mul(table.sequence_word(at.dimension))

@@ -1,44 +1,47 @@
 //! The registries of sequences and decorrelations: one line each.
 
 use super::{
-    BlueNoise, CranleyPatterson, Decorrelation, Demand, DigitalShift, DiscRotation, Halton,
+    BlueNoise, CranleyPatterson, Decorrelation, Demand, DigitalShift, DiscRotation, Facts, Halton,
     Hammersley, IndexOffset, MicroJitter, NoDecorrelation, OwenHash, OwenSobol, Partner, PixelHash,
     Pmj02, R2, Rank1Lattice, Sampler, SamplerError, SamplerTable, Seeding, Sequence, Sobol,
     VanDerCorput,
 };
-use crate::config::{Entry, Parameter, Variant};
+use crate::params::{Entry, Params, Registered, Registry, Variant};
+use std::sync::Arc;
 
-/// Everything that can be named on the `sequence` and `decorrelation` axes.
+/// Everything that can be named on the `sequence` and `decorrelation` axes; more can be added.
 #[derive(Clone)]
 pub struct SamplerRegistry {
-    sequences: Vec<&'static dyn Sequence>,
-    decorrelations: Vec<&'static dyn Decorrelation>,
+    /// The sequences.
+    pub sequences: Registry<dyn Sequence>,
+    /// The decorrelations.
+    pub decorrelations: Registry<dyn Decorrelation>,
 }
 
 impl Default for SamplerRegistry {
     fn default() -> Self {
         Self {
-            sequences: vec![
-                &PixelHash,
-                &VanDerCorput,
-                &Hammersley,
-                &Halton,
-                &Sobol,
-                &OwenSobol,
-                &Pmj02,
-                &Rank1Lattice,
-                &R2,
-            ],
-            decorrelations: vec![
-                &NoDecorrelation,
-                &DiscRotation,
-                &IndexOffset,
-                &CranleyPatterson,
-                &DigitalShift,
-                &OwenHash,
-                &MicroJitter,
-                &BlueNoise,
-            ],
+            sequences: Registry::new(vec![
+                Registered::sequence::<PixelHash>(),
+                Registered::sequence::<VanDerCorput>(),
+                Registered::sequence::<Hammersley>(),
+                Registered::sequence::<Halton>(),
+                Registered::sequence::<Sobol>(),
+                Registered::sequence::<OwenSobol>(),
+                Registered::sequence::<Pmj02>(),
+                Registered::sequence::<Rank1Lattice>(),
+                Registered::sequence::<R2>(),
+            ]),
+            decorrelations: Registry::new(vec![
+                Registered::decorrelation::<NoDecorrelation>(),
+                Registered::decorrelation::<DiscRotation>(),
+                Registered::decorrelation::<IndexOffset>(),
+                Registered::decorrelation::<CranleyPatterson>(),
+                Registered::decorrelation::<DigitalShift>(),
+                Registered::decorrelation::<OwenHash>(),
+                Registered::decorrelation::<MicroJitter>(),
+                Registered::decorrelation::<BlueNoise>(),
+            ]),
         }
     }
 }
@@ -48,46 +51,62 @@ fn pair(sequence: &Variant, decorrelation: &Variant) -> String {
     format!("{sequence} × {decorrelation}")
 }
 
-/// A variant with the defaults of its entry for the parameters that it lacks.
-fn completed(variant: &Variant, schema: &[Parameter]) -> Result<Variant, SamplerError> {
-    let params = variant.params.completed(schema);
-    Ok(Variant {
-        params: params.map_err(|error| SamplerError::Parameter {
+/// The kind of `registry` that `variant` names, with its parameters, and the variant with all of them.
+fn configured<T: ?Sized>(
+    registry: &Registry<T>,
+    axis: &'static str,
+    variant: &Variant,
+) -> Result<(Arc<T>, Variant), SamplerError> {
+    let kind = registry
+        .find(&variant.name)
+        .ok_or_else(|| SamplerError::Unknown {
+            axis,
             name: variant.name.clone(),
-            error,
-        })?,
+        })?;
+    let complete =
+        |params: &Params| Ok((kind.make(params)?, params.completed(&kind.entry.schema)?));
+    let (made, params) = complete(&variant.params).map_err(|error| SamplerError::Parameter {
+        name: variant.name.clone(),
+        error,
+    })?;
+    let variant = Variant {
+        params,
         ..variant.clone()
-    })
+    };
+    Ok((made, variant))
 }
 
+type Pair = (Arc<dyn Sequence>, Arc<dyn Decorrelation>);
+
 impl SamplerRegistry {
-    /// All sequences.
-    pub fn sequences(&self) -> impl Iterator<Item = &'static dyn Sequence> + '_ {
-        self.sequences.iter().copied()
-    }
-
-    /// All decorrelations.
-    pub fn decorrelations(&self) -> impl Iterator<Item = &'static dyn Decorrelation> + '_ {
-        self.decorrelations.iter().copied()
-    }
-
-    fn find(
+    /// The two kinds with their parameters, if they make sense together.
+    fn pair(
         &self,
         sequence: &Variant,
         decorrelation: &Variant,
-    ) -> Result<(&'static dyn Sequence, &'static dyn Decorrelation), SamplerError> {
-        let unknown = |axis, variant: &Variant| SamplerError::Unknown {
-            axis,
-            name: variant.name.clone(),
+    ) -> Result<(Pair, [Variant; 2]), SamplerError> {
+        let (first, sequence) = configured(&self.sequences, "sequence", sequence)?;
+        let (second, decorrelation) =
+            configured(&self.decorrelations, "decorrelation", decorrelation)?;
+        let partner = Partner {
+            name: first.name(),
+            facts: first.facts(),
         };
-        let first = self.sequences().find(|s| s.name() == sequence.name);
-        let second = self
-            .decorrelations()
-            .find(|d| d.name() == decorrelation.name);
-        Ok((
-            first.ok_or_else(|| unknown("sequence", sequence))?,
-            second.ok_or_else(|| unknown("decorrelation", decorrelation))?,
-        ))
+        if let Some(reason) = second.refusal(&partner) {
+            return Err(SamplerError::Pair {
+                pair: pair(&sequence, &decorrelation),
+                reason,
+            });
+        }
+        Ok(((first, second), [sequence, decorrelation]))
+    }
+
+    /// What is to be known of a sequence.
+    ///
+    /// # Errors
+    /// An unknown name or parameter, or a value out of its range.
+    pub fn facts(&self, sequence: &Variant) -> Result<Facts, SamplerError> {
+        Ok(configured(&self.sequences, "sequence", sequence)?.0.facts())
     }
 
     /// Whether seeds change what this pair draws. No table is made.
@@ -99,30 +118,15 @@ impl SamplerRegistry {
         sequence: &Variant,
         decorrelation: &Variant,
     ) -> Result<bool, SamplerError> {
-        let (first, second) = self.find(sequence, decorrelation)?;
-        let sequence = &completed(sequence, &first.parameters())?;
-        let decorrelation = &completed(decorrelation, &second.parameters())?;
-        let facts = first.facts(&sequence.params);
-        let partner = Partner {
-            name: &sequence.name,
-            facts,
-        };
-        match second.refusal(&decorrelation.params, &partner) {
-            None => Ok(facts.random || second.is_random()),
-            Some(reason) => Err(SamplerError::Pair {
-                pair: pair(sequence, decorrelation),
-                reason,
-            }),
-        }
+        let ((first, second), _) = self.pair(sequence, decorrelation)?;
+        Ok(first.facts().random || second.is_random())
     }
 
     /// Whether the mean over seeds is the integral at any number of samples: the sequence is random by
     /// itself, or the decorrelation sees to it. False for unknown names.
     pub fn is_unbiased(&self, sequence: &Variant, decorrelation: &Variant) -> bool {
-        let claims = |(first, second): (&dyn Sequence, &dyn Decorrelation)| {
-            first.facts(&sequence.params).random || second.is_unbiased(&decorrelation.params)
-        };
-        self.find(sequence, decorrelation).is_ok_and(claims)
+        let pair = self.pair(sequence, decorrelation);
+        pair.is_ok_and(|((first, second), _)| first.facts().random || second.is_unbiased())
     }
 
     /// The sampler of two variants, with tables for what is demanded.
@@ -136,17 +140,14 @@ impl SamplerRegistry {
         decorrelation: &Variant,
         demand: &Demand,
     ) -> Result<Sampler, SamplerError> {
-        self.is_random(sequence, decorrelation)?;
-        let (first, second) = self.find(sequence, decorrelation)?;
-        let sequence = &completed(sequence, &first.parameters())?;
-        let decorrelation = &completed(decorrelation, &second.parameters())?;
+        let ((first, second), [sequence, decorrelation]) = self.pair(sequence, decorrelation)?;
+        let facts = first.facts();
         let partner = Partner {
-            name: &sequence.name,
-            facts: first.facts(&sequence.params),
+            name: first.name(),
+            facts,
         };
-        let pair = || pair(sequence, decorrelation);
-        let facts = partner.facts;
-        let [dimensions, samples] = second.limits(&decorrelation.params);
+        let pair = || pair(&sequence, &decorrelation);
+        let [dimensions, samples] = second.limits();
         for limit in facts.dimensions.into_iter().chain(dimensions) {
             if demand.dimensions > limit {
                 return Err(SamplerError::Dimensions {
@@ -165,7 +166,7 @@ impl SamplerRegistry {
                 });
             }
         }
-        let by_count = facts.by_count || second.by_count(&decorrelation.params);
+        let by_count = facts.by_count || second.by_count();
         let unknown = [
             (by_count && demand.samples.is_none()).then_some("the number of samples"),
             (second.by_width() && demand.width.is_none()).then_some("the width of the image"),
@@ -173,40 +174,29 @@ impl SamplerRegistry {
         if let Some(what) = unknown.into_iter().flatten().next() {
             return Err(SamplerError::NotKnown { pair: pair(), what });
         }
-        let words = second.table(&decorrelation.params, &partner, demand);
+        let words = second.table(&partner, demand);
         let words = words.map_err(|reason| SamplerError::Table {
             pair: pair(),
             reason,
         })?;
         Ok(Sampler {
+            table: SamplerTable::new(&first.table(demand), &words),
+            shared_by_pixels: [first.seeding(), second.seeding()].map(|s| s == Seeding::Sample),
             sequence: first,
-            table: SamplerTable::new(&first.table(&sequence.params, demand), &words),
-            sequence_variant: sequence.clone(),
+            sequence_variant: sequence,
             decorrelation: second,
-            decorrelation_variant: decorrelation.clone(),
+            decorrelation_variant: decorrelation,
             demand: *demand,
-            shared_by_pixels: [sequence, decorrelation]
-                .map(|variant| Seeding::of(&variant.params) == Seeding::Sample),
         })
     }
 
     /// Names, descriptions and parameters of the sequences.
     pub fn sequence_entries(&self) -> Vec<Entry> {
-        let entry = |s: &'static dyn Sequence| Entry {
-            name: s.name().to_owned(),
-            description: s.description().to_owned(),
-            schema: s.parameters(),
-        };
-        self.sequences().map(entry).collect()
+        self.sequences.entries()
     }
 
     /// Names, descriptions and parameters of the decorrelations.
     pub fn decorrelation_entries(&self) -> Vec<Entry> {
-        let entry = |d: &'static dyn Decorrelation| Entry {
-            name: d.name().to_owned(),
-            description: d.description().to_owned(),
-            schema: d.parameters(),
-        };
-        self.decorrelations().map(entry).collect()
+        self.decorrelations.entries()
     }
 }

@@ -1,7 +1,9 @@
 //! What a sequence is.
 
 use super::{Coordinate, Demand, SamplerTable};
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
+use crate::params::{Parameters, Registered};
+use std::sync::Arc;
 
 /// What others have to know of a sequence with its parameters.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -22,59 +24,59 @@ pub struct Facts {
     pub samples: Option<u32>,
 }
 
-/// A sequence of points; one static per sequence, one line in the registry.
-pub trait Sequence: Sync {
+/// A sequence of points: the struct of its parameters, one line in the registry.
+pub trait Sequence: Send + Sync {
     /// Name as a user types it.
     fn name(&self) -> &'static str;
     /// One line: what it is and where it comes from.
     fn description(&self) -> &'static str;
     /// Module of the kernel, relative to the kernel folder.
     fn kernel(&self) -> &'static str;
-    /// Parameters.
-    fn parameters(&self) -> ParameterSchema {
-        Vec::new()
+    /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
+    fn sources(&self) -> &'static [(&'static str, &'static str)] {
+        &[]
+    }
+    /// Whether pixels draw different numbers from it.
+    fn seeding(&self) -> Seeding {
+        Seeding::PixelSample
     }
     /// What others have to know.
-    fn facts(&self, params: &Params) -> Facts;
+    fn facts(&self) -> Facts;
     /// Words that the kernel reads by `sequence_word`, as long as the demand needs; the demand is
     /// within the limits of the facts.
-    fn table(&self, _params: &Params, _demand: &Demand) -> Vec<u32> {
+    fn table(&self, _demand: &Demand) -> Vec<u32> {
         Vec::new()
     }
     /// Constants of `package::active::constants` that the kernel imports.
-    fn constants(&self, _params: &Params) -> Vec<(&'static str, u32)> {
+    fn constants(&self) -> Vec<(&'static str, u32)> {
         Vec::new()
     }
     /// Twin of the kernel's `sequence`: a fraction of 2³².
-    fn sequence(&self, params: &Params, table: &SamplerTable, at: Coordinate) -> u32;
+    fn sequence(&self, table: &SamplerTable, at: Coordinate) -> u32;
 }
 
-/// Whether pixels draw different random numbers: the parameter `seeding` of everything that hashes the
-/// pixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Seeding {
-    /// Each pixel draws its own.
-    PixelSample,
-    /// All pixels draw the same: coherence by force (Nilsson & Otte dag 2018, Table 5.3).
-    Sample,
+impl Registered<dyn Sequence> {
+    /// The sequence that `S` declares.
+    pub fn sequence<S: Sequence + Parameters + 'static>() -> Self {
+        let default = S::default();
+        Self::new::<S>(default.name(), default.description(), |params| {
+            Ok(Arc::new(S::from_params(params)?))
+        })
+    }
 }
 
-impl Seeding {
-    /// The parameter.
-    pub fn parameter() -> Parameter {
-        Parameter {
-            name: "seeding",
-            description: "random numbers differ by pixel and sample, or by sample only (Nilsson & Otte dag 2018)",
-            default: ParamValue::Name("pixel-sample".to_owned()),
-            range: ParamRange::Choice(&["pixel-sample", "sample"]),
-        }
+parameters! {
+    /// The parameter of everything that hashes the pixel.
+    pub struct Seeded {
+        /// random numbers differ by pixel and sample, or by sample only (Nilsson & Otte dag 2018)
+        seeding: Seeding = Seeding::PixelSample;
     }
 
-    /// What the parameters say; entries without the parameter leave pixels apart.
-    pub fn of(params: &Params) -> Self {
-        match params.0.get("seeding") {
-            Some(ParamValue::Name(name)) if name == "sample" => Self::Sample,
-            _ => Self::PixelSample,
-        }
+    /// Whether pixels draw different random numbers.
+    pub enum Seeding {
+        /// Each pixel draws its own.
+        PixelSample = "pixel-sample",
+        /// All pixels draw the same: coherence by force (Nilsson & Otte dag 2018, Table 5.3).
+        Sample = "sample",
     }
 }

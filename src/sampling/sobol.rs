@@ -5,15 +5,17 @@
 //! SIAM J. Sci. Comput. 30, 2008 (set D6, from the crate `sobol`).
 
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
-use crate::config::Params;
+use crate::parameters;
 use ::sobol::params::JoeKuoD6;
 
 /// Dimensions of Joe and Kuo's file.
 const DIMENSIONS: u32 = 21_201;
 const BITS: usize = 32;
 
-/// The registry entry.
-pub struct Sobol;
+parameters! {
+    /// The registry entry.
+    pub struct Sobol {}
+}
 
 /// Direction numbers of the first `dimensions` dimensions: `bits` a dimension, the one of the index's
 /// bit 0 first; they are fractions of 2³². The crate packs Joe and Kuo's file in three lengths.
@@ -43,7 +45,7 @@ impl Sequence for Sobol {
         "sampling/sobol"
     }
 
-    fn facts(&self, _: &Params) -> Facts {
+    fn facts(&self) -> Facts {
         Facts {
             base_2: true,
             extensible: true,
@@ -52,11 +54,11 @@ impl Sequence for Sobol {
         }
     }
 
-    fn table(&self, _: &Params, demand: &Demand) -> Vec<u32> {
+    fn table(&self, demand: &Demand) -> Vec<u32> {
         direction_numbers(demand.dimensions, BITS)
     }
 
-    fn sequence(&self, _: &Params, table: &SamplerTable, at: Coordinate) -> u32 {
+    fn sequence(&self, table: &SamplerTable, at: Coordinate) -> u32 {
         let mut rest = at.sample;
         let mut column = at.dimension * BITS as u32;
         let mut x = 0;

@@ -2,13 +2,14 @@
 
 use super::radical_inverse::radical_inverse;
 use super::{Coordinate, Facts, SamplerTable, Sequence};
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
 
-/// The registry entry.
-pub struct VanDerCorput;
-
-fn base(params: &Params) -> u32 {
-    params.integer("base") as u32
+parameters! {
+    /// The registry entry.
+    pub struct VanDerCorput {
+        /// base of the digits
+        base: u32 = 2, in 2..=1024;
+    }
 }
 
 impl Sequence for VanDerCorput {
@@ -24,29 +25,20 @@ impl Sequence for VanDerCorput {
         "sampling/van_der_corput"
     }
 
-    fn parameters(&self) -> ParameterSchema {
-        vec![Parameter {
-            name: "base",
-            description: "base of the digits",
-            default: ParamValue::Integer(2),
-            range: ParamRange::Integer { min: 2, max: 1024 },
-        }]
-    }
-
-    fn facts(&self, params: &Params) -> Facts {
+    fn facts(&self) -> Facts {
         Facts {
-            base_2: base(params) == 2,
+            base_2: self.base == 2,
             extensible: true,
             dimensions: Some(1),
             ..Facts::default()
         }
     }
 
-    fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {
-        vec![("BASE", base(params))]
+    fn constants(&self) -> Vec<(&'static str, u32)> {
+        vec![("BASE", self.base)]
     }
 
-    fn sequence(&self, params: &Params, _: &SamplerTable, at: Coordinate) -> u32 {
-        radical_inverse(at.sample, base(params))
+    fn sequence(&self, _: &SamplerTable, at: Coordinate) -> u32 {
+        radical_inverse(at.sample, self.base)
     }
 }

@@ -25,6 +25,7 @@ impl Triangle {
 }
 
 /// What a loader knows of a scene besides its triangles.
+#[derive(Default)]
 pub(super) struct Look {
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,

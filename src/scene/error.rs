@@ -1,6 +1,6 @@
 //! What can go wrong between a scene's name and its triangles.
 
-use crate::config::ParamError;
+use crate::params::ParamError;
 use std::any::Any;
 use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -127,6 +127,16 @@ pub(super) fn open(path: &Path) -> Result<std::fs::File, SceneError> {
         });
     }
     Ok(file)
+}
+
+/// The bytes of a model that is read whole.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, SceneError> {
+    let mut bytes = Vec::new();
+    let read = open(path)?.read_to_end(&mut bytes);
+    read.map(|_| bytes).map_err(|source| SceneError::Read {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 /// Opens a regular file, and tells its length in bytes. Folders are none, nor are devices and pipes,

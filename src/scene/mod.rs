@@ -21,8 +21,6 @@ mod material;
 mod mtl;
 mod obj;
 mod ply;
-#[cfg(test)]
-mod tests;
 mod text;
 mod texture;
 
@@ -38,8 +36,8 @@ pub use material::{
     MaterialSource,
 };
 
-use crate::config::Variant;
 use crate::geometry::{Camera, Triangle};
+use crate::params::Variant;
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::io::Read as _;

@@ -5,10 +5,10 @@ use crate::accel::{
     AccelKind, BuildLog, BuiltAccel, Hit, Intersection, Ray, Space, TriangleSoup, brute_force_hits,
     brute_force_instances,
 };
-use crate::config::Params;
 use crate::gpu::{Gpu, GpuError, kernel_errors};
 use crate::integrator::{SceneBuffers, Traced};
 use crate::measure::batch::{Batch, Query};
+use crate::params::Params;
 use crate::scene::SceneData;
 
 /// A scene on the adapter, met by one choice of tests.
@@ -30,7 +30,7 @@ pub struct Answers<T> {
 
 /// Every parameter at its default.
 pub fn default_params(kind: &dyn AccelKind) -> Params {
-    let value = |p: &crate::config::Parameter| (p.name.to_owned(), p.default.clone());
+    let value = |p: &crate::params::Parameter| (p.name.to_owned(), p.default.clone());
     Params(kind.parameters().iter().map(value).collect())
 }
 
@@ -39,11 +39,22 @@ pub fn default_params(kind: &dyn AccelKind) -> Params {
 /// # Errors
 /// What it refuses or violates, in words.
 pub fn build(kind: &dyn AccelKind, soup: &TriangleSoup) -> Result<Box<dyn BuiltAccel>, String> {
-    let built = kind.build(soup, &default_params(kind), &mut BuildLog::default());
+    build_with(kind, &default_params(kind), soup)
+}
+
+/// The same with these parameters.
+///
+/// # Errors
+/// As for [`build`].
+pub fn build_with(
+    kind: &dyn AccelKind,
+    params: &Params,
+    soup: &TriangleSoup,
+) -> Result<Box<dyn BuiltAccel>, String> {
+    let built = kind.build(soup, params, &mut BuildLog::default());
     let built = built.map_err(|e| format!("not built: {e}"))?;
-    built
-        .validate(soup)
-        .map_err(|e| format!("not valid: {e}"))?;
+    let checked = built.validate(soup);
+    checked.map_err(|e| format!("not valid: {e}"))?;
     Ok(built)
 }
 

@@ -8,7 +8,7 @@ use raystone::accel::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, Hit, NO_HIT,
     NamedWords, Ray, TriangleSoup, limits,
 };
-use raystone::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use raystone::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// The registry entry.
 pub struct SortedSlabs;

@@ -8,11 +8,11 @@ use raystone::accel::triangle::intersect_triangle;
 use raystone::accel::{
     AccelKind, BuildLog, BuiltAccel, Counters, GpuBuffers, Hit, Ray, TriangleSoup,
 };
-use raystone::config::{ParamRange, ParamValue, ParameterSchema, Params};
 use raystone::gpu::{
     AdapterChoice, Bindings, Composition, Dispatch, Gpu, KernelLibrary, groups_for,
     probe_arithmetic,
 };
+use raystone::params::{ParamRange, ParamValue, ParameterSchema, Params};
 use std::sync::OnceLock;
 
 /// The device that all tests of one program share, with the embedded kernels.
@@ -81,7 +81,7 @@ impl Pcg {
 
 /// Every parameter at its default.
 pub fn default_params(schema: &ParameterSchema) -> Params {
-    let value = |p: &raystone::config::Parameter| (p.name.to_owned(), p.default.clone());
+    let value = |p: &raystone::params::Parameter| (p.name.to_owned(), p.default.clone());
     Params(schema.iter().map(value).collect())
 }
 

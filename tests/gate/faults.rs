@@ -4,10 +4,10 @@ use crate::faulty::{SHORT_STACK, WRONG_INDEX, WRONG_INDEX_ROPED};
 use crate::support::*;
 use crate::{judge, verdict, wrong};
 use raystone::accel::{NO_HIT, Ray, TriangleSoup, brute_force_hits};
-use raystone::config::ParamValue;
 use raystone::gpu::KERNEL_ERRORS;
 use raystone::measure::gate::Judge;
 use raystone::measure::record::{GateVerdict, RayClass};
+use raystone::params::ParamValue;
 use raystone::scene::SceneData;
 
 const RAYS: u32 = 4096;

@@ -4,7 +4,7 @@ use raystone::accel::StructureStats;
 use raystone::accel::{
     AccelError, AccelKind, BuildLog, BuiltAccel, Bvh, GpuBuffers, RopedBvh, TriangleSoup,
 };
-use raystone::config::{ParameterSchema, Params};
+use raystone::params::{ParameterSchema, Params};
 
 /// What is planted.
 #[derive(Clone, Copy)]

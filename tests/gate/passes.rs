@@ -2,7 +2,7 @@
 
 use crate::support::*;
 use crate::{judge, verdict};
-use raystone::config::ParamValue;
+use raystone::params::ParamValue;
 
 /// 144 × 144 rays in each of five classes; and the hard ones.
 const RAYS: u32 = 20_736;

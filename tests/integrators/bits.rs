@@ -2,9 +2,9 @@
 
 use crate::MAX_DEPTH;
 use crate::support::*;
-use raystone::config::{ParamValue, Variant};
 use raystone::image::Image;
 use raystone::integrator::Renderer;
+use raystone::params::{ParamValue, Variant};
 
 fn bits(image: &Image) -> Vec<[u32; 3]> {
     image.pixels.iter().map(|p| p.map(f32::to_bits)).collect()

@@ -3,8 +3,8 @@
 use crate::MAX_DEPTH;
 use crate::support::*;
 use glam::Vec3;
-use raystone::config::ParamValue;
 use raystone::gpu::Gpu;
+use raystone::params::ParamValue;
 use raystone::sampling::Sampler;
 use raystone::scene::Material;
 

@@ -2,8 +2,8 @@
 
 use crate::support::*;
 use raystone::accel::AccelKind;
-use raystone::config::{ParamValue, Variant};
 use raystone::integrator::RAY_COUNT_CLASSES;
+use raystone::params::{ParamValue, Variant};
 
 const SIZE: [u32; 2] = [16, 16];
 const SPP: u32 = 16;

@@ -8,7 +8,7 @@ use raystone::geometry::Triangle;
 use raystone::measure::gate::Judge;
 use raystone::measure::rays::{FAR, RaySet};
 use raystone::measure::record::{JudgeCheck, RayClass};
-use raystone::measure::statistics::Pcg32;
+use raystone::random::Pcg32;
 use raystone::scene::SceneData;
 
 const TRIANGLES: usize = 240;

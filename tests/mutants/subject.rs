@@ -2,7 +2,7 @@
 
 use crate::{Check, CheckError, Plant};
 use raystone::accel::{AccelKind, AccelRegistry, BuildLog, BuiltAccel, TriangleSoup};
-use raystone::config::{Entry, ParamValue, Variant};
+use raystone::params::{Entry, ParamValue, Variant};
 use raystone::sampling::{Demand, Sampler, SamplerRegistry};
 
 /// Parameters that are not at their defaults, as a user would write them.
@@ -127,8 +127,7 @@ pub fn sampler(
     let registry = SamplerRegistry::default();
     let sequence = variant(&registry.sequence_entries(), sequence, changes)?;
     let decorrelation = variant(&registry.decorrelation_entries(), decorrelation, &[])?;
-    let kind = registry.sequences().find(|s| s.name() == sequence.name);
-    let facts = kind.map(|s| s.facts(&sequence.params)).unwrap_or_default();
+    let facts = registry.facts(&sequence).unwrap_or_default();
     let at_most = |wanted: u32, limit: Option<u32>| limit.map_or(wanted, |most| wanted.min(most));
     let demand = Demand {
         samples: demand.samples.map(|n| at_most(n, facts.samples)),

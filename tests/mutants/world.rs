@@ -5,11 +5,12 @@ use crate::soups::{lattice_judge, lattice_scene};
 use crate::{CheckError, Mutant, Options, Plant, Subject, checks};
 use glam::Vec3;
 use raystone::accel::TriangleSoup;
-use raystone::config::{Gate, ParamValue};
+use raystone::config::Gate;
 use raystone::geometry::{Camera, Triangle};
 use raystone::gpu::KernelLibrary;
 use raystone::image::Image;
 use raystone::measure::gate::Judge;
+use raystone::params::ParamValue;
 use raystone::scene::{LoadOptions, LoadReport, Material, SceneData, builtin_scenes, load};
 
 /// Seeds of the integer-grid soups.

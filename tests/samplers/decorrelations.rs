@@ -179,11 +179,12 @@ fn sample_seeding_makes_all_pixels_draw_the_same_and_seeds_still_count() {
     let shared = [("seeding", name("sample"))];
     let registry = SamplerRegistry::default();
     let has_seeding =
-        |schema: &raystone::config::ParameterSchema| schema.iter().any(|p| p.name == "seeding");
+        |schema: &raystone::params::ParameterSchema| schema.iter().any(|p| p.name == "seeding");
     let mut made = Vec::new();
     for sequence in registry
-        .sequences()
-        .filter(|s| has_seeding(&s.parameters()))
+        .sequences
+        .iter()
+        .filter(|s| has_seeding(&s.entry.schema))
     {
         made.push(try_sampler(
             (sequence.name(), &shared),
@@ -192,8 +193,9 @@ fn sample_seeding_makes_all_pixels_draw_the_same_and_seeds_still_count() {
         ));
     }
     for decorrelation in registry
-        .decorrelations()
-        .filter(|d| has_seeding(&d.parameters()))
+        .decorrelations
+        .iter()
+        .filter(|d| has_seeding(&d.entry.schema))
     {
         made.push(try_sampler(
             ("sobol", &[]),

@@ -12,7 +12,7 @@ mod refusals;
 mod streams;
 
 use common::param_variants;
-use raystone::config::{Entry, ParamValue, Variant};
+use raystone::params::{Entry, ParamValue, Variant};
 use raystone::sampling::{
     Coordinate, Demand, Sampler, SamplerError, SamplerRegistry, dimensions, to_unit,
 };
@@ -42,7 +42,7 @@ fn demand(samples: u32, dimensions: u32) -> Demand {
 
 /// An entry with every parameter at its default and in turn at others.
 fn variants(entry: &Entry) -> Vec<Variant> {
-    let variant = |params: raystone::config::Params| Variant {
+    let variant = |params: raystone::params::Params| Variant {
         name: entry.name.clone(),
         label: format!("{} {params:?}", entry.name),
         params,

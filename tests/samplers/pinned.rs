@@ -48,8 +48,7 @@ fn words_of_every_sampler_are_those_that_were_checked() {
     );
     let mut found = Vec::new();
     for (sequence, decorrelation) in &pairs {
-        let entry = registry.sequences().find(|s| s.name() == sequence.name);
-        let facts = entry.expect("registered").facts(&sequence.params);
+        let facts = registry.facts(sequence).expect("registered");
         let demand = demand(1 << 16, facts.dimensions.unwrap_or(122).min(122));
         let made = registry.sampler(sequence, decorrelation, &demand);
         let sampler = made.unwrap_or_else(|e| panic!("{e}"));

@@ -43,8 +43,7 @@ fn all_samplers(samples: u32, dimensions: u32) -> Vec<Sampler> {
     );
     let mut out = Vec::new();
     for sequence in &sequences {
-        let entry = registry.sequences().find(|s| s.name() == sequence.name);
-        let facts = entry.expect("registered").facts(&sequence.params);
+        let facts = registry.facts(sequence).expect("registered");
         let dimensions = facts.dimensions.unwrap_or(dimensions).min(dimensions);
         for decorrelation in &decorrelations {
             match registry.sampler(sequence, decorrelation, &demand(samples, dimensions)) {

@@ -41,8 +41,7 @@ fn samplers() -> Vec<(Sampler, usize)> {
     let mut out = Vec::new();
     let mut refused = 0;
     for (sequence, decorrelation, count) in pairs {
-        let facts = registry.sequences().find(|s| s.name() == sequence.name);
-        let facts = facts.expect("registered").facts(&sequence.params);
+        let facts = registry.facts(sequence).expect("registered");
         let most = if count == MANY && sequence.name == "sobol" && decorrelation.name == "none" {
             1100
         } else {
@@ -133,8 +132,7 @@ fn kernels_equal_their_twins_in_all_that_a_long_run_uses() {
         .iter()
         .map(Entry::default_variant)
     {
-        let entry = registry.sequences().find(|s| s.name() == sequence.name);
-        let facts = entry.expect("registered").facts(&sequence.params);
+        let facts = registry.facts(&sequence).expect("registered");
         let at_most = |wanted: u32, limit: Option<u32>| limit.map_or(wanted, |l| wanted.min(l));
         let demand = demand(
             at_most(1 << 17, facts.samples),
@@ -221,11 +219,15 @@ fn the_cost_of_a_sampler_is_measured_without_its_loop() {
     };
     let registry = SamplerRegistry::default();
     let mut costs: Vec<_> = registry
-        .sequences()
+        .sequences
+        .iter()
         .filter(|s| !["van-der-corput", "r2"].contains(&s.name()))
         .map(|s| cost(s.name(), "none"))
         .collect();
-    let moved = registry.decorrelations().filter(|d| d.name() != "none");
+    let moved = registry
+        .decorrelations
+        .iter()
+        .filter(|d| d.name() != "none");
     costs.extend(moved.map(|d| cost("sobol", d.name())));
     assert!(costs.len() >= 14);
     // Divisions in a loop cost more than one product, whatever the adapter.

@@ -88,7 +88,7 @@ fn adapter() -> String {
 
 /// Small scenes that lead through all there is: emitters, mirrors, the sky, instances, hard triangles.
 fn scenes() -> Vec<(&'static str, Stage)> {
-    use raystone::config::ParamValue::Integer;
+    use raystone::params::ParamValue::Integer;
     let sphere = [("triangles", Integer(2000))];
     let known: [(&str, &[_]); 5] = [
         ("cornell-box", &[]),
@@ -187,7 +187,7 @@ fn image_hash(
     stage: &Stage,
     traced: &raystone::integrator::Traced,
     sampler: &raystone::sampling::Sampler,
-    what: &raystone::config::Variant,
+    what: &raystone::params::Variant,
 ) -> String {
     let renderer = stage.renderer(gpu(), traced, sampler, what, [24, 16], false);
     let mut hash = Hasher::new();
@@ -225,7 +225,7 @@ fn images() {
                 let subject = format!("image {scene}/{}/path", sampler.label().replace(' ', ""));
                 found.insert(subject, image_hash(&stage, &traced, &sampler, &path(3)));
             }
-            for entry in raystone::integrator::integrator_entries() {
+            for entry in raystone::integrator::IntegratorRegistry::default().entries() {
                 if entry.name.starts_with("integrand") {
                     let subject = format!("image {scene}/bvh/{}", entry.name);
                     let hash = image_hash(&stage, &traced, &one, &entry.default_variant());

@@ -23,7 +23,7 @@ use super::{
     TriangleSoup,
 };
 use crate::accel::StructureStats;
-use crate::config::{ParameterSchema, Params};
+use crate::params::{ParameterSchema, Params};
 use boxes::Boxes;
 use layout::Query;
 use octant_roped::Octants;

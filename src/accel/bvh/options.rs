@@ -1,7 +1,7 @@
 //! Parameters of `bvh` and `roped-bvh` beyond those of the tree: which traversal reads which layout.
 
 use super::super::AccelError;
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// Invocations of a workgroup, `LANES` of `kernels/common/lane.wesl`.
 const LANES: u32 = crate::gpu::WORKGROUP_SIZE;

@@ -9,7 +9,7 @@ use super::super::triangle::TriangleRecord;
 use super::super::{AccelError, BuildLog, TriangleSoup};
 use super::instance::NOTHING;
 use crate::accel::StructureStats;
-use crate::config::Params;
+use crate::params::Params;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 use std::ops::Range;

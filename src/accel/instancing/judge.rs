@@ -7,7 +7,7 @@ use super::super::{
 };
 use super::instance::object_ray;
 use super::placed::Placed;
-use crate::config::Params;
+use crate::params::Params;
 use rayon::prelude::*;
 
 /// Nearest hits by testing every triangle of every instance, in parallel over the rays.

@@ -19,8 +19,8 @@ use super::top::Top;
 use super::world_box::BoxMap;
 use super::{Base, clamped};
 use crate::accel::StructureStats;
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// Stands for the size of the stack when an object was entered, outside of any.
 const OUTSIDE: u32 = u32::MAX;

@@ -28,7 +28,7 @@ pub use object_list::ObjectList;
 pub use placed::Placed;
 
 use super::{AccelError, BuildLog, Space, TriangleSoup};
-use crate::config::Params;
+use crate::params::Params;
 use crate::scene::Instance;
 use forest::Forest;
 use placed::View;

@@ -15,8 +15,8 @@ use super::Base;
 use super::instance::{Entry, enter_grown, level, trace_object};
 use super::world_box::BoxMap;
 use crate::accel::StructureStats;
-use crate::config::{ParameterSchema, Params};
 use crate::gpu::UniformValues;
+use crate::params::{ParameterSchema, Params};
 use bytemuck::{Pod, Zeroable};
 
 /// The registry entry.

@@ -7,7 +7,7 @@ use super::super::triangle::{TriangleRecord, intersect_triangle};
 use super::instance::{enter_grown, level, object_ray};
 use super::world_box::BoxMap;
 use crate::geometry::Triangle;
-use crate::measure::statistics::Pcg32;
+use crate::random::Pcg32;
 use crate::scene::{Assembly, Instance, Transform};
 use glam::{DVec3, Mat3, Quat, Vec3};
 use rayon::prelude::*;

@@ -27,8 +27,8 @@ use super::{
     TriangleSoup,
 };
 use crate::accel::StructureStats;
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::gpu::UniformValues;
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// Bits of an entry that hold the logarithm of its block's side; 0: the rest is a cell.
 const LOG_BITS: u32 = 2;

@@ -8,7 +8,7 @@ use super::Node;
 use crate::accel::bounds::Bounds;
 use crate::accel::spatial::{Margin, clip, corners, intersection};
 use crate::accel::{AccelError, BuildLog, TriangleSoup};
-use crate::config::Params;
+use crate::params::Params;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 

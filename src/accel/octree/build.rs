@@ -4,7 +4,7 @@ use super::{INNER_SHIFT, LAST, LEAF, Space};
 use crate::accel::bounds::Bounds;
 use crate::accel::spatial::{Margin, Overlap, corners};
 use crate::accel::{AccelError, TriangleSoup};
-use crate::config::Params;
+use crate::params::Params;
 use rayon::prelude::*;
 
 /// Blocks of children are numbered with 23 bits.

@@ -22,7 +22,7 @@ pub use parameters::tree_parameters;
 
 use super::bounds::Bounds;
 use super::{AccelError, BuildLog, TriangleSoup};
-use crate::config::Params;
+use crate::params::Params;
 use parameters::{Builder, Settings};
 use reference::Reference;
 use sweep::Axes;

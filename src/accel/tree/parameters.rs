@@ -1,7 +1,7 @@
 //! Parameters of all builders.
 
 use super::reference::Box3;
-use crate::config::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// Below this depth splits are by SAH, beyond it by the median, so that depth stays below
 /// `SAH_DEPTH + log2(references) + 1` whatever the input.

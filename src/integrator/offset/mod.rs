@@ -152,7 +152,7 @@ pub fn position_error(
 mod tests {
     use super::*;
     use crate::config::keys;
-    use crate::measure::statistics::Pcg32;
+    use crate::random::Pcg32;
 
     #[test]
     fn experiment_files_know_every_offset() {

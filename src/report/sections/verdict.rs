@@ -1,11 +1,12 @@
 //! Who wins, per scene.
 
-use crate::measure::record::{ClassTiming, Interval, RayClass};
+use crate::measure::figure::figure;
+use crate::measure::record::{ClassTiming, Interval, RayClass, Recorded, StructureRecord};
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
 use crate::report::data::{RunData, SceneGroup, View, structure_name};
 use crate::report::document::*;
 use crate::report::format;
-use crate::report::ruling::{Better, Contender, Ruling, judge};
+use crate::report::ruling::{Contender, Ruling, judge};
 use crate::report::samplers::{MeanError, Metric, Sampler, error_after};
 
 /// The verdict box.
@@ -86,13 +87,10 @@ fn row(question: String, ruling: &Ruling) -> Vec<Cell> {
 
 /// Who may not win, with the reason.
 fn left_out(scene: &SceneGroup) -> Option<String> {
-    let structures = scene.structures.iter().filter_map(|s| {
-        Some(format!(
-            "{} ({})",
-            structure_name(&s.accel, s.runtime_checks),
-            s.fault()?
-        ))
-    });
+    let structures = scene
+        .structures
+        .iter()
+        .filter_map(|s| Some(format!("{} ({})", structure_name(*s), s.fault()?)));
     let samplers = scene.views.iter().flat_map(|view| {
         let fault = |s: &Sampler| {
             Some(format!(
@@ -141,9 +139,9 @@ pub fn ray_classes(scene: &SceneGroup) -> Vec<RayClass> {
 
 /// Compares the structures that passed the gate on one ray class.
 pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
-    let contender = |s: &&crate::measure::record::StructureRecord| {
+    let contender = |s: &Recorded<StructureRecord>| {
         let timing: &ClassTiming = s.timings.iter().find(|timing| timing.class == class)?;
-        let name = structure_name(&s.accel, s.runtime_checks);
+        let name = structure_name(*s);
         let has_spread = timing.ms.len() >= LEAST_FOR_MEDIAN;
         s.fault().is_none().then_some(Contender {
             name,
@@ -153,7 +151,7 @@ pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
     };
     judge(
         scene.structures.iter().filter_map(contender).collect(),
-        Better::Higher,
+        figure("mrays-per-s/v1").better,
     )
 }
 
@@ -174,7 +172,7 @@ pub fn best_per_sample(view: &View, spp: u32) -> Ruling {
 fn rank(view: &View, contenders: Vec<Contender>) -> Ruling {
     match view.reference_fault() {
         Some(reason) => Ruling::Withheld(reason),
-        None => judge(contenders, Better::Lower),
+        None => judge(contenders, figure(Metric::RelMse.figure()).better),
     }
 }
 

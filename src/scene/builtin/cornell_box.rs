@@ -6,25 +6,19 @@
 
 use super::super::builder::{Look, SceneBuilder};
 use super::super::{DEFAULT_IOR, Material};
-use super::Builtin;
+use super::BuiltinScene;
 use super::sphere::SphereGrid;
-use crate::config::{ParamRange, ParamValue, Parameter, Params};
 use crate::geometry::Camera;
+use crate::parameters;
 use glam::{DVec3, Vec3};
 
-pub(super) const SCENE: Builtin = Builtin {
-    name: "cornell-box",
-    description: "the original Cornell box: measured room, two blocks, light in the ceiling (mm)",
-    schema: || {
-        vec![Parameter {
-            name: "glass",
-            description: "a ball of glass in the place of the short block",
-            default: ParamValue::Flag(false),
-            range: ParamRange::Flag,
-        }]
-    },
-    build,
-};
+parameters! {
+    /// `cornell-box`.
+    pub(super) struct CornellBox {
+        /// a ball of glass in the place of the short block
+        glass: bool = false;
+    }
+}
 
 const WHITE: u32 = 0;
 const RED: u32 = 1;
@@ -113,62 +107,67 @@ const BALL_GRID: SphereGrid = SphereGrid {
     sectors: 192,
 };
 
-fn build(params: &Params) -> (SceneBuilder, Look) {
-    let mut builder = SceneBuilder::default();
-    let quad = |builder: &mut SceneBuilder, corners: Quad, material| {
-        builder.push_quad(corners.map(Vec3::from), material);
-    };
-    for (material, corners) in ROOM {
-        quad(&mut builder, corners, material);
-    }
-    for k in 0..4 {
-        let next = (k + 1) % 4;
-        let side = [CEILING[k], CEILING[next], LAMP[next], LAMP[k]];
-        quad(&mut builder, side, WHITE);
-    }
-    quad(&mut builder, LAMP, LIGHT);
-    let glass = params.flag("glass");
-    if glass {
-        let (centre, radius) = BALL;
-        let place = |v: DVec3| (DVec3::from(centre) + radius * v).as_vec3();
-        BALL_GRID.push(&mut builder, GLASS, place);
-    }
-    for (top, height) in BLOCKS.into_iter().skip(usize::from(glass)) {
-        let at = |k: usize, y: f32| [top[k % 4][0], y, top[k % 4][1]];
-        quad(&mut builder, [0, 1, 2, 3].map(|k| at(k, height)), WHITE);
+impl BuiltinScene for CornellBox {
+    const NAME: &'static str = "cornell-box";
+    const DESCRIPTION: &'static str =
+        "the original Cornell box: measured room, two blocks, light in the ceiling (mm)";
+
+    fn build(&self) -> (SceneBuilder, Look) {
+        let mut builder = SceneBuilder::default();
+        let quad = |builder: &mut SceneBuilder, corners: Quad, material| {
+            builder.push_quad(corners.map(Vec3::from), material);
+        };
+        for (material, corners) in ROOM {
+            quad(&mut builder, corners, material);
+        }
         for k in 0..4 {
-            let side = [at(k, 0.0), at(k, height), at(k + 1, height), at(k + 1, 0.0)];
+            let next = (k + 1) % 4;
+            let side = [CEILING[k], CEILING[next], LAMP[next], LAMP[k]];
             quad(&mut builder, side, WHITE);
         }
+        quad(&mut builder, LAMP, LIGHT);
+        if self.glass {
+            let (centre, radius) = BALL;
+            let place = |v: DVec3| (DVec3::from(centre) + radius * v).as_vec3();
+            BALL_GRID.push(&mut builder, GLASS, place);
+        }
+        for (top, height) in BLOCKS.into_iter().skip(usize::from(self.glass)) {
+            let at = |k: usize, y: f32| [top[k % 4][0], y, top[k % 4][1]];
+            quad(&mut builder, [0, 1, 2, 3].map(|k| at(k, height)), WHITE);
+            for k in 0..4 {
+                let side = [at(k, 0.0), at(k, height), at(k + 1, height), at(k + 1, 0.0)];
+                quad(&mut builder, side, WHITE);
+            }
+        }
+        let mut materials = vec![
+            Material::diffuse("white", Vec3::new(0.725, 0.71, 0.68)),
+            Material::diffuse("red", Vec3::new(0.63, 0.065, 0.05)),
+            Material::diffuse("green", Vec3::new(0.14, 0.45, 0.091)),
+            Material::diffuse("light", Vec3::splat(0.78)).emitting(Vec3::new(18.4, 15.6, 8.0)),
+        ];
+        if self.glass {
+            materials.push(Material::dielectric("glass", Vec3::ONE, DEFAULT_IOR));
+        }
+        let look = Look {
+            materials,
+            camera: Some(Camera {
+                eye: Vec3::new(278.0, 273.0, -800.0),
+                target: Vec3::new(278.0, 273.0, 0.0),
+                up: Vec3::Y,
+                // A focal length of 35 mm behind a film of 25 mm.
+                vertical_fov_degrees: 39.3077,
+            }),
+            ..Look::default()
+        };
+        (builder, look)
     }
-    let mut materials = vec![
-        Material::diffuse("white", Vec3::new(0.725, 0.71, 0.68)),
-        Material::diffuse("red", Vec3::new(0.63, 0.065, 0.05)),
-        Material::diffuse("green", Vec3::new(0.14, 0.45, 0.091)),
-        Material::diffuse("light", Vec3::splat(0.78)).emitting(Vec3::new(18.4, 15.6, 8.0)),
-    ];
-    if glass {
-        materials.push(Material::dielectric("glass", Vec3::ONE, DEFAULT_IOR));
-    }
-    let look = Look {
-        materials,
-        textures: Vec::new(),
-        camera: Some(Camera {
-            eye: Vec3::new(278.0, 273.0, -800.0),
-            target: Vec3::new(278.0, 273.0, 0.0),
-            up: Vec3::Y,
-            // A focal length of 35 mm behind a film of 25 mm.
-            vertical_fov_degrees: 39.3077,
-        }),
-        environment: Vec3::ZERO,
-    };
-    (builder, look)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::tests::{load_default, load_with};
     use super::*;
+    use crate::params::ParamValue;
     use crate::scene::DIELECTRIC;
 
     #[test]

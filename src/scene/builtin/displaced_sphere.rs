@@ -2,49 +2,40 @@
 
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::Builtin;
+use super::BuiltinScene;
 use super::numeric::sin_cos_turns;
 use super::sphere::SphereGrid;
-use crate::config::{ParamRange, ParamValue, Parameter, Params};
 use crate::geometry::Camera;
+use crate::parameters;
 use glam::{DVec3, Vec3};
 
-pub(super) const SCENE: Builtin = Builtin {
-    name: "displaced-sphere",
-    description: "closed bumpy sphere of any number of triangles under a white sky",
-    schema: || {
-        vec![Parameter {
-            name: "triangles",
-            description: "number of triangles: the nearest grid that does not exceed it",
-            default: ParamValue::Integer(100_000),
-            range: ParamRange::Integer {
-                min: 8,
-                max: 50_000_000,
-            },
-        }]
-    },
-    build,
-};
+parameters! {
+    /// `displaced-sphere`.
+    pub(super) struct DisplacedSphere {
+        /// number of triangles: the nearest grid that does not exceed it
+        triangles: usize = 100_000, in 8..=50_000_000;
+    }
+}
 
-fn build(params: &Params) -> (SceneBuilder, Look) {
-    let wanted = usize::try_from(params.integer("triangles")).unwrap_or(8);
-    let grid = SphereGrid::with_at_most(wanted);
-    let mut builder = SceneBuilder::new(false, grid.triangles());
-    grid.push(&mut builder, 0, |direction| {
-        (radius(direction) * direction).as_vec3()
-    });
-    let look = Look {
-        materials: vec![Material::diffuse("grey", Vec3::splat(0.7))],
-        textures: Vec::new(),
-        camera: Some(Camera {
-            eye: Vec3::new(1.6, 1.3, 2.6),
-            target: Vec3::ZERO,
-            up: Vec3::Y,
-            vertical_fov_degrees: 40.0,
-        }),
-        environment: Vec3::ONE,
-    };
-    (builder, look)
+impl BuiltinScene for DisplacedSphere {
+    const NAME: &'static str = "displaced-sphere";
+    const DESCRIPTION: &'static str =
+        "closed bumpy sphere of any number of triangles under a white sky";
+
+    fn build(&self) -> (SceneBuilder, Look) {
+        let grid = SphereGrid::with_at_most(self.triangles);
+        let mut builder = SceneBuilder::new(false, grid.triangles());
+        grid.push(&mut builder, 0, |direction| {
+            (radius(direction) * direction).as_vec3()
+        });
+        let look = Look {
+            materials: vec![Material::diffuse("grey", Vec3::splat(0.7))],
+            camera: Some(Camera::upright(Vec3::new(1.6, 1.3, 2.6), Vec3::ZERO, 40.0)),
+            environment: Vec3::ONE,
+            ..Look::default()
+        };
+        (builder, look)
+    }
 }
 
 /// Distance from the centre: three octaves of products of sines, between 0.75 and 1.25.
@@ -59,7 +50,7 @@ fn radius(direction: DVec3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{is_closed, load_with};
-    use super::*;
+    use crate::params::ParamValue;
 
     #[test]
     fn the_surface_is_closed_at_every_size_and_open_without_one_triangle() {

@@ -4,18 +4,18 @@
 
 use super::super::builder::{Look, SceneBuilder};
 use super::super::{Material, Transform};
-use super::Builtin;
-use super::numeric::{Pcg, sin_cos_turns};
+use super::BuiltinScene;
+use super::numeric::sin_cos_turns;
 use super::sphere::SphereGrid;
 use crate::geometry::{Camera, Triangle};
+use crate::parameters;
+use crate::random::Pcg32;
 use glam::Vec3;
 
-pub(super) const SCENE: Builtin = Builtin {
-    name: "far-corners",
-    description: "what only large or deep scenes reach, in little: the gate's second scene",
-    schema: Vec::new,
-    build,
-};
+parameters! {
+    /// `far-corners`.
+    pub(super) struct FarCorners {}
+}
 
 /// Quadrilaterals along each edge of the sheet: its triangles fill rows of texels.
 const SHEET: usize = 64;
@@ -28,36 +28,41 @@ const NEEDLES: usize = 48;
 /// Triangles in a spot of a thousandth of the scene.
 const SPOT: usize = 300;
 
-fn build(_: &crate::config::Params) -> (SceneBuilder, Look) {
-    let mut builder = SceneBuilder::new(false, 2 * SHEET * SHEET + 2048);
-    builder.add_object(ground());
-    builder.add_object(bumpy());
-    let unmoved = Transform::new([Vec3::X, Vec3::Y, Vec3::Z], Vec3::ZERO);
-    builder.place(0, unmoved, 0);
-    for to_world in places() {
-        builder.place(1, to_world, 1);
+impl BuiltinScene for FarCorners {
+    const NAME: &'static str = "far-corners";
+    const DESCRIPTION: &'static str =
+        "what only large or deep scenes reach, in little: the gate's second scene";
+
+    fn build(&self) -> (SceneBuilder, Look) {
+        let mut builder = SceneBuilder::new(false, 2 * SHEET * SHEET + 2048);
+        builder.add_object(ground());
+        builder.add_object(bumpy());
+        let unmoved = Transform::new([Vec3::X, Vec3::Y, Vec3::Z], Vec3::ZERO);
+        builder.place(0, unmoved, 0);
+        for to_world in places() {
+            builder.place(1, to_world, 1);
+        }
+        let look = Look {
+            materials: [(0.7, 0.7, 0.65), (0.75, 0.4, 0.3)]
+                .map(|color| Material::diffuse("corner", color.into()))
+                .into(),
+            camera: Some(Camera::upright(
+                Vec3::new(2.6, 1.9, 3.1),
+                Vec3::new(0.4, 0.3, 0.4),
+                40.0,
+            )),
+            environment: Vec3::ONE,
+            ..Look::default()
+        };
+        (builder, look)
     }
-    let look = Look {
-        materials: [(0.7, 0.7, 0.65), (0.75, 0.4, 0.3)]
-            .map(|color| Material::diffuse("corner", color.into()))
-            .into(),
-        textures: Vec::new(),
-        camera: Some(Camera {
-            eye: Vec3::new(2.6, 1.9, 3.1),
-            target: Vec3::new(0.4, 0.3, 0.4),
-            up: Vec3::Y,
-            vertical_fov_degrees: 40.0,
-        }),
-        environment: Vec3::ONE,
-    };
-    (builder, look)
 }
 
 /// Everything that is not an instance of something else.
 fn ground() -> Vec<Triangle> {
     let mut builder = SceneBuilder::new(false, 0);
-    let mut pcg = Pcg::new(1);
-    let mut point = || Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());
+    let mut pcg = Pcg32::with_stream(1, Pcg32::DEFAULT_STREAM);
+    let mut point = || Vec3::new(pcg.uniform_f32(), pcg.uniform_f32(), pcg.uniform_f32());
     sheet(&mut builder);
     // Shells around a corner: all hold the origin, so that the small ones are reached past the large ones.
     for level in 0..SHELLS {
@@ -149,7 +154,7 @@ mod tests {
 
     #[test]
     fn trees_over_it_are_deep_and_tables_take_more_than_one_row_of_texels() {
-        let scene = load_default(SCENE.name);
+        let scene = load_default(FarCorners::NAME);
         assert!(scene.triangles.len() < 12_000);
         let soup = TriangleSoup::new(&scene);
         let registry = AccelRegistry::default();

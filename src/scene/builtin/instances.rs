@@ -3,11 +3,12 @@
 
 use super::super::builder::{Look, SceneBuilder};
 use super::super::{Material, Transform};
-use super::Builtin;
-use super::numeric::{Pcg, sin_cos_turns};
+use super::BuiltinScene;
+use super::numeric::sin_cos_turns;
 use super::sphere::SphereGrid;
-use crate::config::{ParamRange, ParamValue, Parameter, Params};
 use crate::geometry::{Camera, Triangle};
+use crate::parameters;
+use crate::random::Pcg32;
 use glam::{DMat3, DVec3, Mat3, Vec3};
 
 /// Different objects.
@@ -17,64 +18,58 @@ const OBJECT_RADIUS: f64 = 1.3;
 /// At overlap 1, objects are larger by this factor than what fits into a cell.
 const LARGEST: f64 = 6.0;
 
-pub(super) const SCENE: Builtin = Builtin {
-    name: "instances",
-    description: "copies of four bumpy objects, moved, turned and scaled, under a white sky",
-    schema: || {
-        let integer = |name, description, default, min, max| Parameter {
-            name,
-            description,
-            default: ParamValue::Integer(default),
-            range: ParamRange::Integer { min, max },
-        };
-        vec![
-            integer("count", "number of copies", 64, 1, 4096),
-            integer("detail", "most triangles of an object", 320, 8, 2000),
-            Parameter {
-                name: "overlap",
-                description: "0: boxes of copies stay apart; 1: copies reach across six cells",
-                default: ParamValue::Number(0.2),
-                range: ParamRange::Number { min: 0.0, max: 1.0 },
-            },
-            integer("seed", "seed of places, turns and scales", 1, 0, i64::MAX),
-        ]
-    },
-    build,
-};
+parameters! {
+    /// `instances`.
+    pub(super) struct Instances {
+        /// number of copies
+        count: usize = 64, in 1..=4096;
+        /// most triangles of an object
+        detail: usize = 320, in 8..=2000;
+        /// 0: boxes of copies stay apart; 1: copies reach across six cells
+        overlap: f64 = 0.2, in 0.0..=1.0;
+        /// seed of places, turns and scales
+        seed: u64 = 1, in 0..=i64::MAX as u64;
+    }
+}
 
-fn build(params: &Params) -> (SceneBuilder, Look) {
-    let count = usize::try_from(params.integer("count")).unwrap_or(1);
-    let detail = usize::try_from(params.integer("detail")).unwrap_or(8);
-    let mut pcg = Pcg::new(params.integer("seed") as u64);
-    let mut builder = SceneBuilder::new(false, count * detail);
-    for index in 0..OBJECTS {
-        builder.add_object(object(index, detail));
+impl BuiltinScene for Instances {
+    const NAME: &'static str = "instances";
+    const DESCRIPTION: &'static str =
+        "copies of four bumpy objects, moved, turned and scaled, under a white sky";
+
+    fn build(&self) -> (SceneBuilder, Look) {
+        let count = self.count;
+        let detail = self.detail;
+        let mut pcg = Pcg32::with_stream(self.seed, Pcg32::DEFAULT_STREAM);
+        let mut builder = SceneBuilder::new(false, count * detail);
+        for index in 0..OBJECTS {
+            builder.add_object(object(index, detail));
+        }
+        let cells = (1..).find(|n| n * n * n >= count).unwrap_or(1);
+        for index in 0..count {
+            let cell = [
+                index % cells,
+                index / cells % cells,
+                index / (cells * cells),
+            ];
+            let to_world = transform(&mut pcg, cell, cells, self.overlap);
+            builder.place(index as u32 % OBJECTS, to_world, index as u32 % 3);
+        }
+        let colors = [(0.75, 0.4, 0.3), (0.4, 0.65, 0.4), (0.4, 0.5, 0.75)];
+        let look = Look {
+            materials: colors
+                .map(|color| Material::diffuse("copy", color.into()))
+                .into(),
+            camera: Some(Camera::upright(
+                Vec3::new(1.7, 1.3, 2.5),
+                Vec3::splat(0.5),
+                40.0,
+            )),
+            environment: Vec3::ONE,
+            ..Look::default()
+        };
+        (builder, look)
     }
-    let cells = (1..).find(|n| n * n * n >= count).unwrap_or(1);
-    for index in 0..count {
-        let cell = [
-            index % cells,
-            index / cells % cells,
-            index / (cells * cells),
-        ];
-        let to_world = transform(&mut pcg, cell, cells, params.number("overlap"));
-        builder.place(index as u32 % OBJECTS, to_world, index as u32 % 3);
-    }
-    let colors = [(0.75, 0.4, 0.3), (0.4, 0.65, 0.4), (0.4, 0.5, 0.75)];
-    let look = Look {
-        materials: colors
-            .map(|color| Material::diffuse("copy", color.into()))
-            .into(),
-        textures: Vec::new(),
-        camera: Some(Camera {
-            eye: Vec3::new(1.7, 1.3, 2.5),
-            target: Vec3::splat(0.5),
-            up: Vec3::Y,
-            vertical_fov_degrees: 40.0,
-        }),
-        environment: Vec3::ONE,
-    };
-    (builder, look)
 }
 
 /// A closed bumpy sphere around the origin.
@@ -93,8 +88,8 @@ fn object(index: u32, detail: usize) -> Vec<Triangle> {
 
 /// Where a copy stands in its cell of the unit cube, how it is turned and scaled; one of eight is
 /// mirrored.
-fn transform(pcg: &mut Pcg, cell: [usize; 3], cells: usize, overlap: f64) -> Transform {
-    let mut uniform = || f64::from(pcg.next_f32());
+fn transform(pcg: &mut Pcg32, cell: [usize; 3], cells: usize, overlap: f64) -> Transform {
+    let mut uniform = || f64::from(pcg.uniform_f32());
     let edge = 1.0 / cells as f64;
     let fitting = 0.5 * edge / OBJECT_RADIUS;
     let mut scale = [0.0; 3].map(|_| fitting * (0.5 + 0.5 * uniform()));
@@ -144,6 +139,7 @@ fn rotation([a, b, c]: [f64; 3]) -> DMat3 {
 mod tests {
     use super::super::tests::load_with;
     use super::*;
+    use crate::params::ParamValue;
     use crate::scene::{Bounds, SceneData};
 
     fn scene(count: i64, overlap: f64) -> SceneData {

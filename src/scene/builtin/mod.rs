@@ -16,27 +16,49 @@ mod triangle_soup;
 
 use super::builder::{Look, SceneBuilder};
 use super::{SceneData, SceneError};
-use crate::config::{Entry, ParameterSchema, Params, Variant};
+use crate::params::{Entry, ParamError, ParameterSchema, Parameters, Params, Variant};
 
-/// One built-in scene.
+/// A built-in scene: the struct of its parameters.
+trait BuiltinScene: Parameters {
+    /// Name as a user types it.
+    const NAME: &'static str;
+    /// One line: what it shows.
+    const DESCRIPTION: &'static str;
+
+    /// The triangles, and how they look.
+    fn build(&self) -> (SceneBuilder, Look);
+}
+
+/// One line of the registry.
 struct Builtin {
     name: &'static str,
     description: &'static str,
     schema: fn() -> ParameterSchema,
-    build: fn(&Params) -> (SceneBuilder, Look),
+    build: fn(&Params) -> Result<(SceneBuilder, Look), ParamError>,
+}
+
+impl Builtin {
+    const fn of<S: BuiltinScene>() -> Self {
+        Self {
+            name: S::NAME,
+            description: S::DESCRIPTION,
+            schema: S::schema,
+            build: |params| Ok(S::from_params(params)?.build()),
+        }
+    }
 }
 
 /// The registry.
 const BUILTINS: [Builtin; 9] = [
-    cornell_box::SCENE,
-    displaced_sphere::SCENE,
-    triangle_soup::SCENE,
-    teapot_in_a_stadium::SCENE,
-    instances::SCENE,
-    furnace::FURNACE_BOX,
-    furnace::WHITE_FURNACE,
-    single_triangle::SCENE,
-    far_corners::SCENE,
+    Builtin::of::<cornell_box::CornellBox>(),
+    Builtin::of::<displaced_sphere::DisplacedSphere>(),
+    Builtin::of::<triangle_soup::TriangleSoup>(),
+    Builtin::of::<teapot_in_a_stadium::TeapotInAStadium>(),
+    Builtin::of::<instances::Instances>(),
+    Builtin::of::<furnace::FurnaceBox>(),
+    Builtin::of::<furnace::WhiteFurnace>(),
+    Builtin::of::<single_triangle::SingleTriangle>(),
+    Builtin::of::<far_corners::FarCorners>(),
 ];
 
 /// The built-in scenes with their parameters, for the parser, lists and docs.
@@ -54,11 +76,8 @@ pub fn builtin_scenes() -> Vec<Entry> {
 /// The built-in scene that `variant` names, if it names one.
 pub(super) fn build(variant: &Variant) -> Option<Result<SceneData, SceneError>> {
     let scene = BUILTINS.iter().find(|scene| scene.name == variant.name)?;
-    let params = variant.params.completed(&(scene.schema)());
-    Some(params.map_err(SceneError::from).and_then(|params| {
-        let (builder, look) = (scene.build)(&params);
-        builder.finish(&variant.name, look)
-    }))
+    let built = (scene.build)(&variant.params).map_err(SceneError::from);
+    Some(built.and_then(|(builder, look)| builder.finish(&variant.name, look)))
 }
 
 /// What to type instead of `name`: the nearest built-in name, else all of them.
@@ -83,7 +102,7 @@ pub(super) fn hint(name: &str) -> String {
 #[cfg(test)]
 pub(in crate::scene) mod tests {
     use super::*;
-    use crate::config::{ParamRange, ParamValue};
+    use crate::params::{ParamRange, ParamValue};
     use crate::scene::{LoadOptions, load};
     use std::collections::{BTreeMap, HashMap};
 

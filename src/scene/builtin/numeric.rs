@@ -1,4 +1,4 @@
-//! Sines and random numbers that are equal to the bit on every platform: the standard library's
+//! Sines that are equal to the bit on every platform: the standard library's
 //! `sin` is whatever the system's mathematics library says.
 
 use std::f64::consts::TAU;
@@ -38,40 +38,6 @@ pub(super) fn sin_cos_turns(turns: f64) -> (f64, f64) {
     }
 }
 
-/// PCG-XSH-RR 64/32 (O'Neill 2014).
-pub(in crate::scene) struct Pcg {
-    state: u64,
-}
-
-impl Pcg {
-    const MULTIPLIER: u64 = 6_364_136_223_846_793_005;
-    const INCREMENT: u64 = 1_442_695_040_888_963_407;
-
-    /// A generator for `seed`.
-    pub fn new(seed: u64) -> Self {
-        let mut pcg = Self {
-            state: seed.wrapping_add(Self::INCREMENT),
-        };
-        pcg.next_u32();
-        pcg
-    }
-
-    /// The next 32 random bits.
-    pub fn next_u32(&mut self) -> u32 {
-        let old = self.state;
-        self.state = old
-            .wrapping_mul(Self::MULTIPLIER)
-            .wrapping_add(Self::INCREMENT);
-        let shifted = ((old >> 18) ^ old) >> 27;
-        (shifted as u32).rotate_right((old >> 59) as u32)
-    }
-
-    /// Uniform in [0, 1), 24 bits.
-    pub fn next_f32(&mut self) -> f32 {
-        (self.next_u32() >> 8) as f32 * (1.0 / 16_777_216.0)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -89,18 +55,5 @@ mod tests {
         }
         assert_eq!(sin_cos_turns(0.25), (1.0, 0.0));
         assert_eq!(sin_cos_turns(1.5), (0.0, -1.0));
-    }
-
-    #[test]
-    fn random_numbers_are_uniform_and_depend_on_the_seed() {
-        let draw = |seed| {
-            let mut pcg = Pcg::new(seed);
-            (0..4096).map(|_| pcg.next_f32()).collect::<Vec<_>>()
-        };
-        let values = draw(1);
-        assert_ne!(values, draw(2));
-        assert!(values.iter().all(|x| (0.0..1.0).contains(x)));
-        let mean = values.iter().sum::<f32>() / 4096.0;
-        assert!((mean - 0.5).abs() < 0.02, "{mean}");
     }
 }

@@ -3,27 +3,20 @@
 
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::Builtin;
+use super::BuiltinScene;
 use super::numeric::sin_cos_turns;
 use super::teapot_patches::tessellate;
-use crate::config::{ParamRange, ParamValue, Parameter, Params};
 use crate::geometry::Camera;
+use crate::parameters;
 use glam::Vec3;
 
-pub(super) const SCENE: Builtin = Builtin {
-    name: "teapot-in-a-stadium",
-    description: "the Utah teapot on the field of a stadium a thousand times its size, white sky",
-    schema: || {
-        vec![Parameter {
-            name: "subdivision",
-            description: "quadrilaterals along each edge of the teapot's 32 patches; 10 gives \
-                          6,320 triangles",
-            default: ParamValue::Integer(10),
-            range: ParamRange::Integer { min: 2, max: 500 },
-        }]
-    },
-    build,
-};
+parameters! {
+    /// `teapot-in-a-stadium`.
+    pub(super) struct TeapotInAStadium {
+        /// quadrilaterals along each edge of the teapot's 32 patches; 10 gives 6,320 triangles
+        subdivision: usize = 10, in 2..=500;
+    }
+}
 
 const TEAPOT: u32 = 0;
 const FIELD: u32 = 1;
@@ -43,31 +36,35 @@ const ROW_HEIGHT: f32 = 50.0;
 /// The teapot floats this far above the field, so that its flat bottom does not coincide with it.
 const LIFT: f32 = 0.01;
 
-fn build(params: &Params) -> (SceneBuilder, Look) {
-    let subdivision = usize::try_from(params.integer("subdivision")).unwrap_or(2);
-    let mut builder = SceneBuilder::default();
-    for triangle in tessellate(subdivision) {
-        builder.push(triangle.map(|v| v + LIFT * Vec3::Y), TEAPOT);
+impl BuiltinScene for TeapotInAStadium {
+    const NAME: &'static str = "teapot-in-a-stadium";
+    const DESCRIPTION: &'static str =
+        "the Utah teapot on the field of a stadium a thousand times its size, white sky";
+
+    fn build(&self) -> (SceneBuilder, Look) {
+        let mut builder = SceneBuilder::default();
+        for triangle in tessellate(self.subdivision) {
+            builder.push(triangle.map(|v| v + LIFT * Vec3::Y), TEAPOT);
+        }
+        push_field(&mut builder);
+        push_rows(&mut builder);
+        let look = Look {
+            materials: vec![
+                Material::diffuse("teapot", Vec3::new(0.8, 0.55, 0.3)),
+                Material::diffuse("field", Vec3::new(0.3, 0.5, 0.25)),
+                Material::diffuse("row", Vec3::splat(0.6)),
+                Material::diffuse("other row", Vec3::new(0.3, 0.35, 0.55)),
+            ],
+            camera: Some(Camera::upright(
+                Vec3::new(2.5, 3.4, 8.2),
+                Vec3::new(0.2, 1.9, 0.0),
+                40.0,
+            )),
+            environment: Vec3::ONE,
+            ..Look::default()
+        };
+        (builder, look)
     }
-    push_field(&mut builder);
-    push_rows(&mut builder);
-    let look = Look {
-        materials: vec![
-            Material::diffuse("teapot", Vec3::new(0.8, 0.55, 0.3)),
-            Material::diffuse("field", Vec3::new(0.3, 0.5, 0.25)),
-            Material::diffuse("row", Vec3::splat(0.6)),
-            Material::diffuse("other row", Vec3::new(0.3, 0.35, 0.55)),
-        ],
-        textures: Vec::new(),
-        camera: Some(Camera {
-            eye: Vec3::new(2.5, 3.4, 8.2),
-            target: Vec3::new(0.2, 1.9, 0.0),
-            up: Vec3::Y,
-            vertical_fov_degrees: 40.0,
-        }),
-        environment: Vec3::ONE,
-    };
-    (builder, look)
 }
 
 fn push_field(builder: &mut SceneBuilder) {
@@ -110,6 +107,7 @@ mod tests {
     use super::super::tests::{load_default, load_with};
     use super::*;
     use crate::geometry::Triangle;
+    use crate::params::ParamValue;
     use crate::scene::Bounds;
 
     fn teapot(subdivision: usize) -> Vec<Triangle> {

@@ -2,80 +2,61 @@
 
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
-use super::Builtin;
-use super::numeric::Pcg;
-use crate::config::{ParamRange, ParamValue, Parameter, Params};
+use super::BuiltinScene;
 use crate::geometry::Camera;
+use crate::parameters;
+use crate::random::Pcg32;
 use glam::Vec3;
 
-pub(super) const SCENE: Builtin = Builtin {
-    name: "triangle-soup",
-    description: "random triangles, centres uniform in the unit cube, under a white sky",
-    schema: || {
-        vec![
-            Parameter {
-                name: "triangles",
-                description: "number of triangles",
-                default: ParamValue::Integer(10_000),
-                range: ParamRange::Integer {
-                    min: 1,
-                    max: 50_000_000,
-                },
-            },
-            Parameter {
-                name: "size",
-                description: "edge of the cube that holds a triangle, in edges of the unit cube",
-                default: ParamValue::Number(0.05),
-                range: ParamRange::Number {
-                    min: 1e-4,
-                    max: 1.0,
-                },
-            },
-            Parameter {
-                name: "seed",
-                description: "seed of the random generator (PCG, O'Neill 2014)",
-                default: ParamValue::Integer(1),
-                range: ParamRange::Integer {
-                    min: 0,
-                    max: i64::MAX,
-                },
-            },
-        ]
-    },
-    build,
-};
-
-fn build(params: &Params) -> (SceneBuilder, Look) {
-    let count = usize::try_from(params.integer("triangles")).unwrap_or(1);
-    let size = params.number("size") as f32;
-    let mut pcg = Pcg::new(params.integer("seed") as u64);
-    let mut point = || Vec3::new(pcg.next_f32(), pcg.next_f32(), pcg.next_f32());
-    let mut builder = SceneBuilder::new(false, count);
-    for index in 0..count {
-        let corner = point() - 0.5 * size;
-        let vertices = [0; 3].map(|_| corner + size * point());
-        builder.push(vertices, (index % 3) as u32);
+parameters! {
+    /// `triangle-soup`.
+    pub(super) struct TriangleSoup {
+        /// number of triangles
+        triangles: usize = 10_000, in 1..=50_000_000;
+        /// edge of the cube that holds a triangle, in edges of the unit cube
+        size: f32 = 0.05, in 1e-4..=1.0;
+        /// seed of the random generator (PCG, O'Neill 2014)
+        seed: u64 = 1, in 0..=i64::MAX as u64;
     }
-    let colors = [(0.75, 0.35, 0.3), (0.35, 0.65, 0.4), (0.35, 0.45, 0.75)];
-    let materials = colors.map(|color| Material::diffuse("soup", color.into()));
-    let look = Look {
-        materials: materials.into(),
-        textures: Vec::new(),
-        camera: Some(Camera {
-            eye: Vec3::new(1.7, 1.3, 2.5),
-            target: Vec3::splat(0.5),
-            up: Vec3::Y,
-            vertical_fov_degrees: 40.0,
-        }),
-        environment: Vec3::ONE,
-    };
-    (builder, look)
+}
+
+impl BuiltinScene for TriangleSoup {
+    const NAME: &'static str = "triangle-soup";
+    const DESCRIPTION: &'static str =
+        "random triangles, centres uniform in the unit cube, under a white sky";
+
+    fn build(&self) -> (SceneBuilder, Look) {
+        let count = self.triangles;
+        let size = self.size;
+        let mut pcg = Pcg32::with_stream(self.seed, Pcg32::DEFAULT_STREAM);
+        let mut point = || Vec3::new(pcg.uniform_f32(), pcg.uniform_f32(), pcg.uniform_f32());
+        let mut builder = SceneBuilder::new(false, count);
+        for index in 0..count {
+            let corner = point() - 0.5 * size;
+            let vertices = [0; 3].map(|_| corner + size * point());
+            builder.push(vertices, (index % 3) as u32);
+        }
+        let colors = [(0.75, 0.35, 0.3), (0.35, 0.65, 0.4), (0.35, 0.45, 0.75)];
+        let materials = colors.map(|color| Material::diffuse("soup", color.into()));
+        let look = Look {
+            materials: materials.into(),
+            camera: Some(Camera::upright(
+                Vec3::new(1.7, 1.3, 2.5),
+                Vec3::splat(0.5),
+                40.0,
+            )),
+            environment: Vec3::ONE,
+            ..Look::default()
+        };
+        (builder, look)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::tests::{load_default, load_with};
     use super::*;
+    use crate::params::ParamValue;
 
     #[test]
     fn triangles_fill_the_unit_cube_and_stay_within_their_size() {

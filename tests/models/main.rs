@@ -3,13 +3,18 @@
 
 mod gltf;
 mod obj;
+mod ply;
 mod real;
 mod text;
 
-use super::builtin::numeric::Pcg;
-use super::*;
-use crate::config::Params;
+use glam::{Vec2, Vec3};
+use raystone::params::{Params, Variant};
+use raystone::random::Pcg32;
+use raystone::scene::{
+    DEFAULT_ALBEDO, DIELECTRIC, DIFFUSE, LoadOptions, MIRROR, Material, SceneData, SceneError, load,
+};
 use std::fs;
+use std::path::Path;
 use tempfile::TempDir;
 
 fn variant(name: &str) -> Variant {
@@ -166,7 +171,7 @@ fn damaged_files_never_panic() {
         ("a.gltf", square_json(0).into_bytes()),
     ];
     let folder = TempDir::new().unwrap();
-    let mut pcg = Pcg::new(1);
+    let mut pcg = Pcg32::with_stream(1, Pcg32::DEFAULT_STREAM);
     let mut outcomes = [0, 0];
     for (file, bytes) in &cases {
         // The library and the texture are seen through the OBJ file.
