@@ -34,7 +34,7 @@ pub struct Stress {
     /// Family; may be given many times [default: all, and the shots]
     #[arg(long)]
     family: Vec<String>,
-    /// Rays a case [default: 512, quick 128]
+    /// Rays per case [default: 512, quick 128]
     #[arg(long, value_name = "N")]
     rays: Option<usize>,
     /// Shots at each closed mesh, 0 for none [default: 1000000, quick 16384]

@@ -80,10 +80,10 @@ impl Suite<'_> {
             match bench::build(*kind, &stage.soup) {
                 Ok(built) => {
                     let traced = Traced::upload(&stage.gpu, &*built)?;
-                    for aim in 0..AIMS.len() {
+                    for (aim, aimed_at) in AIMS.iter().enumerate() {
                         let series = self.series(target, &stage, &traced, name, aim)?;
                         let key = key(*test, *kind).with(axis::MESH, mesh);
-                        let key = key.with(axis::PLACE, place).with(axis::AIM, AIMS[aim]);
+                        let key = key.with(axis::PLACE, place).with(axis::AIM, aimed_at);
                         records.push(Line::new(key, Ran::default(), Record::Shots(series)));
                     }
                 }

@@ -78,7 +78,7 @@ fn target(
         found: value,
         verdict: Verdict::new(
             value.is_some(),
-            value.is_some_and(|value| !(value <= limit)),
+            value.is_some_and(|value| value.is_nan() || value > limit),
         ),
         note: match worst {
             Some((value, place)) if value > 0.0 => place,
@@ -102,7 +102,7 @@ fn shot_targets(shots: &[Recorded<ShotsRecord>], wanted: usize) -> Vec<TargetRec
             .map(|s| (s.misses as f64, name(s)))
     };
     let far = at(Place::FAR).map(|s| (s.misses as f64 / s.rays.max(1) as f64, name(s)));
-    let misses = format!("watertight misses of {wanted} rays a mesh, ordinary scale");
+    let misses = format!("watertight misses of {wanted} rays per mesh, ordinary scale");
     let aimed = format!("misses at vertices and edges of {wanted} shots");
     vec![
         target(misses, 0.0, ordinary(true)),
