@@ -55,8 +55,13 @@ pub fn welch_t_test_beyond(a: &[f64], b: &[f64], margin: f64) -> Option<WelchTes
 
 /// Probability that `|T| ≥ |t|` for Student's t with `degrees_of_freedom > 0` (not always whole).
 pub fn student_t_two_sided(t: f64, degrees_of_freedom: f64) -> f64 {
-    let n = degrees_of_freedom;
-    checked_beta_reg(0.5 * n, 0.5, n / (n + t * t)).unwrap_or(f64::NAN)
+    let (tt, n) = (t * t, degrees_of_freedom);
+    let p = match tt < 1.0 {
+        // Near 1 the other argument keeps its digits.
+        true => checked_beta_reg(0.5, 0.5 * n, tt / (n + tt)).map(|rest| 1.0 - rest),
+        false => checked_beta_reg(0.5 * n, 0.5, n / (n + tt)),
+    };
+    p.unwrap_or(f64::NAN)
 }
 
 /// The t that `|T|` exceeds with probability `p` in (0, 1): the inverse of [`student_t_two_sided`].
