@@ -79,7 +79,7 @@ impl SceneBuffers {
                 .iter()
                 .any(|m| m.base_color_texture.is_some());
         let (lights, light_power) = light_words(scene);
-let tables = Tables::of(scene, &lights, textured);
+        let tables = Tables::of(scene, &lights, textured);
         let triangles = TriangleBuffers::upload(gpu, soup)?;
         let mut bindings = triangles.bindings.clone();
         bindings.buffer(
