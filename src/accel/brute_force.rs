@@ -5,10 +5,10 @@ use super::intersection::Reciprocal;
 use super::ray::{Hit, Ray};
 use super::triangle::watertight::{Shear, products, shear, sheared};
 use super::triangle::{TriangleRecord, TriangleTest, intersect_triangle};
+use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, TriangleSoup,
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, StructureStats, TriangleSoup,
 };
-use crate::accel::StructureStats;
 use crate::oracle::{GROUP, Groups, Line};
 use crate::params::{ParameterSchema, Params};
 use rayon::prelude::*;
@@ -77,38 +77,19 @@ impl BuiltAccel for Built {
     }
 
     fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin { soup }))
+        Some(Box::new(Twin(self, soup)))
     }
 }
 
-struct Twin<'a> {
-    soup: &'a TriangleSoup,
-}
-
-impl CpuTwin for Twin<'_> {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        let ray = &self.soup.intersection.raised(ray);
-        let inverse = self.soup.intersection.inverse(ray.direction);
-        let mut hit = Hit::miss(ray);
-        for triangle in &self.soup.records {
-            counters.triangle_tests += 1;
-            intersect_triangle(triangle, ray, inverse, &mut hit);
-        }
-        hit
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        let ray = &self.soup.intersection.raised(ray);
-        let inverse = self.soup.intersection.inverse(ray.direction);
-        let mut hit = Hit::miss(ray);
-        for triangle in &self.soup.records {
-            counters.triangle_tests += 1;
-            intersect_triangle(triangle, ray, inverse, &mut hit);
-            if hit.triangle != super::NO_HIT {
-                return true;
+impl Traverse for Built {
+    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+        for triangle in &soup.records {
+            query.test(triangle);
+            if query.is_answered() {
+                break;
             }
         }
-        false
+        query.hit
     }
 }
 

@@ -3,10 +3,11 @@
 //! Source: T. Aila, S. Laine, "Understanding the efficiency of ray traversal on GPUs", HPG 2009.
 
 use super::super::bounds::{Bounds, enter_box};
-use super::super::leaf::{LEAF, Leaves, leaf_reference};
+use super::super::leaf::{LEAF, LeafReader, Leaves, leaf_reference};
 use super::super::tree::{Coverage, NodeKind, Tree};
-use super::super::{AccelError, Counters, TriangleSoup};
-use super::layout::{Inner, Nodes, Query};
+use super::super::twin::Query;
+use super::super::{AccelError, TriangleSoup};
+use super::layout::{Inner, Nodes};
 use super::options::NodeOrder;
 use super::order::InnerNodes;
 use super::{NONE, ROOT};
@@ -145,13 +146,11 @@ impl Pairs {
 }
 
 impl Nodes for Pairs {
-    fn visit(&self, node: u32, query: &mut Query) -> Inner {
-        query.counters.visit(node as usize);
-        query.counters.box_tests += 2;
+    fn visit(&self, node: u32, leaves: LeafReader, query: &mut Query) -> Inner {
+        query.visit(node as usize);
         let pair = &self.0[node as usize];
-        let (ray, inverse) = (query.ray, query.inverse);
-        let left = enter_box(&pair.left_bounds(), ray, inverse, query.hit.t);
-        let right = enter_box(&pair.right_bounds(), ray, inverse, query.hit.t);
+        let left = query.enter(&pair.left_bounds());
+        let right = query.enter(&pair.right_bounds());
         let swap = right.is_some_and(|r| left.is_none_or(|l| r < l));
         let (mut near, mut far) = ((left, pair.left), (right, pair.right));
         if swap {
@@ -164,7 +163,7 @@ impl Nodes for Pairs {
         };
         if near.0.is_some() {
             if near.1 >= LEAF {
-                query.test_leaf(near.1);
+                leaves.test_leaf(near.1, query);
             } else {
                 inner.first = near.1;
             }
@@ -173,7 +172,7 @@ impl Nodes for Pairs {
         let entered = far.0.is_some_and(|e| e <= query.hit.t * query.inverse.pad);
         if entered && !query.is_answered() {
             if far.1 >= LEAF {
-                query.test_leaf(far.1);
+                leaves.test_leaf(far.1, query);
             } else if inner.first == NONE {
                 inner.first = far.1;
                 inner.side ^= 1;
@@ -185,10 +184,10 @@ impl Nodes for Pairs {
     }
 
     fn second_child(&self, node: u32, from: u32, query: &mut Query) -> u32 {
-        query.counters.visit(node as usize);
+        query.visit(node as usize);
         query.counters.box_tests += 2;
         let pair = &self.0[node as usize];
-        let (ray, inverse) = (query.ray, query.inverse);
+        let (ray, inverse) = (&query.ray, query.inverse);
         let left = enter_box(&pair.left_bounds(), ray, inverse, ray.t_max);
         let right = enter_box(&pair.right_bounds(), ray, inverse, ray.t_max);
         let swap = right.is_some_and(|r| left.is_none_or(|l| r < l));
@@ -209,8 +208,8 @@ impl Nodes for Pairs {
         self.0[node as usize].parent
     }
 
-    fn child(&self, node: u32, side: u32, counters: &mut Counters) -> u32 {
-        counters.visit(node as usize);
+    fn child(&self, node: u32, side: u32, query: &mut Query) -> u32 {
+        query.visit(node as usize);
         let pair = &self.0[node as usize];
         if side == 0 { pair.left } else { pair.right }
     }

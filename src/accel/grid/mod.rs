@@ -26,14 +26,7 @@ pub const MAX_WORDS: u64 = (128 << 20) / 4 - 1;
 /// # Errors
 /// The limit with both numbers.
 pub fn check_words(what: &str, needed: u64) -> Result<(), AccelError> {
-    if needed <= MAX_WORDS {
-        return Ok(());
-    }
-    Err(AccelError::Limit {
-        what: what.to_owned(),
-        needed,
-        limit: MAX_WORDS,
-    })
+    AccelError::check_limit(what, needed, MAX_WORDS)
 }
 
 /// The box that a grid fills, and how exact positions in it are.

@@ -116,13 +116,7 @@ impl Forest {
         });
         let trees = trees?;
         let needed: u64 = trees.iter().map(|tree| tree.order.len() as u64).sum();
-        if needed > u64::from(FIRST_MASK) {
-            return Err(AccelError::Limit {
-                what: "triangles in the leaves of all objects".into(),
-                needed,
-                limit: FIRST_MASK.into(),
-            });
-        }
+        AccelError::check_limit("triangles in the leaves of all objects", needed, FIRST_MASK)?;
         Ok(log.phase("layout", || {
             let mut forest = Self {
                 intersection: objects
@@ -189,21 +183,16 @@ impl Forest {
         coverage.node(0)?;
         let mut stack = vec![(root.nodes.start, Bounds::EVERYTHING, 1)];
         while let Some((index, around, depth)) = stack.pop() {
-            if depth > root.depth.max(1) {
-                return Err(AccelError::Invalid(format!(
-                    "node {index}: deeper than the stack of {}",
-                    root.depth
-                )));
-            }
+            AccelError::ensure(depth <= root.depth.max(1), || {
+                format!("node {index}: deeper than the stack of {}", root.depth)
+            })?;
             for (reference, bounds) in self.nodes[index as usize].children() {
                 if reference == NOTHING {
                     continue;
                 }
-                if !around.contains(&bounds) {
-                    return Err(AccelError::Invalid(format!(
-                        "node {index}: a child's box leaves its own"
-                    )));
-                }
+                AccelError::ensure(around.contains(&bounds), || {
+                    format!("node {index}: a child's box leaves its own")
+                })?;
                 if reference >= LEAF {
                     let (first, count) = leaf_range(reference);
                     let end = first + count;

@@ -224,15 +224,7 @@ fn assemble(
         tree.nodes[cell.slot] = (block as u32) << INNER_SHIFT | filled;
     }
     let (blocks, references) = (tree.nodes.len() as u64 / 8, tree.references.len() as u64);
-    let checked = |what: &str, needed, limit| {
-        let what = what.to_owned();
-        (needed <= limit).then_some(()).ok_or(AccelError::Limit {
-            what,
-            needed,
-            limit,
-        })
-    };
-    checked("cells of an octree that have children", blocks, MAX_BLOCKS)?;
-    checked("references of an octree", references, MAX_REFERENCES)?;
+    AccelError::check_limit("cells of an octree that have children", blocks, MAX_BLOCKS)?;
+    AccelError::check_limit("references of an octree", references, MAX_REFERENCES)?;
     Ok((next_cells, next_triangles))
 }

@@ -4,11 +4,10 @@
 //! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
 //! compressed wide BVHs", HPG 2017, section 3.2.
 
-use super::TriangleSoup;
-use super::bounds::Bounds;
-use super::tree::{NodeKind, Tree};
-use super::triangle::TriangleRecord;
-use crate::accel::StructureStats;
+use crate::accel::bounds::Bounds;
+use crate::accel::tree::{NodeKind, Tree};
+use crate::accel::triangle::TriangleRecord;
+use crate::accel::{StructureStats, TriangleSoup, leaf_histogram};
 use crate::params::Params;
 
 /// Most children of a node here; the cost table of a node has one entry less.
@@ -76,7 +75,7 @@ pub struct CollapseSettings {
 }
 
 impl CollapseSettings {
-    /// Settings from the parameters of [`super::wide::wide_parameters`].
+    /// Settings from the parameters of [`super::wide_parameters`].
     pub fn new(width: usize, params: &Params) -> Self {
         Self {
             width,
@@ -101,7 +100,7 @@ impl WideTree {
             WideKind::Node(_) => None,
             WideKind::Leaf { count, .. } => Some(count as usize),
         });
-        stats.leaf_histogram = super::leaf_histogram(leaves);
+        stats.leaf_histogram = leaf_histogram(leaves);
         stats.leaves = stats.leaf_histogram.iter().sum();
         let weighted = children().map(|child| {
             let weight = match child.kind {
@@ -325,7 +324,7 @@ impl<'a> Costs<'a> {
 mod tests {
     use super::*;
     use crate::accel::tree::TreeNode;
-    use crate::random::Pcg32;
+    use crate::measure::statistics::Pcg32;
 
     fn around(x: f32, size: f32) -> Bounds {
         Bounds {
