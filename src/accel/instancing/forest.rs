@@ -9,7 +9,6 @@ use super::super::triangle::TriangleRecord;
 use super::super::{AccelError, BuildLog, TriangleSoup};
 use super::instance::NOTHING;
 use crate::accel::StructureStats;
-use crate::params::Params;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -104,12 +103,12 @@ impl Forest {
     /// More triangles than a leaf reference can address.
     pub(super) fn build(
         objects: &[&TriangleSoup],
-        params: &Params,
+        parameters: &TreeParameters,
         log: &mut BuildLog,
     ) -> Result<Self, AccelError> {
         let trees: Result<Vec<Tree>, AccelError> = log.phase("objects", || {
             let build = |object: &&TriangleSoup| {
-                let tree = Tree::build(object, params, &mut BuildLog::default())?;
+                let tree = Tree::build(object, parameters, &mut BuildLog::default())?;
                 check_leaves(&tree).map(|()| tree)
             };
             objects.par_iter().map(build).collect()
