@@ -11,6 +11,19 @@ pub struct Triangle {
     pub vertices: [Vec3; 3],
 }
 
+impl Triangle {
+    /// The triangle whose corners are what `to` makes of this one's.
+    pub fn map(self, to: impl FnMut(Vec3) -> Vec3) -> Self {
+        self.vertices.map(to).into()
+    }
+}
+
+impl From<[Vec3; 3]> for Triangle {
+    fn from(vertices: [Vec3; 3]) -> Self {
+        Self { vertices }
+    }
+}
+
 /// A pinhole camera. Rays start at `eye`; pixel (0, 0) is the top left one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
@@ -22,4 +35,16 @@ pub struct Camera {
     pub up: Vec3,
     /// Vertical field of view, degrees, in (0, 180).
     pub vertical_fov_degrees: f32,
+}
+
+impl Camera {
+    /// A camera for which y is up.
+    pub fn upright(eye: Vec3, target: Vec3, vertical_fov_degrees: f32) -> Self {
+        Self {
+            eye,
+            target,
+            up: Vec3::Y,
+            vertical_fov_degrees,
+        }
+    }
 }

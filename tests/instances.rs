@@ -15,7 +15,7 @@ use raystone::geometry::Triangle;
 use raystone::gpu::probe_arithmetic;
 use raystone::measure::gate::{Judge, compare, gate};
 use raystone::measure::hard_rays::HARD_RAYS;
-use raystone::measure::record::Record;
+use raystone::measure::record::{StructureRecord, TimeRecord, all_of, axis};
 use raystone::params::{ParamValue, Params};
 use raystone::run::Registries;
 use raystone::scene::{Assembly, Transform};
@@ -460,31 +460,28 @@ rays = 1024
     let (summary, records) = support::run(experiment, &Registries::default(), out.path(), None);
     assert_eq!(summary.failed, 0, "{records:?}");
     let mut spaces = Vec::new();
-    for record in &records {
-        if let Record::Structure(s) = record {
-            let moves = s.space == Space::Instances;
-            assert_eq!(s.update_ms.is_some(), moves, "{}", s.accel);
-            assert!(
-                s.update_ms
-                    .is_none_or(|ms| ms >= 0.0 && ms < s.build_ms.max(50.0))
-            );
-            spaces.push(s.space);
-        }
+    for s in all_of::<StructureRecord>(&records) {
+        let moves = s.space == Space::Instances;
+        assert_eq!(s.update_ms.is_some(), moves, "{}", s.key);
+        assert!(
+            s.update_ms
+                .is_none_or(|ms| ms >= 0.0 && ms < s.build_ms.max(50.0))
+        );
+        spaces.push(s.space);
     }
     spaces.sort();
     assert_eq!(
         spaces,
         [[Space::World; 2].as_slice(), &[Space::Instances; 5]].concat()
     );
-    let times = records.iter().filter_map(|record| match record {
-        Record::Time(time) => Some((time.image_equal, time.accel.name.clone())),
-        _ => None,
-    });
-    let times: Vec<_> = times.collect();
+    let times = all_of::<TimeRecord>(&records);
+    let times: Vec<_> = times
+        .map(|t| (t.image_equal, t.key.name(axis::ACCEL)))
+        .collect();
     assert!(
         times.len() == 7 && times.iter().all(|(equal, _)| *equal),
         "{times:?}"
     );
-    let page = std::fs::read_to_string(summary.report.expect("a page")).expect("the page");
+    let page = std::fs::read_to_string(out.path().join("index.html")).expect("the page");
     assert!(page.contains("update, ms") && page.contains("judged over instances"));
 }

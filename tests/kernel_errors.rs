@@ -131,6 +131,33 @@ fn faults_of_all_kinds_are_told_with_file_and_line() {
 }
 
 #[test]
+fn a_fault_behind_a_feature_or_in_a_further_condition_has_its_own_line() {
+    let file = "accel/bvh/stack";
+    for (before, after) in [
+        ("@if(!(nothing && textures))\n    ", "let odd = 1.5 + 2u;"),
+        ("if swapped {\n    } ", "else if swopped {\n    }"),
+        (
+            "for (var i = 0u; i < 2u; i++) {\n    ",
+            "let odd = 1.5 + 2u;\n    }",
+        ),
+        (
+            "loop {\n        break;\n        continuing {\n        ",
+            "break if 1.5;\n        }\n    }",
+        ),
+    ] {
+        let swapped = "let swapped = true;\n    ";
+        let to = format!("{swapped}{before}{after}\n    let inner = visit(");
+        let (text, line) = broken(file, "let inner = visit(", &to);
+        let line = line + format!("{swapped}{before}").matches('\n').count();
+        let told = message(file, &text, file).expect_err(after);
+        assert!(
+            told.starts_with(&format!("FILE:{line}: ")),
+            "{to}\nline {line}: {told}"
+        );
+    }
+}
+
+#[test]
 fn sound_kernels_give_no_message() {
     for structure in ["accel/bvh/stack", "accel/bvh/roped", "accel/uniform_grid"] {
         assert_eq!(

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::accel::{AccelRegistry, Counters, Hit, Ray};
 use raystone::gpu::{Composition, KernelLibrary};
-use raystone::integrator::{SceneFeatures, integrators, with_sampler};
+use raystone::integrator::{IntegratorRegistry, SceneFeatures, with_sampler};
 use raystone::params::{Entry, Variant};
 use raystone::sampling::{Demand, Sampler, SamplerRegistry};
 use std::mem::{offset_of, size_of};
@@ -84,7 +84,7 @@ fn with_samplers(kernel: &Composition) -> Vec<Composition> {
 /// their full product would only repeat itself.
 fn renderers() -> Vec<Composition> {
     let mut out = Vec::new();
-    for integrator in integrators() {
+    for integrator in IntegratorRegistry::default().iter() {
         let kernel = Composition::new("integrator/render").with("integrator", integrator.kernel());
         let constants = integrator.constants(&default_params(&integrator.parameters()));
         let kernel = constants.iter().fold(kernel, |k, (n, v)| k.constant(n, *v));

@@ -1,19 +1,16 @@
 //! Accumulation and sampling on this machine's adapter.
 
-use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary};
+mod support;
+
 use raystone::stress::numerics::{Figure, run};
 use std::sync::OnceLock;
-
-fn open(kernels: KernelLibrary) -> Gpu {
-    raystone::gpu::open(&AdapterChoice::Best, kernels)
-        .unwrap_or_else(|e| panic!("no adapter: run scripts/install-driver ({e})"))
-}
+use support::{gpu, kernels_with, open};
 
 /// The figures of the embedded kernels, taken once.
 fn figures() -> &'static [Figure] {
     static FIGURES: OnceLock<Vec<Figure>> = OnceLock::new();
     FIGURES.get_or_init(|| {
-        let figures = run(&open(KernelLibrary::default()), true).expect("the figures are taken");
+        let figures = run(gpu(), true).expect("the figures are taken");
         for figure in &figures {
             println!("{figure:?}");
         }
@@ -23,16 +20,8 @@ fn figures() -> &'static [Figure] {
 
 /// The embedded kernels with one text of one module replaced.
 fn with_fault(module: &str, from: &str, to: &str) -> Vec<Figure> {
-    let library = KernelLibrary::default();
-    let text = library.text(module).expect("a known module");
-    assert_eq!(text.matches(from).count(), 1, "`{from}` in {module}");
-    let text = text.replace(from, to);
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let file = folder.path().join(module).with_extension("wesl");
-    std::fs::create_dir_all(file.parent().expect("a folder")).expect("a folder");
-    std::fs::write(&file, text).expect("a kernel file");
-    let library = library.with_folder(folder.path()).expect("the kernels");
-    run(&open(library), true).expect("the figures are taken")
+    let kernels = kernels_with(module, &[(from, to)]);
+    run(&open(kernels), true).expect("the figures are taken")
 }
 
 fn alarms(figures: &[Figure]) -> Vec<&str> {

@@ -8,7 +8,7 @@ mod support;
 use raystone::config::Plan;
 use raystone::gpu::{AdapterChoice, GpuError, KernelLibrary};
 use raystone::integrator::SceneBuffers;
-use raystone::measure::record::Record;
+use raystone::measure::record::{Body, Line, axis};
 use raystone::run::{Registries, RunError, RunOptions, RunSummary};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -52,60 +52,37 @@ fn experiment(scenes: &[&str]) -> String {
 /// A run's records by what they are about. Panics if one is there twice or the last is not the end.
 struct Outcome {
     summary: RunSummary,
-    records: BTreeMap<String, Record>,
+    records: BTreeMap<String, Line>,
     /// What failed.
     failed: BTreeSet<String>,
 }
 
 /// What a record is about, and whether it tells of a failure.
-fn subject(record: &Record) -> (String, bool) {
+fn subject(line: &Line) -> (String, bool) {
+    let [scene, accel, integrator] =
+        [axis::SCENE, axis::ACCEL, axis::INTEGRATOR].map(|axis| line.key.label(axis));
+    let sampler = line.key.sampler();
+    let cell = format!("{scene}, {integrator}, {sampler}");
     let failed = |failure: &Option<String>| failure.is_some();
-    match record {
-        Record::Run(_) => ("run".to_owned(), false),
-        Record::Scene(r) => (format!("scene {}", r.scene), false),
-        Record::Structure(r) => (format!("{}, {}", r.scene, r.accel), failed(&r.failure)),
-        Record::Reference(r) => (format!("reference {}, {}", r.scene, r.integrator), false),
-        Record::Error(r) => {
-            let cell = format!(
-                "{}, {}, {} × {}",
-                r.scene, r.integrator, r.sequence, r.decorrelation
-            );
-            (format!("replicate {} of {cell}", r.replicate), false)
-        }
-        Record::Bias(r) => {
-            let cell = format!(
-                "{}, {}, {} × {}",
-                r.scene, r.integrator, r.sequence, r.decorrelation
-            );
-            (format!("bias of {cell}"), false)
-        }
-        Record::Spectrum(r) => {
-            let cell = format!(
-                "{}, {}, {} × {}",
-                r.scene, r.integrator, r.sequence, r.decorrelation
-            );
-            (format!("spectrum of {cell}"), false)
-        }
-        Record::SamplerCost(r) => {
-            let cell = format!("{} × {}", r.sequence, r.decorrelation);
-            (format!("cost of {cell}"), false)
-        }
-        Record::Time(r) => {
-            let cell = format!(
-                "{}, {}, {}, {} × {}",
-                r.scene, r.accel, r.integrator, r.sequence, r.decorrelation
-            );
-            (cell, failed(&r.failure))
-        }
-        Record::Stream(r) => {
-            let cell = format!("{} × {}, {:?}", r.sequence, r.decorrelation, r.dimensions);
-            (format!("stream {cell}"), false)
-        }
-        Record::Skipped(r) => (format!("skipped {}", r.cell), false),
-        Record::Failed(r) => (r.cell.clone(), true),
-        Record::Warning(r) => (format!("warning of {}", r.cell), false),
-        Record::Interrupted(_) => ("interrupted".to_owned(), false),
-        Record::Finished(_) => ("finished".to_owned(), false),
+    match &line.body {
+        Body::Run(_) => ("run".to_owned(), false),
+        Body::Scene(_) => (format!("scene {scene}"), false),
+        Body::Structure(r) => (format!("{scene}, {accel}"), failed(&r.failure)),
+        Body::Reference(_) => (format!("reference {scene}, {integrator}"), false),
+        Body::Error(r) => (format!("replicate {} of {cell}", r.replicate), false),
+        Body::Bias(_) => (format!("bias of {cell}"), false),
+        Body::Spectrum(_) => (format!("spectrum of {cell}"), false),
+        Body::SamplerCost(_) => (format!("cost of {sampler}"), false),
+        Body::Time(r) => (
+            format!("{scene}, {accel}, {integrator}, {sampler}"),
+            failed(&r.failure),
+        ),
+        Body::Stream(r) => (format!("stream {sampler}, {:?}", r.dimensions), false),
+        Body::Skipped(r) => (format!("skipped {}", r.cell), false),
+        Body::Failed(r) => (r.cell.clone(), true),
+        Body::Warning(r) => (format!("warning of {}", r.cell), false),
+        Body::Interrupted(_) => ("interrupted".to_owned(), false),
+        Body::Finished(_) => ("finished".to_owned(), false),
     }
 }
 
@@ -115,16 +92,16 @@ fn outcome(scenes: &[&str], lose_device_at: Option<&str>) -> Outcome {
     let (summary, lines) = run(&text, &Registries::default(), folder.path(), lose_device_at);
     let mut records = BTreeMap::new();
     let mut failed = BTreeSet::new();
-    match lines.last() {
-        Some(Record::Finished(end)) => assert_eq!(end.failed, summary.failed),
+    match lines.last().map(|line| &line.body) {
+        Some(Body::Finished(end)) => assert_eq!(end.failed, summary.failed),
         other => panic!("the last record is {other:?}"),
     }
-    for record in lines {
-        let (subject, is_failure) = subject(&record);
+    for line in lines {
+        let (subject, is_failure) = subject(&line);
         if is_failure {
             failed.insert(subject.clone());
         }
-        let before = records.insert(subject.clone(), record);
+        let before = records.insert(subject.clone(), line);
         assert!(before.is_none(), "{subject} is there twice");
     }
     assert_eq!(failed.len(), summary.failed, "{failed:?}");
@@ -164,9 +141,8 @@ fn check_the_rest(disturbed: &Outcome, missing: &BTreeSet<&str>, added: &BTreeSe
     assert_eq!(new, *added);
     let mut images = 0;
     for (subject, record) in &disturbed.records {
-        if let (Record::Error(after), Some(Record::Error(before))) =
-            (record, undisturbed().records.get(subject))
-        {
+        let before = undisturbed().records.get(subject).map(|line| &line.body);
+        if let (Body::Error(after), Some(Body::Error(before))) = (&record.body, before) {
             assert_eq!(after.image_hash, before.image_hash, "{subject}");
             images += 1;
         }
@@ -236,7 +212,7 @@ fn a_missing_model_fails_its_scene_and_the_others_go_on() {
     assert!(disturbed.summary.bad_input);
     assert_eq!(disturbed.failed.len(), 1);
     let failed = disturbed.failed.first().expect("a failure");
-    let Record::Failed(told) = &disturbed.records[failed] else {
+    let Body::Failed(told) = &disturbed.records[failed].body else {
         panic!("{failed}");
     };
     assert!(told.reason.contains(missing), "{told:?}");
@@ -254,10 +230,13 @@ fn vertices_that_are_not_numbers_are_dropped_and_counted() {
         (outcome.summary.failed, outcome.summary.bad_input),
         (0, false)
     );
-    let scenes = outcome.records.values().filter_map(|record| match record {
-        Record::Scene(scene) => Some(scene),
-        _ => None,
-    });
+    let scenes = outcome
+        .records
+        .values()
+        .filter_map(|line| match &line.body {
+            Body::Scene(scene) => Some(scene),
+            _ => None,
+        });
     let scenes: Vec<_> = scenes.collect();
     let [scene] = &scenes[..] else {
         panic!("{} scenes", scenes.len());
@@ -309,7 +288,8 @@ fn a_report_that_cannot_be_written_costs_no_record() {
     let error = refused(folder.path(), AdapterChoice::Best);
     assert_names(&error, &folder.path().join("index.html"));
     let lines = records(folder.path());
-    assert!(matches!(lines.last(), Some(Record::Finished(_))));
+    let last = lines.last().map(|line| &line.body);
+    assert!(matches!(last, Some(Body::Finished(_))));
 }
 
 #[test]

@@ -5,7 +5,10 @@ mod support;
 use raystone::config::Experiment;
 use raystone::discrepancy::{Budget, Measure, PointSet, Value, measure};
 use raystone::integrator::integrand::Function;
-use raystone::measure::record::{BiasRecord, ErrorRecord, Record, SpectrumRecord, StreamRecord};
+use raystone::measure::record::{
+    BiasRecord, ErrorRecord, Kind, Line, Recorded, ReferenceRecord, SamplerCostRecord,
+    SpectrumRecord, StreamRecord, all_of, axis,
+};
 use raystone::measure::spectrum::error_spectrum;
 use raystone::run::Registries;
 use raystone::sampling::{Coordinate, Demand, Sampler, to_unit};
@@ -40,8 +43,8 @@ pairs = [[0, 1], [2, 3]]
 seeds = 8
 "#;
 
-fn records() -> &'static [Record] {
-    static RECORDS: OnceLock<Vec<Record>> = OnceLock::new();
+fn records() -> &'static [Line] {
+    static RECORDS: OnceLock<Vec<Line>> = OnceLock::new();
     RECORDS.get_or_init(|| {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let (summary, records) = run(EXPERIMENT, &Registries::default(), folder.path(), None);
@@ -50,8 +53,8 @@ fn records() -> &'static [Record] {
     })
 }
 
-fn find<'a, T>(pick: impl Fn(&'a Record) -> Option<&'a T>) -> Vec<&'a T> {
-    let found: Vec<_> = records().iter().filter_map(pick).collect();
+fn find<T: Kind>() -> Vec<Recorded<'static, T>> {
+    let found: Vec<_> = all_of(records()).collect();
     assert!(!found.is_empty());
     found
 }
@@ -83,23 +86,17 @@ fn integrands_need_no_scene_and_other_integrators_do() {
 
 #[test]
 fn the_error_against_an_exact_reference_is_what_the_host_computes() {
-    let references = find(|r| match r {
-        Record::Reference(r) => Some(r),
-        _ => None,
-    });
+    let references = find::<ReferenceRecord>();
     for reference in &references {
         assert_eq!((reference.mse, reference.spp), (0.0, 0));
         assert!(reference.exact.is_some());
     }
-    let errors: Vec<&ErrorRecord> = find(|r| match r {
-        Record::Error(e) => Some(e),
-        _ => None,
-    });
+    let errors = find::<ErrorRecord>();
     let sampler = sampler_of("halton", "cranley-patterson", 16);
     let mut compared = 0;
     for error in errors {
-        if error.integrator.name != "integrand:disk"
-            || error.decorrelation.name != "cranley-patterson"
+        if error.key.name(axis::INTEGRATOR) != "integrand:disk"
+            || error.key.name(axis::DECORRELATION) != "cranley-patterson"
         {
             continue;
         }
@@ -123,13 +120,11 @@ fn the_error_against_an_exact_reference_is_what_the_host_computes() {
 
 #[test]
 fn a_clamped_jitter_is_found_to_be_biased_and_a_wrapped_one_is_not() {
-    let checks: Vec<&BiasRecord> = find(|r| match r {
-        Record::Bias(b) => Some(b),
-        _ => None,
-    });
+    let checks = find::<BiasRecord>();
     let of = |edge: &str| -> Vec<f64> {
         let jittered = checks.iter().filter(|b| {
-            b.decorrelation.name == "micro-jitter" && b.decorrelation.params.name("edge") == edge
+            let decorrelation = b.key.get(axis::DECORRELATION).expect("a decorrelation");
+            decorrelation.name == "micro-jitter" && decorrelation.params.name("edge") == edge
         });
         jittered.map(|b| b.z.expect("a z-score").abs()).collect()
     };
@@ -141,15 +136,12 @@ fn a_clamped_jitter_is_found_to_be_biased_and_a_wrapped_one_is_not() {
 
 #[test]
 fn an_error_that_all_pixels_share_survives_the_widest_filter() {
-    let spectra: Vec<&SpectrumRecord> = find(|r| match r {
-        Record::Spectrum(s) => Some(s),
-        _ => None,
-    });
+    let spectra = find::<SpectrumRecord>();
     let share = |decorrelation: &str| -> Vec<f64> {
         let found = spectra
             .iter()
-            .filter(|s| s.decorrelation.name == decorrelation);
-        let share = |s: &&SpectrumRecord| {
+            .filter(|s| s.key.name(axis::DECORRELATION) == decorrelation);
+        let share = |s: &Recorded<SpectrumRecord>| {
             let [first, .., last] = &s.filtered[..] else {
                 panic!("{s:?}");
             };
@@ -167,10 +159,7 @@ fn an_error_that_all_pixels_share_survives_the_widest_filter() {
 
 #[test]
 fn streams_have_every_figure_and_jitter_lies_between_its_ends() {
-    let streams: Vec<&StreamRecord> = find(|r| match r {
-        Record::Stream(s) => Some(s),
-        _ => None,
-    });
+    let streams = find::<StreamRecord>();
     let mut angles = Vec::new();
     for stream in streams {
         let figures = &stream.figures;
@@ -182,13 +171,13 @@ fn streams_have_every_figure_and_jitter_lies_between_its_ends() {
             [2, 3] => {
                 assert_eq!(figures.pixels.len(), 2, "N = 16 and 64");
                 let last = figures.pixels[1];
-                angles.push((stream.decorrelation.name.clone(), last));
+                angles.push((stream.key.name(axis::DECORRELATION), last));
             }
             _ => assert!(figures.pixels.is_empty()),
         }
     }
     for (decorrelation, pixels) in &angles {
-        if decorrelation == "none" {
+        if *decorrelation == "none" {
             assert_eq!(pixels.neighbour_angle, 0.0);
             assert!(pixels.coverage <= 1.0 / 16.0);
         } else {
@@ -196,10 +185,7 @@ fn streams_have_every_figure_and_jitter_lies_between_its_ends() {
             assert!(pixels.coverage > 0.9, "{angles:?}");
         }
     }
-    let costs = find(|r| match r {
-        Record::SamplerCost(c) => Some(c),
-        _ => None,
-    });
+    let costs = find::<SamplerCostRecord>();
     assert_eq!(costs.len(), 4);
 }
 

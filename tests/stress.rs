@@ -1,35 +1,27 @@
 //! The stress suite as a whole: its quick form on this adapter, planted faults that it must see, and the
 //! program's commands.
 
+mod support;
+
 use raystone::accel::triangle::TriangleTest;
-use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
+use raystone::gpu::{Gpu, probe_arithmetic};
 use raystone::report::{stress_tables, write_stress_page};
 use raystone::stress::record::{CellRecord, Record, read, write};
 use raystone::stress::targets::{cells, shots};
-use raystone::stress::{Settings, run};
+use raystone::stress::{StressOptions, run};
 use std::process::Command;
-use std::sync::OnceLock;
-
-fn gpu() -> &'static Gpu {
-    static GPU: OnceLock<Gpu> = OnceLock::new();
-    GPU.get_or_init(|| open(KernelLibrary::default()))
-}
-
-fn open(kernels: KernelLibrary) -> Gpu {
-    raystone::gpu::open(&AdapterChoice::Best, kernels)
-        .unwrap_or_else(|e| panic!("no adapter: run scripts/install-driver ({e})"))
-}
+use support::{gpu, kernels_with, open};
 
 /// A few families through a few structures with the default test and one other.
-fn small() -> Settings {
+fn small() -> StressOptions {
     let names = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect();
-    Settings {
+    StressOptions {
         families: names(&["watertight", "edges", "coincident", "non-finite"]),
         accels: names(&["bvh", "uniform-grid"]),
         triangles: names(&["moeller-trumbore", "watertight"]),
         rays: 64,
         shots: 2048,
-        ..Settings::new(true)
+        ..StressOptions::new(true)
     }
 }
 
@@ -80,27 +72,12 @@ fn a_small_suite_finds_no_difference_from_brute_force_and_writes_tables_records_
     );
 }
 
-/// The embedded kernels with one text replaced.
-fn with_fault(file: &str, from: &str, to: &str) -> KernelLibrary {
-    let library = KernelLibrary::default();
-    let text = library.text(file).expect("a kernel").to_owned();
-    assert_eq!(text.matches(from).count(), 1, "{file}: `{from}`");
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join(file).with_extension("wesl");
-    std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
-    std::fs::write(&path, text.replace(from, to)).expect("a kernel");
-    library.with_folder(folder.path()).expect("the kernels")
-}
-
 #[test]
 fn a_test_that_refuses_rays_through_edges_is_seen_to_leak() {
     // Zero no longer counts as inside.
-    let gpu = open(with_fault(
-        "accel/triangle/moeller_trumbore",
-        "u >= 0.0",
-        "u > 1e-3 * area",
-    ));
-    let settings = Settings {
+    let leaky = [("u >= 0.0", "u > 1e-3 * area")];
+    let gpu = open(kernels_with("accel/triangle/moeller_trumbore", &leaky));
+    let settings = StressOptions {
         triangles: vec![TriangleTest::MoellerTrumbore.name().into()],
         ..small()
     };
@@ -212,4 +189,17 @@ fn unknown_names_and_broken_rays_are_answered_with_two_and_what_there_is() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
         assert!(text.contains(part), "{arguments:?}: {text}");
     }
+}
+
+#[test]
+fn a_folder_that_another_run_writes_is_left_to_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().to_str().expect("a path in UTF-8");
+    let lock = raystone::run::lock_folder(folder.path()).expect("nobody writes it");
+    let output = program(&["stress", "--family", "seams", "--out", out]);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("another run is writing"), "{text}");
+    drop(lock);
+    raystone::run::lock_folder(folder.path()).expect("nobody writes it any more");
 }

@@ -1,6 +1,6 @@
 //! A tiny experiment from its file to its report, through the program.
 
-use raystone::measure::record::{Line, Record, SCHEMA};
+use raystone::measure::record::{Body, Line, SCHEMA, axis};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
@@ -93,11 +93,11 @@ fn a_tiny_experiment_runs_to_its_end_and_leaves_whole_records_and_a_report() {
     let lines = run(&out);
     assert!(lines.iter().all(|line| line.schema == SCHEMA));
     assert!(matches!(
-        lines.first().map(|line| &line.record),
-        Some(Record::Run(_))
+        lines.first().map(|line| &line.body),
+        Some(Body::Run(_))
     ));
-    match lines.last().map(|line| &line.record) {
-        Some(Record::Finished(finished)) => assert_eq!(finished.failed, 0),
+    match lines.last().map(|line| &line.body) {
+        Some(Body::Finished(finished)) => assert_eq!(finished.failed, 0),
         other => panic!("the last line is no end of a run: {other:?}"),
     }
     check_structures(&lines);
@@ -105,7 +105,7 @@ fn a_tiny_experiment_runs_to_its_end_and_leaves_whole_records_and_a_report() {
     check_times(&lines);
     let streams = lines
         .iter()
-        .filter(|line| matches!(line.record, Record::Stream(_)));
+        .filter(|line| matches!(line.body, Body::Stream(_)));
     assert!(streams.count() > 0, "no stream was measured");
     check_report(&out);
 }
@@ -113,7 +113,7 @@ fn a_tiny_experiment_runs_to_its_end_and_leaves_whole_records_and_a_report() {
 fn check_structures(lines: &[Line]) {
     let mut passed = BTreeSet::new();
     for line in lines {
-        let Record::Structure(structure) = &line.record else {
+        let Body::Structure(structure) = &line.body else {
             continue;
         };
         let gate = structure.gate.as_ref().expect("a verdict of the gate");
@@ -125,7 +125,7 @@ fn check_structures(lines: &[Line]) {
             "{gate:?}"
         );
         assert!(!structure.timings.is_empty(), "{structure:?}");
-        passed.insert(structure.accel.name.as_str());
+        passed.insert(line.key.name(axis::ACCEL));
     }
     assert_eq!(passed, BTreeSet::from(STRUCTURES));
 }
@@ -134,7 +134,7 @@ fn check_errors(lines: &[Line]) {
     let mut replicates = BTreeSet::new();
     let mut images = BTreeSet::new();
     for line in lines {
-        let Record::Error(error) = &line.record else {
+        let Body::Error(error) = &line.body else {
             continue;
         };
         let spp: Vec<_> = error.errors.iter().map(|at| at.spp).collect();
@@ -158,12 +158,12 @@ fn check_errors(lines: &[Line]) {
 fn check_times(lines: &[Line]) {
     let mut timed = BTreeSet::new();
     for line in lines {
-        let Record::Time(time) = &line.record else {
+        let Body::Time(time) = &line.body else {
             continue;
         };
         assert!(time.failure.is_none() && time.image_equal, "{time:?}");
         assert!(time.mrays_s.is_some_and(|m| m.value > 0.0), "{time:?}");
-        timed.insert(time.accel.name.as_str());
+        timed.insert(line.key.name(axis::ACCEL));
     }
     assert_eq!(timed, BTreeSet::from(STRUCTURES));
 }

@@ -1,6 +1,7 @@
 //! Adapters in words.
 
 use raystone::gpu::AdapterSummary;
+use raystone::report::format::bytes;
 
 /// What kind of device it is.
 pub fn kind(adapter: &AdapterSummary) -> &'static str {
@@ -29,15 +30,6 @@ pub fn largest_binding(limits: &wgpu::Limits) -> u64 {
     limits
         .max_storage_buffer_binding_size
         .min(limits.max_buffer_size)
-}
-
-/// Bytes in the unit that keeps the number short.
-pub fn bytes(count: u64) -> String {
-    let [mib, gib] = [20, 30].map(|shift| count as f64 / f64::from(1u32 << shift));
-    match gib {
-        1.0.. => format!("{gib:.3} GiB").replace(".000", ""),
-        _ => format!("{mib:.3} MiB").replace(".000", ""),
-    }
 }
 
 /// Two lines: number and name; then everything else.
@@ -74,12 +66,5 @@ mod tests {
         ] {
             assert_eq!(mesa_major(text), major, "{text}");
         }
-    }
-
-    #[test]
-    fn bytes_are_given_in_the_unit_that_fits() {
-        assert_eq!(bytes(128 << 20), "128 MiB");
-        assert_eq!(bytes(1 << 30), "1 GiB");
-        assert_eq!(bytes(3 << 29), "1.500 GiB");
     }
 }

@@ -1,15 +1,15 @@
 //! `raystone doctor`.
 
-use super::adapters::{self, bytes, largest_binding, mesa_major};
+use super::adapters::{self, largest_binding, mesa_major};
 use super::failure::Failure;
 use super::output::print;
 use super::system::{self, System};
-use super::table::grouped;
 use clap::Args;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::gpu::{
     self, AdapterChoice, AdapterSummary, ArithmeticProbe, Gpu, KernelLibrary, probe_arithmetic,
 };
+use raystone::report::format::{bytes, count};
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
@@ -155,7 +155,7 @@ fn loops(gpu: &Gpu, system: &System) -> String {
     format!(
         "END IN SILENCE once an invocation took {} turns in all: kernels check for it,\n              \
          and what needs more is refused (long brute force). For whole loops, {remedy}",
-        grouped(limit as usize)
+        count(limit.into())
     )
 }
 

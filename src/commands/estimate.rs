@@ -1,8 +1,8 @@
 //! How long a plan would take, roughly.
 
 use raystone::config::{Experiment, Plan};
-use raystone::integrator::integrators;
 use raystone::params::Variant;
+use raystone::run::Registries;
 use raystone::sampling::dimensions::{FIRST_BOUNCE, PER_BOUNCE};
 use std::collections::BTreeSet;
 use std::fmt;
@@ -25,11 +25,12 @@ pub struct Estimate {
 
 impl Estimate {
     /// Counts the rays and kernels of a plan.
-    pub fn new(experiment: &Experiment, plan: &Plan) -> Self {
+    pub fn new(experiment: &Experiment, plan: &Plan, registries: &Registries) -> Self {
         let [width, height] = experiment.resolution;
         let pixels = u64::from(width) * u64::from(height);
-        let image =
-            |integrator: &Variant, spp: u32| pixels * u64::from(spp) * rays_per_sample(integrator);
+        let image = |integrator: &Variant, spp: u32| {
+            pixels * u64::from(spp) * rays_per_sample(registries, integrator)
+        };
         let errors = plan
             .samplers
             .iter()
@@ -74,11 +75,9 @@ impl Estimate {
 
 /// Rays that one sample usually takes: one from the camera, and at each bounce one onwards and one
 /// to a light.
-fn rays_per_sample(integrator: &Variant) -> u64 {
-    let known = integrators()
-        .iter()
-        .find(|known| known.name() == integrator.name);
-    let dimensions = known.map_or(FIRST_BOUNCE, |known| known.dimensions(&integrator.params));
+fn rays_per_sample(registries: &Registries, integrator: &Variant) -> u64 {
+    let known = registries.integrators.configured(integrator);
+    let dimensions = known.map_or(FIRST_BOUNCE, |known| known.facts.dimensions);
     let bounces = dimensions.saturating_sub(FIRST_BOUNCE).div_ceil(PER_BOUNCE);
     1 + 2 * u64::from(bounces.min(USUAL_BOUNCES))
 }
@@ -120,7 +119,6 @@ fn duration(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use raystone::run::Registries;
 
     fn estimate(overrides: &[&str]) -> Estimate {
         let text = "[run]\nreplicates = 2\nresolution = [100, 100]\nspp = { pow2 = [0, 3] }\n\
@@ -133,7 +131,7 @@ mod tests {
         let experiment =
             Experiment::parse(text, "test", &overrides, &registries.catalogue()).unwrap();
         let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d)).unwrap();
-        Estimate::new(&experiment, &plan)
+        Estimate::new(&experiment, &plan, &registries)
     }
 
     #[test]

@@ -79,9 +79,7 @@ impl Render {
         let experiment =
             Experiment::parse(DEFAULTS, "raystone render", &self.overrides(), &catalogue)?;
         check_is_one(&experiment)?;
-        let is_randomised =
-            |sequence: &_, decorrelation: &_| registries.is_randomised(sequence, decorrelation);
-        let plan = Plan::new(&experiment, &[], is_randomised)?;
+        let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d))?;
         check_models(&experiment.axes.scene, &catalogue)?;
         // Only the picture is written: no folder is needed.
         let mut options = self.device.options(PathBuf::new(), false);

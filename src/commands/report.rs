@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::output::{print, warn};
 use clap::Args;
-use raystone::report::read::{PARTIAL, RECORDS_FILE};
+use raystone::measure::record::{PARTIAL, RECORDS_FILE};
 use raystone::report::{write_report, write_stress_page};
 use raystone::stress::record as stress;
 use std::path::PathBuf;

@@ -7,8 +7,8 @@ use super::output::{self, print};
 use super::signals;
 use clap::Args;
 use raystone::config::{Experiment, Plan};
-use raystone::measure::record::{Line, Record};
-use raystone::report::read_records;
+use raystone::measure::record::{Body, Line, axis, read_records};
+use raystone::report::{failed_checks, terminal_tables, write_report};
 use raystone::run::{Existing, Kernels, Registries, RunError, RunSummary};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -46,13 +46,13 @@ impl Run {
         let mut overrides = Vec::from_iter(self.device.kernels_override());
         overrides.extend(self.experiment.set.iter().cloned());
         let experiment = Experiment::load(&self.file, &overrides, &catalogue)?;
-        let is_randomised =
-            |sequence: &_, decorrelation: &_| registries.is_randomised(sequence, decorrelation);
-        let plan = Plan::new(&experiment, &self.experiment.only, is_randomised)?;
+        let plan = Plan::new(&experiment, &self.experiment.only, |s, d| {
+            registries.is_randomised(s, d)
+        })?;
         check_models(&plan.scenes, &catalogue)?;
         if self.dry_run {
             Kernels::load(&plan.kernels, &registries)?;
-            let estimate = Estimate::new(&experiment, &plan);
+            let estimate = Estimate::new(&experiment, &plan, &registries);
             print(&format!("{}\n{estimate}\n", plan.describe().trim_end()))?;
             return Ok(ExitCode::SUCCESS);
         }
@@ -68,38 +68,41 @@ impl Run {
         signals::watch(options.interrupt.clone()).map_err(Failure::input)?;
         match raystone::run::run(&experiment, &plan, &registries, &options) {
             Err(RunError::Interrupted) => signals::wait_for_end(),
+            Err(RunError::EndedEarly { folder, source }) => {
+                write_report(&folder)?;
+                Err(RunError::EndedEarly { folder, source }.into())
+            }
             summary => tell(&summary?, self.quiet),
         }
     }
 }
 
+/// Writes the report of a run, prints its tables, and tells what failed.
 fn tell(summary: &RunSummary, quiet: bool) -> Result<ExitCode, Failure> {
-    let mut text = String::new();
-    if !quiet && !summary.tables.is_empty() {
-        text += summary.tables.trim_end();
-        text += "\n\n";
-    }
-    if let Some(report) = &summary.report {
-        text += &match quiet {
-            true => format!("{}\n", report.display()),
-            false => format!("report: {}\n", report.display()),
-        };
-    }
-    print(&text)?;
-    if summary.failed == 0 && !summary.bad_input && summary.failed_checks.is_empty() {
+    let page = write_report(&summary.out)?.html;
+    let lines = read_records(&summary.out).map_err(Failure::input)?.lines;
+    print(&match quiet {
+        true => format!("{}\n", page.display()),
+        false => format!(
+            "{}\n\nreport: {}\n",
+            terminal_tables(&lines).trim_end(),
+            page.display()
+        ),
+    })?;
+    let failed_checks = failed_checks(&lines);
+    if summary.failed == 0 && !summary.bad_input && failed_checks.is_empty() {
         return Ok(ExitCode::SUCCESS);
     }
-    let lines = read_records(&summary.out)?.lines;
     for failure in lines.iter().filter_map(failure) {
         output::tell(&format!("failed: {failure}"));
     }
-    for check in &summary.failed_checks {
+    for check in &failed_checks {
         output::tell(&format!("failed: {check}"));
     }
     output::tell(&format!(
         "{}, {} failed",
         plural(summary.failed, "gate or cell", "gates or cells"),
-        plural(summary.failed_checks.len(), "check", "checks")
+        plural(failed_checks.len(), "check", "checks")
     ));
     Ok(ExitCode::from(if summary.bad_input {
         BAD_INPUT
@@ -114,19 +117,15 @@ fn plural(count: usize, one: &str, many: &str) -> String {
 
 /// The cell of a record and why it failed, if it did.
 fn failure(line: &Line) -> Option<String> {
-    match &line.record {
-        Record::Failed(failed) => Some(format!("{}: {}", failed.cell, failed.reason)),
-        Record::Structure(cell) => {
-            let reason = cell.failure.as_ref()?;
-            Some(format!("{}, {}: {reason}", cell.scene, cell.accel))
-        }
-        Record::Time(cell) => Some(format!(
-            "{}, {}, {}, {} × {}: {}",
-            cell.scene,
-            cell.accel,
-            cell.integrator,
-            cell.sequence,
-            cell.decorrelation,
+    let [scene, accel, integrator] =
+        [axis::SCENE, axis::ACCEL, axis::INTEGRATOR].map(|axis| line.key.label(axis));
+    let accel = format!("{accel}{}", line.key.kernels_mark());
+    match &line.body {
+        Body::Failed(failed) => Some(format!("{}: {}", failed.cell, failed.reason)),
+        Body::Structure(cell) => Some(format!("{scene}, {accel}: {}", cell.failure.as_ref()?)),
+        Body::Time(cell) => Some(format!(
+            "{scene}, {accel}, {integrator}, {}: {}",
+            line.key.sampler(),
             cell.failure.as_ref()?
         )),
         _ => None,

@@ -39,6 +39,7 @@ pub fn watch(_: Interrupt) -> std::io::Result<()> {
 #[cfg(unix)]
 fn end(signal: i32, interrupt: &Interrupt) {
     use super::output::tell;
+    use raystone::report::write_report;
     use raystone::run::Interrupted;
     let name = match signal {
         signal_hook::consts::SIGINT => "SIGINT",
@@ -51,13 +52,13 @@ fn end(signal: i32, interrupt: &Interrupt) {
         // The report is being written already.
         Interrupted::Finished => return,
         Interrupted::NotBegun => {}
-        Interrupted::Kept { folder, report } => match report {
-            Ok(page) => tell(&format!("interrupted; report so far: {}", page.display())),
-            Err(reason) => tell(&format!(
+        Interrupted::Kept(folder) => tell(&match write_report(&folder) {
+            Ok(paths) => format!("interrupted; report so far: {}", paths.html.display()),
+            Err(reason) => format!(
                 "interrupted; records so far: {}; no report: {reason}",
                 folder.display()
-            )),
-        },
+            ),
+        }),
     }
     signal_hook::low_level::exit(128 + signal);
 }

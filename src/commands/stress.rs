@@ -7,10 +7,10 @@ use super::output::{print, tell, warn};
 use clap::Args;
 use raystone::params::{Params, Variant};
 use raystone::report::{stress_tables, write_stress_page};
-use raystone::run::Registries;
+use raystone::run::{Registries, lock_folder};
 use raystone::scene::{LoadOptions, load};
 use raystone::stress::record::{Record, write};
-use raystone::stress::{Settings, run};
+use raystone::stress::{StressOptions, run};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -65,6 +65,7 @@ impl Stress {
         }
         let settings = self.settings();
         settings.check().map_err(Failure::input)?;
+        let _lock = lock_folder(&self.out)?;
         let registries = Registries::default();
         let mut gpus = vec![self.device.open(&registries)?];
         // The host does most of the work of a software adapter one thread at a time.
@@ -89,8 +90,8 @@ impl Stress {
         })
     }
 
-    fn settings(&self) -> Settings {
-        let mut settings = Settings::new(self.quick);
+    fn settings(&self) -> StressOptions {
+        let mut settings = StressOptions::new(self.quick);
         settings.seed = self.seed;
         settings.families = self.family.clone();
         settings.accels = self.accel.clone();

@@ -49,19 +49,6 @@ impl Table {
     }
 }
 
-/// An integer with commas between groups of three digits.
-pub fn grouped(number: usize) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -72,11 +59,5 @@ mod tests {
         table.row(["bvh".to_owned(), "7".to_owned()]);
         table.row(["grid × 2".to_owned()]);
         assert_eq!(table.text(), "name      rays\nbvh          7\ngrid × 2\n");
-    }
-
-    #[test]
-    fn long_numbers_are_grouped_by_thousands() {
-        let texts = [0, 999, 1000, 262_267, 1_021_815].map(grouped);
-        assert_eq!(texts, ["0", "999", "1,000", "262,267", "1,021,815"]);
     }
 }

@@ -101,9 +101,7 @@ impl Trace {
         overrides.extend(self.set.iter().cloned());
         let experiment =
             Experiment::parse(&text(&catalogue), "raystone trace", &overrides, &catalogue)?;
-        let is_randomised =
-            |sequence: &_, decorrelation: &_| registries.is_randomised(sequence, decorrelation);
-        let plan = Plan::new(&experiment, &[], is_randomised)?;
+        let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d))?;
         match (plan.scenes.first(), plan.structures.first()) {
             (Some(scene), Some(cell)) => Ok((scene.clone(), cell.accel.clone())),
             _ => Err(Failure::input(anyhow!(

@@ -3,10 +3,11 @@
 use super::arguments::{DeviceArguments, ExperimentArguments, check_models, list_override};
 use super::failure::{BAD_INPUT, FAILED, Failure};
 use super::output::{print, tell};
-use super::table::{Table, grouped};
+use super::table::Table;
 use clap::Args;
 use raystone::config::{Catalogue, Experiment, Plan, Skipped};
-use raystone::measure::record::{ClassVerdict, GateVerdict, JudgeCheck, RayClass};
+use raystone::measure::record::{ClassVerdict, GateVerdict, JudgeCheck};
+use raystone::report::format::{count, ray_class};
 use raystone::run::{Registries, Verified};
 use raystone::scene::{LoadOptions, load};
 use std::fmt::Write as _;
@@ -57,9 +58,9 @@ impl Verify {
                 &catalogue,
             )?,
         };
-        let is_randomised =
-            |sequence: &_, decorrelation: &_| registries.is_randomised(sequence, decorrelation);
-        let mut plan = Plan::new(&experiment, &self.experiment.only, is_randomised)?;
+        let mut plan = Plan::new(&experiment, &self.experiment.only, |s, d| {
+            registries.is_randomised(s, d)
+        })?;
         check_models(&plan.scenes, &catalogue)?;
         if self.file.is_none() {
             spare_brute_force(&mut plan, self.experiment.allow_outside)?;
@@ -146,7 +147,7 @@ fn spare_brute_force(plan: &mut Plan, allow_outside: bool) -> Result<(), Failure
             cell: format!("{scene}, {BRUTE_FORCE}"),
             reason: format!(
                 "{} triangles, which takes long; --accel {BRUTE_FORCE} alone asks for it",
-                grouped(triangles)
+                count(triangles as u64)
             ),
             cells: 1,
         });
@@ -210,7 +211,7 @@ fn rows(table: &mut Table, head: Vec<String>, verdict: &GateVerdict) {
         format!(
             "{} of {}{kept}",
             brute_force.wrong,
-            grouped(brute_force.rays)
+            count(brute_force.rays as u64)
         ),
         oracle(&verdict.oracle),
     ];
@@ -227,21 +228,19 @@ fn rows(table: &mut Table, head: Vec<String>, verdict: &GateVerdict) {
 }
 
 fn counts(class: &ClassVerdict) -> [String; 4] {
-    let name = match class.class {
-        RayClass::Primary => "primary",
-        RayClass::Shadow => "shadow",
-        RayClass::Ao => "ao",
-        RayClass::Bounce => "bounce",
-        RayClass::Chord => "chord",
-        RayClass::Hard => "hard",
-    };
-    let [rays, wrong, ties] = [class.rays, class.wrong, class.ties].map(grouped);
+    let name = ray_class(class.class);
+    let [rays, wrong, ties] = [class.rays, class.wrong, class.ties].map(|n| count(n as u64));
     [name.to_owned(), rays, wrong, ties]
 }
 
 fn oracle(check: &JudgeCheck) -> String {
     let agree = check.rays.saturating_sub(check.wrong + check.ambiguous);
-    format!("{} / {} / {}", grouped(agree), check.ambiguous, check.wrong)
+    format!(
+        "{} / {} / {}",
+        count(agree as u64),
+        check.ambiguous,
+        check.wrong
+    )
 }
 
 /// Everything that went wrong, in words.
@@ -273,6 +272,7 @@ fn faults(verdict: &Result<GateVerdict, String>) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use raystone::measure::record::RayClass;
     use raystone::params::{Params, Variant};
 
     fn variant(name: &str) -> Variant {

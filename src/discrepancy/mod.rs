@@ -48,6 +48,4 @@ pub use spectrum::{Periodogram, periodogram, radial_spectrum};
 pub use star::{Bracket, star, star_2d, star_2d_prefixes};
 
 #[cfg(test)]
-mod sweep;
-#[cfg(test)]
 mod tests;

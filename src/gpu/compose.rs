@@ -23,6 +23,8 @@ pub struct KernelLibrary {
     files: BTreeMap<String, (PathBuf, String)>,
     /// Modules of override folders.
     overridden: BTreeSet<String>,
+    /// Modules of what was registered from outside.
+    registered: BTreeSet<String>,
     hash: String,
 }
 
@@ -36,6 +38,7 @@ impl Default for KernelLibrary {
         Self {
             files,
             overridden: BTreeSet::new(),
+            registered: BTreeSet::new(),
             hash: String::new(),
         }
     }
@@ -69,10 +72,30 @@ impl KernelLibrary {
             self.overridden.insert(name.join("/"));
             self.files.insert(name.join("/"), (path, text));
         }
-        let texts = self.overridden.iter();
-        let texts = texts.filter_map(|name| Some((name.as_str(), self.text(name)?)));
-        self.hash = cell_hash(&texts.collect::<Vec<_>>());
-        Ok(self)
+        Ok(self.hashed())
+    }
+
+    /// Adds modules that something registered from outside the program brings: their paths
+    /// (`integrator/mine`) and texts.
+    #[must_use]
+    pub fn with_sources(mut self, sources: &[(&str, &str)]) -> Self {
+        for (name, text) in sources {
+            let file = PathBuf::from(format!("{name}.wesl"));
+            self.registered.insert((*name).to_owned());
+            self.files
+                .insert((*name).to_owned(), (file, (*text).to_owned()));
+        }
+        self.hashed()
+    }
+
+    fn hashed(mut self) -> Self {
+        let own = self.overridden.union(&self.registered);
+        let texts = own.filter_map(|name| Some((name.as_str(), self.text(name)?)));
+        let texts: Vec<_> = texts.collect();
+        if !texts.is_empty() {
+            self.hash = cell_hash(&texts);
+        }
+        self
     }
 
     /// Modules that came from override folders, in alphabetical order.
@@ -85,7 +108,7 @@ impl KernelLibrary {
         EMBEDDED.iter().any(|(known, _)| *known == name)
     }
 
-    /// BLAKE3 of the names and texts of all files of override folders; empty without any.
+    /// BLAKE3 of the names and texts of all modules that are not the program's; empty without any.
     pub fn hash(&self) -> &str {
         &self.hash
     }
@@ -104,7 +127,11 @@ impl KernelLibrary {
             let parsed = diagnose::imports(path, text, name).map_err(GpuError::Kernel)?;
             imports.insert(name.as_str(), parsed);
         }
-        let is_root = |name: &&str| Self::is_embedded(name) || wanted.iter().any(|w| w == name);
+        let is_root = |name: &&str| {
+            Self::is_embedded(name)
+                || self.registered.contains(*name)
+                || wanted.iter().any(|w| w == name)
+        };
         let (mut reached, mut rest): (Vec<&str>, Vec<&str>) =
             self.overridden().into_iter().partition(is_root);
         while let Some(name) = reached.pop() {
@@ -188,24 +215,27 @@ impl KernelLibrary {
         for feature in &composition.features {
             compiler.set_feature(feature, true);
         }
-        let result = compiler
-            .compile(&module_path(&composition.entry)?)
-            .map_err(|e| {
-                let sources = self
-                    .files
-                    .values()
-                    .map(|(path, text)| (path.as_path(), text.as_str()));
-                GpuError::Kernel(diagnose::wesl_error(&e.to_string(), &paths, sources))
-            })?;
+        let entry = &module_path(&composition.entry)?;
+        let result = compiler.compile(entry).map_err(|e| {
+            let sources = self
+                .files
+                .values()
+                .map(|(path, text)| (path.as_path(), text.as_str()));
+            GpuError::Kernel(diagnose::wesl_error(&e.to_string(), &paths, sources))
+        })?;
         let wgsl = result.to_string();
-        let map = result.sourcemap.unwrap_or_default();
-        let (module, info) = diagnose::parse_and_validate(&wgsl, &map, &paths)?;
+        let (module, info) = diagnose::parse_and_validate(&diagnose::Composed {
+            wgsl: &wgsl,
+            result: &result,
+            entry,
+            paths: &paths,
+        })?;
         Ok(ComposedKernel {
             composition: composition.clone(),
             wgsl,
             module,
             info,
-            map,
+            map: result.sourcemap.unwrap_or_default(),
         })
     }
 }

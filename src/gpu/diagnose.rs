@@ -1,16 +1,20 @@
 //! Kernel errors in terms of the author's file and line.
 //!
-//! naga reports positions in the composed text. The declaration around the position tells the source
-//! module; within it, the statements of source and composed text are aligned in order (composition
-//! drops comments and switched-off statements, rejoins lines and renames), so that the offending
-//! statement leads to its own source line even where the same line is repeated.
+//! naga reports positions in the composed text. Composition drops comments, cuts out features and
+//! renames, but moves the nodes of the syntax tree with the spans that they have in their files. The
+//! composed text is therefore parsed once more: what stands at the position there is the node of the
+//! same number in the composed tree, whose span leads to the source.
 
 use super::GpuError;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
-use wesl::syntax::{ImportContent, PathOrigin, TranslationUnit};
-use wesl::{BasicSourceMap, SourceMap};
+use wesl::syntax::{
+    CompoundStatement, GlobalDeclaration, GlobalDeclarationNode, ImportContent, PathOrigin,
+    Statement, TranslationUnit,
+};
+use wesl::{BasicSourceMap, CompileResult, ModulePath, SourceMap};
 
 type Paths = BTreeMap<String, PathBuf>;
 
@@ -118,15 +122,25 @@ fn without_colours(text: &str) -> String {
     })
 }
 
+/// A composed kernel and what leads from it to its sources.
+pub(super) struct Composed<'a> {
+    /// The text.
+    pub wgsl: &'a str,
+    /// The tree behind the text.
+    pub result: &'a CompileResult,
+    /// The module whose declarations keep their names.
+    pub entry: &'a ModulePath,
+    /// Files of modules.
+    pub paths: &'a Paths,
+}
+
 /// Parses and validates composed WGSL with the capabilities of plain WebGPU.
 pub(super) fn parse_and_validate(
-    wgsl: &str,
-    map: &BasicSourceMap,
-    paths: &Paths,
+    kernel: &Composed,
 ) -> Result<(naga::Module, naga::valid::ModuleInfo), GpuError> {
-    let module = naga::front::wgsl::parse_str(wgsl).map_err(|e| {
-        let line = e.location(wgsl).map(|l| l.line_number as usize);
-        GpuError::Kernel(describe(wgsl, line, e.message(), map, paths))
+    let module = naga::front::wgsl::parse_str(kernel.wgsl).map_err(|e| {
+        let offset = e.location(kernel.wgsl).map(|l| l.offset as usize);
+        GpuError::Kernel(describe(kernel, offset, e.message()))
     })?;
     let mut validator = naga::valid::Validator::new(
         naga::valid::ValidationFlags::all(),
@@ -134,241 +148,164 @@ pub(super) fn parse_and_validate(
     );
     let info = validator.validate(&module).map_err(|e| {
         // The outer spans are the function and the block around the fault.
-        let width = |span: &naga::Span| span.to_range().map_or(usize::MAX, |r| r.len());
-        let narrowest = e.spans().map(|(span, _)| *span).min_by_key(width);
-        let line = narrowest.map(|span| span.location(wgsl).line_number as usize);
+        let ranges = e.spans().filter_map(|(span, _)| span.to_range());
+        let narrowest = ranges.min_by_key(ExactSizeIterator::len);
         let mut message = e.as_inner().to_string();
         let mut cause: Option<&dyn std::error::Error> = std::error::Error::source(e.as_inner());
         while let Some(inner) = cause {
             let _ = write!(message, ": {inner}");
             cause = inner.source();
         }
-        GpuError::Kernel(describe(wgsl, line, &message, map, paths))
+        GpuError::Kernel(describe(
+            kernel,
+            narrowest.map(|range| range.start),
+            &message,
+        ))
     })?;
     Ok((module, info))
 }
 
 /// One message: file and line of the source, the error, and the offending line.
-fn describe(
-    wgsl: &str,
-    line: Option<usize>,
-    message: &str,
-    map: &BasicSourceMap,
-    paths: &Paths,
-) -> String {
-    let message = readable(message, map);
-    let Some(line) = line else {
+fn describe(kernel: &Composed, offset: Option<usize>, message: &str) -> String {
+    let message = match &kernel.result.sourcemap {
+        Some(map) => readable(message, map),
+        None => message.to_owned(),
+    };
+    let Some(offset) = offset else {
         return format!("kernel error: {message}");
     };
-    let offending = wgsl.lines().nth(line - 1).unwrap_or("").trim();
-    match source_position(wgsl, line, map, paths) {
-        Some((file, source_line, text)) => {
-            format!("{file}:{source_line}: {message}\n    {}", text.trim())
-        }
-        None => format!("composed kernel, line {line}: {message}\n    {offending}"),
-    }
-}
-
-/// Source file, line and text for a line of the composed kernel.
-fn source_position(
-    wgsl: &str,
-    line: usize,
-    map: &BasicSourceMap,
-    paths: &Paths,
-) -> Option<(String, usize, String)> {
-    let lines: Vec<&str> = wgsl.lines().collect();
-    let mangled = (0..line).rev().find_map(|i| declared_name(lines.get(i)?))?;
-    let (module, item) = match map.get_decl(mangled) {
-        Some((module, item)) => (Some(module.to_string()), item.to_owned()),
-        // Declarations of the entry module keep their names.
-        None => (None, mangled.to_owned()),
-    };
-    let (source, file) = match &module {
-        Some(name) => {
-            let path = paths.get(name)?;
-            let source = map.get_source(&name.parse().ok()?)?;
-            (source, path.display().to_string())
-        }
+    let (place, line) = match source_position(kernel, offset) {
+        Some((file, line, text)) => (format!("{file}:{line}"), text),
         None => {
-            let source = map.get_default_source()?;
-            let path = paths.iter().find(|(module, _)| {
-                module
-                    .parse()
-                    .ok()
-                    .and_then(|m| map.get_source(&m))
-                    .is_some_and(|s| s == source)
-            })?;
-            (source, path.1.display().to_string())
+            let (line, text) = line_at(kernel.wgsl, offset);
+            (format!("composed kernel, line {line}"), text)
         }
     };
-    let end_of = |lines: &[&str], start: usize| {
-        lines
-            .iter()
-            .skip(start + 1)
-            .position(|l| declared_name(l).is_some())
-            .map_or(lines.len(), |n| start + 1 + n)
+    format!("{place}: {message}\n    {line}")
+}
+
+/// Source file, line and text for a byte of the composed kernel.
+fn source_position<'a>(kernel: &Composed<'a>, offset: usize) -> Option<(String, usize, &'a str)> {
+    let reparsed = kernel.wgsl.parse::<TranslationUnit>().ok()?;
+    let written = kernel.result.syntax.global_declarations.iter();
+    let written = written.filter(|d| !matches!(d.node(), GlobalDeclaration::Void));
+    let (composed, written) = reparsed
+        .global_declarations
+        .iter()
+        .zip(written)
+        .find(|(composed, _)| composed.span().range().contains(&offset))?;
+    let map = kernel.result.sourcemap.as_ref()?;
+    let name = name(written.node());
+    let module = match map.get_decl(&name) {
+        Some((module, _)) => module,
+        None => kernel.entry,
     };
-    let composed_start = (0..line)
-        .rev()
-        .find(|&i| declared_name(lines[i]).is_some())?;
-    let composed = statements(&lines[composed_start..end_of(&lines, composed_start)], map);
-    let source_lines: Vec<&str> = source.lines().collect();
-    let start = source_lines
+    let source = map.get_source(module)?;
+    let file = kernel.paths.get(&module.to_string())?;
+    let (places, origins) = (spans(composed), spans(written));
+    let around = places
         .iter()
-        .position(|l| declared_name(l) == Some(item.as_str()))?;
-    let written = statements(&source_lines[start..end_of(&source_lines, start)], map);
-    let offending = composed
-        .iter()
-        .rposition(|s| s.line <= line - 1 - composed_start)?;
-    let found = start + written.get(aligned(&composed, &written, offending))?.line;
-    Some((file, found + 1, source_lines[found].to_owned()))
+        .zip(&origins)
+        .filter(|(place, _)| place.contains(&offset));
+    let (_, narrowest) = around.min_by_key(|(place, _)| place.len())?;
+    let start = after_attributes(source, narrowest.start);
+    let (line, text) = line_at(source, start);
+    Some((file.display().to_string(), line, text))
 }
 
-/// A statement, or a part of one that ends in a brace.
-struct Statement {
-    /// Its first line, from 0.
-    line: usize,
-    /// Its words as the author wrote them, separated by spaces.
-    words: String,
+/// Number of the line around a byte, from 1, and the line.
+fn line_at(text: &str, offset: usize) -> (usize, &str) {
+    let line = text[..offset].matches('\n').count();
+    let shown = text.lines().nth(line).unwrap_or_default();
+    (line + 1, shown.trim())
 }
 
-/// Cuts lines into statements; comments, attributes and empty ones are left out.
-fn statements(lines: &[&str], map: &BasicSourceMap) -> Vec<Statement> {
-    let mut out: Vec<Statement> = Vec::new();
-    let mut is_open = false;
-    for (line, text) in lines.iter().enumerate() {
-        let code = text.split("//").next().unwrap_or("").trim();
-        let words = normalise(code, map);
-        if !words.is_empty() {
-            match out.last_mut() {
-                Some(last) if is_open => last.words.push_str(&words),
-                _ => out.push(Statement { line, words }),
-            }
-        }
-        is_open = if code.is_empty() {
-            is_open
-        } else {
-            !code.ends_with([';', '{', '}'])
-        };
+fn name(declaration: &GlobalDeclaration) -> String {
+    let ident = match declaration {
+        GlobalDeclaration::Declaration(d) => &d.ident,
+        GlobalDeclaration::TypeAlias(d) => &d.ident,
+        GlobalDeclaration::Struct(d) => &d.ident,
+        GlobalDeclaration::Function(d) => &d.ident,
+        GlobalDeclaration::Void | GlobalDeclaration::ConstAssert(_) => return String::new(),
+    };
+    ident.name().to_string()
+}
+
+/// Skips attributes, on whose line the fault is not.
+fn after_attributes(text: &str, start: usize) -> usize {
+    let mut rest = &text[start..];
+    while let Some(attribute) = rest.trim_start().strip_prefix('@') {
+        let name = attribute.trim_start_matches(is_of_word);
+        let mut depth = 0;
+        // Of no brackets, nothing; of brackets, all up to the one that closes the first.
+        let end = name.find(|c| {
+            depth += i32::from(c == '(') - i32::from(c == ')');
+            depth == 0
+        });
+        rest = name[end.unwrap_or(name.len())..].trim_start_matches(')');
+    }
+    text.len() - rest.trim_start().len()
+}
+
+/// Spans of a declaration and of the members or statements in it.
+fn spans(declaration: &GlobalDeclarationNode) -> Vec<Range<usize>> {
+    let mut out = vec![declaration.span().range()];
+    match declaration.node() {
+        GlobalDeclaration::Struct(d) => out.extend(d.members.iter().map(|m| m.span().range())),
+        GlobalDeclaration::Function(d) => statements(&d.body, &mut out),
+        _ => {}
     }
     out
 }
 
-/// Index of the written statement that became `composed[offending]`, by the in-order pairing of
-/// both lists with the greatest sum of likeness (Needleman & Wunsch 1970, free gaps).
-fn aligned(composed: &[Statement], written: &[Statement], offending: usize) -> usize {
-    let likeness = |i: usize, j: usize| {
-        let same = strsim::normalized_levenshtein(&composed[i].words, &written[j].words);
-        // Statements that have little in common are better left alone.
-        (same - 0.4).max(0.0)
-    };
-    let (rows, columns) = (composed.len(), written.len());
-    let mut gain = vec![vec![0.0_f64; columns + 1]; rows + 1];
-    let mut pair = vec![vec![0.0_f64; columns]; rows];
-    for i in (0..rows).rev() {
-        for j in (0..columns).rev() {
-            pair[i][j] = likeness(i, j);
-            gain[i][j] = (pair[i][j] + gain[i + 1][j + 1])
-                .max(gain[i + 1][j])
-                .max(gain[i][j + 1]);
+fn statements(block: &CompoundStatement, out: &mut Vec<Range<usize>>) {
+    let mut rest = vec![block];
+    while let Some(block) = rest.pop() {
+        for statement in &block.statements {
+            // Left by features that are off, and not printed.
+            if !matches!(statement.node(), Statement::Void) {
+                out.push(statement.span().range());
+            }
+            match statement.node() {
+                Statement::Compound(s) => rest.push(s),
+                Statement::If(s) => {
+                    rest.push(&s.if_clause.body);
+                    for clause in &s.else_if_clauses {
+                        out.push(clause.expression.span().range());
+                        rest.push(&clause.body);
+                    }
+                    rest.extend(s.else_clause.iter().map(|clause| &clause.body));
+                }
+                Statement::Switch(s) => rest.extend(s.clauses.iter().map(|clause| &clause.body)),
+                Statement::Loop(s) => {
+                    rest.push(&s.body);
+                    if let Some(end) = &s.continuing {
+                        rest.push(&end.body);
+                        let condition = end.break_if.as_ref().map(|b| b.expression.span().range());
+                        out.extend(condition);
+                    }
+                }
+                Statement::For(s) => rest.push(&s.body),
+                Statement::While(s) => rest.push(&s.body),
+                _ => {}
+            }
         }
     }
-    let (mut i, mut j) = (0, 0);
-    while i < offending && j < columns {
-        if gain[i][j] == pair[i][j] + gain[i + 1][j + 1] && pair[i][j] > 0.0 {
-            (i, j) = (i + 1, j + 1);
-        } else if gain[i][j] == gain[i][j + 1] {
-            j += 1;
-        } else {
-            i += 1;
-        }
-    }
-    // The offending statement itself: the likest of what is left before the alignment goes on.
-    let rest = j.min(columns - 1)..columns;
-    rest.max_by(|&a, &b| {
-        let total = |j: usize| pair[offending][j] + gain[offending + 1][j + 1];
-        total(a).total_cmp(&total(b)).then(b.cmp(&a))
-    })
-    .unwrap_or(0)
 }
 
-/// The name declared by a line such as `fn name(`, `struct name {`, `var<storage> name:`.
-fn declared_name(line: &str) -> Option<&str> {
-    if line.starts_with(char::is_whitespace) {
-        return None;
-    }
-    let mut rest = line.trim_start();
-    while let Some(after) = rest.strip_prefix('@') {
-        let end = after.find([' ', ')']).map_or(after.len(), |i| {
-            if after[i..].starts_with(')') {
-                i + 1
-            } else {
-                i
-            }
-        });
-        rest = after[end..].trim_start();
-    }
-    for keyword in ["fn ", "struct ", "const ", "override ", "alias ", "var"] {
-        if let Some(after) = rest.strip_prefix(keyword) {
-            let after = match after.strip_prefix('<') {
-                Some(space) => space.split_once('>')?.1,
-                None => after,
-            };
-            let name = after.trim_start();
-            let end = name
-                .find(|c: char| !c.is_alphanumeric() && c != '_')
-                .unwrap_or(name.len());
-            return (end > 0).then(|| &name[..end]);
-        }
-    }
-    None
+fn is_of_word(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
 }
 
 /// A message with the author's names in the place of mangled ones.
 fn readable(message: &str, map: &BasicSourceMap) -> String {
-    let mut out = String::new();
-    let mut rest = message;
-    while let Some(start) = rest.find("package_") {
-        let (before, tail) = rest.split_at(start);
-        let end = tail
-            .find(|c: char| !c.is_alphanumeric() && c != '_')
-            .unwrap_or(tail.len());
-        let (word, after) = tail.split_at(end);
-        out.push_str(before);
-        out.push_str(map.get_decl(word).map_or(word, |(_, item)| item));
-        rest = after;
-    }
-    out + rest
-}
-
-/// The words of a line as the author wrote them, each followed by a space.
-fn normalise(line: &str, map: &BasicSourceMap) -> String {
-    let mut out = String::new();
-    for word in line
-        .split(|c: char| !c.is_alphanumeric() && c != '_')
-        .filter(|w| !w.is_empty())
-    {
-        out.push_str(map.get_decl(word).map_or(word, |(_, item)| item));
-        out.push(' ');
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn declared_names_are_found_behind_attributes() {
-        assert_eq!(
-            declared_name("fn closest_hit(ray: Ray) -> Hit {"),
-            Some("closest_hit")
-        );
-        assert_eq!(
-            declared_name("@group(0) @binding(1) var<storage, read> nodes: array<u32>;"),
-            Some("nodes")
-        );
-        assert_eq!(declared_name("    let x = 1;"), None);
-        assert_eq!(declared_name("@compute @workgroup_size(64)"), None);
-    }
+    let pieces = message.split_inclusive(|c| !is_of_word(c));
+    let written = |piece: &str| {
+        let word = piece.trim_end_matches(|c| !is_of_word(c));
+        match map.get_decl(word) {
+            Some((_, item)) => piece.replacen(word, item, 1),
+            None => piece.to_owned(),
+        }
+    };
+    pieces.map(written).collect()
 }

@@ -6,7 +6,7 @@
 //! scrambling), a discontinuous one what an edge leaves of it (about −0.75 for all low-discrepancy
 //! points, Owen's lectures "Monte Carlo theory, methods and examples", ch. 17).
 
-use super::Integrator;
+use super::{Integrator, IntegratorFacts};
 use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use crate::sampling::dimensions;
 
@@ -235,12 +235,12 @@ impl Integrator for Integrand {
         self.function(params).constants()
     }
 
-    fn dimensions(&self, _: &Params) -> u32 {
-        dimensions::FIRST_BOUNCE
-    }
-
-    fn exact(&self, params: &Params) -> Option<f64> {
-        Some(self.function(params).integral())
+    fn facts(&self, params: &Params) -> IntegratorFacts {
+        IntegratorFacts {
+            dimensions: dimensions::FIRST_BOUNCE,
+            exact: Some(self.function(params).integral()),
+            ..Default::default()
+        }
     }
 }
 

@@ -4,20 +4,19 @@
 //! Every image that it hands out was checked: no kernel raised its error word, and every pixel took
 //! exactly the samples asked for.
 
-use super::Integrator;
-use super::frame::{Frame, Slice};
+use super::kind::ConfiguredIntegrator;
+use super::slice::{Slice, job_uniform};
 use super::tables::SceneBuffers;
 use super::traced::Traced;
-use crate::gpu::{Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline};
+use crate::geometry::Camera;
+use crate::gpu::{
+    Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline, UniformValues,
+};
 use crate::image::Image;
-use crate::params::Params;
 use crate::sampling::Sampler;
 use std::cell::{Cell, RefCell};
 use std::ops::Range;
 use std::sync::Arc;
-
-/// Names of the ray classes that image kernels count, in the kernel's order.
-pub const RAY_COUNT_CLASSES: [&str; 4] = ["primary", "shadow", "ao", "bounce"];
 
 /// No dispatch should run longer than this, so that no watchdog strikes and progress moves.
 const SLICE_MS: f64 = 250.0;
@@ -38,15 +37,16 @@ pub fn rounding_bound(spp: u32) -> f64 {
 }
 
 /// One image to render.
+#[derive(Clone, Copy)]
 pub struct RenderJob<'a> {
-    /// Image and camera.
-    pub frame: Frame,
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// Where it is taken from.
+    pub camera: Camera,
     /// What draws the samples.
     pub sampler: &'a Sampler,
     /// What is computed per sample.
-    pub integrator: &'static dyn Integrator,
-    /// Its parameters.
-    pub params: &'a Params,
+    pub integrator: &'a ConfiguredIntegrator,
     /// Whether the driver's checks are on.
     pub runtime_checks: bool,
 }
@@ -70,8 +70,9 @@ struct Band {
 /// A compiled job on one scene and structure.
 pub struct Renderer<'a> {
     gpu: &'a Gpu,
-    scene: &'a SceneBuffers,
-    frame: Frame,
+    width: u32,
+    height: u32,
+    uniform: UniformValues,
     pipeline: Arc<Pipeline>,
     bindings: Bindings,
     bands: Vec<Band>,
@@ -88,16 +89,16 @@ pub struct Renderer<'a> {
     spent: Cell<Elapsed>,
 }
 
-/// Buffers for the sums of a frame, as many rows in each as the adapter can bind.
-fn bands(gpu: &Gpu, frame: &Frame) -> Result<Vec<Band>, GpuError> {
-    let row_bytes = u64::from(frame.width) * 16;
+/// Buffers for the sums of an image, as many rows in each as the adapter can bind.
+fn bands(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<Vec<Band>, GpuError> {
+    let row_bytes = u64::from(width) * 16;
     // Slices are multiples of eight rows, the height of a workgroup.
     let fitting = gpu.limits.max_storage_buffer_binding_size / row_bytes.max(1) / 8 * 8;
     let rows = fitting.clamp(8, 1 << 31) as usize;
-    (0..frame.height)
+    (0..height)
         .step_by(rows)
         .map(|start| {
-            let rows = start..frame.height.min(start + rows as u32);
+            let rows = start..height.min(start + rows as u32);
             let bytes = u64::from(rows.end - rows.start) * row_bytes;
             let sums = gpu.zeroed("accumulation", bytes)?;
             Ok(Band { rows, sums })
@@ -117,13 +118,13 @@ fn composition(
         .activate(Composition::new("integrator/render"));
     let kernel = traced.compose(scene.offset.activate(kernel));
     let mut out = with_sampler(kernel, job.sampler)
-        .with("integrator", job.integrator.kernel())
+        .with("integrator", job.integrator.kind.kernel())
         .feature("ray_counts", ray_counts);
     for (name, on) in scene.features.flags() {
         out = out.feature(name, on);
     }
     out = scene.bindings.merged(&traced.bindings).compose(out);
-    for (name, value) in job.integrator.constants(job.params) {
+    for (name, value) in job.integrator.kind.constants(&job.integrator.params) {
         out = out.constant(name, value);
     }
     out
@@ -148,7 +149,7 @@ impl<'a> Renderer<'a> {
     /// buffer.
     pub fn new(
         gpu: &'a Gpu,
-        scene: &'a SceneBuffers,
+        scene: &SceneBuffers,
         traced: &Traced,
         job: &RenderJob,
         ray_counts: bool,
@@ -157,7 +158,7 @@ impl<'a> Renderer<'a> {
             &composition(traced, scene, job, ray_counts),
             job.runtime_checks,
         )?;
-        let bands = bands(gpu, &job.frame)?;
+        let bands = bands(gpu, job.size)?;
         let status = gpu.zeroed("status", 64)?;
         let mut bindings = scene.bindings.merged(&traced.bindings);
         bindings.buffer("status", &status).buffer(
@@ -166,8 +167,9 @@ impl<'a> Renderer<'a> {
         );
         Ok(Self {
             gpu,
-            scene,
-            frame: job.frame,
+            width: job.size[0],
+            height: job.size[1],
+            uniform: job_uniform(job, scene),
             pipeline,
             bindings,
             bands,
@@ -259,7 +261,7 @@ impl<'a> Renderer<'a> {
         if self.gpu.loop_limit.is_some() {
             return 1;
         }
-        let pixels = f64::from(self.frame.width) * f64::from(self.frame.height);
+        let pixels = f64::from(self.width) * f64::from(self.height);
         ((self.rate.get() * SLICE_MS / pixels) as u32).max(1)
     }
 
@@ -274,7 +276,7 @@ impl<'a> Renderer<'a> {
         bindings.buffer("accumulation", &band.sums);
         let mut row = band.rows.start;
         while row < band.rows.end {
-            let row_samples = f64::from(self.frame.width) * f64::from(samples);
+            let row_samples = f64::from(self.width) * f64::from(samples);
             let fitting = (self.rate.get() * SLICE_MS / row_samples) as u32;
             let rows = (fitting / 8 * 8).max(8).min(band.rows.end - row);
             let slice = Slice {
@@ -292,14 +294,14 @@ impl<'a> Renderer<'a> {
     }
 
     fn run_slice(&self, bindings: &mut Bindings, slice: &Slice) -> Result<(), GpuError> {
-        bindings.uniform("frame", self.frame.uniform(self.scene, slice));
-        let groups = [self.frame.width.div_ceil(8), slice.rows.div_ceil(8), 1];
+        bindings.uniform("frame", slice.uniform(&self.uniform));
+        let groups = [self.width.div_ceil(8), slice.rows.div_ceil(8), 1];
         let elapsed = self.gpu.run(&Dispatch {
             pipeline: &self.pipeline,
             bindings,
             groups,
         })?;
-        let work = f64::from(self.frame.width) * f64::from(slice.rows) * f64::from(slice.samples);
+        let work = f64::from(self.width) * f64::from(slice.rows) * f64::from(slice.samples);
         self.rate.set(work / elapsed.ms().max(1e-3));
         let spent = self.spent.get();
         self.spent.set(Elapsed {
@@ -344,8 +346,8 @@ impl<'a> Renderer<'a> {
         let count = f64::from(self.done.get());
         let mean = |total: &[f64; 3]| total.map(|sum| (sum / count) as f32);
         Ok(Image {
-            width: self.frame.width,
-            height: self.frame.height,
+            width: self.width,
+            height: self.height,
             pixels: totals.iter().map(mean).collect(),
         })
     }
@@ -368,7 +370,7 @@ impl<'a> Renderer<'a> {
     /// Adds the sums on the device to those of the blocks before, if they are sound.
     fn add_pending(&self, totals: &mut Vec<[f64; 3]>) -> Result<(), GpuError> {
         self.gpu.check_error_word(self.error_word()?)?;
-        let [width, height] = [self.frame.width, self.frame.height].map(|edge| edge as usize);
+        let [width, height] = [self.width, self.height].map(|edge| edge as usize);
         totals.resize(width * height, [0.0; 3]);
         let wanted = self.pending.get();
         let (mut wrong, mut first) = (0, None);
@@ -407,7 +409,7 @@ impl<'a> Renderer<'a> {
         Ok(self.gpu.read::<u32>(&self.status)?[0])
     }
 
-    /// Rays per class since the last reset, in the order of [`RAY_COUNT_CLASSES`]; zeros unless the
+    /// Rays per class since the last reset, in the order of [`CountedRays`](super::CountedRays); zeros unless the
     /// kernel was compiled to count.
     ///
     /// # Errors

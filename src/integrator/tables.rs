@@ -53,6 +53,8 @@ pub struct SceneBuffers {
     pub first_light: u32,
     /// Sum over emissive triangles of area times luminance.
     pub light_power: f32,
+    /// Length of the diagonal of the scene's box, scene units.
+    pub diagonal: f64,
 }
 
 /// Relative luminance of linear sRGB, as in `kernels/shading/light.wesl`.
@@ -107,6 +109,7 @@ impl SceneBuffers {
             lights: lights.len() as u32,
             first_light,
             light_power,
+            diagonal: f64::from(2.0 * scene.bounds().radius()),
         })
     }
 }

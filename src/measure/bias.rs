@@ -12,6 +12,7 @@
 
 use super::hypothesis::{WelchTest, benjamini_hochberg, t_test_power, welch_t_test_beyond};
 use crate::image::{Image, ImageError, luminance};
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A sampler may be said to have no bias found only if one of so many standard errors of the mean
@@ -46,7 +47,8 @@ impl Default for BiasOptions {
 }
 
 /// What the test says.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum BiasVerdict {
     /// Neither the whole image nor a tile was rejected. This is not a proof: a bias far below the noise
     /// stays unseen.
@@ -60,9 +62,9 @@ pub enum BiasVerdict {
 impl fmt::Display for BiasVerdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoBiasFound => f.write_str("no-bias-found"),
+            Self::NoBiasFound => f.write_str("no bias found"),
             Self::Biased => f.write_str("biased"),
-            Self::NotTestable(reason) => write!(f, "not-testable: {reason}"),
+            Self::NotTestable(reason) => write!(f, "not testable: {reason}"),
         }
     }
 }
@@ -275,7 +277,7 @@ mod tests {
         let mut images = noisy(3, 0.2, &mut generator);
         let few = check_bias(&images, &reference, BiasOptions::default()).unwrap();
         let needed = replicates_needed(BiasOptions::default().alpha);
-        let words = format!("not-testable: 3 replicates, {needed} are needed");
+        let words = format!("not testable: 3 replicates, {needed} are needed");
         assert!(
             few.verdict.to_string().starts_with(&words),
             "{}",
@@ -420,7 +422,7 @@ mod tests {
             single
                 .verdict
                 .to_string()
-                .starts_with("not-testable: 1 replicates")
+                .starts_with("not testable: 1 replicates")
         );
         images[2].pixels[0][1] = f32::NAN;
         let nan = check_bias(&images[..2], &images, options).unwrap();

@@ -9,7 +9,6 @@ use super::record::RayClass;
 use crate::accel::{Counters, CpuTwin, Hit, NO_HIT, Ray, TriangleSoup};
 use crate::config::Gate;
 use crate::geometry::Camera;
-use crate::integrator::Frame;
 use crate::random::Pcg32;
 use crate::scene::{Bounds, SceneData};
 use glam::Vec3;
@@ -72,13 +71,7 @@ impl RaySet {
 
 /// Camera rays through pixel centres, 8×8 tiles row by row.
 pub fn primary_rays(camera: Camera, width: u32, height: u32) -> Vec<Ray> {
-    let [forward, right, up] = Frame {
-        width,
-        height,
-        camera,
-        ao_radius: 0.0,
-    }
-    .basis();
+    let [forward, right, up] = camera.basis([width, height]);
     let mut rays = Vec::with_capacity((width * height) as usize);
     for tile_y in (0..height).step_by(TILE as usize) {
         for tile_x in (0..width).step_by(TILE as usize) {

@@ -30,14 +30,6 @@ pub fn median(samples: &[f64]) -> Option<f64> {
     finite(samples).then(|| raw_median(samples))
 }
 
-/// Median absolute deviation from the median, in the unit of the samples (not scaled to a standard
-/// deviation: multiply by 1.4826 for normal samples).
-pub fn median_absolute_deviation(samples: &[f64]) -> Option<f64> {
-    let centre = median(samples)?;
-    let deviations: Vec<f64> = samples.iter().map(|x| (x - centre).abs()).collect();
-    median(&deviations)
-}
-
 /// Unbiased sample variance (divided by n − 1), two passes; `None` below two samples.
 pub fn variance(samples: &[f64]) -> Option<f64> {
     let centre = mean(samples)?;
@@ -227,10 +219,6 @@ mod tests {
         assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), Some(2.5));
         assert_eq!(mean(&[1.0, 2.0, 6.0]), Some(3.0));
         assert_eq!(variance(&[1.0, 2.0, 6.0]), Some(7.0));
-        assert_eq!(
-            median_absolute_deviation(&[1.0, 1.0, 2.0, 2.0, 4.0, 6.0, 9.0]),
-            Some(1.0)
-        );
     }
 
     #[test]
@@ -239,7 +227,6 @@ mod tests {
             assert_eq!(mean(bad), None);
             assert_eq!(median(bad), None);
             assert_eq!(variance(bad), None);
-            assert_eq!(median_absolute_deviation(bad), None);
             assert_eq!(median_interval(bad), None);
             assert_eq!(mean_interval(bad), None);
         }

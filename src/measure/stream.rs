@@ -1,7 +1,7 @@
 //! Figures of the points that a pair of dimensions really drew: discrepancies, errors of analytic
 //! integrands, coherence between pixels and coverage by many pixels.
 
-use super::record::{FigureAtCount, IntegrandFigures, Interval, StarAtCount, StreamFigures};
+use super::record::{FigureAtCount, IntegrandFigures, Interval, StreamFigures};
 use super::statistics::{log_log_slope, mean_interval, root_mean_interval};
 use crate::discrepancy::{
     Budget, DiscrepancyError, PointSet, Quadratic, quadratic, star_2d_prefixes,
@@ -70,7 +70,7 @@ pub fn squared_errors(function: &Function, points: &[[f64; 2]], counts: &[usize]
 }
 
 /// D* and all other figures over seeds. One seed has intervals of no width.
-pub fn over_seeds(counts: &[usize], seeds: &[SeedFigures]) -> (Vec<StarAtCount>, StreamFigures) {
+pub fn over_seeds(counts: &[usize], seeds: &[SeedFigures]) -> (Vec<FigureAtCount>, StreamFigures) {
     let star = means(counts, seeds, |s| &s.star);
     let figures = StreamFigures {
         star_slope: slope(counts, seeds, |s| &s.star),
@@ -80,10 +80,7 @@ pub fn over_seeds(counts: &[usize], seeds: &[SeedFigures]) -> (Vec<StarAtCount>,
         integrands: integrands(counts, seeds),
         pixels: Vec::new(),
     };
-    let star = star
-        .into_iter()
-        .map(|FigureAtCount { n, value }| StarAtCount { n, star: value });
-    (star.collect(), figures)
+    (star, figures)
 }
 
 type Column = fn(&SeedFigures) -> &Vec<f64>;
@@ -212,7 +209,7 @@ mod tests {
         let expected = |n: f64| 1.0 / n.sqrt() - 0.25 / n;
         for at in &star {
             assert!(
-                (at.star.value - expected(at.n as f64)).abs() < 1e-12,
+                (at.value.value - expected(at.n as f64)).abs() < 1e-12,
                 "{at:?}"
             );
         }

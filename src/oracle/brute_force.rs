@@ -25,3 +25,49 @@ pub(super) fn candidates(triangles: &[Triangle], rays: &[OracleRay]) -> Vec<Vec<
     };
     rays.par_iter().map(of_ray).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::triangle::Crossing;
+    use super::*;
+    use crate::random::Pcg32;
+    use glam::Vec3;
+
+    #[test]
+    fn the_coarse_test_keeps_every_triangle_that_may_be_hit() {
+        let mut random = Pcg32::new(4);
+        let mut signed = || 2.0 * random.uniform_f32() - 1.0;
+        let mut vector = || Vec3::new(signed(), signed(), signed());
+        // Groups of neighbours are small against the scene only where there are many triangles.
+        let mut triangle = |_| {
+            let centre = vector();
+            Triangle {
+                vertices: [0; 3].map(|_| centre + 0.05 * vector()),
+            }
+        };
+        let soup: Vec<Triangle> = (0..6000).map(&mut triangle).collect();
+        let mut ray = |_| OracleRay {
+            origin: (1.5 * vector()).to_array(),
+            t_min: 0.0,
+            direction: vector().to_array(),
+            t_max: f32::INFINITY,
+        };
+        let rays: Vec<_> = (0..200).map(&mut ray).collect();
+        let candidates = candidates(&soup, &rays);
+        let mut possible = 0;
+        for (ray, found) in rays.iter().zip(&candidates) {
+            for (id, triangle) in (0u32..).zip(&soup) {
+                if Crossing::new(triangle, ray).is_possible(ray) {
+                    possible += 1;
+                    assert!(found.contains(&id));
+                }
+            }
+        }
+        let kept: usize = candidates.iter().map(Vec::len).sum();
+        assert!(possible > 0 && kept >= possible);
+        assert!(
+            kept < 200 * soup.len() / 10,
+            "{kept} kept: the coarse test rejects too little"
+        );
+    }
+}

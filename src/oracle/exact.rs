@@ -292,6 +292,7 @@ fn two_product(a: f64, b: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Pcg32;
     use glam::Vec3;
 
     /// The same from integers: exact as long as coordinates are small.
@@ -321,20 +322,8 @@ mod tests {
         (side, [det(a, b, c), whole])
     }
 
-    struct Random(u64);
-
-    impl Random {
-        fn below(&mut self, n: i64) -> i64 {
-            self.0 = self
-                .0
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            ((self.0 >> 33) as i64).rem_euclid(n)
-        }
-
-        fn point(&mut self, extent: i64) -> [i64; 3] {
-            [0; 3].map(|_| self.below(2 * extent + 1) - extent)
-        }
+    fn point(random: &mut Pcg32, extent: i64) -> [i64; 3] {
+        [0; 3].map(|_| random.below(2 * extent as usize + 1) as i64 - extent)
     }
 
     fn f32s(v: [i64; 3], unit: f32) -> [f32; 3] {
@@ -343,19 +332,19 @@ mod tests {
 
     #[test]
     fn sides_and_distances_equal_integer_arithmetic_at_every_scale() {
-        let mut random = Random(3);
+        let mut random = Pcg32::new(3);
         let mut seen = [0; 4];
         for round in 0..40_000 {
             let extent = [1, 3, 1000, 8_000_000][round % 4];
             // Powers of two change nothing but exponents.
             let unit = [1.0, f32::MIN_POSITIVE, 2f32.powi(90)][round % 3];
-            let corners = [0; 3].map(|_| random.point(extent));
-            let origin = random.point(extent);
+            let corners = [0; 3].map(|_| point(&mut random, extent));
+            let origin = point(&mut random, extent);
             // Half of the rays are aimed exactly at a corner.
             let target = if round.is_multiple_of(2) {
                 corners[0]
             } else {
-                random.point(extent)
+                point(&mut random, extent)
             };
             let direction = [0, 1, 2].map(|k| target[k] - origin[k]);
             let (side, [volume, whole]) = by_integers(corners, origin, direction);

@@ -273,6 +273,3 @@ impl Distance {
         Self { t, bound }
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -81,6 +81,12 @@ impl<T: ?Sized> Registry<T> {
         self.iter().find(|kind| kind.name() == name)
     }
 
+    /// Every kind with its parameters at their defaults.
+    pub fn defaults(&self) -> impl Iterator<Item = Arc<T>> {
+        self.iter()
+            .filter_map(|kind| kind.make(&Params::default()).ok())
+    }
+
     /// Names, descriptions and parameters, for parser, help and docs.
     pub fn entries(&self) -> Vec<Entry> {
         self.iter().map(|kind| kind.entry.clone()).collect()

@@ -3,7 +3,6 @@
 use super::format;
 use super::samplers::Sampler;
 use crate::measure::record::*;
-use crate::params::Variant;
 
 /// Everything a run recorded.
 #[derive(Debug, Default)]
@@ -19,9 +18,9 @@ pub struct RunData<'a> {
     /// Scenes in the order in which they first appear.
     pub scenes: Vec<SceneGroup<'a>>,
     /// Dumped streams.
-    pub streams: Vec<&'a StreamRecord>,
+    pub streams: Vec<Recorded<'a, StreamRecord>>,
     /// What drawing costs.
-    pub costs: Vec<&'a SamplerCostRecord>,
+    pub costs: Vec<Recorded<'a, SamplerCostRecord>>,
     /// Cells left out.
     pub skipped: Vec<&'a SkippedRecord>,
     /// Cells that failed without a record of their own kind.
@@ -40,7 +39,7 @@ pub struct SceneGroup<'a> {
     /// The scene itself.
     pub record: Option<&'a SceneRecord>,
     /// Structures in the order measured.
-    pub structures: Vec<&'a StructureRecord>,
+    pub structures: Vec<Recorded<'a, StructureRecord>>,
     /// One per integrator.
     pub views: Vec<View<'a>>,
 }
@@ -55,34 +54,23 @@ pub struct View<'a> {
     /// Samplers in the order in which they first appear.
     pub samplers: Vec<Sampler<'a>>,
     /// Times of full cells.
-    pub times: Vec<&'a TimeRecord>,
-}
-
-/// Name of a sampler: `sequence × decorrelation`.
-pub fn sampler_name(sequence: &Variant, decorrelation: &Variant) -> String {
-    format!("{} × {}", sequence.label, decorrelation.label)
+    pub times: Vec<Recorded<'a, TimeRecord>>,
 }
 
 /// Name of a structure as measured; with the driver's checks off it is another competitor.
-pub fn structure_name(accel: &Variant, runtime_checks: bool) -> String {
-    if runtime_checks {
-        accel.label.clone()
-    } else {
-        format!("{} (unchecked)", accel.label)
-    }
+pub fn structure_name<T>(of: Recorded<T>) -> String {
+    let (label, kernels) = (of.key.label(axis::ACCEL), of.key.kernels_mark());
+    format!("{label}{kernels}{}", unchecked(of))
 }
 
 /// Name of the structure of a timed cell, without the kernels: they are in the sampler's name, so that
 /// the same structure stands in one row whatever kernels traced it.
-pub fn timed_structure(time: &TimeRecord) -> String {
-    without_kernels(&time.accel, &time.ran, time.runtime_checks)
+pub fn timed_structure<T>(of: Recorded<T>) -> String {
+    format!("{}{}", of.key.label(axis::ACCEL), unchecked(of))
 }
 
-/// [`structure_name`] without the kernels.
-pub fn without_kernels(accel: &Variant, ran: &Ran, runtime_checks: bool) -> String {
-    let mut accel = accel.clone();
-    accel.label = ran.without_kernels(&accel.label).to_owned();
-    structure_name(&accel, runtime_checks)
+fn unchecked<T>(of: Recorded<T>) -> &'static str {
+    if of.ran.unchecked { " (unchecked)" } else { "" }
 }
 
 impl<'a> RunData<'a> {
@@ -90,55 +78,37 @@ impl<'a> RunData<'a> {
     pub fn new(lines: &'a [Line]) -> Self {
         let mut data = Self::default();
         for line in lines {
-            match &line.record {
-                Record::Run(record) => data.run = Some(record),
-                Record::Finished(record) => data.finished = Some(record),
-                Record::Interrupted(record) => data.interrupted = Some(record),
-                Record::Warning(record) => data.warnings.push(record),
-                Record::Skipped(record) => data.skipped.push(record),
-                Record::Failed(record) => data.failed.push(record),
-                Record::Stream(record) => put(&mut data.streams, record, |a, b| {
-                    a.sequence == b.sequence
-                        && a.decorrelation == b.decorrelation
-                        && a.dimensions == b.dimensions
+            match &line.body {
+                Body::Run(record) => data.run = Some(record),
+                Body::Finished(record) => data.finished = Some(record),
+                Body::Interrupted(record) => data.interrupted = Some(record),
+                Body::Warning(record) => data.warnings.push(record),
+                Body::Skipped(record) => data.skipped.push(record),
+                Body::Failed(record) => data.failed.push(record),
+                Body::Stream(record) => put(&mut data.streams, line.of(record), |a, b| {
+                    a.key == b.key && a.dimensions == b.dimensions
                 }),
-                Record::SamplerCost(record) => put(&mut data.costs, record, |a, b| {
-                    a.sequence == b.sequence && a.decorrelation == b.decorrelation
-                }),
-                Record::Spectrum(record) => {
-                    let view = data.view(&record.scene, &record.integrator);
-                    let sampler = view.sampler(&record.sequence, &record.decorrelation);
-                    sampler.spectrum = Some(record);
+                Body::SamplerCost(record) => {
+                    put(&mut data.costs, line.of(record), |a, b| a.key == b.key)
                 }
-                Record::Scene(record) => data.scene(&record.scene).record = Some(record),
-                Record::Structure(record) => {
-                    put(&mut data.scene(&record.scene).structures, record, |a, b| {
-                        a.accel == b.accel && a.runtime_checks == b.runtime_checks
-                    })
+                Body::Spectrum(record) => data.sampler(&line.key).spectrum = Some(record),
+                Body::Bias(record) => data.sampler(&line.key).bias = Some(record),
+                Body::Scene(record) => {
+                    data.scene(line.key.label(axis::SCENE)).record = Some(record)
                 }
-                Record::Reference(record) => {
-                    data.view(&record.scene, &record.integrator).reference = Some(record);
+                Body::Structure(record) => {
+                    let scene = data.scene(line.key.label(axis::SCENE));
+                    put(&mut scene.structures, line.of(record), is_same)
                 }
-                Record::Time(record) => {
-                    let view = data.view(&record.scene, &record.integrator);
-                    view.sampler(&record.sequence, &record.decorrelation);
-                    put(&mut view.times, record, |a, b| {
-                        a.accel == b.accel
-                            && a.runtime_checks == b.runtime_checks
-                            && a.sequence == b.sequence
-                            && a.decorrelation == b.decorrelation
-                    });
+                Body::Reference(record) => data.view(&line.key).reference = Some(record),
+                Body::Time(record) => {
+                    data.sampler(&line.key);
+                    let view = data.view(&line.key);
+                    put(&mut view.times, line.of(record), is_same);
                 }
-                Record::Error(record) => {
-                    let view = data.view(&record.scene, &record.integrator);
-                    let sampler = view.sampler(&record.sequence, &record.decorrelation);
-                    put(&mut sampler.replicates, record, |a, b| {
-                        a.replicate == b.replicate
-                    });
-                }
-                Record::Bias(record) => {
-                    let view = data.view(&record.scene, &record.integrator);
-                    view.sampler(&record.sequence, &record.decorrelation).bias = Some(record);
+                Body::Error(record) => {
+                    let replicates = &mut data.sampler(&line.key).replicates;
+                    put(replicates, record, |a, b| a.replicate == b.replicate);
                 }
             }
         }
@@ -149,10 +119,7 @@ impl<'a> RunData<'a> {
     fn name_competitors(&mut self) {
         let (mut structures, mut samplers) = (Vec::new(), Vec::new());
         for scene in &self.scenes {
-            let measured = scene
-                .structures
-                .iter()
-                .map(|s| structure_name(&s.accel, s.runtime_checks));
+            let measured = scene.structures.iter().map(|s| structure_name(*s));
             let timed = scene.views.iter().flat_map(View::timed_structures);
             structures.extend(measured.chain(timed));
             samplers.extend(
@@ -163,11 +130,7 @@ impl<'a> RunData<'a> {
                     .map(|s| s.name.clone()),
             );
         }
-        samplers.extend(
-            self.streams
-                .iter()
-                .map(|s| sampler_name(&s.sequence, &s.decorrelation)),
-        );
+        samplers.extend(self.streams.iter().map(|s| s.key.sampler()));
         self.structures = without_repeats(structures);
         self.samplers = without_repeats(samplers);
     }
@@ -198,19 +161,28 @@ impl<'a> RunData<'a> {
         find_or_push(&mut self.scenes, |scene| scene.name == name, new)
     }
 
-    fn view(&mut self, scene: &'a str, integrator: &'a Variant) -> &mut View<'a> {
-        let integrator = integrator.label.as_str();
+    fn view(&mut self, key: &'a Key) -> &mut View<'a> {
+        let integrator = key.label(axis::INTEGRATOR);
         let new = || View {
             integrator,
             reference: None,
             samplers: Vec::new(),
             times: Vec::new(),
         };
-        find_or_push(
-            &mut self.scene(scene).views,
-            |view| view.integrator == integrator,
-            new,
-        )
+        let views = &mut self.scene(key.label(axis::SCENE)).views;
+        find_or_push(views, |view| view.integrator == integrator, new)
+    }
+
+    fn sampler(&mut self, key: &'a Key) -> &mut Sampler<'a> {
+        let name = key.sampler();
+        let new = || Sampler {
+            name: name.clone(),
+            replicates: Vec::new(),
+            bias: None,
+            spectrum: None,
+        };
+        let samplers = &mut self.view(key).samplers;
+        find_or_push(samplers, |sampler| sampler.name == name, new)
     }
 
     /// Every view with its scene.
@@ -222,29 +194,18 @@ impl<'a> RunData<'a> {
 }
 
 impl<'a> View<'a> {
-    fn sampler(&mut self, sequence: &'a Variant, decorrelation: &'a Variant) -> &mut Sampler<'a> {
-        let name = sampler_name(sequence, decorrelation);
-        let new = || Sampler {
-            name: name.clone(),
-            replicates: Vec::new(),
-            bias: None,
-            spectrum: None,
-        };
-        find_or_push(&mut self.samplers, |sampler| sampler.name == name, new)
-    }
-
     /// Names of the structures that were timed, in the order measured.
     pub fn timed_structures(&self) -> Vec<String> {
-        let names = self.times.iter().map(|time| timed_structure(time));
+        let names = self.times.iter().map(|time| timed_structure(*time));
         without_repeats(names.collect())
     }
 
     /// The time of a cell, unless it failed.
-    pub fn time(&self, structure: &str, sampler: &str) -> Option<&'a TimeRecord> {
-        let matches = |time: &&&TimeRecord| {
+    pub fn time(&self, structure: &str, sampler: &str) -> Option<Recorded<'a, TimeRecord>> {
+        let matches = |time: &&Recorded<TimeRecord>| {
             is_valid_time(time)
-                && timed_structure(time) == structure
-                && sampler_name(&time.sequence, &time.decorrelation) == sampler
+                && timed_structure(**time) == structure
+                && time.key.sampler() == sampler
         };
         self.times.iter().find(matches).copied()
     }
@@ -327,8 +288,12 @@ fn without_repeats(names: Vec<String>) -> Vec<String> {
     kept
 }
 
-fn put<'a, T>(list: &mut Vec<&'a T>, item: &'a T, same: impl Fn(&T, &T) -> bool) {
-    match list.iter_mut().find(|old| same(old, item)) {
+fn is_same<T>(a: &Recorded<T>, b: &Recorded<T>) -> bool {
+    a.key == b.key && a.ran.unchecked == b.ran.unchecked
+}
+
+fn put<T>(list: &mut Vec<T>, item: T, same: impl Fn(&T, &T) -> bool) {
+    match list.iter_mut().find(|old| same(old, &item)) {
         Some(old) => *old = item,
         None => list.push(item),
     }

@@ -3,6 +3,7 @@
 use super::ReportError;
 use super::plot::drawing::Drawing;
 use super::plot::paint::{to_png, to_svg};
+use crate::measure::record::Verdict;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -113,23 +114,12 @@ pub enum Tone {
 /// A statement that passes, fails, or could not be tested.
 #[derive(Debug, Clone, Serialize)]
 pub struct Check {
-    /// `Good`: pass, `Bad`: fail, else not tested.
-    pub tone: Tone,
+    /// Whether it holds.
+    pub verdict: Verdict,
     /// What is claimed.
     pub title: String,
     /// The evidence.
     pub detail: String,
-}
-
-impl Check {
-    /// `PASS`, `FAIL` or `OPEN`: the verdict must not depend on colour.
-    pub fn word(&self) -> &'static str {
-        match self.tone {
-            Tone::Good => "PASS",
-            Tone::Bad => "FAIL",
-            _ => "OPEN",
-        }
-    }
 }
 
 /// A table.

@@ -37,7 +37,7 @@ fn push_block(out: &mut String, block: &Block) {
                 let (title, detail) = (escape(&check.title), escape(&check.detail));
                 push(
                     out,
-                    format_args!("- **{}** {title}: {detail}\n", check.word()),
+                    format_args!("- **{}** {title}: {detail}\n", check.verdict.word()),
                 );
             }
         }

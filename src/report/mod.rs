@@ -1,7 +1,7 @@
 //! Reports: plots, tables, `index.html`, `summary.md` and the terminal's tables, all derived from a
 //! run's records alone.
 //!
-//! Data flows one way: [`read`] parses the lines, [`data`] sorts them, [`samplers`] and [`ruling`]
+//! Data flows one way: [`crate::measure::record`] parses the lines, [`data`] sorts them, [`samplers`] and [`ruling`]
 //! draw conclusions, [`sections`] writes them into a [`document::Document`], and [`html`],
 //! [`markdown`] and [`terminal`] show that document.
 
@@ -13,7 +13,6 @@ pub mod markdown;
 pub mod pictures;
 pub mod plot;
 pub mod point_page;
-pub mod read;
 pub mod ruling;
 pub mod samplers;
 pub mod sections;
@@ -22,11 +21,11 @@ pub mod terminal;
 #[cfg(test)]
 mod tests;
 
-pub use read::{Records, read_records};
 pub use stress::{stress_tables, write_stress_page};
 pub use terminal::{failed_checks, terminal_tables};
 
 use crate::atomic::write_atomic;
+use crate::measure::record::{RecordError, read_records};
 use data::RunData;
 use document::{Block, Document};
 use std::path::{Path, PathBuf};
@@ -35,43 +34,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The records cannot be read.
-    #[error("cannot read {}: {source}; give the folder that a run wrote", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The file holds no record.
-    #[error("{} holds no record: the run wrote nothing before it ended", path.display())]
-    NoRecords {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The records are of another version.
-    #[error(
-        "{}:{line}: schema {found:?}, but this program reads {:?}; use the version that wrote it",
-        path.display(),
-        crate::measure::record::SCHEMA
-    )]
-    Schema {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// The schema found.
-        found: String,
-    },
-    /// A line is no record.
-    #[error("{}:{line}: not a record: {source}; remove the line to read the rest", path.display())]
-    Parse {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Why.
-        source: serde_json::Error,
-    },
+    #[error(transparent)]
+    Records(#[from] RecordError),
     /// A file of the report cannot be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {

@@ -2,6 +2,7 @@
 
 use super::data::View;
 use super::format;
+use crate::measure::bias::BiasVerdict;
 use crate::measure::record::{BiasRecord, ErrorRecord, Interval, SpectrumRecord};
 use crate::measure::statistics::{jackknife_interval, log_log_fit, mean};
 
@@ -121,7 +122,9 @@ impl<'a> Sampler<'a> {
         if bad > 0 {
             return Some(format!("{bad} NaN or infinite pixels"));
         }
-        let bias = self.bias.filter(|bias| bias.verdict == "biased")?;
+        let bias = self
+            .bias
+            .filter(|bias| bias.verdict == BiasVerdict::Biased)?;
         let kind = if bias.by_design {
             "biased by design"
         } else {

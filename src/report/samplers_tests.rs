@@ -4,7 +4,6 @@ use super::*;
 use crate::image::Image;
 use crate::measure::metrics::{Reference, measure};
 use crate::measure::record::ErrorAtSpp;
-use crate::params::{Params, Variant};
 use crate::random::Pcg32;
 
 const PIXELS: usize = 40;
@@ -24,14 +23,6 @@ fn noisy(noise: f64, generator: &mut Pcg32) -> Image {
     Image::new(PIXELS as u32, 1, pixels.collect()).unwrap()
 }
 
-fn variant(label: &str) -> Variant {
-    Variant {
-        name: label.to_owned(),
-        params: Params::default(),
-        label: label.to_owned(),
-    }
-}
-
 /// Replicates as a run records them, against a reference of eight parts with this noise each.
 fn records(noise: f64, part_noise: f64, replicates: u32, g: &mut Pcg32) -> Vec<ErrorRecord> {
     let parts = (0..8).map(|_| noisy(part_noise, g)).collect();
@@ -46,11 +37,6 @@ fn records(noise: f64, part_noise: f64, replicates: u32, g: &mut Pcg32) -> Vec<E
         }
     };
     let record = |replicate| ErrorRecord {
-        scene: "s".into(),
-        integrator: variant("i"),
-        sequence: variant("a"),
-        decorrelation: variant("b"),
-        ran: crate::measure::record::Ran::default(),
         randomised: true,
         replicate,
         seed: replicate,

@@ -1,10 +1,10 @@
 //! The essence of a report for the end of a run.
 
 use super::data::RunData;
-use super::document::{Cell, Table, Tone};
+use super::document::{Cell, Table};
 use super::samplers::Metric;
 use super::sections::{belief, run, samplers, structures, verdict};
-use crate::measure::record::Line;
+use crate::measure::record::{Line, Verdict};
 
 /// Verdicts, speeds, errors and checks as aligned plain text.
 pub fn terminal_tables(records: &[Line]) -> String {
@@ -30,7 +30,12 @@ pub fn terminal_tables(records: &[Line]) -> String {
         .into_iter()
         .chain(run::overhead_check(&data))
     {
-        out += &format!("{}  {}: {}\n", check.word(), check.title, check.detail);
+        out += &format!(
+            "{}  {}: {}\n",
+            check.verdict.word(),
+            check.title,
+            check.detail
+        );
     }
     out
 }
@@ -38,7 +43,7 @@ pub fn terminal_tables(records: &[Line]) -> String {
 /// The checks that failed, each with what it found: any is a failure of the run.
 pub fn failed_checks(records: &[Line]) -> Vec<String> {
     let checks = belief::checks(&RunData::new(records)).into_iter();
-    let failed = checks.filter(|check| check.tone == Tone::Bad);
+    let failed = checks.filter(|check| check.verdict == Verdict::Fail);
     failed
         .map(|c| format!("{}: {}", c.title, c.detail))
         .collect()

@@ -3,14 +3,15 @@
 mod fixture;
 
 use super::*;
+use crate::measure::bias::BiasVerdict;
 use crate::measure::record::*;
 use fixture::*;
 
 /// Puts a fault into a record of its kind.
-type Plant = fn(&mut Record);
+type Plant = fn(&mut Body);
 
 /// Tells one kind of record.
-type IsKind = fn(&Record) -> bool;
+type IsKind = fn(&Body) -> bool;
 
 /// A run's folder; pictures for the first scene only.
 fn folder(lines: &[Line]) -> tempfile::TempDir {
@@ -30,7 +31,7 @@ fn folder(lines: &[Line]) -> tempfile::TempDir {
             .save(dir.path().join(path))
             .unwrap();
     }
-    std::fs::write(dir.path().join(read::RECORDS_FILE), text).unwrap();
+    std::fs::write(dir.path().join(RECORDS_FILE), text).unwrap();
     dir
 }
 
@@ -70,7 +71,7 @@ fn without_pictures(html: &str) -> String {
 fn without(lines: Vec<Line>, dropped: IsKind) -> Vec<Line> {
     lines
         .into_iter()
-        .filter(|line| !dropped(&line.record))
+        .filter(|line| !dropped(&line.body))
         .collect()
 }
 
@@ -110,8 +111,9 @@ fn the_page_is_self_contained_and_escapes_names() {
 fn hostile_names_stay_text_everywhere() {
     let mut lines = small_run();
     for line in &mut lines {
-        if let Record::Structure(record) = &mut line.record {
-            record.accel.label = format!("<b>&{}", record.accel.label);
+        if matches!(line.body, Body::Structure(_)) {
+            let label = format!("<b>&{}", line.key.label(axis::ACCEL));
+            line.key = line.key.clone().with(axis::ACCEL, label);
         }
     }
     let (html, summary) = report("hostile", &lines);
@@ -128,9 +130,10 @@ fn a_biased_sampler_and_a_failed_structure_never_win() {
     let best = sections::verdict::best_per_sample(view, 32).answer();
     assert_eq!(best, "sobol × cranley-patterson");
     for line in &mut spoiled {
-        match &mut line.record {
-            Record::Bias(b) if b.sequence.label == "sobol" => b.verdict = "biased".into(),
-            Record::Structure(s) if s.accel.label == "bvh" => s.gate = Some(gate(1)),
+        let is = |axis, label| line.key.label(axis) == label;
+        match &mut line.body {
+            Body::Bias(b) if is(axis::SEQUENCE, "sobol") => b.verdict = BiasVerdict::Biased,
+            Body::Structure(s) if is(axis::ACCEL, "bvh") => s.gate = Some(gate(1)),
             _ => {}
         }
     }
@@ -147,14 +150,15 @@ fn a_biased_sampler_and_a_failed_structure_never_win() {
 }
 
 /// The run with the figures of one integrator on the second scene changed.
-fn with_errors(change: impl Fn(&mut ErrorRecord)) -> Vec<Line> {
+fn with_errors(change: impl Fn(&Key, &mut ErrorRecord)) -> Vec<Line> {
     let mut lines = full_run();
+    let view = Key::default().with(axis::SCENE, "displaced-sphere");
+    let view = view.with(axis::INTEGRATOR, "path");
     for line in &mut lines {
-        match &mut line.record {
-            Record::Error(e) if e.scene == "displaced-sphere" && e.integrator.label == "path" => {
-                change(e);
-            }
-            _ => {}
+        if let Body::Error(e) = &mut line.body
+            && line.key.agrees(&view, &[axis::SCENE, axis::INTEGRATOR])
+        {
+            change(&line.key, e);
         }
     }
     lines
@@ -163,8 +167,8 @@ fn with_errors(change: impl Fn(&mut ErrorRecord)) -> Vec<Line> {
 #[test]
 fn what_has_one_replicate_is_shown_and_neither_wins_nor_makes_a_winner() {
     // The deterministic one is far better than all others.
-    let lines = with_errors(|e| {
-        if e.sequence.label == "sobol" && e.decorrelation.label == "none" {
+    let lines = with_errors(|key, e| {
+        if key.sampler() == "sobol × none" {
             let metrics = e.errors.iter_mut().flat_map(|at| at.metrics.values_mut());
             metrics.for_each(|value| *value *= 0.02);
         }
@@ -178,8 +182,8 @@ fn what_has_one_replicate_is_shown_and_neither_wins_nor_makes_a_winner() {
     assert!(html.contains("not ranked on displaced-sphere"));
     // All but one have one replicate: the one with many has beaten nobody.
     let mut few = lines.clone();
-    few.retain(|line| match &line.record {
-        Record::Error(e) => e.replicate == 0 || e.sequence.label == "pixel-hash",
+    few.retain(|line| match &line.body {
+        Body::Error(e) => e.replicate == 0 || line.key.name(axis::SEQUENCE) == "pixel-hash",
         _ => true,
     });
     let data = RunData::new(&few);
@@ -190,8 +194,8 @@ fn what_has_one_replicate_is_shown_and_neither_wins_nor_makes_a_winner() {
 #[test]
 fn no_winner_and_no_point_where_the_reference_is_too_noisy() {
     // An estimate about 0, as noise makes it from an error below the reference's own.
-    let lines = with_errors(|e| {
-        if e.sequence.label == "sobol" && e.randomised {
+    let lines = with_errors(|key, e| {
+        if key.name(axis::SEQUENCE) == "sobol" && e.randomised {
             let negative = -1e-7 * (1.0 + f64::from(e.replicate));
             let last = e.errors.last_mut().unwrap();
             last.metrics
@@ -230,12 +234,12 @@ fn no_winner_and_no_point_where_the_reference_is_too_noisy() {
 fn a_scene_without_noise_is_no_fault_of_its_reference() {
     let mut lines = full_run();
     for line in &mut lines {
-        match &mut line.record {
-            Record::Error(e) => {
+        match &mut line.body {
+            Body::Error(e) => {
                 let metrics = e.errors.iter_mut().flat_map(|at| at.metrics.values_mut());
                 metrics.for_each(|value| *value = 0.0);
             }
-            Record::Reference(r) => r.mse = 0.0,
+            Body::Reference(r) => r.mse = 0.0,
             _ => {}
         }
     }
@@ -258,7 +262,7 @@ fn a_slow_sampler_wins_per_second_only_if_its_time_is_known_well_enough() {
     let sharp = race.error_of("sobol × cranley-patterson").unwrap();
     let mut vague = full_run();
     for line in &mut vague {
-        if let Record::Time(time) = &mut line.record
+        if let Body::Time(time) = &mut line.body
             && let Some(ms) = &mut time.ms_per_spp
         {
             (ms.low, ms.high) = (0.5 * ms.value, 2.0 * ms.value);
@@ -276,8 +280,8 @@ fn a_slow_sampler_wins_per_second_only_if_its_time_is_known_well_enough() {
 fn a_bias_by_design_never_wins_and_is_no_failure() {
     let mut lines = full_run();
     for line in &mut lines {
-        if let Record::Bias(b) = &mut line.record
-            && b.verdict == "biased"
+        if let Body::Bias(b) = &mut line.body
+            && b.verdict == BiasVerdict::Biased
         {
             b.by_design = true;
         }
@@ -287,7 +291,7 @@ fn a_bias_by_design_never_wins_and_is_no_failure() {
         .iter()
         .find(|c| c.title.contains("without bias"))
         .unwrap();
-    assert_eq!(bias.word(), "PASS", "{bias:?}");
+    assert_eq!(bias.verdict, Verdict::Pass, "{bias:?}");
     assert!(
         bias.detail.contains("2 biased by design"),
         "{}",
@@ -302,10 +306,12 @@ fn every_check_passes_on_a_clean_run_and_fails_on_its_planted_fault() {
     let clean: Vec<Line> = full_run()
         .into_iter()
         .map(|mut line| {
-            match &mut line.record {
-                Record::Structure(s) => s.gate = Some(gate(0)),
-                Record::Bias(b) if b.verdict == "biased" => b.verdict = "no-bias-found".into(),
-                Record::Finished(f) => f.failed = 0,
+            match &mut line.body {
+                Body::Structure(s) => s.gate = Some(gate(0)),
+                Body::Bias(b) if b.verdict == BiasVerdict::Biased => {
+                    b.verdict = BiasVerdict::NoBiasFound
+                }
+                Body::Finished(f) => f.failed = 0,
                 _ => {}
             }
             line
@@ -315,75 +321,79 @@ fn every_check_passes_on_a_clean_run_and_fails_on_its_planted_fault() {
         let checks = sections::belief::checks(&RunData::new(lines));
         checks
             .into_iter()
-            .filter(|check| check.word() != "PASS")
+            .filter(|check| check.verdict != Verdict::Pass)
             .map(|check| check.title)
             .collect()
     };
     assert_eq!(failing(&clean), Vec::<String>::new());
-    let faults: [(&str, Plant); 10] = [
+    let faults: [(&str, Plant); 9] = [
         ("equal to the bit", |r| {
-            if let Record::Structure(s) = r {
+            if let Body::Structure(s) = r {
                 s.gate = Some(gate(1))
             }
         }),
         ("brute force", |r| {
-            if let Record::Structure(s) = r {
+            if let Body::Structure(s) = r {
                 s.gate.as_mut().unwrap().brute_force.wrong = 1
             }
         }),
         ("oracle", |r| {
-            if let Record::Structure(s) = r {
+            if let Body::Structure(s) = r {
                 s.gate.as_mut().unwrap().oracle.wrong = 1
             }
         }),
         ("across structures", |r| {
-            if let Record::Time(t) = r {
+            if let Body::Time(t) = r {
                 t.image_equal = false
             }
         }),
         ("without bias", |r| {
-            if let Record::Bias(b) = r {
-                b.verdict = "biased".into()
+            if let Body::Bias(b) = r {
+                b.verdict = BiasVerdict::Biased
             }
         }),
         ("finite", |r| {
-            if let Record::Error(e) = r {
+            if let Body::Error(e) = r {
                 e.non_finite_pixels = 1
             }
         }),
         ("Reference noise", |r| {
-            if let Record::Reference(f) = r {
+            if let Body::Reference(f) = r {
                 f.mse = 1.0
             }
         }),
         ("Reference noise", |r| {
-            if let Record::Reference(f) = r {
+            if let Body::Reference(f) = r {
                 f.mse = 0.0
             }
         }),
         ("Reference noise", |r| {
-            if let Record::Reference(f) = r {
-                f.integrator.label = "another".into()
-            }
-        }),
-        ("Reference noise", |r| {
-            if let Record::Error(e) = r {
+            if let Body::Error(e) = r {
                 e.errors[5].metrics.values_mut().for_each(|v| *v = -1e-9)
             }
         }),
     ];
     // An image that no other structure rendered proves nothing.
     let mut lone = clean.clone();
-    lone.retain(|line| !matches!(&line.record, Record::Time(t) if t.accel.name != "bvh"));
+    lone.retain(|line| !matches!(line.body, Body::Time(_)) || line.key.name(axis::ACCEL) == "bvh");
     assert!(lone.len() < clean.len());
     let checks = sections::belief::checks(&RunData::new(&lone));
     let images = checks
         .iter()
         .find(|c| c.title.contains("across structures"));
-    assert_eq!(images.map(|check| check.word()), Some("OPEN"));
-    for (title, plant) in faults {
+    assert_eq!(images.map(|check| check.verdict), Some(Verdict::Open));
+    let planted = faults.map(|(title, plant)| {
         let mut lines = clean.clone();
-        lines.iter_mut().for_each(|line| plant(&mut line.record));
+        lines.iter_mut().for_each(|line| plant(&mut line.body));
+        (title, lines)
+    });
+    let mut astray = clean.clone();
+    for line in &mut astray {
+        if matches!(line.body, Body::Reference(_)) {
+            line.key = line.key.clone().with(axis::INTEGRATOR, "another");
+        }
+    }
+    for (title, lines) in planted.into_iter().chain([("Reference noise", astray)]) {
         let failed = failing(&lines);
         assert!(
             failed.iter().any(|name| name.contains(title)),
@@ -395,17 +405,17 @@ fn every_check_passes_on_a_clean_run_and_fails_on_its_planted_fault() {
 #[test]
 fn a_run_without_one_kind_of_record_still_reports() {
     let kinds: [(&str, IsKind); 11] = [
-        ("no-run", |r| matches!(r, Record::Run(_))),
-        ("no-scene", |r| matches!(r, Record::Scene(_))),
-        ("no-structure", |r| matches!(r, Record::Structure(_))),
-        ("no-reference", |r| matches!(r, Record::Reference(_))),
-        ("no-error", |r| matches!(r, Record::Error(_))),
-        ("no-bias", |r| matches!(r, Record::Bias(_))),
-        ("no-time", |r| matches!(r, Record::Time(_))),
-        ("no-stream", |r| matches!(r, Record::Stream(_))),
-        ("no-spectrum", |r| matches!(r, Record::Spectrum(_))),
-        ("no-cost", |r| matches!(r, Record::SamplerCost(_))),
-        ("no-finished", |r| matches!(r, Record::Finished(_))),
+        ("no-run", |r| matches!(r, Body::Run(_))),
+        ("no-scene", |r| matches!(r, Body::Scene(_))),
+        ("no-structure", |r| matches!(r, Body::Structure(_))),
+        ("no-reference", |r| matches!(r, Body::Reference(_))),
+        ("no-error", |r| matches!(r, Body::Error(_))),
+        ("no-bias", |r| matches!(r, Body::Bias(_))),
+        ("no-time", |r| matches!(r, Body::Time(_))),
+        ("no-stream", |r| matches!(r, Body::Stream(_))),
+        ("no-spectrum", |r| matches!(r, Body::Spectrum(_))),
+        ("no-cost", |r| matches!(r, Body::SamplerCost(_))),
+        ("no-finished", |r| matches!(r, Body::Finished(_))),
     ];
     let small = small_run();
     for (name, is_kind) in kinds {
@@ -416,22 +426,26 @@ fn a_run_without_one_kind_of_record_still_reports() {
             "{name}"
         );
     }
-    let only_run = vec![line(run())];
+    let only_run = vec![Line::about_all(run())];
     let (html, _) = report("only-run", &only_run);
     assert!(html.contains("Nothing was measured") && html.contains("did not finish"));
 }
 
 #[test]
 fn one_structure_one_sampler_and_one_spp_are_enough() {
-    let mut lines = without(small_run(), |record| match record {
-        Record::Structure(s) => s.accel.label != "bvh",
-        Record::Time(t) => t.accel.label != "bvh" || t.sequence.label != "pixel-hash",
-        Record::Error(e) => e.sequence.label != "pixel-hash",
-        Record::Bias(_) => true,
-        _ => false,
+    let mut lines = small_run();
+    lines.retain(|line| {
+        let is = |axis, label| line.key.label(axis) == label;
+        match line.body {
+            Body::Structure(_) => is(axis::ACCEL, "bvh"),
+            Body::Time(_) => is(axis::ACCEL, "bvh") && is(axis::SEQUENCE, "pixel-hash"),
+            Body::Error(_) => is(axis::SEQUENCE, "pixel-hash"),
+            Body::Bias(_) => false,
+            _ => true,
+        }
     });
     for line in &mut lines {
-        if let Record::Error(record) = &mut line.record {
+        if let Body::Error(record) = &mut line.body {
             record.errors.truncate(1);
         }
     }
@@ -441,13 +455,12 @@ fn one_structure_one_sampler_and_one_spp_are_enough() {
 
 #[test]
 fn a_run_where_everything_failed_shows_it_and_no_figure() {
-    let mut lines = without(small_run(), |r| {
-        matches!(r, Record::Error(_) | Record::Bias(_))
-    });
+    let mut lines = without(small_run(), |r| matches!(r, Body::Error(_) | Body::Bias(_)));
     for line in &mut lines {
-        match &mut line.record {
-            Record::Structure(s) => *s = structure(&s.scene, &s.accel.label, 1.0, 9),
-            Record::Time(t) => t.failure = Some("device lost".into()),
+        let [scene, accel] = [axis::SCENE, axis::ACCEL].map(|axis| line.key.label(axis));
+        match &mut line.body {
+            Body::Structure(_) => *line = structure(scene, accel, 1.0, 9),
+            Body::Time(t) => t.failure = Some("device lost".into()),
             _ => {}
         }
     }
@@ -459,23 +472,21 @@ fn a_run_where_everything_failed_shows_it_and_no_figure() {
 #[test]
 fn twelve_structures_fit_into_plots_and_tables() {
     let mut lines = without(small_run(), |r| {
-        matches!(r, Record::Structure(_) | Record::Time(_))
+        matches!(r, Body::Structure(_) | Body::Time(_))
     });
     let names: Vec<String> = (0..12)
         .map(|i| format!("structure-{i} [leaf-size={i}, split-limit=0.25]"))
         .collect();
     let scene = "cornell-box";
     for (i, name) in names.iter().enumerate() {
-        lines.push(line(
-            structure(scene, name, 6.0 / (1.0 + i as f64 * 0.3), 0).into(),
-        ));
+        lines.push(structure(scene, name, 6.0 / (1.0 + i as f64 * 0.3), 0));
     }
     let timed: Vec<(&str, f64)> = names
         .iter()
         .enumerate()
         .map(|(i, name)| (name.as_str(), 1.0 + 0.3 * i as f64))
         .collect();
-    lines.extend(times(scene, "path", &timed).into_iter().map(line));
+    lines.extend(times(scene, "path", &timed));
     let (html, _) = report("twelve", &lines);
     assert!(names.iter().all(|name| html.contains(name)));
 }

@@ -1,26 +1,25 @@
 //! Error: once per scene, integrator and sampler, through the fastest gated structure.
 
+use super::RunError;
+use super::images::Estimator;
 use super::session::Session;
 use super::structures::{self, Gated};
 use super::world::World;
-use super::{RunError, words};
 use crate::config::{REFERENCE_PARTS, SamplerCell, StructureCell};
-use crate::image::Image;
-use crate::image::viridis;
-use crate::image::{Picture, automatic_exposure, tone_map};
-use crate::integrator::{Frame, RenderJob, Renderer, Snapshot, Traced, integrator, rounding_bound};
-use crate::measure::bias::{BiasOptions, check_bias};
+use crate::image::{Image, Picture, automatic_exposure, tone_map, viridis};
+use crate::integrator::{Renderer, Snapshot, Traced, rounding_bound};
+use crate::measure::bias::{BiasOptions, BiasVerdict, check_bias};
 use crate::measure::metrics::error_map;
 use crate::measure::metrics::{Reference, measure};
 use crate::measure::record::{
-    BiasRecord, ErrorAtSpp, ErrorRecord, Ran, Record, ReferenceRecord, SpectrumRecord,
+    BiasRecord, Body, ErrorAtSpp, ErrorRecord, Key, Line, Ran, ReferenceRecord, SpectrumRecord,
+    axis,
 };
 use crate::measure::spectrum::{
     ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power,
 };
 use crate::measure::statistics::mean_interval;
 use crate::params::Variant;
-use crate::sampling::{Demand, Sampler};
 use crate::text::cell_hash;
 use std::time::Instant;
 
@@ -39,56 +38,6 @@ struct Yardstick {
     /// How far rounding alone may move it, relative.
     rounding: f64,
     exposure: f32,
-}
-
-/// The sampler that draws `samples` samples a pixel for an integrator.
-///
-/// # Errors
-/// A name is not registered, or the sampler has too few dimensions or samples.
-pub(super) fn sampler_for(
-    session: &Session,
-    (sequence, decorrelation): (&Variant, &Variant),
-    variant: &Variant,
-    samples: u32,
-) -> Result<Sampler, String> {
-    let integrator =
-        integrator(&variant.name).ok_or_else(|| format!("no integrator is called {variant}"))?;
-    let demand = Demand {
-        samples: Some(samples),
-        dimensions: integrator.dimensions(&variant.params),
-        width: Some(session.experiment.resolution[0]),
-    };
-    let samplers = &session.registries.samplers;
-    let made = samplers.sampler(sequence, decorrelation, &demand);
-    made.map_err(|e| e.to_string())
-}
-
-/// A job for this world; an error if the integrator is not registered.
-pub(super) fn job<'j>(
-    session: &Session,
-    world: &World,
-    sampler: &'j Sampler,
-    variant: &'j Variant,
-    runtime_checks: bool,
-) -> Result<RenderJob<'j>, String> {
-    let integrator =
-        integrator(&variant.name).ok_or_else(|| format!("no integrator is called {variant}"))?;
-    let [width, height] = session.experiment.resolution;
-    let diagonal = f64::from(2.0 * world.scene.bounds().radius());
-    let ao_radius = (integrator.ao_radius(&variant.params).unwrap_or(0.0) * diagonal) as f32;
-    let frame = Frame {
-        width,
-        height,
-        camera: world.camera,
-        ao_radius,
-    };
-    Ok(RenderJob {
-        frame,
-        sampler,
-        integrator,
-        params: &variant.params,
-        runtime_checks,
-    })
 }
 
 /// Renders; the error in words.
@@ -126,7 +75,7 @@ fn reference_structure(
     let gated = structures::build_and_gate(session, world, &cell)?;
     let gated = gated.map(|(traced, _)| traced);
     Ok(gated.map_err(|record| {
-        let failure = record.failure.unwrap_or_default();
+        let failure = record.body.failure.unwrap_or_default();
         format!("{} with the embedded kernels: {failure}", cell.accel)
     }))
 }
@@ -195,24 +144,22 @@ fn reference(
     variant: &Variant,
 ) -> Result<Result<Yardstick, String>, RunError> {
     session.say(format!("{}, {variant}: reference", world.variant));
-    let known = integrator(&variant.name).and_then(|i| i.exact(&variant.params));
-    if let Some(value) = known {
-        return exact_reference(session, world, variant, value);
-    }
     let settings = &session.experiment.reference;
     let start = Instant::now();
     let spp = (settings.spp / REFERENCE_PARTS).max(1);
     let pair = (&settings.sequence, &settings.decorrelation);
-    let sampler = match sampler_for(session, pair, variant, spp) {
-        Ok(sampler) => sampler,
+    let integrator = session.registries.integrators.configured(variant);
+    if let Some(value) = integrator.ok().and_then(|i| i.facts.exact) {
+        return exact_reference(session, world, variant, value);
+    }
+    let estimator = match Estimator::new(session, pair, variant, spp) {
+        Ok(estimator) => estimator,
         Err(reason) => return Ok(Err(reason)),
     };
-    let seeds = session.experiment.seeds().reference_parts;
     let rendered = (|| {
-        words::check(session, world.gpu, &sampler, &seeds)?;
-        let job = job(session, world, &sampler, variant, true)?;
-        let renderer = Renderer::new(world.gpu, &world.buffers, traced, &job, false)
-            .map_err(|e| e.to_string())?;
+        let seeds = session.experiment.seeds().reference_parts;
+        let embedded = (&Variant::default(), traced);
+        let renderer = estimator.renderer(session, world, embedded, &seeds, [true, false])?;
         let mut parts = Vec::new();
         for &seed in &seeds {
             let shots = session
@@ -230,12 +177,13 @@ fn reference(
     };
     let record = ReferenceRecord {
         spp: spp * REFERENCE_PARTS,
-        sampler: sampler.label(),
+        sampler: estimator.sampler.label(),
         seconds: start.elapsed().as_secs_f64(),
-        ran: world.ran(&Variant::default(), kernel),
-        ..reference_record(world, variant, &reference)
+        ..reference_record(&reference)
     };
-    finish_reference(session, world, record, reference, rounding_bound(spp)).map(Ok)
+    let (key, ran) = (world.key(&Variant::default()), Ran::kernel(kernel));
+    let line = Line::new(key.with_variant(axis::INTEGRATOR, variant), ran, record);
+    finish_reference(session, world, line, reference, rounding_bound(spp)).map(Ok)
 }
 
 /// The constant image of a known value: nothing is rendered.
@@ -256,17 +204,17 @@ fn exact_reference(
     session.progress.inc(u64::from(REFERENCE_PARTS));
     let record = ReferenceRecord {
         exact: Some(value),
-        ..reference_record(world, variant, &reference)
+        ..reference_record(&reference)
     };
-    finish_reference(session, world, record, reference, EVALUATION).map(Ok)
+    let key = Key::default().with_variant(axis::SCENE, world.variant);
+    let key = key.with_variant(axis::INTEGRATOR, variant);
+    let line = Line::new(key, Ran::default(), record);
+    finish_reference(session, world, line, reference, EVALUATION).map(Ok)
 }
 
 /// The record of a reference that was not rendered; what was rendered sets more.
-fn reference_record(world: &World, variant: &Variant, reference: &Reference) -> ReferenceRecord {
+fn reference_record(reference: &Reference) -> ReferenceRecord {
     ReferenceRecord {
-        scene: world.variant.label.clone(),
-        integrator: variant.clone(),
-        ran: Ran::default(),
         spp: 0,
         exact: None,
         sampler: "exact".to_owned(),
@@ -281,31 +229,32 @@ fn reference_record(world: &World, variant: &Variant, reference: &Reference) -> 
 fn finish_reference(
     session: &mut Session,
     world: &World,
-    mut record: ReferenceRecord,
+    mut line: Line<ReferenceRecord>,
     reference: Reference,
     rounding: f64,
 ) -> Result<Yardstick, RunError> {
     let exposure = automatic_exposure(reference.image());
-    let labels = [&world.variant.label, &record.integrator.label].map(String::as_str);
+    let integrator = line.key.get(axis::INTEGRATOR).cloned().unwrap_or_default();
+    let labels = [&world.variant.label, &integrator.label].map(String::as_str);
     let picture = tone_map(reference.image(), exposure);
     let image = session.picture(&[&["reference"], &labels[..]].concat(), &picture)?;
-    record.image = image.unwrap_or_default();
-    let cell = format!("reference {}, {}: done", world.variant, record.integrator);
+    line.body.image = image.unwrap_or_default();
+    let cell = format!("reference {}, {integrator}: done", world.variant);
     if !session.is_done(&cell) {
         let hash = cell_hash(&[
             ("scene", &world.scene.hash),
             (
                 "integrator",
-                &serde_json::to_string(&record.integrator).unwrap_or_default(),
+                &serde_json::to_string(&integrator).unwrap_or_default(),
             ),
             (
                 "sampler",
-                &format!("{}, {} spp", record.sampler, record.spp),
+                &format!("{}, {} spp", line.body.sampler, line.body.spp),
             ),
-            ("kernel", &record.ran.kernel_hash),
+            ("kernel", &line.ran.kernel_hash),
             ("version", env!("CARGO_PKG_VERSION")),
         ]);
-        session.write(&hash, Record::Reference(record))?;
+        session.write(&line.hashed(hash).with_body(Body::Reference))?;
         session.finish(cell);
     }
     Ok(Yardstick {
@@ -332,41 +281,31 @@ fn passes<'a>(
     cell: &SamplerCell,
 ) -> Result<Vec<Pass<'a>>, String> {
     let pair = (&cell.sequence, &cell.decorrelation);
-    let gpu = world.device.of(&cell.kernels);
-    let gpu = gpu.map_err(|e| e.to_string())?;
-    let seeds = session.experiment.seeds().replicates;
     let spps: Vec<u32> = session.experiment.spp.counts().collect();
-    let whole = sampler_for(
-        session,
-        pair,
-        &cell.integrator,
-        session.experiment.spp.max(),
-    )?;
-    let single = |spp| {
-        Ok((
-            vec![spp],
-            sampler_for(session, pair, &cell.integrator, spp)?,
-        ))
-    };
-    let samplers = match whole.by_count() {
-        true => spps
-            .into_iter()
+    let most = session.experiment.spp.max();
+    let whole = Estimator::new(session, pair, &cell.integrator, most)?;
+    let estimators = if whole.sampler.by_count() {
+        let single = |spp| {
+            let estimator = Estimator::new(session, pair, &cell.integrator, spp)?;
+            Ok((vec![spp], estimator))
+        };
+        spps.into_iter()
             .map(single)
-            .collect::<Result<_, String>>()?,
-        false => vec![(spps, whole)],
+            .collect::<Result<_, String>>()?
+    } else {
+        vec![(spps, whole)]
     };
-    let pass = |(spps, sampler): (Vec<u32>, Sampler)| {
-        words::check(session, gpu, &sampler, &seeds)?;
-        let job = job(session, world, &sampler, &cell.integrator, true)?;
-        let renderer = Renderer::new(gpu, &world.buffers, &fastest.traced, &job, false);
-        let words = bytemuck::cast_slice(sampler.table.words());
+    let seeds = session.experiment.seeds().replicates;
+    let with = (&cell.kernels, &fastest.traced);
+    let pass = |(spps, estimator): (Vec<u32>, Estimator)| {
+        let words = bytemuck::cast_slice(estimator.sampler.table.words());
         Ok(Pass {
-            renderer: renderer.map_err(|e| e.to_string())?,
+            renderer: estimator.renderer(session, world, with, &seeds, [true, false])?,
             spps,
             table: blake3::hash(words).to_hex().to_string(),
         })
     };
-    samplers.into_iter().map(pass).collect()
+    estimators.into_iter().map(pass).collect()
 }
 
 /// All replicates of one sampler. The inner error concerns this cell alone.
@@ -388,8 +327,12 @@ fn sampler_error(
             .map(|pass| pass.renderer.kernel_hash())
             .collect();
         hashes.dedup();
-        world.ran(&cell.kernels, hashes.join("+"))
+        Ran::kernel(hashes.join("+"))
     };
+    let key = (world.key(&cell.kernels))
+        .with_variant(axis::INTEGRATOR, &cell.integrator)
+        .with_variant(axis::SEQUENCE, &cell.sequence)
+        .with_variant(axis::DECORRELATION, &cell.decorrelation);
     let tables: String = passes.iter().map(|pass| pass.table.as_str()).collect();
     let hash = cell_hash(&[
         ("scene", &world.scene.hash),
@@ -404,6 +347,7 @@ fn sampler_error(
     ]);
     let seeds = session.experiment.seeds().replicates;
     let seeds = seeds.into_iter().take(cell.replicates as usize);
+    let line = |body| Line::new(key.clone(), ran.clone(), body).hashed(&hash);
     let mut finals = Vec::new();
     for (replicate, seed) in seeds.enumerate() {
         let mut snapshots = Vec::new();
@@ -414,7 +358,7 @@ fn sampler_error(
                 Err(reason) => return Ok(Err(reason)),
             }
         }
-        let mut record = match error_record(
+        let record = match error_record(
             session,
             world,
             cell,
@@ -431,24 +375,17 @@ fn sampler_error(
                 record.non_finite_pixels
             )));
         }
-        record.ran = ran.clone();
-        session.write(&hash, Record::Error(record))?;
+        session.write(&line(Body::Error(record)))?;
         finals.extend(snapshots.into_iter().last().map(|s| s.image));
         session.progress.inc(1);
     }
     session.finish(cell.to_string());
-    match bias_record(session, cell, world, &finals, yardstick) {
-        Ok(mut record) => {
-            record.ran = ran.clone();
-            session.write(&hash, Record::Bias(record))?;
-        }
+    match bias_record(session, cell, &finals, yardstick) {
+        Ok(record) => session.write(&line(Body::Bias(record)))?,
         Err(reason) => return Ok(Err(reason)),
     }
-    match spectrum_record(session, cell, world, &finals, yardstick) {
-        Ok(mut record) => {
-            record.ran = ran;
-            session.write(&hash, Record::Spectrum(record)).map(Ok)
-        }
+    match spectrum_record(session, &finals, yardstick) {
+        Ok(record) => session.write(&line(Body::Spectrum(record))).map(Ok),
         Err(reason) => Ok(Err(reason)),
     }
 }
@@ -456,8 +393,6 @@ fn sampler_error(
 /// The spectra of all replicates, at the highest number of samples.
 fn spectrum_record(
     session: &Session,
-    cell: &SamplerCell,
-    world: &World,
     images: &[Image],
     yardstick: &Yardstick,
 ) -> Result<SpectrumRecord, String> {
@@ -473,11 +408,6 @@ fn spectrum_record(
         mean_interval(&values)
     };
     Ok(SpectrumRecord {
-        scene: world.variant.label.clone(),
-        integrator: cell.integrator.clone(),
-        sequence: cell.sequence.clone(),
-        decorrelation: cell.decorrelation.clone(),
-        ran: Ran::default(),
         spp: session.experiment.spp.max(),
         replicates: spectra.len(),
         power: mean_power(&spectra),
@@ -514,11 +444,6 @@ fn error_record(
         return Ok(Err("nothing was rendered".to_owned()));
     };
     let mut record = ErrorRecord {
-        scene: world.variant.label.clone(),
-        integrator: cell.integrator.clone(),
-        sequence: cell.sequence.clone(),
-        decorrelation: cell.decorrelation.clone(),
-        ran: Ran::default(),
         randomised: cell.randomised,
         replicate,
         seed,
@@ -555,7 +480,6 @@ fn error_record(
 fn bias_record(
     session: &Session,
     cell: &SamplerCell,
-    world: &World,
     images: &[Image],
     yardstick: &Yardstick,
 ) -> Result<BiasRecord, String> {
@@ -570,17 +494,12 @@ fn bias_record(
     let check = check_bias(images, yardstick.reference.parts(), options);
     let check = check.map_err(|e| e.to_string())?;
     let verdict = if cell.randomised {
-        check.verdict.to_string()
+        check.verdict
     } else {
-        "not-testable: the sampler is deterministic, its error is not noise".to_owned()
+        BiasVerdict::NotTestable("the sampler is deterministic, its error is not noise".to_owned())
     };
     let whole = check.whole.filter(|_| cell.randomised);
     Ok(BiasRecord {
-        scene: world.variant.label.clone(),
-        integrator: cell.integrator.clone(),
-        sequence: cell.sequence.clone(),
-        decorrelation: cell.decorrelation.clone(),
-        ran: Ran::default(),
         tiles: check.tiles,
         rejected: check.rejected.len(),
         alpha: check.alpha,

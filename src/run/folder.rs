@@ -8,8 +8,7 @@
 
 use super::RunError;
 use crate::atomic::write_atomic;
-use crate::measure::record::{InterruptedRecord, Line, Record, SCHEMA};
-use crate::report::read::{PARTIAL, RECORDS_FILE};
+use crate::measure::record::{Body, InterruptedRecord, Line, PARTIAL, RECORDS_FILE};
 use crate::stress::record::FILE as STRESS_FILE;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Seek as _, Write as _};
@@ -252,21 +251,17 @@ impl Folder {
     }
 
     /// Ends the run early: what was measured so far becomes the result, unless there are earlier ones,
-    /// beside which it stays in `partial/`. Writes the report.
+    /// beside which it stays in `partial/`.
     fn interrupt(&self, reason: &str) -> Interrupted {
         let mut records = self.records();
         if records.state != State::Open {
             return Interrupted::Finished;
         }
         records.state = State::Interrupted;
-        let line = Line {
-            schema: SCHEMA.to_owned(),
-            hash: String::new(),
-            record: Record::Interrupted(InterruptedRecord {
-                reason: reason.to_owned(),
-                wall_s: self.start.elapsed().as_secs_f64(),
-            }),
-        };
+        let line = Line::about_all(Body::Interrupted(InterruptedRecord {
+            reason: reason.to_owned(),
+            wall_s: self.start.elapsed().as_secs_f64(),
+        }));
         // Without this line (a full disk) the report says that the run did not end.
         if let Ok(text) = serde_json::to_string(&line) {
             let _ = self.append_to(&mut records, &format!("{text}\n"));
@@ -275,12 +270,7 @@ impl Folder {
             true => self.out.join(PARTIAL),
             false => self.out.clone(),
         };
-        drop(records);
-        let report = crate::report::write_report(&folder).map(|paths| paths.html);
-        Interrupted::Kept {
-            folder,
-            report: report.map_err(|error| error.to_string()),
-        }
+        Interrupted::Kept(folder)
     }
 }
 
@@ -291,13 +281,8 @@ pub enum Interrupted {
     NotBegun,
     /// It has ended already.
     Finished,
-    /// Its records are kept.
-    Kept {
-        /// The folder that holds them.
-        folder: PathBuf,
-        /// The report's page, or why there is none.
-        report: Result<PathBuf, String>,
-    },
+    /// Its records are kept in this folder.
+    Kept(PathBuf),
 }
 
 /// Ends a run early, from any thread, however long a step of the run takes: see [`Interrupt::now`].
@@ -305,8 +290,7 @@ pub enum Interrupted {
 pub struct Interrupt(Arc<Mutex<Weak<Folder>>>);
 
 impl Interrupt {
-    /// Keeps the records so far with a line that says `reason`, and writes the report; the run itself
-    /// ends with [`RunError::Interrupted`] at its next record.
+    /// Keeps the records so far with a line that says `reason`; the run itself ends with [`RunError::Interrupted`] at its next record.
     pub fn now(&self, reason: &str) -> Interrupted {
         let folder = self.begun().upgrade();
         folder.map_or(Interrupted::NotBegun, |folder| folder.interrupt(reason))
@@ -361,6 +345,19 @@ fn promote(out: &Path) -> io::Result<()> {
         }
     }
     fs::rename(partial.join(RECORDS_FILE), out.join(RECORDS_FILE))
+}
+
+/// Makes and locks a folder that something else than a run writes: until the file is dropped, `None` where
+/// the file system knows no locks.
+///
+/// # Errors
+/// A folder that cannot be written, or that is being written.
+pub fn lock_folder(out: &Path) -> Result<Option<File>, RunError> {
+    fs::create_dir_all(out).map_err(|error| unwritable(out, &error))?;
+    lock(out).map_err(|refusal| match refusal {
+        Refusal::Taken(reason) => RunError::Input(reason),
+        Refusal::Unwritable(error) => error,
+    })
 }
 
 fn lock(out: &Path) -> Result<Option<File>, Refusal> {

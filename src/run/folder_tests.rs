@@ -138,7 +138,7 @@ fn an_interrupted_run_takes_no_more_records() {
     assert_eq!(handle.now("too early"), Interrupted::NotBegun);
     let folder = Arc::new(Folder::open(dir.path(), Existing::Refuse).unwrap());
     handle.begin(&folder);
-    let Interrupted::Kept { folder: kept, .. } = handle.now("SIGINT") else {
+    let Interrupted::Kept(kept) = handle.now("SIGINT") else {
         panic!("nothing was kept");
     };
     assert_eq!(kept, dir.path());

@@ -11,7 +11,7 @@ use std::path::Path;
 /// # Errors
 /// The folder cannot be read, a file in it is no WESL, or no kernel could be made with it.
 pub fn kernel_library(folder: &Path, registries: &Registries) -> Result<KernelLibrary, RunError> {
-    let library = KernelLibrary::default().with_folder(folder);
+    let library = registries.library().with_folder(folder);
     let checked = library.and_then(|library| {
         library.check(&registries.kernels())?;
         Ok(library)
@@ -19,8 +19,11 @@ pub fn kernel_library(folder: &Path, registries: &Registries) -> Result<KernelLi
     checked.map_err(|e| RunError::Input(format!("kernels {}: {e}", folder.display())))
 }
 
-/// The libraries of an axis of kernels.
-pub struct Kernels(Vec<(Variant, KernelLibrary)>);
+/// The libraries of an axis of kernels, and that of the program with what was registered.
+pub struct Kernels {
+    embedded: KernelLibrary,
+    folders: Vec<(Variant, KernelLibrary)>,
+}
 
 impl Kernels {
     /// Reads and checks the folders; the variant of the empty name stands for the embedded kernels.
@@ -33,7 +36,10 @@ impl Kernels {
             let library = kernel_library(Path::new(&kernels.name), registries)?;
             Ok((kernels.clone(), library))
         };
-        folders.map(library).collect::<Result<_, _>>().map(Self)
+        Ok(Self {
+            embedded: registries.library(),
+            folders: folders.map(library).collect::<Result<_, RunError>>()?,
+        })
     }
 
     /// What is recorded of them.
@@ -48,7 +54,7 @@ impl Kernels {
                 .map(|name| file(library, name))
                 .collect(),
         };
-        self.0.iter().map(folder).collect()
+        self.folders.iter().map(folder).collect()
     }
 }
 
@@ -71,8 +77,8 @@ pub(super) struct Device {
 impl Device {
     /// Opens the adapter of the options.
     pub fn open(options: &RunOptions, kernels: &Kernels) -> Result<Self, RunError> {
-        let gpu = gpu::open(&options.adapter, KernelLibrary::default())?;
-        let views = kernels.0.iter();
+        let gpu = gpu::open(&options.adapter, kernels.embedded.clone())?;
+        let views = kernels.folders.iter();
         let views =
             views.map(|(kernels, library)| (kernels.clone(), gpu.with_kernels(library.clone())));
         let views = views.collect();

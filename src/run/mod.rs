@@ -1,10 +1,11 @@
 //! Running an experiment: the one place where all parts meet.
 //!
-//! config → scene → accel → gpu → integrator → measure → records; the report is made from the
-//! records alone.
+//! config → scene → accel → gpu → integrator → measure → records. Reports are made from the records alone,
+//! by others.
 
 mod errors;
 mod folder;
+mod images;
 mod kernels;
 mod registries;
 mod render;
@@ -16,7 +17,7 @@ mod trial;
 mod words;
 mod world;
 
-pub use folder::{Existing, Interrupt, Interrupted};
+pub use folder::{Existing, Interrupt, Interrupted, lock_folder};
 pub use kernels::{Kernels, kernel_library};
 pub use registries::Registries;
 pub use render::{Rendering, render};
@@ -35,7 +36,7 @@ use world::{Absent, World};
 /// What an experiment does not say.
 #[derive(Debug, Clone, Default)]
 pub struct RunOptions {
-    /// Folder for records, images and the report; made if missing.
+    /// Folder for records and images; made if missing.
     pub out: PathBuf,
     /// What to do where that folder holds results.
     pub existing: Existing,
@@ -64,14 +65,8 @@ pub struct RunSummary {
     pub skipped: usize,
     /// Whether a scene could not be loaded (exit code 2).
     pub bad_input: bool,
-    /// Checks of the report that failed, with what they found (exit code 1).
-    pub failed_checks: Vec<String>,
     /// Folder of the records.
     pub out: PathBuf,
-    /// The report's page.
-    pub report: Option<PathBuf>,
-    /// Tables for the terminal.
-    pub tables: String,
 }
 
 /// Why a run could not start or go on. A cell that fails is a record, not an error.
@@ -131,12 +126,12 @@ pub struct Verified {
     pub refused: bool,
 }
 
-/// Runs a plan, writes `records.jsonl`, images and the report to `options.out`, which another run
-/// cannot write meanwhile. Earlier results there stay until the run has ended.
+/// Runs a plan, writes `records.jsonl` and images to `options.out`, which another run cannot write
+/// meanwhile. Earlier results there stay until the run has ended.
 ///
 /// # Errors
 /// No adapter, kernels that cannot be read, or a folder that cannot be written or holds results; the
-/// records so far are kept, with a report.
+/// records so far are kept.
 pub fn run(
     experiment: &Experiment,
     plan: &Plan,
@@ -148,22 +143,17 @@ pub fn run(
     let mut session = Session::new(experiment, plan, registries, options)?;
     let out = measure(&mut session, device, &kernels).map_err(|error| {
         match options.interrupt.now(&error.to_string()) {
-            Interrupted::Kept { folder, .. } => RunError::EndedEarly {
+            Interrupted::Kept(folder) => RunError::EndedEarly {
                 folder,
                 source: Box::new(error),
             },
             _ => error,
         }
     })?;
-    let report = crate::report::write_report(&out).map_err(|e| RunError::Input(e.to_string()))?;
-    let lines = crate::report::read_records(&out).map_err(|e| RunError::Input(e.to_string()))?;
     Ok(RunSummary {
         failed: session.failed,
         skipped: session.skipped,
         bad_input: session.bad_input,
-        report: Some(report.html),
-        failed_checks: crate::report::failed_checks(&lines.lines),
-        tables: crate::report::terminal_tables(&lines.lines),
         out,
     })
 }
@@ -249,11 +239,11 @@ pub fn verify(
             let verdict = match &world {
                 Err(Absent::BadInput(reason) | Absent::NotKept(reason)) => Err(reason.clone()),
                 Ok(world) => match structures::build_and_gate(&mut session, world, cell)? {
-                    Ok((_, record)) => record.gate.ok_or_else(|| "no verdict".to_owned()),
+                    Ok((_, record)) => record.body.gate.ok_or_else(|| "no verdict".to_owned()),
                     Err(record) => {
-                        refused = record.refused;
-                        let reason = record.failure.unwrap_or_default();
-                        record.gate.ok_or(reason)
+                        refused = record.body.refused;
+                        let reason = record.body.failure.unwrap_or_default();
+                        record.body.gate.ok_or(reason)
                     }
                 },
             };

@@ -2,7 +2,8 @@
 
 use crate::accel::AccelRegistry;
 use crate::config::{Catalogue, SamplerCell};
-use crate::integrator::integrator_entries;
+use crate::gpu::KernelLibrary;
+use crate::integrator::IntegratorRegistry;
 use crate::params::Variant;
 use crate::sampling::SamplerRegistry;
 
@@ -13,6 +14,8 @@ pub struct Registries {
     pub accel: AccelRegistry,
     /// Sequences and decorrelations.
     pub samplers: SamplerRegistry,
+    /// Integrators.
+    pub integrators: IntegratorRegistry,
 }
 
 impl Registries {
@@ -23,13 +26,24 @@ impl Registries {
             accel: self.accel.entries(),
             sequence: self.samplers.sequence_entries(),
             decorrelation: self.samplers.decorrelation_entries(),
-            integrator: integrator_entries(),
+            integrator: self.integrators.entries(),
         }
     }
 
     /// Modules that a folder of kernels may bring for what is registered, beside those of the program.
     pub fn kernels(&self) -> Vec<String> {
         self.accel.iter().flat_map(|kind| kind.kernels()).collect()
+    }
+
+    /// The kernels of the program, and those that came with what was registered.
+    pub fn library(&self) -> KernelLibrary {
+        let sequences = self.samplers.sequences.defaults().map(|s| s.sources());
+        let decorrelations = self.samplers.decorrelations.defaults();
+        let decorrelations = decorrelations.map(|d| d.sources());
+        let integrators = self.integrators.iter().map(|i| i.sources());
+        let sources = sequences.chain(decorrelations).chain(integrators);
+        let sources: Vec<_> = sources.flatten().copied().collect();
+        KernelLibrary::default().with_sources(&sources)
     }
 
     /// Whether seeds change what this pair draws.

@@ -1,16 +1,15 @@
 //! One picture, for `raystone render`. Nothing is judged or recorded, so that the first picture is
 //! there at once; the structure is validated on the host.
 
-use super::errors::sampler_for;
+use super::images::Estimator;
 use super::kernels::{Device, Kernels};
 use super::session::Session;
 use super::{Registries, RunError, RunOptions};
 use crate::accel::{BuildLog, Intersection, TriangleSoup};
 use crate::config::{Experiment, Plan};
 use crate::gpu::{Gpu, probe_arithmetic};
-use crate::image::FileFormat;
-use crate::image::Image;
-use crate::integrator::{Frame, RayOffset, RenderJob, Renderer, SceneBuffers, Traced, integrator};
+use crate::image::{FileFormat, Image};
+use crate::integrator::{RayOffset, Renderer, SceneBuffers, Traced};
 use crate::params::Variant;
 use crate::scene::{self, LoadOptions, LoadReport, SceneData};
 use indicatif::ProgressStyle;
@@ -71,6 +70,10 @@ pub fn render(
         ..LoadOptions::default()
     };
     let scene = scene::load(&cell.scene, &load).map_err(input)?;
+    // That of the experiment, of the scene, or one that frames the scene.
+    let own = || scene.view(experiment.aspect());
+    let camera = experiment.camera.unwrap_or_else(own);
+    camera.validate().map_err(input)?;
     let device = Device::open(options, &kernels)?;
     let gpu = device.of(&cell.kernels)?;
     let (soup, offset) = tested_triangles(gpu, experiment, &scene)?;
@@ -82,20 +85,9 @@ pub fn render(
     session.say("compiling the kernel");
     let spp = experiment.spp.max();
     let pair = (&cell.sequence, &cell.decorrelation);
-    let sampler = sampler_for(&session, pair, &cell.integrator, spp).map_err(RunError::Input)?;
-    let integrator = integrator(&cell.integrator.name)
-        .ok_or_else(|| RunError::Input(format!("no integrator is called {}", cell.integrator)))?;
-    let job = RenderJob {
-        frame: frame(
-            experiment,
-            &scene,
-            integrator.ao_radius(&cell.integrator.params),
-        )?,
-        sampler: &sampler,
-        integrator,
-        params: &cell.integrator.params,
-        runtime_checks: true,
-    };
+    let estimator = Estimator::new(&session, pair, &cell.integrator, spp);
+    let estimator = estimator.map_err(RunError::Input)?;
+    let job = estimator.job(&session, camera, true);
     let renderer = Renderer::new(gpu, &buffers, &traced, &job, true)?;
     let mut rendering = Rendering {
         triangles: scene.triangles.len(),
@@ -159,27 +151,6 @@ fn build(
         .validate(soup)
         .map_err(|e| RunError::Wrong(format!("{accel} is not valid: {e}")))?;
     Ok(Traced::upload(gpu, &*built)?)
-}
-
-/// What is seen: the camera of the experiment, of the scene, or one that frames the scene.
-fn frame(
-    experiment: &Experiment,
-    scene: &SceneData,
-    ao_radius: Option<f64>,
-) -> Result<Frame, RunError> {
-    let bounds = scene.bounds();
-    let camera = experiment
-        .camera
-        .unwrap_or_else(|| scene.view(experiment.aspect()));
-    camera.validate().map_err(input)?;
-    let [width, height] = experiment.resolution;
-    let diagonal = f64::from(2.0 * bounds.radius());
-    Ok(Frame {
-        width,
-        height,
-        camera,
-        ao_radius: (ao_radius.unwrap_or(0.0) * diagonal) as f32,
-    })
 }
 
 /// Adds `spp` samples in steps of about [`STEP`]. `show` gets the image after the first, whenever the

@@ -6,9 +6,7 @@ use crate::config::{Experiment, Plan, REFERENCE_PARTS, Skipped};
 use crate::gpu::Environment;
 use crate::gpu::Gpu;
 use crate::image::{Picture, write_png};
-use crate::measure::record::{
-    FinishedRecord, KernelFolder, Line, Record, RunRecord, SCHEMA, SkippedRecord,
-};
+use crate::measure::record::{Body, FinishedRecord, KernelFolder, Line, RunRecord, SkippedRecord};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::{BTreeMap, HashSet};
 use std::path::PathBuf;
@@ -119,16 +117,11 @@ impl<'a> Session<'a> {
     }
 
     /// Appends one record as one whole line and flushes it to the disk.
-    pub fn write(&self, hash: &str, record: Record) -> Result<(), RunError> {
+    pub fn write(&self, line: &Line) -> Result<(), RunError> {
         let Some(folder) = &self.folder else {
             return Ok(());
         };
-        let line = Line {
-            schema: SCHEMA.to_owned(),
-            hash: hash.to_owned(),
-            record,
-        };
-        let mut text = serde_json::to_string(&line)
+        let mut text = serde_json::to_string(line)
             .map_err(|e| RunError::Input(format!("a record cannot be written: {e}")))?;
         text.push('\n');
         folder.append(&text)
@@ -137,13 +130,11 @@ impl<'a> Session<'a> {
     /// Tells what went wrong beside the measuring: now, and in the report.
     pub fn warn(&self, about: &str, reason: String) -> Result<(), RunError> {
         self.tell_warning(&format!("{about}: {reason}"));
-        self.write(
-            "",
-            Record::Warning(SkippedRecord {
-                cell: about.to_owned(),
-                reason,
-            }),
-        )
+        let cell = about.to_owned();
+        self.write(&Line::about_all(Body::Warning(SkippedRecord {
+            cell,
+            reason,
+        })))
     }
 
     /// Hands a warning on, above the progress bar.
@@ -172,7 +163,7 @@ impl<'a> Session<'a> {
             renders_planned: self.plan.renders_planned,
             kernels,
         };
-        self.write("", Record::Run(record))?;
+        self.write(&Line::about_all(Body::Run(record)))?;
         for skipped in &self.plan.skipped {
             self.write_skipped(skipped)?;
         }
@@ -186,7 +177,7 @@ impl<'a> Session<'a> {
             cell: skipped.cell.clone(),
             reason: skipped.reason.clone(),
         };
-        self.write("", Record::Skipped(record))
+        self.write(&Line::about_all(Body::Skipped(record)))
     }
 
     /// Records a cell that needs longer loops than the driver runs.
@@ -213,7 +204,7 @@ impl<'a> Session<'a> {
             skipped: self.skipped,
         };
         self.progress.finish_and_clear();
-        self.write("", Record::Finished(record))?;
+        self.write(&Line::about_all(Body::Finished(record)))?;
         let Some(folder) = &self.folder else {
             return Ok(self.options.out.clone());
         };
@@ -235,13 +226,11 @@ impl<'a> Session<'a> {
     pub fn write_failure(&mut self, cell: &str, reason: String) -> Result<(), RunError> {
         self.failed += 1;
         self.finish(cell.to_owned());
-        self.write(
-            "",
-            Record::Failed(SkippedRecord {
-                cell: cell.to_owned(),
-                reason,
-            }),
-        )
+        let cell = cell.to_owned();
+        self.write(&Line::about_all(Body::Failed(SkippedRecord {
+            cell,
+            reason,
+        })))
     }
 
     /// Shows what is being done.

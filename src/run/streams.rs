@@ -7,9 +7,8 @@ use super::session::Session;
 use crate::config::StreamCell;
 use crate::discrepancy::{Budget, PointSet, radial_spectrum, star_2d};
 use crate::gpu::Gpu;
-use crate::integrator::integrator;
 use crate::measure::record::{
-    PixelsAtCount, Ran, Record, RecordedPoints, SamplerCostRecord, StreamRecord,
+    Body, Key, Line, PixelsAtCount, Ran, RecordedPoints, SamplerCostRecord, StreamRecord, axis,
 };
 use crate::measure::sampler_cost::sampler_cost;
 use crate::measure::stream::{COPIES, SeedFigures, coverage, neighbour_angle, over_seeds};
@@ -62,9 +61,9 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
         session.lose_device_on_request(gpu, &cell.to_string());
         for pair in pairs(session, gpu, &cell)? {
             match stream_record(session, gpu, &cell, pair) {
-                Ok(record) => {
-                    let hash = stream_hash(&cell, &record.ran, &format!("{:?}", pair.dimensions));
-                    session.write(&hash, Record::Stream(record))?;
+                Ok((kernel, record)) => {
+                    let what = format!("{:?}", pair.dimensions);
+                    session.write(&line(&cell, kernel, &what, Body::Stream(record)))?;
                 }
                 Err(reason) => session
                     .write_failure(&format!("stream {cell}, {:?}", pair.dimensions), reason)?,
@@ -72,9 +71,8 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
         }
         if gpu.lost().is_none() {
             match cost_record(session, gpu, &cell) {
-                Ok(record) => {
-                    let hash = stream_hash(&cell, &record.ran, "cost");
-                    session.write(&hash, Record::SamplerCost(record))?;
+                Ok((kernel, record)) => {
+                    session.write(&line(&cell, kernel, "cost", Body::SamplerCost(record)))?;
                 }
                 Err(reason) => session.write_failure(&format!("cost of {cell}"), reason)?,
             }
@@ -127,11 +125,13 @@ fn worst_pair(
     gpu: &Gpu,
     cell: &StreamCell,
 ) -> Result<Option<([u32; 2], usize)>, String> {
-    let integrators = session.experiment.axes.integrator.iter();
-    let drawn = integrators
-        .filter_map(|v| Some(integrator(&v.name)?.dimension_pairs(&v.params)))
-        .flatten();
-    let candidates: Vec<[u32; 2]> = drawn.collect::<BTreeSet<_>>().into_iter().collect();
+    let mut drawn = BTreeSet::new();
+    for variant in &session.experiment.axes.integrator {
+        let integrator = session.registries.integrators.configured(variant);
+        let integrator = integrator.map_err(|e| e.to_string())?;
+        drawn.extend(integrator.facts.dimension_pairs());
+    }
+    let candidates: Vec<[u32; 2]> = drawn.into_iter().collect();
     let highest = candidates.iter().flatten().max().copied().unwrap_or(0);
     if candidates.len() < 2 {
         return Ok(None);
@@ -187,22 +187,19 @@ fn tapped(session: &Session, count: u32) -> Vec<(u32, u32)> {
 }
 
 /// What a stream ran with: no ray was traced.
-fn ran(cell: &StreamCell, kernel_hash: String) -> Ran {
-    Ran {
-        kernels: cell.kernels.kernels_label().to_owned(),
-        kernel_hash,
-        ..Ran::default()
-    }
-}
-
-fn stream_hash(cell: &StreamCell, ran: &Ran, what: &str) -> String {
+/// What was found of a stream, with the hash of the kernel that drew it.
+fn line(cell: &StreamCell, kernel_hash: String, what: &str, body: Body) -> Line {
     let sampler = serde_json::to_string(&(&cell.sequence, &cell.decorrelation));
-    cell_hash(&[
+    let hash = cell_hash(&[
         ("sampler", &sampler.unwrap_or_default()),
         ("what", what),
-        ("kernel", &ran.kernel_hash),
+        ("kernel", &kernel_hash),
         ("version", env!("CARGO_PKG_VERSION")),
-    ])
+    ]);
+    let key = Key::with_kernels(&cell.kernels)
+        .with_variant(axis::SEQUENCE, &cell.sequence)
+        .with_variant(axis::DECORRELATION, &cell.decorrelation);
+    Line::new(key, Ran::kernel(kernel_hash), body).hashed(hash)
 }
 
 fn stream_record(
@@ -210,7 +207,7 @@ fn stream_record(
     gpu: &Gpu,
     cell: &StreamCell,
     pair: Pair,
-) -> Result<StreamRecord, String> {
+) -> Result<(String, StreamRecord), String> {
     let settings = session.experiment.discrepancy.clone();
     let dimensions = pair.dimensions;
     let places = tapped(session, if cell.randomised { settings.seeds } else { 1 });
@@ -257,10 +254,7 @@ fn stream_record(
         true => Some(recorded_points(session, gpu, cell, dimensions, seed)?),
         false => None,
     };
-    Ok(StreamRecord {
-        sequence: cell.sequence.clone(),
-        decorrelation: cell.decorrelation.clone(),
-        ran: ran(cell, kernel_hash(gpu, &sets[0].0)?),
+    let record = StreamRecord {
         dimensions,
         purpose: pair_purpose(dimensions),
         named: pair.named,
@@ -271,7 +265,8 @@ fn stream_record(
         star,
         figures,
         points,
-    })
+    };
+    Ok((kernel_hash(gpu, &sets[0].0)?, record))
 }
 
 /// That pixels draw the same where no seed changes anything: one of them stands for all.
@@ -369,7 +364,7 @@ fn cost_record(
     session: &mut Session,
     gpu: &Gpu,
     cell: &StreamCell,
-) -> Result<SamplerCostRecord, String> {
+) -> Result<(String, SamplerCostRecord), String> {
     let pairs = session.experiment.discrepancy.pairs.iter().flatten();
     let highest = pairs.max().copied().unwrap_or(1).max(1);
     let sampler = sampler_of(
@@ -380,13 +375,11 @@ fn cost_record(
     )?;
     let cost = session.clock.time("gpu", || sampler_cost(gpu, &sampler));
     let cost = cost.map_err(|e| e.to_string())?;
-    Ok(SamplerCostRecord {
-        sequence: cell.sequence.clone(),
-        decorrelation: cell.decorrelation.clone(),
-        ran: ran(cell, cost.kernel_hash),
+    let record = SamplerCostRecord {
         ns_per_sample: cost.ns_per_sample,
         loop_ns_per_sample: cost.loop_ns_per_sample,
-    })
+    };
+    Ok((cost.kernel_hash, record))
 }
 
 /// The sampler of a stream for so many samples, with dimensions up to `highest`.

@@ -15,7 +15,7 @@ use crate::measure::gate::{fault_text, gate, timed_fault};
 use crate::measure::memory::peak_bytes;
 use crate::measure::rays::{RaySet, primary_pixels, primary_rays};
 use crate::measure::record::{
-    ClassTiming, CountersPerRay, GateVerdict, Ran, Record, StructureRecord,
+    Body, ClassTiming, CountersPerRay, GateVerdict, Key, Line, Ran, StructureRecord, axis,
 };
 use crate::measure::timing::{
     Measured, Watch, empty_ms, interleave, millions_per_second, without_overhead,
@@ -31,8 +31,7 @@ pub(super) struct Gated {
     pub runtime_checks: bool,
     /// Million primary and bounce rays per second, for choosing the fastest.
     pub speed: f64,
-    record: StructureRecord,
-    hash: String,
+    record: Line<StructureRecord>,
     /// Counted cost of every pixel's primary ray.
     costs: Vec<f32>,
 }
@@ -42,15 +41,21 @@ struct Built {
     traced: Traced,
     /// What `validate` says.
     structural: Option<String>,
-    record: StructureRecord,
+    record: Line<StructureRecord>,
 }
+
+/// What a build came to, or the record alone of one that failed.
+type Tried = Result<Built, Box<Line<StructureRecord>>>;
+
+/// A structure with its record, or the record alone of one that failed.
+type Outcome = Result<(Traced, Line<StructureRecord>), Box<Line<StructureRecord>>>;
 
 /// Builds, validates, uploads and gates one structure.
 pub(super) fn build_and_gate(
     session: &mut Session,
     world: &World,
     cell: &StructureCell,
-) -> Result<Result<(Traced, StructureRecord), Box<StructureRecord>>, RunError> {
+) -> Result<Outcome, RunError> {
     match build(session, world, cell) {
         Ok(built) => gate_with(session, world, &built, cell),
         Err(record) => Ok(Err(record)),
@@ -58,24 +63,20 @@ pub(super) fn build_and_gate(
 }
 
 /// Builds, validates and uploads: what does not depend on kernels.
-fn build(
-    session: &mut Session,
-    world: &World,
-    cell: &StructureCell,
-) -> Result<Built, Box<StructureRecord>> {
+fn build(session: &mut Session, world: &World, cell: &StructureCell) -> Tried {
     let accel = &cell.accel;
     let mut record = empty_record(world, cell, session.experiment.runtime_checks);
     let Some(kind) = session.registries.accel.get(&accel.name) else {
-        record.failure = Some(format!("no structure is called {accel}"));
+        record.body.failure = Some(format!("no structure is called {accel}"));
         return Err(Box::new(record));
     };
     let mut log = BuildLog::default();
     let (built, peak) = session.clock.time("build", || {
         peak_bytes(|| kind.build(&world.soup, &accel.params, &mut log))
     });
-    record.build_peak_bytes = peak;
-    record.build_ms = log.total_ms();
-    record.build = log.phases;
+    record.body.build_peak_bytes = peak;
+    record.body.build_ms = log.total_ms();
+    record.body.build = log.phases;
     let updated = built.and_then(|mut built| {
         let update_ms = session
             .clock
@@ -84,16 +85,16 @@ fn build(
     });
     let built = match updated {
         Ok((built, update_ms)) => {
-            record.update_ms = update_ms;
+            record.body.update_ms = update_ms;
             built
         }
         Err(error) => {
-            record.failure = Some(error.to_string());
+            record.body.failure = Some(error.to_string());
             return Err(Box::new(record));
         }
     };
-    record.space = built.space();
-    record.stats = built.stats();
+    record.body.space = built.space();
+    record.body.stats = built.stats();
     let structural = session
         .clock
         .time("gate", || built.validate(&world.soup))
@@ -102,7 +103,7 @@ fn build(
     let traced = match Traced::upload(world.gpu, &*built) {
         Ok(traced) => traced,
         Err(error) => {
-            record.failure = Some(error.to_string());
+            record.body.failure = Some(error.to_string());
             return Err(Box::new(record));
         }
     };
@@ -119,12 +120,11 @@ fn gate_with(
     world: &World,
     built: &Built,
     cell: &StructureCell,
-) -> Result<Result<(Traced, StructureRecord), Box<StructureRecord>>, RunError> {
+) -> Result<Outcome, RunError> {
     let gpu = world.device.of(&cell.kernels)?;
     let traced = built.traced.clone();
     let mut record = built.record.clone();
-    record.accel = cell.accel.clone();
-    record.ran = world.ran(&cell.kernels, String::new());
+    record.key = key(world, cell);
     let checks = session.experiment.runtime_checks;
     let gated = session.clock.time("gate", || {
         let verdict = gate_twice(checks, world, gpu, &traced)?;
@@ -132,8 +132,8 @@ fn gate_with(
     });
     match gated {
         Err(error) => {
-            record.refused = error.is_refusal();
-            record.failure = Some(error.to_string());
+            record.body.refused = error.is_refusal();
+            record.body.failure = Some(error.to_string());
         }
         Ok((mut verdict, hash)) => {
             record.ran.kernel_hash = hash;
@@ -146,12 +146,12 @@ fn gate_with(
             }
             if !verdict.passed {
                 let judge_fault = world.judge.of(traced.space).first_wrong.as_deref();
-                record.failure = Some(fault_text(&verdict, judge_fault));
+                record.body.failure = Some(fault_text(&verdict, judge_fault));
             }
-            record.gate = Some(verdict);
+            record.body.gate = Some(verdict);
         }
     }
-    Ok(match record.failure {
+    Ok(match record.body.failure {
         Some(_) => Err(Box::new(record)),
         None => Ok((traced, record)),
     })
@@ -205,14 +205,21 @@ fn gate_twice(
     }
 }
 
-fn empty_record(world: &World, cell: &StructureCell, runtime_checks: bool) -> StructureRecord {
-    StructureRecord {
+fn key(world: &World, cell: &StructureCell) -> Key {
+    (world.key(&cell.kernels)).with_variant(axis::ACCEL, &cell.accel)
+}
+
+fn empty_record(
+    world: &World,
+    cell: &StructureCell,
+    runtime_checks: bool,
+) -> Line<StructureRecord> {
+    let ran = Ran {
+        unchecked: !runtime_checks,
+        ..Ran::default()
+    };
+    let record = StructureRecord {
         refused: false,
-        scene: world.variant.label.clone(),
-        accel: cell.accel.clone(),
-        ran: world.ran(&cell.kernels, String::new()),
-        features: Vec::new(),
-        runtime_checks,
         space: Space::World,
         build: Vec::new(),
         build_ms: 0.0,
@@ -224,7 +231,8 @@ fn empty_record(world: &World, cell: &StructureCell, runtime_checks: bool) -> St
         heat_map: None,
         heat_map_max: None,
         failure: None,
-    }
+    };
+    Line::new(key(world, cell), ran, record)
 }
 
 /// A ray class through a structure, measured.
@@ -264,7 +272,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
         .collect();
     let mut gated = Vec::new();
     // The last structure that was built: it serves all kernels.
-    let mut last: Option<(StructureCell, Result<Built, Box<StructureRecord>>)> = None;
+    let mut last: Option<(StructureCell, Tried)> = None;
     for cell in cells {
         if session.is_done(&cell.to_string()) && !session.is_done(&passed(&cell)) {
             continue;
@@ -281,20 +289,18 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
         };
         let outcome = match &built {
             Ok(built) => gate_with(session, world, built, &cell)?,
-            Err(record) => Err(Box::new(StructureRecord {
-                accel: cell.accel.clone(),
-                ran: world.ran(&cell.kernels, String::new()),
-                ..StructureRecord::clone(record)
+            Err(record) => Err(Box::new(Line {
+                key: key(world, &cell),
+                ..Line::clone(record)
             })),
         };
         match outcome {
             Ok((traced, record)) => gated.push(Gated {
-                hash: structure_hash(world, &cell, &record.ran),
-                runtime_checks: record.runtime_checks,
-                cell: cell.clone(),
+                runtime_checks: !record.ran.unchecked,
                 traced,
                 speed: 0.0,
-                record,
+                record: hashed(world, &cell, record),
+                cell: cell.clone(),
                 costs: Vec::new(),
             }),
             Err(record) => write_failed(session, world, &cell, *record)?,
@@ -311,7 +317,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
     for structure in &gated {
         let cell = structure.cell.to_string();
         if !session.is_done(&cell) {
-            session.write(&structure.hash, Record::Structure(structure.record.clone()))?;
+            session.write(&structure.record.clone().with_body(Body::Structure))?;
             session.finish(cell);
             session.finish(passed(&structure.cell));
         }
@@ -328,30 +334,34 @@ fn is_same_structure(a: &StructureCell, b: &StructureCell) -> bool {
     a.accel.name == b.accel.name && a.accel.params == b.accel.params
 }
 
-fn structure_hash(world: &World, cell: &StructureCell, ran: &Ran) -> String {
+fn hashed(
+    world: &World,
+    cell: &StructureCell,
+    record: Line<StructureRecord>,
+) -> Line<StructureRecord> {
     let params = serde_json::to_string(&cell.accel).unwrap_or_default();
-    cell_hash(&[
+    let hash = cell_hash(&[
         ("scene", &world.scene.hash),
         ("accel", &params),
         ("intersection", &format!("{:?}", world.soup.intersection)),
-        ("kernel", &ran.kernel_hash),
+        ("kernel", &record.ran.kernel_hash),
         ("version", env!("CARGO_PKG_VERSION")),
-    ])
+    ]);
+    record.hashed(hash)
 }
 
 fn write_failed(
     session: &mut Session,
     world: &World,
     cell: &StructureCell,
-    record: StructureRecord,
+    record: Line<StructureRecord>,
 ) -> Result<(), RunError> {
-    if record.refused {
-        return session.write_refused(cell.to_string(), record.failure.unwrap_or_default());
+    if record.body.refused {
+        return session.write_refused(cell.to_string(), record.body.failure.unwrap_or_default());
     }
     session.failed += 1;
     session.finish(cell.to_string());
-    let hash = structure_hash(world, cell, &record.ran);
-    session.write(&hash, Record::Structure(record))
+    session.write(&hashed(world, cell, record).with_body(Body::Structure))
 }
 
 /// Records the structure under which the device was lost; the others get their turn on a new one.
@@ -364,7 +374,7 @@ fn fail_lost(
 ) -> Result<(), RunError> {
     let mut lost = gated.swap_remove(structure);
     gated.clear();
-    lost.record.failure = Some(error.to_string());
+    lost.record.body.failure = Some(error.to_string());
     write_failed(session, world, &lost.cell, lost.record)
 }
 
@@ -444,21 +454,22 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
             }))
         });
         match (outcome, fault) {
-            (Ok(timing), None) => structure.record.timings.extend(timing),
+            (Ok(timing), None) => structure.record.body.timings.extend(timing),
             (Ok(_), Some(fault)) => failures[item.structure] = Some(fault),
             (Err(error), _) => failures[item.structure] = Some(error.to_string()),
         }
-        structure.record.features = item.batch.features();
+        structure.record.ran.features = item.batch.features();
     }
     let mut kept = Vec::new();
     for (mut structure, failure) in gated.drain(..).zip(failures) {
         if let Some(failure) = failure {
-            structure.record.failure = Some(failure);
-            structure.record.timings.clear();
+            structure.record.body.failure = Some(failure);
+            structure.record.body.timings.clear();
             write_failed(session, world, &structure.cell.clone(), structure.record)?;
         } else {
             structure.speed = structure
                 .record
+                .body
                 .timings
                 .iter()
                 .map(|t| t.mrays_s.value.ln())
@@ -524,8 +535,8 @@ fn draw_heat_maps(
             pixels: structure.costs.iter().map(|c| viridis(c / scale)).collect(),
         };
         let names = ["heat", &world.variant.label, &structure.cell.accel.label];
-        structure.record.heat_map = session.picture(&names, &picture)?;
-        structure.record.heat_map_max = Some(f64::from(scale));
+        structure.record.body.heat_map = session.picture(&names, &picture)?;
+        structure.record.body.heat_map_max = Some(f64::from(scale));
     }
     Ok(())
 }

@@ -1,20 +1,19 @@
 //! Time of full cells, at few samples per pixel, in interleaved rounds; and the proof by hash that
 //! every structure gives the same image.
 
-use super::errors::{image_hash, job, sampler_for};
+use super::RunError;
+use super::errors::image_hash;
+use super::images::Estimator;
 use super::session::Session;
 use super::structures::Gated;
 use super::world::World;
-use super::{RunError, words};
 use crate::accel::Space;
 use crate::config::TimeCell;
-use crate::gpu::{Elapsed, Gpu, GpuError};
+use crate::gpu::{Elapsed, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
-use crate::measure::record::{Record, TimeRecord};
+use crate::measure::record::{Body, Line, Ran, TimeRecord, axis};
 use crate::measure::statistics::median_interval;
 use crate::measure::timing::{Measured, Samples, Watch, interleave};
-use crate::params::Variant;
-use crate::sampling::Sampler;
 use crate::text::cell_hash;
 use std::collections::BTreeMap;
 
@@ -68,7 +67,6 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         if session.is_done(&text) {
             continue;
         }
-        let gpu = world.device.of(&cell.kernels)?;
         let Some(structure) = gated.iter().find(|g| g.cell.accel == cell.accel) else {
             if let Some(reason) = refusal(session, &cell) {
                 session.write_refused(text, reason)?;
@@ -82,12 +80,12 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             );
             session.failed += 1;
             session.finish(text);
-            session.write("", Record::Time(record))?;
+            session.write(&record.with_body(Body::Time))?;
             continue;
         };
         session.say(format!("{cell}: compiling"));
         session.lose_device_on_request(world.gpu, &text);
-        match compile(session, world, gpu, structure, cell.clone()) {
+        match compile(session, world, structure, cell.clone()) {
             Ok(item) => timed.push(item),
             Err(reason) => fail(session, world, &cell, reason)?,
         }
@@ -133,16 +131,16 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
                     ("scene", &world.scene.hash),
                     (
                         "cell",
-                        &serde_json::to_string(&(&record.accel, &record.integrator))
+                        &serde_json::to_string(&(&item.cell.accel, &item.cell.integrator))
                             .unwrap_or_default(),
                     ),
                     ("kernel", item.renderer.kernel_text()),
                     ("device", &format!("{:?}", world.gpu.info)),
                     ("version", env!("CARGO_PKG_VERSION")),
                 ]);
-                session.failed += usize::from(record.failure.is_some());
+                session.failed += usize::from(record.body.failure.is_some());
                 session.finish(item.cell.to_string());
-                session.write(&hash, Record::Time(record))?;
+                session.write(&record.hashed(hash).with_body(Body::Time))?;
             }
             Err(reason) => fail(session, world, &item.cell, reason)?,
         }
@@ -160,35 +158,34 @@ fn refusal(session: &Session, cell: &TimeCell) -> Option<String> {
 
 /// Timed are the first samples of the set whose error is measured last: how near the rays of
 /// neighbouring pixels lie may depend on how many there are.
-fn sampler_of(session: &Session, cell: &TimeCell) -> Result<Sampler, String> {
+fn renderer<'a>(
+    session: &mut Session,
+    world: &'a World,
+    structure: &Gated,
+    cell: &TimeCell,
+    checks_and_counts: [bool; 2],
+) -> Result<Renderer<'a>, String> {
     let experiment = &session.experiment;
     let samples = experiment.spp.max().max(experiment.timing.spp);
     let pair = (&cell.sequence, &cell.decorrelation);
-    sampler_for(session, pair, &cell.integrator, samples)
+    let seeds = experiment.seeds().replicates;
+    let estimator = Estimator::new(session, pair, &cell.integrator, samples)?;
+    let with = (&cell.kernels, &structure.traced);
+    estimator.renderer(session, world, with, &seeds, checks_and_counts)
 }
 
 fn compile<'a>(
     session: &mut Session,
     world: &'a World,
-    gpu: &'a Gpu,
     structure: &Gated,
     cell: TimeCell,
 ) -> Result<Timed<'a>, String> {
-    let sampler = sampler_of(session, &cell)?;
-    let seeds = session.experiment.seeds().replicates;
-    words::check(session, gpu, &sampler, &seeds)?;
     let checks = structure.runtime_checks;
-    let job = job(session, world, &sampler, &cell.integrator, checks)?;
-    let compiled = session.clock.time("gpu", || {
-        Renderer::new(gpu, &world.buffers, &structure.traced, &job, false)
-    });
-    let renderer = compiled.map_err(|e| e.to_string())?;
-    let (spp, seed) = (session.experiment.timing.spp, session.experiment.seed);
     Ok(Timed {
+        renderer: renderer(session, world, structure, &cell, [checks, false])?,
         cell,
-        renderer,
-        spp,
-        seed,
+        spp: session.experiment.timing.spp,
+        seed: session.experiment.seed,
         runtime_checks: checks,
         space: structure.traced.space,
         watch: Watch::default(),
@@ -203,7 +200,7 @@ fn finish(
     item: &Timed,
     samples: Samples,
     shared: &mut Shared,
-) -> Result<TimeRecord, String> {
+) -> Result<Line<TimeRecord>, String> {
     let hash = image_hash(&item.renderer.image().map_err(|e| e.to_string())?);
     let key = key(&item.cell, item.space);
     let (rays, first) = match shared.get(&key) {
@@ -234,7 +231,8 @@ fn finish(
         faults.push(text.to_owned());
     }
     let failure = (!faults.is_empty()).then(|| faults.join("; "));
-    let mut record = empty_record(session, world, &item.cell, String::new());
+    let mut line = empty_record(session, world, &item.cell, String::new());
+    let record = &mut line.body;
     record.failure = failure;
     if record.failure.is_none() {
         record.ms_per_spp = median_interval(&per_spp);
@@ -250,10 +248,12 @@ fn finish(
         .collect();
     record.image_hash = hash;
     record.image_equal = equal;
-    record.runtime_checks = item.runtime_checks;
-    record.features = item.renderer.features();
-    record.ran.kernel_hash = item.renderer.kernel_hash();
-    Ok(record)
+    line.ran = Ran {
+        kernel_hash: item.renderer.kernel_hash(),
+        features: item.renderer.features(),
+        unchecked: !item.runtime_checks,
+    };
+    Ok(line)
 }
 
 /// Rays per class, from a separate counting run of the same seed, and the hash of its image.
@@ -263,12 +263,8 @@ fn count_rays(
     structure: &Gated,
     item: &Timed,
 ) -> Result<([u64; 4], String), String> {
-    let sampler = sampler_of(session, &item.cell)?;
-    let job = job(session, world, &sampler, &item.cell.integrator, true)?;
-    let gpu = world.device.of(&item.cell.kernels);
-    let gpu = gpu.map_err(|e| e.to_string())?;
+    let renderer = renderer(session, world, structure, &item.cell, [true, true])?;
     let counted = session.clock.time("gpu", || {
-        let renderer = Renderer::new(gpu, &world.buffers, &structure.traced, &job, true)?;
         renderer.reset();
         renderer.add_samples(0, item.spp, item.seed)?;
         Ok((renderer.ray_counts()?, image_hash(&renderer.image()?)))
@@ -276,15 +272,22 @@ fn count_rays(
     counted.map_err(|e: GpuError| e.to_string())
 }
 
-fn empty_record(session: &Session, world: &World, cell: &TimeCell, failure: String) -> TimeRecord {
-    let label = |v: &Variant| v.clone();
-    TimeRecord {
-        scene: world.variant.label.clone(),
-        accel: label(&cell.accel),
-        ran: world.ran(&cell.kernels, String::new()),
-        sequence: label(&cell.sequence),
-        decorrelation: label(&cell.decorrelation),
-        integrator: label(&cell.integrator),
+fn empty_record(
+    session: &Session,
+    world: &World,
+    cell: &TimeCell,
+    failure: String,
+) -> Line<TimeRecord> {
+    let key = (world.key(&cell.kernels))
+        .with_variant(axis::ACCEL, &cell.accel)
+        .with_variant(axis::SEQUENCE, &cell.sequence)
+        .with_variant(axis::DECORRELATION, &cell.decorrelation)
+        .with_variant(axis::INTEGRATOR, &cell.integrator);
+    let ran = Ran {
+        unchecked: !session.experiment.runtime_checks,
+        ..Ran::default()
+    };
+    let record = TimeRecord {
         resolution: session.experiment.resolution,
         spp: session.experiment.timing.spp,
         ms: Vec::new(),
@@ -294,10 +297,9 @@ fn empty_record(session: &Session, world: &World, cell: &TimeCell, failure: Stri
         mrays_s: None,
         image_hash: String::new(),
         image_equal: false,
-        runtime_checks: session.experiment.runtime_checks,
-        features: Vec::new(),
         failure: Some(failure),
-    }
+    };
+    Line::new(key, ran, record)
 }
 
 fn fail(
@@ -309,5 +311,5 @@ fn fail(
     session.failed += 1;
     session.finish(cell.to_string());
     let record = empty_record(session, world, cell, reason);
-    session.write("", Record::Time(record))
+    session.write(&record.with_body(Body::Time))
 }

@@ -8,7 +8,7 @@ use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu};
 use crate::integrator::{RayOffset, SceneBuffers};
 use crate::measure::gate::Judge;
-use crate::measure::record::{Ran, Record, SceneRecord};
+use crate::measure::record::{Body, Key, Line, Ran, SceneRecord, axis};
 use crate::params::Variant;
 use crate::scene::{self, LoadOptions, SceneData};
 use std::time::Instant;
@@ -75,10 +75,9 @@ impl<'a> World<'a> {
             for line in scene.report.lines() {
                 session.tell_warning(&format!("{variant}: {line}"));
             }
-            session.write(
-                &scene.hash,
-                Record::Scene(scene_record(variant, &scene, camera, load_ms)),
-            )?;
+            let key = Key::default().with_variant(axis::SCENE, variant);
+            let record = Body::Scene(scene_record(&scene, camera, load_ms));
+            session.write(&Line::new(key, Ran::default(), record).hashed(&scene.hash))?;
             session.finish(cell);
         }
         session.say(format!("{variant}: checking the judge"));
@@ -131,23 +130,20 @@ impl<'a> World<'a> {
         })())
     }
 
-    /// What something ran with on this scene.
-    pub fn ran(&self, kernels: &Variant, kernel_hash: String) -> Ran {
+    /// What everything on this scene has in common, with these kernels.
+    pub fn key(&self, kernels: &Variant) -> Key {
         let tests = self.soup.intersection;
-        Ran {
-            kernels: kernels.kernels_label().to_owned(),
-            kernel_hash,
-            triangle: tests.triangle.name().to_owned(),
-            box_test: tests.box_test.name().to_owned(),
-            offset: self.buffers.offset.name().to_owned(),
-        }
+        Key::with_kernels(kernels)
+            .with_variant(axis::SCENE, self.variant)
+            .with(axis::TRIANGLE, tests.triangle.name())
+            .with(axis::BOX_TEST, tests.box_test.name())
+            .with(axis::OFFSET, self.buffers.offset.name())
     }
 }
 
-fn scene_record(variant: &Variant, scene: &SceneData, camera: Camera, load_ms: f64) -> SceneRecord {
+fn scene_record(scene: &SceneData, camera: Camera, load_ms: f64) -> SceneRecord {
     let bounds = scene.bounds();
     SceneRecord {
-        scene: variant.label.clone(),
         triangles: scene.triangles.len(),
         bounds_min: bounds.min.to_array(),
         bounds_max: bounds.max.to_array(),

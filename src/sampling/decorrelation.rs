@@ -57,6 +57,10 @@ pub trait Decorrelation: Send + Sync {
     fn description(&self) -> &'static str;
     /// Module of the kernel, relative to the kernel folder.
     fn kernel(&self) -> &'static str;
+    /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
+    fn sources(&self) -> &'static [(&'static str, &'static str)] {
+        &[]
+    }
     /// Whether pixels draw different numbers from it.
     fn seeding(&self) -> Seeding {
         Seeding::PixelSample

@@ -47,6 +47,7 @@ impl Material {
 }
 
 /// What a loader knows of a scene besides its triangles.
+#[derive(Default)]
 pub(super) struct Look {
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,

@@ -54,6 +54,17 @@ impl Bounds {
 }
 
 impl Camera {
+    /// Unit viewing direction, and half the plane of an image of so many pixels at distance 1, to the right
+    /// and upwards.
+    pub fn basis(&self, [width, height]: [u32; 2]) -> [Vec3; 3] {
+        let forward = (self.target - self.eye).normalize();
+        let right = forward.cross(self.up).normalize();
+        let up = right.cross(forward);
+        let half_height = (0.5 * self.vertical_fov_degrees.to_radians()).tan();
+        let half_width = half_height * width as f32 / height as f32;
+        [forward, right * half_width, up * half_height]
+    }
+
     /// Checks that the camera defines an image.
     ///
     /// # Errors
@@ -99,12 +110,7 @@ mod tests {
 
     #[test]
     fn cameras_that_see_nothing_are_refused() {
-        let good = Camera {
-            eye: Vec3::ONE,
-            target: Vec3::ZERO,
-            up: Vec3::Y,
-            vertical_fov_degrees: 40.0,
-        };
+        let good = Camera::upright(Vec3::ONE, Vec3::ZERO, 40.0);
         good.validate().unwrap();
         let bad: [fn(&mut Camera); 7] = [
             |c| c.vertical_fov_degrees = 0.0,

@@ -129,6 +129,16 @@ pub(super) fn open(path: &Path) -> Result<std::fs::File, SceneError> {
     Ok(file)
 }
 
+/// The bytes of a model that is read whole.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, SceneError> {
+    let mut bytes = Vec::new();
+    let read = open(path)?.read_to_end(&mut bytes);
+    read.map(|_| bytes).map_err(|source| SceneError::Read {
+        path: path.to_owned(),
+        source,
+    })
+}
+
 /// Opens a regular file, and tells its length in bytes. Folders are none, nor are devices and pipes,
 /// which may have no end.
 fn open_regular(path: &Path) -> std::io::Result<(std::fs::File, u64)> {

@@ -2,7 +2,7 @@
 //! mesh, the scene also says which triangles are copies of which object.
 
 use super::builder::{Look, SceneBuilder};
-use super::error::{guarded, open, read_regular};
+use super::error::{self, guarded};
 use super::gltf_accessor::check_accessors;
 use super::gltf_container;
 use super::gltf_files::Files;
@@ -24,11 +24,7 @@ pub(super) fn load(
     name: &str,
     options: &LoadOptions,
 ) -> Result<SceneData, SceneError> {
-    open(path)?;
-    let bytes = read_regular(path).map_err(|source| SceneError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
+    let bytes = error::read(path)?;
     guarded(path, || {
         let (json, blob) = gltf_container::split(&bytes).map_err(|(byte, problem)| {
             SceneError::malformed(path, format!("byte {byte}"), problem)
@@ -117,7 +113,7 @@ fn build(
         materials: palette.materials,
         textures,
         camera,
-        environment: Vec3::ZERO,
+        ..Look::default()
     };
     builder.finish(name, look)
 }

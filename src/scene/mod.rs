@@ -20,8 +20,6 @@ mod instances;
 mod mtl;
 mod obj;
 mod ply;
-#[cfg(test)]
-mod tests;
 mod text;
 mod texture;
 

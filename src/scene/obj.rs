@@ -1,14 +1,13 @@
 //! Wavefront OBJ by `tobj`; materials are in [`super::mtl`].
 
 use super::builder::{DEFAULT_ALBEDO, Look, SceneBuilder};
-use super::error::{guarded, open, panic_text, read_regular};
+use super::error::{self, guarded, panic_text};
 use super::text::normalised;
 use super::texture::decode_all;
 use super::{LoadOptions, Material, SceneData, SceneError, mtl};
 use glam::{Vec2, Vec3};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use tobj::LoadError;
 
 /// Separate indices: no vertex is duplicated, and `tobj` keeps no map over index triples.
 const OPTIONS: tobj::LoadOptions = tobj::LoadOptions {
@@ -27,18 +26,14 @@ pub(super) fn load(
     name: &str,
     options: &LoadOptions,
 ) -> Result<SceneData, SceneError> {
-    open(path)?;
-    let bytes = read_regular(path).map_err(|source| SceneError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
+    let bytes = error::read(path)?;
     guarded(path, || {
         let text = normalised(bytes);
         let library = mtl::Library::new(path, options);
         let models = read(&text, &library).map_err(|failure| {
             let (place, problem) = match first_broken_line(&text) {
                 Some((line, problem)) => (format!("line {line}"), problem),
-                None => (String::new(), failure.to_string()),
+                None => (String::new(), failure),
             };
             SceneError::malformed(path, place, problem)
         })?;
@@ -50,22 +45,14 @@ pub(super) fn load(
     })
 }
 
-/// How `tobj` ends without a model.
-#[derive(Debug, thiserror::Error)]
-enum Failure {
-    #[error("{0}")]
-    Refused(LoadError),
-    /// It multiplies indices before it compares them with what there is.
-    #[error("{0}")]
-    Panicked(String),
-}
-
-fn read(text: &str, library: &mtl::Library) -> Result<Vec<tobj::Model>, Failure> {
+/// The models, or what `tobj` says or panics with: it multiplies indices before it compares them with
+/// what there is.
+fn read(text: &str, library: &mtl::Library) -> Result<Vec<tobj::Model>, String> {
     let load = || tobj::load_obj_buf(&mut text.as_bytes(), &OPTIONS, |file| library.load(file));
     match catch_unwind(AssertUnwindSafe(load)) {
         Ok(Ok((models, _))) => Ok(models),
-        Ok(Err(error)) => Err(Failure::Refused(error)),
-        Err(payload) => Err(Failure::Panicked(panic_text(payload.as_ref()))),
+        Ok(Err(error)) => Err(error.to_string()),
+        Err(payload) => Err(panic_text(payload.as_ref())),
     }
 }
 
@@ -115,8 +102,7 @@ fn build(
     let look = Look {
         materials,
         textures,
-        camera: None,
-        environment: Vec3::ZERO,
+        ..Look::default()
     };
     builder.finish(name, look)
 }

@@ -39,11 +39,22 @@ pub fn default_params(kind: &dyn AccelKind) -> Params {
 /// # Errors
 /// What it refuses or violates, in words.
 pub fn build(kind: &dyn AccelKind, soup: &TriangleSoup) -> Result<Box<dyn BuiltAccel>, String> {
-    let built = kind.build(soup, &default_params(kind), &mut BuildLog::default());
+    build_with(kind, &default_params(kind), soup)
+}
+
+/// The same with these parameters.
+///
+/// # Errors
+/// As for [`build`].
+pub fn build_with(
+    kind: &dyn AccelKind,
+    params: &Params,
+    soup: &TriangleSoup,
+) -> Result<Box<dyn BuiltAccel>, String> {
+    let built = kind.build(soup, params, &mut BuildLog::default());
     let built = built.map_err(|e| format!("not built: {e}"))?;
-    built
-        .validate(soup)
-        .map_err(|e| format!("not valid: {e}"))?;
+    let checked = built.validate(soup);
+    checked.map_err(|e| format!("not valid: {e}"))?;
     Ok(built)
 }
 

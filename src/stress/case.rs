@@ -26,6 +26,9 @@ pub enum Truth {
     Miss,
 }
 
+/// A mesh at a place.
+pub type MakeMesh = fn(&Place) -> Mesh;
+
 /// A scene with rays.
 pub struct Case {
     /// Family that it belongs to.
@@ -111,20 +114,32 @@ impl Random {
         DVec3::new(radius * cos, radius * sin, z)
     }
 
-    /// A point of a triangle's plane, inside it.
-    pub fn on(&mut self, [a, b, c]: [Vec3; 3]) -> DVec3 {
+    /// A point of a triangle's plane, inside it, rounded.
+    pub fn on(&mut self, triangle: &Triangle) -> Vec3 {
         let root = self.unit().sqrt();
         let v = self.unit();
-        let [a, b, c] = [a, b, c].map(|p| p.as_dvec3());
-        a + (b - a) * (root * (1.0 - v)) + (c - a) * (root * v)
+        let [a, b, c] = triangle.vertices.map(|p| p.as_dvec3());
+        (a + (b - a) * (root * (1.0 - v)) + (c - a) * (root * v)).as_vec3()
     }
-}
 
-impl Random {
+    /// A point of an edge, as near as f32 comes.
+    pub fn on_edge(&mut self, triangle: &Triangle) -> Vec3 {
+        let k = self.below(3);
+        let [a, b] = [k, (k + 1) % 3].map(|k| triangle.vertices[k].as_dvec3());
+        // Middles are points of f32 more often than others.
+        let share = if self.below(4) == 0 { 0.5 } else { self.unit() };
+        (a + (b - a) * share).as_vec3()
+    }
+
+    /// A corner of a triangle.
+    pub fn vertex(&mut self, triangle: &Triangle) -> Vec3 {
+        triangle.vertices[self.below(3)]
+    }
+
     /// A point of a random triangle, rounded.
     pub fn on_mesh(&mut self, mesh: &[Triangle]) -> Vec3 {
-        let triangle = mesh[self.below(mesh.len())];
-        self.on(triangle.vertices).as_vec3()
+        let triangle = self.one_of(mesh);
+        self.on(&triangle)
     }
 }
 
@@ -173,6 +188,39 @@ impl Maker {
         let triangles = mesh(&mut random(0));
         let rays = rays(&triangles, &mut random(1), self.rays);
         self.push(label, place, truth, scene(triangles, None), rays);
+    }
+
+    /// Adds a case whose rays are made one by one.
+    pub fn add_each(
+        &mut self,
+        label: impl Into<String>,
+        place: Place,
+        truth: Truth,
+        mesh: impl FnOnce(&mut Random) -> Mesh,
+        mut one: impl FnMut(&[Triangle], &mut Random) -> Ray,
+    ) {
+        self.add(label, place, truth, mesh, |mesh, random, count| {
+            (0..count).map(|_| one(mesh, random)).collect()
+        });
+    }
+
+    /// Adds each of these meshes at each place.
+    pub fn add_on_every_rung(
+        &mut self,
+        meshes: [(&str, MakeMesh); 2],
+        suffix: &str,
+        truth: fn(&Place) -> Truth,
+        one: fn(&Place, &[Triangle], &mut Random) -> Ray,
+    ) {
+        for place in self.places() {
+            for (name, mesh) in meshes {
+                let label = format!("{name}{suffix}, {place}");
+                let mesh = |_: &mut Random| mesh(&place);
+                self.add_each(label, place, truth(&place), mesh, |mesh, random| {
+                    one(&place, mesh, random)
+                });
+            }
+        }
     }
 
     /// Adds a case of placed objects, if they can be placed.

@@ -5,10 +5,9 @@ use super::shot_meshes;
 use super::tally::oracle_ray;
 use crate::accel::watch::{Event, watch};
 use crate::accel::{
-    AccelKind, BuildLog, Counters, Hit, NO_HIT, Ray, TriangleSoup, brute_force_hits,
+    AccelKind, BuiltAccel, Counters, Hit, NO_HIT, Ray, Space, TriangleSoup, brute_force_hits,
     brute_force_instances,
 };
-use crate::accel::{BuiltAccel, Space};
 use crate::oracle::exact_truths;
 use crate::params::Params;
 use crate::scene::SceneData;
@@ -29,11 +28,8 @@ pub fn explain(
     params: &Params,
     ray: &Ray,
 ) -> Result<(String, bool), String> {
-    let built = kind.build(soup, params, &mut BuildLog::default());
-    let built = built.map_err(|e| format!("{} is not built: {e}", kind.name()))?;
-    built
-        .validate(soup)
-        .map_err(|e| format!("{} is not valid: {e}", kind.name()))?;
+    let built = bench::build_with(kind, params, soup);
+    let built = built.map_err(|e| format!("{} is {e}", kind.name()))?;
     let twin = built
         .cpu_twin(soup)
         .ok_or_else(|| format!("{} has no twin on the host", kind.name()))?;
@@ -54,7 +50,7 @@ pub fn explain(
     let any = is_ray && twin.any_hit(ray, &mut Counters::default());
     let equal = hit.same_bits(&expected) && any == (expected.triangle != NO_HIT);
     let _ = writeln!(text, "{:12} {}", kind.name(), hit_text(&hit));
-    let _ = writeln!(text, "{:12} {}", bench_name(&*built), hit_text(&expected));
+    let _ = writeln!(text, "{:12} {}", judge_name(&*built), hit_text(&expected));
     let _ = writeln!(text, "{:12} {}", "any hit", if any { "yes" } else { "no" });
     text += &oracle_text(scene, ray);
     text += match equal {
@@ -64,7 +60,7 @@ pub fn explain(
     Ok((text, equal))
 }
 
-fn bench_name(built: &dyn BuiltAccel) -> &'static str {
+fn judge_name(built: &dyn BuiltAccel) -> &'static str {
     match built.space() {
         Space::World => "brute force",
         Space::Instances => "brute force over instances",
@@ -138,22 +134,13 @@ pub fn scene_of(address: &super::case::Address) -> Result<SceneData, String> {
         let mesh = shot_meshes::ShotMesh::labelled(&address.label, address.seed)?.mesh;
         return Ok(super::case::scene(mesh, None));
     }
-    let family = super::families::Family::named(&address.family).ok_or_else(|| {
-        format!(
-            "there is no family `{}`; `raystone stress` lists them",
-            address.family
-        )
-    })?;
-    let cases = family.cases(address.seed, false, 0);
-    let found = cases.into_iter().find(|case| case.label == address.label);
-    let found = found
-        .ok_or_else(|| format!("family {} has no case `{}`", address.family, address.label))?;
+    let (name, label) = (&address.family, &address.label);
+    let family = super::families::Family::named(name)
+        .ok_or_else(|| format!("there is no family `{name}`; `raystone stress` lists them"))?;
+    let mut cases = family.cases(address.seed, false, 0).into_iter();
+    let found = cases.find(|case| case.label == *label);
+    let found = found.ok_or_else(|| format!("family {name} has no case `{label}`"))?;
     Ok(found.scene)
-}
-
-/// Every parameter of a structure at its default.
-pub fn defaults(kind: &dyn AccelKind) -> Params {
-    bench::default_params(kind)
 }
 
 #[cfg(test)]
@@ -170,32 +157,19 @@ mod tests {
         let soup = TriangleSoup::new(&case.scene);
         for kind in AccelRegistry::default().iter() {
             for ray in &case.rays {
-                let built = kind
-                    .build(&soup, &defaults(kind), &mut BuildLog::default())
-                    .unwrap();
+                let built = bench::build(kind, &soup).unwrap();
                 let mut counters = Counters::default();
                 let twin = built.cpu_twin(&soup).unwrap();
                 let (_, events) = watch(|| twin.closest_hit(ray, &mut counters));
                 let count = |is: fn(&Event) -> bool| events.iter().filter(|e| is(e)).count() as u32;
-                assert_eq!(
-                    count(|e| matches!(e, Event::Node(_))),
-                    counters.nodes,
-                    "{}",
-                    kind.name()
-                );
-                assert_eq!(
-                    count(|e| matches!(e, Event::Triangle(_))),
-                    counters.triangle_tests,
-                    "{}",
-                    kind.name()
-                );
-                let (text, equal) =
-                    explain(&case.scene, &soup, kind, &defaults(kind), ray).unwrap();
-                assert!(
-                    equal && text.contains("exactly hit"),
-                    "{}: {text}",
-                    kind.name()
-                );
+                let nodes = count(|e| matches!(e, Event::Node(_)));
+                let triangles = count(|e| matches!(e, Event::Triangle(_)));
+                let name = kind.name();
+                assert_eq!(nodes, counters.nodes, "{name}");
+                assert_eq!(triangles, counters.triangle_tests, "{name}");
+                let params = bench::default_params(kind);
+                let (text, equal) = explain(&case.scene, &soup, kind, &params, ray).unwrap();
+                assert!(equal && text.contains("exactly hit"), "{name}: {text}");
             }
         }
         assert!(watch(|| ()).1.is_empty());

@@ -38,7 +38,7 @@ const TIMED_RAYS: (usize, usize) = (16_384, 8192);
 
 /// What to do.
 #[derive(Debug, Clone)]
-pub struct Settings {
+pub struct StressOptions {
     /// Few rungs and shots, for a minute at most.
     pub quick: bool,
     /// Seed of everything random.
@@ -57,7 +57,7 @@ pub struct Settings {
     pub model: Option<PathBuf>,
 }
 
-impl Settings {
+impl StressOptions {
     /// The whole suite, or the quick one.
     pub fn new(quick: bool) -> Self {
         let of = |(whole, few): (usize, usize)| if quick { few } else { whole };
@@ -81,8 +81,8 @@ impl Settings {
         let families = families::FAMILIES.iter().map(|f| f.name);
         check_names("family", &self.families, families)?;
         let registry = AccelRegistry::default();
-        let structures: Vec<&str> = registry.iter().map(|kind| kind.name()).collect();
-        check_names("structure", &self.accels, structures.iter().copied())?;
+        let structures = registry.iter().map(|kind| kind.name());
+        check_names("structure", &self.accels, structures)?;
         let tests = TriangleTest::ALL.iter().map(|t| t.name());
         check_names("triangle test", &self.triangles, tests)
     }
@@ -92,11 +92,8 @@ impl Settings {
     }
 
     fn timed_rays(&self) -> usize {
-        if self.quick {
-            TIMED_RAYS.1
-        } else {
-            TIMED_RAYS.0
-        }
+        let (whole, few) = TIMED_RAYS;
+        if self.quick { few } else { whole }
     }
 }
 
@@ -134,16 +131,12 @@ pub enum StressError {
 /// Without a device.
 pub fn run(
     gpus: &[Gpu],
-    settings: &Settings,
+    settings: &StressOptions,
     progress: &Progress,
 ) -> Result<Vec<Record>, StressError> {
     let start = Instant::now();
     let gpu = gpus.first().expect("a device");
-    check_names(
-        "family",
-        &settings.families,
-        families::FAMILIES.iter().map(|f| f.name),
-    )?;
+    settings.check()?;
     let probe = probe_arithmetic(gpu)?;
     let mut records = vec![Record::Suite(first_record(gpu, settings, probe.is_exact()))];
     let mut tests = tests(settings);
@@ -185,7 +178,7 @@ pub fn run(
     Ok(records)
 }
 
-fn first_record(gpu: &Gpu, settings: &Settings, exact: bool) -> SuiteRecord {
+fn first_record(gpu: &Gpu, settings: &StressOptions, exact: bool) -> SuiteRecord {
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     SuiteRecord {
         started_unix_s: now.map_or(0, |d| d.as_secs()),
@@ -202,22 +195,22 @@ fn first_record(gpu: &Gpu, settings: &Settings, exact: bool) -> SuiteRecord {
 fn check_names<'a>(
     what: &'static str,
     wanted: &[String],
-    known: impl Iterator<Item = &'a str> + Clone,
+    known: impl Iterator<Item = &'a str>,
 ) -> Result<(), StressError> {
-    for name in wanted {
-        if !known.clone().any(|k| k == name) {
-            return Err(StressError::Unknown {
-                what,
-                name: name.clone(),
-                known: known.collect::<Vec<_>>().join(", "),
-            });
-        }
+    let known: Vec<&str> = known.collect();
+    let unknown = wanted.iter().find(|name| !known.contains(&name.as_str()));
+    match unknown {
+        None => Ok(()),
+        Some(name) => Err(StressError::Unknown {
+            what,
+            name: name.clone(),
+            known: known.join(", "),
+        }),
     }
-    Ok(())
 }
 
 /// The structures to try, brute force first.
-fn kinds(settings: &Settings) -> Vec<suite::Kind> {
+fn kinds(settings: &StressOptions) -> Vec<suite::Kind> {
     let wanted = |name: &str| {
         let accels = &settings.accels;
         accels.is_empty() || name == BRUTE_FORCE || accels.iter().any(|a| a == name)
@@ -229,7 +222,7 @@ fn kinds(settings: &Settings) -> Vec<suite::Kind> {
 }
 
 /// The triangle tests to try, the default first.
-fn tests(settings: &Settings) -> Vec<TriangleTest> {
+fn tests(settings: &StressOptions) -> Vec<TriangleTest> {
     let wanted = |test: &TriangleTest| {
         settings.triangles.is_empty() || settings.triangles.iter().any(|t| t == test.name())
     };

@@ -27,14 +27,10 @@ pub fn sphere(bands: usize, place: &Place) -> Mesh {
             let [a, b] = [at(band, sector), at(band, sector + 1)];
             let [c, d] = [at(band + 1, sector + 1), at(band + 1, sector)];
             if band > 0 {
-                mesh.push(Triangle {
-                    vertices: [a, b, c],
-                });
+                mesh.push([a, b, c].into());
             }
             if band + 1 < bands {
-                mesh.push(Triangle {
-                    vertices: [a, c, d],
-                });
+                mesh.push([a, c, d].into());
             }
         }
     }
@@ -73,7 +69,7 @@ fn grid(cells: usize, place: &Place, at: impl Fn(f64, f64) -> DVec3) -> Mesh {
         for k in 0..cells {
             let [a, b] = [corner(i, k), corner(i, k + 1)];
             let [c, d] = [corner(i + 1, k + 1), corner(i + 1, k)];
-            mesh.extend([[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices }));
+            mesh.extend([[a, b, c], [a, c, d]].map(Triangle::from));
         }
     }
     mesh
@@ -88,10 +84,8 @@ pub fn model(triangles: &[Triangle], place: &Place) -> Mesh {
     let moved = |v: Vec3| factor * (v.as_dvec3() - 0.5 * (low + high));
     let corners: Vec<[DVec3; 3]> = triangles.iter().map(|t| t.vertices.map(moved)).collect();
     let closed = close_holes(&corners);
-    let placed = |t: &[DVec3; 3]| Triangle {
-        vertices: t.map(|v| place.point(v)),
-    };
-    closed.iter().map(placed).collect()
+    let placed = |t: [DVec3; 3]| t.map(|v| place.point(v)).into();
+    closed.into_iter().map(placed).collect()
 }
 
 /// A point as a key.

@@ -1,7 +1,6 @@
 //! The closed meshes that shots are aimed at, with points inside them to shoot from.
 
 use super::case::{Random, ray, towards};
-use super::families::on_edge;
 use super::place::Place;
 use super::shapes::{self, Mesh, RADIUS};
 use super::tally::oracle_ray;
@@ -129,10 +128,10 @@ impl ShotMesh {
         let triangle = random.one_of(&self.aims);
         match aim {
             // Rays from above go down, not anywhere.
-            0 if self.name == PLANE => towards(origin, random.on(triangle.vertices).as_vec3()),
+            0 if self.name == PLANE => towards(origin, random.on(&triangle)),
             0 => ray(origin, random.direction().as_vec3()),
-            1 => towards(origin, triangle.vertices[random.below(3)]),
-            _ => towards(origin, on_edge(&triangle, random)),
+            1 => towards(origin, random.vertex(&triangle)),
+            _ => towards(origin, random.on_edge(&triangle)),
         }
     }
 }

@@ -6,7 +6,7 @@ use super::families::{FAMILIES, Family};
 use super::place::Place;
 use super::record::{CellRecord, Record, SkippedRecord};
 use super::tally::{Judge, Outcome, Tally};
-use super::{Settings, StressError};
+use super::{StressError, StressOptions};
 use crate::accel::triangle::TriangleTest;
 use crate::accel::{AccelKind, BuiltAccel, Hit, Intersection, NO_HIT, Ray, Space, TriangleSoup};
 use crate::gpu::{Gpu, GpuError};
@@ -34,7 +34,7 @@ pub struct Suite<'a> {
     /// Whether it computes like the host.
     pub exact: bool,
     /// What to do.
-    pub settings: &'a Settings,
+    pub settings: &'a StressOptions,
     /// Structures, brute force among them if asked for.
     pub kinds: Vec<Kind>,
     /// Triangle tests, the default first.
@@ -43,7 +43,7 @@ pub struct Suite<'a> {
 
 /// A cell while its cases are traced.
 #[derive(Default)]
-struct Cell {
+struct OpenCell {
     tally: Tally,
     rungs: Vec<super::record::Rung>,
     slowdown: Option<f64>,
@@ -102,8 +102,8 @@ impl Suite<'_> {
     fn family(&self, family: &Family) -> Result<Vec<Record>, StressError> {
         let settings = self.settings;
         let cases = family.cases(settings.seed, settings.quick, settings.rays);
-        let row = || self.kinds.iter().map(|kind| (*kind, Cell::default()));
-        let mut cells: Vec<Vec<(Kind, Cell)>> =
+        let row = || self.kinds.iter().map(|kind| (*kind, OpenCell::default()));
+        let mut cells: Vec<Vec<(Kind, OpenCell)>> =
             (self.tests.iter()).map(|_| row().collect()).collect();
         let mut timed = 0;
         for case in &cases {
@@ -161,7 +161,7 @@ impl Suite<'_> {
         case: &Case,
         judge: &Judge,
         test: TriangleTest,
-        cells: &mut [(Kind, Cell)],
+        cells: &mut [(Kind, OpenCell)],
     ) -> Result<(), StressError> {
         let soup = TriangleSoup::new(&case.scene).intersecting(Self::with(test));
         let expected = Expected::new(&soup, &case.rays);
@@ -202,7 +202,7 @@ impl Suite<'_> {
 
     /// Times the case with the default test through every structure that can be built; not through brute
     /// force, which does the same whatever the rays, if it has to be quick.
-    fn time(&self, case: &Case, cells: &mut [(Kind, Cell)]) -> Result<(), StressError> {
+    fn time(&self, case: &Case, cells: &mut [(Kind, OpenCell)]) -> Result<(), StressError> {
         let stage = Stage::new(self.gpu(), &case.scene, Intersection::default())?;
         let count = self.settings.timed_rays();
         let ordinary = bench::ordinary_rays(case, self.settings.seed, count);
@@ -255,7 +255,7 @@ struct Trace<'a> {
 }
 
 impl Trace<'_> {
-    fn run(&self, kind: Kind, built: &dyn BuiltAccel, cell: &mut Cell) -> Result<(), GpuError> {
+    fn run(&self, kind: Kind, built: &dyn BuiltAccel, cell: &mut OpenCell) -> Result<(), GpuError> {
         let case = self.case;
         let traced = self.stage.upload(built)?;
         let found = self.stage.closest(&traced, &case.rays)?;
@@ -316,7 +316,7 @@ impl Trace<'_> {
     }
 }
 
-impl Cell {
+impl OpenCell {
     fn record(self, test: TriangleTest, accel: &str, family: &str) -> CellRecord {
         let tally = self.tally;
         CellRecord {

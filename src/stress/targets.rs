@@ -2,7 +2,9 @@
 
 use super::axes::smallest_sound_pad;
 use super::place::Place;
-use super::record::{CellRecord, CostRecord, Record, ShotsRecord, SuiteRecord, TargetRecord};
+use super::record::{
+    CellRecord, CostRecord, OffsetRecord, Record, ShotsRecord, SuiteRecord, TargetRecord,
+};
 use crate::accel::BoxTest;
 use crate::integrator::RayOffset;
 
@@ -17,6 +19,16 @@ const FARTHEST: f64 = 2.0;
 /// The family of rays that are none.
 const NO_RAYS: &str = "non-finite";
 
+/// The records of one kind.
+macro_rules! all {
+    ($records:expr, $kind:ident) => {
+        ($records.iter()).filter_map(|record| match record {
+            Record::$kind(found) => Some(found),
+            _ => None,
+        })
+    };
+}
+
 /// Every target, with what the records say of it.
 pub fn targets(records: &[Record]) -> Vec<TargetRecord> {
     let Some(suite) = suite(records) else {
@@ -25,15 +37,11 @@ pub fn targets(records: &[Record]) -> Vec<TargetRecord> {
     let default = &suite.default_triangle;
     let cells: Vec<&CellRecord> = cells(records).filter(|c| c.triangle == *default).collect();
     let shots: Vec<&ShotsRecord> = shots(records).filter(|s| s.triangle == *default).collect();
-    let cost = records.iter().find_map(|r| match r {
-        Record::Cost(cost) if cost.triangle == *default => Some(cost),
-        _ => None,
-    });
+    let cost = all!(records, Cost).find(|cost| cost.triangle == *default);
     let mut targets = shot_targets(&shots, suite.shots);
     targets.extend(cell_targets(&cells));
     targets.extend(pad_target(records));
-    targets.extend(offset_target(records));
-    targets.extend(far_offset_target(records));
+    targets.extend(offset_targets(records));
     targets.extend(figure_target(records));
     targets.extend(cost.map(cost_target));
     targets
@@ -41,35 +49,26 @@ pub fn targets(records: &[Record]) -> Vec<TargetRecord> {
 
 /// The first record.
 pub fn suite(records: &[Record]) -> Option<&SuiteRecord> {
-    records.iter().find_map(|r| match r {
-        Record::Suite(suite) => Some(suite),
-        _ => None,
-    })
+    all!(records, Suite).next()
 }
 
 /// The cells.
 pub fn cells(records: &[Record]) -> impl Iterator<Item = &CellRecord> {
-    records.iter().filter_map(|r| match r {
-        Record::Cell(cell) => Some(cell),
-        _ => None,
-    })
+    all!(records, Cell)
 }
 
 /// The series of shots.
 pub fn shots(records: &[Record]) -> impl Iterator<Item = &ShotsRecord> {
-    records.iter().filter_map(|r| match r {
-        Record::Shots(shots) => Some(shots),
-        _ => None,
-    })
+    all!(records, Shots)
 }
 
 /// The greatest of some figures against a limit that it must not exceed.
 fn target(
     name: impl Into<String>,
     limit: f64,
-    found: impl Iterator<Item = (f64, String)>,
+    found: impl IntoIterator<Item = (f64, String)>,
 ) -> TargetRecord {
-    let worst = found.max_by(|a, b| a.0.total_cmp(&b.0));
+    let worst = found.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
     let value = worst.as_ref().map(|w| w.0);
     TargetRecord {
         target: name.into(),
@@ -97,17 +96,11 @@ fn shot_targets(shots: &[&ShotsRecord], wanted: usize) -> Vec<TargetRecord> {
             .map(|s| (s.misses as f64, name(s)))
     };
     let far = at(Place::FAR).map(|s| (s.misses as f64 / s.rays.max(1) as f64, name(s)));
+    let misses = format!("watertight misses of {wanted} rays a mesh, ordinary scale");
+    let aimed = format!("misses at vertices and edges of {wanted} shots");
     vec![
-        target(
-            format!("watertight misses of {wanted} rays a mesh, ordinary scale"),
-            0.0,
-            ordinary(true),
-        ),
-        target(
-            format!("misses at vertices and edges of {wanted} shots"),
-            0.0,
-            ordinary(false),
-        ),
+        target(misses, 0.0, ordinary(true)),
+        target(aimed, 0.0, ordinary(false)),
         target("share of misses at the far position", FAR_MISSES, far),
     ]
 }
@@ -121,13 +114,9 @@ fn cell_targets(cells: &[&CellRecord]) -> Vec<TargetRecord> {
         ((c.differing + any) as f64, name(c, replay))
     });
     let hangs = cells.iter().map(|c| {
-        let raised: Vec<_> = c
-            .failures
-            .iter()
-            .filter(|f| !f.contains("not built"))
-            .collect();
-        let first = raised.first().map_or("", |f| f.as_str());
-        (raised.len() as f64, name(c, first))
+        let raised = || c.failures.iter().filter(|f| !f.contains("not built"));
+        let first = raised().next().map_or("", |f| f.as_str());
+        (raised().count() as f64, name(c, first))
     });
     let strange = cells.iter().filter(|c| c.family == NO_RAYS);
     let slowdown = strange.filter_map(|c| Some((c.slowdown?, name(c, "slowdown"))));
@@ -156,69 +145,53 @@ fn cell_targets(cells: &[&CellRecord]) -> Vec<TargetRecord> {
 }
 
 fn pad_target(records: &[Record]) -> Option<TargetRecord> {
-    let is_box_test = |r: &Record| matches!(r, Record::BoxTest(_));
-    records.iter().any(is_box_test).then(|| {
-        let found = smallest_sound_pad(records).map(f64::from);
-        let found = found.unwrap_or(f64::MAX);
-        let limit = f64::from(BoxTest::DEFAULT_ULPS);
+    all!(records, BoxTest).next()?;
+    let found = smallest_sound_pad(all!(records, BoxTest)).map_or(f64::MAX, f64::from);
+    Some(target(
+        "smallest pad of boxes that loses no hit here, ulp",
+        f64::from(BoxTest::DEFAULT_ULPS),
+        [(found, String::new())],
+    ))
+}
+
+/// Rays begun with the default offset: those that meet the triangle they leave, or escape; and how far they
+/// begin from the points they leave, since contact shadows and thin gaps end there.
+fn offset_targets(records: &[Record]) -> Vec<TargetRecord> {
+    let default = RayOffset::default().name();
+    let found = |figure: fn(&OffsetRecord) -> f64| {
+        let of_default = all!(records, Offset).filter(|o| o.offset == default);
+        of_default.map(move |o| (figure(o), format!("{}, {}", o.mesh, o.place)))
+    };
+    let bad = found(|o| (o.self_intersections + o.leaks) as f64);
+    let farthest = found(|o| o.farthest);
+    let name = |what: &str, of: &str| format!("{what} with {default}{of}");
+    let targets = [
         target(
-            "smallest pad of boxes that loses no hit here, ulp",
-            limit,
-            std::iter::once((found, String::new())),
-        )
-    })
-}
-
-/// Rays begun with the default offset that meet the triangle they leave, or escape.
-fn offset_target(records: &[Record]) -> Option<TargetRecord> {
-    let default = RayOffset::default().name();
-    let mut found = (records.iter())
-        .filter_map(|r| match r {
-            Record::Offset(offset) if offset.offset == default => Some(offset),
-            _ => None,
-        })
-        .map(|o| {
-            let bad = o.self_intersections + o.leaks;
-            (bad as f64, format!("{}, {}", o.mesh, o.place))
-        })
-        .peekable();
-    found.peek()?;
-    let name = format!("rays begun with {default} that meet their own triangle or leak");
-    Some(target(name, 0.0, found))
-}
-
-/// How far rays begin from the points they leave: contact shadows and thin gaps end there.
-fn far_offset_target(records: &[Record]) -> Option<TargetRecord> {
-    let default = RayOffset::default().name();
-    let mut found = (records.iter())
-        .filter_map(|r| match r {
-            Record::Offset(offset) if offset.offset == default => Some(offset),
-            _ => None,
-        })
-        .map(|o| (o.farthest, format!("{}, {}", o.mesh, o.place)))
-        .peekable();
-    found.peek()?;
-    let name = format!("farthest begin of a ray with {default}, in bounds of the point's error");
-    Some(target(name, FARTHEST, found))
+            name("rays begun", " that meet their own triangle or leak"),
+            0.0,
+            bad,
+        ),
+        target(
+            name(
+                "farthest begin of a ray",
+                ", in bounds of the point's error",
+            ),
+            FARTHEST,
+            farthest,
+        ),
+    ];
+    targets.into_iter().filter(|t| t.found.is_some()).collect()
 }
 
 /// Accumulation and sampling: how many figures are beyond their alarm level.
 fn figure_target(records: &[Record]) -> Option<TargetRecord> {
-    let mut figures = (records.iter())
-        .filter_map(|r| match r {
-            Record::Figure(figure) => Some(figure),
-            _ => None,
-        })
-        .peekable();
-    figures.peek()?;
-    let alarms: Vec<&str> = figures
-        .filter(|f| !f.passed)
-        .map(|f| f.name.as_str())
-        .collect();
+    all!(records, Figure).next()?;
+    let alarms = all!(records, Figure).filter(|f| !f.passed);
+    let alarms: Vec<&str> = alarms.map(|f| f.name.as_str()).collect();
     Some(target(
         "figures of accumulation and sampling beyond their alarm level",
         0.0,
-        std::iter::once((alarms.len() as f64, alarms.join(", "))),
+        [(alarms.len() as f64, alarms.join(", "))],
     ))
 }
 
@@ -227,11 +200,7 @@ fn cost_target(cost: &CostRecord) -> TargetRecord {
         "time of {} against moeller-trumbore in a traversal",
         cost.triangle
     );
-    target(
-        name,
-        COST,
-        std::iter::once((cost.traversal_ratio, String::new())),
-    )
+    target(name, COST, [(cost.traversal_ratio, String::new())])
 }
 
 #[cfg(test)]

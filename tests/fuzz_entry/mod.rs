@@ -7,11 +7,10 @@
 use raystone::accel::{AccelRegistry, BuildLog, TriangleSoup};
 use raystone::config::{Catalogue, Experiment, Plan};
 use raystone::discrepancy::PointSet;
-use raystone::measure::record::Line;
+use raystone::measure::record::{Line, RECORDS_FILE, read_records};
 use raystone::params::{Params, Variant};
 use raystone::report::data::RunData;
-use raystone::report::read::RECORDS_FILE;
-use raystone::report::{read_records, sections, terminal_tables};
+use raystone::report::{sections, terminal_tables};
 use raystone::run::Registries;
 use raystone::scene::{self, Bounds, LoadOptions, MAX_COORDINATE, SceneData};
 use std::path::Path;

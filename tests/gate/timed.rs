@@ -2,7 +2,7 @@
 
 use crate::support::records;
 use raystone::gpu::KernelLibrary;
-use raystone::measure::record::Record;
+use raystone::measure::record::{StructureRecord, all_of};
 use std::path::Path;
 use std::process::Command;
 
@@ -88,14 +88,12 @@ fn run(folder: &Path) -> (Option<String>, usize) {
         .output()
         .expect("the program starts");
     let words = String::from_utf8_lossy(&output.stderr).into_owned();
-    let structures = records(&out).into_iter().filter_map(|record| match record {
-        Record::Structure(structure) => Some(structure),
-        _ => None,
-    });
+    let lines = records(&out);
+    let structures = all_of::<StructureRecord>(&lines);
     let [structure] = structures.collect::<Vec<_>>().try_into().expect(&words);
-    let gate = structure.gate.expect("a verdict");
+    let gate = structure.gate.as_ref().expect("a verdict");
     assert!(gate.passed, "the gate is to pass: {gate:?}");
-    (structure.failure, structure.timings.len())
+    (structure.failure.clone(), structure.timings.len())
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::fuzz_entry::{FILE, Outcome, Target};
 use raystone::measure::memory::peak_bytes;
-use raystone::report::read::RECORDS_FILE;
+use raystone::measure::record::RECORDS_FILE;
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};

@@ -1,6 +1,6 @@
 //! The folder of a run through the program: reruns, kills, signals, two runs at once, odd names.
 
-use raystone::measure::record::{Line, Record};
+use raystone::measure::record::{Body, Line};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -56,9 +56,9 @@ fn started(out: &Path, more: &[&str]) -> Child {
 }
 
 /// Every record of a folder, each line whole.
-fn records(folder: &Path) -> Vec<Record> {
+fn records(folder: &Path) -> Vec<Body> {
     let text = std::fs::read_to_string(folder.join("records.jsonl")).expect("records");
-    let parse = |line: &str| serde_json::from_str::<Line>(line).map(|line| line.record);
+    let parse = |line: &str| serde_json::from_str::<Line>(line).map(|line| line.body);
     let records: Result<Vec<_>, _> = text.lines().map(parse).collect();
     records.unwrap_or_else(|e| panic!("{e} in {text}"))
 }
@@ -66,9 +66,9 @@ fn records(folder: &Path) -> Vec<Record> {
 /// The pictures that the records name.
 fn pictures(folder: &Path) -> Vec<PathBuf> {
     let names = records(folder).into_iter().flat_map(|record| match record {
-        Record::Structure(r) => vec![r.heat_map],
-        Record::Error(r) => vec![r.image, r.error_map],
-        Record::Reference(r) => vec![Some(r.image)],
+        Body::Structure(r) => vec![r.heat_map],
+        Body::Error(r) => vec![r.image, r.error_map],
+        Body::Reference(r) => vec![Some(r.image)],
         _ => Vec::new(),
     });
     names.flatten().map(|name| folder.join(name)).collect()
@@ -147,9 +147,9 @@ fn of_two_runs_into_one_folder_the_second_ends_at_once() {
     let first = first.wait_with_output().expect("an end");
     assert_eq!(first.status.code(), Some(0), "{}", stderr(&first));
     let lines = records(folder.path());
-    let ends = lines.iter().filter(|r| matches!(r, Record::Finished(_)));
+    let ends = lines.iter().filter(|r| matches!(r, Body::Finished(_)));
     assert_eq!(ends.count(), 1);
-    assert!(matches!(lines.last(), Some(Record::Finished(_))));
+    assert!(matches!(lines.last(), Some(Body::Finished(_))));
 }
 
 #[cfg(unix)]
@@ -164,7 +164,7 @@ fn signals_end_a_run_with_its_records_and_a_report() {
         assert_eq!(ended.status.code(), Some(code), "{words}");
         assert!(words.contains("report so far"), "{words}");
         match records(folder.path()).last() {
-            Some(Record::Interrupted(end)) => assert_eq!(end.reason, format!("SIG{signal}")),
+            Some(Body::Interrupted(end)) => assert_eq!(end.reason, format!("SIG{signal}")),
             other => panic!("the last record is {other:?}"),
         }
         let page = std::fs::read_to_string(folder.path().join("index.html")).expect("a page");
@@ -243,12 +243,12 @@ fn a_picture_that_cannot_be_written_is_a_warning() {
         "{words}"
     );
     let lines = records(folder.path());
-    let warnings = lines.iter().filter(|r| matches!(r, Record::Warning(_)));
+    let warnings = lines.iter().filter(|r| matches!(r, Body::Warning(_)));
     assert!(warnings.count() >= 5);
     assert!(
         lines
             .iter()
-            .any(|r| matches!(r, Record::Time(t) if t.failure.is_none()))
+            .any(|r| matches!(r, Body::Time(t) if t.failure.is_none()))
     );
     let page = std::fs::read_to_string(folder.path().join("index.html")).expect("a page");
     assert!(page.contains("warning"));

@@ -41,7 +41,7 @@ fn samplers() -> Vec<(Sampler, usize)> {
     let mut out = Vec::new();
     let mut refused = 0;
     for (sequence, decorrelation, count) in pairs {
-        let facts = registry.facts(&sequence).expect("registered");
+        let facts = registry.facts(sequence).expect("registered");
         let most = if count == MANY && sequence.name == "sobol" && decorrelation.name == "none" {
             1100
         } else {

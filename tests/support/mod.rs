@@ -6,10 +6,8 @@ use raystone::accel::{AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel
 use raystone::config::{Experiment, Plan};
 use raystone::geometry::Camera;
 use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
-use raystone::integrator::{
-    Frame, RenderJob, Renderer, SceneBuffers, Traced, integrator, integrator_entries,
-};
-use raystone::measure::record::{Line, Record, SCHEMA};
+use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced};
+use raystone::measure::record::{Line, SCHEMA};
 use raystone::measure::statistics::{mean, variance};
 use raystone::params::{Entry, ParamValue, Params, Variant};
 use raystone::run::{Registries, RunOptions, RunSummary};
@@ -127,22 +125,15 @@ impl Stage {
         traced: &Traced,
         sampler: &Sampler,
         what: &Variant,
-        [width, height]: [u32; 2],
+        size: [u32; 2],
         ray_counts: bool,
     ) -> Renderer<'a> {
-        let integrator = integrator(&what.name).expect("a known integrator");
-        let diagonal = f64::from(2.0 * self.scene.bounds().radius());
-        let ao_radius = integrator.ao_radius(&what.params).unwrap_or(0.0) * diagonal;
+        let integrator = IntegratorRegistry::default().configured(what);
         let job = RenderJob {
-            frame: Frame {
-                width,
-                height,
-                camera: self.camera,
-                ao_radius: ao_radius as f32,
-            },
+            size,
+            camera: self.camera,
             sampler,
-            integrator,
-            params: &what.params,
+            integrator: &integrator.unwrap_or_else(|e| panic!("{e}")),
             runtime_checks: true,
         };
         Renderer::new(gpu, &self.buffers, traced, &job, ray_counts)
@@ -234,7 +225,7 @@ pub fn samplers(samples: u32) -> Vec<Sampler> {
 
 /// An integrator with some parameters changed from their defaults.
 pub fn integrator_variant(name: &str, changes: &[(&str, ParamValue)]) -> Variant {
-    variant(&integrator_entries(), name, changes)
+    variant(&IntegratorRegistry::default().entries(), name, changes)
 }
 
 /// The path integrator with this many bounces.
@@ -293,13 +284,14 @@ pub fn replicate_means(renderer: &Renderer, spp: u32, count: u32) -> Vec<f64> {
     (0..count).map(|k| one(1000 + 77 * k)).collect()
 }
 
-/// Runs an experiment to its end and reads its records back. Panics if a line of them is broken.
+/// Runs an experiment to its end, reads its records back and writes the report. Panics if a line of them is
+/// broken.
 pub fn run(
     experiment: &str,
     registries: &Registries,
     out: &Path,
     lose_device_at: Option<&str>,
-) -> (RunSummary, Vec<Record>) {
+) -> (RunSummary, Vec<Line>) {
     let options = RunOptions {
         out: out.to_owned(),
         lose_device_at: lose_device_at.map(str::to_owned),
@@ -308,6 +300,7 @@ pub fn run(
     let (experiment, plan) = plan(experiment, registries);
     let summary = raystone::run::run(&experiment, &plan, registries, &options)
         .unwrap_or_else(|e| panic!("the run ends early: {e}"));
+    raystone::report::write_report(out).unwrap_or_else(|e| panic!("no report: {e}"));
     (summary, records(out))
 }
 
@@ -321,13 +314,13 @@ pub fn plan(text: &str, registries: &Registries) -> (Experiment, Plan) {
 }
 
 /// Every record of a folder, none broken.
-pub fn records(out: &Path) -> Vec<Record> {
+pub fn records(out: &Path) -> Vec<Line> {
     let text = std::fs::read_to_string(out.join("records.jsonl")).expect("records");
     assert!(text.ends_with('\n'), "the last line is not whole");
     let parse = |line: &str| {
         let line: Line = serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line}"));
         assert_eq!(line.schema, SCHEMA);
-        line.record
+        line
     };
     text.lines().map(parse).collect()
 }

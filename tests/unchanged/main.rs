@@ -225,7 +225,7 @@ fn images() {
                 let subject = format!("image {scene}/{}/path", sampler.label().replace(' ', ""));
                 found.insert(subject, image_hash(&stage, &traced, &sampler, &path(3)));
             }
-            for entry in raystone::integrator::integrator_entries() {
+            for entry in raystone::integrator::IntegratorRegistry::default().entries() {
                 if entry.name.starts_with("integrand") {
                     let subject = format!("image {scene}/bvh/{}", entry.name);
                     let hash = image_hash(&stage, &traced, &one, &entry.default_variant());

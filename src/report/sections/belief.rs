@@ -1,6 +1,9 @@
 //! Why to believe the figures: every check of the run, with what it rests on.
 
-use crate::measure::record::{BiasRecord, GateVerdict, JudgeCheck, TimeRecord};
+use crate::measure::bias::BiasVerdict;
+use crate::measure::record::{
+    BiasRecord, GateVerdict, JudgeCheck, Recorded, TimeRecord, Verdict, axis,
+};
 use crate::report::data::{RunData, SceneGroup, structure_name};
 use crate::report::document::*;
 use crate::report::format::{self, count, plural};
@@ -40,13 +43,8 @@ fn check(title: impl Into<String>, tested: bool, wrong: bool, detail: String) ->
     } else {
         NOTHING.into()
     };
-    let tone = match (wrong, tested) {
-        (true, _) => Tone::Bad,
-        (false, true) => Tone::Good,
-        (false, false) => Tone::Note,
-    };
     Check {
-        tone,
+        verdict: Verdict::new(tested, wrong),
         title: title.into(),
         detail,
     }
@@ -66,13 +64,7 @@ fn gate(scene: &SceneGroup) -> Check {
     let faulty: Vec<String> = scene
         .structures
         .iter()
-        .filter_map(|s| {
-            Some(format!(
-                "{} FAILED: {}",
-                structure_name(&s.accel, s.runtime_checks),
-                s.fault()?
-            ))
-        })
+        .filter_map(|s| Some(format!("{} FAILED: {}", structure_name(*s), s.fault()?)))
         .collect();
     if gates.is_empty() && faulty.is_empty() {
         return check(title, false, false, String::new());
@@ -128,28 +120,34 @@ fn judge(data: &RunData, title: &str, pick: fn(&GateVerdict) -> &JudgeCheck) -> 
 }
 
 fn images(data: &RunData) -> Check {
-    let times: Vec<&TimeRecord> = data
+    let times: Vec<Recorded<TimeRecord>> = data
         .views()
         .flat_map(|(_, view)| view.times.iter().copied())
         .filter(|t| !t.image_hash.is_empty())
         .collect();
     // An image that one structure alone rendered equals itself.
-    let has_peer = |t: &&TimeRecord| {
-        times.iter().any(|o| {
-            (&o.scene, &o.integrator, &o.sequence, &o.decorrelation)
-                == (&t.scene, &t.integrator, &t.sequence, &t.decorrelation)
-                && o.accel != t.accel
-        })
+    let image = [
+        axis::SCENE,
+        axis::INTEGRATOR,
+        axis::SEQUENCE,
+        axis::DECORRELATION,
+        axis::KERNELS,
+    ];
+    let has_peer = |t: &Recorded<TimeRecord>| {
+        let is_peer = |o: &Recorded<TimeRecord>| {
+            o.key.agrees(t.key, &image) && !o.key.agrees(t.key, &[axis::ACCEL])
+        };
+        times.iter().any(is_peer)
     };
     let compared = times.iter().copied().filter(has_peer).count();
     let unequal: Vec<String> = times
         .iter()
         .filter(|time| !time.image_equal)
-        .map(|t| {
+        .map(|&t| {
             format!(
                 "{} on {} differs",
-                structure_name(&t.accel, t.runtime_checks),
-                t.scene
+                structure_name(t),
+                t.key.label(axis::SCENE)
             )
         })
         .collect();
@@ -181,12 +179,15 @@ fn bias(data: &RunData) -> Check {
         .flat_map(|(scene, view)| view.samplers.iter().map(move |s| (scene, view, s)))
         .filter_map(|(scene, view, s)| Some((scene, view, s, s.bias?)))
         .collect();
-    let with = |verdict: &str, by_design: bool| {
+    let with = |verdict: BiasVerdict, by_design: bool| {
         let is_it = |r: &&BiasRecord| r.verdict == verdict && r.by_design == by_design;
         records.iter().map(|r| r.3).filter(is_it).count()
     };
-    let clean = with("no-bias-found", false) + with("no-bias-found", true);
-    let (biased, by_design) = (with("biased", false), with("biased", true));
+    let clean = with(BiasVerdict::NoBiasFound, false) + with(BiasVerdict::NoBiasFound, true);
+    let (biased, by_design) = (
+        with(BiasVerdict::Biased, false),
+        with(BiasVerdict::Biased, true),
+    );
     let mut detail = format!(
         "{clean} without a bias found, {biased} biased, {by_design} biased by design, {} not testable",
         records.len() - clean - biased - by_design
@@ -197,7 +198,10 @@ fn bias(data: &RunData) -> Check {
             format::number(record.alpha)
         );
     }
-    for (scene, view, sampler, _) in records.iter().filter(|r| r.3.verdict == "biased") {
+    for (scene, view, sampler, _) in records
+        .iter()
+        .filter(|r| r.3.verdict == BiasVerdict::Biased)
+    {
         detail += &format!(
             "; {} on {}, {}: {}",
             sampler.name,

@@ -1,8 +1,8 @@
 //! Pictures of the points that the kernels of a run drew, from the words in its records.
 
 use super::file_stem;
-use crate::measure::record::{RecordedPoints, StreamRecord};
-use crate::report::data::{RunData, sampler_name};
+use crate::measure::record::{Recorded, RecordedPoints, StreamRecord};
+use crate::report::data::RunData;
 use crate::report::document::*;
 use crate::report::plot::panels::{self, Panel};
 use crate::report::plot::points::{Cloud, Domain, Pair, interval_counts};
@@ -15,9 +15,9 @@ const WIDTH: f64 = 900.0;
 /// samplers need not be those of the run.
 pub fn section(data: &RunData) -> Option<Section> {
     let recorded = |name: &String| {
-        let of_name = |s: &&&StreamRecord| sampler_name(&s.sequence, &s.decorrelation) == *name;
+        let of_name = |s: &&Recorded<StreamRecord>| s.key.sampler() == *name;
         let mut streams = data.streams.iter().filter(of_name);
-        streams.find_map(|s| Some((*s, s.points.as_ref()?)))
+        streams.find_map(|s| Some((*s, s.body.points.as_ref()?)))
     };
     let found: Vec<_> = data
         .samplers

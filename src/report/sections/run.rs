@@ -1,6 +1,7 @@
 //! The run itself: economy of the plan, wall time, what failed, where it ran.
 
-use crate::report::data::{RunData, sampler_name, structure_name};
+use crate::measure::record::Verdict;
+use crate::report::data::{RunData, structure_name};
 use crate::report::document::*;
 use crate::report::format::{self, count, percent};
 
@@ -41,11 +42,7 @@ pub fn overhead_check(data: &RunData) -> Option<Check> {
     let finished = data.finished.filter(|finished| finished.wall_s > 0.0)?;
     let share = finished.overhead_s / finished.wall_s;
     Some(Check {
-        tone: if share <= OVERHEAD_TARGET {
-            Tone::Good
-        } else {
-            Tone::Bad
-        },
+        verdict: Verdict::new(true, share > OVERHEAD_TARGET),
         title: format!("Harness overhead at most {}", percent(OVERHEAD_TARGET)),
         detail: format!(
             "{} of the wall time is neither GPU work nor building, judging or loading.",
@@ -100,11 +97,7 @@ fn failures(data: &RunData) -> Option<Section> {
                     format::ray_class(class.class)
                 );
             }
-            let cell = format!(
-                "{} · {}",
-                scene.name,
-                structure_name(&s.accel, s.runtime_checks)
-            );
+            let cell = format!("{} · {}", scene.name, structure_name(*s));
             add(cell, "FAILED", Tone::Bad, fault);
         }
     }
@@ -115,8 +108,8 @@ fn failures(data: &RunData) -> Option<Section> {
             let Some(reason) = time.failure.clone().or(unequal) else {
                 continue;
             };
-            let structure = structure_name(&time.accel, time.runtime_checks);
-            let sampler = sampler_name(&time.sequence, &time.decorrelation);
+            let structure = structure_name(*time);
+            let sampler = time.key.sampler();
             let cell = format!(
                 "{} · {structure} · {sampler} · {}",
                 scene.name, view.integrator

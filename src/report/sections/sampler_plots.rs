@@ -1,5 +1,6 @@
 //! Plots of samplers under one scene and integrator.
 
+use crate::measure::bias::BiasVerdict;
 use crate::measure::record::Interval;
 use crate::report::data::{RunData, View};
 use crate::report::document::Figure;
@@ -194,7 +195,7 @@ pub fn histograms(view: &View) -> Vec<Histogram> {
         Some(Histogram {
             label: sampler.name.clone(),
             counts: bias.p_histogram.clone(),
-            biased: bias.verdict == "biased",
+            biased: bias.verdict == BiasVerdict::Biased,
         })
     };
     view.samplers.iter().filter_map(histogram).collect()

@@ -3,8 +3,9 @@
 use super::sampler_plots::{error_figures, histograms, pareto_plot};
 use super::spectrum;
 use super::verdict::Race;
-use crate::measure::record::{BiasRecord, Interval, TimeRecord};
-use crate::report::data::{RunData, View, sampler_name, timed_structure};
+use crate::measure::bias::BiasVerdict;
+use crate::measure::record::{BiasRecord, Interval, Recorded, TimeRecord};
+use crate::report::data::{RunData, View, timed_structure};
 use crate::report::document::*;
 use crate::report::plot::histogram;
 use crate::report::plot::pareto::letter;
@@ -184,10 +185,10 @@ fn bias_verdict(sampler: &Sampler) -> Cell {
     }
     match sampler.bias {
         None => "not tested".into(),
-        Some(bias) if bias.verdict == "no-bias-found" => {
+        Some(bias) if bias.verdict == BiasVerdict::NoBiasFound => {
             Cell::from("no bias found").toned(Tone::Good)
         }
-        Some(bias) => bias.verdict.clone().into(),
+        Some(bias) => bias.verdict.to_string().into(),
     }
 }
 
@@ -252,8 +253,8 @@ fn time_table(view: &View) -> Table {
     table
 }
 
-fn is_of(time: &TimeRecord, sampler: &Sampler) -> bool {
-    sampler_name(&time.sequence, &time.decorrelation) == sampler.name
+fn is_of(time: &Recorded<TimeRecord>, sampler: &Sampler) -> bool {
+    time.key.sampler() == sampler.name
 }
 
 fn time_cell(view: &View, structure: &str, sampler: &Sampler) -> Cell {
@@ -261,7 +262,7 @@ fn time_cell(view: &View, structure: &str, sampler: &Sampler) -> Cell {
         return Cell::with_detail(format::number(ms.value), format::bounds(&ms));
     }
     let of_structure =
-        |time: &&&TimeRecord| timed_structure(time) == structure && is_of(time, sampler);
+        |time: &&Recorded<TimeRecord>| timed_structure(**time) == structure && is_of(time, sampler);
     match view.times.iter().find(of_structure) {
         Some(time) if !time.image_equal && time.failure.is_none() => {
             Cell::from("image differs").toned(Tone::Bad)

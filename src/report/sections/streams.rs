@@ -2,8 +2,8 @@
 //! and what drawing costs.
 
 use super::file_stem;
-use crate::measure::record::{FigureAtCount, Interval, SamplerCostRecord, StreamRecord};
-use crate::report::data::{RunData, sampler_name};
+use crate::measure::record::{FigureAtCount, Interval, Recorded, StreamRecord};
+use crate::report::data::RunData;
 use crate::report::document::*;
 use crate::report::format;
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
@@ -34,7 +34,8 @@ pub fn section(data: &RunData) -> Option<Section> {
         }
     }
     for (purpose, dimensions) in pairs {
-        let is_of = |s: &&&StreamRecord| s.purpose == purpose && s.dimensions == dimensions;
+        let is_of =
+            |s: &&Recorded<StreamRecord>| s.purpose == purpose && s.dimensions == dimensions;
         let streams = data.streams.iter().filter(is_of).copied().collect();
         section.blocks.extend(Pair::new(data, streams).blocks());
     }
@@ -49,11 +50,11 @@ struct Pair<'a> {
     what: String,
     /// Start of file names.
     stem: String,
-    streams: Vec<&'a StreamRecord>,
+    streams: Vec<Recorded<'a, StreamRecord>>,
 }
 
 impl<'a> Pair<'a> {
-    fn new(data: &'a RunData<'a>, streams: Vec<&'a StreamRecord>) -> Self {
+    fn new(data: &'a RunData<'a>, streams: Vec<Recorded<'a, StreamRecord>>) -> Self {
         let (purpose, [a, b]) = streams
             .first()
             .map_or(("", [0, 0]), |s| (&s.purpose, s.dimensions));
@@ -127,8 +128,8 @@ impl<'a> Pair<'a> {
         guides: Vec<Guide>,
         values: impl Fn(&StreamRecord) -> Vec<FigureAtCount>,
     ) -> CurvePlot {
-        let curve = |stream: &&StreamRecord| {
-            let name = name(stream);
+        let curve = |stream: &Recorded<StreamRecord>| {
+            let name = stream.key.sampler();
             let point = |at: FigureAtCount| CurvePoint {
                 x: at.n as f64,
                 y: at.value.value,
@@ -175,8 +176,8 @@ impl<'a> Pair<'a> {
         for stream in &self.streams {
             let last = stream.star.last().filter(|at| at.n == most);
             let mut row = vec![
-                Cell::from(name(stream)),
-                format::optional(last.map(|at| at.star.value)).into(),
+                Cell::from(stream.key.sampler()),
+                format::optional(last.map(|at| at.value.value)).into(),
                 slope_cell(stream.figures.star_slope),
             ];
             row.extend(functions.iter().map(|name| {
@@ -212,7 +213,7 @@ impl<'a> Pair<'a> {
             .iter()
             .for_each(|n| table.add_column(format!("N = {n}")));
         for (stream, values) in rows {
-            let mut row = vec![name(stream).into(), seeds_cell(stream)];
+            let mut row = vec![stream.key.sampler().into(), seeds_cell(stream)];
             row.extend(shown.iter().map(|&n| {
                 let found = values.iter().find(|at| at.n == n);
                 interval_cell(found.map(|at| at.value))
@@ -245,7 +246,7 @@ impl<'a> Pair<'a> {
         for stream in &self.streams {
             let pixels = pixels(stream);
             let at = |n: &usize| pixels.iter().find(|at| at.n == *n);
-            let mut row = vec![Cell::from(name(stream))];
+            let mut row = vec![Cell::from(stream.key.sampler())];
             row.extend(counts.iter().map(|n| {
                 let angle = at(n).map(|at| at.neighbour_angle.to_degrees());
                 Cell::from(format::optional(angle))
@@ -272,12 +273,12 @@ fn worst_table(data: &RunData) -> Table {
         };
         let [a, b] = stream.dimensions;
         table.rows.push(vec![
-            name(stream).into(),
+            stream.key.sampler().into(),
             format!("{a} and {b}").into(),
             stream.purpose.as_str().into(),
             of.to_string().into(),
             last.n.to_string().into(),
-            interval_cell(Some(last.star)),
+            interval_cell(Some(last.value)),
         ]);
     }
     table
@@ -289,33 +290,17 @@ fn cost_table(data: &RunData) -> Table {
                    empty loop taken off, all units of the adapter together";
     let mut table = Table::new(caption, &["sampler", "ns per sample", "empty loop, ns"]);
     for cost in &data.costs {
-        let SamplerCostRecord {
-            sequence,
-            decorrelation,
-            ns_per_sample,
-            loop_ns_per_sample,
-            ran: _,
-        } = cost;
         table.rows.push(vec![
-            sampler_name(sequence, decorrelation).into(),
-            interval_cell(Some(*ns_per_sample)),
-            format::number(loop_ns_per_sample.value).into(),
+            cost.key.sampler().into(),
+            interval_cell(Some(cost.ns_per_sample)),
+            format::number(cost.loop_ns_per_sample.value).into(),
         ]);
     }
     table
 }
 
-fn name(stream: &StreamRecord) -> String {
-    sampler_name(&stream.sequence, &stream.decorrelation)
-}
-
 fn star(stream: &StreamRecord) -> Vec<FigureAtCount> {
-    let star = stream.star.iter();
-    star.map(|at| FigureAtCount {
-        n: at.n,
-        value: at.star,
-    })
-    .collect()
+    stream.star.clone()
 }
 
 fn seeds_cell(stream: &StreamRecord) -> Cell {

@@ -5,7 +5,7 @@ use super::trade_off;
 use super::verdict::ray_classes;
 use crate::accel::Space;
 use crate::image::viridis_css;
-use crate::measure::record::{RayClass, StructureRecord};
+use crate::measure::record::{RayClass, Recorded, StructureRecord};
 use crate::report::data::{RunData, SceneGroup, structure_name};
 use crate::report::document::*;
 use crate::report::plot::rates::{Bar, RatePlot};
@@ -43,8 +43,8 @@ fn speed_bounds(scene: &SceneGroup) -> String {
     format::median_bounds(timings.map(|timing| timing.ms.len()))
 }
 
-fn name(structure: &StructureRecord) -> String {
-    structure_name(&structure.accel, structure.runtime_checks)
+fn name(structure: &Recorded<StructureRecord>) -> String {
+    structure_name(*structure)
 }
 
 /// What stands where a structure has no figure.
@@ -62,7 +62,7 @@ fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
         // Nothing passed: one group still shows who failed.
         classes.push(RayClass::Primary);
     }
-    let bar = |s: &StructureRecord, class| {
+    let bar = |s: &Recorded<StructureRecord>, class| {
         let timing = s.timings.iter().find(|timing| timing.class == class);
         let fault = s.fault();
         Bar {
@@ -158,9 +158,9 @@ fn build_table(scene: &SceneGroup) -> Table {
     table
 }
 
-fn built<'a>(scene: &'a SceneGroup) -> impl Iterator<Item = &'a StructureRecord> {
-    let is_built = |s: &&StructureRecord| !s.build.is_empty() || s.gate.is_some();
-    scene.structures.iter().copied().filter(is_built)
+fn built<'a>(scene: &'a SceneGroup) -> impl Iterator<Item = &'a Recorded<'a, StructureRecord>> {
+    let is_built = |s: &&Recorded<StructureRecord>| !s.build.is_empty() || s.gate.is_some();
+    scene.structures.iter().filter(is_built)
 }
 
 fn triangles(scene: &SceneGroup) -> Option<f64> {
@@ -287,7 +287,7 @@ fn heat_maps(dir: &Path, scene: &SceneGroup) -> Option<Block> {
         scene
             .structures
             .iter()
-            .filter_map(|s| Some((s, s.heat_map.as_deref()?)))
+            .filter_map(|s| Some((s, s.body.heat_map.as_deref()?)))
     };
     let maxima: Vec<f64> = mapped().filter_map(|(s, _)| s.heat_map_max).collect();
     let top = maxima.first().copied();

@@ -1,8 +1,8 @@
 //! What a build costs against what it gains: break-even in rays, and time to an image.
 
-use crate::measure::record::{Interval, RayClass, StructureRecord};
+use crate::measure::record::{Interval, RayClass, Recorded, StructureRecord, axis};
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
-use crate::report::data::{SceneGroup, View, structure_name, without_kernels};
+use crate::report::data::{SceneGroup, View, structure_name, timed_structure};
 use crate::report::document::*;
 use crate::report::format;
 
@@ -43,14 +43,14 @@ impl BreakEven {
 }
 
 /// Speed in a class, if it was measured often enough to have a 95 % interval.
-fn rate(structure: &StructureRecord, class: RayClass) -> Option<&Interval> {
-    let timing = structure.timings.iter().find(|t| t.class == class)?;
+fn rate<'a>(structure: &Recorded<'a, StructureRecord>, class: RayClass) -> Option<&'a Interval> {
+    let timing = (structure.body.timings.iter()).find(|t| t.class == class)?;
     (timing.ms.len() >= LEAST_FOR_MEDIAN).then_some(&timing.mrays_s)
 }
 
 /// Rays after which each structure has caught up with the one that is built fastest, per class.
 pub fn break_even_table(scene: &SceneGroup, classes: &[RayClass]) -> Option<Table> {
-    let passed: Vec<&StructureRecord> = scene
+    let passed: Vec<Recorded<StructureRecord>> = scene
         .structures
         .iter()
         .copied()
@@ -59,7 +59,7 @@ pub fn break_even_table(scene: &SceneGroup, classes: &[RayClass]) -> Option<Tabl
     let first = passed
         .iter()
         .min_by(|a, b| a.build_ms.total_cmp(&b.build_ms))?;
-    let first_name = structure_name(&first.accel, first.runtime_checks);
+    let first_name = structure_name(*first);
     let caption = format!(
         "Break-even: rays after which a structure, its build included, overtakes {first_name}, which is built fastest ({} ms)",
         format::number(first.build_ms)
@@ -68,10 +68,10 @@ pub fn break_even_table(scene: &SceneGroup, classes: &[RayClass]) -> Option<Tabl
     for class in classes {
         table.add_column(format::ray_class(*class));
     }
-    for structure in passed.iter().filter(|s| !std::ptr::eq(**s, *first)) {
+    for structure in passed.iter().filter(|s| !std::ptr::eq(s.body, first.body)) {
         let extra_ms = structure.build_ms - first.build_ms;
         let mut row = vec![
-            structure_name(&structure.accel, structure.runtime_checks).into(),
+            structure_name(*structure).into(),
             format::number(structure.build_ms).into(),
         ];
         row.extend(classes.iter().map(|class| {
@@ -115,9 +115,8 @@ pub fn time_to_image_table(scene: &SceneGroup, view: &View) -> Option<Table> {
         let Some(time) = view.time(name, &sampler.name) else {
             continue;
         };
-        let is_it = |s: &&&StructureRecord| {
-            s.ran.kernels == time.ran.kernels
-                && without_kernels(&s.accel, &s.ran, s.runtime_checks) == *name
+        let is_it = |s: &&Recorded<StructureRecord>| {
+            s.key.agrees(time.key, &[axis::KERNELS]) && timed_structure(**s) == *name
         };
         let built = scene.structures.iter().find(is_it);
         let (Some(built), Some(ms)) = (built, time.ms_per_spp) else {

@@ -1,6 +1,6 @@
 //! Who wins, per scene.
 
-use crate::measure::record::{ClassTiming, Interval, RayClass};
+use crate::measure::record::{ClassTiming, Interval, RayClass, Recorded, StructureRecord};
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
 use crate::report::data::{RunData, SceneGroup, View, structure_name};
 use crate::report::document::*;
@@ -86,13 +86,10 @@ fn row(question: String, ruling: &Ruling) -> Vec<Cell> {
 
 /// Who may not win, with the reason.
 fn left_out(scene: &SceneGroup) -> Option<String> {
-    let structures = scene.structures.iter().filter_map(|s| {
-        Some(format!(
-            "{} ({})",
-            structure_name(&s.accel, s.runtime_checks),
-            s.fault()?
-        ))
-    });
+    let structures = scene
+        .structures
+        .iter()
+        .filter_map(|s| Some(format!("{} ({})", structure_name(*s), s.fault()?)));
     let samplers = scene.views.iter().flat_map(|view| {
         let fault = |s: &Sampler| {
             Some(format!(
@@ -141,9 +138,9 @@ pub fn ray_classes(scene: &SceneGroup) -> Vec<RayClass> {
 
 /// Compares the structures that passed the gate on one ray class.
 pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
-    let contender = |s: &&crate::measure::record::StructureRecord| {
+    let contender = |s: &Recorded<StructureRecord>| {
         let timing: &ClassTiming = s.timings.iter().find(|timing| timing.class == class)?;
-        let name = structure_name(&s.accel, s.runtime_checks);
+        let name = structure_name(*s);
         let has_spread = timing.ms.len() >= LEAST_FOR_MEDIAN;
         s.fault().is_none().then_some(Contender {
             name,

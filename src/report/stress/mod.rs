@@ -8,6 +8,7 @@ use super::document::{Banner, Block, Check, Document, Section, Table, Tone};
 use super::format;
 use super::terminal::aligned;
 use super::{ReportError, write_page};
+use crate::measure::record::Verdict;
 use crate::stress::families::FAMILIES;
 use crate::stress::record::{CellRecord, Record, SkippedRecord, TargetRecord};
 use crate::stress::targets::{cells, shots, suite};
@@ -44,7 +45,12 @@ pub fn stress_tables(records: &[Record]) -> String {
         text += &format!("skipped: {}: {}\n", skipped.what, skipped.reason);
     }
     for check in checks(records) {
-        text += &format!("{}  {}: {}\n", check.word(), check.title, check.detail);
+        text += &format!(
+            "{}  {}: {}\n",
+            check.verdict.word(),
+            check.title,
+            check.detail
+        );
     }
     text
 }
@@ -197,10 +203,10 @@ fn check(target: &TargetRecord) -> Check {
         }
     };
     Check {
-        tone: match target.passed {
-            Some(true) => Tone::Good,
-            Some(false) => Tone::Bad,
-            None => Tone::Note,
+        verdict: match target.passed {
+            Some(true) => Verdict::Pass,
+            Some(false) => Verdict::Fail,
+            None => Verdict::Open,
         },
         title: target.target.clone(),
         detail,
@@ -227,10 +233,10 @@ mod tests {
             passed: found.map(|f| f <= 0.0),
             note: "bvh, sphere".into(),
         };
-        assert_eq!(check(&target(None)).word(), "OPEN");
-        assert_eq!(check(&target(Some(0.0))).word(), "PASS");
+        assert_eq!(check(&target(None)).verdict.word(), "OPEN");
+        assert_eq!(check(&target(Some(0.0))).verdict.word(), "PASS");
         let missed = check(&target(Some(3.0)));
-        assert_eq!(missed.word(), "FAIL");
+        assert_eq!(missed.verdict.word(), "FAIL");
         assert!(
             missed.detail.contains("3.00, limit 0") && missed.detail.contains("bvh, sphere"),
             "{}",

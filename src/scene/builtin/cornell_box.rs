@@ -129,7 +129,6 @@ impl BuiltinScene for CornellBox {
                 Material::diffuse("green", Vec3::new(0.14, 0.45, 0.091)),
                 Material::diffuse("light", Vec3::splat(0.78)).emitting(Vec3::new(18.4, 15.6, 8.0)),
             ],
-            textures: Vec::new(),
             camera: Some(Camera {
                 eye: Vec3::new(278.0, 273.0, -800.0),
                 target: Vec3::new(278.0, 273.0, 0.0),
@@ -137,7 +136,7 @@ impl BuiltinScene for CornellBox {
                 // A focal length of 35 mm behind a film of 25 mm.
                 vertical_fov_degrees: 39.3077,
             }),
-            environment: Vec3::ZERO,
+            ..Look::default()
         };
         (builder, look)
     }

@@ -30,14 +30,9 @@ impl BuiltinScene for DisplacedSphere {
         });
         let look = Look {
             materials: vec![Material::diffuse("grey", Vec3::splat(0.7))],
-            textures: Vec::new(),
-            camera: Some(Camera {
-                eye: Vec3::new(1.6, 1.3, 2.6),
-                target: Vec3::ZERO,
-                up: Vec3::Y,
-                vertical_fov_degrees: 40.0,
-            }),
+            camera: Some(Camera::upright(Vec3::new(1.6, 1.3, 2.6), Vec3::ZERO, 40.0)),
             environment: Vec3::ONE,
+            ..Look::default()
         };
         (builder, look)
     }

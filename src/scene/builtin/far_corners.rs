@@ -46,14 +46,13 @@ impl BuiltinScene for FarCorners {
             materials: [(0.7, 0.7, 0.65), (0.75, 0.4, 0.3)]
                 .map(|color| Material::diffuse("corner", color.into()))
                 .into(),
-            textures: Vec::new(),
-            camera: Some(Camera {
-                eye: Vec3::new(2.6, 1.9, 3.1),
-                target: Vec3::new(0.4, 0.3, 0.4),
-                up: Vec3::Y,
-                vertical_fov_degrees: 40.0,
-            }),
+            camera: Some(Camera::upright(
+                Vec3::new(2.6, 1.9, 3.1),
+                Vec3::new(0.4, 0.3, 0.4),
+                40.0,
+            )),
             environment: Vec3::ONE,
+            ..Look::default()
         };
         (builder, look)
     }

@@ -46,14 +46,12 @@ impl BuiltinScene for FurnaceBox {
             Material::diffuse("wall", Vec3::splat(albedo)).emitting(Vec3::splat(1.0 - albedo));
         let look = Look {
             materials: vec![wall],
-            textures: Vec::new(),
-            camera: Some(Camera {
-                eye: Vec3::new(0.3, 0.4, 0.2),
-                target: Vec3::new(0.7, 0.6, 0.9),
-                up: Vec3::Y,
-                vertical_fov_degrees: 60.0,
-            }),
-            environment: Vec3::ZERO,
+            camera: Some(Camera::upright(
+                Vec3::new(0.3, 0.4, 0.2),
+                Vec3::new(0.7, 0.6, 0.9),
+                60.0,
+            )),
+            ..Look::default()
         };
         (builder, look)
     }
@@ -73,14 +71,9 @@ impl BuiltinScene for WhiteFurnace {
         grid.push(&mut builder, 0, DVec3::as_vec3);
         let look = Look {
             materials: vec![Material::diffuse("white", Vec3::ONE)],
-            textures: Vec::new(),
-            camera: Some(Camera {
-                eye: Vec3::new(0.0, 0.0, 3.0),
-                target: Vec3::ZERO,
-                up: Vec3::Y,
-                vertical_fov_degrees: 45.0,
-            }),
+            camera: Some(Camera::upright(Vec3::new(0.0, 0.0, 3.0), Vec3::ZERO, 45.0)),
             environment: Vec3::ONE,
+            ..Look::default()
         };
         (builder, look)
     }

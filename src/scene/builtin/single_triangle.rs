@@ -22,14 +22,13 @@ impl BuiltinScene for SingleTriangle {
         builder.push([Vec3::X, Vec3::Y, Vec3::Z], 0);
         let look = Look {
             materials: vec![Material::diffuse("triangle", Vec3::splat(0.5))],
-            textures: Vec::new(),
-            camera: Some(Camera {
-                eye: Vec3::splat(2.0),
-                target: Vec3::splat(1.0 / 3.0),
-                up: Vec3::Y,
-                vertical_fov_degrees: 40.0,
-            }),
+            camera: Some(Camera::upright(
+                Vec3::splat(2.0),
+                Vec3::splat(1.0 / 3.0),
+                40.0,
+            )),
             environment: Vec3::ONE,
+            ..Look::default()
         };
         (builder, look)
     }

@@ -55,14 +55,13 @@ impl BuiltinScene for TeapotInAStadium {
                 Material::diffuse("row", Vec3::splat(0.6)),
                 Material::diffuse("other row", Vec3::new(0.3, 0.35, 0.55)),
             ],
-            textures: Vec::new(),
-            camera: Some(Camera {
-                eye: Vec3::new(2.5, 3.4, 8.2),
-                target: Vec3::new(0.2, 1.9, 0.0),
-                up: Vec3::Y,
-                vertical_fov_degrees: 40.0,
-            }),
+            camera: Some(Camera::upright(
+                Vec3::new(2.5, 3.4, 8.2),
+                Vec3::new(0.2, 1.9, 0.0),
+                40.0,
+            )),
             environment: Vec3::ONE,
+            ..Look::default()
         };
         (builder, look)
     }

@@ -40,14 +40,13 @@ impl BuiltinScene for TriangleSoup {
         let materials = colors.map(|color| Material::diffuse("soup", color.into()));
         let look = Look {
             materials: materials.into(),
-            textures: Vec::new(),
-            camera: Some(Camera {
-                eye: Vec3::new(1.7, 1.3, 2.5),
-                target: Vec3::splat(0.5),
-                up: Vec3::Y,
-                vertical_fov_degrees: 40.0,
-            }),
+            camera: Some(Camera::upright(
+                Vec3::new(1.7, 1.3, 2.5),
+                Vec3::splat(0.5),
+                40.0,
+            )),
             environment: Vec3::ONE,
+            ..Look::default()
         };
         (builder, look)
     }

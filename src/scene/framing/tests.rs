@@ -39,9 +39,7 @@ fn walls(half: Vec3, missing: &[usize], inwards: bool) -> SceneData {
 fn finish(builder: SceneBuilder) -> SceneData {
     let look = SceneLook {
         materials: vec![Material::diffuse("grey", Vec3::splat(0.5))],
-        textures: Vec::new(),
-        camera: None,
-        environment: Vec3::ZERO,
+        ..SceneLook::default()
     };
     builder.finish("test.obj", look).unwrap()
 }

@@ -1,10 +1,8 @@
 //! Closed meshes: from inside, every miss is a crack.
 
-use super::super::case::{Maker, Random, Truth, ray, towards};
+use super::super::case::{MakeMesh, Maker, Random, Truth, ray, towards};
 use super::super::place::Place;
-use super::super::shapes::{Mesh, RADIUS, cube, sphere};
-use crate::accel::Ray;
-use crate::geometry::Triangle;
+use super::super::shapes::{RADIUS, cube, sphere};
 use glam::{DVec3, Vec3};
 
 /// Bands of the sphere: 528 triangles.
@@ -16,14 +14,10 @@ const BOUNCES: usize = 100;
 /// How far inside the analytic surface a chain turns, as a fraction: facets lie within.
 const INSIDE: f64 = 0.98;
 
-type MakeMesh = fn(&Place) -> Mesh;
-
-fn meshes() -> [(&'static str, MakeMesh); 2] {
-    [
-        ("sphere", |place| sphere(BANDS, place)),
-        ("box", |place| cube(CELLS, place)),
-    ]
-}
+const MESHES: [(&str, MakeMesh); 2] = [
+    ("sphere", |place| sphere(BANDS, place)),
+    ("box", |place| cube(CELLS, place)),
+];
 
 /// A mesh that rounding has crushed is as closed as before, but has no inside.
 pub fn truth(place: &Place) -> Truth {
@@ -38,79 +32,43 @@ pub fn inside(random: &mut Random, place: &Place) -> Vec3 {
     place.point(0.45 * RADIUS * random.in_cube())
 }
 
-/// Adds each mesh at each place with rays made one by one.
-fn on_every_rung(
-    maker: &mut Maker,
-    suffix: &str,
-    truth: fn(&Place) -> Truth,
-    one: fn(&Place, &[Triangle], &mut Random) -> Ray,
-) {
-    for place in maker.places() {
-        for (name, mesh) in meshes() {
-            let label = format!("{name}{suffix}, {place}");
-            maker.add(
-                label,
-                place,
-                truth(&place),
-                |_| mesh(&place),
-                |mesh, random, count| (0..count).map(|_| one(&place, mesh, random)).collect(),
-            );
-        }
-    }
+/// A point around the meshes.
+fn outside(random: &mut Random, place: &Place) -> Vec3 {
+    place.point(3.0 * RADIUS * random.direction())
 }
 
 pub fn watertight(maker: &mut Maker) {
-    on_every_rung(maker, "", truth, |place, _, random| {
+    maker.add_on_every_rung(MESHES, "", truth, |place, _, random| {
         ray(inside(random, place), random.direction().as_vec3())
     });
 }
 
 pub fn vertices(maker: &mut Maker) {
-    on_every_rung(maker, "", truth, |place, mesh, random| {
-        let at = random.below(mesh.len());
-        let vertex = mesh[at].vertices[random.below(3)];
+    let exact = |_: &Place| Truth::Exact;
+    maker.add_on_every_rung(MESHES, "", truth, |place, mesh, random| {
+        let triangle = random.one_of(mesh);
+        let vertex = random.vertex(&triangle);
         towards(inside(random, place), vertex)
     });
-    on_every_rung(
-        maker,
-        " from outside",
-        |_| Truth::Exact,
-        |place, mesh, random| {
-            let at = random.below(mesh.len());
-            let vertex = mesh[at].vertices[random.below(3)];
-            towards(place.point(3.0 * RADIUS * random.direction()), vertex)
-        },
-    );
-}
-
-/// A point of an edge, as near as f32 comes.
-pub fn on_edge(triangle: &Triangle, random: &mut Random) -> Vec3 {
-    let k = random.below(3);
-    let [a, b] = [k, (k + 1) % 3].map(|k| triangle.vertices[k].as_dvec3());
-    // Middles are points of f32 more often than others.
-    let share = if random.below(4) == 0 {
-        0.5
-    } else {
-        random.unit()
-    };
-    (a + (b - a) * share).as_vec3()
+    maker.add_on_every_rung(MESHES, " from outside", exact, |place, mesh, random| {
+        let triangle = random.one_of(mesh);
+        let vertex = random.vertex(&triangle);
+        towards(outside(random, place), vertex)
+    });
 }
 
 pub fn edges(maker: &mut Maker) {
-    on_every_rung(maker, "", truth, |place, mesh, random| {
-        let at = random.below(mesh.len());
-        towards(inside(random, place), on_edge(&mesh[at], random))
+    let exact = |_: &Place| Truth::Exact;
+    maker.add_on_every_rung(MESHES, "", truth, |place, mesh, random| {
+        let triangle = random.one_of(mesh);
+        let from = inside(random, place);
+        towards(from, random.on_edge(&triangle))
     });
-    on_every_rung(
-        maker,
-        " from outside",
-        |_| Truth::Exact,
-        |place, mesh, random| {
-            let at = random.below(mesh.len());
-            let target = on_edge(&mesh[at], random);
-            towards(place.point(3.0 * RADIUS * random.direction()), target)
-        },
-    );
+    maker.add_on_every_rung(MESHES, " from outside", exact, |place, mesh, random| {
+        let triangle = random.one_of(mesh);
+        let target = random.on_edge(&triangle);
+        towards(outside(random, place), target)
+    });
 }
 
 /// One bounce from `p` along `d`: where and where to, on the analytic surface.
@@ -148,7 +106,7 @@ fn bounce_in_sphere(p: DVec3, d: DVec3) -> (DVec3, DVec3) {
 pub fn mirror_chains(maker: &mut Maker) {
     let bounces: [Bounce; 2] = [bounce_in_sphere, bounce_in_box];
     for place in maker.places() {
-        for ((name, mesh), bounce) in meshes().into_iter().zip(bounces) {
+        for ((name, mesh), bounce) in MESHES.into_iter().zip(bounces) {
             let label = format!("{name}, {place}");
             maker.add(
                 label,

@@ -3,7 +3,7 @@
 use super::super::case::{Maker, Random, Truth, ray, towards};
 use super::super::place::Place;
 use super::super::shapes::{Mesh, RADIUS, cube, plane, sphere};
-use super::closed::{inside, on_edge};
+use super::closed::inside;
 use crate::accel::Ray;
 use crate::geometry::Triangle;
 use crate::params::{ParamValue, Params, Variant};
@@ -11,18 +11,15 @@ use crate::scene::{LoadOptions, load};
 use glam::{DVec3, Vec3};
 
 /// Rays at insides, edges and vertices of random triangles, from about the mesh.
-fn shots(place: Place) -> impl Fn(&[Triangle], &mut Random, usize) -> Vec<Ray> {
-    move |mesh, random, count| {
-        let one = |_| {
-            let triangle = mesh[random.below(mesh.len())];
-            let target = match random.below(4) {
-                0 => triangle.vertices[random.below(3)],
-                1 => on_edge(&triangle, random),
-                _ => random.on(triangle.vertices).as_vec3(),
-            };
-            towards(place.point(2.0 * RADIUS * random.in_cube()), target)
+fn shots(place: Place) -> impl Fn(&[Triangle], &mut Random) -> Ray {
+    move |mesh, random| {
+        let triangle = random.one_of(mesh);
+        let target = match random.below(4) {
+            0 => random.vertex(&triangle),
+            1 => random.on_edge(&triangle),
+            _ => random.on(&triangle),
         };
-        (0..count).map(one).collect()
+        towards(place.point(2.0 * RADIUS * random.in_cube()), target)
     }
 }
 
@@ -42,51 +39,28 @@ pub fn needles(maker: &mut Maker) {
     for place in maker.places() {
         let mesh = |random: &mut Random| -> Mesh {
             let one = |i: usize| needle(random, i as f64 * 6.0 / 255.0);
-            (0..256)
-                .map(one)
-                .map(|v| Triangle {
-                    vertices: v.map(|v| place.point(v)),
-                })
-                .collect()
+            let placed = |vertices: [DVec3; 3]| vertices.map(|v| place.point(v)).into();
+            (0..256).map(one).map(placed).collect()
         };
-        maker.add(
-            format!("scattered, {place}"),
-            place,
-            Truth::Exact,
-            mesh,
-            shots(place),
-        );
+        let label = format!("scattered, {place}");
+        maker.add_each(label, place, Truth::Exact, mesh, shots(place));
     }
     // A box a million times wider than high: its walls are closed by needles.
-    for place in maker
-        .places()
-        .into_iter()
-        .filter(|place| place.shift == 0.0)
-    {
+    for place in maker.places().into_iter().filter(|p| p.shift == 0.0) {
+        let label = format!("flat box, {place}");
         let flat = |_: &mut Random| {
             let flatten = |v: Vec3| Vec3::new(v.x, v.y * 1e-6, v.z);
-            let walls = cube(4, &place).into_iter();
-            walls
-                .map(|t| Triangle {
-                    vertices: t.vertices.map(flatten),
-                })
+            cube(4, &place)
+                .into_iter()
+                .map(|t| t.map(flatten))
                 .collect()
         };
-        maker.add(
-            format!("flat box, {place}"),
-            place,
-            Truth::Closed,
-            flat,
-            |_, random, count| {
-                let one = |_| {
-                    let flatten = DVec3::new(1.0, 1e-6, 1.0);
-                    let from = place.point(0.9 * RADIUS * random.in_cube() * flatten);
-                    let to = place.point(RADIUS * random.direction() * flatten);
-                    towards(from, to)
-                };
-                (0..count).map(one).collect()
-            },
-        );
+        maker.add_each(label, place, Truth::Closed, flat, |_, random| {
+            let flatten = DVec3::new(1.0, 1e-6, 1.0);
+            let from = place.point(0.9 * RADIUS * random.in_cube() * flatten);
+            let to = place.point(RADIUS * random.direction() * flatten);
+            towards(from, to)
+        });
     }
 }
 
@@ -98,21 +72,20 @@ pub fn slivers(maker: &mut Maker) {
             for i in 0..whole {
                 let [a, b, c] = mesh[i].vertices;
                 let nearly = |v: Vec3| Vec3::new(v.x.next_up(), v.y, v.z.next_down());
-                mesh.push(Triangle {
-                    vertices: match i % 6 {
-                        0 => [a, a, a],
-                        1 => [a, b, b],
-                        2 => [a, b, 0.5 * (a + b)],
-                        3 => [a, b, nearly(a)],
-                        4 => [a, c, nearly(0.5 * (a + c))],
-                        // Duplicates, begun at another corner or turned over.
-                        _ => random.one_of(&[[a, b, c], [b, c, a], [c, b, a]]),
-                    },
-                });
+                let vertices = match i % 6 {
+                    0 => [a, a, a],
+                    1 => [a, b, b],
+                    2 => [a, b, 0.5 * (a + b)],
+                    3 => [a, b, nearly(a)],
+                    4 => [a, c, nearly(0.5 * (a + c))],
+                    // Duplicates, begun at another corner or turned over.
+                    _ => random.one_of(&[[a, b, c], [b, c, a], [c, b, a]]),
+                };
+                mesh.push(vertices.into());
             }
             mesh
         };
-        maker.add(format!("{place}"), place, Truth::Exact, mesh, shots(place));
+        maker.add_each(format!("{place}"), place, Truth::Exact, mesh, shots(place));
     }
 }
 
@@ -125,22 +98,17 @@ pub fn coincident(maker: &mut Maker) {
                 let mut again = layer.clone();
                 for triangle in &mut again {
                     triangle.vertices.rotate_left(random.below(3));
-                    if copy >= 3 {
-                        let lift = |v: Vec3| {
-                            v.with_y(if copy == 3 {
-                                v.y.next_up()
-                            } else {
-                                v.y.next_down()
-                            })
-                        };
-                        triangle.vertices = triangle.vertices.map(lift);
-                    }
+                    *triangle = match copy {
+                        3 => triangle.map(|v| v.with_y(v.y.next_up())),
+                        4 => triangle.map(|v| v.with_y(v.y.next_down())),
+                        _ => *triangle,
+                    };
                 }
                 mesh.extend(again);
             }
             mesh
         };
-        maker.add(format!("{place}"), place, Truth::Exact, mesh, shots(place));
+        maker.add_each(format!("{place}"), place, Truth::Exact, mesh, shots(place));
     }
 }
 
@@ -155,31 +123,20 @@ pub fn huge_and_tiny(maker: &mut Maker) {
                 DVec3::new(far, -far, far),
                 DVec3::new(0.0, far, far),
             ];
-            mesh.push(Triangle {
-                vertices: wall.map(|v| place.point(v)),
-            });
+            mesh.push(wall.map(|v| place.point(v)).into());
             mesh
         };
-        maker.add(
-            format!("{place}"),
-            place,
-            Truth::Exact,
-            mesh,
-            |mesh, random, count| {
-                let one = |_| {
-                    let target = random.on_mesh(mesh);
-                    let far = place.point(1e6 * RADIUS * random.in_cube());
-                    let near = inside(random, &place);
-                    let from = if random.below(2) == 0 { far } else { near };
-                    if from == target {
-                        ray(from, Vec3::X)
-                    } else {
-                        towards(from, target)
-                    }
-                };
-                (0..count).map(one).collect()
-            },
-        );
+        let label = format!("{place}");
+        maker.add_each(label, place, Truth::Exact, mesh, |mesh, random| {
+            let target = random.on_mesh(mesh);
+            let far = place.point(1e6 * RADIUS * random.in_cube());
+            let near = inside(random, &place);
+            let from = if random.below(2) == 0 { far } else { near };
+            match from == target {
+                true => ray(from, Vec3::X),
+                false => towards(from, target),
+            }
+        });
     }
     let scales: &[f64] = if maker.quick { &[] } else { &[1.0, 1e6] };
     for &scale in scales {
@@ -187,20 +144,13 @@ pub fn huge_and_tiny(maker: &mut Maker) {
         let Some(stadium) = stadium(scale as f32) else {
             continue;
         };
-        maker.add(
-            format!("stadium, {place}"),
-            place,
-            Truth::Exact,
-            |_| stadium,
-            |mesh, random, count| {
-                let one = |_| {
-                    let target = random.on_mesh(mesh);
-                    let near = place.point(DVec3::new(3.0, 4.0, 8.0) * random.in_cube().abs());
-                    towards(near, target)
-                };
-                (0..count).map(one).collect()
-            },
-        );
+        let label = format!("stadium, {place}");
+        let mesh = |_: &mut Random| stadium;
+        maker.add_each(label, place, Truth::Exact, mesh, |mesh, random| {
+            let target = random.on_mesh(mesh);
+            let near = place.point(DVec3::new(3.0, 4.0, 8.0) * random.in_cube().abs());
+            towards(near, target)
+        });
     }
 }
 
@@ -214,9 +164,7 @@ fn stadium(scale: f32) -> Option<Mesh> {
         label: name.into(),
     };
     let scene = load(&variant, &LoadOptions::default()).ok()?;
-    let scaled = scene.triangles.iter().map(|t| Triangle {
-        vertices: t.vertices.map(|v| v * scale),
-    });
+    let scaled = scene.triangles.iter().map(|t| t.map(|v| v * scale));
     Some(scaled.collect())
 }
 
@@ -226,25 +174,18 @@ pub fn deep_trees(maker: &mut Maker) {
         let mesh = move |_: &mut Random| -> Mesh {
             let one = |i: usize| {
                 let size = 2f64.powi(-(i as i32));
-                let mut corner = DVec3::splat(0.0);
+                let mut corner = DVec3::ZERO;
                 for axis in 0..axes {
                     corner[axis] = RADIUS * size;
                 }
                 let [x, y] = [DVec3::X, DVec3::Y].map(|d| 0.4 * RADIUS * size * d);
                 let lean = DVec3::Z * (0.1 * RADIUS * size);
                 let vertices = [corner, corner + x + lean, corner + y - lean];
-                Triangle {
-                    vertices: vertices.map(|v| Place::ORDINARY.point(v)),
-                }
+                vertices.map(|v| Place::ORDINARY.point(v)).into()
             };
             (0..steps).map(one).collect()
         };
-        maker.add(
-            name,
-            Place::ORDINARY,
-            Truth::Exact,
-            mesh,
-            shots(Place::ORDINARY),
-        );
+        let place = Place::ORDINARY;
+        maker.add_each(name, place, Truth::Exact, mesh, shots(place));
     }
 }

@@ -1,42 +1,34 @@
 //! Ordinary meshes; directions, origins and intervals that are not.
 
-use super::super::case::{FAR, Maker, Random, Truth, ray, towards};
+use super::super::case::{FAR, MakeMesh, Maker, Random, Truth, ray, towards};
 use super::super::place::Place;
 use super::super::shapes::{RADIUS, cube, sphere};
-use super::closed::{inside, on_edge, truth};
+use super::super::tally::oracle_ray;
+use super::closed::{inside, truth};
 use crate::accel::Ray;
 use crate::geometry::Triangle;
-use crate::oracle::{ExactCrossing, OracleRay};
+use crate::oracle::ExactCrossing;
 use crate::scene::Bounds;
 use glam::{DVec3, Vec3};
 
-/// Adds a sphere and a box at each place with rays made one by one.
-fn on_every_rung(maker: &mut Maker, one: fn(&Place, &[Triangle], &mut Random) -> Ray) {
-    for place in maker.places() {
-        for (name, mesh) in [("sphere", sphere(8, &place)), ("box", cube(4, &place))] {
-            let label = format!("{name}, {place}");
-            maker.add(
-                label,
-                place,
-                Truth::Exact,
-                |_| mesh,
-                |mesh, random, count| (0..count).map(|_| one(&place, mesh, random)).collect(),
-            );
-        }
-    }
-}
+/// A coarse sphere and a coarse box.
+const MESHES: [(&str, MakeMesh); 2] = [
+    ("sphere", |place| sphere(8, place)),
+    ("box", |place| cube(4, place)),
+];
 
-fn some(mesh: &[Triangle], random: &mut Random) -> Triangle {
-    mesh[random.below(mesh.len())]
+/// Adds the meshes at each place with rays made one by one.
+fn on_every_rung(maker: &mut Maker, one: fn(&Place, &[Triangle], &mut Random) -> Ray) {
+    maker.add_on_every_rung(MESHES, "", |_| Truth::Exact, one);
 }
 
 pub fn axis_parallel(maker: &mut Maker) {
     on_every_rung(maker, |place, mesh, random| {
-        let triangle = some(mesh, random);
+        let triangle = random.one_of(mesh);
         let target = match random.below(3) {
-            0 => triangle.vertices[random.below(3)],
-            1 => on_edge(&triangle, random),
-            _ => random.on(triangle.vertices).as_vec3(),
+            0 => random.vertex(&triangle),
+            1 => random.on_edge(&triangle),
+            _ => random.on(&triangle),
         };
         let mut direction = [0; 3].map(|_| random.one_of(&[0.0, -0.0]));
         let axis = random.below(3);
@@ -52,9 +44,9 @@ pub fn axis_parallel(maker: &mut Maker) {
 
 pub fn in_plane(maker: &mut Maker) {
     on_every_rung(maker, |_, mesh, random| {
-        let triangle = some(mesh, random);
+        let triangle = random.one_of(mesh);
         let [a, b, _] = triangle.vertices;
-        let target = random.on(triangle.vertices).as_vec3();
+        let target = random.on(&triangle);
         match random.below(3) {
             // Along an edge, from beyond it.
             0 => towards(a + (a - b), b),
@@ -83,12 +75,12 @@ fn on_cell_border(bounds: &Bounds, random: &mut Random) -> Vec3 {
 
 pub fn origins(maker: &mut Maker) {
     on_every_rung(maker, |place, mesh, random| {
-        let triangle = some(mesh, random);
+        let triangle = random.one_of(mesh);
         let bounds = Bounds::of(mesh);
         let origin = match random.below(5) {
-            0 => triangle.vertices[random.below(3)],
-            1 => on_edge(&triangle, random),
-            2 => random.on(triangle.vertices).as_vec3(),
+            0 => random.vertex(&triangle),
+            1 => random.on_edge(&triangle),
+            2 => random.on(&triangle),
             3 => on_cell_border(&bounds, random),
             _ => inside(random, place),
         };
@@ -101,18 +93,9 @@ pub fn origins(maker: &mut Maker) {
 
 pub fn interval_ends(maker: &mut Maker) {
     on_every_rung(maker, |place, mesh, random| {
-        let triangle = some(mesh, random);
-        let whole = towards(
-            inside(random, place),
-            random.on(triangle.vertices).as_vec3(),
-        );
-        let line = OracleRay {
-            origin: whole.origin,
-            t_min: 0.0,
-            direction: whole.direction,
-            t_max: FAR,
-        };
-        let t = ExactCrossing::new(&triangle, &line).t as f32;
+        let triangle = random.one_of(mesh);
+        let whole = towards(inside(random, place), random.on(&triangle));
+        let t = ExactCrossing::new(&triangle, &oracle_ray(&whole)).t as f32;
         if !(t > 0.0 && t < FAR) {
             return whole;
         }
@@ -145,10 +128,11 @@ const NOTHINGS: [f32; 8] = [
 
 /// A ray of any length from 10⁻¹⁰ to 10¹⁰, most often with a component or two that are next to nothing,
 /// and from the coordinates of a vertex along those.
-pub fn of_any_length(from: Vec3, mesh: &[Triangle], random: &mut Random) -> Ray {
+fn of_any_length(from: Vec3, mesh: &[Triangle], random: &mut Random) -> Ray {
     let mut from = from;
     let mut direction = random.direction().as_vec3();
-    let vertex = some(mesh, random).vertices[random.below(3)];
+    let triangle = random.one_of(mesh);
+    let vertex = random.vertex(&triangle);
     let first = random.below(3);
     for k in 0..random.below(3) {
         let axis = (first + k) % 3;
@@ -161,21 +145,17 @@ pub fn of_any_length(from: Vec3, mesh: &[Triangle], random: &mut Random) -> Ray 
     ray(from, length * direction)
 }
 
+/// A ray of any length from around the middle of a mesh.
+pub fn from_the_middle(place: &Place, mesh: &[Triangle], random: &mut Random) -> Ray {
+    of_any_length(place.point(0.2 * RADIUS * random.in_cube()), mesh, random)
+}
+
 pub fn lengths(maker: &mut Maker) {
-    for place in maker.places() {
-        for (name, mesh) in [("sphere", sphere(12, &place)), ("box", cube(4, &place))] {
-            let one = |mesh: &[Triangle], random: &mut Random| {
-                of_any_length(place.point(0.2 * RADIUS * random.in_cube()), mesh, random)
-            };
-            maker.add(
-                format!("{name}, {place}"),
-                place,
-                truth(&place),
-                |_| mesh,
-                |mesh, random, count| (0..count).map(|_| one(mesh, random)).collect(),
-            );
-        }
-    }
+    let meshes: [(&str, MakeMesh); 2] = [
+        ("sphere", |place| sphere(12, place)),
+        ("box", |place| cube(4, place)),
+    ];
+    maker.add_on_every_rung(meshes, "", truth, from_the_middle);
 }
 
 pub fn seams(maker: &mut Maker) {
@@ -188,26 +168,18 @@ pub fn seams(maker: &mut Maker) {
         1e-30,
     ] {
         let noisy = |x: f32| if x.abs() < 1e-6 { seam } else { x };
-        let mesh = sphere(12, &place).into_iter().map(|t| Triangle {
-            vertices: t
-                .vertices
-                .map(|v| Vec3::from_array(v.to_array().map(noisy))),
+        let mesh = |_: &mut Random| {
+            let noisy = |v: Vec3| Vec3::from_array(v.to_array().map(noisy));
+            let sphere = sphere(12, &place).into_iter();
+            sphere.map(|t| t.map(noisy)).collect()
+        };
+        let label = format!("{seam:e} for 0");
+        maker.add_each(label, place, Truth::Closed, mesh, |mesh, random| {
+            let mut from = place.point(0.2 * RADIUS * random.in_cube());
+            for _ in 0..random.below(4) {
+                from[random.below(3)] = random.one_of(&NOTHINGS);
+            }
+            of_any_length(from, mesh, random)
         });
-        maker.add(
-            format!("{seam:e} for 0"),
-            place,
-            Truth::Closed,
-            |_| mesh.collect(),
-            |mesh, random, count| {
-                let one = |_| {
-                    let mut from = place.point(0.2 * RADIUS * random.in_cube());
-                    for _ in 0..random.below(4) {
-                        from[random.below(3)] = random.one_of(&NOTHINGS);
-                    }
-                    of_any_length(from, mesh, random)
-                };
-                (0..count).map(one).collect()
-            },
-        );
     }
 }

@@ -2,11 +2,10 @@
 
 use super::super::case::{FAR, Maker, Random, Truth, ray, towards};
 use super::super::place::Place;
-use super::super::shapes::{RADIUS, cube, sphere};
+use super::super::shapes::{Mesh, RADIUS, cube, sphere};
 use super::closed::inside;
 use crate::accel::Ray;
 use crate::accel::ray::SMALLEST_DIRECTION;
-use crate::geometry::Triangle;
 use crate::scene::MAX_COORDINATE;
 use glam::Vec3;
 
@@ -33,35 +32,18 @@ pub fn denormal(maker: &mut Maker) {
     }
     let place = Place::ORDINARY;
     let tiny = [1e-30, 1e-38, 1e-40, 1e-45, -1e-45];
-    maker.add(
-        "directions",
-        place,
-        Truth::Exact,
-        |_| cube(4, &place),
-        |_, random, count| {
-            let one = |_| {
-                let mut direction = random.direction().as_vec3();
-                for axis in 0..random.below(3) {
-                    direction[axis] = random.one_of(&tiny);
-                }
-                ray(inside(random, &place), direction)
-            };
-            (0..count).map(one).collect()
-        },
-    );
-    maker.add(
-        "origins",
-        place,
-        Truth::Exact,
-        |_| cube(4, &place),
-        |_, random, count| {
-            let one = |_| {
-                let origin = [0; 3].map(|_| random.one_of(&tiny));
-                ray(origin.into(), random.direction().as_vec3())
-            };
-            (0..count).map(one).collect()
-        },
-    );
+    let cube = |_: &mut Random| cube(4, &place);
+    maker.add_each("directions", place, Truth::Exact, cube, |_, random| {
+        let mut direction = random.direction().as_vec3();
+        for axis in 0..random.below(3) {
+            direction[axis] = random.one_of(&tiny);
+        }
+        ray(inside(random, &place), direction)
+    });
+    maker.add_each("origins", place, Truth::Exact, cube, |_, random| {
+        let origin = [0; 3].map(|_| random.one_of(&tiny));
+        ray(origin.into(), random.direction().as_vec3())
+    });
 }
 
 /// What is put into a ray.
@@ -83,51 +65,31 @@ const STRANGE: [(&str, [f32; 3]); 2] = [
 
 pub fn non_finite(maker: &mut Maker) {
     let place = Place::ORDINARY;
-    let mut add = |label: String, truth: Truth, spoil: &dyn Fn(&mut Ray, &mut Random)| {
-        maker.add(
-            label,
-            place,
-            truth,
-            |_| sphere(12, &place),
-            |_, random, count| {
-                let one = |_| {
-                    let mut one = ray(inside(random, &place), random.direction().as_vec3());
-                    spoil(&mut one, random);
-                    one
-                };
-                (0..count).map(one).collect()
-            },
-        );
+    let mut add = |label: &str, truth: Truth, spoil: &dyn Fn(&mut Ray, &mut Random)| {
+        let sphere = |_: &mut Random| sphere(12, &place);
+        maker.add_each(label, place, truth, sphere, |_, random| {
+            let mut one = ray(inside(random, &place), random.direction().as_vec3());
+            spoil(&mut one, random);
+            one
+        });
     };
     for (name, values) in STRANGE {
-        add(
-            format!("{name} origin"),
-            Truth::Miss,
-            &move |ray, random| {
-                ray.origin[random.below(3)] = random.one_of(&values);
-            },
-        );
-        add(
-            format!("{name} direction"),
-            Truth::Miss,
-            &move |ray, random| {
-                ray.direction[random.below(3)] = random.one_of(&values);
-            },
-        );
+        add(&format!("{name} origin"), Truth::Miss, &|ray, random| {
+            ray.origin[random.below(3)] = random.one_of(&values);
+        });
+        add(&format!("{name} direction"), Truth::Miss, &|ray, random| {
+            ray.direction[random.below(3)] = random.one_of(&values);
+        });
     }
-    add("NaN t_min".into(), Truth::Miss, &|ray, _| {
-        ray.t_min = f32::NAN
-    });
-    add("NaN t_max".into(), Truth::Miss, &|ray, _| {
-        ray.t_max = f32::NAN
-    });
-    add("zero direction".into(), Truth::Miss, &|ray, random| {
+    add("NaN t_min", Truth::Miss, &|ray, _| ray.t_min = f32::NAN);
+    add("NaN t_max", Truth::Miss, &|ray, _| ray.t_max = f32::NAN);
+    add("zero direction", Truth::Miss, &|ray, random| {
         ray.direction = [0; 3].map(|_| random.one_of(&[0.0, -0.0]));
     });
-    add("direction of nearly zero".into(), Truth::Miss, &|ray, _| {
+    add("direction of nearly zero", Truth::Miss, &|ray, _| {
         ray.direction = ray.direction.map(|d| d * SMALLEST_DIRECTION.next_down());
     });
-    add("empty interval".into(), Truth::Exact, &|ray, _| {
+    add("empty interval", Truth::Exact, &|ray, _| {
         (ray.t_min, ray.t_max) = (2.0, 1.0);
     });
 }
@@ -142,64 +104,46 @@ fn number(random: &mut Random, limit: f32) -> f32 {
     }
 }
 
+/// Triangles of random corners.
+fn shapeless(corner: impl Fn(&mut Random) -> Vec3) -> impl Fn(&mut Random) -> Mesh {
+    move |random| {
+        let mut one = || [0; 3].map(|_| corner(random)).into();
+        (0..400).map(|_| one()).collect()
+    }
+}
+
 pub fn random_bits(maker: &mut Maker) {
     for (name, limit) in [
         ("up to 1e9", 1e9),
         ("up to the limit of coordinates", MAX_COORDINATE),
     ] {
         let vector = move |random: &mut Random| Vec3::from([0; 3].map(|_| number(random, limit)));
-        let mesh = |random: &mut Random| {
-            (0..400)
-                .map(|_| Triangle {
-                    vertices: [0; 3].map(|_| vector(random)),
-                })
-                .collect()
-        };
-        maker.add(
-            name,
-            Place::ORDINARY,
-            Truth::Exact,
-            mesh,
-            |mesh, random, count| {
-                let one = |i: usize| {
-                    let from = vector(random);
-                    match i % 4 {
-                        0 => ray(from, vector(random)),
-                        1 => Ray {
-                            t_max: number(random, FAR).abs(),
-                            ..ray(from, vector(random))
-                        },
-                        _ => towards(from, random.on_mesh(mesh)),
-                    }
-                };
-                (0..).map(one).filter(Ray::is_ray).take(count).collect()
-            },
-        );
+        let (mesh, place) = (shapeless(vector), Place::ORDINARY);
+        maker.add(name, place, Truth::Exact, mesh, |mesh, random, count| {
+            let one = |i: usize| {
+                let from = vector(random);
+                match i % 4 {
+                    0 => ray(from, vector(random)),
+                    1 => Ray {
+                        t_max: number(random, FAR).abs(),
+                        ..ray(from, vector(random))
+                    },
+                    _ => towards(from, random.on_mesh(mesh)),
+                }
+            };
+            (0..).map(one).filter(Ray::is_ray).take(count).collect()
+        });
     }
     // Even numbers of about the same size are rarely random bits, so that these rays often hit.
     let place = Place {
         scale: RADIUS,
         shift: 0.0,
     };
-    let mesh = |random: &mut Random| {
-        let nearby = |random: &mut Random| f32::from_bits(0x3f00_0000 | random.bits() >> 8);
-        (0..400)
-            .map(|_| Triangle {
-                vertices: [0; 3].map(|_| Vec3::from([0; 3].map(|_| nearby(random)))),
-            })
-            .collect()
-    };
-    maker.add(
-        "random mantissas",
-        place,
-        Truth::Exact,
-        mesh,
-        |mesh, random, count| {
-            let one = |_| {
-                let target = random.on_mesh(mesh);
-                towards(place.point(random.in_cube()), target)
-            };
-            (0..count).map(one).collect()
-        },
-    );
+    let nearby = |random: &mut Random| f32::from_bits(0x3f00_0000 | random.bits() >> 8);
+    let mesh = shapeless(move |random| Vec3::from([0; 3].map(|_| nearby(random))));
+    let name = "random mantissas";
+    maker.add_each(name, place, Truth::Exact, mesh, |mesh, random| {
+        let target = random.on_mesh(mesh);
+        towards(place.point(random.in_cube()), target)
+    });
 }

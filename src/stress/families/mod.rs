@@ -10,8 +10,6 @@ mod placed;
 
 use super::case::{Case, Maker};
 
-pub(super) use closed::on_edge;
-
 /// A kind of trouble.
 pub struct Family {
     /// Name as a user types it.
@@ -23,104 +21,112 @@ pub struct Family {
 
 /// Every family.
 pub const FAMILIES: [Family; 19] = [
-    Family {
-        name: "watertight",
-        description: "closed meshes from inside, random directions",
-        make: closed::watertight,
-    },
-    Family {
-        name: "vertices",
-        description: "shots at shared vertices of closed meshes, from inside and outside",
-        make: closed::vertices,
-    },
-    Family {
-        name: "edges",
-        description: "shots at shared edges of closed meshes, from inside and outside",
-        make: closed::edges,
-    },
-    Family {
-        name: "mirror-chains",
-        description: "every ray of a hundred mirror bounces inside a box and a sphere",
-        make: closed::mirror_chains,
-    },
-    Family {
-        name: "axis-parallel",
-        description: "directions along axes and in planes of axes, zeros of both signs",
-        make: directions::axis_parallel,
-    },
-    Family {
-        name: "lengths",
-        description: "closed meshes from inside, directions of length 1e-10 to 1e10, with next to nothing in them",
-        make: directions::lengths,
-    },
-    Family {
-        name: "seams",
-        description: "the same with sin π and less for the 0 of a sphere's seams",
-        make: directions::seams,
-    },
-    Family {
-        name: "in-plane",
-        description: "origin and direction in the plane of triangles",
-        make: directions::in_plane,
-    },
-    Family {
-        name: "origins",
-        description: "origins on vertices, edges, triangles, boxes and cell borders",
-        make: directions::origins,
-    },
-    Family {
-        name: "interval-ends",
-        description: "t_min and t_max exactly at the hit, and one ulp beside it",
-        make: directions::interval_ends,
-    },
-    Family {
-        name: "needles",
-        description: "triangles up to a million times longer than wide",
-        make: degenerate::needles,
-    },
-    Family {
-        name: "slivers",
-        description: "triangles of no area, nearly none, and duplicates, among ordinary ones",
-        make: degenerate::slivers,
-    },
-    Family {
-        name: "coincident",
-        description: "layers at equal distance, and one ulp apart",
-        make: degenerate::coincident,
-    },
-    Family {
-        name: "huge-and-tiny",
-        description: "a small mesh in a scene a million times larger; the teapot in its stadium",
-        make: degenerate::huge_and_tiny,
-    },
-    Family {
-        name: "deep-trees",
-        description: "triangles that shrink geometrically towards a corner",
-        make: degenerate::deep_trees,
-    },
-    Family {
-        name: "denormal",
-        description: "coordinates and directions below the smallest normal number",
-        make: extremes::denormal,
-    },
-    Family {
-        name: "non-finite",
-        description: "NaN and infinity in every component of a ray",
-        make: extremes::non_finite,
-    },
-    Family {
-        name: "random-bits",
-        description: "random bits as vertices and rays, as far as a loader lets them pass",
-        make: extremes::random_bits,
-    },
-    Family {
-        name: "instances",
-        description: "closed objects under nearly degenerate transforms and scales up to a million, from inside",
-        make: placed::instances,
-    },
+    Family::new(
+        "watertight",
+        "closed meshes from inside, random directions",
+        closed::watertight,
+    ),
+    Family::new(
+        "vertices",
+        "shots at shared vertices of closed meshes, from inside and outside",
+        closed::vertices,
+    ),
+    Family::new(
+        "edges",
+        "shots at shared edges of closed meshes, from inside and outside",
+        closed::edges,
+    ),
+    Family::new(
+        "mirror-chains",
+        "every ray of a hundred mirror bounces inside a box and a sphere",
+        closed::mirror_chains,
+    ),
+    Family::new(
+        "axis-parallel",
+        "directions along axes and in planes of axes, zeros of both signs",
+        directions::axis_parallel,
+    ),
+    Family::new(
+        "lengths",
+        "closed meshes from inside, directions of length 1e-10 to 1e10, with next to nothing in them",
+        directions::lengths,
+    ),
+    Family::new(
+        "seams",
+        "the same with sin π and less for the 0 of a sphere's seams",
+        directions::seams,
+    ),
+    Family::new(
+        "in-plane",
+        "origin and direction in the plane of triangles",
+        directions::in_plane,
+    ),
+    Family::new(
+        "origins",
+        "origins on vertices, edges, triangles, boxes and cell borders",
+        directions::origins,
+    ),
+    Family::new(
+        "interval-ends",
+        "t_min and t_max exactly at the hit, and one ulp beside it",
+        directions::interval_ends,
+    ),
+    Family::new(
+        "needles",
+        "triangles up to a million times longer than wide",
+        degenerate::needles,
+    ),
+    Family::new(
+        "slivers",
+        "triangles of no area, nearly none, and duplicates, among ordinary ones",
+        degenerate::slivers,
+    ),
+    Family::new(
+        "coincident",
+        "layers at equal distance, and one ulp apart",
+        degenerate::coincident,
+    ),
+    Family::new(
+        "huge-and-tiny",
+        "a small mesh in a scene a million times larger; the teapot in its stadium",
+        degenerate::huge_and_tiny,
+    ),
+    Family::new(
+        "deep-trees",
+        "triangles that shrink geometrically towards a corner",
+        degenerate::deep_trees,
+    ),
+    Family::new(
+        "denormal",
+        "coordinates and directions below the smallest normal number",
+        extremes::denormal,
+    ),
+    Family::new(
+        "non-finite",
+        "NaN and infinity in every component of a ray",
+        extremes::non_finite,
+    ),
+    Family::new(
+        "random-bits",
+        "random bits as vertices and rays, as far as a loader lets them pass",
+        extremes::random_bits,
+    ),
+    Family::new(
+        "instances",
+        "closed objects under nearly degenerate transforms and scales up to a million, from inside",
+        placed::instances,
+    ),
 ];
 
 impl Family {
+    const fn new(name: &'static str, description: &'static str, make: fn(&mut Maker)) -> Self {
+        Self {
+            name,
+            description,
+            make,
+        }
+    }
+
     /// The family of this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         FAMILIES.iter().find(|family| family.name == name)

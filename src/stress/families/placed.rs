@@ -3,7 +3,7 @@
 use super::super::case::{Maker, Random, ray};
 use super::super::place::Place;
 use super::super::shapes::{RADIUS, sphere};
-use super::directions::of_any_length;
+use super::directions::from_the_middle;
 use crate::scene::{Assembly, Transform};
 use glam::{DMat3, DQuat, DVec3, Vec3};
 
@@ -47,10 +47,7 @@ fn scaled(maker: &mut Maker) {
             },
             |_, random, count| {
                 let mesh = sphere(12, &place);
-                let one = |_| {
-                    let from = place.point(0.2 * RADIUS * random.in_cube());
-                    of_any_length(from, &mesh, random)
-                };
+                let one = |_| from_the_middle(&place, &mesh, random);
                 (0..count).map(one).collect()
             },
         );
@@ -77,8 +74,7 @@ pub fn instances(maker: &mut Maker) {
                 |random| squeezed(random, thickness, spread),
                 |assembly, random, count| {
                     let one = |_| {
-                        let instance =
-                            &assembly.instances()[random.below(assembly.instances().len())];
+                        let instance = random.one_of(assembly.instances());
                         // Rounding far from the origin may carry any point but the middle outside.
                         let reach = if spread > 0.0 { 0.0 } else { 0.2 * RADIUS };
                         let p = (reach * random.in_cube()).as_vec3();

@@ -1,8 +1,8 @@
 //! Words to floats in [0, 1). Judges `to_unit` of `kernels/sampling/sampler.wesl` through
 //! `kernels/stress/conversion.wesl`.
 
-use super::{Figure, NumericsError, U, stage};
-use crate::gpu::{Bindings, Composition, Dispatch, Gpu, UniformValues, groups_for};
+use super::{Figure, NumericsError, U, evaluate, stage};
+use crate::gpu::{Composition, Gpu, UniformValues, groups_for};
 use crate::integrator::with_sampler;
 
 /// Words of one dispatch.
@@ -66,22 +66,12 @@ pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
 fn convert(gpu: &Gpu, first: u32, stride: u32, count: u32) -> Result<Vec<[f32; 2]>, NumericsError> {
     let sampler = stage::sampler("pixel-hash", 1)?;
     let kernel = with_sampler(Composition::new("stress/conversion"), &sampler);
-    let pipeline = gpu.pipeline(&kernel, true)?;
-    let units = gpu.zeroed("units", u64::from(count) * 8)?;
-    let conversion = UniformValues::new()
+    let values = UniformValues::new()
         .u32("first", first)
         .u32("stride", stride)
         .u32("count", count);
-    let mut bindings = Bindings::new();
-    bindings
-        .buffer("units", &units)
-        .uniform("conversion", conversion);
-    gpu.run(&Dispatch {
-        pipeline: &pipeline,
-        bindings: &bindings,
-        groups: groups_for(count),
-    })?;
-    let mut pairs: Vec<[f32; 2]> = gpu.read(&units)?;
-    pairs.truncate(count as usize);
-    Ok(pairs)
+    let units = [("units", u64::from(count) * 8)];
+    let uniform = ("conversion", values);
+    let played = evaluate(gpu, &kernel, uniform, &[], &units, groups_for(count))?;
+    Ok(played.download("units")?)
 }

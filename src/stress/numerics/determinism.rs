@@ -4,7 +4,6 @@ use super::stage::{self, Stage};
 use super::{Figure, NumericsError};
 use crate::gpu::Gpu;
 use crate::image::Image;
-use crate::integrator::integrator;
 use crate::run::dump_stream;
 use crate::sampling::{Coordinate, dimensions};
 
@@ -23,13 +22,10 @@ pub fn figures(gpu: &Gpu) -> Result<Vec<Figure>, NumericsError> {
 
 fn image(gpu: &Gpu) -> Result<Vec<Figure>, NumericsError> {
     let stage = Stage::new(gpu, &stage::scene("cornell-box")?)?;
-    let (kind, name) = ("integrator", "path");
-    let path = integrator(name).ok_or(NumericsError::Missing { kind, name })?;
-    let entries = crate::integrator::integrator_entries();
-    let params = stage::default_variant(kind, &entries, name)?.params;
-    let sampler = stage::sampler("sobol", path.dimensions(&params))?;
+    let path = stage::path(None)?;
+    let sampler = stage::sampler("sobol", path.facts.dimensions)?;
     let render = |spps: &[u32], seed| -> Result<Image, NumericsError> {
-        let renderer = stage.renderer(gpu, path, &params, &sampler, SIZE)?;
+        let renderer = stage.renderer(gpu, &path, &sampler, SIZE)?;
         let mut snapshots = renderer.render(spps, seed)?;
         // `render` returns as many as it was asked for, and it was asked for one at least.
         Ok(snapshots.swap_remove(spps.len() - 1).image)

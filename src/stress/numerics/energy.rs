@@ -3,9 +3,9 @@
 use super::stage::{self, Stage};
 use super::{Figure, NumericsError};
 use crate::gpu::Gpu;
-use crate::integrator::{Integrator, integrator};
+use crate::integrator::{ConfiguredIntegrator, CountedRays, Integrator, IntegratorFacts};
 use crate::measure::statistics::{mean, variance};
-use crate::params::{ParamValue, Params};
+use crate::params::{Params, Variant};
 use crate::sampling::dimensions;
 use crate::scene::SceneData;
 use glam::Vec3;
@@ -38,8 +38,13 @@ impl Integrator for Walk {
         vec![("MAX_DEPTH", DEPTH)]
     }
 
-    fn dimensions(&self, _: &Params) -> u32 {
-        dimensions::needed(DEPTH)
+    fn facts(&self, _: &Params) -> IntegratorFacts {
+        IntegratorFacts {
+            dimensions: dimensions::needed(DEPTH),
+            rays: vec![CountedRays::Bounce],
+            needs_inline: true,
+            ..Default::default()
+        }
     }
 }
 
@@ -68,8 +73,9 @@ pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
 
 fn walk(gpu: &Gpu, spp: u32) -> Result<Vec<Figure>, NumericsError> {
     let stage = Stage::new(gpu, &white_box(0.0)?)?;
-    let sampler = stage::sampler("pixel-hash", dimensions::needed(DEPTH))?;
-    let renderer = stage.renderer(gpu, &WALK, &Params::default(), &sampler, SIZE)?;
+    let walk = ConfiguredIntegrator::new(&WALK, &Variant::default())?;
+    let sampler = stage::sampler("pixel-hash", walk.facts.dimensions)?;
+    let renderer = stage.renderer(gpu, &walk, &sampler, SIZE)?;
     renderer.reset();
     renderer.add_samples(0, spp, 1)?;
     let image = renderer.image()?;
@@ -97,11 +103,9 @@ fn walk(gpu: &Gpu, spp: u32) -> Result<Vec<Figure>, NumericsError> {
 
 /// The radiance of the path tracer after `depth` bounces: one emission for each surface met.
 fn path(gpu: &Gpu, stage: &Stage, depth: i64, spp: u32) -> Result<Figure, NumericsError> {
-    let (kind, name) = ("integrator", "path");
-    let path = integrator(name).ok_or(NumericsError::Missing { kind, name })?;
-    let params = Params([("max_depth".to_owned(), ParamValue::Integer(depth))].into());
-    let sampler = stage::sampler("pixel-hash", path.dimensions(&params))?;
-    let renderer = stage.renderer(gpu, path, &params, &sampler, SIZE)?;
+    let path = stage::path(Some(depth))?;
+    let sampler = stage::sampler("pixel-hash", path.facts.dimensions)?;
+    let renderer = stage.renderer(gpu, &path, &sampler, SIZE)?;
     renderer.reset();
     renderer.add_samples(0, spp, 1)?;
     let image = renderer.image()?;

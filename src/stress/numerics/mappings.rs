@@ -1,8 +1,8 @@
 //! Directions of the hemisphere at the ends of the unit square and for awkward normals. Judges
 //! `kernels/shading/hemisphere.wesl` through `kernels/stress/mappings.wesl`.
 
-use super::{Figure, NumericsError, U};
-use crate::gpu::{Bindings, Composition, Dispatch, Gpu, UniformValues, groups_for};
+use super::{Figure, NumericsError, U, evaluate};
+use crate::gpu::{Composition, Gpu, UniformValues, groups_for};
 use glam::DVec3;
 
 /// Points and normals drawn at random besides the ends.
@@ -14,7 +14,7 @@ const TWO_PI: f32 = 6.283_185_5;
 /// Lengths, sides and errors of what the kernel makes of each point.
 pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
     let (points, normals) = inputs(RANDOM[usize::from(quick)]);
-    let (directions, functions) = evaluate(gpu, &points, &normals)?;
+    let (directions, functions) = map(gpu, &points, &normals)?;
     let mut worst = Worst::default();
     for (k, direction) in directions.iter().enumerate() {
         worst.direction(&points[k], &normals[k], direction);
@@ -179,29 +179,26 @@ fn unit(v: DVec3) -> [f32; 4] {
     [x, y, z, 0.0]
 }
 
-fn evaluate(
+/// Directions and values of functions that the kernel makes of each point.
+fn map(
     gpu: &Gpu,
     points: &Vectors,
     normals: &Vectors,
 ) -> Result<(Vectors, Vectors), NumericsError> {
-    let count = points.len() as u32;
-    let pipeline = gpu.pipeline(&Composition::new("stress/mappings"), true)?;
-    let bytes = u64::from(count) * 16;
-    let [directions, functions] = [
-        gpu.zeroed("directions", bytes)?,
-        gpu.zeroed("functions", bytes)?,
-    ];
-    let mut bindings = Bindings::new();
-    bindings
-        .buffer("points", &gpu.storage("points", points)?)
-        .buffer("normals", &gpu.storage("normals", normals)?)
-        .buffer("directions", &directions)
-        .buffer("functions", &functions)
-        .uniform("mappings", UniformValues::new().u32("count", count));
-    gpu.run(&Dispatch {
-        pipeline: &pipeline,
-        bindings: &bindings,
-        groups: groups_for(count),
-    })?;
-    Ok((gpu.read(&directions)?, gpu.read(&functions)?))
+    let (count, bytes) = (points.len() as u32, points.len() as u64 * 16);
+    let played = evaluate(
+        gpu,
+        &Composition::new("stress/mappings"),
+        ("mappings", UniformValues::new().u32("count", count)),
+        &[
+            ("points", bytemuck::cast_slice(points)),
+            ("normals", bytemuck::cast_slice(normals)),
+        ],
+        &[("directions", bytes), ("functions", bytes)],
+        groups_for(count),
+    )?;
+    Ok((
+        played.download("directions")?,
+        played.download("functions")?,
+    ))
 }

@@ -4,8 +4,10 @@ use super::NumericsError;
 use crate::accel::{AccelRegistry, BuildLog, TriangleSoup};
 use crate::geometry::Camera;
 use crate::gpu::Gpu;
-use crate::integrator::{Frame, Integrator, RenderJob, Renderer, SceneBuffers, Traced};
-use crate::params::{Entry, ParamValue, Params, Variant};
+use crate::integrator::{
+    ConfiguredIntegrator, IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced,
+};
+use crate::params::{Entry, ParamValue, Variant};
 use crate::sampling::{Demand, Sampler, SamplerRegistry};
 use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
 
@@ -34,6 +36,17 @@ pub fn sampler(sequence: &'static str, dimensions: u32) -> Result<Sampler, Numer
         width: None,
     };
     Ok(registry.sampler(&sequence, &none, &demand)?)
+}
+
+/// The path tracer with `depth` bounces at most.
+pub fn path(depth: Option<i64>) -> Result<ConfiguredIntegrator, NumericsError> {
+    let registry = IntegratorRegistry::default();
+    let mut variant = default_variant("integrator", &registry.entries(), "path")?;
+    if let Some(depth) = depth {
+        let depth = ParamValue::Integer(depth);
+        variant.params.0.insert("max_depth".to_owned(), depth);
+    }
+    Ok(registry.configured(&variant)?)
 }
 
 /// A built-in scene with default parameters.
@@ -70,21 +83,15 @@ impl Stage {
     pub fn renderer<'a>(
         &'a self,
         gpu: &'a Gpu,
-        integrator: &'static dyn Integrator,
-        params: &Params,
+        integrator: &ConfiguredIntegrator,
         sampler: &Sampler,
         size: u32,
     ) -> Result<Renderer<'a>, NumericsError> {
         let job = RenderJob {
-            frame: Frame {
-                width: size,
-                height: size,
-                camera: self.camera,
-                ao_radius: 0.0,
-            },
+            size: [size; 2],
+            camera: self.camera,
             sampler,
             integrator,
-            params,
             runtime_checks: true,
         };
         Ok(Renderer::new(

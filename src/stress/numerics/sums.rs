@@ -1,7 +1,7 @@
 //! Sums of 2²⁰ terms in f32, in five ways, against exact ones. Judges `kernels/stress/sums.wesl`.
 
-use super::{Figure, NumericsError, U, stage};
-use crate::gpu::{Bindings, Composition, Dispatch, Gpu, UniformValues};
+use super::{Figure, NumericsError, U, evaluate, stage};
+use crate::gpu::{Composition, Gpu, UniformValues};
 use crate::integrator::{BLOCK_SAMPLES, with_sampler};
 use crate::sampling::{Coordinate, Sampler};
 
@@ -109,29 +109,23 @@ fn totals(
     constant: bool,
 ) -> Result<Vec<[f32; 5]>, NumericsError> {
     let kernel = with_sampler(Composition::new("stress/sums"), sampler);
-    let pipeline = gpu.pipeline(&kernel, true)?;
-    let output = gpu.zeroed("totals", u64::from(LANES) * 32)?;
-    let sums = UniformValues::new()
+    let values = UniformValues::new()
         .u32("count", terms)
         .u32("constant", u32::from(constant))
         .u32("seed", SEED)
         .u32("zero", 0);
-    let mut bindings = Bindings::new();
-    bindings
-        .buffer("totals", &output)
-        .buffer(
-            "sampler_table",
-            &gpu.storage("sampler_table", sampler.table.words())?,
-        )
-        .uniform("sums", sums);
-    gpu.run(&Dispatch {
-        pipeline: &pipeline,
-        bindings: &bindings,
-        groups: [1, 1, 1],
-    })?;
-    let words: Vec<[f32; 8]> = gpu.read(&output)?;
-    Ok(words
-        .iter()
+    let table = bytemuck::cast_slice(sampler.table.words());
+    let played = evaluate(
+        gpu,
+        &kernel,
+        ("sums", values),
+        &[("sampler_table", table)],
+        &[("totals", u64::from(LANES) * 32)],
+        [1, 1, 1],
+    )?;
+    let words: Vec<[f32; 8]> = played.download("totals")?;
+    let ways = words.iter();
+    Ok(ways
         .map(|[a, b, c, d, e, ..]| [*a, *b, *c, *d, *e])
         .collect())
 }

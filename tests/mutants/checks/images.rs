@@ -10,12 +10,10 @@ use glam::Vec3;
 use raystone::geometry::{Camera, Triangle};
 use raystone::gpu::KernelLibrary;
 use raystone::image::Image;
-use raystone::integrator::{
-    Frame, RenderJob, Renderer, SceneBuffers, Traced, integrator, integrator_entries,
-};
+use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced};
 use raystone::measure::bias::{BiasOptions, BiasVerdict, check_bias};
 use raystone::measure::statistics::{mean, variance};
-use raystone::params::{Entry, ParamValue, Variant};
+use raystone::params::{ParamValue, Params, Variant};
 use raystone::sampling::{Demand, Sampler, dimensions};
 use raystone::scene::Material;
 use std::path::Path;
@@ -88,18 +86,6 @@ fn independent() -> Result<Sampler, CheckError> {
     sampler(("pixel-hash", &[]), "none", &demand, &Plant::Nothing)
 }
 
-fn variant(
-    entries: &[Entry],
-    name: &str,
-    change: (&str, ParamValue),
-) -> Result<Variant, CheckError> {
-    let unknown = || CheckError::Stale(format!("there is no integrator `{name}`"));
-    let entry = entries.iter().find(|e| e.name == name);
-    let mut variant = entry.ok_or_else(unknown)?.default_variant();
-    variant.params.0.insert(change.0.to_owned(), change.1);
-    Ok(variant)
-}
-
 /// Images of a scene, or the error word that a kernel raised.
 fn render(
     bench: &Bench,
@@ -107,24 +93,22 @@ fn render(
     (name, change): (&str, (&str, ParamValue)),
     replicates: Replicates,
 ) -> Result<Vec<Image>, CheckError> {
-    let unknown = || CheckError::Stale(format!("there is no integrator `{name}`"));
-    let kind = integrator(name).ok_or_else(unknown)?;
-    let what = variant(&integrator_entries(), name, change)?;
+    let variant = Variant {
+        name: name.to_owned(),
+        params: Params([(change.0.to_owned(), change.1)].into()),
+        ..Variant::default()
+    };
+    let integrator = IntegratorRegistry::default().configured(&variant);
+    let integrator = integrator.map_err(|e| CheckError::Stale(e.to_string()))?;
     let built = build("bvh", &[], &stage.soup)?;
     let traced = Traced::upload(bench.gpu, &*built)?;
     let buffers = SceneBuffers::upload(bench.gpu, &stage.scene, &stage.soup)?;
-    let diagonal = f64::from(2.0 * stage.scene.bounds().radius());
     let sampler = independent()?;
     let job = RenderJob {
-        frame: Frame {
-            width: SIZE,
-            height: SIZE,
-            camera: stage.camera,
-            ao_radius: (kind.ao_radius(&what.params).unwrap_or(0.0) * diagonal) as f32,
-        },
+        size: [SIZE; 2],
+        camera: stage.camera,
         sampler: &sampler,
-        integrator: kind,
-        params: &what.params,
+        integrator: &integrator,
         runtime_checks: true,
     };
     let renderer = Renderer::new(bench.gpu, &buffers, &traced, &job, false)?;

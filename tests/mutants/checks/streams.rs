@@ -8,11 +8,11 @@ use raystone::discrepancy::{Budget, PointSet, net_quality, star_2d};
 use raystone::image::Image;
 use raystone::integrator::integrand::functions;
 use raystone::integrator::{
-    Frame, Integrator, RenderJob, Renderer, SceneBuffers, Traced, integrator,
+    ConfiguredIntegrator, IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced,
 };
 use raystone::measure::statistics::{mean, variance};
 use raystone::measure::words::{Used, compare, dump_stream};
-use raystone::params::Params;
+use raystone::params::Variant;
 use raystone::random::Pcg32;
 use raystone::sampling::{Coordinate, Demand, Sampler, to_unit};
 
@@ -87,25 +87,28 @@ fn dump(bench: &Bench, sampler: &Sampler, at: &[Coordinate]) -> Result<Vec<u32>,
     dump_stream(bench.gpu, sampler, at).map_err(CheckError::Other)
 }
 
+fn integrand() -> Result<ConfiguredIntegrator, CheckError> {
+    let variant = Variant {
+        name: INTEGRAND.to_owned(),
+        ..Variant::default()
+    };
+    let integrator = IntegratorRegistry::default().configured(&variant);
+    integrator.map_err(|e| CheckError::Stale(e.to_string()))
+}
+
 /// Images of the integrand, one for each seed.
 fn images(bench: &Bench, sampler: &Sampler, seeds: &[u32]) -> Result<Vec<Image>, CheckError> {
-    let unknown = || CheckError::Stale(format!("there is no integrator `{INTEGRAND}`"));
-    let kind: &'static dyn Integrator = integrator(INTEGRAND).ok_or_else(unknown)?;
+    let integrator = integrand()?;
     // The kernel has a structure, though it traces nothing.
     let stage = Stage::builtin("single-triangle", &[])?;
     let built = build("bvh", &[], &stage.soup)?;
     let traced = Traced::upload(bench.gpu, &*built)?;
     let buffers = SceneBuffers::upload(bench.gpu, &stage.scene, &stage.soup)?;
     let job = RenderJob {
-        frame: Frame {
-            width: SIZE,
-            height: SIZE,
-            camera: stage.camera,
-            ao_radius: 0.0,
-        },
+        size: [SIZE; 2],
+        camera: stage.camera,
         sampler,
-        integrator: kind,
-        params: &Params::default(),
+        integrator: &integrator,
         runtime_checks: true,
     };
     let renderer = Renderer::new(bench.gpu, &buffers, &traced, &job, false)?;
@@ -195,8 +198,7 @@ pub fn integral(bench: &Bench, names: Names) -> Finding {
     if !(facts.random || UNBIASED.contains(&sampler.decorrelation.name())) {
         return Ok(None);
     }
-    let kind = integrator(INTEGRAND);
-    let exact = kind.and_then(|i| i.exact(&Params::default()));
+    let exact = integrand()?.facts.exact;
     let exact = exact.ok_or_else(|| CheckError::Stale(format!("{INTEGRAND} has no integral")))?;
     let seeds: Vec<u32> = (0..REPLICATES).map(|k| 100 + 77 * k).collect();
     let images = images(bench, &sampler, &seeds)?;

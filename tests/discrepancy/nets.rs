@@ -1,7 +1,9 @@
 //! Nets, the registry of measures.
 
 use super::sets::*;
-use super::*;
+use raystone::discrepancy::{
+    Measure, Net, PointSet, Value, elementary_shapes, measure, net_quality,
+};
 
 fn t_value(points: &PointSet) -> Net {
     net_quality(points, &ample()).unwrap()

@@ -1,7 +1,17 @@
 //! Point sets and a judge that is the definition itself.
 
-use super::super::PointSet;
-use super::super::random::Random;
+use raystone::discrepancy::{Budget, PointSet};
+use raystone::random::Pcg32;
+
+/// Time enough for any small set.
+pub fn ample() -> Budget {
+    Budget::seconds(600.0)
+}
+
+/// The points of a set in two dimensions.
+pub fn pairs(points: &PointSet) -> Vec<[f64; 2]> {
+    points.points().map(|p| [p[0], p[1]]).collect()
+}
 
 pub fn radical_inverse(base: u64, mut i: u64) -> f64 {
     let (mut value, mut scale) = (0u64, 1u64);
@@ -69,11 +79,11 @@ pub fn sobol_in(dim: usize, n: u32) -> PointSet {
 }
 
 pub fn sobol(n: u32) -> Vec<[f64; 2]> {
-    sobol_in(2, n).pairs().unwrap().to_vec()
+    pairs(&sobol_in(2, n))
 }
 
 /// Random points; few levels make ties and coordinates 0 and 1, and some points come twice.
-pub fn random_in(dim: usize, n: usize, levels: usize, random: &mut Random) -> PointSet {
+pub fn random_in(dim: usize, n: usize, levels: usize, random: &mut Pcg32) -> PointSet {
     let mut all: Vec<f64> = Vec::new();
     for i in 0..n {
         if i > 0 && random.below(8) == 0 {
@@ -91,7 +101,7 @@ pub fn star_by_definition(points: &PointSet) -> f64 {
     let n = points.len() as f64;
     let axes: Vec<Vec<f64>> = (0..points.dim())
         .map(|d| {
-            let mut axis = points.column(d);
+            let mut axis: Vec<f64> = points.points().map(|p| p[d]).collect();
             axis.push(1.0);
             axis.sort_unstable_by(f64::total_cmp);
             axis.dedup();

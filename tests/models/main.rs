@@ -3,13 +3,18 @@
 
 mod gltf;
 mod obj;
+mod ply;
 mod real;
 mod text;
 
-use super::*;
-use crate::params::Params;
-use crate::random::Pcg32;
+use glam::{Vec2, Vec3};
+use raystone::params::{Params, Variant};
+use raystone::random::Pcg32;
+use raystone::scene::{
+    DEFAULT_ALBEDO, LoadOptions, Material, MaterialKind, SceneData, SceneError, load,
+};
 use std::fs;
+use std::path::Path;
 use tempfile::TempDir;
 
 fn variant(name: &str) -> Variant {

@@ -1,4 +1,12 @@
-//! `raystone discrepancy` as a user meets it, and SciPy's opinion of the same points.
+//! Measures of point sets against published values and their definitions; `raystone discrepancy` as a
+//! user meets it, and SciPy's opinion of the same points.
+
+mod bounds;
+mod nets;
+mod quadratic;
+mod sets;
+mod star;
+mod sweep;
 
 use raystone::discrepancy::{Budget, Measure, PointSet, Quadratic, quadratic};
 use serde_json::Value;

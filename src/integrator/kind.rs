@@ -1,0 +1,141 @@
+//! What an integrator is, and what the others have to know of it.
+
+use crate::params::{ParamError, ParameterSchema, Params, Variant};
+use crate::sampling::Demand;
+use thiserror::Error;
+
+/// Classes of rays that kernels count, in the order of `kernels/common/ray_counts.wesl`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum CountedRays {
+    /// From the camera.
+    Primary,
+    /// To a point of a light.
+    Shadow,
+    /// Of limited length, for ambient occlusion.
+    Ao,
+    /// From surface to surface.
+    Bounce,
+}
+
+/// Names of [`CountedRays`] in records, in their order.
+pub const RAY_COUNT_CLASSES: [&str; 4] = ["primary", "shadow", "ao", "bounce"];
+
+/// What others have to know of an integrator with its parameters.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct IntegratorFacts {
+    /// Sampler dimensions that it draws at most: 0 … this, excluded.
+    pub dimensions: u32,
+    /// Those among them that no sample draws.
+    pub undrawn: Vec<u32>,
+    /// Classes of rays that it may trace, and counts; none if it traces nothing.
+    pub rays: Vec<CountedRays>,
+    /// The value of every pixel, where it is known: it is then the reference.
+    pub exact: Option<f64>,
+    /// Length of AO rays as a fraction of the scene's diagonal, if it traces any.
+    pub ao_radius: Option<f64>,
+    /// Whether its kernels call `closest_hit` or `any_hit` themselves, and so need a structure whose
+    /// traversal is a function.
+    pub needs_inline: bool,
+}
+
+impl IntegratorFacts {
+    /// Whether it traces anything.
+    pub fn traces(&self) -> bool {
+        !self.rays.is_empty()
+    }
+
+    /// Pairs of dimensions that one sample draws both of: among these is a sampler's worst pair looked for.
+    pub fn dimension_pairs(&self) -> Vec<[u32; 2]> {
+        let mut drawn: Vec<u32> = (0..self.dimensions).collect();
+        drawn.retain(|dimension| !self.undrawn.contains(dimension));
+        let mut pairs = Vec::new();
+        for (i, &a) in drawn.iter().enumerate() {
+            pairs.extend(drawn[i + 1..].iter().map(|&b| [a, b]));
+        }
+        pairs
+    }
+}
+
+/// An integrator; one static per integrator, one line in the registry.
+pub trait Integrator: Sync {
+    /// Name as a user types it.
+    fn name(&self) -> &'static str;
+    /// One line: what it computes.
+    fn description(&self) -> &'static str;
+    /// Module of the kernel that exports `radiance`, relative to the kernel folder.
+    fn kernel(&self) -> &'static str;
+    /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
+    fn sources(&self) -> &'static [(&'static str, &'static str)] {
+        &[]
+    }
+    /// Parameters.
+    fn parameters(&self) -> ParameterSchema {
+        Vec::new()
+    }
+    /// Constants of `package::active::constants` that the kernel imports.
+    fn constants(&self, _params: &Params) -> Vec<(&'static str, u32)> {
+        Vec::new()
+    }
+    /// What others have to know of it.
+    fn facts(&self, params: &Params) -> IntegratorFacts;
+}
+
+/// Why there is no such integrator.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum IntegratorError {
+    /// A name that is not registered.
+    #[error("no integrator is called `{name}`{}", .nearest.map_or(String::new(), |n| format!("; did you mean `{n}`?")))]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The most similar name.
+        nearest: Option<&'static str>,
+    },
+    /// A parameter that it does not have, or a value that it does not allow.
+    #[error("{name}: {error}")]
+    Parameter {
+        /// The integrator.
+        name: String,
+        /// What is wrong.
+        error: ParamError,
+    },
+}
+
+/// An integrator with all its parameters.
+#[derive(Clone)]
+pub struct ConfiguredIntegrator {
+    /// The integrator.
+    pub kind: &'static dyn Integrator,
+    /// Its parameters, none missing.
+    pub params: Params,
+    /// What is to be known of it with these.
+    pub facts: IntegratorFacts,
+}
+
+impl ConfiguredIntegrator {
+    /// `kind` with the parameters of `variant`, and its defaults for those that it lacks.
+    ///
+    /// # Errors
+    /// A parameter that it does not have, or a value that it does not allow.
+    pub fn new(kind: &'static dyn Integrator, variant: &Variant) -> Result<Self, IntegratorError> {
+        let params = variant.params.completed(&kind.parameters());
+        let params = params.map_err(|error| IntegratorError::Parameter {
+            name: variant.name.clone(),
+            error,
+        })?;
+        Ok(Self {
+            kind,
+            facts: kind.facts(&params),
+            params,
+        })
+    }
+
+    /// What a sampler must offer for images of this width.
+    pub fn demand(&self, samples: u32, width: u32) -> Demand {
+        Demand {
+            samples: Some(samples),
+            dimensions: self.facts.dimensions,
+            width: Some(width),
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! What is recorded of the errors of samplers and of the references they are measured against.
+
+use super::Interval;
+use crate::measure::bias::BiasVerdict;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A reference image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ReferenceRecord {
+    /// Samples per pixel of both halves together; 0 if nothing had to be rendered.
+    pub spp: u32,
+    /// The value of every pixel, if it is known: then this is the reference.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exact: Option<f64>,
+    /// Sampler, as `sequence × decorrelation`; `exact` if there was none.
+    pub sampler: String,
+    /// Seconds it took.
+    pub seconds: f64,
+    /// Estimated mean squared error of the reference itself, from its two halves.
+    pub mse: f64,
+    /// Tone-mapped PNG relative to the run's folder; empty if it could not be written.
+    pub image: String,
+    /// Mean radiance over pixels and channels.
+    pub mean: f64,
+}
+
+/// Error at one number of samples.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ErrorAtSpp {
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Metric id with version → value, for instance `rmse/v1`, `relmse/eps=1e-2/v1`.
+    pub metrics: BTreeMap<String, f64>,
+    /// Id of an unbiased metric → its values with each part of the reference left out, those of its
+    /// first half first: the reference's share in the metric's uncertainty.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub without_part: BTreeMap<String, Vec<f64>>,
+}
+
+/// Error of one replicate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ErrorRecord {
+    /// Whether the pair is randomised by its seed; a deterministic pair has one replicate.
+    pub randomised: bool,
+    /// Number of this replicate, from 0.
+    pub replicate: u32,
+    /// Its seed.
+    pub seed: u32,
+    /// Image size in pixels.
+    pub resolution: [u32; 2],
+    /// Error at 1, 2, 4, … samples per pixel.
+    pub errors: Vec<ErrorAtSpp>,
+    /// Pixels that were NaN or infinite (any is a failure).
+    pub non_finite_pixels: usize,
+    /// BLAKE3 of the f32 image at the highest spp.
+    pub image_hash: String,
+    /// Tone-mapped image at the highest spp (first replicate only).
+    pub image: Option<String>,
+    /// Error map at the highest spp (first replicate only).
+    pub error_map: Option<String>,
+}
+
+/// Bias check of one sampler: Welch's t of the replicates against the reference, for the whole image and
+/// per tile.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BiasRecord {
+    /// Tiles tested.
+    pub tiles: usize,
+    /// Tiles rejected after Benjamini–Hochberg at `alpha`.
+    pub rejected: usize,
+    /// Bound on the probability of calling a sampler without bias biased: half of it is for the whole
+    /// image, half is the false-discovery rate among tiles.
+    pub alpha: f64,
+    /// Smallest p-value of a tile.
+    pub min_p: f64,
+    /// Histogram of the p-values in ten equal bins: flat when there is no bias.
+    pub p_histogram: Vec<usize>,
+    /// Difference of the mean luminance of all replicates from the reference's beyond what rounding
+    /// explains, in standard errors (Welch's t); absent where it is not testable or has no spread.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub z: Option<f64>,
+    /// p-value of `z`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub p: Option<f64>,
+    /// Degrees of freedom of `z`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub degrees_of_freedom: Option<f64>,
+    /// Whether the sampler is one whose mean over seeds is not the integral, so that a bias is no fault.
+    #[serde(default)]
+    pub by_design: bool,
+    /// What the check says.
+    pub verdict: BiasVerdict,
+}
+
+/// The signed luminance error of the image at the highest spp, see [`crate::measure::spectrum`]: means
+/// over replicates with intervals.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SpectrumRecord {
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Replicates.
+    pub replicates: usize,
+    /// Power by frequency, white noise being 1; empty if the error is the same in all pixels.
+    pub power: Vec<PowerAt>,
+    /// Mean power up to 1/8 cycle per pixel, white noise being 1.
+    pub low_frequency: Option<Interval>,
+    /// Correlation of the errors of neighbouring pixels.
+    pub autocorrelation: Option<Interval>,
+    /// What Gaussian filters leave of the error.
+    pub filtered: Vec<FilteredError>,
+}
+
+/// A point of a radial spectrum.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PowerAt {
+    /// Cycles per pixel.
+    pub frequency: f64,
+    /// Mean power around that frequency, white noise being 1.
+    pub power: Interval,
+}
+
+/// Error after a Gaussian filter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FilteredError {
+    /// Standard deviation of the filter, pixels; 0 is no filter.
+    pub sigma: f64,
+    /// Root mean square of what is left of the luminance error.
+    pub rmse: Interval,
+}

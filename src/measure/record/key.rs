@@ -1,0 +1,236 @@
+//! What a figure is of: a value on each of some axes.
+
+use crate::params::{KERNELS_MARK, Params, Variant};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// Names of axes, in the order in which exports show them.
+pub mod axis {
+    /// What is traced.
+    pub const SCENE: &str = "scene";
+    /// Acceleration structure.
+    pub const ACCEL: &str = "accel";
+    /// What is computed.
+    pub const INTEGRATOR: &str = "integrator";
+    /// Sample sequence.
+    pub const SEQUENCE: &str = "sequence";
+    /// How the sequence is moved from pixel to pixel.
+    pub const DECORRELATION: &str = "decorrelation";
+    /// Kernels in the place of the embedded ones; absent for these.
+    pub const KERNELS: &str = "kernels";
+    /// Ray–triangle test; absent where no ray is traced.
+    pub const TRIANGLE: &str = "triangle";
+    /// Ray–box test; absent where no ray is traced.
+    pub const BOX_TEST: &str = "box_test";
+    /// How rays are moved off the surface that they leave; absent where none is.
+    pub const OFFSET: &str = "offset";
+    /// Family of hard scenes and rays.
+    pub const FAMILY: &str = "family";
+    /// Mesh that is shot at.
+    pub const MESH: &str = "mesh";
+    /// Scale and translation of a mesh.
+    pub const PLACE: &str = "place";
+    /// What is aimed at.
+    pub const AIM: &str = "aim";
+    /// Class of rays.
+    pub const RAYS: &str = "rays";
+    /// Samples per pixel.
+    pub const SPP: &str = "spp";
+    /// Dimensions of a point set, and what they are used for.
+    pub const DIMENSIONS: &str = "dimensions";
+    /// Number of points.
+    pub const POINTS: &str = "points";
+    /// Any other thing that figures are of.
+    pub const SUBJECT: &str = "subject";
+    /// All of them.
+    pub const ALL: [&str; 18] = [
+        SCENE,
+        ACCEL,
+        INTEGRATOR,
+        SEQUENCE,
+        DECORRELATION,
+        KERNELS,
+        TRIANGLE,
+        BOX_TEST,
+        OFFSET,
+        FAMILY,
+        MESH,
+        PLACE,
+        AIM,
+        RAYS,
+        SPP,
+        DIMENSIONS,
+        POINTS,
+        SUBJECT,
+    ];
+}
+
+/// Axis → what was taken of it. An axis that does not matter to a figure is absent.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Key(BTreeMap<String, Written>);
+
+/// A variant as it is written: a plain name where its label says all.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(from = "PlainOrWhole", into = "PlainOrWhole")]
+struct Written(Variant);
+
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum PlainOrWhole {
+    Plain(String),
+    Whole(Variant),
+}
+
+impl From<PlainOrWhole> for Written {
+    fn from(written: PlainOrWhole) -> Self {
+        Self(match written {
+            PlainOrWhole::Plain(label) => plain(&label),
+            PlainOrWhole::Whole(variant) => variant,
+        })
+    }
+}
+
+impl From<Written> for PlainOrWhole {
+    fn from(Written(variant): Written) -> Self {
+        match variant.params.0.is_empty() && variant.name == variant.label {
+            true => Self::Plain(variant.label),
+            false => Self::Whole(variant),
+        }
+    }
+}
+
+/// A variant without parameters.
+fn plain(label: &str) -> Variant {
+    Variant {
+        name: label.to_owned(),
+        params: Params::default(),
+        label: label.to_owned(),
+    }
+}
+
+impl Key {
+    /// Nothing yet, or these kernels (the embedded ones are not named).
+    pub fn with_kernels(kernels: &Variant) -> Self {
+        Self::default().with(axis::KERNELS, kernels.kernels_label())
+    }
+
+    /// The same key with a name on an axis; an empty name leaves it out.
+    #[must_use]
+    pub fn with(self, axis: &str, label: impl fmt::Display) -> Self {
+        self.with_variant(axis, &plain(&label.to_string()))
+    }
+
+    /// The same key with a variant on an axis. The kernels that its label may end with are an axis of
+    /// their own, and have to be in the key already.
+    #[must_use]
+    pub fn with_variant(mut self, axis: &str, variant: &Variant) -> Self {
+        if variant.label.is_empty() {
+            self.0.remove(axis);
+            return self;
+        }
+        let mut variant = variant.clone();
+        let mark = format!("{KERNELS_MARK}{}", self.label(axis::KERNELS));
+        if mark.len() > KERNELS_MARK.len()
+            && let Some(stem) = variant.label.strip_suffix(&mark)
+        {
+            variant.label = stem.to_owned();
+        }
+        self.0.insert(axis.to_owned(), Written(variant));
+        self
+    }
+
+    /// What was taken of an axis.
+    pub fn get(&self, axis: &str) -> Option<&Variant> {
+        self.0.get(axis).map(|written| &written.0)
+    }
+
+    /// Label of [`Key::get`]; empty without one.
+    pub fn label(&self, axis: &str) -> &str {
+        self.get(axis).map_or("", |variant| &variant.label)
+    }
+
+    /// Registered name of [`Key::get`]; empty without one.
+    pub fn name(&self, axis: &str) -> &str {
+        self.get(axis).map_or("", |variant| &variant.name)
+    }
+
+    /// The axes that matter, each with its label: known ones in their order, others after them.
+    pub fn labels(&self) -> impl Iterator<Item = (&str, &str)> {
+        let known = axis::ALL
+            .into_iter()
+            .filter(|axis| self.0.contains_key(*axis));
+        let others = self.0.keys().map(String::as_str);
+        let others = others.filter(|axis| !axis::ALL.contains(axis));
+        known.chain(others).map(|axis| (axis, self.label(axis)))
+    }
+
+    /// Whether two keys have the same labels on these axes.
+    pub fn agrees(&self, other: &Self, axes: &[&str]) -> bool {
+        axes.iter()
+            .all(|axis| self.label(axis) == other.label(axis))
+    }
+
+    /// Whether no axis matters.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// ` @` and the kernels in the place of the embedded ones; empty for these.
+    pub fn kernels_mark(&self) -> String {
+        match self.label(axis::KERNELS) {
+            "" => String::new(),
+            kernels => format!("{KERNELS_MARK}{kernels}"),
+        }
+    }
+
+    /// `sequence × decorrelation`, with the kernels.
+    pub fn sampler(&self) -> String {
+        let [sequence, decorrelation] =
+            [axis::SEQUENCE, axis::DECORRELATION].map(|axis| self.label(axis));
+        format!("{sequence} × {decorrelation}{}", self.kernels_mark())
+    }
+}
+
+impl fmt::Display for Key {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut between = "";
+        for (axis, label) in self.labels() {
+            write!(f, "{between}{axis} {label}")?;
+            between = ", ";
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_is_written_short_and_reads_back_with_every_parameter() {
+        let mut grid = plain("grid");
+        grid.params
+            .0
+            .insert("lambda".into(), crate::params::ParamValue::Number(3.0));
+        grid.label = "grid(lambda=3) @idea".into();
+        let key = Key::default()
+            .with(axis::KERNELS, "idea")
+            .with(axis::SCENE, "box");
+        let key = key.with_variant(axis::ACCEL, &grid);
+        assert_eq!(key.label(axis::ACCEL), "grid(lambda=3)");
+        assert_eq!(key.kernels_mark(), " @idea");
+        let text = serde_json::to_string(&key).unwrap();
+        assert!(
+            text.contains(r#""scene":"box""#) && text.contains("lambda"),
+            "{text}"
+        );
+        assert_eq!(serde_json::from_str::<Key>(&text).unwrap(), key);
+        assert_eq!(
+            key.to_string(),
+            "scene box, accel grid(lambda=3), kernels idea"
+        );
+        assert!(Key::with_kernels(&Variant::default()).is_empty());
+    }
+}

@@ -1,0 +1,200 @@
+//! Reading and writing files of records.
+
+use super::old::{OLD_SCHEMA, renewed};
+use super::{Line, SCHEMA};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Name of the records in a run's folder.
+pub const RECORDS_FILE: &str = "records.jsonl";
+
+/// Folder, below that of a run, that holds records and images until the run ends; what a killed run
+/// leaves.
+pub const PARTIAL: &str = "partial";
+
+/// What a file of records says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Records<B = super::Body> {
+    /// Every whole line, in order.
+    pub lines: Vec<Line<B>>,
+    /// What was left out while reading, in words.
+    pub warnings: Vec<String>,
+}
+
+/// Why records cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The file cannot be read.
+    #[error("cannot read {}: {source}; give the folder that `raystone run` or `raystone stress` wrote", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file holds no record.
+    #[error("{} holds no record: the run wrote nothing before it ended", path.display())]
+    NoRecords {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The records are of another version.
+    #[error(
+        "{}:{line}: schema {found:?}, but this program reads {SCHEMA:?}; use the version that wrote it",
+        path.display()
+    )]
+    Schema {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// The schema found.
+        found: String,
+    },
+    /// A line is no record.
+    #[error("{}:{line}: not a record: {source}; remove the line to read the rest", path.display())]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Why.
+        source: serde_json::Error,
+    },
+}
+
+/// Only the tag, so that a line of another version is told from a broken one.
+#[derive(Deserialize)]
+struct Tag {
+    schema: String,
+}
+
+/// Reads the records of a run in `dir`: see [`read_lines`].
+///
+/// # Errors
+/// As there.
+pub fn read_records(dir: &Path) -> Result<Records, RecordError> {
+    read_lines(&dir.join(RECORDS_FILE))
+}
+
+/// Reads a file of records, those of a run also if they are of the version before. A last line without its
+/// newline that does not parse is what a crash leaves: it is left out with a warning.
+///
+/// # Errors
+/// A missing or empty file, a line of another schema, or a broken line elsewhere.
+pub fn read_lines<B: DeserializeOwned>(path: &Path) -> Result<Records<B>, RecordError> {
+    // Bytes, because a crash can cut a line inside a character.
+    let bytes = std::fs::read(path).map_err(|source| RecordError::Read {
+        path: path.into(),
+        source,
+    })?;
+    let mut records = Records {
+        lines: Vec::new(),
+        warnings: Vec::new(),
+    };
+    let whole = bytes.is_empty() || bytes.ends_with(b"\n");
+    let mut rows = bytes.split(|&byte| byte == b'\n').enumerate().peekable();
+    while let Some((index, row)) = rows.next() {
+        if row.trim_ascii().is_empty() {
+            continue;
+        }
+        let truncated = !whole && rows.peek().is_none();
+        let line = index + 1;
+        let parsed = match serde_json::from_slice::<Tag>(row) {
+            Ok(tag) if tag.schema == OLD_SCHEMA => {
+                serde_json::from_slice(row).and_then(|old| serde_json::from_value(renewed(old)))
+            }
+            Ok(Tag { schema: found }) if found != SCHEMA => {
+                let path = path.into();
+                return Err(RecordError::Schema { path, line, found });
+            }
+            Err(_) if truncated => {
+                let file = path.file_name().unwrap_or_default().display();
+                let text = format!("line {line} of {file} is cut off and was left out");
+                records.warnings.push(text);
+                continue;
+            }
+            _ => serde_json::from_slice(row),
+        };
+        records
+            .lines
+            .push(parsed.map_err(|source| RecordError::Parse {
+                path: path.into(),
+                line,
+                source,
+            })?);
+    }
+    match records.lines.is_empty() {
+        true => Err(RecordError::NoRecords { path: path.into() }),
+        false => Ok(records),
+    }
+}
+
+/// Lines as they stand in a file.
+///
+/// # Errors
+/// A body cannot be written as JSON.
+pub fn text_of<'a, B: Serialize + 'a>(
+    lines: impl IntoIterator<Item = &'a Line<B>>,
+) -> serde_json::Result<String> {
+    let mut text = String::new();
+    for line in lines {
+        text += &serde_json::to_string(line)?;
+        text.push('\n');
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str =
+        r#"{"schema":"raystone/2","body":{"kind":"skipped","cell":"a","reason":"b"}}"#;
+
+    fn read(text: &str) -> Result<Records, RecordError> {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join(RECORDS_FILE), text).unwrap();
+        read_records(dir.path())
+    }
+
+    #[test]
+    fn a_cut_off_last_line_is_left_out_with_a_warning() {
+        let records = read(&format!("{GOOD}\n{}", &GOOD[..40])).unwrap();
+        assert_eq!((records.lines.len(), records.warnings.len()), (1, 1));
+        assert!(records.warnings[0].contains("line 2 of records.jsonl"));
+        let whole = read(&format!("{GOOD}\n{GOOD}")).unwrap();
+        assert_eq!((whole.lines.len(), whole.warnings.len()), (2, 0));
+        assert_eq!(text_of(&whole.lines).unwrap(), format!("{GOOD}\n{GOOD}\n"));
+    }
+
+    #[test]
+    fn a_broken_line_that_was_ended_is_an_error_with_its_number() {
+        let text = format!("{GOOD}\n{}\n{GOOD}\n", &GOOD[..40]);
+        assert!(matches!(
+            read(&text),
+            Err(RecordError::Parse { line: 2, .. })
+        ));
+    }
+
+    #[test]
+    fn another_schema_is_named_in_the_error() {
+        let error = read(&GOOD.replace("raystone/2", "raystone/7"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("raystone/7") && error.contains("raystone/2") && error.contains(":1"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_missing_and_an_empty_file_are_errors() {
+        assert!(matches!(read(""), Err(RecordError::NoRecords { .. })));
+        assert!(matches!(
+            read_records(Path::new("/nonexistent")),
+            Err(RecordError::Read { .. })
+        ));
+    }
+}

@@ -1,0 +1,172 @@
+//! What is recorded of a structure on a scene, and of full cells.
+
+use super::Interval;
+use crate::accel::{Phase, Space, StructureStats};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Ray classes of the recorded ray sets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RayClass {
+    /// Camera rays through pixel centres, 8×8 tiles; closest hit.
+    Primary,
+    /// Rays from first hits towards emitters (or towards points of the bounding sphere); any hit.
+    Shadow,
+    /// Cosine-distributed rays of limited length from first hits; any hit.
+    Ao,
+    /// Cosine-distributed rays from first hits; closest hit.
+    Bounce,
+    /// Rays between random points of the bounding box; closest hit.
+    Chord,
+    /// Rays that faults hide behind (see [`super::hard_rays`]); both queries, never timed.
+    Hard,
+}
+
+/// Gate result for one ray class.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ClassVerdict {
+    /// Which rays.
+    pub class: RayClass,
+    /// Rays compared to the bit (id, t, u, v; hit or miss for any-hit queries).
+    pub rays: usize,
+    /// Rays whose answer differs and is not a tie.
+    pub wrong: usize,
+    /// Rays whose id or t differs but both triangles lie within 4 ulp of the same distance.
+    pub ties: usize,
+    /// The first wrong ray, replayable, with both answers.
+    pub first_wrong: Option<String>,
+}
+
+/// Comparison of the judge with a slower, simpler judge.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct JudgeCheck {
+    /// Rays compared.
+    pub rays: usize,
+    /// Rays that differ.
+    pub wrong: usize,
+    /// Rays that pass within rounding error of an edge or of another surface (oracle only).
+    pub ambiguous: usize,
+    /// How many of these are hard rays, made to pass there.
+    #[serde(default)]
+    pub hard_ambiguous: usize,
+    /// When it was carried out, if that was before this run: the same rays and answers, found again on disk.
+    #[serde(default)]
+    pub reused_unix_s: Option<u64>,
+}
+
+/// The verdict of the gate on one structure and scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GateVerdict {
+    /// Nothing wrong, no fuse blown, judge itself sound.
+    pub passed: bool,
+    /// Per ray class.
+    pub classes: Vec<ClassVerdict>,
+    /// The judge (scalar plain BVH) against brute force.
+    pub brute_force: JudgeCheck,
+    /// The judge against the f64 oracle.
+    pub oracle: JudgeCheck,
+    /// Error words raised by kernels (step fuse, stack overflow), in words.
+    pub kernel_errors: Vec<String>,
+    /// Structural faults found by `validate`.
+    pub structural: Option<String>,
+    /// What is wrong on the gate's second scene.
+    #[serde(default)]
+    pub elsewhere: Option<String>,
+}
+
+/// Work counted per ray, means over a class.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct CountersPerRay {
+    /// Nodes or cells visited.
+    pub nodes: f64,
+    /// Ray–box tests.
+    pub box_tests: f64,
+    /// Ray–triangle tests.
+    pub triangle_tests: f64,
+    /// Deepest stack seen in the class (entries).
+    pub stack_high_water: u32,
+}
+
+/// Speed of one ray class through one structure.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ClassTiming {
+    /// Which rays.
+    pub class: RayClass,
+    /// Rays per dispatch.
+    pub rays: usize,
+    /// Fraction of the rays that hit something.
+    pub hit_fraction: f64,
+    /// Every kept sample, milliseconds, an empty dispatch already subtracted.
+    pub ms: Vec<f64>,
+    /// The same dispatches by the wall clock, milliseconds.
+    pub wall_ms: Vec<f64>,
+    /// Million rays per second, median with interval.
+    pub mrays_s: Interval,
+    /// Counted work, from a separate run.
+    pub counters: CountersPerRay,
+}
+
+/// A structure on a scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StructureRecord {
+    /// Whether the failure is the driver's, which ends loops too early for this structure: the cell then
+    /// counts as skipped.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub refused: bool,
+    /// Where triangles are met, which decides on the judge: see [`Space`].
+    #[serde(default)]
+    pub space: Space,
+    /// Timed build phases.
+    pub build: Vec<Phase>,
+    /// Sum of the phases, milliseconds.
+    pub build_ms: f64,
+    /// Most host memory that the build needed beyond what was in use before it, the result included,
+    /// bytes; absent where allocations are not counted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub build_peak_bytes: Option<u64>,
+    /// Milliseconds to take over new transforms of all instances, objects kept: median of several;
+    /// absent where a moved object needs a full build.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub update_ms: Option<f64>,
+    /// Static figures.
+    pub stats: StructureStats,
+    /// Verdict; `None` only if the build failed.
+    pub gate: Option<GateVerdict>,
+    /// Speeds; empty unless the gate passed.
+    pub timings: Vec<ClassTiming>,
+    /// Heat map of traversal cost of primary rays, a PNG relative to the run's folder.
+    pub heat_map: Option<String>,
+    /// Cost (nodes + triangle tests) at the top of the heat map's colour scale.
+    pub heat_map_max: Option<f64>,
+    /// Why there are no figures.
+    pub failure: Option<String>,
+}
+
+/// Time of a full cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TimeRecord {
+    /// Image size in pixels.
+    pub resolution: [u32; 2],
+    /// Samples per pixel of each timed render.
+    pub spp: u32,
+    /// Every kept sample, milliseconds per render on the GPU clock.
+    pub ms: Vec<f64>,
+    /// The same renders by the wall clock, milliseconds.
+    pub wall_ms: Vec<f64>,
+    /// Milliseconds per sample per pixel for the whole image, median with interval; absent if the
+    /// cell failed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ms_per_spp: Option<Interval>,
+    /// Rays of each class in one render, from a separate counting run of the same seed.
+    pub rays: BTreeMap<String, u64>,
+    /// All rays over time, million per second; absent if the cell failed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mrays_s: Option<Interval>,
+    /// BLAKE3 of the image.
+    pub image_hash: String,
+    /// Whether the image equals to the bit that of the scene's first gated structure.
+    pub image_equal: bool,
+    /// Why there are no figures.
+    pub failure: Option<String>,
+}

@@ -1,0 +1,73 @@
+//! What the images of a run are made with, and their compiled kernels.
+
+use super::kernels::Device;
+use super::session::Session;
+use super::words;
+use super::world::World;
+use crate::geometry::Camera;
+use crate::integrator::{ConfiguredIntegrator, RenderJob, Renderer, Traced};
+use crate::params::Variant;
+use crate::sampling::Sampler;
+
+/// What is computed per sample, and what draws the samples.
+pub(super) struct Estimator {
+    pub sampler: Sampler,
+    pub integrator: ConfiguredIntegrator,
+}
+
+impl Estimator {
+    /// An integrator with a sampler of `samples` samples a pixel.
+    ///
+    /// # Errors
+    /// A name is not registered, or the sampler has too few dimensions or samples.
+    pub fn new(
+        session: &Session,
+        (sequence, decorrelation): (&Variant, &Variant),
+        integrator: &Variant,
+        samples: u32,
+    ) -> Result<Self, String> {
+        let registries = session.registries;
+        let integrator = registries.integrators.configured(integrator);
+        let integrator = integrator.map_err(|e| e.to_string())?;
+        let demand = integrator.demand(samples, session.experiment.resolution[0]);
+        let sampler = (registries.samplers).sampler(sequence, decorrelation, &demand);
+        Ok(Self {
+            sampler: sampler.map_err(|e| e.to_string())?,
+            integrator,
+        })
+    }
+
+    /// An image of the experiment's size.
+    pub fn job(&self, session: &Session, camera: Camera, runtime_checks: bool) -> RenderJob<'_> {
+        RenderJob {
+            size: session.experiment.resolution,
+            camera,
+            sampler: &self.sampler,
+            integrator: &self.integrator,
+            runtime_checks,
+        }
+    }
+
+    /// The compiled image of a world with these kernels. The sampler's words were compared with those of its
+    /// twin, in all that `seeds` make of them.
+    ///
+    /// # Errors
+    /// A word differs, or the kernel does not compile.
+    pub fn renderer<'a>(
+        &self,
+        session: &mut Session,
+        world: &'a World,
+        (kernels, traced): (&Variant, &Traced),
+        seeds: &[u32],
+        [runtime_checks, ray_counts]: [bool; 2],
+    ) -> Result<Renderer<'a>, String> {
+        let device: &'a Device = world.device;
+        let gpu = device.of(kernels).map_err(|e| e.to_string())?;
+        words::check(session, gpu, &self.sampler, seeds)?;
+        let job = self.job(session, world.camera, runtime_checks);
+        let compiled = session.clock.time("gpu", || {
+            Renderer::new(gpu, &world.buffers, traced, &job, ray_counts)
+        });
+        compiled.map_err(|e| e.to_string())
+    }
+}

@@ -1,0 +1,79 @@
+//! A sequence and a decorrelation of a library user.
+
+use raystone::parameters;
+use raystone::sampling::hash::dimension_number;
+use raystone::sampling::{Coordinate, Decorrelation, Facts, Partner, SamplerTable, Sequence};
+
+parameters! {
+    /// The registry entry of the sequence.
+    pub struct Weyl {}
+}
+
+impl Sequence for Weyl {
+    fn name(&self) -> &'static str {
+        "weyl"
+    }
+
+    fn description(&self) -> &'static str {
+        "multiples of the golden ratio (an example)"
+    }
+
+    fn kernel(&self) -> &'static str {
+        "sampling/weyl"
+    }
+
+    fn sources(&self) -> &'static [(&'static str, &'static str)] {
+        &[("sampling/weyl", include_str!("kernels/sampling/weyl.wesl"))]
+    }
+
+    fn facts(&self) -> Facts {
+        Facts {
+            extensible: true,
+            ..Facts::default()
+        }
+    }
+
+    fn sequence(&self, _: &SamplerTable, at: Coordinate) -> u32 {
+        let multiple = at.sample.wrapping_add(1);
+        let odd = at.dimension.wrapping_mul(2).wrapping_add(1);
+        multiple.wrapping_mul(odd).wrapping_mul(0x9e37_79b9)
+    }
+}
+
+parameters! {
+    /// The registry entry of the decorrelation.
+    pub struct Rotation {}
+}
+
+impl Decorrelation for Rotation {
+    fn name(&self) -> &'static str {
+        "rotation"
+    }
+
+    fn description(&self) -> &'static str {
+        "a random shift for each pixel and dimension (an example)"
+    }
+
+    fn kernel(&self) -> &'static str {
+        "sampling/rotation"
+    }
+
+    fn sources(&self) -> &'static [(&'static str, &'static str)] {
+        &[(
+            "sampling/rotation",
+            include_str!("kernels/sampling/rotation.wesl"),
+        )]
+    }
+
+    fn refusal(&self, partner: &Partner) -> Option<String> {
+        partner.without_structure()
+    }
+
+    fn index(&self, _: &SamplerTable, at: Coordinate) -> u32 {
+        at.sample
+    }
+
+    fn decorrelate(&self, x: u32, _: &SamplerTable, at: Coordinate) -> u32 {
+        x.wrapping_add(dimension_number(at))
+    }
+}
