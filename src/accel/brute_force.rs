@@ -120,43 +120,18 @@ impl Block {
     /// products in the same order, or all of them where signs are not cheaper than the test itself.
     fn candidates(&self, ray: &Ray, inverse: &Reciprocal) -> u32 {
         match inverse.triangle {
-            TriangleTest::MoellerTrumbore => mask(std::array::from_fn(|l| self.triple(l, ray))),
             TriangleTest::Watertight | TriangleTest::Compensated => {
                 let s = shear(ray, inverse);
                 mask(std::array::from_fn(|l| self.sheared(l, &s)))
             }
-            TriangleTest::BaldwinWeber | TriangleTest::Pluecker => (1 << LANES) - 1,
+            _ => (1 << LANES) - 1,
         }
-    }
-
-    fn vertex(&self, vertex: usize, lane: usize) -> [f32; 3] {
-        [0, 1, 2].map(|axis| self.vertices[vertex][axis][lane])
-    }
-
-    /// The scalar triple products of [`TriangleTest::MoellerTrumbore`].
-    fn triple(&self, lane: usize, ray: &Ray) -> u32 {
-        let [dx, dy, dz] = ray.direction;
-        let [v0, v1, v2] = [0, 1, 2].map(|vertex| self.vertex(vertex, lane));
-        let [cx, cy, cz] = [0, 1, 2].map(|a| v0[a] - ray.origin[a]);
-        let [e1x, e1y, e1z] = [0, 1, 2].map(|a| v0[a] - v1[a]);
-        let [e2x, e2y, e2z] = [0, 1, 2].map(|a| v2[a] - v0[a]);
-        let (nx, ny, nz) = (
-            e1y * e2z - e1z * e2y,
-            e1z * e2x - e1x * e2z,
-            e1x * e2y - e1y * e2x,
-        );
-        let (rx, ry, rz) = (dy * cz - dz * cy, dz * cx - dx * cz, dx * cy - dy * cx);
-        let det = nx * dx + ny * dy + nz * dz;
-        let sign = det.to_bits() & 0x8000_0000;
-        let u = f32::from_bits((rx * e2x + ry * e2y + rz * e2z).to_bits() ^ sign);
-        let v = f32::from_bits((rx * e1x + ry * e1y + rz * e1z).to_bits() ^ sign);
-        let area = det.abs();
-        u32::from(area > 0.0) & u32::from(u >= 0.0) & u32::from(v >= 0.0) & u32::from(u + v <= area)
     }
 
     /// The compared products of [`TriangleTest::Watertight`].
     fn sheared(&self, lane: usize, s: &Shear) -> u32 {
-        let vertices = [0, 1, 2].map(|vertex| sheared(s, self.vertex(vertex, lane)));
+        let vertices = [0, 1, 2]
+            .map(|vertex| sheared(s, [0, 1, 2].map(|axis| self.vertices[vertex][axis][lane])));
         let (p, q) = products(vertices);
         let all = |compare: fn(&f32, &f32) -> bool| {
             (0..3).fold(1, |all, i| all & u32::from(compare(&p[i], &q[i])))

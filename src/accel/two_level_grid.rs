@@ -7,7 +7,7 @@
 //! then finds its place in the next one.
 
 use super::grid::lists::{Lists, PartLists, check_lists};
-use super::grid::{Cut, Frame, Grid, areas, check_words, clamped, finest, first_axis, outside};
+use super::grid::{Cut, Grid, GridBox, areas, check_words, clamped, finest, first_axis, outside};
 use super::ray::Hit;
 use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
@@ -59,9 +59,9 @@ impl AccelKind for TwoLevelGrid {
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
         let options = Options::from_params(params)?;
-        let frame = log.phase("bounds", || Frame::new(soup));
-        let resolution = frame.resolution(soup.records.len(), options.lambda1, 4096);
-        let grid = Grid::new(&frame, resolution);
+        let grid_box = log.phase("bounds", || GridBox::new(soup));
+        let resolution = grid_box.resolution(soup.records.len(), options.lambda1, 4096);
+        let grid = Grid::new(&grid_box, resolution);
         let top = Lists::new(self.name(), &grid, soup, true, log)?;
         let built = log.phase("parts", || cut(grid, soup, &top, options.lambda2))?;
         Ok(Box::new(built))

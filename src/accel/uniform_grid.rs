@@ -10,7 +10,7 @@
 //! leaves the whole empty cube around it at once.
 
 use super::grid::lists::{Lists, check_lists};
-use super::grid::{Frame, Grid, check_words, clamped, distance, first_axis, outside};
+use super::grid::{Grid, GridBox, check_words, clamped, distance, first_axis, outside};
 use super::ray::{Hit, Ray};
 use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
@@ -68,9 +68,9 @@ impl AccelKind for UniformGrid {
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
         let options = Options::from_params(params)?;
-        let frame = log.phase("bounds", || Frame::new(soup));
-        let resolution = frame.resolution(soup.records.len(), options.lambda, 4096);
-        let grid = Grid::new(&frame, resolution);
+        let grid_box = log.phase("bounds", || GridBox::new(soup));
+        let resolution = grid_box.resolution(soup.records.len(), options.lambda, 4096);
+        let grid = Grid::new(&grid_box, resolution);
         let exact = options.exact_overlap;
         let Lists { starts, references } = Lists::new(self.name(), &grid, soup, exact, log)?;
         check_words("cells of a uniform-grid", starts.len() as u64)?;

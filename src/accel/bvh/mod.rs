@@ -9,7 +9,7 @@ mod layout;
 mod octant_roped;
 mod options;
 mod order;
-mod pairs;
+pub(super) mod pairs;
 mod parent_pointer;
 mod roped;
 mod short_stack;
@@ -17,7 +17,7 @@ mod stack;
 
 use super::leaf::{COUNT_MASK, LeafReader, Leaves};
 use super::ray::Hit;
-use super::tree::{NodeKind, Tree};
+use super::tree::{Coverage, NodeKind, Tree};
 use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
@@ -155,14 +155,6 @@ impl BuiltBvh {
             NodeArray::Octants(octants) => NamedWords::new("nodes", &octants.0),
         }
     }
-
-    fn node_count(&self) -> usize {
-        match &self.nodes {
-            NodeArray::Pairs(pairs) => pairs.0.len(),
-            NodeArray::Boxes(boxes) => boxes.0.len(),
-            NodeArray::Octants(octants) => octants.0.len(),
-        }
-    }
 }
 
 /// Whether every leaf fits into a reference.
@@ -179,7 +171,15 @@ impl BuiltAccel for BuiltBvh {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
         let (leaves, depth) = (&self.leaves, self.depth);
         match &self.nodes {
-            NodeArray::Pairs(pairs) => pairs.validate(soup, leaves, depth),
+            NodeArray::Pairs(pairs) => {
+                let coverage = Coverage::new(soup, pairs.0.len());
+                pairs::validate(
+                    (ROOT, &pairs.0),
+                    depth,
+                    coverage,
+                    |coverage, leaf, bounds| leaves.cover(coverage, soup, leaf, bounds),
+                )
+            }
             NodeArray::Octants(octants) => octants.validate(soup, leaves, depth),
             NodeArray::Boxes(boxes) if self.options.traversal == Traversal::Roped => {
                 let rope = |link, _, child| roped::rope_of(link, child);
@@ -193,14 +193,15 @@ impl BuiltAccel for BuiltBvh {
         let mut features = self.options.features();
         features.extend(self.leaves.features());
         let stack_entries = self.options.stack_entries(self.depth);
-        let nodes = self.node_count();
+        let nodes = self.node_words();
+        let count = 4 * nodes.words.len() / nodes.element_bytes as usize;
         GpuBuffers {
             kernel: self.options.kernel(),
             features,
-            arrays: vec![self.node_words(), self.leaves.words()],
+            arrays: vec![nodes, self.leaves.words()],
             uniforms: vec![super::limits(
-                self.options.step_fuse(nodes, self.depth),
-                nodes,
+                self.options.step_fuse(count, self.depth),
+                count,
             )],
             constants: (stack_entries > 0)
                 .then_some(("STACK_ENTRIES", stack_entries))

@@ -2,12 +2,13 @@
 //! boxes grown for the ray, and the traversal of one object. Twin of `kernels/accel/instance.wesl`.
 
 use super::super::bounds::Bounds;
+use super::super::bvh::pairs::Pair;
 use super::super::intersection::{Intersection, Reciprocal};
 use super::super::leaf::{LEAF, leaf_range};
 use super::super::ray::{Hit, Ray};
 use super::super::triangle::{TriangleRecord, intersect_triangle};
 use super::super::twin::Query;
-use super::forest::{Forest, Node};
+use super::forest::Forest;
 use crate::scene::{Instance, Transform};
 use bytemuck::{Pod, Zeroable};
 
@@ -127,7 +128,7 @@ pub(super) fn leaf(
 
 /// Both children of a node in the order of their distance, with where they are entered.
 pub(super) fn near_and_far(
-    (place, node): (u32, &Node),
+    (place, node): (u32, &Pair),
     level: &Level,
     query: &mut Query,
 ) -> [(Option<f32>, u32); 2] {
@@ -151,21 +152,32 @@ pub(super) fn is_open(enter: Option<f32>, level: &Level, hit: &Hit) -> bool {
 
 /// Traces the object below `entry.node`, near child first.
 pub(super) fn trace_object(forest: &Forest, entry: &Entry, query: &mut Query) {
-    let Forest {
-        nodes, triangles, ..
-    } = forest;
     let level = level(&entry.object_ray(&query.ray), 0.0, forest.intersection);
+    let node = |index: u32| &forest.nodes[index as usize];
+    walk(node, entry.node, &level, query, |reference, query| {
+        leaf(&forest.triangles, reference, entry.first_id, &level, query);
+    });
+}
+
+/// The loop of both levels where one is inside the other: `visit` gets the references of leaves.
+pub(super) fn walk<'a>(
+    node: impl Fn(u32) -> &'a Pair,
+    root: u32,
+    level: &Level,
+    query: &mut Query,
+    visit: impl Fn(u32, &mut Query),
+) {
     let mut stack = Vec::new();
-    let mut current = entry.node;
+    let mut current = root;
     loop {
-        let children = near_and_far((current, &nodes[current as usize]), &level, query);
+        let children = near_and_far((current, node(current)), level, query);
         let mut next = NOTHING;
         for (enter, reference) in children {
-            if !is_open(enter, &level, &query.hit) {
+            if !is_open(enter, level, &query.hit) || reference == NOTHING {
                 continue;
             }
             if reference >= LEAF {
-                leaf(triangles, reference, entry.first_id, &level, query);
+                visit(reference, query);
                 if query.is_answered() {
                     return;
                 }

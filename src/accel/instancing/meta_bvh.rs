@@ -5,12 +5,12 @@
 //! C. Benthin et al. (HPG 2017), see [`super::top`].
 
 use super::super::bounds::Bounds;
+use super::super::bvh::pairs::Pair;
 use super::super::leaf::{FIRST_MASK, LEAF, leaf_reference};
 use super::super::ray::Hit;
 use super::super::tree::TreeParameters;
 use super::super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, Space, TriangleSoup};
-use super::forest::Node;
 use super::instance::{Entry, NOTHING, is_open, leaf, level, near_and_far};
 use super::top::Top;
 use super::world_box::BoxMap;
@@ -101,7 +101,7 @@ impl Built {
     }
 
     /// A node of either level.
-    pub(super) fn node(&self, index: u32) -> &Node {
+    pub(super) fn node(&self, index: u32) -> &Pair {
         let objects = &self.base.forest.nodes;
         let index = index as usize;
         objects

@@ -27,6 +27,7 @@ pub use meta_bvh::MetaBvh;
 pub use object_list::ObjectList;
 pub use placed::Placed;
 
+use super::bvh::pairs::Pair;
 use super::{AccelError, BuildLog, GpuBuffers, NamedWords, Space, TriangleSoup, limits};
 use crate::gpu::UniformValues;
 use crate::scene::Instance;
@@ -78,7 +79,7 @@ impl Base {
                 NamedWords {
                     name: "nodes",
                     words: [nodes, first, second].concat().into(),
-                    element_bytes: size_of::<forest::Node>() as u32,
+                    element_bytes: size_of::<Pair>() as u32,
                 },
                 NamedWords::new("leaf_triangles", &forest.triangles),
             ],

@@ -372,37 +372,6 @@ mod tests {
             .sum()
     }
 
-    fn area_cost(partition: &Partition) -> f64 {
-        let cost = |c: &Cell| {
-            let [x, y, z] = [0, 1, 2]
-                .map(|a| f64::from(c.max[a] - c.min[a]) * f64::from(partition.fine.cell[a]));
-            (x * y + y * z + z * x) * f64::from(c.count + 1)
-        };
-        partition.cells.iter().map(cost).sum()
-    }
-
-    #[test]
-    fn merged_cells_still_tile_the_grid_and_cost_less() {
-        let mut partition = cut_soup();
-        let all = partition
-            .fine
-            .resolution
-            .iter()
-            .map(|&n| u64::from(n))
-            .product::<u64>();
-        assert_eq!(volume(&partition.cells), all);
-        let (cells, cost) = (partition.cells.len(), area_cost(&partition));
-        merge::merge(&mut partition, 0.995);
-        assert_eq!(volume(&partition.cells), all);
-        assert!(partition.cells.len() < cells, "{cells} cells");
-        assert!(area_cost(&partition) < cost);
-        for (number, cell) in partition.cells.iter().enumerate() {
-            let corner = cell.min.map(u32::from);
-            assert_eq!(partition.map.cell_at(corner), number as u32);
-            assert!(cell.list(&partition.pool).is_sorted());
-        }
-    }
-
     #[test]
     fn boxes_grow_only_over_cells_that_list_nothing_more() {
         let mut partition = cut_soup();

@@ -1,6 +1,6 @@
 //! The builder of `octree`: level by level, the cells of a level on all cores.
 
-use super::{INNER_SHIFT, LAST, LEAF, Space};
+use super::{INNER_SHIFT, LAST, LEAF, RootCell};
 use crate::accel::bounds::Bounds;
 use crate::accel::spatial::{Margin, Overlap, corners};
 use crate::accel::{AccelError, TriangleSoup};
@@ -43,7 +43,7 @@ struct Children {
 /// More blocks or references than a word can address.
 pub(super) fn build(
     soup: &TriangleSoup,
-    space: &Space,
+    space: &RootCell,
     options: &Options,
 ) -> Result<Octree, AccelError> {
     let settings = Settings::new(soup, space, options);
@@ -75,7 +75,7 @@ pub(super) fn default_depth(triangles: usize) -> u32 {
 
 struct Settings<'a> {
     soup: &'a TriangleSoup,
-    space: &'a Space,
+    space: &'a RootCell,
     max_depth: u32,
     leaf_size: usize,
     traversal_cost: f64,
@@ -85,7 +85,7 @@ struct Settings<'a> {
 }
 
 impl<'a> Settings<'a> {
-    fn new(soup: &'a TriangleSoup, space: &'a Space, options: &Options) -> Self {
+    fn new(soup: &'a TriangleSoup, space: &'a RootCell, options: &Options) -> Self {
         Self {
             soup,
             space,
@@ -160,7 +160,7 @@ impl<'a> Settings<'a> {
         let half = self.space.half(depth + 1).map(|h| h + margin);
         let overlap = Overlap::new(&corners(record), half);
         for octant in 0..8_u32 {
-            let child = Space::child(position, octant);
+            let child = RootCell::child(position, octant);
             if mask >> octant & 1 == 1 && !overlap.touches(self.space.centre(child, depth + 1)) {
                 mask &= !(1 << octant);
             }
@@ -213,7 +213,7 @@ fn assemble(
                 filled |= 1 << octant;
                 next_cells.push(Open {
                     slot: 8 * block + octant,
-                    position: Space::child(cell.position, octant as u32),
+                    position: RootCell::child(cell.position, octant as u32),
                     first: next_triangles.len() + start,
                 });
             }

@@ -71,7 +71,7 @@ impl AccelKind for Octree {
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
         let options = Options::from_params(params)?;
-        let space = Space::around(soup);
+        let space = RootCell::around(soup);
         let tree = log.phase("levels", || build::build(soup, &space, &options))?;
         Ok(Box::new(Built {
             space,
@@ -85,12 +85,12 @@ impl AccelKind for Octree {
 
 /// Where cells lie: at depth `d` the planes of an axis are `low + k · extent · 2⁻ᵈ`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Space {
+struct RootCell {
     low: [f32; 3],
     extent: [f32; 3],
 }
 
-impl Space {
+impl RootCell {
     fn around(soup: &TriangleSoup) -> Self {
         if soup.records.is_empty() {
             return Self {
@@ -153,7 +153,7 @@ impl Space {
 }
 
 struct Built {
-    space: Space,
+    space: RootCell,
     clipped: bool,
     /// Block 0 holds the root in its first place, each other block the children of a cell.
     nodes: Vec<u32>,
@@ -180,7 +180,7 @@ impl Built {
                 let filled = (0..8).filter(|octant| word >> octant & 1 == 1);
                 stack.extend(filled.map(|octant| {
                     let child = self.nodes[8 * block + octant as usize];
-                    (child, Space::child(position, octant), depth + 1)
+                    (child, RootCell::child(position, octant), depth + 1)
                 }));
             }
         }
@@ -325,7 +325,7 @@ impl Traverse for Built {
             }
             let octant = open.trailing_zeros() ^ flip;
             open &= open - 1;
-            let child = Space::child(position, octant);
+            let child = RootCell::child(position, octant);
             let half = size.map(|s| 0.5 * s);
             let first: [u32; 3] = std::array::from_fn(|a| child[a] + mirror[a]);
             let near = self.distances(first, half, &ray, *inverse);

@@ -1,6 +1,6 @@
 //! What must hold of a built octree.
 
-use super::{Built, INNER_SHIFT, LAST, LEAF, Space, build};
+use super::{Built, INNER_SHIFT, LAST, LEAF, RootCell, build};
 use crate::accel::spatial::{corners, touches};
 use crate::accel::tree::Coverage;
 use crate::accel::{AccelError, TriangleSoup};
@@ -86,7 +86,7 @@ impl Walk<'_> {
             let inside = self.needed(position, depth, octant, triangles);
             if word >> octant & 1 == 1 {
                 let child = self.built.nodes[8 * block + octant as usize];
-                self.cell(child, Space::child(position, octant), depth + 1, &inside)?;
+                self.cell(child, RootCell::child(position, octant), depth + 1, &inside)?;
             } else if let Some(id) = inside.first() {
                 let what = || format!("triangle {id} touches octant {octant}, which is empty");
                 ensure(false, &what)?;
@@ -99,7 +99,7 @@ impl Walk<'_> {
     fn needed(&self, position: [u32; 3], depth: u32, octant: u32, triangles: &[u32]) -> Vec<u32> {
         let space = &self.built.space;
         let middle = space.middle(position, depth);
-        let child = space.cell(Space::child(position, octant), depth + 1);
+        let child = space.cell(RootCell::child(position, octant), depth + 1);
         let is_needed = |id: &u32| {
             let record = &self.soup.records[*id as usize];
             build::by_box(&record.bounds(), middle) >> octant & 1 == 1

@@ -237,15 +237,16 @@ const APART: Meeting = Meeting {
 
 /// Whether a ray runs in the plane of a triangle, but for what raising its direction
 /// ([`super::ray::raised`]) has tilted it: from an origin in the triangle it would meet it at 0.
-fn is_along(triangle: &TriangleRecord, direction: [f32; 3]) -> bool {
+fn is_along(triangle: &TriangleRecord, direction: [f32; 3], inverse: &Reciprocal) -> bool {
     let TriangleRecord { v0, v1, v2, .. } = triangle;
     let [e1x, e1y, e1z] = [0, 1, 2].map(|a| v0[a] - v1[a]);
     let [e2x, e2y, e2z] = [0, 1, 2].map(|a| v2[a] - v0[a]);
     let nx = e1y * e2z - e1z * e2y;
     let ny = e1z * e2x - e1x * e2z;
     let nz = e1x * e2y - e1y * e2x;
-    let [x, y, z] = direction.map(f32::abs);
-    let unit = 1.0 / x.max(y).max(z);
+    // The reciprocal of the longest component: no other is less.
+    let [x, y, z] = inverse.map(f32::abs);
+    let unit = x.min(y).min(z);
     let tilt = 2.0 * SMALLEST_SLOPE.max(SMALLEST_COMPONENT * unit);
     let [dx, dy, dz] = direction.map(|d| d * unit);
     (nx * dx + ny * dy + nz * dz).abs() <= (nx.abs() + ny.abs() + nz.abs()) * tilt
@@ -278,7 +279,7 @@ pub fn intersect_triangle(
     }
     let nearer = t < hit.t || (t == hit.t && triangle.id < hit.triangle);
     let within = t >= ray.t_min && t <= ray.t_max;
-    if repaired && within && nearer && !is_along(triangle, ray.direction) {
+    if repaired && within && nearer && !is_along(triangle, ray.direction, &inverse) {
         // None of the three is negative, but any may be −0, whose sign compilers do not keep.
         *hit = Hit {
             t: t.abs(),

@@ -438,27 +438,6 @@ mod tests {
     }
 
     #[test]
-    fn every_triangle_stays_in_one_leaf_and_nodes_are_as_wide_as_allowed() {
-        let mut random = Pcg32::new(4);
-        for width in [2, 4, 8] {
-            let tree = random_tree(300, &mut random);
-            let wide = WideTree::collapse(&tree, &settings(width), |_, _| ());
-            let mut order = wide.order.clone();
-            order.sort_unstable();
-            assert_eq!(order, tree.order);
-            assert!(
-                wide.nodes
-                    .iter()
-                    .all(|children| (1..=width).contains(&children.len()))
-            );
-            assert!(wide.nodes.len() < tree.nodes.len() / 2);
-            for child in wide.nodes.iter().flatten() {
-                assert!(matches!(child.kind, WideKind::Node(_)) || !child.is_nothing());
-            }
-        }
-    }
-
-    #[test]
     fn triangles_that_spatial_splits_listed_twice_stand_in_a_leaf_once() {
         let mut order = vec![7, 7, 1, 2, 1];
         assert_eq!(distinct_from(&mut order, 2), 2);

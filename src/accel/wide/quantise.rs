@@ -158,7 +158,7 @@ fn exponent(x: f32) -> i32 {
 /// Distances along a ray to the planes of a node: `q · scale + near` where the ray enters a box,
 /// `+ far` where it leaves.
 #[derive(Debug, Clone, Copy)]
-pub struct Frame {
+pub struct PlaneDistances {
     scale: [f32; 3],
     near: [f32; 3],
     far: [f32; 3],
@@ -167,9 +167,14 @@ pub struct Frame {
 }
 
 /// The frame of a node with first plane `low` and biased exponents in the bytes of `exponents`.
-pub fn frame(low: [f32; 3], exponents: u32, origin: [f32; 3], inverse: Reciprocal) -> Frame {
+pub fn frame(
+    low: [f32; 3],
+    exponents: u32,
+    origin: [f32; 3],
+    inverse: Reciprocal,
+) -> PlaneDistances {
     let biased = exponents.to_le_bytes();
-    let mut frame = Frame {
+    let mut frame = PlaneDistances {
         scale: [0.0; 3],
         near: [0.0; 3],
         far: [0.0; 3],
@@ -207,7 +212,7 @@ fn earlier(a: f32, b: f32) -> f32 {
 }
 
 /// Where the segment enters four boxes, whose near planes on the three axes are these.
-pub fn enter_four(near: [u32; 3], frame: &Frame, t_min: f32) -> [f32; 4] {
+pub fn enter_four(near: [u32; 3], frame: &PlaneDistances, t_min: f32) -> [f32; 4] {
     let distances: [_; 3] =
         std::array::from_fn(|axis| planes(near[axis], frame.scale[axis], frame.near[axis]));
     std::array::from_fn(|i| {
@@ -217,7 +222,7 @@ pub fn enter_four(near: [u32; 3], frame: &Frame, t_min: f32) -> [f32; 4] {
 }
 
 /// Where it leaves them, padded: a box is entered if it does not leave before it enters.
-pub fn leave_four(far: [u32; 3], frame: &Frame, t_best: f32) -> [f32; 4] {
+pub fn leave_four(far: [u32; 3], frame: &PlaneDistances, t_best: f32) -> [f32; 4] {
     let distances: [_; 3] =
         std::array::from_fn(|axis| planes(far[axis], frame.scale[axis], frame.far[axis]));
     std::array::from_fn(|i| {
