@@ -6,11 +6,11 @@ mod common;
 use common::{Pcg, assert_same_hits, build, default_params, scenes};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use raystone::accel::BoxTest;
 use raystone::accel::triangle::{TriangleRecord, TriangleTest, intersect_triangle};
-use raystone::accel::{AccelKind, BoxTest};
 use raystone::accel::{
-    AccelRegistry, BuildLog, BuiltBvh, Bvh, Counters, CpuTwin, Hit, Intersection, NO_HIT, Ray,
-    TriangleSoup,
+    AccelRegistry, BuildLog, BuiltBvh, BvhParameters, Counters, CpuTwin, Hit, Intersection, NO_HIT,
+    Ray, TriangleSoup,
 };
 use raystone::config::Gate;
 use raystone::geometry::Triangle;
@@ -329,7 +329,7 @@ fn inner_rays(triangles: &[[Vec3; 3]], centre: DVec3, count: usize) -> Vec<Ray> 
 
 /// Rays that leave a closed surface unseen.
 fn leaks(soup: &TriangleSoup, rays: &[Ray]) -> Vec<usize> {
-    let params = default_params(&Bvh.parameters());
+    let params = BvhParameters::default();
     let built = BuiltBvh::build(soup, &params, &mut BuildLog::default()).expect("a small scene");
     let twin = built.twin(soup);
     let leaks = |i: &usize| {
@@ -482,7 +482,7 @@ fn what_tests_cost_in_a_whole_traversal() {
             ao_length: 0.0,
             offset: 0.0,
         };
-        let params = default_params(&Bvh.parameters());
+        let params = BvhParameters::default();
         let soup = TriangleSoup::new(&scene);
         let tree = BuiltBvh::build(&soup, &params, &mut BuildLog::default()).expect("a BVH");
         let sets = record_rays(&scene, &soup, camera, &tree.twin(&soup), &settings, 1);

@@ -6,10 +6,11 @@
 
 use super::bounds::Bounds;
 use super::ray::Hit;
+use super::tree::TreeParameters;
 use super::twin::Query;
+use super::wide::Memory;
 use super::wide::{
     Quantisation, Wide, WideChild, WideKind, WideNode, enter_four, frame, leave_four,
-    wide_parameters,
 };
 use super::{AccelError, AccelKind, BuildLog, BuiltAccel, TriangleSoup};
 use crate::parameters;

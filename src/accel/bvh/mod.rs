@@ -26,7 +26,8 @@ use super::{
 use crate::params::{ParameterSchema, Parameters as _, Params};
 use boxes::Boxes;
 use octant_roped::Octants;
-use options::{Options, Traversal};
+pub use options::BvhParameters;
+use options::{Options, RopedParameters, Traversal};
 use pairs::Pairs;
 
 /// The root.

@@ -5,7 +5,7 @@ use super::super::bvh::check_leaves;
 use super::super::bvh::pairs::{self, Pair, Pairs};
 use super::super::intersection::Intersection;
 use super::super::leaf::{FIRST_MASK, leaf_range};
-use super::super::tree::{Coverage, Tree};
+use super::super::tree::{Coverage, Tree, TreeParameters};
 use super::super::triangle::TriangleRecord;
 use super::super::{AccelError, BuildLog, TriangleSoup};
 use crate::accel::StructureStats;

@@ -2,6 +2,7 @@
 
 use super::super::bounds::{Bounds, enter_box};
 use super::super::brute_force::EveryTriangle;
+use super::super::bvh::BvhParameters;
 use super::super::{
     AccelError, BuildLog, BuiltAccel, BuiltBvh, Counters, CpuTwin, Hit, NO_HIT, Ray, TriangleSoup,
 };

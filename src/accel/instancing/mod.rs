@@ -28,6 +28,7 @@ pub use object_list::ObjectList;
 pub use placed::Placed;
 
 use super::bvh::pairs::Pair;
+use super::tree::TreeParameters;
 use super::{AccelError, BuildLog, GpuBuffers, NamedWords, Space, TriangleSoup, limits};
 use crate::gpu::UniformValues;
 use crate::scene::Instance;

@@ -355,13 +355,9 @@ mod tests {
     }
 
     fn cut_soup() -> Partition {
-        let settings = Options {
-            lambda1: 0.12,
-            lambda2: 2.4,
-            levels: 3,
-        };
         let log = &mut BuildLog::default();
-        cut::cut("irregular-grid", &soup(), &settings, log).unwrap_or_else(|e| panic!("{e}"))
+        cut::cut("irregular-grid", &soup(), &Options::default(), log)
+            .unwrap_or_else(|e| panic!("{e}"))
     }
 
     fn volume(cells: &[Cell]) -> u64 {

@@ -4,7 +4,7 @@
 //! Source: I. Wald, V. Havran, "On building fast kd-trees for ray tracing, and on doing that in
 //! O(N log N)", 2006, algorithms 4 and 5.
 
-use super::Node;
+use super::{Node, Options};
 use crate::accel::bounds::Bounds;
 use crate::accel::spatial::{Margin, clip, corners, intersection};
 use crate::accel::{AccelError, BuildLog, TriangleSoup};

@@ -1,6 +1,6 @@
 //! The builder of `octree`: level by level, the cells of a level on all cores.
 
-use super::{INNER_SHIFT, LAST, LEAF, RootCell};
+use super::{INNER_SHIFT, LAST, LEAF, Options, RootCell};
 use crate::accel::bounds::Bounds;
 use crate::accel::spatial::{Margin, Overlap, corners};
 use crate::accel::{AccelError, TriangleSoup};

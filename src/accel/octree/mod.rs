@@ -32,7 +32,7 @@ const LAST: u32 = 0x8000_0000;
 /// no more than `BOX_PAD` before it. More than its square.
 const END_PAD: f32 = 1.000_004;
 /// Cells have integer positions that a float holds exactly.
-const DEEPEST: i64 = 20;
+const DEEPEST: u32 = 20;
 
 parameters! {
     /// Which cells are divided, and what they list.
