@@ -344,7 +344,15 @@ fn the_gate_judges_each_structure_in_its_space_and_sees_the_difference() {
     for kind in support::structures() {
         let traced = stage.traced(gpu, kind);
         let soup = &stage.soup;
-        let verdict = gate(gpu, &stage.buffers, soup, &traced, &judge, &probe, true);
+        let verdict = gate(
+            gpu,
+            &stage.buffers.triangles,
+            soup,
+            &traced,
+            &judge,
+            &probe,
+            true,
+        );
         let verdict = verdict.unwrap_or_else(|e| panic!("{}: {e}", kind.name()));
         assert!(verdict.passed, "{}: {verdict:?}", kind.name());
     }

@@ -9,14 +9,13 @@ use rayon::prelude::*;
 use raystone::accel::BoxTest;
 use raystone::accel::triangle::{TriangleRecord, TriangleTest, intersect_triangle};
 use raystone::accel::{
-    AccelRegistry, BuildLog, BuiltBvh, BvhParameters, Counters, CpuTwin, Hit, Intersection, NO_HIT,
-    Ray, TriangleSoup,
+    AccelRegistry, Ask, BuildLog, BuiltBvh, BvhParameters, Counters, CpuTwin, Hit, Intersection,
+    NO_HIT, Ray, Traced, Tracer, TriangleBuffers, TriangleSoup,
 };
 use raystone::config::Gate;
 use raystone::geometry::Triangle;
 use raystone::gpu::{Bindings, Composition, Dispatch, Gpu, KernelLibrary, groups_for};
-use raystone::integrator::{RayOffset, SceneBuffers, Traced};
-use raystone::measure::batch::{Batch, Query};
+use raystone::integrator::RayOffset;
 use raystone::measure::rays::record_rays;
 use raystone::params::{Params, Variant};
 use raystone::scene::{self, LoadOptions};
@@ -489,13 +488,17 @@ fn what_tests_cost_in_a_whole_traversal() {
         let prepared = TriangleTest::ALL.map(|test| {
             let soup = soup.clone().intersecting(tests_of(test));
             let tree = BuiltBvh::build(&soup, &params, &mut BuildLog::default()).expect("a BVH");
-            let buffers = SceneBuffers::upload(gpu(), &scene, &soup).expect("fits");
+            let buffers = TriangleBuffers::upload(gpu(), &soup).expect("fits");
             (buffers, Traced::upload(gpu(), &tree).expect("fits"))
         });
         for set in &sets {
             let batches = prepared.each_ref().map(|(buffers, traced)| {
-                Batch::new(gpu(), buffers, traced, Query::of(set), &set.rays, false)
-                    .expect("compiles")
+                let ask = Ask {
+                    runtime_checks: false,
+                    ..set.query().into()
+                };
+                let tracer = Tracer::new(gpu(), buffers, traced, ask).expect("compiles");
+                tracer.batch(&set.rays).expect("fits")
             });
             for batch in &batches {
                 batch.trace().expect("traces");

@@ -70,7 +70,7 @@ fn fault(stage: &Stage, kind: &dyn AccelKind, judge: &Judge) -> Option<String> {
     let probe = probe_arithmetic(gpu()).expect("the probe runs");
     match gate(
         gpu(),
-        &stage.buffers,
+        &stage.buffers.triangles,
         &stage.soup,
         &traced,
         judge,

@@ -390,8 +390,7 @@ fn a_link_or_content_that_leads_astray_is_no_valid_structure() {
 
 #[test]
 fn arrays_in_two_to_four_parts_give_the_same_hits() {
-    use raystone::integrator::{SceneBuffers, Traced};
-    use raystone::measure::batch::{Batch, Query};
+    use raystone::accel::{Query, Traced, Tracer, TriangleBuffers};
     if !common::is_exact(common::gpu()) {
         return;
     }
@@ -417,15 +416,16 @@ fn arrays_in_two_to_four_parts_give_the_same_hits() {
             let largest = arrays.iter().map(|a| 4 * a.words.len()).max().unwrap_or(0);
             let largest = largest.max(48 * soup.records.len()) as u64;
             gpu.limits.max_storage_buffer_binding_size = largest / (2 + index as u64 % 3) + 400;
-            let buffers = SceneBuffers::upload(&gpu, &scene, &soup).expect("scene buffers");
+            let buffers = TriangleBuffers::upload(&gpu, &soup).expect("triangles");
             let traced = Traced::upload(&gpu, &*built).expect("arrays in parts");
-            let batch = Batch::new(&gpu, &buffers, &traced, Query::Closest, &rays, true)
-                .unwrap_or_else(|e| panic!("{params:?}: {e}"));
+            let tracer = Tracer::new(&gpu, &buffers, &traced, Query::Closest);
+            let batch = tracer.and_then(|tracer| tracer.batch(&rays));
+            let batch = batch.unwrap_or_else(|e| panic!("{params:?}: {e}"));
             batch.trace().unwrap_or_else(|e| panic!("{params:?}: {e}"));
             assert_eq!(batch.error_word().expect("the error word"), 0);
             let hits = batch.hits().expect("hits");
             assert_same_hits(&format!("{params:?}"), &rays, &expected, &hits);
-            seen.extend(batch.features());
+            seen.extend(batch.tracer().features());
         }
     }
     for array in ["nodes", "leaf_triangles", "triangles"] {
@@ -436,8 +436,7 @@ fn arrays_in_two_to_four_parts_give_the_same_hits() {
 
 #[test]
 fn more_parts_than_the_adapter_binds_are_refused_with_both_numbers() {
-    use raystone::integrator::{SceneBuffers, Traced};
-    use raystone::measure::batch::{Batch, Query};
+    use raystone::accel::{Query, Traced, Tracer, TriangleBuffers};
     let catalogue = raystone::run::Registries::default().catalogue();
     let sphere = catalogue
         .scene
@@ -450,11 +449,10 @@ fn more_parts_than_the_adapter_binds_are_refused_with_both_numbers() {
     gpu.limits.max_storage_buffer_binding_size = soup.records.len() as u64 * 12 + 400;
     gpu.limits.max_storage_buffers_per_shader_stage = 8;
     let built = build(&Bvh, &soup, &params(&[("triangles", "indexed")]));
-    let buffers = SceneBuffers::upload(&gpu, &scene, &soup).expect("scene buffers");
+    let buffers = TriangleBuffers::upload(&gpu, &soup).expect("triangles");
     let traced = Traced::upload(&gpu, &*built).expect("arrays in parts");
-    let rays = scenes::aimed_rays(&mut Pcg::new(4), &soup, 10);
-    let batch = Batch::new(&gpu, &buffers, &traced, Query::Closest, &rays, true);
-    let told = batch.err().expect("too many buffers").to_string();
+    let tracer = Tracer::new(&gpu, &buffers, &traced, Query::Closest);
+    let told = tracer.err().expect("too many buffers").to_string();
     assert!(told.contains("at most 8"), "{told}");
     assert!(["9", "10", "11"].iter().any(|n| told.contains(n)), "{told}");
 }

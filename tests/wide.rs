@@ -68,8 +68,7 @@ fn wide_nodes_of_eight_and_of_four_are_smaller_than_binary_ones() {
 
 #[test]
 fn triangles_in_a_texture_are_not_bound_by_the_limit_of_buffers() {
-    use raystone::integrator::{SceneBuffers, Traced};
-    use raystone::measure::batch::{Batch, Query};
+    use raystone::accel::{Query, Traced, Tracer, TriangleBuffers};
     let catalogue = raystone::run::Registries::default().catalogue();
     let mut entries = catalogue.scene.iter();
     let sphere = entries.find(|e| e.name == "displaced-sphere");
@@ -84,13 +83,14 @@ fn triangles_in_a_texture_are_not_bound_by_the_limit_of_buffers() {
     // The canonical triangles come in parts; those of the leaves, at least as many, in one texture.
     let bytes = 48 * soup.records.len() as u64;
     gpu.limits.max_storage_buffer_binding_size = bytes / 3;
-    let buffers = SceneBuffers::upload(&gpu, &scene, &soup).expect("scene buffers");
+    let buffers = TriangleBuffers::upload(&gpu, &soup).expect("triangles");
     for name in WIDE {
         let kind = kind(name);
         let built = build(kind, &soup, &default_params(&kind.parameters()));
         let expected = brute_force_hits(&soup, &rays);
         let traced = Traced::upload(&gpu, &*built).expect("a texture");
-        let batch = Batch::new(&gpu, &buffers, &traced, Query::Closest, &rays, true).expect(name);
+        let tracer = Tracer::new(&gpu, &buffers, &traced, Query::Closest).expect(name);
+        let batch = tracer.batch(&rays).expect(name);
         batch.trace().expect(name);
         assert_eq!(batch.error_word().expect("the error word"), 0, "{name}");
         assert_same_hits(name, &rays, &expected, &batch.hits().expect("hits"));
@@ -98,7 +98,8 @@ fn triangles_in_a_texture_are_not_bound_by_the_limit_of_buffers() {
         // What fits into neither is refused with both numbers.
         let refused = |gpu: &raystone::gpu::Gpu, built: &dyn raystone::accel::BuiltAccel| {
             let traced = Traced::upload(gpu, built).expect("it is uploaded");
-            let batch = Batch::new(gpu, &buffers, &traced, Query::Closest, &rays, true);
+            let tracer = Tracer::new(gpu, &buffers, &traced, Query::Closest);
+            let batch = tracer.and_then(|tracer| tracer.batch(&rays));
             let traced = batch.and_then(|batch| batch.trace());
             traced.expect_err("it is bound").to_string()
         };

@@ -18,6 +18,7 @@ pub mod ray;
 mod registry;
 mod spatial;
 mod stats;
+pub mod tracer;
 pub mod tree;
 pub mod triangle;
 pub mod twin;
@@ -38,6 +39,9 @@ pub use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::AccelRegistry;
 pub use stats::{BuildLog, LEAF_HISTOGRAM_END, Phase, StructureStats, leaf_histogram};
+pub use tracer::{
+    Answers, Ask, Query, RayBatch, TracePasses, TraceSteps, Traced, Tracer, TriangleBuffers,
+};
 pub use twin::{Counters, CpuTwin};
 pub use two_level_grid::TwoLevelGrid;
 pub use uniform_grid::UniformGrid;
@@ -48,6 +52,7 @@ use crate::scene::SceneData;
 use bytemuck::NoUninit;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+use std::sync::Arc;
 use thiserror::Error;
 use triangle::TriangleRecord;
 
@@ -70,6 +75,9 @@ pub enum AccelError {
     /// Parameters that contradict each other, with the reason.
     #[error("{0}")]
     Contradiction(String),
+    /// What a build on the device met with.
+    #[error("{0}")]
+    Device(String),
     /// A structural invariant is violated.
     #[error("{0}")]
     Invalid(String),
@@ -216,7 +224,8 @@ impl<'a> NamedWords<'a> {
 /// What a structure hands to the GPU.
 #[derive(Debug, Clone, Default)]
 pub struct GpuBuffers<'a> {
-    /// Module of the kernel that traces it, relative to the kernel folder.
+    /// Module of the kernel that traces it, relative to the kernel folder; empty for a pipeline that
+    /// needs none.
     pub kernel: &'static str,
     /// Features (`@if(...)` in the kernel) that its parameters switch on.
     pub features: Vec<&'static str>,
@@ -244,7 +253,10 @@ impl GpuBuffers<'_> {
     /// `composition` with this structure as the active one.
     #[must_use]
     pub fn activate(&self, composition: Composition) -> Composition {
-        let active = composition.with("accel", self.kernel);
+        let active = match self.kernel {
+            "" => composition,
+            kernel => composition.with("accel", kernel),
+        };
         let active = self
             .features
             .iter()
@@ -298,6 +310,16 @@ pub enum Space {
     Instances,
 }
 
+/// How a built structure is traced.
+#[derive(Clone)]
+pub enum Access {
+    /// Its kernel module exports `closest_hit` and `any_hit`, which other kernels import.
+    Inline,
+    /// It answers buffers of rays in passes of its own; kernels with a structure in them (those of
+    /// integrators that trace) cannot use it.
+    Pipeline(Arc<dyn TracePasses>),
+}
+
 /// A built structure.
 pub trait BuiltAccel: Sync {
     /// Checks structural invariants: reachability, containment, depth, ranges.
@@ -307,6 +329,15 @@ pub trait BuiltAccel: Sync {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError>;
     /// The kernel with its arrays, uniforms, constants and features.
     fn buffers(&self) -> GpuBuffers<'_>;
+    /// Arrays that a build on the device left there, by the variables that bind them: they are storage
+    /// arrays beside those of [`BuiltAccel::buffers`].
+    fn on_device(&self) -> Vec<(&'static str, wgpu::Buffer)> {
+        Vec::new()
+    }
+    /// How it is traced.
+    fn access(&self) -> Access {
+        Access::Inline
+    }
     /// Arrays that the kernel can read in several parts, where the adapter binds less than they need:
     /// see [`crate::gpu::Bindings::parts`].
     fn divisible(&self) -> &'static [&'static str] {

@@ -1,6 +1,9 @@
 //! What building a structure took, and static figures of what was built.
 
+use super::AccelError;
+use crate::gpu::{Gpu, Played, Player, Recording};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// A timed phase of a build.
@@ -8,7 +11,7 @@ use std::time::Instant;
 pub struct Phase {
     /// For instance `bounds`, `binned-sah`, `layout`.
     pub name: String,
-    /// Milliseconds of wall time.
+    /// Milliseconds: wall time, or GPU time of a pass on the device.
     pub ms: f64,
 }
 
@@ -53,14 +56,59 @@ impl StructureStats {
     }
 }
 
-/// Timed phases of a build.
-#[derive(Debug, Clone, Default)]
+/// Timed phases of a build, and the device for those that use it.
+#[derive(Clone, Default)]
 pub struct BuildLog {
     /// What was timed so far.
     pub phases: Vec<Phase>,
+    player: Option<Arc<Player>>,
 }
 
 impl BuildLog {
+    /// A log of a build that may use the device.
+    pub fn with_gpu(gpu: &Gpu) -> Self {
+        Self {
+            phases: Vec::new(),
+            player: Some(Arc::new(Player::new(gpu))),
+        }
+    }
+
+    /// The device, if the build may use one.
+    pub fn gpu(&self) -> Option<&Gpu> {
+        self.player.as_deref().map(Player::gpu)
+    }
+
+    /// Plays what builds on the device; each of its runs becomes a phase, by GPU timestamps where there are
+    /// any. Where not, all of it is one phase of wall time.
+    ///
+    /// # Errors
+    /// There is no device, or what it met with.
+    pub fn play(&mut self, recording: &Recording) -> Result<Played, AccelError> {
+        let player = self.player.as_ref();
+        let player = player.ok_or_else(|| {
+            AccelError::Device(
+                "this structure is built on the device, and there is none".to_owned(),
+            )
+        })?;
+        let played = player.play(recording);
+        let played = played.map_err(|e| AccelError::Device(e.to_string()))?;
+        let timed = played.runs.iter();
+        let timed: Option<Vec<Phase>> = timed
+            .map(|(name, ms)| {
+                let name = name.clone();
+                ms.map(|ms| Phase { name, ms })
+            })
+            .collect();
+        let names = || played.runs.iter().map(|(name, _)| name.as_str());
+        self.phases.extend(timed.unwrap_or_else(|| {
+            vec![Phase {
+                name: names().collect::<Vec<_>>().join(" + "),
+                ms: played.wall_ms,
+            }]
+        }));
+        Ok(played)
+    }
+
     /// Runs `work` and notes how long it took.
     pub fn phase<T>(&mut self, name: &str, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();

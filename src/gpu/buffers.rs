@@ -30,6 +30,13 @@ impl Elapsed {
     }
 }
 
+impl std::ops::AddAssign for Elapsed {
+    fn add_assign(&mut self, other: Self) {
+        self.gpu_ms = self.gpu_ms.zip(other.gpu_ms).map(|(a, b)| a + b);
+        self.wall_ms += other.wall_ms;
+    }
+}
+
 /// Refuses what needs more bytes than `limit`.
 pub(super) fn check(name: &str, needed: u64, limit: u64) -> Result<(), GpuError> {
     if needed > limit {

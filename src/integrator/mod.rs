@@ -7,9 +7,10 @@ pub mod offset;
 mod registry;
 mod render;
 mod slice;
+mod stage;
 mod tables;
-mod traced;
 
+pub use crate::accel::Traced;
 pub use kind::{
     ConfiguredIntegrator, CountedRays, Integrator, IntegratorError, IntegratorFacts,
     RAY_COUNT_CLASSES,
@@ -17,5 +18,5 @@ pub use kind::{
 pub use offset::RayOffset;
 pub use registry::IntegratorRegistry;
 pub use render::{BLOCK_SAMPLES, RenderJob, Renderer, Snapshot, rounding_bound, with_sampler};
+pub use stage::{Stage, StageError};
 pub use tables::{SceneBuffers, SceneFeatures};
-pub use traced::Traced;

@@ -7,7 +7,7 @@
 use super::kind::ConfiguredIntegrator;
 use super::slice::{Slice, job_uniform};
 use super::tables::SceneBuffers;
-use super::traced::Traced;
+use crate::accel::Traced;
 use crate::geometry::Camera;
 use crate::gpu::{
     Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline, UniformValues,
@@ -114,6 +114,7 @@ fn composition(
     ray_counts: bool,
 ) -> Composition {
     let kernel = scene
+        .triangles
         .intersection
         .activate(Composition::new("integrator/render"));
     let kernel = traced.compose(scene.offset.activate(kernel));

@@ -1,7 +1,7 @@
 //! Scene buffers for shading: canonical triangles, materials, lights, textures.
 
 use super::offset::{RayOffset, TransformError};
-use crate::accel::{Intersection, TriangleSoup};
+use crate::accel::{TriangleBuffers, TriangleSoup};
 use crate::gpu::{Bindings, Gpu, GpuError};
 use crate::scene::{Daylight, MaterialKind, SceneData};
 use glam::Vec3;
@@ -35,8 +35,8 @@ impl SceneFeatures {
 pub struct SceneBuffers {
     /// `triangles`, `shading_tables`, `texture_data`.
     pub bindings: Bindings,
-    /// How rays meet the triangles.
-    pub intersection: Intersection,
+    /// The triangles alone, and how rays meet them.
+    pub triangles: TriangleBuffers,
     /// Where rays that leave a surface start; integrators ask.
     pub offset: RayOffset,
     /// What instances add to the error of points.
@@ -82,17 +82,15 @@ impl SceneBuffers {
         let first_light = tables.len() as u32;
         let (lights, light_power) = light_words(scene);
         tables.extend_from_slice(&lights);
-        let mut bindings = Bindings::new();
-        let triangles = soup.words();
-        let triangles = triangles.as_flattened();
-        bindings.parts("triangles", &gpu.storage_parts("triangles", triangles)?);
+        let triangles = TriangleBuffers::upload(gpu, soup)?;
+        let mut bindings = triangles.bindings.clone();
         bindings.buffer("shading_tables", &gpu.storage("shading_tables", &tables)?);
         if textured {
             bindings.buffer("texture_data", &gpu.storage("texture_data", &texture_data)?);
         }
         Ok(Self {
             bindings,
-            intersection: soup.intersection,
+            triangles,
             offset: RayOffset::default(),
             transform_error: TransformError::of(soup),
             features: SceneFeatures {

@@ -8,20 +8,18 @@
 //! A scene of instances has a second judge, for structures that take rays to the objects' spaces:
 //! see [`super::instance_judge`].
 
-use super::batch::{Batch, Query};
 use super::instance_judge;
 use super::kept_checks::KeptChecks;
 use super::rays::{RaySet, record_rays};
 use super::record::{ClassVerdict, GateVerdict, JudgeCheck};
 use crate::accel::triangle::TriangleRecord;
 use crate::accel::{
-    AccelError, BuildLog, BuiltAccel, BuiltBvh, BvhParameters, Hit, NO_HIT, Ray, Space,
-    TriangleSoup, brute_force_hits,
+    AccelError, Ask, BuildLog, BuiltAccel, BuiltBvh, BvhParameters, Hit, NO_HIT, Query, Ray,
+    RayBatch, Space, Traced, Tracer, TriangleBuffers, TriangleSoup, brute_force_hits,
 };
 use crate::config::Gate;
 use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu, GpuError, kernel_errors};
-use crate::integrator::{SceneBuffers, Traced};
 use crate::oracle::{self, OracleRay, Verdict};
 use crate::scene::SceneData;
 
@@ -249,7 +247,7 @@ pub(super) fn oracle_ray(ray: &Ray) -> OracleRay {
 /// A kernel does not compile, the device is lost or hangs, or its driver cuts the loops short.
 pub fn gate(
     gpu: &Gpu,
-    scene: &SceneBuffers,
+    triangles: &TriangleBuffers,
     soup: &TriangleSoup,
     traced: &Traced,
     judge: &Judge,
@@ -260,16 +258,15 @@ pub fn gate(
     let mut errors = 0;
     let mut classes = Vec::new();
     for set in &judge.sets {
-        let closest = Batch::new(
-            gpu,
-            scene,
-            traced,
-            Query::Closest,
-            &set.rays,
-            runtime_checks,
-        )?;
+        let batch = |query: Query| {
+            let ask = Ask {
+                runtime_checks,
+                ..query.into()
+            };
+            Tracer::new(gpu, triangles, traced, ask)?.batch(&set.rays)
+        };
+        let (closest, any) = (batch(Query::Closest)?, batch(Query::Any)?);
         closest.trace()?;
-        let any = Batch::new(gpu, scene, traced, Query::Any, &set.rays, runtime_checks)?;
         any.trace()?;
         if !set.is_timed() {
             // What is timed is looked at again; here a second turn shows what a first one left behind.
@@ -307,7 +304,7 @@ pub fn gate(
 /// # Errors
 /// The device is lost or hangs.
 pub fn timed_fault(
-    batch: &Batch,
+    batch: &RayBatch,
     set: &RaySet,
     soup: &TriangleSoup,
     space: Space,
@@ -315,7 +312,7 @@ pub fn timed_fault(
 ) -> Result<Option<String>, GpuError> {
     let mut hits = set.truth.clone();
     let mut found: Vec<_> = hits.iter().map(|h| Some(h.triangle != NO_HIT)).collect();
-    match Query::of(set) {
+    match set.query() {
         Query::Closest => hits = batch.hits()?,
         Query::Any => found = batch.found()?,
     }

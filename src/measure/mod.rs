@@ -1,7 +1,7 @@
 //! Measuring: the gate, the timing protocol, image metrics, statistics, records.
 
-pub mod batch;
 pub mod bias;
+pub mod figure;
 pub mod gate;
 pub mod hard_rays;
 pub mod hypothesis;

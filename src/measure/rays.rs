@@ -6,7 +6,7 @@
 
 use super::hard_rays::hard_rays;
 use super::record::RayClass;
-use crate::accel::{Counters, CpuTwin, Hit, NO_HIT, Ray, TriangleSoup};
+use crate::accel::{Counters, CpuTwin, Hit, NO_HIT, Query, Ray, TriangleSoup};
 use crate::config::Gate;
 use crate::geometry::Camera;
 use crate::random::Pcg32;
@@ -57,9 +57,12 @@ impl RaySet {
         self.class != RayClass::Hard
     }
 
-    /// Whether the class asks for any hit instead of the nearest.
-    pub fn is_any(&self) -> bool {
-        matches!(self.class, RayClass::Shadow | RayClass::Ao)
+    /// What the class asks.
+    pub fn query(&self) -> Query {
+        match self.class {
+            RayClass::Shadow | RayClass::Ao => Query::Any,
+            _ => Query::Closest,
+        }
     }
 
     /// Fraction of the rays that hit something.

@@ -2,7 +2,9 @@
 
 use super::format;
 use super::samplers::Sampler;
+use crate::measure::figure::{FIGURES, Figure, figure};
 use crate::measure::record::*;
+use std::borrow::Cow;
 
 /// Everything a run recorded.
 #[derive(Debug, Default)]
@@ -50,17 +52,29 @@ pub struct View<'a> {
     /// Label of the integrator.
     pub integrator: &'a str,
     /// The reference image.
-    pub reference: Option<&'a ReferenceRecord>,
+    pub reference: Option<Recorded<'a, ReferenceRecord>>,
     /// Samplers in the order in which they first appear.
     pub samplers: Vec<Sampler<'a>>,
     /// Times of full cells.
     pub times: Vec<Recorded<'a, TimeRecord>>,
 }
 
+/// What a sampler's errors are of.
+const SAMPLER_AXES: [&str; 8] = [
+    axis::SCENE,
+    axis::INTEGRATOR,
+    axis::SEQUENCE,
+    axis::DECORRELATION,
+    axis::KERNELS,
+    axis::TRIANGLE,
+    axis::BOX_TEST,
+    axis::OFFSET,
+];
+
 /// Name of a structure as measured; with the driver's checks off it is another competitor.
 pub fn structure_name<T>(of: Recorded<T>) -> String {
     let (label, kernels) = (of.key.label(axis::ACCEL), of.key.kernels_mark());
-    format!("{label}{kernels}{}", unchecked(of))
+    format!("{label}{}{kernels}", unchecked(of))
 }
 
 /// Name of the structure of a timed cell, without the kernels: they are in the sampler's name, so that
@@ -100,7 +114,9 @@ impl<'a> RunData<'a> {
                     let scene = data.scene(line.key.label(axis::SCENE));
                     put(&mut scene.structures, line.of(record), is_same)
                 }
-                Body::Reference(record) => data.view(&line.key).reference = Some(record),
+                Body::Reference(record) => {
+                    data.view(&line.key).reference = Some(line.of(record));
+                }
                 Body::Time(record) => {
                     data.sampler(&line.key);
                     let view = data.view(&line.key);
@@ -133,6 +149,22 @@ impl<'a> RunData<'a> {
         samplers.extend(self.streams.iter().map(|s| s.key.sampler()));
         self.structures = without_repeats(structures);
         self.samplers = without_repeats(samplers);
+    }
+
+    /// A row of the table of figures; of one that nobody describes only the id is known.
+    pub fn figure(&self, id: &str) -> Cow<'a, Figure> {
+        let from_outside = self.run.iter().flat_map(|run| &run.figures);
+        let known = FIGURES
+            .iter()
+            .chain(from_outside)
+            .find(|figure| figure.id == id);
+        known.map(Cow::Borrowed).unwrap_or_else(|| {
+            Cow::Owned(Figure {
+                id: id.to_owned().into(),
+                title: id.to_owned().into(),
+                ..figure("epo/v1").clone()
+            })
+        })
     }
 
     /// Look of a structure in plots.
@@ -176,6 +208,7 @@ impl<'a> RunData<'a> {
     fn sampler(&mut self, key: &'a Key) -> &mut Sampler<'a> {
         let name = key.sampler();
         let new = || Sampler {
+            key: key.only(&SAMPLER_AXES),
             name: name.clone(),
             replicates: Vec::new(),
             bias: None,
@@ -194,6 +227,14 @@ impl<'a> RunData<'a> {
 }
 
 impl<'a> View<'a> {
+    /// Times that may be used.
+    pub fn valid_times(&self) -> impl Iterator<Item = Recorded<'a, TimeRecord>> {
+        self.times
+            .iter()
+            .copied()
+            .filter(|time| is_valid_time(time))
+    }
+
     /// Names of the structures that were timed, in the order measured.
     pub fn timed_structures(&self) -> Vec<String> {
         let names = self.times.iter().map(|time| timed_structure(*time));
@@ -244,6 +285,11 @@ pub fn is_valid_time(time: &TimeRecord) -> bool {
 }
 
 impl StructureRecord {
+    /// Whether it was built at all.
+    pub fn is_built(&self) -> bool {
+        !self.build.is_empty() || self.gate.is_some()
+    }
+
     /// Why the structure gets no figures; `None` when it passed the gate.
     pub fn fault(&self) -> Option<String> {
         if let Some(failure) = &self.failure {

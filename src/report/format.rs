@@ -1,5 +1,6 @@
 //! Numbers as text: three significant digits, units, and a dash for what is absent.
 
+use crate::measure::figure::{Figure, Shown};
 use crate::measure::record::{Interval, RayClass};
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
 
@@ -105,6 +106,18 @@ pub fn bytes(value: u64) -> String {
         unit += 1;
     }
     format!("{} {}", number(scaled), UNITS[unit])
+}
+
+/// A value as its row in the table of figures wants it.
+pub fn figure(figure: &Figure, value: f64) -> String {
+    match figure.shown {
+        _ if !value.is_finite() => ABSENT.into(),
+        Shown::Digits(digits) => significant(value, digits.into()),
+        Shown::Count => count(value as u64),
+        Shown::Bytes => bytes(value as u64),
+        Shown::Percent => percent(value),
+        Shown::Exponent => format!("{value:.2}").replace('-', "−"),
+    }
 }
 
 /// A share as whole percent, one decimal below ten.

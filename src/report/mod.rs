@@ -11,6 +11,7 @@ pub mod format;
 pub mod html;
 pub mod markdown;
 pub mod pictures;
+pub mod pivot;
 pub mod plot;
 pub mod point_page;
 pub mod ruling;
@@ -20,6 +21,7 @@ pub mod stress;
 pub mod terminal;
 #[cfg(test)]
 mod tests;
+pub mod values;
 
 pub use stress::{stress_tables, write_stress_page};
 pub use terminal::{failed_checks, terminal_tables};
@@ -59,13 +61,15 @@ pub struct ReportPaths {
     pub html: PathBuf,
     /// The summary in Markdown.
     pub summary: PathBuf,
+    /// Every figure as comma-separated values.
+    pub figures: PathBuf,
     /// Every plot, SVG and PNG.
     pub plots: Vec<PathBuf>,
     /// What was left out while reading the records, in words.
     pub warnings: Vec<String>,
 }
 
-/// Writes `index.html`, `summary.md` and `plots/*.{svg,png}` beside the `records.jsonl` in `dir`.
+/// Writes `index.html`, `summary.md`, `figures.csv` and `plots/*.{svg,png}` beside the `records.jsonl` in `dir`.
 /// Each file is whole or absent: it is written under another name and renamed.
 ///
 /// # Errors
@@ -77,9 +81,12 @@ pub fn write_report(dir: &Path) -> Result<ReportPaths, ReportError> {
     let (html, plots) = write_page(dir, &mut document)?;
     let summary = dir.join("summary.md");
     write_file(&summary, markdown::summary(&document).as_bytes())?;
+    let figures = dir.join("figures.csv");
+    write_file(&figures, values::csv(&values::values(&data)).as_bytes())?;
     Ok(ReportPaths {
         html,
         summary,
+        figures,
         plots,
         warnings: records.warnings,
     })

@@ -1,6 +1,7 @@
 //! Who wins: named only where the intervals are apart.
 
 use super::format;
+use crate::measure::figure::Better;
 use crate::measure::record::Interval;
 
 /// Names in an answer without a winner; the others are only counted.
@@ -15,15 +16,6 @@ pub struct Contender {
     pub figure: Interval,
     /// Whether the spread is known; without it it is not ranked, neither as winner nor as beaten.
     pub has_spread: bool,
-}
-
-/// Which figures are better.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Better {
-    /// Rates.
-    Higher,
-    /// Errors and times.
-    Lower,
 }
 
 /// The outcome of a comparison.

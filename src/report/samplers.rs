@@ -3,7 +3,8 @@
 use super::data::View;
 use super::format;
 use crate::measure::bias::BiasVerdict;
-use crate::measure::record::{BiasRecord, ErrorRecord, Interval, SpectrumRecord};
+use crate::measure::figure::figure;
+use crate::measure::record::{BiasRecord, ErrorRecord, Interval, Key, SpectrumRecord};
 use crate::measure::statistics::{jackknife_interval, log_log_fit, mean};
 
 /// What an error is that its reference is too noisy for: its estimate is not clearly above 0.
@@ -15,7 +16,9 @@ pub const REFERENCE_SHARE: f64 = 0.1;
 /// A sampler under one scene and integrator.
 #[derive(Debug)]
 pub struct Sampler<'a> {
-    /// `sequence × decorrelation`.
+    /// What it draws for what.
+    pub key: Key,
+    /// `sequence × decorrelation`, with the kernels.
     pub name: String,
     /// Its replicates.
     pub replicates: Vec<&'a ErrorRecord>,
@@ -35,12 +38,25 @@ pub enum Metric {
 }
 
 impl Metric {
+    /// Its row in the table of figures.
+    pub fn figure(self) -> &'static str {
+        match self {
+            Self::RelMse => "relmse-unbiased/v1",
+            Self::Rmse => "rmse-unbiased/v1",
+        }
+    }
+
+    /// The row of its slope.
+    pub fn slope_figure(self) -> &'static str {
+        match self {
+            Self::RelMse => "relmse-slope/v1",
+            Self::Rmse => "rmse-slope/v1",
+        }
+    }
+
     /// How tables and axes name it.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::RelMse => "unbiased relMSE",
-            Self::Rmse => "unbiased RMSE",
-        }
+        &figure(self.figure()).title
     }
 
     /// How files are named after it.

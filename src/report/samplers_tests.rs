@@ -52,6 +52,7 @@ fn records(noise: f64, part_noise: f64, replicates: u32, g: &mut Pcg32) -> Vec<E
 
 fn sampler(records: &[ErrorRecord]) -> Sampler<'_> {
     Sampler {
+        key: Key::default(),
         name: "a × b".into(),
         replicates: records.iter().collect(),
         bias: None,

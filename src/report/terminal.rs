@@ -4,6 +4,7 @@ use super::data::RunData;
 use super::document::{Cell, Table};
 use super::samplers::Metric;
 use super::sections::{belief, run, samplers, structures, verdict};
+use super::values::of_structures;
 use crate::measure::record::{Line, Verdict};
 
 /// Verdicts, speeds, errors and checks as aligned plain text.
@@ -11,7 +12,9 @@ pub fn terminal_tables(records: &[Line]) -> String {
     let data = RunData::new(records);
     let mut tables = Vec::new();
     for scene in &data.scenes {
-        tables.push(structures::speed_table(scene));
+        let values = of_structures(&data, scene);
+        tables.push(structures::speed_table(scene, &values));
+        tables.push(structures::outside_table(&data, scene, &values));
         for view in &scene.views {
             tables.push(samplers::error_table(view, Metric::RelMse));
             tables.push(samplers::efficiency_table(view));

@@ -4,6 +4,7 @@ use crate::accel::AccelRegistry;
 use crate::config::{Catalogue, SamplerCell};
 use crate::gpu::KernelLibrary;
 use crate::integrator::IntegratorRegistry;
+use crate::measure::figure::FigureRegistry;
 use crate::params::Variant;
 use crate::sampling::SamplerRegistry;
 
@@ -16,6 +17,8 @@ pub struct Registries {
     pub samplers: SamplerRegistry,
     /// Integrators.
     pub integrators: IntegratorRegistry,
+    /// Figures beside those of the crate.
+    pub figures: FigureRegistry,
 }
 
 impl Registries {

@@ -4,14 +4,15 @@
 use super::images::Estimator;
 use super::kernels::{Device, Kernels};
 use super::session::Session;
+use super::world::chosen_tests;
 use super::{Registries, RunError, RunOptions};
-use crate::accel::{BuildLog, Intersection, TriangleSoup};
+use crate::accel::{AccelError, TriangleSoup};
 use crate::config::{Experiment, Plan};
-use crate::gpu::{Gpu, probe_arithmetic};
+use crate::gpu::probe_arithmetic;
 use crate::image::{FileFormat, Image};
-use crate::integrator::{RayOffset, Renderer, SceneBuffers, Traced};
+use crate::integrator::{Renderer, Stage, StageError, Traced};
 use crate::params::Variant;
-use crate::scene::{self, LoadOptions, LoadReport, SceneData};
+use crate::scene::{self, LoadOptions, LoadReport};
 use indicatif::ProgressStyle;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -76,19 +77,20 @@ pub fn render(
     camera.validate().map_err(input)?;
     let device = Device::open(options, &kernels)?;
     let gpu = device.of(&cell.kernels)?;
-    let (soup, offset) = tested_triangles(gpu, experiment, &scene)?;
+    let (tests, offset) = chosen_tests(experiment, &probe_arithmetic(gpu)?)?;
+    let mut stage = Stage::new(gpu, scene, tests)?;
+    stage.buffers.offset = offset;
     session.say(format!("{}: building {}", cell.scene, cell.accel));
-    let traced = build(&session, gpu, &soup, &cell.accel)?;
-    let mut buffers = SceneBuffers::upload(gpu, &scene, &soup)?;
-    buffers.offset = offset;
-    drop(soup);
+    let traced = build(&session, &stage, &cell.accel)?;
+    stage.soup = TriangleSoup::default();
+    let scene = &stage.scene;
     session.say("compiling the kernel");
     let spp = experiment.spp.max();
     let pair = (&cell.sequence, &cell.decorrelation);
     let estimator = Estimator::new(&session, pair, &cell.integrator, spp);
     let estimator = estimator.map_err(RunError::Input)?;
     let job = estimator.job(&session, camera, true);
-    let renderer = Renderer::new(gpu, &buffers, &traced, &job, true)?;
+    let renderer = Renderer::new(gpu, &stage.buffers, &traced, &job, true)?;
     let mut rendering = Rendering {
         triangles: scene.triangles.len(),
         spp,
@@ -96,7 +98,7 @@ pub fn render(
         samples_s: 0.0,
         total_s: 0.0,
         rays: 0,
-        report: scene.report,
+        report: scene.report.clone(),
         non_finite_pixels: 0,
     };
     let compiled = Instant::now();
@@ -118,39 +120,17 @@ fn input(error: impl ToString) -> RunError {
     RunError::Input(error.to_string())
 }
 
-/// The triangles with the tests that the experiment asks for, and where rays start.
-fn tested_triangles(
-    gpu: &Gpu,
-    experiment: &Experiment,
-    scene: &SceneData,
-) -> Result<(TriangleSoup, RayOffset), RunError> {
-    let tests = experiment.tests;
-    let chosen = Intersection::named(tests.triangle, tests.box_test).map_err(RunError::Input)?;
-    let offset = RayOffset::named(tests.offset)
-        .ok_or_else(|| RunError::Input(format!("no ray offset is called {}", tests.offset)))?;
-    let probe = probe_arithmetic(gpu)?;
-    chosen.kept_by(&probe).map_err(RunError::Input)?;
-    Ok((TriangleSoup::new(scene).intersecting(chosen), offset))
-}
-
-fn build(
-    session: &Session,
-    gpu: &Gpu,
-    soup: &TriangleSoup,
-    accel: &Variant,
-) -> Result<Traced, RunError> {
-    let kind = session
-        .registries
-        .accel
-        .get(&accel.name)
-        .ok_or_else(|| RunError::Input(format!("no structure is called {accel}")))?;
-    let built = kind
-        .build(soup, &accel.params, &mut BuildLog::default())
-        .map_err(input)?;
-    built
-        .validate(soup)
-        .map_err(|e| RunError::Wrong(format!("{accel} is not valid: {e}")))?;
-    Ok(Traced::upload(gpu, &*built)?)
+/// The structure of an experiment over the stage's scene.
+fn build(session: &Session, stage: &Stage, accel: &Variant) -> Result<Traced, RunError> {
+    let kind = session.registries.accel.get(&accel.name);
+    let kind = kind.ok_or_else(|| RunError::Input(format!("no structure is called {accel}")))?;
+    stage.traced(kind, &accel.params).map_err(|e| match e {
+        StageError::Gpu(error) => error.into(),
+        StageError::Accel(AccelError::Invalid(fault)) => {
+            RunError::Wrong(format!("{accel} is not valid: {fault}"))
+        }
+        error => input(error),
+    })
 }
 
 /// Adds `spp` samples in steps of about [`STEP`]. `show` gets the image after the first, whenever the

@@ -162,6 +162,7 @@ impl<'a> Session<'a> {
             renders_full_product: self.plan.renders_full_product,
             renders_planned: self.plan.renders_planned,
             kernels,
+            figures: self.registries.figures.rows().cloned().collect(),
         };
         self.write(&Line::about_all(Body::Run(record)))?;
         for skipped in &self.plan.skipped {

@@ -4,13 +4,14 @@ use super::RunError;
 use super::session::Session;
 use super::world::World;
 use crate::accel::StructureStats;
-use crate::accel::{AccelError, BuildLog, BuiltAccel, Counters, Space};
+use crate::accel::tracer::{count_work, kernel_hash};
+use crate::accel::{
+    AccelError, Ask, BuildLog, BuiltAccel, Counters, Query, RayBatch, Space, Traced, Tracer,
+};
 use crate::config::StructureCell;
 use crate::gpu::{Elapsed, Gpu, GpuError};
 use crate::image::Picture;
 use crate::image::viridis;
-use crate::integrator::Traced;
-use crate::measure::batch::{Batch, Query, count_work, kernel_hash};
 use crate::measure::gate::{fault_text, gate, timed_fault};
 use crate::measure::memory::peak_bytes;
 use crate::measure::rays::{RaySet, primary_pixels, primary_rays};
@@ -70,7 +71,7 @@ fn build(session: &mut Session, world: &World, cell: &StructureCell) -> Tried {
         record.body.failure = Some(format!("no structure is called {accel}"));
         return Err(Box::new(record));
     };
-    let mut log = BuildLog::default();
+    let mut log = BuildLog::with_gpu(world.gpu);
     let (built, peak) = session.clock.time("build", || {
         peak_bytes(|| kind.build(&world.soup, &accel.params, &mut log))
     });
@@ -95,6 +96,7 @@ fn build(session: &mut Session, world: &World, cell: &StructureCell) -> Tried {
     };
     record.body.space = built.space();
     record.body.stats = built.stats();
+    record.body.figures = (session.registries.figures).of_structure(&*built, &world.soup);
     let structural = session
         .clock
         .time("gate", || built.validate(&world.soup))
@@ -128,7 +130,10 @@ fn gate_with(
     let checks = session.experiment.runtime_checks;
     let gated = session.clock.time("gate", || {
         let verdict = gate_twice(checks, world, gpu, &traced)?;
-        Ok::<_, GpuError>((verdict, kernel_hash(gpu, &world.buffers, &traced)?))
+        Ok::<_, GpuError>((
+            verdict,
+            kernel_hash(gpu, &world.buffers.triangles, &traced)?,
+        ))
     });
     match gated {
         Err(error) => {
@@ -189,7 +194,7 @@ fn gate_twice(
     let run = |checks| {
         gate(
             gpu,
-            &world.buffers,
+            &world.buffers.triangles,
             &world.soup,
             traced,
             &world.judge,
@@ -226,6 +231,7 @@ fn empty_record(
         build_peak_bytes: None,
         update_ms: None,
         stats: StructureStats::default(),
+        figures: Default::default(),
         gate: None,
         timings: Vec::new(),
         heat_map: None,
@@ -239,7 +245,7 @@ fn empty_record(
 struct Timed<'a> {
     structure: usize,
     set: &'a RaySet,
-    batch: Batch<'a>,
+    batch: RayBatch,
     watch: Watch,
 }
 
@@ -392,8 +398,12 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
                 runtime_checks,
                 ..
             } = &gated[structure];
-            let (query, checks) = (Query::of(set), *runtime_checks);
-            match Batch::new(gpu, &world.buffers, traced, query, &set.rays, checks) {
+            let ask = Ask {
+                runtime_checks: *runtime_checks,
+                ..set.query().into()
+            };
+            let tracer = Tracer::new(gpu, &world.buffers.triangles, traced, ask);
+            match tracer.and_then(|tracer| tracer.batch(&set.rays)) {
                 Ok(batch) => timed.push(Timed {
                     structure,
                     set,
@@ -435,9 +445,9 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
             let work = session.clock.time("gpu", || {
                 count_work(
                     gpu,
-                    &world.buffers,
+                    &world.buffers.triangles,
                     &structure.traced,
-                    Query::of(set),
+                    set.query(),
                     &set.rays,
                 )
             })?;
@@ -450,7 +460,7 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
                 ms,
                 wall_ms: samples.wall_ms,
                 mrays_s,
-                counters: per_ray(&work),
+                counters: per_ray(&work.unwrap_or_default()),
             }))
         });
         match (outcome, fault) {
@@ -458,7 +468,7 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
             (Ok(_), Some(fault)) => failures[item.structure] = Some(fault),
             (Err(error), _) => failures[item.structure] = Some(error.to_string()),
         }
-        structure.record.ran.features = item.batch.features();
+        structure.record.ran.features = item.batch.tracer().features();
     }
     let mut kept = Vec::new();
     for (mut structure, failure) in gated.drain(..).zip(failures) {
@@ -509,13 +519,13 @@ fn draw_heat_maps(
         let work = session.clock.time("gpu", || {
             count_work(
                 gpu,
-                &world.buffers,
+                &world.buffers.triangles,
                 &structure.traced,
                 Query::Closest,
                 &rays,
             )
         });
-        let Ok(work) = work else { continue };
+        let Ok(Some(work)) = work else { continue };
         structure.costs = vec![0.0; rays.len()];
         for (pixel, counters) in pixels.iter().zip(&work) {
             structure.costs[*pixel as usize] = (counters.nodes + counters.triangle_tests) as f32;

@@ -3,10 +3,10 @@
 
 use super::session::Session;
 use super::world::World;
-use crate::accel::{AccelError, BuildLog, Intersection, TriangleSoup};
+use crate::accel::{AccelError, Intersection, TriangleSoup};
 use crate::config::{Gate, StructureCell};
 use crate::gpu::{Gpu, GpuError};
-use crate::integrator::{SceneBuffers, Traced};
+use crate::integrator::{Stage, StageError};
 use crate::measure::gate::{Judge, fault_text, gate};
 use crate::params::Variant;
 use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
@@ -30,17 +30,16 @@ const EVERY: usize = 8;
 /// The scene with its judge, made once a run, and what structures were found to do on it.
 #[derive(Default)]
 pub(super) struct Trial {
-    stage: Option<Arc<Stage>>,
+    scene: Option<Arc<JudgedScene>>,
     outcomes: BTreeMap<String, Option<String>>,
 }
 
-struct Stage {
-    scene: SceneData,
-    soup: TriangleSoup,
+struct JudgedScene {
+    scene: Arc<SceneData>,
     judge: Judge,
 }
 
-impl Stage {
+impl JudgedScene {
     fn new(intersection: Intersection) -> Result<Self, String> {
         let entry = builtin_scenes().into_iter().find(|e| e.name == SCENE);
         let variant = entry.ok_or("it is not registered")?.default_variant();
@@ -49,7 +48,8 @@ impl Stage {
         let camera = scene.view(1.0);
         let judge =
             Judge::remembered(&scene, &soup, camera, &GATE, 1).map_err(|e| e.to_string())?;
-        Ok(Self { scene, soup, judge })
+        let scene = Arc::new(scene);
+        Ok(Self { scene, judge })
     }
 }
 
@@ -71,20 +71,20 @@ pub(super) fn fault(
     if let Some(known) = session.trial.outcomes.get(&key) {
         return Ok(known.clone());
     }
-    let stage = match &session.trial.stage {
-        Some(stage) => stage.clone(),
+    let judged = match &session.trial.scene {
+        Some(judged) => judged.clone(),
         None => {
             let made = session
                 .clock
-                .time("judge", || Stage::new(world.soup.intersection));
+                .time("judge", || JudgedScene::new(world.soup.intersection));
             match made {
-                Ok(stage) => session.trial.stage.insert(Arc::new(stage)).clone(),
+                Ok(judged) => session.trial.scene.insert(Arc::new(judged)).clone(),
                 Err(reason) => return Ok(Some(format!("{SCENE}: {reason}"))),
             }
         }
     };
     let found = session.clock.time("gate", || {
-        stage.fault_of(session.registries, world, gpu, &cell.accel)
+        judged.fault_of(session.registries, world, gpu, &cell.accel)
     })?;
     let found = found.map(|fault| format!("{SCENE}: {fault}"));
     session.trial.outcomes.insert(key, found.clone());
@@ -97,7 +97,7 @@ fn cell_key(cell: &StructureCell) -> String {
     format!("{accel} {} {:?}", cell.accel.label, cell.kernels)
 }
 
-impl Stage {
+impl JudgedScene {
     fn fault_of(
         &self,
         registries: &super::Registries,
@@ -108,20 +108,19 @@ impl Stage {
         let Some(kind) = registries.accel.get(&accel.name) else {
             return Ok(None);
         };
-        let built = kind.build(&self.soup, &accel.params, &mut BuildLog::default());
-        let built = built.and_then(|built| built.validate(&self.soup).map(|()| built));
-        let built = match built {
-            Ok(built) => built,
+        let tests = world.soup.intersection;
+        let stage = Stage::new(gpu, Arc::clone(&self.scene), tests)?;
+        let traced = match stage.traced(kind, &accel.params) {
+            Ok(traced) => traced,
+            Err(StageError::Gpu(error)) => return Err(error),
             // Parameters that suit the scene of the run may be too small or too large for this one.
-            Err(AccelError::Invalid(fault)) => return Ok(Some(fault)),
+            Err(StageError::Accel(AccelError::Invalid(fault))) => return Ok(Some(fault)),
             Err(_) => return Ok(None),
         };
-        let traced = Traced::upload(gpu, &*built)?;
-        let buffers = SceneBuffers::upload(gpu, &self.scene, &self.soup)?;
         let thinned = (accel.name == "brute-force").then(|| self.judge.thinned(EVERY));
         let judge = thinned.as_ref().unwrap_or(&self.judge);
-        let (soup, probe) = (&self.soup, &world.probe);
-        let verdict = gate(gpu, &buffers, soup, &traced, judge, probe, true)?;
+        let (triangles, probe) = (&stage.buffers.triangles, &world.probe);
+        let verdict = gate(gpu, triangles, &stage.soup, &traced, judge, probe, true)?;
         let judge_fault = judge.of(traced.space).first_wrong.as_deref();
         Ok((!verdict.passed).then(|| fault_text(&verdict, judge_fault)))
     }

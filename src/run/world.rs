@@ -3,10 +3,11 @@
 use super::RunError;
 use super::kernels::Device;
 use super::session::Session;
-use crate::accel::{Intersection, TriangleSoup};
+use crate::accel::Intersection;
+use crate::config::Experiment;
 use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu};
-use crate::integrator::{RayOffset, SceneBuffers};
+use crate::integrator::{RayOffset, Stage};
 use crate::measure::gate::Judge;
 use crate::measure::record::{Body, Key, Line, Ran, SceneRecord, axis};
 use crate::params::Variant;
@@ -20,11 +21,17 @@ pub(super) struct World<'a> {
     pub gpu: &'a Gpu,
     pub probe: ArithmeticProbe,
     pub variant: &'a Variant,
-    pub scene: SceneData,
+    pub stage: Stage,
     pub camera: Camera,
-    pub soup: TriangleSoup,
-    pub buffers: SceneBuffers,
     pub judge: Judge,
+}
+
+impl std::ops::Deref for World<'_> {
+    type Target = Stage;
+
+    fn deref(&self) -> &Stage {
+        &self.stage
+    }
 }
 
 /// Why there is no world.
@@ -33,6 +40,13 @@ pub(super) enum Absent {
     BadInput(String),
     /// The adapter does not keep what the experiment asks for: its cells are left out.
     NotKept(String),
+}
+
+impl From<Absent> for RunError {
+    fn from(absent: Absent) -> Self {
+        let (Absent::BadInput(reason) | Absent::NotKept(reason)) = absent;
+        Self::Input(reason)
+    }
 }
 
 impl From<String> for Absent {
@@ -81,8 +95,6 @@ impl<'a> World<'a> {
             session.finish(cell);
         }
         session.say(format!("{variant}: checking the judge"));
-        let tests = session.experiment.tests;
-        let chosen = Intersection::named(tests.triangle, tests.box_test);
         let probe = match session.options.arithmetic {
             Some(known) => Ok(known),
             None => session
@@ -90,41 +102,38 @@ impl<'a> World<'a> {
                 .time("gate", || crate::gpu::probe_arithmetic(gpu)),
         };
         let fault = |reason: String| Ok(Err(Absent::BadInput(reason)));
-        let (intersection, offset) = match (&probe, chosen, RayOffset::named(tests.offset)) {
-            (Ok(probe), Ok(chosen), Some(offset)) => match chosen.kept_by(probe) {
-                Ok(()) => (chosen, offset),
-                Err(reason) => return Ok(Err(Absent::NotKept(reason))),
-            },
-            (Err(error), ..) => return fault(error.to_string()),
-            (_, Err(error), _) => return fault(error),
-            (.., None) => return fault(format!("no ray offset is called {}", tests.offset)),
+        let probe = match probe {
+            Ok(probe) => probe,
+            Err(error) => return fault(error.to_string()),
         };
-        let soup = session.clock.time("load", || {
-            TriangleSoup::new(&scene).intersecting(intersection)
-        });
-        let uploaded = session
+        let (intersection, offset) = match chosen_tests(session.experiment, &probe) {
+            Ok(chosen) => chosen,
+            Err(absent) => return Ok(Err(absent)),
+        };
+        let staged = session
             .clock
-            .time("load", || SceneBuffers::upload(gpu, &scene, &soup));
+            .time("load", || Stage::new(gpu, scene, intersection));
+        let mut stage = match staged {
+            Ok(stage) => stage,
+            Err(error) => return fault(error.to_string()),
+        };
+        stage.buffers.offset = offset;
         let experiment = session.experiment;
         let mut settings = experiment.gate;
         settings.rays = settings.rays.max(experiment.timing.rays);
         let judged = session.clock.time("judge", || {
-            Judge::remembered(&scene, &soup, camera, &settings, u64::from(experiment.seed))
+            let seed = u64::from(experiment.seed);
+            Judge::remembered(&stage.scene, &stage.soup, camera, &settings, seed)
         });
         Ok((|| {
-            let mut buffers = uploaded.map_err(|e| e.to_string())?;
-            buffers.offset = offset;
             let judge = judged.map_err(|e| e.to_string())?;
-            let probe = probe.map_err(|e| e.to_string())?;
             Ok(Self {
                 device,
                 gpu,
                 probe,
                 variant,
-                scene,
+                stage,
                 camera,
-                soup,
-                buffers,
                 judge,
             })
         })())
@@ -139,6 +148,19 @@ impl<'a> World<'a> {
             .with(axis::BOX_TEST, tests.box_test.name())
             .with(axis::OFFSET, self.buffers.offset.name())
     }
+}
+
+/// How rays meet triangles and leave surfaces in an experiment, on an adapter of this arithmetic.
+pub(super) fn chosen_tests(
+    experiment: &Experiment,
+    probe: &ArithmeticProbe,
+) -> Result<(Intersection, RayOffset), Absent> {
+    let tests = experiment.tests;
+    let chosen = Intersection::named(tests.triangle, tests.box_test)?;
+    let offset = RayOffset::named(tests.offset)
+        .ok_or_else(|| format!("no ray offset is called {}", tests.offset))?;
+    chosen.kept_by(probe).map_err(Absent::NotKept)?;
+    Ok((chosen, offset))
 }
 
 fn scene_record(scene: &SceneData, camera: Camera, load_ms: f64) -> SceneRecord {

@@ -32,7 +32,7 @@ pub use framing::Framing;
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 
 use crate::geometry::{Camera, Triangle};
-use crate::params::Variant;
+use crate::params::{Params, Variant};
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::io::Read as _;
@@ -182,6 +182,21 @@ impl Default for LoadOptions {
             allow_outside: false,
         }
     }
+}
+
+/// A built-in scene with its default parameters, or a model file.
+///
+/// # Errors
+/// As [`load`].
+pub fn named(name: &str) -> Result<SceneData, SceneError> {
+    let builtin = builtin_scenes().into_iter().find(|e| e.name == name);
+    let file = || Variant {
+        name: name.to_owned(),
+        params: Params::default(),
+        label: name.to_owned(),
+    };
+    let variant = builtin.map_or_else(file, |entry| entry.default_variant());
+    load(&variant, &LoadOptions::default())
 }
 
 /// Loads the scene that `variant` names: a built-in one, or the path of an OBJ, glTF, GLB or PLY

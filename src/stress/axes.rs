@@ -1,7 +1,7 @@
 //! Box tests, ray offsets and the cost of triangle tests.
 
 use super::StressError;
-use super::bench::{self, Expected, Stage};
+use super::bench::{self, Expected};
 use super::case::{self, Random, ray};
 use super::families::Family;
 use super::place::Place;
@@ -10,13 +10,14 @@ use super::shapes::{Mesh, cube, sphere};
 use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite};
 use crate::accel::triangle::TriangleTest;
 use crate::accel::{
-    AccelKind as _, BoxTest, Bvh, Counters, Hit, Intersection, NO_HIT, Ray, TriangleSoup,
+    AccelKind as _, BoxTest, Bvh, Counters, Hit, Intersection, NO_HIT, Query, Ray, RayBatch,
+    Traced, TriangleSoup,
 };
 use crate::gpu::Gpu;
-use crate::integrator::RayOffset;
 use crate::integrator::offset::{TransformError, position_error};
-use crate::measure::batch::{Batch, Query, count_work};
+use crate::integrator::{RayOffset, Stage};
 use glam::Vec3;
+use std::sync::Arc;
 
 /// Families whose rays pass near the sides of boxes.
 const BOX_FAMILIES: [&str; 6] = [
@@ -85,13 +86,13 @@ impl Suite<'_> {
         kind: Kind,
         column: &mut [BoxTestRecord],
     ) -> Result<(), StressError> {
-        let mut stage = Stage::new(gpu, &case.scene, Intersection::default())?;
+        let mut stage = Stage::new(gpu, case.scene.clone(), Intersection::default())?;
         let Ok(built) = bench::build(kind, &stage.soup) else {
             return Ok(());
         };
-        let traced = stage.upload(&*built)?;
+        let traced = Traced::upload(&stage.gpu, &*built)?;
         for ((box_test, ..), record) in BoxTest::ALL.iter().zip(column) {
-            stage.set(Intersection {
+            stage.set_tests(Intersection {
                 box_test: *box_test,
                 ..Intersection::default()
             });
@@ -173,7 +174,7 @@ impl Suite<'_> {
 
     /// Least time of each triangle test through a structure over a sphere.
     fn times(&self, accel: &str, bands: usize, count: usize) -> Result<Vec<Timed>, StressError> {
-        let scene = case::scene(sphere(bands, &Place::ORDINARY), None);
+        let scene = Arc::new(case::scene(sphere(bands, &Place::ORDINARY), None));
         let registry = crate::accel::AccelRegistry::default();
         let Some(kind) = registry.get(accel) else {
             return Ok(Vec::new());
@@ -181,14 +182,15 @@ impl Suite<'_> {
         let mut random = Random::with_stream(self.settings.seed, 79);
         let mut one = || ray(random.in_cube().as_vec3(), random.direction().as_vec3());
         let rays: Vec<Ray> = (0..count).map(|_| one()).collect();
-        let mut batches: Vec<(Timed, Batch)> = Vec::new();
+        let mut batches: Vec<(Timed, RayBatch)> = Vec::new();
         for test in &self.tests {
-            let stage = Stage::new(self.gpu(), &scene, Self::with(*test))?;
+            let stage = Stage::new(self.gpu(), Arc::clone(&scene), Self::with(*test))?;
             let Ok(built) = bench::build(kind, &stage.soup) else {
                 continue;
             };
-            let traced = stage.upload(&*built)?;
-            let work = count_work(self.gpu(), &stage.buffers, &traced, Query::Closest, &rays)?;
+            let traced = Traced::upload(&stage.gpu, &*built)?;
+            let work = stage.count_work(&traced, Query::Closest, &rays)?;
+            let work = work.unwrap_or_default();
             let tests: u64 = work.iter().map(|w| u64::from(w.triangle_tests)).sum();
             // Brute force counts nothing: it tests all.
             let tests = if tests == 0 {
@@ -202,7 +204,7 @@ impl Suite<'_> {
                 tests_per_ray: tests as f64 / count as f64,
                 rays: count,
             };
-            let batch = stage.batch(&traced, Query::Closest, &rays)?;
+            let batch = stage.tracer(&traced, Query::Closest)?.batch(&rays)?;
             batch.trace()?;
             batches.push((timed, batch));
         }

@@ -2,31 +2,12 @@
 
 use super::case::Case;
 use crate::accel::{
-    AccelKind, BuildLog, BuiltAccel, Hit, Intersection, Ray, Space, TriangleSoup, brute_force_hits,
-    brute_force_instances,
+    AccelKind, BuildLog, BuiltAccel, Hit, Query, Ray, Space, Traced, TriangleSoup,
+    brute_force_hits, brute_force_instances,
 };
-use crate::gpu::{Gpu, GpuError, kernel_errors};
-use crate::integrator::{SceneBuffers, Traced};
-use crate::measure::batch::{Batch, Query};
+use crate::gpu::{GpuError, kernel_errors};
+use crate::integrator::Stage;
 use crate::params::Params;
-use crate::scene::SceneData;
-
-/// A scene on the adapter, met by one choice of tests.
-pub struct Stage<'a> {
-    gpu: &'a Gpu,
-    /// The triangles.
-    pub soup: TriangleSoup,
-    /// The same on the adapter.
-    pub buffers: SceneBuffers,
-}
-
-/// Answers with the error word of the kernels.
-pub struct Answers<T> {
-    /// One per ray.
-    pub answers: Vec<T>,
-    /// 0, or what went wrong.
-    pub errors: u32,
-}
 
 /// Every parameter at its default.
 pub fn default_params(kind: &dyn AccelKind) -> Params {
@@ -61,72 +42,6 @@ pub fn build_with(
 /// The error word in words; `None` if there is no error.
 pub fn error_text(errors: u32) -> Option<String> {
     (errors != 0).then(|| kernel_errors(errors).join("; "))
-}
-
-impl<'a> Stage<'a> {
-    /// Uploads a scene.
-    ///
-    /// # Errors
-    /// A buffer exceeds the adapter's limit.
-    pub fn new(gpu: &'a Gpu, scene: &SceneData, tests: Intersection) -> Result<Self, GpuError> {
-        let soup = TriangleSoup::new(scene).intersecting(tests);
-        let buffers = SceneBuffers::upload(gpu, scene, &soup)?;
-        Ok(Self { gpu, soup, buffers })
-    }
-
-    /// The same triangles met by another choice of tests that needs no other words.
-    pub fn set(&mut self, tests: Intersection) {
-        self.soup.intersection = tests;
-        self.buffers.intersection = tests;
-    }
-
-    /// Uploads a structure.
-    ///
-    /// # Errors
-    /// An array exceeds the adapter's limit.
-    pub fn upload(&self, built: &dyn BuiltAccel) -> Result<Traced, GpuError> {
-        Traced::upload(self.gpu, built)
-    }
-
-    /// A batch of rays through a structure.
-    ///
-    /// # Errors
-    /// The kernel does not compile, or the rays exceed the adapter's limit.
-    pub fn batch(
-        &self,
-        traced: &Traced,
-        query: Query,
-        rays: &[Ray],
-    ) -> Result<Batch<'a>, GpuError> {
-        Batch::new(self.gpu, &self.buffers, traced, query, rays, true)
-    }
-
-    /// Nearest hits.
-    ///
-    /// # Errors
-    /// The kernel does not compile, or the device is lost or hangs.
-    pub fn closest(&self, traced: &Traced, rays: &[Ray]) -> Result<Answers<Hit>, GpuError> {
-        let batch = self.batch(traced, Query::Closest, rays)?;
-        batch.trace()?;
-        Ok(Answers {
-            answers: batch.hits()?,
-            errors: batch.error_word()?,
-        })
-    }
-
-    /// Whether anything is hit.
-    ///
-    /// # Errors
-    /// As for [`Stage::closest`].
-    pub fn any(&self, traced: &Traced, rays: &[Ray]) -> Result<Answers<bool>, GpuError> {
-        let batch = self.batch(traced, Query::Any, rays)?;
-        batch.trace()?;
-        Ok(Answers {
-            // A ray without an answer is seen by the closest hit.
-            answers: batch.found()?.iter().map(|a| *a == Some(true)).collect(),
-            errors: batch.error_word()?,
-        })
-    }
 }
 
 /// Brute force's answers.
@@ -166,7 +81,8 @@ pub fn ratio(
     others: &[Ray],
 ) -> Result<f64, GpuError> {
     const ROUNDS: usize = 3;
-    let [a, b] = [rays, others].map(|rays| stage.batch(traced, Query::Closest, rays));
+    let batch = |rays| stage.tracer(traced, Query::Closest)?.batch(rays);
+    let [a, b] = [rays, others].map(batch);
     let (a, b) = (a?, b?);
     // Compiles, and finds how many rays a dispatch takes.
     a.trace()?;

@@ -1,7 +1,7 @@
 //! A million shots at closed meshes from inside, where they are modelled and at Embree's far position:
 //! every miss is a crack.
 
-use super::bench::{self, Stage};
+use super::bench;
 use super::place::Place;
 use super::record::{Record, ShotsRecord, SkippedRecord, Worst};
 use super::shot_meshes::{AIMS, FAMILY, PLANE, SPHERE, ShotMesh};
@@ -9,9 +9,10 @@ use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite};
 use super::tally::oracle_ray;
 use super::{StressError, case};
 use crate::accel::triangle::TriangleTest;
-use crate::accel::{NO_HIT, Ray};
-use crate::integrator::Traced;
+use crate::accel::{NO_HIT, Ray, Traced};
+use crate::integrator::Stage;
 use crate::oracle::exact_truths;
+use std::sync::Arc;
 
 /// Rays traced at a time.
 const CHUNK: usize = 1 << 17;
@@ -60,7 +61,7 @@ impl Suite<'_> {
         records: &mut Vec<Record>,
         progress: &Progress,
     ) -> Result<(), StressError> {
-        let scene = case::scene(target.mesh.clone(), None);
+        let scene = Arc::new(case::scene(target.mesh.clone(), None));
         let (mesh, place) = (target.short_name(), target.place);
         let mut series: Vec<(TriangleTest, Kind, Vec<Record>)> = Vec::new();
         for (row, test) in self.tests.iter().enumerate() {
@@ -73,10 +74,10 @@ impl Suite<'_> {
         self.on_devices(&mut series, |gpu, (test, kind, records)| {
             let name = (test.name(), kind.name());
             progress(&format!("shots: {mesh}, {place}, {}, {}", name.0, name.1));
-            let stage = Stage::new(gpu, &scene, Self::with(*test))?;
+            let stage = Stage::new(gpu, Arc::clone(&scene), Self::with(*test))?;
             match bench::build(*kind, &stage.soup) {
                 Ok(built) => {
-                    let traced = stage.upload(&*built)?;
+                    let traced = Traced::upload(&stage.gpu, &*built)?;
                     for aim in 0..AIMS.len() {
                         let series = self.series(target, &stage, &traced, name, aim)?;
                         records.push(Record::Shots(series));

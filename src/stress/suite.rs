@@ -1,6 +1,6 @@
 //! The cells: every family through every structure with every triangle test.
 
-use super::bench::{self, Expected, Stage};
+use super::bench::{self, Expected};
 use super::case::{Address, Case, Truth, ray_text};
 use super::families::{FAMILIES, Family};
 use super::place::Place;
@@ -8,8 +8,11 @@ use super::record::{CellRecord, Record, SkippedRecord};
 use super::tally::{Judge, Outcome, Tally};
 use super::{StressError, StressOptions};
 use crate::accel::triangle::TriangleTest;
-use crate::accel::{AccelKind, BuiltAccel, Hit, Intersection, NO_HIT, Ray, Space, TriangleSoup};
+use crate::accel::{
+    AccelKind, BuiltAccel, Hit, Intersection, NO_HIT, Ray, Space, Traced, TriangleSoup,
+};
 use crate::gpu::{Gpu, GpuError};
+use crate::integrator::Stage;
 use crate::measure::gate;
 use crate::measure::rays::RaySet;
 use crate::measure::record::RayClass;
@@ -179,7 +182,7 @@ impl Suite<'_> {
                     return Ok(());
                 }
             };
-            let stage = Stage::new(gpu, &case.scene, Self::with(test))?;
+            let stage = Stage::new(gpu, case.scene.clone(), Self::with(test))?;
             let trace = Trace {
                 suite: self,
                 case,
@@ -203,14 +206,19 @@ impl Suite<'_> {
     /// Times the case with the default test through every structure that can be built; not through brute
     /// force, which does the same whatever the rays, if it has to be quick.
     fn time(&self, case: &Case, cells: &mut [(Kind, OpenCell)]) -> Result<(), StressError> {
-        let stage = Stage::new(self.gpu(), &case.scene, Intersection::default())?;
+        let stage = Stage::new(self.gpu(), case.scene.clone(), Intersection::default())?;
         let count = self.settings.timed_rays();
         let ordinary = bench::ordinary_rays(case, self.settings.seed, count);
         let rays = bench::repeated(&case.rays, count);
         let takes = |kind: Kind| !self.settings.quick || kind.name() != BRUTE_FORCE;
         for (kind, cell) in cells.iter_mut().filter(|(kind, _)| takes(*kind)) {
             if let Ok(built) = bench::build(*kind, &stage.soup) {
-                let ratio = bench::ratio(&stage, &stage.upload(&*built)?, &rays, &ordinary)?;
+                let ratio = bench::ratio(
+                    &stage,
+                    &Traced::upload(&stage.gpu, &*built)?,
+                    &rays,
+                    &ordinary,
+                )?;
                 cell.slowdown = Some(cell.slowdown.map_or(ratio, |s: f64| s.max(ratio)));
             }
         }
@@ -247,7 +255,7 @@ struct Trace<'a> {
     suite: &'a Suite<'a>,
     case: &'a Case,
     judge: &'a Judge<'a>,
-    stage: &'a Stage<'a>,
+    stage: &'a Stage,
     expected: &'a Expected,
     /// Answers whose outcomes are known.
     judged: Vec<(&'a Hit, &'a Outcome)>,
@@ -257,7 +265,7 @@ struct Trace<'a> {
 impl Trace<'_> {
     fn run(&self, kind: Kind, built: &dyn BuiltAccel, cell: &mut OpenCell) -> Result<(), GpuError> {
         let case = self.case;
-        let traced = self.stage.upload(built)?;
+        let traced = Traced::upload(&self.stage.gpu, built)?;
         let found = self.stage.closest(&traced, &case.rays)?;
         let expected = self.expected.of(built.space());
         let replay = |index: usize| {

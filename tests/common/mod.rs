@@ -6,12 +6,10 @@ pub mod scenes;
 
 use raystone::accel::triangle::intersect_triangle;
 use raystone::accel::{
-    AccelKind, BuildLog, BuiltAccel, Counters, GpuBuffers, Hit, Ray, TriangleSoup,
+    AccelKind, Ask, BuildLog, BuiltAccel, Counters, Hit, Query, Ray, Traced, Tracer,
+    TriangleBuffers, TriangleSoup,
 };
-use raystone::gpu::{
-    AdapterChoice, Bindings, Composition, Dispatch, Gpu, KernelLibrary, groups_for,
-    probe_arithmetic,
-};
+use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
 use raystone::params::{ParamRange, ParamValue, ParameterSchema, Params};
 use std::sync::OnceLock;
 
@@ -127,15 +125,6 @@ pub fn build(kind: &dyn AccelKind, soup: &TriangleSoup, params: &Params) -> Box<
     built
 }
 
-/// The kernel that traces a batch of rays through a structure.
-pub fn batch_kernel(buffers: &GpuBuffers, features: &[&str]) -> Composition {
-    let mut out = buffers.activate(Composition::new("integrator/trace_rays"));
-    for feature in features {
-        out = out.feature(feature, true);
-    }
-    out
-}
-
 /// What a batch brought back; `work` is empty unless the feature `counters` was on.
 pub struct Batch {
     /// Closest hits; with the feature `any`, `t.to_bits()` is 1 or 0.
@@ -160,76 +149,27 @@ pub fn trace(
     rays: &[Ray],
     features: &[&str],
 ) -> Batch {
-    let counted = features.contains(&"counters");
-    let buffers = built.buffers();
-    let kernel = buffers.kernel;
-    let fail = |e: raystone::gpu::GpuError| -> ! { panic!("{kernel} {features:?}: {e}") };
-    let pipeline = gpu
-        .pipeline(
-            &soup.intersection.activate(batch_kernel(&buffers, features)),
-            true,
-        )
-        .unwrap_or_else(|e| fail(e));
-    let storage = |name: &str, words: &[u32]| gpu.storage(name, words).unwrap_or_else(|e| fail(e));
-    let answer = gpu
-        .zeroed("hits", rays.len() as u64 * if counted { 32 } else { 16 })
-        .unwrap_or_else(|e| fail(e));
-    let status = gpu.zeroed("status", 16).unwrap_or_else(|e| fail(e));
-    let mut bindings = Bindings::new();
-    for array in &buffers.arrays {
-        bindings.buffer(array.name, &storage(array.name, &array.words));
-    }
-    for (name, values) in &buffers.uniforms {
-        bindings.uniform(name, values.clone());
-    }
-    let count = rays.len() as u32;
-    bindings
-        .buffer(
-            "triangles",
-            &storage("triangles", soup.words().as_flattened()),
-        )
-        .buffer("rays", &storage("rays", bytemuck::cast_slice(rays)))
-        .buffer("status", &status)
-        .buffer(if counted { "work" } else { "hits" }, &answer)
-        .uniform(
-            "batch",
-            raystone::gpu::UniformValues::new()
-                .u32("first", 0)
-                .u32("count", count),
-        );
-    let dispatch = Dispatch {
-        pipeline: &pipeline,
-        bindings: &bindings,
-        groups: groups_for(count),
+    let ask = Ask {
+        query: match features.contains(&"any") {
+            true => Query::Any,
+            false => Query::Closest,
+        },
+        counters: features.contains(&"counters"),
+        runtime_checks: true,
     };
-    gpu.run(&dispatch).unwrap_or_else(|e| fail(e));
-    let errors = gpu.read::<u32>(&status).unwrap_or_else(|e| fail(e))[0];
-    assert_eq!(
-        errors, 0,
-        "{kernel} {features:?}: the kernel raised its error word"
-    );
-    let words: Vec<[u32; 4]> = gpu.read(&answer).unwrap_or_else(|e| fail(e));
-    unpack(&words[..rays.len() * if counted { 2 } else { 1 }], counted)
-}
-
-fn unpack(words: &[[u32; 4]], counted: bool) -> Batch {
-    let hit = |w: &[u32; 4]| -> Hit { bytemuck::cast(*w) };
-    if !counted {
-        let hits = words.iter().map(hit).collect();
-        let work = Vec::new();
-        return Batch { hits, work };
-    }
-    let counters = |&[nodes, box_tests, triangle_tests, stack_high_water]: &[u32; 4]| Counters {
-        nodes,
-        box_tests,
-        triangle_tests,
-        stack_high_water,
+    let run = || {
+        let triangles = TriangleBuffers::upload(gpu, soup)?;
+        let traced = Traced::upload(gpu, built)?;
+        let batch = Tracer::new(gpu, &triangles, &traced, ask)?.batch(rays)?;
+        batch.trace()?;
+        gpu.check_error_word(batch.error_word()?)?;
+        let (work, hits) = match ask.counters {
+            true => batch.work()?,
+            false => (Vec::new(), batch.hits()?),
+        };
+        Ok::<_, raystone::gpu::GpuError>(Batch { hits, work })
     };
-    let pairs = words.chunks_exact(2);
-    Batch {
-        hits: pairs.clone().map(|p| hit(&p[1])).collect(),
-        work: pairs.map(|p| counters(&p[0])).collect(),
-    }
+    run().unwrap_or_else(|e| panic!("{} {features:?}: {e}", built.buffers().kernel))
 }
 
 /// The judge: every triangle for every ray.

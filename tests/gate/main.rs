@@ -36,7 +36,7 @@ fn verdict(gpu: &Gpu, stage: &Stage, kind: &dyn AccelKind, judge: &Judge) -> Gat
     let probe = probe_arithmetic(gpu).expect("the probe runs");
     gate(
         gpu,
-        &stage.buffers,
+        &stage.buffers.triangles,
         &stage.soup,
         &traced,
         judge,

@@ -2,19 +2,22 @@
 //! it, renderers, kernels with planted faults, and samples with their standard error.
 #![allow(dead_code)] // Every test program uses its own part of this.
 
-use raystone::accel::{AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, TriangleSoup};
+use raystone::accel::{
+    AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, Intersection, Traced,
+};
 use raystone::config::{Experiment, Plan};
 use raystone::geometry::Camera;
 use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
-use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced};
+use raystone::integrator::{self, IntegratorRegistry, RenderJob, Renderer};
 use raystone::measure::record::{Line, SCHEMA};
 use raystone::measure::statistics::{mean, variance};
 use raystone::params::{Entry, ParamValue, Params, Variant};
 use raystone::run::{Registries, RunOptions, RunSummary};
 use raystone::sampling::{Demand, Sampler, SamplerRegistry, dimensions};
 use raystone::scene::{LoadOptions, SceneData, builtin_scenes, load};
+use std::ops::{Deref, DerefMut};
 use std::path::Path;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// The device that all tests of one program share, with the embedded kernels.
 pub fn gpu() -> &'static Gpu {
@@ -77,26 +80,34 @@ pub fn variant(entries: &[Entry], name: &str, changes: &[(&str, ParamValue)]) ->
     }
 }
 
-/// A scene ready to be traced.
+/// A scene ready to be traced, with its own camera.
 pub struct Stage {
-    pub scene: SceneData,
-    pub soup: TriangleSoup,
+    stage: integrator::Stage,
     pub camera: Camera,
-    pub buffers: SceneBuffers,
+}
+
+impl Deref for Stage {
+    type Target = integrator::Stage;
+
+    fn deref(&self) -> &integrator::Stage {
+        &self.stage
+    }
+}
+
+impl DerefMut for Stage {
+    fn deref_mut(&mut self) -> &mut integrator::Stage {
+        &mut self.stage
+    }
 }
 
 impl Stage {
     /// `scene` as it is, seen by its own camera.
-    pub fn new(gpu: &Gpu, scene: SceneData) -> Self {
-        let soup = TriangleSoup::new(&scene);
+    pub fn new(gpu: &Gpu, scene: impl Into<Arc<SceneData>>) -> Self {
+        let scene = scene.into();
         let camera = scene.view(1.0);
-        let buffers = SceneBuffers::upload(gpu, &scene, &soup).expect("buffers that fit");
-        Self {
-            scene,
-            soup,
-            camera,
-            buffers,
-        }
+        let stage = integrator::Stage::new(gpu, scene, Intersection::default());
+        let stage = stage.expect("buffers that fit");
+        Self { stage, camera }
     }
 
     /// A built-in scene.

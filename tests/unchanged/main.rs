@@ -8,9 +8,9 @@
 mod support;
 
 use blake3::Hasher;
+use raystone::accel::Query;
 use raystone::config::Gate;
 use raystone::discrepancy::{Budget, Measure, PointSet, measure};
-use raystone::measure::batch::{Batch, Query, count_work};
 use raystone::measure::gate::Judge;
 use raystone::sampling::{Coordinate, to_unit};
 use std::collections::BTreeMap;
@@ -162,13 +162,13 @@ fn hits_and_counted_work() {
             for set in &judge.of(traced.space).sets {
                 for query in [Query::Closest, Query::Any] {
                     let rays = &set.rays;
-                    let batch = Batch::new(gpu(), &stage.buffers, &traced, query, rays, true);
-                    let batch = batch.expect("a batch");
+                    let tracer = stage.tracer(&traced, query).expect("a tracer");
+                    let batch = tracer.batch(rays).expect("a batch");
                     batch.trace().expect("answers");
                     hits.update(batch.digest().expect("answers").as_bytes());
                     assert_eq!(batch.error_word().expect("a status"), 0);
-                    let counted = count_work(gpu(), &stage.buffers, &traced, query, rays);
-                    for c in counted.expect("counters") {
+                    let counted = stage.count_work(&traced, query, rays);
+                    for c in counted.expect("counters").expect("it counts") {
                         for word in [c.nodes, c.box_tests, c.triangle_tests, c.stack_high_water] {
                             work.update(&word.to_le_bytes());
                         }

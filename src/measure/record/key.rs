@@ -166,6 +166,24 @@ impl Key {
         known.chain(others).map(|axis| (axis, self.label(axis)))
     }
 
+    /// The same key with these axes alone.
+    #[must_use]
+    pub fn only(&self, axes: &[&str]) -> Self {
+        let kept = self
+            .0
+            .iter()
+            .filter(|(axis, _)| axes.contains(&axis.as_str()));
+        Self(
+            kept.map(|(axis, written)| (axis.clone(), written.clone()))
+                .collect(),
+        )
+    }
+
+    /// Label of the structure, with the kernels.
+    pub fn structure(&self) -> String {
+        format!("{}{}", self.label(axis::ACCEL), self.kernels_mark())
+    }
+
     /// Whether two keys have the same labels on these axes.
     pub fn agrees(&self, other: &Self, axes: &[&str]) -> bool {
         axes.iter()

@@ -2,6 +2,7 @@
 
 use crate::geometry::Camera;
 use crate::gpu::Environment;
+use crate::measure::figure::Figure;
 use crate::scene::LoadReport;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -50,6 +51,9 @@ pub struct RunRecord {
     /// Folders of kernels that stood in the place of embedded ones.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub kernels: Vec<KernelFolder>,
+    /// Figures from outside the crate that its records hold.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub figures: Vec<Figure>,
 }
 
 /// A loaded scene.

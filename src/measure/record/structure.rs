@@ -131,6 +131,9 @@ pub struct StructureRecord {
     pub update_ms: Option<f64>,
     /// Static figures.
     pub stats: StructureStats,
+    /// Figures from outside the crate, by id: see [`crate::measure::figure::FigureRegistry`].
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub figures: BTreeMap<String, Interval>,
     /// Verdict; `None` only if the build failed.
     pub gate: Option<GateVerdict>,
     /// Speeds; empty unless the gate passed.

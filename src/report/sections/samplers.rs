@@ -4,12 +4,14 @@ use super::sampler_plots::{error_figures, histograms, pareto_plot};
 use super::spectrum;
 use super::verdict::Race;
 use crate::measure::bias::BiasVerdict;
-use crate::measure::record::{BiasRecord, Interval, Recorded, TimeRecord};
-use crate::report::data::{RunData, View, timed_structure};
+use crate::measure::record::{BiasRecord, Interval, Key, axis};
+use crate::report::data::{RunData, View, is_valid_time, timed_structure};
 use crate::report::document::*;
+use crate::report::pivot::Pivot;
 use crate::report::plot::histogram;
 use crate::report::plot::pareto::letter;
-use crate::report::samplers::{MeanError, Metric, Sampler, UNRESOLVED};
+use crate::report::samplers::{Metric, Sampler, UNRESOLVED};
+use crate::report::values::{Value, of_view};
 use crate::report::{format, pictures};
 use std::path::Path;
 
@@ -76,32 +78,26 @@ pub fn error_table(view: &View, metric: Metric) -> Table {
             false => format!("; <: {UNRESOLVED}"),
         }
     );
-    let mut table = Table::new(caption, &["sampler", "replicates"]);
-    let measured: Vec<&Sampler> = view
-        .samplers
-        .iter()
-        .filter(|s| !s.replicates.is_empty())
-        .collect();
-    let mut spps: Vec<u32> = means().map(|mean| mean.spp).collect();
-    spps.sort_unstable();
-    spps.dedup();
-    if spps.is_empty() {
-        return table;
+    let row = |s: &Sampler| (s.name.clone(), vec![s.name.clone().into(), replicates(s)]);
+    let measured = view.samplers.iter().filter(|s| !s.replicates.is_empty());
+    let mut values = of_view(view);
+    let spp = |value: &Value| value.key.label(axis::SPP).parse::<u32>().unwrap_or(0);
+    values.sort_by_key(spp);
+    if means().next().is_none() {
+        return Table::default();
     }
-    spps.iter()
-        .for_each(|spp| table.add_column(format!("{spp} spp")));
-    table.add_column("slope");
-    for sampler in measured {
-        let means = sampler.mean_errors(metric);
-        let mut row = vec![Cell::from(sampler.name.clone()), replicates(sampler)];
-        row.extend(spps.iter().map(|spp| {
-            let mean = means.iter().find(|mean| mean.spp == *spp);
-            mean.map_or_else(|| format::ABSENT.into(), |mean| error_cell(sampler, mean))
-        }));
-        row.push(slope_cell(sampler.slope(metric)));
-        table.rows.push(row);
+    Pivot {
+        caption,
+        heads: &["sampler", "replicates"],
+        rows: measured.map(row).collect(),
+        row: Key::sampler,
+        figures: &[metric.figure(), metric.slope_figure()],
+        across: Some(|key| match key.label(axis::SPP) {
+            "" => "slope".into(),
+            spp => format!("{spp} spp"),
+        }),
     }
-    table
+    .table(&values)
 }
 
 fn replicates(sampler: &Sampler) -> Cell {
@@ -113,29 +109,11 @@ fn replicates(sampler: &Sampler) -> Cell {
     }
 }
 
-fn error_cell(sampler: &Sampler, mean: &MeanError) -> Cell {
-    match mean.resolved {
-        true => interval_cell(sampler, &mean.error),
-        false => format!("<{}", format::number(mean.error.high.max(0.0))).into(),
-    }
-}
-
 fn interval_cell(sampler: &Sampler, error: &Interval) -> Cell {
     let value = format::number(error.value);
     match sampler.is_ranked() {
         true => Cell::with_detail(value, format::bounds(error)),
         false => value.into(),
-    }
-}
-
-fn slope_cell(slope: Option<Interval>) -> Cell {
-    let Some(slope) = slope else {
-        return format::ABSENT.into();
-    };
-    let text = format::slope(&slope);
-    match text.split_once(' ') {
-        Some((value, bounds)) => Cell::with_detail(value, bounds),
-        None => text.into(),
     }
 }
 
@@ -227,49 +205,37 @@ pub fn efficiency_table(view: &View) -> Table {
 
 /// Milliseconds per spp of every cell.
 fn time_table(view: &View) -> Table {
-    let caption = format!(
-        "Time of full cells with {}, ms per spp: median [{}]",
-        view.integrator,
-        format::median_bounds(view.times.iter().map(|time| time.ms.len()))
-    );
-    let mut table = Table::new(caption, &["structure"]);
-    let timed = |sampler: &&Sampler| view.times.iter().any(|time| is_of(time, sampler));
-    let samplers: Vec<&Sampler> = view.samplers.iter().filter(timed).collect();
-    samplers
-        .iter()
-        .for_each(|sampler| table.add_column(sampler.name.clone()));
-    for (i, structure) in view.timed_structures().iter().enumerate() {
-        let mut row = vec![Cell::with_detail(
-            structure.clone(),
-            format!("({})", letter(i)),
-        )];
-        row.extend(
-            samplers
-                .iter()
-                .map(|sampler| time_cell(view, structure, sampler)),
-        );
-        table.rows.push(row);
+    let structures = view.timed_structures();
+    let row = |(i, name): (usize, &String)| {
+        let cell = Cell::with_detail(name.clone(), format!("({})", letter(i)));
+        (name.clone(), vec![cell])
+    };
+    let mut table = Pivot {
+        caption: format!(
+            "Time of full cells with {}, ms per spp: median [{}]",
+            view.integrator,
+            format::median_bounds(view.times.iter().map(|time| time.ms.len()))
+        ),
+        heads: &["structure"],
+        rows: structures.iter().enumerate().map(row).collect(),
+        row: |key| key.label(axis::ACCEL).to_owned(),
+        figures: &["ms-per-spp/v1"],
+        across: Some(Key::sampler),
+    }
+    .table(&of_view(view));
+    for time in view.times.iter().filter(|time| !is_valid_time(time)) {
+        let reason = match time.failure {
+            None => "image differs",
+            Some(_) => "FAILED",
+        };
+        let row = structures.iter().position(|s| *s == timed_structure(*time));
+        let sampler = time.key.sampler();
+        let column = table.columns.iter().position(|c| c.title == sampler);
+        if let (Some(row), Some(column)) = (row, column) {
+            table.rows[row][column] = Cell::from(reason).toned(Tone::Bad);
+        }
     }
     table
-}
-
-fn is_of(time: &Recorded<TimeRecord>, sampler: &Sampler) -> bool {
-    time.key.sampler() == sampler.name
-}
-
-fn time_cell(view: &View, structure: &str, sampler: &Sampler) -> Cell {
-    if let Some(ms) = view.ms_per_spp(structure, &sampler.name) {
-        return Cell::with_detail(format::number(ms.value), format::bounds(&ms));
-    }
-    let of_structure =
-        |time: &&Recorded<TimeRecord>| timed_structure(**time) == structure && is_of(time, sampler);
-    match view.times.iter().find(of_structure) {
-        Some(time) if !time.image_equal && time.failure.is_none() => {
-            Cell::from("image differs").toned(Tone::Bad)
-        }
-        Some(_) => Cell::from("FAILED").toned(Tone::Bad),
-        None => format::ABSENT.into(),
-    }
 }
 
 fn gallery(dir: &Path, view: &View) -> Option<Block> {

@@ -2,11 +2,14 @@
 //! and what drawing costs.
 
 use super::file_stem;
-use crate::measure::record::{FigureAtCount, Interval, Recorded, StreamRecord};
+use crate::measure::figure::figure;
+use crate::measure::record::{FigureAtCount, Interval, Key, Recorded, StreamRecord, axis};
 use crate::report::data::RunData;
 use crate::report::document::*;
 use crate::report::format;
+use crate::report::pivot::Pivot;
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
+use crate::report::values::{Value, of_stream};
 
 /// Columns of a table over N at most.
 const COLUMNS: usize = 8;
@@ -74,11 +77,9 @@ impl<'a> Pair<'a> {
         }
         let tables = [
             self.ranking_table(),
-            self.count_table("D*, star discrepancy", star),
-            self.count_table("L2-star discrepancy (root)", |s| s.figures.l2_star.clone()),
-            self.count_table("Centered discrepancy (square)", |s| {
-                s.figures.centered.clone()
-            }),
+            self.count_table("star-discrepancy/v1"),
+            self.count_table("l2-star/v1"),
+            self.count_table("centered/v1"),
             self.pixel_table(),
         ];
         blocks.extend(tables.into_iter().filter_map(Table::into_block));
@@ -190,75 +191,65 @@ impl<'a> Pair<'a> {
         table
     }
 
+    fn values(&self) -> Vec<Value<'static>> {
+        self.streams.iter().flat_map(of_stream).collect()
+    }
+
     /// One figure by N: mean over seeds.
-    fn count_table(
-        &self,
-        figure: &str,
-        values: impl Fn(&StreamRecord) -> Vec<FigureAtCount>,
-    ) -> Table {
-        let caption = format!("{figure} of {}: mean over seeds [95 % interval]", self.what);
-        let mut table = Table::new(caption, &["sampler", "seeds"]);
-        let rows: Vec<_> = self.streams.iter().map(|s| (s, values(s))).collect();
-        let mut counts: Vec<usize> = rows.iter().flat_map(|(_, v)| v).map(|at| at.n).collect();
-        counts.sort_unstable();
+    fn count_table(&self, id: &str) -> Table {
+        let mut values = self.values();
+        values.retain(|value| value.figure.id == id);
+        let n = |value: &Value| value.key.label(axis::POINTS).parse::<usize>().unwrap_or(0);
+        values.sort_by_key(n);
+        let mut counts: Vec<usize> = values.iter().map(n).collect();
         counts.dedup();
         // Thinned from the end, so that the largest N always stays.
         let stride = counts.len().div_ceil(COLUMNS).max(1);
-        let mut shown: Vec<usize> = counts.into_iter().rev().step_by(stride).collect();
-        shown.reverse();
-        if shown.is_empty() {
-            return table;
+        let shown: Vec<usize> = counts.into_iter().rev().step_by(stride).collect();
+        values.retain(|value| shown.contains(&n(value)));
+        if values.is_empty() {
+            return Table::default();
         }
-        shown
-            .iter()
-            .for_each(|n| table.add_column(format!("N = {n}")));
-        for (stream, values) in rows {
-            let mut row = vec![stream.key.sampler().into(), seeds_cell(stream)];
-            row.extend(shown.iter().map(|&n| {
-                let found = values.iter().find(|at| at.n == n);
-                interval_cell(found.map(|at| at.value))
-            }));
-            table.rows.push(row);
+        let row = |s: &Recorded<StreamRecord>| {
+            let name = s.key.sampler();
+            (name.clone(), vec![name.into(), seeds_cell(s)])
+        };
+        Pivot {
+            caption: format!(
+                "{} of {}: mean over seeds [95 % interval]",
+                figure(id).title,
+                self.what
+            ),
+            heads: &["sampler", "seeds"],
+            rows: self.streams.iter().map(row).collect(),
+            row: Key::sampler,
+            figures: &[id],
+            across: Some(points),
         }
-        table
+        .table(&values)
     }
 
     /// Coherence and coverage.
     fn pixel_table(&self) -> Table {
-        let caption = format!(
-            "{}: mean angle between the directions of neighbouring pixels at the same sample, degrees (0: fully \
-             coherent), and share of a grid of 4√N × 4√N cells that the points of 150 pixels fall into",
-            self.what
-        );
-        let mut table = Table::new(caption, &["sampler"]);
-        let pixels = |s: &StreamRecord| s.figures.pixels.clone();
-        let longest = self.streams.iter().map(|s| pixels(s)).max_by_key(Vec::len);
-        let counts: Vec<usize> = longest.iter().flatten().map(|at| at.n).collect();
-        if counts.is_empty() {
-            return table;
+        let row = |s: &Recorded<StreamRecord>| (s.key.sampler(), vec![s.key.sampler().into()]);
+        Pivot {
+            caption: format!(
+                "{}: mean angle between the directions of neighbouring pixels at the same sample, degrees (0: fully \
+                 coherent), and share of a grid of 4√N × 4√N cells that the points of 150 pixels fall into",
+                self.what
+            ),
+            heads: &["sampler"],
+            rows: self.streams.iter().map(row).collect(),
+            row: Key::sampler,
+            figures: &["neighbour-angle/v1", "coverage/v1"],
+            across: Some(points),
         }
-        for n in &counts {
-            table.add_column(format!("angle, N = {n}"));
-        }
-        for n in &counts {
-            table.add_column(format!("coverage, N = {n}"));
-        }
-        for stream in &self.streams {
-            let pixels = pixels(stream);
-            let at = |n: &usize| pixels.iter().find(|at| at.n == *n);
-            let mut row = vec![Cell::from(stream.key.sampler())];
-            row.extend(counts.iter().map(|n| {
-                let angle = at(n).map(|at| at.neighbour_angle.to_degrees());
-                Cell::from(format::optional(angle))
-            }));
-            row.extend(counts.iter().map(|n| {
-                let share = at(n).map(|at| format!("{:.1} %", 100.0 * at.coverage));
-                Cell::from(share.unwrap_or_else(|| format::ABSENT.into()))
-            }));
-            table.rows.push(row);
-        }
-        table
+        .table(&self.values())
     }
+}
+
+fn points(key: &Key) -> String {
+    format!("N = {}", key.label(axis::POINTS))
 }
 
 /// The pair of dimensions with the greatest D* of each sampler.

@@ -3,12 +3,14 @@
 use super::file_stem;
 use super::trade_off;
 use super::verdict::ray_classes;
-use crate::accel::Space;
+use crate::accel::{Phase, Space};
 use crate::image::viridis_css;
-use crate::measure::record::{RayClass, Recorded, StructureRecord};
+use crate::measure::record::{Key, RayClass, Recorded, StructureRecord, axis};
 use crate::report::data::{RunData, SceneGroup, structure_name};
 use crate::report::document::*;
+use crate::report::pivot::Pivot;
 use crate::report::plot::rates::{Bar, RatePlot};
+use crate::report::values::{Value, of_structures};
 use crate::report::{format, pictures};
 use std::path::Path;
 
@@ -28,11 +30,18 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
         blocks.push(Block::Figures(vec![Figure::new(name, caption, drawing)]));
     }
     let classes = ray_classes(scene);
-    let mut tables = vec![speed_table(scene)];
+    let values = of_structures(data, scene);
+    let mut tables = vec![speed_table(scene, &values)];
     tables.extend(trade_off::break_even_table(scene, &classes));
     let views = scene.views.iter();
     tables.extend(views.filter_map(|view| trade_off::time_to_image_table(scene, view)));
-    tables.extend([build_table, shape_table, leaf_table, work_table].map(|table| table(scene)));
+    tables.extend([
+        build_table(scene, &values),
+        shape_table(scene, &values),
+        outside_table(data, scene, &values),
+        leaf_table(scene),
+        work_table(scene, &values),
+    ]);
     blocks.extend(tables.into_iter().filter_map(Table::into_block));
     blocks.extend(heat_maps(dir, scene));
     blocks
@@ -85,126 +94,109 @@ fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
     }
 }
 
+/// A row for each of some structures.
+fn rows<'a>(
+    structures: impl Iterator<Item = &'a Recorded<'a, StructureRecord>>,
+) -> Vec<(String, Vec<Cell>)> {
+    structures
+        .map(|s| (name(s), vec![name(s).into()]))
+        .collect()
+}
+
 /// Mrays/s, one row per structure and one column per ray class.
-pub fn speed_table(scene: &SceneGroup) -> Table {
-    let caption = format!(
-        "Speed on {}, Mrays/s: median [{}]",
-        scene.name,
-        speed_bounds(scene)
-    );
-    let mut table = Table::new(caption, &["structure", ":gate"]);
-    let classes = ray_classes(scene);
-    classes
-        .iter()
-        .for_each(|&class| table.add_column(format::ray_class(class)));
-    for s in &scene.structures {
-        let fault = s.fault();
-        let verdict = if fault.is_none() { "passed" } else { "FAILED" };
+pub fn speed_table(scene: &SceneGroup, values: &[Value]) -> Table {
+    let row = |s: &Recorded<StructureRecord>| {
+        let (verdict, tone) = match s.fault() {
+            None => ("passed", Tone::Good),
+            Some(_) => ("FAILED", Tone::Bad),
+        };
         let judge = match s.space {
             Space::World => "",
             Space::Instances => "judged over instances",
         };
-        let tone = if fault.is_none() {
-            Tone::Good
-        } else {
-            Tone::Bad
-        };
-        let mut row = vec![
-            name(s).into(),
-            Cell::with_detail(verdict, judge).toned(tone),
-        ];
-        row.extend(classes.iter().map(|&class| {
-            let timing = s
-                .timings
-                .iter()
-                .find(|t| t.class == class)
-                .filter(|_| fault.is_none());
-            timing.map_or_else(
-                || format::ABSENT.into(),
-                |t| Cell::with_detail(format::number(t.mrays_s.value), format::bounds(&t.mrays_s)),
-            )
-        }));
-        table.rows.push(row);
+        let gate = Cell::with_detail(verdict, judge).toned(tone);
+        (name(s), vec![name(s).into(), gate])
+    };
+    Pivot {
+        caption: format!(
+            "Speed on {}, Mrays/s: median [{}]",
+            scene.name,
+            speed_bounds(scene)
+        ),
+        heads: &["structure", ":gate"],
+        rows: scene.structures.iter().map(row).collect(),
+        row: Key::structure,
+        figures: &["mrays-per-s/v1"],
+        across: Some(|key| key.label(axis::RAYS).to_owned()),
     }
-    table
+    .table(values)
 }
 
 /// What the build took.
-fn build_table(scene: &SceneGroup) -> Table {
-    let columns = ["structure", "build, ms", ":of which, ms", "peak memory"];
-    let mut table = Table::new("Build (one each)", &columns);
+fn build_table(scene: &SceneGroup, values: &[Value]) -> Table {
     let updated = built(scene).any(|s| s.update_ms.is_some());
-    if updated {
-        table.caption += "; update: all instances moved, objects kept (median of 5)";
-        table.add_column("update, ms");
+    let update = match updated {
+        true => "; update: all instances moved, objects kept (median of 5)",
+        false => "",
+    };
+    let row = |s: &Recorded<StructureRecord>| {
+        let phase = |phase: &Phase| format!("{} {}", phase.name, format::number(phase.ms));
+        let phases: Vec<String> = s.build.iter().map(phase).collect();
+        (name(s), vec![name(s).into(), phases.join(" + ").into()])
+    };
+    Pivot {
+        caption: format!("Build (one each){update}"),
+        heads: &["structure", ":phases of the build, ms"],
+        rows: built(scene).map(row).collect(),
+        row: Key::structure,
+        figures: &["build-ms/v1", "build-peak-bytes/v1", "update-ms/v1"],
+        across: None,
     }
-    for s in built(scene) {
-        let phases: Vec<String> = s
-            .build
-            .iter()
-            .map(|phase| format!("{} {}", phase.name, format::number(phase.ms)))
-            .collect();
-        let mut row = vec![
-            name(s).into(),
-            format::number(s.build_ms).into(),
-            phases.join(" + ").into(),
-            s.build_peak_bytes
-                .map_or(format::ABSENT.into(), format::bytes)
-                .into(),
-        ];
-        row.extend(updated.then(|| format::optional(s.update_ms).into()));
-        table.rows.push(row);
-    }
-    table
+    .table(values)
 }
 
 fn built<'a>(scene: &'a SceneGroup) -> impl Iterator<Item = &'a Recorded<'a, StructureRecord>> {
-    let is_built = |s: &&Recorded<StructureRecord>| !s.build.is_empty() || s.gate.is_some();
-    scene.structures.iter().filter(is_built)
-}
-
-fn triangles(scene: &SceneGroup) -> Option<f64> {
-    let triangles = scene.record?.triangles;
-    (triangles > 0).then_some(triangles as f64)
+    scene.structures.iter().filter(|s| s.is_built())
 }
 
 /// Size and quality of what was built.
-fn shape_table(scene: &SceneGroup) -> Table {
-    let columns = [
-        "structure",
-        "size",
-        "bytes/triangle",
-        "nodes",
-        "leaves",
-        "references",
-        "references/triangle",
-        "depth",
-        "SAH cost",
-        "EPO",
-    ];
-    let caption = "Size and shape (nodes, leaves: cells where there are cells; SAH and end-point overlap with both \
-                   constants 1)";
-    let mut table = Table::new(caption, &columns);
-    for s in built(scene) {
-        let stats = &s.stats;
-        let per_triangle = |x: u64| format::optional(triangles(scene).map(|n| x as f64 / n));
-        table.rows.push(vec![
-            name(s).into(),
-            format::bytes(stats.bytes).into(),
-            per_triangle(stats.bytes).into(),
-            format::count(stats.nodes).into(),
-            format::count(stats.leaves).into(),
-            format::count(stats.references).into(),
-            per_triangle(stats.references).into(),
-            stats
-                .depth
-                .map_or(format::ABSENT.into(), |depth| depth.to_string())
-                .into(),
-            format::optional(stats.sah_cost).into(),
-            format::optional(stats.epo).into(),
-        ]);
+fn shape_table(scene: &SceneGroup, values: &[Value]) -> Table {
+    Pivot {
+        caption: "Size and shape (nodes, leaves: cells where there are cells; SAH and end-point overlap with both \
+                  constants 1)"
+            .into(),
+        heads: &["structure"],
+        rows: rows(built(scene)),
+        row: Key::structure,
+        figures: &[
+            "bytes/v1",
+            "bytes-per-triangle/v1",
+            "nodes/v1",
+            "leaves/v1",
+            "references/v1",
+            "references-per-triangle/v1",
+            "depth/v1",
+            "sah-cost/v1",
+            "epo/v1",
+        ],
+        across: None,
     }
-    table
+    .table(values)
+}
+
+/// Figures that this program does not measure itself.
+pub fn outside_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
+    let from_outside = data.run.iter().flat_map(|run| &run.figures);
+    let ids: Vec<&str> = from_outside.map(|figure| &*figure.id).collect();
+    Pivot {
+        caption: format!("Further figures on {}", scene.name),
+        heads: &["structure"],
+        rows: rows(built(scene)),
+        row: Key::structure,
+        figures: &ids,
+        across: None,
+    }
+    .table(values)
 }
 
 /// Classes of leaf sizes: title, least and greatest number of references.
@@ -249,37 +241,31 @@ fn leaf_table(scene: &SceneGroup) -> Table {
 }
 
 /// Counted work per ray.
-fn work_table(scene: &SceneGroup) -> Table {
-    let columns = [
-        "structure",
-        ":rays",
-        "number",
-        "hit",
-        "nodes/ray",
-        "box tests/ray",
-        "triangle tests/ray",
-        "deepest stack",
-    ];
-    let mut table = Table::new(
-        "Counted work per ray (means over a class, from a separate run)",
-        &columns,
-    );
-    for s in scene.structures.iter().filter(|s| s.fault().is_none()) {
-        for timing in &s.timings {
-            let counters = &timing.counters;
-            table.rows.push(vec![
-                name(s).into(),
-                format::ray_class(timing.class).into(),
-                format::count(timing.rays as u64).into(),
-                format::percent(timing.hit_fraction).into(),
-                format::number(counters.nodes).into(),
-                format::number(counters.box_tests).into(),
-                format::number(counters.triangle_tests).into(),
-                counters.stack_high_water.to_string().into(),
-            ]);
-        }
+fn work_table(scene: &SceneGroup, values: &[Value]) -> Table {
+    let passed = scene.structures.iter().filter(|s| s.fault().is_none());
+    let rows = passed.flat_map(|s| {
+        s.body.timings.iter().map(|timing| {
+            let class = format::ray_class(timing.class);
+            let cells = vec![name(s).into(), class.into()];
+            (format!("{} {class}", name(s)), cells)
+        })
+    });
+    Pivot {
+        caption: "Counted work per ray (means over a class, from a separate run)".into(),
+        heads: &["structure", ":rays"],
+        rows: rows.collect(),
+        row: |key| format!("{} {}", key.structure(), key.label(axis::RAYS)),
+        figures: &[
+            "rays/v1",
+            "hit-share/v1",
+            "nodes-per-ray/v1",
+            "box-tests-per-ray/v1",
+            "triangle-tests-per-ray/v1",
+            "deepest-stack/v1",
+        ],
+        across: None,
     }
-    table
+    .table(values)
 }
 
 fn heat_maps(dir: &Path, scene: &SceneGroup) -> Option<Block> {

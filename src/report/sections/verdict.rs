@@ -1,11 +1,12 @@
 //! Who wins, per scene.
 
+use crate::measure::figure::figure;
 use crate::measure::record::{ClassTiming, Interval, RayClass, Recorded, StructureRecord};
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
 use crate::report::data::{RunData, SceneGroup, View, structure_name};
 use crate::report::document::*;
 use crate::report::format;
-use crate::report::ruling::{Better, Contender, Ruling, judge};
+use crate::report::ruling::{Contender, Ruling, judge};
 use crate::report::samplers::{MeanError, Metric, Sampler, error_after};
 
 /// The verdict box.
@@ -150,7 +151,7 @@ pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
     };
     judge(
         scene.structures.iter().filter_map(contender).collect(),
-        Better::Higher,
+        figure("mrays-per-s/v1").better,
     )
 }
 
@@ -171,7 +172,7 @@ pub fn best_per_sample(view: &View, spp: u32) -> Ruling {
 fn rank(view: &View, contenders: Vec<Contender>) -> Ruling {
     match view.reference_fault() {
         Some(reason) => Ruling::Withheld(reason),
-        None => judge(contenders, Better::Lower),
+        None => judge(contenders, figure(Metric::RelMse.figure()).better),
     }
 }
 

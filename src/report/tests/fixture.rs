@@ -72,6 +72,7 @@ pub(super) fn run() -> Body {
         renders_full_product: 560,
         renders_planned: 152,
         kernels: Vec::new(),
+        figures: Vec::new(),
     })
 }
 
@@ -188,6 +189,7 @@ pub(super) fn structure(scene: &str, accel: &str, mrays: f64, wrong: usize) -> L
             epo: None,
             bytes: 2_840_384,
         },
+        figures: BTreeMap::new(),
         gate: Some(gate(wrong)),
         timings: if wrong == 0 {
             classes.map(timing).to_vec()

@@ -11,11 +11,10 @@ mod mappings;
 mod stage;
 mod sums;
 
-use crate::accel::AccelError;
 use crate::gpu::{
     Bindings, Composition, Gpu, GpuError, Played, Player, Recording, Storage, UniformValues,
 };
-use crate::integrator::IntegratorError;
+use crate::integrator::{IntegratorError, StageError};
 use crate::sampling::SamplerError;
 use crate::scene::SceneError;
 use serde::{Deserialize, Serialize};
@@ -72,9 +71,9 @@ pub enum NumericsError {
     /// A scene cannot be made.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A structure cannot be built.
+    /// A structure is not on the device.
     #[error(transparent)]
-    Accel(#[from] AccelError),
+    Stage(#[from] StageError),
     /// A sampler cannot be made.
     #[error(transparent)]
     Sampler(#[from] SamplerError),

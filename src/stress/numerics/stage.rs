@@ -1,12 +1,10 @@
 //! Scenes and samplers for the figures.
 
 use super::NumericsError;
-use crate::accel::{AccelRegistry, BuildLog, TriangleSoup};
+use crate::accel::{AccelRegistry, Intersection, Traced};
 use crate::geometry::Camera;
 use crate::gpu::Gpu;
-use crate::integrator::{
-    ConfiguredIntegrator, IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced,
-};
+use crate::integrator::{self, ConfiguredIntegrator, IntegratorRegistry, RenderJob, Renderer};
 use crate::params::{Entry, ParamValue, Variant};
 use crate::sampling::{Demand, Sampler, SamplerRegistry};
 use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
@@ -58,7 +56,7 @@ pub fn scene(name: &'static str) -> Result<SceneData, NumericsError> {
 /// A scene on the device, traced through the plain BVH.
 pub struct Stage {
     camera: Camera,
-    buffers: SceneBuffers,
+    stage: integrator::Stage,
     traced: Traced,
 }
 
@@ -70,12 +68,11 @@ impl Stage {
             .get(name)
             .ok_or(NumericsError::Missing { kind, name })?;
         let variant = default_variant(kind, &registry.entries(), name)?;
-        let soup = TriangleSoup::new(scene);
-        let built = bvh.build(&soup, &variant.params, &mut BuildLog::default())?;
+        let stage = integrator::Stage::new(gpu, scene.clone(), Intersection::default())?;
         Ok(Self {
             camera: scene.view(1.0),
-            buffers: SceneBuffers::upload(gpu, scene, &soup)?,
-            traced: Traced::upload(gpu, &*built)?,
+            traced: stage.traced(bvh, &variant.params)?,
+            stage,
         })
     }
 
@@ -96,7 +93,7 @@ impl Stage {
         };
         Ok(Renderer::new(
             gpu,
-            &self.buffers,
+            &self.stage.buffers,
             &self.traced,
             &job,
             false,

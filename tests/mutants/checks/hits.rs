@@ -4,10 +4,9 @@ use super::{Bench, Finding};
 use crate::plant::Faulty;
 use crate::subject::{Changes, build};
 use crate::world::Case;
-use raystone::accel::{Counters, Ray};
+use raystone::accel::tracer::count_work;
+use raystone::accel::{Counters, Query, Ray, Traced, TriangleBuffers};
 use raystone::gpu::ArithmeticProbe;
-use raystone::integrator::{SceneBuffers, Traced};
-use raystone::measure::batch::{Query, count_work};
 use raystone::measure::gate::gate;
 use raystone::measure::record::GateVerdict;
 
@@ -26,9 +25,9 @@ pub fn same_hits(bench: &Bench, name: &str, changes: Changes, cases: &[Case]) ->
     for Case { stage, judge } in cases {
         let built = build(name, changes, &stage.soup)?;
         let traced = Traced::upload(bench.gpu, &Faulty::new(&*built, bench.plant)?)?;
-        let buffers = SceneBuffers::upload(bench.gpu, &stage.scene, &stage.soup)?;
+        let triangles = TriangleBuffers::upload(bench.gpu, &stage.soup)?;
         let soup = &stage.soup;
-        let verdict = gate(bench.gpu, &buffers, soup, &traced, judge, &probe, true)?;
+        let verdict = gate(bench.gpu, &triangles, soup, &traced, judge, &probe, true)?;
         if !verdict.passed {
             let what = evidence(&verdict);
             return Ok(Some(format!("{}: {what}", stage.scene.name)));
@@ -60,7 +59,7 @@ pub fn same_work(bench: &Bench, name: &str, changes: Changes) -> Finding {
             continue;
         };
         let traced = Traced::upload(bench.gpu, &Faulty::new(&*built, bench.plant)?)?;
-        let buffers = SceneBuffers::upload(bench.gpu, &stage.scene, &stage.soup)?;
+        let triangles = TriangleBuffers::upload(bench.gpu, &stage.soup)?;
         let all = judge.sets.iter().flat_map(|set| &set.rays);
         let count = all.clone().count();
         let rays: Vec<Ray> = all
@@ -68,7 +67,8 @@ pub fn same_work(bench: &Bench, name: &str, changes: Changes) -> Finding {
             .copied()
             .collect();
         for query in [Query::Closest, Query::Any] {
-            let found = count_work(bench.gpu, &buffers, &traced, query, &rays)?;
+            let found =
+                count_work(bench.gpu, &triangles, &traced, query, &rays)?.unwrap_or_default();
             for (index, (ray, found)) in rays.iter().zip(&found).enumerate() {
                 let mut expected = Counters::default();
                 if query == Query::Any {

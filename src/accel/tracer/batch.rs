@@ -1,0 +1,209 @@
+//! Rays of the host, traced: uploaded once, answered as often as asked.
+
+use super::{Ask, Query, RayBuffers, Traced, Tracer, TriangleBuffers};
+use crate::accel::{Counters, Hit, Ray};
+use crate::gpu::{Elapsed, Gpu, GpuError, Player, Recording, Slices, Storage};
+use bytemuck::Pod;
+use std::cell::Cell;
+
+/// What stands in the output before a trace; no answer of either query begins with it (as a distance it is
+/// NaN), so that a ray which a dispatch leaves out is seen.
+const POISON: u32 = 0xffff_dead;
+
+/// Workgroups in a row of [`RayBatch::trace_in_rows`].
+const NARROW_ROW: u32 = 3;
+
+/// Rays of the first dispatch through an unknown structure: few, it may be brute force over a million
+/// triangles.
+const FIRST_SLICE: u64 = 64;
+
+/// Answers with the error word of the kernels.
+pub struct Answers<T> {
+    /// One per ray.
+    pub answers: Vec<T>,
+    /// 0, or what went wrong.
+    pub errors: u32,
+}
+
+/// A tracer with rays on the device and room for their answers.
+pub struct RayBatch {
+    tracer: Tracer,
+    player: Player,
+    buffers: RayBuffers,
+    /// As large as the answers, copied over them before each trace.
+    poison: Storage,
+    rays: u32,
+    /// Most workgroups in a row.
+    row: Cell<u32>,
+    slices: Slices,
+}
+
+impl Tracer {
+    /// Uploads rays.
+    ///
+    /// # Errors
+    /// They, or their answers, exceed the adapter's binding limit.
+    pub fn batch(self, rays: &[Ray]) -> Result<RayBatch, GpuError> {
+        let gpu = &self.gpu;
+        let bytes_per_ray = if self.ask.counters { 32 } else { 16 };
+        let answers = gpu.zeroed("answers", rays.len() as u64 * bytes_per_ray)?;
+        let poison = gpu.storage("poison", &vec![POISON; answers.size() as usize / 4])?;
+        let buffers = RayBuffers {
+            rays: Storage::Own(gpu.storage("rays", rays)?),
+            answers: Storage::Own(answers),
+            status: Storage::Own(gpu.zeroed("status", 64)?),
+        };
+        Ok(RayBatch {
+            player: Player::new(gpu),
+            buffers,
+            poison: Storage::Own(poison),
+            rays: rays.len() as u32,
+            row: Cell::new(u32::MAX),
+            slices: Slices::starting_with(FIRST_SLICE).at_least(FIRST_SLICE),
+            tracer: self,
+        })
+    }
+}
+
+impl RayBatch {
+    /// What traces.
+    pub fn tracer(&self) -> &Tracer {
+        &self.tracer
+    }
+
+    /// Traces all rays, in as many dispatches as needed to keep each short. Answers of earlier traces are
+    /// wiped out before the clock starts; the error word is kept. Times are sums over all passes.
+    ///
+    /// # Errors
+    /// The device is lost, hangs, or the driver complains.
+    pub fn trace(&self) -> Result<Elapsed, GpuError> {
+        let mut wipe = Recording::new();
+        wipe.copy(&self.poison, &self.buffers.answers);
+        self.player.play(&wipe)?;
+        let mut total = Elapsed {
+            gpu_ms: self.tracer.gpu.timestamp_period.map(|_| 0.0),
+            wall_ms: 0.0,
+        };
+        let mut first = 0;
+        while first < self.rays {
+            let count = self.slices.next(first, self.rays);
+            let elapsed = self.play(first, count)?;
+            total += elapsed;
+            self.slices.learn(u64::from(count), elapsed);
+            first += count;
+        }
+        Ok(total)
+    }
+
+    /// Traces all rays again in dispatches of narrow rows of workgroups, as dispatches of millions of rays
+    /// are cut by the limit on a row.
+    ///
+    /// # Errors
+    /// The device is lost, hangs, or the driver complains.
+    pub fn trace_in_rows(&self) -> Result<(), GpuError> {
+        self.row.set(NARROW_ROW);
+        let traced = self.trace();
+        self.row.set(u32::MAX);
+        traced.map(|_| ())
+    }
+
+    /// A recording that traces nothing: the fixed cost of a measurement.
+    ///
+    /// # Errors
+    /// The device is lost, hangs, or the driver complains.
+    pub fn trace_nothing(&self) -> Result<Elapsed, GpuError> {
+        self.play(0, 0)
+    }
+
+    fn play(&self, first: u32, count: u32) -> Result<Elapsed, GpuError> {
+        let mut recording = Recording::new();
+        let (range, row) = (first..first + count, self.row.get());
+        self.tracer
+            .record_in_rows(&mut recording, &self.buffers, range, row)?;
+        Ok(self.player.play(&recording)?.elapsed())
+    }
+
+    fn read<T: Pod>(&self, buffer: &Storage) -> Result<Vec<T>, GpuError> {
+        let mut recording = Recording::new();
+        recording.download("", buffer);
+        self.player.play(&recording)?.download("")
+    }
+
+    /// Hits of the last trace of a closest-hit query.
+    ///
+    /// # Errors
+    /// The device is lost or hangs.
+    pub fn hits(&self) -> Result<Vec<Hit>, GpuError> {
+        let mut hits: Vec<Hit> = self.read(&self.buffers.answers)?;
+        hits.truncate(self.rays as usize);
+        Ok(hits)
+    }
+
+    /// Answers of the last trace of an any-hit query; `None` where there is no answer.
+    ///
+    /// # Errors
+    /// The device is lost or hangs.
+    pub fn found(&self) -> Result<Vec<Option<bool>>, GpuError> {
+        let words: Vec<[u32; 4]> = self.read(&self.buffers.answers)?;
+        let answer = |w: &[u32; 4]| (w[0] <= 1).then_some(w[0] == 1);
+        Ok(words.iter().take(self.rays as usize).map(answer).collect())
+    }
+
+    /// Hash of what the last trace left in the output.
+    ///
+    /// # Errors
+    /// The device is lost or hangs.
+    pub fn digest(&self) -> Result<blake3::Hash, GpuError> {
+        Ok(blake3::hash(&self.read::<u8>(&self.buffers.answers)?))
+    }
+
+    /// Counted work of the last trace, and the answers that were found beside it.
+    ///
+    /// # Errors
+    /// The device is lost or hangs.
+    pub fn work(&self) -> Result<(Vec<Counters>, Vec<Hit>), GpuError> {
+        let words: Vec<[[u32; 4]; 2]> = self.read(&self.buffers.answers)?;
+        let counters =
+            |&[nodes, box_tests, triangle_tests, stack_high_water]: &[u32; 4]| Counters {
+                nodes,
+                box_tests,
+                triangle_tests,
+                stack_high_water,
+            };
+        let of_rays = words.iter().take(self.rays as usize);
+        Ok(of_rays
+            .map(|[work, hit]| (counters(work), bytemuck::cast::<_, Hit>(*hit)))
+            .unzip())
+    }
+
+    /// The error word of the kernels.
+    ///
+    /// # Errors
+    /// The device is lost or hangs.
+    pub fn error_word(&self) -> Result<u32, GpuError> {
+        Ok(self.read::<u32>(&self.buffers.status)?[0])
+    }
+}
+
+/// Counted work of every ray, from kernels of their own; `None` for a structure that counts none.
+///
+/// # Errors
+/// A kernel does not compile, or the device is lost or hangs.
+pub fn count_work(
+    gpu: &Gpu,
+    triangles: &TriangleBuffers,
+    traced: &Traced,
+    query: Query,
+    rays: &[Ray],
+) -> Result<Option<Vec<Counters>>, GpuError> {
+    if !traced.passes.counts_work() {
+        return Ok(None);
+    }
+    let ask = Ask {
+        counters: true,
+        ..query.into()
+    };
+    let batch = Tracer::new(gpu, triangles, traced, ask)?.batch(rays)?;
+    batch.trace()?;
+    Ok(Some(batch.work()?.0))
+}

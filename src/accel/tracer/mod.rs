@@ -1,0 +1,222 @@
+//! Tracing: a buffer of rays in, a buffer of answers out, whatever the structure is like inside.
+//!
+//! A structure is either *inline*, a kernel module with `closest_hit` and `any_hit` that other kernels
+//! import, or a *pipeline*, an object that records the passes which answer a buffer of rays
+//! ([`TracePasses`]). A [`Tracer`] sees no difference: an inline structure is a pipeline of one pass.
+
+mod batch;
+mod passes;
+mod traced;
+
+pub use batch::{Answers, RayBatch, count_work};
+pub use passes::{TracePasses, TraceSteps};
+pub use traced::{Traced, TriangleBuffers};
+
+use crate::gpu::{Bindings, Composition, Gpu, GpuError, Pipeline, Recording, Storage};
+use crate::text::cell_hash;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// What is asked of each ray.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Query {
+    /// The nearest hit.
+    Closest,
+    /// Whether there is a hit.
+    Any,
+}
+
+/// What a tracer is made for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Ask {
+    /// What is asked of each ray.
+    pub query: Query,
+    /// Whether work is counted instead of answers kept.
+    pub counters: bool,
+    /// Whether the driver's checks are on.
+    pub runtime_checks: bool,
+}
+
+impl From<Query> for Ask {
+    /// Answers, with the driver's checks.
+    fn from(query: Query) -> Self {
+        Self {
+            query,
+            counters: false,
+            runtime_checks: true,
+        }
+    }
+}
+
+/// Where rays are read and answers written.
+#[derive(Debug, Clone)]
+pub struct RayBuffers {
+    /// 32 bytes a ray: origin, `t_min`, direction, `t_max`.
+    pub rays: Storage,
+    /// 16 bytes a ray: a hit (`t`, triangle, u, v), or 1 or 0 and zeros for [`Query::Any`]; 32 where work
+    /// is counted, the counters first.
+    pub answers: Storage,
+    /// At least 4 bytes: the kernels' error word, to which bits are added.
+    pub status: Storage,
+}
+
+/// Answers buffers of rays through one structure.
+pub struct Tracer {
+    gpu: Gpu,
+    ask: Ask,
+    triangles: TriangleBuffers,
+    traced: Traced,
+    bindings: Bindings,
+    pipelines: Mutex<BTreeMap<String, Arc<Pipeline>>>,
+}
+
+impl Tracer {
+    /// Compiles what the structure needs to answer the query.
+    ///
+    /// # Errors
+    /// A kernel does not compose or compile, or work is to be counted and the structure counts none.
+    pub fn new(
+        gpu: &Gpu,
+        triangles: &TriangleBuffers,
+        traced: &Traced,
+        ask: impl Into<Ask>,
+    ) -> Result<Self, GpuError> {
+        let tracer = Self {
+            gpu: gpu.clone(),
+            ask: ask.into(),
+            triangles: triangles.clone(),
+            traced: traced.clone(),
+            bindings: triangles.bindings.merged(&traced.bindings),
+            pipelines: Mutex::default(),
+        };
+        if tracer.ask.counters && !tracer.counts_work() {
+            let text = "this structure declares that it counts no work";
+            return Err(GpuError::Kernel(text.to_owned()));
+        }
+        let nothing = || Storage::scratch("nothing", 16);
+        let buffers = RayBuffers {
+            rays: nothing(),
+            answers: nothing(),
+            status: nothing(),
+        };
+        tracer.record(&mut Recording::new(), &buffers, 0..0)?;
+        Ok(tracer)
+    }
+
+    /// Whether the structure can count its work.
+    pub fn counts_work(&self) -> bool {
+        self.traced.passes.counts_work()
+    }
+
+    /// Adds the passes that answer rays `range.start … range.end − 1` of the buffers; each answer goes to
+    /// the place of its ray.
+    ///
+    /// # Errors
+    /// A kernel does not compose or compile, or a pass names a buffer that nobody gave.
+    pub fn record(
+        &self,
+        recording: &mut Recording,
+        buffers: &RayBuffers,
+        range: Range<u32>,
+    ) -> Result<(), GpuError> {
+        self.record_in_rows(recording, buffers, range, u32::MAX)
+    }
+
+    /// [`Tracer::record`] with at most so many workgroups in a row.
+    fn record_in_rows(
+        &self,
+        recording: &mut Recording,
+        buffers: &RayBuffers,
+        range: Range<u32>,
+        row: u32,
+    ) -> Result<(), GpuError> {
+        let passes = Arc::clone(&self.traced.passes);
+        let mut steps = TraceSteps::new(self, recording, buffers, range, row);
+        for (name, bytes) in passes.scratch(steps.count) {
+            steps.add_scratch(name, bytes);
+        }
+        passes.record(&mut steps)
+    }
+
+    /// The pipeline of a pass: composed with the structure, the tests and the query.
+    fn pipeline(&self, pass: &str, kernel: Composition) -> Result<Arc<Pipeline>, GpuError> {
+        let mut known = self
+            .pipelines
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        if let Some(pipeline) = known.get(pass) {
+            return Ok(Arc::clone(pipeline));
+        }
+        let kernel = self
+            .traced
+            .compose(self.triangles.intersection.activate(kernel));
+        let kernel = kernel
+            .feature("any", self.ask.query == Query::Any)
+            .feature("counters", self.ask.counters);
+        let kernel = self.bindings.compose(kernel);
+        let pipeline = self.gpu.pipeline(&kernel, self.ask.runtime_checks)?;
+        known.insert(pass.to_owned(), Arc::clone(&pipeline));
+        Ok(pipeline)
+    }
+
+    fn pipelines(&self) -> BTreeMap<String, Arc<Pipeline>> {
+        let known = self.pipelines.lock();
+        known.unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Feature flags of the kernels.
+    pub fn features(&self) -> Vec<String> {
+        let pipelines = self.pipelines();
+        let all = pipelines.values();
+        let mut all: Vec<String> = all
+            .flat_map(|p| p.kernel.composition.features.iter().cloned())
+            .collect();
+        all.sort();
+        all.dedup();
+        all
+    }
+
+    /// Texts of the composed kernels.
+    pub fn kernel_texts(&self) -> Vec<String> {
+        let pipelines = self.pipelines();
+        pipelines.values().map(|p| p.kernel.wgsl.clone()).collect()
+    }
+
+    /// Milliseconds that the first use of each pass's kernel cost, once it ran; see [`Pipeline::cold_ms`].
+    pub fn cold_ms(&self) -> Vec<(String, Option<f64>)> {
+        let pipelines = self.pipelines();
+        let entries = pipelines.into_iter();
+        entries.map(|(pass, p)| (pass, p.cold_ms())).collect()
+    }
+
+    /// BLAKE3 of the kernels.
+    fn hash(&self) -> String {
+        let hashes: Vec<(String, String)> = self
+            .pipelines()
+            .into_iter()
+            .map(|(pass, p)| (pass, p.kernel.hash()))
+            .collect();
+        match &hashes[..] {
+            [(_, only)] => only.clone(),
+            all => {
+                let parts: Vec<_> = all.iter().map(|(p, h)| (p.as_str(), h.as_str())).collect();
+                cell_hash(&parts)
+            }
+        }
+    }
+}
+
+/// BLAKE3 of the kernels that answer both queries through a structure.
+///
+/// # Errors
+/// A kernel does not compile.
+pub fn kernel_hash(
+    gpu: &Gpu,
+    triangles: &TriangleBuffers,
+    traced: &Traced,
+) -> Result<String, GpuError> {
+    let hash = |query: Query| Ok::<_, GpuError>(Tracer::new(gpu, triangles, traced, query)?.hash());
+    let (closest, any) = (hash(Query::Closest)?, hash(Query::Any)?);
+    Ok(cell_hash(&[("closest", &closest), ("any", &any)]))
+}

@@ -1,0 +1,145 @@
+//! The passes in which a structure answers a buffer of rays.
+
+use super::{Query, RayBuffers, Tracer};
+use crate::gpu::{
+    Bindings, Composition, GpuError, Groups, Recording, Storage, UniformValues, groups_for,
+};
+use std::ops::Range;
+
+/// A structure that answers a buffer of rays in passes of its own: rays may be sorted, compacted, traced by
+/// levels, and put back.
+pub trait TracePasses: Send + Sync {
+    /// Buffers that the passes need beside rays, answers and the structure's arrays, for so many rays:
+    /// names of kernel variables, and bytes. What they hold at first is unspecified.
+    fn scratch(&self, _rays: u32) -> Vec<(&'static str, u64)> {
+        Vec::new()
+    }
+    /// Whether the passes count work where that is asked for; where not, no counters are shown.
+    fn counts_work(&self) -> bool {
+        false
+    }
+    /// Records the passes that answer the rays of `steps`. With no rays at all they are recorded, too, to
+    /// be compiled, and not played.
+    ///
+    /// # Errors
+    /// A kernel does not compose or compile.
+    fn record(&self, steps: &mut TraceSteps) -> Result<(), GpuError>;
+}
+
+/// An inline structure: each ray by an invocation of its own.
+pub(super) struct OnePass;
+
+impl TracePasses for OnePass {
+    fn counts_work(&self) -> bool {
+        true
+    }
+
+    fn record(&self, steps: &mut TraceSteps) -> Result<(), GpuError> {
+        let groups = steps.groups(steps.count);
+        let kernel = Composition::new("integrator/trace_rays");
+        steps.run("trace", kernel, groups, &Bindings::new())
+    }
+}
+
+/// What passes are recorded with.
+///
+/// Kernels find bound: the canonical triangles, the structure's arrays and uniforms, its scratch, `rays`,
+/// `hits` (or `work`), `status`, and the uniform `batch` with the members `first` and `count`.
+pub struct TraceSteps<'a> {
+    tracer: &'a Tracer,
+    recording: &'a mut Recording,
+    bindings: Bindings,
+    row: u32,
+    /// The first ray to be answered.
+    pub first: u32,
+    /// How many are.
+    pub count: u32,
+}
+
+impl<'a> TraceSteps<'a> {
+    pub(super) fn new(
+        tracer: &'a Tracer,
+        recording: &'a mut Recording,
+        buffers: &RayBuffers,
+        range: Range<u32>,
+        row: u32,
+    ) -> Self {
+        let (first, count) = (range.start, range.end - range.start);
+        let mut bindings = tracer.bindings.clone();
+        let answers = if tracer.ask.counters { "work" } else { "hits" };
+        bindings
+            .buffer("rays", &buffers.rays)
+            .buffer("status", &buffers.status)
+            .buffer(answers, &buffers.answers)
+            .uniform("batch", batch(first, count));
+        Self {
+            tracer,
+            recording,
+            bindings,
+            row,
+            first,
+            count,
+        }
+    }
+
+    pub(super) fn add_scratch(&mut self, name: &str, bytes: u64) {
+        let scratch = Storage::scratch(&format!("trace {name}"), bytes);
+        self.bindings.buffer(name, scratch);
+    }
+
+    /// What is asked of each ray.
+    pub fn query(&self) -> Query {
+        self.tracer.ask.query
+    }
+
+    /// The buffer of this name.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn storage(&self, name: &str) -> Result<Storage, GpuError> {
+        let found = self.bindings.storage(name).cloned();
+        found.ok_or_else(|| GpuError::Kernel(format!("a pass names the buffer `{name}`, which is neither scratch nor an array of the structure")))
+    }
+
+    /// Workgroups for a kernel of one dimension with so many invocations.
+    pub fn groups(&self, items: u32) -> [u32; 3] {
+        let [x, y, z] = groups_for(items);
+        match x > self.row {
+            true => [self.row, y * x.div_ceil(self.row), z],
+            false => [x, y, z],
+        }
+    }
+
+    /// Fills a buffer with zeros.
+    ///
+    /// # Errors
+    /// There is none of this name.
+    pub fn clear(&mut self, name: &str) -> Result<(), GpuError> {
+        let storage = self.storage(name)?;
+        self.recording.clear(storage);
+        Ok(())
+    }
+
+    /// Runs a kernel with the structure, the tests and the query in it. What `special` binds goes before
+    /// the buffers and values of those names. A pass has one kernel: `name` decides.
+    ///
+    /// # Errors
+    /// The kernel does not compose or compile.
+    pub fn run(
+        &mut self,
+        name: &str,
+        kernel: Composition,
+        groups: impl Into<Groups>,
+        special: &Bindings,
+    ) -> Result<(), GpuError> {
+        let pipeline = self.tracer.pipeline(name, kernel)?;
+        let bindings = self.bindings.merged(special);
+        self.recording.run(name, &pipeline, &bindings, groups);
+        Ok(())
+    }
+}
+
+/// The uniform `batch`: which rays of the buffer a kernel looks at.
+pub fn batch(first: u32, count: u32) -> UniformValues {
+    UniformValues::new().u32("first", first).u32("count", count)
+}

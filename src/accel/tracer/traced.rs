@@ -1,0 +1,100 @@
+//! Triangles and a built structure on the device.
+
+use super::passes::{OnePass, TracePasses};
+use crate::accel::{Access, BuiltAccel, GpuBuffers, Intersection, Space, TriangleSoup};
+use crate::gpu::{Bindings, Composition, Gpu, GpuError};
+use std::sync::Arc;
+
+/// The canonical triangles on the device, and how rays meet them.
+#[derive(Clone)]
+pub struct TriangleBuffers {
+    /// `triangles`, in as many parts as the adapter asks for.
+    pub bindings: Bindings,
+    /// The tests.
+    pub intersection: Intersection,
+}
+
+impl TriangleBuffers {
+    /// Uploads the triangles.
+    ///
+    /// # Errors
+    /// They need more parts than kernels declare.
+    pub fn upload(gpu: &Gpu, soup: &TriangleSoup) -> Result<Self, GpuError> {
+        let mut bindings = Bindings::new();
+        let words = soup.words();
+        let parts = gpu.storage_parts("triangles", words.as_flattened())?;
+        bindings.parts("triangles", &parts);
+        Ok(Self {
+            bindings,
+            intersection: soup.intersection,
+        })
+    }
+}
+
+/// What kernels need to trace with a structure: its module, features, constants, arrays and uniforms, or
+/// the passes that stand for them.
+#[derive(Clone)]
+pub struct Traced {
+    /// What the structure handed over, less the arrays and uniforms, which are bound.
+    active: GpuBuffers<'static>,
+    pub(super) passes: Arc<dyn TracePasses>,
+    /// Whether other kernels can import it.
+    inline: bool,
+    /// Arrays and uniforms of the structure.
+    pub bindings: Bindings,
+    /// Where triangles are met: decides which judge and which images it is compared with.
+    pub space: Space,
+}
+
+impl Traced {
+    /// Uploads a built structure; arrays that its build left on the device stay there.
+    ///
+    /// # Errors
+    /// An array needs more parts, or more bytes, than the adapter offers.
+    pub fn upload(gpu: &Gpu, built: &dyn BuiltAccel) -> Result<Self, GpuError> {
+        let buffers = built.buffers();
+        let mut bindings = Bindings::new();
+        for array in &buffers.arrays {
+            if built.divisible().contains(&array.name) {
+                bindings.parts(array.name, &gpu.storage_parts(array.name, &array.words)?);
+            } else {
+                // What a kernel reads as a texture may exceed what it can bind as a buffer.
+                bindings.buffer(array.name, &gpu.array(array.name, &array.words)?);
+            }
+        }
+        for (name, buffer) in built.on_device() {
+            bindings.buffer(name, &buffer);
+        }
+        for (name, values) in buffers.uniforms {
+            bindings.uniform(name, values);
+        }
+        let active = GpuBuffers {
+            kernel: buffers.kernel,
+            features: buffers.features,
+            constants: buffers.constants,
+            ..Default::default()
+        };
+        let (inline, passes): (bool, Arc<dyn TracePasses>) = match built.access() {
+            Access::Inline => (true, Arc::new(OnePass)),
+            Access::Pipeline(passes) => (false, passes),
+        };
+        Ok(Self {
+            active,
+            passes,
+            inline,
+            bindings,
+            space: built.space(),
+        })
+    }
+
+    /// Whether a kernel of another part can import it: a pipeline answers buffers of rays alone.
+    pub fn is_inline(&self) -> bool {
+        self.inline
+    }
+
+    /// `composition` with this structure as the active one.
+    #[must_use]
+    pub fn compose(&self, composition: Composition) -> Composition {
+        self.active.activate(composition)
+    }
+}

@@ -1,0 +1,277 @@
+//! The table of figures: what each is called, in which unit, which direction is better, how it is shown and
+//! how its interval was made. Pages, tables, plots and exports read it; adding a figure is a row here (or,
+//! from outside, in a [`FigureRegistry`]) and the code that measures it.
+
+use super::record::Interval;
+use crate::accel::{BuiltAccel, TriangleSoup};
+use Better::{Higher, Lower, Neither};
+use Shown::{Bytes, Count, Digits, Exponent, Percent};
+use Spread::{Exact, Jackknife, Mean, Median, Single};
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+/// Which values are better.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Better {
+    /// Rates.
+    Higher,
+    /// Errors, times, sizes.
+    Lower,
+    /// It describes, and does not rank.
+    Neither,
+}
+
+/// How a value is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shown {
+    /// With so many significant digits.
+    Digits(u8),
+    /// As a whole number.
+    Count,
+    /// In bytes with a binary unit.
+    Bytes,
+    /// A share as percent.
+    Percent,
+    /// An exponent, with two decimals.
+    Exponent,
+}
+
+/// How an interval was made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Spread {
+    /// Median with the 95 % interval of its order statistics.
+    Median,
+    /// Mean with Student's 95 % interval.
+    Mean,
+    /// Jackknife over replicates and the reference's parts, with Student's 95 % interval.
+    Jackknife,
+    /// Counted or computed: no interval.
+    Exact,
+    /// Measured once: nothing is known of its spread.
+    Single,
+}
+
+impl Spread {
+    /// What a reader is told.
+    pub fn words(self) -> &'static str {
+        match self {
+            Median => "median, 95 % interval of order statistics",
+            Mean => "mean, Student's 95 % interval",
+            Jackknife => "jackknife, Student's 95 % interval",
+            Exact => "exact",
+            Single => "measured once",
+        }
+    }
+}
+
+/// A figure.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Figure {
+    /// Name with version, for instance `sah-cost/v1`: another definition is another version.
+    pub id: Cow<'static, str>,
+    /// What it is called.
+    pub title: Cow<'static, str>,
+    /// Its unit; empty for plain numbers and for units that are written with the value.
+    pub unit: Cow<'static, str>,
+    /// Which values are better.
+    pub better: Better,
+    /// How it is written.
+    pub shown: Shown,
+    /// How its interval was made.
+    pub spread: Spread,
+}
+
+impl Figure {
+    /// A row of the table.
+    pub const fn new(
+        id: &'static str,
+        title: &'static str,
+        unit: &'static str,
+        better: Better,
+        shown: Shown,
+        spread: Spread,
+    ) -> Self {
+        Self {
+            id: Cow::Borrowed(id),
+            title: Cow::Borrowed(title),
+            unit: Cow::Borrowed(unit),
+            better,
+            shown,
+            spread,
+        }
+    }
+
+    /// Title and unit, as the head of a column.
+    pub fn heading(&self) -> String {
+        match self.unit.is_empty() {
+            true => self.title.to_string(),
+            false => format!("{}, {}", self.title, self.unit),
+        }
+    }
+}
+
+/// Three significant digits.
+const THREE: Shown = Digits(3);
+
+/// All figures that this crate measures.
+#[rustfmt::skip]
+pub static FIGURES: [Figure; 66] = [
+    // A structure and a class of rays.
+    Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
+    Figure::new("rays/v1", "number", "", Neither, Count, Exact),
+    Figure::new("hit-share/v1", "hit", "", Neither, Percent, Exact),
+    Figure::new("nodes-per-ray/v1", "nodes/ray", "", Lower, THREE, Exact),
+    Figure::new("box-tests-per-ray/v1", "box tests/ray", "", Lower, THREE, Exact),
+    Figure::new("triangle-tests-per-ray/v1", "triangle tests/ray", "", Lower, THREE, Exact),
+    Figure::new("deepest-stack/v1", "deepest stack", "", Lower, Count, Exact),
+    // A structure.
+    Figure::new("build-ms/v1", "build", "ms", Lower, THREE, Single),
+    Figure::new("build-peak-bytes/v1", "peak memory", "", Lower, Bytes, Single),
+    Figure::new("update-ms/v1", "update", "ms", Lower, THREE, Single),
+    Figure::new("bytes/v1", "size", "", Lower, Bytes, Exact),
+    Figure::new("bytes-per-triangle/v1", "bytes/triangle", "", Lower, THREE, Exact),
+    Figure::new("nodes/v1", "nodes", "", Neither, Count, Exact),
+    Figure::new("leaves/v1", "leaves", "", Neither, Count, Exact),
+    Figure::new("references/v1", "references", "", Lower, Count, Exact),
+    Figure::new("references-per-triangle/v1", "references/triangle", "", Lower, THREE, Exact),
+    Figure::new("depth/v1", "depth", "", Lower, Count, Exact),
+    Figure::new("sah-cost/v1", "SAH cost", "", Lower, THREE, Exact),
+    Figure::new("epo/v1", "EPO", "", Lower, THREE, Exact),
+    // Full cells.
+    Figure::new("ms-per-spp/v1", "time per sample per pixel", "ms", Lower, THREE, Median),
+    Figure::new("cell-mrays-per-s/v1", "speed of the whole cell", "Mrays/s", Higher, THREE, Median),
+    // Errors of samplers.
+    Figure::new("relmse-unbiased/v1", "unbiased relMSE", "", Lower, THREE, Jackknife),
+    Figure::new("rmse-unbiased/v1", "unbiased RMSE", "", Lower, THREE, Jackknife),
+    Figure::new("relmse-slope/v1", "slope of relMSE", "", Lower, Exponent, Jackknife),
+    Figure::new("rmse-slope/v1", "slope of RMSE", "", Lower, Exponent, Jackknife),
+    Figure::new("bias-z/v1", "difference of the image's mean", "standard errors", Neither, THREE, Exact),
+    Figure::new("low-frequency-power/v1", "low-frequency power", "", Lower, THREE, Mean),
+    Figure::new("neighbour-correlation/v1", "correlation", "", Lower, THREE, Mean),
+    Figure::new("reference-mse/v1", "MSE of the reference", "", Lower, THREE, Single),
+    // Point sets.
+    Figure::new("star-discrepancy/v1", "D*, star discrepancy", "", Lower, THREE, Mean),
+    Figure::new("l2-star/v1", "L2-star discrepancy (root)", "", Lower, THREE, Mean),
+    Figure::new("centered/v1", "Centered discrepancy (square)", "", Lower, THREE, Mean),
+    Figure::new("star-exponent/v1", "D* exponent", "", Lower, Exponent, Mean),
+    Figure::new("l2-star-exponent/v1", "L2-star exponent", "", Lower, Exponent, Mean),
+    Figure::new("integral-rmse/v1", "RMSE of an integral", "", Lower, THREE, Mean),
+    Figure::new("integral-exponent/v1", "exponent of that RMSE", "", Lower, Exponent, Mean),
+    Figure::new("neighbour-angle/v1", "angle", "degrees", Neither, THREE, Single),
+    Figure::new("coverage/v1", "coverage", "", Higher, Percent, Single),
+    Figure::new("ns-per-sample/v1", "ns per sample", "", Lower, THREE, Median),
+    // Hard scenes and rays, judged exactly.
+    Figure::new("false-misses/v1", "false misses", "", Lower, Count, Exact),
+    Figure::new("unexplained-misses/v1", "unexplained misses", "", Lower, Count, Exact),
+    Figure::new("cracks/v1", "cracks", "", Lower, Count, Exact),
+    Figure::new("false-hits/v1", "false hits", "", Lower, Count, Exact),
+    Figure::new("unexplained-hits/v1", "unexplained hits", "", Lower, Count, Exact),
+    Figure::new("wrong-triangle/v1", "wrong triangle", "", Lower, Count, Exact),
+    Figure::new("not-nearest/v1", "not nearest", "", Lower, Count, Exact),
+    Figure::new("borderline/v1", "borderline", "", Neither, Count, Exact),
+    Figure::new("differing/v1", "differing from brute force", "", Lower, Count, Exact),
+    Figure::new("any-differing/v1", "any hits differing from brute force", "", Lower, Count, Exact),
+    Figure::new("ties/v1", "ties", "", Neither, Count, Exact),
+    Figure::new("slowdown/v1", "slowdown", "", Lower, THREE, Single),
+    Figure::new("t-ulp-p99/v1", "99th percentile of the error of t", "ulp", Lower, Digits(2), Exact),
+    Figure::new("point-ulp-p99/v1", "99th percentile of the error of the point", "ulp", Lower, Digits(2), Exact),
+    Figure::new("misses/v1", "misses", "", Lower, Count, Exact),
+    Figure::new("confirmed-misses/v1", "confirmed misses", "", Lower, Count, Exact),
+    Figure::new("lost-hits/v1", "lost", "", Lower, Count, Exact),
+    Figure::new("pad-ulps/v1", "pad", "ulp", Neither, Count, Exact),
+    Figure::new("self-intersections/v1", "self-intersections", "", Lower, Count, Exact),
+    Figure::new("leaks/v1", "leaks", "", Lower, Count, Exact),
+    Figure::new("farthest-begin/v1", "farthest begin", "bounds of the point's error", Lower, THREE, Exact),
+    Figure::new("test-bytes/v1", "bytes", "", Lower, Count, Exact),
+    Figure::new("ns-per-test/v1", "ns per test", "", Lower, THREE, Single),
+    Figure::new("traversal-ratio/v1", "traversal against moeller-trumbore", "", Lower, THREE, Single),
+    Figure::new("tests-per-ray/v1", "tests per ray", "", Lower, THREE, Exact),
+    Figure::new("numerics/v1", "value", "", Lower, THREE, Single),
+    Figure::new("alarm/v1", "alarm", "", Neither, THREE, Exact),
+];
+
+/// The figure of this crate with this id.
+///
+/// # Panics
+/// There is none: the table and the code that measures do not fit.
+pub fn figure(id: &str) -> &'static Figure {
+    let found = FIGURES.iter().find(|figure| figure.id == id);
+    found.unwrap_or_else(|| panic!("the table of figures has no row {id}"))
+}
+
+/// Measures a built structure; `None` where the figure makes no sense.
+pub type OfStructure = fn(&dyn BuiltAccel, &TriangleSoup) -> Option<f64>;
+
+/// Figures from outside the crate, each with the code that measures it.
+#[derive(Debug, Clone, Default)]
+pub struct FigureRegistry(Vec<(Figure, OfStructure)>);
+
+impl FigureRegistry {
+    /// Adds a figure of built structures.
+    ///
+    /// # Errors
+    /// Another figure has its id, or the id has no version.
+    pub fn add(&mut self, figure: Figure, measure: OfStructure) -> Result<(), String> {
+        let id = &figure.id;
+        if !id.contains("/v") {
+            return Err(format!(
+                "the id of the figure {id:?} needs a version, as in \"{id}/v1\""
+            ));
+        }
+        if self.rows().chain(&FIGURES).any(|known| known.id == *id) {
+            return Err(format!(
+                "there is a figure {id:?} already: choose another id or version"
+            ));
+        }
+        self.0.push((figure, measure));
+        Ok(())
+    }
+
+    /// The rows of the table that it adds.
+    pub fn rows(&self) -> impl Iterator<Item = &Figure> {
+        self.0.iter().map(|(figure, _)| figure)
+    }
+
+    /// Every figure that makes sense of a structure, by id.
+    pub fn of_structure(
+        &self,
+        built: &dyn BuiltAccel,
+        soup: &TriangleSoup,
+    ) -> BTreeMap<String, Interval> {
+        let measured = |(figure, measure): &(Figure, OfStructure)| {
+            let value = measure(built, soup).filter(|value| value.is_finite())?;
+            Some((figure.id.to_string(), Interval::exact(value)))
+        };
+        self.0.iter().filter_map(measured).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_figure_has_an_id_of_its_own_with_a_version() {
+        let ids: BTreeSet<_> = FIGURES.iter().map(|figure| &figure.id).collect();
+        assert_eq!(ids.len(), FIGURES.len());
+        assert!(ids.iter().all(|id| id.contains("/v")));
+        assert_eq!(figure("sah-cost/v1").heading(), "SAH cost");
+        assert_eq!(figure("mrays-per-s/v1").heading(), "speed, Mrays/s");
+    }
+
+    #[test]
+    fn a_figure_from_outside_needs_a_version_and_an_id_of_its_own() {
+        let mut registry = FigureRegistry::default();
+        let row = |id| Figure::new(id, "mine", "", Lower, THREE, Exact);
+        assert!(registry.add(row("mine"), |_, _| None).is_err());
+        assert!(registry.add(row("sah-cost/v1"), |_, _| None).is_err());
+        assert!(registry.add(row("mine/v1"), |_, _| None).is_ok());
+        assert!(registry.add(row("mine/v1"), |_, _| None).is_err());
+        assert_eq!(registry.rows().count(), 1);
+    }
+}
