@@ -119,7 +119,10 @@ fn a_minimal_file_gets_the_documented_defaults() {
     assert!(experiment.camera.is_none());
     assert_eq!(labels(&experiment.axes.decorrelation), ["none"]);
     assert_eq!(labels(&experiment.axes.integrator), ["path"]);
-    assert_eq!(experiment.reference.sequence.params.name("hash"), "pcg");
+    assert_eq!(
+        experiment.reference.sequence.params.0["hash"].to_string(),
+        "pcg"
+    );
     assert_eq!(experiment.timing.rounds, 9);
     assert_eq!(experiment.gate.rays, 32768);
     assert_eq!(
@@ -173,8 +176,14 @@ fn lists_of_parameters_make_variants_in_the_order_of_the_schema() {
             "uniform-grid(max_cells=8)",
         ]
     );
-    assert_eq!(experiment.axes.accel[1].params.number("lambda"), 3.0);
-    assert_eq!(experiment.axes.accel[2].params.integer("max_cells"), 8);
+    assert_eq!(
+        experiment.axes.accel[1].params.0["lambda"],
+        ParamValue::Number(3.0)
+    );
+    assert_eq!(
+        experiment.axes.accel[2].params.0["max_cells"],
+        ParamValue::Integer(8)
+    );
     assert_eq!(
         labels(&experiment.axes.sequence),
         [

@@ -9,7 +9,6 @@ use closed::{ORDINARY, inner_rays, sphere};
 use common::{Pcg, assert_same_hits, build, default_params, scenes};
 use glam::Vec3;
 use raystone::accel::triangle::{TriangleRecord, TriangleTest, intersect_triangle};
-use raystone::accel::{AccelKind, BoxTest};
 use raystone::accel::{
     AccelRegistry, Ask, BuildLog, BuiltBvh, Bvh, Counters, Hit, Intersection, NO_HIT, Ray, Traced,
     Tracer, TriangleBuffers, TriangleSoup,
@@ -341,7 +340,7 @@ fn what_tests_cost_in_a_whole_traversal() {
             ao_length: 0.0,
             offset: 0.0,
         };
-        let params = default_params(&Bvh.parameters());
+        let params = BvhParameters::default();
         let soup = TriangleSoup::new(&scene);
         let tree = BuiltBvh::build(&soup, &params, &mut BuildLog::default()).expect("a BVH");
         let sets = record_rays(&scene, &soup, camera, &tree.twin(&soup), &settings, 1);
