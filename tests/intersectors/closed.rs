@@ -1,12 +1,12 @@
 //! Closed surfaces from inside: which triangle tests lose rays.
 
-use crate::common::{Pcg, default_params, scenes};
+use crate::common::{Pcg, scenes};
 use crate::{ray, tests_of};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use raystone::accel::triangle::TriangleTest;
 use raystone::accel::{
-    AccelKind, BuildLog, BuiltBvh, Bvh, Counters, CpuTwin, NO_HIT, Ray, TriangleSoup,
+    BuildLog, BuiltBvh, BvhParameters, Counters, CpuTwin, NO_HIT, Ray, TriangleSoup,
 };
 
 /// A closed surface of triangles whose corners are shared to the bit: a sphere of radius 2 over the
@@ -94,7 +94,7 @@ pub fn inner_rays(triangles: &[[Vec3; 3]], centre: DVec3, count: usize) -> Vec<R
 
 /// Rays that leave a closed surface unseen.
 fn leaks(soup: &TriangleSoup, rays: &[Ray]) -> Vec<usize> {
-    let params = default_params(&Bvh.parameters());
+    let params = BvhParameters::default();
     let built = BuiltBvh::build(soup, &params, &mut BuildLog::default()).expect("a small scene");
     let twin = built.twin(soup);
     let leaks = |i: &usize| {

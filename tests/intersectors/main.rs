@@ -10,8 +10,8 @@ use common::{Pcg, assert_same_hits, build, default_params, scenes};
 use glam::Vec3;
 use raystone::accel::triangle::{TriangleRecord, TriangleTest, intersect_triangle};
 use raystone::accel::{
-    AccelRegistry, Ask, BuildLog, BuiltBvh, Bvh, Counters, Hit, Intersection, NO_HIT, Ray, Traced,
-    Tracer, TriangleBuffers, TriangleSoup,
+    AccelRegistry, Ask, BoxTest, BuildLog, BuiltBvh, BvhParameters, Counters, Hit, Intersection,
+    NO_HIT, Ray, Traced, Tracer, TriangleBuffers, TriangleSoup,
 };
 use raystone::config::Gate;
 use raystone::geometry::Triangle;

@@ -323,7 +323,7 @@ impl<'a> Costs<'a> {
 mod tests {
     use super::*;
     use crate::accel::tree::TreeNode;
-    use crate::measure::statistics::Pcg32;
+    use crate::random::Pcg32;
 
     fn around(x: f32, size: f32) -> Bounds {
         Bounds {

@@ -237,7 +237,7 @@ mod tests {
     use crate::accel::Intersection;
     use crate::accel::bounds::slab;
     use crate::accel::ray::Ray;
-    use crate::measure::statistics::Pcg32;
+    use crate::random::Pcg32;
 
     /// Numbers of all sizes, both signs, zero and neighbours of powers of two among them.
     fn number(random: &mut Pcg32) -> f32 {
