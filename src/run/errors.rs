@@ -1,7 +1,7 @@
 //! Error: once per scene, integrator and sampler, through the fastest gated structure.
 
 use super::RunError;
-use super::images::Estimator;
+use super::images::{Estimator, misfit};
 use super::session::Session;
 use super::structures::{self, Gated};
 use super::world::World;
@@ -45,9 +45,10 @@ fn rendered(renderer: &Renderer, spps: &[u32], seed: u32) -> Result<Vec<Snapshot
     renderer.render(spps, seed).map_err(|e| e.to_string())
 }
 
-/// The fastest gated structure with these kernels.
+/// The fastest gated structure with these kernels that kernels can import.
 fn fastest<'a>(gated: &'a [Gated], kernels: &Variant) -> Option<&'a Gated> {
     let same = gated.iter().filter(|g| g.cell.kernels == *kernels);
+    let same = same.filter(|g| g.traced.is_inline());
     same.max_by(|a, b| a.speed.total_cmp(&b.speed))
 }
 
@@ -58,8 +59,7 @@ fn reference_structure(
     world: &World,
     gated: &[Gated],
 ) -> Result<Result<Traced, String>, RunError> {
-    let embedded = gated.iter().filter(|g| g.cell.kernels.name.is_empty());
-    if let Some(fastest) = embedded.max_by(|a, b| a.speed.total_cmp(&b.speed)) {
+    if let Some(fastest) = fastest(gated, &Variant::default()) {
         return Ok(Ok(fastest.traced.clone()));
     }
     let mut entries = session.registries.accel.entries().into_iter();
@@ -121,6 +121,12 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         };
         for cell in cells {
             let Some(fastest) = fastest(gated, &cell.kernels) else {
+                let mut same = gated.iter().filter(|g| g.cell.kernels == cell.kernels);
+                let reason = same.find_map(|g| misfit(session, &cell.integrator, &g.traced));
+                if let Some(reason) = reason {
+                    session.write_refused(cell.to_string(), reason)?;
+                    continue;
+                }
                 let reason = "no structure passed the gate with these kernels";
                 session.write_failure(&cell.to_string(), reason.to_owned())?;
                 continue;

@@ -9,6 +9,17 @@ use crate::integrator::{ConfiguredIntegrator, RenderJob, Renderer, Traced};
 use crate::params::Variant;
 use crate::sampling::Sampler;
 
+/// Why an integrator cannot use a structure, if that is so.
+pub(super) fn misfit(session: &Session, integrator: &Variant, traced: &Traced) -> Option<String> {
+    let configured = session.registries.integrators.configured(integrator);
+    let needs_inline = configured.is_ok_and(|i| i.facts.needs_inline);
+    (needs_inline && !traced.is_inline()).then(|| {
+        format!(
+            "the kernel of {integrator} traces rays itself, and this structure answers buffers of rays in passes of its own"
+        )
+    })
+}
+
 /// What is computed per sample, and what draws the samples.
 pub(super) struct Estimator {
     pub sampler: Sampler,

@@ -3,7 +3,7 @@
 
 use super::RunError;
 use super::errors::image_hash;
-use super::images::Estimator;
+use super::images::{Estimator, misfit};
 use super::session::Session;
 use super::structures::Gated;
 use super::world::World;
@@ -83,6 +83,11 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             session.write(&record.with_body(Body::Time))?;
             continue;
         };
+        if let Some(reason) = misfit(session, &cell.integrator, &structure.traced) {
+            session.write_refused(text, reason)?;
+            session.progress.inc(1);
+            continue;
+        }
         session.say(format!("{cell}: compiling"));
         session.lose_device_on_request(world.gpu, &text);
         match compile(session, world, structure, cell.clone()) {
