@@ -6,8 +6,6 @@
 
 use super::GpuError;
 use super::diagnose;
-use crate::accel::Intersection;
-use crate::integrator::RayOffset;
 use crate::text::{cell_hash, nearest};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
@@ -179,9 +177,7 @@ impl KernelLibrary {
     /// A module is missing, does not parse, or the result is not valid WGSL; the message names the
     /// source file and line.
     pub fn compose(&self, composition: &Composition) -> Result<ComposedKernel, GpuError> {
-        // Where nobody chose how rays meet triangles and boxes, and leave surfaces, the defaults do.
-        let composition = Intersection::default().activate(composition.clone());
-        let composition = &RayOffset::default().activate(composition);
+        let composition = &composition.clone().completed();
         let mut resolver = VirtualResolver::new();
         let mut paths = BTreeMap::new();
         for (name, (path, text)) in &self.files {
@@ -287,6 +283,14 @@ fn module_path(name: &str) -> Result<ModulePath, GpuError> {
         })
 }
 
+/// What takes the place of virtual modules that nobody chose, and constants that nobody set: the defaults
+/// of the registries above, whose tests compare.
+const DEFAULT_MODULES: [(&str, &str); 2] = [
+    ("triangle", "accel/triangle/watertight"),
+    ("offset", "integrator/offset/error_bound"),
+];
+const DEFAULT_CONSTANTS: [(&str, u32); 1] = [("BOX_PAD_ULPS", 16)];
+
 /// What goes into one kernel.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Composition {
@@ -313,6 +317,19 @@ impl Composition {
     #[must_use]
     pub fn with(mut self, role: &str, module: &str) -> Self {
         self.active.insert(role.to_owned(), module.to_owned());
+        self
+    }
+
+    /// With the defaults where nobody chose how rays meet triangles and boxes, and leave surfaces.
+    #[must_use]
+    pub fn completed(mut self) -> Self {
+        for (role, module) in DEFAULT_MODULES {
+            let chosen = self.active.entry(role.to_owned());
+            chosen.or_insert_with(|| module.to_owned());
+        }
+        for (name, value) in DEFAULT_CONSTANTS {
+            self.constants.entry(name.to_owned()).or_insert(value);
+        }
         self
     }
 

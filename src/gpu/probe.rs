@@ -2,7 +2,6 @@
 
 use super::compose::Composition;
 use super::{Bindings, Dispatch, Gpu, GpuError, LOOPS_CUT, UniformValues, groups_for};
-use crate::accel::triangle::product_error;
 use serde::{Deserialize, Serialize};
 
 /// Whether the adapter computes like IEEE f32 on the host in the patterns that traversal uses.
@@ -14,8 +13,7 @@ pub struct ArithmeticProbe {
     pub exact_division: bool,
     /// `sqrt(a)` is correctly rounded.
     pub exact_sqrt: bool,
-    /// What rounding takes off a product can be computed exactly: see
-    /// [`crate::accel::triangle::product_error`].
+    /// What rounding takes off a product can be computed exactly, by splitting the factors.
     #[serde(default)]
     pub exact_products: bool,
     /// Denormal numbers are kept, not taken for 0. Hits do not depend on it but for rays and scenes
@@ -83,6 +81,17 @@ pub fn probe_arithmetic(gpu: &Gpu) -> Result<ArithmeticProbe, GpuError> {
             && all(|[_, b, c, _]| product_error(*b, *c, b * c), 5),
         denormals: all(|[.., d]| d * 0.5, 7),
     })
+}
+
+/// What rounding took off the product `p` of `a` and `b`, by splitting the factors; twin of the function in
+/// `kernels/accel/triangle/compensated.wesl`.
+fn product_error(a: f32, b: f32, p: f32) -> f32 {
+    // The upper half of a significand.
+    const UPPER: u32 = 0xffff_f000;
+    let a1 = f32::from_bits(a.to_bits() & UPPER);
+    let b1 = f32::from_bits(b.to_bits() & UPPER);
+    let (a2, b2) = (a - a1, b - b1);
+    a2 * b2 - (((p - a1 * b1) - a2 * b1) - a1 * b2)
 }
 
 /// Turns of the loops that [`probe_loops`] runs: outer and inner.

@@ -156,3 +156,18 @@ impl Stage {
         self.buffers.triangles.intersection = tests;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::Composition;
+    use crate::integrator::RayOffset;
+
+    #[test]
+    fn what_kernels_get_where_nobody_chose_is_what_the_registries_call_default() {
+        let chosen = Intersection::default().activate(Composition::new("x"));
+        let chosen = RayOffset::default().activate(chosen);
+        assert_eq!(Composition::new("x").completed(), chosen);
+        assert_ne!(Composition::new("x"), chosen);
+    }
+}

@@ -129,16 +129,20 @@ fn of_rays(key: &Key, s: &StructureRecord) -> Vec<Value<'static>> {
         let key = key
             .clone()
             .with(axis::RAYS, format::ray_class(timing.class));
-        let work = &timing.counters;
         values.push(Value::new(&key, "mrays-per-s/v1", timing.mrays_s));
-        for (id, value) in [
+        let rays = [
             ("rays/v1", timing.rays as f64),
             ("hit-share/v1", timing.hit_fraction),
-            ("nodes-per-ray/v1", work.nodes),
-            ("box-tests-per-ray/v1", work.box_tests),
-            ("triangle-tests-per-ray/v1", work.triangle_tests),
-            ("deepest-stack/v1", f64::from(work.stack_high_water)),
-        ] {
+        ];
+        let work = timing.counters.iter().flat_map(|work| {
+            [
+                ("nodes-per-ray/v1", work.nodes),
+                ("box-tests-per-ray/v1", work.box_tests),
+                ("triangle-tests-per-ray/v1", work.triangle_tests),
+                ("deepest-stack/v1", f64::from(work.stack_high_water)),
+            ]
+        });
+        for (id, value) in rays.into_iter().chain(work) {
             values.push(Value::exact(&key, id, value));
         }
     }

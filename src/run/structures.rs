@@ -460,7 +460,7 @@ fn time_all(session: &mut Session, world: &World, gated: &mut Vec<Gated>) -> Res
                 ms,
                 wall_ms: samples.wall_ms,
                 mrays_s,
-                counters: per_ray(&work.unwrap_or_default()),
+                counters: work.as_deref().map(per_ray),
             }))
         });
         match (outcome, fault) {

@@ -17,7 +17,8 @@ pub struct Coordinate {
 /// Words before those of the sequence: where the words of the decorrelation begin.
 const HEADER: u32 = 1;
 
-/// The words that kernels read as `sampler_table`: the header, the sequence's, the decorrelation's.
+/// The words that kernels read as the texture `sampler_table`: the header, the sequence's, the
+/// decorrelation's, and zeros up to a whole texel of four.
 /// Lengths are data, not constants, so that neither the number of samples nor that of dimensions
 /// makes another kernel.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,7 +28,9 @@ impl SamplerTable {
     /// A table of the words of a sequence and those of a decorrelation.
     pub fn new(sequence: &[u32], decorrelation: &[u32]) -> Self {
         let header = [HEADER + sequence.len() as u32];
-        Self([&header, sequence, decorrelation].concat())
+        let mut words = [&header, sequence, decorrelation].concat();
+        words.resize(words.len().next_multiple_of(4), 0);
+        Self(words)
     }
 
     /// All words, as the device gets them.
@@ -35,12 +38,16 @@ impl SamplerTable {
         &self.0
     }
 
+    fn word(&self, i: u32) -> u32 {
+        self.0[i as usize]
+    }
+
     /// Word `i` of the sequence.
     ///
     /// # Panics
     /// Beyond the table: a dimension that the sampler was not made for.
     pub fn sequence_word(&self, i: u32) -> u32 {
-        self.0[HEADER as usize + i as usize]
+        self.word(HEADER + i)
     }
 
     /// Word `i` of the decorrelation.
@@ -48,6 +55,6 @@ impl SamplerTable {
     /// # Panics
     /// Beyond the table.
     pub fn decorrelation_word(&self, i: u32) -> u32 {
-        self.0[self.0[0] as usize + i as usize]
+        self.word(self.word(0) + i)
     }
 }

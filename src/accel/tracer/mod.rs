@@ -9,7 +9,7 @@ mod passes;
 mod traced;
 
 pub use batch::{Answers, RayBatch, count_work};
-pub use passes::{TracePasses, TraceSteps};
+pub use passes::{TracePasses, TraceSteps, rays_of_batch};
 pub use traced::{Traced, TriangleBuffers};
 
 use crate::gpu::{Bindings, Composition, Gpu, GpuError, Pipeline, Recording, Storage};

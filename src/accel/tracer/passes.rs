@@ -71,7 +71,7 @@ impl<'a> TraceSteps<'a> {
             .buffer("rays", &buffers.rays)
             .buffer("status", &buffers.status)
             .buffer(answers, &buffers.answers)
-            .uniform("batch", batch(first, count));
+            .uniform("batch", rays_of_batch(first, count));
         Self {
             tracer,
             recording,
@@ -140,6 +140,6 @@ impl<'a> TraceSteps<'a> {
 }
 
 /// The uniform `batch`: which rays of the buffer a kernel looks at.
-pub fn batch(first: u32, count: u32) -> UniformValues {
+pub fn rays_of_batch(first: u32, count: u32) -> UniformValues {
     UniformValues::new().u32("first", first).u32("count", count)
 }

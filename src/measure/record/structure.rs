@@ -103,8 +103,9 @@ pub struct ClassTiming {
     pub wall_ms: Vec<f64>,
     /// Million rays per second, median with interval.
     pub mrays_s: Interval,
-    /// Counted work, from a separate run.
-    pub counters: CountersPerRay,
+    /// Counted work, from a separate run; absent for a structure that counts none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counters: Option<CountersPerRay>,
 }
 
 /// A structure on a scene.

@@ -147,12 +147,12 @@ pub(super) fn structure(scene: &str, accel: &str, mrays: f64, wrong: usize) -> L
         ms: vec![1.0, 1.1, 0.9, 1.0, 1.05, 0.95, 1.0],
         wall_ms: vec![1.2, 1.3, 1.1, 1.2, 1.25, 1.15, 1.2],
         mrays_s: around(mrays * factor, 0.03),
-        counters: CountersPerRay {
+        counters: Some(CountersPerRay {
             nodes: 40.0 / factor,
             box_tests: 80.0 / factor,
             triangle_tests: 5.3,
             stack_high_water: 12,
-        },
+        }),
     };
     let classes = [
         (RayClass::Primary, 1.0),

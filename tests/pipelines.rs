@@ -1,0 +1,208 @@
+//! A structure that answers rays in passes of its own goes through gate, timing, counters, a run and its
+//! report like any other, and nothing in the program knows of it.
+
+mod common;
+#[path = "pipelines/sorted_rays.rs"]
+mod sorted_rays;
+
+use common::{Pcg, assert_same_hits, brute_force, build, default_params, scenes, trace};
+use raystone::accel::{AccelKind, Bvh};
+use raystone::config::{Experiment, Plan};
+use raystone::gpu::KernelLibrary;
+use raystone::measure::record::GateVerdict;
+use raystone::run::{Registries, RunOptions, RunSummary, run, verify};
+use sorted_rays::SortedRays;
+use std::path::{Path, PathBuf};
+
+static SORTED: SortedRays = SortedRays {
+    name: "sorted-rays",
+    counts_work: true,
+};
+static UNCOUNTED: SortedRays = SortedRays {
+    name: "uncounted-rays",
+    counts_work: false,
+};
+
+const EXPERIMENT: &str = r#"
+[run]
+name = "pipelines"
+replicates = 2
+seed = 1
+resolution = [16, 16]
+spp = { pow2 = [0, 1] }
+[axes]
+scene = ["cornell-box"]
+accel = ["bvh", "sorted-rays", "uncounted-rays"]
+sequence = ["pixel-hash"]
+decorrelation = ["none"]
+integrator = ["path"]
+[reference]
+spp = 8
+[timing]
+rounds = 3
+min_warmup_ms = 0
+max_warmup_ms = 1
+rays = 1024
+[gate]
+rays = 1024
+brute_force_tests = 1000
+oracle_rays = 16
+[discrepancy]
+points = 16
+"#;
+
+fn kernel_folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pipelines/kernels")
+}
+
+/// The registries and plan of the experiment with the kernels of a folder.
+fn planned(kernels: &Path) -> (Experiment, Plan, Registries) {
+    let mut registries = Registries::default();
+    registries.accel.register(&SORTED);
+    registries.accel.register(&UNCOUNTED);
+    let kernels = [format!(
+        "axes.kernels=[{:?}]",
+        kernels.display().to_string()
+    )];
+    let experiment = Experiment::parse(EXPERIMENT, "experiment", &kernels, &registries.catalogue());
+    let experiment = experiment.unwrap_or_else(|e| panic!("{e}"));
+    let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d));
+    (
+        experiment,
+        plan.unwrap_or_else(|e| panic!("{e}")),
+        registries,
+    )
+}
+
+fn verdicts(kernels: &Path) -> Vec<(String, GateVerdict)> {
+    let (experiment, plan, registries) = planned(kernels);
+    let verified = verify(
+        &experiment,
+        &plan,
+        &registries,
+        &RunOptions::default(),
+        2000,
+    );
+    let verified = verified.unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(verified.len(), 3);
+    let verdict = |v: raystone::run::Verified| (v.accel.name, v.verdict.expect("a verdict"));
+    verified.into_iter().map(verdict).collect()
+}
+
+#[test]
+fn rays_in_another_order_get_the_same_answers_and_counters() {
+    let library = KernelLibrary::default().with_folder(&kernel_folder());
+    let gpu = common::open(library.expect("the kernels of this test"));
+    if !common::is_exact(&gpu) {
+        return;
+    }
+    let mut random = Pcg::new(5);
+    for case in scenes::degenerate_cases() {
+        let mut rays = scenes::aimed_rays(&mut random, &case.soup, 700);
+        // What is no ray has no key, and an answer all the same.
+        rays[3].origin[1] = f32::NAN;
+        rays[4].direction = [f32::INFINITY, 0.0, f32::NAN];
+        let params = default_params(&Bvh.parameters());
+        let [sorted, plain] = [&SORTED as &dyn AccelKind, &Bvh].map(|kind| {
+            let built = build(kind, &case.soup, &params);
+            ["counters", "any"].map(|feature| trace(&gpu, &*built, &case.soup, &rays, &[feature]))
+        });
+        let expected = brute_force(&case.soup, &rays);
+        assert_same_hits(&case.name.to_string(), &rays, &expected, &sorted[0].hits);
+        assert_eq!(sorted[0].work, plain[0].work, "{}", case.name);
+        assert_eq!(sorted[1].found(), plain[1].found(), "{}", case.name);
+    }
+}
+
+#[test]
+fn the_gate_passes_it_and_sees_a_scatter_that_drops_or_misplaces_a_ray() {
+    if !common::is_exact(common::gpu()) {
+        return;
+    }
+    for (name, verdict) in verdicts(&kernel_folder()) {
+        assert!(verdict.passed, "{name}: {verdict:?}");
+    }
+    let faults = [
+        (
+            "restore",
+            "let ray = batch.first",
+            "if (place == 5u) { return; }\n    let ray = batch.first",
+        ),
+        (
+            "restore",
+            "origins[place];",
+            "origins[place ^ u32(batch.count > 64u)];",
+        ),
+        (
+            "sort",
+            "place + 1u] = rays[ray + 1u]",
+            "place + 1u] = rays[2u * batch.first + 1u]",
+        ),
+        (
+            "starts",
+            "sum += count;",
+            "sum += count - u32(key == 77u && count > 0u);",
+        ),
+    ];
+    for (pass, from, to) in faults {
+        let folder = tempfile::tempdir().expect("a folder");
+        let target = folder.path().join("accel/sorted_rays");
+        std::fs::create_dir_all(&target).expect("a folder");
+        let kernels = kernel_folder().join("accel/sorted_rays");
+        for file in std::fs::read_dir(kernels).expect("the kernels") {
+            let file = file.expect("a kernel").path();
+            let name = file.file_name().expect("a name");
+            let mut text = std::fs::read_to_string(&file).expect("a kernel");
+            if file.file_stem().is_some_and(|stem| stem == pass) {
+                assert_eq!(text.matches(from).count(), 1, "`{from}` in {pass}");
+                text = text.replace(from, to);
+            }
+            std::fs::write(target.join(name), text).expect("a kernel");
+        }
+        for (name, verdict) in verdicts(folder.path()) {
+            let wrong: usize = verdict.classes.iter().map(|class| class.wrong).sum();
+            assert_eq!(wrong == 0, name == "bvh", "{name} with `{to}`: {verdict:?}");
+            assert_eq!(verdict.passed, name == "bvh", "{name} with `{to}`");
+        }
+    }
+}
+
+#[test]
+fn a_run_times_counts_and_reports_it_and_leaves_out_single_kernel_integrators() {
+    let (experiment, plan, registries) = planned(&kernel_folder());
+    let folder = tempfile::tempdir().expect("a folder");
+    let options = RunOptions {
+        out: folder.path().join("out"),
+        ..RunOptions::default()
+    };
+    let summary: RunSummary =
+        run(&experiment, &plan, &registries, &options).unwrap_or_else(|e| panic!("{e}"));
+    let records = std::fs::read_to_string(options.out.join("records.jsonl")).expect("records");
+    let lines: Vec<serde_json::Value> = records
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect();
+    let says = |words: &[&str]| {
+        let with = |line: &&serde_json::Value| {
+            let text = line.to_string();
+            words.iter().all(|word| text.contains(word))
+        };
+        lines.iter().filter(with).count()
+    };
+    assert_eq!(summary.failed, 0, "{records}");
+    for name in ["bvh", "sorted-rays", "uncounted-rays"] {
+        let found = says(&["\"timings\"", "mrays_s", &format!("\"{name}\"")]);
+        assert!(found >= 1, "{name}: {records}");
+    }
+    // Images are made with the structure that kernels can import, and the others are left out.
+    for name in ["sorted-rays", "uncounted-rays"] {
+        assert_eq!(
+            says(&["answers buffers of rays", name]),
+            1,
+            "{name}: {records}"
+        );
+    }
+    let report = raystone::report::write_report(&options.out).expect("a report");
+    let page = std::fs::read_to_string(report.html).expect("the page");
+    assert!(page.contains("sorted-rays") && page.contains("uncounted-rays"));
+}
