@@ -238,7 +238,7 @@ fn planted_faults_are_seen() {
         (
             "        return 1.0;\n",
             "        return 0.0;\n",
-            "Fresnel's equations",
+            "law of reflection",
         ),
         (
             "cos_arriving - eta * cos_refracted",

@@ -132,9 +132,12 @@ const INSIDE: Vec3 = Vec3::new(0.1, -0.2, 0.3);
 fn glass_fault(gpu: &Gpu) -> Option<&'static str> {
     let glass = || Material::dielectric("glass", Vec3::ONE, 1.5);
     let pane = Material::thin_dielectric("pane", Vec3::ONE, 1.5);
+    // Most samples are right to the last bits, and so few are ended by roulette that there may be no error
+    // but rounding.
     let is = |found: Estimate, right: f64| {
-        assert!(found.error < 0.02 * right, "{found:?} proves nothing");
-        found.agrees_with(right)
+        println!("{found:?} for {right}");
+        let margin = 5.0 * found.error + 1e-5 * right;
+        found.error < 0.02 * right && (found.mean - right).abs() < margin
     };
     [
         // What comes in goes out: a ball of glass cannot be seen where all around is equally bright.
@@ -153,10 +156,7 @@ fn a_ball_of_glass_in_the_white_furnace_cannot_be_seen() {
     // What is reflected inside gets out later: half of all light is lost, at one passage each.
     let tinted = Material::dielectric("glass", Vec3::splat(0.5), 1.5);
     let seen = ball(gpu(), tinted, INSIDE);
-    assert!(
-        seen.agrees_with(0.5 * 2.25) && !seen.agrees_with(2.25),
-        "{seen:?}"
-    );
+    assert!((seen.mean - 0.5 * 2.25).abs() < 1e-3, "{seen:?}");
 }
 
 #[test]
