@@ -158,12 +158,19 @@ fn quotes(page: &str) -> Vec<(String, String)> {
 }
 
 #[test]
-fn the_page_quotes_files_as_they_are() {
-    let page =
-        std::fs::read_to_string(root().join("docs/adding-a-structure.md")).expect("the page");
-    let quotes = quotes(&page);
-    assert!(quotes.len() >= 5, "only {} quotes", quotes.len());
-    for (file, quoted) in &quotes {
+fn the_pages_quote_files_as_they_are() {
+    let pages = [("adding-a-structure", 5), ("adding-an-integrator", 3)];
+    for (page, least) in pages {
+        let file = root().join("docs").join(page).with_extension("md");
+        let page = std::fs::read_to_string(file).expect("the page");
+        let quotes = quotes(&page);
+        assert!(quotes.len() >= least, "only {} quotes", quotes.len());
+        check_quotes(&quotes);
+    }
+}
+
+fn check_quotes(quotes: &[(String, String)]) {
+    for (file, quoted) in quotes {
         let text = std::fs::read_to_string(root().join(file));
         let text = text.unwrap_or_else(|e| panic!("{file}: {e}"));
         assert!(

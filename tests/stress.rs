@@ -5,8 +5,9 @@ mod support;
 
 use raystone::accel::triangle::TriangleTest;
 use raystone::gpu::{Gpu, probe_arithmetic};
-use raystone::report::{stress_tables, write_stress_page};
-use raystone::stress::record::{CellRecord, Record, read, write};
+use raystone::measure::record::{Key, axis};
+use raystone::stress::record::{Line, read, write};
+use raystone::stress::report::{stress_tables, write_stress_page};
 use raystone::stress::targets::{cells, shots};
 use raystone::stress::{StressOptions, run};
 use std::process::Command;
@@ -25,26 +26,29 @@ fn small() -> StressOptions {
     }
 }
 
-fn run_small(gpu: &Gpu) -> Vec<Record> {
+fn run_small(gpu: &Gpu) -> Vec<Line> {
     run(std::slice::from_ref(gpu), &small(), &|_| ()).expect("the suite runs")
 }
 
 #[test]
 fn a_small_suite_finds_no_difference_from_brute_force_and_writes_tables_records_and_a_page() {
     let records = run_small(gpu());
-    let cells: Vec<&CellRecord> = cells(&records).collect();
+    let cells: Vec<_> = cells(&records).collect();
+    let family = |key: &Key| key.label(axis::FAMILY).to_owned();
     // Four families: the default test through three structures, the other one through two.
     assert_eq!(cells.len(), 4 * (3 + 2));
     let exact = probe_arithmetic(gpu()).expect("the probe runs").is_exact();
     for cell in &cells {
         assert!(cell.rays > 0 && !cell.rungs.is_empty());
-        if exact && cell.family != "non-finite" {
-            let what = format!("{} {} {}", cell.triangle, cell.accel, cell.family);
-            assert_eq!(cell.differing, 0, "{what}: {:?}", cell.worst);
+        if exact && family(cell.key) != "non-finite" {
+            assert_eq!(cell.differing, 0, "{}: {:?}", cell.key, cell.worst);
         }
         assert!(cell.failures.is_empty(), "{:?}", cell.failures);
     }
-    let edges = cells.iter().find(|c| c.family == "edges").expect("a cell");
+    let edges = cells
+        .iter()
+        .find(|c| family(c.key) == "edges")
+        .expect("a cell");
     assert!(
         edges
             .t_ulp
@@ -92,7 +96,7 @@ fn a_test_that_refuses_rays_through_edges_is_seen_to_leak() {
         assert!(series.confirmed > 0 && series.worst.is_some(), "{series:?}");
     }
     let edges = cells(&records)
-        .find(|c| c.family == "edges" && c.accel == "bvh")
+        .find(|c| c.key.label(axis::FAMILY) == "edges" && c.key.label(axis::ACCEL) == "bvh")
         .expect("a cell");
     assert!(edges.cracks > 0 && edges.differing > 0, "{edges:?}");
 }

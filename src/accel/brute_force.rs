@@ -5,10 +5,10 @@ use super::intersection::Reciprocal;
 use super::ray::{Hit, Ray};
 use super::triangle::watertight::{Shear, products, shear, sheared};
 use super::triangle::{TriangleRecord, TriangleTest, intersect_triangle};
+use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, TriangleSoup,
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, StructureStats, TriangleSoup,
 };
-use crate::accel::StructureStats;
 use crate::oracle::{GROUP, Groups, Line};
 use crate::params::{ParameterSchema, Params};
 use rayon::prelude::*;
@@ -77,38 +77,19 @@ impl BuiltAccel for Built {
     }
 
     fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin { soup }))
+        Some(Box::new(Twin(self, soup)))
     }
 }
 
-struct Twin<'a> {
-    soup: &'a TriangleSoup,
-}
-
-impl CpuTwin for Twin<'_> {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        let ray = &self.soup.intersection.raised(ray);
-        let inverse = self.soup.intersection.inverse(ray.direction);
-        let mut hit = Hit::miss(ray);
-        for triangle in &self.soup.records {
-            counters.triangle_tests += 1;
-            intersect_triangle(triangle, ray, inverse, &mut hit);
-        }
-        hit
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        let ray = &self.soup.intersection.raised(ray);
-        let inverse = self.soup.intersection.inverse(ray.direction);
-        let mut hit = Hit::miss(ray);
-        for triangle in &self.soup.records {
-            counters.triangle_tests += 1;
-            intersect_triangle(triangle, ray, inverse, &mut hit);
-            if hit.triangle != super::NO_HIT {
-                return true;
+impl Traverse for Built {
+    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+        for triangle in &soup.records {
+            query.test(triangle);
+            if query.is_answered() {
+                break;
             }
         }
-        false
+        query.hit
     }
 }
 
@@ -139,43 +120,18 @@ impl Block {
     /// products in the same order, or all of them where signs are not cheaper than the test itself.
     fn candidates(&self, ray: &Ray, inverse: &Reciprocal) -> u32 {
         match inverse.triangle {
-            TriangleTest::MoellerTrumbore => mask(std::array::from_fn(|l| self.triple(l, ray))),
             TriangleTest::Watertight | TriangleTest::Compensated => {
                 let s = shear(ray, inverse);
                 mask(std::array::from_fn(|l| self.sheared(l, &s)))
             }
-            TriangleTest::BaldwinWeber | TriangleTest::Pluecker => (1 << LANES) - 1,
+            _ => (1 << LANES) - 1,
         }
-    }
-
-    fn vertex(&self, vertex: usize, lane: usize) -> [f32; 3] {
-        [0, 1, 2].map(|axis| self.vertices[vertex][axis][lane])
-    }
-
-    /// The scalar triple products of [`TriangleTest::MoellerTrumbore`].
-    fn triple(&self, lane: usize, ray: &Ray) -> u32 {
-        let [dx, dy, dz] = ray.direction;
-        let [v0, v1, v2] = [0, 1, 2].map(|vertex| self.vertex(vertex, lane));
-        let [cx, cy, cz] = [0, 1, 2].map(|a| v0[a] - ray.origin[a]);
-        let [e1x, e1y, e1z] = [0, 1, 2].map(|a| v0[a] - v1[a]);
-        let [e2x, e2y, e2z] = [0, 1, 2].map(|a| v2[a] - v0[a]);
-        let (nx, ny, nz) = (
-            e1y * e2z - e1z * e2y,
-            e1z * e2x - e1x * e2z,
-            e1x * e2y - e1y * e2x,
-        );
-        let (rx, ry, rz) = (dy * cz - dz * cy, dz * cx - dx * cz, dx * cy - dy * cx);
-        let det = nx * dx + ny * dy + nz * dz;
-        let sign = det.to_bits() & 0x8000_0000;
-        let u = f32::from_bits((rx * e2x + ry * e2y + rz * e2z).to_bits() ^ sign);
-        let v = f32::from_bits((rx * e1x + ry * e1y + rz * e1z).to_bits() ^ sign);
-        let area = det.abs();
-        u32::from(area > 0.0) & u32::from(u >= 0.0) & u32::from(v >= 0.0) & u32::from(u + v <= area)
     }
 
     /// The compared products of [`TriangleTest::Watertight`].
     fn sheared(&self, lane: usize, s: &Shear) -> u32 {
-        let vertices = [0, 1, 2].map(|vertex| sheared(s, self.vertex(vertex, lane)));
+        let vertices = [0, 1, 2]
+            .map(|vertex| sheared(s, [0, 1, 2].map(|axis| self.vertices[vertex][axis][lane])));
         let (p, q) = products(vertices);
         let all = |compare: fn(&f32, &f32) -> bool| {
             (0..3).fold(1, |all, i| all & u32::from(compare(&p[i], &q[i])))

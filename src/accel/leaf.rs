@@ -2,11 +2,10 @@
 //! as indices into the canonical buffer (less memory). Twin of `kernels/accel/leaf.wesl`.
 
 use super::bounds::Bounds;
-use super::intersection::Reciprocal;
-use super::ray::{Hit, Ray};
 use super::tree::Coverage;
-use super::triangle::{TriangleRecord, intersect_triangle};
-use super::{AccelError, Counters, NamedWords, TriangleSoup};
+use super::triangle::TriangleRecord;
+use super::twin::Query;
+use super::{AccelError, NamedWords, TriangleSoup};
 
 /// Marks a reference to a leaf; bits 26–30 hold its count, bits 0–25 its first place.
 pub const LEAF: u32 = 0x8000_0000;
@@ -45,13 +44,7 @@ impl Leaves {
     /// # Errors
     /// More entries than a reference can address, with both numbers.
     pub fn new(soup: &TriangleSoup, order: &[u32], indexed: bool) -> Result<Self, AccelError> {
-        if order.len() as u64 > u64::from(FIRST_MASK) {
-            return Err(AccelError::Limit {
-                what: "triangles in the leaves".into(),
-                needed: order.len() as u64,
-                limit: FIRST_MASK.into(),
-            });
-        }
+        AccelError::check_limit("triangles in the leaves", order.len() as u64, FIRST_MASK)?;
         let record = |&id: &u32| soup.records[id as usize];
         Ok(if indexed {
             Self::Indexed(order.to_vec())
@@ -71,16 +64,8 @@ impl Leaves {
     /// The array for the GPU.
     pub fn words(&self) -> NamedWords<'_> {
         match self {
-            Self::Gathered(records) => NamedWords {
-                name: "leaf_triangles",
-                words: bytemuck::cast_slice(records).into(),
-                element_bytes: 48,
-            },
-            Self::Indexed(indices) => NamedWords {
-                name: "leaf_indices",
-                words: indices.as_slice().into(),
-                element_bytes: 4,
-            },
+            Self::Gathered(records) => NamedWords::new("leaf_triangles", records),
+            Self::Indexed(indices) => NamedWords::new("leaf_indices", indices),
         }
     }
 
@@ -135,30 +120,11 @@ impl LeafReader<'_> {
         }
     }
 
-    /// Tests `count` triangles from place `first` on.
-    pub fn test_triangles(
-        &self,
-        (first, count): (usize, usize),
-        ray: &Ray,
-        inverse: Reciprocal,
-        hit: &mut Hit,
-        counters: &mut Counters,
-    ) {
-        for place in first..first + count {
-            counters.triangle_tests += 1;
-            intersect_triangle(self.load_leaf_triangle(place), ray, inverse, hit);
-        }
-    }
-
     /// Tests the triangles of the leaf that `reference` names.
-    pub fn test_leaf(
-        &self,
-        reference: u32,
-        ray: &Ray,
-        inverse: Reciprocal,
-        hit: &mut Hit,
-        counters: &mut Counters,
-    ) {
-        self.test_triangles(leaf_range(reference), ray, inverse, hit, counters);
+    pub fn test_leaf(self, reference: u32, query: &mut Query) {
+        let (first, count) = leaf_range(reference);
+        for place in first..first + count {
+            query.test(self.load_leaf_triangle(place));
+        }
     }
 }

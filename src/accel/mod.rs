@@ -6,14 +6,13 @@ pub mod bounds;
 mod brute_force;
 mod bvh;
 mod bvh4;
-mod collapse;
 mod cwbvh;
 mod grid;
-pub mod instancing;
-pub mod intersection;
+mod instancing;
+mod intersection;
 mod irregular_grid;
 mod kd_tree;
-pub mod leaf;
+mod leaf;
 mod octree;
 pub mod ray;
 mod registry;
@@ -22,13 +21,14 @@ mod stats;
 pub mod tracer;
 pub mod tree;
 pub mod triangle;
+pub mod twin;
 mod two_level_grid;
 mod uniform_grid;
 pub mod watch;
 mod wide;
 
 pub use brute_force::{BruteForce, brute_force_hits};
-pub use bvh::{BuiltBvh, Bvh, BvhTwin, RopedBvh};
+pub use bvh::{BuiltBvh, Bvh, RopedBvh};
 pub use bvh4::Bvh4;
 pub use cwbvh::Cwbvh;
 pub use instancing::{InstanceJudge, MetaBvh, ObjectList, Placed, brute_force_instances};
@@ -42,12 +42,14 @@ pub use stats::{BuildLog, LEAF_HISTOGRAM_END, Phase, StructureStats, leaf_histog
 pub use tracer::{
     Answers, Ask, Query, RayBatch, TracePasses, TraceSteps, Traced, Tracer, TriangleBuffers,
 };
+pub use twin::{Counters, CpuTwin};
 pub use two_level_grid::TwoLevelGrid;
 pub use uniform_grid::UniformGrid;
 
 use crate::gpu::{Composition, UniformValues};
 use crate::params::{ParamError, ParameterSchema, Params};
 use crate::scene::SceneData;
+use bytemuck::NoUninit;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -79,6 +81,39 @@ pub enum AccelError {
     /// A structural invariant is violated.
     #[error("{0}")]
     Invalid(String),
+}
+
+impl AccelError {
+    /// [`AccelError::Limit`] if `needed` is more than `limit`.
+    ///
+    /// # Errors
+    /// It is, with both numbers.
+    pub fn check_limit(
+        what: impl Into<String>,
+        needed: impl Into<u64>,
+        limit: impl Into<u64>,
+    ) -> Result<(), Self> {
+        let (what, needed, limit) = (what.into(), needed.into(), limit.into());
+        if needed <= limit {
+            return Ok(());
+        }
+        Err(Self::Limit {
+            what,
+            needed,
+            limit,
+        })
+    }
+
+    /// [`AccelError::Invalid`] unless `holds`.
+    ///
+    /// # Errors
+    /// It does not; `what` says what is violated.
+    pub(crate) fn ensure(holds: bool, what: impl FnOnce() -> String) -> Result<(), Self> {
+        match holds {
+            true => Ok(()),
+            false => Err(Self::Invalid(what())),
+        }
+    }
 }
 
 /// The triangles of a scene as structures see them: the canonical records.
@@ -175,6 +210,17 @@ pub struct NamedWords<'a> {
     pub element_bytes: u32,
 }
 
+impl<'a> NamedWords<'a> {
+    /// An array whose memory is laid out like the GPU's; a record names the size of its elements.
+    pub fn new<T: NoUninit>(name: &'static str, elements: &'a [T]) -> Self {
+        Self {
+            name,
+            words: bytemuck::cast_slice(elements).into(),
+            element_bytes: size_of::<T>() as u32,
+        }
+    }
+}
+
 /// What a structure hands to the GPU.
 #[derive(Debug, Clone, Default)]
 pub struct GpuBuffers<'a> {
@@ -224,35 +270,6 @@ impl GpuBuffers<'_> {
     pub fn bytes(&self) -> u64 {
         self.arrays.iter().map(|a| a.words.len() as u64 * 4).sum()
     }
-}
-
-/// Counted work of one ray. Twin of `kernels/common/counters.wesl`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Counters {
-    /// Nodes or cells visited.
-    pub nodes: u32,
-    /// Ray–box tests.
-    pub box_tests: u32,
-    /// Ray–triangle tests.
-    pub triangle_tests: u32,
-    /// Deepest stack, entries.
-    pub stack_high_water: u32,
-}
-
-impl Counters {
-    /// Counts the visit of a node or cell, given its place among the structure's own.
-    pub(crate) fn visit(&mut self, place: usize) {
-        self.nodes += 1;
-        watch::note(watch::Event::Node(place as u32));
-    }
-}
-
-/// The traversal of a kernel in scalar Rust: the same hits, the same counters.
-pub trait CpuTwin: Sync {
-    /// Nearest hit, ties decided for the lowest triangle index.
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit;
-    /// Whether anything is hit.
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool;
 }
 
 /// A kind of structure: one static per structure, one line in the registry.

@@ -147,11 +147,13 @@ pub(super) fn touches(corners: &Corners, cell: &Bounds) -> bool {
     meets && Overlap::new(corners, half).touches(centre)
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+/// Scalar product.
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+/// Vector product.
+pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],

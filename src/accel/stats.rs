@@ -40,6 +40,22 @@ pub struct StructureStats {
     pub bytes: u64,
 }
 
+impl StructureStats {
+    /// Leaves, references and histogram of cells that list so many triangles; all else is left 0.
+    pub(super) fn of_cells(lengths: impl Iterator<Item = usize>) -> Self {
+        let mut stats = Self::default();
+        let counted = lengths.inspect(|&length| {
+            stats.leaves += u64::from(length > 0);
+            stats.references += length as u64;
+        });
+        let leaf_histogram = leaf_histogram(counted);
+        Self {
+            leaf_histogram,
+            ..stats
+        }
+    }
+}
+
 /// Timed phases of a build, and the device for those that use it.
 #[derive(Clone, Default)]
 pub struct BuildLog {

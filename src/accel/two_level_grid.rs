@@ -6,16 +6,14 @@
 //! One loop walks both levels: it steps through the parts of a top cell until it leaves the cell, and
 //! then finds its place in the next one.
 
-use super::bounds::enter_box;
 use super::grid::lists::{Lists, PartLists, check_lists};
-use super::grid::{Cut, Frame, Grid, areas, check_words, clamped, finest, first_axis, outside};
-use super::ray::{Hit, NO_HIT, Ray};
-use super::triangle::intersect_triangle;
+use super::grid::{Cut, Grid, GridBox, areas, check_words, clamped, finest, first_axis, outside};
+use super::ray::Hit;
+use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
     TriangleSoup,
 };
-use crate::accel::StructureStats;
 use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use rayon::prelude::*;
 
@@ -62,9 +60,9 @@ impl AccelKind for TwoLevelGrid {
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
         let params = &params.completed(&self.parameters())?;
-        let frame = log.phase("bounds", || Frame::new(soup));
-        let resolution = frame.resolution(soup.records.len(), params.number("lambda1"), 4096);
-        let grid = Grid::new(&frame, resolution);
+        let grid_box = log.phase("bounds", || GridBox::new(soup));
+        let resolution = grid_box.resolution(soup.records.len(), params.number("lambda1"), 4096);
+        let grid = Grid::new(&grid_box, resolution);
         let top = Lists::new(self.name(), &grid, soup, true, log)?;
         let lambda = params.number("lambda2");
         let built = log.phase("parts", || cut(grid, soup, &top, lambda))?;
@@ -255,17 +253,12 @@ impl BuiltAccel for Built {
             self.grid.resolution[a] as usize * (parts.max().unwrap_or(1) as usize + 2)
         };
         let steps = 2 * (0..3).map(column).sum::<usize>();
-        let array = |name, words| NamedWords {
-            name,
-            words,
-            element_bytes: 4,
-        };
         GpuBuffers {
             kernel: "accel/two_level_grid",
             features: Vec::new(),
             arrays: vec![
-                array("cells", self.cells.as_slice().into()),
-                array("references", self.references.as_slice().into()),
+                NamedWords::new("cells", &self.cells),
+                NamedWords::new("references", &self.references),
             ],
             uniforms: vec![
                 self.grid.uniform(),
@@ -279,23 +272,15 @@ impl BuiltAccel for Built {
         let parts = (self.cells.len() - self.first_part() - 1) as u64;
         StructureStats {
             nodes: self.grid.cells() + parts,
-            leaves: self.lengths().filter(|&l| l > 0).count() as u64,
-            references: self.references.len() as u64,
-            leaf_histogram: super::leaf_histogram(self.lengths()),
             depth: Some(1),
             bytes: self.buffers().bytes(),
-            ..Default::default()
+            ..StructureStats::of_cells(self.lengths())
         }
     }
 
     fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin { built: self, soup }))
+        Some(Box::new(Twin(self, soup)))
     }
-}
-
-struct Twin<'a> {
-    built: &'a Built,
-    soup: &'a TriangleSoup,
 }
 
 /// Cell of a top cell's grid at `place`, in top cells.
@@ -303,43 +288,38 @@ fn find_part(place: [f32; 3], top: [u32; 3], parts: [u32; 3]) -> [u32; 3] {
     std::array::from_fn(|a| clamped((place[a] - top[a] as f32) * parts[a] as f32, parts[a]))
 }
 
-impl Twin<'_> {
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let grid = &self.built.grid;
-        let ray = &self.soup.intersection.raised(ray);
-        let inverse = self.soup.intersection.inverse(ray.direction);
-        let mut hit = Hit::miss(ray);
-        counters.box_tests += 1;
-        let Some(enter) = enter_box(&grid.bounds, ray, inverse, ray.t_max) else {
-            return hit;
+impl Traverse for Built {
+    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+        let grid = &self.grid;
+        let Some(enter) = query.enter(&grid.bounds) else {
+            return query.hit;
         };
+        let ray = query.ray;
+        let inverse = query.inverse;
         let forward = inverse.map(|i| i >= 0.0);
-        let entry = grid.in_cells(ray, enter);
+        let entry = grid.in_cells(&ray, enter);
         let mut top: [u32; 3] = std::array::from_fn(|a| clamped(entry[a], grid.resolution[a]));
-        let (mut first, mut resolution) = self.built.top(top);
+        let (mut first, mut resolution) = self.top(top);
         let mut parts = resolution.map(|r| r.max(1));
         let mut part = find_part(entry, top, parts);
         loop {
             // The place of the cell's first part.
-            counters.visit(first as usize);
+            query.visit(first as usize);
             if resolution[0] != 0 {
                 let place = first + (part[2] * parts[1] + part[1]) * parts[0] + part[0];
-                for &id in self.built.list(place as usize) {
-                    counters.triangle_tests += 1;
-                    intersect_triangle(&self.soup.records[id as usize], ray, inverse, &mut hit);
-                }
+                query.test_list(soup, self.list(place as usize).iter().copied());
             }
-            if any && hit.triangle != NO_HIT {
-                return hit;
+            if query.is_answered() {
+                return query.hit;
             }
             let planes = std::array::from_fn(|a| {
                 top[a] as f32 + (part[a] + u32::from(forward[a])) as f32 / parts[a] as f32
             });
-            let next = grid.distances(ray, *inverse, planes);
+            let next = grid.distances(&ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
             // The exit must lie clearly behind the hit: an equally near one may wait next door.
-            if hit.t * inverse.pad < leave {
-                return hit;
+            if query.hit.t * inverse.pad < leave {
+                return query.hit;
             }
             let axis = first_axis(next, leave);
             let step = if forward[axis] { 1 } else { -1 };
@@ -349,22 +329,12 @@ impl Twin<'_> {
             }
             top[axis] = top[axis].wrapping_add_signed(step);
             if outside(top, grid.resolution) {
-                return hit;
+                return query.hit;
             }
-            (first, resolution) = self.built.top(top);
+            (first, resolution) = self.top(top);
             parts = resolution.map(|r| r.max(1));
-            part = find_part(grid.in_cells(ray, leave), top, parts);
+            part = find_part(grid.in_cells(&ray, leave), top, parts);
             part[axis] = if forward[axis] { 0 } else { parts[axis] - 1 };
         }
-    }
-}
-
-impl CpuTwin for Twin<'_> {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.trace(ray, false, counters)
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.trace(ray, true, counters).triangle != NO_HIT
     }
 }

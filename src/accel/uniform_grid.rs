@@ -9,16 +9,14 @@
 //! nearest hit. With `skip = chebyshev` an empty cell knows how far the nearest list is, and the walk
 //! leaves the whole empty cube around it at once.
 
-use super::bounds::enter_box;
 use super::grid::lists::{Lists, check_lists};
-use super::grid::{Frame, Grid, check_words, clamped, distance, first_axis, outside};
-use super::ray::{Hit, NO_HIT, Ray};
-use super::triangle::intersect_triangle;
+use super::grid::{Grid, GridBox, check_words, clamped, distance, first_axis, outside};
+use super::ray::{Hit, Ray};
+use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
     TriangleSoup,
 };
-use crate::accel::StructureStats;
 use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use rayon::prelude::*;
 
@@ -72,9 +70,9 @@ impl AccelKind for UniformGrid {
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
         let params = &params.completed(&self.parameters())?;
-        let frame = log.phase("bounds", || Frame::new(soup));
-        let resolution = frame.resolution(soup.records.len(), params.number("lambda"), 4096);
-        let grid = Grid::new(&frame, resolution);
+        let grid_box = log.phase("bounds", || GridBox::new(soup));
+        let resolution = grid_box.resolution(soup.records.len(), params.number("lambda"), 4096);
+        let grid = Grid::new(&grid_box, resolution);
         let exact = params.flag("exact_overlap");
         let Lists { starts, references } = Lists::new(self.name(), &grid, soup, exact, log)?;
         check_words("cells of a uniform-grid", starts.len() as u64)?;
@@ -127,18 +125,20 @@ impl Built {
     }
 
     fn check_order(&self) -> Result<(), AccelError> {
-        let wrong = |text: String| Err(AccelError::Invalid(text));
         let cells = self.grid.cells() as usize;
-        if self.cells.len() != cells + 1 || self.start(cells) != self.references.len() {
-            return wrong("the cells do not cover the references".to_owned());
-        }
+        let is_covered =
+            self.cells.len() == cells + 1 && self.start(cells) == self.references.len();
+        AccelError::ensure(is_covered, || {
+            "the cells do not cover the references".into()
+        })?;
         for cell in 0..cells {
-            if self.start(cell) > self.start(cell + 1) {
-                return wrong(format!("cell {cell}: its list runs backwards"));
-            }
-            if self.skip && self.list(cell).is_empty() == (self.cells[cell] >> START_BITS == 0) {
-                return wrong(format!("cell {cell}: its distance contradicts its list"));
-            }
+            AccelError::ensure(self.start(cell) <= self.start(cell + 1), || {
+                format!("cell {cell}: its list runs backwards")
+            })?;
+            let is_near = self.cells[cell] >> START_BITS == 0;
+            AccelError::ensure(!self.skip || self.list(cell).is_empty() != is_near, || {
+                format!("cell {cell}: its distance contradicts its list")
+            })?;
         }
         Ok(())
     }
@@ -161,16 +161,8 @@ impl BuiltAccel for Built {
             kernel: "accel/uniform_grid",
             features: if self.skip { vec!["skip"] } else { Vec::new() },
             arrays: vec![
-                NamedWords {
-                    name: "cells",
-                    words: self.cells.as_slice().into(),
-                    element_bytes: 4,
-                },
-                NamedWords {
-                    name: "references",
-                    words: self.references.as_slice().into(),
-                    element_bytes: 4,
-                },
+                NamedWords::new("cells", &self.cells),
+                NamedWords::new("references", &self.references),
             ],
             uniforms: vec![
                 self.grid.uniform(),
@@ -181,20 +173,16 @@ impl BuiltAccel for Built {
     }
 
     fn stats(&self) -> StructureStats {
-        let cells = self.grid.cells() as usize;
-        let lengths = || (0..cells).map(|cell| self.list(cell).len());
+        let lengths = (0..self.grid.cells() as usize).map(|cell| self.list(cell).len());
         StructureStats {
-            nodes: cells as u64,
-            leaves: lengths().filter(|&l| l > 0).count() as u64,
-            references: self.references.len() as u64,
-            leaf_histogram: super::leaf_histogram(lengths()),
+            nodes: self.grid.cells(),
             bytes: self.buffers().bytes(),
-            ..Default::default()
+            ..StructureStats::of_cells(lengths)
         }
     }
 
     fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin { built: self, soup }))
+        Some(Box::new(Twin(self, soup)))
     }
 }
 
@@ -216,66 +204,46 @@ fn jump(
     })
 }
 
-struct Twin<'a> {
-    built: &'a Built,
-    soup: &'a TriangleSoup,
-}
-
-impl Twin<'_> {
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let grid = &self.built.grid;
-        let ray = &self.soup.intersection.raised(ray);
-        let inverse = self.soup.intersection.inverse(ray.direction);
-        let mut hit = Hit::miss(ray);
-        counters.box_tests += 1;
-        let Some(enter) = enter_box(&grid.bounds, ray, inverse, ray.t_max) else {
-            return hit;
+impl Traverse for Built {
+    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+        let grid = &self.grid;
+        let Some(enter) = query.enter(&grid.bounds) else {
+            return query.hit;
         };
+        let ray = query.ray;
+        let inverse = query.inverse;
         let forward = inverse.map(|i| i >= 0.0);
-        let entry = grid.in_cells(ray, enter);
+        let entry = grid.in_cells(&ray, enter);
         let mut cell: [u32; 3] = std::array::from_fn(|a| clamped(entry[a], grid.resolution[a]));
         loop {
             let index = grid.index(cell) as usize;
-            counters.visit(index);
-            for &id in self.built.list(index) {
-                counters.triangle_tests += 1;
-                intersect_triangle(&self.soup.records[id as usize], ray, inverse, &mut hit);
-            }
-            if any && hit.triangle != NO_HIT {
-                return hit;
+            query.visit(index);
+            query.test_list(soup, self.list(index).iter().copied());
+            if query.is_answered() {
+                return query.hit;
             }
             // Cells that can be left at once: the cube of empty ones, or this cell alone.
-            let reach = self.built.reach(index);
+            let reach = self.reach(index);
             let planes: [f32; 3] = std::array::from_fn(|a| {
                 let plane = if forward[a] { reach } else { 1 - reach };
                 (cell[a] as i32 + plane) as f32
             });
-            let next = grid.distances(ray, *inverse, planes);
+            let next = grid.distances(&ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
             // The exit must lie clearly behind the hit: an equally near one may wait next door.
-            if hit.t * inverse.pad < leave {
-                return hit;
+            if query.hit.t * inverse.pad < leave {
+                return query.hit;
             }
             let axis = first_axis(next, leave);
             let step = if forward[axis] { reach } else { -reach };
             let beyond = cell[axis].wrapping_add_signed(step);
             if reach > 1 {
-                cell = jump(grid, ray, leave, reach, cell, forward);
+                cell = jump(grid, &ray, leave, reach, cell, forward);
             }
             cell[axis] = beyond;
             if outside(cell, grid.resolution) {
-                return hit;
+                return query.hit;
             }
         }
-    }
-}
-
-impl CpuTwin for Twin<'_> {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.trace(ray, false, counters)
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.trace(ray, true, counters).triangle != NO_HIT
     }
 }

@@ -3,9 +3,10 @@
 use super::failure::Failure;
 use super::output::{print, warn};
 use clap::Args;
-use raystone::measure::record::{PARTIAL, RECORDS_FILE};
-use raystone::report::{write_report, write_stress_page};
-use raystone::stress::record as stress;
+use raystone::measure::record::{PARTIAL, RECORDS_FILE, STRESS_FILE};
+use raystone::report::write_report;
+use raystone::stress::record::read;
+use raystone::stress::report::write_stress_page;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -18,9 +19,9 @@ pub struct Report {
 
 impl Report {
     pub fn execute(self) -> Result<ExitCode, Failure> {
-        let is_suite = self.dir.join(stress::FILE).exists();
+        let is_suite = self.dir.join(STRESS_FILE).exists();
         if is_suite && !self.dir.join(RECORDS_FILE).exists() {
-            let records = stress::read(&self.dir).map_err(Failure::input)?;
+            let records = read(&self.dir).map_err(Failure::input)?;
             let page = write_stress_page(&self.dir, &records)?;
             print(&format!("report: {}\n", page.display()))?;
             return Ok(ExitCode::SUCCESS);

@@ -5,11 +5,12 @@ use super::failure::{FAILED, Failure};
 use super::faults::plant_faults;
 use super::output::{print, tell, warn};
 use clap::Args;
+use raystone::measure::record::Verdict;
 use raystone::params::{Params, Variant};
-use raystone::report::{stress_tables, write_stress_page};
 use raystone::run::{Registries, lock_folder};
 use raystone::scene::{LoadOptions, load};
-use raystone::stress::record::{Record, write};
+use raystone::stress::record::{Line, Record, write};
+use raystone::stress::report::{stress_tables, write_stress_page};
 use raystone::stress::{StressOptions, run};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -33,7 +34,7 @@ pub struct Stress {
     /// Family; may be given many times [default: all, and the shots]
     #[arg(long)]
     family: Vec<String>,
-    /// Rays a case [default: 512, quick 128]
+    /// Rays per case [default: 512, quick 128]
     #[arg(long, value_name = "N")]
     rays: Option<usize>,
     /// Shots at each closed mesh, 0 for none [default: 1000000, quick 16384]
@@ -77,7 +78,7 @@ impl Stress {
         let progress =
             |what: &str| tell(&format!("{:6.1} s  {what}", start.elapsed().as_secs_f64()));
         let records = run(&gpus, &settings, &progress).map_err(Failure::input)?;
-        write(&self.out, &records).map_err(Failure::input)?;
+        write(&self.out, &records)?;
         let page = write_stress_page(&self.out, &records)?;
         print(&format!(
             "{}report: {}\n",
@@ -121,6 +122,6 @@ fn check_model(model: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-fn is_missed_target(record: &Record) -> bool {
-    matches!(record, Record::Target(target) if target.passed == Some(false))
+fn is_missed_target(line: &Line) -> bool {
+    matches!(&line.body, Record::Target(target) if target.verdict == Verdict::Fail)
 }

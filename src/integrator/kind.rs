@@ -1,5 +1,7 @@
 //! What an integrator is, and what the others have to know of it.
 
+use super::{ImageSteps, Traced};
+use crate::gpu::{Bindings, Composition, GpuError};
 use crate::params::{ParamError, ParameterSchema, Params, Variant};
 use crate::sampling::Demand;
 use thiserror::Error;
@@ -62,8 +64,11 @@ pub trait Integrator: Sync {
     fn name(&self) -> &'static str;
     /// One line: what it computes.
     fn description(&self) -> &'static str;
-    /// Module of the kernel that exports `radiance`, relative to the kernel folder.
-    fn kernel(&self) -> &'static str;
+    /// Module of the kernel that exports `radiance`, relative to the kernel folder: what an integrator of one
+    /// kernel is. One that records passes of its own needs none.
+    fn kernel(&self) -> &'static str {
+        ""
+    }
     /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
     fn sources(&self) -> &'static [(&'static str, &'static str)] {
         &[]
@@ -78,6 +83,21 @@ pub trait Integrator: Sync {
     }
     /// What others have to know of it.
     fn facts(&self, params: &Params) -> IntegratorFacts;
+    /// Buffers between its passes: names of kernel variables, and bytes for each sample of a slice of the
+    /// image. What they hold at first is unspecified.
+    fn scratch(&self) -> &'static [(&'static str, u64)] {
+        &[]
+    }
+    /// Records the passes that add the samples of a slice to the sums, sample after sample within a pixel,
+    /// so that the image does not depend on slices. With no rows they are recorded, too, to be compiled, and not
+    /// played.
+    ///
+    /// # Errors
+    /// A kernel does not compose or compile.
+    fn record(&self, steps: &mut ImageSteps) -> Result<(), GpuError> {
+        let kernel = Composition::new("integrator/render").with("integrator", self.kernel());
+        steps.run("render", kernel, steps.pixels(), &Bindings::new())
+    }
 }
 
 /// Why there is no such integrator.
@@ -127,6 +147,16 @@ impl ConfiguredIntegrator {
             kind,
             facts: kind.facts(&params),
             params,
+        })
+    }
+
+    /// Why it cannot render through this structure, if so.
+    pub fn refusal(&self, traced: &Traced) -> Option<String> {
+        (self.facts.needs_inline && !traced.is_inline()).then(|| {
+            format!(
+                "{} calls the structure from its own kernel, and this structure answers buffers of rays alone",
+                self.kind.name()
+            )
         })
     }
 

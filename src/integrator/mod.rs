@@ -4,6 +4,7 @@ mod builtin;
 pub mod integrand;
 mod kind;
 pub mod offset;
+mod passes;
 mod registry;
 mod render;
 mod slice;
@@ -16,6 +17,7 @@ pub use kind::{
     RAY_COUNT_CLASSES,
 };
 pub use offset::RayOffset;
+pub use passes::ImageSteps;
 pub use registry::IntegratorRegistry;
 pub use render::{BLOCK_SAMPLES, RenderJob, Renderer, Snapshot, rounding_bound, with_sampler};
 pub use stage::{Stage, StageError};

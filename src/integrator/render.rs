@@ -1,27 +1,26 @@
-//! The renderer: runs an image kernel in slices of about a quarter of a second and keeps the sum at
-//! every power of two of samples, so that one run yields the error at spp = 1, 2, 4, ….
+//! The renderer: plays the passes of an integrator in slices of about a quarter of a second and keeps the
+//! sum at every power of two of samples, so that one run yields the error at spp = 1, 2, 4, ….
 //!
 //! Every image that it hands out was checked: no kernel raised its error word, and every pixel took
 //! exactly the samples asked for.
 
 use super::kind::ConfiguredIntegrator;
+use super::passes::{ImageSteps, Passes};
 use super::slice::{Slice, job_uniform};
 use super::tables::SceneBuffers;
 use crate::accel::Traced;
 use crate::geometry::Camera;
-use crate::gpu::{
-    Bindings, Composition, Dispatch, Elapsed, Gpu, GpuError, Pipeline, UniformValues,
-};
+use crate::gpu::{Composition, Elapsed, Gpu, GpuError, Player, Recording, Slices, UniformValues};
 use crate::image::Image;
 use crate::sampling::Sampler;
+use crate::text::cell_hash;
 use std::cell::{Cell, RefCell};
 use std::ops::Range;
-use std::sync::Arc;
 
-/// No dispatch should run longer than this, so that no watchdog strikes and progress moves.
-const SLICE_MS: f64 = 250.0;
-/// Samples per millisecond that the first slice assumes: slow, so that it is short.
-const CAUTIOUS_RATE: f64 = 100.0;
+/// Samples of the first slice: few, it may be slow.
+const FIRST_SLICE: u64 = 25_000;
+/// Bytes that a buffer between passes may take at most, below the adapter's limit.
+const SCRATCH_BYTES: u64 = 1 << 28;
 
 /// Samples of a pixel that are summed in f32 on the device before the host adds the sum in f64. Blocks
 /// begin at multiples of it, so that an image does not depend on slices.
@@ -70,11 +69,11 @@ struct Band {
 /// A compiled job on one scene and structure.
 pub struct Renderer<'a> {
     gpu: &'a Gpu,
-    width: u32,
-    height: u32,
+    player: Player,
+    size: [u32; 2],
+    integrator: ConfiguredIntegrator,
     uniform: UniformValues,
-    pipeline: Arc<Pipeline>,
-    bindings: Bindings,
+    passes: Passes,
     bands: Vec<Band>,
     status: wgpu::Buffer,
     /// Samples per pixel since the last reset.
@@ -83,9 +82,10 @@ pub struct Renderer<'a> {
     pending: Cell<u32>,
     /// The sums of the blocks before; empty if there were none.
     blocks: RefCell<Vec<[f64; 3]>>,
-    /// Samples per millisecond seen so far.
-    rate: Cell<f64>,
-    /// GPU milliseconds and wall milliseconds of all dispatches since the last reset.
+    slices: Slices,
+    /// Samples for which the buffers between passes have room.
+    most: u64,
+    /// GPU milliseconds and wall milliseconds of all slices since the last reset.
     spent: Cell<Elapsed>,
 }
 
@@ -106,31 +106,6 @@ fn bands(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<Vec<Band>, GpuError> {
         .collect()
 }
 
-/// The composition of a job's kernel.
-fn composition(
-    traced: &Traced,
-    scene: &SceneBuffers,
-    job: &RenderJob,
-    ray_counts: bool,
-) -> Composition {
-    let kernel = scene
-        .triangles
-        .intersection
-        .activate(Composition::new("integrator/render"));
-    let kernel = traced.compose(scene.offset.activate(kernel));
-    let mut out = with_sampler(kernel, job.sampler)
-        .with("integrator", job.integrator.kind.kernel())
-        .feature("ray_counts", ray_counts);
-    for (name, on) in scene.features.flags() {
-        out = out.feature(name, on);
-    }
-    out = scene.bindings.merged(&traced.bindings).compose(out);
-    for (name, value) in job.integrator.kind.constants(&job.integrator.params) {
-        out = out.constant(name, value);
-    }
-    out
-}
-
 /// Puts a sampler into a kernel that draws; its words are bound as `sampler_table`.
 #[must_use]
 pub fn with_sampler(mut composition: Composition, sampler: &Sampler) -> Composition {
@@ -142,12 +117,22 @@ pub fn with_sampler(mut composition: Composition, sampler: &Sampler) -> Composit
         .with("decorrelation", sampler.decorrelation.kernel())
 }
 
+/// Samples for which an integrator's buffers between passes have room.
+fn most_samples(gpu: &Gpu, scratch: &[(&str, u64)]) -> u64 {
+    let limit = gpu
+        .limits
+        .max_storage_buffer_binding_size
+        .min(SCRATCH_BYTES);
+    let fitting = scratch.iter().map(|(_, bytes)| limit / (*bytes).max(1));
+    fitting.min().unwrap_or(u64::MAX)
+}
+
 impl<'a> Renderer<'a> {
-    /// Compiles the job's kernel and makes its buffers.
+    /// Compiles the job's kernels and makes its buffers.
     ///
     /// # Errors
-    /// The kernel does not compose or compile, or the scene or one row of the image is too large for a
-    /// buffer.
+    /// A kernel does not compose or compile, the integrator needs another kind of structure, or the scene or
+    /// one row of the image is too large for a buffer.
     pub fn new(
         gpu: &'a Gpu,
         scene: &SceneBuffers,
@@ -155,82 +140,79 @@ impl<'a> Renderer<'a> {
         job: &RenderJob,
         ray_counts: bool,
     ) -> Result<Self, GpuError> {
-        let pipeline = gpu.pipeline(
-            &composition(traced, scene, job, ray_counts),
-            job.runtime_checks,
-        )?;
-        let bands = bands(gpu, job.size)?;
+        if let Some(reason) = job.integrator.refusal(traced) {
+            return Err(GpuError::Kernel(reason));
+        }
         let status = gpu.zeroed("status", 64)?;
-        let mut bindings = scene.bindings.merged(&traced.bindings);
-        bindings.buffer("status", &status).buffer(
-            "sampler_table",
-            &gpu.storage("sampler_table", job.sampler.table.words())?,
-        );
-        Ok(Self {
+        let renderer = Self {
             gpu,
-            width: job.size[0],
-            height: job.size[1],
+            player: Player::new(gpu),
+            size: job.size,
+            integrator: job.integrator.clone(),
             uniform: job_uniform(job, scene),
-            pipeline,
-            bindings,
-            bands,
+            passes: Passes::new(gpu, scene, traced, job, &status, ray_counts)?,
+            bands: bands(gpu, job.size)?,
             status,
             done: Cell::new(0),
             pending: Cell::new(0),
             blocks: RefCell::default(),
-            rate: Cell::new(CAUTIOUS_RATE),
+            slices: Slices::starting_with(FIRST_SLICE),
+            most: most_samples(gpu, job.integrator.kind.scratch()),
             spent: Cell::default(),
-        })
+        };
+        if let Some(band) = renderer.bands.first() {
+            renderer.record(&mut Recording::new(), band, &Slice::default())?;
+        }
+        Ok(renderer)
     }
 
-    /// Feature flags of the kernel.
+    /// Feature flags of the kernels.
     pub fn features(&self) -> Vec<String> {
-        self.pipeline
-            .kernel
-            .composition
-            .features
-            .iter()
-            .cloned()
-            .collect()
+        self.passes.features()
     }
 
-    /// Text of the composed kernel.
-    pub fn kernel_text(&self) -> &str {
-        &self.pipeline.kernel.wgsl
+    /// Texts of the composed kernels.
+    pub fn kernel_text(&self) -> String {
+        let texts = self.passes.texts();
+        let texts: Vec<String> = texts.into_iter().map(|(_, text)| text).collect();
+        texts.join("\n")
     }
 
-    /// BLAKE3 of that text.
+    /// BLAKE3 of the text of the one kernel, or of the names and texts of all passes.
     pub fn kernel_hash(&self) -> String {
-        self.pipeline.kernel.hash()
+        let texts = self.passes.texts();
+        match &texts[..] {
+            [(_, only)] => blake3::hash(only.as_bytes()).to_hex().to_string(),
+            all => {
+                let parts: Vec<_> = all.iter().map(|(p, t)| (p.as_str(), t.as_str())).collect();
+                cell_hash(&parts)
+            }
+        }
     }
 
     /// Clears the sum, the error word, the ray counts and the clock.
-    pub fn reset(&self) {
-        let mut encoder = self
-            .gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.clear_buffer(&self.status, 0, None);
-        self.gpu.queue.submit([encoder.finish()]);
-        self.clear_sums();
+    ///
+    /// # Errors
+    /// The device is lost or hangs.
+    pub fn reset(&self) -> Result<(), GpuError> {
+        let mut recording = Recording::new();
+        recording.clear(&self.status);
+        self.clear_sums(&mut recording);
+        self.player.play(&recording)?;
+        self.pending.set(0);
         self.done.set(0);
         self.blocks.borrow_mut().clear();
         self.spent.set(Elapsed {
             gpu_ms: self.gpu.timestamp_period.map(|_| 0.0),
             wall_ms: 0.0,
         });
+        Ok(())
     }
 
-    fn clear_sums(&self) {
-        let mut encoder = self
-            .gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    fn clear_sums(&self, recording: &mut Recording) {
         for band in &self.bands {
-            encoder.clear_buffer(&band.sums, 0, None);
+            recording.clear(&band.sums);
         }
-        self.gpu.queue.submit([encoder.finish()]);
-        self.pending.set(0);
     }
 
     /// Adds samples `first … first + count - 1` to every pixel, in slices.
@@ -256,14 +238,19 @@ impl<'a> Renderer<'a> {
         Ok(())
     }
 
-    /// Samples of all pixels that a dispatch has time for. Where a driver ends loops, one alone, so
-    /// that only a sample that needs more turns than the driver allows is refused.
+    /// Samples, pixels times samples per pixel, of a slice.
+    fn fitting(&self) -> u64 {
+        self.slices.fitting().min(self.most)
+    }
+
+    /// Samples of all pixels that a slice has time for. Where a driver ends loops, one alone, so that only
+    /// a sample that needs more turns than the driver allows is refused.
     fn samples_at_once(&self) -> u32 {
         if self.gpu.loop_limit.is_some() {
             return 1;
         }
-        let pixels = f64::from(self.width) * f64::from(self.height);
-        ((self.rate.get() * SLICE_MS / pixels) as u32).max(1)
+        let [width, height] = self.size.map(u64::from);
+        (self.fitting() / (width * height).max(1)).clamp(1, u64::from(BLOCK_SAMPLES)) as u32
     }
 
     fn add_to_band(
@@ -273,42 +260,54 @@ impl<'a> Renderer<'a> {
         samples: u32,
         seed: u32,
     ) -> Result<(), GpuError> {
-        let mut bindings = self.bindings.clone();
-        bindings.buffer("accumulation", &band.sums);
         let mut row = band.rows.start;
         while row < band.rows.end {
-            let row_samples = f64::from(self.width) * f64::from(samples);
-            let fitting = (self.rate.get() * SLICE_MS / row_samples) as u32;
-            let rows = (fitting / 8 * 8).max(8).min(band.rows.end - row);
+            let row_samples = u64::from(self.size[0]) * u64::from(samples);
+            let fitting = self.fitting() / row_samples.max(1) / 8 * 8;
+            let rows = fitting.clamp(8, 1 << 31) as u32;
             let slice = Slice {
                 band_row: band.rows.start,
                 first_row: row,
-                rows,
+                rows: rows.min(band.rows.end - row),
                 first_sample,
                 samples,
                 seed,
             };
-            self.run_slice(&mut bindings, &slice)?;
-            row += rows;
+            self.run_slice(band, &slice)?;
+            row += slice.rows;
         }
         Ok(())
     }
 
-    fn run_slice(&self, bindings: &mut Bindings, slice: &Slice) -> Result<(), GpuError> {
-        bindings.uniform("frame", slice.uniform(&self.uniform));
-        let groups = [self.width.div_ceil(8), slice.rows.div_ceil(8), 1];
-        let elapsed = self.gpu.run(&Dispatch {
-            pipeline: &self.pipeline,
-            bindings,
-            groups,
-        })?;
-        let work = f64::from(self.width) * f64::from(slice.rows) * f64::from(slice.samples);
-        self.rate.set(work / elapsed.ms().max(1e-3));
-        let spent = self.spent.get();
-        self.spent.set(Elapsed {
-            gpu_ms: spent.gpu_ms.zip(elapsed.gpu_ms).map(|(a, b)| a + b),
-            wall_ms: spent.wall_ms + elapsed.wall_ms,
-        });
+    fn record(
+        &self,
+        recording: &mut Recording,
+        band: &Band,
+        slice: &Slice,
+    ) -> Result<(), GpuError> {
+        let kind = self.integrator.kind;
+        let of_job = (self.size[0], &self.uniform);
+        let (sums, scratch) = (&band.sums, kind.scratch());
+        kind.record(&mut ImageSteps::new(
+            &self.passes,
+            recording,
+            of_job,
+            slice,
+            sums,
+            scratch,
+        ))
+    }
+
+    fn run_slice(&self, band: &Band, slice: &Slice) -> Result<(), GpuError> {
+        let mut recording = Recording::new();
+        self.record(&mut recording, band, slice)?;
+        let elapsed = self.player.play(&recording)?.elapsed();
+        let row_samples = u64::from(self.size[0]) * u64::from(slice.samples);
+        self.slices
+            .learn(row_samples * u64::from(slice.rows), elapsed);
+        let mut spent = self.spent.get();
+        spent += elapsed;
+        self.spent.set(spent);
         Ok(())
     }
 
@@ -322,7 +321,7 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// As for [`Renderer::image`], or the driver complains.
     pub fn render(&self, spps: &[u32], seed: u32) -> Result<Vec<Snapshot>, GpuError> {
-        self.reset();
+        self.reset()?;
         let mut done = 0;
         let mut out = Vec::with_capacity(spps.len());
         for &spp in spps {
@@ -347,8 +346,8 @@ impl<'a> Renderer<'a> {
         let count = f64::from(self.done.get());
         let mean = |total: &[f64; 3]| total.map(|sum| (sum / count) as f32);
         Ok(Image {
-            width: self.width,
-            height: self.height,
+            width: self.size[0],
+            height: self.size[1],
             pixels: totals.iter().map(mean).collect(),
         })
     }
@@ -356,7 +355,10 @@ impl<'a> Renderer<'a> {
     /// Takes the sums of a whole block over to the host.
     fn close_block(&self) -> Result<(), GpuError> {
         self.add_pending(&mut self.blocks.borrow_mut())?;
-        self.clear_sums();
+        let mut recording = Recording::new();
+        self.clear_sums(&mut recording);
+        self.player.play(&recording)?;
+        self.pending.set(0);
         Ok(())
     }
 
@@ -370,13 +372,20 @@ impl<'a> Renderer<'a> {
 
     /// Adds the sums on the device to those of the blocks before, if they are sound.
     fn add_pending(&self, totals: &mut Vec<[f64; 3]>) -> Result<(), GpuError> {
-        self.gpu.check_error_word(self.error_word()?)?;
-        let [width, height] = [self.width, self.height].map(|edge| edge as usize);
+        let mut recording = Recording::new();
+        recording.download("status", &self.status);
+        for (index, band) in self.bands.iter().enumerate() {
+            recording.download(&index.to_string(), &band.sums);
+        }
+        let played = self.player.play(&recording)?;
+        let status: Vec<u32> = played.download("status")?;
+        self.gpu.check_error_word(status[0])?;
+        let [width, height] = self.size.map(|edge| edge as usize);
         totals.resize(width * height, [0.0; 3]);
         let wanted = self.pending.get();
         let (mut wrong, mut first) = (0, None);
-        for band in &self.bands {
-            let sums: Vec<[f32; 4]> = self.gpu.read(&band.sums)?;
+        for (index, band) in self.bands.iter().enumerate() {
+            let sums: Vec<[f32; 4]> = played.download(&index.to_string())?;
             let [start, end] = [band.rows.start, band.rows.end].map(|row| row as usize * width);
             let pixels = totals[start..end].iter_mut().zip(&sums);
             for (pixel, (total, [r, g, b, taken])) in (start..).zip(pixels) {

@@ -5,7 +5,7 @@ use super::tables::SceneBuffers;
 use crate::gpu::UniformValues;
 
 /// The rows and samples of one dispatch.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Slice {
     /// First row of the band whose sums are bound.
     pub band_row: u32,

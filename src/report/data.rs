@@ -1,8 +1,8 @@
 //! Records sorted by what they speak of: scene, integrator, sampler.
 
-use super::format;
 use super::samplers::Sampler;
 use crate::measure::figure::{FIGURES, Figure, figure};
+use crate::measure::gate::fault_text;
 use crate::measure::record::*;
 use std::borrow::Cow;
 
@@ -298,33 +298,12 @@ impl StructureRecord {
         let Some(gate) = &self.gate else {
             return Some("not gated".into());
         };
-        if gate.passed {
-            return None;
-        }
-        let wrong: usize = gate.classes.iter().map(|class| class.wrong).sum();
-        let rays: usize = gate.classes.iter().map(|class| class.rays).sum();
-        let mut faults = Vec::new();
-        if wrong > 0 {
-            faults.push(format!(
-                "{} of {} rays differ",
-                format::count(wrong as u64),
-                format::count(rays as u64)
-            ));
-        }
-        if gate.brute_force.wrong + gate.oracle.wrong > 0 {
-            faults.push("the judge itself is wrong".into());
-        }
-        faults.extend(gate.structural.iter().cloned());
-        faults.extend(gate.kernel_errors.iter().cloned());
-        Some(if faults.is_empty() {
-            "gate not passed".into()
-        } else {
-            faults.join("; ")
-        })
+        (!gate.passed).then(|| fault_text(gate, None))
     }
 }
 
-fn without_repeats(names: Vec<String>) -> Vec<String> {
+/// The names, each once, in their order.
+pub fn without_repeats(names: Vec<String>) -> Vec<String> {
     let mut kept: Vec<String> = Vec::new();
     for name in names {
         if !kept.contains(&name) {

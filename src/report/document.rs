@@ -1,9 +1,10 @@
 //! The report as a document that HTML, Markdown and the terminal show alike.
 
 use super::ReportError;
+use super::format;
 use super::plot::drawing::Drawing;
 use super::plot::paint::{to_png, to_svg};
-use crate::measure::record::Verdict;
+use crate::measure::record::{Interval, Verdict};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -160,6 +161,17 @@ impl Cell {
             text: text.into(),
             detail: detail.into(),
             tone: Tone::Plain,
+        }
+    }
+
+    /// A figure with three digits and its interval, if it has one; a dash if it is absent.
+    pub fn of(figure: Option<Interval>) -> Self {
+        match figure {
+            Some(i) if i.low < i.high => {
+                Self::with_detail(format::number(i.value), format::bounds(&i))
+            }
+            Some(i) => format::number(i.value).into(),
+            None => format::ABSENT.into(),
         }
     }
 

@@ -17,13 +17,11 @@ pub mod point_page;
 pub mod ruling;
 pub mod samplers;
 pub mod sections;
-pub mod stress;
 pub mod terminal;
 #[cfg(test)]
 mod tests;
 pub mod values;
 
-pub use stress::{stress_tables, write_stress_page};
 pub use terminal::{failed_checks, terminal_tables};
 
 use crate::atomic::write_atomic;
@@ -108,7 +106,11 @@ pub fn write_page(
     Ok((html, plots))
 }
 
-fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
+/// Writes a file of a report whole or not at all.
+///
+/// # Errors
+/// [`ReportError::Write`].
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
     write_atomic(path, bytes).map_err(|source| ReportError::Write {
         path: path.into(),
         source,

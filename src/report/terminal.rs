@@ -29,10 +29,8 @@ pub fn terminal_tables(records: &[Line]) -> String {
     if data.run.is_some_and(|run| run.environment.software) {
         out += "Software adapter: times compare structures on this adapter only.\n";
     }
-    for check in belief::checks(&data)
-        .into_iter()
-        .chain(run::overhead_check(&data))
-    {
+    out += &run::overhead(&data).map_or(String::new(), |text| text + "\n");
+    for check in belief::checks(&data) {
         out += &format!(
             "{}  {}: {}\n",
             check.verdict.word(),

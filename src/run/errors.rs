@@ -1,7 +1,7 @@
 //! Error: once per scene, integrator and sampler, through the fastest gated structure.
 
 use super::RunError;
-use super::images::Estimator;
+use super::images::{self, Estimator};
 use super::session::Session;
 use super::structures::{self, Gated};
 use super::world::World;
@@ -45,20 +45,26 @@ fn rendered(renderer: &Renderer, spps: &[u32], seed: u32) -> Result<Vec<Snapshot
     renderer.render(spps, seed).map_err(|e| e.to_string())
 }
 
-/// The fastest gated structure with these kernels.
-fn fastest<'a>(gated: &'a [Gated], kernels: &Variant) -> Option<&'a Gated> {
-    let same = gated.iter().filter(|g| g.cell.kernels == *kernels);
-    same.max_by(|a, b| a.speed.total_cmp(&b.speed))
+/// The fastest gated structure with the kernels of a cell that its integrator can use.
+fn fastest<'a>(session: &Session, gated: &'a [Gated], cell: &SamplerCell) -> Option<&'a Gated> {
+    let fits = |g: &&Gated| {
+        g.cell.kernels == cell.kernels
+            && images::unfit(session, &cell.integrator, &g.traced).is_none()
+    };
+    let fitting = gated.iter().filter(fits);
+    fitting.max_by(|a, b| a.speed.total_cmp(&b.speed))
 }
 
 /// What references are rendered through: the fastest structure that passed with the embedded kernels, so
-/// that a fault of other kernels is not in both images. A run of other kernels alone gets a plain BVH.
+/// that a fault of other kernels is not in both images, and that all integrators can use. A run without one
+/// gets a plain BVH.
 fn reference_structure(
     session: &mut Session,
     world: &World,
     gated: &[Gated],
 ) -> Result<Result<Traced, String>, RunError> {
-    let embedded = gated.iter().filter(|g| g.cell.kernels.name.is_empty());
+    let embedded = gated.iter();
+    let embedded = embedded.filter(|g| g.cell.kernels.name.is_empty() && g.traced.is_inline());
     if let Some(fastest) = embedded.max_by(|a, b| a.speed.total_cmp(&b.speed)) {
         return Ok(Ok(fastest.traced.clone()));
     }
@@ -120,9 +126,16 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             }
         };
         for cell in cells {
-            let Some(fastest) = fastest(gated, &cell.kernels) else {
-                let reason = "no structure passed the gate with these kernels";
-                session.write_failure(&cell.to_string(), reason.to_owned())?;
+            let Some(fastest) = fastest(session, gated, &cell) else {
+                let mut same = gated.iter().filter(|g| g.cell.kernels == cell.kernels);
+                let unfit = same.find_map(|g| images::unfit(session, &cell.integrator, &g.traced));
+                match unfit {
+                    Some(reason) => session.write_refused(cell.to_string(), reason)?,
+                    None => {
+                        let reason = "no structure passed the gate with these kernels";
+                        session.write_failure(&cell.to_string(), reason.to_owned())?;
+                    }
+                }
                 continue;
             };
             session.lose_device_on_request(world.gpu, &cell.to_string());

@@ -8,8 +8,7 @@
 
 use super::RunError;
 use crate::atomic::write_atomic;
-use crate::measure::record::{Body, InterruptedRecord, Line, PARTIAL, RECORDS_FILE};
-use crate::stress::record::FILE as STRESS_FILE;
+use crate::measure::record::{Body, InterruptedRecord, Line, PARTIAL, RECORDS_FILE, STRESS_FILE};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};

@@ -9,6 +9,12 @@ use crate::integrator::{ConfiguredIntegrator, RenderJob, Renderer, Traced};
 use crate::params::Variant;
 use crate::sampling::Sampler;
 
+/// Why an integrator cannot render through a structure, if so: such a cell is left out.
+pub(super) fn unfit(session: &Session, integrator: &Variant, traced: &Traced) -> Option<String> {
+    let integrator = session.registries.integrators.configured(integrator);
+    integrator.ok()?.refusal(traced)
+}
+
 /// What is computed per sample, and what draws the samples.
 pub(super) struct Estimator {
     pub sampler: Sampler,

@@ -89,6 +89,9 @@ pub fn render(
     let pair = (&cell.sequence, &cell.decorrelation);
     let estimator = Estimator::new(&session, pair, &cell.integrator, spp);
     let estimator = estimator.map_err(RunError::Input)?;
+    if let Some(reason) = estimator.integrator.refusal(&traced) {
+        return Err(RunError::Input(format!("{}: {reason}", cell.accel)));
+    }
     let job = estimator.job(&session, camera, true);
     let renderer = Renderer::new(gpu, &stage.buffers, &traced, &job, true)?;
     let mut rendering = Rendering {
@@ -148,7 +151,7 @@ fn add_all_samples(
         session.progress.set_style(style);
     }
     session.progress.set_length(u64::from(spp));
-    renderer.reset();
+    renderer.reset()?;
     let start = Instant::now();
     let (mut done, mut shown, mut last) = (0, 0, start);
     loop {

@@ -3,7 +3,7 @@
 
 use super::RunError;
 use super::errors::image_hash;
-use super::images::Estimator;
+use super::images::{self, Estimator};
 use super::session::Session;
 use super::structures::Gated;
 use super::world::World;
@@ -30,7 +30,7 @@ struct Timed<'a> {
 
 impl Measured for Timed<'_> {
     fn measure(&self) -> Result<Elapsed, GpuError> {
-        self.renderer.reset();
+        self.renderer.reset()?;
         self.renderer.add_samples(0, self.spp, self.seed)?;
         self.renderer.check()?;
         let elapsed = self.renderer.spent();
@@ -54,98 +54,97 @@ fn key(cell: &TimeCell, space: Space) -> String {
 
 /// All full cells of a scene.
 pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Result<(), RunError> {
-    let cells: Vec<TimeCell> = session
-        .plan
-        .times
-        .iter()
-        .filter(|c| c.scene == *world.variant)
-        .cloned()
-        .collect();
+    let cells = session.plan.times.iter();
+    let cells = cells.filter(|c| c.scene == *world.variant && !session.is_done(&c.to_string()));
     let mut timed = Vec::new();
-    for cell in cells {
-        let text = cell.to_string();
-        if session.is_done(&text) {
-            continue;
-        }
-        let Some(structure) = gated.iter().find(|g| g.cell.accel == cell.accel) else {
-            if let Some(reason) = refusal(session, &cell) {
-                session.write_refused(text, reason)?;
-                continue;
-            }
-            let record = empty_record(
-                session,
-                world,
-                &cell,
-                "its structure did not pass the gate".to_owned(),
-            );
-            session.failed += 1;
-            session.finish(text);
-            session.write(&record.with_body(Body::Time))?;
-            continue;
-        };
-        session.say(format!("{cell}: compiling"));
-        session.lose_device_on_request(world.gpu, &text);
-        match compile(session, world, structure, cell.clone()) {
-            Ok(item) => timed.push(item),
-            Err(reason) => fail(session, world, &cell, reason)?,
-        }
-        session.progress.inc(1);
+    for cell in cells.cloned().collect::<Vec<_>>() {
+        timed.extend(prepare(session, world, gated, cell)?);
         if world.gpu.lost().is_some() {
             return Ok(());
         }
     }
     session.say(format!("{}: timing full cells", world.variant));
-    let (timing, seed) = (
-        session.experiment.timing,
-        u64::from(session.experiment.seed),
-    );
+    let timing = session.experiment.timing;
+    let seed = u64::from(session.experiment.seed);
     let progress = session.progress.clone();
-    let samples = match session.clock.time("gpu", || {
+    let samples = session.clock.time("gpu", || {
         interleave(&timed, &timing, seed, || progress.inc(1))
-    }) {
+    });
+    let samples = match samples {
         Ok(samples) => samples,
         Err((index, error)) => {
-            return fail(
-                session,
-                world,
-                &timed[index].cell.clone(),
-                error.to_string(),
-            );
+            return fail(session, world, &timed[index].cell, error.to_string());
         }
     };
     let mut shared = Shared::default();
     for (item, samples) in timed.iter().zip(samples) {
         let structure = gated.iter().find(|g| g.cell.accel == item.cell.accel);
-        if let Err(error) = &samples
-            && error.is_refusal()
-        {
-            session.write_refused(item.cell.to_string(), error.to_string())?;
-            continue;
-        }
-        let measured = samples.map_err(|e| e.to_string());
-        let record = measured
-            .and_then(|samples| finish(session, world, structure, item, samples, &mut shared));
-        match record {
-            Ok(record) => {
-                let hash = cell_hash(&[
-                    ("scene", &world.scene.hash),
-                    (
-                        "cell",
-                        &serde_json::to_string(&(&item.cell.accel, &item.cell.integrator))
-                            .unwrap_or_default(),
-                    ),
-                    ("kernel", item.renderer.kernel_text()),
-                    ("device", &format!("{:?}", world.gpu.info)),
-                    ("version", env!("CARGO_PKG_VERSION")),
-                ]);
-                session.failed += usize::from(record.body.failure.is_some());
-                session.finish(item.cell.to_string());
-                session.write(&record.hashed(hash).with_body(Body::Time))?;
+        let record = match samples {
+            Err(error) if error.is_refusal() => {
+                session.write_refused(item.cell.to_string(), error.to_string())?;
+                continue;
             }
+            Err(error) => Err(error.to_string()),
+            Ok(samples) => finish(session, world, structure, item, samples, &mut shared),
+        };
+        match record {
+            Ok(record) => write(session, world, item, record)?,
             Err(reason) => fail(session, world, &item.cell, reason)?,
         }
     }
     Ok(())
+}
+
+/// Compiles a cell. One that cannot be timed has its record then.
+fn prepare<'a>(
+    session: &mut Session,
+    world: &'a World,
+    gated: &[Gated],
+    cell: TimeCell,
+) -> Result<Option<Timed<'a>>, RunError> {
+    let text = cell.to_string();
+    let Some(structure) = gated.iter().find(|g| g.cell.accel == cell.accel) else {
+        match refusal(session, &cell) {
+            Some(reason) => session.write_refused(text, reason)?,
+            None => {
+                let reason = "its structure did not pass the gate".to_owned();
+                fail(session, world, &cell, reason)?;
+            }
+        }
+        return Ok(None);
+    };
+    session.say(format!("{cell}: compiling"));
+    session.lose_device_on_request(world.gpu, &text);
+    let unfit = images::unfit(session, &cell.integrator, &structure.traced);
+    if let Some(reason) = unfit {
+        session.write_refused(text, reason)?;
+        return Ok(None);
+    }
+    let compiled = compile(session, world, structure, cell.clone());
+    session.progress.inc(1);
+    match compiled {
+        Ok(item) => Ok(Some(item)),
+        Err(reason) => fail(session, world, &cell, reason).map(|()| None),
+    }
+}
+
+fn write(
+    session: &mut Session,
+    world: &World,
+    item: &Timed,
+    record: Line<TimeRecord>,
+) -> Result<(), RunError> {
+    let pair = serde_json::to_string(&(&item.cell.accel, &item.cell.integrator));
+    let hash = cell_hash(&[
+        ("scene", &world.scene.hash),
+        ("cell", &pair.unwrap_or_default()),
+        ("kernel", &item.renderer.kernel_text()),
+        ("device", &format!("{:?}", world.gpu.info)),
+        ("version", env!("CARGO_PKG_VERSION")),
+    ]);
+    session.failed += usize::from(record.body.failure.is_some());
+    session.finish(item.cell.to_string());
+    session.write(&record.hashed(hash).with_body(Body::Time))
 }
 
 /// Why the driver cannot run the structure of a cell, if that is so.
@@ -265,7 +264,7 @@ fn count_rays(
 ) -> Result<([u64; 4], String), String> {
     let renderer = renderer(session, world, structure, &item.cell, [true, true])?;
     let counted = session.clock.time("gpu", || {
-        renderer.reset();
+        renderer.reset()?;
         renderer.add_samples(0, item.spp, item.seed)?;
         Ok((renderer.ray_counts()?, image_hash(&renderer.image()?)))
     });

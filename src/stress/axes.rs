@@ -5,7 +5,7 @@ use super::bench::{self, Expected};
 use super::case::{self, Random, ray};
 use super::families::Family;
 use super::place::Place;
-use super::record::{BoxTestRecord, CostRecord, OffsetRecord, Record, Worst};
+use super::record::{BoxTestRecord, CostRecord, Line, OffsetRecord, Record, Worst};
 use super::shapes::{Mesh, cube, sphere};
 use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite};
 use crate::accel::triangle::TriangleTest;
@@ -16,6 +16,7 @@ use crate::accel::{
 use crate::gpu::Gpu;
 use crate::integrator::offset::{TransformError, position_error};
 use crate::integrator::{RayOffset, Stage};
+use crate::measure::record::{Key, Ran, axis};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -49,7 +50,7 @@ impl Suite<'_> {
     ///
     /// # Errors
     /// The device is lost or hangs.
-    pub fn box_tests(&self, progress: &Progress) -> Result<Vec<Record>, StressError> {
+    pub fn box_tests(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
         progress("box tests");
         let structures = match self.settings.quick {
             true => &BOX_STRUCTURES[..BOX_STRUCTURES_IF_QUICK],
@@ -59,7 +60,7 @@ impl Suite<'_> {
             .filter(|kind| structures.contains(&kind.name()))
             .map(|kind| {
                 let tests = BoxTest::ALL.iter();
-                let empty = tests.map(|(test, name, _)| empty_record(*test, name, *kind));
+                let empty = tests.map(|(test, ..)| empty_record(*test));
                 (*kind, empty.collect())
             })
             .collect();
@@ -73,9 +74,16 @@ impl Suite<'_> {
                 })?;
             }
         }
-        let records = (0..BoxTest::ALL.len())
-            .flat_map(|test| columns.iter().map(move |(_, column)| &column[test]));
-        Ok(records.cloned().map(Record::BoxTest).collect())
+        let mut lines = Vec::new();
+        for (place, (_, name, _)) in BoxTest::ALL.iter().enumerate() {
+            for (kind, column) in &columns {
+                let key = Key::default().with(axis::BOX_TEST, name);
+                let key = key.with(axis::ACCEL, kind.name());
+                let record = Record::BoxTest(column[place].clone());
+                lines.push(Line::new(key, Ran::default(), record));
+            }
+        }
+        Ok(lines)
     }
 
     fn box_case(
@@ -91,7 +99,7 @@ impl Suite<'_> {
             return Ok(());
         };
         let traced = Traced::upload(&stage.gpu, &*built)?;
-        for ((box_test, ..), record) in BoxTest::ALL.iter().zip(column) {
+        for ((box_test, name, _), record) in BoxTest::ALL.iter().zip(column) {
             stage.set_tests(Intersection {
                 box_test: *box_test,
                 ..Intersection::default()
@@ -109,7 +117,7 @@ impl Suite<'_> {
                     let replay = self.replay(case, kind.name(), test, &case.rays[index]);
                     Worst {
                         what: "lost hit".into(),
-                        replay: format!("{replay} --box-test {}", record.box_test),
+                        replay: format!("{replay} --box-test {name}"),
                     }
                 });
             }
@@ -121,7 +129,7 @@ impl Suite<'_> {
     ///
     /// # Errors
     /// The tree cannot be built, in words.
-    pub fn offsets(&self, progress: &Progress) -> Result<Vec<Record>, StressError> {
+    pub fn offsets(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
         progress("ray offsets");
         let mut records = Vec::new();
         let rays = OFFSET_RAYS * self.settings.rays;
@@ -135,9 +143,16 @@ impl Suite<'_> {
         ]) {
             for (name, mesh) in closed_meshes(&place) {
                 for offset in RayOffset::ALL {
-                    let mut record = no_bounces(name, place, offset, rays);
+                    let mut record = OffsetRecord {
+                        rays,
+                        ..OffsetRecord::default()
+                    };
                     bounce(&mesh, offset, self.settings.seed, &mut record)?;
-                    records.push(Record::Offset(record));
+                    let triangle = Intersection::default().triangle.name();
+                    let key = Key::default().with(axis::OFFSET, offset.name());
+                    let key = key.with(axis::TRIANGLE, triangle).with(axis::MESH, name);
+                    let key = key.with(axis::PLACE, place);
+                    records.push(Line::new(key, Ran::default(), Record::Offset(record)));
                 }
             }
         }
@@ -148,7 +163,7 @@ impl Suite<'_> {
     ///
     /// # Errors
     /// The device is lost or hangs.
-    pub fn costs(&self, progress: &Progress) -> Result<Vec<Record>, StressError> {
+    pub fn costs(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
         progress("cost of triangle tests");
         let all = self.times(BRUTE_FORCE, COST_BANDS.0, COST_RAYS.0)?;
         let some = self.times(PLAIN, COST_BANDS.1, COST_RAYS.1)?;
@@ -158,13 +173,14 @@ impl Suite<'_> {
         let plain_ms = plain.map_or(f64::NAN, |t| t.ms);
         let pairs = all.iter().zip(&some);
         let record = |(all, some): (&Timed, &Timed)| {
-            Record::Cost(CostRecord {
-                triangle: all.test.name().into(),
+            let record = Record::Cost(CostRecord {
                 bytes: all.test.bytes(),
                 ns_per_test: all.ms * 1e6 / (all.tests_per_ray * all.rays as f64),
                 traversal_ratio: some.ms / plain_ms,
                 tests_per_ray: some.tests_per_ray,
-            })
+            });
+            let key = Key::default().with(axis::TRIANGLE, all.test.name());
+            Line::new(key, Ran::default(), record)
         };
         Ok(match plain_ms.is_nan() {
             true => Vec::new(),
@@ -225,20 +241,18 @@ struct Timed {
     rays: usize,
 }
 
-fn empty_record(test: BoxTest, name: &str, kind: Kind) -> BoxTestRecord {
+fn empty_record(test: BoxTest) -> BoxTestRecord {
     BoxTestRecord {
-        box_test: name.to_owned(),
         pad_ulps: test.pad_ulps,
-        accel: kind.name().to_owned(),
         rays: 0,
         lost: 0,
         worst: None,
     }
 }
 
-/// The smallest pad with a finite reciprocal that loses no hit, nor does any greater one.
+/// The smallest pad that loses no hit, nor does any greater one.
 pub fn smallest_sound_pad<'a>(tests: impl Iterator<Item = &'a BoxTestRecord>) -> Option<u32> {
-    let padded: Vec<_> = tests.filter(|t| t.box_test != "plain").collect();
+    let padded: Vec<_> = tests.collect();
     let lossy = padded.iter().filter(|t| t.lost > 0).map(|t| t.pad_ulps);
     let lossy = lossy.max();
     let sound = padded.iter().map(|t| t.pad_ulps);
@@ -266,19 +280,6 @@ fn closed_meshes(place: &Place) -> [(&'static str, Mesh); 4] {
         ("box at 0", at(0.0)),
         ("box at 0, tilted", at(1e-9)),
     ]
-}
-
-fn no_bounces(mesh: &str, place: Place, offset: RayOffset, rays: usize) -> OffsetRecord {
-    OffsetRecord {
-        offset: offset.name().into(),
-        triangle: Intersection::default().triangle.name().into(),
-        mesh: mesh.into(),
-        place,
-        rays,
-        self_intersections: 0,
-        leaks: 0,
-        farthest: 0.0,
-    }
 }
 
 /// Chains of mirror bounces from inside. A flat triangle that a ray has left cannot be hit by it, and a
@@ -357,7 +358,10 @@ mod tests {
     fn without_an_offset_chains_meet_their_own_triangle_and_with_a_bound_they_do_not() {
         for (name, mesh) in closed_meshes(&Place::ORDINARY) {
             let count = |offset: RayOffset| {
-                let mut record = no_bounces(name, Place::ORDINARY, offset, 3000);
+                let mut record = OffsetRecord {
+                    rays: 3000,
+                    ..OffsetRecord::default()
+                };
                 bounce(&mesh, offset, 1, &mut record).unwrap();
                 (record.self_intersections, record.leaks)
             };
@@ -369,24 +373,16 @@ mod tests {
 
     #[test]
     fn the_smallest_sound_pad_is_above_every_pad_that_loses_hits() {
-        let test = |name: &str, pad_ulps: u32, lost: usize| BoxTestRecord {
-            box_test: name.into(),
+        let test = |pad_ulps: u32, lost: usize| BoxTestRecord {
             pad_ulps,
-            accel: "bvh".into(),
             rays: 10,
             lost,
             worst: None,
         };
-        let mut records = vec![
-            test("a", 0, 7),
-            test("b", 2, 0),
-            test("c", 3, 1),
-            test("d", 4, 0),
-            test("plain", 0, 9),
-        ];
+        let mut records = vec![test(0, 7), test(2, 0), test(3, 1), test(4, 0)];
         assert_eq!(smallest_sound_pad(records.iter()), Some(4));
-        records.push(test("e", 16, 0));
+        records.push(test(16, 0));
         assert_eq!(smallest_sound_pad(records.iter()), Some(4));
-        assert_eq!(smallest_sound_pad([test("a", 0, 1)].iter()), None);
+        assert_eq!(smallest_sound_pad([test(0, 1)].iter()), None);
     }
 }

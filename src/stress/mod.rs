@@ -13,6 +13,7 @@ pub mod families;
 pub mod numerics;
 pub mod place;
 pub mod record;
+pub mod report;
 pub mod shapes;
 pub mod shot_meshes;
 pub mod shots;
@@ -24,7 +25,7 @@ use crate::accel::triangle::TriangleTest;
 use crate::accel::{AccelRegistry, Intersection};
 use crate::gpu::capture as capture_environment;
 use crate::gpu::{Gpu, GpuError, probe_arithmetic};
-use record::{Record, SuiteRecord};
+use record::{Line, Record, SuiteRecord};
 use std::path::PathBuf;
 use std::time::{Instant, SystemTime};
 use suite::{BRUTE_FORCE, Progress, Suite};
@@ -133,18 +134,20 @@ pub fn run(
     gpus: &[Gpu],
     settings: &StressOptions,
     progress: &Progress,
-) -> Result<Vec<Record>, StressError> {
+) -> Result<Vec<Line>, StressError> {
     let start = Instant::now();
     let gpu = gpus.first().expect("a device");
     settings.check()?;
     let probe = probe_arithmetic(gpu)?;
-    let mut records = vec![Record::Suite(first_record(gpu, settings, probe.is_exact()))];
+    let first = first_record(gpu, settings, probe.is_exact());
+    let mut records = vec![Line::about_all(Record::Suite(first))];
     let mut tests = tests(settings);
     tests.retain(|test| match Suite::with(*test).kept_by(&probe) {
         Ok(()) => true,
         Err(reason) => {
             let what = test.name().to_owned();
-            records.push(Record::Skipped(record::SkippedRecord { what, reason }));
+            let skipped = Record::Skipped(record::SkippedRecord { what, reason });
+            records.push(Line::about_all(skipped));
             false
         }
     });
@@ -168,13 +171,13 @@ pub fn run(
         }
         progress("accumulation and sampling");
         let figures = numerics::run(gpu, settings.quick)?;
-        records.extend(figures.into_iter().map(Record::Figure));
+        let figures = figures.into_iter().map(Record::Figure);
+        records.extend(figures.map(Line::about_all));
     }
     let targets = targets::targets(&records);
-    records.extend(targets.into_iter().map(Record::Target));
-    records.push(Record::Finished {
-        wall_s: start.elapsed().as_secs_f64(),
-    });
+    records.extend(targets.into_iter().map(Record::Target).map(Line::about_all));
+    let wall_s = start.elapsed().as_secs_f64();
+    records.push(Line::about_all(Record::Finished { wall_s }));
     Ok(records)
 }
 

@@ -2,24 +2,15 @@
 
 use super::place::Place;
 use crate::gpu::Environment;
+#[cfg(test)]
+use crate::measure::record::SCHEMA;
+use crate::measure::record::{RecordError, STRESS_FILE, Verdict, read_lines, text_of};
+use crate::report::{ReportError, write_file};
 use serde::{Deserialize, Serialize};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Version tag of every line.
-pub const SCHEMA: &str = "raystone-stress/1";
-/// Name of the file in the suite's folder.
-pub const FILE: &str = "stress.jsonl";
 
 /// A line of the file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Line {
-    /// Always [`SCHEMA`].
-    pub schema: String,
-    /// What was found.
-    pub record: Record,
-}
+pub type Line = crate::measure::record::Line<Record>;
 
 /// What a line holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -61,7 +52,7 @@ pub struct SuiteRecord {
     pub quick: bool,
     /// Seed.
     pub seed: u64,
-    /// Rays a case.
+    /// Rays per case.
     pub rays: usize,
     /// Shots at each closed mesh.
     pub shots: usize,
@@ -113,12 +104,6 @@ pub struct Rung {
 /// A triangle test, a structure and a family.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CellRecord {
-    /// Triangle test.
-    pub triangle: String,
-    /// Structure.
-    pub accel: String,
-    /// Family.
-    pub family: String,
     /// Rays, over all rungs.
     pub rays: usize,
     /// Misses where something is hit exactly.
@@ -164,18 +149,8 @@ pub struct CellRecord {
 /// Shots at one closed mesh from inside, or at a plane: every miss is a crack.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShotsRecord {
-    /// Triangle test.
-    pub triangle: String,
-    /// Structure.
-    pub accel: String,
-    /// Mesh.
-    pub mesh: String,
     /// Triangles of the mesh.
     pub triangles: usize,
-    /// Where it stands.
-    pub place: Place,
-    /// `random`, `vertices` or `edges`: what is aimed at.
-    pub aim: String,
     /// Rays.
     pub rays: usize,
     /// Rays that missed.
@@ -191,12 +166,8 @@ pub struct ShotsRecord {
 /// How many hits a box test loses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BoxTestRecord {
-    /// Name of the box test.
-    pub box_test: String,
     /// Pad, ulp.
     pub pad_ulps: u32,
-    /// Structure.
-    pub accel: String,
     /// Rays.
     pub rays: usize,
     /// Answers that differ from brute force.
@@ -206,16 +177,8 @@ pub struct BoxTestRecord {
 }
 
 /// What a ray offset does.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct OffsetRecord {
-    /// Name of the offset.
-    pub offset: String,
-    /// Triangle test.
-    pub triangle: String,
-    /// Mesh.
-    pub mesh: String,
-    /// Where it stands.
-    pub place: Place,
     /// Rays that were spawned.
     pub rays: usize,
     /// Rays that hit the triangle they start from.
@@ -231,15 +194,13 @@ pub struct OffsetRecord {
 /// What a triangle test costs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CostRecord {
-    /// Triangle test.
-    pub triangle: String,
     /// Bytes it reads of a triangle.
     pub bytes: u32,
-    /// Nanoseconds a test in the brute-force kernel, on the whole adapter.
+    /// Nanoseconds per test in the brute-force kernel, on the whole adapter.
     pub ns_per_test: f64,
     /// Time through the default structure against Möller–Trumbore.
     pub traversal_ratio: f64,
-    /// Triangle tests a ray in that traversal.
+    /// Triangle tests per ray in that traversal.
     pub tests_per_ray: f64,
 }
 
@@ -252,8 +213,8 @@ pub struct TargetRecord {
     pub limit: f64,
     /// What was found; absent if it was not looked at.
     pub found: Option<f64>,
-    /// Whether it holds; `None` if it was not looked at.
-    pub passed: Option<bool>,
+    /// Whether it holds.
+    pub verdict: Verdict,
     /// Where it is worst.
     pub note: String,
 }
@@ -267,84 +228,28 @@ pub struct SkippedRecord {
     pub reason: String,
 }
 
-/// Why records cannot be written or read.
-#[derive(Debug, Error)]
-pub enum RecordError {
-    /// The file or folder.
-    #[error("cannot write {}: {source}; choose another folder with --out", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The file cannot be read.
-    #[error("cannot read {}: {source}; give the folder that `raystone stress` wrote", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A line is no record.
-    #[error("{}:{line}: not a record of the suite: {reason}", path.display())]
-    Parse {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Why.
-        reason: String,
-    },
-}
-
-/// Writes all records at once: the file is whole or absent.
+/// Writes all lines at once: the file is whole or absent.
 ///
 /// # Errors
 /// The folder cannot be made or written.
-pub fn write(dir: &Path, records: &[Record]) -> Result<PathBuf, RecordError> {
-    let path = dir.join(FILE);
-    let failed = |source: std::io::Error| RecordError::Write {
+pub fn write(dir: &Path, lines: &[Line]) -> Result<PathBuf, ReportError> {
+    let path = dir.join(STRESS_FILE);
+    let failed = |source| ReportError::Write {
         path: path.clone(),
         source,
     };
     std::fs::create_dir_all(dir).map_err(failed)?;
-    let mut text = Vec::new();
-    for record in records {
-        let line = Line {
-            schema: SCHEMA.to_owned(),
-            record: record.clone(),
-        };
-        serde_json::to_writer(&mut text, &line).map_err(|e| failed(e.into()))?;
-        writeln!(text).map_err(failed)?;
-    }
-    crate::atomic::write_atomic(&path, &text).map_err(failed)?;
+    let text = text_of(lines).map_err(|error| failed(error.into()))?;
+    write_file(&path, text.as_bytes())?;
     Ok(path)
 }
 
-/// Reads the records of a folder.
+/// Reads the lines of a folder.
 ///
 /// # Errors
 /// A missing file, another schema, or a line that is no record.
-pub fn read(dir: &Path) -> Result<Vec<Record>, RecordError> {
-    let path = dir.join(FILE);
-    let text = std::fs::read_to_string(&path).map_err(|source| RecordError::Read {
-        path: path.clone(),
-        source,
-    })?;
-    let parse = |(index, row): (usize, &str)| {
-        let failed = |reason: String| RecordError::Parse {
-            path: path.clone(),
-            line: index + 1,
-            reason,
-        };
-        let line: Line = serde_json::from_str(row).map_err(|e| failed(e.to_string()))?;
-        match line.schema == SCHEMA {
-            true => Ok(line.record),
-            false => Err(failed(format!("schema {:?}, not {SCHEMA:?}", line.schema))),
-        }
-    };
-    text.lines().enumerate().map(parse).collect()
+pub fn read(dir: &Path) -> Result<Vec<Line>, RecordError> {
+    Ok(read_lines(&dir.join(STRESS_FILE))?.lines)
 }
 
 #[cfg(test)]
@@ -354,23 +259,21 @@ mod tests {
     #[test]
     fn records_read_back_and_another_schema_is_refused_with_its_line() {
         let dir = tempfile::tempdir().unwrap();
-        let records = vec![
-            Record::Target(TargetRecord {
-                target: "cracks".into(),
-                limit: 0.0,
-                found: Some(0.0),
-                passed: Some(true),
-                note: String::new(),
-            }),
-            Record::Finished { wall_s: 1.5 },
-        ];
-        let path = write(dir.path(), &records).unwrap();
-        assert_eq!(read(dir.path()).unwrap(), records);
+        let target = Record::Target(TargetRecord {
+            target: "cracks".into(),
+            limit: 0.0,
+            found: Some(0.0),
+            verdict: Verdict::Pass,
+            note: String::new(),
+        });
+        let lines = [target, Record::Finished { wall_s: 1.5 }].map(Line::about_all);
+        let path = write(dir.path(), &lines).unwrap();
+        assert_eq!(read(dir.path()).unwrap(), lines);
         let text = std::fs::read_to_string(&path).unwrap();
-        std::fs::write(&path, text.replacen(SCHEMA, "raystone-stress/9", 1)).unwrap();
+        std::fs::write(&path, text.replacen(SCHEMA, "raystone-stress/1", 1)).unwrap();
         let error = read(dir.path()).unwrap_err().to_string();
         assert!(
-            error.contains(":1:") && error.contains("raystone-stress/9"),
+            error.contains(":1:") && error.contains("raystone-stress/1") && error.contains(SCHEMA),
             "{error}"
         );
     }

@@ -3,14 +3,15 @@
 
 use super::bench;
 use super::place::Place;
-use super::record::{Record, ShotsRecord, SkippedRecord, Worst};
+use super::record::{Line, Record, ShotsRecord, SkippedRecord, Worst};
 use super::shot_meshes::{AIMS, FAMILY, PLANE, SPHERE, ShotMesh};
-use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite};
+use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite, key};
 use super::tally::oracle_ray;
 use super::{StressError, case};
 use crate::accel::triangle::TriangleTest;
 use crate::accel::{NO_HIT, Ray, Traced};
 use crate::integrator::Stage;
+use crate::measure::record::{Ran, axis};
 use crate::oracle::exact_truths;
 use std::sync::Arc;
 
@@ -18,22 +19,24 @@ use std::sync::Arc;
 const CHUNK: usize = 1 << 17;
 /// Misses that are looked up in the oracle, a series.
 const LOOKED_UP: usize = 64;
+
+fn skipped(what: String, reason: String) -> Line {
+    Line::about_all(Record::Skipped(SkippedRecord { what, reason }))
+}
+
 impl Suite<'_> {
     /// Shoots at every mesh, through every structure with the default test and through the plain one
     /// with the others.
     ///
     /// # Errors
     /// The device is lost or hangs.
-    pub fn shots(&self, progress: &Progress) -> Result<Vec<Record>, StressError> {
+    pub fn shots(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
         let mut records = Vec::new();
         let model = self.settings.model.as_ref();
         let model = model.map(|path| path.to_string_lossy().into_owned());
         let model = model.unwrap_or_default();
         if model.is_empty() {
-            records.push(Record::Skipped(SkippedRecord {
-                what: "shots at a model".into(),
-                reason: "none was given".into(),
-            }));
+            records.push(skipped("shots at a model".into(), "none was given".into()));
         }
         for place in [Place::ORDINARY, Place::FAR] {
             for name in [SPHERE, PLANE, &model]
@@ -45,10 +48,9 @@ impl Suite<'_> {
                 }
                 match ShotMesh::named(name, place, self.settings.seed) {
                     Ok(target) => self.shoot_at(&target, &mut records, progress)?,
-                    Err(reason) => records.push(Record::Skipped(SkippedRecord {
-                        what: format!("shots at {name}, {place}"),
-                        reason,
-                    })),
+                    Err(reason) => {
+                        records.push(skipped(format!("shots at {name}, {place}"), reason))
+                    }
                 }
             }
         }
@@ -58,12 +60,12 @@ impl Suite<'_> {
     fn shoot_at(
         &self,
         target: &ShotMesh,
-        records: &mut Vec<Record>,
+        records: &mut Vec<Line>,
         progress: &Progress,
     ) -> Result<(), StressError> {
         let scene = Arc::new(case::scene(target.mesh.clone(), None));
         let (mesh, place) = (target.short_name(), target.place);
-        let mut series: Vec<(TriangleTest, Kind, Vec<Record>)> = Vec::new();
+        let mut series: Vec<(TriangleTest, Kind, Vec<Line>)> = Vec::new();
         for (row, test) in self.tests.iter().enumerate() {
             let kinds = self.kinds.iter().filter(|kind| match row {
                 0 => kind.name() != BRUTE_FORCE,
@@ -78,15 +80,17 @@ impl Suite<'_> {
             match bench::build(*kind, &stage.soup) {
                 Ok(built) => {
                     let traced = Traced::upload(&stage.gpu, &*built)?;
-                    for aim in 0..AIMS.len() {
+                    for (aim, aimed_at) in AIMS.iter().enumerate() {
                         let series = self.series(target, &stage, &traced, name, aim)?;
-                        records.push(Record::Shots(series));
+                        let key = key(*test, *kind).with(axis::MESH, mesh);
+                        let key = key.with(axis::PLACE, place).with(axis::AIM, aimed_at);
+                        records.push(Line::new(key, Ran::default(), Record::Shots(series)));
                     }
                 }
-                Err(reason) => records.push(Record::Skipped(SkippedRecord {
-                    what: format!("{}, {}, {mesh}, {place}", name.0, name.1),
-                    reason,
-                })),
+                Err(reason) => {
+                    let what = format!("{}, {}, {mesh}, {place}", name.0, name.1);
+                    records.push(skipped(what, reason))
+                }
             }
             Ok(())
         })?;
@@ -104,12 +108,7 @@ impl Suite<'_> {
         aim: usize,
     ) -> Result<ShotsRecord, StressError> {
         let mut record = ShotsRecord {
-            triangle: triangle.into(),
-            accel: accel.into(),
-            mesh: target.short_name().into(),
             triangles: target.mesh.len(),
-            place: target.place,
-            aim: AIMS[aim].into(),
             rays: 0,
             misses: 0,
             confirmed: 0,

@@ -4,7 +4,7 @@ use super::bench::{self, Expected};
 use super::case::{Address, Case, Truth, ray_text};
 use super::families::{FAMILIES, Family};
 use super::place::Place;
-use super::record::{CellRecord, Record, SkippedRecord};
+use super::record::{CellRecord, Line, Record, SkippedRecord};
 use super::tally::{Judge, Outcome, Tally};
 use super::{StressError, StressOptions};
 use crate::accel::triangle::TriangleTest;
@@ -15,7 +15,7 @@ use crate::gpu::{Gpu, GpuError};
 use crate::integrator::Stage;
 use crate::measure::gate;
 use crate::measure::rays::RaySet;
-use crate::measure::record::RayClass;
+use crate::measure::record::{Key, Ran, RayClass, axis};
 
 /// Is told what is being done, by any thread.
 pub type Progress<'a> = dyn Fn(&str) + Sync + 'a;
@@ -42,6 +42,12 @@ pub struct Suite<'a> {
     pub kinds: Vec<Kind>,
     /// Triangle tests, the default first.
     pub tests: Vec<TriangleTest>,
+}
+
+/// What everything through a structure with a triangle test has in common.
+pub(super) fn key(test: TriangleTest, kind: Kind) -> Key {
+    let key = Key::default().with(axis::TRIANGLE, test.name());
+    key.with(axis::ACCEL, kind.name())
 }
 
 /// A cell while its cases are traced.
@@ -92,7 +98,7 @@ impl Suite<'_> {
     ///
     /// # Errors
     /// The device is lost or hangs.
-    pub fn cells(&self, progress: &Progress) -> Result<Vec<Record>, StressError> {
+    pub fn cells(&self, progress: &Progress) -> Result<Vec<Line>, StressError> {
         let chosen = |family: &&Family| self.settings.wants_family(family.name);
         let mut records = Vec::new();
         for family in FAMILIES.iter().filter(chosen) {
@@ -102,7 +108,7 @@ impl Suite<'_> {
         Ok(records)
     }
 
-    fn family(&self, family: &Family) -> Result<Vec<Record>, StressError> {
+    fn family(&self, family: &Family) -> Result<Vec<Line>, StressError> {
         let settings = self.settings;
         let cases = family.cases(settings.seed, settings.quick, settings.rays);
         let row = || self.kinds.iter().map(|kind| (*kind, OpenCell::default()));
@@ -122,13 +128,15 @@ impl Suite<'_> {
         let mut records = Vec::new();
         for (test, row) in self.tests.iter().zip(cells) {
             for (kind, cell) in row {
-                records.push(match cell.rungs.is_empty() && cell.failures.is_empty() {
+                let key = key(*test, kind).with(axis::FAMILY, family.name);
+                let record = match cell.rungs.is_empty() && cell.failures.is_empty() {
                     true => Record::Skipped(SkippedRecord {
                         what: format!("{}, {}, {}", test.name(), kind.name(), family.name),
                         reason: "every case of it is left to other cells".into(),
                     }),
-                    false => Record::Cell(cell.record(*test, kind.name(), family.name)),
-                });
+                    false => Record::Cell(cell.record()),
+                };
+                records.push(Line::new(key, Ran::default(), record));
             }
         }
         Ok(records)
@@ -325,12 +333,9 @@ impl Trace<'_> {
 }
 
 impl OpenCell {
-    fn record(self, test: TriangleTest, accel: &str, family: &str) -> CellRecord {
+    fn record(self) -> CellRecord {
         let tally = self.tally;
         CellRecord {
-            triangle: test.name().to_owned(),
-            accel: accel.to_owned(),
-            family: family.to_owned(),
             rays: tally.rays,
             false_misses: tally.false_misses,
             unexplained_misses: tally.unexplained_misses,

@@ -3,10 +3,11 @@
 use super::axes::smallest_sound_pad;
 use super::place::Place;
 use super::record::{
-    CellRecord, CostRecord, OffsetRecord, Record, ShotsRecord, SuiteRecord, TargetRecord,
+    CellRecord, Line, OffsetRecord, Record, ShotsRecord, SuiteRecord, TargetRecord,
 };
 use crate::accel::BoxTest;
 use crate::integrator::RayOffset;
+use crate::measure::record::{Key, Recorded, Verdict, axis};
 
 /// Misses that Embree's own test allows at the far position, as a share of the rays.
 const FAR_MISSES: f64 = 2e-5;
@@ -22,43 +23,44 @@ const NO_RAYS: &str = "non-finite";
 /// The records of one kind.
 macro_rules! all {
     ($records:expr, $kind:ident) => {
-        ($records.iter()).filter_map(|record| match record {
-            Record::$kind(found) => Some(found),
+        ($records.iter()).filter_map(|line| match &line.body {
+            Record::$kind(found) => Some(line.of(found)),
             _ => None,
         })
     };
 }
 
 /// Every target, with what the records say of it.
-pub fn targets(records: &[Record]) -> Vec<TargetRecord> {
+pub fn targets(records: &[Line]) -> Vec<TargetRecord> {
     let Some(suite) = suite(records) else {
         return Vec::new();
     };
     let default = &suite.default_triangle;
-    let cells: Vec<&CellRecord> = cells(records).filter(|c| c.triangle == *default).collect();
-    let shots: Vec<&ShotsRecord> = shots(records).filter(|s| s.triangle == *default).collect();
-    let cost = all!(records, Cost).find(|cost| cost.triangle == *default);
+    let is_default = |key: &Key| key.label(axis::TRIANGLE) == default;
+    let cells: Vec<_> = cells(records).filter(|c| is_default(c.key)).collect();
+    let shots: Vec<_> = shots(records).filter(|s| is_default(s.key)).collect();
+    let cost = all!(records, Cost).find(|cost| is_default(cost.key));
     let mut targets = shot_targets(&shots, suite.shots);
     targets.extend(cell_targets(&cells));
     targets.extend(pad_target(records));
     targets.extend(offset_targets(records));
     targets.extend(figure_target(records));
-    targets.extend(cost.map(cost_target));
+    targets.extend(cost.map(|cost| cost_target(default, cost.traversal_ratio)));
     targets
 }
 
 /// The first record.
-pub fn suite(records: &[Record]) -> Option<&SuiteRecord> {
-    all!(records, Suite).next()
+pub fn suite(records: &[Line]) -> Option<&SuiteRecord> {
+    all!(records, Suite).next().map(|suite| suite.body)
 }
 
 /// The cells.
-pub fn cells(records: &[Record]) -> impl Iterator<Item = &CellRecord> {
+pub fn cells(records: &[Line]) -> impl Iterator<Item = Recorded<'_, CellRecord>> {
     all!(records, Cell)
 }
 
 /// The series of shots.
-pub fn shots(records: &[Record]) -> impl Iterator<Item = &ShotsRecord> {
+pub fn shots(records: &[Line]) -> impl Iterator<Item = Recorded<'_, ShotsRecord>> {
     all!(records, Shots)
 }
 
@@ -74,7 +76,10 @@ fn target(
         target: name.into(),
         limit,
         found: value,
-        passed: value.map(|value| value <= limit),
+        verdict: Verdict::new(
+            value.is_some(),
+            value.is_some_and(|value| value.is_nan() || value > limit),
+        ),
         note: match worst {
             Some((value, place)) if value > 0.0 => place,
             _ => String::new(),
@@ -82,21 +87,22 @@ fn target(
     }
 }
 
-fn shot_targets(shots: &[&ShotsRecord], wanted: usize) -> Vec<TargetRecord> {
-    let name = |s: &ShotsRecord| {
-        format!(
-            "{}, {}, {}, {}: {} of {}",
-            s.accel, s.mesh, s.place, s.aim, s.misses, s.rays
-        )
+fn shot_targets(shots: &[Recorded<ShotsRecord>], wanted: usize) -> Vec<TargetRecord> {
+    let name = |s: &Recorded<ShotsRecord>| {
+        let what = [axis::ACCEL, axis::MESH, axis::PLACE, axis::AIM].map(|axis| s.key.label(axis));
+        format!("{}: {} of {}", what.join(", "), s.misses, s.rays)
     };
-    let at = |place: Place| shots.iter().filter(move |s| s.place == place);
+    let at = |place: Place| {
+        let place = place.to_string();
+        (shots.iter()).filter(move |s| s.key.label(axis::PLACE) == place)
+    };
     let ordinary = |random: bool| {
         at(Place::ORDINARY)
-            .filter(move |s| (s.aim == "random") == random)
+            .filter(move |s| (s.key.label(axis::AIM) == "random") == random)
             .map(|s| (s.misses as f64, name(s)))
     };
     let far = at(Place::FAR).map(|s| (s.misses as f64 / s.rays.max(1) as f64, name(s)));
-    let misses = format!("watertight misses of {wanted} rays a mesh, ordinary scale");
+    let misses = format!("watertight misses of {wanted} rays per mesh, ordinary scale");
     let aimed = format!("misses at vertices and edges of {wanted} shots");
     vec![
         target(misses, 0.0, ordinary(true)),
@@ -105,8 +111,11 @@ fn shot_targets(shots: &[&ShotsRecord], wanted: usize) -> Vec<TargetRecord> {
     ]
 }
 
-fn cell_targets(cells: &[&CellRecord]) -> Vec<TargetRecord> {
-    let name = |c: &CellRecord, what: &str| format!("{}, {}: {what}", c.accel, c.family);
+fn cell_targets(cells: &[Recorded<CellRecord>]) -> Vec<TargetRecord> {
+    let name = |c: &Recorded<CellRecord>, what: &str| {
+        let [accel, family] = [axis::ACCEL, axis::FAMILY].map(|axis| c.key.label(axis));
+        format!("{accel}, {family}: {what}")
+    };
     let cracks = cells.iter().map(|c| (c.cracks as f64, name(c, "cracks")));
     let differing = cells.iter().map(|c| {
         let any = c.any_differing.unwrap_or(0);
@@ -118,7 +127,9 @@ fn cell_targets(cells: &[&CellRecord]) -> Vec<TargetRecord> {
         let first = raised().next().map_or("", |f| f.as_str());
         (raised().count() as f64, name(c, first))
     });
-    let strange = cells.iter().filter(|c| c.family == NO_RAYS);
+    let strange = cells
+        .iter()
+        .filter(|c| c.key.label(axis::FAMILY) == NO_RAYS);
     let slowdown = strange.filter_map(|c| Some((c.slowdown?, name(c, "slowdown"))));
     vec![
         target(
@@ -144,9 +155,11 @@ fn cell_targets(cells: &[&CellRecord]) -> Vec<TargetRecord> {
     ]
 }
 
-fn pad_target(records: &[Record]) -> Option<TargetRecord> {
+fn pad_target(records: &[Line]) -> Option<TargetRecord> {
     all!(records, BoxTest).next()?;
-    let found = smallest_sound_pad(all!(records, BoxTest)).map_or(f64::MAX, f64::from);
+    // Without a pad and a finite reciprocal, what WGSL leaves open decides.
+    let padded = all!(records, BoxTest).filter(|t| t.key.label(axis::BOX_TEST) != "plain");
+    let found = smallest_sound_pad(padded.map(|t| t.body)).map_or(f64::MAX, f64::from);
     Some(target(
         "smallest pad of boxes that loses no hit here, ulp",
         f64::from(BoxTest::DEFAULT_ULPS),
@@ -156,11 +169,14 @@ fn pad_target(records: &[Record]) -> Option<TargetRecord> {
 
 /// Rays begun with the default offset: those that meet the triangle they leave, or escape; and how far they
 /// begin from the points they leave, since contact shadows and thin gaps end there.
-fn offset_targets(records: &[Record]) -> Vec<TargetRecord> {
+fn offset_targets(records: &[Line]) -> Vec<TargetRecord> {
     let default = RayOffset::default().name();
     let found = |figure: fn(&OffsetRecord) -> f64| {
-        let of_default = all!(records, Offset).filter(|o| o.offset == default);
-        of_default.map(move |o| (figure(o), format!("{}, {}", o.mesh, o.place)))
+        let of_default = all!(records, Offset).filter(|o| o.key.label(axis::OFFSET) == default);
+        of_default.map(move |o| {
+            let [mesh, place] = [axis::MESH, axis::PLACE].map(|axis| o.key.label(axis));
+            (figure(o.body), format!("{mesh}, {place}"))
+        })
     };
     let bad = found(|o| (o.self_intersections + o.leaks) as f64);
     let farthest = found(|o| o.farthest);
@@ -184,10 +200,10 @@ fn offset_targets(records: &[Record]) -> Vec<TargetRecord> {
 }
 
 /// Accumulation and sampling: how many figures are beyond their alarm level.
-fn figure_target(records: &[Record]) -> Option<TargetRecord> {
+fn figure_target(records: &[Line]) -> Option<TargetRecord> {
     all!(records, Figure).next()?;
     let alarms = all!(records, Figure).filter(|f| !f.passed);
-    let alarms: Vec<&str> = alarms.map(|f| f.name.as_str()).collect();
+    let alarms: Vec<&str> = alarms.map(|f| f.body.name.as_str()).collect();
     Some(target(
         "figures of accumulation and sampling beyond their alarm level",
         0.0,
@@ -195,76 +211,70 @@ fn figure_target(records: &[Record]) -> Option<TargetRecord> {
     ))
 }
 
-fn cost_target(cost: &CostRecord) -> TargetRecord {
-    let name = format!(
-        "time of {} against moeller-trumbore in a traversal",
-        cost.triangle
-    );
-    target(name, COST, [(cost.traversal_ratio, String::new())])
+fn cost_target(triangle: &str, ratio: f64) -> TargetRecord {
+    let name = format!("time of {triangle} against moeller-trumbore in a traversal");
+    target(name, COST, [(ratio, String::new())])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::record::Ran;
 
     #[test]
     fn one_figure_beyond_its_alarm_fails_their_target_by_name() {
         let figure = |name: &str, passed| {
-            Record::Figure(crate::stress::numerics::Figure {
+            Line::about_all(Record::Figure(crate::stress::numerics::Figure {
                 name: name.into(),
                 value: 2.0,
                 alarm: Some(1.0),
                 unit: String::new(),
                 passed,
                 note: String::new(),
-            })
+            }))
         };
-        let verdict = |records: &[Record]| figure_target(records).map(|t| (t.passed, t.note));
+        let verdict = |records: &[Line]| figure_target(records).map(|t| (t.verdict, t.note));
         assert_eq!(verdict(&[]), None);
         let good = verdict(&[figure("sum", true)]);
-        assert_eq!(good, Some((Some(true), String::new())));
+        assert_eq!(good, Some((Verdict::Pass, String::new())));
         let bad = verdict(&[figure("sum", true), figure("acos", false)]);
-        assert_eq!(bad, Some((Some(false), "acos".into())));
+        assert_eq!(bad, Some((Verdict::Fail, "acos".into())));
     }
 
-    fn shot(misses: usize, place: Place, aim: &str) -> ShotsRecord {
-        ShotsRecord {
-            triangle: "watertight".into(),
-            accel: "bvh".into(),
-            mesh: "sphere".into(),
+    fn shot(misses: usize, place: Place, aim: &str) -> Line {
+        let record = ShotsRecord {
             triangles: 10,
-            place,
-            aim: aim.into(),
             rays: 1000,
             misses,
             confirmed: misses,
             failure: None,
             worst: None,
-        }
+        };
+        let key = Key::default().with(axis::PLACE, place).with(axis::AIM, aim);
+        Line::new(key, Ran::default(), Record::Shots(record))
     }
 
     #[test]
     fn one_miss_fails_its_target_and_no_other() {
-        let verdicts = |shots: &[ShotsRecord]| -> Vec<Option<bool>> {
-            let shots: Vec<&ShotsRecord> = shots.iter().collect();
-            shot_targets(&shots, 1000)
-                .iter()
-                .map(|t| t.passed)
-                .collect()
+        let verdicts = |lines: &[Line]| -> Vec<Verdict> {
+            let shots: Vec<_> = shots(lines).collect();
+            let targets = shot_targets(&shots, 1000);
+            targets.iter().map(|t| t.verdict).collect()
         };
-        let good = [
-            shot(0, Place::ORDINARY, "random"),
-            shot(0, Place::ORDINARY, "edges"),
-            shot(0, Place::FAR, "random"),
-        ];
-        assert_eq!(verdicts(&good), [Some(true); 3]);
+        let shots = |misses: [usize; 3]| {
+            [
+                shot(misses[0], Place::ORDINARY, "random"),
+                shot(misses[1], Place::ORDINARY, "edges"),
+                shot(misses[2], Place::FAR, "random"),
+            ]
+        };
+        assert_eq!(verdicts(&shots([0; 3])), [Verdict::Pass; 3]);
         for bad in 0..3 {
-            let mut shots = good.clone();
-            shots[bad].misses = 1;
-            let mut expected = [Some(true); 3];
-            expected[bad] = Some(false);
-            assert_eq!(verdicts(&shots), expected);
+            let (mut misses, mut expected) = ([0; 3], [Verdict::Pass; 3]);
+            misses[bad] = 1;
+            expected[bad] = Verdict::Fail;
+            assert_eq!(verdicts(&shots(misses)), expected);
         }
-        assert_eq!(verdicts(&[]), [None; 3]);
+        assert_eq!(verdicts(&[]), [Verdict::Open; 3]);
     }
 }

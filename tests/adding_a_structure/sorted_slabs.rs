@@ -1,12 +1,11 @@
 //! `sorted-slabs`: triangles sorted along x, cut into runs of equal length, one box a run; a ray
 //! tests every box. The example of `docs/adding-a-structure.md`.
 
-use raystone::accel::StructureStats;
-use raystone::accel::bounds::{Bounds, enter_box};
-use raystone::accel::triangle::intersect_triangle;
+use raystone::accel::bounds::Bounds;
+use raystone::accel::twin::{Query, Traverse, Twin};
 use raystone::accel::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, Hit, NO_HIT,
-    NamedWords, Ray, TriangleSoup, limits,
+    AccelError, AccelKind, BuildLog, BuiltAccel, CpuTwin, GpuBuffers, Hit, NamedWords,
+    StructureStats, TriangleSoup, limits,
 };
 use raystone::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
@@ -113,11 +112,7 @@ impl BuiltAccel for Built {
                     words: runs.into(),
                     element_bytes: 32,
                 },
-                NamedWords {
-                    name: "order",
-                    words: self.order.as_slice().into(),
-                    element_bytes: 4,
-                },
+                NamedWords::new("order", &self.order),
             ],
             uniforms: vec![limits(self.runs.len(), self.runs.len())],
             constants: Vec::new(),
@@ -135,44 +130,24 @@ impl BuiltAccel for Built {
     }
 
     fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin { built: self, soup }))
+        Some(Box::new(Twin(self, soup)))
     }
 }
 
-struct Twin<'a> {
-    built: &'a Built,
-    soup: &'a TriangleSoup,
-}
-
-impl Twin<'_> {
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let ray = &self.soup.intersection.raised(ray);
-        let inverse = self.soup.intersection.inverse(ray.direction);
-        let mut hit = Hit::miss(ray);
-        for run in &self.built.runs {
-            counters.nodes += 1;
-            counters.box_tests += 1;
-            if enter_box(&run.bounds, ray, inverse, hit.t).is_none() {
+impl Traverse for Built {
+    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+        for (index, run) in self.runs.iter().enumerate() {
+            query.visit(index);
+            if query.enter(&run.bounds).is_none() {
                 continue;
             }
-            for &id in &self.built.order[run.first as usize..run.end as usize] {
-                counters.triangle_tests += 1;
-                intersect_triangle(&self.soup.records[id as usize], ray, inverse, &mut hit);
+            for &id in &self.order[run.first as usize..run.end as usize] {
+                query.test(&soup.records[id as usize]);
             }
-            if any && hit.triangle != NO_HIT {
-                return hit;
+            if query.is_answered() {
+                break;
             }
         }
-        hit
-    }
-}
-
-impl CpuTwin for Twin<'_> {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.trace(ray, false, counters)
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.trace(ray, true, counters).triangle != NO_HIT
+        query.hit
     }
 }

@@ -47,7 +47,7 @@ fn an_image_does_not_depend_on_how_its_samples_and_rows_are_cut() {
     );
     let whole = last(&renderer, &[4], 11);
     let sliced = |steps: &[(u32, u32)]| {
-        renderer.reset();
+        renderer.reset().expect("a device");
         for &(first, count) in steps {
             renderer.add_samples(first, count, 11).expect("samples");
         }

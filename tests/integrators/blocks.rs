@@ -83,7 +83,7 @@ fn an_image_during_which_a_kernel_raised_its_error_word_is_an_error() {
     with_renderer(&open(impatient), [16, 16], |renderer| {
         let error = renderer.render(&[1], 1).expect_err("a blown fuse");
         assert!(error.to_string().contains("step fuse"), "{error}");
-        renderer.reset();
+        renderer.reset().expect("a device");
         renderer.add_samples(0, 1, 1).expect("samples");
         renderer.ray_counts().expect_err("a blown fuse");
     });

@@ -5,11 +5,12 @@
 //! comes first in memory is decided by the boxes: the one that lies lower on the axis along which
 //! their centres are farthest apart. A ray that runs up that axis takes it first.
 
-use super::super::bounds::{Bounds, enter_box};
-use super::super::leaf::{LEAF, Leaves, leaf_reference};
+use super::super::bounds::Bounds;
+use super::super::leaf::{LEAF, LeafReader, Leaves, leaf_reference};
 use super::super::tree::{Coverage, NodeKind, Tree};
-use super::super::{AccelError, Counters, Ray, TriangleSoup};
-use super::layout::{Inner, Nodes, Query};
+use super::super::twin::Query;
+use super::super::{AccelError, Ray, TriangleSoup};
+use super::layout::{Inner, Nodes};
 use super::options::NodeOrder;
 use super::order::InnerNodes;
 use super::{NONE, ROOT};
@@ -157,20 +158,19 @@ impl Boxes {
 }
 
 impl Nodes for Boxes {
-    fn visit(&self, node: u32, query: &mut Query) -> Inner {
-        query.counters.visit(node as usize);
-        query.counters.box_tests += 1;
+    fn visit(&self, node: u32, leaves: LeafReader, query: &mut Query) -> Inner {
+        query.visit(node as usize);
         let node = &self.0[node as usize];
         let mut inner = Inner {
             first: NONE,
             second: NONE,
             side: 0,
         };
-        if enter_box(&node.bounds(), query.ray, query.inverse, query.hit.t).is_some() {
+        if query.enter(&node.bounds()).is_some() {
             if node.content >= LEAF {
-                query.test_leaf(node.content);
+                leaves.test_leaf(node.content, query);
             } else {
-                inner.side = near_side(node.content, query.ray);
+                inner.side = near_side(node.content, &query.ray);
                 inner.first = (node.content & CHILD_MASK) + inner.side;
                 inner.second = inner.first ^ 1;
             }
@@ -179,9 +179,9 @@ impl Nodes for Boxes {
     }
 
     fn second_child(&self, node: u32, from: u32, query: &mut Query) -> u32 {
-        query.counters.visit(node as usize);
+        query.visit(node as usize);
         let content = self.0[node as usize].content;
-        if from & 1 == near_side(content, query.ray) {
+        if from & 1 == near_side(content, &query.ray) {
             from ^ 1
         } else {
             NONE
@@ -192,8 +192,8 @@ impl Nodes for Boxes {
         self.0[node as usize].link
     }
 
-    fn child(&self, node: u32, side: u32, counters: &mut Counters) -> u32 {
-        counters.visit(node as usize);
+    fn child(&self, node: u32, side: u32, query: &mut Query) -> u32 {
+        query.visit(node as usize);
         (self.0[node as usize].content & CHILD_MASK) + side
     }
 }

@@ -9,23 +9,22 @@ mod layout;
 mod octant_roped;
 mod options;
 mod order;
-mod pairs;
+pub(super) mod pairs;
 mod parent_pointer;
 mod roped;
 mod short_stack;
 mod stack;
 
 use super::leaf::{COUNT_MASK, LeafReader, Leaves};
-use super::ray::{Hit, NO_HIT, Ray};
-use super::tree::{NodeKind, Tree, tree_parameters};
+use super::ray::Hit;
+use super::tree::{Coverage, NodeKind, Tree, tree_parameters};
+use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
     TriangleSoup,
 };
-use crate::accel::StructureStats;
 use crate::params::{ParameterSchema, Params};
 use boxes::Boxes;
-use layout::Query;
 use octant_roped::Octants;
 use options::{Options, Traversal};
 use pairs::Pairs;
@@ -149,29 +148,17 @@ impl BuiltBvh {
         Ok(built)
     }
 
-    /// The scalar twin over the triangles that it was built over.
-    pub fn twin<'a>(&'a self, soup: &'a TriangleSoup) -> BvhTwin<'a> {
-        BvhTwin { built: self, soup }
+    /// The scalar twin over the triangles that it was built over; with default parameters it is the
+    /// judge of the gate.
+    pub fn twin<'a>(&'a self, soup: &'a TriangleSoup) -> Twin<'a, Self> {
+        Twin(self, soup)
     }
 
     fn node_words(&self) -> NamedWords<'_> {
-        let (words, element_bytes): (&[u32], _) = match &self.nodes {
-            NodeArray::Pairs(pairs) => (bytemuck::cast_slice(&pairs.0), 64),
-            NodeArray::Boxes(boxes) => (bytemuck::cast_slice(&boxes.0), 32),
-            NodeArray::Octants(octants) => (bytemuck::cast_slice(&octants.0), 64),
-        };
-        NamedWords {
-            name: "nodes",
-            words: words.into(),
-            element_bytes,
-        }
-    }
-
-    fn node_count(&self) -> usize {
         match &self.nodes {
-            NodeArray::Pairs(pairs) => pairs.0.len(),
-            NodeArray::Boxes(boxes) => boxes.0.len(),
-            NodeArray::Octants(octants) => octants.0.len(),
+            NodeArray::Pairs(pairs) => NamedWords::new("nodes", &pairs.0),
+            NodeArray::Boxes(boxes) => NamedWords::new("nodes", &boxes.0),
+            NodeArray::Octants(octants) => NamedWords::new("nodes", &octants.0),
         }
     }
 }
@@ -183,21 +170,22 @@ pub(super) fn check_leaves(tree: &Tree) -> Result<(), AccelError> {
         NodeKind::Leaf { count, .. } => *count,
     };
     let fullest = tree.nodes.iter().map(|n| count(&n.kind)).max().unwrap_or(0);
-    if fullest > COUNT_MASK {
-        return Err(AccelError::Limit {
-            what: "triangles in one leaf of a bvh".into(),
-            needed: fullest.into(),
-            limit: COUNT_MASK.into(),
-        });
-    }
-    Ok(())
+    AccelError::check_limit("triangles in one leaf of a bvh", fullest, COUNT_MASK)
 }
 
 impl BuiltAccel for BuiltBvh {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
         let (leaves, depth) = (&self.leaves, self.depth);
         match &self.nodes {
-            NodeArray::Pairs(pairs) => pairs.validate(soup, leaves, depth),
+            NodeArray::Pairs(pairs) => {
+                let coverage = Coverage::new(soup, pairs.0.len());
+                pairs::validate(
+                    (ROOT, &pairs.0),
+                    depth,
+                    coverage,
+                    |coverage, leaf, bounds| leaves.cover(coverage, soup, leaf, bounds),
+                )
+            }
             NodeArray::Octants(octants) => octants.validate(soup, leaves, depth),
             NodeArray::Boxes(boxes) if self.options.traversal == Traversal::Roped => {
                 let rope = |link, _, child| roped::rope_of(link, child);
@@ -211,14 +199,15 @@ impl BuiltAccel for BuiltBvh {
         let mut features = self.options.features();
         features.extend(self.leaves.features());
         let stack_entries = self.options.stack_entries(self.depth);
-        let nodes = self.node_count();
+        let nodes = self.node_words();
+        let count = 4 * nodes.words.len() / nodes.element_bytes as usize;
         GpuBuffers {
             kernel: self.options.kernel(),
             features,
-            arrays: vec![self.node_words(), self.leaves.words()],
+            arrays: vec![nodes, self.leaves.words()],
             uniforms: vec![super::limits(
-                self.options.step_fuse(nodes, self.depth),
-                nodes,
+                self.options.step_fuse(count, self.depth),
+                count,
             )],
             constants: (stack_entries > 0)
                 .then_some(("STACK_ENTRIES", stack_entries))
@@ -240,50 +229,31 @@ impl BuiltAccel for BuiltBvh {
     }
 }
 
-/// The traversal in scalar Rust; with default parameters it is the judge of the gate.
-#[derive(Clone, Copy)]
-pub struct BvhTwin<'a> {
-    built: &'a BuiltBvh,
-    soup: &'a TriangleSoup,
-}
-
-impl BvhTwin<'_> {
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
+impl Traverse for BuiltBvh {
+    fn trace(&self, soup: &TriangleSoup, query: Query) -> Hit {
         let leaves = LeafReader {
-            leaves: &self.built.leaves,
-            soup: self.soup,
+            leaves: &self.leaves,
+            soup,
         };
-        let ray = &self.soup.intersection.raised(ray);
-        let query = Query::new(ray, any, leaves, counters);
-        let options = &self.built.options;
-        let entries = options.stack_entries(self.built.depth) as usize;
-        match (&self.built.nodes, options.traversal) {
-            (NodeArray::Octants(octants), _) => octant_roped::trace(octants, query),
-            (NodeArray::Boxes(boxes), Traversal::Roped) => roped::trace(boxes, query),
+        let options = &self.options;
+        let entries = options.stack_entries(self.depth) as usize;
+        match (&self.nodes, options.traversal) {
+            (NodeArray::Octants(octants), _) => octant_roped::trace(octants, leaves, query),
+            (NodeArray::Boxes(boxes), Traversal::Roped) => roped::trace(boxes, leaves, query),
             (NodeArray::Boxes(boxes), Traversal::ParentPointer) => {
-                parent_pointer::trace(boxes, query)
+                parent_pointer::trace(boxes, leaves, query)
             }
             (NodeArray::Boxes(boxes), Traversal::ShortStack) => {
-                short_stack::trace(boxes, entries, query)
+                short_stack::trace(boxes, entries, leaves, query)
             }
-            (NodeArray::Boxes(boxes), _) => stack::trace(boxes, query),
+            (NodeArray::Boxes(boxes), _) => stack::trace(boxes, leaves, query),
             (NodeArray::Pairs(pairs), Traversal::ParentPointer) => {
-                parent_pointer::trace(pairs, query)
+                parent_pointer::trace(pairs, leaves, query)
             }
             (NodeArray::Pairs(pairs), Traversal::ShortStack) => {
-                short_stack::trace(pairs, entries, query)
+                short_stack::trace(pairs, entries, leaves, query)
             }
-            (NodeArray::Pairs(pairs), _) => stack::trace(pairs, query),
+            (NodeArray::Pairs(pairs), _) => stack::trace(pairs, leaves, query),
         }
-    }
-}
-
-impl CpuTwin for BvhTwin<'_> {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.trace(ray, false, counters)
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.trace(ray, true, counters).triangle != NO_HIT
     }
 }

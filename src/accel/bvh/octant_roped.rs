@@ -1,12 +1,11 @@
 //! Skip pointers for each of the eight orders in which rays of an octant of directions come to the
 //! boxes. Twin of `kernels/accel/bvh/octant_roped.wesl`.
 
-use super::super::bounds::enter_box;
-use super::super::leaf::{LEAF, Leaves};
+use super::super::leaf::{LEAF, LeafReader, Leaves};
 use super::super::ray::Hit;
+use super::super::twin::Query;
 use super::super::{AccelError, TriangleSoup};
 use super::boxes::{AXIS_SHIFT, BoxNode, Boxes, CHILD_MASK};
-use super::layout::Query;
 use super::{NONE, ROOT};
 use bytemuck::{Pod, Zeroable};
 
@@ -92,22 +91,21 @@ impl Octants {
     }
 }
 
-pub(super) fn trace(octants: &Octants, mut query: Query) -> Hit {
+pub(super) fn trace(octants: &Octants, leaves: LeafReader, mut query: Query) -> Hit {
     let octant = octant_of(query.ray.direction);
     let mut current = ROOT;
     loop {
         if current == NONE || query.is_answered() {
             return query.hit;
         }
-        query.counters.visit(current as usize);
-        query.counters.box_tests += 1;
+        query.visit(current as usize);
         let OctantNode { node, ropes } = &octants.0[current as usize];
-        let entered = enter_box(&node.bounds(), query.ray, query.inverse, query.hit.t).is_some();
+        let entered = query.enter(&node.bounds()).is_some();
         if entered && node.content < LEAF {
             current = (node.content & CHILD_MASK) + near_side(node.content, octant);
         } else {
             if entered {
-                query.test_leaf(node.content);
+                leaves.test_leaf(node.content, &mut query);
             }
             current = ropes[octant as usize];
         }

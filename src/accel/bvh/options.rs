@@ -185,26 +185,13 @@ impl Options {
     /// # Errors
     /// Its stack does not fit into workgroup memory, or its trail into two words.
     pub fn check_depth(&self, depth: u32) -> Result<(), AccelError> {
-        let limit = |what: &str, needed: u32, limit: u32| {
-            if needed <= limit {
-                return Ok(());
-            }
-            Err(AccelError::Limit {
-                what: what.to_owned(),
-                needed: needed.into(),
-                limit: limit.into(),
-            })
-        };
         if self.traversal == Traversal::ShortStack {
-            limit("levels of a restart trail", depth, TRAIL_LEVELS)?;
+            AccelError::check_limit("levels of a restart trail", depth, TRAIL_LEVELS)?;
         }
         if self.stack_feature == Some("stack_workgroup") {
             let bytes = self.stack_entries(depth) * LANES * 4;
-            limit(
-                "bytes of stacks in workgroup memory",
-                bytes,
-                WORKGROUP_BYTES,
-            )?;
+            let what = "bytes of stacks in workgroup memory";
+            AccelError::check_limit(what, bytes, WORKGROUP_BYTES)?;
         }
         Ok(())
     }

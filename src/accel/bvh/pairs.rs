@@ -2,20 +2,21 @@
 //!
 //! Source: T. Aila, S. Laine, "Understanding the efficiency of ray traversal on GPUs", HPG 2009.
 
+use super::super::AccelError;
 use super::super::bounds::{Bounds, enter_box};
-use super::super::leaf::{LEAF, Leaves, leaf_reference};
+use super::super::leaf::{LEAF, LeafReader, leaf_reference};
 use super::super::tree::{Coverage, NodeKind, Tree};
-use super::super::{AccelError, Counters, TriangleSoup};
-use super::layout::{Inner, Nodes, Query};
+use super::super::twin::Query;
+use super::NONE;
+use super::layout::{Inner, Nodes};
 use super::options::NodeOrder;
 use super::order::InnerNodes;
-use super::{NONE, ROOT};
 use bytemuck::{Pod, Zeroable};
 
 /// Boxes of both children with what they refer to: four `vec4<u32>`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub(super) struct Pair {
+pub(in crate::accel) struct Pair {
     left_min: [f32; 3],
     left: u32,
     left_max: [f32; 3],
@@ -27,67 +28,85 @@ pub(super) struct Pair {
 }
 
 impl Pair {
-    /// Root of an empty scene.
-    const NOTHING: Pair = Pair {
-        left_min: [0.0; 3],
-        left: NONE,
-        left_max: [0.0; 3],
-        parent: NONE,
-        right_min: [0.0; 3],
-        right: NONE,
-        right_max: [0.0; 3],
-        unused: 0,
-    };
-
-    fn left_bounds(&self) -> Bounds {
+    /// What stands for a missing child: a box of no extent with nothing in it.
+    pub const MISSING: (u32, Bounds) = (
+        NONE,
         Bounds {
-            min: self.left_min,
-            max: self.left_max,
+            min: [0.0; 3],
+            max: [0.0; 3],
+        },
+    );
+
+    /// A node of these children, reference and box, which has no parent yet.
+    pub fn new([(left, left_box), (right, right_box)]: [(u32, Bounds); 2]) -> Self {
+        Self {
+            left_min: left_box.min,
+            left,
+            left_max: left_box.max,
+            parent: NONE,
+            right_min: right_box.min,
+            right,
+            right_max: right_box.max,
+            unused: 0,
         }
     }
 
-    fn right_bounds(&self) -> Bounds {
-        Bounds {
-            min: self.right_min,
-            max: self.right_max,
+    /// References and boxes of both children.
+    pub fn children(&self) -> [(u32, Bounds); 2] {
+        let bounds = |min, max| Bounds { min, max };
+        [
+            (self.left, bounds(self.left_min, self.left_max)),
+            (self.right, bounds(self.right_min, self.right_max)),
+        ]
+    }
+
+    /// Box around both children.
+    pub fn bounds(&self) -> Bounds {
+        let present = self.children().into_iter().filter(|(r, _)| *r != NONE);
+        present.fold(Bounds::EMPTY, |all, (_, bounds)| all.union(&bounds))
+    }
+
+    /// The node after what it refers to moved up by this many places.
+    pub fn moved_by(self, nodes: u32, triangles: u32) -> Self {
+        let moved = |reference| match reference {
+            NONE => NONE,
+            _ if reference >= LEAF => reference + triangles,
+            _ => reference + nodes,
+        };
+        Self {
+            left: moved(self.left),
+            right: moved(self.right),
+            parent: moved(self.parent),
+            ..self
         }
     }
 }
 
 /// Inner nodes; leaves are references in them.
-pub(super) struct Pairs(pub Vec<Pair>);
+pub(in crate::accel) struct Pairs(pub Vec<Pair>);
 
 impl Pairs {
-    pub fn new(tree: &Tree, order: NodeOrder) -> Self {
+    /// Lays out a tree depth first.
+    pub fn depth_first(tree: &Tree) -> Self {
+        Self::new(tree, NodeOrder::DepthFirst)
+    }
+
+    /// Lays out a tree.
+    pub(super) fn new(tree: &Tree, order: NodeOrder) -> Self {
         let inner = InnerNodes::new(tree, order, |_, _| false);
-        let reference = |index: u32| match tree.nodes[index as usize].kind {
-            NodeKind::Inner { .. } => inner.places[index as usize],
-            NodeKind::Leaf { first, count } => leaf_reference(first, count),
-        };
-        let pair = |[left, right]: [u32; 2]| {
-            let (l, r) = (
-                &tree.nodes[left as usize].bounds,
-                &tree.nodes[right as usize].bounds,
-            );
-            Pair {
-                left_min: l.min,
-                left: reference(left),
-                left_max: l.max,
-                right_min: r.min,
-                right: reference(right),
-                right_max: r.max,
-                ..Pair::NOTHING
-            }
+        let child = |index: u32| {
+            let node = &tree.nodes[index as usize];
+            let reference = match node.kind {
+                NodeKind::Inner { .. } => inner.places[index as usize],
+                NodeKind::Leaf { first, count } => leaf_reference(first, count),
+            };
+            (reference, node.bounds)
         };
         let children = inner.nodes.iter().filter_map(|&n| inner.children(n));
-        let mut pairs: Vec<Pair> = children.map(pair).collect();
+        let mut pairs: Vec<Pair> = children.map(|c| Pair::new(c.map(child))).collect();
         if pairs.is_empty() {
-            let mut root = Pair::NOTHING;
-            if let Some(only) = tree.nodes.first() {
-                (root.left_min, root.left_max, root.left) =
-                    (only.bounds.min, only.bounds.max, reference(0));
-            }
-            pairs.push(root);
+            let only = tree.nodes.first().map_or(Pair::MISSING, |_| child(0));
+            pairs.push(Pair::new([only, Pair::MISSING]));
         }
         for index in 0..pairs.len() {
             for child in [pairs[index].left, pairs[index].right] {
@@ -98,62 +117,55 @@ impl Pairs {
         }
         Self(pairs)
     }
+}
 
-    /// Checks reachability, containment, parents and depth.
-    ///
-    /// # Errors
-    /// The first violated invariant, with the node.
-    pub fn validate(
-        &self,
-        soup: &TriangleSoup,
-        leaves: &Leaves,
-        max_depth: u32,
-    ) -> Result<(), AccelError> {
-        let invalid =
-            |index: u32, what: &str| Err(AccelError::Invalid(format!("node {index}: {what}")));
-        let mut coverage = Coverage::new(soup, self.0.len());
-        coverage.node(ROOT as usize)?;
-        let mut stack = vec![(ROOT, NONE, Bounds::EVERYTHING, 1)];
-        while let Some((index, parent, around, depth)) = stack.pop() {
-            let node = &self.0[index as usize];
-            if depth > max_depth.max(1) {
-                return invalid(index, &format!("deeper than {max_depth} levels"));
+/// Checks reachability, containment, parents and depth of a tree of `nodes`, whose references count the
+/// first one as number `first`; `cover` notes a leaf, given its reference and its box.
+///
+/// # Errors
+/// The first violated invariant, with the node.
+pub(in crate::accel) fn validate<'a>(
+    (first, nodes): (u32, &[Pair]),
+    max_depth: u32,
+    mut coverage: Coverage<'a>,
+    cover: impl Fn(&mut Coverage<'a>, u32, &Bounds) -> Result<(), AccelError>,
+) -> Result<(), AccelError> {
+    coverage.node(0)?;
+    let mut stack = vec![(first, NONE, Bounds::EVERYTHING, 1)];
+    while let Some((index, parent, around, depth)) = stack.pop() {
+        let ensure =
+            |holds, what: &str| AccelError::ensure(holds, || format!("node {index}: {what}"));
+        let node = &nodes[(index - first) as usize];
+        AccelError::ensure(depth <= max_depth.max(1), || {
+            format!("node {index}: deeper than {max_depth} levels")
+        })?;
+        ensure(node.parent == parent, "its parent is another node")?;
+        for (reference, bounds) in node.children() {
+            if reference == NONE {
+                continue;
             }
-            if node.parent != parent {
-                return invalid(index, "its parent is another node");
-            }
-            for (reference, bounds) in [
-                (node.left, node.left_bounds()),
-                (node.right, node.right_bounds()),
-            ] {
-                if reference == NONE {
-                    continue;
-                }
-                if !around.contains(&bounds) {
-                    return invalid(index, "a child's box leaves its own");
-                }
-                if reference < LEAF {
-                    coverage.node(reference as usize)?;
-                    stack.push((reference, index, bounds, depth + 1));
-                } else {
-                    leaves.cover(&mut coverage, soup, reference, &bounds)?;
-                }
+            let inside = around.contains(&bounds);
+            ensure(inside, "a child's box leaves its own")?;
+            if reference < LEAF {
+                let place = reference.checked_sub(first);
+                coverage.node(place.map_or(nodes.len(), |place| place as usize))?;
+                stack.push((reference, index, bounds, depth + 1));
+            } else {
+                cover(&mut coverage, reference, &bounds)?;
             }
         }
-        coverage.is_complete()
     }
+    coverage.is_complete()
 }
 
 impl Nodes for Pairs {
-    fn visit(&self, node: u32, query: &mut Query) -> Inner {
-        query.counters.visit(node as usize);
-        query.counters.box_tests += 2;
-        let pair = &self.0[node as usize];
-        let (ray, inverse) = (query.ray, query.inverse);
-        let left = enter_box(&pair.left_bounds(), ray, inverse, query.hit.t);
-        let right = enter_box(&pair.right_bounds(), ray, inverse, query.hit.t);
-        let swap = right.is_some_and(|r| left.is_none_or(|l| r < l));
-        let (mut near, mut far) = ((left, pair.left), (right, pair.right));
+    fn visit(&self, node: u32, leaves: LeafReader, query: &mut Query) -> Inner {
+        query.visit(node as usize);
+        let [(left, left_box), (right, right_box)] = self.0[node as usize].children();
+        let left = (query.enter(&left_box), left);
+        let right = (query.enter(&right_box), right);
+        let swap = right.0.is_some_and(|r| left.0.is_none_or(|l| r < l));
+        let (mut near, mut far) = (left, right);
         if swap {
             std::mem::swap(&mut near, &mut far);
         }
@@ -164,7 +176,7 @@ impl Nodes for Pairs {
         };
         if near.0.is_some() {
             if near.1 >= LEAF {
-                query.test_leaf(near.1);
+                leaves.test_leaf(near.1, query);
             } else {
                 inner.first = near.1;
             }
@@ -173,7 +185,7 @@ impl Nodes for Pairs {
         let entered = far.0.is_some_and(|e| e <= query.hit.t * query.inverse.pad);
         if entered && !query.is_answered() {
             if far.1 >= LEAF {
-                query.test_leaf(far.1);
+                leaves.test_leaf(far.1, query);
             } else if inner.first == NONE {
                 inner.first = far.1;
                 inner.side ^= 1;
@@ -185,17 +197,17 @@ impl Nodes for Pairs {
     }
 
     fn second_child(&self, node: u32, from: u32, query: &mut Query) -> u32 {
-        query.counters.visit(node as usize);
+        query.visit(node as usize);
         query.counters.box_tests += 2;
-        let pair = &self.0[node as usize];
-        let (ray, inverse) = (query.ray, query.inverse);
-        let left = enter_box(&pair.left_bounds(), ray, inverse, ray.t_max);
-        let right = enter_box(&pair.right_bounds(), ray, inverse, ray.t_max);
-        let swap = right.is_some_and(|r| left.is_none_or(|l| r < l));
+        let (ray, inverse) = (&query.ray, query.inverse);
+        let enter = |bounds| enter_box(bounds, ray, inverse, ray.t_max);
+        let [(left, left_box), (right, right_box)] = self.0[node as usize].children();
+        let (enter_left, enter_right) = (enter(&left_box), enter(&right_box));
+        let swap = enter_right.is_some_and(|r| enter_left.is_none_or(|l| r < l));
         let (near, far, enter) = if swap {
-            (pair.right, pair.left, left)
+            (right, left, enter_left)
         } else {
-            (pair.left, pair.right, right)
+            (left, right, enter_right)
         };
         let entered = enter.is_some_and(|e| e <= query.hit.t * query.inverse.pad);
         if from == near && far < LEAF && entered {
@@ -209,8 +221,8 @@ impl Nodes for Pairs {
         self.0[node as usize].parent
     }
 
-    fn child(&self, node: u32, side: u32, counters: &mut Counters) -> u32 {
-        counters.visit(node as usize);
+    fn child(&self, node: u32, side: u32, query: &mut Query) -> u32 {
+        query.visit(node as usize);
         let pair = &self.0[node as usize];
         if side == 0 { pair.left } else { pair.right }
     }

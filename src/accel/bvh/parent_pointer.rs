@@ -4,17 +4,19 @@
 //! Sources: M. Hapala et al., "Efficient stack-less BVH traversal for ray tracing", SCCG 2011; Dufay
 //! 2017, Algorithm 4.3, which as printed ends early after a missed first child and forgets hits.
 
+use super::super::leaf::LeafReader;
 use super::super::ray::Hit;
-use super::layout::{Nodes, Query};
+use super::super::twin::Query;
+use super::layout::Nodes;
 use super::{NONE, ROOT};
 
-pub(super) fn trace(nodes: &impl Nodes, mut query: Query) -> Hit {
+pub(super) fn trace(nodes: &impl Nodes, leaves: LeafReader, mut query: Query) -> Hit {
     let mut current = ROOT;
     // The child that we come from, NONE on the way down.
     let mut from_child = NONE;
     loop {
         let next = if from_child == NONE {
-            let inner = nodes.visit(current, &mut query);
+            let inner = nodes.visit(current, leaves, &mut query);
             if query.is_answered() {
                 return query.hit;
             }

@@ -2,11 +2,10 @@
 //!
 //! Sources: B. Smits, "Efficiency issues for ray tracing", 1998; Dufay 2017, Algorithm 4.4.
 
-use super::super::bounds::enter_box;
-use super::super::leaf::LEAF;
+use super::super::leaf::{LEAF, LeafReader};
 use super::super::ray::Hit;
+use super::super::twin::Query;
 use super::boxes::{Boxes, CHILD_MASK};
-use super::layout::Query;
 use super::{NONE, ROOT};
 
 /// The rope of a node, from its parent's rope: the first child leads to the second, the second to
@@ -33,19 +32,18 @@ pub(super) fn rope(mut boxes: Boxes) -> Boxes {
     boxes
 }
 
-pub(super) fn trace(boxes: &Boxes, mut query: Query) -> Hit {
+pub(super) fn trace(boxes: &Boxes, leaves: LeafReader, mut query: Query) -> Hit {
     let mut current = ROOT;
     loop {
         if current == NONE || query.is_answered() {
             return query.hit;
         }
-        query.counters.visit(current as usize);
-        query.counters.box_tests += 1;
+        query.visit(current as usize);
         let node = &boxes.0[current as usize];
-        if enter_box(&node.bounds(), query.ray, query.inverse, query.hit.t).is_none() {
+        if query.enter(&node.bounds()).is_none() {
             current = node.link;
         } else if node.content >= LEAF {
-            query.test_leaf(node.content);
+            leaves.test_leaf(node.content, &mut query);
             current = node.link;
         } else {
             current = node.content & CHILD_MASK;

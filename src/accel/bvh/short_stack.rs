@@ -5,12 +5,19 @@
 //! child the path takes, so that a restart tests no box; a second word says where the other child is
 //! still to be visited. Visits are those of the full stack.
 
+use super::super::leaf::LeafReader;
 use super::super::ray::Hit;
-use super::layout::{Nodes, Query};
+use super::super::twin::Query;
+use super::layout::Nodes;
 use super::{NONE, ROOT};
 use std::collections::VecDeque;
 
-pub(super) fn trace(nodes: &impl Nodes, entries: usize, mut query: Query) -> Hit {
+pub(super) fn trace(
+    nodes: &impl Nodes,
+    entries: usize,
+    leaves: LeafReader,
+    mut query: Query,
+) -> Hit {
     let mut stack = VecDeque::with_capacity(entries);
     let push = |stack: &mut VecDeque<u32>, query: &mut Query, node| {
         if stack.len() == entries {
@@ -28,14 +35,14 @@ pub(super) fn trace(nodes: &impl Nodes, entries: usize, mut query: Query) -> Hit
         if level < restart_end {
             let taken = (side >> level & 1) as u32;
             if pending >> level & 1 == 1 {
-                let other = nodes.child(current, taken ^ 1, query.counters);
+                let other = nodes.child(current, taken ^ 1, &mut query);
                 push(&mut stack, &mut query, other);
             }
-            current = nodes.child(current, taken, query.counters);
+            current = nodes.child(current, taken, &mut query);
             level += 1;
             continue;
         }
-        let inner = nodes.visit(current, &mut query);
+        let inner = nodes.visit(current, leaves, &mut query);
         if query.is_answered() {
             return query.hit;
         }

@@ -1,14 +1,16 @@
 //! Near child first, the far one on a stack. Twin of `kernels/accel/bvh/stack.wesl`.
 
+use super::super::leaf::LeafReader;
 use super::super::ray::Hit;
-use super::layout::{Nodes, Query};
+use super::super::twin::Query;
+use super::layout::Nodes;
 use super::{NONE, ROOT};
 
-pub(super) fn trace(nodes: &impl Nodes, mut query: Query) -> Hit {
+pub(super) fn trace(nodes: &impl Nodes, leaves: LeafReader, mut query: Query) -> Hit {
     let mut stack = Vec::new();
     let mut current = ROOT;
     loop {
-        let inner = nodes.visit(current, &mut query);
+        let inner = nodes.visit(current, leaves, &mut query);
         if query.is_answered() {
             return query.hit;
         }

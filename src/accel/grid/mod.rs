@@ -1,7 +1,7 @@
 //! What the grids share: the box cut into cells, the place of a position, the insertion of triangles.
 //! Twin of `kernels/accel/grid.wesl`.
 //!
-//! A triangle is listed in every cell that it overlaps once the cell is grown by [`Frame::margin`],
+//! A triangle is listed in every cell that it overlaps once the cell is grown by [`GridBox::margin`],
 //! which is larger than what rounding can move the walk. The planes of a grid are the same f32
 //! expression everywhere, and the distance to a plane is monotone in the plane even after rounding,
 //! so that a walk passes planes in order; the margin covers the rounding of positions, from which
@@ -13,6 +13,7 @@ pub mod raster;
 
 use super::bounds::Bounds;
 use super::ray::Ray;
+use super::spatial::cross;
 use super::triangle::TriangleRecord;
 use super::{AccelError, TriangleSoup};
 use crate::gpu::UniformValues;
@@ -26,19 +27,12 @@ pub const MAX_WORDS: u64 = (128 << 20) / 4 - 1;
 /// # Errors
 /// The limit with both numbers.
 pub fn check_words(what: &str, needed: u64) -> Result<(), AccelError> {
-    if needed <= MAX_WORDS {
-        return Ok(());
-    }
-    Err(AccelError::Limit {
-        what: what.to_owned(),
-        needed,
-        limit: MAX_WORDS,
-    })
+    AccelError::check_limit(what, needed, MAX_WORDS)
 }
 
 /// The box that a grid fills, and how exact positions in it are.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
+pub struct GridBox {
     /// Around all triangles, grown by the margin.
     pub bounds: Bounds,
     /// By how much cells are grown along each axis when triangles are listed, scene units. Positions
@@ -51,8 +45,8 @@ pub struct Frame {
     diagonal: f32,
 }
 
-impl Frame {
-    /// The frame of a scene; a unit box if it is empty.
+impl GridBox {
+    /// That of a scene; a unit box if it is empty.
     pub fn new(soup: &TriangleSoup) -> Self {
         let mut bounds = bounds_of(&soup.records);
         if soup.records.is_empty() {
@@ -145,12 +139,7 @@ impl Cut {
 pub fn areas(soup: &TriangleSoup) -> Vec<f32> {
     let area = |record: &TriangleRecord| {
         let [e, f] = record.edges();
-        let normal = [
-            e[1] * f[2] - e[2] * f[1],
-            e[2] * f[0] - e[0] * f[2],
-            e[0] * f[1] - e[1] * f[0],
-        ];
-        0.5 * normal.iter().map(|n| n * n).sum::<f64>().sqrt() as f32
+        0.5 * cross(e, f).iter().map(|n| n * n).sum::<f64>().sqrt() as f32
     };
     soup.records.par_iter().map(area).collect()
 }
@@ -178,19 +167,19 @@ pub struct Grid {
     pub cell: [f32; 3],
     /// Their reciprocals.
     pub inverse_cell: [f32; 3],
-    /// See [`Frame::margin`].
+    /// See [`GridBox::margin`].
     pub margin: [f32; 3],
 }
 
 impl Grid {
-    /// A frame cut into `resolution` cells.
-    pub fn new(frame: &Frame, resolution: [u32; 3]) -> Self {
-        let extent = frame.bounds.extent();
+    /// A box cut into `resolution` cells.
+    pub fn new(grid_box: &GridBox, resolution: [u32; 3]) -> Self {
+        let extent = grid_box.bounds.extent();
         Self::with_cells(
-            frame.bounds.min,
+            grid_box.bounds.min,
             std::array::from_fn(|a| extent[a] / resolution[a] as f32),
             resolution,
-            frame.margin,
+            grid_box.margin,
         )
     }
 

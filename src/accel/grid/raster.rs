@@ -6,6 +6,7 @@
 //! three projections of both overlap. Each condition leaves an interval of cells in a row, so that a
 //! row costs the same however many of its cells are listed.
 
+use super::super::spatial::cross;
 use super::super::triangle::TriangleRecord;
 use super::Grid;
 
@@ -97,14 +98,9 @@ impl Raster {
 fn margin_of(record: &TriangleRecord) -> f64 {
     let [e, f] = record.edges();
     let square = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>();
-    let normal = [
-        e[1] * f[2] - e[2] * f[1],
-        e[2] * f[0] - e[0] * f[2],
-        e[0] * f[1] - e[1] * f[0],
-    ];
     let third = std::array::from_fn(|a| f[a] - e[a]);
     let longest = square(e).max(square(f)).max(square(third));
-    let ratio = longest / square(normal).sqrt();
+    let ratio = longest / square(cross(e, f)).sqrt();
     // A point has no width either: 0 / 0.
     if ratio > 1.0 { ratio.min(1e6) } else { 1.0 }
 }
@@ -206,11 +202,7 @@ impl Plane {
         let [p, q, r] = shape.corners;
         let e: [f64; 3] = std::array::from_fn(|a| q[a] - p[a]);
         let f: [f64; 3] = std::array::from_fn(|a| r[a] - p[a]);
-        let normal = [
-            e[1] * f[2] - e[2] * f[1],
-            e[2] * f[0] - e[0] * f[2],
-            e[0] * f[1] - e[1] * f[0],
-        ];
+        let normal = cross(e, f);
         let reach = (0..3).map(|a| normal[a].abs() * (0.5 + shape.grow[a]));
         let size = |v: [f64; 3]| v.iter().map(|x| x.abs()).sum::<f64>();
         // What rounding may do to the plane of a needle.
@@ -244,9 +236,10 @@ impl Plane {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Frame, Grid};
+    use super::super::{Grid, GridBox};
     use super::*;
     use crate::accel::TriangleSoup;
+    use crate::accel::spatial::dot;
     use crate::geometry::Triangle;
     use glam::Vec3;
     use std::collections::BTreeSet;
@@ -261,14 +254,6 @@ mod tests {
 
     /// The separating-axis test with all 13 axes, for one cell grown by `grow` cells.
     fn overlaps(corners: &[[f64; 3]; 3], cell: [u32; 3], grow: [f64; 3]) -> bool {
-        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let cross = |a: [f64; 3], b: [f64; 3]| {
-            [
-                a[1] * b[2] - a[2] * b[1],
-                a[2] * b[0] - a[0] * b[2],
-                a[0] * b[1] - a[1] * b[0],
-            ]
-        };
         let edge = |i: usize| -> [f64; 3] {
             std::array::from_fn(|a| corners[(i + 1) % 3][a] - corners[i][a])
         };
@@ -307,7 +292,7 @@ mod tests {
                 records: vec![record, far],
                 ..Default::default()
             };
-            let grid = Grid::new(&Frame::new(&soup), [9, 7, 8]);
+            let grid = Grid::new(&GridBox::new(&soup), [9, 7, 8]);
             let listed = |exact: bool| {
                 let mut cells = BTreeSet::new();
                 Raster::default().rows(&grid, &record, exact, |first, count| {

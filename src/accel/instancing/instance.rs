@@ -1,13 +1,14 @@
 //! What the two-level traversals share: instances as kernels read them, rays in an object's space,
 //! boxes grown for the ray, and the traversal of one object. Twin of `kernels/accel/instance.wesl`.
 
-use super::super::Counters;
 use super::super::bounds::Bounds;
+use super::super::bvh::pairs::Pair;
 use super::super::intersection::{Intersection, Reciprocal};
 use super::super::leaf::{LEAF, leaf_range};
-use super::super::ray::{Hit, NO_HIT, Ray};
+use super::super::ray::{Hit, Ray};
 use super::super::triangle::{TriangleRecord, intersect_triangle};
-use super::forest::{Forest, Node};
+use super::super::twin::Query;
+use super::forest::Forest;
 use crate::scene::{Instance, Transform};
 use bytemuck::{Pod, Zeroable};
 
@@ -114,30 +115,28 @@ pub(super) fn leaf(
     reference: u32,
     first_id: u32,
     level: &Level,
-    hit: &mut Hit,
-    counters: &mut Counters,
+    query: &mut Query,
 ) {
     let (first, count) = leaf_range(reference);
     for triangle in &triangles[first..first + count] {
-        counters.triangle_tests += 1;
+        query.counters.triangle_tests += 1;
         let id = triangle.id + first_id;
         let triangle = TriangleRecord { id, ..*triangle };
-        intersect_triangle(&triangle, &level.ray, level.inverse, hit);
+        intersect_triangle(&triangle, &level.ray, level.inverse, &mut query.hit);
     }
 }
 
 /// Both children of a node in the order of their distance, with where they are entered.
 pub(super) fn near_and_far(
-    (place, node): (u32, &Node),
+    (place, node): (u32, &Pair),
     level: &Level,
-    t_best: f32,
-    counters: &mut Counters,
+    query: &mut Query,
 ) -> [(Option<f32>, u32); 2] {
-    counters.visit(place as usize);
-    counters.box_tests += 2;
+    query.visit(place as usize);
+    query.counters.box_tests += 2;
     let [(left, left_box), (right, right_box)] = node.children();
-    let enter_left = enter_grown(level, &left_box, t_best);
-    let enter_right = enter_grown(level, &right_box, t_best);
+    let enter_left = enter_grown(level, &left_box, query.hit.t);
+    let enter_right = enter_grown(level, &right_box, query.hit.t);
     let swap = enter_right.is_some_and(|r| enter_left.is_none_or(|l| r < l));
     if swap {
         [(enter_right, right), (enter_left, left)]
@@ -152,37 +151,41 @@ pub(super) fn is_open(enter: Option<f32>, level: &Level, hit: &Hit) -> bool {
 }
 
 /// Traces the object below `entry.node`, near child first.
-pub(super) fn trace_object(
-    forest: &Forest,
-    entry: &Entry,
-    ray: &Ray,
-    any: bool,
-    hit: &mut Hit,
-    counters: &mut Counters,
+pub(super) fn trace_object(forest: &Forest, entry: &Entry, query: &mut Query) {
+    let level = level(&entry.object_ray(&query.ray), 0.0, forest.intersection);
+    let node = |index: u32| &forest.nodes[index as usize];
+    walk(node, entry.node, &level, query, |reference, query| {
+        leaf(&forest.triangles, reference, entry.first_id, &level, query);
+    });
+}
+
+/// The loop of both levels where one is inside the other: `visit` gets the references of leaves.
+pub(super) fn walk<'a>(
+    node: impl Fn(u32) -> &'a Pair,
+    root: u32,
+    level: &Level,
+    query: &mut Query,
+    visit: impl Fn(u32, &mut Query),
 ) {
-    let Forest {
-        nodes, triangles, ..
-    } = forest;
-    let level = level(&entry.object_ray(ray), 0.0, forest.intersection);
     let mut stack = Vec::new();
-    let mut current = entry.node;
+    let mut current = root;
     loop {
-        let children = near_and_far((current, &nodes[current as usize]), &level, hit.t, counters);
+        let children = near_and_far((current, node(current)), level, query);
         let mut next = NOTHING;
         for (enter, reference) in children {
-            if !is_open(enter, &level, hit) {
+            if !is_open(enter, level, &query.hit) || reference == NOTHING {
                 continue;
             }
             if reference >= LEAF {
-                leaf(triangles, reference, entry.first_id, &level, hit, counters);
-                if any && hit.triangle != NO_HIT {
+                visit(reference, query);
+                if query.is_answered() {
                     return;
                 }
             } else if next == NOTHING {
                 next = reference;
             } else {
                 stack.push(reference);
-                counters.stack_high_water = counters.stack_high_water.max(stack.len() as u32);
+                query.count_stack(stack.len());
             }
         }
         if next == NOTHING {

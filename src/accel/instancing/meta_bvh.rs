@@ -5,21 +5,17 @@
 //! C. Benthin et al. (HPG 2017), see [`super::top`].
 
 use super::super::bounds::Bounds;
+use super::super::bvh::pairs::Pair;
 use super::super::leaf::{FIRST_MASK, LEAF, leaf_reference};
-use super::super::ray::{Hit, NO_HIT, Ray};
+use super::super::ray::Hit;
 use super::super::tree::tree_parameters;
-use super::super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords, Space,
-    TriangleSoup,
-};
-use super::forest::Node;
+use super::super::twin::{CpuTwin, Query, Traverse, Twin};
+use super::super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, Space, TriangleSoup};
 use super::instance::{Entry, NOTHING, is_open, leaf, level, near_and_far};
-use super::meta_bvh_nested::NestedTwin;
 use super::top::Top;
 use super::world_box::BoxMap;
-use super::{Base, clamped};
+use super::{Base, Upper, clamped, meta_bvh_nested};
 use crate::accel::StructureStats;
-use crate::gpu::UniformValues;
 use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
 /// Stands for the size of the stack when an object was entered, outside of any.
@@ -69,7 +65,7 @@ impl AccelKind for MetaBvh {
         let top = log.phase("upper level", || {
             Top::build(&base.instances, &base.forest, rebraid)
         });
-        Ok(Box::new(MetaBvhTwin {
+        Ok(Box::new(Built {
             base,
             top,
             rebraid,
@@ -81,32 +77,25 @@ impl AccelKind for MetaBvh {
 /// Refuses more entries than references can address: like triangles, by `FIRST_MASK`.
 fn check_entries(instances: usize, rebraid: usize) -> Result<(), AccelError> {
     let needed = instances as u64 * rebraid.max(1) as u64;
-    if needed <= u64::from(FIRST_MASK) {
-        return Ok(());
-    }
-    Err(AccelError::Limit {
-        what: "entries of the upper level of a meta-bvh".into(),
-        needed,
-        limit: FIRST_MASK.into(),
-    })
+    let what = "entries of the upper level of a meta-bvh";
+    AccelError::check_limit(what, needed, FIRST_MASK)
 }
 
-/// The built structure; it is its own CPU twin.
-pub(super) struct MetaBvhTwin {
+pub(super) struct Built {
     pub(super) base: Base,
     pub(super) top: Top,
     rebraid: usize,
     nested: bool,
 }
 
-impl MetaBvhTwin {
+impl Built {
     /// The root of the upper level, behind the nodes of all objects.
     pub(super) fn root(&self) -> u32 {
         self.base.forest.nodes.len() as u32
     }
 
     /// A node of either level.
-    pub(super) fn node(&self, index: u32) -> &Node {
+    pub(super) fn node(&self, index: u32) -> &Pair {
         let objects = &self.base.forest.nodes;
         let index = index as usize;
         objects
@@ -134,104 +123,57 @@ impl MetaBvhTwin {
         clamped(1 + self.top.nodes.len() as u64 + below.sum::<u64>())
     }
 
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let triangles = &self.base.forest.triangles;
-        let tests = self.base.forest.intersection;
-        let ray = &tests.raised(ray);
-        let world = level(ray, self.top.growth, tests);
-        let mut hit = Hit::miss(ray);
-        let mut stack: Vec<u32> = Vec::new();
-        // The level that is traversed: the world, or the object that was entered with `floor` entries
-        // on the stack.
-        let (mut here, mut floor, mut first_id) = (world, OUTSIDE, 0);
-        let mut current = self.root();
-        loop {
-            let children = near_and_far((current, self.node(current)), &here, hit.t, counters);
-            let mut next = NOTHING;
-            for (enter, reference) in children {
-                if !is_open(enter, &here, &hit) {
-                    continue;
-                }
-                if floor != OUTSIDE && reference >= LEAF {
-                    leaf(triangles, reference, first_id, &here, &mut hit, counters);
-                    if any && hit.triangle != NO_HIT {
-                        return hit;
-                    }
-                } else if next == NOTHING {
-                    next = reference;
-                } else if reference != NOTHING {
-                    stack.push(reference);
-                    counters.stack_high_water = counters.stack_high_water.max(stack.len() as u32);
-                }
-            }
-            if next == NOTHING {
-                if stack.len() as u32 == floor {
-                    (here, floor) = (world, OUTSIDE);
-                }
-                match stack.pop() {
-                    Some(reference) => next = reference,
-                    None => return hit,
-                }
-            }
-            if floor == OUTSIDE && next >= LEAF {
-                let entry = self.load_entry(next);
-                here = level(&entry.object_ray(ray), 0.0, tests);
-                (floor, first_id, next) = (stack.len() as u32, entry.first_id, entry.node);
-            }
-            current = next;
-        }
-    }
-
     /// Checks the tree of the upper level: boxes, and that every entry is reached once.
     fn validate_top(&self) -> Result<(), AccelError> {
         let maps: Vec<BoxMap> = self.base.instances.iter().map(BoxMap::new).collect();
-        let invalid = |text: String| Err(AccelError::Invalid(format!("upper level: {text}")));
+        let ensure = |holds, what: &dyn Fn() -> String| {
+            AccelError::ensure(holds, || format!("upper level: {}", what()))
+        };
         let first = self.root();
         let mut nodes = vec![false; self.top.nodes.len()];
         let mut entries = vec![false; self.top.entries.len()];
         let mut stack = vec![(first, Bounds::EVERYTHING, 1)];
         while let Some((index, around, depth)) = stack.pop() {
             let place = index.wrapping_sub(first) as usize;
-            if depth > self.top_stack_entries() {
-                return invalid(format!("node {place} is deeper than the stack"));
-            }
-            if nodes.get(place) != Some(&false) {
-                return invalid(format!("node {place} is missing or reached twice"));
-            }
+            let fits = depth <= self.top_stack_entries();
+            ensure(fits, &|| format!("node {place} is deeper than the stack"))?;
+            let is_new = nodes.get(place) == Some(&false);
+            ensure(is_new, &|| {
+                format!("node {place} is missing or reached twice")
+            })?;
             nodes[place] = true;
             for (reference, bounds) in self.top.nodes[place].children() {
                 if reference == NOTHING {
                     continue;
                 }
-                if !around.contains(&bounds) {
-                    return invalid(format!("node {place}: a child's box leaves its own"));
-                }
+                let what = || format!("node {place}: a child's box leaves its own");
+                ensure(around.contains(&bounds), &what)?;
                 if reference < LEAF {
                     stack.push((reference, bounds, depth + 1));
                     continue;
                 }
                 let entry = (reference & FIRST_MASK) as usize;
-                if reference != leaf_reference(entry as u32, 1)
-                    || entries.get(entry) != Some(&false)
-                {
-                    return invalid(format!("entry {entry} is missing or reached twice"));
-                }
+                let is_new = reference == leaf_reference(entry as u32, 1)
+                    && entries.get(entry) == Some(&false);
+                ensure(is_new, &|| {
+                    format!("entry {entry} is missing or reached twice")
+                })?;
                 entries[entry] = true;
                 let part = &self.top.entries[entry];
                 let object_box = self.base.forest.nodes[part.node as usize].bounds();
                 let map = &maps[part.instance as usize];
-                if !bounds.contains(&map.world_box(&object_box)) {
-                    return invalid(format!("entry {entry} sticks out of its box"));
-                }
-                if map.growth() > self.top.growth {
-                    return invalid(format!("entry {entry} needs more growth of boxes"));
-                }
+                let inside = bounds.contains(&map.world_box(&object_box));
+                ensure(inside, &|| format!("entry {entry} sticks out of its box"))?;
+                let grown = map.growth() <= self.top.growth;
+                ensure(grown, &|| {
+                    format!("entry {entry} needs more growth of boxes")
+                })?;
             }
         }
-        match (nodes.iter().chain(&entries)).position(|seen| !seen) {
-            Some(_) => invalid("a node or entry is never reached".to_owned()),
-            None => Ok(()),
-        }
+        let all_reached = nodes.iter().chain(&entries).all(|seen| *seen);
+        ensure(all_reached, &|| {
+            "a node or entry is never reached".to_owned()
+        })
     }
 
     /// Checks that the entries of each instance make up its object, each part once.
@@ -240,12 +182,13 @@ impl MetaBvhTwin {
         let mut parts: Vec<Vec<u32>> = vec![Vec::new(); instances.len()];
         for (index, entry) in self.top.entries.iter().enumerate() {
             let instance = instances.get(entry.instance as usize);
-            if instance.map(|i| Entry::new(entry.instance, i, entry.node)) != Some(*entry) {
-                return Err(AccelError::Invalid(format!(
+            let expected = instance.map(|i| Entry::new(entry.instance, i, entry.node));
+            AccelError::ensure(expected == Some(*entry), || {
+                format!(
                     "entry {index} is not instance {} as it stands",
                     entry.instance
-                )));
-            }
+                )
+            })?;
             parts[entry.instance as usize].push(entry.node);
         }
         for (index, (instance, parts)) in instances.iter().zip(&mut parts).enumerate() {
@@ -259,25 +202,21 @@ impl MetaBvhTwin {
                     continue;
                 }
                 let children = self.base.forest.nodes[node as usize].children();
-                if children.iter().any(|(child, _)| *child >= LEAF) {
-                    return Err(AccelError::Invalid(format!(
-                        "instance {index}: triangles below node {node} are in no entry"
-                    )));
-                }
+                AccelError::ensure(children.iter().all(|(child, _)| *child < LEAF), || {
+                    format!("instance {index}: triangles below node {node} are in no entry")
+                })?;
                 stack.extend(children.map(|(child, _)| child));
             }
-            if found != parts.len() {
-                return Err(AccelError::Invalid(format!(
-                    "instance {index}: {} entries, of which {found} are parts of their own",
-                    parts.len()
-                )));
-            }
+            let all = parts.len();
+            AccelError::ensure(found == all, || {
+                format!("instance {index}: {all} entries, of which {found} are parts of their own")
+            })?;
         }
         Ok(())
     }
 }
 
-impl BuiltAccel for MetaBvhTwin {
+impl BuiltAccel for Built {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
         self.base.validate(soup)?;
         self.validate_parts()?;
@@ -285,45 +224,26 @@ impl BuiltAccel for MetaBvhTwin {
     }
 
     fn buffers(&self) -> GpuBuffers<'_> {
-        let forest = &self.base.forest;
-        let nodes = bytemuck::cast_slice(&forest.nodes);
-        let top = bytemuck::cast_slice(&self.top.nodes);
-        let entries = bytemuck::cast_slice(&self.top.entries);
-        let first_entry = forest.nodes.len() + self.top.nodes.len();
-        let (objects, top_entries) = (forest.stack_entries(), self.top_stack_entries());
+        let nodes = self.base.forest.nodes.len();
+        let (objects, upper) = (self.base.forest.stack_entries(), self.top_stack_entries());
         // Nested loops have a stack each, of the same size.
         let (kernel, stack_entries) = match self.nested {
-            true => ("accel/meta_bvh_nested", objects.max(top_entries)),
-            false => ("accel/meta_bvh", objects + top_entries),
+            true => ("accel/meta_bvh_nested", objects.max(upper)),
+            false => ("accel/meta_bvh", objects + upper),
         };
-        GpuBuffers {
+        self.base.buffers(&Upper {
             kernel,
-            features: Vec::new(),
-            arrays: vec![
-                NamedWords {
-                    name: "nodes",
-                    words: [nodes, top, entries].concat().into(),
-                    element_bytes: 64,
-                },
-                NamedWords {
-                    name: "leaf_triangles",
-                    words: bytemuck::cast_slice(&forest.triangles).into(),
-                    element_bytes: 48,
-                },
+            parts: [
+                bytemuck::cast_slice(&self.top.nodes),
+                bytemuck::cast_slice(&self.top.entries),
             ],
-            uniforms: vec![
-                super::super::limits(self.step_fuse(), self.top.entries.len()),
-                (
-                    "instancing",
-                    UniformValues::new()
-                        .u32("root", self.root())
-                        .u32("first_entry", first_entry as u32)
-                        .f32("growth", self.top.growth),
-                ),
-            ],
-            // Rounded up, so that scenes of like depth share a kernel.
-            constants: vec![("STACK_ENTRIES", stack_entries.next_multiple_of(8))],
-        }
+            step_fuse: self.step_fuse(),
+            entries: self.top.entries.len(),
+            root: nodes,
+            first_entry: nodes + self.top.nodes.len(),
+            growth: self.top.growth,
+            stack_entries,
+        })
     }
 
     fn divisible(&self) -> &'static [&'static str] {
@@ -332,13 +252,9 @@ impl BuiltAccel for MetaBvhTwin {
 
     fn stats(&self) -> StructureStats {
         let forest = &self.base.forest;
-        let bytes = size_of_val(&forest.nodes[..])
-            + size_of_val(&forest.triangles[..])
-            + size_of_val(&self.top.nodes[..])
-            + size_of_val(&self.top.entries[..]);
         let below = forest.stats.depth.unwrap_or(0);
         StructureStats {
-            bytes: bytes as u64,
+            bytes: self.buffers().bytes(),
             nodes: forest.stats.nodes + self.top.nodes.len() as u64,
             depth: Some(self.top.depth + below),
             ..forest.stats.clone()
@@ -355,22 +271,59 @@ impl BuiltAccel for MetaBvhTwin {
         }))
     }
 
-    fn cpu_twin<'a>(&'a self, _: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        if self.nested {
-            Some(Box::new(NestedTwin(self)))
-        } else {
-            Some(Box::new(self))
-        }
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(Twin(self, soup)))
     }
 }
 
-impl CpuTwin for &MetaBvhTwin {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.trace(ray, false, counters)
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.trace(ray, true, counters).triangle != NO_HIT
+impl Traverse for Built {
+    fn trace(&self, _: &TriangleSoup, mut query: Query) -> Hit {
+        if self.nested {
+            return meta_bvh_nested::trace(self, query);
+        }
+        let triangles = &self.base.forest.triangles;
+        let tests = self.base.forest.intersection;
+        let world = level(&query.ray, self.top.growth, tests);
+        let mut stack: Vec<u32> = Vec::new();
+        // The level that is traversed: the world, or the object that was entered with `floor` entries
+        // on the stack.
+        let (mut here, mut floor, mut first_id) = (world, OUTSIDE, 0);
+        let mut current = self.root();
+        loop {
+            let children = near_and_far((current, self.node(current)), &here, &mut query);
+            let mut next = NOTHING;
+            for (enter, reference) in children {
+                if !is_open(enter, &here, &query.hit) {
+                    continue;
+                }
+                if floor != OUTSIDE && reference >= LEAF {
+                    leaf(triangles, reference, first_id, &here, &mut query);
+                    if query.is_answered() {
+                        return query.hit;
+                    }
+                } else if next == NOTHING {
+                    next = reference;
+                } else if reference != NOTHING {
+                    stack.push(reference);
+                    query.count_stack(stack.len());
+                }
+            }
+            if next == NOTHING {
+                if stack.len() as u32 == floor {
+                    (here, floor) = (world, OUTSIDE);
+                }
+                match stack.pop() {
+                    Some(reference) => next = reference,
+                    None => return query.hit,
+                }
+            }
+            if floor == OUTSIDE && next >= LEAF {
+                let entry = self.load_entry(next);
+                here = level(&entry.object_ray(&query.ray), 0.0, tests);
+                (floor, first_id, next) = (stack.len() as u32, entry.first_id, entry.node);
+            }
+            current = next;
+        }
     }
 }
 

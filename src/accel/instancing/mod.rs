@@ -27,11 +27,28 @@ pub use meta_bvh::MetaBvh;
 pub use object_list::ObjectList;
 pub use placed::Placed;
 
-use super::{AccelError, BuildLog, Space, TriangleSoup};
+use super::bvh::pairs::Pair;
+use super::{AccelError, BuildLog, GpuBuffers, NamedWords, Space, TriangleSoup, limits};
+use crate::gpu::UniformValues;
 use crate::params::Params;
 use crate::scene::Instance;
 use forest::Forest;
 use placed::View;
+
+/// An upper level as kernels bind it.
+struct Upper<'a> {
+    kernel: &'static str,
+    /// What lies behind the nodes of the objects.
+    parts: [&'a [u32]; 2],
+    step_fuse: usize,
+    entries: usize,
+    /// Its first node.
+    root: usize,
+    /// Place of the first entry, in nodes.
+    first_entry: usize,
+    growth: f32,
+    stack_entries: u32,
+}
 
 /// What both structures are built from: the BVHs of the objects and where these stand.
 struct Base {
@@ -46,6 +63,37 @@ impl Base {
             forest: Forest::build(&view.objects, params, log)?,
             instances: view.instances.into_owned(),
         })
+    }
+
+    /// Buffers of the objects with an upper level behind their nodes.
+    fn buffers(&self, top: &Upper) -> GpuBuffers<'_> {
+        let forest = &self.forest;
+        let nodes: &[u32] = bytemuck::cast_slice(&forest.nodes);
+        let [first, second] = top.parts;
+        GpuBuffers {
+            kernel: top.kernel,
+            arrays: vec![
+                NamedWords {
+                    name: "nodes",
+                    words: [nodes, first, second].concat().into(),
+                    element_bytes: size_of::<Pair>() as u32,
+                },
+                NamedWords::new("leaf_triangles", &forest.triangles),
+            ],
+            uniforms: vec![
+                limits(top.step_fuse, top.entries),
+                (
+                    "instancing",
+                    UniformValues::new()
+                        .u32("root", top.root as u32)
+                        .u32("first_entry", top.first_entry as u32)
+                        .f32("growth", top.growth),
+                ),
+            ],
+            // Rounded up, so that scenes of like depth share a kernel.
+            constants: vec![("STACK_ENTRIES", top.stack_entries.next_multiple_of(8))],
+            ..Default::default()
+        }
     }
 
     fn space(&self) -> Space {
@@ -74,16 +122,15 @@ impl Base {
             .eq(view.instances.iter().map(key));
         let sizes = view.objects.iter().map(|object| object.records.len());
         let same_objects = self.forest.roots.iter().map(|r| r.object_size).eq(sizes);
-        if same_instances && same_objects {
-            return Ok(());
-        }
-        Err(AccelError::Invalid(format!(
-            "built for {} instances of {} objects, given {} of {}: other ones need a new build",
-            self.instances.len(),
-            self.forest.roots.len(),
-            view.instances.len(),
-            view.objects.len()
-        )))
+        AccelError::ensure(same_instances && same_objects, || {
+            format!(
+                "built for {} instances of {} objects, given {} of {}: other ones need a new build",
+                self.instances.len(),
+                self.forest.roots.len(),
+                view.instances.len(),
+                view.objects.len()
+            )
+        })
     }
 
     /// Checks objects and transforms against those of `soup`.

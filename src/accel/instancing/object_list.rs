@@ -5,17 +5,14 @@
 //! J. Dufay's thesis (2017), where the meta-BVH replaces the list.
 
 use super::super::bounds::Bounds;
-use super::super::ray::{Hit, NO_HIT, Ray};
+use super::super::ray::Hit;
 use super::super::tree::tree_parameters;
-use super::super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords, Space,
-    TriangleSoup,
-};
-use super::Base;
+use super::super::twin::{CpuTwin, Query, Traverse, Twin};
+use super::super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, Space, TriangleSoup};
 use super::instance::{Entry, enter_grown, level, trace_object};
 use super::world_box::BoxMap;
+use super::{Base, Upper};
 use crate::accel::StructureStats;
-use crate::gpu::UniformValues;
 use crate::params::{ParameterSchema, Params};
 use bytemuck::{Pod, Zeroable};
 
@@ -115,54 +112,33 @@ impl BuiltAccel for Built {
             let listed = self.entries.get(index) == Some(&expected);
             let world_box = map.world_box(&root.bounds);
             let boxed = self.boxes.get(index).map(BoxWords::bounds);
-            if !listed || !boxed.is_some_and(|b| b.contains(&world_box)) {
-                return Err(AccelError::Invalid(format!(
-                    "instance {index} is not listed as it stands"
-                )));
-            }
-            if map.growth() > self.growth {
-                return Err(AccelError::Invalid(format!(
-                    "instance {index}: boxes grow by {}, its transform needs {}",
-                    self.growth,
-                    map.growth()
-                )));
-            }
+            AccelError::ensure(
+                listed && boxed.is_some_and(|b| b.contains(&world_box)),
+                || format!("instance {index} is not listed as it stands"),
+            )?;
+            AccelError::ensure(map.growth() <= self.growth, || {
+                let (growth, needed) = (self.growth, map.growth());
+                format!("instance {index}: boxes grow by {growth}, its transform needs {needed}")
+            })?;
         }
         Ok(())
     }
 
     fn buffers(&self) -> GpuBuffers<'_> {
-        let forest = &self.base.forest;
-        let nodes = bytemuck::cast_slice(&forest.nodes);
-        let entries = bytemuck::cast_slice(&self.entries);
-        let boxes = bytemuck::cast_slice(&self.boxes);
-        GpuBuffers {
+        let nodes = self.base.forest.nodes.len();
+        self.base.buffers(&Upper {
             kernel: "accel/object_list",
-            arrays: vec![
-                NamedWords {
-                    name: "nodes",
-                    words: [nodes, entries, boxes].concat().into(),
-                    element_bytes: 64,
-                },
-                NamedWords {
-                    name: "leaf_triangles",
-                    words: bytemuck::cast_slice(&forest.triangles).into(),
-                    element_bytes: 48,
-                },
+            parts: [
+                bytemuck::cast_slice(&self.entries),
+                bytemuck::cast_slice(&self.boxes),
             ],
-            uniforms: vec![
-                super::super::limits(forest.nodes.len() + 1, self.entries.len()),
-                (
-                    "instancing",
-                    UniformValues::new()
-                        .u32("root", 0)
-                        .u32("first_entry", forest.nodes.len() as u32)
-                        .f32("growth", self.growth),
-                ),
-            ],
-            constants: vec![("STACK_ENTRIES", forest.stack_entries().next_multiple_of(8))],
-            ..Default::default()
-        }
+            step_fuse: nodes + 1,
+            entries: self.entries.len(),
+            root: 0,
+            first_entry: nodes,
+            growth: self.growth,
+            stack_entries: self.base.forest.stack_entries(),
+        })
     }
 
     fn divisible(&self) -> &'static [&'static str] {
@@ -170,12 +146,8 @@ impl BuiltAccel for Built {
     }
 
     fn stats(&self) -> StructureStats {
-        let bytes = size_of_val(&self.base.forest.nodes[..])
-            + size_of_val(&self.base.forest.triangles[..])
-            + size_of_val(&self.entries[..])
-            + size_of_val(&self.boxes[..]);
         StructureStats {
-            bytes: bytes as u64,
+            bytes: self.buffers().bytes(),
             ..self.base.forest.stats.clone()
         }
     }
@@ -188,39 +160,25 @@ impl BuiltAccel for Built {
         Some(self.base.update(soup).map(|()| self.list()))
     }
 
-    fn cpu_twin<'a>(&'a self, _: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin(self)))
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(Twin(self, soup)))
     }
 }
 
-struct Twin<'a>(&'a Built);
-
-impl Twin<'_> {
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let forest = &self.0.base.forest;
-        let ray = &forest.intersection.raised(ray);
-        let world = level(ray, self.0.growth, forest.intersection);
-        let mut hit = Hit::miss(ray);
-        for (entry, world_box) in self.0.entries.iter().zip(&self.0.boxes) {
-            counters.box_tests += 1;
-            if enter_grown(&world, &world_box.bounds(), hit.t).is_none() {
+impl Traverse for Built {
+    fn trace(&self, _: &TriangleSoup, mut query: Query) -> Hit {
+        let forest = &self.base.forest;
+        let world = level(&query.ray, self.growth, forest.intersection);
+        for (entry, world_box) in self.entries.iter().zip(&self.boxes) {
+            query.counters.box_tests += 1;
+            if enter_grown(&world, &world_box.bounds(), query.hit.t).is_none() {
                 continue;
             }
-            trace_object(forest, entry, ray, any, &mut hit, counters);
-            if any && hit.triangle != NO_HIT {
+            trace_object(forest, entry, &mut query);
+            if query.is_answered() {
                 break;
             }
         }
-        hit
-    }
-}
-
-impl CpuTwin for Twin<'_> {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.trace(ray, false, counters)
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.trace(ray, true, counters).triangle != NO_HIT
+        query.hit
     }
 }

@@ -7,8 +7,9 @@
 //! overlapping: apart, there is nothing to gain.
 
 use super::super::bounds::Bounds;
+use super::super::bvh::pairs::Pair;
 use super::super::leaf::{LEAF, leaf_reference};
-use super::forest::{Forest, Node};
+use super::forest::Forest;
 use super::instance::Entry;
 use super::world_box::BoxMap;
 use crate::scene::Instance;
@@ -24,7 +25,7 @@ const LARGE: f32 = 0.1;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Top {
     /// Root first. References to inner nodes count from the first node after the forest's.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<Pair>,
     /// What the leaves hold.
     pub entries: Vec<Entry>,
     /// Deepest leaf.
@@ -49,11 +50,11 @@ impl Top {
         let room = parts.len() * rebraid.saturating_sub(1);
         builder.top.growth = builder.maps.iter().map(BoxMap::growth).fold(0.0, f32::max);
         match parts.len() {
-            0 => builder.top.nodes.push(Node::new([Node::MISSING; 2])),
+            0 => builder.top.nodes.push(Pair::new([Pair::MISSING; 2])),
             _ => {
                 let root = builder.subtree(parts, room, 0);
                 if root.0 >= LEAF {
-                    builder.top.nodes.push(Node::new([root, Node::MISSING]));
+                    builder.top.nodes.push(Pair::new([root, Pair::MISSING]));
                 }
             }
         }
@@ -119,13 +120,13 @@ impl Builder<'_> {
         let share = f64::from(low_area) / f64::from(low_area + high_area).max(f64::MIN_POSITIVE);
         let low_room = ((room as f64 * share) as usize).min(room);
         let here = self.top.nodes.len();
-        self.top.nodes.push(Node::new([Node::MISSING; 2]));
+        self.top.nodes.push(Pair::new([Pair::MISSING; 2]));
         let [low, high] = split.parts;
         let children = [
             self.subtree(low, low_room, depth + 1),
             self.subtree(high, room - low_room, depth + 1),
         ];
-        self.top.nodes[here] = Node::new(children);
+        self.top.nodes[here] = Pair::new(children);
         ((self.forest.nodes.len() + here) as u32, bounds)
     }
 

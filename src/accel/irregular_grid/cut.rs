@@ -2,7 +2,7 @@
 //! triangles, and cells of one voxel; empty octants are one cell from the start.
 
 use super::super::grid::lists::{Lists, PartLists};
-use super::super::grid::{Cut, Frame, Grid, areas, check_words, finest};
+use super::super::grid::{Cut, Grid, GridBox, areas, check_words, finest};
 use super::super::{AccelError, TriangleSoup};
 use super::voxels::{Block, Cell, Entry, Map};
 use super::{Partition, Settings};
@@ -27,10 +27,10 @@ pub fn cut(
     settings: &Settings,
     log: &mut BuildLog,
 ) -> Result<Partition, AccelError> {
-    let frame = log.phase("bounds", || Frame::new(soup));
-    let top = frame.resolution(soup.records.len(), settings.lambda1, MOST_TOP);
+    let grid_box = log.phase("bounds", || GridBox::new(soup));
+    let top = grid_box.resolution(soup.records.len(), settings.lambda1, MOST_TOP);
     let shift = (65_535 / top[0].max(top[1]).max(top[2])).ilog2();
-    let coarse = Grid::new(&frame, top);
+    let coarse = Grid::new(&grid_box, top);
     let fine = coarse.part([0; 3], top, top.map(|n| n << shift));
     let lists = Lists::new(name, &coarse, soup, true, log)?;
     log.phase("build", || {
@@ -48,13 +48,20 @@ pub fn cut(
             .map(|c| c..(c + RUN).min(tops))
             .collect();
         let cut_run = |cells: std::ops::Range<usize>| {
-            let mut run = Run::new(&fine, soup, &areas, settings);
+            let mut run = Run {
+                fine: &fine,
+                soup,
+                areas: &areas,
+                settings,
+                made: Pieces::default(),
+                spare: Vec::new(),
+            };
             for cell in cells {
                 let lowest = coarse.coordinates(cell as u32).map(|c| c << shift);
                 let entry = run.entry(lowest, shift, lists.of(cell), 2);
-                run.top.push(entry);
+                run.made.top.push(entry);
             }
-            run.result()
+            run.made
         };
         let runs: Vec<Pieces> = ranges.into_par_iter().map(cut_run).collect();
         Ok(join(fine, top, shift, runs))
@@ -93,7 +100,8 @@ fn parts_log(
         .min(MOST_LOG)
 }
 
-/// What a task produced; places and numbers count from its own begin.
+/// What a task produces; places and numbers count from its own begin.
+#[derive(Default)]
 struct Pieces {
     top: Vec<u32>,
     entries: Vec<u32>,
@@ -163,11 +171,7 @@ struct Run<'a> {
     soup: &'a TriangleSoup,
     areas: &'a [f32],
     settings: &'a Settings,
-    top: Vec<u32>,
-    entries: Vec<u32>,
-    blocks: Vec<Block>,
-    cells: Vec<Cell>,
-    pool: Vec<u32>,
+    made: Pieces,
     /// Memory for lists, one for each level in use.
     spare: Vec<PartLists>,
 }
@@ -184,37 +188,7 @@ struct Open<'a> {
     level: u32,
 }
 
-impl<'a> Run<'a> {
-    fn new(
-        fine: &'a Grid,
-        soup: &'a TriangleSoup,
-        areas: &'a [f32],
-        settings: &'a Settings,
-    ) -> Self {
-        Self {
-            fine,
-            soup,
-            areas,
-            settings,
-            top: Vec::new(),
-            entries: Vec::new(),
-            blocks: Vec::new(),
-            cells: Vec::new(),
-            pool: Vec::new(),
-            spare: Vec::new(),
-        }
-    }
-
-    fn result(self) -> Pieces {
-        Pieces {
-            top: self.top,
-            entries: self.entries,
-            blocks: self.blocks,
-            cells: self.cells,
-            pool: self.pool,
-        }
-    }
-
+impl Run<'_> {
     /// Word of the entry of a cube of 2^`size` voxels, with all that is below it.
     fn entry(&mut self, lowest: [u32; 3], size: u32, ids: &[u32], level: u32) -> u32 {
         let areas = ids.iter().map(|&id| self.areas[id as usize]);
@@ -226,13 +200,13 @@ impl<'a> Run<'a> {
         let part = self.fine.part(lowest, [1 << size; 3], [1 << log; 3]);
         lists.fill(&part, self.soup, ids);
         let block = Block {
-            first: self.entries.len() as u32,
+            first: self.made.entries.len() as u32,
             log,
         };
-        let number = self.blocks.len() as u32;
-        self.blocks.push(block);
-        self.entries
-            .resize(self.entries.len() + (1 << (3 * log)), 0);
+        let number = self.made.blocks.len() as u32;
+        self.made.blocks.push(block);
+        let end = self.made.entries.len() + (1 << (3 * log));
+        self.made.entries.resize(end, 0);
         let open = Open {
             block,
             lists: &lists,
@@ -247,14 +221,14 @@ impl<'a> Run<'a> {
     }
 
     fn cell(&mut self, lowest: [u32; 3], size: u32, ids: &[u32]) -> u32 {
-        let number = self.cells.len() as u32;
-        self.cells.push(Cell {
+        let number = self.made.cells.len() as u32;
+        self.made.cells.push(Cell {
             min: lowest.map(|v| v as u16),
             max: lowest.map(|v| (v + (1 << size)) as u16),
-            first: self.pool.len() as u32,
+            first: self.made.pool.len() as u32,
             count: ids.len() as u32,
         });
-        self.pool.extend_from_slice(ids);
+        self.made.pool.extend_from_slice(ids);
         Map::encode(Entry::Cell(number))
     }
 
@@ -273,7 +247,7 @@ impl<'a> Run<'a> {
             let word = self.cell(lowest, open.size + log, &[]);
             for (y, z) in rows() {
                 let first = (block.first + row(y, z)) as usize;
-                self.entries[first..first + side as usize].fill(word);
+                self.made.entries[first..first + side as usize].fill(word);
             }
         } else if log > 0 {
             for octant in 0..8 {
@@ -289,7 +263,7 @@ impl<'a> Run<'a> {
             } else {
                 self.cell(lowest, open.size, ids)
             };
-            self.entries[(block.first + index) as usize] = word;
+            self.made.entries[(block.first + index) as usize] = word;
         }
     }
 }

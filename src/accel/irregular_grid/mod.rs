@@ -17,16 +17,14 @@ mod merge;
 mod voxels;
 
 use self::voxels::{Cell, Map};
-use super::bounds::enter_box;
 use super::grid::lists::check_lists;
 use super::grid::{Grid, check_words, clamped, first_axis, outside};
-use super::ray::{Hit, NO_HIT, Ray};
-use super::triangle::intersect_triangle;
+use super::ray::Hit;
+use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
     TriangleSoup,
 };
-use crate::accel::StructureStats;
 use crate::gpu::UniformValues;
 use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
@@ -294,16 +292,8 @@ impl BuiltAccel for Built {
             kernel: "accel/irregular_grid",
             features: Vec::new(),
             arrays: vec![
-                NamedWords {
-                    name: "cells",
-                    words: self.cells.as_slice().into(),
-                    element_bytes: 16,
-                },
-                NamedWords {
-                    name: "words",
-                    words: self.words.as_slice().into(),
-                    element_bytes: 4,
-                },
+                NamedWords::new("cells", bytemuck::cast_slice::<u32, [u32; 4]>(&self.cells)),
+                NamedWords::new("words", &self.words),
             ],
             uniforms: vec![
                 self.fine.uniform(),
@@ -315,65 +305,49 @@ impl BuiltAccel for Built {
     }
 
     fn stats(&self) -> StructureStats {
-        let mut lengths = vec![0usize; self.count()];
-        for (number, length) in lengths.iter_mut().enumerate() {
-            *length = self.list(self.cells[4 * number + 3]).count();
-        }
+        let lists = self.cells.chunks_exact(4).map(|words| words[3]);
         StructureStats {
-            nodes: lengths.len() as u64,
-            leaves: lengths.iter().filter(|&&l| l > 0).count() as u64,
-            references: (self.words.len() - self.first_reference) as u64,
-            leaf_histogram: super::leaf_histogram(lengths.into_iter()),
+            nodes: self.count() as u64,
             bytes: self.buffers().bytes(),
-            ..Default::default()
+            ..StructureStats::of_cells(lists.map(|list| self.list(list).count()))
         }
     }
 
     fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin { built: self, soup }))
+        Some(Box::new(Twin(self, soup)))
     }
 }
 
-struct Twin<'a> {
-    built: &'a Built,
-    soup: &'a TriangleSoup,
-}
-
-impl Twin<'_> {
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let grid = &self.built.fine;
-        let ray = &self.soup.intersection.raised(ray);
-        let inverse = self.soup.intersection.inverse(ray.direction);
-        let mut hit = Hit::miss(ray);
-        counters.box_tests += 1;
-        let Some(enter) = enter_box(&grid.bounds, ray, inverse, ray.t_max) else {
-            return hit;
+impl Traverse for Built {
+    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+        let grid = &self.fine;
+        let Some(enter) = query.enter(&grid.bounds) else {
+            return query.hit;
         };
+        let ray = query.ray;
+        let inverse = query.inverse;
         let forward = inverse.map(|i| i >= 0.0);
-        let entry = grid.in_cells(ray, enter);
+        let entry = grid.in_cells(&ray, enter);
         let mut voxel: [u32; 3] = std::array::from_fn(|a| clamped(entry[a], grid.resolution[a]));
         loop {
-            let place = self.built.find_cell(voxel);
-            counters.visit(place as usize);
-            let cell = self.built.load_cell(place);
-            for id in self.built.list(cell.list) {
-                counters.triangle_tests += 1;
-                intersect_triangle(&self.soup.records[id as usize], ray, inverse, &mut hit);
-            }
-            if any && hit.triangle != NO_HIT {
-                return hit;
+            let place = self.find_cell(voxel);
+            query.visit(place as usize);
+            let cell = self.load_cell(place);
+            query.test_list(soup, self.list(cell.list));
+            if query.is_answered() {
+                return query.hit;
             }
             let planes = std::array::from_fn(|a| {
                 (if forward[a] { cell.max[a] } else { cell.min[a] }) as f32
             });
-            let next = grid.distances(ray, *inverse, planes);
+            let next = grid.distances(&ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
             // The exit must lie clearly behind the hit: an equally near one may wait next door.
-            if hit.t * inverse.pad < leave {
-                return hit;
+            if query.hit.t * inverse.pad < leave {
+                return query.hit;
             }
             let axis = first_axis(next, leave);
-            let place = grid.in_cells(ray, leave);
+            let place = grid.in_cells(&ray, leave);
             voxel = std::array::from_fn(|a| {
                 if a == axis {
                     return (if forward[a] {
@@ -389,19 +363,9 @@ impl Twin<'_> {
                 place[a].max(low as f32).min(high as f32) as u32
             });
             if outside(voxel, grid.resolution) {
-                return hit;
+                return query.hit;
             }
         }
-    }
-}
-
-impl CpuTwin for Twin<'_> {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.trace(ray, false, counters)
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.trace(ray, true, counters).triangle != NO_HIT
     }
 }
 
@@ -448,37 +412,6 @@ mod tests {
             .iter()
             .map(|c| side(c, 0) * side(c, 1) * side(c, 2))
             .sum()
-    }
-
-    fn area_cost(partition: &Partition) -> f64 {
-        let cost = |c: &Cell| {
-            let [x, y, z] = [0, 1, 2]
-                .map(|a| f64::from(c.max[a] - c.min[a]) * f64::from(partition.fine.cell[a]));
-            (x * y + y * z + z * x) * f64::from(c.count + 1)
-        };
-        partition.cells.iter().map(cost).sum()
-    }
-
-    #[test]
-    fn merged_cells_still_tile_the_grid_and_cost_less() {
-        let mut partition = cut_soup();
-        let all = partition
-            .fine
-            .resolution
-            .iter()
-            .map(|&n| u64::from(n))
-            .product::<u64>();
-        assert_eq!(volume(&partition.cells), all);
-        let (cells, cost) = (partition.cells.len(), area_cost(&partition));
-        merge::merge(&mut partition, 0.995);
-        assert_eq!(volume(&partition.cells), all);
-        assert!(partition.cells.len() < cells, "{cells} cells");
-        assert!(area_cost(&partition) < cost);
-        for (number, cell) in partition.cells.iter().enumerate() {
-            let corner = cell.min.map(u32::from);
-            assert_eq!(partition.map.cell_at(corner), number as u32);
-            assert!(cell.list(&partition.pool).is_sorted());
-        }
     }
 
     #[test]

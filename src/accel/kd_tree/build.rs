@@ -35,15 +35,8 @@ pub(super) fn build(
     params: &Params,
     log: &mut BuildLog,
 ) -> Result<KdTree, AccelError> {
-    let limit = |what: &str, needed, limit| AccelError::Limit {
-        what: what.to_owned(),
-        needed,
-        limit,
-    };
     let count = soup.records.len() as u64;
-    if count >= MAX_ITEMS {
-        return Err(limit("triangles of a kd-tree", count, MAX_ITEMS - 1));
-    }
+    AccelError::check_limit("triangles of a kd-tree", count, MAX_ITEMS - 1)?;
     let settings = Settings {
         traversal_cost: params.number("traversal_cost") as f32,
         intersection_cost: params.number("intersection_cost") as f32,
@@ -58,13 +51,9 @@ pub(super) fn build(
     };
     let root = log.phase("sort", || Cell::root(soup, bounds));
     let subtree = log.phase("sah-events", || build_subtree(root, 0, &settings));
-    if settings.references.into_inner() > MAX_REFERENCES {
-        return Err(limit(
-            "references of a kd-tree, at least",
-            MAX_REFERENCES + 1,
-            MAX_REFERENCES,
-        ));
-    }
+    // Beyond the limit cells are not divided: how many there would be is not known.
+    let made = settings.references.into_inner().min(MAX_REFERENCES + 1);
+    AccelError::check_limit("references of a kd-tree, at least", made, MAX_REFERENCES)?;
     Ok(log.phase("layout", || lay_out(subtree)))
 }
 

@@ -1,6 +1,6 @@
 //! The builder of `octree`: level by level, the cells of a level on all cores.
 
-use super::{INNER_SHIFT, LAST, LEAF, Space};
+use super::{INNER_SHIFT, LAST, LEAF, RootCell};
 use crate::accel::bounds::Bounds;
 use crate::accel::spatial::{Margin, Overlap, corners};
 use crate::accel::{AccelError, TriangleSoup};
@@ -44,7 +44,7 @@ struct Children {
 /// More blocks or references than a word can address.
 pub(super) fn build(
     soup: &TriangleSoup,
-    space: &Space,
+    space: &RootCell,
     params: &Params,
 ) -> Result<Octree, AccelError> {
     let settings = Settings::new(soup, space, params);
@@ -76,7 +76,7 @@ pub(super) fn default_depth(triangles: usize) -> u32 {
 
 struct Settings<'a> {
     soup: &'a TriangleSoup,
-    space: &'a Space,
+    space: &'a RootCell,
     max_depth: u32,
     leaf_size: usize,
     traversal_cost: f64,
@@ -86,7 +86,7 @@ struct Settings<'a> {
 }
 
 impl<'a> Settings<'a> {
-    fn new(soup: &'a TriangleSoup, space: &'a Space, params: &Params) -> Self {
+    fn new(soup: &'a TriangleSoup, space: &'a RootCell, params: &Params) -> Self {
         Self {
             soup,
             space,
@@ -161,7 +161,7 @@ impl<'a> Settings<'a> {
         let half = self.space.half(depth + 1).map(|h| h + margin);
         let overlap = Overlap::new(&corners(record), half);
         for octant in 0..8_u32 {
-            let child = Space::child(position, octant);
+            let child = RootCell::child(position, octant);
             if mask >> octant & 1 == 1 && !overlap.touches(self.space.centre(child, depth + 1)) {
                 mask &= !(1 << octant);
             }
@@ -214,7 +214,7 @@ fn assemble(
                 filled |= 1 << octant;
                 next_cells.push(Open {
                     slot: 8 * block + octant,
-                    position: Space::child(cell.position, octant as u32),
+                    position: RootCell::child(cell.position, octant as u32),
                     first: next_triangles.len() + start,
                 });
             }
@@ -224,15 +224,7 @@ fn assemble(
         tree.nodes[cell.slot] = (block as u32) << INNER_SHIFT | filled;
     }
     let (blocks, references) = (tree.nodes.len() as u64 / 8, tree.references.len() as u64);
-    let checked = |what: &str, needed, limit| {
-        let what = what.to_owned();
-        (needed <= limit).then_some(()).ok_or(AccelError::Limit {
-            what,
-            needed,
-            limit,
-        })
-    };
-    checked("cells of an octree that have children", blocks, MAX_BLOCKS)?;
-    checked("references of an octree", references, MAX_REFERENCES)?;
+    AccelError::check_limit("cells of an octree that have children", blocks, MAX_BLOCKS)?;
+    AccelError::check_limit("references of an octree", references, MAX_REFERENCES)?;
     Ok((next_cells, next_triangles))
 }

@@ -1,4 +1,4 @@
-//! Faults in a built tree that `validate()` must find, and the arithmetic of octants.
+//! Faults in a built tree that `validate()` must find.
 
 use super::*;
 use crate::geometry::Triangle;
@@ -24,7 +24,7 @@ fn built(soup: &TriangleSoup, clip: bool) -> Built {
     params
         .0
         .insert("leaf_size".to_owned(), ParamValue::Integer(4));
-    let space = Space::around(soup);
+    let space = RootCell::around(soup);
     let tree = build::build(soup, &space, &params).expect("it builds");
     Built {
         space,
@@ -85,64 +85,4 @@ fn validation_finds_planted_faults() {
     });
     plant("cells that lie elsewhere", &|b| b.space.low[0] -= 0.9);
     plant("a box that is too small", &|b| b.space.extent[1] -= 0.5);
-}
-
-#[test]
-fn mirroring_exchanges_the_halves_of_the_axes_that_are_flipped() {
-    for flip in 0..8 {
-        for mask in 0..256 {
-            let expected = (0..8).filter(|i| mask >> (i ^ flip) & 1 == 1);
-            let expected: u32 = expected.map(|i| 1 << i).sum();
-            assert_eq!(
-                mirrored(mask, flip),
-                expected,
-                "{mask:#b} flipped by {flip:#b}"
-            );
-        }
-    }
-}
-
-#[test]
-fn visited_children_are_those_whose_interval_is_not_empty() {
-    let distances = [-1.0, 0.0, 1.0, 2.0, 3.0, 4.0];
-    let mut counts = [0; 9];
-    for [x, y, z] in (0..216).map(|i| [i / 36, i / 6 % 6, i % 6].map(|k| distances[k])) {
-        let pad = crate::accel::BoxTest::default().pad();
-        for (enter, exit) in [(0.0, 4.0), (1.0, 3.0), (2.0, 2.0), (3.0, 2.0)] {
-            let middle = [x, y, z];
-            let overlaps = |octant: u32| {
-                let (mut from, mut to) = (enter, exit);
-                for (axis, plane) in middle.iter().enumerate() {
-                    if octant >> axis & 1 == 1 {
-                        from = f32::max(from, *plane);
-                    } else {
-                        to = f32::min(to, *plane);
-                    }
-                }
-                from <= to * pad
-            };
-            let expected: u32 = (0..8).filter(|o| overlaps(*o)).map(|o| 1 << o).sum();
-            assert_eq!(
-                visited(enter, exit, middle, pad),
-                expected,
-                "{enter}..{exit} {middle:?}"
-            );
-            counts[expected.count_ones() as usize] += 1;
-        }
-    }
-    // None, one and up to all eight come up.
-    assert!(
-        counts[0] > 0 && counts[1] > 0 && counts[4] > 0 && counts[8] > 0,
-        "{counts:?}"
-    );
-}
-
-#[test]
-fn boxes_reach_the_octants_on_their_side_and_only_the_lower_one_where_they_end_in_a_plane() {
-    let reaches = |min, max| build::by_box(&Bounds { min, max }, [1.0; 3]);
-    assert_eq!(reaches([0.0; 3], [2.0; 3]), 255);
-    assert_eq!(reaches([0.0; 3], [1.0; 3]), 1);
-    assert_eq!(reaches([1.0; 3], [2.0; 3]), 128);
-    assert_eq!(reaches([1.0; 3], [1.0; 3]), 1);
-    assert_eq!(reaches([0.0, 1.5, 0.0], [2.0, 1.6, 1.0]), 0b1100);
 }

@@ -1,7 +1,7 @@
 //! A bound on the depth of trees whose builder knows none.
 
 use super::parameters::SAH_DEPTH;
-use super::subtree::make_inner;
+use super::subtree::{depth_first, make_inner};
 use super::{NodeKind, Tree, TreeNode};
 
 /// Deepest leaf that a tree of so many references may have.
@@ -16,25 +16,23 @@ pub(super) fn limit_depth(tree: Tree) -> Tree {
         return tree;
     }
     let mut nodes = Vec::with_capacity(tree.nodes.len());
-    // Nodes to visit with their depth, and the parent whose second child they are.
-    let mut stack = vec![(0, 0, None)];
-    while let Some((index, depth, second_of)) = stack.pop() {
-        if let Some(parent) = second_of {
-            make_inner(&mut nodes, parent);
-        }
+    depth_first((0, 0), &mut nodes, |(index, depth), nodes| {
         let node = tree.nodes[index as usize];
         match node.kind {
             NodeKind::Inner { .. } if depth == SAH_DEPTH => {
-                balance(&leaves_below(&tree, index), &mut nodes);
+                balance(&leaves_below(&tree, index), nodes);
+                None
             }
             NodeKind::Inner { left, right } => {
                 nodes.push(node);
-                stack.push((right, depth + 1, Some(nodes.len() - 1)));
-                stack.push((left, depth + 1, None));
+                Some([(left, depth + 1), (right, depth + 1)])
             }
-            NodeKind::Leaf { .. } => nodes.push(node),
+            NodeKind::Leaf { .. } => {
+                nodes.push(node);
+                None
+            }
         }
-    }
+    });
     Tree::new(nodes, tree.order)
 }
 

@@ -7,7 +7,7 @@ use super::Tree;
 use super::depth::limit_depth;
 use super::parameters::Settings;
 use super::reference::{Box3, Reference};
-use super::subtree::{leaf, make_inner};
+use super::subtree::{depth_first, leaf};
 use crate::accel::AccelError;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
@@ -74,12 +74,7 @@ pub(super) fn build(
 fn take_over(bvh: &Bvh2) -> Tree {
     let mut nodes = Vec::with_capacity(bvh.nodes.len());
     let mut order = Vec::with_capacity(bvh.primitive_indices.len());
-    // Nodes to visit, with the parent whose second child they are.
-    let mut stack = vec![(0, None)];
-    while let Some((index, second_of)) = stack.pop() {
-        if let Some(parent) = second_of {
-            make_inner(&mut nodes, parent);
-        }
+    depth_first(0, &mut nodes, |index, nodes| {
         let node = &bvh.nodes[index as usize];
         let bounds = Box3 {
             min: node.aabb().min,
@@ -87,14 +82,12 @@ fn take_over(bvh: &Bvh2) -> Tree {
         };
         let (first, count) = (node.first_index, node.prim_count);
         nodes.push(leaf(bounds, order.len() as u32, count as usize));
-        if node.is_leaf() {
-            order.extend_from_slice(
-                &bvh.primitive_indices[first as usize..(first + count) as usize],
-            );
-        } else {
-            stack.push((first + 1, Some(nodes.len() - 1)));
-            stack.push((first, None));
+        if !node.is_leaf() {
+            return Some([first, first + 1]);
         }
-    }
+        let entries = first as usize..(first + count) as usize;
+        order.extend_from_slice(&bvh.primitive_indices[entries]);
+        None
+    });
     Tree::new(nodes, order)
 }

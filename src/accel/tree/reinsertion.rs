@@ -11,7 +11,7 @@
 use super::depth::depth_limit;
 use super::parameters::Settings;
 use super::reference::Box3;
-use super::subtree::{leaf, make_inner};
+use super::subtree::{depth_first, leaf};
 use super::{NodeKind, Tree, TreeNode};
 use rayon::prelude::*;
 
@@ -225,28 +225,11 @@ impl Hierarchy {
         // The sibling takes the parent's place, which frees the pair.
         let pair = node.min(beside);
         let (moved, kept, displaced) = (*self.node(node), *self.node(beside), *self.node(target));
-        self.place(
-            parent,
-            Node {
-                parent: self.node(parent).parent,
-                ..kept
-            },
-        );
+        let below = |parent, node| Node { parent, ..node };
+        self.place(parent, below(self.node(parent).parent, kept));
         // Had the target been the sibling, it would have moved; but that is excluded.
-        self.place(
-            pair,
-            Node {
-                parent: target,
-                ..displaced
-            },
-        );
-        self.place(
-            pair + 1,
-            Node {
-                parent: target,
-                ..moved
-            },
-        );
+        self.place(pair, below(target, displaced));
+        self.place(pair + 1, below(target, moved));
         let joint = &mut self.nodes[target as usize];
         (joint.first, joint.count) = (pair, 0);
         self.update_upwards(target);
@@ -279,22 +262,16 @@ impl Hierarchy {
     fn lay_out(&self, old_order: &[u32]) -> Tree {
         let mut nodes = Vec::with_capacity(self.nodes.len());
         let mut order = Vec::with_capacity(old_order.len());
-        // Nodes to visit, with the parent whose second child they are.
-        let mut stack = vec![(ROOT, None)];
-        while let Some((index, second_of)) = stack.pop() {
-            if let Some(parent) = second_of {
-                make_inner(&mut nodes, parent);
-            }
+        depth_first(ROOT, &mut nodes, |index, nodes| {
             let node = self.node(index);
             let entries = node.first as usize..(node.first + node.count) as usize;
             nodes.push(leaf(node.bounds, order.len() as u32, entries.len()));
             if node.count == 0 {
-                stack.push((node.first + 1, Some(nodes.len() - 1)));
-                stack.push((node.first, None));
-            } else {
-                order.extend_from_slice(&old_order[entries]);
+                return Some([node.first, node.first + 1]);
             }
-        }
+            order.extend_from_slice(&old_order[entries]);
+            None
+        });
         Tree::new(nodes, order)
     }
 }

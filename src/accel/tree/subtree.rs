@@ -78,3 +78,24 @@ pub(super) fn make_inner(nodes: &mut [TreeNode], here: usize) {
         right: nodes.len() as u32,
     };
 }
+
+/// Lays out a tree in depth-first order: `visit` appends what it is given, and returns the children of an
+/// inner node.
+pub(super) fn depth_first<T>(
+    root: T,
+    nodes: &mut Vec<TreeNode>,
+    mut visit: impl FnMut(T, &mut Vec<TreeNode>) -> Option<[T; 2]>,
+) {
+    // What is to be visited, with the parent whose second child it is.
+    let mut stack = vec![(root, None)];
+    while let Some((at, second_of)) = stack.pop() {
+        if let Some(parent) = second_of {
+            make_inner(nodes, parent);
+        }
+        let here = nodes.len();
+        if let Some([left, right]) = visit(at, nodes) {
+            stack.push((right, Some(here)));
+            stack.push((left, None));
+        }
+    }
+}

@@ -8,6 +8,7 @@
 use super::watertight::turned;
 use super::{APART, DISTANCE_PAD, Meeting, TriangleRecord};
 use crate::accel::ray::Ray;
+use crate::accel::spatial::cross;
 
 /// To the unit triangle, with axes turned so that the one along which the normal is longest comes last;
 /// the coefficient of that axis is 1 in `plane` and 0 in `u` and `v`.
@@ -44,7 +45,7 @@ impl Transform {
 /// The transform of a triangle; one that is never met, if it has no area or is out of range.
 pub(super) fn transform(triangle: &TriangleRecord) -> Transform {
     let [e, f] = triangle.edges();
-    let normal = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| e[i] * f[j] - e[j] * f[i]);
+    let normal = cross(e, f);
     let axis = (0..3).fold(0, |best, axis| {
         if normal[axis].abs() > normal[best].abs() {
             axis

@@ -12,7 +12,9 @@ mod structure;
 
 pub use error::*;
 pub use key::{Key, axis};
-pub use read::{PARTIAL, RECORDS_FILE, RecordError, Records, read_lines, read_records, text_of};
+pub use read::{
+    PARTIAL, RECORDS_FILE, RecordError, Records, STRESS_FILE, read_lines, read_records, text_of,
+};
 pub use run::*;
 pub use stream::*;
 pub use structure::*;

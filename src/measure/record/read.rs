@@ -9,6 +9,9 @@ use std::path::{Path, PathBuf};
 /// Name of the records in a run's folder.
 pub const RECORDS_FILE: &str = "records.jsonl";
 
+/// Name of the records in the folder of the stress suite.
+pub const STRESS_FILE: &str = "stress.jsonl";
+
 /// Folder, below that of a run, that holds records and images until the run ends; what a killed run
 /// leaves.
 pub const PARTIAL: &str = "partial";

@@ -4,6 +4,7 @@ use super::axis::{Axis, Frame};
 use super::drawing::{Anchor, DIM, Drawing, INK, Ink};
 use super::marker;
 use super::paint::fit_text;
+use crate::measure::record::Interval;
 
 /// One point of a curve, with the ends of its 95 % interval (equal to `y` where there is none).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,6 +17,18 @@ pub struct CurvePoint {
     pub low: f64,
     /// Upper end.
     pub high: f64,
+}
+
+impl CurvePoint {
+    /// A figure at `x`.
+    pub fn new(x: f64, y: &Interval) -> Self {
+        Self {
+            x,
+            y: y.value,
+            low: y.low,
+            high: y.high,
+        }
+    }
 }
 
 /// One curve.

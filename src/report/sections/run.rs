@@ -1,9 +1,10 @@
 //! The run itself: economy of the plan, wall time, what failed, where it ran.
 
-use crate::measure::record::Verdict;
-use crate::report::data::{RunData, structure_name};
+use crate::measure::record::{Recorded, StructureRecord, TimeRecord};
+use crate::report::data::{RunData, SceneGroup, View, structure_name};
 use crate::report::document::*;
 use crate::report::format::{self, count, percent};
+use crate::report::samplers::Sampler;
 
 /// Largest share of the wall time that the harness may take for itself.
 const OVERHEAD_TARGET: f64 = 0.1;
@@ -28,27 +29,28 @@ fn time(data: &RunData) -> Option<Section> {
             percent(saved)
         )));
     }
-    if let Some(finished) = data.finished {
-        section
-            .blocks
-            .extend(overhead_check(data).map(|check| Block::Checks(vec![check])));
-        section.blocks.extend(wall_table(finished).into_block());
-    }
+    section.blocks.extend(overhead(data).map(Block::Paragraph));
+    section
+        .blocks
+        .extend(data.finished.and_then(|end| wall_table(end).into_block()));
     (!section.blocks.is_empty()).then_some(section)
 }
 
-/// Whether the harness keeps to its share of the wall time; `None` if the run did not finish.
-pub fn overhead_check(data: &RunData) -> Option<Check> {
+/// What the harness takes for itself; `None` if the run did not finish. No check, since no figure depends
+/// on it: a slow disk or a tiny experiment is no fault of the results.
+pub fn overhead(data: &RunData) -> Option<String> {
     let finished = data.finished.filter(|finished| finished.wall_s > 0.0)?;
     let share = finished.overhead_s / finished.wall_s;
-    Some(Check {
-        verdict: Verdict::new(true, share > OVERHEAD_TARGET),
-        title: format!("Harness overhead at most {}", percent(OVERHEAD_TARGET)),
-        detail: format!(
-            "{} of the wall time is neither GPU work nor building, judging or loading.",
-            percent(share)
-        ),
-    })
+    let much = match share > OVERHEAD_TARGET {
+        true => "more than",
+        false => "within",
+    };
+    Some(format!(
+        "Harness overhead: {} of the wall time is neither GPU work nor building, judging or loading ({much} \
+         the {} that the harness is meant to take).",
+        percent(share),
+        percent(OVERHEAD_TARGET)
+    ))
 }
 
 fn wall_table(finished: &crate::measure::record::FinishedRecord) -> Table {
@@ -77,85 +79,65 @@ fn wall_table(finished: &crate::measure::record::FinishedRecord) -> Table {
     table
 }
 
+/// A cell, its state, and why.
+type Failure = (String, &'static str, String);
+
 fn failures(data: &RunData) -> Option<Section> {
+    let mut rows: Vec<Failure> = data.scenes.iter().flat_map(failed_structures).collect();
+    rows.extend(
+        data.views()
+            .flat_map(|(scene, view)| failed_cells(scene, view)),
+    );
+    for (records, state) in [
+        (&data.failed, "FAILED"),
+        (&data.skipped, "skipped"),
+        (&data.warnings, "warning"),
+    ] {
+        rows.extend((records.iter()).map(|r| (r.cell.clone(), state, r.reason.clone())));
+    }
     let mut table = Table::new("Failed and skipped cells", &["cell", ":state", ":reason"]);
-    let mut add = |cell: String, state: &str, tone, reason: String| {
-        table.rows.push(vec![
-            cell.into(),
-            Cell::from(state).toned(tone),
-            reason.into(),
-        ]);
-    };
-    for scene in &data.scenes {
-        for s in &scene.structures {
-            let Some(mut fault) = s.fault() else { continue };
-            let classes = s.gate.iter().flat_map(|gate| &gate.classes);
-            for class in classes.filter(|class| class.first_wrong.is_some()) {
-                let ray = class.first_wrong.as_deref().unwrap_or_default();
-                fault += &format!(
-                    "; first wrong {} ray: {ray}",
-                    format::ray_class(class.class)
-                );
-            }
-            let cell = format!("{} · {}", scene.name, structure_name(*s));
-            add(cell, "FAILED", Tone::Bad, fault);
-        }
-    }
-    for (scene, view) in data.views() {
-        for time in &view.times {
-            let unequal = (!time.image_equal)
-                .then(|| "its image differs from the other structures'".to_owned());
-            let Some(reason) = time.failure.clone().or(unequal) else {
-                continue;
-            };
-            let structure = structure_name(*time);
-            let sampler = time.key.sampler();
-            let cell = format!(
-                "{} · {structure} · {sampler} · {}",
-                scene.name, view.integrator
-            );
-            add(cell, "FAILED", Tone::Bad, reason);
-        }
-        for sampler in &view.samplers {
-            let Some(fault) = sampler.fault() else {
-                continue;
-            };
-            add(
-                format!("{} · {} · {}", scene.name, sampler.name, view.integrator),
-                "FAILED",
-                Tone::Bad,
-                fault,
-            );
-        }
-    }
-    for failed in &data.failed {
-        add(
-            failed.cell.clone(),
-            "FAILED",
-            Tone::Bad,
-            failed.reason.clone(),
-        );
-    }
-    for skipped in &data.skipped {
-        add(
-            skipped.cell.clone(),
-            "skipped",
-            Tone::Note,
-            skipped.reason.clone(),
-        );
-    }
-    for warning in &data.warnings {
-        add(
-            warning.cell.clone(),
-            "warning",
-            Tone::Note,
-            warning.reason.clone(),
-        );
+    for (cell, state, reason) in rows {
+        let tone = match state {
+            "FAILED" => Tone::Bad,
+            _ => Tone::Note,
+        };
+        let state = Cell::from(state).toned(tone);
+        table.rows.push(vec![cell.into(), state, reason.into()]);
     }
     let mut section = Section::new("failures", "Failed and skipped");
     let none = || Block::Paragraph("No cell failed and none was skipped.".into());
     section.blocks.push(table.into_block().unwrap_or_else(none));
     Some(section)
+}
+
+fn failed_structures(scene: &SceneGroup) -> Vec<Failure> {
+    let failure = |s: &Recorded<StructureRecord>| {
+        let cell = format!("{} · {}", scene.name, structure_name(*s));
+        Some((cell, "FAILED", s.fault()?))
+    };
+    scene.structures.iter().filter_map(failure).collect()
+}
+
+fn failed_cells(scene: &SceneGroup, view: &View) -> Vec<Failure> {
+    let time = |time: &Recorded<TimeRecord>| {
+        let unequal =
+            (!time.image_equal).then(|| "its image differs from the other structures'".to_owned());
+        let reason = time.failure.clone().or(unequal)?;
+        let (structure, sampler) = (structure_name(*time), time.key.sampler());
+        let cell = format!(
+            "{} · {structure} · {sampler} · {}",
+            scene.name, view.integrator
+        );
+        Some((cell, "FAILED", reason))
+    };
+    let sampler = |sampler: &Sampler| {
+        let cell = format!("{} · {} · {}", scene.name, sampler.name, view.integrator);
+        Some((cell, "FAILED", sampler.fault()?))
+    };
+    let times = view.times.iter().filter_map(time);
+    times
+        .chain(view.samplers.iter().filter_map(sampler))
+        .collect()
 }
 
 fn environment(data: &RunData) -> Option<Section> {

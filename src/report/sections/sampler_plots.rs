@@ -1,7 +1,6 @@
 //! Plots of samplers under one scene and integrator.
 
 use crate::measure::bias::BiasVerdict;
-use crate::measure::record::Interval;
 use crate::report::data::{RunData, View};
 use crate::report::document::Figure;
 use crate::report::format;
@@ -117,12 +116,7 @@ fn curve(
         .mean_errors(metric)
         .iter()
         .filter(|mean| mean.resolved)
-        .map(|mean| CurvePoint {
-            x: f64::from(mean.spp) * x_per_spp,
-            y: mean.error.value,
-            low: mean.error.low,
-            high: mean.error.high,
-        })
+        .map(|mean| CurvePoint::new(f64::from(mean.spp) * x_per_spp, &mean.error))
         .collect();
     let (look, exact) = (data.sampler_look(&sampler.name), sampler.is_deterministic());
     (!points.is_empty()).then_some(Curve {
@@ -165,11 +159,7 @@ pub fn pareto_plot(data: &RunData, view: &View) -> Option<(ParetoPlot, String)> 
                 continue;
             }
             let scale = f64::from(spp) / 1000.0;
-            let seconds = Interval {
-                value: t.value * scale,
-                low: t.low * scale,
-                high: t.high * scale,
-            };
+            let seconds = t.scaled(scale);
             points.push(CellPoint {
                 structure,
                 sampler: index,

@@ -1,6 +1,6 @@
 //! What the errors of samplers look like: spectra, and what filters leave.
 
-use crate::measure::record::{FilteredError, Interval, SpectrumRecord};
+use crate::measure::record::{FilteredError, SpectrumRecord};
 use crate::report::data::{RunData, View};
 use crate::report::document::*;
 use crate::report::format;
@@ -59,7 +59,8 @@ impl<'a> Found<'a> {
 
     fn power_plot(&self, data: &RunData) -> CurvePlot {
         let points = |record: &SpectrumRecord| {
-            let at = |at: &crate::measure::record::PowerAt| point(at.frequency, &at.power);
+            let at =
+                |at: &crate::measure::record::PowerAt| CurvePoint::new(at.frequency, &at.power);
             record.power.iter().map(at).collect()
         };
         CurvePlot {
@@ -76,7 +77,7 @@ impl<'a> Found<'a> {
             let Some(before) = unfiltered(record) else {
                 return Vec::new();
             };
-            let at = |at: &FilteredError| point(at.sigma, &scaled(&at.rmse, 1.0 / before));
+            let at = |at: &FilteredError| CurvePoint::new(at.sigma, &at.rmse.scaled(1.0 / before));
             let wide = record.filtered.iter().filter(|at| at.sigma > 0.0);
             wide.map(at).collect()
         };
@@ -112,8 +113,8 @@ impl<'a> Found<'a> {
             let before = unfiltered(record);
             let mut row = vec![
                 Cell::from(*name),
-                cell(record.low_frequency),
-                cell(record.autocorrelation),
+                Cell::of(record.low_frequency),
+                Cell::of(record.autocorrelation),
                 format::optional(before).into(),
             ];
             row.extend(sigmas.iter().map(|&sigma| {
@@ -137,37 +138,10 @@ fn unfiltered(record: &SpectrumRecord) -> Option<f64> {
     at_sigma(record, 0.0).filter(|rmse| *rmse > 0.0)
 }
 
-fn scaled(interval: &Interval, factor: f64) -> Interval {
-    Interval {
-        value: factor * interval.value,
-        low: factor * interval.low,
-        high: factor * interval.high,
-    }
-}
-
-fn point(x: f64, y: &Interval) -> CurvePoint {
-    CurvePoint {
-        x,
-        y: y.value,
-        low: y.low,
-        high: y.high,
-    }
-}
-
 fn guide(label: &str, factor: f64, exponent: f64) -> Guide {
     Guide {
         label: label.into(),
         factor,
         exponent,
-    }
-}
-
-fn cell(figure: Option<Interval>) -> Cell {
-    match figure {
-        Some(figure) if figure.low < figure.high => {
-            Cell::with_detail(format::number(figure.value), format::bounds(&figure))
-        }
-        Some(figure) => format::number(figure.value).into(),
-        None => format::ABSENT.into(),
     }
 }

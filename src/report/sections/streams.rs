@@ -131,12 +131,7 @@ impl<'a> Pair<'a> {
     ) -> CurvePlot {
         let curve = |stream: &Recorded<StreamRecord>| {
             let name = stream.key.sampler();
-            let point = |at: FigureAtCount| CurvePoint {
-                x: at.n as f64,
-                y: at.value.value,
-                low: at.value.low,
-                high: at.value.high,
-            };
+            let point = |at: FigureAtCount| CurvePoint::new(at.n as f64, &at.value);
             Curve {
                 look: self.data.sampler_look(&name),
                 label: name,
@@ -269,7 +264,7 @@ fn worst_table(data: &RunData) -> Table {
             stream.purpose.as_str().into(),
             of.to_string().into(),
             last.n.to_string().into(),
-            interval_cell(Some(last.value)),
+            Cell::of(Some(last.value)),
         ]);
     }
     table
@@ -283,7 +278,7 @@ fn cost_table(data: &RunData) -> Table {
     for cost in &data.costs {
         table.rows.push(vec![
             cost.key.sampler().into(),
-            interval_cell(Some(cost.ns_per_sample)),
+            Cell::of(Some(cost.ns_per_sample)),
             format::number(cost.loop_ns_per_sample.value).into(),
         ]);
     }
@@ -300,16 +295,6 @@ fn seeds_cell(stream: &StreamRecord) -> Cell {
         seeds.into()
     } else {
         Cell::with_detail(seeds, "deterministic")
-    }
-}
-
-fn interval_cell(figure: Option<Interval>) -> Cell {
-    match figure {
-        Some(figure) if figure.low < figure.high => {
-            Cell::with_detail(format::number(figure.value), format::bounds(&figure))
-        }
-        Some(figure) => format::number(figure.value).into(),
-        None => format::ABSENT.into(),
     }
 }
 

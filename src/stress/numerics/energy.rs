@@ -76,7 +76,7 @@ fn walk(gpu: &Gpu, spp: u32) -> Result<Vec<Figure>, NumericsError> {
     let walk = ConfiguredIntegrator::new(&WALK, &Variant::default())?;
     let sampler = stage::sampler("pixel-hash", walk.facts.dimensions)?;
     let renderer = stage.renderer(gpu, &walk, &sampler, SIZE)?;
-    renderer.reset();
+    renderer.reset()?;
     renderer.add_samples(0, spp, 1)?;
     let image = renderer.image()?;
     let walks = f64::from(SIZE * SIZE * spp);
@@ -106,7 +106,7 @@ fn path(gpu: &Gpu, stage: &Stage, depth: i64, spp: u32) -> Result<Figure, Numeri
     let path = stage::path(Some(depth))?;
     let sampler = stage::sampler("pixel-hash", path.facts.dimensions)?;
     let renderer = stage.renderer(gpu, &path, &sampler, SIZE)?;
-    renderer.reset();
+    renderer.reset()?;
     renderer.add_samples(0, spp, 1)?;
     let image = renderer.image()?;
     let pixels: Vec<f64> = image.pixels.iter().map(|p| f64::from(p[0])).collect();

@@ -8,18 +8,15 @@
 //! [`super::spatial`]; a level is three splits, one along each axis.
 
 mod build;
+mod validate;
 
 use super::bounds::Bounds;
-use super::intersection::Reciprocal;
-use super::ray::{Hit, NO_HIT, Ray};
-use super::spatial::{corners, touches};
-use super::tree::Coverage;
-use super::triangle::intersect_triangle;
+use super::ray::{Hit, Ray};
+use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
     TriangleSoup,
 };
-use crate::accel::StructureStats;
 use crate::gpu::UniformValues;
 use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 
@@ -95,7 +92,7 @@ impl AccelKind for Octree {
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
         let params = &params.completed(&self.parameters())?;
-        let space = Space::around(soup);
+        let space = RootCell::around(soup);
         let tree = log.phase("levels", || build::build(soup, &space, params))?;
         Ok(Box::new(Built {
             space,
@@ -109,12 +106,12 @@ impl AccelKind for Octree {
 
 /// Where cells lie: at depth `d` the planes of an axis are `low + k · extent · 2⁻ᵈ`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Space {
+struct RootCell {
     low: [f32; 3],
     extent: [f32; 3],
 }
 
-impl Space {
+impl RootCell {
     fn around(soup: &TriangleSoup) -> Self {
         if soup.records.is_empty() {
             return Self {
@@ -177,7 +174,7 @@ impl Space {
 }
 
 struct Built {
-    space: Space,
+    space: RootCell,
     clipped: bool,
     /// Block 0 holds the root in its first place, each other block the children of a cell.
     nodes: Vec<u32>,
@@ -204,123 +201,16 @@ impl Built {
                 let filled = (0..8).filter(|octant| word >> octant & 1 == 1);
                 stack.extend(filled.map(|octant| {
                     let child = self.nodes[8 * block + octant as usize];
-                    (child, Space::child(position, octant), depth + 1)
+                    (child, RootCell::child(position, octant), depth + 1)
                 }));
             }
         }
     }
 }
 
-/// `validate()` on its way down: cells, and which triangles they must list.
-struct Validation<'a> {
-    built: &'a Built,
-    soup: &'a TriangleSoup,
-    blocks: Coverage<'a>,
-    listed: usize,
-}
-
-impl Validation<'_> {
-    fn cell(
-        &mut self,
-        word: u32,
-        position: [u32; 3],
-        depth: u32,
-        triangles: &[u32],
-    ) -> Result<(), AccelError> {
-        let wrong = |text: String| {
-            Err(AccelError::Invalid(format!(
-                "cell {position:?} at depth {depth}: {text}"
-            )))
-        };
-        if word & LEAF != 0 {
-            let Some(list) = self.built.list(word & !LEAF) else {
-                return wrong("its references lie outside the array".to_owned());
-            };
-            self.listed += list.len();
-            let ids: Vec<u32> = list.iter().map(|r| r & !LAST).collect();
-            if let Some(id) = ids
-                .iter()
-                .find(|id| **id as usize >= self.soup.records.len())
-            {
-                return wrong(format!("triangle {id} does not exist"));
-            }
-            if !ids.is_sorted_by(|a, b| a < b) {
-                return wrong("its references do not ascend".to_owned());
-            }
-            let lost = triangles.iter().find(|id| ids.binary_search(id).is_err());
-            return match lost {
-                Some(id) => wrong(format!("triangle {id} touches it and is not listed")),
-                None => Ok(()),
-            };
-        }
-        if depth > self.built.depth {
-            return wrong("deeper than the tree".to_owned());
-        }
-        let block = (word >> INNER_SHIFT) as usize;
-        self.blocks.node(block)?;
-        let middle = self.built.space.middle(position, depth);
-        for octant in 0..8 {
-            let child = Space::child(position, octant);
-            let inside: Vec<u32> = triangles
-                .iter()
-                .copied()
-                .filter(|&id| self.needs(id, middle, octant, child, depth + 1))
-                .collect();
-            if word >> octant & 1 == 1 {
-                self.cell(
-                    self.built.nodes[8 * block + octant as usize],
-                    child,
-                    depth + 1,
-                    &inside,
-                )?;
-            } else if let Some(id) = inside.first() {
-                return wrong(format!(
-                    "triangle {id} touches octant {octant}, which is empty"
-                ));
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether a child of a cell that must list a triangle must list it, too.
-    fn needs(&self, id: u32, middle: [f32; 3], octant: u32, child: [u32; 3], depth: u32) -> bool {
-        let record = &self.soup.records[id as usize];
-        build::by_box(&record.bounds(), middle) >> octant & 1 == 1
-            && (!self.built.clipped
-                || touches(&corners(record), &self.built.space.cell(child, depth)))
-    }
-}
-
 impl BuiltAccel for Built {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
-        let wrong = |text: String| Err(AccelError::Invalid(text));
-        let root = self.space.cell([0; 3], 0);
-        for record in &soup.records {
-            if !root.contains(&record.bounds()) {
-                return wrong(format!("triangle {} lies outside the tree", record.id));
-            }
-        }
-        if soup.records.is_empty() && self.nodes[0] == 0 && self.references.is_empty() {
-            return Ok(());
-        }
-        let no_triangles = TriangleSoup::default();
-        let mut validation = Validation {
-            built: self,
-            soup,
-            blocks: Coverage::new(&no_triangles, self.nodes.len() / 8),
-            listed: 0,
-        };
-        validation.blocks.node(0)?;
-        let all: Vec<u32> = (0..soup.records.len() as u32).collect();
-        validation.cell(self.nodes[0], [0; 3], 0, &all)?;
-        if validation.listed != self.references.len() {
-            return wrong(format!(
-                "leaves list {} of {} references",
-                validation.listed,
-                self.references.len()
-            ));
-        }
-        validation.blocks.is_complete()
+        validate::validate(self, soup)
     }
 
     fn buffers(&self) -> GpuBuffers<'_> {
@@ -331,16 +221,8 @@ impl BuiltAccel for Built {
             kernel: "accel/octree",
             features: Vec::new(),
             arrays: vec![
-                NamedWords {
-                    name: "nodes",
-                    words: self.nodes.as_slice().into(),
-                    element_bytes: 4,
-                },
-                NamedWords {
-                    name: "references",
-                    words: self.references.as_slice().into(),
-                    element_bytes: 4,
-                },
+                NamedWords::new("nodes", &self.nodes),
+                NamedWords::new("references", &self.references),
             ],
             uniforms: vec![
                 ("space", space),
@@ -383,13 +265,8 @@ impl BuiltAccel for Built {
     }
 
     fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin { built: self, soup }))
+        Some(Box::new(Twin(self, soup)))
     }
-}
-
-struct Twin<'a> {
-    built: &'a Built,
-    soup: &'a TriangleSoup,
 }
 
 /// A bit for each child; bit `i` stands for octant `i ^ flip`, so that lower bits come first along
@@ -428,19 +305,11 @@ fn visited(enter: f32, exit: f32, middle: [f32; 3], pad: f32) -> u32 {
     out & 0xff
 }
 
-impl Twin<'_> {
-    fn leaf(
-        &self,
-        first: u32,
-        ray: &Ray,
-        inverse: Reciprocal,
-        hit: &mut Hit,
-        counters: &mut Counters,
-    ) {
-        for reference in &self.built.references[first as usize..] {
-            counters.triangle_tests += 1;
-            let id = (reference & !LAST) as usize;
-            intersect_triangle(&self.soup.records[id], ray, inverse, hit);
+impl Built {
+    /// Tests the triangles of the leaf that begins at `first`.
+    fn leaf(&self, first: u32, soup: &TriangleSoup, query: &mut Query) {
+        for reference in &self.references[first as usize..] {
+            query.test(&soup.records[(reference & !LAST) as usize]);
             if reference & LAST != 0 {
                 return;
             }
@@ -449,26 +318,27 @@ impl Twin<'_> {
 
     /// Distances of the three planes `k` of cells of this size.
     fn distances(&self, k: [u32; 3], size: [f32; 3], ray: &Ray, inverse: [f32; 3]) -> [f32; 3] {
-        let plane = |a| self.built.space.plane(a, k[a], size[a]);
+        let plane = |a| self.space.plane(a, k[a], size[a]);
         std::array::from_fn(|a| (plane(a) - ray.origin[a]) * inverse[a])
     }
+}
 
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let ray = &self.soup.intersection.raised(ray);
-        let inverse = self.soup.intersection.inverse(ray.direction);
+impl Traverse for Built {
+    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+        let ray = query.ray;
+        let inverse = query.inverse;
         let mirror = inverse.map(|i| u32::from(i < 0.0));
         let flip = mirror[0] | mirror[1] << 1 | mirror[2] << 2;
-        let mut hit = Hit::miss(ray);
         // The cell whose children are being visited: its block and the children to come. At first one
         // of twice the size, of which the root is the only child.
         let mut open = 1 << flip;
         let mut position = [0; 3];
-        let mut size = self.built.space.extent.map(|e| 2.0 * e);
+        let mut size = self.space.extent.map(|e| 2.0 * e);
         let mut stack = Vec::new();
         loop {
             while open & FILLED_MASK == 0 {
                 let Some(parent) = stack.pop() else {
-                    return hit;
+                    return query.hit;
                 };
                 open = parent;
                 position = position.map(|p| p >> 1);
@@ -476,49 +346,39 @@ impl Twin<'_> {
             }
             let octant = open.trailing_zeros() ^ flip;
             open &= open - 1;
-            let child = Space::child(position, octant);
+            let child = RootCell::child(position, octant);
             let half = size.map(|s| 0.5 * s);
             let first: [u32; 3] = std::array::from_fn(|a| child[a] + mirror[a]);
-            let near = self.distances(first, half, ray, *inverse);
+            let near = self.distances(first, half, &ray, *inverse);
             let enter = near[0].max(near[1]).max(near[2]).max(ray.t_min);
-            if enter > hit.t * END_PAD {
-                return hit;
+            if enter > query.hit.t * END_PAD {
+                return query.hit;
             }
             let place = ((open >> INNER_SHIFT) * 8 + octant) as usize;
-            counters.visit(place);
-            let word = self.built.nodes[place];
+            query.visit(place);
+            let word = self.nodes[place];
             if word & LEAF != 0 {
-                self.leaf(word & !LEAF, ray, inverse, &mut hit, counters);
-                if any && hit.triangle != NO_HIT {
-                    return hit;
+                self.leaf(word & !LEAF, soup, &mut query);
+                if query.is_answered() {
+                    return query.hit;
                 }
                 continue;
             }
             let last = std::array::from_fn(|a| child[a] + 1 - mirror[a]);
-            let far = self.distances(last, half, ray, *inverse);
-            let exit = far[0].min(far[1]).min(far[2]).min(hit.t);
+            let far = self.distances(last, half, &ray, *inverse);
+            let exit = far[0].min(far[1]).min(far[2]).min(query.hit.t);
             let middle = self.distances(
                 child.map(|c| 2 * c + 1),
                 half.map(|h| 0.5 * h),
-                ray,
+                &ray,
                 *inverse,
             );
             stack.push(open);
-            counters.stack_high_water = counters.stack_high_water.max(stack.len() as u32);
+            query.count_stack(stack.len());
             let filled = mirrored(word & FILLED_MASK, flip);
             open = word & !FILLED_MASK | visited(enter, exit, middle, inverse.pad) & filled;
             (position, size) = (child, half);
         }
-    }
-}
-
-impl CpuTwin for Twin<'_> {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.trace(ray, false, counters)
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.trace(ray, true, counters).triangle != NO_HIT
     }
 }
 

@@ -5,13 +5,13 @@ use crate::report::document::Figure;
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::report::plot::heat::HeatMap;
 use crate::stress::families::FAMILIES;
-use crate::stress::record::Record;
+use crate::stress::record::Line;
 use crate::stress::suite::BRUTE_FORCE;
 
 /// Families whose errors are drawn over the rungs.
 const CURVES: [&str; 4] = ["watertight", "edges", "axis-parallel", "needles"];
 
-pub(super) fn heat_map(records: &[Record], test: &str) -> Option<Figure> {
+pub(super) fn heat_map(records: &[Line], test: &str) -> Option<Figure> {
     let tried = |accel: &String| {
         FAMILIES
             .iter()
@@ -47,7 +47,7 @@ pub(super) fn heat_map(records: &[Record], test: &str) -> Option<Figure> {
 }
 
 /// Error of the distance over the rungs, one plot per family and sweep, one curve per triangle test.
-pub(super) fn curves(records: &[Record]) -> Vec<Figure> {
+pub(super) fn curves(records: &[Line]) -> Vec<Figure> {
     let mut figures = Vec::new();
     for family in CURVES {
         for (sweep, title) in [("scale", "scale"), ("shift", "translation, units")] {

@@ -7,17 +7,15 @@
 //! rendering", 2004 (8-byte nodes). Why hits are equal to brute force to the bit: [`super::spatial`].
 
 mod build;
+mod validate;
 
 use super::bounds::{Bounds, slab};
-use super::ray::{Hit, NO_HIT, Ray};
-use super::spatial::{corners, touches};
-use super::tree::Coverage;
-use super::triangle::intersect_triangle;
+use super::ray::Hit;
+use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, Counters, CpuTwin, GpuBuffers, NamedWords,
+    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
     TriangleSoup,
 };
-use crate::accel::StructureStats;
 use crate::gpu::UniformValues;
 use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
 use bytemuck::{Pod, Zeroable};
@@ -245,127 +243,11 @@ impl Built {
             bytes: self.buffers().bytes(),
         }
     }
-
-    /// Those of `triangles`, all of which the cell of node `index` must list, that its leaves lack.
-    fn lacking(
-        &self,
-        index: usize,
-        cell: &Bounds,
-        triangles: Vec<u32>,
-        soup: &TriangleSoup,
-        coverage: &mut Coverage,
-    ) -> Result<Vec<u32>, AccelError> {
-        coverage.node(index)?;
-        let (axis, position, children) = match self.nodes[index].content() {
-            Content::Leaf { first, count } => {
-                return lacking_in_leaf(
-                    index,
-                    self.references.get(first..first + count),
-                    triangles,
-                );
-            }
-            Content::Inner {
-                axis,
-                position,
-                children,
-            } => (axis, position, children),
-        };
-        let inside = cell.min[axis] <= position && position <= cell.max[axis];
-        if !inside {
-            return Err(AccelError::Invalid(format!(
-                "node {index}: its plane lies outside its cell"
-            )));
-        }
-        let cells = halves(cell, axis, position);
-        let (mut below, mut above, mut planar) = (Vec::new(), Vec::new(), Vec::new());
-        for id in triangles {
-            let record = &soup.records[id as usize];
-            let bounds = record.bounds();
-            let (low, high) = (bounds.min[axis], bounds.max[axis]);
-            if low == position && high == position {
-                planar.push(id);
-            } else if high <= position {
-                below.push(id);
-            } else if low >= position {
-                above.push(id);
-            } else {
-                let needed = |cell| !self.clipped || touches(&corners(record), cell);
-                below.extend(needed(&cells[0]).then_some(id));
-                above.extend(needed(&cells[1]).then_some(id));
-            }
-        }
-        // What lies in the plane may be on either side.
-        planar.sort_unstable();
-        let with_planar = |mut list: Vec<u32>| {
-            list.extend(&planar);
-            list
-        };
-        let lacks_below = self.lacking(children, &cells[0], with_planar(below), soup, coverage)?;
-        let lacks_above =
-            self.lacking(children + 1, &cells[1], with_planar(above), soup, coverage)?;
-        let on_one_side = |id: &u32| planar.binary_search(id).is_ok();
-        let (either, mut lost): (Vec<u32>, Vec<u32>) =
-            lacks_below.into_iter().partition(on_one_side);
-        let (also, rest): (Vec<u32>, Vec<u32>) = lacks_above.into_iter().partition(on_one_side);
-        lost.extend(rest);
-        lost.extend(either.into_iter().filter(|id| also.contains(id)));
-        Ok(lost)
-    }
-}
-
-/// Those of `triangles` that a leaf does not list.
-fn lacking_in_leaf(
-    index: usize,
-    references: Option<&[u32]>,
-    mut triangles: Vec<u32>,
-) -> Result<Vec<u32>, AccelError> {
-    let wrong = |text: &str| Err(AccelError::Invalid(format!("leaf {index}: {text}")));
-    let Some(references) = references else {
-        return wrong("its references lie outside the array");
-    };
-    if !references.is_sorted_by(|a, b| a < b) {
-        return wrong("its references do not ascend");
-    }
-    triangles.retain(|id| references.binary_search(id).is_err());
-    Ok(triangles)
 }
 
 impl BuiltAccel for Built {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
-        let wrong = |text: String| Err(AccelError::Invalid(text));
-        for record in &soup.records {
-            if !self.bounds.contains(&record.bounds()) {
-                return wrong(format!("triangle {} lies outside the tree", record.id));
-            }
-        }
-        let exists = |id: &&u32| **id as usize >= soup.records.len();
-        if let Some(id) = self.references.iter().find(exists) {
-            return wrong(format!("triangle {id} does not exist"));
-        }
-        let listed: usize = self
-            .nodes
-            .iter()
-            .map(|node| match node.content() {
-                Content::Leaf { count, .. } => count,
-                Content::Inner { .. } => 0,
-            })
-            .sum();
-        if listed != self.references.len() {
-            return wrong(format!(
-                "leaves list {listed} of {} references",
-                self.references.len()
-            ));
-        }
-        let all = (0..soup.records.len() as u32).collect();
-        let no_triangles = TriangleSoup::default();
-        let mut coverage = Coverage::new(&no_triangles, self.nodes.len());
-        let lost = self.lacking(0, &self.bounds, all, soup, &mut coverage)?;
-        if let Some(id) = lost.first() {
-            return wrong(format!(
-                "triangle {id} is missing in a leaf that it touches"
-            ));
-        }
-        coverage.is_complete()
+        validate::validate(self, soup)
     }
 
     fn buffers(&self) -> GpuBuffers<'_> {
@@ -377,16 +259,8 @@ impl BuiltAccel for Built {
             kernel: "accel/kd_tree",
             features: Vec::new(),
             arrays: vec![
-                NamedWords {
-                    name: "nodes",
-                    words: bytemuck::cast_slice(&self.nodes).into(),
-                    element_bytes: 8,
-                },
-                NamedWords {
-                    name: "references",
-                    words: self.references.as_slice().into(),
-                    element_bytes: 4,
-                },
+                NamedWords::new("nodes", &self.nodes),
+                NamedWords::new("references", &self.references),
             ],
             uniforms: vec![
                 ("tree", tree),
@@ -403,33 +277,27 @@ impl BuiltAccel for Built {
     }
 
     fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin { built: self, soup }))
+        Some(Box::new(Twin(self, soup)))
     }
 }
 
-struct Twin<'a> {
-    built: &'a Built,
-    soup: &'a TriangleSoup,
-}
-
-impl Twin<'_> {
-    fn trace(&self, ray: &Ray, any: bool, counters: &mut Counters) -> Hit {
-        let ray = &self.soup.intersection.raised(ray);
-        let inverse = self.soup.intersection.inverse(ray.direction);
-        let mut hit = Hit::miss(ray);
-        counters.box_tests += 1;
-        let (enter, end) = slab(&self.built.bounds, ray, *inverse);
+impl Traverse for Built {
+    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+        let ray = query.ray;
+        let inverse = query.inverse;
+        query.counters.box_tests += 1;
+        let (enter, end) = slab(&self.bounds, &ray, *inverse);
         let mut enter = enter.max(ray.t_min);
-        let mut exit = end.min(hit.t);
+        let mut exit = end.min(query.hit.t);
         if enter > exit * inverse.pad {
-            return hit;
+            return query.hit;
         }
         // Far sides that wait, with the distance where the ray enters them.
         let mut stack: Vec<(usize, f32)> = Vec::new();
         let mut current = 0;
         loop {
-            counters.visit(current);
-            match self.built.nodes[current].content() {
+            query.visit(current);
+            match self.nodes[current].content() {
                 Content::Inner {
                     axis,
                     position,
@@ -444,41 +312,28 @@ impl Twin<'_> {
                         current = far;
                     } else {
                         stack.push((far, enter.max(plane)));
-                        counters.stack_high_water =
-                            counters.stack_high_water.max(stack.len() as u32);
+                        query.count_stack(stack.len());
                         exit = exit.min(plane);
                         current = near;
                     }
                 }
                 Content::Leaf { first, count } => {
-                    for &id in &self.built.references[first..first + count] {
-                        counters.triangle_tests += 1;
-                        intersect_triangle(&self.soup.records[id as usize], ray, inverse, &mut hit);
-                    }
-                    if any && hit.triangle != NO_HIT {
-                        return hit;
+                    let ids = &self.references[first..first + count];
+                    query.test_list(soup, ids.iter().copied());
+                    if query.is_answered() {
+                        return query.hit;
                     }
                     match stack.pop() {
-                        Some((far, distance)) if distance <= hit.t * END_PAD => {
+                        Some((far, distance)) if distance <= query.hit.t * END_PAD => {
                             (current, enter) = (far, distance);
                         }
-                        _ => return hit,
+                        _ => return query.hit,
                     }
                     // A cell ends where the one waiting below it begins.
-                    exit = stack.last().map_or(end, |(_, next)| *next).min(hit.t);
+                    exit = stack.last().map_or(end, |(_, next)| *next).min(query.hit.t);
                 }
             }
         }
-    }
-}
-
-impl CpuTwin for Twin<'_> {
-    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
-        self.trace(ray, false, counters)
-    }
-
-    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
-        self.trace(ray, true, counters).triangle != NO_HIT
     }
 }
 

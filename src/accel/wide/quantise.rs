@@ -1,4 +1,4 @@
-//! Boxes of eight bits a plane in the frame of their node. Twin of `kernels/accel/wide.wesl`.
+//! Boxes of eight bits a plane on the grid of planes of their node. Twin of `kernels/accel/wide.wesl`.
 //!
 //! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
 //! compressed wide BVHs", HPG 2017, sections 3.1 and 4.1.
@@ -6,7 +6,7 @@
 //! A plane lies at `low + q · 2^e` for a whole q in 0..256. `low` is a multiple of `2^e`, and `e` is
 //! so large that all planes are multiples of `2^e` below `2^24 · 2^e`: they are floats, their decoding
 //! is exact however an adapter rounds, and a box of planes contains what it was made for by integer
-//! arithmetic ([`Grid::new`]).
+//! arithmetic ([`Quantisation::new`]).
 //!
 //! **No hit is lost.** The proof in `docs/design.md` needs of a box B that its computed distances
 //! enclose those of every coordinate in it: n(B) ≤ d(y) ≤ f(B) with `d(y) = (y − origin) · inverse` as
@@ -18,13 +18,9 @@
 //! With `slack ≥ 16uM(1 − 4u)` ([`FRAME_PAD`] = 16u) there is a factor of two left. Both sides use the
 //! same reciprocal, whose own error does not count.
 
-use super::bounds::Bounds;
-use super::intersection::Reciprocal;
-use super::tree::{NodeKind, Tree, tree_parameters};
-use super::triangle::TriangleRecord;
-use super::{AccelError, BuildLog, GpuBuffers, NamedWords, TriangleSoup};
-use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
-use bytemuck::Pod;
+use super::WideChild;
+use crate::accel::bounds::Bounds;
+use crate::accel::intersection::Reciprocal;
 
 /// Relative slack of the distances to quantised planes, 2⁻²⁰.
 pub const FRAME_PAD: f32 = 9.536_743e-7;
@@ -36,100 +32,56 @@ const LEAST_EXPONENT: i32 = -60;
 const BIAS: i32 = 127;
 const MANTISSA: i32 = 24;
 
-/// Parameters of a wide structure: those of the binary tree it is collapsed from, with leaves of at
-/// most `max_leaf` triangles, and where kernels read it from.
-pub fn wide_parameters(max_leaf: u32) -> ParameterSchema {
-    let max = i64::from(max_leaf);
-    let mut schema = tree_parameters();
-    for parameter in &mut schema {
-        if parameter.name == "leaf_size" {
-            parameter.default = ParamValue::Integer(max);
-            parameter.range = ParamRange::Integer { min: 1, max };
-        }
-    }
-    schema.push(Parameter {
-        name: "texels",
-        description: "read nodes and triangles as texels of textures instead of from buffers",
-        default: ParamValue::Flag(true),
-        range: ParamRange::Flag,
-    });
-    schema
-}
-
-/// The binary tree to collapse, one triangle a leaf: the collapse decides about leaves.
-///
-/// # Errors
-/// The tree cannot be built.
-pub fn wide_tree(
-    soup: &TriangleSoup,
-    params: &Params,
-    log: &mut BuildLog,
-) -> Result<Tree, AccelError> {
-    let mut params = params.clone();
-    params
-        .0
-        .insert("leaf_size".to_owned(), ParamValue::Integer(1));
-    let tree = Tree::build(soup, &params, log)?;
-    let largest = tree.nodes.iter().map(|node| match node.kind {
-        NodeKind::Leaf { count, .. } => count,
-        NodeKind::Inner { .. } => 0,
-    });
-    match largest.max() {
-        Some(count) if count > 1 => Err(AccelError::Limit {
-            what: "triangles of a leaf before the collapse".into(),
-            needed: count.into(),
-            limit: 1,
-        }),
-        _ => Ok(tree),
-    }
-}
-
-/// Fails if there are more nodes than `limit`.
-///
-/// # Errors
-/// There are, with both numbers.
-pub fn node_limit(structure: &str, nodes: usize, limit: u32) -> Result<(), AccelError> {
-    if nodes as u64 > u64::from(limit) {
-        return Err(AccelError::Limit {
-            what: format!("nodes of a {structure}"),
-            needed: nodes as u64,
-            limit: limit.into(),
-        });
-    }
-    Ok(())
-}
-
-/// Nodes and triangles of a wide structure as its kernel binds them.
-pub fn wide_arrays<'a, N: Pod>(
-    nodes: &'a [N],
-    leaf_triangles: &'a [TriangleRecord],
-    texels: bool,
-) -> GpuBuffers<'a> {
-    GpuBuffers {
-        features: if texels { vec!["texels"] } else { Vec::new() },
-        arrays: vec![
-            NamedWords {
-                name: "nodes",
-                words: bytemuck::cast_slice(nodes).into(),
-                element_bytes: size_of::<N>() as u32,
-            },
-            NamedWords {
-                name: "leaf_triangles",
-                words: bytemuck::cast_slice(leaf_triangles).into(),
-                element_bytes: size_of::<TriangleRecord>() as u32,
-            },
-        ],
-        ..Default::default()
-    }
-}
-
 /// The planes of a node: where the first one lies and how far they are apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grid {
+pub struct Quantisation {
     /// First plane on each axis.
     pub low: [f32; 3],
     /// Biased exponents of the distance between planes.
     pub exponents: [u8; 3],
+}
+
+impl Quantisation {
+    /// That of a node with these children, and the planes of each slot at the minimum and the maximum
+    /// of each axis; zeros if there are no children.
+    pub fn of_children<const WIDTH: usize>(
+        children: &[WideChild],
+    ) -> (Self, [[[u8; WIDTH]; 3]; 2]) {
+        let present = || children.iter().enumerate().filter(|(_, c)| !c.is_nothing());
+        let around = present().fold(Bounds::EMPTY, |b, (_, child)| b.union(&child.bounds));
+        let mut planes = [[[0; WIDTH]; 3]; 2];
+        if present().next().is_none() {
+            let nothing = Self {
+                low: [0.0; 3],
+                exponents: [0; 3],
+            };
+            return (nothing, planes);
+        }
+        let quantisation = Self::new(&around);
+        for (slot, child) in present() {
+            let Planes { low, high } = quantisation.around(&child.bounds);
+            for axis in 0..3 {
+                planes[0][axis][slot] = low[axis];
+                planes[1][axis][slot] = high[axis];
+            }
+        }
+        (quantisation, planes)
+    }
+
+    /// The box of a slot of a node with this first plane and these exponents.
+    pub fn slot_bounds<const WIDTH: usize>(
+        low: [f32; 3],
+        exponents: u32,
+        [lows, highs]: [&[[u8; WIDTH]; 3]; 2],
+        slot: usize,
+    ) -> Bounds {
+        let [x, y, z, _] = exponents.to_le_bytes();
+        let exponents = [x, y, z];
+        Self { low, exponents }.bounds(&Planes {
+            low: lows.map(|q| q[slot]),
+            high: highs.map(|q| q[slot]),
+        })
+    }
 }
 
 /// A box by plane numbers.
@@ -141,8 +93,8 @@ pub struct Planes {
     pub high: [u8; 3],
 }
 
-impl Grid {
-    /// The finest grid that covers `bounds`.
+impl Quantisation {
+    /// The finest that covers `bounds`.
     pub fn new(bounds: &Bounds) -> Self {
         let mut grid = Self {
             low: [0.0; 3],
@@ -166,7 +118,7 @@ impl Grid {
         grid
     }
 
-    /// The smallest box of planes around `bounds`, which must lie in the grid.
+    /// The smallest box of planes around `bounds`, which must lie between them.
     pub fn around(&self, bounds: &Bounds) -> Planes {
         let mut planes = Planes::default();
         for axis in 0..3 {
@@ -206,7 +158,7 @@ fn exponent(x: f32) -> i32 {
 /// Distances along a ray to the planes of a node: `q · scale + near` where the ray enters a box,
 /// `+ far` where it leaves.
 #[derive(Debug, Clone, Copy)]
-pub struct Frame {
+pub struct PlaneDistances {
     scale: [f32; 3],
     near: [f32; 3],
     far: [f32; 3],
@@ -215,9 +167,14 @@ pub struct Frame {
 }
 
 /// The frame of a node with first plane `low` and biased exponents in the bytes of `exponents`.
-pub fn frame(low: [f32; 3], exponents: u32, origin: [f32; 3], inverse: Reciprocal) -> Frame {
+pub fn frame(
+    low: [f32; 3],
+    exponents: u32,
+    origin: [f32; 3],
+    inverse: Reciprocal,
+) -> PlaneDistances {
     let biased = exponents.to_le_bytes();
-    let mut frame = Frame {
+    let mut frame = PlaneDistances {
         scale: [0.0; 3],
         near: [0.0; 3],
         far: [0.0; 3],
@@ -255,7 +212,7 @@ fn earlier(a: f32, b: f32) -> f32 {
 }
 
 /// Where the segment enters four boxes, whose near planes on the three axes are these.
-pub fn enter_four(near: [u32; 3], frame: &Frame, t_min: f32) -> [f32; 4] {
+pub fn enter_four(near: [u32; 3], frame: &PlaneDistances, t_min: f32) -> [f32; 4] {
     let distances: [_; 3] =
         std::array::from_fn(|axis| planes(near[axis], frame.scale[axis], frame.near[axis]));
     std::array::from_fn(|i| {
@@ -265,7 +222,7 @@ pub fn enter_four(near: [u32; 3], frame: &Frame, t_min: f32) -> [f32; 4] {
 }
 
 /// Where it leaves them, padded: a box is entered if it does not leave before it enters.
-pub fn leave_four(far: [u32; 3], frame: &Frame, t_best: f32) -> [f32; 4] {
+pub fn leave_four(far: [u32; 3], frame: &PlaneDistances, t_best: f32) -> [f32; 4] {
     let distances: [_; 3] =
         std::array::from_fn(|axis| planes(far[axis], frame.scale[axis], frame.far[axis]));
     std::array::from_fn(|i| {
@@ -333,7 +290,7 @@ mod tests {
         let mut random = Pcg32::new(1);
         for _ in 0..20_000 {
             let whole = random_box(&mut random);
-            let grid = Grid::new(&whole);
+            let grid = Quantisation::new(&whole);
             for inner in [whole, part(&whole, &mut random)] {
                 let planes = grid.around(&inner);
                 let decoded = grid.bounds(&planes);
@@ -362,7 +319,7 @@ mod tests {
         for _ in 0..20_000 {
             let whole = random_box(&mut random);
             let inner = part(&whole, &mut random);
-            let grid = Grid::new(&whole);
+            let grid = Quantisation::new(&whole);
             let planes = grid.around(&inner);
             let ray = Ray {
                 origin: std::array::from_fn(|_| number(&mut random)),

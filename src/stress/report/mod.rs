@@ -3,40 +3,49 @@
 mod axes;
 mod families;
 mod figures;
+mod values;
 
-use super::document::{Banner, Block, Check, Document, Section, Table, Tone};
-use super::format;
-use super::terminal::aligned;
-use super::{ReportError, write_page};
+#[cfg(test)]
 use crate::measure::record::Verdict;
+use crate::measure::record::{Recorded, axis};
+use crate::report::data::without_repeats;
+use crate::report::document::{Banner, Block, Check, Document, Section, Table, Tone};
+use crate::report::terminal::aligned;
+use crate::report::values::csv;
+use crate::report::{ReportError, format, write_file, write_page};
 use crate::stress::families::FAMILIES;
-use crate::stress::record::{CellRecord, Record, SkippedRecord, TargetRecord};
+use crate::stress::record::{CellRecord, Line, Record, SkippedRecord, TargetRecord};
 use crate::stress::targets::{cells, shots, suite};
 use axes::{extras, shot_table};
 use families::{count_table, error_table, matrix_table, worst_table};
 use figures::{curves, heat_map};
 use std::path::{Path, PathBuf};
 
-/// Writes `index.html` and the plots beside the `stress.jsonl` in `dir`.
+/// Writes `index.html`, `figures.csv` and the plots beside the `stress.jsonl` in `dir`.
 ///
 /// # Errors
 /// A folder that cannot be written.
-pub fn write_stress_page(dir: &Path, records: &[Record]) -> Result<PathBuf, ReportError> {
+pub fn write_stress_page(dir: &Path, records: &[Line]) -> Result<PathBuf, ReportError> {
     let mut document = document(records);
     let (html, _) = write_page(dir, &mut document)?;
+    write_file(
+        &dir.join("figures.csv"),
+        csv(&values::values(records)).as_bytes(),
+    )?;
     Ok(html)
 }
 
 /// Targets, families and the matrix as aligned plain text.
-pub fn stress_tables(records: &[Record]) -> String {
+pub fn stress_tables(records: &[Line]) -> String {
     let mut text = String::new();
     let mut tables: Vec<Table> = triangles(records)
         .iter()
         .flat_map(|test| [count_table(records, test), error_table(records, test)])
         .collect();
     tables.push(matrix_table(records));
-    tables.extend(shot_table(records));
-    tables.extend(extras(records));
+    let values = values::values(records);
+    tables.push(shot_table(records, &values));
+    tables.extend(extras(records, &values));
     for table in tables.iter().filter(|table| !table.rows.is_empty()) {
         text += &aligned(table);
         text.push('\n');
@@ -55,7 +64,7 @@ pub fn stress_tables(records: &[Record]) -> String {
     text
 }
 
-fn document(records: &[Record]) -> Document {
+fn document(records: &[Line]) -> Document {
     let mut verdict = Section::new("targets", "Targets of the default configuration");
     verdict.blocks.push(Block::Checks(checks(records)));
     let mut maps = Section::new("maps", "Where hits are lost");
@@ -79,13 +88,12 @@ fn document(records: &[Record]) -> Document {
     let mut errors = Section::new("errors", "Error against scale and translation");
     errors.blocks.push(Block::Figures(curves(records)));
     let mut rest = Section::new("axes", "Shots, box tests, offsets, cost");
-    rest.blocks.extend(
-        shot_table(records)
-            .into_iter()
-            .filter_map(Table::into_block),
-    );
+    let values = values::values(records);
     rest.blocks
-        .extend(extras(records).into_iter().filter_map(Table::into_block));
+        .extend(shot_table(records, &values).into_block());
+    let extras = extras(records, &values);
+    rest.blocks
+        .extend(extras.into_iter().filter_map(Table::into_block));
     let mut worst = Section::new("worst", "Worst rays");
     worst.blocks.extend(worst_table(records).into_block());
     let left_out: Vec<String> = skipped(records)
@@ -103,7 +111,7 @@ fn document(records: &[Record]) -> Document {
     }
 }
 
-fn subtitle(records: &[Record]) -> String {
+fn subtitle(records: &[Line]) -> String {
     let Some(suite) = suite(records) else {
         return "The first record is missing.".into();
     };
@@ -121,7 +129,7 @@ fn subtitle(records: &[Record]) -> String {
     )
 }
 
-fn banners(records: &[Record]) -> Vec<Banner> {
+fn banners(records: &[Line]) -> Vec<Banner> {
     let mut banners = Vec::new();
     let mut add = |tone, text: &str| {
         banners.push(Banner {
@@ -135,52 +143,52 @@ fn banners(records: &[Record]) -> Vec<Banner> {
             "This adapter does not compute like the host: differences within 4 ulp are ties.",
         );
     }
-    if !records.iter().any(|r| matches!(r, Record::Finished { .. })) {
+    if !records
+        .iter()
+        .any(|line| matches!(line.body, Record::Finished { .. }))
+    {
         add(Tone::Bad, "The suite did not finish.");
     }
     banners
 }
 
 /// Triangle tests in the order in which they were tried, the default first.
-fn triangles(records: &[Record]) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    let of_cells = cells(records).map(|c| &c.triangle);
-    for name in of_cells.chain(shots(records).map(|s| &s.triangle)) {
-        if !names.contains(name) {
-            names.push(name.clone());
-        }
-    }
-    names
+fn triangles(records: &[Line]) -> Vec<String> {
+    let keys = cells(records)
+        .map(|c| c.key)
+        .chain(shots(records).map(|s| s.key));
+    without_repeats(
+        keys.map(|key| key.label(axis::TRIANGLE).to_owned())
+            .collect(),
+    )
 }
 
-fn structures(records: &[Record]) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    for cell in cells(records) {
-        if !names.contains(&cell.accel) {
-            names.push(cell.accel.clone());
-        }
-    }
-    names
+fn structures(records: &[Line]) -> Vec<String> {
+    let names = cells(records).map(|cell| cell.key.label(axis::ACCEL).to_owned());
+    without_repeats(names.collect())
 }
 
 fn cell<'a>(
-    records: &'a [Record],
+    records: &'a [Line],
     test: &str,
     accel: &str,
     family: &str,
-) -> Option<&'a CellRecord> {
-    cells(records).find(|c| c.triangle == test && c.accel == accel && c.family == family)
+) -> Option<Recorded<'a, CellRecord>> {
+    cells(records).find(|c| {
+        let labels = [axis::TRIANGLE, axis::ACCEL, axis::FAMILY].map(|axis| c.key.label(axis));
+        labels == [test, accel, family]
+    })
 }
 
-fn skipped(records: &[Record]) -> impl Iterator<Item = &SkippedRecord> {
-    records.iter().filter_map(|r| match r {
+fn skipped(records: &[Line]) -> impl Iterator<Item = &SkippedRecord> {
+    records.iter().filter_map(|line| match &line.body {
         Record::Skipped(skipped) => Some(skipped),
         _ => None,
     })
 }
 
-fn checks(records: &[Record]) -> Vec<Check> {
-    let targets = records.iter().filter_map(|r| match r {
+fn checks(records: &[Line]) -> Vec<Check> {
+    let targets = records.iter().filter_map(|line| match &line.body {
         Record::Target(target) => Some(target),
         _ => None,
     });
@@ -203,11 +211,7 @@ fn check(target: &TargetRecord) -> Check {
         }
     };
     Check {
-        verdict: match target.passed {
-            Some(true) => Verdict::Pass,
-            Some(false) => Verdict::Fail,
-            None => Verdict::Open,
-        },
+        verdict: target.verdict,
         title: target.target.clone(),
         detail,
     }
@@ -230,7 +234,7 @@ mod tests {
             target: "misses".into(),
             limit: 0.0,
             found,
-            passed: found.map(|f| f <= 0.0),
+            verdict: Verdict::new(found.is_some(), found.is_some_and(|f| f > 0.0)),
             note: "bvh, sphere".into(),
         };
         assert_eq!(check(&target(None)).verdict.word(), "OPEN");

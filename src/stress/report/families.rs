@@ -1,10 +1,11 @@
 //! Tables of families, structures and their worst rays.
 
 use super::{cell, structures, triangles};
+use crate::measure::record::{Recorded, axis};
 use crate::report::document::{Cell, Table, Tone};
 use crate::report::format;
 use crate::stress::families::FAMILIES;
-use crate::stress::record::{CellRecord, Quantiles, Record};
+use crate::stress::record::{CellRecord, Line, Quantiles};
 use crate::stress::suite::BRUTE_FORCE;
 use crate::stress::targets::cells;
 
@@ -24,19 +25,21 @@ fn three(quantiles: Option<Quantiles>) -> String {
 }
 
 /// The families that were tried with a triangle test, each with its cells, brute force's first.
-fn rows<'a>(records: &'a [Record], test: &str) -> Vec<(&'static str, Vec<&'a CellRecord>)> {
+fn rows<'a>(records: &'a [Line], test: &str) -> Vec<(&'static str, Vec<Recorded<'a, CellRecord>>)> {
     let of = |family: &'static str| {
-        let is_of = |c: &&CellRecord| c.triangle == test && c.family == family;
-        let mut found: Vec<&CellRecord> = cells(records).filter(is_of).collect();
-        found.sort_by_key(|c| c.accel != BRUTE_FORCE);
-        let judged = found.first().is_some_and(|c| c.accel == BRUTE_FORCE);
+        let is_of = |c: &Recorded<CellRecord>| {
+            c.key.label(axis::TRIANGLE) == test && c.key.label(axis::FAMILY) == family
+        };
+        let mut found: Vec<_> = cells(records).filter(is_of).collect();
+        found.sort_by_key(|c| c.key.label(axis::ACCEL) != BRUTE_FORCE);
+        let judged = (found.first()).is_some_and(|c| c.key.label(axis::ACCEL) == BRUTE_FORCE);
         judged.then_some((family, found))
     };
     FAMILIES.iter().filter_map(|f| of(f.name)).collect()
 }
 
 /// What brute force with one triangle test gets wrong, and what other structures do otherwise.
-pub(super) fn count_table(records: &[Record], test: &str) -> Table {
+pub(super) fn count_table(records: &[Line], test: &str) -> Table {
     let mut table = Table::new(
         format!("{test}: brute force against the exact oracle; (…) is not explained by rounding"),
         &[
@@ -85,10 +88,10 @@ fn count(n: usize) -> String {
 
 /// The structures whose answers are not brute force's, or that failed; how many if they are more than a
 /// line takes.
-fn differing(of_family: &[&CellRecord]) -> String {
+fn differing(of_family: &[Recorded<CellRecord>]) -> String {
     const MOST: usize = 3;
     let wrong = |c: &CellRecord| c.differing + c.any_differing.unwrap_or(0);
-    let differ: Vec<&&CellRecord> = (of_family.iter())
+    let differ: Vec<&Recorded<CellRecord>> = (of_family.iter())
         .filter(|c| wrong(c) > 0 || !c.failures.is_empty())
         .collect();
     if differ.len() > MOST {
@@ -100,15 +103,18 @@ fn differing(of_family: &[&CellRecord]) -> String {
             of_family.len()
         );
     }
-    let name = |c: &&&CellRecord| match c.failures.len() {
-        0 => format!("{} {}", c.accel, wrong(c)),
-        failed => format!("{} {} ({failed} failed)", c.accel, wrong(c)),
+    let name = |c: &&Recorded<CellRecord>| {
+        let accel = c.key.label(axis::ACCEL);
+        match c.failures.len() {
+            0 => format!("{accel} {}", wrong(c)),
+            failed => format!("{accel} {} ({failed} failed)", wrong(c)),
+        }
     };
     differ.iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
 /// How exact the right hits of brute force are.
-pub(super) fn error_table(records: &[Record], test: &str) -> Table {
+pub(super) fn error_table(records: &[Line], test: &str) -> Table {
     let mut table = Table::new(
         format!("{test}: errors of right hits, median / p99 / max"),
         &[
@@ -135,7 +141,7 @@ pub(super) fn error_table(records: &[Record], test: &str) -> Table {
 }
 
 /// A mark per triangle test, structure and family.
-pub(super) fn matrix_table(records: &[Record]) -> Table {
+pub(super) fn matrix_table(records: &[Line]) -> Table {
     let mut table = Table::new(
         "false misses per triangle test, structure and family; · none, ! differs from brute force, x failed",
         &["triangle", ":structure"],
@@ -143,12 +149,12 @@ pub(super) fn matrix_table(records: &[Record]) -> Table {
     let families: Vec<&str> = FAMILIES
         .iter()
         .map(|f| f.name)
-        .filter(|name| cells(records).any(|c| c.family == *name))
+        .filter(|name| cells(records).any(|c| c.key.label(axis::FAMILY) == *name))
         .collect();
     families.iter().for_each(|name| table.add_column(*name));
     for test in triangles(records) {
         for accel in structures(records) {
-            let row: Vec<Option<&CellRecord>> = families
+            let row: Vec<Option<Recorded<CellRecord>>> = families
                 .iter()
                 .map(|f| cell(records, &test, &accel, f))
                 .collect();
@@ -158,7 +164,7 @@ pub(super) fn matrix_table(records: &[Record]) -> Table {
             let mut cells: Vec<Cell> = vec![test.clone().into(), accel.clone().into()];
             cells.extend(
                 row.iter()
-                    .map(|cell| cell.map_or_else(|| "".into(), |c| mark(c).into())),
+                    .map(|cell| cell.map_or_else(|| "".into(), |c| mark(&c).into())),
             );
             table.rows.push(cells);
         }
@@ -180,18 +186,20 @@ fn mark(cell: &CellRecord) -> String {
     text
 }
 
-pub(super) fn worst_table(records: &[Record]) -> Table {
+pub(super) fn worst_table(records: &[Line]) -> Table {
     let mut table = Table::new(
         "The ray to look at first in each cell of brute force and of structures that differ from it",
         &["family", ":triangle", ":structure", ":what", ":replay"],
     );
     for cell in cells(records) {
         let Some(worst) = &cell.worst else { continue };
-        if cell.accel == BRUTE_FORCE || cell.differing > 0 {
+        let [family, triangle, accel] =
+            [axis::FAMILY, axis::TRIANGLE, axis::ACCEL].map(|axis| cell.key.label(axis));
+        if accel == BRUTE_FORCE || cell.differing > 0 {
             table.rows.push(vec![
-                cell.family.clone().into(),
-                cell.triangle.clone().into(),
-                cell.accel.clone().into(),
+                family.into(),
+                triangle.into(),
+                accel.into(),
                 worst.what.clone().into(),
                 worst.replay.clone().into(),
             ]);

@@ -1,0 +1,118 @@
+//! Twins: the traversals of kernels in scalar Rust, with the same hits and the same counted work.
+//!
+//! A structure writes [`Traverse::trace`], the twin of the kernel's `trace`. What all of them begin
+//! and end with stands here.
+
+use super::TriangleSoup;
+use super::bounds::{Bounds, enter_box};
+use super::intersection::{Intersection, Reciprocal};
+use super::ray::{Hit, NO_HIT, Ray};
+use super::triangle::{TriangleRecord, intersect_triangle};
+use super::watch;
+
+/// Counted work of one ray. Twin of `kernels/common/counters.wesl`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Nodes or cells visited.
+    pub nodes: u32,
+    /// Ray–box tests.
+    pub box_tests: u32,
+    /// Ray–triangle tests.
+    pub triangle_tests: u32,
+    /// Deepest stack, entries.
+    pub stack_high_water: u32,
+}
+
+/// One ray on its way through a structure.
+pub struct Query<'a> {
+    /// The ray as it is traced: see [`super::ray::raised`].
+    pub ray: Ray,
+    /// What tests need of its direction.
+    pub inverse: Reciprocal,
+    /// Whether any hit is enough.
+    pub any: bool,
+    /// The nearest hit so far.
+    pub hit: Hit,
+    /// The work so far.
+    pub counters: &'a mut Counters,
+}
+
+impl<'a> Query<'a> {
+    /// The question of `ray`, met by these tests.
+    pub fn new(ray: &Ray, any: bool, tests: Intersection, counters: &'a mut Counters) -> Self {
+        let ray = tests.raised(ray);
+        Self {
+            ray,
+            inverse: tests.inverse(ray.direction),
+            any,
+            hit: Hit::miss(&ray),
+            counters,
+        }
+    }
+
+    /// Whether any hit is enough and there is one.
+    pub fn is_answered(&self) -> bool {
+        self.any && self.hit.triangle != NO_HIT
+    }
+
+    /// Counts the visit of a node or cell, given its place among the structure's own.
+    pub fn visit(&mut self, place: usize) {
+        self.counters.nodes += 1;
+        watch::note(watch::Event::Node(place as u32));
+    }
+
+    /// Notes how many entries the stack has.
+    pub fn count_stack(&mut self, entries: usize) {
+        let highest = &mut self.counters.stack_high_water;
+        *highest = (*highest).max(entries as u32);
+    }
+
+    /// Distance at which the ray enters a box before the hit so far, or `None`; see [`enter_box`].
+    pub fn enter(&mut self, bounds: &Bounds) -> Option<f32> {
+        self.counters.box_tests += 1;
+        enter_box(bounds, &self.ray, self.inverse, self.hit.t)
+    }
+
+    /// Tests a triangle.
+    pub fn test(&mut self, triangle: &TriangleRecord) {
+        self.counters.triangle_tests += 1;
+        intersect_triangle(triangle, &self.ray, self.inverse, &mut self.hit);
+    }
+
+    /// Tests the triangles of a list.
+    pub fn test_list(&mut self, soup: &TriangleSoup, ids: impl IntoIterator<Item = u32>) {
+        for id in ids {
+            self.test(&soup.records[id as usize]);
+        }
+    }
+}
+
+/// A structure that can be traversed on the host.
+pub trait Traverse: Sync {
+    /// Twin of the kernel's `trace`; `soup` is what the structure was built over.
+    fn trace(&self, soup: &TriangleSoup, query: Query) -> Hit;
+}
+
+/// What answers rays on the host.
+pub trait CpuTwin: Sync {
+    /// Nearest hit, ties decided for the lowest triangle index.
+    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit;
+    /// Whether anything is hit.
+    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool;
+}
+
+/// A structure with the triangles that it was built over.
+pub struct Twin<'a, T>(pub &'a T, pub &'a TriangleSoup);
+
+impl<T: Traverse> CpuTwin for Twin<'_, T> {
+    fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
+        let Self(built, soup) = self;
+        built.trace(soup, Query::new(ray, false, soup.intersection, counters))
+    }
+
+    fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
+        let Self(built, soup) = self;
+        let query = Query::new(ray, true, soup.intersection, counters);
+        built.trace(soup, query).triangle != NO_HIT
+    }
+}

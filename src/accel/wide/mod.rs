@@ -1,0 +1,192 @@
+//! What the wide structures `bvh4` and `cwbvh` share: a binary tree, collapsed; nodes of quantised
+//! boxes; their build, validation, buffers and figures.
+
+mod collapse;
+mod quantise;
+
+pub use collapse::{WideChild, WideKind};
+pub use quantise::{Quantisation, enter_four, frame, leave_four};
+
+use super::bounds::Bounds;
+use super::ray::Hit;
+use super::tree::{Coverage, NodeKind, Tree, tree_parameters};
+use super::triangle::TriangleRecord;
+use super::twin::{CpuTwin, Query, Traverse, Twin};
+use super::{
+    AccelError, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats, TriangleSoup,
+};
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use bytemuck::Pod;
+use collapse::{CollapseSettings, WideTree};
+use std::ops::Range;
+
+/// Parameters of a wide structure: those of the binary tree it is collapsed from, with leaves of at
+/// most `max_leaf` triangles, and where kernels read it from.
+pub fn wide_parameters(max_leaf: u32) -> ParameterSchema {
+    let max = i64::from(max_leaf);
+    let mut schema = tree_parameters();
+    for parameter in &mut schema {
+        if parameter.name == "leaf_size" {
+            parameter.default = ParamValue::Integer(max);
+            parameter.range = ParamRange::Integer { min: 1, max };
+        }
+    }
+    schema.push(Parameter {
+        name: "texels",
+        description: "read nodes and triangles as texels of textures instead of from buffers",
+        default: ParamValue::Flag(true),
+        range: ParamRange::Flag,
+    });
+    schema
+}
+
+/// The binary tree to collapse, one triangle a leaf: the collapse decides about leaves.
+fn wide_tree(soup: &TriangleSoup, params: &Params, log: &mut BuildLog) -> Result<Tree, AccelError> {
+    let mut params = params.clone();
+    params
+        .0
+        .insert("leaf_size".to_owned(), ParamValue::Integer(1));
+    let tree = Tree::build(soup, &params, log)?;
+    let largest = tree.nodes.iter().map(|node| match node.kind {
+        NodeKind::Leaf { count, .. } => count,
+        NodeKind::Inner { .. } => 0,
+    });
+    let largest = largest.max().unwrap_or(0);
+    AccelError::check_limit("triangles of a leaf before the collapse", largest, 1_u64)?;
+    Ok(tree)
+}
+
+/// A node of a wide structure, as what the structures share sees it.
+pub trait WideNode: Pod + Send + Sync {
+    /// Name of the structure.
+    const STRUCTURE: &'static str;
+    /// Module of the kernel.
+    const KERNEL: &'static str;
+    /// Most children.
+    const WIDTH: usize;
+    /// Most nodes.
+    const MOST_NODES: u64;
+
+    /// Moves the children of a node with this box to the slots they are to have.
+    fn arrange(_bounds: &Bounds, _children: &mut Vec<WideChild>) {}
+    /// The node with these children in its slots.
+    fn pack(slots: &[WideChild]) -> Self;
+    /// Box of a slot, as kernels decode it.
+    fn bounds(&self, slot: usize) -> Bounds;
+    /// Node and triangles in a slot; at most one of them, if the structure is valid.
+    fn content(&self, slot: usize) -> (Option<usize>, Option<Range<usize>>);
+    /// Twin of the kernel's `trace`.
+    fn trace(built: &Wide<Self>, query: Query) -> Hit;
+}
+
+/// A built wide structure.
+pub struct Wide<N> {
+    /// The root first.
+    pub nodes: Vec<N>,
+    /// Triangle records, leaf by leaf.
+    pub leaf_triangles: Vec<TriangleRecord>,
+    stats: StructureStats,
+    texels: bool,
+}
+
+impl<N: WideNode> Wide<N> {
+    /// Builds the binary tree and collapses it.
+    ///
+    /// # Errors
+    /// The tree cannot be built, or there are more nodes than an index can name.
+    pub fn build(
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Box<dyn BuiltAccel>, AccelError>
+    where
+        N: 'static,
+    {
+        let tree = wide_tree(soup, params, log)?;
+        let settings = CollapseSettings::new(N::WIDTH, params);
+        let wide = log.phase("collapse", || {
+            WideTree::collapse(&tree, &settings, N::arrange)
+        });
+        let what = format!("nodes of a {}", N::STRUCTURE);
+        AccelError::check_limit(what, wide.nodes.len() as u64, N::MOST_NODES)?;
+        Ok(Box::new(log.phase("layout", || {
+            let nodes: Vec<N> = wide.nodes.iter().map(|slots| N::pack(slots)).collect();
+            let leaf_triangles = wide.records(soup);
+            let bytes = size_of_val(&nodes[..]) + size_of_val(&leaf_triangles[..]);
+            Self {
+                stats: StructureStats {
+                    bytes: bytes as u64,
+                    ..wide.stats()
+                },
+                nodes,
+                leaf_triangles,
+                texels: params.flag("texels"),
+            }
+        })))
+    }
+
+    /// Groups on the stack at most: a level leaves one behind.
+    fn depth(&self) -> u32 {
+        self.stats.depth.unwrap_or(0)
+    }
+}
+
+impl<N: WideNode> BuiltAccel for Wide<N> {
+    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
+        let invalid = |index, what: &str| Err(AccelError::Invalid(format!("node {index}: {what}")));
+        let mut coverage = Coverage::new(soup, self.nodes.len());
+        let mut open = vec![(0, Bounds::EVERYTHING, 1)];
+        while let Some((index, around, depth)) = open.pop() {
+            coverage.node(index)?;
+            if depth > self.depth() {
+                return invalid(index, &format!("deeper than the stack of {}", self.depth()));
+            }
+            let node = &self.nodes[index];
+            for slot in 0..N::WIDTH {
+                // What is below must lie in every decoded box on the way.
+                let bounds = around.intersection(&node.bounds(slot));
+                match node.content(slot) {
+                    (Some(_), Some(_)) => {
+                        return invalid(index, &format!("slot {slot} is a leaf and a node"));
+                    }
+                    (Some(child), None) => open.push((child, bounds, depth + 1)),
+                    (None, Some(leaf)) => coverage.leaf(self.leaf_triangles.get(leaf), &bounds)?,
+                    (None, None) => {}
+                }
+            }
+        }
+        coverage.is_complete()
+    }
+
+    fn buffers(&self) -> GpuBuffers<'_> {
+        GpuBuffers {
+            kernel: N::KERNEL,
+            features: if self.texels {
+                vec!["texels"]
+            } else {
+                Vec::new()
+            },
+            arrays: vec![
+                NamedWords::new("nodes", &self.nodes),
+                NamedWords::new("leaf_triangles", &self.leaf_triangles),
+            ],
+            uniforms: vec![super::limits(self.nodes.len(), self.nodes.len())],
+            // A multiple of 8, so that scenes of like depth share a kernel, and one to spare.
+            constants: vec![("STACK_ENTRIES", (self.depth() + 1).next_multiple_of(8))],
+        }
+    }
+
+    fn stats(&self) -> StructureStats {
+        self.stats.clone()
+    }
+
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(Twin(self, soup)))
+    }
+}
+
+impl<N: WideNode> Traverse for Wide<N> {
+    fn trace(&self, _: &TriangleSoup, query: Query) -> Hit {
+        N::trace(self, query)
+    }
+}

@@ -1,0 +1,234 @@
+//! The passes in which an integrator adds samples to an image.
+
+use super::render::with_sampler;
+use super::slice::Slice;
+use super::tables::SceneBuffers;
+use super::{RenderJob, Traced};
+use crate::accel::tracer::RayBuffers;
+use crate::accel::{Ask, Query, Tracer, TriangleBuffers};
+use crate::gpu::{
+    Bindings, Composition, Gpu, GpuError, Groups, Pipeline, Recording, Storage, UniformValues,
+};
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// What the passes of a job are composed with and bind, and those that were compiled.
+pub(super) struct Passes {
+    gpu: Gpu,
+    /// Everything that is chosen but the entry.
+    chosen: Composition,
+    bindings: Bindings,
+    triangles: TriangleBuffers,
+    traced: Traced,
+    runtime_checks: bool,
+    pipelines: RefCell<BTreeMap<String, Arc<Pipeline>>>,
+    /// What answers buffers of rays, by the name of the query.
+    tracers: RefCell<BTreeMap<String, Arc<Tracer>>>,
+}
+
+impl Passes {
+    pub fn new(
+        gpu: &Gpu,
+        scene: &SceneBuffers,
+        traced: &Traced,
+        job: &RenderJob,
+        status: &wgpu::Buffer,
+        ray_counts: bool,
+    ) -> Result<Self, GpuError> {
+        let table = gpu.storage("sampler_table", job.sampler.table.words())?;
+        let mut bindings = scene.bindings.clone();
+        let chosen = scene.triangles.intersection.activate(Composition::new(""));
+        let mut chosen = scene.offset.activate(chosen);
+        // Kernels that call no structure are the same with all of them.
+        if job.integrator.facts.needs_inline {
+            bindings = bindings.merged(&traced.bindings);
+            chosen = traced.compose(chosen);
+        }
+        let mut chosen = with_sampler(chosen, job.sampler).feature("ray_counts", ray_counts);
+        for (name, on) in scene.features.flags() {
+            chosen = chosen.feature(name, on);
+        }
+        for (name, value) in job.integrator.kind.constants(&job.integrator.params) {
+            chosen = chosen.constant(name, value);
+        }
+        let chosen = bindings.compose(chosen);
+        bindings
+            .buffer("status", status)
+            .buffer("sampler_table", &table);
+        Ok(Self {
+            gpu: gpu.clone(),
+            chosen,
+            bindings,
+            triangles: scene.triangles.clone(),
+            traced: traced.clone(),
+            runtime_checks: job.runtime_checks,
+            pipelines: RefCell::default(),
+            tracers: RefCell::default(),
+        })
+    }
+
+    fn pipeline(&self, pass: &str, kernel: Composition) -> Result<Arc<Pipeline>, GpuError> {
+        if let Some(pipeline) = self.pipelines.borrow().get(pass) {
+            return Ok(Arc::clone(pipeline));
+        }
+        let mut all = self.chosen.clone();
+        all.entry = kernel.entry;
+        all.active.extend(kernel.active);
+        all.features.extend(kernel.features);
+        all.constants.extend(kernel.constants);
+        let pipeline = self.gpu.pipeline(&all, self.runtime_checks)?;
+        let mut known = self.pipelines.borrow_mut();
+        known.insert(pass.to_owned(), Arc::clone(&pipeline));
+        Ok(pipeline)
+    }
+
+    fn tracer(&self, query: Query) -> Result<Arc<Tracer>, GpuError> {
+        let name = format!("trace {query:?}").to_lowercase();
+        if let Some(tracer) = self.tracers.borrow().get(&name) {
+            return Ok(Arc::clone(tracer));
+        }
+        let ask = Ask {
+            runtime_checks: self.runtime_checks,
+            ..query.into()
+        };
+        let tracer = Tracer::new(&self.gpu, &self.triangles, &self.traced, ask)?;
+        let tracer = Arc::new(tracer);
+        self.tracers.borrow_mut().insert(name, Arc::clone(&tracer));
+        Ok(tracer)
+    }
+
+    /// Feature flags of the kernels.
+    pub fn features(&self) -> Vec<String> {
+        let mut all = BTreeSet::new();
+        for pipeline in self.pipelines.borrow().values() {
+            all.extend(pipeline.kernel.composition.features.iter().cloned());
+        }
+        for tracer in self.tracers.borrow().values() {
+            all.extend(tracer.features());
+        }
+        all.into_iter().collect()
+    }
+
+    /// Text of every composed kernel, by the name of its pass.
+    pub fn texts(&self) -> Vec<(String, String)> {
+        let pipelines = self.pipelines.borrow();
+        let mut texts: Vec<_> = pipelines
+            .iter()
+            .map(|(pass, pipeline)| (pass.clone(), pipeline.kernel.wgsl.clone()))
+            .collect();
+        for (name, tracer) in self.tracers.borrow().iter() {
+            let of_passes = tracer.kernel_texts().into_iter();
+            texts.extend(of_passes.map(|text| (name.clone(), text)));
+        }
+        texts
+    }
+}
+
+/// What passes are recorded with: they add the samples of a slice of the image, some rows of it, to the sums.
+///
+/// Kernels find bound: what shading reads of the scene, `sampler_table`, `status`, `accumulation` (the sums
+/// of a band of rows), the uniform `frame` (see `kernels/integrator/frame.wesl`), and the integrator's scratch.
+pub struct ImageSteps<'a> {
+    passes: &'a Passes,
+    recording: &'a mut Recording,
+    bindings: Bindings,
+    /// Width of the image, pixels.
+    pub width: u32,
+    /// Rows of the slice.
+    pub rows: u32,
+    /// Samples that each of their pixels takes.
+    pub samples: u32,
+}
+
+impl<'a> ImageSteps<'a> {
+    /// Steps for a slice of a job, whose sums and scratch are these.
+    pub(super) fn new(
+        passes: &'a Passes,
+        recording: &'a mut Recording,
+        (width, of_job): (u32, &UniformValues),
+        slice: &Slice,
+        sums: &wgpu::Buffer,
+        scratch: &[(&'static str, u64)],
+    ) -> Self {
+        let mut bindings = passes.bindings.clone();
+        bindings
+            .buffer("accumulation", sums)
+            .uniform("frame", slice.uniform(of_job));
+        let count = u64::from(width) * u64::from(slice.rows) * u64::from(slice.samples);
+        for (name, bytes) in scratch {
+            let storage = Storage::scratch(&format!("image {name}"), bytes * count.max(1));
+            bindings.buffer(name, storage);
+        }
+        Self {
+            passes,
+            recording,
+            bindings,
+            width,
+            rows: slice.rows,
+            samples: slice.samples,
+        }
+    }
+
+    /// All samples of the slice.
+    pub fn count(&self) -> u32 {
+        self.width * self.rows * self.samples
+    }
+
+    /// Workgroups of 8 × 8 invocations, one for each pixel of the slice.
+    pub fn pixels(&self) -> [u32; 3] {
+        [self.width.div_ceil(8), self.rows.div_ceil(8), 1]
+    }
+
+    /// The buffer of this name.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn storage(&self, name: &str) -> Result<Storage, GpuError> {
+        let found = self.bindings.storage(name).cloned();
+        found.ok_or_else(|| {
+            GpuError::Kernel(format!(
+                "a pass names the buffer `{name}`, which is neither scratch nor of the scene"
+            ))
+        })
+    }
+
+    /// Answers the first `count` rays of a buffer (32 bytes each: origin, `t_min`, direction, `t_max`), inline
+    /// or in the structure's own passes. Answers have 16 bytes: a hit, or 1 or 0 where any hit is asked for.
+    ///
+    /// # Errors
+    /// A kernel does not compose or compile, or there is no such buffer.
+    pub fn trace(
+        &mut self,
+        query: Query,
+        (rays, answers): (&str, &str),
+        count: u32,
+    ) -> Result<(), GpuError> {
+        let buffers = RayBuffers {
+            rays: self.storage(rays)?,
+            answers: self.storage(answers)?,
+            status: self.storage("status")?,
+        };
+        let tracer = self.passes.tracer(query)?;
+        tracer.record(self.recording, &buffers, 0..count)
+    }
+
+    /// Runs a kernel, composed with the job's sampler, scene, constants and, where the integrator needs it
+    /// inline, structure. What `special` binds goes before the buffers and values of those names. A pass has
+    /// one kernel: `name` decides.
+    ///
+    /// # Errors
+    /// The kernel does not compose or compile.
+    pub fn run(
+        &mut self,
+        name: &str,
+        kernel: Composition,
+        groups: impl Into<Groups>,
+        special: &Bindings,
+    ) -> Result<(), GpuError> {
+        let pipeline = self.passes.pipeline(name, kernel)?;
+        let bindings = self.bindings.merged(special);
+        self.recording.run(name, &pipeline, &bindings, groups);
+        Ok(())
+    }
+}
