@@ -4,9 +4,9 @@
 //! `cargo bench -p raystone-benches --bench builders -- sponza/binned` runs one of them.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use raystone::accel::tree::{Tree, tree_parameters};
+use raystone::accel::tree::{Tree, TreeParameters};
 use raystone::accel::{BuildLog, TriangleSoup};
-use raystone::params::{ParamRange, ParamValue, Params, Variant};
+use raystone::params::{ParamRange, ParamValue, Parameters as _, Params, Variant};
 use raystone::scene::{LoadOptions, builtin_scenes, load};
 use std::hint::black_box;
 use std::path::Path;
@@ -19,7 +19,7 @@ const COMBINATIONS: [(&str, &str, i64); 3] = [
 ];
 
 fn params(builder: &str, reinsertion: i64) -> Params {
-    let schema = tree_parameters();
+    let schema = TreeParameters::schema();
     let defaults = schema
         .iter()
         .map(|p| (p.name.to_owned(), p.default.clone()));
@@ -31,7 +31,7 @@ fn params(builder: &str, reinsertion: i64) -> Params {
 }
 
 fn variants() -> Vec<(String, Params)> {
-    let schema = tree_parameters();
+    let schema = TreeParameters::schema();
     let builder = schema.iter().find(|p| p.name == "builder");
     let Some(ParamRange::Choice(names)) = builder.map(|p| &p.range) else {
         panic!("builder is no choice of names");
@@ -69,6 +69,7 @@ fn bench_scene(criterion: &mut Criterion, label: &str, soup: &TriangleSoup) {
         let mut group = criterion.benchmark_group(label);
         group.sample_size(10);
         for (name, params) in variants() {
+            let params = TreeParameters::from_params(&params).expect("parameters");
             let build = || Tree::build(black_box(soup), &params, &mut BuildLog::default());
             group.bench_function(format!("{name}/{threads}T"), |bencher| {
                 bencher.iter(|| pool.install(build));

@@ -6,18 +6,18 @@ mod common;
 use common::scenes::{self, aimed_rays, lattice_rays, lattice_soup};
 use common::{Pcg, assert_same_hits, brute_force, default_params};
 use glam::Vec3;
-use raystone::accel::tree::{NodeKind, Tree, tree_parameters};
+use raystone::accel::tree::{NodeKind, Tree, TreeParameters};
 use raystone::accel::triangle::TriangleRecord;
-use raystone::accel::{AccelKind, BuildLog, Bvh, Counters, Hit, Ray, TriangleSoup};
+use raystone::accel::{AccelKind, BuildLog, Bvh, BvhParameters, Counters, Hit, Ray, TriangleSoup};
 use raystone::geometry::Triangle;
-use raystone::params::{ParamRange, ParamValue, Params, Variant};
+use raystone::params::{ParamRange, ParamValue, Parameters as _, Params, Variant};
 use raystone::scene::{LoadOptions, load};
 use std::path::Path;
 
 const SPONZA: &str = "../shared/scenes/sponza-crytek/sponza.obj";
 
 fn builders() -> &'static [&'static str] {
-    let schema = tree_parameters();
+    let schema = TreeParameters::schema();
     let builder = schema.iter().find(|p| p.name == "builder");
     match builder.map(|p| &p.range) {
         Some(ParamRange::Choice(names)) => {
@@ -49,8 +49,15 @@ fn with_builder(name: &str, changes: &[&str]) -> Params {
     params(&[&[builder.as_str()], changes].concat())
 }
 
+/// The parameters of the tree among those of `bvh`.
+fn tree(params: &Params) -> TreeParameters {
+    BvhParameters::from_params(params)
+        .expect("parameters of bvh")
+        .tree
+}
+
 fn build(soup: &TriangleSoup, params: &Params) -> Tree {
-    Tree::build(soup, params, &mut BuildLog::default())
+    Tree::build(soup, &tree(params), &mut BuildLog::default())
         .unwrap_or_else(|e| panic!("{params:?}: {e}"))
 }
 
@@ -338,7 +345,7 @@ fn coordinates_that_are_no_numbers_neither_hang_nor_panic() {
             }
             for name in builders() {
                 let params = with_builder(name, &["reinsertion=3"]);
-                let tree = Tree::build(&soup, &params, &mut BuildLog::default());
+                let tree = Tree::build(&soup, &tree(&params), &mut BuildLog::default());
                 match tree {
                     Ok(mut tree) => {
                         tree.note_epo(&soup);
@@ -360,12 +367,18 @@ fn every_phase_of_a_build_is_timed_under_the_name_of_its_builder() {
     let soup = lattice_soup(&mut Pcg::new(1), 50, 6);
     for name in builders() {
         let mut log = BuildLog::default();
-        Tree::build(&soup, &with_builder(name, &["reinsertion=1"]), &mut log).expect("a tree");
+        Tree::build(
+            &soup,
+            &tree(&with_builder(name, &["reinsertion=1"])),
+            &mut log,
+        )
+        .expect("a tree");
         let phases: Vec<&str> = log.phases.iter().map(|p| p.name.as_str()).collect();
         assert_eq!(phases, ["boxes", name, "reinsertion", "leaves"]);
     }
     let mut log = BuildLog::default();
-    let empty = Tree::build(&TriangleSoup::default(), &params(&[]), &mut log).expect("a tree");
+    let empty =
+        Tree::build(&TriangleSoup::default(), &tree(&params(&[])), &mut log).expect("a tree");
     assert!(empty.nodes.is_empty() && empty.stats().sah_cost.is_none());
 }
 

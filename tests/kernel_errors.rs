@@ -13,7 +13,7 @@ fn composition(structure: &str) -> Composition {
         .constant("SHARED_SEQUENCE", 0)
         .constant("SHARED_DECORRELATION", 0)
         .constant("MAX_DEPTH", 4);
-    for feature in ["textures", "lights", "mirror", "daylight"] {
+    for feature in ["textures", "lights", "mirror", "dielectric", "daylight"] {
         out = out.feature(feature, true);
     }
     out

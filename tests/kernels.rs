@@ -16,7 +16,11 @@ use std::mem::{offset_of, size_of};
 
 /// Names of the scene's feature flags, and the flag of the counting run.
 fn render_features() -> Vec<&'static str> {
-    let mut names: Vec<_> = SceneFeatures::default().flags().map(|(n, _)| n).to_vec();
+    let mut names: Vec<_> = SceneFeatures::default()
+        .flags()
+        .into_iter()
+        .map(|(n, _)| n)
+        .collect();
     names.push("ray_counts");
     names
 }

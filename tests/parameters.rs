@@ -4,7 +4,7 @@
 mod common;
 
 use common::{Pcg, default_params, scenes};
-use raystone::accel::{AccelRegistry, BuildLog, BuiltBvh, TriangleSoup};
+use raystone::accel::{AccelRegistry, BuildLog, BuiltBvh, BvhParameters, TriangleSoup};
 use raystone::params::{ParamRange, ParamValue, ParameterSchema, Params, Variant};
 use raystone::sampling::{Demand, SamplerRegistry};
 use raystone::scene::{LoadOptions, load};
@@ -81,7 +81,7 @@ fn a_structure_completes_its_parameters_and_refuses_what_it_does_not_know() {
     }
     assert!(refused > 200, "{refused}");
     let soup = &soups[1];
-    assert!(BuiltBvh::build(soup, &Params::default(), &mut BuildLog::default()).is_ok());
+    assert!(BuiltBvh::build(soup, &BvhParameters::default(), &mut BuildLog::default()).is_ok());
 }
 
 fn variant(name: &str, params: Params) -> Variant {

@@ -124,7 +124,8 @@ fn a_clamped_jitter_is_found_to_be_biased_and_a_wrapped_one_is_not() {
     let of = |edge: &str| -> Vec<f64> {
         let jittered = checks.iter().filter(|b| {
             let decorrelation = b.key.get(axis::DECORRELATION).expect("a decorrelation");
-            decorrelation.name == "micro-jitter" && decorrelation.params.name("edge") == edge
+            decorrelation.name == "micro-jitter"
+                && decorrelation.params.0["edge"].to_string() == edge
         });
         jittered.map(|b| b.z.expect("a z-score").abs()).collect()
     };

@@ -84,7 +84,7 @@ fn combinations() -> Vec<Params> {
         }
     }
     for traversal in names_of("traversal") {
-        let here = |p: &&Params| p.name("traversal") == *traversal;
+        let here = |p: &&Params| p.0["traversal"].to_string() == *traversal;
         assert!(out.iter().filter(here).count() >= 6, "{traversal}");
     }
     out

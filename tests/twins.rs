@@ -74,6 +74,10 @@ const NO_TWIN: &[(&str, &str)] = &[
     ("stress/sums", "judged in src/stress/numerics/sums.rs"),
     ("shading/basis", "judged in src/stress/numerics/mappings.rs"),
     ("shading/bsdf", "the table of materials; judged by images"),
+    (
+        "shading/bsdf/dielectric",
+        "judged in f64 by tests/dielectric",
+    ),
     ("shading/bsdf/diffuse", "judged by images, not by a twin"),
     ("shading/bsdf/mirror", "judged by images, not by a twin"),
     (
@@ -466,4 +470,22 @@ fn the_error_word_and_the_ray_classes_mean_the_same_on_both_sides() {
         let constant = format!("RAY_{}", name.to_uppercase());
         assert_eq!(classes.get(&constant), Some(&(index as u32)), "{constant}");
     }
+}
+
+#[test]
+fn kinds_of_materials_have_the_numbers_of_their_rows() {
+    let names: Vec<String> = raystone::scene::MATERIAL_KINDS
+        .map(|kind| kind.name.to_uppercase())
+        .to_vec();
+    let numbered = |text: &str| {
+        let found = values(&constants(text));
+        let mut found: Vec<_> = found.into_iter().map(|(name, n)| (n, name)).collect();
+        found.sort();
+        let names: Vec<String> = found.into_iter().map(|(_, name)| name).collect();
+        names
+    };
+    let table = kernel_text("shading/bsdf");
+    assert_eq!(numbered(&table), names);
+    let swapped = table.replace("MIRROR: u32 = 1u", "MIRROR: u32 = 3u");
+    assert_ne!(numbered(&swapped), names);
 }

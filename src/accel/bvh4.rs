@@ -6,13 +6,15 @@
 
 use super::bounds::Bounds;
 use super::ray::Hit;
+use super::tree::TreeParameters;
 use super::twin::Query;
+use super::wide::Memory;
 use super::wide::{
     Quantisation, Wide, WideChild, WideKind, WideNode, enter_four, frame, leave_four,
-    wide_parameters,
 };
 use super::{AccelError, AccelKind, BuildLog, BuiltAccel, TriangleSoup};
-use crate::params::{ParameterSchema, Params};
+use crate::parameters;
+use crate::params::{ParameterSchema, Parameters as _, Params};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
@@ -30,6 +32,16 @@ const LEAF: u32 = 0x8000_0000;
 const MISSED: u32 = 0xffff_ffff;
 const STACKED_MASK: u32 = 0xffff_ff00;
 
+parameters! {
+    /// The tree and where kernels read it from.
+    struct Options {
+        /// The binary tree that is collapsed.
+        tree: TreeParameters { leaf_size = MAX_LEAF as usize, in 1..=MAX_LEAF as usize; };
+        /// Where kernels read it from.
+        memory: Memory;
+    }
+}
+
 /// The registry entry.
 pub struct Bvh4;
 
@@ -43,7 +55,7 @@ impl AccelKind for Bvh4 {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        wide_parameters(MAX_LEAF)
+        Options::schema()
     }
 
     fn build(
@@ -52,8 +64,8 @@ impl AccelKind for Bvh4 {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let params = &params.completed(&self.parameters())?;
-        Wide::<Node>::build(soup, params, log)
+        let options = Options::from_params(params)?;
+        Wide::<Node>::build(soup, &options.tree, &options.memory, log)
     }
 }
 

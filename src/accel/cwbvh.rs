@@ -6,13 +6,15 @@
 
 use super::bounds::Bounds;
 use super::ray::Hit;
+use super::tree::TreeParameters;
 use super::twin::Query;
+use super::wide::Memory;
 use super::wide::{
     Quantisation, Wide, WideChild, WideKind, WideNode, enter_four, frame, leave_four,
-    wide_parameters,
 };
 use super::{AccelError, AccelKind, BuildLog, BuiltAccel, TriangleSoup};
-use crate::params::{ParameterSchema, Params};
+use crate::parameters;
+use crate::params::{ParameterSchema, Parameters as _, Params};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
@@ -27,6 +29,16 @@ const MASK_SHIFT: u32 = 24;
 const COUNT_SHIFT: u32 = 5;
 const PLACE_MASK: u32 = 31;
 
+parameters! {
+    /// The tree and where kernels read it from.
+    struct Options {
+        /// The binary tree that is collapsed.
+        tree: TreeParameters { leaf_size = MAX_LEAF as usize, in 1..=MAX_LEAF as usize; };
+        /// Where kernels read it from.
+        memory: Memory;
+    }
+}
+
 /// The registry entry.
 pub struct Cwbvh;
 
@@ -40,7 +52,7 @@ impl AccelKind for Cwbvh {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        wide_parameters(MAX_LEAF)
+        Options::schema()
     }
 
     fn build(
@@ -49,8 +61,8 @@ impl AccelKind for Cwbvh {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let params = &params.completed(&self.parameters())?;
-        Wide::<Node>::build(soup, params, log)
+        let options = Options::from_params(params)?;
+        Wide::<Node>::build(soup, &options.tree, &options.memory, log)
     }
 }
 

@@ -28,7 +28,7 @@ pub mod watch;
 mod wide;
 
 pub use brute_force::{BruteForce, brute_force_hits};
-pub use bvh::{BuiltBvh, Bvh, RopedBvh};
+pub use bvh::{BuiltBvh, Bvh, BvhParameters, RopedBvh};
 pub use bvh4::Bvh4;
 pub use cwbvh::Cwbvh;
 pub use instancing::{InstanceJudge, MetaBvh, ObjectList, Placed, brute_force_instances};

@@ -14,7 +14,8 @@ use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
     TriangleSoup,
 };
-use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
+use crate::params::{ParameterSchema, Parameters as _, Params};
 use rayon::prelude::*;
 
 /// Most parts of a top cell along an axis: its resolution takes ten bits an axis.
@@ -24,6 +25,16 @@ const PART_BITS: u32 = 10;
 const PART_MASK: u32 = 1023;
 /// Top cells that one task cuts.
 const RUN: usize = 64;
+
+parameters! {
+    /// Resolutions of the two levels.
+    struct Options {
+        /// top cells per triangle of the scene
+        lambda1: f64 = 0.12, in 0.001..=1000.0;
+        /// parts of a top cell per triangle in it
+        lambda2: f64 = 2.4, in 0.001..=1000.0;
+    }
+}
 
 /// The registry entry.
 pub struct TwoLevelGrid;
@@ -38,19 +49,7 @@ impl AccelKind for TwoLevelGrid {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        let density = |name, description, default| Parameter {
-            name,
-            description,
-            default: ParamValue::Number(default),
-            range: ParamRange::Number {
-                min: 0.001,
-                max: 1000.0,
-            },
-        };
-        vec![
-            density("lambda1", "top cells per triangle of the scene", 0.12),
-            density("lambda2", "parts of a top cell per triangle in it", 2.4),
-        ]
+        Options::schema()
     }
 
     fn build(
@@ -59,13 +58,12 @@ impl AccelKind for TwoLevelGrid {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let params = &params.completed(&self.parameters())?;
+        let options = Options::from_params(params)?;
         let grid_box = log.phase("bounds", || GridBox::new(soup));
-        let resolution = grid_box.resolution(soup.records.len(), params.number("lambda1"), 4096);
+        let resolution = grid_box.resolution(soup.records.len(), options.lambda1, 4096);
         let grid = Grid::new(&grid_box, resolution);
         let top = Lists::new(self.name(), &grid, soup, true, log)?;
-        let lambda = params.number("lambda2");
-        let built = log.phase("parts", || cut(grid, soup, &top, lambda))?;
+        let built = log.phase("parts", || cut(grid, soup, &top, options.lambda2))?;
         Ok(Box::new(built))
     }
 }

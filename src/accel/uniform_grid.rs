@@ -17,12 +17,33 @@ use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
     TriangleSoup,
 };
-use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
+use crate::params::{ParameterSchema, Parameters as _, Params};
 use rayon::prelude::*;
 
 /// Bits of a cell's word that hold the begin of its list; the others hold the distance.
 const START_BITS: u32 = 25;
 const START_MASK: u32 = 0x01ff_ffff;
+
+parameters! {
+    /// Resolution, and how empty space is left.
+    struct Options {
+        /// cells per triangle: resolution = extent · cbrt(λ · triangles / volume)
+        lambda: f64 = 5.0, in 0.01..=1000.0;
+        /// how empty space is left: cell by cell, or by the Chebyshev distance to the nearest list
+        skip: Skip = Skip::None;
+        /// list a triangle only where it overlaps the cell, not where its box does
+        exact_overlap: bool = true;
+    }
+
+    /// How empty space is left.
+    enum Skip {
+        /// Cell by cell.
+        None = "none",
+        /// By the Chebyshev distance to the nearest list.
+        Chebyshev = "chebyshev",
+    }
+}
 
 /// The registry entry.
 pub struct UniformGrid;
@@ -37,30 +58,7 @@ impl AccelKind for UniformGrid {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        vec![
-            Parameter {
-                name: "lambda",
-                description: "cells per triangle: resolution = extent · cbrt(λ · triangles / volume)",
-                default: ParamValue::Number(5.0),
-                range: ParamRange::Number {
-                    min: 0.01,
-                    max: 1000.0,
-                },
-            },
-            Parameter {
-                name: "skip",
-                description: "how empty space is left: cell by cell, or by the Chebyshev distance to \
-                              the nearest list",
-                default: ParamValue::Name("none".into()),
-                range: ParamRange::Choice(&["none", "chebyshev"]),
-            },
-            Parameter {
-                name: "exact_overlap",
-                description: "list a triangle only where it overlaps the cell, not where its box does",
-                default: ParamValue::Flag(true),
-                range: ParamRange::Flag,
-            },
-        ]
+        Options::schema()
     }
 
     fn build(
@@ -69,18 +67,18 @@ impl AccelKind for UniformGrid {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let params = &params.completed(&self.parameters())?;
+        let options = Options::from_params(params)?;
         let grid_box = log.phase("bounds", || GridBox::new(soup));
-        let resolution = grid_box.resolution(soup.records.len(), params.number("lambda"), 4096);
+        let resolution = grid_box.resolution(soup.records.len(), options.lambda, 4096);
         let grid = Grid::new(&grid_box, resolution);
-        let exact = params.flag("exact_overlap");
+        let exact = options.exact_overlap;
         let Lists { starts, references } = Lists::new(self.name(), &grid, soup, exact, log)?;
         check_words("cells of a uniform-grid", starts.len() as u64)?;
         let mut built = Built {
             grid,
             cells: starts,
             references,
-            skip: params.name("skip") == "chebyshev",
+            skip: options.skip == Skip::Chebyshev,
         };
         if built.skip {
             log.phase("distances", || built.add_distances());

@@ -12,11 +12,12 @@ use raystone::integrator::RayOffset;
 use raystone::measure::metrics::METRICS;
 use raystone::params::{Entry, Parameter};
 use raystone::run::Registries;
+use raystone::scene::MATERIAL_KINDS;
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-/// List everything that can be named: scenes, structures, samplers, integrators, metrics, measures,
-/// adapters
+/// List everything that can be named: scenes, structures, samplers, integrators, materials, metrics,
+/// measures, adapters
 #[derive(Args)]
 pub struct List {
     /// What to list [default: everything]
@@ -35,6 +36,8 @@ enum Topic {
     Decorrelation,
     #[value(alias = "integrators")]
     Integrator,
+    #[value(alias = "materials")]
+    Material,
     #[value(alias = "triangles")]
     Triangle,
     #[value(alias = "box-tests", alias = "box")]
@@ -64,6 +67,10 @@ impl List {
                 Topic::Sequence => axis(Axis::Sequence, &catalogue.sequence),
                 Topic::Decorrelation => axis(Axis::Decorrelation, &catalogue.decorrelation),
                 Topic::Integrator => axis(Axis::Integrator, &catalogue.integrator),
+                Topic::Material => named(
+                    "material: how surfaces scatter light, as model files say",
+                    MATERIAL_KINDS.map(|kind| (kind.name, kind.description)),
+                ),
                 Topic::Triangle => triangles(),
                 Topic::BoxTest => named(
                     "box_test: of all structures",

@@ -2,11 +2,26 @@
 
 use super::kind::CountedRays::{Ao, Bounce, Primary as Camera, Shadow};
 use super::{Integrator, IntegratorFacts};
-use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
+use crate::params::{ParameterSchema, Parameters as _, Params};
 use crate::sampling::dimensions;
 
 /// Bounces before roulette: `ROULETTE_DEPTH` of `kernels/integrator/path.wesl`.
 const ROULETTE_DEPTH: u32 = 3;
+
+parameters! {
+    /// Parameters of `ao`.
+    struct AoParameters {
+        /// length of AO rays as a fraction of the scene's diagonal
+        radius: f64 = 0.1, in 1e-6..=10.0;
+    }
+
+    /// Parameters of `path`.
+    struct PathParameters {
+        /// most bounces of a path
+        max_depth: u32 = 6, in 0..=20;
+    }
+}
 
 pub(super) struct Primary;
 pub(super) struct AmbientOcclusion;
@@ -49,22 +64,14 @@ impl Integrator for AmbientOcclusion {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        vec![Parameter {
-            name: "radius",
-            description: "length of AO rays as a fraction of the scene's diagonal",
-            default: ParamValue::Number(0.1),
-            range: ParamRange::Number {
-                min: 1e-6,
-                max: 10.0,
-            },
-        }]
+        AoParameters::schema()
     }
 
     fn facts(&self, params: &Params) -> IntegratorFacts {
         IntegratorFacts {
             dimensions: dimensions::at_bounce(0, dimensions::DIRECTION) + 2,
             rays: vec![Camera, Ao],
-            ao_radius: Some(params.number("radius")),
+            ao_radius: Some(AoParameters::from_checked(params).radius),
             needs_inline: true,
             ..Default::default()
         }
@@ -85,22 +92,17 @@ impl Integrator for Path {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        vec![Parameter {
-            name: "max_depth",
-            description: "most bounces of a path",
-            default: ParamValue::Integer(6),
-            range: ParamRange::Integer { min: 0, max: 20 },
-        }]
+        PathParameters::schema()
     }
 
     fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {
-        vec![("MAX_DEPTH", params.integer("max_depth") as u32)]
+        vec![("MAX_DEPTH", PathParameters::from_checked(params).max_depth)]
     }
 
     fn facts(&self, params: &Params) -> IntegratorFacts {
         let roulette = |bounce| dimensions::at_bounce(bounce, dimensions::ROULETTE);
         IntegratorFacts {
-            dimensions: dimensions::needed(params.integer("max_depth") as u32),
+            dimensions: dimensions::needed(PathParameters::from_checked(params).max_depth),
             undrawn: (0..ROULETTE_DEPTH).map(roulette).collect(),
             rays: vec![Camera, Shadow, Bounce],
             needs_inline: true,

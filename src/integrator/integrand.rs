@@ -7,7 +7,8 @@
 //! points, Owen's lectures "Monte Carlo theory, methods and examples", ch. 17).
 
 use super::{Integrator, IntegratorFacts};
-use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
+use crate::params::{ParameterSchema, Parameters as _, Params};
 use crate::sampling::dimensions;
 
 /// Square of the radius of the disk, so that its quarter has about the area 1/2.
@@ -17,8 +18,13 @@ const BOX_CORNER: [f32; 2] = [std::f32::consts::FRAC_1_SQRT_2, 0.618_034];
 /// `half-plane`: x · cos + y · sin < offset.
 const OBLIQUE_EDGE: [f32; 3] = [-0.6, 0.8, 0.2];
 
-/// `heaviside`: degrees unless the experiment says otherwise.
-const ANGLE: f64 = 30.0;
+parameters! {
+    /// Parameters of `heaviside`.
+    struct Edge {
+        /// angle of the edge's normal to the x axis, degrees
+        angle: f64 = 30.0, in 0.0..=360.0;
+    }
+}
 
 // Numbers of the functions in the kernel.
 const EXPONENTIAL: u32 = 0;
@@ -190,7 +196,9 @@ pub(super) static INTEGRANDS: [Integrand; 6] = [
 /// their defaults.
 pub fn functions() -> Vec<(&'static str, Function)> {
     let function = |integrand: &'static Integrand| {
-        let function = integrand.function.unwrap_or(Function::heaviside(ANGLE));
+        let function = integrand
+            .function
+            .unwrap_or(Function::heaviside(Edge::default().angle));
         (integrand.name.trim_start_matches("integrand:"), function)
     };
     INTEGRANDS.iter().map(function).collect()
@@ -199,7 +207,7 @@ pub fn functions() -> Vec<(&'static str, Function)> {
 impl Integrand {
     fn function(&self, params: &Params) -> Function {
         self.function
-            .unwrap_or_else(|| Function::heaviside(params.number("angle")))
+            .unwrap_or_else(|| Function::heaviside(Edge::from_checked(params).angle))
     }
 }
 
@@ -217,18 +225,10 @@ impl Integrator for Integrand {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        if self.function.is_some() {
-            return Vec::new();
+        match self.function {
+            Some(_) => Vec::new(),
+            None => Edge::schema(),
         }
-        vec![Parameter {
-            name: "angle",
-            description: "angle of the edge's normal to the x axis, degrees",
-            default: ParamValue::Number(ANGLE),
-            range: ParamRange::Number {
-                min: 0.0,
-                max: 360.0,
-            },
-        }]
     }
 
     fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {

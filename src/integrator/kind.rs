@@ -58,8 +58,8 @@ impl IntegratorFacts {
     }
 }
 
-/// An integrator; one static per integrator, one line in the registry.
-pub trait Integrator: Sync {
+/// An integrator: the struct of its parameters, one line in the registry.
+pub trait Integrator: Send + Sync {
     /// Name as a user types it.
     fn name(&self) -> &'static str;
     /// One line: what it computes.

@@ -3,7 +3,7 @@
 use super::offset::{RayOffset, TransformError};
 use crate::accel::{TriangleBuffers, TriangleSoup};
 use crate::gpu::{Bindings, Gpu, GpuError};
-use crate::scene::{Daylight, MaterialKind, SceneData};
+use crate::scene::{DIFFUSE, Daylight, MATERIAL_KINDS, MaterialKind, SceneData};
 use glam::Vec3;
 
 /// What a scene makes kernels carry; absent features are not in the kernel.
@@ -13,27 +13,30 @@ pub struct SceneFeatures {
     pub textures: bool,
     /// There are lights that can be sampled: materials that emit.
     pub lights: bool,
-    /// Some material is a mirror.
-    pub mirror: bool,
     /// The environment is the sky over a scene without a light.
     pub daylight: bool,
+    /// Which of [`MATERIAL_KINDS`] some material is of.
+    pub materials: [bool; MATERIAL_KINDS.len()],
 }
 
 impl SceneFeatures {
-    /// Feature names as kernels write them, with whether they are on.
-    pub fn flags(&self) -> [(&'static str, bool); 4] {
-        [
+    /// Feature names as kernels write them, with whether they are on. Diffuse, which every kernel has, is none.
+    pub fn flags(&self) -> Vec<(&'static str, bool)> {
+        let kinds = MATERIAL_KINDS.iter().map(|kind| kind.name);
+        let mut flags: Vec<_> = kinds.zip(self.materials).collect();
+        flags.retain(|(name, _)| *name != DIFFUSE.name);
+        flags.extend([
             ("textures", self.textures),
             ("lights", self.lights),
-            ("mirror", self.mirror),
             ("daylight", self.daylight),
-        ]
+        ]);
+        flags
     }
 }
 
 /// A scene on the GPU.
 pub struct SceneBuffers {
-    /// `triangles`, `shading_tables`, `texture_data`.
+    /// `triangles`, `shading_tables`.
     pub bindings: Bindings,
     /// The triangles alone, and how rays meet them.
     pub triangles: TriangleBuffers,
@@ -53,11 +56,13 @@ pub struct SceneBuffers {
     pub first_light: u32,
     /// Sum over emissive triangles of area times luminance.
     pub light_power: f32,
+    /// Where texture coordinates begin in `shading_tables`, in words.
+    pub first_uv: u32,
     /// Length of the diagonal of the scene's box, scene units.
     pub diagonal: f64,
 }
 
-/// Relative luminance of linear sRGB, as in `kernels/shading/light.wesl`.
+/// Relative luminance of linear sRGB, as in `kernels/shading/light/triangles.wesl`.
 fn luminance(c: Vec3) -> f32 {
     0.212_671 * c.x + 0.715_160 * c.y + 0.072_169 * c.z
 }
@@ -73,21 +78,14 @@ impl SceneBuffers {
                 .materials
                 .iter()
                 .any(|m| m.base_color_texture.is_some());
-        let (texture_data, first_texels) = if textured {
-            texture_words(scene)
-        } else {
-            (Vec::new(), Vec::new())
-        };
-        let mut tables = material_words(scene, &first_texels);
-        let first_light = tables.len() as u32;
         let (lights, light_power) = light_words(scene);
-        tables.extend_from_slice(&lights);
+        let tables = Tables::of(scene, &lights, textured);
         let triangles = TriangleBuffers::upload(gpu, soup)?;
         let mut bindings = triangles.bindings.clone();
-        bindings.buffer("shading_tables", &gpu.storage("shading_tables", &tables)?);
-        if textured {
-            bindings.buffer("texture_data", &gpu.storage("texture_data", &texture_data)?);
-        }
+        bindings.buffer(
+            "shading_tables",
+            &gpu.storage("shading_tables", &tables.words)?,
+        );
         Ok(Self {
             bindings,
             triangles,
@@ -96,60 +94,86 @@ impl SceneBuffers {
             features: SceneFeatures {
                 textures: textured,
                 lights: !lights.is_empty(),
-                mirror: scene
-                    .materials
-                    .iter()
-                    .any(|m| m.kind == MaterialKind::Mirror),
                 daylight: scene.daylight.is_some(),
+                materials: MATERIAL_KINDS
+                    .map(|kind| scene.materials.iter().any(|m| m.kind == kind)),
             },
             environment: scene.environment.to_array(),
             daylight: scene.daylight.unwrap_or_default(),
             lights: lights.len() as u32,
-            first_light,
+            first_light: tables.first_light,
             light_power,
+            first_uv: tables.first_uv,
             diagonal: f64::from(2.0 * scene.bounds().radius()),
         })
     }
 }
 
-/// Texture coordinates, then texels; and where each texture's texels begin.
-fn texture_words(scene: &SceneData) -> (Vec<u32>, Vec<u32>) {
-    let texels: usize = scene.textures.iter().map(|t| t.texels.len()).sum();
-    let mut words = Vec::with_capacity(6 * scene.uvs.len() + texels);
-    for corners in &scene.uvs {
-        words.extend(
-            corners
-                .iter()
-                .flat_map(|uv| [uv.x.to_bits(), uv.y.to_bits()]),
-        );
-    }
-    let mut first = Vec::with_capacity(scene.textures.len());
-    for texture in &scene.textures {
-        first.push(words.len() as u32);
-        words.extend(texture.texels.iter().map(|t| u32::from_le_bytes(*t)));
-    }
-    (words, first)
+/// Words of a material without its parameters.
+const MATERIAL_WORDS: usize = 12;
+
+/// Content of `shading_tables`, in this order: three `vec4` a material, parameters of materials, lights,
+/// six words of texture coordinates a triangle, texels.
+///
+/// A material: base colour and number of its kind; emission and place of its parameters, in `vec4`; place of its
+/// first texel, in words, width and height of its texture, and 1 if it has one.
+struct Tables {
+    words: Vec<u32>,
+    /// In `vec4`.
+    first_light: u32,
+    /// In words.
+    first_uv: u32,
 }
 
-fn material_words(scene: &SceneData, first_texels: &[u32]) -> Vec<[u32; 4]> {
-    let mut words = Vec::with_capacity(3 * scene.materials.len());
-    for material in &scene.materials {
-        let [r, g, b] = material.base_color.to_array().map(f32::to_bits);
-        let kind = match material.kind {
-            MaterialKind::Diffuse => 0,
-            MaterialKind::Mirror => 1,
-        };
-        words.push([r, g, b, kind]);
-        let [r, g, b] = material.emission.to_array().map(f32::to_bits);
-        words.push([r, g, b, 0]);
-        let texture = material.base_color_texture.and_then(|t| {
-            let first = first_texels.get(t as usize)?;
-            let texture = &scene.textures[t as usize];
-            Some([*first, texture.width, texture.height, 1])
-        });
-        words.push(texture.unwrap_or_default());
+impl Tables {
+    fn of(scene: &SceneData, lights: &[[u32; 4]], textured: bool) -> Self {
+        let mut words = vec![0; MATERIAL_WORDS * scene.materials.len()];
+        for (index, material) in scene.materials.iter().enumerate() {
+            let parameters = words.len() as u32 / 4;
+            words.extend(material.parameters.iter().map(|x| x.to_bits()));
+            words.resize(words.len().next_multiple_of(4), 0);
+            let [r, g, b] = material.base_color.to_array().map(f32::to_bits);
+            let [er, eg, eb] = material.emission.to_array().map(f32::to_bits);
+            let row = [r, g, b, number(material.kind), er, eg, eb, parameters];
+            let first = MATERIAL_WORDS * index;
+            words[first..first + row.len()].copy_from_slice(&row);
+        }
+        let first_light = words.len() as u32 / 4;
+        words.extend_from_slice(lights.as_flattened());
+        let first_uv = words.len() as u32;
+        if textured {
+            push_textures(scene, &mut words);
+        }
+        words.resize(words.len().next_multiple_of(4), 0);
+        Self {
+            words,
+            first_light,
+            first_uv,
+        }
     }
-    words
+}
+
+/// Of a kind of material, in kernels.
+fn number(kind: &MaterialKind) -> u32 {
+    let place = MATERIAL_KINDS.iter().position(|known| *known == kind);
+    place.unwrap_or_default() as u32
+}
+
+/// Appends texture coordinates and texels, and tells the materials where theirs are.
+fn push_textures(scene: &SceneData, words: &mut Vec<u32>) {
+    let texels: usize = scene.textures.iter().map(|t| t.texels.len()).sum();
+    words.reserve_exact(6 * scene.uvs.len() + texels + 3);
+    let uvs = scene.uvs.iter().flatten();
+    words.extend(uvs.flat_map(|uv| [uv.x.to_bits(), uv.y.to_bits()]));
+    for (id, texture) in (0_u32..).zip(&scene.textures) {
+        let row = [words.len() as u32, texture.width, texture.height, 1];
+        words.extend(texture.texels.iter().map(|t| u32::from_le_bytes(*t)));
+        for (index, material) in scene.materials.iter().enumerate() {
+            if material.base_color_texture == Some(id) {
+                words[MATERIAL_WORDS * index + 8..][..4].copy_from_slice(&row);
+            }
+        }
+    }
 }
 
 /// One row per emissive triangle: index and cumulative probability; and the total power.

@@ -12,17 +12,15 @@ use super::instance_judge;
 use super::kept_checks::KeptChecks;
 use super::rays::{RaySet, record_rays};
 use super::record::{ClassVerdict, GateVerdict, JudgeCheck};
-use crate::accel::AccelKind;
 use crate::accel::triangle::TriangleRecord;
 use crate::accel::{
-    AccelError, Ask, BuildLog, BuiltAccel, BuiltBvh, Bvh, Hit, NO_HIT, Query, Ray, RayBatch, Space,
-    Traced, Tracer, TriangleBuffers, TriangleSoup, brute_force_hits,
+    AccelError, Ask, BuildLog, BuiltAccel, BuiltBvh, BvhParameters, Hit, NO_HIT, Query, Ray,
+    RayBatch, Space, Traced, Tracer, TriangleBuffers, TriangleSoup, brute_force_hits,
 };
 use crate::config::Gate;
 use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu, GpuError, kernel_errors};
 use crate::oracle::{self, OracleRay, Verdict};
-use crate::params::Params;
 use crate::scene::SceneData;
 
 /// The judge is compared with brute force on at least this many rays.
@@ -90,8 +88,7 @@ impl Judge {
         settings: &Gate,
         seed: u64,
     ) -> Result<Self, AccelError> {
-        let schema = Bvh.parameters().into_iter();
-        let params = Params(schema.map(|p| (p.name.to_owned(), p.default)).collect());
+        let params = BvhParameters::default();
         let tree = BuiltBvh::build(soup, &params, &mut BuildLog::default())?;
         tree.validate(soup)?;
         let twin = tree.twin(soup);

@@ -23,6 +23,11 @@ pub trait Parameters: Default + Sized {
     fn from_params(params: &Params) -> Result<Self, ParamError> {
         Self::read(&params.completed(&Self::schema())?)
     }
+
+    /// The same for parameters that were checked before; where they do not fit, all have their defaults.
+    fn from_checked(params: &Params) -> Self {
+        Self::from_params(params).unwrap_or_default()
+    }
 }
 
 /// A type that a declared parameter can have.

@@ -7,6 +7,7 @@ mod errors;
 mod folder;
 mod images;
 mod kernels;
+mod reference;
 mod registries;
 mod render;
 mod session;

@@ -1,8 +1,8 @@
 //! Gathers triangles from a loader and turns them into a checked [`SceneData`].
 
 use super::{
-    Assembly, Daylight, Framing, InstanceError, LoadReport, Material, MaterialKind, MaterialSource,
-    SceneData, SceneError, Texture, Transform,
+    Assembly, Daylight, Framing, InstanceError, LoadReport, Material, SceneData, SceneError,
+    Texture, Transform,
 };
 use crate::geometry::{Camera, Triangle};
 use glam::{Vec2, Vec3};
@@ -21,28 +21,6 @@ impl Triangle {
     pub fn has_zero_area(&self) -> bool {
         let [a, b, c] = self.vertices.map(Vec3::as_dvec3);
         (b - a).cross(c - a) == glam::DVec3::ZERO
-    }
-}
-
-impl Material {
-    /// A plain Lambertian material, `color` being linear RGB reflectance.
-    pub fn diffuse(name: impl Into<String>, color: Vec3) -> Self {
-        Self {
-            name: name.into(),
-            kind: MaterialKind::Diffuse,
-            base_color: color,
-            base_color_texture: None,
-            emission: Vec3::ZERO,
-            source: MaterialSource::default(),
-        }
-    }
-
-    /// The same material, emitting `radiance` (linear RGB) from both sides.
-    pub fn emitting(self, radiance: Vec3) -> Self {
-        Self {
-            emission: radiance,
-            ..self
-        }
     }
 }
 

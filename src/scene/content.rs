@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use std::mem::size_of_val;
 
 /// Changed whenever the order or meaning of the hashed bytes changes.
-const HASH_VERSION: &[u8] = b"raystone scene 1";
+const HASH_VERSION: &[u8] = b"raystone scene 2";
 
 impl SceneData {
     /// The box of all triangles, scene units.
@@ -81,7 +81,8 @@ impl SceneData {
         hash.bytes(&self.materials.len().to_le_bytes());
         for material in &self.materials {
             let texture = material.base_color_texture.map_or(-1, i64::from);
-            hash.bytes(&[material.kind as u8]);
+            hash.bytes(material.kind.name.as_bytes());
+            hash.bytes(bytemuck::cast_slice(&material.parameters));
             hash.bytes(&texture.to_le_bytes());
             hash.vectors(&[material.base_color, material.emission]);
             // The derived Debug text is a total, deterministic image of the plain fields.
@@ -127,17 +128,19 @@ impl Hash {
 
 #[cfg(test)]
 mod tests {
-    use crate::scene::Daylight;
     use crate::scene::builtin::tests::load_default;
+    use crate::scene::{Daylight, MIRROR};
 
     #[test]
     fn the_hash_sees_every_part_of_the_scene() {
         let scene = load_default("cornell-box");
         type Change = fn(&mut crate::scene::SceneData);
-        let changes: [(&str, Change); 8] = [
+        let changes: [(&str, Change); 10] = [
             ("vertex", |s| s.triangles[3].vertices[1].x += 1e-3),
             ("material id", |s| s.material_ids[0] = 1),
             ("reflectance", |s| s.materials[0].base_color.y += 1e-3),
+            ("kind", |s| s.materials[0].kind = &MIRROR),
+            ("parameter", |s| s.materials[0].parameters.push(1.5)),
             ("emission", |s| s.materials[0].emission.z += 1e-3),
             ("source", |s| s.materials[0].source.ior = Some(1.5)),
             ("camera", |s| s.camera = None),

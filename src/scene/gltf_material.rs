@@ -2,15 +2,14 @@
 
 use super::builder::DEFAULT_ALBEDO;
 use super::gltf_files::Files;
-use super::mtl::{emitted, reflectance};
+use super::material::{Description, Format, emitted};
 use super::texture::{Encoded, ImageSource};
-use super::{Material, MaterialKind, MaterialSource, approximation_warning};
+use super::{DIELECTRIC, DIFFUSE, MIRROR, Material, MaterialSource, approximation_warning};
 use glam::{Mat2, Vec2, Vec3, Vec4, Vec4Swizzles};
 use std::borrow::Cow;
 
-/// Metalness from which, and roughness up to which, a surface is a perfect mirror.
-const MIRROR_METALLIC: f32 = 0.99;
-const MIRROR_ROUGHNESS: f32 = 0.02;
+/// Roughness from which glass looks frosted.
+const FROSTED: f32 = 0.1;
 
 /// All materials of a document and the images that they need.
 pub(super) struct Palette<'a> {
@@ -65,7 +64,7 @@ pub(super) fn read<'a>(
         let mut found = convert(&material);
         let info = base_color(&material).1.filter(|_| with_textures);
         palette.texture_uses.push(match info {
-            Some(info) if found.kind == MaterialKind::Diffuse => {
+            Some(info) if found.kind != &MIRROR => {
                 let image = info.texture().source();
                 let id = image_ids[image.index()].get_or_insert_with(|| {
                     palette.images.push(image_source(files, &image, buffers));
@@ -102,50 +101,46 @@ fn convert(material: &gltf::Material<'_>) -> Material {
     let (color, _) = base_color(material);
     let model = material.pbr_metallic_roughness();
     let gloss = material.pbr_specular_glossiness();
-    let mirror = gloss.is_none()
-        && model.metallic_factor() >= MIRROR_METALLIC
-        && model.roughness_factor() <= MIRROR_ROUGHNESS
-        && model.metallic_roughness_texture().is_none();
     // A texture can make any part of the surface dark: better no light than light everywhere.
     let emission = match material.emissive_texture() {
         Some(_) => Vec3::ZERO,
         None => emitted(material.emissive_factor()) * material.emissive_strength().unwrap_or(1.0),
     };
     let index = material.index().unwrap_or(0);
-    Material {
-        name: material
-            .name()
-            .map_or_else(|| format!("material {index}"), str::to_owned),
-        kind: if mirror {
-            MaterialKind::Mirror
-        } else {
-            MaterialKind::Diffuse
-        },
-        base_color: reflectance(color.xyz()),
-        base_color_texture: None,
-        emission: emitted(emission),
-        source: MaterialSource {
-            roughness: Some(match &gloss {
-                Some(gloss) => 1.0 - gloss.glossiness_factor(),
-                None => model.roughness_factor(),
-            }),
-            metallic: gloss.is_none().then(|| model.metallic_factor()),
-            specular: gloss.map(|gloss| gloss.specular_factor()),
-            shininess: None,
-            ior: material.ior(),
-            transmission: material.transmission().map(|t| t.transmission_factor()),
-            opacity: Some(color.w),
-            alpha_mode: Some(
-                match material.alpha_mode() {
-                    gltf::material::AlphaMode::Opaque => "OPAQUE",
-                    gltf::material::AlphaMode::Mask => "MASK",
-                    gltf::material::AlphaMode::Blend => "BLEND",
-                }
-                .to_owned(),
-            ),
-            illum: None,
-        },
-    }
+    let source = MaterialSource {
+        roughness: Some(match &gloss {
+            Some(gloss) => 1.0 - gloss.glossiness_factor(),
+            None => model.roughness_factor(),
+        }),
+        metallic: gloss.is_none().then(|| model.metallic_factor()),
+        specular: gloss.map(|gloss| gloss.specular_factor()),
+        shininess: None,
+        ior: material.ior(),
+        transmission: material.transmission().map(|t| t.transmission_factor()),
+        filter: None,
+        thickness: material.volume().map(|v| v.thickness_factor()),
+        opacity: Some(color.w),
+        alpha_mode: Some(
+            match material.alpha_mode() {
+                gltf::material::AlphaMode::Opaque => "OPAQUE",
+                gltf::material::AlphaMode::Mask => "MASK",
+                gltf::material::AlphaMode::Blend => "BLEND",
+            }
+            .to_owned(),
+        ),
+        illum: None,
+    };
+    let transmission = material.transmission();
+    let description = Description {
+        format: Format::Gltf,
+        base_color: color.xyz(),
+        is_varied: model.metallic_roughness_texture().is_some()
+            || transmission.is_some_and(|t| t.transmission_texture().is_some()),
+        source: &source,
+    };
+    let name = material.name();
+    let name = name.map_or_else(|| format!("material {index}"), str::to_owned);
+    Material::described(name, &description).emitting(emitted(emission))
 }
 
 fn mapping(info: &gltf::texture::Info<'_>) -> TextureUse {
@@ -218,12 +213,15 @@ fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
             .map(|(converted, _)| converted.name.as_str())
             .collect()
     };
-    let transmissive = of(&|m, _| m.source.transmission.is_some_and(|t| t > 0.0));
+    let transmissive =
+        of(&|m, _| m.kind != &DIELECTRIC && m.source.transmission.is_some_and(|t| t > 0.0));
+    let frosted =
+        of(&|m, _| m.kind == &DIELECTRIC && m.source.roughness.is_some_and(|r| r > FROSTED));
     let cut_out = of(&|m, _| m.source.alpha_mode.as_deref() != Some("OPAQUE"));
     // Where a texture scales the metalness, the factor alone says nothing.
     let metal = of(&|m, original| {
         let model = original.pbr_metallic_roughness();
-        m.kind == MaterialKind::Diffuse
+        m.kind == &DIFFUSE
             && m.source.metallic.is_some_and(|metal| metal > 0.5)
             && model.metallic_roughness_texture().is_none()
     });
@@ -231,10 +229,15 @@ fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
         original.emissive_texture().is_some() && emitted(original.emissive_factor()) != Vec3::ZERO
     });
     [
-        approximation_warning("transmissive", transmissive),
-        approximation_warning("cut out or blended by alpha", cut_out),
-        approximation_warning("rough metal", metal),
-        approximation_warning("lit by an emissive texture (drawn dark)", textured_light),
+        approximation_warning("transmissive", "diffuse", transmissive),
+        approximation_warning("frosted glass", "clear glass", frosted),
+        approximation_warning("cut out or blended by alpha", "diffuse", cut_out),
+        approximation_warning("rough metal", "diffuse", metal),
+        approximation_warning(
+            "lit by an emissive texture (drawn dark)",
+            "diffuse",
+            textured_light,
+        ),
     ]
     .into_iter()
     .flatten()

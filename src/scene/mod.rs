@@ -17,6 +17,7 @@ mod gltf_container;
 mod gltf_files;
 mod gltf_material;
 mod instances;
+mod material;
 mod mtl;
 mod obj;
 mod ply;
@@ -30,6 +31,10 @@ pub use daylight::Daylight;
 pub use error::SceneError;
 pub use framing::Framing;
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
+pub use material::{
+    DEFAULT_IOR, DIELECTRIC, DIFFUSE, MATERIAL_KINDS, MIRROR, Material, MaterialKind,
+    MaterialSource,
+};
 
 use crate::geometry::{Camera, Triangle};
 use crate::params::{Params, Variant};
@@ -37,57 +42,6 @@ use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::io::Read as _;
 use std::path::Path;
-
-/// How light leaves a surface, as far as the kernels render it today.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum MaterialKind {
-    /// Lambertian reflection of the (possibly textured) base colour.
-    Diffuse,
-    /// Perfect mirror tinted by the base colour.
-    Mirror,
-}
-
-/// What the file said of a material beyond what [`MaterialKind`] renders: kept, because more of it
-/// will be rendered later. Absent values are `None`, never a default.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct MaterialSource {
-    /// Linear roughness in [0, 1] (glTF), or derived from the Phong exponent (MTL).
-    pub roughness: Option<f32>,
-    /// Metalness in [0, 1] (glTF).
-    pub metallic: Option<f32>,
-    /// Specular colour (MTL `Ks`, glTF specular-glossiness).
-    pub specular: Option<[f32; 3]>,
-    /// Phong exponent (MTL `Ns`).
-    pub shininess: Option<f32>,
-    /// Index of refraction (MTL `Ni`, glTF `KHR_materials_ior`).
-    pub ior: Option<f32>,
-    /// Fraction of light transmitted, in [0, 1].
-    pub transmission: Option<f32>,
-    /// Opacity in [0, 1] (MTL `d`, glTF alpha).
-    pub opacity: Option<f32>,
-    /// glTF alpha mode, as in the file (`OPAQUE`, `MASK`, `BLEND`).
-    pub alpha_mode: Option<String>,
-    /// MTL illumination model.
-    pub illum: Option<u8>,
-}
-
-/// A surface material.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Material {
-    /// Name in the file, or a made-up one.
-    pub name: String,
-    /// What the kernels render.
-    pub kind: MaterialKind,
-    /// Linear RGB reflectance, each in [0, 1]; multiplied by the texture if there is one.
-    pub base_color: Vec3,
-    /// Index into [`SceneData::textures`] of the base-colour texture.
-    pub base_color_texture: Option<u32>,
-    /// Emitted radiance, linear RGB, both sides of the triangle.
-    pub emission: Vec3,
-    /// What else the file said.
-    pub source: MaterialSource,
-}
 
 /// An 8-bit sRGB texture, row by row from the top; wraps in both directions.
 #[derive(Debug, Clone, PartialEq)]
@@ -267,8 +221,8 @@ const MODEL_START: u64 = 512;
 /// How many materials a warning names.
 const NAMES_IN_WARNING: usize = 4;
 
-/// One line for all materials that are `what` but drawn as diffuse; nothing if there are none.
-fn approximation_warning(what: &str, names: Vec<&str>) -> Option<String> {
+/// One line for all materials that are `what` but drawn as `drawn`; nothing if there are none.
+fn approximation_warning(what: &str, drawn: &str, names: Vec<&str>) -> Option<String> {
     if names.is_empty() {
         return None;
     }
@@ -285,6 +239,6 @@ fn approximation_warning(what: &str, names: Vec<&str>) -> Option<String> {
         "materials are"
     };
     Some(format!(
-        "{count} {are} {what}, which is not rendered yet; drawn as diffuse: {shown}{more}"
+        "{count} {are} {what}, which is not rendered yet; drawn as {drawn}: {shown}{more}"
     ))
 }

@@ -2,20 +2,16 @@
 
 use super::builder::DEFAULT_ALBEDO;
 use super::error::read_regular;
+use super::material::{Description, Format, emitted};
 use super::text::normalised;
 use super::texture::{Encoded, ImageSource};
-use super::{LoadOptions, Material, MaterialKind, MaterialSource};
+use super::{DIELECTRIC, DIFFUSE, LoadOptions, Material, MaterialSource};
 use glam::Vec3;
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use tobj::{LoadError, MTLLoadResult};
-
-/// Illumination models of the MTL standard that mirror (3 … 9 all ray trace; 5 is a mirror with
-/// Fresnel), and those that refract.
-const ILLUM_MIRROR: [u8; 3] = [3, 5, 8];
-const ILLUM_REFRACTS: [u8; 4] = [4, 6, 7, 9];
 
 /// Gathers the materials of all `mtllib` statements while `tobj` reads the OBJ file.
 ///
@@ -83,12 +79,12 @@ impl Library {
     /// is drawn otherwise than the file says.
     pub fn into_contents(self) -> Contents {
         let mut contents = self.contents.into_inner();
-        let approximated = contents.materials.iter().filter(|m| {
-            let refracts = |illum| ILLUM_REFRACTS.contains(&illum);
-            m.source.illum.is_some_and(refracts) || m.source.opacity.is_some_and(|d| d < 1.0)
-        });
+        let approximated = contents
+            .materials
+            .iter()
+            .filter(|m| m.kind != &DIELECTRIC && m.source.opacity.is_some_and(|d| d < 1.0));
         let names = approximated.map(|m| m.name.as_str()).collect();
-        let text = super::approximation_warning("transparent or refracting", names);
+        let text = super::approximation_warning("partly transparent", "diffuse", names);
         contents.warnings.extend(text);
         contents
     }
@@ -108,19 +104,18 @@ impl Contents {
             DEFAULT_ALBEDO
         };
         let diffuse = Vec3::from(material.diffuse.unwrap_or([unstated; 3]));
-        let specular = Vec3::from(material.specular.unwrap_or_default());
-        let mirror = is_mirror(material.illumination_model, diffuse, specular);
+        let source = source(material);
+        let description = Description {
+            format: Format::Mtl,
+            base_color: diffuse,
+            is_varied: false,
+            source: &source,
+        };
+        let found = Material::described(material.name.clone(), &description);
         self.materials.push(Material {
-            name: material.name.clone(),
-            kind: if mirror {
-                MaterialKind::Mirror
-            } else {
-                MaterialKind::Diffuse
-            },
-            base_color: reflectance(if mirror { specular } else { diffuse }),
-            base_color_texture: if mirror { None } else { texture },
+            base_color_texture: texture.filter(|_| found.kind == &DIFFUSE),
             emission: emitted(material.emissive.unwrap_or_default()),
-            source: source(material),
+            ..found
         });
     }
 
@@ -152,29 +147,13 @@ fn relative(file: &Path, options: &LoadOptions) -> std::io::Result<()> {
     }
 }
 
-/// A mirror by its illumination model whose specular part outshines a nearly black diffuse one.
-fn is_mirror(illum: Option<u8>, diffuse: Vec3, specular: Vec3) -> bool {
-    illum.is_some_and(|illum| ILLUM_MIRROR.contains(&illum))
-        && specular.max_element() > 0.0
-        && diffuse.max_element() <= 0.1 * specular.max_element()
-}
-
-/// Finite and within [0, 1].
-pub(super) fn reflectance(color: Vec3) -> Vec3 {
-    Vec3::select(color.is_finite_mask(), color, Vec3::ZERO).clamp(Vec3::ZERO, Vec3::ONE)
-}
-
-/// Finite and not negative.
-pub(super) fn emitted(color: impl Into<Vec3>) -> Vec3 {
-    let color = color.into();
-    Vec3::select(color.is_finite_mask(), color, Vec3::ZERO).max(Vec3::ZERO)
-}
-
 fn source(material: &tobj::Material) -> MaterialSource {
-    let extra = |key: &str| -> Option<f32> {
-        let value = material.unknown_param.get(key)?;
-        value.split_whitespace().next()?.parse().ok()
+    let numbers = |key: &str| -> Vec<f32> {
+        let value = material.unknown_param.get(key).map_or("", String::as_str);
+        let words = value.split_whitespace();
+        words.map_while(|word| word.parse().ok()).collect()
     };
+    let extra = |key: &str| numbers(key).first().copied();
     // Beckmann roughness of a Phong lobe: alpha^2 = 2 / (n + 2) (Walter et al. 2007), and glTF's
     // roughness is the square root of alpha.
     let phong = |n: f32| (2.0 / (n.max(0.0) + 2.0)).powf(0.25);
@@ -185,6 +164,12 @@ fn source(material: &tobj::Material) -> MaterialSource {
         shininess: material.shininess,
         ior: material.optical_density,
         transmission: None,
+        filter: match numbers("Tf")[..] {
+            [] => None,
+            [r, g, b, ..] => Some([r, g, b]),
+            [grey, ..] => Some([grey; 3]),
+        },
+        thickness: None,
         opacity: material.dissolve.or(extra("Tr").map(|t| 1.0 - t)),
         alpha_mode: None,
         illum: material.illumination_model,
@@ -267,15 +252,6 @@ mod tests {
         ] {
             assert_eq!(texture_path(statement), file, "{statement}");
         }
-    }
-
-    #[test]
-    fn only_a_bright_specular_part_over_black_makes_a_mirror() {
-        let (black, grey) = (Vec3::ZERO, Vec3::splat(0.5));
-        assert!(is_mirror(Some(5), black, grey));
-        assert!(!is_mirror(Some(2), black, grey));
-        assert!(!is_mirror(Some(5), grey, grey));
-        assert!(!is_mirror(Some(5), black, black));
     }
 
     #[test]

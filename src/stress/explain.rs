@@ -4,10 +4,7 @@ use super::bench;
 use super::shot_meshes;
 use super::tally::oracle_ray;
 use crate::accel::watch::{Event, watch};
-use crate::accel::{
-    AccelKind, BuiltAccel, Counters, Hit, NO_HIT, Ray, Space, TriangleSoup, brute_force_hits,
-    brute_force_instances,
-};
+use crate::accel::{AccelKind, BuiltAccel, Counters, Hit, NO_HIT, Ray, Space, TriangleSoup};
 use crate::oracle::exact_truths;
 use crate::params::Params;
 use crate::scene::SceneData;
@@ -46,7 +43,8 @@ pub fn explain(
         "\n{} nodes or cells, {} box tests, {} triangle tests, stack {}",
         counters.nodes, counters.box_tests, counters.triangle_tests, counters.stack_high_water
     );
-    let expected = brute_force(&*built, soup, ray);
+    let expected = bench::Expected::new(soup, &[*ray]);
+    let expected = expected.of(built.space())[0];
     let any = is_ray && twin.any_hit(ray, &mut Counters::default());
     let equal = hit.same_bits(&expected) && any == (expected.triangle != NO_HIT);
     let _ = writeln!(text, "{:12} {}", kind.name(), hit_text(&hit));
@@ -65,14 +63,6 @@ fn judge_name(built: &dyn BuiltAccel) -> &'static str {
         Space::World => "brute force",
         Space::Instances => "brute force over instances",
     }
-}
-
-fn brute_force(built: &dyn BuiltAccel, soup: &TriangleSoup, ray: &Ray) -> Hit {
-    let hits = match (built.space(), &soup.placed) {
-        (Space::Instances, Some(placed)) => brute_force_instances(placed, &[*ray]),
-        _ => brute_force_hits(soup, &[*ray]),
-    };
-    hits.first().copied().unwrap_or(Hit::miss(ray))
 }
 
 /// One line a node, with the triangles tested there.

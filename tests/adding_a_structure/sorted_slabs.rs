@@ -7,7 +7,16 @@ use raystone::accel::{
     AccelError, AccelKind, BuildLog, BuiltAccel, CpuTwin, GpuBuffers, Hit, NamedWords,
     StructureStats, TriangleSoup, limits,
 };
-use raystone::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use raystone::parameters;
+use raystone::params::{ParameterSchema, Parameters as _, Params};
+
+parameters! {
+    /// The parameters.
+    struct Slabs {
+        /// triangles in a run
+        run_length: usize = 16, in 1..=1024;
+    }
+}
 
 /// The registry entry.
 pub struct SortedSlabs;
@@ -22,12 +31,7 @@ impl AccelKind for SortedSlabs {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        vec![Parameter {
-            name: "run_length",
-            description: "triangles in a run",
-            default: ParamValue::Integer(16),
-            range: ParamRange::Integer { min: 1, max: 1024 },
-        }]
+        Slabs::schema()
     }
 
     fn build(
@@ -36,7 +40,7 @@ impl AccelKind for SortedSlabs {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let length = params.integer("run_length") as usize;
+        let length = Slabs::from_params(params)?.run_length;
         let order = log.phase("sort", || {
             let centre = |id: u32| soup.records[id as usize].bounds().doubled_centre()[0];
             let mut order: Vec<u32> = (0..soup.records.len() as u32).collect();

@@ -1,8 +1,16 @@
 //! `facing`: an integrator of one kernel.
 
 use raystone::integrator::{CountedRays, Integrator, IntegratorFacts};
-use raystone::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use raystone::parameters;
+use raystone::params::{ParameterSchema, Parameters as _, Params};
 use raystone::sampling::dimensions::FIRST_BOUNCE;
+
+parameters! {
+    struct Brightness {
+        /// what the cosine is multiplied with
+        brightness: u32 = 1, in 1..=100;
+    }
+}
 
 /// The registry entry.
 pub struct Facing;
@@ -28,16 +36,11 @@ impl Integrator for Facing {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        vec![Parameter {
-            name: "brightness",
-            description: "what the cosine is multiplied with",
-            default: ParamValue::Integer(1),
-            range: ParamRange::Integer { min: 1, max: 100 },
-        }]
+        Brightness::schema()
     }
 
     fn constants(&self, params: &Params) -> Vec<(&'static str, u32)> {
-        vec![("BRIGHTNESS", params.integer("brightness") as u32)]
+        vec![("BRIGHTNESS", Brightness::from_checked(params).brightness)]
     }
 
     fn facts(&self, _: &Params) -> IntegratorFacts {

@@ -2,9 +2,11 @@
 
 use crate::MAX_DEPTH;
 use crate::support::*;
+use glam::Vec3;
 use raystone::gpu::Gpu;
 use raystone::params::ParamValue;
 use raystone::sampling::Sampler;
+use raystone::scene::Material;
 
 const SIZE: [u32; 2] = [16, 16];
 /// Emission alone, direct light, no roulette yet, roulette, most dimensions.
@@ -104,6 +106,86 @@ fn every_pixel_of_the_white_furnace_is_one_and_none_is_where_the_sphere_is_grey(
         assert!(error < 1e-5, "{}: {error}", kind.name());
     }
     assert!(largest_error(&grey, "bvh") > 0.4);
+}
+
+/// Bounces until nothing of note goes round in a ball of glass.
+const LONG: i64 = 20;
+
+/// Mean radiance under a white sky of a ball of this material, seen from there.
+fn ball(gpu: &Gpu, material: Material, eye: Vec3) -> Estimate {
+    let mut scene = builtin("white-furnace", &[]);
+    scene.materials = vec![material];
+    if let Some(camera) = &mut scene.camera {
+        camera.eye = eye;
+    }
+    let stage = Stage::new(gpu, scene);
+    let traced = stage.traced(gpu, structure("bvh"));
+    let sampler = sampler("pixel-hash", "none");
+    let renderer = stage.renderer(gpu, &traced, &sampler, &path(LONG), SIZE, false);
+    Estimate::of(&replicate_means(&renderer, RANDOM_SPP, 16))
+}
+
+const OUTSIDE: Vec3 = Vec3::new(0.0, 0.0, 3.0);
+const INSIDE: Vec3 = Vec3::new(0.1, -0.2, 0.3);
+
+/// What a ball of glass with the index 1.5 shows that it should not, if anything.
+fn glass_fault(gpu: &Gpu) -> Option<&'static str> {
+    let glass = || Material::dielectric("glass", Vec3::ONE, 1.5);
+    let pane = Material::thin_dielectric("pane", Vec3::ONE, 1.5);
+    let is = |found: Estimate, right: f64| {
+        assert!(found.error < 0.02 * right, "{found:?} proves nothing");
+        found.agrees_with(right)
+    };
+    [
+        // What comes in goes out: a ball of glass cannot be seen where all around is equally bright.
+        ("outside", is(ball(gpu, glass(), OUTSIDE), 1.0)),
+        // Radiance over the square of the index stays the same along a ray.
+        ("inside", is(ball(gpu, glass(), INSIDE), 1.5 * 1.5)),
+        ("bubble", is(ball(gpu, pane, OUTSIDE), 1.0)),
+    ]
+    .into_iter()
+    .find_map(|(what, is_right)| (!is_right).then_some(what))
+}
+
+#[test]
+fn a_ball_of_glass_in_the_white_furnace_cannot_be_seen() {
+    assert_eq!(glass_fault(gpu()), None);
+    // What is reflected inside gets out later: half of all light is lost, at one passage each.
+    let tinted = Material::dielectric("glass", Vec3::splat(0.5), 1.5);
+    let seen = ball(gpu(), tinted, INSIDE);
+    assert!(
+        seen.agrees_with(0.5 * 2.25) && !seen.agrees_with(2.25),
+        "{seen:?}"
+    );
+}
+
+#[test]
+fn faults_of_glass_show_in_the_white_furnace() {
+    for (file, from, to, expected) in [
+        // Without the refraction of radiance, glass is as bright inside as outside.
+        (
+            "shading/bsdf/dielectric",
+            "tint / (eta * eta)",
+            "tint",
+            "inside",
+        ),
+        (
+            "shading/bsdf/dielectric",
+            "surface.side > 0.0",
+            "true",
+            "outside",
+        ),
+        (
+            "shading/surface",
+            "select(surface.normal, -surface.normal",
+            "select(surface.normal, surface.normal",
+            "outside",
+        ),
+    ] {
+        let gpu = open(kernels_with(file, &[(from, to)]));
+        let fault = glass_fault(&gpu).unwrap_or_default();
+        assert_eq!(fault, expected, "`{to}` for `{from}`");
+    }
 }
 
 #[test]

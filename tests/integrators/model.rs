@@ -4,7 +4,7 @@ use crate::support::*;
 use glam::Vec3;
 use raystone::geometry::Camera;
 use raystone::image::Image;
-use raystone::scene::{MaterialKind, SceneData};
+use raystone::scene::{DIFFUSE, MIRROR, SceneData};
 use std::path::Path;
 
 const SIZE: u32 = 16;
@@ -41,7 +41,7 @@ fn render(stage: &Stage, depth: i64, spp: u32) -> Image {
         .image
 }
 
-const MIRROR: &str = "
+const MIRROR_MODEL: &str = "
 v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0
 v 0 -9 3\nv 0 9 3\nv 9 9 3\nv 9 -9 3
 usemtl mirror\nf 1 2 3 4\nusemtl lamp\nf 5 6 7 8\n";
@@ -52,9 +52,9 @@ newmtl lamp\nKd 0 0 0\nKe 4 2 8\n";
 #[test]
 fn a_mirror_shows_the_tinted_radiance_of_a_lamp_behind_the_camera() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let scene = load(folder.path(), MIRROR, MIRROR_MATERIALS);
+    let scene = load(folder.path(), MIRROR_MODEL, MIRROR_MATERIALS);
     let kinds: Vec<_> = scene.materials.iter().map(|m| m.kind).collect();
-    assert_eq!(kinds, [MaterialKind::Mirror, MaterialKind::Diffuse]);
+    assert_eq!(kinds, [&MIRROR, &DIFFUSE]);
     let pixel = |image: &Image, x: u32, y: u32| image.pixels[(y * SIZE + x) as usize];
     let mirror = Stage::new(gpu(), scene.clone());
     let image = render(&mirror, 1, 4);
@@ -70,7 +70,7 @@ fn a_mirror_shows_the_tinted_radiance_of_a_lamp_behind_the_camera() {
         }
     }
     let mut diffuse = scene;
-    diffuse.materials[0].kind = MaterialKind::Diffuse;
+    diffuse.materials[0].kind = &DIFFUSE;
     let image = render(&Stage::new(gpu(), diffuse), 1, 16);
     let left = pixel(&image, 2, 8);
     assert!(left[0] > 0.0, "{left:?}: a diffuse surface scatters");

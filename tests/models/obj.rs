@@ -18,7 +18,8 @@ fn relative_indices_and_polygons_give_the_same_triangles_as_absolute_ones() {
 fn obj_materials_and_textures_arrive() {
     let mtl = b"newmtl wall\nKd 0.5 0.25 2\nmap_Kd -s 1 1 1 tex.png\nNs 10\nillum 2\n\
         newmtl lamp\nKe 3 2 1\nnewmtl mirror\nillum 5\nKd 0 0 0\nKs 0.9 0.8 0.7\n\
-        newmtl glass\nillum 7\nNi 1.5\nd 0.1\n";
+        newmtl glass\nillum 7\nNi 1.4\nTf 0.25 1 0.5625\nd 0.1\n\
+        newmtl pane\nillum 2\nd 0.3\n";
     let obj = format!(
         "mtllib m.mtl\n{SQUARE}vt 0 0\nvt 1 0\nvt 1 0.75\nusemtl wall\nf 1/1 2/2 3/3\n\
          usemtl lamp\nf 1 2 3\nusemtl mirror\nf 1 2 3\nusemtl glass\nf 1 2 3\n"
@@ -33,7 +34,7 @@ fn obj_materials_and_textures_arrive() {
         ],
     )
     .unwrap();
-    let [wall, lamp, mirror, glass] = &scene.materials[..] else {
+    let [wall, lamp, mirror, glass, pane] = &scene.materials[..] else {
         panic!("{:?}", scene.materials);
     };
     assert_eq!(wall.base_color, Vec3::new(0.5, 0.25, 1.0));
@@ -48,14 +49,14 @@ fn obj_materials_and_textures_arrive() {
         [down(0.0, 0.0), down(1.0, 0.0), down(1.0, 0.75)]
     );
     assert_eq!(lamp.emission, Vec3::new(3.0, 2.0, 1.0));
-    assert_eq!(mirror.kind, MaterialKind::Mirror);
+    assert_eq!(mirror.kind, &MIRROR);
     assert_eq!(mirror.base_color, Vec3::new(0.9, 0.8, 0.7));
-    assert_eq!(
-        (glass.kind, glass.source.ior),
-        (MaterialKind::Diffuse, Some(1.5))
-    );
+    assert_eq!(glass.kind, &DIELECTRIC);
+    assert_eq!(glass.parameters, [1.4, 0.0]);
+    assert_eq!(glass.base_color, Vec3::new(0.5, 1.0, 0.75));
+    assert_eq!(pane.kind, &DIFFUSE);
     assert_eq!(scene.report.warnings.len(), 1, "{:?}", scene.report);
-    assert!(scene.report.warnings[0].contains("glass"));
+    assert!(scene.report.warnings[0].contains("diffuse: pane"));
     assert_eq!(scene.emitters(), [1]);
 }
 

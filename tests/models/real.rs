@@ -80,7 +80,7 @@ fn the_textures_and_lights_of_real_models_arrive() {
             let lit = file == "Original";
             assert_eq!(!scene.emitters().is_empty(), lit, "{file}");
             assert_eq!(scene.environment == Vec3::ZERO, lit, "{file}");
-            let is_mirror = |m: &&Material| m.kind == MaterialKind::Mirror;
+            let is_mirror = |m: &&Material| m.kind == &MIRROR;
             assert_eq!(
                 scene.materials.iter().filter(is_mirror).count(),
                 mirrors,

@@ -17,16 +17,17 @@ mod stack;
 
 use super::leaf::{COUNT_MASK, LeafReader, Leaves};
 use super::ray::Hit;
-use super::tree::{Coverage, NodeKind, Tree, tree_parameters};
+use super::tree::{Coverage, NodeKind, Tree};
 use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
     TriangleSoup,
 };
-use crate::params::{ParameterSchema, Params};
+use crate::params::{ParameterSchema, Parameters as _, Params};
 use boxes::Boxes;
 use octant_roped::Octants;
-use options::{Options, Traversal};
+pub use options::BvhParameters;
+use options::{Options, RopedParameters, Traversal};
 use pairs::Pairs;
 
 /// The root.
@@ -47,9 +48,7 @@ impl AccelKind for Bvh {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        let mut out = tree_parameters();
-        out.extend(options::bvh_parameters());
-        out
+        BvhParameters::schema()
     }
 
     fn build(
@@ -58,7 +57,7 @@ impl AccelKind for Bvh {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let params = params.completed(&self.parameters())?;
+        let params = BvhParameters::from_params(params)?;
         Ok(Box::new(BuiltBvh::build(soup, &params, log)?))
     }
 }
@@ -76,9 +75,7 @@ impl AccelKind for RopedBvh {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        let mut out = tree_parameters();
-        out.extend(options::roped_parameters());
-        out
+        RopedParameters::schema()
     }
 
     fn build(
@@ -87,7 +84,7 @@ impl AccelKind for RopedBvh {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let params = params.completed(&self.parameters())?;
+        let params = RopedParameters::from_params(params)?.into();
         Ok(Box::new(BuiltBvh::build(soup, &params, log)?))
     }
 }
@@ -115,13 +112,11 @@ impl BuiltBvh {
     /// Parameters that contradict each other, or a tree that exceeds a limit of the layout.
     pub fn build(
         soup: &TriangleSoup,
-        params: &Params,
+        params: &BvhParameters,
         log: &mut BuildLog,
     ) -> Result<Self, AccelError> {
-        // `roped-bvh` has fewer parameters; those it lacks keep to their defaults.
-        let params = &params.completed(&Bvh.parameters())?;
         let options = Options::new(params)?;
-        let mut tree = Tree::build(soup, params, log)?;
+        let mut tree = Tree::build(soup, &params.tree, log)?;
         tree.note_epo(soup);
         let depth = tree.depth();
         options.check_depth(depth)?;

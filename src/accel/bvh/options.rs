@@ -1,7 +1,8 @@
 //! Parameters of `bvh` and `roped-bvh` beyond those of the tree: which traversal reads which layout.
 
 use super::super::AccelError;
-use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::accel::tree::TreeParameters;
+use crate::parameters;
 
 /// Invocations of a workgroup, `LANES` of `kernels/common/lane.wesl`.
 const LANES: u32 = crate::gpu::WORKGROUP_SIZE;
@@ -10,22 +11,116 @@ const WORKGROUP_BYTES: u32 = 16384;
 /// Levels that the two words of a restart trail hold.
 const TRAIL_LEVELS: u32 = 64;
 
-/// How the tree is walked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Traversal {
-    Stack,
-    ParentPointer,
-    Roped,
-    OctantRoped,
-    ShortStack,
+parameters! {
+    /// Parameters of `bvh`.
+    pub struct BvhParameters {
+        /// The tree.
+        tree: TreeParameters;
+        /// near child first with a stack (Aila & Laine 2009), parent pointers (Hapala 2011) or a short
+        /// stack with a restart trail (Laine 2010); skip pointers in one order (Smits 1998) or in eight
+        traversal: Traversal = Traversal::Stack;
+        /// 64: boxes of both children, nearer first (octant-roped: own box, eight ropes); 32: own box,
+        /// order by axis; auto: what the traversal does best
+        node_bytes: NodeBytes = NodeBytes::Auto;
+        /// where the stack lies (stack, short-stack)
+        stack_memory: StackMemory = StackMemory::Function;
+        /// entries of short-stack; no other traversal reads it
+        short_stack_entries: u32 = 4, in 1..=32;
+        /// Where nodes and triangles lie.
+        layout: Layout;
+    }
+
+    /// Parameters of `roped-bvh`.
+    pub struct RopedParameters {
+        /// The tree.
+        tree: TreeParameters;
+        /// skip pointers in one order (Dufay 2017, Alg. 4.4) or in eight, by octant of the direction
+        traversal: Ropes = Ropes::Roped;
+        /// Where nodes and triangles lie.
+        layout: Layout;
+    }
+
+    /// Parameters that all traversals read.
+    pub struct Layout {
+        /// leaves: copies of the triangles in leaf order, or indices
+        triangles: LeafTriangles = LeafTriangles::Gathered;
+        /// order of nodes in memory (van Emde Boas: halves of the height, recursively)
+        node_order: NodeOrder = NodeOrder::DepthFirst;
+    }
+
+    /// How the tree is walked.
+    pub enum Traversal {
+        /// Near child first, with a stack.
+        Stack = "stack",
+        /// Near child first, back by parent pointers.
+        ParentPointer = "parent-pointer",
+        /// Skip pointers in one order.
+        Roped = "roped",
+        /// Skip pointers in eight orders.
+        OctantRoped = "octant-roped",
+        /// A short stack with a restart trail.
+        ShortStack = "short-stack",
+    }
+
+    /// How `roped-bvh` is walked.
+    pub enum Ropes {
+        /// Skip pointers in one order.
+        Roped = "roped",
+        /// Skip pointers in eight orders.
+        OctantRoped = "octant-roped",
+    }
+
+    /// Bytes of a node.
+    pub enum NodeBytes {
+        /// What the traversal does best.
+        Auto = "auto",
+        /// Its own box.
+        Own = "32",
+        /// Boxes of both children, or its own and eight ropes.
+        Both = "64",
+    }
+
+    /// Where a stack lies.
+    pub enum StackMemory {
+        /// In a variable of the function.
+        Function = "function",
+        /// In a private variable of the module.
+        Private = "private",
+        /// In workgroup memory.
+        Workgroup = "workgroup",
+    }
+
+    /// What leaves hold.
+    pub enum LeafTriangles {
+        /// Copies of the triangles.
+        Gathered = "gathered",
+        /// Indices.
+        Indexed = "indexed",
+    }
+
+    /// In what order nodes lie in memory.
+    pub enum NodeOrder {
+        /// A node before its subtrees, one after the other.
+        DepthFirst = "depth-first",
+        /// Level by level.
+        BreadthFirst = "breadth-first",
+        /// Halves of the height, recursively.
+        VanEmdeBoas = "van-emde-boas",
+    }
 }
 
-/// In what order nodes lie in memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum NodeOrder {
-    DepthFirst,
-    BreadthFirst,
-    VanEmdeBoas,
+impl From<RopedParameters> for BvhParameters {
+    fn from(roped: RopedParameters) -> Self {
+        Self {
+            tree: roped.tree,
+            traversal: match roped.traversal {
+                Ropes::Roped => Traversal::Roped,
+                Ropes::OctantRoped => Traversal::OctantRoped,
+            },
+            layout: roped.layout,
+            ..Self::default()
+        }
+    }
 }
 
 /// The choices of one built structure, free of contradictions.
@@ -41,140 +136,40 @@ pub(super) struct Options {
     short_stack_entries: u32,
 }
 
-fn choice(
-    name: &'static str,
-    description: &'static str,
-    names: &'static [&'static str],
-) -> Parameter {
-    Parameter {
-        name,
-        description,
-        default: ParamValue::Name(names[0].to_owned()),
-        range: ParamRange::Choice(names),
-    }
-}
-
-/// Parameters that all traversals read.
-fn layout_parameters() -> ParameterSchema {
-    vec![
-        choice(
-            "triangles",
-            "leaves: copies of the triangles in leaf order, or indices",
-            &["gathered", "indexed"],
-        ),
-        choice(
-            "node_order",
-            "order of nodes in memory (van Emde Boas: halves of the height, recursively)",
-            &["depth-first", "breadth-first", "van-emde-boas"],
-        ),
-    ]
-}
-
-/// Parameters of `bvh`.
-pub(super) fn bvh_parameters() -> ParameterSchema {
-    let mut out = vec![
-        choice(
-            "traversal",
-            "near child first with a stack (Aila & Laine 2009), parent pointers (Hapala 2011) or a \
-             short stack with a restart trail (Laine 2010); skip pointers in one order (Smits 1998) \
-             or in eight",
-            &[
-                "stack",
-                "parent-pointer",
-                "roped",
-                "octant-roped",
-                "short-stack",
-            ],
-        ),
-        choice(
-            "node_bytes",
-            "64: boxes of both children, nearer first (octant-roped: own box, eight ropes); 32: own \
-             box, order by axis; auto: what the traversal does best",
-            &["auto", "32", "64"],
-        ),
-        choice(
-            "stack_memory",
-            "where the stack lies (stack, short-stack)",
-            &["function", "private", "workgroup"],
-        ),
-        Parameter {
-            name: "short_stack_entries",
-            description: "entries of short-stack; no other traversal reads it",
-            default: ParamValue::Integer(4),
-            range: ParamRange::Integer { min: 1, max: 32 },
-        },
-    ];
-    out.extend(layout_parameters());
-    out
-}
-
-/// Parameters of `roped-bvh`.
-pub(super) fn roped_parameters() -> ParameterSchema {
-    let mut out = vec![choice(
-        "traversal",
-        "skip pointers in one order (Dufay 2017, Alg. 4.4) or in eight, by octant of the direction",
-        &["roped", "octant-roped"],
-    )];
-    out.extend(layout_parameters());
-    out
-}
-
 impl Options {
-    /// Reads the parameters of either schema.
+    /// The choices that `params` make.
     ///
     /// # Errors
     /// Two of them contradict each other.
-    pub fn new(params: &Params) -> Result<Self, AccelError> {
-        let traversal = match params.name("traversal") {
-            "parent-pointer" => Traversal::ParentPointer,
-            "roped" => Traversal::Roped,
-            "octant-roped" => Traversal::OctantRoped,
-            "short-stack" => Traversal::ShortStack,
-            _ => Traversal::Stack,
-        };
-        let given = |name: &str| params.0.contains_key(name);
-        let stack_memory = if given("stack_memory") {
-            params.name("stack_memory")
-        } else {
-            "function"
-        };
-        let node_bytes = if given("node_bytes") {
-            params.name("node_bytes")
-        } else {
-            "auto"
-        };
+    pub fn new(params: &BvhParameters) -> Result<Self, AccelError> {
+        let traversal = params.traversal;
         let contradiction = |why: &str| Err(AccelError::Contradiction(why.to_owned()));
         let has_stack = matches!(traversal, Traversal::Stack | Traversal::ShortStack);
-        match (traversal, node_bytes) {
-            _ if !has_stack && stack_memory != "function" => contradiction(
+        match (traversal, params.node_bytes) {
+            _ if !has_stack && params.stack_memory != StackMemory::Function => contradiction(
                 "stack_memory: this traversal has no stack; leave it at `function`, or take \
                  traversal = stack or short-stack",
             ),
-            (Traversal::Roped, "64") => contradiction(
+            (Traversal::Roped, NodeBytes::Both) => contradiction(
                 "node_bytes = 64: a rope leads to one box, not to a pair; traversal = roped takes 32",
             ),
-            (Traversal::OctantRoped, "32") => contradiction(
+            (Traversal::OctantRoped, NodeBytes::Own) => contradiction(
                 "node_bytes = 32: a box and eight ropes need 64; traversal = parent-pointer with \
                  node_bytes = 32 walks in the same order",
             ),
             _ => Ok(Self {
                 traversal,
-                boxes: node_bytes == "32" || traversal == Traversal::Roped,
-                indexed: params.name("triangles") == "indexed",
-                order: match params.name("node_order") {
-                    "breadth-first" => NodeOrder::BreadthFirst,
-                    "van-emde-boas" => NodeOrder::VanEmdeBoas,
-                    _ => NodeOrder::DepthFirst,
+                boxes: params.node_bytes == NodeBytes::Own || traversal == Traversal::Roped,
+                indexed: params.layout.triangles == LeafTriangles::Indexed,
+                order: params.layout.node_order,
+                stack_feature: match params.stack_memory {
+                    StackMemory::Function => None,
+                    StackMemory::Private => Some("stack_private"),
+                    StackMemory::Workgroup => Some("stack_workgroup"),
                 },
-                stack_feature: match stack_memory {
-                    "private" => Some("stack_private"),
-                    "workgroup" => Some("stack_workgroup"),
-                    _ => None,
-                },
-                short_stack_entries: if traversal == Traversal::ShortStack {
-                    params.integer("short_stack_entries") as u32
-                } else {
-                    0
+                short_stack_entries: match traversal {
+                    Traversal::ShortStack => params.short_stack_entries,
+                    _ => 0,
                 },
             }),
         }

@@ -5,11 +5,10 @@ use super::super::bvh::check_leaves;
 use super::super::bvh::pairs::{self, Pair, Pairs};
 use super::super::intersection::Intersection;
 use super::super::leaf::{FIRST_MASK, leaf_range};
-use super::super::tree::{Coverage, Tree};
+use super::super::tree::{Coverage, Tree, TreeParameters};
 use super::super::triangle::TriangleRecord;
 use super::super::{AccelError, BuildLog, TriangleSoup};
 use crate::accel::StructureStats;
-use crate::params::Params;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -48,12 +47,12 @@ impl Forest {
     /// More triangles than a leaf reference can address.
     pub(super) fn build(
         objects: &[&TriangleSoup],
-        params: &Params,
+        parameters: &TreeParameters,
         log: &mut BuildLog,
     ) -> Result<Self, AccelError> {
         let trees: Result<Vec<Tree>, AccelError> = log.phase("objects", || {
             let build = |object: &&TriangleSoup| {
-                let tree = Tree::build(object, params, &mut BuildLog::default())?;
+                let tree = Tree::build(object, parameters, &mut BuildLog::default())?;
                 check_leaves(&tree).map(|()| tree)
             };
             objects.par_iter().map(build).collect()

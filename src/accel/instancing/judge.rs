@@ -2,12 +2,12 @@
 
 use super::super::bounds::{Bounds, enter_box};
 use super::super::brute_force::EveryTriangle;
+use super::super::bvh::BvhParameters;
 use super::super::{
     AccelError, BuildLog, BuiltAccel, BuiltBvh, Counters, CpuTwin, Hit, NO_HIT, Ray, TriangleSoup,
 };
 use super::instance::object_ray;
 use super::placed::Placed;
-use crate::params::Params;
 use rayon::prelude::*;
 
 /// Nearest hits by testing every triangle of every instance, in parallel over the rays.
@@ -42,7 +42,8 @@ impl<'a> InstanceJudge<'a> {
     /// An object has too many triangles for a BVH.
     pub fn new(placed: &'a Placed) -> Result<Self, AccelError> {
         let build = |object: &TriangleSoup| {
-            let built = BuiltBvh::build(object, &Params::default(), &mut BuildLog::default())?;
+            let built =
+                BuiltBvh::build(object, &BvhParameters::default(), &mut BuildLog::default())?;
             built.validate(object)?;
             Ok::<_, AccelError>((object.bounds(), built))
         };

@@ -8,7 +8,7 @@ use super::super::bounds::Bounds;
 use super::super::bvh::pairs::Pair;
 use super::super::leaf::{FIRST_MASK, LEAF, leaf_reference};
 use super::super::ray::Hit;
-use super::super::tree::tree_parameters;
+use super::super::tree::TreeParameters;
 use super::super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, Space, TriangleSoup};
 use super::instance::{Entry, NOTHING, is_open, leaf, level, near_and_far};
@@ -16,10 +16,31 @@ use super::top::Top;
 use super::world_box::BoxMap;
 use super::{Base, Upper, clamped, meta_bvh_nested};
 use crate::accel::StructureStats;
-use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
+use crate::params::{ParameterSchema, Parameters as _, Params};
 
 /// Stands for the size of the stack when an object was entered, outside of any.
 const OUTSIDE: u32 = u32::MAX;
+
+parameters! {
+    /// The objects' trees, and what is above them.
+    struct Options {
+        /// The objects' trees.
+        tree: TreeParameters;
+        /// most entries of the upper level per instance; 0 and 1 open none
+        rebraid: usize = 0, in 0..=8;
+        /// one loop over both levels, or one inside the other
+        r#loop: Loop = Loop::One;
+    }
+
+    /// How both levels are walked.
+    enum Loop {
+        /// In one loop.
+        One = "one",
+        /// One loop inside the other.
+        Nested = "nested",
+    }
+}
 
 /// The registry entry.
 pub struct MetaBvh;
@@ -34,22 +55,7 @@ impl AccelKind for MetaBvh {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        let mut parameters = tree_parameters();
-        parameters.extend([
-            Parameter {
-                name: "rebraid",
-                description: "most entries of the upper level per instance; 0 and 1 open none",
-                default: ParamValue::Integer(0),
-                range: ParamRange::Integer { min: 0, max: 8 },
-            },
-            Parameter {
-                name: "loop",
-                description: "one loop over both levels, or one inside the other",
-                default: ParamValue::Name("one".to_owned()),
-                range: ParamRange::Choice(&["one", "nested"]),
-            },
-        ]);
-        parameters
+        Options::schema()
     }
 
     fn build(
@@ -58,9 +64,9 @@ impl AccelKind for MetaBvh {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let params = &params.completed(&self.parameters())?;
-        let base = Base::build(soup, params, log)?;
-        let rebraid = params.integer("rebraid") as usize;
+        let options = Options::from_params(params)?;
+        let base = Base::build(soup, &options.tree, log)?;
+        let rebraid = options.rebraid;
         check_entries(base.instances.len(), rebraid)?;
         let top = log.phase("upper level", || {
             Top::build(&base.instances, &base.forest, rebraid)
@@ -69,7 +75,7 @@ impl AccelKind for MetaBvh {
             base,
             top,
             rebraid,
-            nested: params.name("loop") == "nested",
+            nested: options.r#loop == Loop::Nested,
         }))
     }
 }

@@ -28,9 +28,9 @@ pub use object_list::ObjectList;
 pub use placed::Placed;
 
 use super::bvh::pairs::Pair;
+use super::tree::TreeParameters;
 use super::{AccelError, BuildLog, GpuBuffers, NamedWords, Space, TriangleSoup, limits};
 use crate::gpu::UniformValues;
-use crate::params::Params;
 use crate::scene::Instance;
 use forest::Forest;
 use placed::View;
@@ -57,10 +57,14 @@ struct Base {
 }
 
 impl Base {
-    fn build(soup: &TriangleSoup, params: &Params, log: &mut BuildLog) -> Result<Self, AccelError> {
+    fn build(
+        soup: &TriangleSoup,
+        tree: &TreeParameters,
+        log: &mut BuildLog,
+    ) -> Result<Self, AccelError> {
         let view = View::of(soup);
         Ok(Self {
-            forest: Forest::build(&view.objects, params, log)?,
+            forest: Forest::build(&view.objects, tree, log)?,
             instances: view.instances.into_owned(),
         })
     }

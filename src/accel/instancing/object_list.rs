@@ -6,14 +6,14 @@
 
 use super::super::bounds::Bounds;
 use super::super::ray::Hit;
-use super::super::tree::tree_parameters;
+use super::super::tree::TreeParameters;
 use super::super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, Space, TriangleSoup};
 use super::instance::{Entry, enter_grown, level, trace_object};
 use super::world_box::BoxMap;
 use super::{Base, Upper};
 use crate::accel::StructureStats;
-use crate::params::{ParameterSchema, Params};
+use crate::params::{ParameterSchema, Parameters as _, Params};
 use bytemuck::{Pod, Zeroable};
 
 /// The registry entry.
@@ -29,7 +29,7 @@ impl AccelKind for ObjectList {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        tree_parameters()
+        TreeParameters::schema()
     }
 
     fn build(
@@ -38,8 +38,8 @@ impl AccelKind for ObjectList {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let params = &params.completed(&self.parameters())?;
-        let base = Base::build(soup, params, log)?;
+        let tree = TreeParameters::from_params(params)?;
+        let base = Base::build(soup, &tree, log)?;
         let mut built = Built {
             base,
             entries: Vec::new(),

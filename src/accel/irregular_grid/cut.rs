@@ -5,7 +5,7 @@ use super::super::grid::lists::{Lists, PartLists};
 use super::super::grid::{Cut, Grid, GridBox, areas, check_words, finest};
 use super::super::{AccelError, TriangleSoup};
 use super::voxels::{Block, Cell, Entry, Map};
-use super::{Partition, Settings};
+use super::{Options, Partition};
 use crate::accel::BuildLog;
 use rayon::prelude::*;
 
@@ -24,7 +24,7 @@ const RUN: usize = 64;
 pub fn cut(
     name: &str,
     soup: &TriangleSoup,
-    settings: &Settings,
+    settings: &Options,
     log: &mut BuildLog,
 ) -> Result<Partition, AccelError> {
     let grid_box = log.phase("bounds", || GridBox::new(soup));
@@ -72,7 +72,7 @@ pub fn cut(
 /// cut along each axis.
 fn parts_log(
     fine: &Grid,
-    settings: &Settings,
+    settings: &Options,
     size: u32,
     areas: impl ExactSizeIterator<Item = f32>,
 ) -> u32 {
@@ -170,7 +170,7 @@ struct Run<'a> {
     fine: &'a Grid,
     soup: &'a TriangleSoup,
     areas: &'a [f32],
-    settings: &'a Settings,
+    settings: &'a Options,
     made: Pieces,
     /// Memory for lists, one for each level in use.
     spare: Vec<PartLists>,

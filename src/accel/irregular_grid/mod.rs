@@ -26,7 +26,8 @@ use super::{
     TriangleSoup,
 };
 use crate::gpu::UniformValues;
-use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
+use crate::params::{ParameterSchema, Parameters as _, Params};
 
 /// Bits of an entry that hold the logarithm of its block's side; 0: the rest is a cell.
 const LOG_BITS: u32 = 2;
@@ -35,6 +36,23 @@ const LOG_MASK: u32 = 3;
 const LAST: u32 = 0x8000_0000;
 /// Place of the list of an empty cell.
 const EMPTY: u32 = 0xffff_ffff;
+
+parameters! {
+    /// How cells are cut, merged and expanded.
+    struct Options {
+        /// top cells per triangle of the scene
+        lambda1: f64 = 0.12, in 0.001..=100.0;
+        /// voxels of a top cell per triangle in it, rounded up to a power of two an axis
+        lambda2: f64 = 2.4, in 0.001..=100.0;
+        /// merge on while a round leaves fewer than this part of the cells; 0: not at all
+        alpha: f64 = 0.995, in 0.0..=0.9999;
+        /// times that boxes grow along each axis
+        expansions: u32 = 3, in 0..=16;
+        /// levels of the grid: 2 as in the paper; more cut a voxel again where it holds most triangles of
+        /// its top cell
+        levels: u32 = 3, in 2..=4;
+    }
+}
 
 /// The registry entry.
 pub struct IrregularGrid;
@@ -49,56 +67,7 @@ impl AccelKind for IrregularGrid {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        let number = |name, description, default, min, max| Parameter {
-            name,
-            description,
-            default: ParamValue::Number(default),
-            range: ParamRange::Number { min, max },
-        };
-        let integer = |name, description, default, min, max| Parameter {
-            name,
-            description,
-            default: ParamValue::Integer(default),
-            range: ParamRange::Integer { min, max },
-        };
-        vec![
-            number(
-                "lambda1",
-                "top cells per triangle of the scene",
-                0.12,
-                0.001,
-                100.0,
-            ),
-            number(
-                "lambda2",
-                "voxels of a top cell per triangle in it, rounded up to a power of two an axis",
-                2.4,
-                0.001,
-                100.0,
-            ),
-            number(
-                "alpha",
-                "merge on while a round leaves fewer than this part of the cells; 0: not at all",
-                0.995,
-                0.0,
-                0.9999,
-            ),
-            integer(
-                "expansions",
-                "times that boxes grow along each axis",
-                3,
-                0,
-                16,
-            ),
-            integer(
-                "levels",
-                "levels of the grid: 2 as in the paper; more cut a voxel again where it holds most \
-                 triangles of its top cell",
-                3,
-                2,
-                4,
-            ),
-        ]
+        Options::schema()
     }
 
     fn build(
@@ -107,16 +76,12 @@ impl AccelKind for IrregularGrid {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let params = &params.completed(&self.parameters())?;
-        let settings = Settings {
-            lambda1: params.number("lambda1"),
-            lambda2: params.number("lambda2"),
-            levels: params.integer("levels") as u32,
-        };
-        let mut partition = cut::cut(self.name(), soup, &settings, log)?;
-        let (alpha, passes) = (params.number("alpha"), params.integer("expansions") as u32);
-        log.phase("merge", || merge::merge(&mut partition, alpha));
-        log.phase("expand", || expand::expand(&mut partition, passes));
+        let options = Options::from_params(params)?;
+        let mut partition = cut::cut(self.name(), soup, &options, log)?;
+        log.phase("merge", || merge::merge(&mut partition, options.alpha));
+        log.phase("expand", || {
+            expand::expand(&mut partition, options.expansions)
+        });
         check_words(
             "cells of an irregular-grid",
             4 * partition.cells.len() as u64,
@@ -134,13 +99,6 @@ impl AccelKind for IrregularGrid {
             first_reference: arrays.first_reference,
         }))
     }
-}
-
-/// Parameters of the cutting.
-struct Settings {
-    lambda1: f64,
-    lambda2: f64,
-    levels: u32,
 }
 
 /// The grid between its phases.
@@ -397,13 +355,9 @@ mod tests {
     }
 
     fn cut_soup() -> Partition {
-        let settings = Settings {
-            lambda1: 0.12,
-            lambda2: 2.4,
-            levels: 3,
-        };
         let log = &mut BuildLog::default();
-        cut::cut("irregular-grid", &soup(), &settings, log).unwrap_or_else(|e| panic!("{e}"))
+        cut::cut("irregular-grid", &soup(), &Options::default(), log)
+            .unwrap_or_else(|e| panic!("{e}"))
     }
 
     fn volume(cells: &[Cell]) -> u64 {

@@ -4,11 +4,10 @@
 //! Source: I. Wald, V. Havran, "On building fast kd-trees for ray tracing, and on doing that in
 //! O(N log N)", 2006, algorithms 4 and 5.
 
-use super::Node;
+use super::{Node, Options};
 use crate::accel::bounds::Bounds;
 use crate::accel::spatial::{Margin, clip, corners, intersection};
 use crate::accel::{AccelError, BuildLog, TriangleSoup};
-use crate::params::Params;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -32,20 +31,20 @@ pub(super) struct KdTree {
 pub(super) fn build(
     soup: &TriangleSoup,
     bounds: Bounds,
-    params: &Params,
+    options: &Options,
     log: &mut BuildLog,
 ) -> Result<KdTree, AccelError> {
     let count = soup.records.len() as u64;
     AccelError::check_limit("triangles of a kd-tree", count, MAX_ITEMS - 1)?;
     let settings = Settings {
-        traversal_cost: params.number("traversal_cost") as f32,
-        intersection_cost: params.number("intersection_cost") as f32,
-        kept_if_empty: 1.0 - params.number("empty_bonus") as f32,
-        max_depth: match params.integer("max_depth") {
+        traversal_cost: options.traversal_cost,
+        intersection_cost: options.intersection_cost,
+        kept_if_empty: 1.0 - options.empty_bonus,
+        max_depth: match options.max_depth {
             0 => default_depth(soup.records.len()),
-            depth => depth as u32,
+            depth => depth,
         },
-        margin: params.flag("clip").then(|| Margin::new(&bounds)),
+        margin: options.clip.then(|| Margin::new(&bounds)),
         soup,
         references: AtomicU64::new(0),
     };

@@ -17,7 +17,8 @@ use super::{
     TriangleSoup,
 };
 use crate::gpu::UniformValues;
-use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
+use crate::params::{ParameterSchema, Parameters as _, Params};
 use bytemuck::{Pod, Zeroable};
 
 /// Low bits of [`Node::link`]: the axis of the plane, or [`LEAF`].
@@ -28,6 +29,22 @@ const LINK_SHIFT: u32 = 2;
 /// A cell that begins behind the hit by this factor ends the walk: all others on the stack begin
 /// no more than `BOX_PAD` before it. More than its square.
 const END_PAD: f32 = 1.000_004;
+
+parameters! {
+    /// Which cells are divided, and what they list.
+    struct Options {
+        /// deepest leaf; 0 stands for 8 + 1.3 log2 of the number of triangles
+        max_depth: u32 = 0, in 0..=64;
+        /// SAH cost of visiting an inner node
+        traversal_cost: f32 = 1.0, in 0.01..=100.0;
+        /// SAH cost of testing a triangle
+        intersection_cost: f32 = 1.0, in 0.01..=100.0;
+        /// fraction of its cost that a split saves which cuts off empty space
+        empty_bonus: f32 = 0.2, in 0.0..=0.9;
+        /// perfect splits: cells that a triangle's box reaches but the triangle does not are spared it
+        clip: bool = true;
+    }
+}
 
 /// The registry entry.
 pub struct KdTree;
@@ -42,47 +59,7 @@ impl AccelKind for KdTree {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        let number = |name, description, default, min, max| Parameter {
-            name,
-            description,
-            default: ParamValue::Number(default),
-            range: ParamRange::Number { min, max },
-        };
-        vec![
-            Parameter {
-                name: "max_depth",
-                description: "deepest leaf; 0 stands for 8 + 1.3 log2 of the number of triangles",
-                default: ParamValue::Integer(0),
-                range: ParamRange::Integer { min: 0, max: 64 },
-            },
-            number(
-                "traversal_cost",
-                "SAH cost of visiting an inner node",
-                1.0,
-                0.01,
-                100.0,
-            ),
-            number(
-                "intersection_cost",
-                "SAH cost of testing a triangle",
-                1.0,
-                0.01,
-                100.0,
-            ),
-            number(
-                "empty_bonus",
-                "fraction of its cost that a split saves which cuts off empty space",
-                0.2,
-                0.0,
-                0.9,
-            ),
-            Parameter {
-                name: "clip",
-                description: "perfect splits: cells that a triangle's box reaches but the triangle does not are spared it",
-                default: ParamValue::Flag(true),
-                range: ParamRange::Flag,
-            },
-        ]
+        Options::schema()
     }
 
     fn build(
@@ -91,7 +68,7 @@ impl AccelKind for KdTree {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let params = &params.completed(&self.parameters())?;
+        let options = Options::from_params(params)?;
         let bounds = if soup.records.is_empty() {
             Bounds {
                 min: [0.0; 3],
@@ -100,10 +77,10 @@ impl AccelKind for KdTree {
         } else {
             soup.bounds()
         };
-        let tree = build::build(soup, bounds, params, log)?;
+        let tree = build::build(soup, bounds, &options, log)?;
         let mut built = Built {
             bounds,
-            clipped: params.flag("clip"),
+            clipped: options.clip,
             nodes: tree.nodes,
             references: tree.references,
             stats: StructureStats::default(),

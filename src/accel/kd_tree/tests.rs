@@ -19,10 +19,11 @@ fn soup() -> TriangleSoup {
 }
 
 fn built(soup: &TriangleSoup, clip: bool) -> Built {
-    let defaults = KdTree.parameters().into_iter();
-    let mut params = Params(defaults.map(|p| (p.name.to_owned(), p.default)).collect());
-    params.0.insert("clip".to_owned(), ParamValue::Flag(clip));
-    let tree = build::build(soup, soup.bounds(), &params, &mut BuildLog::default());
+    let options = Options {
+        clip,
+        ..Options::default()
+    };
+    let tree = build::build(soup, soup.bounds(), &options, &mut BuildLog::default());
     let tree = tree.expect("it builds");
     let mut built = Built {
         bounds: soup.bounds(),

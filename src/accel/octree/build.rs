@@ -1,10 +1,9 @@
 //! The builder of `octree`: level by level, the cells of a level on all cores.
 
-use super::{INNER_SHIFT, LAST, LEAF, RootCell};
+use super::{INNER_SHIFT, LAST, LEAF, Options, RootCell};
 use crate::accel::bounds::Bounds;
 use crate::accel::spatial::{Margin, Overlap, corners};
 use crate::accel::{AccelError, TriangleSoup};
-use crate::params::Params;
 use rayon::prelude::*;
 
 /// Blocks of children are numbered with 23 bits.
@@ -45,9 +44,9 @@ struct Children {
 pub(super) fn build(
     soup: &TriangleSoup,
     space: &RootCell,
-    params: &Params,
+    options: &Options,
 ) -> Result<Octree, AccelError> {
-    let settings = Settings::new(soup, space, params);
+    let settings = Settings::new(soup, space, options);
     let mut tree = Octree {
         nodes: vec![0; 8],
         references: Vec::new(),
@@ -86,17 +85,17 @@ struct Settings<'a> {
 }
 
 impl<'a> Settings<'a> {
-    fn new(soup: &'a TriangleSoup, space: &'a RootCell, params: &Params) -> Self {
+    fn new(soup: &'a TriangleSoup, space: &'a RootCell, options: &Options) -> Self {
         Self {
             soup,
             space,
-            max_depth: match params.integer("max_depth") {
+            max_depth: match options.max_depth {
                 0 => default_depth(soup.records.len()),
-                depth => depth as u32,
+                depth => depth,
             },
-            leaf_size: params.integer("leaf_size") as usize,
-            traversal_cost: params.number("traversal_cost"),
-            margin: params.flag("clip").then(|| Margin::new(&soup.bounds())),
+            leaf_size: options.leaf_size,
+            traversal_cost: options.traversal_cost,
+            margin: options.clip.then(|| Margin::new(&soup.bounds())),
             boxes: soup.records.par_iter().map(|r| r.bounds()).collect(),
         }
     }

@@ -18,7 +18,8 @@ use super::{
     TriangleSoup,
 };
 use crate::gpu::UniformValues;
-use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
+use crate::params::{ParameterSchema, Parameters as _, Params};
 
 /// Marks the word of a leaf; the other bits are its first place in the references.
 const LEAF: u32 = 0x8000_0000;
@@ -31,7 +32,21 @@ const LAST: u32 = 0x8000_0000;
 /// no more than `BOX_PAD` before it. More than its square.
 const END_PAD: f32 = 1.000_004;
 /// Cells have integer positions that a float holds exactly.
-const DEEPEST: i64 = 20;
+const DEEPEST: u32 = 20;
+
+parameters! {
+    /// Which cells are divided, and what they list.
+    struct Options {
+        /// deepest leaf; 0 stands for 2 + log4 of the number of triangles
+        max_depth: u32 = 0, in 0..=DEEPEST;
+        /// cells of no more triangles are not divided
+        leaf_size: usize = 8, in 1..=1024;
+        /// SAH cost of visiting a cell in triangle tests; cells that would not gain are not divided
+        traversal_cost: f64 = 1.0, in 0.01..=100.0;
+        /// list a triangle by itself, not by its box
+        clip: bool = true;
+    }
+}
 
 /// The registry entry.
 pub struct Octree;
@@ -46,43 +61,7 @@ impl AccelKind for Octree {
     }
 
     fn parameters(&self) -> ParameterSchema {
-        let integer = |name, description, default, min, max| Parameter {
-            name,
-            description,
-            default: ParamValue::Integer(default),
-            range: ParamRange::Integer { min, max },
-        };
-        vec![
-            integer(
-                "max_depth",
-                "deepest leaf; 0 stands for 2 + log4 of the number of triangles",
-                0,
-                0,
-                DEEPEST,
-            ),
-            integer(
-                "leaf_size",
-                "cells of no more triangles are not divided",
-                8,
-                1,
-                1024,
-            ),
-            Parameter {
-                name: "traversal_cost",
-                description: "SAH cost of visiting a cell in triangle tests; cells that would not gain are not divided",
-                default: ParamValue::Number(1.0),
-                range: ParamRange::Number {
-                    min: 0.01,
-                    max: 100.0,
-                },
-            },
-            Parameter {
-                name: "clip",
-                description: "list a triangle by itself, not by its box",
-                default: ParamValue::Flag(true),
-                range: ParamRange::Flag,
-            },
-        ]
+        Options::schema()
     }
 
     fn build(
@@ -91,12 +70,12 @@ impl AccelKind for Octree {
         params: &Params,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let params = &params.completed(&self.parameters())?;
+        let options = Options::from_params(params)?;
         let space = RootCell::around(soup);
-        let tree = log.phase("levels", || build::build(soup, &space, params))?;
+        let tree = log.phase("levels", || build::build(soup, &space, &options))?;
         Ok(Box::new(Built {
             space,
-            clipped: params.flag("clip"),
+            clipped: options.clip,
             nodes: tree.nodes,
             references: tree.references,
             depth: tree.depth,

@@ -18,14 +18,13 @@ fn soup() -> TriangleSoup {
 }
 
 fn built(soup: &TriangleSoup, clip: bool) -> Built {
-    let defaults = Octree.parameters().into_iter();
-    let mut params = Params(defaults.map(|p| (p.name.to_owned(), p.default)).collect());
-    params.0.insert("clip".to_owned(), ParamValue::Flag(clip));
-    params
-        .0
-        .insert("leaf_size".to_owned(), ParamValue::Integer(4));
+    let options = Options {
+        clip,
+        leaf_size: 4,
+        ..Options::default()
+    };
     let space = RootCell::around(soup);
-    let tree = build::build(soup, &space, &params).expect("it builds");
+    let tree = build::build(soup, &space, &options).expect("it builds");
     Built {
         space,
         clipped: clip,

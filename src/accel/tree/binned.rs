@@ -8,7 +8,7 @@
 //! Source: I. Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007.
 
 use super::TreeNode;
-use super::parameters::{MAX_BINS, SAH_DEPTH, Settings};
+use super::parameters::{MAX_BINS, SAH_DEPTH, TreeParameters};
 use super::reference::{Box3, Reference, bounds_of};
 use super::subtree::{PARALLEL_GRAIN, Subtree, leaf, make_inner};
 use glam::Vec3A;
@@ -20,7 +20,7 @@ const EXHAUSTIVE: usize = 4;
 const PARALLEL_BINNING: usize = 1 << 16;
 
 /// The tree over `references`, which are brought into the order of the leaves.
-pub(super) fn build(references: &mut [Reference], settings: &Settings) -> Subtree {
+pub(super) fn build(references: &mut [Reference], settings: &TreeParameters) -> Subtree {
     let bounds = bounds_of(references);
     grow(references, bounds, 0, settings, 0)
 }
@@ -30,7 +30,7 @@ fn grow(
     references: &mut [Reference],
     bounds: Box3,
     first: u32,
-    settings: &Settings,
+    settings: &TreeParameters,
     depth: u32,
 ) -> Subtree {
     if references.len() <= PARALLEL_GRAIN {
@@ -56,7 +56,7 @@ fn append(
     references: &mut [Reference],
     bounds: Box3,
     first: u32,
-    settings: &Settings,
+    settings: &TreeParameters,
     depth: u32,
     nodes: &mut Vec<TreeNode>,
 ) {
@@ -78,7 +78,7 @@ fn append(
 fn split(
     references: &mut [Reference],
     bounds: Box3,
-    settings: &Settings,
+    settings: &TreeParameters,
     depth: u32,
 ) -> Option<(usize, [Box3; 2])> {
     let areas = references.iter().map(|r| r.bounds().half_area());

@@ -4,7 +4,7 @@
 //! exists already, so the decision is exact: for the given splits no other choice of leaves is
 //! cheaper.
 
-use super::parameters::Settings;
+use super::parameters::TreeParameters;
 use super::{NodeKind, Tree};
 
 /// What is known of a subtree once all below it is decided.
@@ -23,7 +23,7 @@ struct Below {
 
 /// Chooses the leaves of `tree`, whose leaves are consecutive runs of the order; a triangle that comes
 /// twice into one leaf is listed there once.
-pub(super) fn choose_leaves(tree: Tree, has_duplicates: bool, settings: &Settings) -> Tree {
+pub(super) fn choose_leaves(tree: Tree, has_duplicates: bool, settings: &TreeParameters) -> Tree {
     let mut below = vec![Below::default(); tree.nodes.len()];
     let triangles = |first: u32, count: u32| {
         let entries = &tree.order[first as usize..(first + count) as usize];
@@ -55,7 +55,7 @@ pub(super) fn choose_leaves(tree: Tree, has_duplicates: bool, settings: &Setting
                 };
                 if subtree.count as usize <= 2 * settings.leaf_size {
                     let count = triangles(subtree.first, subtree.count);
-                    let pays = leaf_cost(count) <= subtree.cost || count <= settings.min_leaf_size;
+                    let pays = leaf_cost(count) <= subtree.cost || count <= settings.least_leaf();
                     if count <= settings.leaf_size && pays {
                         subtree.cost = leaf_cost(count);
                         subtree.is_leaf = true;

@@ -18,12 +18,11 @@ mod subtree;
 mod sweep;
 
 pub use coverage::Coverage;
-pub use parameters::tree_parameters;
+pub use parameters::{Builder, Preset, TreeParameters};
 
 use super::bounds::Bounds;
 use super::{AccelError, BuildLog, TriangleSoup};
-use crate::params::Params;
-use parameters::{Builder, Settings};
+use crate::params::Choice as _;
 use reference::Reference;
 use sweep::Axes;
 
@@ -71,28 +70,27 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// Builds the tree with the builder that `params` name; phases are timed in `log`.
+    /// Builds the tree with the builder that `settings` name; phases are timed in `log`.
     ///
     /// # Errors
     /// A limit of the builder is exceeded.
     pub fn build(
         soup: &TriangleSoup,
-        params: &Params,
+        settings: &TreeParameters,
         log: &mut BuildLog,
     ) -> Result<Tree, AccelError> {
-        let settings = Settings::new(params);
         if soup.records.is_empty() {
             return Ok(Tree::default());
         }
         let references = log.phase("boxes", || reference::references(soup));
-        let name = params.name("builder");
-        let mut tree = log.phase(name, || Tree::grow(references, &settings))?;
+        let builder = settings.builder.name();
+        let mut tree = log.phase(builder, || Tree::grow(references, settings))?;
         if settings.reinsertion > 0 {
-            tree = log.phase("reinsertion", || reinsertion::optimise(tree, &settings));
+            tree = log.phase("reinsertion", || reinsertion::optimise(tree, settings));
         }
         let has_duplicates = tree.has_duplicates(soup);
         Ok(log.phase("leaves", || {
-            leaves::choose_leaves(tree, has_duplicates, &settings)
+            leaves::choose_leaves(tree, has_duplicates, settings)
         }))
     }
 
@@ -103,7 +101,7 @@ impl Tree {
     }
 
     /// The tree of the builder alone.
-    fn grow(mut references: Vec<Reference>, settings: &Settings) -> Result<Tree, AccelError> {
+    fn grow(mut references: Vec<Reference>, settings: &TreeParameters) -> Result<Tree, AccelError> {
         let (subtree, order) = match settings.builder {
             Builder::Binned => {
                 let subtree = binned::build(&mut references, settings);

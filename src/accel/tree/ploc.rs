@@ -5,7 +5,7 @@
 
 use super::Tree;
 use super::depth::limit_depth;
-use super::parameters::Settings;
+use super::parameters::{Preset, TreeParameters};
 use super::reference::{Box3, Reference};
 use super::subtree::{depth_first, leaf};
 use crate::accel::AccelError;
@@ -25,14 +25,14 @@ impl Boundable for Reference {
 }
 
 /// The parameters of obvhs' presets. Those that split triangles do without: see `sbvh`.
-fn preset(index: usize) -> BvhBuildParams {
-    match index {
-        0 => BvhBuildParams::fastest_build(),
-        1 => BvhBuildParams::very_fast_build(),
-        2 => BvhBuildParams::fast_build(),
-        3 => BvhBuildParams::medium_build(),
-        4 => BvhBuildParams::slow_build(),
-        _ => BvhBuildParams::very_slow_build(),
+fn preset(preset: Preset) -> BvhBuildParams {
+    match preset {
+        Preset::Fastest => BvhBuildParams::fastest_build(),
+        Preset::VeryFast => BvhBuildParams::very_fast_build(),
+        Preset::Fast => BvhBuildParams::fast_build(),
+        Preset::Medium => BvhBuildParams::medium_build(),
+        Preset::Slow => BvhBuildParams::slow_build(),
+        Preset::VerySlow => BvhBuildParams::very_slow_build(),
     }
 }
 
@@ -42,7 +42,7 @@ fn preset(index: usize) -> BvhBuildParams {
 /// A coordinate is too large or not a number.
 pub(super) fn build(
     references: &[Reference],
-    settings: &Settings,
+    settings: &TreeParameters,
     reinsertion: bool,
 ) -> Result<Tree, AccelError> {
     let usable = |x: &f32| x.abs() <= LARGEST_COORDINATE;
@@ -55,7 +55,7 @@ pub(super) fn build(
             bad.id, bad.min, bad.max
         )));
     }
-    let preset = preset(settings.preset);
+    let preset = preset(settings.ploc_preset);
     let ids = references.iter().map(|r| r.id).collect();
     let mut bvh = PlocBuilder::with_capacity(references.len()).build(
         preset.ploc_search_distance,

@@ -9,7 +9,7 @@
 //! hierarchy optimization", 2018 (rounds).
 
 use super::depth::depth_limit;
-use super::parameters::Settings;
+use super::parameters::TreeParameters;
 use super::reference::Box3;
 use super::subtree::{depth_first, leaf};
 use super::{NodeKind, Tree, TreeNode};
@@ -40,7 +40,7 @@ struct Move {
 }
 
 /// Improves `tree` by `settings.reinsertion` rounds; the leaves stay as they are.
-pub(super) fn optimise(tree: Tree, settings: &Settings) -> Tree {
+pub(super) fn optimise(tree: Tree, settings: &TreeParameters) -> Tree {
     let mut hierarchy = Hierarchy::new(&tree);
     let order = tree.order;
     drop(tree.nodes);

@@ -10,12 +10,12 @@
 //! Source: M. Stich, H. Friedrich, A. Dietrich, "Spatial splits in bounding volume hierarchies", 2009.
 
 use super::binned::{best_bin_split, median_split};
-use super::parameters::{SAH_DEPTH, Settings};
+use super::parameters::{SAH_DEPTH, TreeParameters};
 use super::reference::{Box3, Reference, bounds_of};
 use super::subtree::{PARALLEL_GRAIN, Subtree};
 
 /// The tree, with the order of the leaves. There are at most twice as many references as triangles.
-pub(super) fn build(references: Vec<Reference>, settings: &Settings) -> (Subtree, Vec<u32>) {
+pub(super) fn build(references: Vec<Reference>, settings: &TreeParameters) -> (Subtree, Vec<u32>) {
     let bounds = bounds_of(&references);
     let spatial = Spatial {
         settings,
@@ -28,7 +28,7 @@ pub(super) fn build(references: Vec<Reference>, settings: &Settings) -> (Subtree
 }
 
 struct Spatial<'a> {
-    settings: &'a Settings,
+    settings: &'a TreeParameters,
     /// Half area of overlap from which on spatial splits are tried.
     least_overlap: f32,
 }
@@ -149,7 +149,7 @@ struct Bin {
 fn best_plane(
     references: &[Reference],
     bounds: &Box3,
-    settings: &Settings,
+    settings: &TreeParameters,
     limit: f32,
 ) -> Option<Plane> {
     let count = settings.spatial_bins;

@@ -14,7 +14,7 @@
 //! in O(N log N)", 2006; the longest axis alone: A. Dufay, 2017, chapter 4.
 
 use super::TreeNode;
-use super::parameters::{SAH_DEPTH, Settings};
+use super::parameters::{SAH_DEPTH, TreeParameters};
 use super::reference::{Box3, Reference};
 use super::subtree::{PARALLEL_GRAIN, Subtree, leaf, make_inner};
 use rayon::prelude::*;
@@ -30,7 +30,7 @@ pub(super) enum Axes {
 pub(super) fn build(
     references: &[Reference],
     axes: Axes,
-    settings: &Settings,
+    settings: &TreeParameters,
 ) -> (Subtree, Vec<u32>) {
     let mut lists = [0, 1, 2].map(|axis| {
         let mut list: Vec<u32> = (0..references.len() as u32).collect();
@@ -57,7 +57,7 @@ pub(super) fn build(
 struct Sweep<'a> {
     references: &'a [Reference],
     axes: Axes,
-    settings: &'a Settings,
+    settings: &'a TreeParameters,
 }
 
 /// The sorted lists of a node: the same references along x, y and z.

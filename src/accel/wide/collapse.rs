@@ -5,10 +5,9 @@
 //! compressed wide BVHs", HPG 2017, section 3.2.
 
 use crate::accel::bounds::Bounds;
-use crate::accel::tree::{NodeKind, Tree};
+use crate::accel::tree::{NodeKind, Tree, TreeParameters};
 use crate::accel::triangle::TriangleRecord;
 use crate::accel::{StructureStats, TriangleSoup, leaf_histogram};
-use crate::params::Params;
 
 /// Most children of a node here; the cost table of a node has one entry less.
 const MAX_WIDTH: usize = 8;
@@ -75,13 +74,13 @@ pub struct CollapseSettings {
 }
 
 impl CollapseSettings {
-    /// Settings from the parameters of [`super::wide_parameters`].
-    pub fn new(width: usize, params: &Params) -> Self {
+    /// Settings from the parameters of the binary tree.
+    pub fn new(width: usize, parameters: &TreeParameters) -> Self {
         Self {
             width,
-            leaf_size: params.integer("leaf_size") as u32,
-            traversal_cost: params.number("traversal_cost") as f32,
-            intersection_cost: params.number("intersection_cost") as f32,
+            leaf_size: parameters.leaf_size as u32,
+            traversal_cost: parameters.traversal_cost,
+            intersection_cost: parameters.intersection_cost,
         }
     }
 }

@@ -9,44 +9,32 @@ pub use quantise::{Quantisation, enter_four, frame, leave_four};
 
 use super::bounds::Bounds;
 use super::ray::Hit;
-use super::tree::{Coverage, NodeKind, Tree, tree_parameters};
+use super::tree::{Coverage, NodeKind, Tree, TreeParameters};
 use super::triangle::TriangleRecord;
 use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
     AccelError, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats, TriangleSoup,
 };
-use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params};
+use crate::parameters;
 use bytemuck::Pod;
 use collapse::{CollapseSettings, WideTree};
 use std::ops::Range;
 
-/// Parameters of a wide structure: those of the binary tree it is collapsed from, with leaves of at
-/// most `max_leaf` triangles, and where kernels read it from.
-pub fn wide_parameters(max_leaf: u32) -> ParameterSchema {
-    let max = i64::from(max_leaf);
-    let mut schema = tree_parameters();
-    for parameter in &mut schema {
-        if parameter.name == "leaf_size" {
-            parameter.default = ParamValue::Integer(max);
-            parameter.range = ParamRange::Integer { min: 1, max };
-        }
+parameters! {
+    /// Where kernels read a wide structure from.
+    pub struct Memory {
+        /// read nodes and triangles as texels of textures instead of from buffers
+        texels: bool = true;
     }
-    schema.push(Parameter {
-        name: "texels",
-        description: "read nodes and triangles as texels of textures instead of from buffers",
-        default: ParamValue::Flag(true),
-        range: ParamRange::Flag,
-    });
-    schema
 }
 
 /// The binary tree to collapse, one triangle a leaf: the collapse decides about leaves.
-fn wide_tree(soup: &TriangleSoup, params: &Params, log: &mut BuildLog) -> Result<Tree, AccelError> {
-    let mut params = params.clone();
-    params
-        .0
-        .insert("leaf_size".to_owned(), ParamValue::Integer(1));
-    let tree = Tree::build(soup, &params, log)?;
+fn wide_tree(
+    soup: &TriangleSoup,
+    parameters: &TreeParameters,
+    log: &mut BuildLog,
+) -> Result<Tree, AccelError> {
+    let tree = Tree::build(soup, &parameters.with_single_leaves(), log)?;
     let largest = tree.nodes.iter().map(|node| match node.kind {
         NodeKind::Leaf { count, .. } => count,
         NodeKind::Inner { .. } => 0,
@@ -96,14 +84,15 @@ impl<N: WideNode> Wide<N> {
     /// The tree cannot be built, or there are more nodes than an index can name.
     pub fn build(
         soup: &TriangleSoup,
-        params: &Params,
+        parameters: &TreeParameters,
+        memory: &Memory,
         log: &mut BuildLog,
     ) -> Result<Box<dyn BuiltAccel>, AccelError>
     where
         N: 'static,
     {
-        let tree = wide_tree(soup, params, log)?;
-        let settings = CollapseSettings::new(N::WIDTH, params);
+        let tree = wide_tree(soup, parameters, log)?;
+        let settings = CollapseSettings::new(N::WIDTH, parameters);
         let wide = log.phase("collapse", || {
             WideTree::collapse(&tree, &settings, N::arrange)
         });
@@ -120,7 +109,7 @@ impl<N: WideNode> Wide<N> {
                 },
                 nodes,
                 leaf_triangles,
-                texels: params.flag("texels"),
+                texels: memory.texels,
             }
         })))
     }

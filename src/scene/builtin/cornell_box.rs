@@ -4,22 +4,27 @@
 //! Reflectances and the radiance of the light are the usual linear RGB conversions of the
 //! published spectra. The ceiling is a frame around the light, so that no two surfaces coincide.
 
-use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
+use super::super::{DEFAULT_IOR, Material};
 use super::BuiltinScene;
+use super::sphere::SphereGrid;
 use crate::geometry::Camera;
 use crate::parameters;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 parameters! {
     /// `cornell-box`.
-    pub(super) struct CornellBox {}
+    pub(super) struct CornellBox {
+        /// a ball of glass in the place of the short block
+        glass: bool = false;
+    }
 }
 
 const WHITE: u32 = 0;
 const RED: u32 = 1;
 const GREEN: u32 = 2;
 const LIGHT: u32 = 3;
+const GLASS: u32 = 4;
 
 type Quad = [[f32; 3]; 4];
 
@@ -95,6 +100,13 @@ const BLOCKS: [([[f32; 2]; 4], f32); 2] = [
     ),
 ];
 
+/// The ball: centre and radius. It stands clear of floor and walls, and shows no facets at usual sizes.
+const BALL: ([f64; 3], f64) = ([186.0, 91.0, 169.0], 90.0);
+const BALL_GRID: SphereGrid = SphereGrid {
+    bands: 96,
+    sectors: 192,
+};
+
 impl BuiltinScene for CornellBox {
     const NAME: &'static str = "cornell-box";
     const DESCRIPTION: &'static str =
@@ -114,7 +126,12 @@ impl BuiltinScene for CornellBox {
             quad(&mut builder, side, WHITE);
         }
         quad(&mut builder, LAMP, LIGHT);
-        for (top, height) in BLOCKS {
+        if self.glass {
+            let (centre, radius) = BALL;
+            let place = |v: DVec3| (DVec3::from(centre) + radius * v).as_vec3();
+            BALL_GRID.push(&mut builder, GLASS, place);
+        }
+        for (top, height) in BLOCKS.into_iter().skip(usize::from(self.glass)) {
             let at = |k: usize, y: f32| [top[k % 4][0], y, top[k % 4][1]];
             quad(&mut builder, [0, 1, 2, 3].map(|k| at(k, height)), WHITE);
             for k in 0..4 {
@@ -122,13 +139,17 @@ impl BuiltinScene for CornellBox {
                 quad(&mut builder, side, WHITE);
             }
         }
+        let mut materials = vec![
+            Material::diffuse("white", Vec3::new(0.725, 0.71, 0.68)),
+            Material::diffuse("red", Vec3::new(0.63, 0.065, 0.05)),
+            Material::diffuse("green", Vec3::new(0.14, 0.45, 0.091)),
+            Material::diffuse("light", Vec3::splat(0.78)).emitting(Vec3::new(18.4, 15.6, 8.0)),
+        ];
+        if self.glass {
+            materials.push(Material::dielectric("glass", Vec3::ONE, DEFAULT_IOR));
+        }
         let look = Look {
-            materials: vec![
-                Material::diffuse("white", Vec3::new(0.725, 0.71, 0.68)),
-                Material::diffuse("red", Vec3::new(0.63, 0.065, 0.05)),
-                Material::diffuse("green", Vec3::new(0.14, 0.45, 0.091)),
-                Material::diffuse("light", Vec3::splat(0.78)).emitting(Vec3::new(18.4, 15.6, 8.0)),
-            ],
+            materials,
             camera: Some(Camera {
                 eye: Vec3::new(278.0, 273.0, -800.0),
                 target: Vec3::new(278.0, 273.0, 0.0),
@@ -144,7 +165,25 @@ impl BuiltinScene for CornellBox {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::load_default;
+    use super::super::tests::{load_default, load_with};
+    use super::*;
+    use crate::params::ParamValue;
+    use crate::scene::DIELECTRIC;
+
+    #[test]
+    fn a_ball_of_glass_takes_the_place_of_one_block_and_stands_clear_of_all_else() {
+        let scene = load_with("cornell-box", &[("glass", ParamValue::Flag(true))]);
+        let plain = load_default("cornell-box");
+        let kind = |id: &u32| scene.materials[*id as usize].kind;
+        let others = scene
+            .material_ids
+            .iter()
+            .filter(|id| kind(id) != &DIELECTRIC);
+        assert_eq!(others.count(), plain.triangles.len() - 10);
+        let ([_, height, _], radius) = BALL;
+        assert!(height > radius);
+        assert_eq!(scene.bounds(), plain.bounds());
+    }
 
     #[test]
     fn the_box_has_the_published_extent_and_its_ceiling_leaves_room_for_the_light() {

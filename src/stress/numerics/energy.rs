@@ -1,4 +1,4 @@
-//! What long paths lose or gain where nothing is absorbed: a closed box of albedo 1.
+//! What long paths lose or gain where nothing is absorbed: a closed box of albedo 1, a ball of glass.
 
 use super::stage::{self, Stage};
 use super::{Figure, NumericsError};
@@ -7,7 +7,7 @@ use crate::integrator::{ConfiguredIntegrator, CountedRays, Integrator, Integrato
 use crate::measure::statistics::{mean, variance};
 use crate::params::{Params, Variant};
 use crate::sampling::dimensions;
-use crate::scene::SceneData;
+use crate::scene::{DEFAULT_IOR, Material, SceneData};
 use glam::Vec3;
 
 /// Bounces of the longest walk.
@@ -17,6 +17,7 @@ const SIZE: u32 = 32;
 const SPP: [u32; 2] = [256, 32];
 /// Depths of the path tracer; it allows 20.
 const PATH_DEPTHS: [&[i64]; 2] = [&[1, 20], &[20]];
+const GLASS_DEPTH: i64 = 20;
 
 /// The walk of `kernels/stress/energy.wesl` in the place of an integrator.
 struct Walk;
@@ -66,9 +67,29 @@ pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
     let mut figures = walk(gpu, spp)?;
     let stage = Stage::new(gpu, &white_box(1.0)?)?;
     for depth in PATH_DEPTHS[usize::from(quick)] {
-        figures.push(path(gpu, &stage, *depth, spp)?);
+        let truth = *depth as f64 + 1.0;
+        figures.push(path(gpu, &stage, *depth, spp, ("in a white box", truth))?);
     }
+    figures.push(glass(gpu, spp)?);
     Ok(figures)
+}
+
+/// The radiance in a ball of glass under a white sky: the square of its index, wherever one looks.
+fn glass(gpu: &Gpu, spp: u32) -> Result<Figure, NumericsError> {
+    let mut scene = stage::scene("white-furnace")?;
+    scene.materials = vec![Material::dielectric("glass", Vec3::ONE, DEFAULT_IOR)];
+    if let Some(camera) = &mut scene.camera {
+        camera.eye = Vec3::new(0.1, -0.2, 0.3);
+    }
+    let stage = Stage::new(gpu, &scene)?;
+    let index = f64::from(DEFAULT_IOR);
+    path(
+        gpu,
+        &stage,
+        GLASS_DEPTH,
+        spp,
+        ("in a ball of glass", index * index),
+    )
 }
 
 fn walk(gpu: &Gpu, spp: u32) -> Result<Vec<Figure>, NumericsError> {
@@ -101,8 +122,14 @@ fn walk(gpu: &Gpu, spp: u32) -> Result<Vec<Figure>, NumericsError> {
         .collect())
 }
 
-/// The radiance of the path tracer after `depth` bounces: one emission for each surface met.
-fn path(gpu: &Gpu, stage: &Stage, depth: i64, spp: u32) -> Result<Figure, NumericsError> {
+/// How far the radiance of the path tracer after `depth` bounces is off the truth.
+fn path(
+    gpu: &Gpu,
+    stage: &Stage,
+    depth: i64,
+    spp: u32,
+    (place, expected): (&str, f64),
+) -> Result<Figure, NumericsError> {
     let path = stage::path(Some(depth))?;
     let sampler = stage::sampler("pixel-hash", path.facts.dimensions)?;
     let renderer = stage.renderer(gpu, &path, &sampler, SIZE)?;
@@ -110,11 +137,10 @@ fn path(gpu: &Gpu, stage: &Stage, depth: i64, spp: u32) -> Result<Figure, Numeri
     renderer.add_samples(0, spp, 1)?;
     let image = renderer.image()?;
     let pixels: Vec<f64> = image.pixels.iter().map(|p| f64::from(p[0])).collect();
-    let expected = depth as f64 + 1.0;
     let error = (variance(&pixels).unwrap_or(f64::NAN) / pixels.len() as f64).sqrt();
     let drift = mean(&pixels).unwrap_or(f64::NAN) - expected;
     Ok(Figure::checked(
-        &format!("energy of the path tracer after {depth} bounces, off the truth"),
+        &format!("energy of the path tracer {place} after {depth} bounces, off the truth"),
         drift.abs() / error,
         5.0,
         "standard errors",

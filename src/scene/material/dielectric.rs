@@ -1,0 +1,155 @@
+//! Smooth dielectrics: glass, water, and panes of them.
+//!
+//! * MTL: illumination models 4, 6, 7 and 9 refract. The index is `Ni` (1.5 where it is missing); the body
+//!   filters light by `Tf`, at each of its two surfaces by the root. A missing or black `Tf` filters nothing:
+//!   exporters write 0 for "not stated". `d` below 1 with another model is a mixture of surface and
+//!   nothing, which no kind renders yet.
+//! * glTF: `KHR_materials_transmission` of at least a half on what is no metal, with the base colour as tint
+//!   and `KHR_materials_ior` (1.5 where it is missing). Walls are thin, as the standard has them, unless
+//!   `KHR_materials_volume` gives them a thickness.
+
+use super::{Description, Format, Look, Material, MaterialKind};
+use glam::Vec3;
+
+/// The kind.
+pub static DIELECTRIC: MaterialKind = MaterialKind {
+    name: "dielectric",
+    description: "smooth glass: Fresnel reflection, refraction tinted by the base colour (MTL illum 4, 6, 7, 9; \
+                  glTF transmission)",
+    parameters: &[
+        "index of refraction of the inside, relative to the outside",
+        "1 if both surfaces of a wall are one triangle, else 0",
+    ],
+    recognise,
+};
+
+/// Index of refraction where a file names none: window glass.
+pub const DEFAULT_IOR: f32 = 1.5;
+
+/// Beyond these no surface transmits anything worth a ray.
+const LEAST_IOR: f32 = 0.1;
+const GREATEST_IOR: f32 = 10.0;
+
+/// Illumination models of the MTL standard that refract.
+const ILLUM: [u8; 4] = [4, 6, 7, 9];
+/// Part of the light that is transmitted from which a surface counts as glass.
+const LEAST_TRANSMISSION: f32 = 0.5;
+/// Metalness from which nothing is transmitted.
+const METAL: f32 = 0.5;
+
+fn recognise(description: &Description<'_>) -> Option<Look> {
+    let source = description.source;
+    let (is_glass, tint, is_thin) = match description.format {
+        Format::Mtl => {
+            let filter = Vec3::from(source.filter.unwrap_or([1.0; 3]));
+            let stated = filter.is_finite() && filter.max_element() > 0.0;
+            let filter = if stated { filter } else { Vec3::ONE };
+            let tint = filter.clamp(Vec3::ZERO, Vec3::ONE).map(f32::sqrt);
+            (
+                source.illum.is_some_and(|i| ILLUM.contains(&i)),
+                tint,
+                false,
+            )
+        }
+        Format::Gltf => {
+            let transmits = source.transmission.is_some_and(|t| t >= LEAST_TRANSMISSION);
+            let is_metal = source.metallic.is_some_and(|m| m >= METAL);
+            let is_thin = source.thickness.is_none_or(|t| t <= 0.0);
+            let is_glass = transmits && !is_metal && !description.is_varied;
+            (is_glass, description.base_color, is_thin)
+        }
+    };
+    is_glass.then(|| Look {
+        base_color: tint,
+        parameters: parameters(source.ior, is_thin),
+    })
+}
+
+/// The index and whether the wall is thin. What is no index (0 in glTF stands for infinity) is that of glass.
+fn parameters(ior: Option<f32>, is_thin: bool) -> Vec<f32> {
+    let stated = ior.filter(|ior| ior.is_finite() && *ior > 0.0);
+    let ior = stated.unwrap_or(DEFAULT_IOR).clamp(LEAST_IOR, GREATEST_IOR);
+    vec![ior, if is_thin { 1.0 } else { 0.0 }]
+}
+
+impl Material {
+    /// The surface of a body of this index of refraction, whose corners turn counter-clockwise seen from outside. Light is
+    /// multiplied by `tint` at every passage.
+    pub fn dielectric(name: impl Into<String>, tint: Vec3, ior: f32) -> Self {
+        Self {
+            parameters: parameters(Some(ior), false),
+            ..Self::plain(name, &DIELECTRIC, tint)
+        }
+    }
+
+    /// The same as a wall without thickness: light passes straight on.
+    pub fn thin_dielectric(name: impl Into<String>, tint: Vec3, ior: f32) -> Self {
+        Self {
+            parameters: parameters(Some(ior), true),
+            ..Self::plain(name, &DIELECTRIC, tint)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::MaterialSource;
+    use super::*;
+
+    fn look(format: Format, source: MaterialSource) -> Option<(Vec3, Vec<f32>)> {
+        let description = Description {
+            format,
+            base_color: Vec3::splat(0.25),
+            is_varied: false,
+            source: &source,
+        };
+        recognise(&description).map(|look| (look.base_color, look.parameters))
+    }
+
+    #[test]
+    fn an_mtl_body_is_glass_by_its_model_and_filters_at_both_surfaces() {
+        let mtl = |illum, ior, filter| {
+            let source = MaterialSource {
+                illum: Some(illum),
+                ior,
+                filter,
+                ..MaterialSource::default()
+            };
+            look(Format::Mtl, source)
+        };
+        let half = Vec3::splat(0.5);
+        let clear = |ior: f32| Some((Vec3::ONE, vec![ior, 0.0]));
+        assert_eq!(
+            mtl(7, Some(1.33), Some([0.25; 3])),
+            Some((half, vec![1.33, 0.0]))
+        );
+        assert_eq!(mtl(4, None, None), clear(DEFAULT_IOR));
+        assert_eq!(mtl(6, Some(0.0), Some([0.0; 3])), clear(DEFAULT_IOR));
+        assert_eq!(
+            mtl(9, Some(f32::INFINITY), Some([f32::NAN; 3])),
+            clear(DEFAULT_IOR)
+        );
+        assert_eq!(mtl(2, Some(1.5), Some([1.0; 3])), None);
+        assert_eq!(mtl(5, Some(1.5), Some([1.0; 3])), None, "a mirror");
+    }
+
+    #[test]
+    fn a_gltf_surface_is_glass_by_its_transmission_and_thick_by_its_volume() {
+        let gltf = |transmission, metallic, thickness| {
+            let source = MaterialSource {
+                transmission: Some(transmission),
+                metallic: Some(metallic),
+                thickness,
+                ior: Some(1.4),
+                ..MaterialSource::default()
+            };
+            look(Format::Gltf, source)
+        };
+        let glass = |thin: f32| Some((Vec3::splat(0.25), vec![1.4, thin]));
+        assert_eq!(gltf(1.0, 0.0, None), glass(1.0));
+        assert_eq!(gltf(1.0, 0.0, Some(0.0)), glass(1.0));
+        assert_eq!(gltf(0.9, 0.0, Some(0.2)), glass(0.0));
+        assert_eq!(gltf(0.1, 0.0, Some(0.2)), None);
+        assert_eq!(gltf(1.0, 1.0, None), None, "metals transmit nothing");
+    }
+}

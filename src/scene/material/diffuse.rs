@@ -1,0 +1,19 @@
+//! Lambertian surfaces, and whatever no other kind recognises.
+
+use super::{Material, MaterialKind};
+use glam::Vec3;
+
+/// The kind.
+pub static DIFFUSE: MaterialKind = MaterialKind {
+    name: "diffuse",
+    description: "Lambertian reflection of the (possibly textured) base colour",
+    parameters: &[],
+    recognise: |_| None,
+};
+
+impl Material {
+    /// A plain Lambertian material, `color` being linear RGB reflectance.
+    pub fn diffuse(name: impl Into<String>, color: Vec3) -> Self {
+        Self::plain(name, &DIFFUSE, color)
+    }
+}

@@ -1,0 +1,163 @@
+//! Materials: what surfaces do with light. A kind of material is three files: its kernel in
+//! `kernels/shading/bsdf/`, a file here with its line in [`MATERIAL_KINDS`], and its line in the table of
+//! kernels, `kernels/shading/bsdf.wesl`. No integrator knows of it. How the parts fit: `docs/shading.md`.
+
+mod dielectric;
+mod diffuse;
+mod mirror;
+
+pub use dielectric::{DEFAULT_IOR, DIELECTRIC};
+pub use diffuse::DIFFUSE;
+pub use mirror::MIRROR;
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// A kind of material.
+pub struct MaterialKind {
+    /// Name; also the feature that brings its kernel into those of a scene.
+    pub name: &'static str,
+    /// One line: what it does with light.
+    pub description: &'static str,
+    /// What [`Material::parameters`] holds, in this order.
+    pub parameters: &'static [&'static str],
+    /// How a material that a file describes looks as one of this kind, if it is one. What none recognises
+    /// is diffuse.
+    recognise: fn(&Description<'_>) -> Option<Look>,
+}
+
+/// The table of kinds; a kind's place is its number in `kernels/shading/bsdf.wesl`. Where a file's material
+/// fits several, the last counts.
+pub static MATERIAL_KINDS: [&MaterialKind; 3] = [&DIFFUSE, &MIRROR, &DIELECTRIC];
+
+impl PartialEq for MaterialKind {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl fmt::Debug for MaterialKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+/// A surface material.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Material {
+    /// Name in the file, or a made-up one.
+    pub name: String,
+    /// What the kernels render.
+    pub kind: &'static MaterialKind,
+    /// Numbers that only this kind has, as [`MaterialKind::parameters`] names them.
+    pub parameters: Vec<f32>,
+    /// Linear RGB reflectance or tint, each in [0, 1]; multiplied by the texture if there is one.
+    pub base_color: Vec3,
+    /// Index into [`super::SceneData::textures`] of the base-colour texture.
+    pub base_color_texture: Option<u32>,
+    /// Emitted radiance, linear RGB, both sides of the triangle.
+    pub emission: Vec3,
+    /// What else the file said.
+    pub source: MaterialSource,
+}
+
+impl Material {
+    fn plain(name: impl Into<String>, kind: &'static MaterialKind, base_color: Vec3) -> Self {
+        Self {
+            name: name.into(),
+            kind,
+            parameters: Vec::new(),
+            base_color,
+            base_color_texture: None,
+            emission: Vec3::ZERO,
+            source: MaterialSource::default(),
+        }
+    }
+
+    /// The material that a file describes, without texture and emission.
+    pub(super) fn described(name: String, description: &Description<'_>) -> Self {
+        let mut kinds = MATERIAL_KINDS.iter().rev();
+        let found = kinds.find_map(|&kind| Some((kind, (kind.recognise)(description)?)));
+        let plain = Look {
+            base_color: description.base_color,
+            parameters: Vec::new(),
+        };
+        let (kind, look) = found.unwrap_or((&DIFFUSE, plain));
+        Self {
+            parameters: look.parameters,
+            source: description.source.clone(),
+            ..Self::plain(name, kind, reflectance(look.base_color))
+        }
+    }
+
+    /// The same material, emitting `radiance` (linear RGB) from both sides.
+    pub fn emitting(self, radiance: Vec3) -> Self {
+        Self {
+            emission: radiance,
+            ..self
+        }
+    }
+}
+
+/// What the file said of a material beyond what [`MaterialKind`] renders: kept, because more of it
+/// will be rendered later. Absent values are `None`, never a default.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct MaterialSource {
+    /// Linear roughness in [0, 1] (glTF), or derived from the Phong exponent (MTL).
+    pub roughness: Option<f32>,
+    /// Metalness in [0, 1] (glTF).
+    pub metallic: Option<f32>,
+    /// Specular colour (MTL `Ks`, glTF specular-glossiness).
+    pub specular: Option<[f32; 3]>,
+    /// Phong exponent (MTL `Ns`).
+    pub shininess: Option<f32>,
+    /// Index of refraction (MTL `Ni`, glTF `KHR_materials_ior`).
+    pub ior: Option<f32>,
+    /// Fraction of light transmitted, in [0, 1].
+    pub transmission: Option<f32>,
+    /// What is left of light that passed through the body (MTL `Tf`).
+    pub filter: Option<[f32; 3]>,
+    /// Thickness of the body below the surface (`KHR_materials_volume`); 0 is a thin wall.
+    pub thickness: Option<f32>,
+    /// Opacity in [0, 1] (MTL `d`, glTF alpha).
+    pub opacity: Option<f32>,
+    /// glTF alpha mode, as in the file (`OPAQUE`, `MASK`, `BLEND`).
+    pub alpha_mode: Option<String>,
+    /// MTL illumination model.
+    pub illum: Option<u8>,
+}
+
+/// The file formats that describe materials, each with its own rules.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Format {
+    Mtl,
+    Gltf,
+}
+
+/// What a file says of a material, for the kinds to recognise themselves in.
+pub(super) struct Description<'a> {
+    pub format: Format,
+    /// MTL `Kd`, glTF base or diffuse colour.
+    pub base_color: Vec3,
+    /// Whether a texture scales metalness, roughness or transmission: the numbers alone say nothing then.
+    pub is_varied: bool,
+    pub source: &'a MaterialSource,
+}
+
+/// A description as one kind renders it.
+struct Look {
+    base_color: Vec3,
+    parameters: Vec<f32>,
+}
+
+/// Finite and within [0, 1].
+pub(super) fn reflectance(color: Vec3) -> Vec3 {
+    Vec3::select(color.is_finite_mask(), color, Vec3::ZERO).clamp(Vec3::ZERO, Vec3::ONE)
+}
+
+/// Finite and not negative.
+pub(super) fn emitted(color: impl Into<Vec3>) -> Vec3 {
+    let color = color.into();
+    Vec3::select(color.is_finite_mask(), color, Vec3::ZERO).max(Vec3::ZERO)
+}

@@ -1,0 +1,154 @@
+//! Parameters that a library user declares: read, refused and swept like those of the program.
+
+use raystone::config::{Catalogue, Experiment};
+use raystone::parameters;
+use raystone::params::{
+    Choice as _, Entry, ParamError, ParamRange, ParamValue, Parameters as _, Params,
+};
+
+parameters! {
+    /// A lamp.
+    pub struct Lamp {
+        /// radiance,
+        /// any unit
+        power: f64 = 2.5, in 0.0..=10.0;
+        /// where it stands
+        place: Place = Place::OnTheCeiling;
+        /// What it is seen through.
+        glass: Glass { layers = 3, in 2..=4; };
+        /// whether it is on
+        r#loop: bool = true;
+    }
+
+    /// A pane.
+    pub struct Glass {
+        /// panes, one behind the other
+        layers: u32 = 1, in 0..=8;
+        /// share of the light that passes
+        clear: f32 = 0.2, in 0.0..=1.0;
+    }
+
+    /// Where a lamp stands.
+    pub enum Place {
+        /// Above.
+        OnTheCeiling = "on-the-ceiling",
+        /// Below.
+        OnTheFloor = "on-the-floor",
+    }
+}
+
+fn params(values: &[(&str, ParamValue)]) -> Params {
+    let owned = values
+        .iter()
+        .map(|(name, value)| ((*name).to_owned(), value.clone()));
+    Params(owned.collect())
+}
+
+#[test]
+fn one_declaration_gives_schema_defaults_and_fields() {
+    let schema = Lamp::schema();
+    let names: Vec<_> = schema.iter().map(|p| p.name).collect();
+    assert_eq!(names, ["power", "place", "layers", "clear", "loop"]);
+    assert_eq!(schema[0].description, "radiance, any unit");
+    // What a struct within says of itself, and what the one around it says instead.
+    assert_eq!(schema[2].range, ParamRange::Integer { min: 2, max: 4 });
+    assert_eq!(
+        Glass::schema()[0].range,
+        ParamRange::Integer { min: 0, max: 8 }
+    );
+    assert_eq!(
+        (Lamp::default().glass.layers, Glass::default().layers),
+        (3, 1)
+    );
+    // 0.2 as a file writes it, not the f64 of the f32.
+    assert_eq!(schema[3].default, ParamValue::Number(0.2));
+    assert_eq!(Lamp::from_params(&Params::default()), Ok(Lamp::default()));
+    assert_eq!(Place::from_name("on-the-floor"), Some(Place::OnTheFloor));
+    let set = params(&[
+        ("power", ParamValue::Integer(7)),
+        ("place", ParamValue::Name("on-the-floor".into())),
+        ("clear", ParamValue::Number(0.1)),
+        ("loop", ParamValue::Flag(false)),
+    ]);
+    let lamp = Lamp::from_params(&set).expect("values in their ranges");
+    assert_eq!((lamp.power, lamp.place), (7.0, Place::OnTheFloor));
+    assert_eq!((lamp.glass.clear, lamp.r#loop), (0.1, false));
+}
+
+#[test]
+fn what_does_not_fit_is_an_error_that_names_it_and_never_a_panic() {
+    let refused = |name: &str, value: ParamValue| {
+        let error = Lamp::from_params(&params(&[(name, value)])).err();
+        error
+            .unwrap_or_else(|| panic!("{name} is taken"))
+            .to_string()
+    };
+    let misspelt = refused("powr", ParamValue::Integer(1));
+    assert!(
+        misspelt.contains("`powr`") && misspelt.contains("`power`"),
+        "{misspelt}"
+    );
+    for (name, value, words) in [
+        ("power", ParamValue::Number(10.5), "[0, 10]"),
+        ("power", ParamValue::Number(f64::NAN), "[0, 10]"),
+        ("layers", ParamValue::Integer(1), "[2, 4]"),
+        ("layers", ParamValue::Integer(-1), "[2, 4]"),
+        ("layers", ParamValue::Number(3.0), "[2, 4]"),
+        (
+            "place",
+            ParamValue::Name("On-The-Floor".into()),
+            "on-the-floor",
+        ),
+        ("loop", ParamValue::Integer(1), "true or false"),
+    ] {
+        let error = refused(name, value);
+        assert!(
+            error.contains(&format!("`{name}`")) && error.contains(words),
+            "{error}"
+        );
+    }
+    // Read without being completed first: an old record may lack what was added since.
+    let missing = Lamp::read(&Params::default());
+    assert!(
+        matches!(missing, Err(ParamError::Value { name: "power", .. })),
+        "{missing:?}"
+    );
+}
+
+#[test]
+fn an_experiment_sweeps_them() {
+    let entry = |name: &str, schema| Entry {
+        name: name.to_owned(),
+        description: String::new(),
+        schema,
+    };
+    let mut catalogue: Catalogue = raystone::run::Registries::default().catalogue();
+    catalogue.accel.push(entry("lamp", Lamp::schema()));
+    let text = |values: &str| {
+        format!(
+            "[axes]\nscene = [\"cornell-box\"]\naccel = [\"lamp\"]\nsequence = [\"sobol\"]\n\
+             [accel.lamp]\n{values}\n"
+        )
+    };
+    let parse = |values: &str| Experiment::parse(&text(values), "lamp.toml", &[], &catalogue);
+    let swept = parse("layers = [2, 3]\nplace = [\"on-the-floor\", \"on-the-ceiling\"]");
+    let swept = swept.expect("values in their ranges");
+    let labels: Vec<_> = swept.axes.accel.iter().map(|v| v.label.as_str()).collect();
+    assert_eq!(
+        labels,
+        [
+            "lamp(place=on-the-floor,layers=2)",
+            "lamp(place=on-the-floor)",
+            "lamp(layers=2)",
+            "lamp",
+        ]
+    );
+    for (values, words) in [
+        ("layers = 5", "[2, 4]"),
+        ("layrs = 2", "`layers`"),
+        ("place = \"on-the-flor\"", "`on-the-floor`"),
+    ] {
+        let error = parse(values).expect_err(values).to_string();
+        assert!(error.contains(words), "{error}");
+    }
+}
