@@ -2,11 +2,11 @@
 
 use raystone::accel::tracer::rays_of_batch;
 use raystone::accel::{
-    AccelError, AccelKind, Access, BuildLog, BuiltAccel, BuiltBvh, Bvh, CpuTwin, GpuBuffers,
-    StructureStats, TracePasses, TraceSteps, TriangleSoup,
+    AccelError, AccelKind, Access, BuildLog, BuiltAccel, BuiltBvh, Bvh, BvhParameters, CpuTwin,
+    GpuBuffers, StructureStats, TracePasses, TraceSteps, TriangleSoup,
 };
 use raystone::gpu::{Bindings, Composition, GpuError, UniformValues};
-use raystone::params::{ParameterSchema, Params};
+use raystone::params::{ParameterSchema, Parameters as _, Params};
 use std::sync::Arc;
 
 /// Sets of rays of one octant and one of 512 cells.
@@ -57,7 +57,7 @@ impl AccelKind for SortedRays {
         let bounds = soup.bounds();
         let scale = |axis: usize| 8.0 / (bounds.max[axis] - bounds.min[axis]).max(1e-20);
         Ok(Box::new(Built {
-            tree: BuiltBvh::build(soup, params, log)?,
+            tree: BuiltBvh::build(soup, &BvhParameters::from_params(params)?, log)?,
             low: bounds.min,
             scale: [0, 1, 2].map(scale),
             counts_work: self.counts_work,
