@@ -258,7 +258,7 @@ fn planted_faults_are_seen() {
         (
             "surface.arriving + 2.0 * cos",
             "surface.arriving - 2.0 * cos",
-            "law of reflection",
+            "length of the direction",
         ),
     ] {
         let found = all_faults(kernels_with(file, &[(from, to)]));
