@@ -285,9 +285,16 @@ fn a_folder_that_cannot_be_written_is_told_before_anything_is_run() {
 fn a_report_that_cannot_be_written_costs_no_record() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     std::fs::create_dir_all(folder.path().join("index.html/taken")).expect("a folder");
-    let error = refused(folder.path(), AdapterChoice::Best);
-    assert_names(&error, &folder.path().join("index.html"));
-    let lines = records(folder.path());
+    let registries = Registries::default();
+    let (_, lines) = run(
+        &experiment(&["furnace-box"]),
+        &registries,
+        folder.path(),
+        None,
+    );
+    let error = raystone::report::write_report(folder.path()).expect_err("a taken name");
+    let page = folder.path().join("index.html").display().to_string();
+    assert!(error.to_string().contains(&page), "{error}");
     let last = lines.last().map(|line| &line.body);
     assert!(matches!(last, Some(Body::Finished(_))));
 }

@@ -96,7 +96,7 @@ pub const MUTANTS: &[Mutant] = &[
             "accel/brute_force",
             "i < limits.elements",
             "i + 1u < limits.elements",
-            2,
+            1,
         ),
         BRUTE,
         Check::Lattice,
@@ -104,11 +104,7 @@ pub const MUTANTS: &[Mutant] = &[
     row(
         "leaf-one-short",
         "a leaf's last triangle is not tested",
-        text(
-            "accel/leaf",
-            "place < first + count;",
-            "place + 1u < first + count;",
-        ),
+        text("accel/leaf", "place < end;", "place + 1u < end;"),
         BVH,
         Check::Lattice,
     ),

@@ -77,8 +77,8 @@ pub const MUTANTS: &[Mutant] = &[
         "a shadow ray is blocked by what lies behind its end",
         text(
             "accel/brute_force",
-            "return hit.triangle != NO_HIT;",
-            "return hit.triangle != NO_HIT || ray.t_max < ray.t_min;",
+            "return trace(ray, true).triangle != NO_HIT;",
+            "return trace(ray, true).triangle != NO_HIT || ray.t_max < ray.t_min;",
         ),
         BRUTE,
         Check::Lattice,

@@ -213,8 +213,8 @@ pub const MUTANTS: &[Mutant] = &[
         "a leaf of 31 triangles loses the last one",
         text(
             "accel/leaf",
-            "(reference >> COUNT_SHIFT) & COUNT_MASK, ray",
-            "min((reference >> COUNT_SHIFT) & COUNT_MASK, 30u), ray",
+            "((reference >> COUNT_SHIFT) & COUNT_MASK)",
+            "min((reference >> COUNT_SHIFT) & COUNT_MASK, 30u)",
         ),
         LARGE_LEAVES,
         Check::Lattice,

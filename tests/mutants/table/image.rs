@@ -161,8 +161,8 @@ pub const MUTANTS: &[Mutant] = &[
         "the normal points away from the ray",
         text(
             "shading/surface",
-            "dot(outside, ray.direction) > 0.0",
-            "dot(outside, ray.direction) < 0.0",
+            "dot(inward, ray.direction) > 0.0",
+            "dot(inward, ray.direction) < 0.0",
         ),
         IMAGES,
         Check::Furnace,
