@@ -355,7 +355,7 @@ fn a_stack_that_overflows_raises_the_error_word_and_one_of_the_right_size_does_n
         }));
         let panic = outcome.expect_err("the error word is raised");
         let text = panic.downcast_ref::<String>().expect("a text");
-        assert!(text.contains("error word"), "{name}: {text}");
+        assert!(text.contains("stack overflowed"), "{name}: {text}");
     }
 }
 
