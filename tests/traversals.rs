@@ -357,7 +357,7 @@ fn an_overflowing_stack_and_a_blown_step_fuse_raise_the_error_word() {
         assert_eq!(error_word("accel/stack", full, full, &changes), None);
         let told = error_word("accel/stack", full, "(*stack).held == 1u", &changes);
         let told = told.expect("an overflow");
-        assert!(told.contains("left: 2"), "{memory}: {told}");
+        assert!(told.contains("stack overflowed"), "{memory}: {told}");
     }
     for (traversal, module) in [
         ("stack", "stack"),
@@ -371,7 +371,7 @@ fn an_overflowing_stack_and_a_blown_step_fuse_raise_the_error_word() {
         let changes = [("traversal", traversal)];
         assert_eq!(error_word(&module, fuse, fuse, &changes), None);
         let told = error_word(&module, fuse, "step < 4u", &changes).expect("a blown fuse");
-        assert!(told.contains("left: 1"), "{traversal}: {told}");
+        assert!(told.contains("step fuse"), "{traversal}: {told}");
     }
 }
 
