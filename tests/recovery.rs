@@ -284,17 +284,17 @@ fn a_folder_that_cannot_be_written_is_told_before_anything_is_run() {
 #[test]
 fn a_report_that_cannot_be_written_costs_no_record() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    std::fs::create_dir_all(folder.path().join("index.html/taken")).expect("a folder");
     let registries = Registries::default();
-    let (_, lines) = run(
-        &experiment(&["furnace-box"]),
-        &registries,
-        folder.path(),
-        None,
-    );
+    let experiment = experiment(&["furnace-box"]);
+    let (_, measured) = run(&experiment, &registries, folder.path(), None);
+    let page = folder.path().join("index.html");
+    std::fs::remove_file(&page).expect("the page");
+    std::fs::create_dir_all(page.join("taken")).expect("a folder");
     let error = raystone::report::write_report(folder.path()).expect_err("a taken name");
-    let page = folder.path().join("index.html").display().to_string();
-    assert!(error.to_string().contains(&page), "{error}");
+    let text = error.to_string();
+    assert!(text.contains(&page.display().to_string()), "{text}");
+    let lines = records(folder.path());
+    assert_eq!(lines.len(), measured.len());
     let last = lines.last().map(|line| &line.body);
     assert!(matches!(last, Some(Body::Finished(_))));
 }
