@@ -108,7 +108,7 @@ fn rays_in_another_order_get_the_same_answers_and_counters() {
             ["counters", "any"].map(|feature| trace(&gpu, &*built, &case.soup, &rays, &[feature]))
         });
         let expected = brute_force(&case.soup, &rays);
-        assert_same_hits(&case.name.to_string(), &rays, &expected, &sorted[0].hits);
+        assert_same_hits(case.name, &rays, &expected, &sorted[0].hits);
         assert_eq!(sorted[0].work, plain[0].work, "{}", case.name);
         assert_eq!(sorted[1].found(), plain[1].found(), "{}", case.name);
     }
