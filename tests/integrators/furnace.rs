@@ -128,23 +128,28 @@ fn ball(gpu: &Gpu, material: Material, eye: Vec3) -> Estimate {
 const OUTSIDE: Vec3 = Vec3::new(0.0, 0.0, 3.0);
 const INSIDE: Vec3 = Vec3::new(0.1, -0.2, 0.3);
 
+/// What may be missing of 1: between facets, light that entered at a grazing angle meets the surface beyond
+/// the critical angle and goes round for more than [`LONG`] bounces.
+const TRAPPED: f64 = 0.01;
+
 /// What a ball of glass with the index 1.5 shows that it should not, if anything.
 fn glass_fault(gpu: &Gpu) -> Option<&'static str> {
     let glass = || Material::dielectric("glass", Vec3::ONE, 1.5);
     let pane = Material::thin_dielectric("pane", Vec3::ONE, 1.5);
     // Most samples are right to the last bits, and so few are ended by roulette that there may be no error
     // but rounding.
-    let is = |found: Estimate, right: f64| {
+    let is = |found: Estimate, right: f64, trapped: f64| {
         println!("{found:?} for {right}");
         let margin = 5.0 * found.error + 1e-5 * right;
-        found.error < 0.02 * right && (found.mean - right).abs() < margin
+        let low = right - trapped - margin;
+        found.error < 0.02 * right && (low..right + margin).contains(&found.mean)
     };
     [
         // What comes in goes out: a ball of glass cannot be seen where all around is equally bright.
-        ("outside", is(ball(gpu, glass(), OUTSIDE), 1.0)),
+        ("outside", is(ball(gpu, glass(), OUTSIDE), 1.0, TRAPPED)),
         // Radiance over the square of the index stays the same along a ray.
-        ("inside", is(ball(gpu, glass(), INSIDE), 1.5 * 1.5)),
-        ("bubble", is(ball(gpu, pane, OUTSIDE), 1.0)),
+        ("inside", is(ball(gpu, glass(), INSIDE), 1.5 * 1.5, 0.0)),
+        ("bubble", is(ball(gpu, pane, OUTSIDE), 1.0, 0.0)),
     ]
     .into_iter()
     .find_map(|(what, is_right)| (!is_right).then_some(what))
