@@ -19,7 +19,9 @@ fn soup() -> (&'static str, TriangleSoup) {
     let load = |name: &str| {
         let registries = raystone::run::Registries::default();
         let catalogue = registries.catalogue();
-        let built_in = catalogue.scene.iter().find(|entry| entry.name == name);
+        let built_in = catalogue[Axis::Scene]
+            .iter()
+            .find(|entry| entry.name == name);
         let file = || Variant {
             name: name.to_owned(),
             params: Params::default(),

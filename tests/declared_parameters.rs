@@ -123,7 +123,7 @@ fn an_experiment_sweeps_them() {
         schema,
     };
     let mut catalogue: Catalogue = raystone::run::Registries::default().catalogue();
-    catalogue.accel.push(entry("lamp", Lamp::schema()));
+    catalogue[Axis::Accel].push(entry("lamp", Lamp::schema()));
     let text = |values: &str| {
         format!(
             "[axes]\nscene = [\"cornell-box\"]\naccel = [\"lamp\"]\nsequence = [\"sobol\"]\n\

@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use clap::Args;
-use raystone::config::Catalogue;
+use raystone::config::{Axis, Catalogue};
 use raystone::gpu::{self, AdapterChoice, Gpu, KernelLibrary};
 use raystone::params::Variant;
 use raystone::run::{Registries, RunOptions, kernel_library};
@@ -89,7 +89,10 @@ pub fn list_override(key: &str, values: &[String]) -> String {
 /// The first one that does not.
 pub fn check_models(scenes: &[Variant], catalogue: &Catalogue) -> Result<(), SceneError> {
     for scene in scenes {
-        if catalogue.scene.iter().any(|entry| entry.name == scene.name) {
+        if catalogue[Axis::Scene]
+            .iter()
+            .any(|entry| entry.name == scene.name)
+        {
             continue;
         }
         check_model(Path::new(&scene.name))?;

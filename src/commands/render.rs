@@ -80,7 +80,7 @@ impl Render {
             Experiment::parse(DEFAULTS, "raystone render", &self.overrides(), &catalogue)?;
         check_is_one(&experiment)?;
         let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d))?;
-        check_models(&experiment.axes.scene, &catalogue)?;
+        check_models(&experiment.axes[Axis::Scene], &catalogue)?;
         // Only the picture is written: no folder is needed.
         let mut options = self.device.options(PathBuf::new(), false);
         options.allow_outside = self.allow_outside;
@@ -165,7 +165,7 @@ fn summary(rendering: &Rendering, [width, height]: [u32; 2]) -> String {
 /// One picture is one cell.
 fn check_is_one(experiment: &Experiment) -> Result<(), Failure> {
     for axis in Axis::ALL {
-        let variants = experiment.axes.variants(axis);
+        let variants = &experiment.axes[axis];
         if variants.len() > 1 {
             let labels: Vec<_> = variants.iter().map(|v| v.label.as_str()).collect();
             return Err(Failure::input(anyhow!(
@@ -235,15 +235,15 @@ mod tests {
         assert_eq!(experiment.spp.max(), 8);
         assert_eq!(experiment.resolution, [32, 24]);
         assert_eq!(experiment.seed, 9001);
-        assert_eq!(experiment.axes.accel[0].name, "roped-bvh");
-        assert_eq!(experiment.axes.scene[0].name, "cornell-box");
+        assert_eq!(experiment.axes[Axis::Accel][0].name, "roped-bvh");
+        assert_eq!(experiment.axes[Axis::Scene][0].name, "cornell-box");
     }
 
     #[test]
     fn a_scene_path_may_hold_commas_and_quotes() {
         let experiment = experiment(&["--scene", r#"my "a,b".obj"#]).unwrap();
-        assert_eq!(experiment.axes.scene.len(), 1);
-        assert_eq!(experiment.axes.scene[0].name, r#"my "a,b".obj"#);
+        assert_eq!(experiment.axes[Axis::Scene].len(), 1);
+        assert_eq!(experiment.axes[Axis::Scene][0].name, r#"my "a,b".obj"#);
     }
 
     #[test]

@@ -5,9 +5,8 @@ use super::failure::{FAILED, Failure};
 use super::output::{print, warn};
 use anyhow::anyhow;
 use clap::Args;
-use raystone::accel::triangle::TriangleTest;
-use raystone::accel::{BoxTest, Intersection, TriangleSoup};
-use raystone::config::{Catalogue, Experiment, Plan};
+use raystone::accel::TriangleSoup;
+use raystone::config::{Axis, Catalogue, Cell, Experiment, Plan};
 use raystone::params::Variant;
 use raystone::run::Registries;
 use raystone::scene::{LoadOptions, SceneData, load};
@@ -49,9 +48,12 @@ impl Trace {
     pub fn execute(self) -> Result<ExitCode, Failure> {
         let ray = parse_ray(&self.ray).map_err(|e| Failure::input(anyhow!("--ray: {e}")))?;
         let registries = Registries::default();
-        let (scene, accel) = self.variants(&registries)?;
-        let scene = self.load(&scene)?;
-        let soup = TriangleSoup::new(&scene).intersecting(self.intersection()?);
+        let cell = self.cell(&registries)?;
+        let scene = self.load(&cell[Axis::Scene])?;
+        let tests = registries.intersection(&cell);
+        let tests = tests.map_err(|e| Failure::input(anyhow!(e)))?;
+        let soup = TriangleSoup::new(&scene).intersecting(tests);
+        let accel = &cell[Axis::Accel];
         let kind = registries
             .accel
             .get(&accel.name)
@@ -65,29 +67,8 @@ impl Trace {
         })
     }
 
-    fn intersection(&self) -> Result<Intersection, Failure> {
-        let unknown = |what: &str, name: &str, known: Vec<&str>| {
-            Failure::input(anyhow!(
-                "--{what}: no `{name}`; there are: {}",
-                known.join(", ")
-            ))
-        };
-        let mut tests = Intersection::default();
-        if let Some(name) = &self.triangle {
-            let known = || TriangleTest::ALL.map(TriangleTest::name).to_vec();
-            tests.triangle =
-                TriangleTest::named(name).ok_or_else(|| unknown("triangle", name, known()))?;
-        }
-        if let Some(name) = &self.box_test {
-            let known = || BoxTest::ALL.map(|(_, name, _)| name).to_vec();
-            tests.box_test =
-                BoxTest::named(name).ok_or_else(|| unknown("box-test", name, known()))?;
-        }
-        Ok(tests)
-    }
-
-    /// Scene and structure with their parameters, read as those of an experiment file.
-    fn variants(&self, registries: &Registries) -> Result<(Variant, Variant), Failure> {
+    /// Scene, structure and tests with their parameters, read as those of an experiment file.
+    fn cell(&self, registries: &Registries) -> Result<Cell, Failure> {
         let catalogue = registries.catalogue();
         // A case of the suite is no scene of an experiment; any other one stands in its place there.
         let scene = match Address::parse(&self.scene) {
@@ -98,16 +79,21 @@ impl Trace {
             list_override("axes.scene", &[scene]),
             list_override("axes.accel", std::slice::from_ref(&self.accel)),
         ];
+        for (key, test) in [
+            ("axes.triangle", &self.triangle),
+            ("axes.box_test", &self.box_test),
+        ] {
+            overrides.extend(
+                test.iter()
+                    .map(|t| list_override(key, std::slice::from_ref(t))),
+            );
+        }
         overrides.extend(self.set.iter().cloned());
         let experiment =
             Experiment::parse(&text(&catalogue), "raystone trace", &overrides, &catalogue)?;
         let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d))?;
-        match (plan.scenes.first(), plan.structures.first()) {
-            (Some(scene), Some(cell)) => Ok((scene.clone(), cell.accel.clone())),
-            _ => Err(Failure::input(anyhow!(
-                "--set leaves no scene or no structure"
-            ))),
-        }
+        let cell = plan.structures.into_iter().next();
+        cell.ok_or_else(|| Failure::input(anyhow!("--set leaves no scene or no structure")))
     }
 
     fn load(&self, variant: &Variant) -> Result<SceneData, Failure> {
@@ -129,7 +115,9 @@ impl Trace {
 
 /// An experiment with everything but scene and structure.
 fn text(catalogue: &Catalogue) -> String {
-    let sequence = catalogue.sequence.first().map(|entry| entry.name.as_str());
+    let sequence = catalogue[Axis::Sequence]
+        .first()
+        .map(|entry| entry.name.as_str());
     format!(
         "[run]\nname = \"trace\"\n[axes]\nsequence = {}\n",
         toml::Value::from(sequence.unwrap_or_default()),

@@ -117,8 +117,8 @@ fn a_minimal_file_gets_the_documented_defaults() {
     assert_eq!(experiment.spp.max(), 32);
     assert!(experiment.runtime_checks);
     assert!(experiment.camera.is_none());
-    assert_eq!(labels(&experiment.axes.decorrelation), ["none"]);
-    assert_eq!(labels(&experiment.axes.integrator), ["path"]);
+    assert_eq!(labels(&experiment.axes[Axis::Decorrelation]), ["none"]);
+    assert_eq!(labels(&experiment.axes[Axis::Integrator]), ["path"]);
     assert_eq!(
         experiment.reference.sequence.params.0["hash"].to_string(),
         "pcg"
@@ -167,7 +167,7 @@ fn lists_of_parameters_make_variants_in_the_order_of_the_schema() {
          [sequence.pixel-hash]\nhash = \"wang\"\nshuffle = [false, true]\n",
     );
     assert_eq!(
-        labels(&experiment.axes.accel),
+        labels(&experiment.axes[Axis::Accel]),
         [
             "bvh",
             "uniform-grid(lambda=3)",
@@ -177,15 +177,15 @@ fn lists_of_parameters_make_variants_in_the_order_of_the_schema() {
         ]
     );
     assert_eq!(
-        experiment.axes.accel[1].params.0["lambda"],
+        experiment.axes[Axis::Accel][1].params.0["lambda"],
         ParamValue::Number(3.0)
     );
     assert_eq!(
-        experiment.axes.accel[2].params.0["max_cells"],
+        experiment.axes[Axis::Accel][2].params.0["max_cells"],
         ParamValue::Integer(8)
     );
     assert_eq!(
-        labels(&experiment.axes.sequence),
+        labels(&experiment.axes[Axis::Sequence]),
         [
             "pixel-hash(hash=wang)",
             "pixel-hash(hash=wang,shuffle=true)",
@@ -201,7 +201,7 @@ fn double_brackets_make_variants_side_by_side_and_none_twice() {
          [[accel.uniform-grid]]\nmax_cells = [4096, 8]\n",
     );
     assert_eq!(
-        labels(&experiment.axes.accel),
+        labels(&experiment.axes[Axis::Accel]),
         [
             "bvh",
             "uniform-grid(lambda=3)",
@@ -232,11 +232,11 @@ fn overrides_replace_values_of_the_file_and_are_cited() {
     assert_eq!(experiment.spp.max(), 4);
     assert_eq!(experiment.name, "other name");
     assert_eq!(
-        labels(&experiment.axes.scene),
+        labels(&experiment.axes[Axis::Scene]),
         ["dragon.ply", "cornell-box"]
     );
-    assert_eq!(experiment.axes.scene[0].name, "../models/dragon.ply");
-    assert_eq!(experiment.axes.accel.len(), 3);
+    assert_eq!(experiment.axes[Axis::Scene][0].name, "../models/dragon.ply");
+    assert_eq!(experiment.axes[Axis::Accel].len(), 3);
     assert_eq!(experiment.timing.rounds, 4);
     assert!(experiment.text.starts_with(&text));
     assert!(experiment.text.contains("# --set run.resolution=[32,16]\n"));
@@ -434,7 +434,7 @@ fn committed_experiments_parse_and_plan() {
                 .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
             assert!(!plan.times.is_empty() && !plan.streams.is_empty());
             // The saving is in the structures.
-            match experiment.axes.accel.len() {
+            match experiment.axes[Axis::Accel].len() {
                 1 => assert_eq!(plan.renders_planned, plan.renders_full_product),
                 _ => assert!(plan.renders_planned < plan.renders_full_product),
             }

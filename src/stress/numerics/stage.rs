@@ -4,7 +4,9 @@ use super::NumericsError;
 use crate::accel::{AccelRegistry, Intersection, Traced};
 use crate::geometry::Camera;
 use crate::gpu::Gpu;
-use crate::integrator::{self, ConfiguredIntegrator, IntegratorRegistry, RenderJob, Renderer};
+use crate::integrator::{
+    self, ConfiguredIntegrator, IntegratorRegistry, RayOffset, RenderJob, Renderer,
+};
 use crate::params::{Entry, ParamValue, Variant};
 use crate::sampling::{Demand, Sampler, SamplerRegistry};
 use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
@@ -89,6 +91,7 @@ impl Stage {
             camera: self.camera,
             sampler,
             integrator,
+            offset: RayOffset::default(),
             runtime_checks: true,
         };
         Ok(Renderer::new(
