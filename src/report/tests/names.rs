@@ -87,7 +87,9 @@ fn two_triangle_or_box_tests_make_two_competitors_and_two_views_each() {
                 assert!(shown.contains(name), "{name} of {axis}");
             }
         }
-        let row = text.lines().find(|line| line.starts_with("roped-bvh · theirs"));
+        let row = text
+            .lines()
+            .find(|line| line.starts_with("roped-bvh · theirs"));
         let words: Vec<&str> = row.unwrap_or_default().split_whitespace().collect();
         assert_eq!(words[3..5], ["passed", "2.49"], "{text}");
         let plots = ["path-ours-0-pareto", "path-theirs-1-pareto"];
