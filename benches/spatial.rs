@@ -3,6 +3,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use raystone::accel::{AccelRegistry, BuildLog, TriangleSoup};
+use raystone::config::Axis;
 use raystone::params::{ParamValue, Params, Variant};
 use raystone::scene::{self, LoadOptions};
 

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{Pcg, brute_force, build, default_params, differences, scenes, trace};
-use raystone::accel::{AccelRegistry, Hit, Intersection, Ray, TriangleSoup};
+use raystone::accel::{AccelRegistry, Hit, Intersection, Ray, TriangleRegistry, TriangleSoup};
 use raystone::gpu::{Gpu, KernelLibrary};
 
 /// One fault: replace `from` by `to` in the kernel `file`; structures whose answers must go wrong.
@@ -161,7 +161,10 @@ const FAULTS: &[Fault] = &[
 fn cases(triangle: &str) -> Vec<(TriangleSoup, Vec<Ray>, Vec<Hit>)> {
     let case = |seed| {
         let mut rng = Pcg::new(seed);
-        let tests = Intersection::named(triangle, "padded-16").expect("two tests");
+        let tests = Intersection {
+            triangle: TriangleRegistry::default().get(triangle).expect("a test"),
+            ..Intersection::default()
+        };
         let soup = scenes::lattice_soup(&mut rng, 200, 6).intersecting(tests);
         let mut rays = scenes::lattice_rays(&mut rng, 2048, 6);
         rays.extend(scenes::aimed_rays(&mut rng, &soup, 2048));

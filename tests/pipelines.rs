@@ -7,6 +7,7 @@ mod sorted_rays;
 
 use common::{Pcg, assert_same_hits, brute_force, build, default_params, scenes, trace};
 use raystone::accel::{AccelKind, Bvh};
+use raystone::config::Axis;
 use raystone::config::{Experiment, Plan};
 use raystone::gpu::KernelLibrary;
 use raystone::measure::record::GateVerdict;
@@ -85,7 +86,12 @@ fn verdicts(kernels: &Path) -> Vec<(String, GateVerdict)> {
     );
     let verified = verified.unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(verified.len(), 3);
-    let verdict = |v: raystone::run::Verified| (v.accel.name, v.verdict.expect("a verdict"));
+    let verdict = |v: raystone::run::Verified| {
+        (
+            v.cell[Axis::Accel].name.clone(),
+            v.verdict.expect("a verdict"),
+        )
+    };
     verified.into_iter().map(verdict).collect()
 }
 

@@ -2,7 +2,7 @@
 
 mod support;
 
-use raystone::config::Experiment;
+use raystone::config::{Axis, Experiment};
 use raystone::discrepancy::{Budget, Measure, PointSet, Value, measure};
 use raystone::integrator::integrand::Function;
 use raystone::measure::record::{

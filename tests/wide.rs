@@ -4,6 +4,7 @@ mod common;
 
 use common::{Pcg, assert_same_hits, brute_force, build, default_params, scenes, trace};
 use raystone::accel::{AccelKind, AccelRegistry, Counters, TriangleSoup, brute_force_hits};
+use raystone::config::Axis;
 use raystone::params::{ParamValue, Params};
 
 const WIDE: [&str; 2] = ["bvh4", "cwbvh"];

@@ -278,6 +278,7 @@ fn faults(verdict: &Result<GateVerdict, String>) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use raystone::config::Cell;
     use raystone::measure::record::RayClass;
     use raystone::params::{Params, Variant};
 
@@ -319,8 +320,9 @@ mod tests {
     #[test]
     fn a_wrong_ray_is_counted_shown_and_fails_the_structure() {
         let one = |verdict| Verified {
-            scene: variant("cornell-box"),
-            accel: variant("bvh"),
+            cell: Cell::default()
+                .with(Axis::Scene, &variant("cornell-box"))
+                .with(Axis::Accel, &variant("bvh")),
             verdict,
             bad_input: false,
             refused: false,

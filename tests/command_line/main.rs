@@ -4,6 +4,7 @@ mod models;
 mod pictures;
 mod points;
 
+use raystone::config::Axis;
 use raystone::discrepancy::Measure;
 use raystone::measure::metrics::METRICS;
 use raystone::run::Registries;

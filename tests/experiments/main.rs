@@ -59,13 +59,16 @@ fn catalogue() -> Catalogue {
             parameter("shuffle", ParamValue::Flag(false), ParamRange::Flag),
         ],
     ));
-    Catalogue {
-        scene: plain(&["cornell-box", "displaced-sphere", "teapot-in-a-stadium"]),
-        accel,
-        sequence,
-        decorrelation: plain(&["none", "cranley-patterson"]),
-        integrator: plain(&["primary", "ao", "path"]),
-    }
+    let mut catalogue = Catalogue::default();
+    catalogue[Axis::Scene] = plain(&["cornell-box", "displaced-sphere", "teapot-in-a-stadium"]);
+    catalogue[Axis::Accel] = accel;
+    catalogue[Axis::Sequence] = sequence;
+    catalogue[Axis::Decorrelation] = plain(&["none", "cranley-patterson"]);
+    catalogue[Axis::Integrator] = plain(&["primary", "ao", "path"]);
+    catalogue[Axis::Triangle] = plain(&["watertight", "pluecker"]);
+    catalogue[Axis::BoxTest] = plain(&["padded-16", "plain"]);
+    catalogue[Axis::Offset] = plain(&["error-bound", "none"]);
+    catalogue
 }
 
 const AXES: &str = "[axes]\nscene = [\"cornell-box\"]\naccel = [\"bvh\", \"uniform-grid\"]\n\
@@ -295,12 +298,12 @@ fn a_plan_measures_errors_once_and_times_every_cell() {
     assert_eq!(plan.times.len(), 7 * 2 * 3);
     assert_eq!(plan.streams.len(), 3);
     // Two samplers are randomised and need 4 renders, one is not and needs 1.
-    assert_eq!(plan.renders_planned, 2 * 2 * (4 + 4 + 1));
-    assert_eq!(plan.renders_full_product, 7 * 2 * (4 + 4 + 1));
+    assert_eq!(plan.renders_planned(), 2 * 2 * (4 + 4 + 1));
+    assert_eq!(plan.renders_full_product(), 7 * 2 * (4 + 4 + 1));
     let brute_force = plan
         .structures
         .iter()
-        .filter(|s| s.accel.name == "brute-force");
+        .filter(|s| s[Axis::Accel].name == "brute-force");
     assert_eq!(brute_force.count(), 1);
     let cells: Vec<usize> = plan.skipped.iter().map(|skipped| skipped.cells).collect();
     assert_eq!(cells, [2 * 4 * 2, 2 * 4]);
@@ -404,7 +407,11 @@ fn every_default_is_accepted_by_the_parser() {
         let Some(default) = key.default else { continue };
         let (section, name) = (key.section, key.name);
         let mut text = String::new();
-        if section != "axes" {
+        if section == "axes" {
+            if !AXES.contains(&format!("\n{name} = ")) {
+                text = format!("{name} = {default}\n");
+            }
+        } else {
             text = format!("[{section}]\n{name} = {default}\n");
         }
         if section == "camera" {
@@ -412,7 +419,6 @@ fn every_default_is_accepted_by_the_parser() {
         }
         good(&text);
     }
-    assert_eq!(Axis::ALL.len(), 6);
 }
 
 #[test]
@@ -435,8 +441,8 @@ fn committed_experiments_parse_and_plan() {
             assert!(!plan.times.is_empty() && !plan.streams.is_empty());
             // The saving is in the structures.
             match experiment.axes[Axis::Accel].len() {
-                1 => assert_eq!(plan.renders_planned, plan.renders_full_product),
-                _ => assert!(plan.renders_planned < plan.renders_full_product),
+                1 => assert_eq!(plan.renders_planned(), plan.renders_full_product()),
+                _ => assert!(plan.renders_planned() < plan.renders_full_product()),
             }
             seen += 1;
         }
