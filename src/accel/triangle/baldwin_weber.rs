@@ -43,7 +43,7 @@ impl Transform {
 }
 
 /// The transform of a triangle; one that is never met, if it has no area or is out of range.
-fn transform(triangle: &TriangleRecord) -> Transform {
+fn load_transform(triangle: &TriangleRecord) -> Transform {
     let [e, f] = triangle.edges();
     let normal = cross(e, f);
     let axis = (0..3).fold(0, |best, axis| {
@@ -90,11 +90,11 @@ impl TriangleTest for BaldwinWeber {
     }
 
     fn transformed(&self, triangle: &TriangleRecord) -> Option<[[u32; 4]; 3]> {
-        Some(transform(triangle).words())
+        Some(load_transform(triangle).words())
     }
 
     fn meet(&self, triangle: &TriangleRecord, ray: &Ray, _: &[f32; 3]) -> Meeting {
-        let m = transform(triangle);
+        let m = load_transform(triangle);
         let o = turned(ray.origin, m.axis);
         let d = turned(ray.direction, m.axis);
         let det = d[2] + m.plane[0] * d[0] + m.plane[1] * d[1];
@@ -120,7 +120,7 @@ impl TriangleTest for BaldwinWeber {
         _: &[f32; 3],
         found: &Meeting,
     ) -> [f32; 3] {
-        let m = transform(triangle);
+        let m = load_transform(triangle);
         let signed = turned(ray.direction, m.axis);
         let o = turned(ray.origin, m.axis).map(f32::abs);
         let d = signed.map(f32::abs);
