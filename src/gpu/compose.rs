@@ -173,7 +173,10 @@ impl KernelLibrary {
         let composition = &composition.clone().completed();
         let mut resolver = VirtualResolver::new();
         let mut paths = BTreeMap::new();
-        let own = self.files.iter().map(|(name, file)| Ok((name.clone(), file)));
+        let own = self
+            .files
+            .iter()
+            .map(|(name, file)| Ok((name.clone(), file)));
         let chosen = composition.active.iter().map(|(active, name)| {
             let missing = || {
                 GpuError::Kernel(format!("there is no kernel `{name}.wesl` (wanted as the active {active}); add it under kernels/ or to the folder given by --kernels"))

@@ -197,6 +197,7 @@ impl Gpu {
     /// # Errors
     /// The device is lost or does not finish in time.
     pub fn read<T: Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
-        self.play(Recording::new().download("", buffer))?.download("")
+        self.play(Recording::new().download("", buffer))?
+            .download("")
     }
 }

@@ -185,7 +185,12 @@ pub fn dump_stream(
             );
         let mut recording = Recording::new();
         recording
-            .run("words", &pipeline, &bindings, groups_for(words.len() as u32))
+            .run(
+                "words",
+                &pipeline,
+                &bindings,
+                groups_for(words.len() as u32),
+            )
             .download("stream", &stream);
         let mut out: Vec<u32> = gpu.play(&recording)?.download("stream")?;
         out.truncate(words.len());

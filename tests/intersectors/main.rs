@@ -187,7 +187,12 @@ fn kernel_and_twin_of_every_offset_agree_to_the_bit() {
             .buffer("hits", &output);
         let mut recording = Recording::new();
         recording
-            .run("offsets", &pipeline, &bindings, groups_for(points.len() as u32))
+            .run(
+                "offsets",
+                &pipeline,
+                &bindings,
+                groups_for(points.len() as u32),
+            )
             .download("hits", &output);
         let played = gpu.play(&recording).expect("runs");
         let found: Vec<[f32; 4]> = played.download("hits").expect("hits");
