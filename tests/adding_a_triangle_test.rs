@@ -194,6 +194,6 @@ fn a_sweep_over_offsets_shows_the_bias_of_rays_that_are_not_moved() {
         (found.by_design, found.verdict.clone())
     };
     assert_eq!(verdict("none"), (true, BiasVerdict::Biased));
-    assert_eq!(verdict("error-bound").0, false);
+    assert!(!verdict("error-bound").0);
     assert_ne!(verdict("error-bound").1, BiasVerdict::Biased);
 }
