@@ -1,7 +1,7 @@
 //! Words to floats in [0, 1). Judges `to_unit` of `kernels/sampling/sampler.wesl` through
 //! `kernels/stress/conversion.wesl`.
 
-use super::{Figure, NumericsError, U, evaluate, stage};
+use super::{Gauge, NumericsError, U, evaluate, stage};
 use crate::gpu::{Composition, Gpu, UniformValues, groups_for};
 use crate::integrator::with_sampler;
 
@@ -12,7 +12,7 @@ const TOP: u32 = 512;
 
 /// Whether every draw keeps its upper 24 bits and none is 1, over all values of these bits, or over
 /// every 16th of them where it has to be quick.
-pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
+pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let stride: u32 = if quick { 1 << 12 } else { 1 << 8 };
     let words = u32::MAX / stride + 1;
     let (mut wrong, mut largest) = (0_u64, 0.0_f64);
@@ -30,28 +30,28 @@ pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
     let ones = |column: usize| top.iter().filter(|pair| pair[column] >= 1.0).count();
     let tried = format!("of {words} words with lower bits of ones");
     Ok(vec![
-        Figure::checked(
+        Gauge::checked(
             "draws that lose one of 24 bits",
             wrong as f64,
             0.0,
             "words",
             tried,
         ),
-        Figure::checked(
+        Gauge::checked(
             "largest draw",
             largest,
             1.0 - U,
             "",
             "1 would be outside of all tables",
         ),
-        Figure::checked(
+        Gauge::checked(
             "draws that are 1",
             ones(0) as f64,
             0.0,
             "words",
             format!("of the {TOP} largest words"),
         ),
-        Figure::shown(
+        Gauge::shown(
             "words that f32(x) · 2⁻³² makes 1",
             ones(1) as f64,
             "words",

@@ -1,7 +1,7 @@
 //! The same seed twice, and in other slices: the same bits. The hashes tell adapters apart.
 
 use super::stage::{self, Stage};
-use super::{Figure, NumericsError};
+use super::{Gauge, NumericsError};
 use crate::gpu::Gpu;
 use crate::image::Image;
 use crate::run::dump_stream;
@@ -14,13 +14,13 @@ const SEED: u32 = 5;
 const POINTS: u32 = 1 << 16;
 
 /// Renders and draws everything twice.
-pub fn figures(gpu: &Gpu) -> Result<Vec<Figure>, NumericsError> {
+pub fn figures(gpu: &Gpu) -> Result<Vec<Gauge>, NumericsError> {
     let mut figures = image(gpu)?;
     figures.push(stream(gpu)?);
     Ok(figures)
 }
 
-fn image(gpu: &Gpu) -> Result<Vec<Figure>, NumericsError> {
+fn image(gpu: &Gpu) -> Result<Vec<Gauge>, NumericsError> {
     let stage = Stage::new(gpu, &stage::scene("cornell-box")?)?;
     let path = stage::path(None)?;
     let sampler = stage::sampler("sobol", path.facts.dimensions)?;
@@ -43,14 +43,14 @@ fn image(gpu: &Gpu) -> Result<Vec<Figure>, NumericsError> {
         hash(bytemuck::cast_slice(&first.pixels))
     );
     Ok(vec![
-        Figure::checked(
+        Gauge::checked(
             "pixels that differ when rendered again",
             differing(&again),
             0.0,
             "pixels",
             note,
         ),
-        Figure::checked(
+        Gauge::checked(
             "pixels that differ when rendered in slices",
             differing(&in_slices),
             0.0,
@@ -60,7 +60,7 @@ fn image(gpu: &Gpu) -> Result<Vec<Figure>, NumericsError> {
     ])
 }
 
-fn stream(gpu: &Gpu) -> Result<Figure, NumericsError> {
+fn stream(gpu: &Gpu) -> Result<Gauge, NumericsError> {
     let sampler = stage::sampler("pixel-hash", dimensions::needed(6))?;
     let coordinates: Vec<Coordinate> = (0..POINTS)
         .map(|k| Coordinate {
@@ -77,7 +77,7 @@ fn stream(gpu: &Gpu) -> Result<Figure, NumericsError> {
         "{POINTS} words, hash {}",
         hash(bytemuck::cast_slice(&first))
     );
-    Ok(Figure::checked(
+    Ok(Gauge::checked(
         "drawn words that differ when drawn again",
         differing as f64,
         0.0,

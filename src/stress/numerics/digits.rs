@@ -1,6 +1,6 @@
 //! Radical inverses at large indices against exact rationals.
 
-use super::{Figure, NumericsError, stage};
+use super::{Gauge, NumericsError, stage};
 use crate::gpu::Gpu;
 use crate::run::dump_stream;
 use crate::sampling::Coordinate;
@@ -9,7 +9,7 @@ use crate::sampling::Coordinate;
 const DIMENSIONS: u32 = 256;
 
 /// How far the adapter's words of `halton` lie from the exact points, for indices up to 2³² − 1.
-pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
+pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let sampler = stage::sampler("halton", DIMENSIONS)?;
     let step = if quick { 16 } else { 1 };
     let coordinates: Vec<Coordinate> = (0..DIMENSIONS)
@@ -43,21 +43,21 @@ pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
         words.len()
     );
     Ok(vec![
-        Figure::checked(
+        Gauge::checked(
             "Halton words that differ from the host's",
             other as f64,
             0.0,
             "words",
             &*tried,
         ),
-        Figure::checked(
+        Gauge::checked(
             "error of Halton points over its bound",
             beyond,
             1.0,
             "",
             "the bound is 32 · base · 2⁻³²: what truncated divisions lose",
         ),
-        Figure::shown(
+        Gauge::shown(
             "largest error of a Halton point",
             lost / 256.0,
             "2⁻²⁴",

@@ -1,7 +1,7 @@
 //! What long paths lose or gain where nothing is absorbed: a closed box of albedo 1, a ball of glass.
 
 use super::stage::{self, Stage};
-use super::{Figure, NumericsError};
+use super::{Gauge, NumericsError};
 use crate::gpu::Gpu;
 use crate::integrator::{ConfiguredIntegrator, CountedRays, Integrator, IntegratorFacts};
 use crate::measure::statistics::{mean, variance};
@@ -62,7 +62,7 @@ fn white_box(emission: f32) -> Result<SceneData, NumericsError> {
 }
 
 /// Energy left by walks of up to 64 bounces, and by the path tracer with light and roulette.
-pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
+pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let spp = SPP[usize::from(quick)];
     let mut figures = walk(gpu, spp)?;
     let stage = Stage::new(gpu, &white_box(1.0)?)?;
@@ -74,7 +74,7 @@ pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
 }
 
 /// The radiance in a ball of glass under a white sky: the square of its index, wherever one looks.
-fn glass(gpu: &Gpu, spp: u32) -> Result<Figure, NumericsError> {
+fn glass(gpu: &Gpu, spp: u32) -> Result<Gauge, NumericsError> {
     let mut scene = stage::scene("white-furnace")?;
     scene.materials = vec![Material::dielectric("glass", Vec3::ONE, DEFAULT_IOR)];
     if let Some(camera) = &mut scene.camera {
@@ -84,7 +84,7 @@ fn glass(gpu: &Gpu, spp: u32) -> Result<Figure, NumericsError> {
     let pixels = radiance(gpu, &stage, GLASS_DEPTH, spp)?;
     let truth = f64::from(DEFAULT_IOR * DEFAULT_IOR);
     let found = mean(&pixels).unwrap_or(f64::NAN);
-    Ok(Figure::checked(
+    Ok(Gauge::checked(
         "radiance in a ball of glass, off the square of its index",
         (found / truth - 1.0).abs(),
         1e-4,
@@ -93,7 +93,7 @@ fn glass(gpu: &Gpu, spp: u32) -> Result<Figure, NumericsError> {
     ))
 }
 
-fn walk(gpu: &Gpu, spp: u32) -> Result<Vec<Figure>, NumericsError> {
+fn walk(gpu: &Gpu, spp: u32) -> Result<Vec<Gauge>, NumericsError> {
     let stage = Stage::new(gpu, &white_box(0.0)?)?;
     let walk = ConfiguredIntegrator::new(&WALK, &Variant::default())?;
     let sampler = stage::sampler("pixel-hash", walk.facts.dimensions)?;
@@ -105,7 +105,7 @@ fn walk(gpu: &Gpu, spp: u32) -> Result<Vec<Figure>, NumericsError> {
     let drift = |(channel, bounces): (usize, u32)| {
         let pixels = image.pixels.iter().map(|p| f64::from(p[channel]));
         let left = mean(&pixels.collect::<Vec<_>>()).unwrap_or(f64::NAN);
-        Figure::checked(
+        Gauge::checked(
             &format!("energy lost or gained in {bounces} bounces of albedo 1"),
             (left - 1.0).abs(),
             f64::from(bounces) * 1e-6,
@@ -135,12 +135,12 @@ fn radiance(gpu: &Gpu, stage: &Stage, depth: i64, spp: u32) -> Result<Vec<f64>, 
 }
 
 /// The radiance of the path tracer after `depth` bounces: one emission for each surface met.
-fn path(gpu: &Gpu, stage: &Stage, depth: i64, spp: u32) -> Result<Figure, NumericsError> {
+fn path(gpu: &Gpu, stage: &Stage, depth: i64, spp: u32) -> Result<Gauge, NumericsError> {
     let pixels = radiance(gpu, stage, depth, spp)?;
     let expected = depth as f64 + 1.0;
     let error = (variance(&pixels).unwrap_or(f64::NAN) / pixels.len() as f64).sqrt();
     let drift = mean(&pixels).unwrap_or(f64::NAN) - expected;
-    Ok(Figure::checked(
+    Ok(Gauge::checked(
         &format!("energy of the path tracer after {depth} bounces, off the truth"),
         drift.abs() / error,
         5.0,

@@ -19,9 +19,9 @@ use crate::sampling::SamplerError;
 use crate::scene::SceneError;
 use serde::{Deserialize, Serialize};
 
-/// One thing measured on an adapter.
+/// One thing measured on an adapter, with the level from which it is an alarm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Figure {
+pub struct Gauge {
     /// What was measured.
     pub name: String,
     /// The figure: the larger, the worse.
@@ -36,7 +36,7 @@ pub struct Figure {
     pub note: String,
 }
 
-impl Figure {
+impl Gauge {
     /// A figure that must not exceed `alarm`.
     fn checked(name: &str, value: f64, alarm: f64, unit: &str, note: impl Into<String>) -> Self {
         Self {
@@ -97,7 +97,7 @@ pub enum NumericsError {
 ///
 /// # Errors
 /// A kernel does not compile or run, or memory is short.
-pub fn run(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
+pub fn run(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let mut figures = sums::figures(gpu)?;
     figures.extend(conversion::figures(gpu, quick)?);
     figures.extend(digits::figures(gpu, quick)?);
