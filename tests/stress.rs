@@ -93,12 +93,18 @@ fn a_test_that_refuses_rays_through_edges_is_seen_to_leak() {
         shots(&records).count()
     );
     for series in shots(&records).filter(|s| s.count("misses/v1") > 0) {
-        assert!(series.count("confirmed-misses/v1") > 0 && series.worst.is_some(), "{series:?}");
+        assert!(
+            series.count("confirmed-misses/v1") > 0 && series.worst.is_some(),
+            "{series:?}"
+        );
     }
     let edges = cells(&records)
         .find(|c| c.key.label(axis::FAMILY) == "edges" && c.key.label(axis::ACCEL) == "bvh")
         .expect("a cell");
-    assert!(edges.count("cracks/v1") > 0 && edges.differing() > 0, "{edges:?}");
+    assert!(
+        edges.count("cracks/v1") > 0 && edges.differing() > 0,
+        "{edges:?}"
+    );
 }
 
 fn program(arguments: &[&str]) -> std::process::Output {

@@ -2,7 +2,7 @@
 
 use super::StressError;
 use super::bench::{self, Expected};
-use super::case::{self, Random, ray};
+use super::case::{self, Random};
 use super::families::Family;
 use super::place::Place;
 use super::record::{Findings, Line, Record, Worst, line};
@@ -191,7 +191,7 @@ impl Suite<'_> {
             return Ok(Vec::new());
         };
         let mut random = Random::with_stream(self.settings.seed, 79);
-        let mut one = || ray(random.in_cube().as_vec3(), random.direction().as_vec3());
+        let mut one = || Ray::new(random.in_cube().as_vec3(), random.direction().as_vec3());
         let rays: Vec<Ray> = (0..count).map(|_| one()).collect();
         let mut batches: Vec<(Timed, RayBatch)> = Vec::new();
         for test in &self.tests {
@@ -238,7 +238,11 @@ struct Timed {
 
 fn empty_record(test: BoxTest) -> Findings {
     let pad = f64::from(test.pad_ulps);
-    Findings::of([("pad-ulps/v1", pad), ("rays/v1", 0.0), ("lost-hits/v1", 0.0)])
+    Findings::of([
+        ("pad-ulps/v1", pad),
+        ("rays/v1", 0.0),
+        ("lost-hits/v1", 0.0),
+    ])
 }
 
 /// The smallest pad that loses no hit, nor does any greater one.
@@ -276,12 +280,7 @@ fn closed_meshes(place: &Place) -> [(&'static str, Mesh); 4] {
 
 /// Chains of mirror bounces from inside. A flat triangle that a ray has left cannot be hit by it, and a
 /// closed mesh cannot be left: chains that do either begin anew.
-fn bounce(
-    mesh: &Mesh,
-    offset: RayOffset,
-    seed: u64,
-    rays: usize,
-) -> Result<Findings, StressError> {
+fn bounce(mesh: &Mesh, offset: RayOffset, seed: u64, rays: usize) -> Result<Findings, StressError> {
     let soup = TriangleSoup::new(&case::scene(mesh.clone(), None));
     let built = Bvh.build(&soup, &bench::default_params(&Bvh), &mut Default::default());
     let built = built.map_err(|e| StressError::Build(e.to_string()))?;
@@ -295,7 +294,7 @@ fn bounce(
     let (mut traced, mut self_intersections, mut leaks, mut farthest) = (0, 0, 0, 0.0_f64);
     while traced < rays {
         let origin = (centre + reach * random.in_cube()).as_vec3();
-        let mut next = ray(origin, random.direction().as_vec3());
+        let mut next = Ray::new(origin, random.direction().as_vec3());
         let mut from = NO_HIT;
         for _ in 0..BOUNCES {
             let hit = twin.closest_hit(&next, &mut Counters::default());
@@ -342,7 +341,7 @@ fn mirror(soup: &TriangleSoup, incoming: &Ray, hit: &Hit, offset: RayOffset) -> 
     let unit = f64::from(p.abs().max_element() * f32::EPSILON);
     let bound = f64::from(facing.abs().dot(error.into())) + 2.0 * unit;
     let mirrored = direction - facing * (2.0 * facing.dot(direction));
-    let next = ray(origin.into(), mirrored.try_normalize()?);
+    let next = Ray::new(origin, mirrored.try_normalize()?);
     Some((next, moved / bound.max(f64::MIN_POSITIVE)))
 }
 

@@ -6,7 +6,6 @@ use super::place::Place;
 use super::record::{Findings, Line, Record, Worst, line, skipped};
 use super::shot_meshes::{AIMS, FAMILY, PLANE, SPHERE, ShotMesh};
 use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite, key};
-use super::tally::oracle_ray;
 use super::{StressError, case};
 use crate::accel::triangle::TriangleTest;
 use crate::accel::{NO_HIT, Ray, Traced};
@@ -32,7 +31,11 @@ impl Suite<'_> {
         let model = model.map(|path| path.to_string_lossy().into_owned());
         let model = model.unwrap_or_default();
         if model.is_empty() {
-            records.push(skipped(Key::default(), "shots at a model".into(), "none was given"));
+            records.push(skipped(
+                Key::default(),
+                "shots at a model".into(),
+                "none was given",
+            ));
         }
         for place in [Place::ORDINARY, Place::FAR] {
             for name in [SPHERE, PLANE, &model]
@@ -126,8 +129,7 @@ impl Suite<'_> {
                 break;
             }
         }
-        let lines: Vec<_> = looked_up.iter().map(oracle_ray).collect();
-        let truths = exact_truths(&target.mesh, &lines);
+        let truths = exact_truths(&target.mesh, &looked_up);
         let confirmed = truths.iter().filter(|truth| !truth.hits.is_empty()).count();
         let worst = looked_up.first().map(|ray| Worst {
             what: format!("crack in the {}", target.label()),

@@ -4,7 +4,7 @@ use super::case::{Case, Truth};
 use super::record::{Findings, Quantiles, Rung, Worst};
 use crate::accel::{Hit, NO_HIT, Ray};
 use crate::geometry::Triangle;
-use crate::oracle::{ExactTruth, ExactVerdict, OracleRay, exact_truths};
+use crate::oracle::{ExactTruth, ExactVerdict, exact_truths};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -28,23 +28,11 @@ pub struct CaseJudge<'a> {
     truths: Vec<ExactTruth>,
 }
 
-pub(super) fn oracle_ray(ray: &Ray) -> OracleRay {
-    OracleRay {
-        origin: ray.origin,
-        t_min: ray.t_min,
-        direction: ray.direction,
-        t_max: ray.t_max,
-    }
-}
-
 impl<'a> CaseJudge<'a> {
     /// Looks up the truth of every ray.
     pub fn new(case: &'a Case) -> Self {
         let truths = match case.truth {
-            Truth::Exact | Truth::Closed => {
-                let rays: Vec<_> = case.rays.iter().map(oracle_ray).collect();
-                exact_truths(&case.scene.triangles, &rays)
-            }
+            Truth::Exact | Truth::Closed => exact_truths(&case.scene.triangles, &case.rays),
             _ => Vec::new(),
         };
         Self { case, truths }
@@ -64,7 +52,7 @@ impl<'a> CaseJudge<'a> {
             (Truth::Exact | Truth::Closed, _) => {
                 let ray = &self.case.rays[index];
                 let triangles = &self.case.scene.triangles;
-                let verdict = self.truths[index].judge(triangles, &oracle_ray(ray), answer);
+                let verdict = self.truths[index].judge(triangles, ray, answer);
                 let errors = match verdict {
                     ExactVerdict::Hit(t) => {
                         Some(errors(&triangles[hit.triangle as usize], ray, hit, t))
@@ -238,7 +226,9 @@ impl Tally {
 
     /// All of it; any hits only if they were asked for.
     pub fn findings(self, asked_any: bool) -> Findings {
-        let counted = COUNTED.iter().filter(|id| asked_any || **id != "any-differing/v1");
+        let counted = COUNTED
+            .iter()
+            .filter(|id| asked_any || **id != "any-differing/v1");
         let mut found = Findings::of(counted.map(|id| (*id, self.counted(id) as f64)));
         found.errors = self.quantiles();
         if let Some([t, _, point, _]) = &found.errors {

@@ -118,7 +118,9 @@ fn cell_targets(cells: &[Recorded<Findings>]) -> Vec<TargetRecord> {
         let [accel, family] = [axis::ACCEL, axis::FAMILY].map(|axis| c.key.label(axis));
         format!("{accel}, {family}: {what}")
     };
-    let cracks = cells.iter().map(|c| (c.count("cracks/v1") as f64, name(c, "cracks")));
+    let cracks = cells
+        .iter()
+        .map(|c| (c.count("cracks/v1") as f64, name(c, "cracks")));
     let differing = cells.iter().map(|c| {
         let replay = c.worst.as_ref().map_or("", |w| w.replay.as_str());
         (c.differing() as f64, name(c, replay))

@@ -22,49 +22,23 @@ pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     }
     let tried = format!("of {} points and normals", points.len());
     let ends = "draws at both ends of the square included";
+    let inside = "how far below; a point of it would start inside";
+    let disc = "the disc under the hemisphere: all of it inside the unit circle up to this";
     Ok(vec![
-        Gauge::checked(
-            "directions that are not finite",
-            worst.not_finite,
-            0.0,
-            "",
-            tried,
-        ),
-        Gauge::checked(
-            "length of directions, off 1",
-            worst.length,
-            2.0 * WGSL_SIN,
-            "",
-            ends,
-        ),
-        Gauge::checked(
-            "directions below their surface",
-            worst.below,
-            4.0 * U,
-            "cosine",
-            "how far below; a point of it would start inside",
-        ),
-        Gauge::checked(
-            "radius of the disc, off √u",
-            worst.radius,
-            2.0 * WGSL_SIN,
-            "",
-            "the disc under the hemisphere: all of it inside the unit circle up to this",
-        ),
-        Gauge::checked(
+        Gauge::new("directions that are not finite", worst.not_finite, tried).at_most(0.0),
+        Gauge::new("length of directions, off 1", worst.length, ends).at_most(2.0 * WGSL_SIN),
+        Gauge::new("directions below their surface", worst.below, inside)
+            .at_most(4.0 * U)
+            .in_unit("cosine"),
+        Gauge::new("radius of the disc, off √u", worst.radius, disc).at_most(2.0 * WGSL_SIN),
+        Gauge::new(
             "error of sin and cos in [0, 2π)",
             worst.sin,
-            WGSL_SIN,
-            "",
             "WGSL allows 2⁻¹¹",
-        ),
-        Gauge::checked("error of √(1 − u)", worst.sqrt, 4.0 * U, "", ends),
-        Gauge::shown(
-            "error of acos in [−1, 1]",
-            worst.acos,
-            "",
-            "no kernel calls it",
-        ),
+        )
+        .at_most(WGSL_SIN),
+        Gauge::new("error of √(1 − u)", worst.sqrt, ends).at_most(4.0 * U),
+        Gauge::new("error of acos in [−1, 1]", worst.acos, "no kernel calls it"),
     ])
 }
 

@@ -8,7 +8,7 @@ mod determinism;
 mod digits;
 mod energy;
 mod mappings;
-mod stage;
+mod rig;
 mod sums;
 
 use crate::gpu::{
@@ -37,28 +37,31 @@ pub struct Gauge {
 }
 
 impl Gauge {
-    /// A figure that must not exceed `alarm`.
-    fn checked(name: &str, value: f64, alarm: f64, unit: &str, note: impl Into<String>) -> Self {
+    /// A figure for comparison, a plain number.
+    fn new(name: impl Into<String>, value: f64, note: impl Into<String>) -> Self {
         Self {
-            name: name.to_owned(),
+            name: name.into(),
             value,
-            alarm: Some(alarm),
-            unit: unit.to_owned(),
-            passed: value <= alarm,
+            alarm: None,
+            unit: String::new(),
+            passed: !value.is_nan(),
             note: note.into(),
         }
     }
 
-    /// A figure for comparison.
-    fn shown(name: &str, value: f64, unit: &str, note: impl Into<String>) -> Self {
+    /// The same figure, which must not exceed this.
+    fn at_most(self, alarm: f64) -> Self {
         Self {
-            name: name.to_owned(),
-            value,
-            alarm: None,
-            unit: unit.to_owned(),
-            passed: !value.is_nan(),
-            note: note.into(),
+            alarm: Some(alarm),
+            passed: self.value <= alarm,
+            ..self
         }
+    }
+
+    /// The same figure in a unit.
+    fn in_unit(self, unit: &str) -> Self {
+        let unit = unit.to_owned();
+        Self { unit, ..self }
     }
 }
 
@@ -83,14 +86,6 @@ pub enum NumericsError {
     /// A stream of words cannot be drawn.
     #[error("{0}")]
     Stream(String),
-    /// A name that this module uses is not registered.
-    #[error("the numerical checks need {kind} `{name}`, which is not registered")]
-    Missing {
-        /// What it is.
-        kind: &'static str,
-        /// Its name.
-        name: &'static str,
-    },
 }
 
 /// Takes all figures on `gpu`; `quick` leaves out what takes long, at the cost of fewer numbers tried.
