@@ -1,8 +1,8 @@
 //! `raystone list`.
 
 use super::adapters;
-use super::failure::Failure;
 use super::output::print;
+use anyhow::Result;
 use clap::{Args, ValueEnum};
 use raystone::accel::BoxTest;
 use raystone::accel::triangle::TriangleTest;
@@ -53,7 +53,7 @@ enum Topic {
 }
 
 impl List {
-    pub fn execute(self) -> Result<ExitCode, Failure> {
+    pub fn execute(self) -> Result<ExitCode> {
         let catalogue = Registries::default().catalogue();
         let topics = match &self.what {
             Some(topic) => std::slice::from_ref(topic),

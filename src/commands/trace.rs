@@ -1,9 +1,9 @@
 //! `raystone trace`.
 
-use super::arguments::list_override;
-use super::failure::{FAILED, Failure};
-use super::output::{print, warn};
-use anyhow::anyhow;
+use super::arguments::{list_override, warn_of};
+use super::failure::FAILED;
+use super::output::print;
+use anyhow::{Result, anyhow};
 use clap::Args;
 use raystone::accel::triangle::TriangleTest;
 use raystone::accel::{BoxTest, Intersection, TriangleSoup};
@@ -46,8 +46,8 @@ pub struct Trace {
 }
 
 impl Trace {
-    pub fn execute(self) -> Result<ExitCode, Failure> {
-        let ray = parse_ray(&self.ray).map_err(|e| Failure::input(anyhow!("--ray: {e}")))?;
+    pub fn execute(self) -> Result<ExitCode> {
+        let ray = parse_ray(&self.ray).map_err(|e| anyhow!("--ray: {e}"))?;
         let registries = Registries::default();
         let (scene, accel) = self.variants(&registries)?;
         let scene = self.load(&scene)?;
@@ -55,9 +55,9 @@ impl Trace {
         let kind = registries
             .accel
             .get(&accel.name)
-            .ok_or_else(|| Failure::input(anyhow!("no structure `{}`", accel.name)))?;
+            .ok_or_else(|| anyhow!("no structure `{}`", accel.name))?;
         let explained = explain(&scene, &soup, kind, &accel.params, &ray);
-        let (text, equal) = explained.map_err(|e| Failure::input(anyhow!(e)))?;
+        let (text, equal) = explained.map_err(|e| anyhow!(e))?;
         print(&text)?;
         Ok(match equal {
             true => ExitCode::SUCCESS,
@@ -65,12 +65,9 @@ impl Trace {
         })
     }
 
-    fn intersection(&self) -> Result<Intersection, Failure> {
+    fn intersection(&self) -> Result<Intersection> {
         let unknown = |what: &str, name: &str, known: Vec<&str>| {
-            Failure::input(anyhow!(
-                "--{what}: no `{name}`; there are: {}",
-                known.join(", ")
-            ))
+            anyhow!("--{what}: no `{name}`; there are: {}", known.join(", "))
         };
         let mut tests = Intersection::default();
         if let Some(name) = &self.triangle {
@@ -87,7 +84,7 @@ impl Trace {
     }
 
     /// Scene and structure with their parameters, read as those of an experiment file.
-    fn variants(&self, registries: &Registries) -> Result<(Variant, Variant), Failure> {
+    fn variants(&self, registries: &Registries) -> Result<(Variant, Variant)> {
         let catalogue = registries.catalogue();
         // A case of the suite is no scene of an experiment; any other one stands in its place there.
         let scene = match Address::parse(&self.scene) {
@@ -104,15 +101,13 @@ impl Trace {
         let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d))?;
         match (plan.scenes.first(), plan.structures.first()) {
             (Some(scene), Some(cell)) => Ok((scene.clone(), cell.accel.clone())),
-            _ => Err(Failure::input(anyhow!(
-                "--set leaves no scene or no structure"
-            ))),
+            _ => Err(anyhow!("--set leaves no scene or no structure")),
         }
     }
 
-    fn load(&self, variant: &Variant) -> Result<SceneData, Failure> {
+    fn load(&self, variant: &Variant) -> Result<SceneData> {
         if let Some(address) = Address::parse(&self.scene) {
-            return scene_of(&address).map_err(|e| Failure::input(anyhow!("--scene: {e}")));
+            return scene_of(&address).map_err(|e| anyhow!("--scene: {e}"));
         }
         let options = LoadOptions {
             textures: false,
@@ -120,9 +115,7 @@ impl Trace {
             ..LoadOptions::default()
         };
         let scene = load(variant, &options)?;
-        for line in scene.report.lines() {
-            warn(&format!("{variant}: {line}"));
-        }
+        warn_of(&scene);
         Ok(scene)
     }
 }

@@ -7,7 +7,7 @@
 
 use super::record::SamplerCostRecord;
 use super::statistics::median_interval;
-use crate::gpu::{Bindings, Composition, Dispatch, Gpu, GpuError, UniformValues, groups_for};
+use crate::gpu::{Bindings, Composition, Gpu, GpuError, Recording, UniformValues, groups_for};
 use crate::integrator::with_sampler;
 use crate::sampling::Sampler;
 
@@ -41,12 +41,9 @@ impl Loop<'_> {
             .u32("seed", 1);
         bindings.uniform("cost", values);
         let pipeline = self.gpu.pipeline(kernel, true)?;
-        let elapsed = self.gpu.run(&Dispatch {
-            pipeline: &pipeline,
-            bindings: &bindings,
-            groups: groups_for(PIXELS),
-        })?;
-        Ok(elapsed.ms())
+        let mut recording = Recording::new();
+        recording.run("cost", &pipeline, &bindings, groups_for(PIXELS));
+        Ok(self.gpu.play(&recording)?.elapsed().ms())
     }
 }
 

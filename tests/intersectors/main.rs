@@ -15,7 +15,7 @@ use raystone::accel::{
 };
 use raystone::config::Gate;
 use raystone::geometry::Triangle;
-use raystone::gpu::{Bindings, Composition, Dispatch, Gpu, KernelLibrary, groups_for};
+use raystone::gpu::{Bindings, Composition, Gpu, KernelLibrary, Recording, groups_for};
 use raystone::integrator::RayOffset;
 use raystone::measure::rays::record_rays;
 use raystone::params::{Params, Variant};
@@ -121,13 +121,12 @@ fn pairs_on_device(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
         )
         .buffer("rays", &gpu.storage("rays", rays).expect("fits"))
         .buffer("hits", &output);
-    gpu.run(&Dispatch {
-        pipeline: &pipeline,
-        bindings: &bindings,
-        groups: groups_for(rays.len() as u32),
-    })
-    .expect("runs");
-    gpu.read(&output).expect("reads")
+    let mut recording = Recording::new();
+    recording
+        .run("pairs", &pipeline, &bindings, groups_for(rays.len() as u32))
+        .download("hits", &output);
+    let played = gpu.play(&recording).expect("runs");
+    played.download("hits").expect("hits")
 }
 
 #[test]
@@ -186,13 +185,17 @@ fn kernel_and_twin_of_every_offset_agree_to_the_bit() {
         bindings
             .buffer("rays", &gpu.storage("rays", &words).expect("fits"))
             .buffer("hits", &output);
-        gpu.run(&Dispatch {
-            pipeline: &pipeline,
-            bindings: &bindings,
-            groups: groups_for(points.len() as u32),
-        })
-        .expect("runs");
-        let found: Vec<[f32; 4]> = gpu.read(&output).expect("reads");
+        let mut recording = Recording::new();
+        recording
+            .run(
+                "offsets",
+                &pipeline,
+                &bindings,
+                groups_for(points.len() as u32),
+            )
+            .download("hits", &output);
+        let played = gpu.play(&recording).expect("runs");
+        let found: Vec<[f32; 4]> = played.download("hits").expect("hits");
         let mut moved = 0;
         for ([p, n, error], found) in points.iter().zip(&found) {
             let expected = offset.offset_point(*p, *n, *error);
