@@ -80,8 +80,8 @@ fn lattice_ray(random: &mut Pcg32) -> Ray {
     }
     let [t_min, t_max] = match random.below(4) {
         0 => [0.0, between(random, 0, EXTENT)],
-        1 => [0.5 * between(random, 0, EXTENT), FAR],
-        _ => [0.0, FAR],
+        1 => [0.5 * between(random, 0, EXTENT), Ray::FAR],
+        _ => [0.0, Ray::FAR],
     };
     Ray {
         origin,
