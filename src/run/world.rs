@@ -7,7 +7,7 @@ use crate::config::{Axis, Cell};
 use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu};
 use crate::integrator::Stage;
-use crate::measure::gate::Judge;
+use crate::measure::gate::{Checks, Judge};
 use crate::measure::record::{Body, Key, Line, Ran, SceneRecord};
 use crate::params::Variant;
 use crate::scene::{self, LoadOptions, SceneData};
@@ -123,7 +123,14 @@ impl<'a> World<'a> {
         settings.rays = settings.rays.max(experiment.timing.rays);
         let judge = session.clock.time("judge", || {
             let seed = u64::from(experiment.seed);
-            Judge::remembered(&stage.scene, &stage.soup, loaded.camera, &settings, seed)
+            Judge::new(
+                &stage.scene,
+                &stage.soup,
+                loaded.camera,
+                &settings,
+                seed,
+                Checks::Kept,
+            )
         });
         Ok(Self {
             device,
