@@ -1,11 +1,11 @@
 //! Faults planted in kernels must turn the comparison with brute force red: what the tests of
 //! structures would otherwise prove nothing about.
 
-mod common;
+mod support;
 
-use common::{Pcg, brute_force, build, default_params, differences, scenes, trace};
 use raystone::accel::{AccelRegistry, Hit, Intersection, Ray, TriangleSoup};
 use raystone::gpu::{Gpu, KernelLibrary};
+use support::{Pcg, brute_force, build, default_params, differences, scenes, trace};
 
 /// One fault: replace `from` by `to` in the kernel `file`; structures whose answers must go wrong.
 struct Fault {
@@ -200,13 +200,13 @@ fn with_override(file: &str, change: impl Fn(&str) -> String) -> KernelLibrary {
 
 #[test]
 fn planted_faults_turn_the_comparison_red_and_unchanged_overrides_do_not() {
-    if !common::is_exact(common::gpu()) {
+    if !support::is_exact(support::gpu()) {
         return;
     }
     for fault in FAULTS {
         let cases = cases(fault.triangle);
-        let sound = common::open(with_override(fault.file, str::to_owned));
-        let faulty = common::open(with_override(fault.file, |text| {
+        let sound = support::open(with_override(fault.file, str::to_owned));
+        let faulty = support::open(with_override(fault.file, |text| {
             let times = text.matches(fault.from).count();
             assert_eq!(
                 times, 1,

@@ -1,11 +1,10 @@
 //! A structure that answers rays in passes of its own goes through gate, timing, counters, a run and its
 //! report like any other, and nothing in the program knows of it.
 
-mod common;
 #[path = "pipelines/sorted_rays.rs"]
 mod sorted_rays;
+mod support;
 
-use common::{Pcg, assert_same_hits, brute_force, build, default_params, scenes, trace};
 use raystone::accel::{AccelKind, Bvh};
 use raystone::config::{Experiment, Plan};
 use raystone::gpu::KernelLibrary;
@@ -13,6 +12,7 @@ use raystone::measure::record::GateVerdict;
 use raystone::run::{Registries, RunOptions, RunSummary, run, verify};
 use sorted_rays::SortedRays;
 use std::path::{Path, PathBuf};
+use support::{Pcg, assert_same_hits, brute_force, build, default_params, scenes, trace};
 
 static SORTED: SortedRays = SortedRays {
     name: "sorted-rays",
@@ -92,8 +92,8 @@ fn verdicts(kernels: &Path) -> Vec<(String, GateVerdict)> {
 #[test]
 fn rays_in_another_order_get_the_same_answers_and_counters() {
     let library = KernelLibrary::default().with_folder(&kernel_folder());
-    let gpu = common::open(library.expect("the kernels of this test"));
-    if !common::is_exact(&gpu) {
+    let gpu = support::open(library.expect("the kernels of this test"));
+    if !support::is_exact(&gpu) {
         return;
     }
     let mut random = Pcg::new(5);
@@ -116,7 +116,7 @@ fn rays_in_another_order_get_the_same_answers_and_counters() {
 
 #[test]
 fn the_gate_passes_it_and_sees_a_scatter_that_drops_or_misplaces_a_ray() {
-    if !common::is_exact(common::gpu()) {
+    if !support::is_exact(support::gpu()) {
         return;
     }
     for (name, verdict) in verdicts(&kernel_folder()) {

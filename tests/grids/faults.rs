@@ -1,7 +1,7 @@
 //! Planted faults must fail on the rays at which grids went wrong.
 
-use crate::common::scenes;
-use crate::common::{self, Pcg, brute_force, build, default_params, trace};
+use crate::support::scenes;
+use crate::support::{self, Pcg, brute_force, build, default_params, trace};
 use crate::{grid, slanted, with};
 use raystone::gpu::{Gpu, KernelLibrary};
 use raystone::params::ParamValue;
@@ -112,12 +112,12 @@ fn device(fault: &Fault, planted: bool) -> Gpu {
     let file = folder.path().join(fault.file).with_extension("wesl");
     std::fs::create_dir_all(file.parent().expect("a parent")).expect("a folder");
     std::fs::write(&file, text).expect("a written kernel");
-    common::open(library.with_folder(folder.path()).expect("the folder"))
+    support::open(library.with_folder(folder.path()).expect("the folder"))
 }
 
 #[test]
 fn planted_faults_turn_the_comparison_red() {
-    if !common::is_exact(common::gpu()) {
+    if !support::is_exact(support::gpu()) {
         return;
     }
     let mut rng = Pcg::new(5);
@@ -138,7 +138,7 @@ fn planted_faults_turn_the_comparison_red() {
         let built = build(kind, &soup, &params);
         let wrong = |gpu: &Gpu| {
             let found = trace(gpu, &*built, &soup, &rays, &[]);
-            common::differences(&expected, &found.hits).len()
+            support::differences(&expected, &found.hits).len()
         };
         assert_eq!(
             wrong(&device(fault, false)),

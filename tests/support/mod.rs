@@ -1,6 +1,11 @@
-//! What the tests of integrators, gate and recovery share: one device per test program, scenes on
-//! it, renderers, kernels with planted faults, and samples with their standard error.
-#![allow(dead_code)] // Every test program uses its own part of this.
+//! What test programs share: one device for each, scenes and structures on it, rays and their answers,
+//! renderers, kernels with planted faults, samples with their standard error, runs.
+#![allow(dead_code, unused_imports)] // Every test program uses its own part of this.
+
+mod hits;
+pub mod scenes;
+
+pub use hits::*;
 
 use raystone::accel::{
     AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, Intersection, Traced,
@@ -117,7 +122,11 @@ impl Stage {
 
     /// A structure with its default parameters, built on this scene.
     pub fn build(&self, kind: &dyn AccelKind) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        kind.build(&self.soup, &defaults(kind), &mut BuildLog::default())
+        kind.build(
+            &self.soup,
+            &default_params(&kind.parameters()),
+            &mut BuildLog::default(),
+        )
     }
 
     /// [`Stage::build`], on the GPU.
@@ -166,17 +175,6 @@ pub fn from_file(path: &Path) -> SceneData {
         label: "file".to_owned(),
     };
     load(&variant, &LoadOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
-}
-
-/// Parameters of a structure at their defaults.
-pub fn defaults(kind: &dyn AccelKind) -> Params {
-    let schema = kind.parameters();
-    Params(
-        schema
-            .into_iter()
-            .map(|p| (p.name.to_owned(), p.default))
-            .collect(),
-    )
 }
 
 /// The registered structures; never none.
