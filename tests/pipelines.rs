@@ -23,34 +23,6 @@ static UNCOUNTED: SortedRays = SortedRays {
     counts_work: false,
 };
 
-const EXPERIMENT: &str = r#"
-[run]
-name = "pipelines"
-replicates = 2
-seed = 1
-resolution = [16, 16]
-spp = { pow2 = [0, 1] }
-[axes]
-scene = ["cornell-box"]
-accel = ["bvh", "sorted-rays", "uncounted-rays"]
-sequence = ["pixel-hash"]
-decorrelation = ["none"]
-integrator = ["path"]
-[reference]
-spp = 8
-[timing]
-rounds = 3
-min_warmup_ms = 0
-max_warmup_ms = 1
-rays = 1024
-[gate]
-rays = 1024
-brute_force_tests = 1000
-oracle_rays = 16
-[discrepancy]
-points = 16
-"#;
-
 fn kernel_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pipelines/kernels")
 }
@@ -64,7 +36,9 @@ fn planned(kernels: &Path) -> (Experiment, Plan, Registries) {
         "axes.kernels=[{:?}]",
         kernels.display().to_string()
     )];
-    let experiment = Experiment::parse(EXPERIMENT, "experiment", &kernels, &registries.catalogue());
+    let structures = r#"["bvh", "sorted-rays", "uncounted-rays"]"#;
+    let text = support::SMALL.replace(r#"["bvh"]"#, structures);
+    let experiment = Experiment::parse(&text, "experiment", &kernels, &registries.catalogue());
     let experiment = experiment.unwrap_or_else(|e| panic!("{e}"));
     let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d));
     (

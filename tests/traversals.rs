@@ -332,14 +332,7 @@ fn trees_deeper_than_a_trail_or_the_workgroups_memory_are_refused_with_both_numb
 
 /// The error word of a kernel with one line of `module` replaced.
 fn error_word(module: &str, from: &str, to: &str, changes: &[(&str, &str)]) -> Option<String> {
-    let library = raystone::gpu::KernelLibrary::default();
-    let text = library.text(module).expect("an embedded kernel").to_owned();
-    assert_eq!(text.matches(from).count(), 1, "`{from}` in {module}");
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = folder.path().join(format!("{module}.wesl"));
-    std::fs::create_dir_all(path.parent().expect("a parent")).expect("a folder");
-    std::fs::write(&path, text.replace(from, to)).expect("a written kernel");
-    let gpu = support::open(library.with_folder(folder.path()).expect("the folder"));
+    let gpu = support::open(support::kernels_with(module, &[(from, to)]));
     let mut rng = Pcg::new(2);
     let soup = scenes::lattice_soup(&mut rng, 400, 12);
     let rays = scenes::aimed_rays(&mut rng, &soup, 300);

@@ -48,6 +48,34 @@ pub fn is_exact(gpu: &Gpu) -> bool {
     probe.is_exact()
 }
 
+/// A path tracer in the Cornell box with a plain BVH, with as little of all else as a run takes.
+pub const SMALL: &str = r#"
+[run]
+name = "small"
+replicates = 2
+resolution = [16, 16]
+spp = { pow2 = [0, 1] }
+[axes]
+scene = ["cornell-box"]
+accel = ["bvh"]
+sequence = ["pixel-hash"]
+decorrelation = ["none"]
+integrator = ["path"]
+[reference]
+spp = 8
+[timing]
+rounds = 3
+min_warmup_ms = 0
+max_warmup_ms = 1
+rays = 1024
+[gate]
+rays = 1024
+brute_force_tests = 1000
+oracle_rays = 16
+[discrepancy]
+points = 16
+"#;
+
 /// The embedded kernels with one text replaced in one of them. Panics unless `from` stands there
 /// exactly once, so that a fault is never planted beside the kernel.
 pub fn kernels_with(module: &str, changes: &[(&str, &str)]) -> KernelLibrary {
