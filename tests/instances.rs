@@ -11,7 +11,7 @@ use raystone::accel::{
 use raystone::config::Gate;
 use raystone::geometry::Triangle;
 use raystone::gpu::probe_arithmetic;
-use raystone::measure::gate::{Judge, compare, gate};
+use raystone::measure::gate::{Checks, Judge, compare, gate};
 use raystone::measure::hard_rays::HARD_RAYS;
 use raystone::measure::record::{StructureRecord, TimeRecord, all_of, axis};
 use raystone::params::{ParamValue, Params};
@@ -326,7 +326,14 @@ fn the_gate_judges_each_structure_in_its_space_and_sees_the_difference() {
         ao_length: 0.0,
         offset: 0.0,
     };
-    let judge = Judge::new(&stage.scene, &stage.soup, stage.camera, &settings, 1);
+    let judge = Judge::new(
+        &stage.scene,
+        &stage.soup,
+        stage.camera,
+        &settings,
+        1,
+        Checks::Repeated,
+    );
     let judge = judge.expect("a judge");
     let over_instances = judge.instances.as_deref().expect("a judge of instances");
     for judge in [&judge, over_instances] {

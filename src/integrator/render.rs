@@ -113,8 +113,8 @@ pub fn with_sampler(mut composition: Composition, sampler: &Sampler) -> Composit
         composition = composition.constant(name, value);
     }
     composition
-        .with("sequence", sampler.sequence.kernel())
-        .with("decorrelation", sampler.decorrelation.kernel())
+        .with("sequence", &sampler.sequence.kernel())
+        .with("decorrelation", &sampler.decorrelation.kernel())
 }
 
 /// Samples for which an integrator's buffers between passes have room.

@@ -71,7 +71,7 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
         }
         if gpu.lost().is_none() {
             match cost_record(session, gpu, &cell) {
-                Ok((kernel, record)) => {
+                Ok((record, kernel)) => {
                     session.write(&line(&cell, kernel, "cost", Body::SamplerCost(record)))?;
                 }
                 Err(reason) => session.write_failure(&format!("cost of {cell}"), reason)?,
@@ -364,7 +364,7 @@ fn cost_record(
     session: &mut Session,
     gpu: &Gpu,
     cell: &StreamCell,
-) -> Result<(String, SamplerCostRecord), String> {
+) -> Result<(SamplerCostRecord, String), String> {
     let pairs = session.experiment.discrepancy.pairs.iter().flatten();
     let highest = pairs.max().copied().unwrap_or(1).max(1);
     let sampler = sampler_of(
@@ -374,12 +374,7 @@ fn cost_record(
         highest,
     )?;
     let cost = session.clock.time("gpu", || sampler_cost(gpu, &sampler));
-    let cost = cost.map_err(|e| e.to_string())?;
-    let record = SamplerCostRecord {
-        ns_per_sample: cost.ns_per_sample,
-        loop_ns_per_sample: cost.loop_ns_per_sample,
-    };
-    Ok((cost.kernel_hash, record))
+    cost.map_err(|e| e.to_string())
 }
 
 /// The sampler of a stream for so many samples, with dimensions up to `highest`.

@@ -7,7 +7,7 @@ use crate::accel::{AccelError, Intersection, TriangleSoup};
 use crate::config::{Gate, StructureCell};
 use crate::gpu::{Gpu, GpuError};
 use crate::integrator::{Stage, StageError};
-use crate::measure::gate::{Judge, fault_text, gate};
+use crate::measure::gate::{Checks, Judge, fault_text, gate};
 use crate::params::Variant;
 use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
 use std::collections::BTreeMap;
@@ -47,7 +47,7 @@ impl JudgedScene {
         let soup = TriangleSoup::new(&scene).intersecting(intersection);
         let camera = scene.view(1.0);
         let judge =
-            Judge::remembered(&scene, &soup, camera, &GATE, 1).map_err(|e| e.to_string())?;
+            Judge::new(&scene, &soup, camera, &GATE, 1, Checks::Kept).map_err(|e| e.to_string())?;
         let scene = Arc::new(scene);
         Ok(Self { scene, judge })
     }

@@ -8,7 +8,7 @@ use crate::config::Experiment;
 use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu};
 use crate::integrator::{RayOffset, Stage};
-use crate::measure::gate::Judge;
+use crate::measure::gate::{Checks, Judge};
 use crate::measure::record::{Body, Key, Line, Ran, SceneRecord, axis};
 use crate::params::Variant;
 use crate::scene::{self, LoadOptions, SceneData};
@@ -123,7 +123,14 @@ impl<'a> World<'a> {
         settings.rays = settings.rays.max(experiment.timing.rays);
         let judged = session.clock.time("judge", || {
             let seed = u64::from(experiment.seed);
-            Judge::remembered(&stage.scene, &stage.soup, camera, &settings, seed)
+            Judge::new(
+                &stage.scene,
+                &stage.soup,
+                camera,
+                &settings,
+                seed,
+                Checks::Kept,
+            )
         });
         Ok((|| {
             let judge = judged.map_err(|e| e.to_string())?;

@@ -25,7 +25,8 @@ use crate::accel::triangle::TriangleTest;
 use crate::accel::{AccelRegistry, Intersection};
 use crate::gpu::capture as capture_environment;
 use crate::gpu::{Gpu, GpuError, probe_arithmetic};
-use record::{Line, Record, SuiteRecord};
+use crate::measure::record::Key;
+use record::{Line, Record, SuiteRecord, about_all, skipped};
 use std::path::PathBuf;
 use std::time::{Instant, SystemTime};
 use suite::{BRUTE_FORCE, Progress, Suite};
@@ -140,14 +141,12 @@ pub fn run(
     settings.check()?;
     let probe = probe_arithmetic(gpu)?;
     let first = first_record(gpu, settings, probe.is_exact());
-    let mut records = vec![Line::about_all(Record::Suite(first))];
+    let mut records = vec![about_all(Record::Suite(first))];
     let mut tests = tests(settings);
     tests.retain(|test| match Suite::with(*test).kept_by(&probe) {
         Ok(()) => true,
         Err(reason) => {
-            let what = test.name().to_owned();
-            let skipped = Record::Skipped(record::SkippedRecord { what, reason });
-            records.push(Line::about_all(skipped));
+            records.push(skipped(Key::default(), test.name().to_owned(), reason));
             false
         }
     });
@@ -170,14 +169,13 @@ pub fn run(
             records.extend(suite.costs(progress)?);
         }
         progress("accumulation and sampling");
-        let figures = numerics::run(gpu, settings.quick)?;
-        let figures = figures.into_iter().map(Record::Figure);
-        records.extend(figures.map(Line::about_all));
+        let gauges = numerics::run(gpu, settings.quick)?.into_iter();
+        records.extend(gauges.map(Record::Gauge).map(about_all));
     }
     let targets = targets::targets(&records);
-    records.extend(targets.into_iter().map(Record::Target).map(Line::about_all));
+    records.extend(targets.into_iter().map(Record::Target).map(about_all));
     let wall_s = start.elapsed().as_secs_f64();
-    records.push(Line::about_all(Record::Finished { wall_s }));
+    records.push(about_all(Record::Finished { wall_s }));
     Ok(records)
 }
 

@@ -213,7 +213,7 @@ fn the_tables_of_heitz_are_read_by_kernel_and_twin_alike() {
 fn the_cost_of_a_sampler_is_measured_without_its_loop() {
     let cost = |sequence, decorrelation| {
         let sampler = sampler(sequence, decorrelation, &demand(256, 8));
-        let cost = sampler_cost(support::gpu(), &sampler).unwrap_or_else(|e| panic!("{e}"));
+        let (cost, _) = sampler_cost(support::gpu(), &sampler).unwrap_or_else(|e| panic!("{e}"));
         println!("{}: {cost:?}", sampler.label());
         cost.ns_per_sample
     };

@@ -49,7 +49,7 @@ fn labels(key: &Key, axes: &[&str]) -> String {
 pub(super) fn shot_table(lines: &[Line], values: &[Value]) -> Table {
     let misses: Vec<Value> = values
         .iter()
-        .filter(|v| v.figure.id != "rays/v1")
+        .filter(|v| v.figure.id == "misses/v1")
         .cloned()
         .collect();
     let mut table = table(
@@ -70,7 +70,7 @@ pub(super) fn shot_table(lines: &[Line], values: &[Value]) -> Table {
         Some(&|key| key.label(axis::AIM).to_owned()),
     );
     let shots = lines.iter().find_map(|line| match &line.body {
-        Record::Shots(shots) => Some(shots.rays),
+        Record::Shots(shots) => Some(shots.count("rays/v1")),
         _ => None,
     });
     table.caption += &format!(
@@ -145,7 +145,7 @@ fn numerics(lines: &[Line]) -> Table {
     let heads = ["figure", "value", "alarm", ":unit", ":verdict", ":note"];
     let mut table = Table::new("accumulation and sampling", &heads);
     for line in lines {
-        if let Record::Figure(f) = &line.body {
+        if let Record::Gauge(f) = &line.body {
             table.rows.push(vec![
                 f.name.clone().into(),
                 format::number(f.value).into(),
