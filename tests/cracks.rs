@@ -4,7 +4,7 @@
 mod support;
 
 use glam::{DVec3, Vec3};
-use raystone::accel::triangle::TriangleTest;
+use raystone::accel::triangle::{AnyTriangleTest, Compensated, Watertight};
 use raystone::accel::{
     AccelRegistry, BuiltAccel, Counters, Hit, Intersection, NO_HIT, Placed, Ray, Space,
     TriangleSoup, brute_force_hits, brute_force_instances,
@@ -157,7 +157,7 @@ fn structures_agree(what: &str, soup: &TriangleSoup, rays: &[Ray], flat: &[Hit],
 #[test]
 fn no_length_of_a_direction_opens_a_crack() {
     let triangles = |seam| sphere(seam).into_iter().map(|t| t.vertices);
-    for test in [TriangleTest::Watertight, TriangleTest::Compensated] {
+    for test in [&Watertight as AnyTriangleTest, &Compensated] {
         let tests = Intersection {
             triangle: test,
             ..Default::default()

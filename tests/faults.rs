@@ -2,7 +2,7 @@
 
 mod support;
 
-use raystone::accel::{AccelKind, BruteForce, Intersection};
+use raystone::accel::{AccelKind, BruteForce, Intersection, TriangleRegistry};
 use support::{
     Pcg, brute_force, build, default_params, differences, kernels_with, open, scenes, trace,
 };
@@ -12,7 +12,12 @@ fn a_ray_along_a_face_of_a_box_that_hits_what_lies_behind_it_is_seen() {
     if !support::is_exact(support::gpu()) {
         return;
     }
-    let tests = Intersection::named("moeller-trumbore", "padded-16").expect("two tests");
+    let tests = Intersection {
+        triangle: TriangleRegistry::default()
+            .get("moeller-trumbore")
+            .expect("a test"),
+        ..Intersection::default()
+    };
     let allowed = "all(outside <= allowance(triangle, ray, inverse, found))";
     let [sound, faulty] = [allowed, "true"].map(|to| {
         let gpu = open(kernels_with("accel/triangle", &[(allowed, to)]));

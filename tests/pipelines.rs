@@ -6,6 +6,7 @@ mod sorted_rays;
 mod support;
 
 use raystone::accel::{AccelKind, Bvh};
+use raystone::config::Axis;
 use raystone::config::{Experiment, Plan};
 use raystone::gpu::KernelLibrary;
 use raystone::measure::record::GateVerdict;
@@ -59,7 +60,12 @@ fn verdicts(kernels: &Path) -> Vec<(String, GateVerdict)> {
     );
     let verified = verified.unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(verified.len(), 3);
-    let verdict = |v: raystone::run::Verified| (v.accel.name, v.verdict.expect("a verdict"));
+    let verdict = |v: raystone::run::Verified| {
+        (
+            v.cell[Axis::Accel].name.clone(),
+            v.verdict.expect("a verdict"),
+        )
+    };
     verified.into_iter().map(verdict).collect()
 }
 

@@ -6,6 +6,7 @@ mod support;
 use raystone::accel::{
     AccelError, AccelKind, BuildLog, Bvh, Counters, Hit, Ray, RopedBvh, TriangleSoup,
 };
+use raystone::config::Axis;
 use raystone::params::{ParamRange, ParamValue, Params};
 use support::scenes::{self, Case};
 use support::{Pcg, assert_same_hits, brute_force, build, default_params, trace};
@@ -388,8 +389,7 @@ fn arrays_in_two_to_four_parts_give_the_same_hits() {
         return;
     }
     let catalogue = raystone::run::Registries::default().catalogue();
-    let sphere = catalogue
-        .scene
+    let sphere = catalogue[Axis::Scene]
         .iter()
         .find(|e| e.name == "displaced-sphere");
     let mut variant = sphere.expect("a built-in scene").default_variant();
@@ -431,8 +431,7 @@ fn arrays_in_two_to_four_parts_give_the_same_hits() {
 fn more_parts_than_the_adapter_binds_are_refused_with_both_numbers() {
     use raystone::accel::{Query, Traced, Tracer, TriangleBuffers};
     let catalogue = raystone::run::Registries::default().catalogue();
-    let sphere = catalogue
-        .scene
+    let sphere = catalogue[Axis::Scene]
         .iter()
         .find(|e| e.name == "displaced-sphere");
     let variant = sphere.expect("a built-in scene").default_variant();

@@ -3,6 +3,7 @@
 mod support;
 
 use raystone::accel::{AccelKind, AccelRegistry, Counters, TriangleSoup, brute_force_hits};
+use raystone::config::Axis;
 use raystone::params::{ParamValue, Params};
 use support::{Pcg, assert_same_hits, brute_force, build, default_params, scenes, trace};
 
@@ -70,7 +71,7 @@ fn wide_nodes_of_eight_and_of_four_are_smaller_than_binary_ones() {
 fn triangles_in_a_texture_are_not_bound_by_the_limit_of_buffers() {
     use raystone::accel::{Query, Traced, Tracer, TriangleBuffers};
     let catalogue = raystone::run::Registries::default().catalogue();
-    let mut entries = catalogue.scene.iter();
+    let mut entries = catalogue[Axis::Scene].iter();
     let sphere = entries.find(|e| e.name == "displaced-sphere");
     let variant = sphere.expect("a built-in scene").default_variant();
     let scene = raystone::scene::load(&variant, &Default::default()).expect("a scene");

@@ -13,6 +13,7 @@ use raystone::accel::{
 use raystone::config::{Experiment, Plan};
 use raystone::geometry::Camera;
 use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
+use raystone::integrator::RayOffset;
 use raystone::integrator::{self, IntegratorRegistry, RenderJob, Renderer};
 use raystone::measure::record::{Line, SCHEMA};
 use raystone::measure::statistics::{mean, variance};
@@ -182,6 +183,7 @@ impl Stage {
             camera: self.camera,
             sampler,
             integrator: &integrator.unwrap_or_else(|e| panic!("{e}")),
+            offset: RayOffset::default(),
             runtime_checks: true,
         };
         Renderer::new(gpu, &self.buffers, traced, &job, ray_counts)
