@@ -1,7 +1,6 @@
 //! Folders of kernels in the place of the embedded ones: what a run of them leaves behind, and what is
 //! refused.
 
-mod common;
 mod support;
 
 use raystone::config::Axis;

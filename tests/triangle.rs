@@ -1,13 +1,13 @@
 //! The one triangle test against exact integer arithmetic, and on closed surfaces: what all
 //! structures are equal to must itself be right.
 
-mod common;
+mod support;
 
-use common::{Pcg, brute_force, scenes};
 use raystone::accel::triangle::{
     AnyTriangleTest, Compensated, MoellerTrumbore, TriangleRecord, TriangleTest as _, Watertight,
 };
 use raystone::accel::{Intersection, NO_HIT, Ray, TriangleSoup};
+use support::{Pcg, brute_force, scenes};
 
 /// What exact integer arithmetic says of one ray and one triangle.
 enum Exact {

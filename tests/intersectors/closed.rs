@@ -1,6 +1,6 @@
 //! Closed surfaces from inside: which triangle tests lose rays.
 
-use crate::common::{Pcg, scenes};
+use crate::support::{Pcg, scenes};
 use crate::{ray, tests_of};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;

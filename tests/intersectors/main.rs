@@ -2,11 +2,10 @@
 //! and closed surfaces from inside.
 
 mod closed;
-#[path = "../common/mod.rs"]
-mod common;
+#[path = "../support/mod.rs"]
+mod support;
 
 use closed::{ORDINARY, inner_rays, sphere};
-use common::{Pcg, assert_same_hits, build, default_params, scenes};
 use glam::Vec3;
 use raystone::accel::triangle::{
     AnyTriangleTest, BaldwinWeber, TriangleRecord, TriangleTest as _, Watertight,
@@ -25,6 +24,7 @@ use raystone::params::{Params, Variant};
 use raystone::scene::{self, LoadOptions};
 use std::path::Path;
 use std::sync::OnceLock;
+use support::{Pcg, assert_same_hits, build, default_params, scenes};
 
 /// A device with the kernels of this test.
 fn gpu() -> &'static Gpu {
@@ -32,7 +32,7 @@ fn gpu() -> &'static Gpu {
     GPU.get_or_init(|| {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/intersectors/kernels");
         let library = KernelLibrary::default().with_folder(&folder);
-        common::open(library.expect("the kernels of this test"))
+        support::open(library.expect("the kernels of this test"))
     })
 }
 
@@ -134,7 +134,7 @@ fn pairs_on_device(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
 
 #[test]
 fn kernel_and_twin_of_every_test_agree_to_the_bit_on_pairs() {
-    if !common::is_exact(gpu()) {
+    if !support::is_exact(gpu()) {
         return;
     }
     let (triangles, rays) = pairs(120_000);
@@ -157,7 +157,7 @@ fn kernel_and_twin_of_every_test_agree_to_the_bit_on_pairs() {
             let soup =
                 scenes::soup(triangles.iter().copied()).intersecting(Intersection::default());
             let other = pairs_on_device(&soup, &rays);
-            let different = common::differences(&expected, &other).len();
+            let different = support::differences(&expected, &other).len();
             assert!(different > 0, "{} is the default", triangle.name());
         }
     }
@@ -165,7 +165,7 @@ fn kernel_and_twin_of_every_test_agree_to_the_bit_on_pairs() {
 
 #[test]
 fn kernel_and_twin_of_every_offset_agree_to_the_bit() {
-    if !common::is_exact(gpu()) {
+    if !support::is_exact(gpu()) {
         return;
     }
     let mut rng = Pcg::new(5);
@@ -213,13 +213,13 @@ fn kernel_and_twin_of_every_offset_agree_to_the_bit() {
 #[test]
 fn every_structure_equals_brute_force_with_every_test() {
     let gpu = gpu();
-    let exact = common::is_exact(gpu);
+    let exact = support::is_exact(gpu);
     let mut rng = Pcg::new(3);
     let lattice = scenes::lattice_soup(&mut rng, 60, 6);
     let rays = scenes::lattice_rays(&mut rng, 400, 6);
     for triangle in TriangleRegistry::default().iter() {
         let soup = lattice.clone().intersecting(tests_of(triangle));
-        let expected = common::brute_force(&soup, &rays);
+        let expected = support::brute_force(&soup, &rays);
         assert!(expected.iter().any(|h| h.triangle != NO_HIT));
         assert_same_hits(
             "brute force in blocks",
@@ -239,7 +239,7 @@ fn every_structure_equals_brute_force_with_every_test() {
                 assert_same_hits(&format!("twin of {what}"), &rays, &expected, &found);
             }
             if exact {
-                let found = common::trace(gpu, &*built, &soup, &rays, &[]).hits;
+                let found = support::trace(gpu, &*built, &soup, &rays, &[]).hits;
                 assert_same_hits(&what, &rays, &expected, &found);
             }
         }
@@ -249,7 +249,7 @@ fn every_structure_equals_brute_force_with_every_test() {
 #[test]
 fn less_padded_boxes_are_another_kernel_and_the_twins_follow() {
     let gpu = gpu();
-    if !common::is_exact(gpu) {
+    if !support::is_exact(gpu) {
         return;
     }
     let triangles = sphere(8, ORDINARY);
@@ -273,7 +273,7 @@ fn less_padded_boxes_are_another_kernel_and_the_twins_follow() {
             let mut counters = Counters::default();
             let closest = |ray| twin.closest_hit(ray, &mut counters);
             let expected: Vec<Hit> = rays.iter().map(closest).collect();
-            let found = common::trace(gpu, &*built, &soup, &rays, &[]).hits;
+            let found = support::trace(gpu, &*built, &soup, &rays, &[]).hits;
             assert_same_hits(
                 &format!("{} with {name}", kind.name()),
                 &rays,
