@@ -10,8 +10,8 @@ use super::shapes::{Mesh, cube, sphere};
 use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite};
 use crate::accel::triangle::TriangleTest;
 use crate::accel::{
-    AccelKind as _, BoxTest, Bvh, Counters, Hit, Intersection, NO_HIT, Query, Ray, RayBatch,
-    Traced, TriangleSoup,
+    BoxTest, BuildLog, BuiltBvh, BvhParameters, Counters, CpuTwin as _, Hit, Intersection, NO_HIT,
+    Query, Ray, RayBatch, Traced, TriangleSoup,
 };
 use crate::gpu::Gpu;
 use crate::integrator::offset::{TransformError, position_error};
@@ -282,11 +282,8 @@ fn closed_meshes(place: &Place) -> [(&'static str, Mesh); 4] {
 /// closed mesh cannot be left: chains that do either begin anew.
 fn bounce(mesh: &Mesh, offset: RayOffset, seed: u64, rays: usize) -> Result<Findings, StressError> {
     let soup = TriangleSoup::new(&case::scene(mesh.clone(), None));
-    let built = Bvh.build(&soup, &bench::default_params(&Bvh), &mut Default::default());
-    let built = built.map_err(|e| StressError::Build(e.to_string()))?;
-    let Some(twin) = built.cpu_twin(&soup) else {
-        return Err(StressError::Build("it has no twin".to_owned()));
-    };
+    let built = BuiltBvh::build(&soup, &BvhParameters::default(), &mut BuildLog::default())?;
+    let twin = built.twin(&soup);
     let mut random = Random::with_stream(seed, 80);
     let bounds = crate::scene::Bounds::of(mesh);
     let [low, high] = [bounds.min, bounds.max].map(|v| v.as_dvec3());

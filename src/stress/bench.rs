@@ -9,18 +9,12 @@ use crate::gpu::{GpuError, kernel_errors};
 use crate::integrator::Stage;
 use crate::params::Params;
 
-/// Every parameter at its default.
-pub fn default_params(kind: &dyn AccelKind) -> Params {
-    let value = |p: &crate::params::Parameter| (p.name.to_owned(), p.default.clone());
-    Params(kind.parameters().iter().map(value).collect())
-}
-
 /// Builds a structure with its default parameters and checks its invariants.
 ///
 /// # Errors
 /// What it refuses or violates, in words.
 pub fn build(kind: &dyn AccelKind, soup: &TriangleSoup) -> Result<Box<dyn BuiltAccel>, String> {
-    build_with(kind, &default_params(kind), soup)
+    build_with(kind, &Params::default(), soup)
 }
 
 /// The same with these parameters.

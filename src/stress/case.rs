@@ -1,7 +1,7 @@
 //! One scene with rays that are hard for it.
 
 use super::place::Place;
-use super::shapes::Mesh;
+use super::shapes::{Mesh, cube, sphere};
 use crate::accel::Ray;
 use crate::geometry::Triangle;
 use crate::random::Pcg32;
@@ -23,8 +23,24 @@ pub enum Truth {
     Miss,
 }
 
-/// A mesh at a place.
-pub type MakeMesh = fn(&Place) -> Mesh;
+/// How fine the meshes are on which most rays are tried: a closed sphere and a closed box.
+#[derive(Clone, Copy)]
+pub struct Meshes {
+    /// Bands of the sphere.
+    pub bands: usize,
+    /// Cells along an edge of the box.
+    pub cells: usize,
+}
+
+impl Meshes {
+    /// Both with their names, at a place.
+    pub fn at(self, place: &Place) -> [(&'static str, Mesh); 2] {
+        [
+            ("sphere", sphere(self.bands, place)),
+            ("box", cube(self.cells, place)),
+        ]
+    }
+}
 
 /// A scene with rays.
 pub struct Case {
@@ -194,18 +210,21 @@ impl Maker {
     /// Adds each of these meshes at each place.
     pub fn add_on_every_rung(
         &mut self,
-        meshes: [(&str, MakeMesh); 2],
+        meshes: Meshes,
         suffix: &str,
         truth: fn(&Place) -> Truth,
         one: fn(&Place, &[Triangle], &mut Random) -> Ray,
     ) {
         for place in self.places() {
-            for (name, mesh) in meshes {
+            for (name, mesh) in meshes.at(&place) {
                 let label = format!("{name}{suffix}, {place}");
-                let mesh = |_: &mut Random| mesh(&place);
-                self.add_each(label, place, truth(&place), mesh, |mesh, random| {
-                    one(&place, mesh, random)
-                });
+                self.add_each(
+                    label,
+                    place,
+                    truth(&place),
+                    |_| mesh,
+                    |mesh, random| one(&place, mesh, random),
+                );
             }
         }
     }

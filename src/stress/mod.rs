@@ -22,7 +22,7 @@ pub mod tally;
 pub mod targets;
 
 use crate::accel::triangle::TriangleTest;
-use crate::accel::{AccelRegistry, Intersection};
+use crate::accel::{AccelError, AccelRegistry, Intersection};
 use crate::gpu::capture as capture_environment;
 use crate::gpu::{Gpu, GpuError, probe_arithmetic};
 use crate::measure::record::Key;
@@ -110,7 +110,7 @@ pub enum StressError {
     Numerics(#[from] numerics::NumericsError),
     /// A tree that the suite itself needs.
     #[error("a tree of the suite is not built: {0}")]
-    Build(String),
+    Build(#[from] AccelError),
     /// A name that nothing has.
     #[error("unknown {what} `{name}`; there are: {known}")]
     Unknown {

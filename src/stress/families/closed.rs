@@ -1,24 +1,20 @@
 //! Closed meshes: from inside, every miss is a crack.
 
-use super::super::case::{MakeMesh, Maker, Random, Truth, towards};
+use super::super::case::{Maker, Meshes, Random, Truth, towards};
 use super::super::place::Place;
-use super::super::shapes::{RADIUS, cube, sphere};
+use super::super::shapes::RADIUS;
 use crate::accel::Ray;
 use glam::{DVec3, Vec3};
 
-/// Bands of the sphere: 528 triangles.
-const BANDS: usize = 12;
-/// Cells along an edge of the box: 300 triangles.
-const CELLS: usize = 5;
+/// 528 and 300 triangles.
+const MESHES: Meshes = Meshes {
+    bands: 12,
+    cells: 5,
+};
 /// Bounces of a chain.
 const BOUNCES: usize = 100;
 /// How far inside the analytic surface a chain turns, as a fraction: facets lie within.
 const INSIDE: f64 = 0.98;
-
-const MESHES: [(&str, MakeMesh); 2] = [
-    ("sphere", |place| sphere(BANDS, place)),
-    ("box", |place| cube(CELLS, place)),
-];
 
 /// A mesh that rounding has crushed is as closed as before, but has no inside.
 pub fn truth(place: &Place) -> Truth {
@@ -107,13 +103,13 @@ fn bounce_in_sphere(p: DVec3, d: DVec3) -> (DVec3, DVec3) {
 pub fn mirror_chains(maker: &mut Maker) {
     let bounces: [Bounce; 2] = [bounce_in_sphere, bounce_in_box];
     for place in maker.places() {
-        for ((name, mesh), bounce) in MESHES.into_iter().zip(bounces) {
+        for ((name, mesh), bounce) in MESHES.at(&place).into_iter().zip(bounces) {
             let label = format!("{name}, {place}");
             maker.add(
                 label,
                 place,
                 truth(&place),
-                |_| mesh(&place),
+                |_| mesh,
                 |_, random, count| {
                     let mut rays = Vec::with_capacity(count);
                     while rays.len() < count {

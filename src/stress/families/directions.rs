@@ -1,8 +1,8 @@
 //! Ordinary meshes; directions, origins and intervals that are not.
 
-use super::super::case::{MakeMesh, Maker, Random, Truth, towards};
+use super::super::case::{Maker, Meshes, Random, Truth, towards};
 use super::super::place::Place;
-use super::super::shapes::{RADIUS, cube, sphere};
+use super::super::shapes::{RADIUS, sphere};
 use super::closed::{inside, truth};
 use crate::accel::Ray;
 use crate::geometry::Triangle;
@@ -11,10 +11,7 @@ use crate::scene::Bounds;
 use glam::{DVec3, Vec3};
 
 /// A coarse sphere and a coarse box.
-const MESHES: [(&str, MakeMesh); 2] = [
-    ("sphere", |place| sphere(8, place)),
-    ("box", |place| cube(4, place)),
-];
+const MESHES: Meshes = Meshes { bands: 8, cells: 4 };
 
 /// Adds the meshes at each place with rays made one by one.
 fn on_every_rung(maker: &mut Maker, one: fn(&Place, &[Triangle], &mut Random) -> Ray) {
@@ -146,10 +143,10 @@ pub fn from_the_middle(place: &Place, mesh: &[Triangle], random: &mut Random) ->
 }
 
 pub fn lengths(maker: &mut Maker) {
-    let meshes: [(&str, MakeMesh); 2] = [
-        ("sphere", |place| sphere(12, place)),
-        ("box", |place| cube(4, place)),
-    ];
+    let meshes = Meshes {
+        bands: 12,
+        ..MESHES
+    };
     maker.add_on_every_rung(meshes, "", truth, from_the_middle);
 }
 
