@@ -11,7 +11,7 @@ pub mod case;
 pub mod explain;
 pub mod families;
 pub mod numerics;
-pub mod place;
+pub mod placement;
 pub mod record;
 pub mod report;
 pub mod shapes;

@@ -1,9 +1,10 @@
 //! Closed meshes: from inside, every miss is a crack.
 
-use super::super::case::{Maker, Meshes, Random, Truth, towards};
-use super::super::place::Place;
-use super::super::shapes::RADIUS;
+use super::super::case::{Maker, Meshes, Truth, towards};
+use super::super::placement::Placement;
+use super::super::shapes::{RADIUS, on_edge, vertex};
 use crate::accel::Ray;
+use crate::random::Pcg32;
 use glam::{DVec3, Vec3};
 
 /// 528 and 300 triangles.
@@ -17,7 +18,7 @@ const BOUNCES: usize = 100;
 const INSIDE: f64 = 0.98;
 
 /// A mesh that rounding has crushed is as closed as before, but has no inside.
-pub fn truth(place: &Place) -> Truth {
+pub fn truth(place: &Placement) -> Truth {
     match place.keeps_shape() {
         true => Truth::Closed,
         false => Truth::Exact,
@@ -25,12 +26,12 @@ pub fn truth(place: &Place) -> Truth {
 }
 
 /// A point well inside the sphere and the box.
-pub fn inside(random: &mut Random, place: &Place) -> Vec3 {
+pub fn inside(random: &mut Pcg32, place: &Placement) -> Vec3 {
     place.point(0.45 * RADIUS * random.in_cube())
 }
 
 /// A point around the meshes.
-fn outside(random: &mut Random, place: &Place) -> Vec3 {
+fn outside(random: &mut Pcg32, place: &Placement) -> Vec3 {
     place.point(3.0 * RADIUS * random.direction())
 }
 
@@ -41,29 +42,29 @@ pub fn watertight(maker: &mut Maker) {
 }
 
 pub fn vertices(maker: &mut Maker) {
-    let exact = |_: &Place| Truth::Exact;
+    let exact = |_: &Placement| Truth::Exact;
     maker.add_on_every_rung(MESHES, "", truth, |place, mesh, random| {
         let triangle = random.one_of(mesh);
-        let vertex = random.vertex(&triangle);
+        let vertex = vertex(&triangle, random);
         towards(inside(random, place), vertex)
     });
     maker.add_on_every_rung(MESHES, " from outside", exact, |place, mesh, random| {
         let triangle = random.one_of(mesh);
-        let vertex = random.vertex(&triangle);
+        let vertex = vertex(&triangle, random);
         towards(outside(random, place), vertex)
     });
 }
 
 pub fn edges(maker: &mut Maker) {
-    let exact = |_: &Place| Truth::Exact;
+    let exact = |_: &Placement| Truth::Exact;
     maker.add_on_every_rung(MESHES, "", truth, |place, mesh, random| {
         let triangle = random.one_of(mesh);
         let from = inside(random, place);
-        towards(from, random.on_edge(&triangle))
+        towards(from, on_edge(&triangle, random))
     });
     maker.add_on_every_rung(MESHES, " from outside", exact, |place, mesh, random| {
         let triangle = random.one_of(mesh);
-        let target = random.on_edge(&triangle);
+        let target = on_edge(&triangle, random);
         towards(outside(random, place), target)
     });
 }
