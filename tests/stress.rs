@@ -3,7 +3,7 @@
 
 mod support;
 
-use raystone::accel::triangle::TriangleTest;
+use raystone::accel::triangle::{MoellerTrumbore, TriangleTest as _};
 use raystone::gpu::{Gpu, probe_arithmetic};
 use raystone::measure::record::{Key, axis};
 use raystone::stress::record::{Line, read, write};
@@ -82,7 +82,7 @@ fn a_test_that_refuses_rays_through_edges_is_seen_to_leak() {
     let leaky = [("u >= 0.0", "u > 1e-3 * area")];
     let gpu = open(kernels_with("accel/triangle/moeller_trumbore", &leaky));
     let settings = StressOptions {
-        triangles: vec![TriangleTest::MoellerTrumbore.name().into()],
+        triangles: vec![MoellerTrumbore.name().into()],
         ..small()
     };
     let records = run(&[gpu], &settings, &|_| ()).expect("the suite runs");

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use clap::Args;
-use raystone::config::{Experiment, Plan};
+use raystone::config::{Axis, Experiment, Plan};
 use raystone::gpu::{self, AdapterChoice, Gpu, KernelLibrary};
 use raystone::run::{Registries, RunOptions, kernel_library};
 use raystone::scene::{SceneData, check_model};
@@ -84,7 +84,11 @@ pub fn list_override(key: &str, values: &[String]) -> String {
 pub fn plan(experiment: &Experiment, only: &[String], registries: &Registries) -> Result<Plan> {
     let plan = Plan::new(experiment, only, |s, d| registries.is_randomised(s, d))?;
     let catalogue = registries.catalogue();
-    let is_model = |name: &str| catalogue.scene.iter().all(|entry| entry.name != name);
+    let is_model = |name: &str| {
+        catalogue[Axis::Scene]
+            .iter()
+            .all(|entry| entry.name != name)
+    };
     for scene in plan.scenes.iter().filter(|scene| is_model(&scene.name)) {
         check_model(Path::new(&scene.name))?;
     }

@@ -120,7 +120,7 @@ impl Points {
         let overrides = self.overrides(&catalogue)?;
         let experiment = Experiment::parse(DEFAULTS, "raystone points", &overrides, &catalogue)?;
         let one = |axis| -> Result<Variant> {
-            match experiment.axes.variants(axis) {
+            match experiment.axes[axis].as_slice() {
                 [variant] => Ok(variant.clone()),
                 several => Err(anyhow!(
                     "points are drawn from one {axis}, not from {}: give one value",
@@ -150,7 +150,7 @@ impl Points {
                 &format!("axes.{axis}"),
                 std::slice::from_ref(name),
             ));
-            let entry = catalogue.entries(axis).iter().find(|e| e.name == *name);
+            let entry = catalogue[axis].iter().find(|e| e.name == *name);
             entries.extend(entry.map(|entry| (axis, entry)));
         }
         // An unknown name is answered by the parser, better than a parameter of it would be.

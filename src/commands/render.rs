@@ -155,7 +155,7 @@ fn summary(rendering: &Rendering, [width, height]: [u32; 2]) -> String {
 /// One picture is one cell.
 fn check_is_one(experiment: &Experiment) -> Result<()> {
     for axis in Axis::ALL {
-        let variants = experiment.axes.variants(axis);
+        let variants = &experiment.axes[axis];
         if variants.len() > 1 {
             let labels: Vec<_> = variants.iter().map(|v| v.label.as_str()).collect();
             bail!(
@@ -215,15 +215,15 @@ mod tests {
         let experiment = experiment(&flags.split(' ').collect::<Vec<_>>()).unwrap();
         assert_eq!((experiment.spp.max(), experiment.seed), (8, 9001));
         assert_eq!(experiment.resolution, [32, 24]);
-        assert_eq!(experiment.axes.accel[0].name, "roped-bvh");
-        assert_eq!(experiment.axes.scene[0].name, "cornell-box");
+        assert_eq!(experiment.axes[Axis::Accel][0].name, "roped-bvh");
+        assert_eq!(experiment.axes[Axis::Scene][0].name, "cornell-box");
     }
 
     #[test]
     fn a_scene_path_may_hold_commas_and_quotes() {
         let experiment = experiment(&["--scene", r#"my "a,b".obj"#]).unwrap();
-        assert_eq!(experiment.axes.scene.len(), 1);
-        assert_eq!(experiment.axes.scene[0].name, r#"my "a,b".obj"#);
+        assert_eq!(experiment.axes[Axis::Scene].len(), 1);
+        assert_eq!(experiment.axes[Axis::Scene][0].name, r#"my "a,b".obj"#);
     }
 
     #[test]

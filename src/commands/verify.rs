@@ -5,7 +5,7 @@ use super::failure::{BAD_INPUT, FAILED};
 use super::output::{print, tell};
 use anyhow::Result;
 use clap::Args;
-use raystone::config::{Catalogue, Experiment, Plan, Skipped};
+use raystone::config::{Axis, Catalogue, Experiment, Plan, Skipped};
 use raystone::measure::record::{ClassVerdict, GateVerdict, JudgeCheck};
 use raystone::report::document::{Cell, Table};
 use raystone::report::format::{count, ray_class};
@@ -106,12 +106,13 @@ impl Verify {
 
 /// An experiment of every structure on the scenes of the gate.
 fn defaults(catalogue: &Catalogue) -> String {
-    let accel: Vec<_> = catalogue
-        .accel
+    let accel: Vec<_> = catalogue[Axis::Accel]
         .iter()
         .map(|entry| entry.name.clone())
         .collect();
-    let sequence = catalogue.sequence.first().map(|entry| entry.name.as_str());
+    let sequence = catalogue[Axis::Sequence]
+        .first()
+        .map(|entry| entry.name.as_str());
     format!(
         "[run]\nname = \"verify\"\n[axes]\nscene = {}\naccel = {}\nsequence = {}\n",
         toml::Value::from(SCENES.to_vec()),
@@ -124,9 +125,13 @@ fn defaults(catalogue: &Catalogue) -> String {
 fn spare_brute_force(plan: &mut Plan, allow_outside: bool) -> Result<()> {
     let mut large = Vec::new();
     for scene in &plan.scenes {
-        let cells = || plan.structures.iter().filter(|cell| cell.scene == *scene);
-        let tries_all = cells().any(|cell| cell.accel.name == BRUTE_FORCE);
-        if !tries_all || cells().all(|cell| cell.accel.name == BRUTE_FORCE) {
+        let cells = || {
+            plan.structures
+                .iter()
+                .filter(|cell| cell[Axis::Scene] == *scene)
+        };
+        let tries_all = cells().any(|cell| cell[Axis::Accel].name == BRUTE_FORCE);
+        if !tries_all || cells().all(|cell| cell[Axis::Accel].name == BRUTE_FORCE) {
             continue;
         }
         let options = LoadOptions {
@@ -141,7 +146,7 @@ fn spare_brute_force(plan: &mut Plan, allow_outside: bool) -> Result<()> {
     }
     for (scene, triangles) in large {
         plan.structures
-            .retain(|cell| cell.scene != scene || cell.accel.name != BRUTE_FORCE);
+            .retain(|cell| cell[Axis::Scene] != scene || cell[Axis::Accel].name != BRUTE_FORCE);
         plan.skipped.push(Skipped {
             cell: format!("{scene}, {BRUTE_FORCE}"),
             reason: format!(
@@ -183,14 +188,15 @@ fn table(verified: &[Verified]) -> String {
             (Ok(_), true) => "passed",
             (Ok(_), false) => "FAILED",
         };
-        let head = [one.scene.label.as_str(), &one.accel.label, word].map(Cell::from);
+        let names = one.cell.labels(&[Axis::Accel]).join(", ");
+        let head = [one.cell[Axis::Scene].label.as_str(), &names, word].map(Cell::from);
         match &one.verdict {
             Ok(verdict) => table.rows.extend(rows(head, verdict)),
             Err(_) => table.rows.push(head.into()),
         }
         for detail in faults(&one.verdict) {
             // Writing to a string cannot fail.
-            let _ = writeln!(details, "{}, {}: {detail}", one.scene, one.accel);
+            let _ = writeln!(details, "{}: {detail}", one.cell);
         }
     }
     let legend = "brute force: the judge against it, wrong of rays; \
@@ -297,7 +303,10 @@ mod tests {
     fn without_a_file_every_structure_is_checked() {
         let catalogue = Registries::default().catalogue();
         let experiment = Experiment::parse(&defaults(&catalogue), "test", &[], &catalogue).unwrap();
-        assert_eq!(experiment.axes.accel.len(), catalogue.accel.len());
-        assert_eq!(experiment.axes.scene.len(), SCENES.len());
+        assert_eq!(
+            experiment.axes[Axis::Accel].len(),
+            catalogue[Axis::Accel].len()
+        );
+        assert_eq!(experiment.axes[Axis::Scene].len(), SCENES.len());
     }
 }

@@ -8,14 +8,14 @@ use super::placement::Placement;
 use super::record::{Findings, Line, Record, Worst, line};
 use super::shapes::{Mesh, cube, sphere};
 use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite};
-use crate::accel::triangle::TriangleTest;
+use crate::accel::triangle::AnyTriangleTest;
 use crate::accel::{
     BoxTest, BuildLog, BuiltBvh, BvhParameters, Counters, CpuTwin as _, Hit, Intersection, NO_HIT,
     Query, Ray, RayBatch, Traced, TriangleSoup,
 };
 use crate::gpu::Gpu;
 use crate::integrator::offset::{TransformError, position_error};
-use crate::integrator::{RayOffset, Stage};
+use crate::integrator::{OffsetRegistry, RayOffset, Stage};
 use crate::measure::record::{Key, axis};
 use crate::random::Pcg32;
 use glam::Vec3;
@@ -45,6 +45,8 @@ const OFFSET_RAYS: usize = 16;
 const COST_BANDS: (usize, usize) = (24, 64);
 const COST_RAYS: (usize, usize) = (4096, 65_536);
 const COST_ROUNDS: usize = 5;
+/// The test that costs are compared with.
+const PLAIN_TEST: &str = "moeller-trumbore";
 
 impl Suite<'_> {
     /// How many hits each box test loses, with the default triangle test.
@@ -57,7 +59,7 @@ impl Suite<'_> {
             true => &BOX_STRUCTURES[..BOX_STRUCTURES_IF_QUICK],
             false => &BOX_STRUCTURES[..],
         };
-        let column = || BoxTest::ALL.iter().map(|(test, ..)| empty_record(*test));
+        let column = || BoxTest::ALL.iter().map(|test| empty_record(*test));
         let mut columns: Vec<(Kind, Vec<Findings>)> = (self.kinds.iter())
             .filter(|kind| structures.contains(&kind.name()))
             .map(|kind| (*kind, column().collect()))
@@ -73,9 +75,9 @@ impl Suite<'_> {
             }
         }
         let mut lines = Vec::new();
-        for (place, (_, name, _)) in BoxTest::ALL.iter().enumerate() {
+        for (place, test) in BoxTest::ALL.iter().enumerate() {
             for (kind, column) in &columns {
-                let key = Key::default().with(axis::BOX_TEST, name);
+                let key = Key::default().with(axis::BOX_TEST, test.name);
                 let key = key.with(axis::ACCEL, kind.name());
                 lines.push(line(key, Record::BoxTest(column[place].clone())));
             }
@@ -96,7 +98,7 @@ impl Suite<'_> {
             return Ok(());
         };
         let traced = Traced::upload(&stage.gpu, &*built)?;
-        for ((box_test, name, _), record) in BoxTest::ALL.iter().zip(column) {
+        for (box_test, record) in BoxTest::ALL.iter().zip(column) {
             stage.set_tests(Intersection {
                 box_test: *box_test,
                 ..Intersection::default()
@@ -114,7 +116,7 @@ impl Suite<'_> {
                     let replay = self.replay(case, kind.name(), test, &case.rays[index]);
                     Worst {
                         what: "lost hit".into(),
-                        replay: format!("{replay} --box-test {name}"),
+                        replay: format!("{replay} --box-test {}", box_test.name),
                     }
                 });
             }
@@ -139,10 +141,10 @@ impl Suite<'_> {
             Placement::FAR,
         ]) {
             for (name, mesh) in closed_meshes(&place) {
-                for offset in RayOffset::ALL {
+                for &offset in OffsetRegistry::default().iter() {
                     let found = bounce(&mesh, offset, self.settings.seed, rays)?;
                     let triangle = Intersection::default().triangle.name();
-                    let key = Key::default().with(axis::OFFSET, offset.name());
+                    let key = Key::default().with(axis::OFFSET, offset.name);
                     let key = key.with(axis::TRIANGLE, triangle).with(axis::MESH, name);
                     let key = key.with(axis::PLACE, place);
                     records.push(line(key, Record::Offset(found)));
@@ -160,9 +162,7 @@ impl Suite<'_> {
         progress("cost of triangle tests");
         let all = self.times(BRUTE_FORCE, COST_BANDS.0, COST_RAYS.0)?;
         let some = self.times(PLAIN, COST_BANDS.1, COST_RAYS.1)?;
-        let plain = some
-            .iter()
-            .find(|t| t.test == TriangleTest::MoellerTrumbore);
+        let plain = some.iter().find(|t| t.test.name() == PLAIN_TEST);
         let plain_ms = plain.map_or(f64::NAN, |t| t.ms);
         let pairs = all.iter().zip(&some);
         let record = |(all, some): (&Timed, &Timed)| {
@@ -231,7 +231,7 @@ impl Suite<'_> {
 
 /// A triangle test that was timed.
 struct Timed {
-    test: TriangleTest,
+    test: AnyTriangleTest,
     ms: f64,
     tests_per_ray: f64,
     rays: usize,
@@ -334,7 +334,7 @@ fn mirror(soup: &TriangleSoup, incoming: &Ray, hit: &Hit, offset: RayOffset) -> 
         normal
     };
     let error = position_error(v0.into(), e1.into(), e2.into(), &TransformError::default());
-    let origin = offset.offset_point(p.into(), facing.into(), error);
+    let origin = (offset.offset_point)(p.into(), facing.into(), error);
     let moved = (Vec3::from(origin) - p).as_dvec3().length();
     let unit = f64::from(p.abs().max_element() * f32::EPSILON);
     let bound = f64::from(facing.abs().dot(error.into())) + 2.0 * unit;
@@ -346,6 +346,7 @@ fn mirror(soup: &TriangleSoup, incoming: &Ray, hit: &Hit, offset: RayOffset) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrator::offset;
 
     #[test]
     fn without_an_offset_chains_meet_their_own_triangle_and_with_a_bound_they_do_not() {
@@ -354,9 +355,9 @@ mod tests {
                 let found = bounce(&mesh, offset, 1, 3000).unwrap();
                 found.count("self-intersections/v1") + found.count("leaks/v1")
             };
-            let none = count(RayOffset::None);
+            let none = count(offset::NONE);
             assert!(none > 30, "{name}: {none:?}");
-            assert_eq!(count(RayOffset::ErrorBound), 0, "{name}");
+            assert_eq!(count(offset::ERROR_BOUND), 0, "{name}");
         }
     }
 

@@ -21,8 +21,8 @@ pub mod suite;
 pub mod tally;
 pub mod targets;
 
-use crate::accel::triangle::TriangleTest;
-use crate::accel::{AccelError, AccelRegistry, Intersection};
+use crate::accel::triangle::AnyTriangleTest;
+use crate::accel::{AccelError, AccelRegistry, Intersection, TriangleRegistry};
 use crate::gpu::capture as capture_environment;
 use crate::gpu::{Gpu, GpuError, probe_arithmetic};
 use crate::measure::record::Key;
@@ -85,7 +85,8 @@ impl StressOptions {
         let registry = AccelRegistry::default();
         let structures = registry.iter().map(|kind| kind.name());
         check_names("structure", &self.accels, structures)?;
-        let tests = TriangleTest::ALL.iter().map(|t| t.name());
+        let tests = TriangleRegistry::default();
+        let tests = tests.iter().map(|test| test.name());
         check_names("triangle test", &self.triangles, tests)
     }
 
@@ -223,11 +224,12 @@ fn kinds(settings: &StressOptions) -> Vec<suite::Kind> {
 }
 
 /// The triangle tests to try, the default first.
-fn tests(settings: &StressOptions) -> Vec<TriangleTest> {
-    let wanted = |test: &TriangleTest| {
+fn tests(settings: &StressOptions) -> Vec<AnyTriangleTest> {
+    let wanted = |test: &AnyTriangleTest| {
         settings.triangles.is_empty() || settings.triangles.iter().any(|t| t == test.name())
     };
-    let mut tests: Vec<TriangleTest> = TriangleTest::ALL.into_iter().filter(wanted).collect();
+    let mut tests: Vec<AnyTriangleTest> =
+        TriangleRegistry::default().iter().filter(wanted).collect();
     tests.sort_by_key(|test| *test != Intersection::default().triangle);
     tests
 }

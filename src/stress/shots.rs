@@ -7,7 +7,7 @@ use super::record::{Findings, Line, Record, Worst, line, skipped};
 use super::shot_meshes::{AIMS, FAMILY, PLANE, SPHERE, ShotMesh};
 use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite, key};
 use super::{StressError, case};
-use crate::accel::triangle::TriangleTest;
+use crate::accel::triangle::AnyTriangleTest;
 use crate::accel::{NO_HIT, Ray, Traced};
 use crate::integrator::Stage;
 use crate::measure::record::{Key, axis};
@@ -65,7 +65,7 @@ impl Suite<'_> {
     ) -> Result<(), StressError> {
         let scene = Arc::new(case::scene(target.mesh.clone(), None));
         let (mesh, place) = (target.short_name(), target.place);
-        let mut series: Vec<(TriangleTest, Kind, Vec<Line>)> = Vec::new();
+        let mut series: Vec<(AnyTriangleTest, Kind, Vec<Line>)> = Vec::new();
         for (row, test) in self.tests.iter().enumerate() {
             let kinds = self.kinds.iter().filter(|kind| match row {
                 0 => kind.name() != BRUTE_FORCE,

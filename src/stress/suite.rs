@@ -7,7 +7,7 @@ use super::placement::Placement;
 use super::record::{Findings, Line, Record, Rung, line, skipped};
 use super::tally::{CaseJudge, Outcome, Tally};
 use super::{StressError, StressOptions};
-use crate::accel::triangle::TriangleTest;
+use crate::accel::triangle::AnyTriangleTest;
 use crate::accel::{
     AccelKind, BuiltAccel, Hit, Intersection, NO_HIT, Ray, Space, Traced, TriangleSoup,
 };
@@ -41,11 +41,11 @@ pub struct Suite<'a> {
     /// Structures, brute force among them if asked for.
     pub kinds: Vec<Kind>,
     /// Triangle tests, the default first.
-    pub tests: Vec<TriangleTest>,
+    pub tests: Vec<AnyTriangleTest>,
 }
 
 /// What everything through a structure with a triangle test has in common.
-pub(super) fn key(test: TriangleTest, kind: Kind) -> Key {
+pub(super) fn key(test: AnyTriangleTest, kind: Kind) -> Key {
     let key = Key::default().with(axis::TRIANGLE, test.name());
     key.with(axis::ACCEL, kind.name())
 }
@@ -76,7 +76,7 @@ impl OpenCell {
 
 impl Suite<'_> {
     /// The default triangle test with the default box test.
-    pub fn with(triangle: TriangleTest) -> Intersection {
+    pub fn with(triangle: AnyTriangleTest) -> Intersection {
         Intersection {
             triangle,
             ..Intersection::default()
@@ -166,7 +166,7 @@ impl Suite<'_> {
     }
 
     /// Other tests than the default one climb few rungs through structures other than the plain one.
-    fn takes(&self, case: &Case, test: TriangleTest, kind: Kind) -> bool {
+    fn takes(&self, case: &Case, test: AnyTriangleTest, kind: Kind) -> bool {
         let is_default = Some(&test) == self.tests.first();
         let stands_for_all = kind.name() == PLAIN || kind.name() == BRUTE_FORCE;
         let coarse = Placement::ladder(true).contains(&case.place);
@@ -175,7 +175,7 @@ impl Suite<'_> {
 
     /// Whether any hit is asked for: with the default test; through the plain structure only if it has to
     /// be quick, since every kernel has to be compiled.
-    fn asks_any(&self, test: TriangleTest, kind: Kind) -> bool {
+    fn asks_any(&self, test: AnyTriangleTest, kind: Kind) -> bool {
         let is_default = Some(&test) == self.tests.first();
         is_default && (!self.settings.quick || kind.name() == PLAIN)
     }
@@ -184,7 +184,7 @@ impl Suite<'_> {
         &self,
         case: &Case,
         judge: &CaseJudge,
-        test: TriangleTest,
+        test: AnyTriangleTest,
         cells: &mut [(Kind, OpenCell)],
     ) -> Result<(), StressError> {
         let soup = TriangleSoup::new(&case.scene).intersecting(Self::with(test));
@@ -247,7 +247,7 @@ impl Suite<'_> {
     }
 
     /// The command that shows what a structure does with a ray of a case.
-    pub fn replay(&self, case: &Case, kind: &str, test: TriangleTest, ray: &Ray) -> String {
+    pub fn replay(&self, case: &Case, kind: &str, test: AnyTriangleTest, ray: &Ray) -> String {
         self.replay_at(case.family, &case.label, (kind, test.name()), ray)
     }
 
@@ -280,7 +280,7 @@ struct Trace<'a> {
     expected: &'a Expected,
     /// Answers whose outcomes are known.
     judged: Vec<(&'a Hit, &'a Outcome)>,
-    test: TriangleTest,
+    test: AnyTriangleTest,
 }
 
 impl Trace<'_> {

@@ -165,7 +165,7 @@ fn pad_target(records: &[Line]) -> Option<TargetRecord> {
     let found = smallest_sound_pad(padded.map(|t| t.body)).map_or(f64::MAX, |pad| pad as f64);
     Some(target(
         "smallest pad of boxes that loses no hit here, ulp",
-        f64::from(BoxTest::DEFAULT_ULPS),
+        f64::from(BoxTest::default().pad_ulps),
         [(found, String::new())],
     ))
 }
@@ -173,7 +173,7 @@ fn pad_target(records: &[Line]) -> Option<TargetRecord> {
 /// Rays begun with the default offset: those that meet the triangle they leave, or escape; and how far they
 /// begin from the points they leave, since contact shadows and thin gaps end there.
 fn offset_targets(records: &[Line]) -> Vec<TargetRecord> {
-    let default = RayOffset::default().name();
+    let default = RayOffset::default().name;
     let found = |figures: &'static [&'static str]| {
         let of_default = all!(records, Offset).filter(|o| o.key.label(axis::OFFSET) == default);
         of_default.map(move |o| {

@@ -4,6 +4,7 @@ mod models;
 mod pictures;
 mod points;
 
+use raystone::config::Axis;
 use raystone::discrepancy::Measure;
 use raystone::measure::metrics::METRICS;
 use raystone::run::Registries;
@@ -174,11 +175,11 @@ fn list_mentions_every_entry_of_every_registry() {
     let words = stdout(&listed);
     let catalogue = Registries::default().catalogue();
     let axes = [
-        ("scene", &catalogue.scene),
-        ("accel", &catalogue.accel),
-        ("sequence", &catalogue.sequence),
-        ("decorrelation", &catalogue.decorrelation),
-        ("integrator", &catalogue.integrator),
+        ("scene", &catalogue[Axis::Scene]),
+        ("accel", &catalogue[Axis::Accel]),
+        ("sequence", &catalogue[Axis::Sequence]),
+        ("decorrelation", &catalogue[Axis::Decorrelation]),
+        ("integrator", &catalogue[Axis::Integrator]),
     ];
     for (axis, entries) in axes {
         let one_axis = stdout(&run(&["list", axis]));

@@ -3,7 +3,9 @@
 use super::NumericsError;
 use crate::accel::{AccelRegistry, Intersection, Traced};
 use crate::gpu::Gpu;
-use crate::integrator::{ConfiguredIntegrator, IntegratorRegistry, RenderJob, Renderer, Stage};
+use crate::integrator::{
+    ConfiguredIntegrator, IntegratorRegistry, RayOffset, RenderJob, Renderer, Stage,
+};
 use crate::params::{ParamValue, Params, Variant};
 use crate::sampling::{Demand, Sampler, SamplerRegistry};
 use crate::scene::SceneData;
@@ -65,6 +67,7 @@ impl Rig {
             camera: self.stage.scene.view(1.0),
             sampler,
             integrator,
+            offset: RayOffset::default(),
             runtime_checks: true,
         };
         let stage = &self.stage;
