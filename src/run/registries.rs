@@ -44,7 +44,9 @@ impl Registries {
         let decorrelations = self.samplers.decorrelations.defaults();
         let decorrelations = decorrelations.map(|d| d.sources());
         let integrators = self.integrators.iter().map(|i| i.sources());
-        let sources = sequences.chain(decorrelations).chain(integrators);
+        let structures = self.accel.iter().map(|kind| kind.sources());
+        let samplers = sequences.chain(decorrelations);
+        let sources = samplers.chain(integrators).chain(structures);
         let sources: Vec<_> = sources.flatten().copied().collect();
         KernelLibrary::default().with_sources(&sources)
     }
