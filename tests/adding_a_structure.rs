@@ -1,23 +1,23 @@
 //! Keeps `docs/adding-a-structure.md` true: the structure that it adds goes through the public
 //! interface and the whole gate, and every file that it quotes is quoted rightly.
 
-mod common;
 #[path = "adding_a_structure/device_slabs.rs"]
 mod device_slabs;
 #[path = "adding_a_structure/sorted_slabs.rs"]
 mod sorted_slabs;
+mod support;
 
-use common::{
-    Pcg, assert_same_hits, brute_force, build, default_params, param_variants, scenes, trace,
-};
 use device_slabs::DeviceSlabs;
 use raystone::accel::{AccelKind, BuildLog, Counters};
 use raystone::config::{Experiment, Plan};
 use raystone::gpu::KernelLibrary;
 use raystone::measure::record::GateVerdict;
-use raystone::run::{Registries, RunOptions, run, verify};
+use raystone::run::{Registries, RunOptions, verify};
 use sorted_slabs::SortedSlabs;
 use std::path::Path;
+use support::{
+    Pcg, assert_same_hits, brute_force, build, default_params, param_variants, scenes, trace,
+};
 
 const KERNEL: &str = "accel/sorted_slabs.wesl";
 
@@ -53,20 +53,6 @@ sequence = "pixel-hash"
 seed = 2
 "#;
 
-/// Little of everything.
-const QUICK: &str = "[timing]
-rounds = 3
-min_warmup_ms = 0
-max_warmup_ms = 1
-rays = 1024
-[gate]
-rays = 1024
-brute_force_tests = 1000
-oracle_rays = 16
-[discrepancy]
-points = 16
-";
-
 /// The gate of every cell of the experiment, with the kernels of a folder in the place of those that came along.
 fn verdicts(kernels: Option<&Path>) -> Vec<GateVerdict> {
     let mut registries = Registries::default();
@@ -87,7 +73,7 @@ fn verdicts(kernels: Option<&Path>) -> Vec<GateVerdict> {
 
 #[test]
 fn the_structure_passes_the_whole_gate_through_the_public_interface() {
-    if !common::is_exact(common::gpu()) {
+    if !support::is_exact(support::gpu()) {
         return;
     }
     for verdict in verdicts(None) {
@@ -117,8 +103,8 @@ fn the_gate_refuses_a_kernel_that_forgets_the_last_triangle_of_a_run() {
 
 #[test]
 fn kernel_and_twin_equal_brute_force_on_hard_scenes() {
-    let gpu = common::open(KernelLibrary::default().with_sources(SortedSlabs.sources()));
-    if !common::is_exact(&gpu) {
+    let gpu = support::open(KernelLibrary::default().with_sources(SortedSlabs.sources()));
+    if !support::is_exact(&gpu) {
         return;
     }
     let mut rng = Pcg::new(31);
@@ -159,8 +145,8 @@ fn building(from: &str, to: &str) -> KernelLibrary {
 
 #[test]
 fn a_structure_built_on_the_device_stays_there_and_equals_brute_force() {
-    let gpu = common::open(building("", ""));
-    if !common::is_exact(&gpu) {
+    let gpu = support::open(building("", ""));
+    if !support::is_exact(&gpu) {
         return;
     }
     let mut rng = Pcg::new(41);
@@ -195,41 +181,29 @@ fn a_fault_of_a_build_on_the_device_and_a_missing_device_are_seen() {
     assert!(told.contains("built on the device"), "{told}");
     let faults = [("order[place]", "order[first]"), ("low = min", "low = max")];
     for (from, to) in faults {
-        let gpu = common::open(building(from, to));
+        let gpu = support::open(building(from, to));
         let built = DeviceSlabs.build(&soup, &params, &mut BuildLog::with_gpu(&gpu));
         let built = built.unwrap_or_else(|e| panic!("{e}"));
         assert!(built.validate(&soup).is_err(), "{to}");
         let rays = scenes::lattice_rays(&mut Pcg::new(6), 2000, 6);
         let batch = trace(&gpu, &*built, &soup, &rays, &[]);
-        let wrong = common::differences(&brute_force(&soup, &rays), &batch.hits);
+        let wrong = support::differences(&brute_force(&soup, &rays), &batch.hits);
         assert!(!wrong.is_empty(), "{to}");
     }
 }
 
 #[test]
 fn the_pass_of_a_build_on_the_device_is_a_phase_of_the_record() {
-    if !common::is_exact(common::gpu()) {
+    if !support::is_exact(support::gpu()) {
         return;
     }
     let mut registries = Registries::default();
     registries.accel.register(&DeviceSlabs);
-    let text = EXPERIMENT
-        .replace("sorted-slabs", "device-slabs")
-        .replace("run_length = [8, 64]", "run_length = 8")
-        .replace(", \"displaced-sphere\"]", "]")
-        .replace("[scene.displaced-sphere]\ntriangles = 1000\n", QUICK);
-    let experiment = Experiment::parse(&text, "experiment", &[], &registries.catalogue());
-    let experiment = experiment.unwrap_or_else(|e| panic!("{e}"));
-    let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d));
-    let plan = plan.unwrap_or_else(|e| panic!("{e}"));
+    let text = support::SMALL.replace("[\"bvh\"]", "[\"device-slabs\"]");
     let folder = tempfile::tempdir().expect("a folder");
-    let options = RunOptions {
-        out: folder.path().join("out"),
-        ..RunOptions::default()
-    };
-    let summary = run(&experiment, &plan, &registries, &options);
-    let records = std::fs::read_to_string(options.out.join("records.jsonl")).expect("records");
-    assert_eq!(summary.expect("a run").failed, 0, "{records}");
+    let (summary, _) = support::run(&text, &registries, folder.path(), None);
+    let records = std::fs::read_to_string(folder.path().join("records.jsonl")).expect("records");
+    assert_eq!(summary.failed, 0, "{records}");
     let built = records
         .lines()
         .find(|l| l.contains("\"sort\"") && l.contains("\"boxes\""));

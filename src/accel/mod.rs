@@ -51,7 +51,7 @@ pub use irregular_grid::IrregularGrid;
 pub use kd_tree::KdTree;
 pub use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
-pub use registry::AccelRegistry;
+pub use registry::{AccelRegistry, BoxRegistry, TriangleRegistry};
 pub use stats::{BuildLog, LEAF_HISTOGRAM_END, Phase, StructureStats};
 pub use structure::Structure;
 pub use tracer::{
@@ -62,7 +62,7 @@ pub use two_level_grid::TwoLevelGrid;
 pub use uniform_grid::UniformGrid;
 
 use crate::gpu::{Composition, UniformValues};
-use crate::params::{ParamError, ParameterSchema, Params};
+use crate::params::{ParamError, ParameterSchema, Params, Sources};
 use crate::scene::SceneData;
 use bytemuck::NoUninit;
 use serde::{Deserialize, Serialize};
@@ -290,7 +290,7 @@ pub trait AccelKind: Sync {
         vec![format!("accel/{}", self.name().replace('-', "_"))]
     }
     /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
-    fn sources(&self) -> &'static [(&'static str, &'static str)] {
+    fn sources(&self) -> Sources {
         &[]
     }
     /// Builds the structure.

@@ -1,7 +1,7 @@
 //! What the file of a structure begins with: the declaration of its registry entry, and the vocabulary.
 
 use super::{AccelKind, BuildLog, BuildResult, TriangleSoup};
-use crate::params::{ParameterSchema, Parameters, Params};
+use crate::params::{ParameterSchema, Parameters, Params, Sources};
 
 /// A registry entry whose name and parameters are known at compile time. Every one is an [`AccelKind`].
 pub trait Structure: Sync {
@@ -10,7 +10,7 @@ pub trait Structure: Sync {
     /// One line: what it is and where it comes from.
     const DESCRIPTION: &'static str;
     /// See [`AccelKind::sources`].
-    const SOURCES: &'static [(&'static str, &'static str)] = &[];
+    const SOURCES: Sources = &[];
     /// What it can be set to, declared by [`parameters!`](crate::parameters).
     type Parameters: Parameters;
 
@@ -34,7 +34,7 @@ impl<S: Structure> AccelKind for S {
         S::Parameters::schema()
     }
 
-    fn sources(&self) -> &'static [(&'static str, &'static str)] {
+    fn sources(&self) -> Sources {
         Self::SOURCES
     }
 

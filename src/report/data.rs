@@ -1,10 +1,12 @@
 //! Records sorted by what they speak of: scene, integrator, sampler.
 
+use super::names::Names;
 use super::samplers::Sampler;
 use crate::measure::figure::{FIGURES, Figure, figure};
 use crate::measure::gate::fault_text;
 use crate::measure::record::*;
 use std::borrow::Cow;
+use std::ops::Deref;
 
 /// Everything a run recorded.
 #[derive(Debug, Default)]
@@ -27,6 +29,8 @@ pub struct RunData<'a> {
     pub skipped: Vec<&'a SkippedRecord>,
     /// Cells that failed without a record of their own kind.
     pub failed: Vec<&'a SkippedRecord>,
+    /// What competitors are called.
+    pub names: Names,
     /// Every structure of the run; the index is its look in all plots.
     pub structures: Vec<String>,
     /// Every sampler of the run; the index is its look in all plots.
@@ -41,26 +45,61 @@ pub struct SceneGroup<'a> {
     /// The scene itself.
     pub record: Option<&'a SceneRecord>,
     /// Structures in the order measured.
-    pub structures: Vec<Recorded<'a, StructureRecord>>,
-    /// One per integrator.
+    pub structures: Vec<Measured<'a, StructureRecord>>,
+    /// One per integrator, triangle test and box test.
     pub views: Vec<View<'a>>,
 }
 
-/// A scene under one integrator: images with one reference.
+/// A scene under one integrator, triangle test and box test: images with one reference.
 #[derive(Debug)]
 pub struct View<'a> {
-    /// Label of the integrator.
-    pub integrator: &'a str,
+    /// What all its images are of.
+    key: Key,
+    /// The integrator, with what else tells this view from others.
+    pub name: String,
     /// The reference image.
     pub reference: Option<Recorded<'a, ReferenceRecord>>,
     /// Samplers in the order in which they first appear.
     pub samplers: Vec<Sampler<'a>>,
     /// Times of full cells.
-    pub times: Vec<Recorded<'a, TimeRecord>>,
+    pub times: Vec<Measured<'a, TimeRecord>>,
 }
 
-/// What a sampler's errors are of.
-const SAMPLER_AXES: [&str; 8] = [
+/// What was measured of a structure, alone or with a sampler; reads like the record.
+#[derive(Debug)]
+pub struct Measured<'a, T> {
+    /// What was measured. With the driver's checks off the structure is another competitor, and its
+    /// label says so.
+    pub key: Key,
+    /// Name of the structure: among all of the scene, or among those that one view was timed with.
+    pub structure: String,
+    /// Name of the sampler that it was timed with.
+    pub sampler: String,
+    /// The record.
+    pub body: &'a T,
+}
+
+impl<T> Deref for Measured<'_, T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        self.body
+    }
+}
+
+/// What the images of a view have in common.
+const VIEW_AXES: [&str; 4] = [
+    axis::SCENE,
+    axis::INTEGRATOR,
+    axis::TRIANGLE,
+    axis::BOX_TEST,
+];
+
+/// What tells the structures of a scene apart.
+pub const STRUCTURE_AXES: [&str; 4] = [axis::ACCEL, axis::KERNELS, axis::TRIANGLE, axis::BOX_TEST];
+
+/// What a sampler's errors are of, and what an image depends on: all but the structure.
+pub const SAMPLER_AXES: [&str; 8] = [
     axis::SCENE,
     axis::INTEGRATOR,
     axis::SEQUENCE,
@@ -71,26 +110,22 @@ const SAMPLER_AXES: [&str; 8] = [
     axis::OFFSET,
 ];
 
-/// Name of a structure as measured; with the driver's checks off it is another competitor.
-pub fn structure_name<T>(of: Recorded<T>) -> String {
-    let (label, kernels) = (of.key.label(axis::ACCEL), of.key.kernels_mark());
-    format!("{label}{}{kernels}", unchecked(of))
-}
-
-/// Name of the structure of a timed cell, without the kernels: they are in the sampler's name, so that
-/// the same structure stands in one row whatever kernels traced it.
-pub fn timed_structure<T>(of: Recorded<T>) -> String {
-    format!("{}{}", of.key.label(axis::ACCEL), unchecked(of))
-}
-
-fn unchecked<T>(of: Recorded<T>) -> &'static str {
-    if of.ran.unchecked { " (unchecked)" } else { "" }
+/// The key of a line; a structure that ran without the driver's checks has another label.
+fn competitor(line: &Line) -> Key {
+    let accel = line.key.label(axis::ACCEL);
+    match line.ran.unchecked && !accel.is_empty() {
+        true => (line.key.clone()).with(axis::ACCEL, format!("{accel} (unchecked)")),
+        false => line.key.clone(),
+    }
 }
 
 impl<'a> RunData<'a> {
     /// Sorts the lines. Of two lines on the same thing the later one holds.
     pub fn new(lines: &'a [Line]) -> Self {
-        let mut data = Self::default();
+        let mut data = Self {
+            names: Names::new(lines),
+            ..Self::default()
+        };
         for line in lines {
             match &line.body {
                 Body::Run(record) => data.run = Some(record),
@@ -111,16 +146,27 @@ impl<'a> RunData<'a> {
                     data.scene(line.key.label(axis::SCENE)).record = Some(record)
                 }
                 Body::Structure(record) => {
+                    let key = competitor(line);
+                    let measured = Measured {
+                        structure: data.names.structure(&key),
+                        sampler: String::new(),
+                        key,
+                        body: record,
+                    };
                     let scene = data.scene(line.key.label(axis::SCENE));
-                    put(&mut scene.structures, line.of(record), is_same)
+                    put(&mut scene.structures, measured, |a, b| a.key == b.key)
                 }
-                Body::Reference(record) => {
-                    data.view(&line.key).reference = Some(line.of(record));
-                }
+                Body::Reference(_) => {}
                 Body::Time(record) => {
-                    data.sampler(&line.key);
+                    let key = competitor(line);
+                    let measured = Measured {
+                        structure: key.label(axis::ACCEL).to_owned(),
+                        sampler: data.sampler(&line.key).name.clone(),
+                        key,
+                        body: record,
+                    };
                     let view = data.view(&line.key);
-                    put(&mut view.times, line.of(record), is_same);
+                    put(&mut view.times, measured, |a, b| a.key == b.key);
                 }
                 Body::Error(record) => {
                     let replicates = &mut data.sampler(&line.key).replicates;
@@ -128,14 +174,38 @@ impl<'a> RunData<'a> {
                 }
             }
         }
+        for reference in all_of(lines) {
+            data.refer_to(reference);
+        }
         data.name_competitors();
         data
+    }
+
+    /// Gives a reference to every view that it is of. One whose value is known was not rendered, so that
+    /// it is of every test.
+    fn refer_to(&mut self, reference: Recorded<'a, ReferenceRecord>) {
+        let scene = self.scene(reference.key.label(axis::SCENE));
+        let is_of = |view: &&mut View| {
+            let fits = |axis: &str| match reference.key.label(axis) {
+                "" => true,
+                label => label == view.key.label(axis),
+            };
+            VIEW_AXES.into_iter().all(fits)
+        };
+        let mut of_no_view = true;
+        for view in scene.views.iter_mut().filter(is_of) {
+            view.reference = Some(reference);
+            of_no_view = false;
+        }
+        if of_no_view {
+            self.view(reference.key).reference = Some(reference);
+        }
     }
 
     fn name_competitors(&mut self) {
         let (mut structures, mut samplers) = (Vec::new(), Vec::new());
         for scene in &self.scenes {
-            let measured = scene.structures.iter().map(|s| structure_name(*s));
+            let measured = scene.structures.iter().map(|s| s.structure.clone());
             let timed = scene.views.iter().flat_map(View::timed_structures);
             structures.extend(measured.chain(timed));
             samplers.extend(
@@ -146,7 +216,7 @@ impl<'a> RunData<'a> {
                     .map(|s| s.name.clone()),
             );
         }
-        samplers.extend(self.streams.iter().map(|s| s.key.sampler()));
+        samplers.extend(self.streams.iter().map(|s| self.names.sampler(s.key)));
         self.structures = without_repeats(structures);
         self.samplers = without_repeats(samplers);
     }
@@ -194,28 +264,29 @@ impl<'a> RunData<'a> {
     }
 
     fn view(&mut self, key: &'a Key) -> &mut View<'a> {
-        let integrator = key.label(axis::INTEGRATOR);
+        let name = self.names.view(key);
         let new = || View {
-            integrator,
+            key: key.only(&VIEW_AXES),
+            name,
             reference: None,
             samplers: Vec::new(),
             times: Vec::new(),
         };
         let views = &mut self.scene(key.label(axis::SCENE)).views;
-        find_or_push(views, |view| view.integrator == integrator, new)
+        find_or_push(views, |view| view.key.agrees(key, &VIEW_AXES), new)
     }
 
     fn sampler(&mut self, key: &'a Key) -> &mut Sampler<'a> {
-        let name = key.sampler();
+        let name = self.names.sampler(key);
         let new = || Sampler {
             key: key.only(&SAMPLER_AXES),
-            name: name.clone(),
+            name,
             replicates: Vec::new(),
             bias: None,
             spectrum: None,
         };
         let samplers = &mut self.view(key).samplers;
-        find_or_push(samplers, |sampler| sampler.name == name, new)
+        find_or_push(samplers, |s| s.key.agrees(key, &SAMPLER_AXES), new)
     }
 
     /// Every view with its scene.
@@ -226,29 +297,22 @@ impl<'a> RunData<'a> {
     }
 }
 
-impl<'a> View<'a> {
+impl View<'_> {
     /// Times that may be used.
-    pub fn valid_times(&self) -> impl Iterator<Item = Recorded<'a, TimeRecord>> {
-        self.times
-            .iter()
-            .copied()
-            .filter(|time| is_valid_time(time))
+    pub fn valid_times(&self) -> impl Iterator<Item = &Measured<'_, TimeRecord>> {
+        self.times.iter().filter(|time| is_valid_time(time))
     }
 
     /// Names of the structures that were timed, in the order measured.
     pub fn timed_structures(&self) -> Vec<String> {
-        let names = self.times.iter().map(|time| timed_structure(*time));
+        let names = self.times.iter().map(|time| time.structure.clone());
         without_repeats(names.collect())
     }
 
     /// The time of a cell, unless it failed.
-    pub fn time(&self, structure: &str, sampler: &str) -> Option<Recorded<'a, TimeRecord>> {
-        let matches = |time: &&Recorded<TimeRecord>| {
-            is_valid_time(time)
-                && timed_structure(**time) == structure
-                && time.key.sampler() == sampler
-        };
-        self.times.iter().find(matches).copied()
+    pub fn time(&self, structure: &str, sampler: &str) -> Option<&Measured<'_, TimeRecord>> {
+        self.valid_times()
+            .find(|time| time.structure == structure && time.sampler == sampler)
     }
 
     /// Milliseconds per spp of [`View::time`].
@@ -311,10 +375,6 @@ pub fn without_repeats(names: Vec<String>) -> Vec<String> {
         }
     }
     kept
-}
-
-fn is_same<T>(a: &Recorded<T>, b: &Recorded<T>) -> bool {
-    a.key == b.key && a.ran.unchecked == b.ran.unchecked
 }
 
 fn put<T>(list: &mut Vec<T>, item: T, same: impl Fn(&T, &T) -> bool) {

@@ -10,6 +10,7 @@ pub mod document;
 pub mod format;
 pub mod html;
 pub mod markdown;
+pub mod names;
 pub mod pictures;
 pub mod pivot;
 pub mod plot;

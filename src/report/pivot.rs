@@ -6,7 +6,7 @@ use super::values::Value;
 use crate::measure::record::Key;
 
 /// A part of a key, as a row or column is called.
-pub type Part = fn(&Key) -> String;
+pub type Part<'a> = &'a dyn Fn(&Key) -> String;
 
 /// How values are laid out.
 pub struct Pivot<'a> {
@@ -17,11 +17,11 @@ pub struct Pivot<'a> {
     /// What tells rows apart, and the cells before their figures.
     pub rows: Vec<(String, Vec<Cell>)>,
     /// Which part of a key chooses the row.
-    pub row: Part,
+    pub row: Part<'a>,
     /// Ids of the figures, in the order of their columns.
     pub figures: &'a [&'a str],
     /// Which part of a key makes columns of its own; none: one column per figure.
-    pub across: Option<Part>,
+    pub across: Option<Part<'a>>,
 }
 
 impl Pivot<'_> {
@@ -98,9 +98,9 @@ mod tests {
                 rows: ["a", "b"]
                     .map(|name| (name.into(), vec![name.into()]))
                     .to_vec(),
-                row: |key| key.label(axis::ACCEL).into(),
+                row: &|key| key.label(axis::ACCEL).into(),
                 figures,
-                across: Some(|key| key.label(axis::RAYS).into()),
+                across: Some(&|key| key.label(axis::RAYS).into()),
             }
             .table(&values)
         };

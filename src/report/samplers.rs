@@ -13,12 +13,12 @@ pub const UNRESOLVED: &str = "below what the reference can resolve";
 /// The part of the least measured error that the reference's own may be.
 pub const REFERENCE_SHARE: f64 = 0.1;
 
-/// A sampler under one scene and integrator.
+/// A sampler under one scene, integrator, triangle test and box test.
 #[derive(Debug)]
 pub struct Sampler<'a> {
     /// What it draws for what.
     pub key: Key,
-    /// `sequence × decorrelation`, with the kernels.
+    /// `sequence × decorrelation`, with what else tells it from others, see [`super::names`].
     pub name: String,
     /// Its replicates.
     pub replicates: Vec<&'a ErrorRecord>,

@@ -13,10 +13,10 @@ pub fn terminal_tables(records: &[Line]) -> String {
     let mut tables = Vec::new();
     for scene in &data.scenes {
         let values = of_structures(&data, scene);
-        tables.push(structures::speed_table(scene, &values));
+        tables.push(structures::speed_table(&data, scene, &values));
         tables.push(structures::outside_table(&data, scene, &values));
         for view in &scene.views {
-            tables.push(samplers::error_table(view, Metric::RelMse));
+            tables.push(samplers::error_table(&data, view, Metric::RelMse));
             tables.push(samplers::efficiency_table(view));
         }
         tables.push(verdict::table(scene));
@@ -52,7 +52,7 @@ pub fn failed_checks(records: &[Line]) -> Vec<String> {
 
 /// The table with columns padded to equal width; of figures only the value is kept, since intervals
 /// would not fit a terminal, except in tables of text.
-pub(crate) fn aligned(table: &Table) -> String {
+pub fn aligned(table: &Table) -> String {
     let wordy = table.columns.iter().filter(|column| column.text).count() > 2;
     let shown = |cell: &Cell| {
         if wordy {

@@ -1,6 +1,6 @@
 //! What the records say, figure by figure: each value with its key. Tables and exports read these.
 
-use super::data::{RunData, SceneGroup, View, timed_structure};
+use super::data::{RunData, SceneGroup, View};
 use super::document::Cell;
 use super::format;
 use super::samplers::Metric;
@@ -84,12 +84,12 @@ pub fn of_structures<'a>(data: &RunData<'a>, scene: &SceneGroup<'a>) -> Vec<Valu
     let triangles = scene.record.map_or(0, |record| record.triangles);
     let mut values = Vec::new();
     for s in &scene.structures {
-        let key = s.key.clone().with(axis::ACCEL, timed_structure(*s));
+        let key = &s.key;
         if s.is_built() {
-            values.extend(of_build(&key, s, triangles));
+            values.extend(of_build(key, s, triangles));
         }
         if s.fault().is_none() {
-            values.extend(of_rays(&key, s));
+            values.extend(of_rays(key, s));
         }
         values.extend(s.body.figures.iter().map(|(id, value)| Value {
             key: key.clone(),
@@ -180,13 +180,13 @@ pub fn of_view(view: &View) -> Vec<Value<'static>> {
         }
     }
     for time in view.valid_times() {
-        let key = time.key.clone().with(axis::ACCEL, timed_structure(time));
+        let key = &time.key;
         let ms = time
             .ms_per_spp
-            .map(|ms| Value::new(&key, "ms-per-spp/v1", ms));
+            .map(|ms| Value::new(key, "ms-per-spp/v1", ms));
         let rate = time
             .mrays_s
-            .map(|rate| Value::new(&key, "cell-mrays-per-s/v1", rate));
+            .map(|rate| Value::new(key, "cell-mrays-per-s/v1", rate));
         values.extend(ms.into_iter().chain(rate));
     }
     values.extend(

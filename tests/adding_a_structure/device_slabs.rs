@@ -8,6 +8,7 @@ use raystone::accel::{
     TriangleBuffers, TriangleSoup,
 };
 use raystone::gpu::{Composition, Gpu, GpuError, Recording, UniformValues, groups_for};
+use raystone::params::Sources;
 
 /// The registry entry.
 pub struct DeviceSlabs;
@@ -15,7 +16,7 @@ pub struct DeviceSlabs;
 impl Structure for DeviceSlabs {
     const NAME: &'static str = "device-slabs";
     const DESCRIPTION: &'static str = "sorted-slabs with boxes made on the device (an example)";
-    const SOURCES: &'static [(&'static str, &'static str)] = &[
+    const SOURCES: Sources = &[
         (
             "accel/sorted_slabs",
             include_str!("kernels/accel/sorted_slabs.wesl"),

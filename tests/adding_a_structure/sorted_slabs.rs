@@ -8,6 +8,7 @@ use raystone::accel::{
     StructureStats, TriangleSoup, limits,
 };
 use raystone::parameters;
+use raystone::params::Sources;
 
 parameters! {
     /// The parameters.
@@ -24,7 +25,7 @@ impl Structure for SortedSlabs {
     const NAME: &'static str = "sorted-slabs";
     const DESCRIPTION: &'static str =
         "triangles sorted along x in runs with one box each (an example)";
-    const SOURCES: &'static [(&'static str, &'static str)] = &[(
+    const SOURCES: Sources = &[(
         "accel/sorted_slabs",
         include_str!("kernels/accel/sorted_slabs.wesl"),
     )];

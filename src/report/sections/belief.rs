@@ -1,10 +1,8 @@
 //! Why to believe the figures: every check of the run, with what it rests on.
 
 use crate::measure::bias::BiasVerdict;
-use crate::measure::record::{
-    BiasRecord, GateVerdict, JudgeCheck, Recorded, TimeRecord, Verdict, axis,
-};
-use crate::report::data::{RunData, SceneGroup, structure_name};
+use crate::measure::record::{BiasRecord, GateVerdict, JudgeCheck, TimeRecord, Verdict, axis};
+use crate::report::data::{Measured, RunData, SAMPLER_AXES, SceneGroup};
 use crate::report::document::*;
 use crate::report::format::{self, count, plural};
 use crate::report::samplers::REFERENCE_SHARE;
@@ -64,7 +62,7 @@ fn gate(scene: &SceneGroup) -> Check {
     let faulty: Vec<String> = scene
         .structures
         .iter()
-        .filter_map(|s| Some(format!("{} FAILED: {}", structure_name(*s), s.fault()?)))
+        .filter_map(|s| Some(format!("{} FAILED: {}", s.structure, s.fault()?)))
         .collect();
     if gates.is_empty() && faulty.is_empty() {
         return check(title, false, false, String::new());
@@ -120,35 +118,25 @@ fn judge(data: &RunData, title: &str, pick: fn(&GateVerdict) -> &JudgeCheck) -> 
 }
 
 fn images(data: &RunData) -> Check {
-    let times: Vec<Recorded<TimeRecord>> = data
+    let times: Vec<&Measured<TimeRecord>> = data
         .views()
-        .flat_map(|(_, view)| view.times.iter().copied())
+        .flat_map(|(_, view)| &view.times)
         .filter(|t| !t.image_hash.is_empty())
         .collect();
     // An image that one structure alone rendered equals itself.
-    let image = [
-        axis::SCENE,
-        axis::INTEGRATOR,
-        axis::SEQUENCE,
-        axis::DECORRELATION,
-        axis::KERNELS,
-    ];
-    let has_peer = |t: &Recorded<TimeRecord>| {
-        let is_peer = |o: &Recorded<TimeRecord>| {
-            o.key.agrees(t.key, &image) && !o.key.agrees(t.key, &[axis::ACCEL])
+    let has_peer = |t: &&&Measured<TimeRecord>| {
+        let is_peer = |o: &&Measured<TimeRecord>| {
+            o.key.agrees(&t.key, &SAMPLER_AXES) && !o.key.agrees(&t.key, &[axis::ACCEL])
         };
         times.iter().any(is_peer)
     };
-    let compared = times.iter().copied().filter(has_peer).count();
+    let compared = times.iter().filter(has_peer).count();
     let unequal: Vec<String> = times
         .iter()
         .filter(|time| !time.image_equal)
-        .map(|&t| {
-            format!(
-                "{} on {} differs",
-                structure_name(t),
-                t.key.label(axis::SCENE)
-            )
+        .map(|t| {
+            let scene = t.key.label(axis::SCENE);
+            format!("{} with {} on {scene} differs", t.structure, t.sampler)
         })
         .collect();
     let mut detail = format!(
@@ -206,7 +194,7 @@ fn bias(data: &RunData) -> Check {
             "; {} on {}, {}: {}",
             sampler.name,
             scene.name,
-            view.integrator,
+            view.name,
             sampler.fault().unwrap_or_default()
         );
     }
@@ -259,10 +247,7 @@ fn reference_noise(data: &RunData) -> Check {
             }
         };
         let fault = fault.map_or(String::new(), |fault| format!(": {fault}"));
-        details.push(format!(
-            "{}, {}: {known}{fault}",
-            scene.name, view.integrator
-        ));
+        details.push(format!("{}, {}: {known}{fault}", scene.name, view.name));
     }
     let title = format!(
         "Reference noise below {} of every error",

@@ -139,7 +139,7 @@ fn scene_section(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -
         .blocks
         .extend(structures::blocks(dir, data, index, scene));
     for (number, view) in scene.views.iter().enumerate() {
-        let stem = format!("scene-{index}-{}-{number}", file_stem(view.integrator));
+        let stem = format!("scene-{index}-{}-{number}", file_stem(&view.name));
         section
             .blocks
             .extend(samplers::blocks(dir, data, &stem, view));

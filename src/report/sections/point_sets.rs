@@ -1,8 +1,8 @@
 //! Pictures of the points that the kernels of a run drew, from the words in its records.
 
 use super::file_stem;
-use crate::measure::record::{Recorded, RecordedPoints, StreamRecord};
-use crate::report::data::RunData;
+use crate::measure::record::{Recorded, RecordedPoints, StreamRecord, axis};
+use crate::report::data::{RunData, without_repeats};
 use crate::report::document::*;
 use crate::report::plot::panels::{self, Panel};
 use crate::report::plot::points::{Cloud, Domain, Pair, interval_counts};
@@ -15,15 +15,19 @@ const WIDTH: f64 = 900.0;
 /// samplers need not be those of the run.
 pub fn section(data: &RunData) -> Option<Section> {
     let recorded = |name: &String| {
-        let of_name = |s: &&Recorded<StreamRecord>| s.key.sampler() == *name;
+        let of_name = |s: &&Recorded<StreamRecord>| data.names.sampler(s.key) == *name;
         let mut streams = data.streams.iter().filter(of_name);
         streams.find_map(|s| Some((*s, s.body.points.as_ref()?)))
     };
-    let found: Vec<_> = data
-        .samplers
-        .iter()
-        .map(|name| (name, recorded(name)))
-        .collect();
+    // However rays are offset, the same words are drawn.
+    let drawn = [axis::SEQUENCE, axis::DECORRELATION, axis::KERNELS];
+    let keys = data.views().flat_map(|(_, view)| &view.samplers);
+    let keys = keys
+        .map(|s| &s.key)
+        .chain(data.streams.iter().map(|s| s.key));
+    let names = keys.map(|key| data.names.sampler(&key.only(&drawn)));
+    let names = without_repeats(names.collect());
+    let found: Vec<_> = names.iter().map(|name| (name, recorded(name))).collect();
     let (stream, first) = found.iter().find_map(|(_, found)| *found)?;
     let mut section = Section::new("point-sets", "Point sets");
     section.blocks.push(Block::Paragraph(format!(

@@ -1,7 +1,7 @@
 //! The run itself: economy of the plan, wall time, what failed, where it ran.
 
-use crate::measure::record::{Recorded, StructureRecord, TimeRecord};
-use crate::report::data::{RunData, SceneGroup, View, structure_name};
+use crate::measure::record::{StructureRecord, TimeRecord};
+use crate::report::data::{Measured, RunData, SceneGroup, View};
 use crate::report::document::*;
 use crate::report::format::{self, count, percent};
 use crate::report::samplers::Sampler;
@@ -111,27 +111,26 @@ fn failures(data: &RunData) -> Option<Section> {
 }
 
 fn failed_structures(scene: &SceneGroup) -> Vec<Failure> {
-    let failure = |s: &Recorded<StructureRecord>| {
-        let cell = format!("{} · {}", scene.name, structure_name(*s));
+    let failure = |s: &Measured<StructureRecord>| {
+        let cell = format!("{} · {}", scene.name, s.structure);
         Some((cell, "FAILED", s.fault()?))
     };
     scene.structures.iter().filter_map(failure).collect()
 }
 
 fn failed_cells(scene: &SceneGroup, view: &View) -> Vec<Failure> {
-    let time = |time: &Recorded<TimeRecord>| {
+    let time = |time: &Measured<TimeRecord>| {
         let unequal =
             (!time.image_equal).then(|| "its image differs from the other structures'".to_owned());
         let reason = time.failure.clone().or(unequal)?;
-        let (structure, sampler) = (structure_name(*time), time.key.sampler());
         let cell = format!(
-            "{} · {structure} · {sampler} · {}",
-            scene.name, view.integrator
+            "{} · {} · {} · {}",
+            scene.name, time.structure, time.sampler, view.name
         );
         Some((cell, "FAILED", reason))
     };
     let sampler = |sampler: &Sampler| {
-        let cell = format!("{} · {} · {}", scene.name, sampler.name, view.integrator);
+        let cell = format!("{} · {} · {}", scene.name, sampler.name, view.name);
         Some((cell, "FAILED", sampler.fault()?))
     };
     let times = view.times.iter().filter_map(time);

@@ -4,8 +4,8 @@ use super::sampler_plots::{error_figures, histograms, pareto_plot};
 use super::spectrum;
 use super::verdict::Race;
 use crate::measure::bias::BiasVerdict;
-use crate::measure::record::{BiasRecord, Interval, Key, axis};
-use crate::report::data::{RunData, View, is_valid_time, timed_structure};
+use crate::measure::record::{BiasRecord, Interval, axis};
+use crate::report::data::{RunData, View, is_valid_time};
 use crate::report::document::*;
 use crate::report::pivot::Pivot;
 use crate::report::plot::histogram;
@@ -17,13 +17,13 @@ use std::path::Path;
 
 /// Everything on the samplers of a view; `stem` starts the names of its plots.
 pub fn blocks(dir: &Path, data: &RunData, stem: &str, view: &View) -> Vec<Block> {
-    let mut blocks = vec![Block::Heading(format!("Samplers with {}", view.integrator))];
+    let mut blocks = vec![Block::Heading(format!("Samplers with {}", view.name))];
     let figures = error_figures(data, stem, view);
     if !figures.is_empty() {
         blocks.push(Block::Figures(figures));
     }
-    blocks.extend(error_table(view, Metric::RelMse).into_block());
-    blocks.extend(error_table(view, Metric::Rmse).into_block());
+    blocks.extend(error_table(data, view, Metric::RelMse).into_block());
+    blocks.extend(error_table(data, view, Metric::Rmse).into_block());
     blocks.extend(spectrum::blocks(data, stem, view));
     blocks.extend(efficiency_table(view).into_block());
     if let Some((pareto, hidden)) = pareto_plot(data, view)
@@ -40,7 +40,7 @@ pub fn blocks(dir: &Path, data: &RunData, stem: &str, view: &View) -> Vec<Block>
             drawing,
         )]));
     }
-    blocks.extend(time_table(view).into_block());
+    blocks.extend(time_table(data, view).into_block());
     blocks.extend(bias_table(view).into_block());
     if let Some(drawing) = histogram::draw(&histograms(view)) {
         let caption = "Bias check: p-values of all tiles per sampler; flat (dashed) without bias, red where biased.";
@@ -58,7 +58,7 @@ pub fn blocks(dir: &Path, data: &RunData, stem: &str, view: &View) -> Vec<Block>
 }
 
 /// Mean error per spp, slope and bias verdict.
-pub fn error_table(view: &View, metric: Metric) -> Table {
+pub fn error_table(data: &RunData, view: &View, metric: Metric) -> Table {
     let id = view
         .samplers
         .iter()
@@ -72,7 +72,7 @@ pub fn error_table(view: &View, metric: Metric) -> Table {
     let caption = format!(
         "{} with {}: mean [95 % interval] at each spp; metric {root}{id}{}",
         metric.name(),
-        view.integrator,
+        view.name,
         match means().all(|mean| mean.resolved) {
             true => String::new(),
             false => format!("; <: {UNRESOLVED}"),
@@ -90,9 +90,9 @@ pub fn error_table(view: &View, metric: Metric) -> Table {
         caption,
         heads: &["sampler", "replicates"],
         rows: measured.map(row).collect(),
-        row: Key::sampler,
+        row: &|key| data.names.sampler(key),
         figures: &[metric.figure(), metric.slope_figure()],
-        across: Some(|key| match key.label(axis::SPP) {
+        across: Some(&|key| match key.label(axis::SPP) {
             "" => "slope".into(),
             spp => format!("{spp} spp"),
         }),
@@ -124,7 +124,7 @@ pub fn bias_table(view: &View) -> Table {
     let caption = format!(
         "Bias check with {}: biased if the p of the image is at most half of {}, or tiles are rejected \
          at the other half",
-        view.integrator,
+        view.name,
         format::optional(level)
     );
     let columns = [
@@ -175,10 +175,7 @@ pub fn efficiency_table(view: &View) -> Table {
     let (Some(race), Some(spp)) = (Race::new(view), view.common_spp()) else {
         return Table::default();
     };
-    let caption = format!(
-        "Error per second with {}, {}",
-        view.integrator, race.structure
-    );
+    let caption = format!("Error per second with {}, {}", view.name, race.structure);
     let name = Metric::RelMse.name();
     let product = format!("{name} × seconds at {spp} spp");
     let equal_time = format!("{name} after {} s", format::number(race.seconds));
@@ -204,7 +201,7 @@ pub fn efficiency_table(view: &View) -> Table {
 }
 
 /// Milliseconds per spp of every cell.
-fn time_table(view: &View) -> Table {
+fn time_table(data: &RunData, view: &View) -> Table {
     let structures = view.timed_structures();
     let row = |(i, name): (usize, &String)| {
         let cell = Cell::with_detail(name.clone(), format!("({})", letter(i)));
@@ -213,14 +210,14 @@ fn time_table(view: &View) -> Table {
     let mut table = Pivot {
         caption: format!(
             "Time of full cells with {}, ms per spp: median [{}]",
-            view.integrator,
+            view.name,
             format::median_bounds(view.times.iter().map(|time| time.ms.len()))
         ),
         heads: &["structure"],
         rows: structures.iter().enumerate().map(row).collect(),
-        row: |key| key.label(axis::ACCEL).to_owned(),
+        row: &|key| key.label(axis::ACCEL).to_owned(),
         figures: &["ms-per-spp/v1"],
-        across: Some(Key::sampler),
+        across: Some(&|key| data.names.sampler(key)),
     }
     .table(&of_view(view));
     for time in view.times.iter().filter(|time| !is_valid_time(time)) {
@@ -228,9 +225,8 @@ fn time_table(view: &View) -> Table {
             None => "image differs",
             Some(_) => "FAILED",
         };
-        let row = structures.iter().position(|s| *s == timed_structure(*time));
-        let sampler = time.key.sampler();
-        let column = table.columns.iter().position(|c| c.title == sampler);
+        let row = structures.iter().position(|s| *s == time.structure);
+        let column = table.columns.iter().position(|c| c.title == time.sampler);
         if let (Some(row), Some(column)) = (row, column) {
             table.rows[row][column] = Cell::from(reason).toned(Tone::Bad);
         }
@@ -278,7 +274,7 @@ fn gallery(dir: &Path, view: &View) -> Option<Block> {
             ));
         }
     }
-    let caption = format!("Renders and error maps with {}", view.integrator);
+    let caption = format!("Renders and error maps with {}", view.name);
     (!items.is_empty()).then_some(Block::Gallery(Gallery {
         caption,
         items,

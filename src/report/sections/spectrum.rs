@@ -97,7 +97,7 @@ impl<'a> Found<'a> {
         let caption = format!(
             "Error in space with {} at {spp} spp, luminance: power up to 1/8 cycle per pixel (white noise 1), \
              correlation of neighbours (white noise 0), RMSE, and share of it after filters",
-            view.integrator
+            view.name
         );
         let columns = ["sampler", "low-frequency power", "correlation", "RMSE"];
         let mut table = Table::new(caption, &columns);

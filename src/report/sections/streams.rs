@@ -130,7 +130,7 @@ impl<'a> Pair<'a> {
         values: impl Fn(&StreamRecord) -> Vec<FigureAtCount>,
     ) -> CurvePlot {
         let curve = |stream: &Recorded<StreamRecord>| {
-            let name = stream.key.sampler();
+            let name = self.data.names.sampler(stream.key);
             let point = |at: FigureAtCount| CurvePoint::new(at.n as f64, &at.value);
             Curve {
                 look: self.data.sampler_look(&name),
@@ -172,7 +172,7 @@ impl<'a> Pair<'a> {
         for stream in &self.streams {
             let last = stream.star.last().filter(|at| at.n == most);
             let mut row = vec![
-                Cell::from(stream.key.sampler()),
+                Cell::from(self.data.names.sampler(stream.key)),
                 format::optional(last.map(|at| at.value.value)).into(),
                 slope_cell(stream.figures.star_slope),
             ];
@@ -206,7 +206,7 @@ impl<'a> Pair<'a> {
             return Table::default();
         }
         let row = |s: &Recorded<StreamRecord>| {
-            let name = s.key.sampler();
+            let name = self.data.names.sampler(s.key);
             (name.clone(), vec![name.into(), seeds_cell(s)])
         };
         Pivot {
@@ -217,16 +217,21 @@ impl<'a> Pair<'a> {
             ),
             heads: &["sampler", "seeds"],
             rows: self.streams.iter().map(row).collect(),
-            row: Key::sampler,
+            row: &|key| self.data.names.sampler(key),
             figures: &[id],
-            across: Some(points),
+            across: Some(&points),
         }
         .table(&values)
     }
 
     /// Coherence and coverage.
     fn pixel_table(&self) -> Table {
-        let row = |s: &Recorded<StreamRecord>| (s.key.sampler(), vec![s.key.sampler().into()]);
+        let row = |s: &Recorded<StreamRecord>| {
+            (
+                self.data.names.sampler(s.key),
+                vec![self.data.names.sampler(s.key).into()],
+            )
+        };
         Pivot {
             caption: format!(
                 "{}: mean angle between the directions of neighbouring pixels at the same sample, degrees (0: fully \
@@ -235,9 +240,9 @@ impl<'a> Pair<'a> {
             ),
             heads: &["sampler"],
             rows: self.streams.iter().map(row).collect(),
-            row: Key::sampler,
+            row: &|key| self.data.names.sampler(key),
             figures: &["neighbour-angle/v1", "coverage/v1"],
-            across: Some(points),
+            across: Some(&points),
         }
         .table(&self.values())
     }
@@ -259,7 +264,7 @@ fn worst_table(data: &RunData) -> Table {
         };
         let [a, b] = stream.dimensions;
         table.rows.push(vec![
-            stream.key.sampler().into(),
+            data.names.sampler(stream.key).into(),
             format!("{a} and {b}").into(),
             stream.purpose.as_str().into(),
             of.to_string().into(),
@@ -277,7 +282,7 @@ fn cost_table(data: &RunData) -> Table {
     let mut table = Table::new(caption, &["sampler", "ns per sample", "empty loop, ns"]);
     for cost in &data.costs {
         table.rows.push(vec![
-            cost.key.sampler().into(),
+            data.names.sampler(cost.key).into(),
             Cell::of(Some(cost.ns_per_sample)),
             format::number(cost.loop_ns_per_sample.value).into(),
         ]);

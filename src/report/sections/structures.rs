@@ -5,8 +5,8 @@ use super::trade_off;
 use super::verdict::ray_classes;
 use crate::accel::{Phase, Space};
 use crate::image::viridis_css;
-use crate::measure::record::{Key, RayClass, Recorded, StructureRecord, axis};
-use crate::report::data::{RunData, SceneGroup, structure_name};
+use crate::measure::record::{RayClass, StructureRecord, axis};
+use crate::report::data::{Measured, RunData, SceneGroup};
 use crate::report::document::*;
 use crate::report::pivot::Pivot;
 use crate::report::plot::rates::{Bar, RatePlot};
@@ -31,16 +31,16 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
     }
     let classes = ray_classes(scene);
     let values = of_structures(data, scene);
-    let mut tables = vec![speed_table(scene, &values)];
+    let mut tables = vec![speed_table(data, scene, &values)];
     tables.extend(trade_off::break_even_table(scene, &classes));
     let views = scene.views.iter();
     tables.extend(views.filter_map(|view| trade_off::time_to_image_table(scene, view)));
     tables.extend([
-        build_table(scene, &values),
-        shape_table(scene, &values),
+        build_table(data, scene, &values),
+        shape_table(data, scene, &values),
         outside_table(data, scene, &values),
         leaf_table(scene),
-        work_table(scene, &values),
+        work_table(data, scene, &values),
     ]);
     blocks.extend(tables.into_iter().filter_map(Table::into_block));
     blocks.extend(heat_maps(dir, scene));
@@ -50,10 +50,6 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
 fn speed_bounds(scene: &SceneGroup) -> String {
     let timings = scene.structures.iter().flat_map(|s| &s.timings);
     format::median_bounds(timings.map(|timing| timing.ms.len()))
-}
-
-fn name(structure: &Recorded<StructureRecord>) -> String {
-    structure_name(*structure)
 }
 
 /// What stands where a structure has no figure.
@@ -71,12 +67,12 @@ fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
         // Nothing passed: one group still shows who failed.
         classes.push(RayClass::Primary);
     }
-    let bar = |s: &Recorded<StructureRecord>, class| {
+    let bar = |s: &Measured<StructureRecord>, class| {
         let timing = s.timings.iter().find(|timing| timing.class == class);
         let fault = s.fault();
         Bar {
-            label: name(s),
-            look: data.structure_look(&name(s)),
+            label: s.structure.clone(),
+            look: data.structure_look(&s.structure),
             rate: timing
                 .filter(|_| fault.is_none())
                 .map(|timing| timing.mrays_s),
@@ -96,16 +92,16 @@ fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
 
 /// A row for each of some structures.
 fn rows<'a>(
-    structures: impl Iterator<Item = &'a Recorded<'a, StructureRecord>>,
+    structures: impl Iterator<Item = &'a Measured<'a, StructureRecord>>,
 ) -> Vec<(String, Vec<Cell>)> {
     structures
-        .map(|s| (name(s), vec![name(s).into()]))
+        .map(|s| (s.structure.clone(), vec![s.structure.clone().into()]))
         .collect()
 }
 
 /// Mrays/s, one row per structure and one column per ray class.
-pub fn speed_table(scene: &SceneGroup, values: &[Value]) -> Table {
-    let row = |s: &Recorded<StructureRecord>| {
+pub fn speed_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
+    let row = |s: &Measured<StructureRecord>| {
         let (verdict, tone) = match s.fault() {
             None => ("passed", Tone::Good),
             Some(_) => ("FAILED", Tone::Bad),
@@ -115,7 +111,7 @@ pub fn speed_table(scene: &SceneGroup, values: &[Value]) -> Table {
             Space::Instances => "judged over instances",
         };
         let gate = Cell::with_detail(verdict, judge).toned(tone);
-        (name(s), vec![name(s).into(), gate])
+        (s.structure.clone(), vec![s.structure.clone().into(), gate])
     };
     Pivot {
         caption: format!(
@@ -125,49 +121,52 @@ pub fn speed_table(scene: &SceneGroup, values: &[Value]) -> Table {
         ),
         heads: &["structure", ":gate"],
         rows: scene.structures.iter().map(row).collect(),
-        row: Key::structure,
+        row: &|key| data.names.structure(key),
         figures: &["mrays-per-s/v1"],
-        across: Some(|key| key.label(axis::RAYS).to_owned()),
+        across: Some(&|key| key.label(axis::RAYS).to_owned()),
     }
     .table(values)
 }
 
 /// What the build took.
-fn build_table(scene: &SceneGroup, values: &[Value]) -> Table {
+fn build_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
     let updated = built(scene).any(|s| s.update_ms.is_some());
     let update = match updated {
         true => "; update: all instances moved, objects kept (median of 5)",
         false => "",
     };
-    let row = |s: &Recorded<StructureRecord>| {
+    let row = |s: &Measured<StructureRecord>| {
         let phase = |phase: &Phase| format!("{} {}", phase.name, format::number(phase.ms));
         let phases: Vec<String> = s.build.iter().map(phase).collect();
-        (name(s), vec![name(s).into(), phases.join(" + ").into()])
+        (
+            s.structure.clone(),
+            vec![s.structure.clone().into(), phases.join(" + ").into()],
+        )
     };
     Pivot {
         caption: format!("Build (one each){update}"),
         heads: &["structure", ":phases of the build, ms"],
         rows: built(scene).map(row).collect(),
-        row: Key::structure,
+        row: &|key| data.names.structure(key),
         figures: &["build-ms/v1", "build-peak-bytes/v1", "update-ms/v1"],
         across: None,
     }
     .table(values)
 }
 
-fn built<'a>(scene: &'a SceneGroup) -> impl Iterator<Item = &'a Recorded<'a, StructureRecord>> {
+fn built<'a>(scene: &'a SceneGroup) -> impl Iterator<Item = &'a Measured<'a, StructureRecord>> {
     scene.structures.iter().filter(|s| s.is_built())
 }
 
 /// Size and quality of what was built.
-fn shape_table(scene: &SceneGroup, values: &[Value]) -> Table {
+fn shape_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
     Pivot {
         caption: "Size and shape (nodes, leaves: cells where there are cells; SAH and end-point overlap with both \
                   constants 1)"
             .into(),
         heads: &["structure"],
         rows: rows(built(scene)),
-        row: Key::structure,
+        row: &|key| data.names.structure(key),
         figures: &[
             "bytes/v1",
             "bytes-per-triangle/v1",
@@ -192,7 +191,7 @@ pub fn outside_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Ta
         caption: format!("Further figures on {}", scene.name),
         heads: &["structure"],
         rows: rows(built(scene)),
-        row: Key::structure,
+        row: &|key| data.names.structure(key),
         figures: &ids,
         across: None,
     }
@@ -226,7 +225,7 @@ fn leaf_table(scene: &SceneGroup) -> Table {
         if all == 0 {
             continue;
         }
-        let mut row = vec![name(s).into()];
+        let mut row = vec![s.structure.clone().into()];
         row.extend(LEAF_CLASSES.map(|(_, least, greatest)| {
             let inside = |(k, n): (usize, &u64)| (least <= k && k <= greatest).then_some(*n);
             let leaves: u64 = histogram.iter().enumerate().filter_map(inside).sum();
@@ -241,20 +240,20 @@ fn leaf_table(scene: &SceneGroup) -> Table {
 }
 
 /// Counted work per ray.
-fn work_table(scene: &SceneGroup, values: &[Value]) -> Table {
+fn work_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
     let passed = scene.structures.iter().filter(|s| s.fault().is_none());
     let rows = passed.flat_map(|s| {
         s.body.timings.iter().map(|timing| {
             let class = format::ray_class(timing.class);
-            let cells = vec![name(s).into(), class.into()];
-            (format!("{} {class}", name(s)), cells)
+            let cells = vec![s.structure.clone().into(), class.into()];
+            (format!("{} {class}", s.structure), cells)
         })
     });
     Pivot {
         caption: "Counted work per ray (means over a class, from a separate run)".into(),
         heads: &["structure", ":rays"],
         rows: rows.collect(),
-        row: |key| format!("{} {}", key.structure(), key.label(axis::RAYS)),
+        row: &|key| format!("{} {}", data.names.structure(key), key.label(axis::RAYS)),
         figures: &[
             "rays/v1",
             "hit-share/v1",
@@ -281,8 +280,8 @@ fn heat_maps(dir: &Path, scene: &SceneGroup) -> Option<Block> {
     let items: Vec<Picture> = mapped()
         .map(|(s, path)| {
             let caption = match s.heat_map_max.filter(|_| !shared) {
-                Some(max) => format!("{} (top of scale {})", name(s), format::number(max)),
-                None => name(s),
+                Some(max) => format!("{} (top of scale {})", s.structure, format::number(max)),
+                None => s.structure.clone(),
             };
             let caption = if s.fault().is_some() {
                 format!("{caption}: {}", word_instead(s))

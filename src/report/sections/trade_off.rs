@@ -1,8 +1,8 @@
 //! What a build costs against what it gains: break-even in rays, and time to an image.
 
-use crate::measure::record::{Interval, RayClass, Recorded, StructureRecord, axis};
+use crate::measure::record::{Interval, RayClass, StructureRecord};
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
-use crate::report::data::{SceneGroup, View, structure_name, timed_structure};
+use crate::report::data::{Measured, STRUCTURE_AXES, SceneGroup, View};
 use crate::report::document::*;
 use crate::report::format;
 
@@ -43,25 +43,24 @@ impl BreakEven {
 }
 
 /// Speed in a class, if it was measured often enough to have a 95 % interval.
-fn rate<'a>(structure: &Recorded<'a, StructureRecord>, class: RayClass) -> Option<&'a Interval> {
+fn rate<'a>(structure: &Measured<'a, StructureRecord>, class: RayClass) -> Option<&'a Interval> {
     let timing = (structure.body.timings.iter()).find(|t| t.class == class)?;
     (timing.ms.len() >= LEAST_FOR_MEDIAN).then_some(&timing.mrays_s)
 }
 
 /// Rays after which each structure has caught up with the one that is built fastest, per class.
 pub fn break_even_table(scene: &SceneGroup, classes: &[RayClass]) -> Option<Table> {
-    let passed: Vec<Recorded<StructureRecord>> = scene
+    let passed: Vec<&Measured<StructureRecord>> = scene
         .structures
         .iter()
-        .copied()
         .filter(|s| s.fault().is_none() && !s.timings.is_empty())
         .collect();
     let first = passed
         .iter()
         .min_by(|a, b| a.build_ms.total_cmp(&b.build_ms))?;
-    let first_name = structure_name(*first);
     let caption = format!(
-        "Break-even: rays after which a structure, its build included, overtakes {first_name}, which is built fastest ({} ms)",
+        "Break-even: rays after which a structure, its build included, overtakes {}, which is built fastest ({} ms)",
+        first.structure,
         format::number(first.build_ms)
     );
     let mut table = Table::new(caption, &["structure", "build, ms"]);
@@ -71,7 +70,7 @@ pub fn break_even_table(scene: &SceneGroup, classes: &[RayClass]) -> Option<Tabl
     for structure in passed.iter().filter(|s| !std::ptr::eq(s.body, first.body)) {
         let extra_ms = structure.build_ms - first.build_ms;
         let mut row = vec![
-            structure_name(*structure).into(),
+            structure.structure.clone().into(),
             format::number(structure.build_ms).into(),
         ];
         row.extend(classes.iter().map(|class| {
@@ -103,7 +102,7 @@ pub fn time_to_image_table(scene: &SceneGroup, view: &View) -> Option<Table> {
         .max()?;
     let caption = format!(
         "Time to image: build + rendering by {} with {}, ms",
-        view.integrator, sampler.name
+        view.name, sampler.name
     );
     let mut table = Table::new(caption, &["structure", "build"]);
     let mut counts = vec![1, most_spp];
@@ -115,9 +114,7 @@ pub fn time_to_image_table(scene: &SceneGroup, view: &View) -> Option<Table> {
         let Some(time) = view.time(name, &sampler.name) else {
             continue;
         };
-        let is_it = |s: &&Recorded<StructureRecord>| {
-            s.key.agrees(time.key, &[axis::KERNELS]) && timed_structure(**s) == *name
-        };
+        let is_it = |s: &&Measured<StructureRecord>| s.key.agrees(&time.key, &STRUCTURE_AXES);
         let built = scene.structures.iter().find(is_it);
         let (Some(built), Some(ms)) = (built, time.ms_per_spp) else {
             continue;

@@ -1,9 +1,9 @@
 //! Who wins, per scene.
 
 use crate::measure::figure::figure;
-use crate::measure::record::{ClassTiming, Interval, RayClass, Recorded, StructureRecord};
+use crate::measure::record::{ClassTiming, Interval, RayClass, StructureRecord};
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
-use crate::report::data::{RunData, SceneGroup, View, structure_name};
+use crate::report::data::{Measured, RunData, SceneGroup, View};
 use crate::report::document::*;
 use crate::report::format;
 use crate::report::ruling::{Contender, Ruling, judge};
@@ -53,7 +53,7 @@ pub fn table(scene: &SceneGroup) -> Table {
         if let Some(spp) = view.common_spp() {
             let question = format!(
                 "least error per sample: {}, {} at {spp} spp",
-                view.integrator,
+                view.name,
                 Metric::RelMse.name()
             );
             table.rows.push(row(question, &best_per_sample(view, spp)));
@@ -62,7 +62,7 @@ pub fn table(scene: &SceneGroup) -> Table {
             let seconds = format::number(race.seconds);
             let question = format!(
                 "least error per second: {}, {} after {seconds} s",
-                view.integrator,
+                view.name,
                 Metric::RelMse.name()
             );
             table.rows.push(row(question, &race.ruling()));
@@ -90,16 +90,9 @@ fn left_out(scene: &SceneGroup) -> Option<String> {
     let structures = scene
         .structures
         .iter()
-        .filter_map(|s| Some(format!("{} ({})", structure_name(*s), s.fault()?)));
+        .filter_map(|s| Some(format!("{} ({})", s.structure, s.fault()?)));
     let samplers = scene.views.iter().flat_map(|view| {
-        let fault = |s: &Sampler| {
-            Some(format!(
-                "{} with {} ({})",
-                s.name,
-                view.integrator,
-                s.fault()?
-            ))
-        };
+        let fault = |s: &Sampler| Some(format!("{} with {} ({})", s.name, view.name, s.fault()?));
         view.samplers.iter().filter_map(fault)
     });
     let names: Vec<String> = structures.chain(samplers).collect();
@@ -116,7 +109,7 @@ fn left_out(scene: &SceneGroup) -> Option<String> {
 fn unranked(scene: &SceneGroup) -> Option<String> {
     let samplers = scene.views.iter().flat_map(|view| {
         let single = view.samplers.iter().filter(|s| s.replicates.len() == 1);
-        single.map(|s| format!("{} with {}", s.name, view.integrator))
+        single.map(|s| format!("{} with {}", s.name, view.name))
     });
     let names: Vec<String> = samplers.collect();
     (!names.is_empty()).then(|| {
@@ -139,9 +132,9 @@ pub fn ray_classes(scene: &SceneGroup) -> Vec<RayClass> {
 
 /// Compares the structures that passed the gate on one ray class.
 pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
-    let contender = |s: &Recorded<StructureRecord>| {
+    let contender = |s: &Measured<StructureRecord>| {
         let timing: &ClassTiming = s.timings.iter().find(|timing| timing.class == class)?;
-        let name = structure_name(*s);
+        let name = s.structure.clone();
         let has_spread = timing.ms.len() >= LEAST_FOR_MEDIAN;
         s.fault().is_none().then_some(Contender {
             name,

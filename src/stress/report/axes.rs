@@ -49,7 +49,7 @@ fn labels(key: &Key, axes: &[&str]) -> String {
 pub(super) fn shot_table(lines: &[Line], values: &[Value]) -> Table {
     let misses: Vec<Value> = values
         .iter()
-        .filter(|v| v.figure.id != "rays/v1")
+        .filter(|v| v.figure.id == "misses/v1")
         .cloned()
         .collect();
     let mut table = table(
@@ -64,13 +64,13 @@ pub(super) fn shot_table(lines: &[Line], values: &[Value]) -> Table {
                 (":mesh", axis::MESH),
                 (":place", axis::PLACE),
             ],
-            |key| labels(key, &[axis::TRIANGLE, axis::ACCEL, axis::MESH, axis::PLACE]),
+            &|key| labels(key, &[axis::TRIANGLE, axis::ACCEL, axis::MESH, axis::PLACE]),
         ),
         &["misses/v1"],
-        Some(|key| key.label(axis::AIM).to_owned()),
+        Some(&|key| key.label(axis::AIM).to_owned()),
     );
     let shots = lines.iter().find_map(|line| match &line.body {
-        Record::Shots(shots) => Some(shots.rays),
+        Record::Shots(shots) => Some(shots.count("rays/v1")),
         _ => None,
     });
     table.caption += &format!(
@@ -89,7 +89,7 @@ pub(super) fn extras(lines: &[Line], values: &[Value]) -> Vec<Table> {
         (
             "box tests: answers that differ from brute force",
             &[("box test", axis::BOX_TEST), (":structure", axis::ACCEL)],
-            |key| labels(key, &[axis::BOX_TEST, axis::ACCEL]),
+            &|key| labels(key, &[axis::BOX_TEST, axis::ACCEL]),
         ),
         &["pad-ulps/v1", "rays/v1", "lost-hits/v1"],
         None,
@@ -106,7 +106,7 @@ pub(super) fn extras(lines: &[Line], values: &[Value]) -> Vec<Table> {
                 (":mesh", axis::MESH),
                 (":place", axis::PLACE),
             ],
-            |key| {
+            &|key| {
                 labels(
                     key,
                     &[axis::OFFSET, axis::TRIANGLE, axis::MESH, axis::PLACE],
@@ -128,7 +128,7 @@ pub(super) fn extras(lines: &[Line], values: &[Value]) -> Vec<Table> {
         (
             "cost of triangle tests",
             &[("triangle", axis::TRIANGLE)],
-            |key| key.label(axis::TRIANGLE).to_owned(),
+            &|key| key.label(axis::TRIANGLE).to_owned(),
         ),
         &[
             "test-bytes/v1",
@@ -145,7 +145,7 @@ fn numerics(lines: &[Line]) -> Table {
     let heads = ["figure", "value", "alarm", ":unit", ":verdict", ":note"];
     let mut table = Table::new("accumulation and sampling", &heads);
     for line in lines {
-        if let Record::Figure(f) = &line.body {
+        if let Record::Gauge(f) = &line.body {
             table.rows.push(vec![
                 f.name.clone().into(),
                 format::number(f.value).into(),

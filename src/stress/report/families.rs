@@ -5,29 +5,23 @@ use crate::measure::record::{Recorded, axis};
 use crate::report::document::{Cell, Table, Tone};
 use crate::report::format;
 use crate::stress::families::FAMILIES;
-use crate::stress::record::{CellRecord, Line, Quantiles};
+use crate::stress::record::{Findings, Line, Quantiles};
 use crate::stress::suite::BRUTE_FORCE;
 use crate::stress::targets::cells;
 
-fn three(quantiles: Option<Quantiles>) -> String {
-    quantiles.map_or_else(
-        || format::ABSENT.into(),
-        |q| {
-            // What is relative to nothing is held as the greatest number.
-            let text = |x: f64| match x {
-                f64::MAX => "∞".to_owned(),
-                x => format::significant(x, 2),
-            };
-            let of = [q.median, q.p99, q.max].map(text);
-            of.join(" / ")
-        },
-    )
+fn three(of: Quantiles) -> Cell {
+    // What is relative to nothing is held as the greatest number.
+    let text = |x: f64| match x {
+        f64::MAX => "∞".to_owned(),
+        x => format::significant(x, 2),
+    };
+    [of.median, of.p99, of.max].map(text).join(" / ").into()
 }
 
 /// The families that were tried with a triangle test, each with its cells, brute force's first.
-fn rows<'a>(records: &'a [Line], test: &str) -> Vec<(&'static str, Vec<Recorded<'a, CellRecord>>)> {
+fn rows<'a>(records: &'a [Line], test: &str) -> Vec<(&'static str, Vec<Recorded<'a, Findings>>)> {
     let of = |family: &'static str| {
-        let is_of = |c: &Recorded<CellRecord>| {
+        let is_of = |c: &Recorded<Findings>| {
             c.key.label(axis::TRIANGLE) == test && c.key.label(axis::FAMILY) == family
         };
         let mut found: Vec<_> = cells(records).filter(is_of).collect();
@@ -57,45 +51,41 @@ pub(super) fn count_table(records: &[Line], test: &str) -> Table {
     );
     for (family, of_family) in rows(records, test) {
         let cell = of_family[0];
-        let slowest = of_family.iter().filter_map(|c| c.slowdown).reduce(f64::max);
-        let both = |all: usize, unexplained: usize| match all {
+        let slowdowns = of_family.iter().filter_map(|c| c.get("slowdown/v1"));
+        let count = |id: &str| format::count(cell.count(id) as u64);
+        let both = |all: &str, unexplained: &str| match cell.count(all) {
             0 => "0".to_owned(),
             _ => format!("{} ({})", count(all), count(unexplained)),
         };
-        let tone = match cell.cracks {
+        let tone = match cell.count("cracks/v1") {
             0 => Tone::Plain,
             _ => Tone::Bad,
         };
         table.rows.push(vec![
             family.into(),
-            count(cell.rays).into(),
-            both(cell.false_misses, cell.unexplained_misses).into(),
-            Cell::from(count(cell.cracks)).toned(tone),
-            both(cell.false_hits, cell.unexplained_hits).into(),
-            count(cell.wrong_triangle).into(),
-            count(cell.not_nearest).into(),
-            count(cell.borderline).into(),
-            format::optional(slowest).into(),
+            count("rays/v1").into(),
+            both("false-misses/v1", "unexplained-misses/v1").into(),
+            Cell::from(count("cracks/v1")).toned(tone),
+            both("false-hits/v1", "unexplained-hits/v1").into(),
+            count("wrong-triangle/v1").into(),
+            count("not-nearest/v1").into(),
+            count("borderline/v1").into(),
+            format::optional(slowdowns.reduce(f64::max)).into(),
             differing(&of_family).into(),
         ]);
     }
     table
 }
 
-fn count(n: usize) -> String {
-    format::count(n as u64)
-}
-
 /// The structures whose answers are not brute force's, or that failed; how many if they are more than a
 /// line takes.
-fn differing(of_family: &[Recorded<CellRecord>]) -> String {
+fn differing(of_family: &[Recorded<Findings>]) -> String {
     const MOST: usize = 3;
-    let wrong = |c: &CellRecord| c.differing + c.any_differing.unwrap_or(0);
-    let differ: Vec<&Recorded<CellRecord>> = (of_family.iter())
-        .filter(|c| wrong(c) > 0 || !c.failures.is_empty())
+    let differ: Vec<&Recorded<Findings>> = (of_family.iter())
+        .filter(|c| c.differing() > 0 || !c.failures.is_empty())
         .collect();
     if differ.len() > MOST {
-        let most = differ.iter().map(|c| wrong(c)).max().unwrap_or(0);
+        let most = differ.iter().map(|c| c.differing()).max().unwrap_or(0);
         let failed = differ.iter().filter(|c| !c.failures.is_empty()).count();
         return format!(
             "{} of {}, up to {most}; {failed} failed",
@@ -103,11 +93,11 @@ fn differing(of_family: &[Recorded<CellRecord>]) -> String {
             of_family.len()
         );
     }
-    let name = |c: &&Recorded<CellRecord>| {
+    let name = |c: &&Recorded<Findings>| {
         let accel = c.key.label(axis::ACCEL);
         match c.failures.len() {
-            0 => format!("{accel} {}", wrong(c)),
-            failed => format!("{accel} {} ({failed} failed)", wrong(c)),
+            0 => format!("{accel} {}", c.differing()),
+            failed => format!("{accel} {} ({failed} failed)", c.differing()),
         }
     };
     differ.iter().map(name).collect::<Vec<_>>().join(", ")
@@ -126,15 +116,10 @@ pub(super) fn error_table(records: &[Line], test: &str) -> Table {
         ],
     );
     for (family, of_family) in rows(records, test) {
-        let cell = of_family[0];
-        if cell.t_ulp.is_some() {
-            table.rows.push(vec![
-                family.into(),
-                three(cell.t_ulp).into(),
-                three(cell.t_relative).into(),
-                three(cell.point_ulp).into(),
-                three(cell.point_relative).into(),
-            ]);
+        if let Some(errors) = of_family[0].errors {
+            let mut row = vec![family.into()];
+            row.extend(errors.map(three));
+            table.rows.push(row);
         }
     }
     table
@@ -154,7 +139,7 @@ pub(super) fn matrix_table(records: &[Line]) -> Table {
     families.iter().for_each(|name| table.add_column(*name));
     for test in triangles(records) {
         for accel in structures(records) {
-            let row: Vec<Option<Recorded<CellRecord>>> = families
+            let row: Vec<Option<Recorded<Findings>>> = families
                 .iter()
                 .map(|f| cell(records, &test, &accel, f))
                 .collect();
@@ -172,12 +157,12 @@ pub(super) fn matrix_table(records: &[Line]) -> Table {
     table
 }
 
-fn mark(cell: &CellRecord) -> String {
-    let mut text = match cell.false_misses {
+fn mark(cell: &Findings) -> String {
+    let mut text = match cell.count("false-misses/v1") {
         0 => "·".to_owned(),
         n => n.to_string(),
     };
-    if cell.differing + cell.any_differing.unwrap_or(0) > 0 {
+    if cell.differing() > 0 {
         text.push('!');
     }
     if !cell.failures.is_empty() {
@@ -195,7 +180,7 @@ pub(super) fn worst_table(records: &[Line]) -> Table {
         let Some(worst) = &cell.worst else { continue };
         let [family, triangle, accel] =
             [axis::FAMILY, axis::TRIANGLE, axis::ACCEL].map(|axis| cell.key.label(axis));
-        if accel == BRUTE_FORCE || cell.differing > 0 {
+        if accel == BRUTE_FORCE || cell.count("differing/v1") > 0 {
             table.rows.push(vec![
                 family.into(),
                 triangle.into(),

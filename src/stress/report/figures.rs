@@ -28,9 +28,11 @@ pub(super) fn heat_map(records: &[Line], test: &str) -> Option<Figure> {
         .collect();
     let value = |accel: &String, family: &String| {
         let cell = cell(records, test, accel, family)?;
-        let lost = cell.cracks.max(cell.unexplained_misses);
-        let share = lost as f64 / cell.rays.max(1) as f64;
-        Some((1e6 * share, cell.differing > 0))
+        let lost = cell
+            .count("cracks/v1")
+            .max(cell.count("unexplained-misses/v1"));
+        let share = lost as f64 / cell.count("rays/v1").max(1) as f64;
+        Some((1e6 * share, cell.count("differing/v1") > 0))
     };
     let values = rows
         .iter()

@@ -7,14 +7,14 @@ mod values;
 
 #[cfg(test)]
 use crate::measure::record::Verdict;
-use crate::measure::record::{Recorded, axis};
+use crate::measure::record::{Recorded, SkippedRecord, axis};
 use crate::report::data::without_repeats;
 use crate::report::document::{Banner, Block, Check, Document, Section, Table, Tone};
 use crate::report::terminal::aligned;
 use crate::report::values::csv;
 use crate::report::{ReportError, format, write_file, write_page};
 use crate::stress::families::FAMILIES;
-use crate::stress::record::{CellRecord, Line, Record, SkippedRecord, TargetRecord};
+use crate::stress::record::{Findings, Line, Record, TargetRecord};
 use crate::stress::targets::{cells, shots, suite};
 use axes::{extras, shot_table};
 use families::{count_table, error_table, matrix_table, worst_table};
@@ -51,7 +51,7 @@ pub fn stress_tables(records: &[Line]) -> String {
         text.push('\n');
     }
     for skipped in skipped(records).filter(|s| !s.reason.starts_with("every case")) {
-        text += &format!("skipped: {}: {}\n", skipped.what, skipped.reason);
+        text += &format!("skipped: {}: {}\n", skipped.cell, skipped.reason);
     }
     for check in checks(records) {
         text += &format!(
@@ -97,7 +97,7 @@ fn document(records: &[Line]) -> Document {
     let mut worst = Section::new("worst", "Worst rays");
     worst.blocks.extend(worst_table(records).into_block());
     let left_out: Vec<String> = skipped(records)
-        .map(|s| format!("{}: {}", s.what, s.reason))
+        .map(|s| format!("{}: {}", s.cell, s.reason))
         .collect();
     if !left_out.is_empty() {
         worst.blocks.push(Block::Heading("Left out".into()));
@@ -173,7 +173,7 @@ fn cell<'a>(
     test: &str,
     accel: &str,
     family: &str,
-) -> Option<Recorded<'a, CellRecord>> {
+) -> Option<Recorded<'a, Findings>> {
     cells(records).find(|c| {
         let labels = [axis::TRIANGLE, axis::ACCEL, axis::FAMILY].map(|axis| c.key.label(axis));
         labels == [test, accel, family]

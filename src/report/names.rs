@@ -1,0 +1,130 @@
+//! What competitors are called: by their main label, and by the further axes on which their run varies.
+
+use crate::measure::record::{Body, Key, Line, axis};
+
+/// Axes that are named only where a run has more than one value of them.
+const NAMED_IF_VARIED: [&str; 3] = [axis::TRIANGLE, axis::BOX_TEST, axis::OFFSET];
+
+/// The names of one run.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Names {
+    varied: Vec<&'static str>,
+}
+
+impl Names {
+    /// Finds out on which axes the competitors of a run differ. References are none: whatever the
+    /// offset of a sampler, they are rendered with the default one.
+    pub fn new(lines: &[Line]) -> Self {
+        let keys = || {
+            let competing = |line: &&Line| !matches!(line.body, Body::Reference(_));
+            lines.iter().filter(competing).map(|line| &line.key)
+        };
+        let is_varied = |axis: &&'static str| {
+            let mut labels = keys().map(|key| key.label(axis)).filter(|l| !l.is_empty());
+            let first = labels.next();
+            labels.any(|label| Some(label) != first)
+        };
+        Self {
+            varied: NAMED_IF_VARIED.into_iter().filter(is_varied).collect(),
+        }
+    }
+
+    /// A structure among all of its scene.
+    pub fn structure(&self, key: &Key) -> String {
+        let main = key.label(axis::ACCEL).to_owned();
+        self.with_further(main + &kernels(key), key, &[axis::TRIANGLE, axis::BOX_TEST])
+    }
+
+    /// A sampler among those of one view, or one whose words were read back.
+    pub fn sampler(&self, key: &Key) -> String {
+        let [sequence, decorrelation] =
+            [axis::SEQUENCE, axis::DECORRELATION].map(|axis| key.label(axis));
+        let main = format!("{sequence} × {decorrelation}{}", kernels(key));
+        self.with_further(main, key, &[axis::OFFSET])
+    }
+
+    /// What the images of a view are of: the integrator, and the tests that its rays meet triangles and
+    /// boxes with.
+    pub fn view(&self, key: &Key) -> String {
+        let main = key.label(axis::INTEGRATOR).to_owned();
+        self.with_further(main, key, &[axis::TRIANGLE, axis::BOX_TEST])
+    }
+
+    fn with_further(&self, main: String, key: &Key, axes: &[&str]) -> String {
+        let varied = axes.iter().filter(|axis| self.varied.contains(axis));
+        let labels = varied.map(|axis| key.label(axis));
+        labels
+            .filter(|label| !label.is_empty())
+            .fold(main, |name, label| format!("{name} · {label}"))
+    }
+}
+
+/// ` @` and the kernels in the place of the embedded ones; empty for these.
+fn kernels(key: &Key) -> String {
+    match key.label(axis::KERNELS) {
+        "" => String::new(),
+        kernels => format!(" @{kernels}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::record::{Ran, SkippedRecord};
+
+    fn line(labels: &[(&str, &str)]) -> Line {
+        let add = |key: Key, (axis, label): &(&str, &str)| key.with(axis, label);
+        let key = labels.iter().fold(Key::default(), add);
+        let body = SkippedRecord {
+            cell: String::new(),
+            reason: String::new(),
+        };
+        Line::new(key, Ran::default(), Body::Warning(body))
+    }
+
+    #[test]
+    fn only_axes_that_vary_are_named_and_kernels_always() {
+        let a = line(&[
+            (axis::ACCEL, "bvh"),
+            (axis::SEQUENCE, "sobol"),
+            (axis::DECORRELATION, "none"),
+            (axis::INTEGRATOR, "path"),
+            (axis::KERNELS, "idea"),
+            (axis::TRIANGLE, "baldwin-weber"),
+            (axis::BOX_TEST, "slab"),
+            (axis::OFFSET, "error-bound"),
+        ]);
+        let named = |names: &Names| {
+            let key = &a.key;
+            [names.structure(key), names.sampler(key), names.view(key)]
+        };
+        let alone = Names::new(std::slice::from_ref(&a));
+        assert_eq!(named(&alone), ["bvh @idea", "sobol × none @idea", "path"]);
+        // Lines without the axis tell nothing of it.
+        assert_eq!(Names::new(&[a.clone(), line(&[])]), alone);
+        for (axis, other, expected) in [
+            (
+                axis::TRIANGLE,
+                "watertight",
+                [
+                    "bvh @idea · baldwin-weber",
+                    "sobol × none @idea",
+                    "path · baldwin-weber",
+                ],
+            ),
+            (
+                axis::BOX_TEST,
+                "robust",
+                ["bvh @idea · slab", "sobol × none @idea", "path · slab"],
+            ),
+            (
+                axis::OFFSET,
+                "none",
+                ["bvh @idea", "sobol × none @idea · error-bound", "path"],
+            ),
+        ] {
+            let both = Names::new(&[a.clone(), line(&[(axis, other)])]);
+            assert_eq!(named(&both), expected);
+        }
+    }
+}
