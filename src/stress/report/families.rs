@@ -1,28 +1,16 @@
 //! Tables of families, structures and their worst rays.
 
+use super::values::of_line;
 use super::{cell, structures, triangles};
 use crate::measure::record::{Recorded, axis};
 use crate::report::document::{Cell, Table, Tone};
 use crate::report::format;
+use crate::report::pivot::{FIGURES_ALONE, Rows};
+use crate::report::values::Value;
 use crate::stress::families::FAMILIES;
 use crate::stress::record::{CellRecord, Line, Quantiles};
 use crate::stress::suite::BRUTE_FORCE;
 use crate::stress::targets::cells;
-
-fn three(quantiles: Option<Quantiles>) -> String {
-    quantiles.map_or_else(
-        || format::ABSENT.into(),
-        |q| {
-            // What is relative to nothing is held as the greatest number.
-            let text = |x: f64| match x {
-                f64::MAX => "∞".to_owned(),
-                x => format::significant(x, 2),
-            };
-            let of = [q.median, q.p99, q.max].map(text);
-            of.join(" / ")
-        },
-    )
-}
 
 /// The families that were tried with a triangle test, each with its cells, brute force's first.
 fn rows<'a>(records: &'a [Line], test: &str) -> Vec<(&'static str, Vec<Recorded<'a, CellRecord>>)> {
@@ -40,62 +28,63 @@ fn rows<'a>(records: &'a [Line], test: &str) -> Vec<(&'static str, Vec<Recorded<
 
 /// What brute force with one triangle test gets wrong, and what other structures do otherwise.
 pub(super) fn count_table(records: &[Line], test: &str) -> Table {
-    let mut table = Table::new(
-        format!("{test}: brute force against the exact oracle; (…) is not explained by rounding"),
+    let families = rows(records, test);
+    let row = |(family, cells): &(&str, Vec<Recorded<CellRecord>>)| {
+        let differ = differing(cells).into();
+        (cells[0].key.clone(), vec![(*family).into(), differ])
+    };
+    let judged = |line: &&Line| families.iter().any(|(_, cells)| *cells[0].key == line.key);
+    let mut values: Vec<Value> = records.iter().filter(judged).flat_map(of_line).collect();
+    // Not brute force's own, which visits all in any case.
+    values.retain(|value| value.figure.id != "slowdown/v1");
+    for (_, cells) in &families {
+        let slowest = cells.iter().filter_map(|c| c.slowdown).reduce(f64::max);
+        values.extend(Value::known(cells[0].key, [("slowdown/v1", slowest)]));
+    }
+    let heads = ["family", ":structures that differ"];
+    let mut table = Rows::new(&[axis::FAMILY], &heads, families.iter().map(row)).table(
+        &values,
+        format!("{test}: brute force against the exact oracle; unexplained: not by rounding"),
         &[
-            "family",
-            "rays",
-            "false misses",
-            "cracks",
-            "false hits",
-            "wrong triangle",
-            "not nearest",
-            "borderline",
-            "slowdown",
-            ":structures that differ",
+            "rays/v1",
+            "false-misses/v1",
+            "unexplained-misses/v1",
+            "cracks/v1",
+            "false-hits/v1",
+            "unexplained-hits/v1",
+            "wrong-triangle/v1",
+            "not-nearest/v1",
+            "borderline/v1",
+            "slowdown/v1",
         ],
+        FIGURES_ALONE,
     );
-    for (family, of_family) in rows(records, test) {
-        let cell = of_family[0];
-        let slowest = of_family.iter().filter_map(|c| c.slowdown).reduce(f64::max);
-        let both = |all: usize, unexplained: usize| match all {
-            0 => "0".to_owned(),
-            _ => format!("{} ({})", count(all), count(unexplained)),
-        };
-        let tone = match cell.cracks {
-            0 => Tone::Plain,
-            _ => Tone::Bad,
-        };
-        table.rows.push(vec![
-            family.into(),
-            count(cell.rays).into(),
-            both(cell.false_misses, cell.unexplained_misses).into(),
-            Cell::from(count(cell.cracks)).toned(tone),
-            both(cell.false_hits, cell.unexplained_hits).into(),
-            count(cell.wrong_triangle).into(),
-            count(cell.not_nearest).into(),
-            count(cell.borderline).into(),
-            format::optional(slowest).into(),
-            differing(&of_family).into(),
-        ]);
+    let cracks = table.columns.iter().position(|c| c.title == "cracks");
+    for row in &mut table.rows {
+        let cell = cracks.and_then(|column| row.get_mut(column));
+        if let Some(cell) = cell.filter(|cell| cell.text != "0") {
+            cell.tone = Tone::Bad;
+        }
     }
     table
 }
 
-fn count(n: usize) -> String {
-    format::count(n as u64)
+impl CellRecord {
+    /// Answers that are not brute force's.
+    fn all_differing(&self) -> usize {
+        self.differing + self.any_differing.unwrap_or(0)
+    }
 }
 
 /// The structures whose answers are not brute force's, or that failed; how many if they are more than a
 /// line takes.
 fn differing(of_family: &[Recorded<CellRecord>]) -> String {
     const MOST: usize = 3;
-    let wrong = |c: &CellRecord| c.differing + c.any_differing.unwrap_or(0);
     let differ: Vec<&Recorded<CellRecord>> = (of_family.iter())
-        .filter(|c| wrong(c) > 0 || !c.failures.is_empty())
+        .filter(|c| c.all_differing() > 0 || !c.failures.is_empty())
         .collect();
     if differ.len() > MOST {
-        let most = differ.iter().map(|c| wrong(c)).max().unwrap_or(0);
+        let most = differ.iter().map(|c| c.all_differing()).max().unwrap_or(0);
         let failed = differ.iter().filter(|c| !c.failures.is_empty()).count();
         return format!(
             "{} of {}, up to {most}; {failed} failed",
@@ -104,10 +93,10 @@ fn differing(of_family: &[Recorded<CellRecord>]) -> String {
         );
     }
     let name = |c: &&Recorded<CellRecord>| {
-        let accel = c.key.label(axis::ACCEL);
+        let text = format!("{} {}", c.key.label(axis::ACCEL), c.all_differing());
         match c.failures.len() {
-            0 => format!("{accel} {}", wrong(c)),
-            failed => format!("{accel} {} ({failed} failed)", wrong(c)),
+            0 => text,
+            failed => format!("{text} ({failed} failed)"),
         }
     };
     differ.iter().map(name).collect::<Vec<_>>().join(", ")
@@ -115,94 +104,89 @@ fn differing(of_family: &[Recorded<CellRecord>]) -> String {
 
 /// How exact the right hits of brute force are.
 pub(super) fn error_table(records: &[Line], test: &str) -> Table {
-    let mut table = Table::new(
-        format!("{test}: errors of right hits, median / p99 / max"),
-        &[
-            "family",
-            "error of t, ulp",
-            "of t, relative",
-            "of the point, ulp",
-            "of the point, relative",
-        ],
-    );
+    let caption = format!("{test}: errors of right hits, median / p99 / max");
+    let heads = [
+        "family",
+        "error of t, ulp",
+        "of t, relative",
+        "of the point, ulp",
+        "of the point, relative",
+    ];
+    let mut table = Table::new(caption, &heads);
     for (family, of_family) in rows(records, test) {
         let cell = of_family[0];
         if cell.t_ulp.is_some() {
-            table.rows.push(vec![
-                family.into(),
-                three(cell.t_ulp).into(),
-                three(cell.t_relative).into(),
-                three(cell.point_ulp).into(),
-                three(cell.point_relative).into(),
-            ]);
+            let errors = [
+                cell.t_ulp,
+                cell.t_relative,
+                cell.point_ulp,
+                cell.point_relative,
+            ];
+            let errors = errors.map(|quantiles| Cell::from(three(quantiles)));
+            table.rows.push([&[family.into()][..], &errors].concat());
         }
     }
     table
 }
 
+fn three(quantiles: Option<Quantiles>) -> String {
+    let Some(q) = quantiles else {
+        return format::ABSENT.into();
+    };
+    // What is relative to nothing is held as the greatest number.
+    let text = |x: f64| match x {
+        f64::MAX => "∞".to_owned(),
+        x => format::significant(x, 2),
+    };
+    [q.median, q.p99, q.max].map(text).join(" / ")
+}
+
 /// A mark per triangle test, structure and family.
 pub(super) fn matrix_table(records: &[Line]) -> Table {
-    let mut table = Table::new(
-        "false misses per triangle test, structure and family; · none, ! differs from brute force, x failed",
-        &["triangle", ":structure"],
-    );
-    let families: Vec<&str> = FAMILIES
-        .iter()
-        .map(|f| f.name)
-        .filter(|name| cells(records).any(|c| c.key.label(axis::FAMILY) == *name))
-        .collect();
+    let caption = "False misses per triangle test, structure and family; · none, ! differs from brute force, x failed";
+    let mut table = Table::new(caption, &["triangle", ":structure"]);
+    let tried = |name: &&str| cells(records).any(|c| c.key.label(axis::FAMILY) == *name);
+    let families: Vec<&str> = FAMILIES.iter().map(|f| f.name).filter(tried).collect();
     families.iter().for_each(|name| table.add_column(*name));
     for test in triangles(records) {
         for accel in structures(records) {
-            let row: Vec<Option<Recorded<CellRecord>>> = families
-                .iter()
-                .map(|f| cell(records, &test, &accel, f))
-                .collect();
-            if row.iter().all(Option::is_none) {
-                continue;
+            let marks = families.iter().map(|f| cell(records, &test, &accel, f));
+            let marks: Vec<_> = marks.map(|cell| cell.map(|c| mark(&c))).collect();
+            if marks.iter().any(Option::is_some) {
+                let mut row: Vec<Cell> = vec![test.clone().into(), accel.into()];
+                row.extend(
+                    marks
+                        .into_iter()
+                        .map(|mark| mark.unwrap_or_default().into()),
+                );
+                table.rows.push(row);
             }
-            let mut cells: Vec<Cell> = vec![test.clone().into(), accel.clone().into()];
-            cells.extend(
-                row.iter()
-                    .map(|cell| cell.map_or_else(|| "".into(), |c| mark(&c).into())),
-            );
-            table.rows.push(cells);
         }
     }
     table
 }
 
 fn mark(cell: &CellRecord) -> String {
-    let mut text = match cell.false_misses {
+    let count = match cell.false_misses {
         0 => "·".to_owned(),
         n => n.to_string(),
     };
-    if cell.differing + cell.any_differing.unwrap_or(0) > 0 {
-        text.push('!');
-    }
-    if !cell.failures.is_empty() {
-        text.push('x');
-    }
-    text
+    let differs = if cell.all_differing() > 0 { "!" } else { "" };
+    let failed = if cell.failures.is_empty() { "" } else { "x" };
+    count + differs + failed
 }
 
 pub(super) fn worst_table(records: &[Line]) -> Table {
-    let mut table = Table::new(
-        "The ray to look at first in each cell of brute force and of structures that differ from it",
-        &["family", ":triangle", ":structure", ":what", ":replay"],
-    );
+    let caption = "The ray to look at first in each cell of brute force and of structures that differ from it";
+    let heads = ["family", ":triangle", ":structure", ":what", ":replay"];
+    let mut table = Table::new(caption, &heads);
     for cell in cells(records) {
         let Some(worst) = &cell.worst else { continue };
-        let [family, triangle, accel] =
-            [axis::FAMILY, axis::TRIANGLE, axis::ACCEL].map(|axis| cell.key.label(axis));
-        if accel == BRUTE_FORCE || cell.differing > 0 {
-            table.rows.push(vec![
-                family.into(),
-                triangle.into(),
-                accel.into(),
-                worst.what.clone().into(),
-                worst.replay.clone().into(),
-            ]);
+        if cell.key.label(axis::ACCEL) == BRUTE_FORCE || cell.differing > 0 {
+            let labels =
+                [axis::FAMILY, axis::TRIANGLE, axis::ACCEL].map(|axis| cell.key.label(axis));
+            let row = labels.into_iter().chain([&*worst.what, &worst.replay]);
+            table.rows.push(row.map(Cell::from).collect());
         }
     }
     table
