@@ -122,7 +122,7 @@ const THREE: Shown = Digits(3);
 pub static FIGURES: [Figure; 79] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
-    Figure::new("rays/v1", "number", "", Neither, Count, Exact),
+    Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
     Figure::new("hit-share/v1", "hit", "", Neither, Percent, Exact),
     Figure::new("nodes-per-ray/v1", "nodes/ray", "", Lower, THREE, Exact),
     Figure::new("box-tests-per-ray/v1", "box tests/ray", "", Lower, THREE, Exact),
@@ -142,7 +142,7 @@ pub static FIGURES: [Figure; 79] = [
     Figure::new("sah-cost/v1", "SAH cost", "", Lower, THREE, Exact),
     Figure::new("epo/v1", "EPO", "", Lower, THREE, Exact),
     Figure::new("leaf-share/v1", "share of the leaves", "", Neither, Percent, Exact),
-    Figure::new("break-even/v1", "break-even", "million rays", Lower, THREE, Single),
+    Figure::new("break-even/v1", "break-even", "thousand rays", Lower, THREE, Single),
     // Full cells.
     Figure::new("ms-per-spp/v1", "time per sample per pixel", "ms", Lower, THREE, Median),
     Figure::new("cell-mrays-per-s/v1", "speed of the whole cell", "Mrays/s", Higher, THREE, Median),

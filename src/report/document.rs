@@ -110,6 +110,20 @@ impl Block {
         let figures: Vec<Figure> = figures.into_iter().flatten().collect();
         (!figures.is_empty()).then_some(Self::Figures(figures))
     }
+
+    /// Pictures, if there are any.
+    pub fn gallery(
+        caption: impl Into<String>,
+        items: Vec<Picture>,
+        scale: Option<ColorScale>,
+    ) -> Option<Self> {
+        let caption = caption.into();
+        (!items.is_empty()).then_some(Self::Gallery(Gallery {
+            caption,
+            items,
+            scale,
+        }))
+    }
 }
 
 /// How a text is meant.

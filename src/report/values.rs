@@ -207,13 +207,13 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
         values.extend(sampler.bias.into_iter().flat_map(|bias| of_bias(key, bias)));
         let spectrum = sampler.spectrum.into_iter();
         values.extend(spectrum.flat_map(|s| of_spectrum(key, s)));
-    }
-    for time in view.valid_times() {
-        let figures = [
-            ("ms-per-spp/v1", time.ms_per_spp),
-            ("cell-mrays-per-s/v1", time.mrays_s),
-        ];
-        values.extend(Value::known(&time.key, figures));
+        for time in view.valid_times().filter(|t| t.sampler == sampler.name) {
+            let figures = [
+                ("ms-per-spp/v1", time.ms_per_spp),
+                ("cell-mrays-per-s/v1", time.mrays_s),
+            ];
+            values.extend(Value::known(&time.key, figures));
+        }
     }
     let reference = view.reference.iter();
     values.extend(reference.map(|r| Value::new(r.key, "reference-mse/v1", r.mse)));
@@ -374,7 +374,7 @@ mod tests {
             "scene,accel,figure,title,unit,value,low,high,interval\n\
              \"a,\"\"b\"\"\",,build-ms/v1,build,ms,2,1,3,measured once\n\
              ,bvh,rmse-unbiased/v1,unbiased RMSE,,,,0.5,\"jackknife, Student's 95 % interval\"\n\
-             ,bvh,break-even/v1,break-even,million rays,,,,never\n"
+             ,bvh,break-even/v1,break-even,thousand rays,,,,never\n"
         );
     }
 }

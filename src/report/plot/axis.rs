@@ -205,7 +205,7 @@ fn plain(value: f64) -> String {
 
 /// `0.02`, `1000`, or `2·10⁻⁵` where that is shorter.
 fn decimal_or_power(mantissa: u32, exponent: i32) -> String {
-    if (-2..=4).contains(&exponent) {
+    if (-3..=4).contains(&exponent) {
         let decimals = (-exponent).max(0) as usize;
         return format!("{:.decimals$}", f64::from(mantissa) * 10f64.powi(exponent));
     }

@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn no_point_draws_the_frame_and_one_point_one_dot() {
+    fn no_point_draws_the_frame_one_point_one_dot_and_the_border_lies_on_the_frame() {
         for domain in [
             Domain::Square,
             Domain::PolarDisc,
@@ -274,19 +274,14 @@ mod tests {
             let one = drawn(Cloud::new(domain, vec![[0.25, 0.75]]));
             assert_eq!(dots(&one).len(), 1, "{domain:?}");
         }
-    }
-
-    #[test]
-    fn points_on_the_border_lie_on_the_frame() {
         let corners = [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0]];
-        let drawing = drawn(Cloud::new(Domain::Square, corners.into()));
         let expected = [(10.0, 226.0), (210.0, 26.0), (210.0, 226.0)];
+        let drawing = drawn(Cloud::new(Domain::Square, corners.into()));
         for (found, expected) in dots(&drawing).iter().zip(expected) {
             let distance = (found.0 - expected.0).hypot(found.1 - expected.1);
             assert!(distance < 1e-9, "{found:?}");
         }
-        let counts = interval_counts(&corners, [1, 1]);
-        assert_eq!(counts, [1, 1, 0, 1]);
+        assert_eq!(interval_counts(&corners, [1, 1]), [1, 1, 0, 1]);
     }
 
     #[test]

@@ -34,7 +34,7 @@ pub fn blocks(
     blocks.extend(time_table(data, view, &values).into_block());
     blocks.extend(bias_table(view, &values).into_block());
     blocks.extend(Block::figures([histograms(stem, view)]));
-    blocks.extend(gallery(dir, view));
+    blocks.extend(galleries(dir, view).into_iter().flatten());
     if blocks.len() == 1 {
         blocks.push(Block::Paragraph("Nothing was measured.".into()));
     }
@@ -173,8 +173,10 @@ fn time_table(data: &RunData, view: &View, values: &[Value]) -> Table {
     table
 }
 
-fn gallery(dir: &Path, view: &View) -> Option<Block> {
-    let mut items = Vec::new();
+/// The reference and a render of each sampler, then where each render is wrong.
+fn galleries(dir: &Path, view: &View) -> [Option<Block>; 2] {
+    let mut renders = Vec::new();
+    let mut errors = Vec::new();
     if let Some(reference) = view.reference.filter(|r| !r.image.is_empty()) {
         let caption = match reference.exact {
             Some(value) => format!("reference: the exact value, {value}"),
@@ -185,7 +187,7 @@ fn gallery(dir: &Path, view: &View) -> Option<Block> {
                 format::number(reference.seconds)
             ),
         };
-        items.push(pictures::load(dir, &reference.image, caption));
+        renders.push(pictures::load(dir, &reference.image, caption));
     }
     for sampler in &view.samplers {
         let mut replicates = sampler.replicates.iter();
@@ -193,15 +195,12 @@ fn gallery(dir: &Path, view: &View) -> Option<Block> {
         let Some(first) = shown else { continue };
         let last = first.errors.last();
         let spp = last.map_or(String::new(), |error| format!(", {} spp", error.spp));
-        for (of, path) in [("", &first.image), ("error of ", &first.error_map)] {
-            let caption = || format!("{of}{}{spp}", sampler.name);
-            items.extend(path.iter().map(|path| pictures::load(dir, path, caption())));
-        }
+        let load = |path: &String| pictures::load(dir, path, format!("{}{spp}", sampler.name));
+        renders.extend(first.image.as_ref().map(load));
+        errors.extend(first.error_map.as_ref().map(load));
     }
-    let caption = format!("Renders and error maps with {}", view.name);
-    (!items.is_empty()).then_some(Block::Gallery(Gallery {
-        caption,
-        items,
-        scale: None,
-    }))
+    [("Renders", renders), ("Error maps", errors)].map(|(what, items)| {
+        let caption = format!("{what} with {}", view.name);
+        Block::gallery(caption, items, None)
+    })
 }

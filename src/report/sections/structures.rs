@@ -5,7 +5,7 @@ use super::trade_off;
 use super::verdict::ray_classes;
 use crate::accel::{Phase, Space};
 use crate::image::viridis_css;
-use crate::measure::record::{Key, RayClass, StructureRecord, axis};
+use crate::measure::record::{RayClass, StructureRecord, axis};
 use crate::report::data::{Measured, RunData, STRUCTURE_AXES, SceneGroup};
 use crate::report::document::*;
 use crate::report::pivot::{FIGURES_ALONE, Part, Rows};
@@ -177,17 +177,17 @@ fn leaf_table(scene: &SceneGroup, values: &[Value]) -> Table {
 
 /// Counted work per ray.
 fn work_table(scene: &SceneGroup, values: &[Value]) -> Table {
-    let mut by = STRUCTURE_AXES.to_vec();
-    by.push(axis::RAYS);
-    let passed = scene.structures.iter().filter(|s| s.fault().is_none());
-    let rows = passed.flat_map(|s| {
-        s.body.timings.iter().map(|timing| {
-            let class = format::ray_class(timing.class);
-            let key: Key = s.key.clone().with(axis::RAYS, class);
-            (key, vec![s.structure.clone().into(), class.into()])
+    let by = [&[axis::RAYS], &STRUCTURE_AXES[..]].concat();
+    let passed = || scene.structures.iter().filter(|s| s.fault().is_none());
+    let rows = ray_classes(scene).into_iter().flat_map(|class| {
+        let timed = passed().filter(move |s| s.timings.iter().any(|t| t.class == class));
+        timed.map(move |s| {
+            let class = format::ray_class(class);
+            let key = s.key.clone().with(axis::RAYS, class);
+            (key, vec![class.into(), s.structure.clone().into()])
         })
     });
-    Rows::new(&by, &["structure", ":rays"], rows).table(
+    Rows::new(&by, &["class", ":structure"], rows).table(
         values,
         "Counted work per ray (means over a class, from a separate run)",
         &[
@@ -230,10 +230,5 @@ fn heat_maps(dir: &Path, scene: &SceneGroup) -> Option<Block> {
         title: "nodes + triangle tests per primary ray".into(),
         labels: [0.0, 0.25, 0.5, 0.75, 1.0].map(label).to_vec(),
     });
-    let caption = "Traversal cost of primary rays".into();
-    (!items.is_empty()).then_some(Block::Gallery(Gallery {
-        caption,
-        items,
-        scale,
-    }))
+    Block::gallery("Traversal cost of primary rays", items, scale)
 }

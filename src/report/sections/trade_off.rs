@@ -10,7 +10,7 @@ use crate::report::pivot::Rows;
 use crate::report::samplers::Sampler;
 use crate::report::values::{Reading, Value};
 
-/// After how many million rays a structure has caught up with one that is built `extra_build_ms` faster.
+/// After how many thousand rays a structure has caught up with one that is built `extra_build_ms` faster.
 /// Speeds in Mrays/s.
 fn caught_up(extra_build_ms: f64, slow_build: &Interval, fast_build: &Interval) -> Reading {
     if slow_build.high < fast_build.low {
@@ -20,7 +20,7 @@ fn caught_up(extra_build_ms: f64, slow_build: &Interval, fast_build: &Interval) 
         return Reading::Word("undecided");
     }
     let seconds_per_million = 1.0 / fast_build.value - 1.0 / slow_build.value;
-    (extra_build_ms.max(0.0) * 1e-3 / seconds_per_million).into()
+    (extra_build_ms.max(0.0) / seconds_per_million).into()
 }
 
 /// Speed in a class, if it was measured often enough to have a 95 % interval.
@@ -68,7 +68,7 @@ pub fn break_even(scene: &SceneGroup) -> Vec<Value<'static>> {
 pub fn break_even_table(scene: &SceneGroup, values: &[Value]) -> Option<Table> {
     let (first, others) = by_build(scene)?;
     let caption = format!(
-        "Break-even: million rays after which a structure, its build included, overtakes {}, which is built \
+        "Break-even: thousand rays after which a structure, its build included, overtakes {}, which is built \
          fastest ({} ms)",
         first.structure,
         format::number(first.build_ms)
@@ -145,11 +145,11 @@ mod tests {
             high: value * 1.05,
         };
         let of = |slow, fast| caught_up(100.0, &speed(slow), &speed(fast));
-        // 100 ms more; 1 s/M rays against 2 s/M rays: after 0.1 M rays.
+        // 100 ms more; 1 s/M rays against 2 s/M rays: after 100,000 rays.
         let Reading::Known(found) = of(1.0, 0.5) else {
             panic!("no number");
         };
-        assert!((found.value - 0.1).abs() < 1e-12, "{found:?}");
+        assert!((found.value - 100.0).abs() < 1e-9, "{found:?}");
         assert_eq!(of(0.5, 1.0), Reading::Word("never"));
         assert_eq!(of(1.0, 0.98), Reading::Word("undecided"));
     }

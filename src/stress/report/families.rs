@@ -83,6 +83,9 @@ fn differing(of_family: &[Recorded<CellRecord>]) -> String {
     let differ: Vec<&Recorded<CellRecord>> = (of_family.iter())
         .filter(|c| c.all_differing() > 0 || !c.failures.is_empty())
         .collect();
+    if differ.is_empty() {
+        return "none".into();
+    }
     if differ.len() > MOST {
         let most = differ.iter().map(|c| c.all_differing()).max().unwrap_or(0);
         let failed = differ.iter().filter(|c| !c.failures.is_empty()).count();

@@ -1,12 +1,13 @@
 //! Maps of lost hits, and errors over the rungs.
 
 use super::{cell, structures, triangles};
+use crate::measure::record::Interval;
 use crate::report::document::Figure;
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::report::plot::heat::HeatMap;
 use crate::stress::families::FAMILIES;
 use crate::stress::place::Place;
-use crate::stress::record::{Line, Rung};
+use crate::stress::record::Line;
 use crate::stress::suite::BRUTE_FORCE;
 
 /// Families whose errors are drawn over the rungs.
@@ -53,15 +54,13 @@ pub(super) fn curves(records: &[Line]) -> Vec<Option<Figure>> {
         let plot = CurvePlot {
             x_title: x_title.into(),
             x_ticks: Ticks::PowersOfTen,
-            y_title: "error of t, ulp".into(),
+            y_title: "error of t (99th percentile), ulp".into(),
             curves: (triangles(records).iter().enumerate())
                 .filter_map(curve)
                 .collect(),
             guides: Vec::new(),
         };
-        let caption = format!(
-            "{family}: error of the distance, median (end of the band) to 99th percentile (line)."
-        );
+        let caption = format!("{family}: 99th percentile of the error of the distance over rungs.");
         plot.figure(format!("error-{family}-{name}"), caption)
     };
     sweeps.map(figure).collect()
@@ -76,18 +75,21 @@ fn curve(
 ) -> Option<Curve> {
     let cell = cell(records, test, BRUTE_FORCE, family)?;
     let first = cell.rungs.first()?.label.split(", ").next()?;
-    let point = |rung: &Rung| {
-        let q = rung.t_ulp?;
-        Some(CurvePoint {
-            x: on_axis(&rung.place)?,
-            y: q.p99,
-            low: q.median.max(1e-3).min(q.p99),
-            high: q.p99,
-        })
-    };
     let of_first = cell.rungs.iter().filter(|r| r.label.starts_with(first));
-    let mut points: Vec<CurvePoint> = of_first.filter_map(point).collect();
+    let mut points: Vec<CurvePoint> = Vec::new();
+    for rung in of_first {
+        let (Some(x), Some(q)) = (on_axis(&rung.place), rung.t_ulp) else {
+            continue;
+        };
+        // Of several cases in one place the worst counts.
+        match points.iter_mut().find(|point| point.x == x) {
+            Some(known) if known.y >= q.p99 => {}
+            Some(known) => *known = CurvePoint::new(x, &Interval::exact(q.p99)),
+            None => points.push(CurvePoint::new(x, &Interval::exact(q.p99))),
+        }
+    }
     points.sort_by(|a, b| a.x.total_cmp(&b.x));
+    (points.len() > 1).then_some(())?;
     Some(Curve {
         label: format!("{test}, {first}"),
         look,
