@@ -3,6 +3,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use raystone::accel::{AccelRegistry, BuildLog, TriangleSoup};
+use raystone::config::Axis;
 use raystone::params::{ParamValue, Params, Variant};
 use raystone::scene::{self, LoadOptions};
 
@@ -19,7 +20,9 @@ fn soup() -> (&'static str, TriangleSoup) {
     let load = |name: &str| {
         let registries = raystone::run::Registries::default();
         let catalogue = registries.catalogue();
-        let built_in = catalogue.scene.iter().find(|entry| entry.name == name);
+        let built_in = catalogue[Axis::Scene]
+            .iter()
+            .find(|entry| entry.name == name);
         let file = || Variant {
             name: name.to_owned(),
             params: Params::default(),

@@ -1,4 +1,4 @@
-//! Triangles and the camera: what experiments, scenes, structures and the oracle have in common.
+//! Triangles, rays and the camera: what experiments, scenes, structures and the oracle have in common.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -21,6 +21,45 @@ impl Triangle {
 impl From<[Vec3; 3]> for Triangle {
     fn from(vertices: [Vec3; 3]) -> Self {
         Self { vertices }
+    }
+}
+
+/// A ray segment, 32 bytes, the layout of the ray buffers.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Ray {
+    /// Origin, scene units.
+    pub origin: [f32; 3],
+    /// Least distance of a hit, ≥ 0, in units of the direction's length.
+    pub t_min: f32,
+    /// Direction; need not be normalised.
+    pub direction: [f32; 3],
+    /// Greatest distance of a hit; the oracle also takes infinity.
+    pub t_max: f32,
+}
+
+impl Ray {
+    /// End of rays that have none; a kernel multiplies it by pads without overflow.
+    pub const FAR: f32 = 1e30;
+
+    /// The ray from distance 0 to [`Ray::FAR`].
+    pub fn new(origin: impl Into<[f32; 3]>, direction: impl Into<[f32; 3]>) -> Self {
+        Self {
+            origin: origin.into(),
+            t_min: 0.0,
+            direction: direction.into(),
+            t_max: Self::FAR,
+        }
+    }
+
+    /// The same ray with other ends.
+    #[must_use]
+    pub fn between(self, t_min: f32, t_max: f32) -> Self {
+        Self {
+            t_min,
+            t_max,
+            ..self
+        }
     }
 }
 

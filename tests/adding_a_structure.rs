@@ -1,11 +1,10 @@
 //! Keeps `docs/adding-a-structure.md` true: the structure that it adds goes through the public
 //! interface and the whole gate, and every file that it quotes is quoted rightly.
 
-mod common;
 #[path = "adding_a_structure/sorted_slabs.rs"]
 mod sorted_slabs;
+mod support;
 
-use common::{Pcg, assert_same_hits, brute_force, build, param_variants, scenes, trace};
 use raystone::accel::{AccelKind, Counters};
 use raystone::config::{Experiment, Plan};
 use raystone::gpu::KernelLibrary;
@@ -13,6 +12,7 @@ use raystone::measure::record::GateVerdict;
 use raystone::run::{Registries, RunOptions, verify};
 use sorted_slabs::SortedSlabs;
 use std::path::{Path, PathBuf};
+use support::{Pcg, assert_same_hits, brute_force, build, param_variants, scenes, trace};
 
 const KERNEL: &str = "accel/sorted_slabs.wesl";
 
@@ -74,7 +74,7 @@ fn verdicts(kernels: &Path) -> Vec<GateVerdict> {
 
 #[test]
 fn the_structure_passes_the_whole_gate_through_the_public_interface() {
-    if !common::is_exact(common::gpu()) {
+    if !support::is_exact(support::gpu()) {
         return;
     }
     for verdict in verdicts(&kernel_folder()) {
@@ -102,12 +102,12 @@ fn the_gate_refuses_a_kernel_that_forgets_the_last_triangle_of_a_run() {
 
 #[test]
 fn kernel_and_twin_equal_brute_force_on_hard_scenes() {
-    let gpu = common::open(
+    let gpu = support::open(
         KernelLibrary::default()
             .with_folder(&kernel_folder())
             .expect("the folder"),
     );
-    if !common::is_exact(&gpu) {
+    if !support::is_exact(&gpu) {
         return;
     }
     let mut rng = Pcg::new(31);

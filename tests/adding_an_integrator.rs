@@ -17,6 +17,7 @@ use piped::PipedBvh;
 use raystone::accel::{AccelKind, Traced};
 use raystone::gpu::{Gpu, KernelLibrary};
 use raystone::image::Image;
+use raystone::integrator::RayOffset;
 use raystone::integrator::{ConfiguredIntegrator, Integrator, RenderJob, Renderer};
 use raystone::measure::record::{Body, Line, axis};
 use raystone::params::Registered;
@@ -131,6 +132,7 @@ fn renderer<'a>(
         camera: stage.camera,
         sampler: &support::sampler("sobol", "cranley-patterson"),
         integrator: &configured(kind),
+        offset: RayOffset::default(),
         runtime_checks: true,
     };
     Renderer::new(gpu, &stage.buffers, traced, &job, true).unwrap_or_else(|e| panic!("{e}"))

@@ -1,10 +1,8 @@
 //! The builders of the binary tree: the same tree for any number of threads, exact hits where
 //! triangles are split, a bound on the depth, quality on a real scene, and bad input.
 
-mod common;
+mod support;
 
-use common::scenes::{self, aimed_rays, lattice_rays, lattice_soup};
-use common::{Pcg, assert_same_hits, brute_force, default_params};
 use glam::Vec3;
 use raystone::accel::tree::{NodeKind, Tree, TreeParameters};
 use raystone::accel::triangle::TriangleRecord;
@@ -13,6 +11,8 @@ use raystone::geometry::Triangle;
 use raystone::params::{ParamRange, ParamValue, Parameters as _, Params, Variant};
 use raystone::scene::{LoadOptions, load};
 use std::path::Path;
+use support::scenes::{self, aimed_rays, lattice_rays, lattice_soup};
+use support::{Pcg, assert_same_hits, brute_force, default_params};
 
 const SPONZA: &str = "../shared/scenes/sponza-crytek/sponza.obj";
 

@@ -1,17 +1,17 @@
 //! Closed meshes from inside, hit by rays of every length: no miss, whatever the length of a direction,
 //! the zeros in it, the noise of the seams and the scale of an instance; and every structure says so.
 
-mod common;
+mod support;
 
-use common::{assert_same_hits, build, default_params, scenes, trace};
 use glam::{DVec3, Vec3};
-use raystone::accel::triangle::TriangleTest;
+use raystone::accel::triangle::{AnyTriangleTest, Compensated, Watertight};
 use raystone::accel::{
     AccelRegistry, BuiltAccel, Counters, Hit, Intersection, NO_HIT, Placed, Ray, Space,
     TriangleSoup, brute_force_hits, brute_force_instances,
 };
 use raystone::geometry::Triangle;
 use raystone::scene::{Assembly, Transform};
+use support::{assert_same_hits, build, default_params, scenes, trace};
 
 /// Lengths of directions: what integrators use, and far beyond.
 const LENGTHS: [f32; 10] = [1e-15, 1e-10, 1e-7, 1e-5, 1e-4, 1e-2, 1.0, 1e4, 1e10, 1e20];
@@ -138,14 +138,14 @@ fn structures_agree(what: &str, soup: &TriangleSoup, rays: &[Ray], flat: &[Hit],
                 "{what}: any hit"
             );
         }
-        if common::is_exact(common::gpu()) {
+        if support::is_exact(support::gpu()) {
             assert_same_hits(
                 &what,
                 rays,
                 expected,
-                &trace(common::gpu(), &*built, soup, rays, &[]).hits,
+                &trace(support::gpu(), &*built, soup, rays, &[]).hits,
             );
-            let any = trace(common::gpu(), &*built, soup, rays, &["any"]).found();
+            let any = trace(support::gpu(), &*built, soup, rays, &["any"]).found();
             assert!(
                 any.iter().all(|found| *found),
                 "{what}: any hit on the device"
@@ -157,7 +157,7 @@ fn structures_agree(what: &str, soup: &TriangleSoup, rays: &[Ray], flat: &[Hit],
 #[test]
 fn no_length_of_a_direction_opens_a_crack() {
     let triangles = |seam| sphere(seam).into_iter().map(|t| t.vertices);
-    for test in [TriangleTest::Watertight, TriangleTest::Compensated] {
+    for test in [&Watertight as AnyTriangleTest, &Compensated] {
         let tests = Intersection {
             triangle: test,
             ..Default::default()

@@ -1,6 +1,6 @@
 //! Parameters that a library user declares: read, refused and swept like those of the program.
 
-use raystone::config::{Catalogue, Experiment};
+use raystone::config::{Axis, Catalogue, Experiment};
 use raystone::parameters;
 use raystone::params::{
     Choice as _, Entry, ParamError, ParamRange, ParamValue, Parameters as _, Params,
@@ -123,7 +123,7 @@ fn an_experiment_sweeps_them() {
         schema,
     };
     let mut catalogue: Catalogue = raystone::run::Registries::default().catalogue();
-    catalogue.accel.push(entry("lamp", Lamp::schema()));
+    catalogue[Axis::Accel].push(entry("lamp", Lamp::schema()));
     let text = |values: &str| {
         format!(
             "[axes]\nscene = [\"cornell-box\"]\naccel = [\"lamp\"]\nsequence = [\"sobol\"]\n\
@@ -133,7 +133,10 @@ fn an_experiment_sweeps_them() {
     let parse = |values: &str| Experiment::parse(&text(values), "lamp.toml", &[], &catalogue);
     let swept = parse("layers = [2, 3]\nplace = [\"on-the-floor\", \"on-the-ceiling\"]");
     let swept = swept.expect("values in their ranges");
-    let labels: Vec<_> = swept.axes.accel.iter().map(|v| v.label.as_str()).collect();
+    let labels: Vec<_> = swept.axes[Axis::Accel]
+        .iter()
+        .map(|v| v.label.as_str())
+        .collect();
     assert_eq!(
         labels,
         [

@@ -1,10 +1,8 @@
 //! Two-level structures: equal to brute force over the same instances to the bit, before and after
 //! instances move; and what the gate, the records and the flat structures make of such scenes.
 
-mod common;
 mod support;
 
-use common::{Pcg, assert_same_hits, build, default_params, differences, scenes, trace};
 use glam::{Mat3, Quat, Vec3};
 use raystone::accel::{
     AccelKind, Counters, CpuTwin, Hit, InstanceJudge, MetaBvh, NO_HIT, ObjectList, Placed, Ray,
@@ -13,13 +11,14 @@ use raystone::accel::{
 use raystone::config::Gate;
 use raystone::geometry::Triangle;
 use raystone::gpu::probe_arithmetic;
-use raystone::measure::gate::{Judge, compare, gate};
+use raystone::measure::gate::{Checks, Judge, compare, gate};
 use raystone::measure::hard_rays::HARD_RAYS;
 use raystone::measure::record::{StructureRecord, TimeRecord, all_of, axis};
 use raystone::params::{ParamValue, Params};
 use raystone::run::Registries;
 use raystone::scene::{Assembly, Transform};
 use support::Stage;
+use support::{Pcg, assert_same_hits, build, default_params, differences, scenes, trace};
 
 const KINDS: [&dyn AccelKind; 2] = [&ObjectList, &MetaBvh];
 
@@ -131,7 +130,7 @@ fn check(what: &str, kind: &dyn AccelKind, soup: &TriangleSoup, rays: &[Ray], ex
         let any: Vec<bool> = twins.map(|(r, w)| twin.any_hit(r, &mut w[1])).collect();
         assert_eq!(any, blocked, "{what}: any hit of the twin");
 
-        let run = |features: &[&str]| trace(common::gpu(), &*built, soup, rays, features);
+        let run = |features: &[&str]| trace(support::gpu(), &*built, soup, rays, features);
         assert_same_hits(&what, rays, expected, &run(&[]).hits);
         assert_eq!(run(&["any"]).found(), blocked, "{what}: any hit");
         let counted = [run(&["counters"]).work, run(&["any", "counters"]).work];
@@ -144,7 +143,7 @@ fn check(what: &str, kind: &dyn AccelKind, soup: &TriangleSoup, rays: &[Ray], ex
 
 #[test]
 fn structures_equal_brute_force_over_instances_and_count_like_their_twins() {
-    if !common::is_exact(common::gpu()) {
+    if !support::is_exact(support::gpu()) {
         return;
     }
     type Draw = fn(&mut Pcg) -> Transform;
@@ -327,7 +326,14 @@ fn the_gate_judges_each_structure_in_its_space_and_sees_the_difference() {
         ao_length: 0.0,
         offset: 0.0,
     };
-    let judge = Judge::new(&stage.scene, &stage.soup, stage.camera, &settings, 1);
+    let judge = Judge::new(
+        &stage.scene,
+        &stage.soup,
+        stage.camera,
+        &settings,
+        1,
+        Checks::Repeated,
+    );
     let judge = judge.expect("a judge");
     let over_instances = judge.instances.as_deref().expect("a judge of instances");
     for judge in [&judge, over_instances] {
@@ -393,7 +399,7 @@ fn a_tie_over_instances_allows_what_rounding_the_transform_can_do_and_no_more() 
 
 #[test]
 fn faults_in_the_kernels_of_instances_are_seen() {
-    if !common::is_exact(common::gpu()) {
+    if !support::is_exact(support::gpu()) {
         return;
     }
     let mut rng = Pcg::new(21);
@@ -427,7 +433,7 @@ fn faults_in_the_kernels_of_instances_are_seen() {
         ),
     ];
     for (module, from, to, kinds) in faults {
-        let gpu = common::open(support::kernels_with(module, &[(from, to)]));
+        let gpu = support::open(support::kernels_with(module, &[(from, to)]));
         for kind in kinds.iter().map(|k| KINDS[*k]) {
             let built = build(kind, &soup, &default_params(&kind.parameters()));
             let found = trace(&gpu, &*built, &soup, &rays, &[]);

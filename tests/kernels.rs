@@ -2,9 +2,8 @@
 //! default limits, carries no counters unless asked, and has structs laid out like Rust's. No
 //! adapter is needed.
 
-mod common;
+mod support;
 
-use common::{Pcg, build, default_params, param_variants, scenes};
 use rayon::prelude::*;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::accel::{AccelRegistry, Counters, Hit, Ray};
@@ -13,6 +12,7 @@ use raystone::integrator::{IntegratorRegistry, SceneFeatures, with_sampler};
 use raystone::params::{Entry, Variant};
 use raystone::sampling::{Demand, Sampler, SamplerRegistry};
 use std::mem::{offset_of, size_of};
+use support::{Pcg, build, default_params, param_variants, scenes};
 
 /// Names of the scene's feature flags, and the flag of the counting run.
 fn render_features() -> Vec<&'static str> {

@@ -2,13 +2,13 @@
 
 mod support;
 
-use raystone::stress::numerics::{Figure, run};
+use raystone::stress::numerics::{Gauge, run};
 use std::sync::OnceLock;
 use support::{gpu, kernels_with, open};
 
 /// The figures of the embedded kernels, taken once.
-fn figures() -> &'static [Figure] {
-    static FIGURES: OnceLock<Vec<Figure>> = OnceLock::new();
+fn figures() -> &'static [Gauge] {
+    static FIGURES: OnceLock<Vec<Gauge>> = OnceLock::new();
     FIGURES.get_or_init(|| {
         let figures = run(gpu(), true).expect("the figures are taken");
         for figure in &figures {
@@ -19,12 +19,12 @@ fn figures() -> &'static [Figure] {
 }
 
 /// The embedded kernels with one text of one module replaced.
-fn with_fault(module: &str, from: &str, to: &str) -> Vec<Figure> {
+fn with_fault(module: &str, from: &str, to: &str) -> Vec<Gauge> {
     let kernels = kernels_with(module, &[(from, to)]);
     run(&open(kernels), true).expect("the figures are taken")
 }
 
-fn alarms(figures: &[Figure]) -> Vec<&str> {
+fn alarms(figures: &[Gauge]) -> Vec<&str> {
     let failed = figures.iter().filter(|figure| !figure.passed);
     failed.map(|figure| figure.name.as_str()).collect()
 }

@@ -1,10 +1,8 @@
 //! The oracle: known answers, planted faults, and agreement with two straightforward f32 tests.
 
 use glam::Vec3;
-use raystone::geometry::Triangle;
-use raystone::oracle::{
-    ClosestHit, Fault, OracleRay, Verdict, judge, judge_any_hits, judge_closest_hits,
-};
+use raystone::geometry::{Ray, Triangle};
+use raystone::oracle::{ClosestHit, Fault, Verdict, judge, judge_any_hits, judge_closest_hits};
 use raystone::random::Pcg32;
 
 /// Where random rays and triangles come from.
@@ -23,7 +21,7 @@ impl Random {
         Vec3::new(self.signed(), self.signed(), self.signed())
     }
 
-    fn ray(&mut self) -> OracleRay {
+    fn ray(&mut self) -> Ray {
         ray(self.vector() * 1.5, self.vector())
     }
 
@@ -40,13 +38,8 @@ fn triangle(vertices: [Vec3; 3]) -> Triangle {
     Triangle { vertices }
 }
 
-fn ray(origin: Vec3, direction: Vec3) -> OracleRay {
-    OracleRay {
-        origin: origin.to_array(),
-        t_min: 0.0,
-        direction: direction.to_array(),
-        t_max: f32::INFINITY,
-    }
+fn ray(origin: Vec3, direction: Vec3) -> Ray {
+    Ray::new(origin, direction).between(0.0, f32::INFINITY)
 }
 
 /// (0, 0, z), (1, 0, z), (0, 1, z).
@@ -54,15 +47,15 @@ fn corner(z: f32) -> Triangle {
     triangle([Vec3::ZERO, Vec3::X, Vec3::Y].map(|v| v + z * Vec3::Z))
 }
 
-fn towards(x: f32, y: f32) -> OracleRay {
+fn towards(x: f32, y: f32) -> Ray {
     ray(Vec3::new(x, y, -1.0), Vec3::Z)
 }
 
 /// One triangle, one ray, in f32.
-type Test32 = fn(&Triangle, &OracleRay) -> Option<f32>;
+type Test32 = fn(&Triangle, &Ray) -> Option<f32>;
 
 /// Normal first: det = d·n, t = c·n / det, u and v from d×c.
-fn normal_first(triangle: &Triangle, ray: &OracleRay) -> Option<f32> {
+fn normal_first(triangle: &Triangle, ray: &Ray) -> Option<f32> {
     let [v0, v1, v2] = triangle.vertices;
     let direction = Vec3::from(ray.direction);
     let (e1, e2) = (v1 - v0, v2 - v0);
@@ -78,7 +71,7 @@ fn normal_first(triangle: &Triangle, ray: &OracleRay) -> Option<f32> {
 }
 
 /// As in Möller and Trumbore 1997, with divisions.
-fn moeller_trumbore(triangle: &Triangle, ray: &OracleRay) -> Option<f32> {
+fn moeller_trumbore(triangle: &Triangle, ray: &Ray) -> Option<f32> {
     let [v0, v1, v2] = triangle.vertices;
     let direction = Vec3::from(ray.direction);
     let (e1, e2) = (v1 - v0, v2 - v0);
@@ -93,7 +86,7 @@ fn moeller_trumbore(triangle: &Triangle, ray: &OracleRay) -> Option<f32> {
 }
 
 /// Sheared vertices, as in Woop, Benthin and Wald 2013, with a reciprocal.
-fn sheared(triangle: &Triangle, ray: &OracleRay) -> Option<f32> {
+fn sheared(triangle: &Triangle, ray: &Ray) -> Option<f32> {
     let direction = Vec3::from(ray.direction);
     let size = direction.abs();
     let z = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b]))?;
@@ -113,7 +106,7 @@ fn sheared(triangle: &Triangle, ray: &OracleRay) -> Option<f32> {
     (inside && area != 0.0 && t > ray.t_min && t < ray.t_max).then_some(t)
 }
 
-fn closest(test: Test32, triangles: &[Triangle], ray: &OracleRay) -> ClosestHit {
+fn closest(test: Test32, triangles: &[Triangle], ray: &Ray) -> ClosestHit {
     let mut best: ClosestHit = None;
     for (id, triangle) in (0..).zip(triangles) {
         if let Some(t) = test(triangle, ray) {
@@ -267,8 +260,8 @@ fn any_hit_answers_are_judged_by_whether_something_blocks() {
 }
 
 /// Judges the answers of `test` over a soup; returns (hits, ambiguous).
-fn judge_soup(test: Test32, triangles: &[Triangle], rays: &[OracleRay]) -> (usize, usize) {
-    let answer = |ray: &OracleRay| (*ray, closest(test, triangles, ray));
+fn judge_soup(test: Test32, triangles: &[Triangle], rays: &[Ray]) -> (usize, usize) {
+    let answer = |ray: &Ray| (*ray, closest(test, triangles, ray));
     let queries: Vec<_> = rays.iter().map(answer).collect();
     let verdicts = judge_closest_hits(triangles, &queries);
     for (query, verdict) in queries.iter().zip(&verdicts) {

@@ -1,13 +1,13 @@
 //! Every entry of every registry with parameters as a library user may hand them over: none, unknown
 //! names, wrong types, values out of range. Missing ones take their defaults; the rest is an error.
 
-mod common;
+mod support;
 
-use common::{Pcg, default_params, scenes};
 use raystone::accel::{AccelRegistry, BuildLog, BuiltBvh, BvhParameters, TriangleSoup};
 use raystone::params::{ParamRange, ParamValue, ParameterSchema, Params, Variant};
 use raystone::sampling::{Demand, SamplerRegistry};
 use raystone::scene::{LoadOptions, load};
+use support::{Pcg, default_params, scenes};
 
 /// Parameters that a schema does not allow, each with a word that the message must hold.
 fn hostile(schema: &ParameterSchema) -> Vec<(Params, String)> {

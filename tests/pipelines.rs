@@ -1,18 +1,19 @@
 //! A structure that answers rays in passes of its own goes through gate, timing, counters, a run and its
 //! report like any other, and nothing in the program knows of it.
 
-mod common;
 #[path = "pipelines/sorted_rays.rs"]
 mod sorted_rays;
+mod support;
 
-use common::{Pcg, assert_same_hits, brute_force, build, default_params, scenes, trace};
 use raystone::accel::{AccelKind, Bvh};
+use raystone::config::Axis;
 use raystone::config::{Experiment, Plan};
 use raystone::gpu::KernelLibrary;
 use raystone::measure::record::GateVerdict;
 use raystone::run::{Registries, RunOptions, RunSummary, run, verify};
 use sorted_rays::SortedRays;
 use std::path::{Path, PathBuf};
+use support::{Pcg, assert_same_hits, brute_force, build, default_params, scenes, trace};
 
 static SORTED: SortedRays = SortedRays {
     name: "sorted-rays",
@@ -22,34 +23,6 @@ static UNCOUNTED: SortedRays = SortedRays {
     name: "uncounted-rays",
     counts_work: false,
 };
-
-const EXPERIMENT: &str = r#"
-[run]
-name = "pipelines"
-replicates = 2
-seed = 1
-resolution = [16, 16]
-spp = { pow2 = [0, 1] }
-[axes]
-scene = ["cornell-box"]
-accel = ["bvh", "sorted-rays", "uncounted-rays"]
-sequence = ["pixel-hash"]
-decorrelation = ["none"]
-integrator = ["path"]
-[reference]
-spp = 8
-[timing]
-rounds = 3
-min_warmup_ms = 0
-max_warmup_ms = 1
-rays = 1024
-[gate]
-rays = 1024
-brute_force_tests = 1000
-oracle_rays = 16
-[discrepancy]
-points = 16
-"#;
 
 fn kernel_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pipelines/kernels")
@@ -64,7 +37,9 @@ fn planned(kernels: &Path) -> (Experiment, Plan, Registries) {
         "axes.kernels=[{:?}]",
         kernels.display().to_string()
     )];
-    let experiment = Experiment::parse(EXPERIMENT, "experiment", &kernels, &registries.catalogue());
+    let structures = r#"["bvh", "sorted-rays", "uncounted-rays"]"#;
+    let text = support::SMALL.replace(r#"["bvh"]"#, structures);
+    let experiment = Experiment::parse(&text, "experiment", &kernels, &registries.catalogue());
     let experiment = experiment.unwrap_or_else(|e| panic!("{e}"));
     let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d));
     (
@@ -85,15 +60,20 @@ fn verdicts(kernels: &Path) -> Vec<(String, GateVerdict)> {
     );
     let verified = verified.unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(verified.len(), 3);
-    let verdict = |v: raystone::run::Verified| (v.accel.name, v.verdict.expect("a verdict"));
+    let verdict = |v: raystone::run::Verified| {
+        (
+            v.cell[Axis::Accel].name.clone(),
+            v.verdict.expect("a verdict"),
+        )
+    };
     verified.into_iter().map(verdict).collect()
 }
 
 #[test]
 fn rays_in_another_order_get_the_same_answers_and_counters() {
     let library = KernelLibrary::default().with_folder(&kernel_folder());
-    let gpu = common::open(library.expect("the kernels of this test"));
-    if !common::is_exact(&gpu) {
+    let gpu = support::open(library.expect("the kernels of this test"));
+    if !support::is_exact(&gpu) {
         return;
     }
     let mut random = Pcg::new(5);
@@ -116,7 +96,7 @@ fn rays_in_another_order_get_the_same_answers_and_counters() {
 
 #[test]
 fn the_gate_passes_it_and_sees_a_scatter_that_drops_or_misplaces_a_ray() {
-    if !common::is_exact(common::gpu()) {
+    if !support::is_exact(support::gpu()) {
         return;
     }
     for (name, verdict) in verdicts(&kernel_folder()) {

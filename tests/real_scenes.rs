@@ -8,7 +8,7 @@ use raystone::accel::AccelKind;
 use raystone::config::Gate;
 use raystone::gpu::probe_arithmetic;
 use raystone::integrator::Traced;
-use raystone::measure::gate::{Judge, gate};
+use raystone::measure::gate::{Checks, Judge, gate};
 use std::path::{Path, PathBuf};
 use support::*;
 
@@ -100,7 +100,14 @@ fn every_structure_passes_the_gate_on_real_models() {
             ao_length: 0.0,
             offset: 0.0,
         };
-        let judge = Judge::new(&stage.scene, &stage.soup, stage.camera, &settings, 1);
+        let judge = Judge::new(
+            &stage.scene,
+            &stage.soup,
+            stage.camera,
+            &settings,
+            1,
+            Checks::Repeated,
+        );
         let judge = judge.expect("a judge");
         assert!(
             judge.is_sound(),

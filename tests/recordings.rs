@@ -1,14 +1,14 @@
 //! Recordings: steps in order, one submission, times per step, nothing made twice, limits.
 
-mod common;
+mod support;
 
-use common::open;
 use raystone::gpu::{
     Bindings, Composition, Gpu, GpuError, Groups, KernelLibrary, Pipeline, Player, Recording,
     Storage, UniformValues,
 };
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
+use support::open;
 
 const WORDS: u32 = 256;
 const BYTES: u64 = WORDS as u64 * 4;

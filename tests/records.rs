@@ -12,7 +12,7 @@ use std::path::Path;
 const OLD: &str = "fuzz/corpus/records/all-kinds.jsonl";
 
 fn read(path: &Path) -> Result<Vec<Line>, RecordError> {
-    Ok(read_lines(path)?.lines)
+    Ok(read_lines(path, SCHEMA)?.lines)
 }
 
 #[test]

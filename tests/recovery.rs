@@ -160,9 +160,7 @@ fn a_device_lost_at_a_structure_fails_that_structure_alone() {
     let cell = &plan.structures[1];
     let disturbed = outcome(&SCENES, Some(&cell.to_string()));
     // Without the structure there is nothing to time its full cells with.
-    let dependent =
-        |t: &&raystone::config::TimeCell| t.scene == cell.scene && t.accel == cell.accel;
-    let times = plan.times.iter().filter(dependent);
+    let times = plan.times.iter().filter(|time| time.is_on(cell));
     let mut expected: BTreeSet<String> = times.map(ToString::to_string).collect();
     assert_eq!(expected.len(), 2);
     expected.insert(cell.to_string());

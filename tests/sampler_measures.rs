@@ -2,7 +2,7 @@
 
 mod support;
 
-use raystone::config::Experiment;
+use raystone::config::{Axis, Experiment};
 use raystone::discrepancy::{Budget, Measure, PointSet, Value, measure};
 use raystone::integrator::integrand::Function;
 use raystone::measure::record::{
@@ -75,8 +75,8 @@ fn point(sampler: &Sampler, pixel: u32, sample: u32, seed: u32) -> [f32; 2] {
 #[test]
 fn integrands_need_no_scene_and_other_integrators_do() {
     let (experiment, plan) = plan(EXPERIMENT, &Registries::default());
-    assert_eq!(experiment.axes.scene[0].name, "single-triangle");
-    assert_eq!(experiment.axes.accel[0].name, "brute-force");
+    assert_eq!(experiment.axes[Axis::Scene][0].name, "single-triangle");
+    assert_eq!(experiment.axes[Axis::Accel][0].name, "brute-force");
     assert_eq!(plan.scenes.len(), 1);
     let traced = EXPERIMENT.replace("\"integrand:disk\"", "\"ao\"");
     let catalogue = Registries::default().catalogue();

@@ -2,10 +2,8 @@
 //! the corners of cells, needles and grazing rays, segments that end at a hit; what their parameters
 //! promise; stacks that are too small. Twin and kernel against brute force, to the bit.
 
-mod common;
+mod support;
 
-use common::scenes::{self, FAR};
-use common::{Pcg, assert_same_hits, brute_force, build, default_params, trace};
 use glam::Vec3;
 use raystone::accel::StructureStats;
 use raystone::accel::{
@@ -14,6 +12,8 @@ use raystone::accel::{
 };
 use raystone::params::{ParamValue, Params};
 use raystone::scene::{self, LoadOptions};
+use support::scenes::{self, FAR};
+use support::{Pcg, assert_same_hits, brute_force, build, default_params, trace};
 
 const KINDS: [&str; 2] = ["octree", "kd-tree"];
 
@@ -84,8 +84,8 @@ fn check(
             let found = twin.any_hit(ray, &mut Counters::default());
             assert_eq!(found, *blocked, "{what}: any hit of {ray:?}");
         }
-        if on_device && common::is_exact(common::gpu()) {
-            let hits = trace(common::gpu(), &*built, soup, rays, &[]).hits;
+        if on_device && support::is_exact(support::gpu()) {
+            let hits = trace(support::gpu(), &*built, soup, rays, &[]).hits;
             assert_same_hits(&format!("{what}, kernel"), rays, &expected, &hits);
         }
     }
@@ -221,7 +221,7 @@ fn a_leaf_that_lost_a_triangle_is_seen_by_the_same_rays() {
     for (name, params) in variants() {
         let built = build(kind(name), &without, &params);
         let found = twin_hits(&*built, &soup, &rays);
-        let different = common::differences(&expected, &found).len();
+        let different = support::differences(&expected, &found).len();
         assert!(different > 0, "{name} {params:?}: not seen");
         assert!(built.validate(&soup).is_err(), "{name} {params:?}: valid");
     }
@@ -349,9 +349,9 @@ fn a_stack_that_overflows_raises_the_error_word_and_one_of_the_right_size_does_n
     let rays = scenes::aimed_rays(&mut Pcg::new(15), &soup, 500);
     for name in KINDS {
         let built = build(kind(name), &soup, &with(name, &[]));
-        trace(common::gpu(), &*built, &soup, &rays, &[]);
+        trace(support::gpu(), &*built, &soup, &rays, &[]);
         let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-            trace(common::gpu(), &SmallStack(&*built), &soup, &rays, &[]);
+            trace(support::gpu(), &SmallStack(&*built), &soup, &rays, &[]);
         }));
         let panic = outcome.expect_err("the error word is raised");
         let text = panic.downcast_ref::<String>().expect("a text");
@@ -404,7 +404,7 @@ fn an_empty_scene_is_traced_and_missed() {
     let rays = rays_in_planes(&mut Pcg::new(18), 100);
     for name in KINDS {
         let empty = build(kind(name), &nothing, &with(name, &[]));
-        let hits = trace(common::gpu(), &*empty, &nothing, &rays, &[]).hits;
+        let hits = trace(support::gpu(), &*empty, &nothing, &rays, &[]).hits;
         assert!(hits.iter().all(|h| h.triangle == NO_HIT), "{name}");
     }
 }

@@ -3,7 +3,7 @@
 
 mod support;
 
-use raystone::accel::triangle::TriangleTest;
+use raystone::accel::triangle::{MoellerTrumbore, TriangleTest as _};
 use raystone::gpu::{Gpu, probe_arithmetic};
 use raystone::measure::record::{Key, axis};
 use raystone::stress::record::{Line, read, write};
@@ -39,9 +39,9 @@ fn a_small_suite_finds_no_difference_from_brute_force_and_writes_tables_records_
     assert_eq!(cells.len(), 4 * (3 + 2));
     let exact = probe_arithmetic(gpu()).expect("the probe runs").is_exact();
     for cell in &cells {
-        assert!(cell.rays > 0 && !cell.rungs.is_empty());
+        assert!(cell.count("rays/v1") > 0 && !cell.rungs.is_empty());
         if exact && family(cell.key) != "non-finite" {
-            assert_eq!(cell.differing, 0, "{}: {:?}", cell.key, cell.worst);
+            assert_eq!(cell.differing(), 0, "{}: {:?}", cell.key, cell.worst);
         }
         assert!(cell.failures.is_empty(), "{:?}", cell.failures);
     }
@@ -51,8 +51,8 @@ fn a_small_suite_finds_no_difference_from_brute_force_and_writes_tables_records_
         .expect("a cell");
     assert!(
         edges
-            .t_ulp
-            .is_some_and(|q| q.median <= q.p99 && q.p99 <= q.max && q.max > 0.0)
+            .errors
+            .is_some_and(|[q, ..]| q.median <= q.p99 && q.p99 <= q.max && q.max > 0.0)
     );
     assert!(shots(&records).count() >= 12);
 
@@ -82,23 +82,29 @@ fn a_test_that_refuses_rays_through_edges_is_seen_to_leak() {
     let leaky = [("u >= 0.0", "u > 1e-3 * area")];
     let gpu = open(kernels_with("accel/triangle/moeller_trumbore", &leaky));
     let settings = StressOptions {
-        triangles: vec![TriangleTest::MoellerTrumbore.name().into()],
+        triangles: vec![MoellerTrumbore.name().into()],
         ..small()
     };
     let records = run(&[gpu], &settings, &|_| ()).expect("the suite runs");
-    let leaks: usize = shots(&records).map(|s| s.misses).sum();
+    let leaks: usize = shots(&records).map(|s| s.count("misses/v1")).sum();
     assert!(
         leaks > 0,
         "no crack was seen in {} series",
         shots(&records).count()
     );
-    for series in shots(&records).filter(|s| s.misses > 0) {
-        assert!(series.confirmed > 0 && series.worst.is_some(), "{series:?}");
+    for series in shots(&records).filter(|s| s.count("misses/v1") > 0) {
+        assert!(
+            series.count("confirmed-misses/v1") > 0 && series.worst.is_some(),
+            "{series:?}"
+        );
     }
     let edges = cells(&records)
         .find(|c| c.key.label(axis::FAMILY) == "edges" && c.key.label(axis::ACCEL) == "bvh")
         .expect("a cell");
-    assert!(edges.cracks > 0 && edges.differing > 0, "{edges:?}");
+    assert!(
+        edges.count("cracks/v1") > 0 && edges.differing() > 0,
+        "{edges:?}"
+    );
 }
 
 fn program(arguments: &[&str]) -> std::process::Output {

@@ -1,10 +1,10 @@
 //! Every registered structure against brute force, to the bit: the scalar twin, the kernel, the
 //! counters, any-hit queries, and builds. A new structure is tested without a new line here.
 
-mod common;
+mod support;
 
-use common::scenes::{self, Case};
-use common::{Pcg, assert_same_hits, brute_force, build, default_params, param_variants, trace};
+use support::scenes::{self, Case};
+use support::{Pcg, assert_same_hits, brute_force, build, default_params, param_variants, trace};
 
 use rayon::prelude::*;
 use raystone::accel::triangle::TriangleRecord;
@@ -59,7 +59,7 @@ fn check_kernel(
     rays: &[Ray],
     expected: &[Hit],
 ) {
-    let gpu = common::gpu();
+    let gpu = support::gpu();
     let built = build(kind, soup, params);
     let what = format!("{what}: kernel of {} {params:?}", kind.name());
     let run = |features: &[&str]| trace(gpu, &*built, soup, rays, features);
@@ -205,7 +205,7 @@ fn twins_equal_brute_force_on_hard_scenes_with_every_parameter() {
 
 #[test]
 fn kernels_equal_brute_force_and_count_like_their_twins_on_random_lattice_scenes() {
-    if !common::is_exact(common::gpu()) {
+    if !support::is_exact(support::gpu()) {
         return;
     }
     for seed in 0..20 {
@@ -229,7 +229,7 @@ fn kernels_equal_brute_force_and_count_like_their_twins_on_random_lattice_scenes
 
 #[test]
 fn kernels_equal_brute_force_and_count_like_their_twins_on_hard_scenes() {
-    if !common::is_exact(common::gpu()) {
+    if !support::is_exact(support::gpu()) {
         return;
     }
     for (case, rays, expected) in hard_cases(6, 400) {
@@ -261,7 +261,7 @@ fn hits_at_the_ends_of_a_segment_count_and_ties_go_to_the_lowest_index() {
     ];
     for kind in kinds() {
         let built = build(kind, &wall.soup, &default_params(&kind.parameters()));
-        let answers = |rays: &[Ray]| trace(common::gpu(), &*built, &wall.soup, rays, &[]);
+        let answers = |rays: &[Ray]| trace(support::gpu(), &*built, &wall.soup, rays, &[]);
         for hit in answers(&rays).hits {
             assert_eq!((hit.t, hit.triangle), (2.0, id), "{}", kind.name());
         }
@@ -290,7 +290,7 @@ fn a_single_wrong_bit_in_a_hit_is_seen() {
     for fault in faults {
         let mut found = expected.clone();
         fault(&mut found[struck]);
-        assert_eq!(common::differences(&expected, &found), [struck]);
+        assert_eq!(support::differences(&expected, &found), [struck]);
     }
 }
 

@@ -1,14 +1,15 @@
 //! Every traversal over every layout of the binary BVH: the same hits as brute force to the bit, the
 //! work that the papers promise, and errors where something is too small.
 
-mod common;
+mod support;
 
-use common::scenes::{self, Case};
-use common::{Pcg, assert_same_hits, brute_force, build, default_params, trace};
 use raystone::accel::{
     AccelError, AccelKind, BuildLog, Bvh, Counters, Hit, Ray, RopedBvh, TriangleSoup,
 };
+use raystone::config::Axis;
 use raystone::params::{ParamRange, ParamValue, Params};
+use support::scenes::{self, Case};
+use support::{Pcg, assert_same_hits, brute_force, build, default_params, trace};
 
 /// Parameters of `bvh` with some of them set.
 fn params(changes: &[(&str, &str)]) -> Params {
@@ -142,8 +143,8 @@ fn twins_of_all_combinations_equal_brute_force_to_the_bit_on_hard_scenes() {
 
 #[test]
 fn kernels_of_all_combinations_equal_brute_force_and_count_like_their_twins() {
-    let gpu = common::gpu();
-    if !common::is_exact(gpu) {
+    let gpu = support::gpu();
+    if !support::is_exact(gpu) {
         return;
     }
     let combinations = combinations();
@@ -332,14 +333,7 @@ fn trees_deeper_than_a_trail_or_the_workgroups_memory_are_refused_with_both_numb
 
 /// The error word of a kernel with one line of `module` replaced.
 fn error_word(module: &str, from: &str, to: &str, changes: &[(&str, &str)]) -> Option<String> {
-    let library = raystone::gpu::KernelLibrary::default();
-    let text = library.text(module).expect("an embedded kernel").to_owned();
-    assert_eq!(text.matches(from).count(), 1, "`{from}` in {module}");
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = folder.path().join(format!("{module}.wesl"));
-    std::fs::create_dir_all(path.parent().expect("a parent")).expect("a folder");
-    std::fs::write(&path, text.replace(from, to)).expect("a written kernel");
-    let gpu = common::open(library.with_folder(folder.path()).expect("the folder"));
+    let gpu = support::open(support::kernels_with(module, &[(from, to)]));
     let mut rng = Pcg::new(2);
     let soup = scenes::lattice_soup(&mut rng, 400, 12);
     let rays = scenes::aimed_rays(&mut rng, &soup, 300);
@@ -391,12 +385,11 @@ fn a_link_or_content_that_leads_astray_is_no_valid_structure() {
 #[test]
 fn arrays_in_two_to_four_parts_give_the_same_hits() {
     use raystone::accel::{Query, Traced, Tracer, TriangleBuffers};
-    if !common::is_exact(common::gpu()) {
+    if !support::is_exact(support::gpu()) {
         return;
     }
     let catalogue = raystone::run::Registries::default().catalogue();
-    let sphere = catalogue
-        .scene
+    let sphere = catalogue[Axis::Scene]
         .iter()
         .find(|e| e.name == "displaced-sphere");
     let mut variant = sphere.expect("a built-in scene").default_variant();
@@ -406,7 +399,7 @@ fn arrays_in_two_to_four_parts_give_the_same_hits() {
     let soup = TriangleSoup::new(&scene);
     let rays = scenes::aimed_rays(&mut Pcg::new(4), &soup, 1000);
     let expected = brute_force(&soup, &rays);
-    let mut gpu = common::open(raystone::gpu::KernelLibrary::default());
+    let mut gpu = support::open(raystone::gpu::KernelLibrary::default());
     let mut seen = std::collections::BTreeSet::new();
     for (index, kernel) in KERNELS.iter().enumerate() {
         for triangles in names_of("triangles") {
@@ -438,14 +431,13 @@ fn arrays_in_two_to_four_parts_give_the_same_hits() {
 fn more_parts_than_the_adapter_binds_are_refused_with_both_numbers() {
     use raystone::accel::{Query, Traced, Tracer, TriangleBuffers};
     let catalogue = raystone::run::Registries::default().catalogue();
-    let sphere = catalogue
-        .scene
+    let sphere = catalogue[Axis::Scene]
         .iter()
         .find(|e| e.name == "displaced-sphere");
     let variant = sphere.expect("a built-in scene").default_variant();
     let scene = raystone::scene::load(&variant, &Default::default()).expect("a scene");
     let soup = TriangleSoup::new(&scene);
-    let mut gpu = common::open(raystone::gpu::KernelLibrary::default());
+    let mut gpu = support::open(raystone::gpu::KernelLibrary::default());
     gpu.limits.max_storage_buffer_binding_size = soup.records.len() as u64 * 12 + 400;
     gpu.limits.max_storage_buffers_per_shader_stage = 8;
     let built = build(&Bvh, &soup, &params(&[("triangles", "indexed")]));

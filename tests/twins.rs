@@ -161,11 +161,6 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
     ("accel/bvh4", "child", "one expression of the kernel"),
     ("accel/brute_force", "mask", "the judge, in batches"),
     (
-        "accel/triangle/baldwin_weber",
-        "transform",
-        "made beforehand",
-    ),
-    (
         "accel/triangle/watertight",
         "products",
         "two expressions of the kernel",

@@ -1,10 +1,11 @@
 //! Wide BVHs: every layout of their arrays, every builder below them.
 
-mod common;
+mod support;
 
-use common::{Pcg, assert_same_hits, brute_force, build, default_params, scenes, trace};
 use raystone::accel::{AccelKind, AccelRegistry, Counters, TriangleSoup, brute_force_hits};
+use raystone::config::Axis;
 use raystone::params::{ParamValue, Params};
+use support::{Pcg, assert_same_hits, brute_force, build, default_params, scenes, trace};
 
 const WIDE: [&str; 2] = ["bvh4", "cwbvh"];
 
@@ -24,7 +25,7 @@ fn with(kind: &dyn AccelKind, name: &str, value: ParamValue) -> Params {
 
 #[test]
 fn kernels_read_buffers_and_textures_alike() {
-    if !common::is_exact(common::gpu()) {
+    if !support::is_exact(support::gpu()) {
         return;
     }
     // More triangles than fit into one row of texels.
@@ -38,7 +39,7 @@ fn kernels_read_buffers_and_textures_alike() {
         for texels in [false, true] {
             let built = build(kind, &soup, &with(kind, "texels", ParamValue::Flag(texels)));
             let twin = built.cpu_twin(&soup).expect("a twin");
-            let found = trace(common::gpu(), &*built, &soup, &rays, &["counters"]);
+            let found = trace(support::gpu(), &*built, &soup, &rays, &["counters"]);
             let what = format!("{name}, texels {texels}");
             assert_same_hits(&what, &rays, &expected, &found.hits);
             for (index, ray) in rays.iter().enumerate() {
@@ -70,14 +71,14 @@ fn wide_nodes_of_eight_and_of_four_are_smaller_than_binary_ones() {
 fn triangles_in_a_texture_are_not_bound_by_the_limit_of_buffers() {
     use raystone::accel::{Query, Traced, Tracer, TriangleBuffers};
     let catalogue = raystone::run::Registries::default().catalogue();
-    let mut entries = catalogue.scene.iter();
+    let mut entries = catalogue[Axis::Scene].iter();
     let sphere = entries.find(|e| e.name == "displaced-sphere");
     let variant = sphere.expect("a built-in scene").default_variant();
     let scene = raystone::scene::load(&variant, &Default::default()).expect("a scene");
     let soup = TriangleSoup::new(&scene);
     let rays = scenes::aimed_rays(&mut Pcg::new(4), &soup, 1000);
-    let mut gpu = common::open(raystone::gpu::KernelLibrary::default());
-    if !common::is_exact(&gpu) {
+    let mut gpu = support::open(raystone::gpu::KernelLibrary::default());
+    if !support::is_exact(&gpu) {
         return;
     }
     // The canonical triangles come in parts; those of the leaves, at least as many, in one texture.

@@ -4,7 +4,7 @@
 use super::intersection::Reciprocal;
 use super::ray::{Hit, Ray};
 use super::triangle::watertight::{Shear, products, shear, sheared};
-use super::triangle::{TriangleRecord, TriangleTest, intersect_triangle};
+use super::triangle::{TriangleRecord, intersect_triangle};
 use super::twin::{CpuTwin, Query, Traverse, Twin};
 use super::{
     AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, StructureStats, TriangleSoup,
@@ -119,16 +119,14 @@ impl Block {
     /// Lanes that may meet the ray: those that pass the sign tests of its triangle test, by the same
     /// products in the same order, or all of them where signs are not cheaper than the test itself.
     fn candidates(&self, ray: &Ray, inverse: &Reciprocal) -> u32 {
-        match inverse.triangle {
-            TriangleTest::Watertight | TriangleTest::Compensated => {
-                let s = shear(ray, inverse);
-                mask(std::array::from_fn(|l| self.sheared(l, &s)))
-            }
-            _ => (1 << LANES) - 1,
+        if !inverse.triangle.follows_watertight_signs() {
+            return (1 << LANES) - 1;
         }
+        let s = shear(ray, inverse);
+        mask(std::array::from_fn(|l| self.sheared(l, &s)))
     }
 
-    /// The compared products of [`TriangleTest::Watertight`].
+    /// The compared products of [`super::triangle::Watertight`].
     fn sheared(&self, lane: usize, s: &Shear) -> u32 {
         let vertices = [0, 1, 2]
             .map(|vertex| sheared(s, [0, 1, 2].map(|axis| self.vertices[vertex][axis][lane])));

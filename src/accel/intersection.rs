@@ -2,27 +2,37 @@
 //! composition and on the host through [`Reciprocal`].
 
 use super::ray::{Ray, raised, safe_inverse};
-use super::triangle::TriangleTest;
+use super::triangle::{AnyTriangleTest, Watertight};
 use crate::gpu::{ArithmeticProbe, Composition};
-use crate::text::nearest;
-use serde::{Deserialize, Serialize};
+use crate::params::Named;
 use std::ops::Deref;
 
 /// The tests of one run. Hits of every structure equal those of brute force with the same choice to
 /// the bit, if [`BoxTest`] is padded by [`BoxTest::PROVEN_ULPS`] or more; less is there to be measured.
-#[derive(
-    Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
-)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intersection {
     /// The ray–triangle test.
-    pub triangle: TriangleTest,
+    pub triangle: AnyTriangleTest,
     /// The ray–box test.
     pub box_test: BoxTest,
 }
 
+impl Default for Intersection {
+    fn default() -> Self {
+        Self {
+            triangle: &Watertight,
+            box_test: BoxTest::default(),
+        }
+    }
+}
+
 /// A slab test: which reciprocal of the direction it uses, and how far it is padded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BoxTest {
+    /// Name as a user types it.
+    pub name: &'static str,
+    /// One line: what it is and its source.
+    pub description: &'static str,
     /// Whether components near 0 are raised ([`super::ray::raised`]), so that 1/d is finite: infinity and 0 · ∞ WGSL
     /// does not define.
     pub finite: bool,
@@ -32,74 +42,64 @@ pub struct BoxTest {
 
 impl Default for BoxTest {
     fn default() -> Self {
-        Self {
-            finite: true,
-            pad_ulps: Self::DEFAULT_ULPS,
-        }
+        Self::ALL[0]
+    }
+}
+
+impl Named for BoxTest {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn description(&self) -> &'static str {
+        self.description
     }
 }
 
 impl BoxTest {
-    /// The default pad, 2⁻¹⁹: more than twice [`super::triangle::TRIANGLE_PAD`].
-    pub const DEFAULT_ULPS: u32 = 16;
     /// The least pad for which the theorem of [`super::triangle`] holds: (1 + p) / (1 − p) for the pad p
     /// of triangles, and their roundings.
     pub const PROVEN_ULPS: u32 = 9;
 
-    /// Every box test, by the name and the line that users see.
-    pub const ALL: [(BoxTest, &'static str, &'static str); 6] = [
-        (
-            Self::finite(Self::DEFAULT_ULPS),
+    /// Every box test of the program. The first one is the default: 2⁻¹⁹ is more than twice
+    /// [`super::triangle::TRIANGLE_PAD`].
+    pub const ALL: [BoxTest; 6] = [
+        Self::padded(
+            16,
             "padded-16",
             "slabs, finite reciprocal, far side times 1 + 16 ulp: the pad that the proof needs, twice",
         ),
-        (
-            Self::finite(4),
+        Self::padded(
+            4,
             "padded-4",
             "slabs, finite reciprocal, far side times 1 + 4 ulp",
         ),
-        (
-            Self::finite(3),
+        Self::padded(
+            3,
             "padded-3",
             "slabs, finite reciprocal, far side times 1 + 3 ulp (Embree's robust mode)",
         ),
-        (
-            Self::finite(2),
+        Self::padded(
+            2,
             "padded-2",
             "slabs, finite reciprocal, far side times 1 + 2 ulp (Ize 2013)",
         ),
-        (
-            Self::finite(0),
-            "padded-0",
-            "slabs, finite reciprocal, no pad",
-        ),
-        (
-            Self {
-                finite: false,
-                pad_ulps: 0,
-            },
-            "plain",
-            "slabs with 1/d, no pad: relies on infinity and on minimum and maximum of NaN",
-        ),
+        Self::padded(0, "padded-0", "slabs, finite reciprocal, no pad"),
+        Self {
+            name: "plain",
+            description: "slabs with 1/d, no pad: relies on infinity and on minimum and maximum of NaN",
+            finite: false,
+            pad_ulps: 0,
+        },
     ];
 
-    const fn finite(pad_ulps: u32) -> Self {
+    const fn padded(pad_ulps: u32, name: &'static str, description: &'static str) -> Self {
         Self {
+            name,
+            description,
             finite: true,
             pad_ulps,
         }
-    }
-
-    /// The test of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        let found = Self::ALL.iter().find(|(_, known, _)| *known == name);
-        found.map(|(test, ..)| *test)
-    }
-
-    /// The name of one of [`BoxTest::ALL`], or `custom`.
-    pub fn name(&self) -> &'static str {
-        let found = Self::ALL.iter().find(|(test, ..)| test == self);
-        found.map_or("custom", |(_, name, _)| name)
     }
 
     /// The factor on the far side of a box. Twin of `BOX_PAD` in `kernels/accel/bounds.wesl`.
@@ -109,34 +109,12 @@ impl BoxTest {
 }
 
 impl Intersection {
-    /// The tests of these names, with what was wrong of an unknown one.
-    ///
-    /// # Errors
-    /// A name is not known; the message names the nearest known one.
-    pub fn named(triangle: &str, box_test: &str) -> Result<Self, String> {
-        let unknown = |what: &str, name: &str, known: Vec<&'static str>| {
-            let near = nearest(name, known).unwrap_or_default();
-            format!("unknown {what} test `{name}`; did you mean `{near}`?")
-        };
-        Ok(Self {
-            triangle: TriangleTest::named(triangle).ok_or_else(|| {
-                let known = TriangleTest::ALL.map(TriangleTest::name);
-                unknown("triangle", triangle, known.to_vec())
-            })?,
-            box_test: BoxTest::named(box_test).ok_or_else(|| {
-                let known = BoxTest::ALL.map(|(_, name, _)| name);
-                unknown("box", box_test, known.to_vec())
-            })?,
-        })
-    }
-
     /// Whether the gate asks hard rays: with triangle tests that are not watertight the oracle's bounds and
     /// the cells of grids say nothing of rays in planes of triangles, and with boxes padded by less than the
     /// proof needs hits are lost by intention.
     pub fn bears_hard_rays(&self) -> bool {
-        let watertight = [TriangleTest::Watertight, TriangleTest::Compensated];
         let padded = self.box_test.finite && self.box_test.pad_ulps >= BoxTest::PROVEN_ULPS;
-        padded && watertight.contains(&self.triangle)
+        padded && self.triangle.is_watertight()
     }
 
     /// Whether an adapter keeps this choice.
@@ -144,13 +122,13 @@ impl Intersection {
     /// # Errors
     /// Why it does not: without exact two-products the compensated test is another one.
     pub fn kept_by(self, probe: &ArithmeticProbe) -> Result<(), String> {
-        if self.triangle != TriangleTest::Compensated || probe.exact_products {
+        if !self.triangle.needs_exact_products() || probe.exact_products {
             return Ok(());
         }
         Err(format!(
             "this adapter does not keep the two-products of the triangle test `{}`; choose `{}`",
-            TriangleTest::Compensated.name(),
-            TriangleTest::Watertight.name()
+            self.triangle.name(),
+            Self::default().triangle.name()
         ))
     }
 
@@ -202,7 +180,7 @@ pub struct Reciprocal {
     /// The factor on the far side of boxes; `BOX_PAD` of kernels.
     pub pad: f32,
     /// The triangle test.
-    pub triangle: TriangleTest,
+    pub triangle: AnyTriangleTest,
 }
 
 impl Deref for Reciprocal {
@@ -217,37 +195,23 @@ impl Deref for Reciprocal {
 mod tests {
     use super::*;
     use crate::accel::ray::SMALLEST_SLOPE;
+    use crate::accel::triangle::Compensated;
 
     #[test]
-    fn the_default_pad_is_two_to_the_minus_nineteen_and_names_are_found_again() {
+    fn the_default_pad_is_two_to_the_minus_nineteen() {
         assert_eq!(BoxTest::default().pad(), 1.0 + 2.0_f32.powi(-19));
-        for (test, name, description) in BoxTest::ALL {
-            assert_eq!(BoxTest::named(name), Some(test));
-            assert_eq!(test.name(), name);
-            assert!(!description.is_empty());
-        }
-        assert_eq!(BoxTest::named("padded-5"), None);
+        assert_eq!(BoxTest::default().name, "padded-16");
     }
 
     #[test]
-    fn experiment_files_know_every_test_and_nearest_names_are_told() {
-        use crate::config::keys;
-        let triangles = TriangleTest::ALL.map(TriangleTest::name);
-        assert_eq!(triangles, keys::TRIANGLE_TESTS);
-        assert_eq!(BoxTest::ALL.map(|(_, name, _)| name), keys::BOX_TESTS);
-        for triangle in triangles {
-            for (box_test, name, _) in BoxTest::ALL {
-                let tests = Intersection::named(triangle, name).expect("known names");
-                assert_eq!(
-                    (tests.triangle.name(), tests.box_test),
-                    (triangle, box_test)
-                );
-            }
-        }
-        let error = Intersection::named("watertigth", "plain").expect_err("no such test");
-        assert!(error.contains("`watertight`"), "{error}");
-        let error = Intersection::named("pluecker", "padded-5").expect_err("no such test");
-        assert!(error.contains("`padded-"), "{error}");
+    fn what_an_experiment_says_nothing_of_are_the_default_tests() {
+        use crate::config::Axis;
+        let tests = Intersection::default();
+        let names = [Axis::Triangle, Axis::BoxTest].map(Axis::default_name);
+        assert_eq!(
+            names,
+            [Some(tests.triangle.name()), Some(tests.box_test.name)]
+        );
     }
 
     #[test]
@@ -260,7 +224,7 @@ mod tests {
             denormals: true,
         };
         let tests = Intersection {
-            triangle: TriangleTest::Compensated,
+            triangle: &Compensated,
             ..Default::default()
         };
         assert_eq!(tests.kept_by(&probe(true)), Ok(()));
@@ -280,7 +244,9 @@ mod tests {
         };
         let limit = 0.5 / SMALLEST_SLOPE;
         assert_eq!(*of(BoxTest::default()), [limit, -limit, 0.5]);
-        let plain = BoxTest::named("plain").expect("a known name");
-        assert_eq!(*of(plain), [f32::INFINITY, f32::NEG_INFINITY, 0.5]);
+        assert_eq!(
+            *of(BoxTest::ALL[5]),
+            [f32::INFINITY, f32::NEG_INFINITY, 0.5]
+        );
     }
 }

@@ -37,7 +37,7 @@ pub use irregular_grid::IrregularGrid;
 pub use kd_tree::KdTree;
 pub use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
-pub use registry::AccelRegistry;
+pub use registry::{AccelRegistry, BoxRegistry, TriangleRegistry};
 pub use stats::{BuildLog, LEAF_HISTOGRAM_END, Phase, StructureStats, leaf_histogram};
 pub use tracer::{
     Answers, Ask, Query, RayBatch, TracePasses, TraceSteps, Traced, Tracer, TriangleBuffers,

@@ -1,5 +1,6 @@
 //! Rays and hits as kernels see them. Twin of `kernels/accel/ray.wesl`.
 
+pub use crate::geometry::Ray;
 use bytemuck::{Pod, Zeroable};
 
 /// Triangle index of a miss.
@@ -17,20 +18,6 @@ pub const SMALLEST_COMPONENT: f32 = 5.169_879e-26;
 /// The least component of a raised direction against its longest, 2⁻⁶⁰: far less than rounding, and its
 /// square is not yet denormal.
 pub const SMALLEST_SLOPE: f32 = 8.673_617_4e-19;
-
-/// A ray segment, 32 bytes, the layout of the ray buffers.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct Ray {
-    /// Origin, scene units.
-    pub origin: [f32; 3],
-    /// Least distance of a hit, ≥ 0, in units of the direction's length.
-    pub t_min: f32,
-    /// Direction; need not be normalised.
-    pub direction: [f32; 3],
-    /// Greatest distance of a hit.
-    pub t_max: f32,
-}
 
 /// The nearest hit, 16 bytes, the layout of the hit buffers.
 #[repr(C)]

@@ -1,60 +1,80 @@
-//! The registry of structures: one line each.
+//! The registries of structures and of the tests that all of them share: one line each.
 
+use super::intersection::BoxTest;
+use super::triangle::{
+    BaldwinWeber, Compensated, MoellerTrumbore, Pluecker, TriangleTest, Watertight,
+};
 use super::{AccelKind, BruteForce, KdTree, Octree, RopedBvh, UniformGrid};
-use crate::params::Entry;
+use crate::params::{Kinds, Named, ParameterSchema, Sources};
 
 /// Everything that can be named on the `accel` axis.
-#[derive(Clone)]
-pub struct AccelRegistry {
-    kinds: Vec<&'static dyn AccelKind>,
-}
+pub type AccelRegistry = Kinds<dyn AccelKind>;
+/// Everything that can be named on the `triangle` axis.
+pub type TriangleRegistry = Kinds<dyn TriangleTest>;
+/// Everything that can be named on the `box_test` axis.
+pub type BoxRegistry = Kinds<BoxTest>;
 
 impl Default for AccelRegistry {
     fn default() -> Self {
-        Self {
-            kinds: vec![
-                &BruteForce,
-                &super::Bvh,
-                &RopedBvh,
-                &super::Bvh4,
-                &super::Cwbvh,
-                &UniformGrid,
-                &super::TwoLevelGrid,
-                &super::IrregularGrid,
-                &Octree,
-                &KdTree,
-                &super::ObjectList,
-                &super::MetaBvh,
-            ],
-        }
+        Self::new([
+            &BruteForce as &dyn AccelKind,
+            &super::Bvh,
+            &RopedBvh,
+            &super::Bvh4,
+            &super::Cwbvh,
+            &UniformGrid,
+            &super::TwoLevelGrid,
+            &super::IrregularGrid,
+            &Octree,
+            &KdTree,
+            &super::ObjectList,
+            &super::MetaBvh,
+        ])
     }
 }
 
-impl AccelRegistry {
-    /// Adds a structure; it replaces one of the same name.
-    pub fn register(&mut self, kind: &'static dyn AccelKind) {
-        self.kinds.retain(|k| k.name() != kind.name());
-        self.kinds.push(kind);
+impl Default for TriangleRegistry {
+    fn default() -> Self {
+        Self::new([
+            &MoellerTrumbore as &dyn TriangleTest,
+            &BaldwinWeber,
+            &Pluecker,
+            &Watertight,
+            &Compensated,
+        ])
+    }
+}
+
+impl Default for BoxRegistry {
+    fn default() -> Self {
+        Self::new(&BoxTest::ALL)
+    }
+}
+
+impl Named for dyn AccelKind {
+    fn name(&self) -> &'static str {
+        AccelKind::name(self)
     }
 
-    /// The structure of this name.
-    pub fn get(&self, name: &str) -> Option<&'static dyn AccelKind> {
-        self.kinds.iter().copied().find(|k| k.name() == name)
+    fn description(&self) -> &'static str {
+        AccelKind::description(self)
     }
 
-    /// All structures.
-    pub fn iter(&self) -> impl Iterator<Item = &'static dyn AccelKind> + '_ {
-        self.kinds.iter().copied()
+    fn parameters(&self) -> ParameterSchema {
+        AccelKind::parameters(self)
+    }
+}
+
+impl Named for dyn TriangleTest {
+    fn name(&self) -> &'static str {
+        TriangleTest::name(self)
     }
 
-    /// Names, descriptions and parameters for parser, help and docs.
-    pub fn entries(&self) -> Vec<Entry> {
-        self.iter()
-            .map(|k| Entry {
-                name: k.name().to_owned(),
-                description: k.description().to_owned(),
-                schema: k.parameters(),
-            })
-            .collect()
+    fn description(&self) -> &'static str {
+        TriangleTest::description(self)
+    }
+
+    fn sources(&self) -> Sources {
+        TriangleTest::sources(self)
     }
 }

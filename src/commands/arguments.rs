@@ -1,12 +1,11 @@
 //! Arguments that several commands share.
 
-use super::failure::Failure;
+use anyhow::Result;
 use clap::Args;
-use raystone::config::Catalogue;
+use raystone::config::{Axis, Experiment, Plan};
 use raystone::gpu::{self, AdapterChoice, Gpu, KernelLibrary};
-use raystone::params::Variant;
 use raystone::run::{Registries, RunOptions, kernel_library};
-use raystone::scene::{SceneError, check_model};
+use raystone::scene::{SceneData, check_model};
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
@@ -45,7 +44,7 @@ impl DeviceArguments {
     ///
     /// # Errors
     /// No adapter, or kernels that cannot be read.
-    pub fn open(&self, registries: &Registries) -> Result<Gpu, Failure> {
+    pub fn open(&self, registries: &Registries) -> Result<Gpu> {
         let kernels = match &self.kernels {
             Some(folder) => kernel_library(folder, registries)?,
             None => KernelLibrary::default(),
@@ -73,38 +72,32 @@ pub struct ExperimentArguments {
     pub allow_outside: bool,
 }
 
-/// An override `key=value` whose value is this text, whatever characters are in it.
-pub fn text_override(key: &str, value: &str) -> String {
-    format!("{key}={}", toml::Value::from(value))
-}
-
-/// An override `key=value` whose value is the list of these texts.
+/// An override `key=value` whose value is the list of these texts, whatever characters are in them.
 pub fn list_override(key: &str, values: &[String]) -> String {
     format!("{key}={}", toml::Value::from(values.to_vec()))
 }
 
-/// Checks that the models among the scenes look like models, before minutes are spent on other cells.
+/// The plan of an experiment whose models look like models: told before minutes are spent on other cells.
 ///
 /// # Errors
-/// The first one that does not.
-pub fn check_models(scenes: &[Variant], catalogue: &Catalogue) -> Result<(), SceneError> {
-    for scene in scenes {
-        if catalogue.scene.iter().any(|entry| entry.name == scene.name) {
-            continue;
-        }
+/// Cells that do not fit together, and the first model that is none.
+pub fn plan(experiment: &Experiment, only: &[String], registries: &Registries) -> Result<Plan> {
+    let plan = Plan::new(experiment, only, |s, d| registries.is_randomised(s, d))?;
+    let catalogue = registries.catalogue();
+    let is_model = |name: &str| {
+        catalogue[Axis::Scene]
+            .iter()
+            .all(|entry| entry.name != name)
+    };
+    for scene in plan.scenes.iter().filter(|scene| is_model(&scene.name)) {
         check_model(Path::new(&scene.name))?;
     }
-    Ok(())
+    Ok(plan)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn overrides_keep_quotes_and_commas_of_a_text() {
-        let text = text_override("axes.scene", r#"a,"b".obj"#);
-        let value: toml::Table = text.parse().unwrap();
-        assert_eq!(value["axes"]["scene"].as_str(), Some(r#"a,"b".obj"#));
+/// Warns of everything that makes a scene differ from its file.
+pub fn warn_of(scene: &SceneData) {
+    for line in scene.report.lines() {
+        super::output::warn(&format!("{}: {line}", scene.name));
     }
 }

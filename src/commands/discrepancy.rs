@@ -1,8 +1,7 @@
 //! `raystone discrepancy`.
 
-use super::failure::Failure;
 use super::output::print;
-use anyhow::{Context as _, anyhow};
+use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Args;
 use raystone::discrepancy::{Budget, DiscrepancyError, Measure, PointSet, Value, measure};
 use raystone::text::nearest;
@@ -47,13 +46,12 @@ struct Results {
 }
 
 impl Discrepancy {
-    pub fn execute(self) -> Result<ExitCode, Failure> {
-        let measures = measures(&self.measure).map_err(Failure::input)?;
+    pub fn execute(self) -> Result<ExitCode> {
+        let measures = measures(&self.measure)?;
         if self.budget.is_nan() || self.budget <= 0.0 {
-            let message = "--budget: give a number of seconds above 0";
-            return Err(Failure::input(anyhow!(message)));
+            bail!("--budget: give a number of seconds above 0");
         }
-        let points = self.points().map_err(Failure::input)?;
+        let points = self.points()?;
         let mut results = Map::new();
         for kind in measures {
             let clock = Instant::now();
@@ -66,24 +64,17 @@ impl Discrepancy {
             dim: points.dim(),
             measures: results,
         };
-        let text = serde_json::to_string_pretty(&all).context("cannot write the results as JSON");
-        print(&(text.map_err(Failure::input)? + "\n"))?;
+        print(&(serde_json::to_string_pretty(&all)? + "\n"))?;
         Ok(ExitCode::SUCCESS)
     }
 
-    fn points(&self) -> anyhow::Result<PointSet> {
-        let from_stdin = self.file.as_os_str() == "-";
-        let name = if from_stdin {
-            "standard input".to_owned()
-        } else {
-            self.file.display().to_string()
-        };
-        let bytes = if from_stdin {
+    fn points(&self) -> Result<PointSet> {
+        let (name, bytes) = if self.file.as_os_str() == "-" {
             let mut bytes = Vec::new();
             let read = std::io::stdin().lock().read_to_end(&mut bytes);
-            read.map(|_| bytes)
+            ("standard input".to_owned(), read.map(|_| bytes))
         } else {
-            std::fs::read(&self.file)
+            (self.file.display().to_string(), std::fs::read(&self.file))
         };
         let bytes = bytes.with_context(|| format!("cannot read {name}"))?;
         let points = PointSet::from_bytes(&bytes).map_err(|error| match error {
@@ -94,7 +85,7 @@ impl Discrepancy {
             return Ok(points);
         };
         if dim == 0 {
-            return Err(anyhow!("--dim: give at least 1"));
+            bail!("--dim: give at least 1");
         }
         let first: Vec<usize> = (0..dim.min(points.dim() + 1)).collect();
         points.project(&first).map_err(|_| {
@@ -104,7 +95,7 @@ impl Discrepancy {
     }
 }
 
-fn measures(names: &[String]) -> anyhow::Result<Vec<Measure>> {
+fn measures(names: &[String]) -> Result<Vec<Measure>> {
     let mut found = Vec::new();
     for name in names.iter().map(|name| name.trim()) {
         if name == "all" {

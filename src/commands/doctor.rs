@@ -1,13 +1,15 @@
 //! `raystone doctor`.
 
 use super::adapters::{self, largest_binding, mesa_major};
-use super::failure::Failure;
+use super::failure::{NO_ADAPTER, tell_error};
 use super::output::print;
 use super::system::{self, System};
+use anyhow::Result;
 use clap::Args;
 use raystone::accel::triangle::TriangleRecord;
 use raystone::gpu::{
-    self, AdapterChoice, AdapterSummary, ArithmeticProbe, Gpu, KernelLibrary, probe_arithmetic,
+    self, AdapterChoice, AdapterSummary, ArithmeticProbe, Gpu, GpuError, KernelLibrary,
+    probe_arithmetic,
 };
 use raystone::report::format::{bytes, count};
 use std::fmt::Write as _;
@@ -22,7 +24,7 @@ pub struct Doctor {
 }
 
 impl Doctor {
-    pub fn execute(self) -> Result<ExitCode, Failure> {
+    pub fn execute(self) -> Result<ExitCode> {
         let system = System::this();
         let found = gpu::adapters();
         let mut text = machine(&system);
@@ -37,21 +39,23 @@ impl Doctor {
         text += &system::environment();
         let choice = self.adapter.unwrap_or_default();
         let examined = gpu::open(&choice, KernelLibrary::default())
-            .map_err(Failure::from)
             .and_then(|gpu| examine(&gpu, &choice, &found, &system));
-        match examined {
+        let failed = match examined {
             Ok(findings) => {
-                print(&(text + &findings))?;
-                Ok(ExitCode::SUCCESS)
+                text += &findings;
+                None
             }
-            Err(failure) => {
-                if found.is_empty() {
-                    text += &remedy(&system);
-                }
-                print(&text)?;
-                Err(failure)
-            }
+            Err(failure) => Some(failure),
+        };
+        if found.is_empty() {
+            text += &remedy(&system);
         }
+        print(&text)?;
+        // Whatever it was: this is no adapter that a command could use.
+        Ok(failed.map_or(ExitCode::SUCCESS, |failure| {
+            tell_error(&failure.into());
+            ExitCode::from(NO_ADAPTER)
+        }))
     }
 }
 
@@ -96,8 +100,8 @@ fn examine(
     choice: &AdapterChoice,
     found: &[AdapterSummary],
     system: &System,
-) -> Result<String, Failure> {
-    let probe = probe_arithmetic(gpu).map_err(Failure::no_adapter)?;
+) -> Result<String, GpuError> {
+    let probe = probe_arithmetic(gpu)?;
     let position = found.iter().find(|adapter| adapter.info == gpu.info);
     let number = position.map_or(String::new(), |adapter| format!("{}, ", adapter.index));
     let reason = match choice {
@@ -107,28 +111,29 @@ fn examine(
         }
         _ => "--adapter asks for it",
     };
-    let limit = largest_binding(&gpu.limits);
-    let triangle = size_of::<TriangleRecord>();
-    let millions = limit as f64 / triangle as f64 / 1e6;
-    let mut text = format!("\nAdapter in use: {number}{}; {reason}\n", gpu.info.name);
     let timestamps = match gpu.timestamp_period {
         Some(_) => "present: passes are timed by the GPU's own clock",
         None => "absent: the wall clock is used instead, and marked in the report",
     };
-    let _ = writeln!(
-        text,
-        "  dispatch    a kernel ran, and its results came back"
-    );
-    let _ = writeln!(text, "  arithmetic  {}", arithmetic(probe));
-    let _ = writeln!(text, "  denormals   {}", denormals(probe));
-    let _ = writeln!(text, "  loops       {}", loops(gpu, system));
-    let _ = writeln!(text, "  timestamps  {timestamps}");
-    let _ = writeln!(
-        text,
-        "  scene size  at most about {millions:.1} million triangles ({} per binding, {triangle} bytes each)",
+    let limit = largest_binding(&gpu.limits);
+    let triangle = size_of::<TriangleRecord>();
+    let millions = limit as f64 / triangle as f64 / 1e6;
+    let size = format!(
+        "at most about {millions:.1} million triangles ({} per binding, {triangle} bytes each)",
         bytes(limit),
     );
-    text += &speed(gpu, system);
+    let rows = [
+        ("dispatch", "a kernel ran, and its results came back".into()),
+        ("arithmetic", arithmetic(probe)),
+        ("denormals", denormals(probe).into()),
+        ("loops", loops(gpu, system)),
+        ("timestamps", timestamps.into()),
+        ("scene size", size),
+    ];
+    let mut text = format!("\nAdapter in use: {number}{}; {reason}\n", gpu.info.name);
+    for (name, what) in rows.into_iter().chain(speed(gpu, system)) {
+        let _ = writeln!(text, "  {name:<10}  {what}");
+    }
     text += match gpu.loop_limit {
         None => "\nEverything that Raystone needs works here.\n",
         Some(_) => "\nRaystone works here, but for what loops long: see above.\n",
@@ -178,22 +183,14 @@ fn arithmetic(probe: ArithmeticProbe) -> String {
     }
 }
 
-/// What to expect of the speed, and whether a faster driver is at hand.
-fn speed(gpu: &Gpu, system: &System) -> String {
-    if !gpu.is_software() {
-        return String::new();
-    }
-    let mut text =
-        "  speed       software: times compare structures on this adapter only\n".to_owned();
+/// What to expect of the speed of a software adapter, and whether a faster driver is at hand.
+fn speed(gpu: &Gpu, system: &System) -> Option<(&'static str, String)> {
+    let mut text = "software: times compare structures on this adapter only".to_owned();
     if let Some(major @ ..=22) = mesa_major(&gpu.info.driver_info) {
-        let _ = writeln!(
-            text,
-            "              Mesa {major} takes about twice as long as Mesa 25{}",
-            match system.has_backports() {
-                true => "; to get that, type: scripts/install-driver --backports",
-                false => "",
-            }
-        );
+        text += &format!("\n              Mesa {major} takes about twice as long as Mesa 25");
+        if system.has_backports() {
+            text += "; to get that, type: scripts/install-driver --backports";
+        }
     }
-    text
+    gpu.is_software().then_some(("speed", text))
 }

@@ -1,10 +1,9 @@
 //! How long a plan would take, roughly.
 
-use raystone::config::{Experiment, Plan};
+use raystone::config::{Axis, Cell, Experiment, Plan};
 use raystone::params::Variant;
 use raystone::run::Registries;
 use raystone::sampling::dimensions::{FIRST_BOUNCE, PER_BOUNCE};
-use std::collections::BTreeSet;
 use std::fmt;
 
 /// Rays per second of a software adapter with two cores: a round figure for incoherent rays.
@@ -31,26 +30,26 @@ impl Estimate {
         let image = |integrator: &Variant, spp: u32| {
             pixels * u64::from(spp) * rays_per_sample(registries, integrator)
         };
-        let errors = plan
-            .samplers
+        let errors = plan.samplers.iter().map(|cell| {
+            u64::from(plan.renders(cell)) * image(&cell[Axis::Integrator], experiment.spp.max())
+        });
+        // One for each world and integrator.
+        let part = |cell: &Cell| cell.on(&[&Cell::WORLD[..], &[Axis::Integrator]].concat());
+        let mut references: Vec<Cell> = Vec::new();
+        for cell in plan.samplers.iter().map(part) {
+            if !references.contains(&cell) {
+                references.push(cell);
+            }
+        }
+        let references = references
             .iter()
-            .map(|cell| u64::from(cell.replicates) * image(&cell.integrator, experiment.spp.max()));
-        let references: BTreeSet<_> = plan
-            .samplers
-            .iter()
-            .map(|cell| (&cell.scene.label, &cell.integrator.label))
-            .collect();
-        let reference = |(scene, integrator)| {
-            let mut cells = plan.samplers.iter();
-            let cell = cells.find(|c| (&c.scene.label, &c.integrator.label) == (scene, integrator));
-            cell.map_or(0, |cell| image(&cell.integrator, experiment.reference.spp))
-        };
+            .map(|cell| image(&cell[Axis::Integrator], experiment.reference.spp));
         let timing = &experiment.timing;
         let rounds = u64::from(timing.rounds);
         let times = plan
             .times
             .iter()
-            .map(|cell| rounds * image(&cell.integrator, timing.spp));
+            .map(|cell| rounds * image(&cell[Axis::Integrator], timing.spp));
         let recorded = u64::from(experiment.gate.rays) + rounds * u64::from(timing.rays);
         let structures = plan.structures.len() as u64;
         let full_cells = plan.times.len() as u64;
@@ -58,7 +57,7 @@ impl Estimate {
         let warmups = RAY_CLASSES * structures + full_cells;
         Self {
             rays: errors.sum::<u64>()
-                + references.into_iter().map(reference).sum::<u64>()
+                + references.sum::<u64>()
                 + times.sum::<u64>()
                 + structures * RAY_CLASSES * recorded,
             kernels,

@@ -1,9 +1,9 @@
 //! `raystone stress --mutants`: the planted faults are a test program of the project, which cargo builds and
 //! runs in a checkout.
 
-use super::failure::{FAILED, Failure};
+use super::failure::FAILED;
 use super::output::print;
-use anyhow::{Context as _, anyhow};
+use anyhow::{Context as _, Result, anyhow};
 use raystone::gpu::AdapterChoice;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
@@ -14,13 +14,13 @@ const OUT: &str = "RAYSTONE_MUTANTS_OUT";
 const ADAPTER: &str = "RAYSTONE_MUTANTS_ADAPTER";
 
 /// Has cargo plant the faults, prints their table and leaves `mutants.jsonl` in `out`.
-pub fn plant_faults(out: &Path, adapter: Option<&AdapterChoice>) -> Result<ExitCode, Failure> {
+pub fn plant_faults(out: &Path, adapter: Option<&AdapterChoice>) -> Result<ExitCode> {
     let root = checkout().ok_or_else(|| {
-        Failure::input(anyhow!(
+        anyhow!(
             "--mutants plants faults in the project's sources: type it in a folder of a checkout of Raystone"
-        ))
+        )
     })?;
-    let out = prepared(out).map_err(Failure::input)?;
+    let out = prepared(out)?;
     let table = out.join("mutants.txt");
     let mut cargo = Command::new("cargo");
     cargo
@@ -34,15 +34,12 @@ pub fn plant_faults(out: &Path, adapter: Option<&AdapterChoice>) -> Result<ExitC
         Some(AdapterChoice::Name(name)) => cargo.env(ADAPTER, name),
         Some(AdapterChoice::Best) | None => cargo.env_remove(ADAPTER),
     };
-    let status = cargo
-        .status()
-        .context("cannot run cargo, which --mutants needs; install Rust (https://rustup.rs) or correct PATH")
-        .map_err(Failure::input)?;
-    let text = std::fs::read_to_string(&table)
-        .with_context(|| {
-            format!("the planted faults did not run to their end ({status}); cargo says why above")
-        })
-        .map_err(Failure::input)?;
+    let status = cargo.status().context(
+        "cannot run cargo, which --mutants needs; install Rust (https://rustup.rs) or correct PATH",
+    )?;
+    let text = std::fs::read_to_string(&table).with_context(|| {
+        format!("the planted faults did not run to their end ({status}); cargo says why above")
+    })?;
     let records = out.join("mutants.jsonl");
     print(&format!("{text}records: {}\n", records.display()))?;
     Ok(match status.success() {
@@ -63,7 +60,7 @@ fn checkout() -> Option<PathBuf> {
 }
 
 /// `out` as an absolute path, for the test runs elsewhere, without the table of an earlier run.
-fn prepared(out: &Path) -> anyhow::Result<PathBuf> {
+fn prepared(out: &Path) -> Result<PathBuf> {
     let out = std::path::absolute(out)?;
     std::fs::create_dir_all(&out).with_context(|| format!("cannot make {}", out.display()))?;
     let table = out.join("mutants.txt");

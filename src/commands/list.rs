@@ -1,14 +1,11 @@
 //! `raystone list`.
 
 use super::adapters;
-use super::failure::Failure;
 use super::output::print;
+use anyhow::Result;
 use clap::{Args, ValueEnum};
-use raystone::accel::BoxTest;
-use raystone::accel::triangle::TriangleTest;
-use raystone::config::{Axis, keys};
+use raystone::config::Axis;
 use raystone::discrepancy::Measure;
-use raystone::integrator::RayOffset;
 use raystone::measure::metrics::METRICS;
 use raystone::params::{Entry, Parameter};
 use raystone::run::Registries;
@@ -53,32 +50,27 @@ enum Topic {
 }
 
 impl List {
-    pub fn execute(self) -> Result<ExitCode, Failure> {
+    pub fn execute(self) -> Result<ExitCode> {
         let catalogue = Registries::default().catalogue();
         let topics = match &self.what {
             Some(topic) => std::slice::from_ref(topic),
             None => Topic::value_variants(),
         };
+        let axis = |axis| entries(axis, &catalogue[axis]);
         let sections: Vec<String> = topics
             .iter()
             .map(|topic| match topic {
-                Topic::Scene => axis(Axis::Scene, &catalogue.scene),
-                Topic::Accel => axis(Axis::Accel, &catalogue.accel),
-                Topic::Sequence => axis(Axis::Sequence, &catalogue.sequence),
-                Topic::Decorrelation => axis(Axis::Decorrelation, &catalogue.decorrelation),
-                Topic::Integrator => axis(Axis::Integrator, &catalogue.integrator),
+                Topic::Scene => axis(Axis::Scene),
+                Topic::Accel => axis(Axis::Accel),
+                Topic::Sequence => axis(Axis::Sequence),
+                Topic::Decorrelation => axis(Axis::Decorrelation),
+                Topic::Integrator => axis(Axis::Integrator),
+                Topic::Triangle => axis(Axis::Triangle),
+                Topic::BoxTest => axis(Axis::BoxTest),
+                Topic::Offset => axis(Axis::Offset),
                 Topic::Material => named(
                     "material: how surfaces scatter light, as model files say",
                     MATERIAL_KINDS.map(|kind| (kind.name, kind.description)),
-                ),
-                Topic::Triangle => triangles(),
-                Topic::BoxTest => named(
-                    "box_test: of all structures",
-                    BoxTest::ALL.map(|(_, name, text)| (name, text)),
-                ),
-                Topic::Offset => named(
-                    "offset: how rays leave a surface",
-                    RayOffset::ALL.map(|o| (o.name(), o.description())),
                 ),
                 Topic::Metric => metrics(),
                 Topic::Measure => measures(),
@@ -94,10 +86,13 @@ impl List {
     }
 }
 
-fn axis(axis: Axis, entries: &[Entry]) -> String {
+fn entries(axis: Axis, entries: &[Entry]) -> String {
     let width = entries.iter().map(|e| e.name.len()).max().unwrap_or(0);
     let mut text = match axis {
         Axis::Scene => "scene: built in, or the path of a .obj, .gltf, .glb or .ply file\n".into(),
+        Axis::Triangle => "triangle: ray-triangle test of all structures\n".into(),
+        Axis::BoxTest => "box_test: of all structures\n".into(),
+        Axis::Offset => "offset: how rays leave a surface\n".into(),
         axis => format!("{axis}\n"),
     };
     // Writing to a string cannot fail.
@@ -114,17 +109,6 @@ fn axis(axis: Axis, entries: &[Entry]) -> String {
         if let Some((from, names)) = shared {
             let _ = writeln!(text, "  {:width$}    as `{from}`: {}", "", names.join(", "));
         }
-    }
-    text
-}
-
-fn triangles() -> String {
-    let width = keys::TRIANGLE_TESTS.iter().map(|n| n.len()).max();
-    let width = width.unwrap_or(0);
-    let mut text = "triangle: ray-triangle test of all structures\n".to_owned();
-    for test in TriangleTest::ALL {
-        let (name, what, bytes) = (test.name(), test.description(), test.bytes());
-        let _ = writeln!(text, "  {name:width$}  {what}; {bytes} bytes a triangle");
     }
     text
 }

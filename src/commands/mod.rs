@@ -17,7 +17,6 @@ mod run;
 mod signals;
 mod stress;
 mod system;
-mod table;
 mod trace;
 mod verify;
 
@@ -98,7 +97,7 @@ pub fn main() -> ExitCode {
         Command::Stress(command) => command.execute(),
         Command::Trace(command) => command.execute(),
     };
-    done.unwrap_or_else(|failure| failure.tell())
+    done.unwrap_or_else(failure::end)
 }
 
 #[cfg(test)]

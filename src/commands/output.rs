@@ -1,14 +1,13 @@
 //! Standard output and standard error.
 
-use super::failure::Failure;
-use anyhow::Context as _;
+use anyhow::{Context as _, Result};
 use std::io::{ErrorKind, Write as _};
 
 /// Writes `text` to standard output.
 ///
 /// A reader that went away (`raystone list | head`) has what it wanted: that is no failure, and the
 /// exit code still tells how the command ended.
-pub fn print(text: &str) -> Result<(), Failure> {
+pub fn print(text: &str) -> Result<()> {
     let mut output = std::io::stdout().lock();
     match output
         .write_all(text.as_bytes())
@@ -18,7 +17,6 @@ pub fn print(text: &str) -> Result<(), Failure> {
         _ => Ok(()),
     }
     .context("cannot write to standard output")
-    .map_err(Failure::input)
 }
 
 /// Writes a line to standard error. A terminal that went away is no reason to end: what is measured

@@ -1,9 +1,8 @@
 //! `raystone points`.
 
 use super::arguments::{DeviceArguments, list_override};
-use super::failure::Failure;
 use super::output::print;
-use anyhow::anyhow;
+use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use raystone::config::{Axis, Catalogue, Experiment};
 use raystone::gpu::Gpu;
@@ -67,20 +66,19 @@ pub struct Points {
 }
 
 impl Points {
-    pub fn execute(self) -> Result<ExitCode, Failure> {
+    pub fn execute(self) -> Result<ExitCode> {
         let registries = Registries::default();
         let sampler = self.sampler(&registries)?;
         let [x, y] = self.pixel;
         if x >= self.width {
-            return Err(Failure::input(anyhow!(
+            bail!(
                 "--pixel {x},{y}: the image is {} pixels wide; set --width",
                 self.width
-            )));
+            );
         }
         let pixel = y.checked_mul(self.width).and_then(|row| row.checked_add(x));
-        let pixel = pixel.ok_or_else(|| {
-            Failure::input(anyhow!("--pixel {x},{y}: pixels are numbered by 32 bits"))
-        })?;
+        let pixel =
+            pixel.ok_or_else(|| anyhow!("--pixel {x},{y}: pixels are numbered by 32 bits"))?;
         let gpu = match self.gpu {
             true => Some(self.device.open(&registries)?),
             false => None,
@@ -117,17 +115,17 @@ impl Points {
         samples.into_iter().flat_map(point).collect()
     }
 
-    fn sampler(&self, registries: &Registries) -> Result<Sampler, Failure> {
+    fn sampler(&self, registries: &Registries) -> Result<Sampler> {
         let catalogue = registries.catalogue();
         let overrides = self.overrides(&catalogue)?;
         let experiment = Experiment::parse(DEFAULTS, "raystone points", &overrides, &catalogue)?;
-        let one = |axis| -> Result<Variant, Failure> {
-            match experiment.axes.variants(axis) {
+        let one = |axis| -> Result<Variant> {
+            match experiment.axes[axis].as_slice() {
                 [variant] => Ok(variant.clone()),
-                several => Err(Failure::input(anyhow!(
+                several => Err(anyhow!(
                     "points are drawn from one {axis}, not from {}: give one value",
                     several.len()
-                ))),
+                )),
             }
         };
         let highest = self.dims.iter().copied().max().unwrap_or(0);
@@ -137,12 +135,11 @@ impl Points {
             width: Some(self.width),
         };
         let pair = (one(Axis::Sequence)?, one(Axis::Decorrelation)?);
-        let made = registries.samplers.sampler(&pair.0, &pair.1, &demand);
-        made.map_err(Failure::input)
+        Ok(registries.samplers.sampler(&pair.0, &pair.1, &demand)?)
     }
 
     /// What the flags say, as overrides of [`DEFAULTS`].
-    fn overrides(&self, catalogue: &Catalogue) -> Result<Vec<String>, Failure> {
+    fn overrides(&self, catalogue: &Catalogue) -> Result<Vec<String>> {
         let mut overrides = Vec::new();
         let mut entries: Vec<(Axis, &Entry)> = Vec::new();
         for (axis, name) in [
@@ -153,7 +150,7 @@ impl Points {
                 &format!("axes.{axis}"),
                 std::slice::from_ref(name),
             ));
-            let entry = catalogue.entries(axis).iter().find(|e| e.name == *name);
+            let entry = catalogue[axis].iter().find(|e| e.name == *name);
             entries.extend(entry.map(|entry| (axis, entry)));
         }
         // An unknown name is answered by the parser, better than a parameter of it would be.
@@ -184,7 +181,7 @@ pub(super) struct Stream {
 
 impl Stream {
     /// The number at each coordinate.
-    pub(super) fn words(&self, coordinates: &[Coordinate]) -> Result<Vec<u32>, Failure> {
+    pub(super) fn words(&self, coordinates: &[Coordinate]) -> Result<Vec<u32>> {
         let Some(gpu) = &self.gpu else {
             return Ok(coordinates
                 .iter()
@@ -194,13 +191,13 @@ impl Stream {
         let mut words = Vec::with_capacity(coordinates.len());
         for batch in coordinates.chunks(BATCH) {
             let dumped = dump_stream(gpu, &self.sampler, batch);
-            words.extend(dumped.map_err(|reason| Failure::input(anyhow!(reason)))?);
+            words.extend(dumped.map_err(|reason| anyhow!(reason))?);
         }
         Ok(words)
     }
 }
 
-fn unknown_parameter(param: &str, key: &str, entries: &[(Axis, &Entry)]) -> Failure {
+fn unknown_parameter(param: &str, key: &str, entries: &[(Axis, &Entry)]) -> anyhow::Error {
     let names = entries.iter().flat_map(|(_, entry)| &entry.schema);
     let known: Vec<&str> = names.map(|p| p.name).collect();
     let hint = match nearest(key, known.iter().copied()) {
@@ -208,9 +205,7 @@ fn unknown_parameter(param: &str, key: &str, entries: &[(Axis, &Entry)]) -> Fail
         None => "neither has parameters".to_owned(),
     };
     let [sequence, decorrelation] = [0, 1].map(|i| entries[i].1.name.as_str());
-    Failure::input(anyhow!(
-        "--param {param}: {sequence} × {decorrelation} has no parameter `{key}`; {hint}"
-    ))
+    anyhow!("--param {param}: {sequence} × {decorrelation} has no parameter `{key}`; {hint}")
 }
 
 /// One point a line.

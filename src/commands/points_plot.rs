@@ -1,9 +1,8 @@
 //! `raystone points --plot`.
 
-use super::failure::Failure;
 use super::output::print;
 use super::points::{Points, Stream};
-use anyhow::{Context as _, anyhow};
+use anyhow::{Context as _, Result, anyhow};
 use raystone::discrepancy::PointSet;
 use raystone::report::plot::points::{MOST_DRAWN, thinned};
 use raystone::report::point_page::{PointPage, document};
@@ -18,20 +17,14 @@ const MOST_DIMENSIONS: usize = 16;
 
 impl Points {
     /// Draws the points of the pixel with this number, and prints where the page is.
-    pub(super) fn draw(
-        &self,
-        stream: &Stream,
-        pixel: u32,
-        folder: &Path,
-    ) -> Result<ExitCode, Failure> {
+    pub(super) fn draw(&self, stream: &Stream, pixel: u32, folder: &Path) -> Result<ExitCode> {
         self.check(pixel)?;
         // Before the work, so that a folder that cannot be written costs no time.
         std::fs::create_dir_all(folder)
-            .with_context(|| format!("--plot: cannot make the folder {}", folder.display()))
-            .map_err(Failure::input)?;
+            .with_context(|| format!("--plot: cannot make the folder {}", folder.display()))?;
         let words = stream.words(&self.coordinates(pixel, 0..self.count, &self.dims))?;
         let numbers = words.into_iter().map(unit).collect();
-        let points = PointSet::new(self.dims.len(), numbers).map_err(Failure::input)?;
+        let points = PointSet::new(self.dims.len(), numbers)?;
         let [x, y] = self.pixel;
         let page = PointPage {
             label: stream.sampler.label(),
@@ -45,14 +38,14 @@ impl Points {
             points,
             copies: self.copies(stream, pixel)?,
         };
-        let mut document = document(&page).map_err(Failure::input)?;
+        let mut document = document(&page)?;
         let (html, _) = write_page(folder, &mut document)?;
         print(&format!("page: {}\n", html.display()))?;
         Ok(ExitCode::SUCCESS)
     }
 
-    fn check(&self, pixel: u32) -> Result<(), Failure> {
-        let refuse = |reason: String| Err(Failure::input(anyhow!(reason)));
+    fn check(&self, pixel: u32) -> Result<()> {
+        let refuse = |reason: String| Err(anyhow!(reason));
         let (count, dims) = (self.count, self.dims.len());
         if !(2..=MOST_DIMENSIONS).contains(&dims) {
             return refuse(format!(
@@ -74,7 +67,7 @@ impl Points {
     }
 
     /// The first two dimensions of the same samples in each pixel, no more of them than are drawn.
-    fn copies(&self, stream: &Stream, pixel: u32) -> Result<Vec<Vec<[f64; 2]>>, Failure> {
+    fn copies(&self, stream: &Stream, pixel: u32) -> Result<Vec<Vec<[f64; 2]>>> {
         let each = (MOST_DRAWN / self.copies as usize).max(1);
         let samples: Vec<u32> = thinned(self.count as usize, each)
             .into_iter()

@@ -1,11 +1,10 @@
 //! `raystone render`.
 
-use super::arguments::{DeviceArguments, check_models, list_override, text_override};
-use super::failure::Failure;
+use super::arguments::{DeviceArguments, list_override, plan};
 use super::output::print;
-use anyhow::anyhow;
+use anyhow::{Result, bail};
 use clap::Args;
-use raystone::config::{Axis, Experiment, Plan};
+use raystone::config::{Axis, Experiment};
 use raystone::image::FileFormat;
 use raystone::run::{Registries, Rendering};
 use std::path::{Path, PathBuf};
@@ -72,15 +71,14 @@ pub struct Render {
 }
 
 impl Render {
-    pub fn execute(self) -> Result<ExitCode, Failure> {
+    pub fn execute(self) -> Result<ExitCode> {
         check_output(&self.output)?;
         let registries = Registries::default();
         let catalogue = registries.catalogue();
         let experiment =
             Experiment::parse(DEFAULTS, "raystone render", &self.overrides(), &catalogue)?;
         check_is_one(&experiment)?;
-        let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d))?;
-        check_models(&experiment.axes.scene, &catalogue)?;
+        let plan = plan(&experiment, &[], &registries)?;
         // Only the picture is written: no folder is needed.
         let mut options = self.device.options(PathBuf::new(), false);
         options.allow_outside = self.allow_outside;
@@ -93,20 +91,15 @@ impl Render {
 
     fn overrides(&self) -> Vec<String> {
         let mut overrides = Vec::new();
-        if let Some(scene) = &self.scene {
-            // A list, because a path may hold commas.
-            overrides.push(list_override("axes.scene", std::slice::from_ref(scene)));
-        }
         for (axis, name) in [
+            (Axis::Scene, &self.scene),
             (Axis::Accel, &self.accel),
             (Axis::Sequence, &self.sequence),
             (Axis::Decorrelation, &self.decorrelation),
             (Axis::Integrator, &self.integrator),
         ] {
-            overrides.extend(
-                name.iter()
-                    .map(|name| text_override(&format!("axes.{axis}"), name)),
-            );
+            let list = |name| list_override(&format!("axes.{axis}"), std::slice::from_ref(name));
+            overrides.extend(name.as_ref().map(list));
         }
         if let Some(exponent) = self.spp {
             overrides.push(format!("run.spp={{ pow2 = [{exponent}, {exponent}] }}"));
@@ -126,16 +119,13 @@ impl Render {
 }
 
 /// Whether the picture can be written, asked before anything is rendered.
-fn check_output(file: &Path) -> Result<(), Failure> {
-    FileFormat::of(file).map_err(Failure::input)?;
+fn check_output(file: &Path) -> Result<()> {
+    FileFormat::of(file)?;
     let folder = file.parent().filter(|f| !f.as_os_str().is_empty());
-    match folder.is_none_or(Path::is_dir) {
-        true => Ok(()),
-        false => Err(Failure::input(anyhow!(
-            "cannot write {}: its folder does not exist",
-            file.display()
-        ))),
+    if !folder.is_none_or(Path::is_dir) {
+        bail!("cannot write {}: its folder does not exist", file.display());
     }
+    Ok(())
 }
 
 /// What was approximated, a line each, and how long it took.
@@ -163,16 +153,16 @@ fn summary(rendering: &Rendering, [width, height]: [u32; 2]) -> String {
 }
 
 /// One picture is one cell.
-fn check_is_one(experiment: &Experiment) -> Result<(), Failure> {
+fn check_is_one(experiment: &Experiment) -> Result<()> {
     for axis in Axis::ALL {
-        let variants = experiment.axes.variants(axis);
+        let variants = &experiment.axes[axis];
         if variants.len() > 1 {
             let labels: Vec<_> = variants.iter().map(|v| v.label.as_str()).collect();
-            return Err(Failure::input(anyhow!(
+            bail!(
                 "render makes one picture, but {axis} has {} values ({}); give one",
                 labels.len(),
                 labels.join(", ")
-            )));
+            );
         }
     }
     Ok(())
@@ -220,46 +210,33 @@ mod tests {
 
     #[test]
     fn flags_reach_the_experiment_and_set_has_the_last_word() {
-        let flags = [
-            "--spp",
-            "8",
-            "--size",
-            "64x48",
-            "--seed",
-            "9001",
-            "--accel",
-            "roped-bvh",
-        ];
-        let experiment = experiment(&[&flags[..], &["--set", "run.resolution=[32,24]"]].concat());
-        let experiment = experiment.unwrap();
-        assert_eq!(experiment.spp.max(), 8);
+        let flags =
+            "--spp 8 --size 64x48 --seed 9001 --accel roped-bvh --set run.resolution=[32,24]";
+        let experiment = experiment(&flags.split(' ').collect::<Vec<_>>()).unwrap();
+        assert_eq!((experiment.spp.max(), experiment.seed), (8, 9001));
         assert_eq!(experiment.resolution, [32, 24]);
-        assert_eq!(experiment.seed, 9001);
-        assert_eq!(experiment.axes.accel[0].name, "roped-bvh");
-        assert_eq!(experiment.axes.scene[0].name, "cornell-box");
+        assert_eq!(experiment.axes[Axis::Accel][0].name, "roped-bvh");
+        assert_eq!(experiment.axes[Axis::Scene][0].name, "cornell-box");
     }
 
     #[test]
     fn a_scene_path_may_hold_commas_and_quotes() {
         let experiment = experiment(&["--scene", r#"my "a,b".obj"#]).unwrap();
-        assert_eq!(experiment.axes.scene.len(), 1);
-        assert_eq!(experiment.axes.scene[0].name, r#"my "a,b".obj"#);
+        assert_eq!(experiment.axes[Axis::Scene].len(), 1);
+        assert_eq!(experiment.axes[Axis::Scene][0].name, r#"my "a,b".obj"#);
     }
 
     #[test]
-    fn samples_that_are_no_power_of_two_are_refused_with_one_that_is() {
-        for (text, near) in [("12", "8"), ("0", "1"), ("70000", "65536")] {
-            let error = experiment(&["--spp", text]).unwrap_err();
-            assert!(
-                error.contains(&format!("for instance {near}")),
-                "{text}: {error}"
-            );
+    fn what_cannot_be_is_refused_with_what_can() {
+        for (flag, text, says) in [
+            ("--spp", "12", "for instance 8"),
+            ("--spp", "0", "for instance 1"),
+            ("--spp", "70000", "for instance 65536"),
+            ("--size", "64", "512x384"),
+            ("--size", "64x4", "run.resolution"),
+        ] {
+            let error = experiment(&[flag, text]).unwrap_err();
+            assert!(error.contains(says), "{text}: {error}");
         }
-        assert!(experiment(&["--size", "64"]).is_err());
-        assert!(
-            experiment(&["--size", "64x4"])
-                .unwrap_err()
-                .contains("run.resolution")
-        );
     }
 }

@@ -1,7 +1,7 @@
 //! `raystone report`.
 
-use super::failure::Failure;
 use super::output::{print, warn};
+use anyhow::Result;
 use clap::Args;
 use raystone::measure::record::{PARTIAL, RECORDS_FILE, STRESS_FILE};
 use raystone::report::write_report;
@@ -18,10 +18,10 @@ pub struct Report {
 }
 
 impl Report {
-    pub fn execute(self) -> Result<ExitCode, Failure> {
+    pub fn execute(self) -> Result<ExitCode> {
         let is_suite = self.dir.join(STRESS_FILE).exists();
         if is_suite && !self.dir.join(RECORDS_FILE).exists() {
-            let records = read(&self.dir).map_err(Failure::input)?;
+            let records = read(&self.dir)?;
             let page = write_stress_page(&self.dir, &records)?;
             print(&format!("report: {}\n", page.display()))?;
             return Ok(ExitCode::SUCCESS);

@@ -1,12 +1,13 @@
 //! `raystone run`.
 
-use super::arguments::{DeviceArguments, ExperimentArguments, check_models};
+use super::arguments::{DeviceArguments, ExperimentArguments, plan};
 use super::estimate::Estimate;
-use super::failure::{BAD_INPUT, FAILED, Failure};
+use super::failure::{BAD_INPUT, FAILED};
 use super::output::{self, print};
 use super::signals;
+use anyhow::Result;
 use clap::Args;
-use raystone::config::{Experiment, Plan};
+use raystone::config::Experiment;
 use raystone::measure::record::{Body, Line, axis, read_records};
 use raystone::report::{failed_checks, terminal_tables, write_report};
 use raystone::run::{Existing, Kernels, Registries, RunError, RunSummary};
@@ -40,16 +41,13 @@ pub struct Run {
 }
 
 impl Run {
-    pub fn execute(self) -> Result<ExitCode, Failure> {
+    pub fn execute(self) -> Result<ExitCode> {
         let registries = Registries::default();
         let catalogue = registries.catalogue();
         let mut overrides = Vec::from_iter(self.device.kernels_override());
         overrides.extend(self.experiment.set.iter().cloned());
         let experiment = Experiment::load(&self.file, &overrides, &catalogue)?;
-        let plan = Plan::new(&experiment, &self.experiment.only, |s, d| {
-            registries.is_randomised(s, d)
-        })?;
-        check_models(&plan.scenes, &catalogue)?;
+        let plan = plan(&experiment, &self.experiment.only, &registries)?;
         if self.dry_run {
             Kernels::load(&plan.kernels, &registries)?;
             let estimate = Estimate::new(&experiment, &plan, &registries);
@@ -65,7 +63,7 @@ impl Run {
         let mut options = self.device.options(out, self.quiet);
         options.existing = existing;
         options.allow_outside = self.experiment.allow_outside;
-        signals::watch(options.interrupt.clone()).map_err(Failure::input)?;
+        signals::watch(options.interrupt.clone())?;
         match raystone::run::run(&experiment, &plan, &registries, &options) {
             Err(RunError::Interrupted) => signals::wait_for_end(),
             Err(RunError::EndedEarly { folder, source }) => {
@@ -78,9 +76,9 @@ impl Run {
 }
 
 /// Writes the report of a run, prints its tables, and tells what failed.
-fn tell(summary: &RunSummary, quiet: bool) -> Result<ExitCode, Failure> {
+fn tell(summary: &RunSummary, quiet: bool) -> Result<ExitCode> {
     let page = write_report(&summary.out)?.html;
-    let lines = read_records(&summary.out).map_err(Failure::input)?.lines;
+    let lines = read_records(&summary.out)?.lines;
     print(&match quiet {
         true => format!("{}\n", page.display()),
         false => format!(

@@ -1,18 +1,18 @@
 //! `raystone stress`.
 
-use super::arguments::DeviceArguments;
-use super::failure::{FAILED, Failure};
+use super::arguments::{DeviceArguments, warn_of};
+use super::failure::FAILED;
 use super::faults::plant_faults;
-use super::output::{print, tell, warn};
+use super::output::{print, tell};
+use anyhow::Result;
 use clap::Args;
 use raystone::measure::record::Verdict;
-use raystone::params::{Params, Variant};
 use raystone::run::{Registries, lock_folder};
-use raystone::scene::{LoadOptions, load};
+use raystone::scene::named;
 use raystone::stress::record::{Line, Record, write};
 use raystone::stress::report::{stress_tables, write_stress_page};
 use raystone::stress::{StressOptions, run};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -57,15 +57,16 @@ pub struct Stress {
 }
 
 impl Stress {
-    pub fn execute(self) -> Result<ExitCode, Failure> {
+    pub fn execute(self) -> Result<ExitCode> {
         if self.mutants {
             return plant_faults(&self.out, self.device.adapter.as_ref());
         }
         if let Some(model) = &self.model {
-            check_model(model)?;
+            // A model that was asked for has to be there; the default one may be missing.
+            warn_of(&named(&model.to_string_lossy())?);
         }
         let settings = self.settings();
-        settings.check().map_err(Failure::input)?;
+        settings.check()?;
         let _lock = lock_folder(&self.out)?;
         let registries = Registries::default();
         let mut gpus = vec![self.device.open(&registries)?];
@@ -77,7 +78,7 @@ impl Stress {
         let start = Instant::now();
         let progress =
             |what: &str| tell(&format!("{:6.1} s  {what}", start.elapsed().as_secs_f64()));
-        let records = run(&gpus, &settings, &progress).map_err(Failure::input)?;
+        let records = run(&gpus, &settings, &progress)?;
         write(&self.out, &records)?;
         let page = write_stress_page(&self.out, &records)?;
         print(&format!(
@@ -105,21 +106,6 @@ impl Stress {
         settings.model = self.model.clone();
         settings
     }
-}
-
-/// A model that was asked for has to be there; the default one may be missing.
-fn check_model(model: &Path) -> Result<(), Failure> {
-    let name = model.to_string_lossy().into_owned();
-    let variant = Variant {
-        label: name.clone(),
-        name,
-        params: Params::default(),
-    };
-    let scene = load(&variant, &LoadOptions::default())?;
-    for line in scene.report.lines() {
-        warn(&format!("{variant}: {line}"));
-    }
-    Ok(())
 }
 
 fn is_missed_target(line: &Line) -> bool {

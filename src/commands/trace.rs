@@ -1,13 +1,12 @@
 //! `raystone trace`.
 
-use super::arguments::list_override;
-use super::failure::{FAILED, Failure};
-use super::output::{print, warn};
-use anyhow::anyhow;
+use super::arguments::{list_override, warn_of};
+use super::failure::FAILED;
+use super::output::print;
+use anyhow::{Result, anyhow};
 use clap::Args;
-use raystone::accel::triangle::TriangleTest;
-use raystone::accel::{BoxTest, Intersection, TriangleSoup};
-use raystone::config::{Catalogue, Experiment, Plan};
+use raystone::accel::TriangleSoup;
+use raystone::config::{Axis, Catalogue, Cell, Experiment, Plan};
 use raystone::params::Variant;
 use raystone::run::Registries;
 use raystone::scene::{LoadOptions, SceneData, load};
@@ -46,18 +45,18 @@ pub struct Trace {
 }
 
 impl Trace {
-    pub fn execute(self) -> Result<ExitCode, Failure> {
-        let ray = parse_ray(&self.ray).map_err(|e| Failure::input(anyhow!("--ray: {e}")))?;
+    pub fn execute(self) -> Result<ExitCode> {
+        let ray = parse_ray(&self.ray).map_err(|e| anyhow!("--ray: {e}"))?;
         let registries = Registries::default();
-        let (scene, accel) = self.variants(&registries)?;
-        let scene = self.load(&scene)?;
-        let soup = TriangleSoup::new(&scene).intersecting(self.intersection()?);
-        let kind = registries
-            .accel
-            .get(&accel.name)
-            .ok_or_else(|| Failure::input(anyhow!("no structure `{}`", accel.name)))?;
+        let cell = self.cell(&registries)?;
+        let scene = self.load(&cell[Axis::Scene])?;
+        let tests = registries.intersection(&cell).map_err(|e| anyhow!(e))?;
+        let soup = TriangleSoup::new(&scene).intersecting(tests);
+        let accel = &cell[Axis::Accel];
+        let kind = registries.accel.named("structure", &accel.name);
+        let kind = kind.map_err(|e| anyhow!(e))?;
         let explained = explain(&scene, &soup, kind, &accel.params, &ray);
-        let (text, equal) = explained.map_err(|e| Failure::input(anyhow!(e)))?;
+        let (text, equal) = explained.map_err(|e| anyhow!(e))?;
         print(&text)?;
         Ok(match equal {
             true => ExitCode::SUCCESS,
@@ -65,54 +64,36 @@ impl Trace {
         })
     }
 
-    fn intersection(&self) -> Result<Intersection, Failure> {
-        let unknown = |what: &str, name: &str, known: Vec<&str>| {
-            Failure::input(anyhow!(
-                "--{what}: no `{name}`; there are: {}",
-                known.join(", ")
-            ))
-        };
-        let mut tests = Intersection::default();
-        if let Some(name) = &self.triangle {
-            let known = || TriangleTest::ALL.map(TriangleTest::name).to_vec();
-            tests.triangle =
-                TriangleTest::named(name).ok_or_else(|| unknown("triangle", name, known()))?;
-        }
-        if let Some(name) = &self.box_test {
-            let known = || BoxTest::ALL.map(|(_, name, _)| name).to_vec();
-            tests.box_test =
-                BoxTest::named(name).ok_or_else(|| unknown("box-test", name, known()))?;
-        }
-        Ok(tests)
-    }
-
-    /// Scene and structure with their parameters, read as those of an experiment file.
-    fn variants(&self, registries: &Registries) -> Result<(Variant, Variant), Failure> {
+    /// Scene, structure and tests with their parameters, read as those of an experiment file.
+    fn cell(&self, registries: &Registries) -> Result<Cell> {
         let catalogue = registries.catalogue();
         // A case of the suite is no scene of an experiment; any other one stands in its place there.
         let scene = match Address::parse(&self.scene) {
             Some(_) => "cornell-box".to_owned(),
             None => self.scene.clone(),
         };
-        let mut overrides = vec![
-            list_override("axes.scene", &[scene]),
-            list_override("axes.accel", std::slice::from_ref(&self.accel)),
-        ];
+        let tests = [("triangle", &self.triangle), ("box_test", &self.box_test)];
+        let tests = tests
+            .into_iter()
+            .filter_map(|(axis, name)| Some((axis, name.as_ref()?)));
+        let named = [("scene", &scene), ("accel", &self.accel)]
+            .into_iter()
+            .chain(tests);
+        let one = |(axis, name): (&str, &String)| {
+            list_override(&format!("axes.{axis}"), std::slice::from_ref(name))
+        };
+        let mut overrides: Vec<String> = named.map(one).collect();
         overrides.extend(self.set.iter().cloned());
         let experiment =
             Experiment::parse(&text(&catalogue), "raystone trace", &overrides, &catalogue)?;
         let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d))?;
-        match (plan.scenes.first(), plan.structures.first()) {
-            (Some(scene), Some(cell)) => Ok((scene.clone(), cell.accel.clone())),
-            _ => Err(Failure::input(anyhow!(
-                "--set leaves no scene or no structure"
-            ))),
-        }
+        let cell = plan.structures.into_iter().next();
+        cell.ok_or_else(|| anyhow!("--set leaves no scene or no structure"))
     }
 
-    fn load(&self, variant: &Variant) -> Result<SceneData, Failure> {
+    fn load(&self, variant: &Variant) -> Result<SceneData> {
         if let Some(address) = Address::parse(&self.scene) {
-            return scene_of(&address).map_err(|e| Failure::input(anyhow!("--scene: {e}")));
+            return scene_of(&address).map_err(|e| anyhow!("--scene: {e}"));
         }
         let options = LoadOptions {
             textures: false,
@@ -120,16 +101,16 @@ impl Trace {
             ..LoadOptions::default()
         };
         let scene = load(variant, &options)?;
-        for line in scene.report.lines() {
-            warn(&format!("{variant}: {line}"));
-        }
+        warn_of(&scene);
         Ok(scene)
     }
 }
 
 /// An experiment with everything but scene and structure.
 fn text(catalogue: &Catalogue) -> String {
-    let sequence = catalogue.sequence.first().map(|entry| entry.name.as_str());
+    let sequence = catalogue[Axis::Sequence]
+        .first()
+        .map(|entry| entry.name.as_str());
     format!(
         "[run]\nname = \"trace\"\n[axes]\nsequence = {}\n",
         toml::Value::from(sequence.unwrap_or_default()),

@@ -1,13 +1,15 @@
 //! `raystone verify`.
 
-use super::arguments::{DeviceArguments, ExperimentArguments, check_models, list_override};
-use super::failure::{BAD_INPUT, FAILED, Failure};
+use super::arguments::{DeviceArguments, ExperimentArguments, list_override, plan};
+use super::failure::{BAD_INPUT, FAILED};
 use super::output::{print, tell};
-use super::table::Table;
+use anyhow::Result;
 use clap::Args;
-use raystone::config::{Catalogue, Experiment, Plan, Skipped};
+use raystone::config::{Axis, Catalogue, Experiment, Plan, Skipped};
 use raystone::measure::record::{ClassVerdict, GateVerdict, JudgeCheck};
+use raystone::report::document::{Cell, Table};
 use raystone::report::format::{count, ray_class};
+use raystone::report::terminal::aligned;
 use raystone::run::{Registries, Verified};
 use raystone::scene::{LoadOptions, load};
 use std::fmt::Write as _;
@@ -45,7 +47,7 @@ pub struct Verify {
 }
 
 impl Verify {
-    pub fn execute(self) -> Result<ExitCode, Failure> {
+    pub fn execute(self) -> Result<ExitCode> {
         let registries = Registries::default();
         let catalogue = registries.catalogue();
         let overrides = self.overrides();
@@ -58,10 +60,7 @@ impl Verify {
                 &catalogue,
             )?,
         };
-        let mut plan = Plan::new(&experiment, &self.experiment.only, |s, d| {
-            registries.is_randomised(s, d)
-        })?;
-        check_models(&plan.scenes, &catalogue)?;
+        let mut plan = plan(&experiment, &self.experiment.only, &registries)?;
         if self.file.is_none() {
             spare_brute_force(&mut plan, self.experiment.allow_outside)?;
         }
@@ -107,12 +106,13 @@ impl Verify {
 
 /// An experiment of every structure on the scenes of the gate.
 fn defaults(catalogue: &Catalogue) -> String {
-    let accel: Vec<_> = catalogue
-        .accel
+    let accel: Vec<_> = catalogue[Axis::Accel]
         .iter()
         .map(|entry| entry.name.clone())
         .collect();
-    let sequence = catalogue.sequence.first().map(|entry| entry.name.as_str());
+    let sequence = catalogue[Axis::Sequence]
+        .first()
+        .map(|entry| entry.name.as_str());
     format!(
         "[run]\nname = \"verify\"\n[axes]\nscene = {}\naccel = {}\nsequence = {}\n",
         toml::Value::from(SCENES.to_vec()),
@@ -122,12 +122,16 @@ fn defaults(catalogue: &Catalogue) -> String {
 }
 
 /// Leaves out brute force on scenes with many triangles, where other structures are checked.
-fn spare_brute_force(plan: &mut Plan, allow_outside: bool) -> Result<(), Failure> {
+fn spare_brute_force(plan: &mut Plan, allow_outside: bool) -> Result<()> {
     let mut large = Vec::new();
     for scene in &plan.scenes {
-        let cells = || plan.structures.iter().filter(|cell| cell.scene == *scene);
-        let tries_all = cells().any(|cell| cell.accel.name == BRUTE_FORCE);
-        if !tries_all || cells().all(|cell| cell.accel.name == BRUTE_FORCE) {
+        let cells = || {
+            plan.structures
+                .iter()
+                .filter(|cell| cell[Axis::Scene] == *scene)
+        };
+        let tries_all = cells().any(|cell| cell[Axis::Accel].name == BRUTE_FORCE);
+        if !tries_all || cells().all(|cell| cell[Axis::Accel].name == BRUTE_FORCE) {
             continue;
         }
         let options = LoadOptions {
@@ -142,7 +146,7 @@ fn spare_brute_force(plan: &mut Plan, allow_outside: bool) -> Result<(), Failure
     }
     for (scene, triangles) in large {
         plan.structures
-            .retain(|cell| cell.scene != scene || cell.accel.name != BRUTE_FORCE);
+            .retain(|cell| cell[Axis::Scene] != scene || cell[Axis::Accel].name != BRUTE_FORCE);
         plan.skipped.push(Skipped {
             cell: format!("{scene}, {BRUTE_FORCE}"),
             reason: format!(
@@ -164,67 +168,66 @@ fn passed(verified: &Verified) -> bool {
 
 /// A row per ray class, and what else went wrong below the table.
 fn table(verified: &[Verified]) -> String {
-    let mut table = Table::new(&[
+    let columns = [
         "scene",
-        "structure",
-        "verdict",
-        "class",
-        "#rays",
-        "#wrong",
-        "#ties",
-        "brute force",
-        "oracle",
-    ]);
+        ":structure",
+        ":verdict",
+        ":class",
+        "rays",
+        "wrong",
+        "ties",
+        ":brute force",
+        ":oracle",
+    ];
+    let mut table = Table::new("Hits against the judge", &columns);
     let mut details = String::new();
     for one in verified {
-        let names = [one.scene.label.clone(), one.accel.label.clone()];
         let word = match (&one.verdict, passed(one)) {
             (Err(_), _) if one.refused => "left out",
             (Err(_), _) => "not run",
             (Ok(_), true) => "passed",
             (Ok(_), false) => "FAILED",
         };
-        let head = names.into_iter().chain([word.to_owned()]);
+        let names = one.cell.labels(&[Axis::Accel]).join(", ");
+        let head = [one.cell[Axis::Scene].label.as_str(), &names, word].map(Cell::from);
         match &one.verdict {
-            Ok(verdict) => rows(&mut table, head.collect(), verdict),
-            Err(_) => table.row(head),
+            Ok(verdict) => table.rows.extend(rows(head, verdict)),
+            Err(_) => table.rows.push(head.into()),
         }
         for detail in faults(&one.verdict) {
             // Writing to a string cannot fail.
-            let _ = writeln!(details, "{}, {}: {detail}", one.scene, one.accel);
+            let _ = writeln!(details, "{}: {detail}", one.cell);
         }
     }
     let legend = "brute force: the judge against it, wrong of rays; \
                   oracle: the judge against double precision, agree / ambiguous / wrong; \
                   kept: found on disk, checked before\n";
-    format!("{}{legend}{details}", table.text())
+    format!("{}{legend}{details}", aligned(&table))
 }
 
 /// The rows of one structure; names and the judge's own checks stand in the first.
-fn rows(table: &mut Table, head: Vec<String>, verdict: &GateVerdict) {
+fn rows(head: [Cell; 3], verdict: &GateVerdict) -> Vec<Vec<Cell>> {
     let brute_force = &verdict.brute_force;
-    let kept = match brute_force.reused_unix_s {
-        Some(_) => " (kept)",
-        None => "",
-    };
+    let kept = brute_force.reused_unix_s.map_or("", |_| " (kept)");
+    let rays = count(brute_force.rays as u64);
     let judge = [
-        format!(
-            "{} of {}{kept}",
-            brute_force.wrong,
-            count(brute_force.rays as u64)
-        ),
+        format!("{} of {rays}{kept}", brute_force.wrong),
         oracle(&verdict.oracle),
     ];
-    for (i, class) in verdict.classes.iter().enumerate() {
-        let (head, judge) = match i {
-            0 => (head.clone(), judge.to_vec()),
-            _ => (vec![String::new(); head.len()], Vec::new()),
-        };
-        table.row(head.into_iter().chain(counts(class)).chain(judge));
+    let mut rows: Vec<Vec<Cell>> = Vec::new();
+    for class in &verdict.classes {
+        let mut row = vec![Cell::default(); head.len()];
+        row.extend(counts(class).map(Cell::from));
+        rows.push(row);
     }
-    if verdict.classes.is_empty() {
-        table.row(head);
+    match rows.first_mut() {
+        Some(first) => {
+            first.splice(..head.len(), head);
+            first.extend(judge.map(Cell::from));
+        }
+        None => rows.push(head.into()),
     }
+    rows
 }
 
 fn counts(class: &ClassVerdict) -> [String; 4] {
@@ -249,99 +252,30 @@ fn faults(verdict: &Result<GateVerdict, String>) -> Vec<String> {
         Ok(verdict) => verdict,
         Err(reason) => return vec![reason.clone()],
     };
-    let wrong = verdict.classes.iter().filter_map(|class| {
-        let first = class.first_wrong.as_ref()?;
-        Some(format!("first wrong {} ray: {first}", counts(class)[0]))
-    });
-    let structural = verdict
-        .structural
-        .iter()
-        .map(|fault| format!("structure: {fault}"));
-    let kernel = verdict
-        .kernel_errors
-        .iter()
-        .map(|error| format!("kernel: {error}"));
-    let elsewhere = verdict.elsewhere.iter().cloned();
-    wrong
-        .chain(structural)
-        .chain(kernel)
-        .chain(elsewhere)
-        .collect()
+    let mut faults = Vec::new();
+    for class in &verdict.classes {
+        let first = class.first_wrong.as_ref();
+        faults.extend(first.map(|ray| format!("first wrong {} ray: {ray}", counts(class)[0])));
+    }
+    faults.extend(
+        verdict
+            .structural
+            .iter()
+            .map(|fault| format!("structure: {fault}")),
+    );
+    faults.extend(
+        verdict
+            .kernel_errors
+            .iter()
+            .map(|error| format!("kernel: {error}")),
+    );
+    faults.extend(verdict.elsewhere.clone());
+    faults
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use raystone::measure::record::RayClass;
-    use raystone::params::{Params, Variant};
-
-    fn variant(name: &str) -> Variant {
-        Variant {
-            name: name.into(),
-            params: Params::default(),
-            label: name.into(),
-        }
-    }
-
-    fn verdict(wrong: usize) -> GateVerdict {
-        let first_wrong = (wrong > 0).then(|| "ray 17".to_owned());
-        GateVerdict {
-            passed: wrong == 0,
-            classes: vec![ClassVerdict {
-                class: RayClass::Primary,
-                rays: 32_768,
-                wrong,
-                ties: 2,
-                first_wrong,
-            }],
-            brute_force: JudgeCheck {
-                rays: 2000,
-                ..JudgeCheck::default()
-            },
-            oracle: JudgeCheck {
-                rays: 2048,
-                wrong: 1,
-                ambiguous: 7,
-                ..JudgeCheck::default()
-            },
-            kernel_errors: Vec::new(),
-            structural: None,
-            elsewhere: None,
-        }
-    }
-
-    #[test]
-    fn a_wrong_ray_is_counted_shown_and_fails_the_structure() {
-        let one = |verdict| Verified {
-            scene: variant("cornell-box"),
-            accel: variant("bvh"),
-            verdict,
-            bad_input: false,
-            refused: false,
-        };
-        let good = one(Ok(verdict(0)));
-        let text = table(std::slice::from_ref(&good));
-        assert!(
-            passed(&good) && text.contains("passed") && text.contains("32,768"),
-            "{text}"
-        );
-        assert!(
-            text.contains("2,040 / 7 / 1") && !text.contains("FAILED"),
-            "{text}"
-        );
-        let bad = one(Ok(verdict(3)));
-        let text = table(std::slice::from_ref(&bad));
-        assert!(
-            !passed(&bad) && text.contains("FAILED") && text.contains("ray 17"),
-            "{text}"
-        );
-        let broken = one(Err("too deep".into()));
-        let text = table(std::slice::from_ref(&broken));
-        assert!(
-            !passed(&broken) && text.contains("not run") && text.contains("too deep"),
-            "{text}"
-        );
-    }
 
     fn plan(scene: &str, accel: &str) -> Plan {
         let registries = Registries::default();
@@ -369,7 +303,10 @@ mod tests {
     fn without_a_file_every_structure_is_checked() {
         let catalogue = Registries::default().catalogue();
         let experiment = Experiment::parse(&defaults(&catalogue), "test", &[], &catalogue).unwrap();
-        assert_eq!(experiment.axes.accel.len(), catalogue.accel.len());
-        assert_eq!(experiment.axes.scene.len(), SCENES.len());
+        assert_eq!(
+            experiment.axes[Axis::Accel].len(),
+            catalogue[Axis::Accel].len()
+        );
+        assert_eq!(experiment.axes[Axis::Scene].len(), SCENES.len());
     }
 }

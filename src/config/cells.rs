@@ -1,106 +1,116 @@
 //! The cells of a plan.
 
-use crate::params::Variant;
+use super::axis_map::AxisMap;
+use super::keys::Axis;
+use crate::params::{Params, Variant};
+use std::collections::BTreeMap;
 use std::fmt;
+use std::ops::Index;
 
-/// A structure on a scene: built, gated and timed with the recorded rays.
-#[derive(Debug, Clone, PartialEq)]
-pub struct StructureCell {
-    /// What is traced.
-    pub scene: Variant,
-    /// The structure; its label ends with the kernels', unless they are the embedded ones.
-    pub accel: Variant,
-    /// The kernels.
-    pub kernels: Variant,
-}
-
-/// A sampler on a scene: its error is measured.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SamplerCell {
-    /// What is traced.
-    pub scene: Variant,
-    /// What is computed.
-    pub integrator: Variant,
-    /// The sequence.
-    pub sequence: Variant,
-    /// The decorrelation; its label ends with the kernels', unless they are the embedded ones.
-    pub decorrelation: Variant,
-    /// The kernels.
-    pub kernels: Variant,
-    /// Whether each seed gives another image.
-    pub randomised: bool,
-    /// Renders needed: all replicates, or one if the sampler is deterministic.
-    pub replicates: u32,
-}
-
-/// A full cell: its time is measured.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TimeCell {
-    /// What is traced.
-    pub scene: Variant,
-    /// The structure; its label ends with the kernels', unless they are the embedded ones.
-    pub accel: Variant,
-    /// The sequence.
-    pub sequence: Variant,
-    /// The decorrelation, labelled as the structure.
-    pub decorrelation: Variant,
-    /// What is computed.
-    pub integrator: Variant,
-    /// The kernels.
-    pub kernels: Variant,
-}
-
-/// A sampler's stream: its star discrepancy is measured.
-#[derive(Debug, Clone, PartialEq)]
-pub struct StreamCell {
-    /// The sequence.
-    pub sequence: Variant,
-    /// The decorrelation; its label ends with the kernels', unless they are the embedded ones.
-    pub decorrelation: Variant,
-    /// The kernels.
-    pub kernels: Variant,
-    /// Whether each seed gives another point set.
+/// What is run together, and recorded under one key: a variant on each axis that matters to it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Cell {
+    variants: AxisMap<Option<Variant>>,
+    /// Whether each seed makes its sampler draw other numbers; no without one.
     pub randomised: bool,
 }
 
-impl fmt::Display for StructureCell {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, {}", self.scene, self.accel)
+/// What stands on an axis that does not matter.
+static NOTHING: Variant = Variant {
+    name: String::new(),
+    params: Params(BTreeMap::new()),
+    label: String::new(),
+};
+
+impl Cell {
+    /// What builds, gate and timings of a structure depend on.
+    pub const STRUCTURE: [Axis; 5] = [
+        Axis::Scene,
+        Axis::Triangle,
+        Axis::BoxTest,
+        Axis::Accel,
+        Axis::Kernels,
+    ];
+    /// What the error of a sampler depends on: not the structure, as hits are equal to the bit.
+    pub const SAMPLER: [Axis; 8] = [
+        Axis::Scene,
+        Axis::Triangle,
+        Axis::BoxTest,
+        Axis::Integrator,
+        Axis::Sequence,
+        Axis::Decorrelation,
+        Axis::Offset,
+        Axis::Kernels,
+    ];
+    /// What the words that a sampler draws depend on.
+    pub const STREAM: [Axis; 3] = [Axis::Sequence, Axis::Decorrelation, Axis::Kernels];
+    /// What is loaded, uploaded and judged once for all cells on it.
+    pub const WORLD: [Axis; 3] = [Axis::Scene, Axis::Triangle, Axis::BoxTest];
+
+    /// The variant on an axis, if that matters.
+    pub fn get(&self, axis: Axis) -> Option<&Variant> {
+        self.variants[axis].as_ref()
+    }
+
+    /// The same cell with this variant on an axis.
+    #[must_use]
+    pub fn with(mut self, axis: Axis, variant: &Variant) -> Self {
+        self.variants[axis] = Some(variant.clone());
+        self
+    }
+
+    /// The part of the cell on these axes.
+    #[must_use]
+    pub fn on(&self, axes: &[Axis]) -> Self {
+        let variants = axes
+            .iter()
+            .filter_map(|&axis| Some((axis, self.get(axis)?)));
+        variants.fold(Self::default(), |cell, (axis, variant)| {
+            cell.with(axis, variant)
+        })
+    }
+
+    /// Whether `part` is this cell on the axes that matter to `part`.
+    pub fn is_on(&self, part: &Cell) -> bool {
+        let mut axes = part.variants.iter();
+        axes.all(|(axis, variant)| variant.is_none() || *variant == self.variants[axis])
+    }
+
+    /// Labels on these axes, and behind them those of tests, offset and kernels where they are not the
+    /// default ones: what tells cells of a run apart.
+    pub fn labels(&self, axes: &[Axis]) -> Vec<&str> {
+        let named = axes.iter().map(|&axis| self[axis].label.as_str());
+        named.chain(self.unusual()).collect()
+    }
+
+    fn unusual(&self) -> impl Iterator<Item = &str> {
+        let further = [Axis::Triangle, Axis::BoxTest, Axis::Offset, Axis::Kernels];
+        further.into_iter().filter_map(|axis| {
+            let variant = self.get(axis)?;
+            (Some(variant.label.as_str()) != axis.default_name() && !variant.name.is_empty())
+                .then_some(variant.label.as_str())
+        })
     }
 }
 
-impl fmt::Display for SamplerCell {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            scene,
-            integrator,
-            sequence,
-            decorrelation,
-            ..
-        } = self;
-        write!(f, "{scene}, {integrator}, {sequence} × {decorrelation}")
+/// The variant on an axis; one of an empty name where it does not matter.
+impl Index<Axis> for Cell {
+    type Output = Variant;
+
+    fn index(&self, axis: Axis) -> &Variant {
+        self.get(axis).unwrap_or(&NOTHING)
     }
 }
 
-impl fmt::Display for TimeCell {
+impl fmt::Display for Cell {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            scene,
-            accel,
-            sequence,
-            decorrelation,
-            integrator,
-            ..
-        } = self;
-        write!(
-            f,
-            "{scene}, {accel}, {integrator}, {sequence} × {decorrelation}"
-        )
-    }
-}
-
-impl fmt::Display for StreamCell {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} × {}", self.sequence, self.decorrelation)
+        let main = [Axis::Scene, Axis::Accel, Axis::Integrator];
+        let main = main.into_iter().filter_map(|axis| self.get(axis));
+        let mut parts: Vec<String> = main.map(Variant::to_string).collect();
+        if let Some(sequence) = self.get(Axis::Sequence) {
+            parts.push(format!("{sequence} × {}", self[Axis::Decorrelation]));
+        }
+        parts.extend(self.unusual().map(str::to_owned));
+        f.write_str(&parts.join(", "))
     }
 }

@@ -16,6 +16,14 @@ fn owned(names: &[&str]) -> Vec<String> {
 pub(super) fn check_sections(tree: &Table, catalogue: &Catalogue) -> Result<(), ConfigError> {
     let sections = keys::sections();
     for (name, item) in tree {
+        if name == "intersection" {
+            return Err(ConfigError::Refused {
+                at: item.at.to_string(),
+                reason: "its keys are axes: write `triangle`, `box_test` and `offset` under [axes], each a \
+                         name or a list of names"
+                    .to_owned(),
+            });
+        }
         if !sections.contains(&name.as_str()) {
             let what = match item.value {
                 Value::Table(_) => "section",
@@ -138,7 +146,7 @@ pub(super) fn pattern_list(
     axes: &Axes,
     lenient: bool,
 ) -> Result<Vec<Pattern>, ConfigError> {
-    let variants = axes.variants(axis);
+    let variants = &axes[axis];
     let patterns = texts.iter().map(|(item, text)| {
         let pattern = Pattern::new(*text);
         let named = pattern.without_negation();

@@ -1,5 +1,6 @@
 //! A checked experiment: every value in range, every name known, axes expanded into variants.
 
+use super::axis_map::AxisMap;
 use super::error::Place;
 use super::keys::Axis;
 use super::pattern::Pattern;
@@ -30,8 +31,6 @@ pub struct Experiment {
     pub spp: SppRange,
     /// Whether kernels keep the bounds checks and loop bounds of the driver layer.
     pub runtime_checks: bool,
-    /// How rays meet triangles and boxes, and leave surfaces.
-    pub tests: Tests,
     /// Camera for all scenes; `None` leaves it to each scene.
     pub camera: Option<Camera>,
     /// What is varied.
@@ -78,35 +77,7 @@ impl SppRange {
 }
 
 /// The axes of the product, each with at least one variant.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Axes {
-    /// What is traced.
-    pub scene: Vec<Variant>,
-    /// Acceleration structures.
-    pub accel: Vec<Variant>,
-    /// Sample sequences.
-    pub sequence: Vec<Variant>,
-    /// Decorrelations.
-    pub decorrelation: Vec<Variant>,
-    /// Integrators.
-    pub integrator: Vec<Variant>,
-    /// Folders of kernels; the name of the embedded ones is empty.
-    pub kernels: Vec<Variant>,
-}
-
-impl Axes {
-    /// The variants of one axis.
-    pub fn variants(&self, axis: Axis) -> &[Variant] {
-        match axis {
-            Axis::Scene => &self.scene,
-            Axis::Accel => &self.accel,
-            Axis::Sequence => &self.sequence,
-            Axis::Decorrelation => &self.decorrelation,
-            Axis::Integrator => &self.integrator,
-            Axis::Kernels => &self.kernels,
-        }
-    }
-}
+pub type Axes = AxisMap<Vec<Variant>>;
 
 /// Cells left out: those that fit a pattern on every axis named.
 #[derive(Debug, Clone, PartialEq)]
@@ -178,18 +149,6 @@ pub struct Timing {
     pub max_warmup_ms: u32,
     /// Rays per class and dispatch.
     pub rays: u32,
-}
-
-/// Names of the tests that all structures share, and of the offset of rays: the section
-/// `[intersection]`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Tests {
-    /// The ray–triangle test.
-    pub triangle: &'static str,
-    /// The ray–box test.
-    pub box_test: &'static str,
-    /// How rays are moved off the surface that they leave.
-    pub offset: &'static str,
 }
 
 /// How much the gate checks.

@@ -16,18 +16,27 @@ pub enum Axis {
     Decorrelation,
     /// What is computed from the hits.
     Integrator,
+    /// The ray–triangle test of structures and judge.
+    Triangle,
+    /// The ray–box test of structures.
+    BoxTest,
+    /// How rays are moved off the surface that they leave.
+    Offset,
     /// The kernels that all this runs with.
     Kernels,
 }
 
 impl Axis {
     /// All axes, in the order of tables and plans.
-    pub const ALL: [Axis; 6] = [
+    pub const ALL: [Axis; 9] = [
         Axis::Scene,
         Axis::Accel,
         Axis::Sequence,
         Axis::Decorrelation,
         Axis::Integrator,
+        Axis::Triangle,
+        Axis::BoxTest,
+        Axis::Offset,
         Axis::Kernels,
     ];
 
@@ -39,6 +48,9 @@ impl Axis {
             Axis::Sequence => "sequence",
             Axis::Decorrelation => "decorrelation",
             Axis::Integrator => "integrator",
+            Axis::Triangle => "triangle",
+            Axis::BoxTest => "box_test",
+            Axis::Offset => "offset",
             Axis::Kernels => "kernels",
         }
     }
@@ -46,6 +58,12 @@ impl Axis {
     /// The axis of this name.
     pub fn from_name(name: &str) -> Option<Axis> {
         Self::ALL.into_iter().find(|axis| axis.name() == name)
+    }
+
+    /// What stands on the axis where an experiment says nothing of it; nothing if it has to.
+    pub fn default_name(self) -> Option<&'static str> {
+        let default = find("axes", self.name())?.default?;
+        Some(default.trim_matches(['[', ']', '"']))
     }
 }
 
@@ -76,8 +94,6 @@ pub enum Kind {
         /// Greatest value.
         max: i64,
     },
-    /// One of these names.
-    Choice(&'static [&'static str]),
     /// Two integers.
     IntegerPair {
         /// Least value of each.
@@ -119,7 +135,6 @@ impl fmt::Display for Kind {
             Self::Flag => write!(f, "true or false"),
             Self::Integer { min, max } => write!(f, "an integer in [{min}, {max}]"),
             Self::PowerOfTwo { min, max } => write!(f, "a power of two in [{min}, {max}]"),
-            Self::Choice(names) => write!(f, "one of {}", names.join(", ")),
             Self::IntegerPair { min, max } => {
                 write!(f, "a list of two integers in [{min}, {max}]")
             }
@@ -192,26 +207,6 @@ const fn integer(min: i64, max: i64) -> Kind {
     Kind::Integer { min, max }
 }
 
-/// Names of the ray–triangle tests.
-pub const TRIANGLE_TESTS: &[&str] = &[
-    "moeller-trumbore",
-    "baldwin-weber",
-    "pluecker",
-    "watertight",
-    "compensated",
-];
-/// Names of the ray–box tests.
-pub const BOX_TESTS: &[&str] = &[
-    "padded-16",
-    "padded-4",
-    "padded-3",
-    "padded-2",
-    "padded-0",
-    "plain",
-];
-/// Names of the offsets of rays.
-pub const RAY_OFFSETS: &[&str] = &["none", "fixed", "integer", "error-bound"];
-
 const SEED: Kind = integer(0, u32::MAX as i64);
 
 /// All keys, in the order of the documentation. Parameters of registry entries (`[accel.NAME]` and
@@ -229,19 +224,22 @@ pub const KEYS: &[Key] = &[
     key("axes", "sequence", Kind::Names(Axis::Sequence), None, "Sample sequences."),
     key("axes", "decorrelation", Kind::Names(Axis::Decorrelation), Some("[\"none\"]"), "How the pixels' sample points are made different."),
     key("axes", "integrator", Kind::Names(Axis::Integrator), Some("[\"path\"]"), "What is computed from the hits."),
+    key("axes", "triangle", Kind::Names(Axis::Triangle), Some("[\"watertight\"]"), "Ray-triangle tests, of all structures and of the judge."),
+    key("axes", "box_test", Kind::Names(Axis::BoxTest), Some("[\"padded-16\"]"), "Ray-box tests: reciprocal and pad. Hits are proven for `padded-16` alone; the others are there to be measured."),
+    key("axes", "offset", Kind::Names(Axis::Offset), Some("[\"error-bound\"]"), "How rays that leave a surface are moved off it by integrators. References are always rendered with `error-bound`."),
     key("axes", "kernels", Kind::Names(Axis::Kernels), Some("[\"\"]"), "Folders whose kernels (`*.wesl`) replace the embedded ones of the same path, or join them, relative to the current directory; `\"\"` are the embedded ones."),
     key("camera", "eye", Kind::Vector, None, "Position of the pinhole, scene units."),
     key("camera", "target", Kind::Vector, None, "Point that projects to the centre of the image, scene units."),
     key("camera", "up", Kind::Vector, Some("[0, 1, 0]"), "Up direction; not parallel to the viewing direction."),
     key("camera", "fov", Kind::Number { min: 1.0, max: 179.0 }, Some("40"), "Vertical field of view, degrees."),
-    key("intersection", "triangle", Kind::Choice(TRIANGLE_TESTS), Some("\"watertight\""), "Ray-triangle test of all structures and of the judge."),
-    key("intersection", "box_test", Kind::Choice(BOX_TESTS), Some("\"padded-16\""), "Ray-box test: reciprocal and pad. Hits are proven for `padded-16` alone; the others are there to be measured."),
-    key("intersection", "offset", Kind::Choice(RAY_OFFSETS), Some("\"error-bound\""), "How rays that leave a surface are moved off it by integrators."),
     key("exclude", "scene", Kind::Patterns(Axis::Scene), None, "Cells of these scenes …"),
     key("exclude", "accel", Kind::Patterns(Axis::Accel), None, "… with these structures …"),
     key("exclude", "sequence", Kind::Patterns(Axis::Sequence), None, "… these sequences …"),
     key("exclude", "decorrelation", Kind::Patterns(Axis::Decorrelation), None, "… these decorrelations …"),
     key("exclude", "integrator", Kind::Patterns(Axis::Integrator), None, "… these integrators …"),
+    key("exclude", "triangle", Kind::Patterns(Axis::Triangle), None, "… these triangle tests …"),
+    key("exclude", "box_test", Kind::Patterns(Axis::BoxTest), None, "… these box tests …"),
+    key("exclude", "offset", Kind::Patterns(Axis::Offset), None, "… these offsets …"),
     key("exclude", "kernels", Kind::Patterns(Axis::Kernels), None, "… and these kernels are left out."),
     key("reference", "spp", integer(2, 1 << 24), Some("4096"), "Samples per pixel of the reference image, both halves together."),
     key("reference", "sequence", Kind::Name(Axis::Sequence), Some("\"pixel-hash\""), "Sequence of the reference, with its default parameters."),

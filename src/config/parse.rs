@@ -4,7 +4,7 @@ use super::check::{
     as_table, check_on_axis, check_sections, exclude_tables, parameter_tables, pattern_list,
 };
 use super::error::{ConfigError, Place};
-use super::experiment::{Axes, Discrepancy, Exclude, Experiment, Gate, Reference, Tests, Timing};
+use super::experiment::{Axes, Discrepancy, Exclude, Experiment, Gate, Reference, Timing};
 use super::keys::{Axis, KEYS, OPTIONAL_SECTIONS};
 use super::section::{Section, texts};
 use super::tree::{self, Item, Table, Value};
@@ -40,7 +40,7 @@ pub(super) fn parse(
             expected: "a text without control characters".to_owned(),
         });
     }
-    let axes = reader.axes()?;
+    let axes = Axes::try_new(|axis| reader.axis(axis))?;
     let experiment = Experiment {
         name,
         source: file.to_owned(),
@@ -50,7 +50,6 @@ pub(super) fn parse(
         resolution: run.unsigned_pair("resolution")?,
         spp: run.exponents("spp")?,
         runtime_checks: run.flag("runtime_checks")?,
-        tests: reader.tests()?,
         camera: reader.camera()?,
         excludes: reader.excludes(&axes)?,
         axes,
@@ -184,17 +183,6 @@ impl<'t> Reader<'t> {
                 expected: "a section".to_owned(),
             }),
         }
-    }
-
-    fn axes(&self) -> Result<Axes, ConfigError> {
-        Ok(Axes {
-            scene: self.axis(Axis::Scene)?,
-            accel: self.axis(Axis::Accel)?,
-            sequence: self.axis(Axis::Sequence)?,
-            decorrelation: self.axis(Axis::Decorrelation)?,
-            integrator: self.axis(Axis::Integrator)?,
-            kernels: self.axis(Axis::Kernels)?,
-        })
     }
 
     /// The variants of one axis, in the order of the file.
@@ -335,15 +323,6 @@ impl<'t> Reader<'t> {
             return Err(section.not_allowed("max_warmup_ms", expected));
         }
         Ok(timing)
-    }
-
-    fn tests(&self) -> Result<Tests, ConfigError> {
-        let section = self.section("intersection")?;
-        Ok(Tests {
-            triangle: section.choice("triangle")?,
-            box_test: section.choice("box_test")?,
-            offset: section.choice("offset")?,
-        })
     }
 
     fn gate(&self) -> Result<Gate, ConfigError> {

@@ -91,23 +91,6 @@ impl<'t> Section<'t> {
         }
     }
 
-    /// One of the names of a [`Kind::Choice`].
-    pub fn choice(&self, name: &str) -> Result<&'static str, ConfigError> {
-        let text = self.text(name)?;
-        let key = self.key(name);
-        let names = match key.kind {
-            Kind::Choice(names) => names,
-            _ => &[],
-        };
-        let known = names.iter().find(|known| **known == text);
-        known.copied().ok_or_else(|| ConfigError::Unknown {
-            at: self.place(name),
-            what: format!("value of `{}`", key.path()),
-            name: text.to_owned(),
-            known: names.iter().map(|known| (*known).to_owned()).collect(),
-        })
-    }
-
     pub fn flag(&self, name: &str) -> Result<bool, ConfigError> {
         let item = self.item(name)?;
         match item.value {

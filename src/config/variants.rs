@@ -17,7 +17,7 @@ pub(super) fn resolve(
     text: &str,
     catalogue: &Catalogue,
 ) -> Result<Entry, ConfigError> {
-    let entries = catalogue.entries(axis);
+    let entries = &catalogue[axis];
     if let Some(entry) = entries.iter().find(|entry| entry.name == text) {
         return Ok(entry.clone());
     }

@@ -6,8 +6,8 @@
 //! corner visited is snapped to one that is no worse: shrunk onto the points inside for boxes with too
 //! many, grown up to the points outside for boxes with too few.
 
-use super::random::Random;
 use super::{Budget, PointSet};
+use crate::random::SplitMix64;
 
 /// Work of one search at most, in coordinates looked at.
 const WORK: usize = 20_000_000;
@@ -39,7 +39,7 @@ pub(super) fn ascend(points: &PointSet, seed: u64, budget: &Budget) -> f64 {
             let mut walker = Walker {
                 grid: &grid,
                 side,
-                random: Random(seed ^ ((walk as u64) << 32)),
+                random: SplitMix64(seed ^ ((walk as u64) << 32)),
                 outside: vec![0; points.len()],
             };
             best = best.max(walker.walk(steps / WALKS / 2, budget));
@@ -101,7 +101,7 @@ impl Grid {
 struct Walker<'a> {
     grid: &'a Grid,
     side: Side,
-    random: Random,
+    random: SplitMix64,
     /// By point: dimensions in which it is outside the present box.
     outside: Vec<u32>,
 }
@@ -142,7 +142,7 @@ impl Walker<'_> {
         let dims = self.grid.ranks.len();
         let power = 1.0 / dims as f64;
         let corner = (0..dims).map(|d| {
-            let side = self.random.unit().powf(power);
+            let side = self.random.uniform().powf(power);
             self.grid.coordinates[d][1..].partition_point(|&c| c <= side) as u32
         });
         let last = |(d, i): (usize, u32)| i.min(self.grid.last(d) as u32);

@@ -57,8 +57,8 @@ pub fn minimum_distance(points: &PointSet, metric: Metric) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::random::Random;
     use super::*;
+    use crate::random::SplitMix64;
 
     fn brute_force(points: &PointSet, metric: Metric) -> Option<f64> {
         let all: Vec<&[f64]> = points.points().collect();
@@ -69,7 +69,7 @@ mod tests {
 
     #[test]
     fn the_sweep_finds_what_all_pairs_have() {
-        let mut random = Random(4);
+        let mut random = SplitMix64(4);
         for round in 0..1000 {
             let (dim, n) = (1 + round % 4, 1 + random.below(30));
             let levels = [2, 9, 1 << 20][round % 3];

@@ -15,11 +15,7 @@ const NAME: &str = "dispersion";
 /// # Errors
 /// The time of the budget is spent first; points that are not pairs.
 pub fn largest_empty_box(points: &PointSet, budget: &Budget) -> Result<f64, DiscrepancyError> {
-    let Some(pairs) = points.pairs() else {
-        let reason = format!("needs points of 2 dimensions, these have {}", points.dim());
-        let measure = NAME;
-        return Err(DiscrepancyError::NotDefined { measure, reason });
-    };
+    let pairs = points.pairs_for(NAME)?;
     let mut ys: Vec<f64> = pairs.iter().map(|p| p[1]).chain([0.0, 1.0]).collect();
     ys.sort_unstable_by(f64::total_cmp);
     let mut largest = ys.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
@@ -69,8 +65,8 @@ fn grow(seed: [f64; 2], right: &[[f64; 2]], known: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::random::Random;
     use super::*;
+    use crate::random::SplitMix64;
 
     /// All boxes between coordinates of points and borders.
     fn brute_force(points: &[[f64; 2]]) -> f64 {
@@ -89,7 +85,7 @@ mod tests {
 
     #[test]
     fn growing_boxes_finds_what_all_boxes_have() {
-        let mut random = Random(11);
+        let mut random = SplitMix64(11);
         for round in 0..1000 {
             let n = 1 + random.below(8);
             let levels = [3, 8, 1 << 20][round % 3];

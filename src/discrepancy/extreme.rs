@@ -12,11 +12,7 @@ use super::{Budget, DiscrepancyError, PointSet};
 /// # Errors
 /// The time of the budget is spent first; points that are not pairs.
 pub fn extreme_2d(points: &PointSet, budget: &Budget) -> Result<f64, DiscrepancyError> {
-    let Some(pairs) = points.pairs() else {
-        let reason = format!("needs points of 2 dimensions, these have {}", points.dim());
-        let measure = "extreme";
-        return Err(DiscrepancyError::NotDefined { measure, reason });
-    };
+    let pairs = points.pairs_for("extreme")?;
     let n = pairs.len() as f64;
     let mut by_x = pairs.to_vec();
     by_x.sort_unstable_by(|p, q| p[0].total_cmp(&q[0]));

@@ -52,66 +52,56 @@ pub enum Value {
     Matrix(Vec<Vec<Option<f64>>>),
 }
 
+/// Every measure with its name on the command line and in results, and one line that says what it is; in the
+/// order of the documentation.
+#[rustfmt::skip]
+const TABLE: [(Measure, &str, &str); 14] = [
+    (Measure::Star, "star", "star discrepancy: largest error of a box at the origin; exact or bounds"),
+    (Measure::Extreme, "extreme", "extreme discrepancy, 2-D: largest error of any box"),
+    (Measure::Quadratic(Quadratic::L2Star), "l2star", "L2-star discrepancy, root and square"),
+    (Measure::Quadratic(Quadratic::Centered), "centered", "centered L2 discrepancy, root and square"),
+    (Measure::Quadratic(Quadratic::WrapAround), "wrap", "wrap-around L2 discrepancy, root and square"),
+    (Measure::Quadratic(Quadratic::Mixture), "mixture", "mixture discrepancy, root and square"),
+    (Measure::Quadratic(Quadratic::Average), "average", "L2-star averaged over all corners as origin, root and square"),
+    (Measure::Distance(Metric::Plain), "distance", "least distance between two points"),
+    (Measure::Distance(Metric::Torus), "torus-distance", "least distance between two points on the torus"),
+    (Measure::Dispersion, "dispersion", "area of the largest empty axis-parallel box, 2-D"),
+    (Measure::NetQuality, "tvalue", "t of a (t, m, d)-net in base 2"),
+    (Measure::Intervals, "intervals", "shapes of elementary intervals with one point in each"),
+    (Measure::Spectrum, "spectrum", "radial mean of the power spectrum, 2-D"),
+    (Measure::Pairs, "pairs", "star discrepancy of every pair of dimensions"),
+];
+
 impl Measure {
     /// Every measure, in the order of the documentation.
-    pub const ALL: [Self; 14] = [
-        Self::Star,
-        Self::Extreme,
-        Self::Quadratic(Quadratic::L2Star),
-        Self::Quadratic(Quadratic::Centered),
-        Self::Quadratic(Quadratic::WrapAround),
-        Self::Quadratic(Quadratic::Mixture),
-        Self::Quadratic(Quadratic::Average),
-        Self::Distance(Metric::Plain),
-        Self::Distance(Metric::Torus),
-        Self::Dispersion,
-        Self::NetQuality,
-        Self::Intervals,
-        Self::Spectrum,
-        Self::Pairs,
-    ];
+    pub const ALL: [Self; TABLE.len()] = {
+        let mut all = [Self::Star; TABLE.len()];
+        let mut row = 0;
+        while row < all.len() {
+            all[row] = TABLE[row].0;
+            row += 1;
+        }
+        all
+    };
 
     /// The measure of a name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|m| m.name() == name)
     }
 
+    fn row(self) -> (&'static str, &'static str) {
+        let row = TABLE.iter().find(|(measure, ..)| *measure == self);
+        row.map_or(("", ""), |(_, name, description)| (name, description))
+    }
+
     /// Name on the command line and in results.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Star => "star",
-            Self::Extreme => "extreme",
-            Self::Quadratic(kind) => kind.name(),
-            Self::Distance(Metric::Plain) => "distance",
-            Self::Distance(Metric::Torus) => "torus-distance",
-            Self::Dispersion => "dispersion",
-            Self::NetQuality => "tvalue",
-            Self::Intervals => "intervals",
-            Self::Spectrum => "spectrum",
-            Self::Pairs => "pairs",
-        }
+        self.row().0
     }
 
     /// One line that says what it is.
     pub fn description(self) -> &'static str {
-        match self {
-            Self::Star => "star discrepancy: largest error of a box at the origin; exact or bounds",
-            Self::Extreme => "extreme discrepancy, 2-D: largest error of any box",
-            Self::Quadratic(Quadratic::L2Star) => "L2-star discrepancy, root and square",
-            Self::Quadratic(Quadratic::Centered) => "centered L2 discrepancy, root and square",
-            Self::Quadratic(Quadratic::WrapAround) => "wrap-around L2 discrepancy, root and square",
-            Self::Quadratic(Quadratic::Mixture) => "mixture discrepancy, root and square",
-            Self::Quadratic(Quadratic::Average) => {
-                "L2-star averaged over all corners as origin, root and square"
-            }
-            Self::Distance(Metric::Plain) => "least distance between two points",
-            Self::Distance(Metric::Torus) => "least distance between two points on the torus",
-            Self::Dispersion => "area of the largest empty axis-parallel box, 2-D",
-            Self::NetQuality => "t of a (t, m, d)-net in base 2",
-            Self::Intervals => "shapes of elementary intervals with one point in each",
-            Self::Spectrum => "radial mean of the power spectrum, 2-D",
-            Self::Pairs => "star discrepancy of every pair of dimensions",
-        }
+        self.row().1
     }
 }
 

@@ -1,5 +1,5 @@
 //! How evenly point sets fill the unit cube: exact star discrepancy and its companions. Usable on its
-//! own: nothing here depends on the rest of the crate.
+//! own: of the rest of the crate it takes random numbers alone.
 //!
 //! The star discrepancy of N points is the largest difference, over all boxes with one corner at
 //! the origin, between the volume of the box and the fraction of the points in it (Niederreiter
@@ -30,7 +30,6 @@ mod orthants;
 mod planar;
 mod points;
 mod quadratic;
-mod random;
 mod spectrum;
 mod star;
 mod sum;

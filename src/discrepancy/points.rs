@@ -131,6 +131,13 @@ impl PointSet {
     pub(super) fn pairs(&self) -> Option<&[[f64; 2]]> {
         (self.dim == 2).then(|| self.coordinates.as_chunks().0)
     }
+
+    /// The points as pairs, for a measure that needs them.
+    pub(super) fn pairs_for(&self, measure: &'static str) -> Result<&[[f64; 2]], DiscrepancyError> {
+        let reason = format!("needs points of 2 dimensions, these have {}", self.dim);
+        let missing = DiscrepancyError::NotDefined { measure, reason };
+        self.pairs().ok_or(missing)
+    }
 }
 
 fn words(line: &str) -> impl Iterator<Item = &str> {

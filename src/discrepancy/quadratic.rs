@@ -9,7 +9,7 @@
 //! Its terms are near 1 and cancel to about N⁻², so all sums are compensated.
 
 use super::sum::{LANES, Sum};
-use super::{Budget, DiscrepancyError, PointSet};
+use super::{Budget, DiscrepancyError, Measure, PointSet};
 
 /// A discrepancy in the mean square.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,18 +45,6 @@ pub fn quadratic(
         Quadratic::WrapAround => square(points, &WrapAround, budget),
         Quadratic::Mixture => square(points, &Mixture, budget),
         Quadratic::Average => square(points, &Average, budget),
-    }
-}
-
-impl Quadratic {
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::L2Star => "l2star",
-            Self::Centered => "centered",
-            Self::WrapAround => "wrap",
-            Self::Mixture => "mixture",
-            Self::Average => "average",
-        }
     }
 }
 
@@ -151,6 +139,7 @@ fn square<K: Kernel>(
     kernel: &K,
     budget: &Budget,
 ) -> Result<f64, DiscrepancyError> {
+    let name = Measure::Quadratic(K::KIND).name();
     let n = points.len() as f64;
     let columns: Vec<Column> = (0..points.dim()).map(|d| Column::new(points, d)).collect();
     let mut singles = Sum::new();
@@ -158,7 +147,7 @@ fn square<K: Kernel>(
     let mut pairs = Sum::new();
     for i in 0..points.len() {
         if i % 64 == 0 {
-            budget.check(K::KIND.name())?;
+            budget.check(name)?;
         }
         let at = |c: &Column| [c.x[i], c.z[i]];
         let means = columns.iter().map(at).map(|[x, z]| kernel.mean(x, z));
@@ -182,12 +171,13 @@ fn square<K: Kernel>(
     }
     let square = all.value() / power(K::SCALE);
     if !square.is_finite() {
-        let reason = format!(
-            "is beyond the range of numbers in {} dimensions",
-            points.dim()
-        );
-        let measure = K::KIND.name();
-        return Err(DiscrepancyError::NotDefined { measure, reason });
+        return Err(DiscrepancyError::NotDefined {
+            measure: name,
+            reason: format!(
+                "is beyond the range of numbers in {} dimensions",
+                points.dim()
+            ),
+        });
     }
     // A set may be perfect up to rounding.
     Ok(square.max(0.0))

@@ -58,11 +58,7 @@ pub fn periodogram(
     highest: usize,
     budget: &Budget,
 ) -> Result<Periodogram, DiscrepancyError> {
-    let Some(pairs) = points.pairs() else {
-        let reason = format!("needs points of 2 dimensions, these have {}", points.dim());
-        let measure = NAME;
-        return Err(DiscrepancyError::NotDefined { measure, reason });
-    };
+    let pairs = points.pairs_for(NAME)?;
     let size = highest + 1;
     let mut sums = vec![[0.0; 2]; size * (2 * size - 1)];
     let (mut across, mut along) = (Vec::new(), Vec::new());
@@ -113,8 +109,8 @@ fn waves(out: &mut Vec<[f64; 2]>, x: f64, frequencies: std::ops::RangeInclusive<
 
 #[cfg(test)]
 mod tests {
-    use super::super::random::Random;
     use super::*;
+    use crate::random::SplitMix64;
 
     fn spectrum(points: &[[f64; 2]], highest: usize) -> Vec<f64> {
         let set = PointSet::from_points(points).unwrap();
@@ -150,8 +146,10 @@ mod tests {
         for p in spectrum(&[[0.3, 0.7]], 12) {
             assert!((p - 1.0).abs() < 1e-12, "{p}");
         }
-        let mut random = Random(3);
-        let noise: Vec<_> = (0..512).map(|_| [random.unit(), random.unit()]).collect();
+        let mut random = SplitMix64(3);
+        let noise: Vec<_> = (0..512)
+            .map(|_| [random.uniform(), random.uniform()])
+            .collect();
         let power = spectrum(&noise, 24);
         let mean = power.iter().sum::<f64>() / 24.0;
         assert!((mean - 1.0).abs() < 0.2, "{mean}");

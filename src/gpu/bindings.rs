@@ -152,20 +152,20 @@ impl Bindings {
         out
     }
 
-    /// What a storage binding of a kernel is bound to; `lend` finds the buffer.
+    /// What a storage binding of a kernel is bound to; `lend` finds scratch buffers.
     pub(super) fn resource<'a>(
         &self,
         gpu: &Gpu,
         pipeline: &Pipeline,
         binding: &Binding,
-        lend: impl Fn(&Storage) -> Option<&'a wgpu::Buffer>,
+        lend: impl Fn(&str) -> Option<&'a wgpu::Buffer>,
     ) -> Result<Resource, GpuError> {
         let name = &binding.name;
         let unbound = || pipeline.unbound(name, self.buffers.keys());
         let array = self.buffers.get(name).ok_or_else(unbound)?;
         let buffer = match &array.storage {
             Storage::Own(buffer) => buffer,
-            scratch => lend(scratch).ok_or_else(unbound)?,
+            Storage::Scratch { name, .. } => lend(name).ok_or_else(unbound)?,
         };
         if binding.kind == BindingKind::Texels {
             return texels_of(gpu, name, array, buffer).map(Resource::Texels);

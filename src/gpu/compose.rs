@@ -88,8 +88,7 @@ impl KernelLibrary {
 
     fn hashed(mut self) -> Self {
         let own = self.overridden.union(&self.registered);
-        let texts = own.filter_map(|name| Some((name.as_str(), self.text(name)?)));
-        let texts: Vec<_> = texts.collect();
+        let texts: Vec<_> = own.map(|name| (&**name, &*self.files[name].1)).collect();
         if !texts.is_empty() {
             self.hash = cell_hash(&texts);
         }
@@ -119,9 +118,7 @@ impl KernelLibrary {
     pub fn check(&self, wanted: &[String]) -> Result<(), GpuError> {
         let mut imports = BTreeMap::new();
         for name in &self.overridden {
-            let Some((path, text)) = self.files.get(name) else {
-                continue;
-            };
+            let (path, text) = &self.files[name];
             let parsed = diagnose::imports(path, text, name).map_err(GpuError::Kernel)?;
             imports.insert(name.as_str(), parsed);
         }
@@ -150,14 +147,10 @@ impl KernelLibrary {
         let known = EMBEDDED.iter().map(|(name, _)| *name);
         let known = known.chain(wanted.iter().map(String::as_str));
         let near = nearest(lost, known).unwrap_or_default();
-        let path = self
-            .files
-            .get(*lost)
-            .map(|(path, _)| path.display().to_string());
         Err(GpuError::Kernel(format!(
             "{}: this file replaces no kernel, and none imports it; did you mean `{near}.wesl`? \
              (paths are relative to the folder given, upper and lower case count)",
-            path.unwrap_or_default()
+            self.files[*lost].0.display()
         )))
     }
 
@@ -180,26 +173,25 @@ impl KernelLibrary {
         let composition = &composition.clone().completed();
         let mut resolver = VirtualResolver::new();
         let mut paths = BTreeMap::new();
-        for (name, (path, text)) in &self.files {
-            resolver.add_module(module_path(name)?, text.as_str().into());
-            paths.insert(module_path(name)?.to_string(), path.clone());
-        }
-        for (active, name) in &composition.active {
-            let (path, text) = self.files.get(name).ok_or_else(|| {
-                GpuError::Kernel(format!("there is no kernel `{name}.wesl` (wanted as the active {active}); add it under kernels/ or to the folder given by --kernels"))
-            })?;
-            resolver.add_module(
-                module_path(&format!("active/{active}"))?,
-                text.as_str().into(),
-            );
-            paths.insert(
-                module_path(&format!("active/{active}"))?.to_string(),
-                path.clone(),
-            );
-        }
-        let constants: String = composition
-            .constants
+        let own = self
+            .files
             .iter()
+            .map(|(name, file)| Ok((name.clone(), file)));
+        let chosen = composition.active.iter().map(|(active, name)| {
+            let missing = || {
+                GpuError::Kernel(format!("there is no kernel `{name}.wesl` (wanted as the active {active}); add it under kernels/ or to the folder given by --kernels"))
+            };
+            let file = self.files.get(name).ok_or_else(missing)?;
+            Ok((format!("active/{active}"), file))
+        });
+        for module in own.chain(chosen) {
+            let (name, (path, text)) = module?;
+            let module = module_path(&name)?;
+            paths.insert(module.to_string(), path.clone());
+            resolver.add_module(module, text.as_str().into());
+        }
+        let constants = composition.constants.iter();
+        let constants: String = constants
             .map(|(name, value)| format!("const {name}: u32 = {value}u;\n"))
             .collect();
         resolver.add_module(module_path("active/constants")?, constants.into());

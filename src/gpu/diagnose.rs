@@ -71,16 +71,11 @@ fn import_of_missing_module<'a>(
 /// The text is no WESL: file, line and what stands there.
 pub(super) fn imports(file: &Path, text: &str, module: &str) -> Result<Vec<Vec<String>>, String> {
     let unit = text.parse::<TranslationUnit>().map_err(|error| {
-        let start = error.span.range().start.min(text.len());
-        let line = text.as_bytes()[..start]
-            .iter()
-            .filter(|byte| **byte == b'\n')
-            .count();
-        let offending = text.lines().nth(line).unwrap_or_default().trim();
+        let (line, offending) = line_at(text, error.span.range().start);
         let what = error.error.to_string();
         // The parser lists every token that it would have taken.
         let what = what.split(", expected").next().unwrap_or_default();
-        format!("{}:{}: {what}\n    {offending}", file.display(), line + 1)
+        format!("{}:{line}: {what}\n    {offending}", file.display())
     })?;
     let mut paths = Vec::new();
     for import in &unit.imports {
@@ -215,7 +210,8 @@ fn source_position<'a>(kernel: &Composed<'a>, offset: usize) -> Option<(String, 
 
 /// Number of the line around a byte, from 1, and the line.
 fn line_at(text: &str, offset: usize) -> (usize, &str) {
-    let line = text[..offset].matches('\n').count();
+    let before = &text.as_bytes()[..offset.min(text.len())];
+    let line = before.iter().filter(|byte| **byte == b'\n').count();
     let shown = text.lines().nth(line).unwrap_or_default();
     (line + 1, shown.trim())
 }

@@ -19,9 +19,7 @@ pub(super) type PipelineCache = HashMap<(Composition, bool), BTreeMap<String, Ar
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum BindingKind {
-    Storage {
-        writable: bool,
-    },
+    Storage,
     Uniform {
         size: u32,
         members: Vec<(String, u32)>,
@@ -47,7 +45,7 @@ pub struct Pipeline {
     pub(super) bindings: Vec<Binding>,
     /// Milliseconds of composition and of the driver's front end.
     made_ms: f64,
-    /// Milliseconds of its first dispatch, which did nothing: drivers compile then, if not before.
+    /// Milliseconds of its first dispatch, which had no workgroups: see [`Pipeline::cold_ms`].
     pub(super) first_ms: OnceLock<f64>,
 }
 
@@ -80,9 +78,7 @@ fn reflect(kernel: &ComposedKernel) -> Vec<Binding> {
                     members,
                 }
             }
-            naga::AddressSpace::Storage { access } => BindingKind::Storage {
-                writable: access.contains(naga::StorageAccess::STORE),
-            },
+            naga::AddressSpace::Storage { .. } => BindingKind::Storage,
             naga::AddressSpace::Handle => BindingKind::Texels,
             _ => continue,
         };
@@ -94,31 +90,6 @@ fn reflect(kernel: &ComposedKernel) -> Vec<Binding> {
         });
     }
     bindings
-}
-
-fn layout_entry(binding: &Binding) -> wgpu::BindGroupLayoutEntry {
-    let buffer = |ty| wgpu::BindingType::Buffer {
-        ty,
-        has_dynamic_offset: false,
-        min_binding_size: None,
-    };
-    let ty = match &binding.kind {
-        BindingKind::Storage { writable } => buffer(wgpu::BufferBindingType::Storage {
-            read_only: !writable,
-        }),
-        BindingKind::Uniform { .. } => buffer(wgpu::BufferBindingType::Uniform),
-        BindingKind::Texels => wgpu::BindingType::StorageTexture {
-            access: wgpu::StorageTextureAccess::ReadOnly,
-            format: TEXEL_FORMAT,
-            view_dimension: wgpu::TextureViewDimension::D2,
-        },
-    };
-    wgpu::BindGroupLayoutEntry {
-        binding: binding.binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty,
-        count: None,
-    }
 }
 
 impl Gpu {
@@ -165,7 +136,7 @@ impl Gpu {
         start: Instant,
     ) -> Result<Pipeline, GpuError> {
         let bindings = reflect(&kernel);
-        let storage = |b: &&Binding| matches!(b.kind, BindingKind::Storage { .. });
+        let storage = |b: &&Binding| b.kind == BindingKind::Storage;
         let needed = bindings.iter().filter(storage).count() as u64;
         let limit = u64::from(self.limits.max_storage_buffers_per_shader_stage);
         if needed > limit {
@@ -175,53 +146,14 @@ impl Gpu {
                 limit,
             });
         }
-        let groups = bindings.iter().map(|b| b.group + 1).max().unwrap_or(0);
-        let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let layouts: Vec<_> = (0..groups)
-            .map(|group| {
-                let mut entries: Vec<_> = bindings
-                    .iter()
-                    .filter(|b| b.group == group)
-                    .map(layout_entry)
-                    .collect();
-                entries.sort_by_key(|e| e.binding);
-                self.device
-                    .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                        label: None,
-                        entries: &entries,
-                    })
-            })
-            .collect();
-        let references: Vec<_> = layouts.iter().map(Some).collect();
-        let layout = self
-            .device
-            .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: None,
-                bind_group_layouts: &references,
-                immediate_size: 0,
-            });
         let label = kernel.composition.entry.clone();
-        let descriptor = wgpu::ShaderModuleDescriptor {
-            label: Some(&label),
-            source: wgpu::ShaderSource::Wgsl(kernel.wgsl.as_str().into()),
-        };
-        let module = if runtime_checks {
-            self.device.create_shader_module(descriptor)
-        } else {
-            // SAFETY: reached only for kernels whose checked module passed the gate on this scene
-            // and adapter: no access out of bounds was needed and every loop has a fuse.
-            unsafe {
-                self.device.create_shader_module_trusted(
-                    descriptor,
-                    wgpu::ShaderRuntimeChecks::unchecked(),
-                )
-            }
-        };
+        let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let module = self.shader_module(&label, &kernel.wgsl, runtime_checks);
         let compute = self
             .device
             .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(&label),
-                layout: Some(&layout),
+                layout: None,
                 module: &module,
                 entry_point: None,
                 compilation_options: wgpu::PipelineCompilationOptions {
@@ -234,21 +166,37 @@ impl Gpu {
         if let Some(error) = pollster::block_on(scope.pop()) {
             return Err(GpuError::Driver(format!("kernel `{label}`: {error}")));
         }
+        let groups = bindings.iter().map(|b| b.group + 1).max().unwrap_or(0);
+        let layouts = (0..groups).map(|group| compute.get_bind_group_layout(group));
         Ok(Pipeline {
+            layouts: layouts.collect(),
             kernel,
             compute,
-            layouts,
             bindings,
             made_ms: start.elapsed().as_secs_f64() * 1e3,
             first_ms: OnceLock::new(),
         })
     }
+
+    fn shader_module(&self, label: &str, wgsl: &str, runtime_checks: bool) -> wgpu::ShaderModule {
+        let descriptor = wgpu::ShaderModuleDescriptor {
+            label: Some(label),
+            source: wgpu::ShaderSource::Wgsl(wgsl.into()),
+        };
+        if runtime_checks {
+            return self.device.create_shader_module(descriptor);
+        }
+        let checks = wgpu::ShaderRuntimeChecks::unchecked();
+        // SAFETY: reached only for kernels whose checked module passed the gate on this scene and
+        // adapter: no access out of bounds was needed and every loop has a fuse.
+        unsafe { self.device.create_shader_module_trusted(descriptor, checks) }
+    }
 }
 
 impl Pipeline {
     /// Milliseconds that the first use of this kernel cost: composition, the driver's front end, and a
-    /// dispatch of no workgroups, in which drivers compile that did not so before. `None` until then; no
-    /// other time contains it.
+    /// dispatch of no workgroups, in which Mesa's `llvmpipe` does all its compiling (for a path tracer a
+    /// second there, a tenth of one before). `None` until then; no other time contains it.
     pub fn cold_ms(&self) -> Option<f64> {
         Some(self.made_ms + self.first_ms.get()?)
     }
@@ -263,21 +211,5 @@ impl Pipeline {
             binding: binding.to_owned(),
             known: known.cloned().collect::<Vec<_>>().join(", "),
         }
-    }
-
-    /// Names of everything the kernel binds.
-    pub fn binding_names(&self) -> Vec<&str> {
-        self.bindings.iter().map(|b| b.name.as_str()).collect()
-    }
-
-    /// Offsets of the members of a uniform struct, as reflected from the composed kernel.
-    pub fn uniform_members(&self, name: &str) -> Option<&[(String, u32)]> {
-        self.bindings
-            .iter()
-            .find(|b| b.name == name)
-            .and_then(|b| match &b.kind {
-                BindingKind::Uniform { members, .. } => Some(members.as_slice()),
-                BindingKind::Storage { .. } | BindingKind::Texels => None,
-            })
     }
 }

@@ -199,11 +199,8 @@ impl Kept {
                     let key = (place, binding.group, binding.binding);
                     Resource::Buffer(self.uniform(gpu, key, bytes)?)
                 }
-                BindingKind::Storage { .. } | BindingKind::Texels => {
-                    let lend = |scratch: &Storage| match scratch {
-                        Storage::Scratch { name, .. } => self.scratch.get(name),
-                        Storage::Own(_) => None,
-                    };
+                BindingKind::Storage | BindingKind::Texels => {
+                    let lend = |name: &str| self.scratch.get(name);
                     run.bindings.resource(gpu, &run.pipeline, binding, lend)?
                 }
             };

@@ -1,7 +1,7 @@
 //! What the adapter's arithmetic and loops do, found out at start.
 
 use super::compose::Composition;
-use super::{Bindings, Dispatch, Gpu, GpuError, LOOPS_CUT, UniformValues, groups_for};
+use super::{Bindings, Gpu, GpuError, LOOPS_CUT, Recording, Storage, UniformValues, groups_for};
 use serde::{Deserialize, Serialize};
 
 /// Whether the adapter computes like IEEE f32 on the host in the patterns that traversal uses.
@@ -61,12 +61,11 @@ pub fn probe_arithmetic(gpu: &Gpu) -> Result<ArithmeticProbe, GpuError> {
     bindings
         .buffer("probe_in", &gpu.storage("probe_in", &input)?)
         .buffer("probe_out", &output);
-    gpu.run(&Dispatch {
-        pipeline: &pipeline,
-        bindings: &bindings,
-        groups: groups_for(COUNT),
-    })?;
-    let result: Vec<[f32; 8]> = gpu.read(&output)?;
+    let mut recording = Recording::new();
+    recording
+        .run("probe", &pipeline, &bindings, groups_for(COUNT))
+        .download("probe", &output);
+    let result: Vec<[f32; 8]> = gpu.play(&recording)?.download("probe")?;
     let all = |expected: fn(&[f32; 4]) -> f32, lane: usize| {
         input
             .iter()
@@ -111,21 +110,23 @@ pub(super) fn probe_loops(gpu: &Gpu) -> Result<Option<u32>, GpuError> {
     let pipeline = gpu.pipeline(&kernel, true)?;
     let mut limit = None;
     for [outer, inner] in LOOPS {
-        let turns = gpu.zeroed("turns", 8)?;
-        let status = gpu.zeroed("status", 64)?;
+        let [turns, status] = [("turns", 8), ("status", 64)].map(|(n, b)| Storage::scratch(n, b));
         let loops = UniformValues::new().u32("outer", outer).u32("inner", inner);
         let mut bindings = Bindings::new();
         bindings
             .buffer("turns", &turns)
             .buffer("status", &status)
             .uniform("loops", loops);
-        gpu.run(&Dispatch {
-            pipeline: &pipeline,
-            bindings: &bindings,
-            groups: [1, 1, 1],
-        })?;
-        let taken = gpu.read::<u32>(&turns)?[0];
-        let noticed = gpu.read::<u32>(&status)?[0] & LOOPS_CUT != 0;
+        let mut recording = Recording::new();
+        recording
+            .clear(&turns)
+            .clear(&status)
+            .run("loops", &pipeline, &bindings, [1, 1, 1])
+            .download("turns", &turns)
+            .download("status", &status);
+        let played = gpu.play(&recording)?;
+        let taken = played.download::<u32>("turns")?[0];
+        let noticed = played.download::<u32>("status")?[0] & LOOPS_CUT != 0;
         let wanted = outer * inner;
         if taken == wanted && !noticed {
             continue;

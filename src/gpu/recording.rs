@@ -183,25 +183,13 @@ impl Played {
     }
 }
 
-/// One dispatch: which kernel, over what.
-pub struct Dispatch<'a> {
-    /// The kernel.
-    pub pipeline: &'a Arc<Pipeline>,
-    /// Its buffers and values.
-    pub bindings: &'a Bindings,
-    /// Workgroups in x, y, z.
-    pub groups: [u32; 3],
-}
-
 impl Gpu {
-    /// Runs one dispatch to its end and measures it.
+    /// Plays a recording that is played once: [`Player::play`] of a player of its own.
     ///
     /// # Errors
     /// As [`Player::play`].
-    pub fn run(&self, dispatch: &Dispatch) -> Result<Elapsed, GpuError> {
-        let mut recording = Recording::new();
-        recording.run("", dispatch.pipeline, dispatch.bindings, dispatch.groups);
-        Ok(Player::new(self).play(&recording)?.elapsed())
+    pub fn play(&self, recording: &Recording) -> Result<Played, GpuError> {
+        Player::new(self).play(recording)
     }
 
     /// Copies a buffer to the host.
@@ -209,8 +197,7 @@ impl Gpu {
     /// # Errors
     /// The device is lost or does not finish in time.
     pub fn read<T: Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
-        let mut recording = Recording::new();
-        recording.download("", buffer);
-        Player::new(self).play(&recording)?.download("")
+        self.play(Recording::new().download("", buffer))?
+            .download("")
     }
 }

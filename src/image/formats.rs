@@ -65,15 +65,23 @@ impl FileFormat {
     /// # Errors
     /// [`ImageError::Encode`], [`ImageError::Write`].
     pub fn write(&self, path: &Path, image: &Image) -> Result<(), ImageError> {
-        let bytes = (self.encode)(image).map_err(|source| ImageError::Encode {
-            path: path.to_owned(),
-            source,
-        })?;
-        write_atomic(path, &bytes).map_err(|source| ImageError::Write {
-            path: path.to_owned(),
-            source,
-        })
+        save(path, (self.encode)(image))
     }
+}
+
+/// Writes an encoded picture, whole or not at all.
+pub(super) fn save(
+    path: &Path,
+    encoded: Result<Vec<u8>, image::ImageError>,
+) -> Result<(), ImageError> {
+    let bytes = encoded.map_err(|source| ImageError::Encode {
+        path: path.to_owned(),
+        source,
+    })?;
+    write_atomic(path, &bytes).map_err(|source| ImageError::Write {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 fn encode_hdr(image: &Image) -> Result<Vec<u8>, image::ImageError> {

@@ -1,7 +1,7 @@
 //! Pictures to look at: tone mapping, error maps and PNG files.
 
+use super::formats::save;
 use super::{Image, ImageError, is_finite, luminance};
-use crate::atomic::write_atomic;
 use std::io;
 use std::path::Path;
 
@@ -61,14 +61,7 @@ pub fn tone_map(image: &Image, exposure: f32) -> Picture {
 /// # Errors
 /// [`ImageError::Write`], [`ImageError::Encode`].
 pub fn write_png(path: &Path, picture: &Picture) -> Result<(), ImageError> {
-    let bytes = encode_png(picture).map_err(|source| ImageError::Encode {
-        path: path.to_owned(),
-        source,
-    })?;
-    write_atomic(path, &bytes).map_err(|source| ImageError::Write {
-        path: path.to_owned(),
-        source,
-    })
+    save(path, encode_png(picture))
 }
 
 /// The bytes of a PNG file.

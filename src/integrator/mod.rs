@@ -16,7 +16,7 @@ pub use kind::{
     ConfiguredIntegrator, CountedRays, Integrator, IntegratorError, IntegratorFacts,
     RAY_COUNT_CLASSES,
 };
-pub use offset::RayOffset;
+pub use offset::{OffsetRegistry, RayOffset};
 pub use passes::ImageSteps;
 pub use registry::IntegratorRegistry;
 pub use render::{BLOCK_SAMPLES, RenderJob, Renderer, Snapshot, rounding_bound, with_sampler};

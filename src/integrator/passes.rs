@@ -39,7 +39,7 @@ impl Passes {
         let table = gpu.storage("sampler_table", job.sampler.table.words())?;
         let mut bindings = scene.bindings.clone();
         let chosen = scene.triangles.intersection.activate(Composition::new(""));
-        let mut chosen = scene.offset.activate(chosen);
+        let mut chosen = job.offset.activate(chosen);
         // Kernels that call no structure are the same with all of them.
         if job.integrator.facts.needs_inline {
             bindings = bindings.merged(&traced.bindings);

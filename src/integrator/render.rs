@@ -5,6 +5,7 @@
 //! exactly the samples asked for.
 
 use super::kind::ConfiguredIntegrator;
+use super::offset::RayOffset;
 use super::passes::{ImageSteps, Passes};
 use super::slice::{Slice, job_uniform};
 use super::tables::SceneBuffers;
@@ -46,6 +47,8 @@ pub struct RenderJob<'a> {
     pub sampler: &'a Sampler,
     /// What is computed per sample.
     pub integrator: &'a ConfiguredIntegrator,
+    /// Where rays that leave a surface start.
+    pub offset: RayOffset,
     /// Whether the driver's checks are on.
     pub runtime_checks: bool,
 }
@@ -113,8 +116,8 @@ pub fn with_sampler(mut composition: Composition, sampler: &Sampler) -> Composit
         composition = composition.constant(name, value);
     }
     composition
-        .with("sequence", sampler.sequence.kernel())
-        .with("decorrelation", sampler.decorrelation.kernel())
+        .with("sequence", &sampler.sequence.kernel())
+        .with("decorrelation", &sampler.decorrelation.kernel())
 }
 
 /// Samples for which an integrator's buffers between passes have room.

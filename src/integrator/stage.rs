@@ -91,16 +91,14 @@ impl Stage {
     /// # Errors
     /// As [`Stage::traced`], or nothing is called so.
     pub fn structure(&self, registry: &AccelRegistry, name: &str) -> Result<Traced, StageError> {
-        let entries = registry.entries();
-        let entry = entries.iter().find(|entry| entry.name == name);
-        let (Some(kind), Some(entry)) = (registry.get(name), entry) else {
+        let kind = registry.get(name).ok_or_else(|| {
             let known: Vec<&str> = registry.iter().map(AccelKind::name).collect();
-            return Err(StageError::Unknown {
+            StageError::Unknown {
                 name: name.to_owned(),
                 known: known.join(", "),
-            });
-        };
-        self.traced(kind, &entry.default_variant().params)
+            }
+        })?;
+        self.traced(kind, &Params::default())
     }
 
     /// What answers buffers of rays through a structure of this scene.

@@ -1,6 +1,6 @@
 //! Scene buffers for shading: canonical triangles, materials, lights, textures.
 
-use super::offset::{RayOffset, TransformError};
+use super::offset::TransformError;
 use crate::accel::{TriangleBuffers, TriangleSoup};
 use crate::gpu::{Bindings, Gpu, GpuError};
 use crate::scene::{DIFFUSE, Daylight, MATERIAL_KINDS, MaterialKind, SceneData};
@@ -40,8 +40,6 @@ pub struct SceneBuffers {
     pub bindings: Bindings,
     /// The triangles alone, and how rays meet them.
     pub triangles: TriangleBuffers,
-    /// Where rays that leave a surface start; integrators ask.
-    pub offset: RayOffset,
     /// What instances add to the error of points.
     pub transform_error: TransformError,
     /// What kernels must carry.
@@ -89,7 +87,6 @@ impl SceneBuffers {
         Ok(Self {
             bindings,
             triangles,
-            offset: RayOffset::default(),
             transform_error: TransformError::of(soup),
             features: SceneFeatures {
                 textures: textured,

@@ -244,6 +244,11 @@ mod tests {
         images.iter().map(scale).collect()
     }
 
+    /// The check with default options.
+    fn check(replicates: &[Image], parts: &[Image]) -> BiasCheck {
+        check_bias(replicates, parts, BiasOptions::default()).unwrap()
+    }
+
     #[test]
     fn a_bias_of_the_whole_image_is_found_in_either_direction_though_no_tile_shows_it() {
         let mut generator = Pcg32::new(77);
@@ -251,7 +256,11 @@ mod tests {
         let images = noisy(16, 0.2, &mut generator);
         // Standard error of the mean of 16 images of 1,056 pixels, against 16 more.
         let error = 0.2 / 3f64.sqrt() / (1056.0f64 * 16.0).sqrt() * 2f64.sqrt();
-        for bias in [0.0, 8.0, -8.0] {
+        for (bias, expected) in [
+            (0.0, BiasVerdict::NoBiasFound),
+            (8.0, BiasVerdict::Biased),
+            (-8.0, BiasVerdict::Biased),
+        ] {
             let images = scaled(&images, 1.0 + bias * error);
             let options = BiasOptions {
                 tile: 2,
@@ -262,10 +271,6 @@ mod tests {
             assert!((whole.t - bias).abs() < 3.5, "{bias}: {whole:?}");
             assert_eq!(check.rejected.len(), 0, "{bias}");
             assert!((25.0..=30.0).contains(&whole.degrees_of_freedom));
-            let expected = match bias == 0.0 {
-                true => BiasVerdict::NoBiasFound,
-                false => BiasVerdict::Biased,
-            };
             assert_eq!(check.verdict, expected, "{bias}: {whole:?}");
         }
     }
@@ -274,18 +279,14 @@ mod tests {
     fn too_few_replicates_say_how_many_are_needed_and_find_a_large_bias_still() {
         let mut generator = Pcg32::new(78);
         let reference = noisy(8, 0.2, &mut generator);
-        let mut images = noisy(3, 0.2, &mut generator);
-        let few = check_bias(&images, &reference, BiasOptions::default()).unwrap();
+        let images = noisy(3, 0.2, &mut generator);
+        let few = check(&images, &reference);
         let needed = replicates_needed(BiasOptions::default().alpha);
         let words = format!("not testable: 3 replicates, {needed} are needed");
-        assert!(
-            few.verdict.to_string().starts_with(&words),
-            "{}",
-            few.verdict
-        );
+        let said = few.verdict.to_string();
+        assert!(said.starts_with(&words), "{said}");
         assert!(few.whole.is_some(), "the figures are told all the same");
-        images = scaled(&images, 1.5);
-        let biased = check_bias(&images, &reference, BiasOptions::default()).unwrap();
+        let biased = check(&scaled(&images, 1.5), &reference);
         assert_eq!(biased.verdict, BiasVerdict::Biased);
     }
 
@@ -299,18 +300,27 @@ mod tests {
         let found = (0..200).filter(|_| {
             let images = noisy(needed as usize, 0.2, &mut generator);
             let images = scaled(&images, 1.0 - EFFECT * error);
-            let check = check_bias(&images, &reference, BiasOptions::default()).unwrap();
-            check.verdict == BiasVerdict::Biased
+            check(&images, &reference).verdict == BiasVerdict::Biased
         });
         // 90 % or a little more, standard deviation 2 %.
         let share = found.count() as f64 / 200.0;
         assert!(share > 0.84, "{share}");
     }
 
+    fn brighten_tile(images: &[Image], factor: f32) -> Vec<Image> {
+        let mut images = images.to_vec();
+        for image in &mut images {
+            for (x, y) in (0..64).map(|i| (16 + i % 8, 8 + i / 8)) {
+                let pixel = &mut image.pixels[y * WIDTH as usize + x];
+                *pixel = pixel.map(|v| v * factor);
+            }
+        }
+        images
+    }
+
     #[test]
     fn rounding_of_a_constant_is_no_bias_and_one_percent_in_a_tile_is() {
-        let mut generator = Pcg32::new(80);
-        let exact = noisy(8, 0.0, &mut generator);
+        let exact = noisy(8, 0.0, &mut Pcg32::new(80));
         let rounding = crate::integrator::rounding_bound(1 << 16);
         let options = BiasOptions {
             rounding,
@@ -320,29 +330,26 @@ mod tests {
         let sum = (0..1 << 16).fold(0.0f32, |sum, _| sum + 0.1);
         let plain = f64::from(sum / 65_536.0) / f64::from(0.1f32);
         assert!((plain - 1.0).abs() > 1e-4, "{plain}");
-        for (factor, verdict) in [
-            (1.0 + 0.9 * rounding, BiasVerdict::NoBiasFound),
-            (1.0 - 0.9 * rounding, BiasVerdict::NoBiasFound),
-            (1.0 + 1.1 * rounding, BiasVerdict::Biased),
+        for (images, verdict, rejected) in [
+            (
+                scaled(&exact, 1.0 + 0.9 * rounding),
+                BiasVerdict::NoBiasFound,
+                0,
+            ),
+            (
+                scaled(&exact, 1.0 - 0.9 * rounding),
+                BiasVerdict::NoBiasFound,
+                0,
+            ),
+            (
+                scaled(&exact, 1.0 + 1.1 * rounding),
+                BiasVerdict::Biased,
+                18,
+            ),
+            (brighten_tile(&exact, 1.01), BiasVerdict::Biased, 1),
         ] {
-            let check = check_bias(&scaled(&exact, factor), &exact, options).unwrap();
-            assert_eq!(check.verdict, verdict, "{factor}");
-        }
-        let mut images = exact.clone();
-        brighten_tile(&mut images, 1.01);
-        let check = check_bias(&images, &exact, options).unwrap();
-        assert_eq!(
-            (check.verdict, check.rejected),
-            (BiasVerdict::Biased, vec![[16, 8]])
-        );
-    }
-
-    fn brighten_tile(images: &mut [Image], factor: f32) {
-        for image in images {
-            for (x, y) in (0..64).map(|i| (16 + i % 8, 8 + i / 8)) {
-                let pixel = &mut image.pixels[y * WIDTH as usize + x];
-                *pixel = pixel.map(|v| v * factor);
-            }
+            let check = check_bias(&images, &exact, options).unwrap();
+            assert_eq!((check.verdict, check.rejected.len()), (verdict, rejected));
         }
     }
 
@@ -350,13 +357,12 @@ mod tests {
     fn a_planted_bias_of_a_few_percent_in_one_tile_is_found_there() {
         let mut generator = Pcg32::new(5);
         let parts = noisy(8, 0.1, &mut generator);
-        let mut replicates = noisy(8, 0.2, &mut generator);
-        let before = check_bias(&replicates, &parts, BiasOptions::default()).unwrap();
+        let replicates = noisy(8, 0.2, &mut generator);
+        let before = check(&replicates, &parts);
         assert_eq!(before.verdict, BiasVerdict::NoBiasFound);
         assert_eq!(before.tiles, 6 * 3);
         assert_eq!(before.p_histogram.iter().sum::<usize>(), before.tiles);
-        brighten_tile(&mut replicates, 1.06);
-        let after = check_bias(&replicates, &parts, BiasOptions::default()).unwrap();
+        let after = check(&brighten_tile(&replicates, 1.06), &parts);
         assert_eq!(after.verdict, BiasVerdict::Biased);
         assert_eq!(after.rejected, [[16, 8]]);
         assert!(after.min_p < 1e-4);
@@ -370,68 +376,45 @@ mod tests {
             alpha: 0.05,
             ..BiasOptions::default()
         };
-        let mut histogram = [0; 10];
-        let alarms = (0..trials)
-            .filter(|_| {
-                let parts = noisy(4, 0.3, &mut generator);
-                let replicates = noisy(8, 0.5, &mut generator);
-                let check = check_bias(&replicates, &parts, options).unwrap();
-                histogram
-                    .iter_mut()
-                    .zip(check.p_histogram)
-                    .for_each(|(h, c)| *h += c);
-                check.verdict == BiasVerdict::Biased
-            })
-            .count();
+        let (mut alarms, mut histogram) = (0, [0; 10]);
+        for _ in 0..trials {
+            let parts = noisy(4, 0.3, &mut generator);
+            let replicates = noisy(8, 0.5, &mut generator);
+            let check = check_bias(&replicates, &parts, options).unwrap();
+            let bins = histogram.iter_mut().zip(check.p_histogram);
+            bins.for_each(|(sum, count)| *sum += count);
+            alarms += u32::from(check.verdict == BiasVerdict::Biased);
+        }
         // At most 20 expected of 400, standard deviation 4.4.
         assert!(alarms <= 30, "{alarms} false alarms in {trials}");
         let tiles: usize = histogram.iter().sum();
-        for count in histogram {
-            let share = count as f64 / tiles as f64;
-            assert!(
-                (0.08..0.12).contains(&share),
-                "p-values not flat: {histogram:?}"
-            );
-        }
+        let shares = histogram.map(|count| count as f64 / tiles as f64);
+        let flat = shares.iter().all(|share| (0.08..0.12).contains(share));
+        assert!(flat, "p-values not flat: {shares:?}");
     }
 
     #[test]
     fn tiles_without_noise_are_equal_or_biased() {
-        let mut generator = Pcg32::new(7);
-        let flat = noisy(3, 0.0, &mut generator);
-        let equal = check_bias(&flat, &flat, BiasOptions::default()).unwrap();
+        let flat = noisy(3, 0.0, &mut Pcg32::new(7));
+        let equal = check(&flat, &flat);
         assert_eq!(equal.verdict, BiasVerdict::NoBiasFound);
         assert_eq!((equal.min_p, equal.p_histogram[9]), (1.0, equal.tiles));
-        let mut rounded = flat.clone();
-        brighten_tile(&mut rounded, 1.0 + 1e-6);
-        let rounded = check_bias(&rounded, &flat, BiasOptions::default()).unwrap();
+        let rounded = check(&brighten_tile(&flat, 1.0 + 1e-6), &flat);
         assert_eq!(rounded.verdict, BiasVerdict::NoBiasFound);
-        let mut brighter = flat.clone();
-        brighten_tile(&mut brighter, 1.001);
-        let brighter = check_bias(&brighter, &flat, BiasOptions::default()).unwrap();
+        let brighter = check(&brighten_tile(&flat, 1.001), &flat);
         assert_eq!((brighter.rejected.len(), brighter.min_p), (1, 0.0));
     }
 
     #[test]
     fn what_cannot_be_tested_says_why() {
-        let mut generator = Pcg32::new(8);
-        let mut images = noisy(3, 0.1, &mut generator);
-        let options = BiasOptions::default();
-        let single = check_bias(&images[..1], &images, options).unwrap();
-        assert!(
-            single
-                .verdict
-                .to_string()
-                .starts_with("not testable: 1 replicates")
-        );
+        let mut images = noisy(3, 0.1, &mut Pcg32::new(8));
+        let said = |check: BiasCheck| check.verdict.to_string();
+        let single = said(check(&images[..1], &images));
+        assert!(single.starts_with("not testable: 1 replicates"), "{single}");
         images[2].pixels[0][1] = f32::NAN;
-        let nan = check_bias(&images[..2], &images, options).unwrap();
-        assert!(
-            nan.verdict.to_string().contains("1 pixels of the parts"),
-            "{}",
-            nan.verdict
-        );
+        let nan = said(check(&images[..2], &images));
+        assert!(nan.contains("1 pixels of the parts"), "{nan}");
         let other = Image::new(1, 1, vec![[0.0; 3]]).unwrap();
-        assert!(check_bias(&[other.clone(), other], &images, options).is_err());
+        assert!(check_bias(&[other.clone(), other], &images, BiasOptions::default()).is_err());
     }
 }

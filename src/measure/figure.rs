@@ -119,7 +119,7 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 79] = [
+pub static FIGURES: [Figure; 80] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
@@ -192,6 +192,7 @@ pub static FIGURES: [Figure; 79] = [
     Figure::new("slowdown/v1", "slowdown", "", Lower, THREE, Single),
     Figure::new("t-ulp-p99/v1", "99th percentile of the error of t", "ulp", Lower, Digits(2), Exact),
     Figure::new("point-ulp-p99/v1", "99th percentile of the error of the point", "ulp", Lower, Digits(2), Exact),
+    Figure::new("triangles/v1", "triangles", "", Neither, Count, Exact),
     Figure::new("misses/v1", "misses", "", Lower, Count, Exact),
     Figure::new("confirmed-misses/v1", "confirmed misses", "", Lower, Count, Exact),
     Figure::new("lost-hits/v1", "lost", "", Lower, Count, Exact),

@@ -20,7 +20,7 @@ use crate::accel::{
 use crate::config::Gate;
 use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu, GpuError, kernel_errors};
-use crate::oracle::{self, OracleRay, Verdict};
+use crate::oracle::{self, Verdict};
 use crate::scene::SceneData;
 
 /// The judge is compared with brute force on at least this many rays.
@@ -42,6 +42,15 @@ pub struct Judge {
     pub instances: Option<Box<Judge>>,
 }
 
+/// What becomes of checks of a judge that were carried out before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Checks {
+    /// They are repeated.
+    Repeated,
+    /// Those of a judge that is the same to the bit are found again on disk.
+    Kept,
+}
+
 impl Judge {
     /// Builds the judge, records the rays and checks the judge itself.
     ///
@@ -53,40 +62,7 @@ impl Judge {
         camera: Camera,
         settings: &Gate,
         seed: u64,
-    ) -> Result<Self, AccelError> {
-        let mut judge = Self::unchecked(scene, soup, camera, settings, seed)?;
-        judge.check(scene, soup, settings);
-        Ok(judge)
-    }
-
-    /// [`Judge::new`], but what was checked before and is the same to the bit is not checked again.
-    ///
-    /// # Errors
-    /// As [`Judge::new`].
-    pub fn remembered(
-        scene: &SceneData,
-        soup: &TriangleSoup,
-        camera: Camera,
-        settings: &Gate,
-        seed: u64,
-    ) -> Result<Self, AccelError> {
-        let mut judge = Self::unchecked(scene, soup, camera, settings, seed)?;
-        let kept = KeptChecks::of(&judge, &scene.hash, soup.intersection, settings);
-        if !kept.as_ref().is_some_and(|kept| kept.restore(&mut judge)) {
-            judge.check(scene, soup, settings);
-            if let Some(kept) = kept {
-                kept.keep(&judge);
-            }
-        }
-        Ok(judge)
-    }
-
-    fn unchecked(
-        scene: &SceneData,
-        soup: &TriangleSoup,
-        camera: Camera,
-        settings: &Gate,
-        seed: u64,
+        past: Checks,
     ) -> Result<Self, AccelError> {
         let params = BvhParameters::default();
         let tree = BuiltBvh::build(soup, &params, &mut BuildLog::default())?;
@@ -96,6 +72,14 @@ impl Judge {
         drop(tree);
         let mut judge = Self::of_sets(sets);
         judge.instances = instance_judge::new(soup, &judge.sets, seed)?.map(Box::new);
+        let kept = match past {
+            Checks::Repeated => None,
+            Checks::Kept => KeptChecks::of(&judge, &scene.hash, soup.intersection, settings),
+        };
+        if !kept.as_ref().is_some_and(|kept| kept.restore(&mut judge)) {
+            judge.check(scene, soup, settings);
+            kept.iter().for_each(|kept| kept.keep(&judge));
+        }
         Ok(judge)
     }
 
@@ -193,10 +177,9 @@ impl Judge {
         let questions: Vec<_> = pairs
             .iter()
             .map(|(ray, hit)| {
-                (
-                    oracle_ray(&soup.intersection.raised(ray)),
-                    (hit.triangle != NO_HIT).then_some((hit.triangle, hit.t)),
-                )
+                // As it is traced: what is raised next to 0 decides at edges.
+                let answer = (hit.triangle != NO_HIT).then_some((hit.triangle, hit.t));
+                (soup.intersection.raised(ray), answer)
             })
             .collect();
         let verdicts = oracle::judge_closest_hits(&scene.triangles, &questions);
@@ -227,16 +210,6 @@ impl Judge {
     /// Whether the judge agrees with brute force and with the oracle.
     pub fn is_sound(&self) -> bool {
         self.brute_force.wrong == 0 && self.oracle.wrong == 0
-    }
-}
-
-/// A ray for the oracle: as it is traced, since what is raised next to 0 decides at edges.
-pub(super) fn oracle_ray(ray: &Ray) -> OracleRay {
-    OracleRay {
-        origin: ray.origin,
-        t_min: ray.t_min,
-        direction: ray.direction,
-        t_max: ray.t_max,
     }
 }
 
@@ -373,12 +346,11 @@ pub fn compare(
         first_wrong: None,
     };
     for (index, (ray, truth)) in set.rays.iter().zip(&set.truth).enumerate() {
-        let hit = hits.get(index).copied().unwrap_or(Hit {
+        let none = Hit {
             t: f32::NAN,
-            triangle: NO_HIT,
-            u: 0.0,
-            v: 0.0,
-        });
+            ..Hit::miss(ray)
+        };
+        let hit = hits.get(index).copied().unwrap_or(none);
         let any_right = found.get(index) == Some(&Some(truth.triangle != NO_HIT));
         if hit.same_bits(truth) && any_right {
             continue;
@@ -456,7 +428,7 @@ impl Meeting {
     fn may_hit(&self, t: f32) -> bool {
         let triangle = self.record.triangle();
         !matches!(
-            oracle::judge(&[triangle], oracle_ray(&self.ray), Some((0, t))),
+            oracle::judge(&[triangle], self.ray, Some((0, t))),
             Verdict::Wrong(_)
         )
     }

@@ -8,7 +8,6 @@
 //!
 //! They are made from the scene and a seed alone, and never timed.
 
-use super::rays::FAR;
 use crate::accel::{Counters, CpuTwin, NO_HIT, Ray, TriangleSoup};
 use crate::random::Pcg32;
 use glam::Vec3;
@@ -51,20 +50,16 @@ fn part(ray: &Ray, t: f32, turn: usize) -> Ray {
         0..=2 => [0.0, t],
         3 | 4 => [0.0, t.next_down()],
         5 => [0.0, t.next_up()],
-        6 | 7 => [t, FAR],
-        8 | 9 => [t.next_up(), FAR],
-        10 => [t.next_down(), FAR],
+        6 | 7 => [t, Ray::FAR],
+        8 | 9 => [t.next_up(), Ray::FAR],
+        10 => [t.next_down(), Ray::FAR],
         11 => [t, t],
         12 => [t, t.next_down()],
         13 => [0.0, 0.0],
         14 => [0.5 * t, 1e37],
         _ => [-0.0, 2.0 * t],
     };
-    Ray {
-        t_min,
-        t_max,
-        ..*ray
-    }
+    ray.between(t_min, t_max)
 }
 
 /// Makes rays of one scene.
@@ -111,12 +106,7 @@ impl<'a> Maker<'a> {
             _ => self.towards_a_triangle(),
         };
         let usable = direction.is_finite() && direction.abs().max_element() > 1e-16;
-        Ray {
-            origin: origin.to_array(),
-            t_min: 0.0,
-            direction: if usable { direction } else { Vec3::Y }.to_array(),
-            t_max: FAR,
-        }
+        Ray::new(origin, if usable { direction } else { Vec3::Y })
     }
 
     fn unit(&mut self) -> f32 {

@@ -3,7 +3,7 @@
 //! equal to the bit here too; flat triangles in world space round otherwise and judge flat
 //! structures only.
 
-use super::gate::{Judge, Meeting, oracle_ray};
+use super::gate::{Judge, Meeting};
 use super::rays::RaySet;
 use super::record::RayClass;
 use crate::accel::{
@@ -11,7 +11,7 @@ use crate::accel::{
 };
 use crate::config::Gate;
 use crate::geometry::Triangle;
-use crate::oracle::{self, OracleRay, Verdict};
+use crate::oracle::{self, Verdict};
 use crate::scene::Instance;
 use glam::DVec3;
 
@@ -67,12 +67,11 @@ fn oracle_verdicts(placed: &Placed, pairs: &[(Ray, Hit)]) -> Vec<Verdict> {
             for (pair, (ray, hit)) in pairs.iter().enumerate() {
                 let tests = object.intersection;
                 let local = placed.object_ray(instance, &tests.raised(ray));
-                let local = oracle_ray(&tests.raised(&local));
+                let local = tests.raised(&local);
                 questions.push(if ids.contains(&hit.triangle) {
                     (local, Some((hit.triangle - instance.first, hit.t)))
                 } else {
-                    let t_max = hit.t;
-                    (OracleRay { t_max, ..local }, None)
+                    (local.between(local.t_min, hit.t), None)
                 });
                 asked.push(pair);
             }

@@ -151,36 +151,25 @@ fn program() -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::{Hit, NO_HIT, Ray};
+    use crate::accel::{Hit, Ray};
     use crate::measure::rays::RaySet;
     use crate::measure::record::RayClass;
 
     fn judge(t: f32) -> Judge {
-        let ray = Ray {
-            origin: [0.0; 3],
-            t_min: 0.0,
-            direction: [1.0; 3],
-            t_max: 1.0,
-        };
         let checked = JudgeCheck {
             rays: 7,
             ..JudgeCheck::default()
         };
+        let ray = Ray::new([0.0; 3], [1.0; 3]).between(0.0, t);
+        let set = RaySet {
+            class: RayClass::Chord,
+            truth: vec![Hit::miss(&ray)],
+            rays: vec![ray],
+        };
         Judge {
-            sets: vec![RaySet {
-                class: RayClass::Chord,
-                rays: vec![ray],
-                truth: vec![Hit {
-                    t,
-                    triangle: NO_HIT,
-                    u: 0.0,
-                    v: 0.0,
-                }],
-            }],
             brute_force: checked.clone(),
             oracle: checked,
-            first_wrong: None,
-            instances: None,
+            ..Judge::of_sets(vec![set])
         }
     }
 

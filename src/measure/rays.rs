@@ -14,8 +14,6 @@ use crate::scene::{Bounds, SceneData};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Longest distance of unbounded rays; a kernel multiplies it by pads without overflow.
-pub const FAR: f32 = 1e30;
 /// Origins are moved off their surface by this fraction of the scene's diagonal.
 const OFFSET: f32 = 1e-5;
 /// Length of AO rays as a fraction of the scene's diagonal.
@@ -72,26 +70,19 @@ impl RaySet {
     }
 }
 
-/// Camera rays through pixel centres, 8×8 tiles row by row.
+/// Camera rays through the centres of [`primary_pixels`].
 pub fn primary_rays(camera: Camera, width: u32, height: u32) -> Vec<Ray> {
     let [forward, right, up] = camera.basis([width, height]);
-    let mut rays = Vec::with_capacity((width * height) as usize);
-    for tile_y in (0..height).step_by(TILE as usize) {
-        for tile_x in (0..width).step_by(TILE as usize) {
-            for y in tile_y..(tile_y + TILE).min(height) {
-                for x in tile_x..(tile_x + TILE).min(width) {
-                    let s = 2.0 * (x as f32 + 0.5) / width as f32 - 1.0;
-                    let t = 1.0 - 2.0 * (y as f32 + 0.5) / height as f32;
-                    let direction = (forward + right * s + up * t).normalize();
-                    rays.push(ray(camera.eye, direction, FAR));
-                }
-            }
-        }
-    }
-    rays
+    let ray = |pixel: u32| {
+        let s = 2.0 * ((pixel % width) as f32 + 0.5) / width as f32 - 1.0;
+        let t = 1.0 - 2.0 * ((pixel / width) as f32 + 0.5) / height as f32;
+        Ray::new(camera.eye, (forward + right * s + up * t).normalize())
+    };
+    let pixels = primary_pixels(width, height);
+    pixels.into_iter().map(ray).collect()
 }
 
-/// Position in the image of each ray of [`primary_rays`], as `y * width + x`.
+/// The pixels of an image in 8×8 tiles, row by row, as `y * width + x`.
 pub fn primary_pixels(width: u32, height: u32) -> Vec<u32> {
     let mut pixels = Vec::with_capacity((width * height) as usize);
     for tile_y in (0..height).step_by(TILE as usize) {
@@ -102,15 +93,6 @@ pub fn primary_pixels(width: u32, height: u32) -> Vec<u32> {
         }
     }
     pixels
-}
-
-fn ray(origin: Vec3, direction: Vec3, t_max: f32) -> Ray {
-    Ray {
-        origin: origin.to_array(),
-        t_min: 0.0,
-        direction: direction.to_array(),
-        t_max,
-    }
 }
 
 /// Point and unit normal, on the side of the ray, of every primary hit.
@@ -167,14 +149,14 @@ pub fn record_rays(
         let shadow = starts().map(|(p, _)| {
             let target = light_point(scene, &emitters, &bounds, &mut random);
             // A little short of the emitter, which must not shadow itself.
-            ray(p, target - p, 0.9999)
+            Ray::new(p, target - p).between(0.0, 0.9999)
         });
         let shadow = shadow.collect();
         let ao = starts()
-            .map(|(p, n)| ray(p, cosine_direction(n, &mut random), ao_length))
+            .map(|(p, n)| Ray::new(p, cosine_direction(n, &mut random)).between(0.0, ao_length))
             .collect();
         let bounce = starts()
-            .map(|(p, n)| ray(p, cosine_direction(n, &mut random), FAR))
+            .map(|(p, n)| Ray::new(p, cosine_direction(n, &mut random)))
             .collect();
         sets.push(RaySet::new(RayClass::Shadow, shadow, judge));
         sets.push(RaySet::new(RayClass::Ao, ao, judge));
@@ -193,7 +175,7 @@ pub fn record_rays(
         let direction = (inside(&mut random) - from)
             .try_normalize()
             .unwrap_or(Vec3::X);
-        ray(from, direction, FAR)
+        Ray::new(from, direction)
     });
     sets.push(RaySet::new(RayClass::Chord, chords.collect(), judge));
     if soup.intersection.bears_hard_rays() {

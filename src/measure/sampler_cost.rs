@@ -5,9 +5,9 @@
 //! Both run by turns, and the difference is what counts: a throughput over all units of the adapter,
 //! not a latency.
 
-use super::record::Interval;
+use super::record::SamplerCostRecord;
 use super::statistics::median_interval;
-use crate::gpu::{Bindings, Composition, Dispatch, Gpu, GpuError, UniformValues, groups_for};
+use crate::gpu::{Bindings, Composition, Gpu, GpuError, Recording, UniformValues, groups_for};
 use crate::integrator::with_sampler;
 use crate::sampling::Sampler;
 
@@ -22,20 +22,6 @@ const TURNS_PER_DRAW: u32 = 33;
 /// A dispatch should take about so long, milliseconds.
 const DISPATCH_MS: f64 = 25.0;
 const ROUNDS: usize = 9;
-
-/// What a sampler costs on an adapter.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SamplerCost {
-    /// Nanoseconds of adapter time per two-dimensional sample, loop taken off: median of the rounds with
-    /// its 95 % interval. Near zero it may be negative.
-    pub ns_per_sample: Interval,
-    /// Nanoseconds of the loop that was taken off.
-    pub loop_ns_per_sample: Interval,
-    /// Two-dimensional samples of one dispatch.
-    pub samples: u64,
-    /// BLAKE3 of the kernel that draws.
-    pub kernel_hash: String,
-}
 
 /// The two kernels with what they read.
 struct Loop<'a> {
@@ -55,22 +41,19 @@ impl Loop<'_> {
             .u32("seed", 1);
         bindings.uniform("cost", values);
         let pipeline = self.gpu.pipeline(kernel, true)?;
-        let elapsed = self.gpu.run(&Dispatch {
-            pipeline: &pipeline,
-            bindings: &bindings,
-            groups: groups_for(PIXELS),
-        })?;
-        Ok(elapsed.ms())
+        let mut recording = Recording::new();
+        recording.run("cost", &pipeline, &bindings, groups_for(PIXELS));
+        Ok(self.gpu.play(&recording)?.elapsed().ms())
     }
 }
 
-/// Measures what a sampler costs on this adapter. Samples are those that it was made for, from the
+/// Measures what a sampler costs on this adapter; also returns the BLAKE3 of the kernel that draws. Samples are those that it was made for, from the
 /// first on; dimensions the first eight of them.
 ///
 /// # Errors
 /// The sampler was made for less than two dimensions, its kernel does not run, or its table is too
 /// large.
-pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<SamplerCost, GpuError> {
+pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<(SamplerCostRecord, String), GpuError> {
     let pairs = (sampler.demand.dimensions / 2).min(MOST_PAIRS);
     if pairs == 0 {
         return Err(GpuError::Kernel(format!(
@@ -117,10 +100,9 @@ pub fn sampler_cost(gpu: &Gpu, sampler: &Sampler) -> Result<SamplerCost, GpuErro
         median_interval(values)
             .ok_or_else(|| GpuError::Driver("a clock returned what is no time".to_owned()))
     };
-    Ok(SamplerCost {
+    let record = SamplerCostRecord {
         ns_per_sample: interval(&drawn)?,
         loop_ns_per_sample: interval(&looped)?,
-        samples: count,
-        kernel_hash: gpu.pipeline(&drawing, true)?.kernel.hash(),
-    })
+    };
+    Ok((record, gpu.pipeline(&drawing, true)?.kernel.hash()))
 }

@@ -5,7 +5,7 @@
 //! from a buffer and imports the same modules as the renderer, under the same constants and with the same
 //! table.
 
-use crate::gpu::{Bindings, Composition, Dispatch, Gpu, GpuError, UniformValues, groups_for};
+use crate::gpu::{Bindings, Composition, Gpu, GpuError, Recording, UniformValues, groups_for};
 use crate::integrator::with_sampler;
 use crate::random::Pcg32;
 use crate::sampling::{Coordinate, Sampler};
@@ -183,12 +183,16 @@ pub fn dump_stream(
                 "dump",
                 UniformValues::new().u32("count", words.len() as u32),
             );
-        gpu.run(&Dispatch {
-            pipeline: &pipeline,
-            bindings: &bindings,
-            groups: groups_for(words.len() as u32),
-        })?;
-        let mut out: Vec<u32> = gpu.read(&stream)?;
+        let mut recording = Recording::new();
+        recording
+            .run(
+                "words",
+                &pipeline,
+                &bindings,
+                groups_for(words.len() as u32),
+            )
+            .download("stream", &stream);
+        let mut out: Vec<u32> = gpu.play(&recording)?.download("stream")?;
         out.truncate(words.len());
         Ok::<_, GpuError>(out)
     };

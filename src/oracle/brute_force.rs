@@ -1,8 +1,7 @@
 //! Which triangles a ray may hit at all: every one whose group the ray's line meets.
 
-use super::OracleRay;
 use super::groups::{Groups, Line};
-use crate::geometry::Triangle;
+use crate::geometry::{Ray, Triangle};
 use rayon::prelude::*;
 
 /// From so many rays on it pays to bring neighbours together.
@@ -10,10 +9,10 @@ const MANY: usize = 64;
 
 /// For each ray the triangles that it may hit, increasing; all triangles of which an f32 test could answer
 /// a point near the triangle are among them, wherever on the ray's line.
-pub(super) fn candidates(triangles: &[Triangle], rays: &[OracleRay]) -> Vec<Vec<u32>> {
+pub(super) fn candidates(triangles: &[Triangle], rays: &[Ray]) -> Vec<Vec<u32>> {
     let corners = |id: usize| triangles[id].vertices.map(|v| v.to_array());
     let groups = Groups::new(triangles.len(), rays.len() >= MANY, corners);
-    let of_ray = |ray: &OracleRay| {
+    let of_ray = |ray: &Ray| {
         let line = Line::whole(ray.origin, ray.direction);
         let mut found = Vec::new();
         groups.visit(&line, |group| {
@@ -41,17 +40,10 @@ mod tests {
         // Groups of neighbours are small against the scene only where there are many triangles.
         let mut triangle = |_| {
             let centre = vector();
-            Triangle {
-                vertices: [0; 3].map(|_| centre + 0.05 * vector()),
-            }
+            [0; 3].map(|_| centre + 0.05 * vector()).into()
         };
         let soup: Vec<Triangle> = (0..6000).map(&mut triangle).collect();
-        let mut ray = |_| OracleRay {
-            origin: (1.5 * vector()).to_array(),
-            t_min: 0.0,
-            direction: vector().to_array(),
-            t_max: f32::INFINITY,
-        };
+        let mut ray = |_| Ray::new(1.5 * vector(), vector());
         let rays: Vec<_> = (0..200).map(&mut ray).collect();
         let candidates = candidates(&soup, &rays);
         let mut possible = 0;

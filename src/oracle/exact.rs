@@ -19,9 +19,8 @@
 //! Floating-Point Arithmetic*, GROW-EXPANSION). Products stay between 2⁻⁴⁴⁷ and 2³⁸⁴: nothing underflows
 //! or overflows for any finite f32 input.
 
-use super::OracleRay;
 use super::triangle::{Vector, cross, dot, subtract, widen};
-use crate::geometry::Triangle;
+use crate::geometry::{Ray, Triangle};
 
 /// Half an ulp of 1 in f64.
 const EPSILON: f64 = f64::EPSILON / 2.0;
@@ -58,7 +57,7 @@ pub struct ExactCrossing {
 
 impl ExactCrossing {
     /// Looks at one triangle. Every number of `ray` and `triangle` must be finite, but for `t_max`.
-    pub fn new(triangle: &Triangle, ray: &OracleRay) -> Self {
+    pub fn new(triangle: &Triangle, ray: &Ray) -> Self {
         let pair = Pair::new(triangle, ray);
         let signs = pair.edges().map(|e| e.sign());
         let positive = signs.contains(&1);
@@ -135,7 +134,7 @@ struct Determinant {
 }
 
 impl Pair {
-    fn new(triangle: &Triangle, ray: &OracleRay) -> Self {
+    fn new(triangle: &Triangle, ray: &Ray) -> Self {
         let v = triangle.vertices.map(|v| widen(v.to_array()));
         let o = widen(ray.origin);
         Self {
@@ -311,9 +310,8 @@ mod tests {
         };
         let edges = [det(d, b, c), det(d, c, a), det(d, a, b)];
         let whole: i128 = edges.iter().sum();
-        let (any_positive, any_negative) =
-            (edges.iter().any(|e| *e > 0), edges.iter().any(|e| *e < 0));
-        let side = match (whole == 0, any_positive && any_negative, edges.contains(&0)) {
+        let of_both_signs = edges.iter().any(|e| *e > 0) && edges.iter().any(|e| *e < 0);
+        let side = match (whole == 0, of_both_signs, edges.contains(&0)) {
             (true, ..) => Side::Parallel,
             (_, true, _) => Side::Outside,
             (_, _, true) => Side::Edge,
@@ -341,22 +339,14 @@ mod tests {
             let corners = [0; 3].map(|_| point(&mut random, extent));
             let origin = point(&mut random, extent);
             // Half of the rays are aimed exactly at a corner.
-            let target = if round.is_multiple_of(2) {
-                corners[0]
-            } else {
-                point(&mut random, extent)
+            let target = match round % 2 {
+                0 => corners[0],
+                _ => point(&mut random, extent),
             };
             let direction = [0, 1, 2].map(|k| target[k] - origin[k]);
             let (side, [volume, whole]) = by_integers(corners, origin, direction);
-            let triangle = Triangle {
-                vertices: corners.map(|v| Vec3::from(f32s(v, unit))),
-            };
-            let ray = OracleRay {
-                origin: f32s(origin, unit),
-                t_min: 0.0,
-                direction: f32s(direction, unit),
-                t_max: f32::INFINITY,
-            };
+            let triangle = corners.map(|v| Vec3::from(f32s(v, unit))).into();
+            let ray = Ray::new(f32s(origin, unit), f32s(direction, unit));
             let found = ExactCrossing::new(&triangle, &ray);
             assert_eq!(found.side, side, "{corners:?} {origin:?} {direction:?}");
             seen[side as usize] += 1;
@@ -376,13 +366,7 @@ mod tests {
         let side = |y: f32| {
             let corner = Vec3::new(1.0, y, 0.0);
             let vertices = [corner, Vec3::new(far, far, 1.0), Vec3::new(far, -far, 1.0)];
-            let ray = OracleRay {
-                origin: [0.0, 0.0, 0.0],
-                t_min: 0.0,
-                direction: [1.0, 1.0, 0.0],
-                t_max: f32::INFINITY,
-            };
-            ExactCrossing::new(&Triangle { vertices }, &ray).side
+            ExactCrossing::new(&vertices.into(), &Ray::new([0.0; 3], [1.0, 1.0, 0.0])).side
         };
         assert_eq!(side(1.0), Side::Edge);
         assert_eq!(side(1.0_f32.next_up()), Side::Outside);
@@ -398,13 +382,8 @@ mod tests {
             Vec3::new(-1.0, 2.0, third),
         ];
         let hit = |t_min: f32, t_max: f32| {
-            let ray = OracleRay {
-                origin: [0.0; 3],
-                t_min,
-                direction: [0.0, 0.0, 1.0],
-                t_max,
-            };
-            ExactCrossing::new(&Triangle { vertices }, &ray).is_hit()
+            let ray = Ray::new([0.0; 3], Vec3::Z).between(t_min, t_max);
+            ExactCrossing::new(&vertices.into(), &ray).is_hit()
         };
         assert!(hit(third, third) && hit(0.0, third) && hit(third, f32::INFINITY));
         assert!(!hit(0.0, third.next_down()) && !hit(third.next_up(), 1.0));

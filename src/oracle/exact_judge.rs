@@ -2,8 +2,8 @@
 
 use super::exact::{ExactCrossing, Side};
 use super::triangle::Crossing;
-use super::{ClosestHit, OracleRay, brute_force};
-use crate::geometry::Triangle;
+use super::{ClosestHit, brute_force};
+use crate::geometry::{Ray, Triangle};
 use rayon::prelude::*;
 
 /// A triangle that a ray meets within its interval, exactly.
@@ -55,7 +55,7 @@ pub enum ExactVerdict {
 }
 
 /// What every ray meets, edges included, on all cores. All numbers must be finite, but for `t_max`.
-pub fn exact_truths(triangles: &[Triangle], rays: &[OracleRay]) -> Vec<ExactTruth> {
+pub fn exact_truths(triangles: &[Triangle], rays: &[Ray]) -> Vec<ExactTruth> {
     let candidates = brute_force::candidates(triangles, rays);
     (rays.par_iter().zip(&candidates))
         .map(|(ray, found)| ExactTruth::new(triangles, ray, found))
@@ -63,7 +63,7 @@ pub fn exact_truths(triangles: &[Triangle], rays: &[OracleRay]) -> Vec<ExactTrut
 }
 
 impl ExactTruth {
-    fn new(triangles: &[Triangle], ray: &OracleRay, candidates: &[u32]) -> Self {
+    fn new(triangles: &[Triangle], ray: &Ray, candidates: &[u32]) -> Self {
         let crossed = |&id: &u32| {
             let triangle = &triangles[id as usize];
             let exact = ExactCrossing::new(triangle, ray);
@@ -84,12 +84,7 @@ impl ExactTruth {
     }
 
     /// The opinion of a closest-hit answer to `ray`, whose truth this is.
-    pub fn judge(
-        &self,
-        triangles: &[Triangle],
-        ray: &OracleRay,
-        answer: ClosestHit,
-    ) -> ExactVerdict {
+    pub fn judge(&self, triangles: &[Triangle], ray: &Ray, answer: ClosestHit) -> ExactVerdict {
         let Some((id, _)) = answer else {
             return self.judge_miss(ray);
         };
@@ -120,7 +115,7 @@ impl ExactTruth {
         }
     }
 
-    fn judge_miss(&self, ray: &OracleRay) -> ExactVerdict {
+    fn judge_miss(&self, ray: &Ray) -> ExactVerdict {
         if self.hits.is_empty() {
             return ExactVerdict::Miss;
         }
@@ -139,7 +134,7 @@ fn slack(crossing: &Crossing) -> f64 {
 
 /// Whether rounding may move the distance over an end of the interval. A distance of exactly an end is
 /// in the interval: where it is exactly representable, a test has no excuse.
-fn near_end(t: f64, slack: f64, ray: &OracleRay) -> bool {
+fn near_end(t: f64, slack: f64, ray: &Ray) -> bool {
     [ray.t_min, ray.t_max]
         .map(f64::from)
         .into_iter()
@@ -154,57 +149,40 @@ mod tests {
     fn floor(z: f32) -> [Triangle; 2] {
         let at = |x: f32, y: f32| Vec3::new(x, y, z);
         let [a, b, c, d] = [at(0.0, 0.0), at(1.0, 0.0), at(1.0, 1.0), at(0.0, 1.0)];
-        [[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices })
+        [[a, b, c], [a, c, d]].map(Triangle::from)
     }
 
-    fn down(x: f32, y: f32, t_max: f32) -> OracleRay {
-        OracleRay {
-            origin: [x, y, 1.0],
-            t_min: 0.0,
-            direction: [0.0, 0.0, -1.0],
-            t_max,
-        }
+    fn down(x: f32, y: f32, t_max: f32) -> Ray {
+        Ray::new([x, y, 1.0], Vec3::NEG_Z).between(0.0, t_max)
     }
 
     #[test]
     fn answers_are_sorted_into_hits_misses_and_each_kind_of_fault() {
+        use ExactVerdict::{Borderline, FalseHit, FalseMiss, Hit, Miss, NotNearest, WrongTriangle};
         let triangles = [floor(0.0), floor(-1.0)].concat();
-        let judge = |ray: OracleRay, answer: ClosestHit| {
+        let judge = |ray: Ray, answer: ClosestHit| {
             exact_truths(&triangles, &[ray])[0].judge(&triangles, &ray, answer)
         };
-        let inside = down(0.75, 0.25, 10.0);
-        assert_eq!(judge(inside, Some((0, 1.0))), ExactVerdict::Hit(1.0));
-        assert_eq!(judge(inside, Some((1, 1.0))), ExactVerdict::WrongTriangle);
-        assert_eq!(judge(inside, Some((2, 2.0))), ExactVerdict::NotNearest);
-        assert_eq!(
-            judge(inside, None),
-            ExactVerdict::FalseMiss { explained: false }
-        );
-        let diagonal = down(0.5, 0.5, 10.0);
-        assert_eq!(judge(diagonal, Some((0, 1.0))), ExactVerdict::Hit(1.0));
-        assert_eq!(judge(diagonal, Some((1, 1.0))), ExactVerdict::Hit(1.0));
-        assert_eq!(
-            judge(diagonal, None),
-            ExactVerdict::FalseMiss { explained: true }
-        );
-        let beside = down(3.0, 0.5, 10.0);
-        assert_eq!(judge(beside, None), ExactVerdict::Miss);
-        assert_eq!(
-            judge(beside, Some((0, 1.0))),
-            ExactVerdict::FalseHit { explained: false }
-        );
-        assert_eq!(
-            judge(beside, Some((99, 1.0))),
-            ExactVerdict::FalseHit { explained: false }
-        );
-        let touching = down(0.75, 0.25, 1.0);
-        assert_eq!(judge(touching, Some((0, 1.0))), ExactVerdict::Hit(1.0));
-        assert!(matches!(
-            judge(touching, None),
-            ExactVerdict::FalseMiss { .. }
-        ));
+        let (inside, diagonal) = (down(0.75, 0.25, 10.0), down(0.5, 0.5, 10.0));
+        let (beside, touching) = (down(3.0, 0.5, 10.0), down(0.75, 0.25, 1.0));
         let short = down(0.75, 0.25, 1.0_f32.next_down());
-        assert_eq!(judge(short, None), ExactVerdict::Miss);
-        assert_eq!(judge(short, Some((0, 1.0))), ExactVerdict::Borderline);
+        for (ray, answer, verdict) in [
+            (inside, Some((0, 1.0)), Hit(1.0)),
+            (inside, Some((1, 1.0)), WrongTriangle),
+            (inside, Some((2, 2.0)), NotNearest),
+            (inside, None, FalseMiss { explained: false }),
+            (diagonal, Some((0, 1.0)), Hit(1.0)),
+            (diagonal, Some((1, 1.0)), Hit(1.0)),
+            (diagonal, None, FalseMiss { explained: true }),
+            (beside, None, Miss),
+            (beside, Some((0, 1.0)), FalseHit { explained: false }),
+            (beside, Some((99, 1.0)), FalseHit { explained: false }),
+            (touching, Some((0, 1.0)), Hit(1.0)),
+            (touching, None, FalseMiss { explained: true }),
+            (short, None, Miss),
+            (short, Some((0, 1.0)), Borderline),
+        ] {
+            assert_eq!(judge(ray, answer), verdict, "{ray:?} {answer:?}");
+        }
     }
 }

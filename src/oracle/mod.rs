@@ -17,25 +17,11 @@ pub use exact::{ExactCrossing, Side};
 pub use exact_judge::{Crossed, ExactTruth, ExactVerdict, exact_truths};
 pub use groups::{GROUP, Groups, Line};
 
-use crate::geometry::Triangle;
+use crate::geometry::{Ray, Triangle};
 use rayon::prelude::*;
 use std::fmt;
 use thiserror::Error;
 use triangle::Crossing;
-
-/// A ray as a kernel sees it: points `origin + t·direction`, `t_min ≤ t ≤ t_max`; the direction need
-/// not be of unit length, `t_max` may be infinite.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OracleRay {
-    /// Start, scene units.
-    pub origin: [f32; 3],
-    /// Nearest distance that counts.
-    pub t_min: f32,
-    /// Direction; `t` is measured in its length.
-    pub direction: [f32; 3],
-    /// Farthest distance that counts.
-    pub t_max: f32,
-}
 
 /// The nearest hit that a structure found: triangle index and distance; `None` for a miss.
 pub type ClosestHit = Option<(u32, f32)>;
@@ -133,32 +119,29 @@ impl fmt::Display for Distance {
 }
 
 /// Judges one closest-hit answer over all `triangles`.
-pub fn judge(triangles: &[Triangle], ray: OracleRay, answer: ClosestHit) -> Verdict {
+pub fn judge(triangles: &[Triangle], ray: Ray, answer: ClosestHit) -> Verdict {
     let candidates = brute_force::candidates(triangles, &[ray]);
     Scene::new(triangles, &ray, &candidates[0]).judge_closest(answer)
 }
 
 /// Judges many closest-hit answers, in the order of `queries`, on all cores.
-pub fn judge_closest_hits(
-    triangles: &[Triangle],
-    queries: &[(OracleRay, ClosestHit)],
-) -> Vec<Verdict> {
+pub fn judge_closest_hits(triangles: &[Triangle], queries: &[(Ray, ClosestHit)]) -> Vec<Verdict> {
     judge_all(triangles, queries, |scene, answer| {
         scene.judge_closest(answer)
     })
 }
 
 /// Judges many any-hit answers (`true`: something lies in the ray's interval), on all cores.
-pub fn judge_any_hits(triangles: &[Triangle], queries: &[(OracleRay, bool)]) -> Vec<Verdict> {
+pub fn judge_any_hits(triangles: &[Triangle], queries: &[(Ray, bool)]) -> Vec<Verdict> {
     judge_all(triangles, queries, |scene, answer| scene.judge_any(answer))
 }
 
 fn judge_all<A: Copy + Sync>(
     triangles: &[Triangle],
-    queries: &[(OracleRay, A)],
+    queries: &[(Ray, A)],
     judge: impl Fn(&Scene, A) -> Verdict + Sync,
 ) -> Vec<Verdict> {
-    let rays: Vec<OracleRay> = queries.iter().map(|q| q.0).collect();
+    let rays: Vec<Ray> = queries.iter().map(|q| q.0).collect();
     let candidates = brute_force::candidates(triangles, &rays);
     (queries.par_iter().zip(&candidates))
         .map(|((ray, answer), found)| judge(&Scene::new(triangles, ray, found), *answer))
@@ -168,12 +151,12 @@ fn judge_all<A: Copy + Sync>(
 /// One ray with every triangle that it may hit.
 struct Scene<'a> {
     triangles: &'a [Triangle],
-    ray: &'a OracleRay,
+    ray: &'a Ray,
     possible: Vec<(u32, Crossing)>,
 }
 
 impl<'a> Scene<'a> {
-    fn new(triangles: &'a [Triangle], ray: &'a OracleRay, candidates: &[u32]) -> Self {
+    fn new(triangles: &'a [Triangle], ray: &'a Ray, candidates: &[u32]) -> Self {
         let possible = candidates
             .iter()
             .map(|&id| (id, Crossing::new(&triangles[id as usize], ray)))

@@ -34,8 +34,7 @@
 //! The bounds here are those of both kinds, whichever is wider. A test that moves vertices into a frame
 //! of the triangle's own (Baldwin and Weber) has wider ones still, and is wrong by these.
 
-use super::OracleRay;
-use crate::geometry::Triangle;
+use crate::geometry::{Ray, Triangle};
 
 /// Half an ulp of 1 in f32.
 const EPSILON: f64 = 1.0 / (1u32 << 24) as f64;
@@ -83,7 +82,7 @@ struct Sheared {
 }
 
 impl Crossing {
-    pub(super) fn new(triangle: &Triangle, ray: &OracleRay) -> Self {
+    pub(super) fn new(triangle: &Triangle, ray: &Ray) -> Self {
         let [v0, v1, v2] = triangle.vertices.map(|v| widen(v.to_array()));
         let d = widen(ray.direction);
         let (e1, e2) = (subtract(v1, v0), subtract(v2, v0));
@@ -116,7 +115,7 @@ impl Crossing {
     }
 
     /// Whether an f32 test may find a hit in the ray's interval.
-    pub(super) fn is_possible(&self, ray: &OracleRay) -> bool {
+    pub(super) fn is_possible(&self, ray: &Ray) -> bool {
         let facing = |sign: f64| {
             sign * self.det.value + self.det_error() > 0.0
                 && (self.barycentrics.iter()).all(|b| sign * b.value + b.error >= 0.0)
@@ -128,7 +127,7 @@ impl Crossing {
     }
 
     /// Whether every f32 test must find a hit in the ray's interval.
-    pub(super) fn is_definite(&self, ray: &OracleRay) -> bool {
+    pub(super) fn is_definite(&self, ray: &Ray) -> bool {
         let sign = self.det.value.signum();
         let inside = (self.barycentrics.iter()).all(|b| sign * b.value > b.error);
         let in_reach = |t: Bounded| {

@@ -60,29 +60,6 @@ pub struct Variant {
     pub label: String,
 }
 
-impl Variant {
-    /// What records call these kernels: nothing if they are the embedded ones.
-    pub fn kernels_label(&self) -> &str {
-        match self.name.as_str() {
-            "" => "",
-            _ => &self.label,
-        }
-    }
-
-    /// This variant run with `kernels`: where they are not the embedded ones, the label ends with theirs.
-    #[must_use]
-    pub fn with_kernels(mut self, kernels: &Variant) -> Self {
-        if !kernels.name.is_empty() {
-            self.label += KERNELS_MARK;
-            self.label += &kernels.label;
-        }
-        self
-    }
-}
-
-/// What stands between a name and its kernels in labels.
-pub const KERNELS_MARK: &str = " @";
-
 impl fmt::Display for Variant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.label)

@@ -42,12 +42,14 @@
 
 mod declare;
 mod entry;
+mod kinds;
 mod registry;
 mod schema;
 mod value;
 
 pub use declare::{Bounded, Choice, ParameterType, Parameters, Unbounded, named, read, redeclare};
-pub use entry::{Entry, KERNELS_MARK, Variant};
+pub use entry::{Entry, Variant};
+pub use kinds::{Kinds, Named, Sources};
 pub use registry::{Registered, Registry};
 pub use schema::{ParamError, ParamRange, Parameter, ParameterSchema};
 pub use value::{ParamValue, Params};

@@ -47,7 +47,7 @@ pub fn failed_checks(records: &[Line]) -> Vec<String> {
 
 /// The table with columns padded to equal width; of figures only the value is kept, since intervals
 /// would not fit a terminal, except in tables of text.
-pub(crate) fn aligned(table: &Table) -> String {
+pub fn aligned(table: &Table) -> String {
     let wordy = table.columns.iter().filter(|column| column.text).count() > 2;
     let shown = |cell: &Cell| match wordy {
         true => cell.flat(),

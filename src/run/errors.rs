@@ -1,102 +1,112 @@
 //! Error: once per scene, integrator and sampler, through the fastest gated structure.
 
-use super::RunError;
 use super::images::{self, Estimator};
 use super::reference::{Yardstick, reference, reference_structure};
-use super::session::Session;
+use super::session::{Session, content_hash};
 use super::structures::Gated;
 use super::world::World;
-use crate::config::SamplerCell;
+use super::{Fault, RunError};
+use crate::config::{Axis, Cell};
 use crate::image::{Image, Picture, tone_map, viridis};
 use crate::integrator::{Renderer, Snapshot, rounding_bound};
 use crate::measure::bias::{BiasOptions, BiasVerdict, check_bias};
 use crate::measure::metrics::{error_map, measure};
 use crate::measure::record::{
-    BiasRecord, Body, ErrorAtSpp, ErrorRecord, Line, Ran, SpectrumRecord, axis,
+    BiasRecord, Body, ErrorAtSpp, ErrorRecord, Key, Line, Ran, SpectrumRecord,
 };
 use crate::measure::spectrum::{
     ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power,
 };
 use crate::measure::statistics::mean_interval;
-use crate::text::cell_hash;
 
 /// Relative error per pixel at the top of the colour scale of error maps.
 const ERROR_MAP_FULL_SCALE: f32 = 1.0;
 
-/// Renders; the error in words.
-fn rendered(renderer: &Renderer, spps: &[u32], seed: u32) -> Result<Vec<Snapshot>, String> {
-    renderer.render(spps, seed).map_err(|e| e.to_string())
+/// The fastest gated structure with the kernels of a cell that its integrator can use, or why there is none:
+/// a refusal, or a failure.
+fn fastest<'a>(
+    session: &Session,
+    gated: &'a [Gated],
+    cell: &Cell,
+) -> Result<&'a Gated, Option<String>> {
+    let same = gated
+        .iter()
+        .filter(|g| g.cell[Axis::Kernels] == cell[Axis::Kernels]);
+    let unfit = |g: &Gated| images::unfit(session, &cell[Axis::Integrator], &g.traced);
+    let fitting = same.clone().filter(|g| unfit(g).is_none());
+    let fastest = fitting.max_by(|a, b| a.speed.total_cmp(&b.speed));
+    fastest.ok_or_else(|| same.clone().find_map(unfit))
 }
 
-/// The fastest gated structure with the kernels of a cell that its integrator can use.
-fn fastest<'a>(session: &Session, gated: &'a [Gated], cell: &SamplerCell) -> Option<&'a Gated> {
-    let fits = |g: &&Gated| {
-        g.cell.kernels == cell.kernels
-            && images::unfit(session, &cell.integrator, &g.traced).is_none()
-    };
-    let fitting = gated.iter().filter(fits);
-    fitting.max_by(|a, b| a.speed.total_cmp(&b.speed))
-}
-
-/// All samplers of a scene.
+/// All samplers of a world.
 pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Result<(), RunError> {
     if gated.is_empty() {
         return Ok(());
     }
-    let cells: Vec<SamplerCell> = session
-        .plan
-        .samplers
-        .iter()
-        .filter(|c| c.scene == *world.variant)
-        .cloned()
-        .collect();
     let mut traced = None;
-    for variant in session.experiment.axes.integrator.clone() {
-        let wanted = |c: &&SamplerCell| c.integrator == variant && !session.is_done(&c.to_string());
-        let cells: Vec<SamplerCell> = cells.iter().filter(wanted).cloned().collect();
+    for integrator in &session.experiment.axes[Axis::Integrator] {
+        let wanted = world.cell.clone().with(Axis::Integrator, integrator);
+        let cells = session.plan.samplers.iter();
+        let cells = cells.filter(|c| c.is_on(&wanted) && !session.is_done(&c.to_string()));
+        let cells: Vec<Cell> = cells.cloned().collect();
         if cells.is_empty() {
             continue;
         }
         let traced = match &traced {
             Some(known) => known,
-            None => traced.insert(reference_structure(session, world, gated)?),
+            None => traced.insert(match reference_structure(session, world, gated) {
+                Ok(traced) => Ok(traced),
+                Err(fault) => Err(fault.of_cell()?),
+            }),
         };
         let made = match traced {
-            Ok(traced) => reference(session, world, traced, &variant)?,
-            Err(reason) => Err(reason.clone()),
+            Ok(traced) => reference(session, world, traced, &wanted),
+            Err(reason) => Err(reason.clone().into()),
         };
-        let yardstick = match made {
-            Ok(yardstick) => yardstick,
-            Err(reason) => {
+        match made {
+            Ok(yardstick) => all_errors(session, world, gated, &cells, &yardstick)?,
+            Err(fault) => {
+                let reason = fault.of_cell()?;
                 for cell in cells {
                     session.write_failure(&cell.to_string(), format!("no reference: {reason}"))?;
                 }
-                if world.gpu.lost().is_some() {
-                    return Ok(());
-                }
+            }
+        }
+        if world.gpu.lost().is_some() {
+            return Ok(());
+        }
+    }
+    Ok(())
+}
+
+/// The samplers with one reference.
+fn all_errors(
+    session: &mut Session,
+    world: &World,
+    gated: &[Gated],
+    cells: &[Cell],
+    yardstick: &Yardstick,
+) -> Result<(), RunError> {
+    for cell in cells {
+        let text = cell.to_string();
+        let fastest = match fastest(session, gated, cell) {
+            Ok(fastest) => fastest,
+            Err(Some(refusal)) => {
+                session.write_refused(text, refusal)?;
+                continue;
+            }
+            Err(None) => {
+                let reason = "no structure passed the gate with these kernels";
+                session.write_failure(&text, reason.to_owned())?;
                 continue;
             }
         };
-        for cell in cells {
-            let Some(fastest) = fastest(session, gated, &cell) else {
-                let mut same = gated.iter().filter(|g| g.cell.kernels == cell.kernels);
-                let unfit = same.find_map(|g| images::unfit(session, &cell.integrator, &g.traced));
-                match unfit {
-                    Some(reason) => session.write_refused(cell.to_string(), reason)?,
-                    None => {
-                        let reason = "no structure passed the gate with these kernels";
-                        session.write_failure(&cell.to_string(), reason.to_owned())?;
-                    }
-                }
-                continue;
-            };
-            session.lose_device_on_request(world.gpu, &cell.to_string());
-            if let Err(reason) = sampler_error(session, world, fastest, &cell, &yardstick)? {
-                session.write_failure(&cell.to_string(), reason)?;
-            }
-            if world.gpu.lost().is_some() {
-                return Ok(());
-            }
+        session.lose_device_on_request(world.gpu, &text);
+        if let Err(fault) = sampler_error(session, world, fastest, cell, yardstick) {
+            session.write_failure(&text, fault.of_cell()?)?;
+        }
+        if world.gpu.lost().is_some() {
+            return Ok(());
         }
     }
     Ok(())
@@ -116,15 +126,14 @@ fn passes<'a>(
     session: &mut Session,
     world: &'a World,
     fastest: &Gated,
-    cell: &SamplerCell,
+    cell: &Cell,
 ) -> Result<Vec<Pass<'a>>, String> {
-    let pair = (&cell.sequence, &cell.decorrelation);
     let spps: Vec<u32> = session.experiment.spp.counts().collect();
     let most = session.experiment.spp.max();
-    let whole = Estimator::new(session, pair, &cell.integrator, most)?;
+    let whole = Estimator::new(session, cell, most)?;
     let estimators = if whole.sampler.by_count() {
         let single = |spp| {
-            let estimator = Estimator::new(session, pair, &cell.integrator, spp)?;
+            let estimator = Estimator::new(session, cell, spp)?;
             Ok((vec![spp], estimator))
         };
         spps.into_iter()
@@ -134,11 +143,10 @@ fn passes<'a>(
         vec![(spps, whole)]
     };
     let seeds = session.experiment.seeds().replicates;
-    let with = (&cell.kernels, &fastest.traced);
     let pass = |(spps, estimator): (Vec<u32>, Estimator)| {
         let words = bytemuck::cast_slice(estimator.sampler.table.words());
         Ok(Pass {
-            renderer: estimator.renderer(session, world, with, &seeds, [true, false])?,
+            renderer: estimator.renderer(session, world, &fastest.traced, &seeds, [true, false])?,
             spps,
             table: blake3::hash(words).to_hex().to_string(),
         })
@@ -146,86 +154,48 @@ fn passes<'a>(
     estimators.into_iter().map(pass).collect()
 }
 
-/// All replicates of one sampler. The inner error concerns this cell alone.
+/// All replicates of one sampler.
 fn sampler_error(
     session: &mut Session,
     world: &World,
     fastest: &Gated,
-    cell: &SamplerCell,
+    cell: &Cell,
     yardstick: &Yardstick,
-) -> Result<Result<(), String>, RunError> {
+) -> Result<(), Fault> {
     session.say(cell.to_string());
-    let passes = match passes(session, world, fastest, cell) {
-        Ok(passes) => passes,
-        Err(reason) => return Ok(Err(reason)),
-    };
-    let ran = {
-        let mut hashes: Vec<_> = passes
-            .iter()
-            .map(|pass| pass.renderer.kernel_hash())
-            .collect();
-        hashes.dedup();
-        Ran::kernel(hashes.join("+"))
-    };
-    let key = (world.key(&cell.kernels))
-        .with_variant(axis::INTEGRATOR, &cell.integrator)
-        .with_variant(axis::SEQUENCE, &cell.sequence)
-        .with_variant(axis::DECORRELATION, &cell.decorrelation);
+    let passes = passes(session, world, fastest, cell)?;
+    let mut kernels: Vec<_> = passes.iter().map(|p| p.renderer.kernel_hash()).collect();
+    kernels.dedup();
     let tables: String = passes.iter().map(|pass| pass.table.as_str()).collect();
-    let hash = cell_hash(&[
-        ("scene", &world.scene.hash),
-        (
-            "sampler",
-            &serde_json::to_string(&(&cell.sequence, &cell.decorrelation, &cell.integrator))
-                .unwrap_or_default(),
-        ),
-        ("kernel", &ran.kernel_hash),
-        ("sampler table", &tables),
-        ("version", env!("CARGO_PKG_VERSION")),
-    ]);
+    let blank = Line::new(Key::from(cell), Ran::kernel(kernels.join("+")), ());
+    let hash = content_hash(&blank, &world.scene.hash, &[("sampler table", &tables)]);
+    let line = |body| blank.clone().hashed(&hash).with_body(|()| body);
     let seeds = session.experiment.seeds().replicates;
-    let seeds = seeds.into_iter().take(cell.replicates as usize);
-    let line = |body| Line::new(key.clone(), ran.clone(), body).hashed(&hash);
+    let seeds = seeds.into_iter().take(session.plan.renders(cell) as usize);
     let mut finals = Vec::new();
-    for (replicate, seed) in seeds.enumerate() {
+    for (replicate, seed) in (0..).zip(seeds) {
         let mut snapshots = Vec::new();
         for pass in &passes {
-            let render = || rendered(&pass.renderer, &pass.spps, seed);
-            match session.clock.time("gpu", render) {
-                Ok(rendered) => snapshots.extend(rendered),
-                Err(reason) => return Ok(Err(reason)),
-            }
+            let render = || pass.renderer.render(&pass.spps, seed);
+            let rendered = session.clock.time("gpu", render);
+            snapshots.extend(rendered.map_err(|e| e.to_string())?);
         }
-        let record = match error_record(
-            session,
-            world,
-            cell,
-            yardstick,
-            &snapshots,
-            (replicate as u32, seed),
-        )? {
-            Ok(record) => record,
-            Err(reason) => return Ok(Err(reason)),
-        };
+        let record = error_record(session, cell, yardstick, &snapshots, (replicate, seed))?;
         if record.non_finite_pixels > 0 {
-            return Ok(Err(format!(
-                "replicate {replicate} has {} pixels that are not finite",
-                record.non_finite_pixels
-            )));
+            let count = record.non_finite_pixels;
+            let reason = format!("replicate {replicate} has {count} pixels that are not finite");
+            return Err(reason.into());
         }
         session.write(&line(Body::Error(record)))?;
         finals.extend(snapshots.into_iter().last().map(|s| s.image));
         session.progress.inc(1);
     }
     session.finish(cell.to_string());
-    match bias_record(session, cell, &finals, yardstick) {
-        Ok(record) => session.write(&line(Body::Bias(record)))?,
-        Err(reason) => return Ok(Err(reason)),
-    }
-    match spectrum_record(session, &finals, yardstick) {
-        Ok(record) => session.write(&line(Body::Spectrum(record))).map(Ok),
-        Err(reason) => Ok(Err(reason)),
-    }
+    let bias = bias_record(session, cell, &finals, yardstick)?;
+    session.write(&line(Body::Bias(bias)))?;
+    let spectrum = spectrum_record(session, &finals, yardstick)?;
+    session.write(&line(Body::Spectrum(spectrum)))?;
+    Ok(())
 }
 
 /// The spectra of all replicates, at the highest number of samples.
@@ -257,30 +227,24 @@ fn spectrum_record(
 
 fn error_record(
     session: &Session,
-    world: &World,
-    cell: &SamplerCell,
+    cell: &Cell,
     yardstick: &Yardstick,
     snapshots: &[Snapshot],
     (replicate, seed): (u32, u32),
-) -> Result<Result<ErrorRecord, String>, RunError> {
+) -> Result<ErrorRecord, Fault> {
+    let reference = &yardstick.reference;
     let mut errors = Vec::new();
     let mut non_finite_pixels = 0;
     for snapshot in snapshots {
-        match measure(&snapshot.image, &yardstick.reference) {
-            Ok(report) => {
-                non_finite_pixels = non_finite_pixels.max(report.non_finite_pixels);
-                errors.push(ErrorAtSpp {
-                    spp: snapshot.spp,
-                    metrics: report.metrics,
-                    without_part: report.without_part,
-                });
-            }
-            Err(error) => return Ok(Err(error.to_string())),
-        }
+        let report = measure(&snapshot.image, reference).map_err(|e| e.to_string())?;
+        non_finite_pixels = non_finite_pixels.max(report.non_finite_pixels);
+        errors.push(ErrorAtSpp {
+            spp: snapshot.spp,
+            metrics: report.metrics,
+            without_part: report.without_part,
+        });
     }
-    let Some(last) = snapshots.last() else {
-        return Ok(Err("nothing was rendered".to_owned()));
-    };
+    let last = snapshots.last().ok_or("nothing was rendered".to_owned())?;
     let mut record = ErrorRecord {
         randomised: cell.randomised,
         replicate,
@@ -293,35 +257,31 @@ fn error_record(
         error_map: None,
     };
     if replicate == 0 {
-        let labels = [
-            &world.variant.label,
-            &cell.integrator.label,
-            &cell.sequence.label,
-            &cell.decorrelation.label,
+        let axes = [
+            Axis::Scene,
+            Axis::Integrator,
+            Axis::Sequence,
+            Axis::Decorrelation,
         ];
-        let draw = |kind, picture: &Picture| {
-            let names = [&[kind], &labels.map(String::as_str)[..]].concat();
-            session.picture(&names, picture)
-        };
+        let labels = cell.labels(&axes);
+        let draw =
+            |kind, picture: &Picture| session.picture(&[&[kind], &labels[..]].concat(), picture);
         record.image = draw("image", &tone_map(&last.image, yardstick.exposure))?;
-        let (reference, scale) = (&yardstick.reference, ERROR_MAP_FULL_SCALE);
-        match error_map(&last.image, reference, scale, viridis) {
-            Ok(picture) => record.error_map = draw("error", &picture)?,
-            Err(error) => return Ok(Err(error.to_string())),
-        }
+        let map = error_map(&last.image, reference, ERROR_MAP_FULL_SCALE, viridis);
+        record.error_map = draw("error", &map.map_err(|e| e.to_string())?)?;
     }
-    Ok(Ok(record))
+    Ok(record)
 }
 
 /// The probability of a false alarm is shared out among all samplers of the run that claim to have no
 /// bias, so that a run of many sound samplers does not cry wolf.
 fn bias_record(
     session: &Session,
-    cell: &SamplerCell,
+    cell: &Cell,
     images: &[Image],
     yardstick: &Yardstick,
 ) -> Result<BiasRecord, String> {
-    let claims = |s: &SamplerCell| s.randomised && session.registries.is_unbiased(s);
+    let claims = |s: &Cell| s.randomised && session.registries.is_unbiased(s);
     let tested = session.plan.samplers.iter().filter(|s| claims(s)).count();
     let defaults = BiasOptions::default();
     let options = BiasOptions {

@@ -4,8 +4,9 @@ use super::kernels::Device;
 use super::session::Session;
 use super::words;
 use super::world::World;
+use crate::config::{Axis, Cell};
 use crate::geometry::Camera;
-use crate::integrator::{ConfiguredIntegrator, RenderJob, Renderer, Traced};
+use crate::integrator::{ConfiguredIntegrator, RayOffset, RenderJob, Renderer, Traced};
 use crate::params::Variant;
 use crate::sampling::Sampler;
 
@@ -15,31 +16,31 @@ pub(super) fn unfit(session: &Session, integrator: &Variant, traced: &Traced) ->
     integrator.ok()?.refusal(traced)
 }
 
-/// What is computed per sample, and what draws the samples.
+/// What is computed per sample, what draws the samples, and the kernels of both.
 pub(super) struct Estimator {
     pub sampler: Sampler,
     pub integrator: ConfiguredIntegrator,
+    offset: RayOffset,
+    kernels: Variant,
 }
 
 impl Estimator {
-    /// An integrator with a sampler of `samples` samples a pixel.
+    /// That of a cell, for `samples` samples per pixel.
     ///
     /// # Errors
     /// A name is not registered, or the sampler has too few dimensions or samples.
-    pub fn new(
-        session: &Session,
-        (sequence, decorrelation): (&Variant, &Variant),
-        integrator: &Variant,
-        samples: u32,
-    ) -> Result<Self, String> {
+    pub fn new(session: &Session, cell: &Cell, samples: u32) -> Result<Self, String> {
         let registries = session.registries;
-        let integrator = registries.integrators.configured(integrator);
+        let integrator = registries.integrators.configured(&cell[Axis::Integrator]);
         let integrator = integrator.map_err(|e| e.to_string())?;
+        let (sequence, decorrelation) = (&cell[Axis::Sequence], &cell[Axis::Decorrelation]);
         let demand = integrator.demand(samples, session.experiment.resolution[0]);
         let sampler = (registries.samplers).sampler(sequence, decorrelation, &demand);
         Ok(Self {
             sampler: sampler.map_err(|e| e.to_string())?,
             integrator,
+            offset: registries.offset(cell)?,
+            kernels: cell[Axis::Kernels].clone(),
         })
     }
 
@@ -50,11 +51,12 @@ impl Estimator {
             camera,
             sampler: &self.sampler,
             integrator: &self.integrator,
+            offset: self.offset,
             runtime_checks,
         }
     }
 
-    /// The compiled image of a world with these kernels. The sampler's words were compared with those of its
+    /// The compiled image of a world. The sampler's words were compared with those of its
     /// twin, in all that `seeds` make of them.
     ///
     /// # Errors
@@ -63,12 +65,12 @@ impl Estimator {
         &self,
         session: &mut Session,
         world: &'a World,
-        (kernels, traced): (&Variant, &Traced),
+        traced: &Traced,
         seeds: &[u32],
         [runtime_checks, ray_counts]: [bool; 2],
     ) -> Result<Renderer<'a>, String> {
         let device: &'a Device = world.device;
-        let gpu = device.of(kernels).map_err(|e| e.to_string())?;
+        let gpu = device.of(&self.kernels).map_err(|e| e.to_string())?;
         words::check(session, gpu, &self.sampler, seeds)?;
         let job = self.job(session, world.camera, runtime_checks);
         let compiled = session.clock.time("gpu", || {

@@ -12,6 +12,7 @@ mod registries;
 mod render;
 mod session;
 mod streams;
+mod structure_times;
 mod structures;
 mod times;
 mod trial;
@@ -23,7 +24,7 @@ pub use kernels::{Kernels, kernel_library};
 pub use registries::Registries;
 pub use render::{Rendering, render};
 
-use crate::config::{Experiment, Plan};
+use crate::config::{Cell, Experiment, Plan};
 use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
 use crate::measure::record::GateVerdict;
 pub use crate::measure::words::dump_stream;
@@ -32,7 +33,7 @@ use kernels::Device;
 use session::Session;
 use std::path::PathBuf;
 use thiserror::Error;
-use world::{Absent, World};
+use world::{Absent, Loaded, World};
 
 /// What an experiment does not say.
 #[derive(Debug, Clone, Default)]
@@ -112,13 +113,41 @@ impl RunError {
     }
 }
 
+/// Why something has no figures.
+pub(crate) enum Fault {
+    /// One cell is at fault, which gets a record of it.
+    Cell(String),
+    /// Nothing can go on.
+    Run(RunError),
+}
+
+impl From<String> for Fault {
+    fn from(reason: String) -> Self {
+        Self::Cell(reason)
+    }
+}
+
+impl From<RunError> for Fault {
+    fn from(error: RunError) -> Self {
+        Self::Run(error)
+    }
+}
+
+impl Fault {
+    /// The reason that is one cell's, or what ends the run.
+    fn of_cell(self) -> Result<String, RunError> {
+        match self {
+            Self::Cell(reason) => Ok(reason),
+            Self::Run(error) => Err(error),
+        }
+    }
+}
+
 /// One structure's verdict, for `raystone verify`.
 #[derive(Debug, Clone)]
 pub struct Verified {
-    /// Scene.
-    pub scene: Variant,
-    /// Structure.
-    pub accel: Variant,
+    /// Scene, tests, structure and kernels.
+    pub cell: Cell,
     /// Verdict, or why there is none.
     pub verdict: Result<GateVerdict, String>,
     /// Whether the scene could not be loaded (exit code 2).
@@ -189,23 +218,49 @@ fn measure(
 }
 
 fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Result<(), RunError> {
-    let gpu = &device.gpu;
-    let cell = format!("scene {variant}: failed");
-    if session.is_done(&cell) {
+    let failed = format!("scene {variant}: failed");
+    if session.is_done(&failed) {
         return Ok(());
     }
-    let world = match World::new(session, device, variant)? {
+    let loaded = match Loaded::new(session, variant) {
+        Ok(loaded) => loaded,
+        Err(fault) => {
+            session.bad_input = true;
+            return session.write_failure(&failed, fault.of_cell()?);
+        }
+    };
+    for cell in session.plan.worlds(variant) {
+        run_world(session, device, &loaded, &cell)?;
+        if device.gpu.lost().is_some() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+fn run_world(
+    session: &mut Session,
+    device: &Device,
+    loaded: &Loaded,
+    cell: &Cell,
+) -> Result<(), RunError> {
+    let failed = format!("scene {cell}: failed");
+    if session.is_done(&failed) {
+        return Ok(());
+    }
+    let world = match World::new(session, device, loaded, cell) {
         Ok(world) => world,
         Err(Absent::BadInput(reason)) => {
             session.bad_input = true;
-            return session.write_failure(&cell, reason);
+            return session.write_failure(&failed, reason);
         }
         Err(Absent::NotKept(reason)) => {
-            session.finish(cell);
-            return session.write_skipped(&session.plan.all_of(variant, reason));
+            session.finish(failed);
+            return session.write_skipped(&session.plan.all_on(cell, reason));
         }
     };
     session.progress.inc(session::SCENE_STEPS);
+    let gpu = &device.gpu;
     let gated = structures::run(session, &world)?;
     if gpu.lost().is_none() {
         errors::run(session, &world, &gated)?;
@@ -234,29 +289,46 @@ pub fn verify(
     let mut session = Session::unrecorded(&experiment, plan, registries, options);
     let mut verified = Vec::new();
     for scene in &plan.scenes {
-        let world = World::new(&mut session, &device, scene)?;
-        for cell in plan.structures.iter().filter(|c| c.scene == *scene) {
-            let mut refused = false;
-            let verdict = match &world {
-                Err(Absent::BadInput(reason) | Absent::NotKept(reason)) => Err(reason.clone()),
-                Ok(world) => match structures::build_and_gate(&mut session, world, cell)? {
-                    Ok((_, record)) => record.body.gate.ok_or_else(|| "no verdict".to_owned()),
-                    Err(record) => {
-                        refused = record.body.refused;
-                        let reason = record.body.failure.unwrap_or_default();
-                        record.body.gate.ok_or(reason)
-                    }
-                },
+        let loaded = match Loaded::new(&mut session, scene) {
+            Ok(loaded) => Ok(loaded),
+            Err(fault) => Err(fault.of_cell()?),
+        };
+        for part in plan.worlds(scene) {
+            let world = match &loaded {
+                Ok(loaded) => World::new(&mut session, &device, loaded, &part),
+                Err(reason) => Err(Absent::BadInput(reason.clone())),
             };
-            verified.push(Verified {
-                scene: scene.clone(),
-                accel: cell.accel.clone(),
-                verdict,
-                bad_input: matches!(world, Err(Absent::BadInput(_))),
-                refused,
-            });
+            for cell in plan.structures.iter().filter(|c| c.is_on(&part)) {
+                verified.push(verify_cell(&mut session, &world, cell)?);
+            }
         }
     }
     session.progress.finish_and_clear();
+    Ok(verified)
+}
+
+fn verify_cell(
+    session: &mut Session,
+    world: &Result<World, Absent>,
+    cell: &Cell,
+) -> Result<Verified, RunError> {
+    let mut verified = Verified {
+        cell: cell.clone(),
+        verdict: Err("no verdict".to_owned()),
+        bad_input: matches!(world, Err(Absent::BadInput(_))),
+        refused: false,
+    };
+    match world {
+        Err(Absent::BadInput(reason) | Absent::NotKept(reason)) => {
+            verified.verdict = Err(reason.clone());
+        }
+        Ok(world) => {
+            let record = structures::build_and_gate(session, world, cell)?
+                .record
+                .body;
+            verified.refused = record.refused;
+            verified.verdict = record.gate.ok_or(record.failure.unwrap_or_default());
+        }
+    }
     Ok(verified)
 }

@@ -1,17 +1,16 @@
 //! References: what images are compared with, and the exposure of their pictures.
 
-use super::RunError;
 use super::images::Estimator;
-use super::session::Session;
+use super::session::{Session, content_hash};
 use super::structures::{self, Gated};
 use super::world::World;
-use crate::config::{REFERENCE_PARTS, StructureCell};
+use super::{Fault, RunError};
+use crate::config::{Axis, Cell, REFERENCE_PARTS};
 use crate::image::{Image, automatic_exposure, tone_map};
 use crate::integrator::{Traced, rounding_bound};
 use crate::measure::metrics::Reference;
-use crate::measure::record::{Body, Key, Line, Ran, ReferenceRecord, axis};
-use crate::params::Variant;
-use crate::text::cell_hash;
+use crate::measure::record::{Body, Key, Line, Ran, ReferenceRecord};
+use crate::params::{Entry, Variant};
 use std::time::Instant;
 
 /// What references are rendered through where no structure ran with the embedded kernels.
@@ -36,103 +35,103 @@ pub(super) fn reference_structure(
     session: &mut Session,
     world: &World,
     gated: &[Gated],
-) -> Result<Result<Traced, String>, RunError> {
-    let embedded = gated.iter();
-    let embedded = embedded.filter(|g| g.cell.kernels.name.is_empty() && g.traced.is_inline());
+) -> Result<Traced, Fault> {
+    let embedded = |g: &&Gated| g.cell[Axis::Kernels].name.is_empty() && g.traced.is_inline();
+    let embedded = gated.iter().filter(embedded);
     if let Some(fastest) = embedded.max_by(|a, b| a.speed.total_cmp(&b.speed)) {
-        return Ok(Ok(fastest.traced.clone()));
+        return Ok(fastest.traced.clone());
     }
-    let mut entries = session.registries.accel.entries().into_iter();
-    let Some(plain) = entries.find(|entry| entry.name == REFERENCE_STRUCTURE) else {
-        return Ok(Err(format!("no structure is called {REFERENCE_STRUCTURE}")));
-    };
-    let cell = StructureCell {
-        scene: world.variant.clone(),
-        accel: plain.default_variant(),
-        kernels: Variant::default(),
-    };
+    let kinds = &session.registries.accel;
+    kinds.named("structure", REFERENCE_STRUCTURE)?;
+    let entries = kinds.entries();
+    let plain = entries.iter().find(|e| e.name == REFERENCE_STRUCTURE);
+    let plain = plain.map(Entry::default_variant).unwrap_or_default();
+    let cell =
+        (world.cell.clone().with(Axis::Accel, &plain)).with(Axis::Kernels, &Variant::default());
     session.say(format!("{cell}: build and gate, for the reference"));
-    let gated = structures::build_and_gate(session, world, &cell)?;
-    let gated = gated.map(|(traced, _)| traced);
-    Ok(gated.map_err(|record| {
-        let failure = record.body.failure.unwrap_or_default();
-        format!("{} with the embedded kernels: {failure}", cell.accel)
-    }))
+    let candidate = structures::build_and_gate(session, world, &cell)?;
+    candidate.traced.ok_or_else(|| {
+        let failure = candidate.record.body.failure.unwrap_or_default();
+        format!("{plain} with the embedded kernels: {failure}").into()
+    })
 }
 
-/// The reference of an integrator, known or rendered. The inner error concerns its cells alone.
+/// The reference of a world and an integrator, known or rendered: with the sampler that the experiment names,
+/// the embedded kernels, and rays that leave surfaces by the default offset, so that the error of other
+/// offsets is seen.
 pub(super) fn reference(
     session: &mut Session,
     world: &World,
     traced: &Traced,
-    variant: &Variant,
-) -> Result<Result<Yardstick, String>, RunError> {
-    session.say(format!("{}, {variant}: reference", world.variant));
-    let settings = &session.experiment.reference;
+    cell: &Cell,
+) -> Result<Yardstick, Fault> {
+    session.say(format!("{cell}: reference"));
     let start = Instant::now();
-    let spp = (settings.spp / REFERENCE_PARTS).max(1);
-    let pair = (&settings.sequence, &settings.decorrelation);
-    let integrator = session.registries.integrators.configured(variant);
+    let settings = &session.experiment.reference;
+    let offset = Axis::Offset.default_name().unwrap_or_default();
+    let offset = Variant {
+        name: offset.to_owned(),
+        label: offset.to_owned(),
+        ..Variant::default()
+    };
+    let cell = cell.clone().with(Axis::Offset, &offset);
+    let key = Key::from(&cell);
+    let integrator = (session.registries.integrators).configured(&cell[Axis::Integrator]);
     if let Some(value) = integrator.ok().and_then(|i| i.facts.exact) {
-        return exact_reference(session, world, variant, value);
+        return exact_reference(session, world, &cell, value);
     }
-    let estimator = match Estimator::new(session, pair, variant, spp) {
-        Ok(estimator) => estimator,
-        Err(reason) => return Ok(Err(reason)),
-    };
-    let rendered = (|| {
-        let seeds = session.experiment.seeds().reference_parts;
-        let embedded = (&Variant::default(), traced);
-        let renderer = estimator.renderer(session, world, embedded, &seeds, [true, false])?;
-        let mut parts = Vec::new();
-        for &seed in &seeds {
-            let shots = session.clock.time("gpu", || renderer.render(&[spp], seed));
-            let shots = shots.map_err(|e| e.to_string());
-            parts.extend(shots?.into_iter().map(|s| s.image));
-            session.progress.inc(1);
-        }
-        let reference = Reference::from_parts(parts).map_err(|e| e.to_string())?;
-        Ok::<_, String>((reference, renderer.kernel_hash()))
-    })();
-    let (reference, kernel) = match rendered {
-        Ok(rendered) => rendered,
-        Err(reason) => return Ok(Err(reason)),
-    };
+    let cell = (cell.with(Axis::Sequence, &settings.sequence))
+        .with(Axis::Decorrelation, &settings.decorrelation);
+    let spp = (settings.spp / REFERENCE_PARTS).max(1);
+    let estimator = Estimator::new(session, &cell, spp)?;
+    let seeds = session.experiment.seeds().reference_parts;
+    let renderer = estimator.renderer(session, world, traced, &seeds, [true, false])?;
+    let mut parts = Vec::new();
+    for &seed in &seeds {
+        let shots = session.clock.time("gpu", || renderer.render(&[spp], seed));
+        let shots = shots.map_err(|e| e.to_string())?;
+        parts.extend(shots.into_iter().map(|s| s.image));
+        session.progress.inc(1);
+    }
+    let reference = Reference::from_parts(parts).map_err(|e| e.to_string())?;
     let record = ReferenceRecord {
         spp: spp * REFERENCE_PARTS,
         sampler: estimator.sampler.label(),
         seconds: start.elapsed().as_secs_f64(),
         ..reference_record(&reference)
     };
-    let (key, ran) = (world.key(&Variant::default()), Ran::kernel(kernel));
-    let line = Line::new(key.with_variant(axis::INTEGRATOR, variant), ran, record);
-    finish_reference(session, world, line, reference, rounding_bound(spp)).map(Ok)
+    let line = Line::new(key, Ran::kernel(renderer.kernel_hash()), record);
+    Ok(finish_reference(
+        session,
+        world,
+        &cell,
+        line,
+        reference,
+        rounding_bound(spp),
+    )?)
 }
 
 /// The constant image of a known value: nothing is rendered.
 fn exact_reference(
     session: &mut Session,
     world: &World,
-    variant: &Variant,
+    cell: &Cell,
     value: f64,
-) -> Result<Result<Yardstick, String>, RunError> {
+) -> Result<Yardstick, Fault> {
     let [width, height] = session.experiment.resolution;
     let pixels = vec![[value as f32; 3]; width as usize * height as usize];
-    let made = Image::new(width, height, pixels)
-        .and_then(|image| Reference::from_parts(vec![image; REFERENCE_PARTS as usize]));
-    let reference = match made {
-        Ok(made) => made,
-        Err(error) => return Ok(Err(error.to_string())),
-    };
+    let reference = Image::new(width, height, pixels)
+        .and_then(|image| Reference::from_parts(vec![image; REFERENCE_PARTS as usize]))
+        .map_err(|e| e.to_string())?;
     session.progress.inc(u64::from(REFERENCE_PARTS));
     let record = ReferenceRecord {
         exact: Some(value),
         ..reference_record(&reference)
     };
-    let key = Key::default().with_variant(axis::SCENE, world.variant);
-    let key = key.with_variant(axis::INTEGRATOR, variant);
-    let line = Line::new(key, Ran::default(), record);
-    finish_reference(session, world, line, reference, EVALUATION).map(Ok)
+    let line = Line::new(Key::from(cell), Ran::default(), record);
+    Ok(finish_reference(
+        session, world, cell, line, reference, EVALUATION,
+    )?)
 }
 
 /// The record of a reference that was not rendered; what was rendered sets more.
@@ -152,33 +151,22 @@ fn reference_record(reference: &Reference) -> ReferenceRecord {
 fn finish_reference(
     session: &mut Session,
     world: &World,
+    cell: &Cell,
     mut line: Line<ReferenceRecord>,
     reference: Reference,
     rounding: f64,
 ) -> Result<Yardstick, RunError> {
     let exposure = automatic_exposure(reference.image());
-    let integrator = line.key.get(axis::INTEGRATOR).cloned().unwrap_or_default();
-    let labels = [&world.variant.label, &integrator.label].map(String::as_str);
+    let labels = cell.labels(&[Axis::Scene, Axis::Integrator]);
     let picture = tone_map(reference.image(), exposure);
     let image = session.picture(&[&["reference"], &labels[..]].concat(), &picture)?;
     line.body.image = image.unwrap_or_default();
-    let cell = format!("reference {}, {integrator}: done", world.variant);
-    if !session.is_done(&cell) {
-        let hash = cell_hash(&[
-            ("scene", &world.scene.hash),
-            (
-                "integrator",
-                &serde_json::to_string(&integrator).unwrap_or_default(),
-            ),
-            (
-                "sampler",
-                &format!("{}, {} spp", line.body.sampler, line.body.spp),
-            ),
-            ("kernel", &line.ran.kernel_hash),
-            ("version", env!("CARGO_PKG_VERSION")),
-        ]);
+    let done = format!("reference {}: done", labels.join(", "));
+    if !session.is_done(&done) {
+        let sampler = format!("{}, {} spp", line.body.sampler, line.body.spp);
+        let hash = content_hash(&line, &world.scene.hash, &[("sampler", &sampler)]);
         session.write(&line.hashed(hash).with_body(Body::Reference))?;
-        session.finish(cell);
+        session.finish(done);
     }
     Ok(Yardstick {
         reference,

@@ -1,9 +1,9 @@
 //! All registries together.
 
-use crate::accel::AccelRegistry;
-use crate::config::{Catalogue, SamplerCell};
+use crate::accel::{AccelRegistry, BoxRegistry, Intersection, TriangleRegistry};
+use crate::config::{Axis, Catalogue, Cell};
 use crate::gpu::KernelLibrary;
-use crate::integrator::IntegratorRegistry;
+use crate::integrator::{IntegratorRegistry, OffsetRegistry, RayOffset};
 use crate::measure::figure::FigureRegistry;
 use crate::params::Variant;
 use crate::sampling::SamplerRegistry;
@@ -17,6 +17,12 @@ pub struct Registries {
     pub samplers: SamplerRegistry,
     /// Integrators.
     pub integrators: IntegratorRegistry,
+    /// Ray–triangle tests.
+    pub triangles: TriangleRegistry,
+    /// Ray–box tests.
+    pub boxes: BoxRegistry,
+    /// Offsets of rays that leave a surface.
+    pub offsets: OffsetRegistry,
     /// Figures beside those of the crate.
     pub figures: FigureRegistry,
 }
@@ -24,13 +30,36 @@ pub struct Registries {
 impl Registries {
     /// Names, descriptions and parameters for the parser, lists and docs.
     pub fn catalogue(&self) -> Catalogue {
-        Catalogue {
-            scene: crate::scene::builtin_scenes(),
-            accel: self.accel.entries(),
-            sequence: self.samplers.sequence_entries(),
-            decorrelation: self.samplers.decorrelation_entries(),
-            integrator: self.integrators.entries(),
-        }
+        let mut catalogue = Catalogue::default();
+        catalogue[Axis::Scene] = crate::scene::builtin_scenes();
+        catalogue[Axis::Accel] = self.accel.entries();
+        catalogue[Axis::Sequence] = self.samplers.sequence_entries();
+        catalogue[Axis::Decorrelation] = self.samplers.decorrelation_entries();
+        catalogue[Axis::Integrator] = self.integrators.entries();
+        catalogue[Axis::Triangle] = self.triangles.entries();
+        catalogue[Axis::BoxTest] = self.boxes.entries();
+        catalogue[Axis::Offset] = self.offsets.entries();
+        catalogue
+    }
+
+    /// How the rays of a cell meet triangles and boxes.
+    ///
+    /// # Errors
+    /// A test is not registered.
+    pub fn intersection(&self, cell: &Cell) -> Result<Intersection, String> {
+        let [triangle, box_test] = [Axis::Triangle, Axis::BoxTest].map(|axis| &cell[axis].name);
+        Ok(Intersection {
+            triangle: self.triangles.named("triangle test", triangle)?,
+            box_test: *self.boxes.named("box test", box_test)?,
+        })
+    }
+
+    /// How the rays of a cell leave surfaces.
+    ///
+    /// # Errors
+    /// The offset is not registered.
+    pub fn offset(&self, cell: &Cell) -> Result<RayOffset, String> {
+        (self.offsets.named("offset", &cell[Axis::Offset].name)).copied()
     }
 
     /// Modules that a folder of kernels may bring for what is registered, beside those of the program.
@@ -43,9 +72,11 @@ impl Registries {
         let sequences = self.samplers.sequences.defaults().map(|s| s.sources());
         let decorrelations = self.samplers.decorrelations.defaults();
         let decorrelations = decorrelations.map(|d| d.sources());
-        let integrators = self.integrators.iter().map(|i| i.sources());
-        let sources = sequences.chain(decorrelations).chain(integrators);
-        let sources: Vec<_> = sources.flatten().copied().collect();
+        let samplers = sequences.chain(decorrelations).flatten().copied();
+        let others = (self.integrators.sources())
+            .chain(self.triangles.sources())
+            .chain(self.offsets.sources());
+        let sources: Vec<_> = samplers.chain(others).collect();
         KernelLibrary::default().with_sources(&sources)
     }
 
@@ -63,7 +94,9 @@ impl Registries {
     }
 
     /// Whether the mean over seeds of what this sampler estimates is claimed to be the integral.
-    pub fn is_unbiased(&self, cell: &SamplerCell) -> bool {
-        (self.samplers).is_unbiased(&cell.sequence, &cell.decorrelation)
+    pub fn is_unbiased(&self, cell: &Cell) -> bool {
+        let claimed =
+            (self.samplers).is_unbiased(&cell[Axis::Sequence], &cell[Axis::Decorrelation]);
+        claimed && self.offset(cell).is_ok_and(|offset| offset.is_unbiased)
     }
 }

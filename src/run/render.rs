@@ -4,10 +4,9 @@
 use super::images::Estimator;
 use super::kernels::{Device, Kernels};
 use super::session::Session;
-use super::world::chosen_tests;
 use super::{Registries, RunError, RunOptions};
 use crate::accel::{AccelError, TriangleSoup};
-use crate::config::{Experiment, Plan};
+use crate::config::{Axis, Experiment, Plan};
 use crate::gpu::probe_arithmetic;
 use crate::image::{FileFormat, Image};
 use crate::integrator::{Renderer, Stage, StageError, Traced};
@@ -65,32 +64,33 @@ pub fn render(
         .ok_or_else(|| RunError::Input("there is nothing to render".to_owned()))?;
     let kernels = Kernels::load(&plan.kernels, registries)?;
     let session = Session::unrecorded(experiment, plan, registries, options);
-    session.say(format!("{}: loading", cell.scene));
+    let (scene, accel) = (&cell[Axis::Scene], &cell[Axis::Accel]);
+    session.say(format!("{scene}: loading"));
     let load = LoadOptions {
         allow_outside: options.allow_outside,
         ..LoadOptions::default()
     };
-    let scene = scene::load(&cell.scene, &load).map_err(input)?;
+    let scene_data = scene::load(scene, &load).map_err(input)?;
     // That of the experiment, of the scene, or one that frames the scene.
-    let own = || scene.view(experiment.aspect());
+    let own = || scene_data.view(experiment.aspect());
     let camera = experiment.camera.unwrap_or_else(own);
     camera.validate().map_err(input)?;
     let device = Device::open(options, &kernels)?;
-    let gpu = device.of(&cell.kernels)?;
-    let (tests, offset) = chosen_tests(experiment, &probe_arithmetic(gpu)?)?;
-    let mut stage = Stage::new(gpu, scene, tests)?;
-    stage.buffers.offset = offset;
-    session.say(format!("{}: building {}", cell.scene, cell.accel));
-    let traced = build(&session, &stage, &cell.accel)?;
+    let gpu = device.of(&cell[Axis::Kernels])?;
+    let tests = registries.intersection(cell).map_err(RunError::Input)?;
+    let kept = tests.kept_by(&probe_arithmetic(gpu)?);
+    kept.map_err(RunError::Input)?;
+    let mut stage = Stage::new(gpu, scene_data, tests)?;
+    session.say(format!("{scene}: building {accel}"));
+    let traced = build(&session, &stage, accel)?;
     stage.soup = TriangleSoup::default();
     let scene = &stage.scene;
     session.say("compiling the kernel");
     let spp = experiment.spp.max();
-    let pair = (&cell.sequence, &cell.decorrelation);
-    let estimator = Estimator::new(&session, pair, &cell.integrator, spp);
+    let estimator = Estimator::new(&session, cell, spp);
     let estimator = estimator.map_err(RunError::Input)?;
     if let Some(reason) = estimator.integrator.refusal(&traced) {
-        return Err(RunError::Input(format!("{}: {reason}", cell.accel)));
+        return Err(RunError::Input(format!("{accel}: {reason}")));
     }
     let job = estimator.job(&session, camera, true);
     let renderer = Renderer::new(gpu, &stage.buffers, &traced, &job, true)?;

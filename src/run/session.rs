@@ -2,11 +2,14 @@
 
 use super::folder::Folder;
 use super::{RunError, RunOptions};
-use crate::config::{Experiment, Plan, REFERENCE_PARTS, Skipped};
+use crate::config::{Axis, Experiment, Plan, REFERENCE_PARTS, Skipped};
 use crate::gpu::Environment;
 use crate::gpu::Gpu;
 use crate::image::{Picture, write_png};
-use crate::measure::record::{Body, FinishedRecord, KernelFolder, Line, RunRecord, SkippedRecord};
+use crate::measure::record::{
+    Body, FinishedRecord, KernelFolder, Line, RunRecord, SkippedRecord, axis,
+};
+use crate::text::cell_hash;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::{BTreeMap, HashSet};
 use std::path::PathBuf;
@@ -159,8 +162,8 @@ impl<'a> Session<'a> {
             experiment_text: self.experiment.text.clone(),
             started_unix_s: seconds,
             environment,
-            renders_full_product: self.plan.renders_full_product,
-            renders_planned: self.plan.renders_planned,
+            renders_full_product: self.plan.renders_full_product(),
+            renders_planned: self.plan.renders_planned(),
             kernels,
             figures: self.registries.figures.rows().cloned().collect(),
         };
@@ -264,8 +267,23 @@ fn steps(experiment: &Experiment, plan: &Plan) -> u64 {
     let rounds = u64::from(experiment.timing.rounds) + 1;
     let structures = plan.structures.len() as u64 * (2 + 5 * rounds);
     let times = plan.times.len() as u64 * (1 + rounds);
-    let scenes = plan.scenes.len() as u64 * SCENE_STEPS;
-    let references =
-        plan.scenes.len() * experiment.axes.integrator.len() * REFERENCE_PARTS as usize;
-    scenes + structures + times + (plan.renders_planned + references + plan.streams.len()) as u64
+    let worlds: usize = plan.scenes.iter().map(|s| plan.worlds(s).len()).sum();
+    let scenes = worlds as u64 * SCENE_STEPS;
+    let references = worlds * experiment.axes[Axis::Integrator].len() * REFERENCE_PARTS as usize;
+    scenes + structures + times + (plan.renders_planned() + references + plan.streams.len()) as u64
+}
+
+/// Content hash of the cell of a line: its key, the bytes of its scene, the kernels that ran, and what else
+/// its figures depend on.
+pub(super) fn content_hash<B>(line: &Line<B>, scene_hash: &str, also: &[(&str, &str)]) -> String {
+    // A scene is known by its bytes, wherever it lies.
+    let key = line.key.clone().with(axis::SCENE, "");
+    let key = serde_json::to_string(&key).unwrap_or_default();
+    let parts = [
+        ("key", key.as_str()),
+        ("scene", scene_hash),
+        ("kernel", &line.ran.kernel_hash),
+        ("version", env!("CARGO_PKG_VERSION")),
+    ];
+    cell_hash(&[&parts, also].concat())
 }

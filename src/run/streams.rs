@@ -3,12 +3,12 @@
 
 use super::RunError;
 use super::kernels::Device;
-use super::session::Session;
-use crate::config::StreamCell;
+use super::session::{Session, content_hash};
+use crate::config::{Axis, Cell};
 use crate::discrepancy::{Budget, PointSet, radial_spectrum, star_2d};
 use crate::gpu::Gpu;
 use crate::measure::record::{
-    Body, Key, Line, PixelsAtCount, Ran, RecordedPoints, SamplerCostRecord, StreamRecord, axis,
+    Body, Key, Line, PixelsAtCount, Ran, RecordedPoints, SamplerCostRecord, StreamRecord,
 };
 use crate::measure::sampler_cost::sampler_cost;
 use crate::measure::stream::{COPIES, SeedFigures, coverage, neighbour_angle, over_seeds};
@@ -16,7 +16,6 @@ use crate::measure::words::{compare, dump_stream, kernel_hash};
 use crate::sampling::dimensions::{DIRECTION, FIRST_BOUNCE, PER_BOUNCE, pair_purpose};
 use crate::sampling::hash::pcg_hash;
 use crate::sampling::{Coordinate, Demand, Sampler, to_unit};
-use crate::text::cell_hash;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
@@ -56,7 +55,7 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
         if session.is_done(&cell.to_string()) {
             continue;
         }
-        let gpu = device.of(&cell.kernels)?;
+        let gpu = device.of(&cell[Axis::Kernels])?;
         session.say(format!("discrepancy of {cell}"));
         session.lose_device_on_request(gpu, &cell.to_string());
         for pair in pairs(session, gpu, &cell)? {
@@ -71,7 +70,7 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
         }
         if gpu.lost().is_none() {
             match cost_record(session, gpu, &cell) {
-                Ok((kernel, record)) => {
+                Ok((record, kernel)) => {
                     session.write(&line(&cell, kernel, "cost", Body::SamplerCost(record)))?;
                 }
                 Err(reason) => session.write_failure(&format!("cost of {cell}"), reason)?,
@@ -87,7 +86,7 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
 }
 
 /// The pairs of the experiment and the worst of those that its integrators draw.
-fn pairs(session: &mut Session, gpu: &Gpu, cell: &StreamCell) -> Result<Vec<Pair>, RunError> {
+fn pairs(session: &mut Session, gpu: &Gpu, cell: &Cell) -> Result<Vec<Pair>, RunError> {
     let named = |&dimensions: &[u32; 2]| Pair {
         dimensions,
         named: true,
@@ -123,10 +122,10 @@ fn pairs(session: &mut Session, gpu: &Gpu, cell: &StreamCell) -> Result<Vec<Pair
 fn worst_pair(
     session: &mut Session,
     gpu: &Gpu,
-    cell: &StreamCell,
+    cell: &Cell,
 ) -> Result<Option<([u32; 2], usize)>, String> {
     let mut drawn = BTreeSet::new();
-    for variant in &session.experiment.axes.integrator {
+    for variant in &session.experiment.axes[Axis::Integrator] {
         let integrator = session.registries.integrators.configured(variant);
         let integrator = integrator.map_err(|e| e.to_string())?;
         drawn.extend(integrator.facts.dimension_pairs());
@@ -186,26 +185,17 @@ fn tapped(session: &Session, count: u32) -> Vec<(u32, u32)> {
         .collect()
 }
 
-/// What a stream ran with: no ray was traced.
 /// What was found of a stream, with the hash of the kernel that drew it.
-fn line(cell: &StreamCell, kernel_hash: String, what: &str, body: Body) -> Line {
-    let sampler = serde_json::to_string(&(&cell.sequence, &cell.decorrelation));
-    let hash = cell_hash(&[
-        ("sampler", &sampler.unwrap_or_default()),
-        ("what", what),
-        ("kernel", &kernel_hash),
-        ("version", env!("CARGO_PKG_VERSION")),
-    ]);
-    let key = Key::with_kernels(&cell.kernels)
-        .with_variant(axis::SEQUENCE, &cell.sequence)
-        .with_variant(axis::DECORRELATION, &cell.decorrelation);
-    Line::new(key, Ran::kernel(kernel_hash), body).hashed(hash)
+fn line(cell: &Cell, kernel_hash: String, what: &str, body: Body) -> Line {
+    let line = Line::new(Key::from(cell), Ran::kernel(kernel_hash), body);
+    let hash = content_hash(&line, "", &[("what", what)]);
+    line.hashed(hash)
 }
 
 fn stream_record(
     session: &mut Session,
     gpu: &Gpu,
-    cell: &StreamCell,
+    cell: &Cell,
     pair: Pair,
 ) -> Result<(String, StreamRecord), String> {
     let settings = session.experiment.discrepancy.clone();
@@ -304,7 +294,7 @@ fn check_shared(
 fn recorded_points(
     session: &mut Session,
     gpu: &Gpu,
-    cell: &StreamCell,
+    cell: &Cell,
     pair: [u32; 2],
     seed: u32,
 ) -> Result<RecordedPoints, String> {
@@ -363,8 +353,8 @@ fn pixels_at(
 fn cost_record(
     session: &mut Session,
     gpu: &Gpu,
-    cell: &StreamCell,
-) -> Result<(String, SamplerCostRecord), String> {
+    cell: &Cell,
+) -> Result<(SamplerCostRecord, String), String> {
     let pairs = session.experiment.discrepancy.pairs.iter().flatten();
     let highest = pairs.max().copied().unwrap_or(1).max(1);
     let sampler = sampler_of(
@@ -374,18 +364,13 @@ fn cost_record(
         highest,
     )?;
     let cost = session.clock.time("gpu", || sampler_cost(gpu, &sampler));
-    let cost = cost.map_err(|e| e.to_string())?;
-    let record = SamplerCostRecord {
-        ns_per_sample: cost.ns_per_sample,
-        loop_ns_per_sample: cost.loop_ns_per_sample,
-    };
-    Ok((cost.kernel_hash, record))
+    cost.map_err(|e| e.to_string())
 }
 
 /// The sampler of a stream for so many samples, with dimensions up to `highest`.
 fn sampler_of(
     session: &Session,
-    cell: &StreamCell,
+    cell: &Cell,
     samples: u32,
     highest: u32,
 ) -> Result<Sampler, String> {
@@ -395,7 +380,7 @@ fn sampler_of(
         width: Some(session.experiment.resolution[0]),
     };
     let samplers = &session.registries.samplers;
-    let made = samplers.sampler(&cell.sequence, &cell.decorrelation, &demand);
+    let made = samplers.sampler(&cell[Axis::Sequence], &cell[Axis::Decorrelation], &demand);
     made.map_err(|e| e.to_string())
 }
 
@@ -403,7 +388,7 @@ fn sampler_of(
 /// has points of its own.
 fn point_sets(
     session: &Session,
-    cell: &StreamCell,
+    cell: &Cell,
     pair: [u32; 2],
     counts: &[usize],
 ) -> Result<Vec<(Sampler, Vec<usize>)>, String> {

@@ -4,22 +4,21 @@
 use super::RunError;
 use super::errors::image_hash;
 use super::images::{self, Estimator};
-use super::session::Session;
+use super::session::{Session, content_hash};
 use super::structures::Gated;
 use super::world::World;
 use crate::accel::Space;
-use crate::config::TimeCell;
+use crate::config::{Axis, Cell};
 use crate::gpu::{Elapsed, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
-use crate::measure::record::{Body, Line, Ran, TimeRecord, axis};
+use crate::measure::record::{Body, Key, Line, Ran, TimeRecord};
 use crate::measure::statistics::median_interval;
 use crate::measure::timing::{Measured, Samples, Watch, interleave};
-use crate::text::cell_hash;
 use std::collections::BTreeMap;
 
 /// A full cell, compiled.
 struct Timed<'a> {
-    cell: TimeCell,
+    cell: Cell,
     renderer: Renderer<'a>,
     spp: u32,
     seed: u32,
@@ -45,17 +44,14 @@ impl Measured for Timed<'_> {
 /// rendered once into fresh buffers.
 type Shared = BTreeMap<String, ([u64; 4], String)>;
 
-fn key(cell: &TimeCell, space: Space) -> String {
-    format!(
-        "{}, {} × {} in {space:?}",
-        cell.integrator, cell.sequence, cell.decorrelation
-    )
+fn key(cell: &Cell, space: Space) -> String {
+    format!("{} in {space:?}", cell.on(&Cell::SAMPLER))
 }
 
-/// All full cells of a scene.
+/// All full cells of a world.
 pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Result<(), RunError> {
     let cells = session.plan.times.iter();
-    let cells = cells.filter(|c| c.scene == *world.variant && !session.is_done(&c.to_string()));
+    let cells = cells.filter(|c| c.is_on(&world.cell) && !session.is_done(&c.to_string()));
     let mut timed = Vec::new();
     for cell in cells.cloned().collect::<Vec<_>>() {
         timed.extend(prepare(session, world, gated, cell)?);
@@ -63,7 +59,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             return Ok(());
         }
     }
-    session.say(format!("{}: timing full cells", world.variant));
+    session.say(format!("{}: timing full cells", world.cell));
     let timing = session.experiment.timing;
     let seed = u64::from(session.experiment.seed);
     let progress = session.progress.clone();
@@ -73,12 +69,12 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     let samples = match samples {
         Ok(samples) => samples,
         Err((index, error)) => {
-            return fail(session, world, &timed[index].cell, error.to_string());
+            return fail(session, &timed[index].cell, error.to_string());
         }
     };
     let mut shared = Shared::default();
     for (item, samples) in timed.iter().zip(samples) {
-        let structure = gated.iter().find(|g| g.cell.accel == item.cell.accel);
+        let structure = gated.iter().find(|g| item.cell.is_on(&g.cell));
         let record = match samples {
             Err(error) if error.is_refusal() => {
                 session.write_refused(item.cell.to_string(), error.to_string())?;
@@ -89,7 +85,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         };
         match record {
             Ok(record) => write(session, world, item, record)?,
-            Err(reason) => fail(session, world, &item.cell, reason)?,
+            Err(reason) => fail(session, &item.cell, reason)?,
         }
     }
     Ok(())
@@ -100,22 +96,22 @@ fn prepare<'a>(
     session: &mut Session,
     world: &'a World,
     gated: &[Gated],
-    cell: TimeCell,
+    cell: Cell,
 ) -> Result<Option<Timed<'a>>, RunError> {
     let text = cell.to_string();
-    let Some(structure) = gated.iter().find(|g| g.cell.accel == cell.accel) else {
+    let Some(structure) = gated.iter().find(|g| cell.is_on(&g.cell)) else {
         match refusal(session, &cell) {
             Some(reason) => session.write_refused(text, reason)?,
             None => {
                 let reason = "its structure did not pass the gate".to_owned();
-                fail(session, world, &cell, reason)?;
+                fail(session, &cell, reason)?;
             }
         }
         return Ok(None);
     };
     session.say(format!("{cell}: compiling"));
     session.lose_device_on_request(world.gpu, &text);
-    let unfit = images::unfit(session, &cell.integrator, &structure.traced);
+    let unfit = images::unfit(session, &cell[Axis::Integrator], &structure.traced);
     if let Some(reason) = unfit {
         session.write_refused(text, reason)?;
         return Ok(None);
@@ -124,7 +120,7 @@ fn prepare<'a>(
     session.progress.inc(1);
     match compiled {
         Ok(item) => Ok(Some(item)),
-        Err(reason) => fail(session, world, &cell, reason).map(|()| None),
+        Err(reason) => fail(session, &cell, reason).map(|()| None),
     }
 }
 
@@ -134,24 +130,17 @@ fn write(
     item: &Timed,
     record: Line<TimeRecord>,
 ) -> Result<(), RunError> {
-    let pair = serde_json::to_string(&(&item.cell.accel, &item.cell.integrator));
-    let hash = cell_hash(&[
-        ("scene", &world.scene.hash),
-        ("cell", &pair.unwrap_or_default()),
-        ("kernel", &item.renderer.kernel_text()),
-        ("device", &format!("{:?}", world.gpu.info)),
-        ("version", env!("CARGO_PKG_VERSION")),
-    ]);
+    let device = format!("{:?}", world.gpu.info);
+    let hash = content_hash(&record, &world.scene.hash, &[("device", &device)]);
     session.failed += usize::from(record.body.failure.is_some());
     session.finish(item.cell.to_string());
     session.write(&record.hashed(hash).with_body(Body::Time))
 }
 
 /// Why the driver cannot run the structure of a cell, if that is so.
-fn refusal(session: &Session, cell: &TimeCell) -> Option<String> {
+fn refusal(session: &Session, cell: &Cell) -> Option<String> {
     let mut structures = session.plan.structures.iter();
-    let structure = structures
-        .find(|s| (&s.scene, &s.accel, &s.kernels) == (&cell.scene, &cell.accel, &cell.kernels))?;
+    let structure = structures.find(|s| cell.is_on(s))?;
     session.refused.get(&structure.to_string()).cloned()
 }
 
@@ -161,23 +150,21 @@ fn renderer<'a>(
     session: &mut Session,
     world: &'a World,
     structure: &Gated,
-    cell: &TimeCell,
+    cell: &Cell,
     checks_and_counts: [bool; 2],
 ) -> Result<Renderer<'a>, String> {
     let experiment = &session.experiment;
     let samples = experiment.spp.max().max(experiment.timing.spp);
-    let pair = (&cell.sequence, &cell.decorrelation);
     let seeds = experiment.seeds().replicates;
-    let estimator = Estimator::new(session, pair, &cell.integrator, samples)?;
-    let with = (&cell.kernels, &structure.traced);
-    estimator.renderer(session, world, with, &seeds, checks_and_counts)
+    let estimator = Estimator::new(session, cell, samples)?;
+    estimator.renderer(session, world, &structure.traced, &seeds, checks_and_counts)
 }
 
 fn compile<'a>(
     session: &mut Session,
     world: &'a World,
     structure: &Gated,
-    cell: TimeCell,
+    cell: Cell,
 ) -> Result<Timed<'a>, String> {
     let checks = structure.runtime_checks;
     Ok(Timed {
@@ -230,7 +217,7 @@ fn finish(
         faults.push(text.to_owned());
     }
     let failure = (!faults.is_empty()).then(|| faults.join("; "));
-    let mut line = empty_record(session, world, &item.cell, String::new());
+    let mut line = empty_record(session, &item.cell, String::new());
     let record = &mut line.body;
     record.failure = failure;
     if record.failure.is_none() {
@@ -271,17 +258,7 @@ fn count_rays(
     counted.map_err(|e: GpuError| e.to_string())
 }
 
-fn empty_record(
-    session: &Session,
-    world: &World,
-    cell: &TimeCell,
-    failure: String,
-) -> Line<TimeRecord> {
-    let key = (world.key(&cell.kernels))
-        .with_variant(axis::ACCEL, &cell.accel)
-        .with_variant(axis::SEQUENCE, &cell.sequence)
-        .with_variant(axis::DECORRELATION, &cell.decorrelation)
-        .with_variant(axis::INTEGRATOR, &cell.integrator);
+fn empty_record(session: &Session, cell: &Cell, failure: String) -> Line<TimeRecord> {
     let ran = Ran {
         unchecked: !session.experiment.runtime_checks,
         ..Ran::default()
@@ -298,17 +275,12 @@ fn empty_record(
         image_equal: false,
         failure: Some(failure),
     };
-    Line::new(key, ran, record)
+    Line::new(Key::from(cell), ran, record)
 }
 
-fn fail(
-    session: &mut Session,
-    world: &World,
-    cell: &TimeCell,
-    reason: String,
-) -> Result<(), RunError> {
+fn fail(session: &mut Session, cell: &Cell, reason: String) -> Result<(), RunError> {
     session.failed += 1;
     session.finish(cell.to_string());
-    let record = empty_record(session, world, cell, reason);
+    let record = empty_record(session, cell, reason);
     session.write(&record.with_body(Body::Time))
 }

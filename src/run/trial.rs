@@ -4,10 +4,10 @@
 use super::session::Session;
 use super::world::World;
 use crate::accel::{AccelError, Intersection, TriangleSoup};
-use crate::config::{Gate, StructureCell};
+use crate::config::{Axis, Cell, Gate};
 use crate::gpu::{Gpu, GpuError};
 use crate::integrator::{Stage, StageError};
-use crate::measure::gate::{Judge, fault_text, gate};
+use crate::measure::gate::{Checks, Judge, fault_text, gate};
 use crate::params::Variant;
 use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
 use std::collections::BTreeMap;
@@ -27,10 +27,11 @@ const GATE: Gate = Gate {
 /// Brute force takes each of so many rays.
 const EVERY: usize = 8;
 
-/// The scene with its judge, made once a run, and what structures were found to do on it.
+/// The scene with its judges, made once per run, and what structures were found to do on it.
 #[derive(Default)]
 pub(super) struct Trial {
-    scene: Option<Arc<JudgedScene>>,
+    /// By the tests that it was judged with.
+    scenes: BTreeMap<String, Arc<JudgedScene>>,
     outcomes: BTreeMap<String, Option<String>>,
 }
 
@@ -47,7 +48,7 @@ impl JudgedScene {
         let soup = TriangleSoup::new(&scene).intersecting(intersection);
         let camera = scene.view(1.0);
         let judge =
-            Judge::remembered(&scene, &soup, camera, &GATE, 1).map_err(|e| e.to_string())?;
+            Judge::new(&scene, &soup, camera, &GATE, 1, Checks::Kept).map_err(|e| e.to_string())?;
         let scene = Arc::new(scene);
         Ok(Self { scene, judge })
     }
@@ -62,39 +63,36 @@ pub(super) fn fault(
     session: &mut Session,
     world: &World,
     gpu: &Gpu,
-    cell: &StructureCell,
+    cell: &Cell,
 ) -> Result<Option<String>, GpuError> {
-    let key = cell_key(cell);
-    if world.variant.name == SCENE || !world.soup.intersection.bears_hard_rays() {
+    let tests = world.soup.intersection;
+    if world.cell[Axis::Scene].name == SCENE || !tests.bears_hard_rays() {
         return Ok(None);
     }
+    // Structures with the same parameters, tests and kernels are the same.
+    let parts = [Axis::Accel, Axis::Triangle, Axis::BoxTest, Axis::Kernels];
+    let key = format!("{:?}", cell.on(&parts));
     if let Some(known) = session.trial.outcomes.get(&key) {
         return Ok(known.clone());
     }
-    let judged = match &session.trial.scene {
-        Some(judged) => judged.clone(),
+    let of_tests = format!("{tests:?}");
+    let judged = match session.trial.scenes.get(&of_tests) {
+        Some(judged) => Arc::clone(judged),
         None => {
-            let made = session
-                .clock
-                .time("judge", || JudgedScene::new(world.soup.intersection));
+            let made = session.clock.time("judge", || JudgedScene::new(tests));
             match made {
-                Ok(judged) => session.trial.scene.insert(Arc::new(judged)).clone(),
+                Ok(judged) => Arc::new(judged),
                 Err(reason) => return Ok(Some(format!("{SCENE}: {reason}"))),
             }
         }
     };
+    (session.trial.scenes).insert(of_tests, Arc::clone(&judged));
     let found = session.clock.time("gate", || {
-        judged.fault_of(session.registries, world, gpu, &cell.accel)
+        judged.fault_of(session.registries, world, gpu, &cell[Axis::Accel])
     })?;
     let found = found.map(|fault| format!("{SCENE}: {fault}"));
     session.trial.outcomes.insert(key, found.clone());
     Ok(found)
-}
-
-/// Structures with the same parameters and kernels are the same.
-fn cell_key(cell: &StructureCell) -> String {
-    let accel = serde_json::to_string(&cell.accel).unwrap_or_default();
-    format!("{accel} {} {:?}", cell.accel.label, cell.kernels)
 }
 
 impl JudgedScene {

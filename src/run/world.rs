@@ -1,26 +1,33 @@
 //! A scene made ready: loaded, uploaded, judged.
 
-use super::RunError;
 use super::kernels::Device;
 use super::session::Session;
-use crate::accel::Intersection;
-use crate::config::Experiment;
+use super::{Fault, RunError};
+use crate::config::{Axis, Cell};
 use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu};
-use crate::integrator::{RayOffset, Stage};
-use crate::measure::gate::Judge;
-use crate::measure::record::{Body, Key, Line, Ran, SceneRecord, axis};
+use crate::integrator::Stage;
+use crate::measure::gate::{Checks, Judge};
+use crate::measure::record::{Body, Key, Line, Ran, SceneRecord};
 use crate::params::Variant;
 use crate::scene::{self, LoadOptions, SceneData};
+use std::sync::Arc;
 use std::time::Instant;
 
-/// A scene with everything that its cells share.
+/// A scene as it was read.
+pub(super) struct Loaded {
+    scene: Arc<SceneData>,
+    camera: Camera,
+}
+
+/// A scene and the tests of its triangles and boxes, with everything that its cells share.
 pub(super) struct World<'a> {
     pub device: &'a Device,
     /// The device with the embedded kernels.
     pub gpu: &'a Gpu,
     pub probe: ArithmeticProbe,
-    pub variant: &'a Variant,
+    /// What all cells of this world have in common: see [`Cell::WORLD`].
+    pub cell: Cell,
     pub stage: Stage,
     pub camera: Camera,
     pub judge: Judge,
@@ -55,14 +62,9 @@ impl From<String> for Absent {
     }
 }
 
-impl<'a> World<'a> {
-    /// Loads, uploads and judges a scene. The inner error concerns this scene alone.
-    pub fn new(
-        session: &mut Session,
-        device: &'a Device,
-        variant: &'a Variant,
-    ) -> Result<Result<Self, Absent>, RunError> {
-        let gpu = &device.gpu;
+impl Loaded {
+    /// Loads a scene and records it.
+    pub fn new(session: &mut Session, variant: &Variant) -> Result<Self, Fault> {
         session.say(format!("{variant}: loading"));
         let start = Instant::now();
         let options = LoadOptions {
@@ -72,95 +74,74 @@ impl<'a> World<'a> {
         let loaded = session
             .clock
             .time("load", || scene::load(variant, &options));
-        let scene = match loaded {
-            Ok(scene) => scene,
-            Err(error) => return Ok(Err(Absent::BadInput(error.to_string()))),
-        };
+        let scene = loaded.map_err(|e| e.to_string())?;
         let load_ms = start.elapsed().as_secs_f64() * 1e3;
-        let camera = session
-            .experiment
-            .camera
-            .unwrap_or_else(|| scene.view(session.experiment.aspect()));
-        if let Err(error) = camera.validate() {
-            return Ok(Err(Absent::BadInput(error.to_string())));
-        }
+        let own = || scene.view(session.experiment.aspect());
+        let camera = session.experiment.camera.unwrap_or_else(own);
+        camera.validate().map_err(|e| e.to_string())?;
         let cell = format!("scene {variant}");
         if !session.is_done(&cell) {
             for line in scene.report.lines() {
                 session.tell_warning(&format!("{variant}: {line}"));
             }
-            let key = Key::default().with_variant(axis::SCENE, variant);
+            let key = Key::from(&Cell::default().with(Axis::Scene, variant));
             let record = Body::Scene(scene_record(&scene, camera, load_ms));
             session.write(&Line::new(key, Ran::default(), record).hashed(&scene.hash))?;
             session.finish(cell);
         }
-        session.say(format!("{variant}: checking the judge"));
-        let probe = match session.options.arithmetic {
-            Some(known) => Ok(known),
-            None => session
-                .clock
-                .time("gate", || crate::gpu::probe_arithmetic(gpu)),
-        };
-        let fault = |reason: String| Ok(Err(Absent::BadInput(reason)));
-        let probe = match probe {
-            Ok(probe) => probe,
-            Err(error) => return fault(error.to_string()),
-        };
-        let (intersection, offset) = match chosen_tests(session.experiment, &probe) {
-            Ok(chosen) => chosen,
-            Err(absent) => return Ok(Err(absent)),
-        };
-        let staged = session
-            .clock
-            .time("load", || Stage::new(gpu, scene, intersection));
-        let mut stage = match staged {
-            Ok(stage) => stage,
-            Err(error) => return fault(error.to_string()),
-        };
-        stage.buffers.offset = offset;
-        let experiment = session.experiment;
-        let mut settings = experiment.gate;
-        settings.rays = settings.rays.max(experiment.timing.rays);
-        let judged = session.clock.time("judge", || {
-            let seed = u64::from(experiment.seed);
-            Judge::remembered(&stage.scene, &stage.soup, camera, &settings, seed)
-        });
-        Ok((|| {
-            let judge = judged.map_err(|e| e.to_string())?;
-            Ok(Self {
-                device,
-                gpu,
-                probe,
-                variant,
-                stage,
-                camera,
-                judge,
-            })
-        })())
-    }
-
-    /// What everything on this scene has in common, with these kernels.
-    pub fn key(&self, kernels: &Variant) -> Key {
-        let tests = self.soup.intersection;
-        Key::with_kernels(kernels)
-            .with_variant(axis::SCENE, self.variant)
-            .with(axis::TRIANGLE, tests.triangle.name())
-            .with(axis::BOX_TEST, tests.box_test.name())
-            .with(axis::OFFSET, self.buffers.offset.name())
+        Ok(Self {
+            scene: Arc::new(scene),
+            camera,
+        })
     }
 }
 
-/// How rays meet triangles and leave surfaces in an experiment, on an adapter of this arithmetic.
-pub(super) fn chosen_tests(
-    experiment: &Experiment,
-    probe: &ArithmeticProbe,
-) -> Result<(Intersection, RayOffset), Absent> {
-    let tests = experiment.tests;
-    let chosen = Intersection::named(tests.triangle, tests.box_test)?;
-    let offset = RayOffset::named(tests.offset)
-        .ok_or_else(|| format!("no ray offset is called {}", tests.offset))?;
-    chosen.kept_by(probe).map_err(Absent::NotKept)?;
-    Ok((chosen, offset))
+impl<'a> World<'a> {
+    /// Uploads and judges a scene with the tests of a cell.
+    pub fn new(
+        session: &mut Session,
+        device: &'a Device,
+        loaded: &Loaded,
+        cell: &Cell,
+    ) -> Result<Self, Absent> {
+        let gpu = &device.gpu;
+        session.say(format!("{cell}: checking the judge"));
+        let tests = session.registries.intersection(cell)?;
+        let probe = match session.options.arithmetic {
+            Some(known) => known,
+            None => (session.clock)
+                .time("gate", || crate::gpu::probe_arithmetic(gpu))
+                .map_err(|e| e.to_string())?,
+        };
+        tests.kept_by(&probe).map_err(Absent::NotKept)?;
+        let stage = session
+            .clock
+            .time("load", || Stage::new(gpu, Arc::clone(&loaded.scene), tests))
+            .map_err(|e| e.to_string())?;
+        let experiment = session.experiment;
+        let mut settings = experiment.gate;
+        settings.rays = settings.rays.max(experiment.timing.rays);
+        let judge = session.clock.time("judge", || {
+            let seed = u64::from(experiment.seed);
+            Judge::new(
+                &stage.scene,
+                &stage.soup,
+                loaded.camera,
+                &settings,
+                seed,
+                Checks::Kept,
+            )
+        });
+        Ok(Self {
+            device,
+            gpu,
+            probe,
+            cell: cell.clone(),
+            stage,
+            camera: loaded.camera,
+            judge: judge.map_err(|e| e.to_string())?,
+        })
+    }
 }
 
 fn scene_record(scene: &SceneData, camera: Camera, load_ms: f64) -> SceneRecord {

@@ -110,10 +110,6 @@ impl Decorrelation for BlueNoise {
         "shifts by a void-and-cluster mask (Georgiev & Fajardo 2016), or the tables of Heitz et al. (2019)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/blue_noise"
-    }
-
     fn by_count(&self) -> bool {
         self.folder().is_some()
     }

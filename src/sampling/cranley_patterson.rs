@@ -25,10 +25,6 @@ impl Decorrelation for CranleyPatterson {
         "a random shift modulo 1 for each pixel and dimension (Cranley & Patterson 1976)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/cranley_patterson"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

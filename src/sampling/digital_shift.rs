@@ -26,10 +26,6 @@ impl Decorrelation for DigitalShift {
         "random bits flipped for each pixel and dimension, keeps nets in base 2 (L'Ecuyer & Lemieux 2002)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/digital_shift"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

@@ -26,10 +26,6 @@ impl Decorrelation for DiscRotation {
         "a random turn of the disc of each pair of dimensions, leaves rings (Dufay 2017 §5.3.2)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/disc_rotation"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

@@ -94,10 +94,6 @@ impl Sequence for Halton {
         "radical inverses in the first 256 primes, from index 0 (Halton 1960)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/halton"
-    }
-
     fn facts(&self) -> Facts {
         Facts {
             extensible: true,

@@ -29,10 +29,6 @@ impl Sequence for Hammersley {
         "i/N and radical inverses in prime bases, for N known beforehand (Hammersley 1960)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/hammersley"
-    }
-
     fn constants(&self) -> Vec<(&'static str, u32)> {
         self.rule.constants()
     }

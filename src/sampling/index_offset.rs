@@ -28,10 +28,6 @@ impl Decorrelation for IndexOffset {
         "each pixel begins at a random index of the sequence (Dufay 2017 §5.3.2)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/index_offset"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

@@ -64,10 +64,6 @@ impl Decorrelation for MicroJitter {
         "a shift of at most K·N^(-1/s) for each pixel and dimension, keeps rays coherent (Dufay 2017 §5.4)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/micro_jitter"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

@@ -18,8 +18,8 @@ impl Decorrelation for NoDecorrelation {
         "every pixel uses the same points: coherent rays, structured error (Dufay 2017)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/no_decorrelation"
+    fn kernel(&self) -> String {
+        "sampling/no_decorrelation".to_owned()
     }
 
     fn is_random(&self) -> bool {

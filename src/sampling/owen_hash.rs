@@ -27,10 +27,6 @@ impl Decorrelation for OwenHash {
         "Owen scrambling and a nested shuffle of the index, by hashing, for each pixel (Burley 2020; Vegdahl 2021)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/owen_hash"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

@@ -33,10 +33,6 @@ impl Sequence for OwenSobol {
         "Sobol points Owen-scrambled and shuffled by hashing, as the crate sobol_burley (Burley 2020)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/owen_sobol"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

@@ -38,10 +38,6 @@ impl Sequence for PixelHash {
         "independent numbers: a hash of pixel, sample, dimension and seed (Jarzynski & Olano 2020; Wang 1997; Dufay 2017 Alg. 5.1)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/pixel_hash"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

@@ -25,10 +25,6 @@ impl Sequence for Pmj02 {
         "progressive multi-jittered (0,2) points, a random set in a random order for each pair of dimensions (Christensen et al. 2018)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/pmj02"
-    }
-
     fn facts(&self) -> Facts {
         Facts {
             base_2: true,

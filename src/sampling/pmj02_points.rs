@@ -4,6 +4,8 @@
 //! EGSR 2018, for the order of the cells; M. Pharr, "Efficient generation of points that satisfy
 //! two-dimensional elementary intervals", JCGT 8(1), 2019, for choosing the digits of x and y apart.
 
+use crate::random::SplitMix64;
+
 /// Which elementary intervals of area 2^-m hold a point: bit column · rows + row of shape k, which has
 /// 2^k columns and 2^(m−k) rows.
 struct Occupancy {
@@ -41,25 +43,12 @@ impl Occupancy {
     }
 }
 
-/// A random stream: SplitMix64 (G. Steele, D. Lea, C. Flood 2014), upper half.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 32) as u32
-    }
-}
-
 /// A point in the cell of `corner`, whose first `x_bits` and `y_bits` digits (m together) are given.
 ///
 /// The interval of x's first k + 1 digits and y's first m − k − 1 depends on no later digit of either,
 /// so the digits are chosen one after the other. Its two halves came from two intervals with one point
 /// each, so one of them is always free.
-fn place(occupied: &Occupancy, corner: [u32; 2], x_bits: u32, random: &mut Random) -> [u32; 2] {
+fn place(occupied: &Occupancy, corner: [u32; 2], x_bits: u32, random: &mut SplitMix64) -> [u32; 2] {
     let m = occupied.m;
     let mut point = corner;
     for axis in [0, 1] {
@@ -76,24 +65,24 @@ fn place(occupied: &Occupancy, corner: [u32; 2], x_bits: u32, random: &mut Rando
             };
             let free = [digits, digits | set].map(|d| occupied.is_free(columns, with(d)));
             let choose_set = match free {
-                [true, true] => random.next() >> 31 == 1,
+                [true, true] => random.next_u32() >> 31 == 1,
                 [zero, _] => !zero,
             };
             digits |= u32::from(choose_set) * set;
         }
-        point[axis] = digits | random.next() & below(m);
+        point[axis] = digits | random.next_u32() & below(m);
     }
     point
 }
 
 /// Nested uniform shuffle: the halves of every block, down to single points, change places or not at
 /// random.
-fn shuffle(block: &mut [[u32; 2]], random: &mut Random) {
+fn shuffle(block: &mut [[u32; 2]], random: &mut SplitMix64) {
     if block.len() < 2 {
         return;
     }
     let (first, second) = block.split_at_mut(block.len() / 2);
-    if random.next() >> 31 == 1 {
+    if random.next_u32() >> 31 == 1 {
         first.swap_with_slice(second);
     }
     shuffle(first, random);
@@ -112,7 +101,7 @@ fn shuffle(block: &mut [[u32; 2]], random: &mut Random) {
 /// aligned block is a net; here only prefixes are.
 pub(super) fn shuffled_points(count: u32, seed: u32) -> Vec<[u32; 2]> {
     let mut points = pmj02_points(count, seed);
-    let mut random = Random(u64::from(seed) << 32 | 1);
+    let mut random = SplitMix64(u64::from(seed) << 32 | 1);
     let mut first = 1;
     while first < points.len() {
         shuffle(&mut points[first..2 * first], &mut random);
@@ -121,10 +110,25 @@ pub(super) fn shuffled_points(count: u32, seed: u32) -> Vec<[u32; 2]> {
     points
 }
 
+/// Adds a point in the quarter that lies `turned` from that of point `i`, whose cell has `bits` digits.
+fn add_beside(
+    points: &mut Vec<[u32; 2]>,
+    i: usize,
+    turned: [u32; 2],
+    bits: u32,
+    occupied: &mut Occupancy,
+    random: &mut SplitMix64,
+) {
+    let corner = [points[i][0] ^ turned[0], points[i][1] ^ turned[1]];
+    let point = place(occupied, corner, bits, random);
+    occupied.insert(point);
+    points.push(point);
+}
+
 /// `count` points (a power of two), of which every prefix of 2^m is a (0, m, 2)-net in base 2.
 fn pmj02_points(count: u32, seed: u32) -> Vec<[u32; 2]> {
-    let mut random = Random(u64::from(seed) << 32);
-    let mut points = vec![[random.next(), random.next()]];
+    let mut random = SplitMix64(u64::from(seed) << 32);
+    let mut points = vec![[random.next_u32(), random.next_u32()]];
     let mut k = 0;
     // From 4^k points to 4^(k+1): first into the opposite quarter of each point's cell, then into
     // either of the two left, at last opposite of those.
@@ -133,36 +137,21 @@ fn pmj02_points(count: u32, seed: u32) -> Vec<[u32; 2]> {
         let before = points.len();
         let mut occupied = Occupancy::new(2 * k + 1, &points);
         for i in 0..before {
-            let [x, y] = points[i];
-            let point = place(&occupied, [x ^ half, y ^ half], k + 1, &mut random);
-            occupied.insert(point);
-            points.push(point);
+            add_beside(&mut points, i, [half; 2], k + 1, &mut occupied, &mut random);
         }
         if points.len() == count as usize {
             break;
         }
         let mut occupied = Occupancy::new(2 * k + 2, &points);
         for i in 0..before {
-            let [x, y] = points[i];
-            let turned = if random.next() >> 31 == 1 {
-                [half, 0]
-            } else {
-                [0, half]
+            let turned = match random.next_u32() >> 31 {
+                1 => [half, 0],
+                _ => [0, half],
             };
-            let point = place(
-                &occupied,
-                [x ^ turned[0], y ^ turned[1]],
-                k + 1,
-                &mut random,
-            );
-            occupied.insert(point);
-            points.push(point);
+            add_beside(&mut points, i, turned, k + 1, &mut occupied, &mut random);
         }
         for i in 2 * before..3 * before {
-            let [x, y] = points[i];
-            let point = place(&occupied, [x ^ half, y ^ half], k + 1, &mut random);
-            occupied.insert(point);
-            points.push(point);
+            add_beside(&mut points, i, [half; 2], k + 1, &mut occupied, &mut random);
         }
         k += 1;
     }

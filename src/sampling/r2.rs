@@ -44,10 +44,6 @@ impl Sequence for R2 {
         "additive recurrence: powers of a generalised golden ratio (Roberts 2018), beyond 8 dimensions square roots of primes (Richtmyer 1951)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/r2"
-    }
-
     fn facts(&self) -> Facts {
         Facts {
             extensible: true,

@@ -23,10 +23,6 @@ impl Sequence for Rank1Lattice {
         "extensible rank-1 lattice, generating vector searched component by component (Sloan & Reztsov 2002)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/rank1_lattice"
-    }
-
     fn facts(&self) -> Facts {
         Facts {
             dimensions: Some(super::lattice_search::DIMENSIONS as u32),

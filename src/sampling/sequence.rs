@@ -30,8 +30,10 @@ pub trait Sequence: Send + Sync {
     fn name(&self) -> &'static str;
     /// One line: what it is and where it comes from.
     fn description(&self) -> &'static str;
-    /// Module of the kernel, relative to the kernel folder.
-    fn kernel(&self) -> &'static str;
+    /// Module of the kernel, relative to the kernel folder: by default the file of that name.
+    fn kernel(&self) -> String {
+        format!("sampling/{}", self.name().replace('-', "_"))
+    }
     /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
     fn sources(&self) -> &'static [(&'static str, &'static str)] {
         &[]

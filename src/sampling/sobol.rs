@@ -41,10 +41,6 @@ impl Sequence for Sobol {
         "(t, s)-sequence in base 2, 21201 dimensions of Joe & Kuo's D6 direction numbers (2008), from index 0"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/sobol"
-    }
-
     fn facts(&self) -> Facts {
         Facts {
             base_2: true,

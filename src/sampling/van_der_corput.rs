@@ -21,10 +21,6 @@ impl Sequence for VanDerCorput {
         "radical inverse in one base, one-dimensional, from index 0 (van der Corput 1935)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/van_der_corput"
-    }
-
     fn facts(&self) -> Facts {
         Facts {
             base_2: self.base == 2,

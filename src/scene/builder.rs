@@ -33,6 +33,18 @@ pub(super) struct Look {
     pub environment: Vec3,
 }
 
+impl Look {
+    /// Surfaces under a white sky, seen from `eye` with a vertical field of view of `fov` degrees.
+    pub fn under_sky(materials: Vec<Material>, eye: Vec3, target: Vec3, fov: f32) -> Self {
+        Self {
+            materials,
+            camera: Some(Camera::upright(eye, target, fov)),
+            environment: Vec3::ONE,
+            ..Self::default()
+        }
+    }
+}
+
 /// Collects triangles: drops what cannot be traced, counts what is odd.
 #[derive(Default)]
 pub(super) struct SceneBuilder {
@@ -91,6 +103,14 @@ impl SceneBuilder {
     pub fn push_quad(&mut self, [a, b, c, d]: [Vec3; 4], material: u32) {
         self.push([a, b, c], material);
         self.push([a, c, d], material);
+    }
+
+    /// Adds `edge` by `edge` quadrilaterals between the points of a grid.
+    pub fn push_grid(&mut self, edge: usize, material: u32, at: impl Fn(usize, usize) -> Vec3) {
+        for (i, k) in (0..edge).flat_map(|i| (0..edge).map(move |k| (i, k))) {
+            let quad = [at(i, k), at(i, k + 1), at(i + 1, k + 1), at(i + 1, k)];
+            self.push_quad(quad, material);
+        }
     }
 
     /// Adds an object to the assembly. It is numbered by the order of addition.

@@ -92,14 +92,21 @@ pub enum SceneError {
 }
 
 fn at(place: &str) -> String {
-    if place.is_empty() {
-        String::new()
-    } else {
-        format!(" ({place})")
+    match place {
+        "" => String::new(),
+        place => format!(" ({place})"),
     }
 }
 
 impl SceneError {
+    /// A [`SceneError::Read`] of this file.
+    pub(super) fn unreadable(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
+        |source| Self::Read {
+            path: path.to_owned(),
+            source,
+        }
+    }
+
     /// A [`SceneError::Malformed`].
     pub(super) fn malformed(
         path: &Path,
@@ -116,11 +123,7 @@ impl SceneError {
 
 /// Opens a model, telling a missing or empty file from a readable one.
 pub(super) fn open(path: &Path) -> Result<std::fs::File, SceneError> {
-    let read = |source| SceneError::Read {
-        path: path.to_owned(),
-        source,
-    };
-    let (file, bytes) = open_regular(path).map_err(read)?;
+    let (file, bytes) = open_regular(path).map_err(SceneError::unreadable(path))?;
     if bytes == 0 {
         return Err(SceneError::Empty {
             path: path.to_owned(),
@@ -133,10 +136,7 @@ pub(super) fn open(path: &Path) -> Result<std::fs::File, SceneError> {
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, SceneError> {
     let mut bytes = Vec::new();
     let read = open(path)?.read_to_end(&mut bytes);
-    read.map(|_| bytes).map_err(|source| SceneError::Read {
-        path: path.to_owned(),
-        source,
-    })
+    read.map(|_| bytes).map_err(SceneError::unreadable(path))
 }
 
 /// Opens a regular file, and tells its length in bytes. Folders are none, nor are devices and pipes,

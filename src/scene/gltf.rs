@@ -6,7 +6,7 @@ use super::error::{self, guarded};
 use super::gltf_accessor::check_accessors;
 use super::gltf_container;
 use super::gltf_files::Files;
-use super::gltf_material::{self, TextureUse};
+use super::gltf_material::{self, Mapping};
 use super::texture::decode_all;
 use super::{InstanceError, LoadOptions, SceneData, SceneError, Transform};
 use crate::geometry::{Camera, Triangle};
@@ -43,11 +43,8 @@ pub(super) fn load(
 fn parse(json: &[u8]) -> Result<gltf::Document, String> {
     let unchecked = gltf::Gltf::from_slice_without_validation(json).map_err(|e| e.to_string())?;
     let root = unchecked.document.into_json();
-    if let Some(problem) = root
-        .extensions_required
-        .iter()
-        .find_map(|name| compressed(name))
-    {
+    let mut required = root.extensions_required.iter();
+    if let Some(problem) = required.find_map(|name| compressed(name)) {
         return Err(problem);
     }
     for (m, mesh) in root.meshes.iter().enumerate() {
@@ -88,7 +85,7 @@ fn build(
     let mut geometry = Geometry {
         path,
         buffers,
-        texture_uses: &palette.texture_uses,
+        mappings: &palette.mappings,
         builder: SceneBuilder::new(!palette.images.is_empty(), 0),
         camera: None,
         copies: Copies::new(document),
@@ -152,7 +149,7 @@ fn read_buffers(
 struct Geometry<'a> {
     path: &'a Path,
     buffers: &'a [Vec<u8>],
-    texture_uses: &'a [TextureUse],
+    mappings: &'a [Option<Mapping>],
     builder: SceneBuilder,
     camera: Option<Camera>,
     /// `None` where no nodes share a mesh, or once a node could not be made an instance.
@@ -167,8 +164,6 @@ struct Copies {
     uses: Vec<usize>,
     /// The object that a mesh became.
     objects: Vec<Option<u32>>,
-    /// Triangles of the present mesh in its own space, if they are still needed.
-    triangles: Vec<Triangle>,
 }
 
 impl Copies {
@@ -178,16 +173,8 @@ impl Copies {
             uses[mesh.index()] += 1;
         }
         let shared = uses.iter().any(|n| *n > 1);
-        shared.then(|| Self {
-            objects: vec![None; uses.len()],
-            uses,
-            triangles: Vec::new(),
-        })
-    }
-
-    /// Whether the mesh's own triangles are to be gathered.
-    fn needs(&self, mesh: usize) -> bool {
-        self.uses[mesh] > 1 && self.objects[mesh].is_none()
+        let objects = vec![None; uses.len()];
+        shared.then_some(Self { uses, objects })
     }
 }
 
@@ -229,9 +216,9 @@ impl<'a> Geometry<'a> {
         };
         self.deformed += usize::from(node.skin().is_some());
         let before = self.builder.len();
-        let gather = self.copies.as_ref().is_some_and(|c| c.needs(mesh.index()));
+        let mut own = Vec::new();
         for primitive in mesh.primitives() {
-            let read = self.read_primitive(&primitive, world, gather);
+            let read = self.read_primitive(&primitive, world, &mut own);
             read.map_err(|problem| {
                 let label = mesh.name().unwrap_or("unnamed");
                 let place = format!(
@@ -242,53 +229,52 @@ impl<'a> Geometry<'a> {
                 SceneError::malformed(self.path, place, problem)
             })?;
         }
-        self.place(node, &mesh, world, before);
+        if self.builder.len() > before {
+            self.place(node, mesh.index(), own, world, before);
+        }
         Ok(())
     }
 
-    /// Makes the node an instance of its mesh, whose triangles in world space begin at `before`. What
-    /// cannot be one leaves the scene without instances.
-    fn place(&mut self, node: &gltf::Node<'a>, mesh: &gltf::Mesh<'a>, world: Mat4, before: usize) {
-        let Some(mut copies) = self.copies.take() else {
+    /// Makes the node an instance of its mesh with the triangles `own`, those of which in world space begin
+    /// at `before`. What cannot be one leaves the scene without instances.
+    fn place(
+        &mut self,
+        node: &gltf::Node<'a>,
+        mesh: usize,
+        own: Vec<Triangle>,
+        world: Mat4,
+        before: usize,
+    ) {
+        let Some(copies) = &mut self.copies else {
             return;
         };
-        let pushed = self.builder.len() - before;
-        let triangles = std::mem::take(&mut copies.triangles);
-        if pushed == 0 {
-            self.copies = Some(copies);
-            return;
-        }
-        let assembly = &mut self.builder.assembly;
-        let placed = if copies.uses[mesh.index()] > 1 {
-            let known = copies.objects[mesh.index()];
-            let object = known.map_or_else(|| assembly.add_object(triangles), Ok);
-            object.and_then(|object| {
-                copies.objects[mesh.index()] = Some(object);
-                assembly.place(object, Transform::from_matrix(world))
-            })
-        } else {
-            let own = self.builder.triangles()[before..].to_vec();
-            let assembly = &mut self.builder.assembly;
-            let object = assembly.add_object(own);
-            object.and_then(|object| assembly.place(object, Transform::IDENTITY))
-        };
-        let problem = match placed {
-            Ok(_) if self.builder.assembly.triangles() == self.builder.len() as u64 => None,
-            Ok(_) => Some("it has triangles that are not finite".to_owned()),
-            Err(error) => Some(reason(&error)),
-        };
-        match problem {
-            None => self.copies = Some(copies),
-            Some(problem) => {
-                let label = node.name().unwrap_or("unnamed");
-                self.builder.assembly = Default::default();
-                self.builder.report.warnings.push(format!(
-                    "node {} `{label}` cannot be an instance ({problem}): the scene is traced as a \
-                     flat list of triangles",
-                    node.index()
-                ));
+        let (object, triangles, to_world) = match copies.uses[mesh] > 1 {
+            true => (
+                &mut copies.objects[mesh],
+                own,
+                Transform::from_matrix(world),
+            ),
+            false => {
+                let triangles = self.builder.triangles()[before..].to_vec();
+                (&mut None, triangles, Transform::IDENTITY)
             }
-        }
+        };
+        let assembly = &mut self.builder.assembly;
+        let known = object.map_or_else(|| assembly.add_object(triangles), Ok);
+        let placed = known.and_then(|known| assembly.place(*object.insert(known), to_world));
+        let problem = match placed {
+            Ok(_) if assembly.triangles() == self.builder.len() as u64 => return,
+            Ok(_) => "it has triangles that are not finite".to_owned(),
+            Err(error) => reason(&error),
+        };
+        let label = node.name().unwrap_or("unnamed");
+        self.copies = None;
+        self.builder.assembly = Default::default();
+        self.builder.report.warnings.push(format!(
+            "node {} `{label}` cannot be an instance ({problem}): the scene is traced as a \
+             flat list of triangles",
+            node.index()
+        ));
     }
 
     fn read_camera(&mut self, camera: &gltf::Camera<'_>, world: Mat4) -> Option<Camera> {
@@ -315,11 +301,12 @@ impl<'a> Geometry<'a> {
         Some(found)
     }
 
+    /// Adds the triangles of a primitive, and to `own` those in the space of the mesh where nodes share one.
     fn read_primitive(
         &mut self,
         primitive: &gltf::Primitive<'a>,
         world: Mat4,
-        gather: bool,
+        own: &mut Vec<Triangle>,
     ) -> Result<(), String> {
         let mode = primitive.mode();
         if !matches!(
@@ -333,16 +320,16 @@ impl<'a> Geometry<'a> {
         let buffers = self.buffers;
         let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
         // The file's materials, then one for primitives that name none.
-        let last = self.texture_uses.len() - 1;
+        let last = self.mappings.len() - 1;
         let material = primitive.material().index().unwrap_or(last);
-        let texture_use = &self.texture_uses[material];
-        check_accessors(primitive, buffers, texture_use)?;
-        let own: Vec<Vec3> = reader
+        let mapping = self.mappings[material].as_ref();
+        check_accessors(primitive, buffers, mapping)?;
+        let local: Vec<Vec3> = reader
             .read_positions()
             .ok_or("its positions are missing or outside their buffer")?
             .map(Vec3::from)
             .collect();
-        let positions: Vec<Vec3> = own.iter().map(|p| world.transform_point3(*p)).collect();
+        let positions: Vec<Vec3> = local.iter().map(|p| world.transform_point3(*p)).collect();
         let indices: Cow<'_, [u32]> = match (primitive.indices(), reader.read_indices()) {
             (None, _) => (0..positions.len() as u32).collect(),
             (Some(_), Some(indices)) => indices.into_u32().collect(),
@@ -354,39 +341,39 @@ impl<'a> Geometry<'a> {
                 positions.len()
             ));
         }
-        let uvs: Vec<Vec2> = match texture_use {
-            TextureUse::None => Vec::new(),
-            TextureUse::Mapped { set, transform } => reader
-                .read_tex_coords(*set)
-                .map(|uvs| uvs.into_f32().map(|uv| transform.apply(uv)).collect())
-                .unwrap_or_default(),
+        let read = |mapping: &Mapping| {
+            let uvs = reader.read_tex_coords(mapping.set)?.into_f32();
+            Some(uvs.map(|uv| mapping.apply(uv)).collect())
         };
+        let uvs: Vec<Vec2> = mapping.and_then(read).unwrap_or_default();
         let uv = |i: u32| uvs.get(i as usize).copied().unwrap_or_default();
+        let is_shared = self.copies.is_some();
         for_each_face(mode, &indices, |corners| {
             let vertices = corners.map(|i| positions[i as usize]);
             self.builder
                 .push_textured(vertices, corners.map(uv), material as u32);
+            if is_shared {
+                let vertices = corners.map(|i| local[i as usize]);
+                own.push(Triangle { vertices });
+            }
         });
-        if let Some(copies) = self.copies.as_mut().filter(|_| gather) {
-            for_each_face(mode, &indices, |corners| {
-                let vertices = corners.map(|i| own[i as usize]);
-                copies.triangles.push(Triangle { vertices });
-            });
-        }
         Ok(())
     }
 
     fn report_left_out(&mut self) {
-        let warnings = &mut self.builder.report.warnings;
-        if self.lines_or_points > 0 {
-            let count = self.lines_or_points;
-            warnings.push(format!("{count} primitives of lines or points left out"));
-        }
-        if self.deformed > 0 {
-            let count = self.deformed;
-            warnings.push(format!(
-                "{count} meshes have a skin or morph targets: shown in their rest shape"
-            ));
+        for (count, what) in [
+            (
+                self.lines_or_points,
+                "primitives of lines or points left out",
+            ),
+            (
+                self.deformed,
+                "meshes have a skin or morph targets: shown in their rest shape",
+            ),
+        ] {
+            if count > 0 {
+                self.builder.report.warnings.push(format!("{count} {what}"));
+            }
         }
     }
 }

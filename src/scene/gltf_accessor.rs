@@ -1,7 +1,7 @@
 //! Checks of glTF accessors. The crate's readers take for granted that types fit, that strides are
 //! wide enough and that offsets and counts stay within their buffers, and panic where they do not.
 
-use super::gltf_material::TextureUse;
+use super::gltf_material::Mapping;
 use gltf::Semantic;
 use gltf::accessor::{Accessor, DataType, Dimensions};
 use gltf::buffer::View;
@@ -13,7 +13,7 @@ use gltf::buffer::View;
 pub(super) fn check_accessors(
     primitive: &gltf::Primitive<'_>,
     buffers: &[Vec<u8>],
-    texture_use: &TextureUse,
+    mapping: Option<&Mapping>,
 ) -> Result<(), String> {
     if let Some(positions) = primitive.get(&Semantic::Positions) {
         check_data(&positions, buffers).map_err(|p| format!("its positions {p}"))?;
@@ -28,7 +28,7 @@ pub(super) fn check_accessors(
             return Err("its indices are not unsigned integers".to_owned());
         }
     }
-    let TextureUse::Mapped { set, .. } = texture_use else {
+    let Some(Mapping { set, .. }) = mapping else {
         return Ok(());
     };
     if let Some(uvs) = primitive.get(&Semantic::TexCoords(*set)) {
@@ -52,22 +52,13 @@ fn check_data(accessor: &Accessor<'_>, buffers: &[Vec<u8>]) -> Result<(), String
     let replaced = |problem: String| format!("are replaced by some that {problem}");
     let (indices, values) = (sparse.indices(), sparse.values());
     let index_size = indices.index_type().size();
-    let places = check_range(
-        &indices.view(),
-        indices.offset(),
-        sparse.count(),
-        index_size,
-        buffers,
-    );
-    places.map_err(replaced)?;
-    check_range(
-        &values.view(),
-        values.offset(),
-        sparse.count(),
-        size,
-        buffers,
-    )
-    .map_err(replaced)
+    for (view, offset, size) in [
+        (indices.view(), indices.offset(), index_size),
+        (values.view(), values.offset(), size),
+    ] {
+        check_range(&view, offset, sparse.count(), size, buffers).map_err(replaced)?;
+    }
+    Ok(())
 }
 
 /// Checks that `count` elements of `size` bytes lie in their view, and the view in its buffer.

@@ -15,31 +15,39 @@ const FROSTED: f32 = 0.1;
 pub(super) struct Palette<'a> {
     /// The document's materials in order, then the default one.
     pub materials: Vec<Material>,
-    /// How the texture of each material is mapped; parallel to `materials`.
-    pub texture_uses: Vec<TextureUse>,
+    /// How the texture of each material is mapped, if it has one; parallel to `materials`.
+    pub mappings: Vec<Option<Mapping>>,
     /// Images that some material uses; materials index into it.
     pub images: Vec<ImageSource<'a>>,
     pub warnings: Vec<String>,
 }
 
-/// Where a material's texture coordinates come from.
-pub(super) enum TextureUse {
-    /// The material has no texture.
-    None,
-    /// Coordinates are set `set` of the mesh after `transform`.
-    Mapped {
-        set: u32,
-        transform: TextureTransform,
-    },
-}
-
-/// `KHR_texture_transform`: scale, then rotation, then offset.
-pub(super) struct TextureTransform {
+/// Where a texture's coordinates come from: set `set` of the mesh, by `KHR_texture_transform` scaled, then
+/// rotated, then moved.
+pub(super) struct Mapping {
+    pub set: u32,
     linear: Mat2,
     offset: Vec2,
 }
 
-impl TextureTransform {
+impl Mapping {
+    fn of(info: &gltf::texture::Info<'_>) -> Self {
+        let Some(transform) = info.texture_transform() else {
+            return Self {
+                set: info.tex_coord(),
+                linear: Mat2::IDENTITY,
+                offset: Vec2::ZERO,
+            };
+        };
+        let (sin, cos) = transform.rotation().sin_cos();
+        let rotation = Mat2::from_cols(Vec2::new(cos, -sin), Vec2::new(sin, cos));
+        Self {
+            set: transform.tex_coord().unwrap_or(info.tex_coord()),
+            linear: rotation * Mat2::from_diagonal(transform.scale().into()),
+            offset: transform.offset().into(),
+        }
+    }
+
     pub fn apply(&self, uv: [f32; 2]) -> Vec2 {
         self.linear * Vec2::from(uv) + self.offset
     }
@@ -54,7 +62,7 @@ pub(super) fn read<'a>(
 ) -> Palette<'a> {
     let mut palette = Palette {
         materials: Vec::new(),
-        texture_uses: Vec::new(),
+        mappings: Vec::new(),
         images: Vec::new(),
         warnings: Vec::new(),
     };
@@ -63,24 +71,21 @@ pub(super) fn read<'a>(
     for material in document.materials() {
         let mut found = convert(&material);
         let info = base_color(&material).1.filter(|_| with_textures);
-        palette.texture_uses.push(match info {
-            Some(info) if found.kind != &MIRROR => {
-                let image = info.texture().source();
-                let id = image_ids[image.index()].get_or_insert_with(|| {
-                    palette.images.push(image_source(files, &image, buffers));
-                    palette.images.len() as u32 - 1
-                });
-                found.base_color_texture = Some(*id);
-                mapping(&info)
-            }
-            _ => TextureUse::None,
-        });
+        let info = info.filter(|_| found.kind != &MIRROR);
+        palette.mappings.push(info.as_ref().map(Mapping::of));
+        if let Some(image) = info.map(|info| info.texture().source()) {
+            let id = image_ids[image.index()].get_or_insert_with(|| {
+                palette.images.push(image_source(files, &image, buffers));
+                palette.images.len() as u32 - 1
+            });
+            found.base_color_texture = Some(*id);
+        }
         palette.materials.push(found);
     }
     palette
         .materials
         .push(Material::diffuse("default", Vec3::splat(DEFAULT_ALBEDO)));
-    palette.texture_uses.push(TextureUse::None);
+    palette.mappings.push(None);
     palette.warnings = warnings(document, &palette.materials);
     palette
 }
@@ -120,48 +125,22 @@ fn convert(material: &gltf::Material<'_>) -> Material {
         filter: None,
         thickness: material.volume().map(|v| v.thickness_factor()),
         opacity: Some(color.w),
-        alpha_mode: Some(
-            match material.alpha_mode() {
-                gltf::material::AlphaMode::Opaque => "OPAQUE",
-                gltf::material::AlphaMode::Mask => "MASK",
-                gltf::material::AlphaMode::Blend => "BLEND",
-            }
-            .to_owned(),
-        ),
+        // The names of the standard are the crate's in capitals.
+        alpha_mode: Some(format!("{:?}", material.alpha_mode()).to_uppercase()),
         illum: None,
     };
-    let transmission = material.transmission();
     let description = Description {
         format: Format::Gltf,
         base_color: color.xyz(),
         is_varied: model.metallic_roughness_texture().is_some()
-            || transmission.is_some_and(|t| t.transmission_texture().is_some()),
+            || material
+                .transmission()
+                .is_some_and(|t| t.transmission_texture().is_some()),
         source: &source,
     };
     let name = material.name();
     let name = name.map_or_else(|| format!("material {index}"), str::to_owned);
     Material::described(name, &description).emitting(emitted(emission))
-}
-
-fn mapping(info: &gltf::texture::Info<'_>) -> TextureUse {
-    let Some(transform) = info.texture_transform() else {
-        return TextureUse::Mapped {
-            set: info.tex_coord(),
-            transform: TextureTransform {
-                linear: Mat2::IDENTITY,
-                offset: Vec2::ZERO,
-            },
-        };
-    };
-    let (sin, cos) = transform.rotation().sin_cos();
-    let rotation = Mat2::from_cols(Vec2::new(cos, -sin), Vec2::new(sin, cos));
-    TextureUse::Mapped {
-        set: transform.tex_coord().unwrap_or(info.tex_coord()),
-        transform: TextureTransform {
-            linear: rotation * Mat2::from_diagonal(transform.scale().into()),
-            offset: transform.offset().into(),
-        },
-    }
 }
 
 fn image_source<'a>(
@@ -173,21 +152,15 @@ fn image_source<'a>(
     let (uri_name, encoded) = match image.source() {
         gltf::image::Source::View { view, .. } => {
             let range = view.offset()..view.offset().saturating_add(view.length());
-            let bytes = buffers
-                .get(view.buffer().index())
-                .and_then(|data| data.get(range));
-            let encoded = match bytes {
-                Some(bytes) => Encoded::Memory(Cow::Borrowed(bytes)),
-                None => Encoded::Missing("its bytes lie outside the buffer".to_owned()),
-            };
+            let buffer = buffers.get(view.buffer().index());
+            let bytes = buffer.and_then(|data| data.get(range));
+            let missing = || Encoded::Missing("its bytes lie outside the buffer".to_owned());
+            let encoded = bytes.map_or_else(missing, |b| Encoded::Memory(Cow::Borrowed(b)));
             (None, encoded)
         }
         gltf::image::Source::Uri { uri, .. } if uri.starts_with("data:") => {
-            let encoded = match files.read(uri) {
-                Ok(bytes) => Encoded::Memory(Cow::Owned(bytes)),
-                Err(problem) => Encoded::Missing(problem),
-            };
-            (None, encoded)
+            let owned = |bytes| Encoded::Memory(Cow::Owned(bytes));
+            (None, files.read(uri).map_or_else(Encoded::Missing, owned))
         }
         gltf::image::Source::Uri { uri, .. } => (
             Some(uri),

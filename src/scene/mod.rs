@@ -70,15 +70,13 @@ pub struct LoadReport {
 impl LoadReport {
     /// Everything that makes the scene differ from its file, a line each, for people.
     pub fn lines(&self) -> Vec<String> {
-        let dropped = match self.dropped_non_finite {
-            0 => None,
-            1 => Some("1 triangle dropped: a vertex is not finite".to_owned()),
-            n => Some(format!("{n} triangles dropped: a vertex is not finite")),
+        let mut lines = match self.dropped_non_finite {
+            0 => Vec::new(),
+            1 => vec!["1 triangle dropped: a vertex is not finite".to_owned()],
+            n => vec![format!("{n} triangles dropped: a vertex is not finite")],
         };
-        dropped
-            .into_iter()
-            .chain(self.warnings.iter().cloned())
-            .collect()
+        lines.extend_from_slice(&self.warnings);
+        lines
     }
 }
 
@@ -164,8 +162,7 @@ pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Scene
     }
     let name = variant.name.as_str();
     let path = Path::new(name);
-    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-    match extension.to_str().unwrap_or_default() {
+    match extension(path).as_str() {
         "obj" => obj::load(path, name, options),
         "gltf" | "glb" => gltf::load(path, name, options),
         "ply" => ply::load(path, name),
@@ -185,19 +182,14 @@ pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Scene
 /// # Errors
 /// [`SceneError`]: an unknown format, or a file that cannot be read or cannot be a model.
 pub fn check_model(path: &Path) -> Result<(), SceneError> {
-    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-    let extension = extension.to_str().unwrap_or_default();
     let mut start = Vec::new();
     let read = error::open(path)?.take(MODEL_START).read_to_end(&mut start);
-    read.map_err(|source| SceneError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
+    read.map_err(SceneError::unreadable(path))?;
     let json = || {
         let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start);
         text.trim_ascii_start().starts_with(b"{")
     };
-    let (begins_well, expected) = match extension {
+    let (begins_well, expected) = match extension(path).as_str() {
         "obj" => (!start.contains(&0), "it is not text"),
         "gltf" | "glb" => (
             start.starts_with(b"glTF") || json(),
@@ -215,6 +207,15 @@ pub fn check_model(path: &Path) -> Result<(), SceneError> {
     }
 }
 
+/// The ending of a file's name in lower case.
+fn extension(path: &Path) -> String {
+    let extension = path.extension().unwrap_or_default();
+    extension
+        .to_ascii_lowercase()
+        .to_string_lossy()
+        .into_owned()
+}
+
 /// Bytes of a model that [`check_model`] looks at.
 const MODEL_START: u64 = 512;
 
@@ -226,19 +227,13 @@ fn approximation_warning(what: &str, drawn: &str, names: Vec<&str>) -> Option<St
     if names.is_empty() {
         return None;
     }
-    let shown = names[..names.len().min(NAMES_IN_WARNING)].join(", ");
-    let more = if names.len() > NAMES_IN_WARNING {
-        ", …"
-    } else {
-        ""
-    };
     let count = names.len();
-    let are = if count == 1 {
-        "material is"
-    } else {
-        "materials are"
-    };
+    let mut shown = names[..count.min(NAMES_IN_WARNING)].join(", ");
+    if count > NAMES_IN_WARNING {
+        shown += ", …";
+    }
+    let are = ["materials are", "material is"][usize::from(count == 1)];
     Some(format!(
-        "{count} {are} {what}, which is not rendered yet; drawn as {drawn}: {shown}{more}"
+        "{count} {are} {what}, which is not rendered yet; drawn as {drawn}: {shown}"
     ))
 }

@@ -9,6 +9,7 @@ use super::{DIELECTRIC, DIFFUSE, LoadOptions, Material, MaterialSource};
 use glam::Vec3;
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
+use std::fmt::Display;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use tobj::{LoadError, MTLLoadResult};
@@ -52,22 +53,18 @@ impl Library {
             return Ok(Default::default());
         }
         let mut contents = self.contents.borrow_mut();
+        let unread = |error: &dyn Display| {
+            let path = path.display();
+            format!("material library {path}: {error}; its materials are drawn grey")
+        };
         let bytes = relative(file, &self.options).and_then(|()| read_regular(&path));
         let bytes = bytes.map_err(|error| {
-            contents.warnings.push(format!(
-                "material library {}: {error}; its materials are drawn grey",
-                path.display()
-            ));
+            contents.warnings.push(unread(&error));
             LoadError::OpenFileFailed
         })?;
         let text = readable_lines(&normalised(bytes), &path, &mut contents.warnings);
-        let (materials, names) =
-            tobj::load_mtl_buf(&mut Cursor::new(text)).inspect_err(|error| {
-                contents.warnings.push(format!(
-                    "material library {}: {error}; its materials are drawn grey",
-                    path.display()
-                ));
-            })?;
+        let read = tobj::load_mtl_buf(&mut Cursor::new(text));
+        let (materials, names) = read.inspect_err(|error| contents.warnings.push(unread(error)))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         for material in &materials {
             contents.add(material, folder, &self.options);

@@ -2,21 +2,21 @@
 
 use super::StressError;
 use super::bench::{self, Expected};
-use super::case::{self, Random, ray};
+use super::case::{self, Random};
 use super::families::Family;
 use super::place::Place;
-use super::record::{BoxTestRecord, CostRecord, Line, OffsetRecord, Record, Worst};
+use super::record::{Findings, Line, Record, Worst, line};
 use super::shapes::{Mesh, cube, sphere};
 use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite};
-use crate::accel::triangle::TriangleTest;
+use crate::accel::triangle::AnyTriangleTest;
 use crate::accel::{
     AccelKind as _, BoxTest, Bvh, Counters, Hit, Intersection, NO_HIT, Query, Ray, RayBatch,
     Traced, TriangleSoup,
 };
 use crate::gpu::Gpu;
 use crate::integrator::offset::{TransformError, position_error};
-use crate::integrator::{RayOffset, Stage};
-use crate::measure::record::{Key, Ran, axis};
+use crate::integrator::{OffsetRegistry, RayOffset, Stage};
+use crate::measure::record::{Key, axis};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -44,6 +44,8 @@ const OFFSET_RAYS: usize = 16;
 const COST_BANDS: (usize, usize) = (24, 64);
 const COST_RAYS: (usize, usize) = (4096, 65_536);
 const COST_ROUNDS: usize = 5;
+/// The test that costs are compared with.
+const PLAIN_TEST: &str = "moeller-trumbore";
 
 impl Suite<'_> {
     /// How many hits each box test loses, with the default triangle test.
@@ -56,13 +58,10 @@ impl Suite<'_> {
             true => &BOX_STRUCTURES[..BOX_STRUCTURES_IF_QUICK],
             false => &BOX_STRUCTURES[..],
         };
-        let mut columns: Vec<(Kind, Vec<BoxTestRecord>)> = (self.kinds.iter())
+        let column = || BoxTest::ALL.iter().map(|test| empty_record(*test));
+        let mut columns: Vec<(Kind, Vec<Findings>)> = (self.kinds.iter())
             .filter(|kind| structures.contains(&kind.name()))
-            .map(|kind| {
-                let tests = BoxTest::ALL.iter();
-                let empty = tests.map(|(test, ..)| empty_record(*test));
-                (*kind, empty.collect())
-            })
+            .map(|kind| (*kind, column().collect()))
             .collect();
         for family in BOX_FAMILIES.iter().filter_map(|name| Family::named(name)) {
             let settings = self.settings;
@@ -75,12 +74,11 @@ impl Suite<'_> {
             }
         }
         let mut lines = Vec::new();
-        for (place, (_, name, _)) in BoxTest::ALL.iter().enumerate() {
+        for (place, test) in BoxTest::ALL.iter().enumerate() {
             for (kind, column) in &columns {
-                let key = Key::default().with(axis::BOX_TEST, name);
+                let key = Key::default().with(axis::BOX_TEST, test.name);
                 let key = key.with(axis::ACCEL, kind.name());
-                let record = Record::BoxTest(column[place].clone());
-                lines.push(Line::new(key, Ran::default(), record));
+                lines.push(line(key, Record::BoxTest(column[place].clone())));
             }
         }
         Ok(lines)
@@ -92,32 +90,32 @@ impl Suite<'_> {
         case: &case::Case,
         expected: &Expected,
         kind: Kind,
-        column: &mut [BoxTestRecord],
+        column: &mut [Findings],
     ) -> Result<(), StressError> {
         let mut stage = Stage::new(gpu, case.scene.clone(), Intersection::default())?;
         let Ok(built) = bench::build(kind, &stage.soup) else {
             return Ok(());
         };
         let traced = Traced::upload(&stage.gpu, &*built)?;
-        for ((box_test, name, _), record) in BoxTest::ALL.iter().zip(column) {
+        for (box_test, record) in BoxTest::ALL.iter().zip(column) {
             stage.set_tests(Intersection {
                 box_test: *box_test,
                 ..Intersection::default()
             });
             let found = stage.closest(&traced, &case.rays)?;
-            record.rays += case.rays.len();
+            record.add("rays/v1", case.rays.len() as f64);
             let pairs = found.answers.iter().zip(expected.of(built.space()));
             let lost = pairs
                 .enumerate()
                 .filter(|(_, (hit, truth))| !hit.same_bits(truth));
             for (index, _) in lost {
-                record.lost += 1;
+                record.add("lost-hits/v1", 1.0);
                 record.worst.get_or_insert_with(|| {
                     let test = Intersection::default().triangle;
                     let replay = self.replay(case, kind.name(), test, &case.rays[index]);
                     Worst {
                         what: "lost hit".into(),
-                        replay: format!("{replay} --box-test {name}"),
+                        replay: format!("{replay} --box-test {}", box_test.name),
                     }
                 });
             }
@@ -142,17 +140,13 @@ impl Suite<'_> {
             Place::FAR,
         ]) {
             for (name, mesh) in closed_meshes(&place) {
-                for offset in RayOffset::ALL {
-                    let mut record = OffsetRecord {
-                        rays,
-                        ..OffsetRecord::default()
-                    };
-                    bounce(&mesh, offset, self.settings.seed, &mut record)?;
+                for &offset in OffsetRegistry::default().iter() {
+                    let found = bounce(&mesh, offset, self.settings.seed, rays)?;
                     let triangle = Intersection::default().triangle.name();
-                    let key = Key::default().with(axis::OFFSET, offset.name());
+                    let key = Key::default().with(axis::OFFSET, offset.name);
                     let key = key.with(axis::TRIANGLE, triangle).with(axis::MESH, name);
                     let key = key.with(axis::PLACE, place);
-                    records.push(Line::new(key, Ran::default(), Record::Offset(record)));
+                    records.push(line(key, Record::Offset(found)));
                 }
             }
         }
@@ -167,20 +161,21 @@ impl Suite<'_> {
         progress("cost of triangle tests");
         let all = self.times(BRUTE_FORCE, COST_BANDS.0, COST_RAYS.0)?;
         let some = self.times(PLAIN, COST_BANDS.1, COST_RAYS.1)?;
-        let plain = some
-            .iter()
-            .find(|t| t.test == TriangleTest::MoellerTrumbore);
+        let plain = some.iter().find(|t| t.test.name() == PLAIN_TEST);
         let plain_ms = plain.map_or(f64::NAN, |t| t.ms);
         let pairs = all.iter().zip(&some);
         let record = |(all, some): (&Timed, &Timed)| {
-            let record = Record::Cost(CostRecord {
-                bytes: all.test.bytes(),
-                ns_per_test: all.ms * 1e6 / (all.tests_per_ray * all.rays as f64),
-                traversal_ratio: some.ms / plain_ms,
-                tests_per_ray: some.tests_per_ray,
-            });
+            let found = Findings::of([
+                ("test-bytes/v1", f64::from(all.test.bytes())),
+                (
+                    "ns-per-test/v1",
+                    all.ms * 1e6 / (all.tests_per_ray * all.rays as f64),
+                ),
+                ("traversal-ratio/v1", some.ms / plain_ms),
+                ("tests-per-ray/v1", some.tests_per_ray),
+            ]);
             let key = Key::default().with(axis::TRIANGLE, all.test.name());
-            Line::new(key, Ran::default(), record)
+            line(key, Record::Cost(found))
         };
         Ok(match plain_ms.is_nan() {
             true => Vec::new(),
@@ -196,7 +191,7 @@ impl Suite<'_> {
             return Ok(Vec::new());
         };
         let mut random = Random::with_stream(self.settings.seed, 79);
-        let mut one = || ray(random.in_cube().as_vec3(), random.direction().as_vec3());
+        let mut one = || Ray::new(random.in_cube().as_vec3(), random.direction().as_vec3());
         let rays: Vec<Ray> = (0..count).map(|_| one()).collect();
         let mut batches: Vec<(Timed, RayBatch)> = Vec::new();
         for test in &self.tests {
@@ -235,27 +230,28 @@ impl Suite<'_> {
 
 /// A triangle test that was timed.
 struct Timed {
-    test: TriangleTest,
+    test: AnyTriangleTest,
     ms: f64,
     tests_per_ray: f64,
     rays: usize,
 }
 
-fn empty_record(test: BoxTest) -> BoxTestRecord {
-    BoxTestRecord {
-        pad_ulps: test.pad_ulps,
-        rays: 0,
-        lost: 0,
-        worst: None,
-    }
+fn empty_record(test: BoxTest) -> Findings {
+    let pad = f64::from(test.pad_ulps);
+    Findings::of([
+        ("pad-ulps/v1", pad),
+        ("rays/v1", 0.0),
+        ("lost-hits/v1", 0.0),
+    ])
 }
 
 /// The smallest pad that loses no hit, nor does any greater one.
-pub fn smallest_sound_pad<'a>(tests: impl Iterator<Item = &'a BoxTestRecord>) -> Option<u32> {
-    let padded: Vec<_> = tests.collect();
-    let lossy = padded.iter().filter(|t| t.lost > 0).map(|t| t.pad_ulps);
-    let lossy = lossy.max();
-    let sound = padded.iter().map(|t| t.pad_ulps);
+pub fn smallest_sound_pad<'a>(tests: impl Iterator<Item = &'a Findings>) -> Option<usize> {
+    let padded: Vec<[usize; 2]> = tests
+        .map(|t| ["pad-ulps/v1", "lost-hits/v1"].map(|id| t.count(id)))
+        .collect();
+    let lossy = padded.iter().filter(|t| t[1] > 0).map(|t| t[0]).max();
+    let sound = padded.iter().map(|t| t[0]);
     sound.filter(|pad| Some(*pad) > lossy).min()
 }
 
@@ -284,46 +280,45 @@ fn closed_meshes(place: &Place) -> [(&'static str, Mesh); 4] {
 
 /// Chains of mirror bounces from inside. A flat triangle that a ray has left cannot be hit by it, and a
 /// closed mesh cannot be left: chains that do either begin anew.
-fn bounce(
-    mesh: &Mesh,
-    offset: RayOffset,
-    seed: u64,
-    record: &mut OffsetRecord,
-) -> Result<(), StressError> {
+fn bounce(mesh: &Mesh, offset: RayOffset, seed: u64, rays: usize) -> Result<Findings, StressError> {
     let soup = TriangleSoup::new(&case::scene(mesh.clone(), None));
     let built = Bvh.build(&soup, &bench::default_params(&Bvh), &mut Default::default());
     let built = built.map_err(|e| StressError::Build(e.to_string()))?;
     let Some(twin) = built.cpu_twin(&soup) else {
-        return Ok(());
+        return Err(StressError::Build("it has no twin".to_owned()));
     };
     let mut random = Random::with_stream(seed, 80);
     let bounds = crate::scene::Bounds::of(mesh);
     let [low, high] = [bounds.min, bounds.max].map(|v| v.as_dvec3());
     let (centre, reach) = (0.5 * (low + high), 0.1 * (high - low).max_element());
-    let mut traced = 0;
-    while traced < record.rays {
+    let (mut traced, mut self_intersections, mut leaks, mut farthest) = (0, 0, 0, 0.0_f64);
+    while traced < rays {
         let origin = (centre + reach * random.in_cube()).as_vec3();
-        let mut next = ray(origin, random.direction().as_vec3());
+        let mut next = Ray::new(origin, random.direction().as_vec3());
         let mut from = NO_HIT;
         for _ in 0..BOUNCES {
             let hit = twin.closest_hit(&next, &mut Counters::default());
             traced += 1;
             let left_itself = hit.triangle == from && from != NO_HIT;
-            record.self_intersections += usize::from(left_itself);
-            record.leaks += usize::from(hit.triangle == NO_HIT);
+            self_intersections += u32::from(left_itself);
+            leaks += u32::from(hit.triangle == NO_HIT);
             if left_itself || hit.triangle == NO_HIT {
                 break;
             }
             let Some((mirrored, moved)) = mirror(&soup, &next, &hit, offset) else {
                 break;
             };
-            record.farthest = record.farthest.max(moved);
+            farthest = farthest.max(moved);
             from = hit.triangle;
             next = mirrored;
         }
     }
-    record.rays = traced;
-    Ok(())
+    Ok(Findings::of([
+        ("rays/v1", traced as f64),
+        ("self-intersections/v1", f64::from(self_intersections)),
+        ("leaks/v1", f64::from(leaks)),
+        ("farthest-begin/v1", farthest),
+    ]))
 }
 
 /// The mirrored ray, begun as integrators begin it, and how many bounds of the point's error it was moved;
@@ -341,48 +336,42 @@ fn mirror(soup: &TriangleSoup, incoming: &Ray, hit: &Hit, offset: RayOffset) -> 
         normal
     };
     let error = position_error(v0.into(), e1.into(), e2.into(), &TransformError::default());
-    let origin = offset.offset_point(p.into(), facing.into(), error);
+    let origin = (offset.offset_point)(p.into(), facing.into(), error);
     let moved = (Vec3::from(origin) - p).as_dvec3().length();
     let unit = f64::from(p.abs().max_element() * f32::EPSILON);
     let bound = f64::from(facing.abs().dot(error.into())) + 2.0 * unit;
     let mirrored = direction - facing * (2.0 * facing.dot(direction));
-    let next = ray(origin.into(), mirrored.try_normalize()?);
+    let next = Ray::new(origin, mirrored.try_normalize()?);
     Some((next, moved / bound.max(f64::MIN_POSITIVE)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrator::offset;
 
     #[test]
     fn without_an_offset_chains_meet_their_own_triangle_and_with_a_bound_they_do_not() {
         for (name, mesh) in closed_meshes(&Place::ORDINARY) {
             let count = |offset: RayOffset| {
-                let mut record = OffsetRecord {
-                    rays: 3000,
-                    ..OffsetRecord::default()
-                };
-                bounce(&mesh, offset, 1, &mut record).unwrap();
-                (record.self_intersections, record.leaks)
+                let found = bounce(&mesh, offset, 1, 3000).unwrap();
+                found.count("self-intersections/v1") + found.count("leaks/v1")
             };
-            let none = count(RayOffset::None);
-            assert!(none.0 + none.1 > 30, "{name}: {none:?}");
-            assert_eq!(count(RayOffset::ErrorBound), (0, 0), "{name}");
+            let none = count(offset::NONE);
+            assert!(none > 30, "{name}: {none:?}");
+            assert_eq!(count(offset::ERROR_BOUND), 0, "{name}");
         }
     }
 
     #[test]
     fn the_smallest_sound_pad_is_above_every_pad_that_loses_hits() {
-        let test = |pad_ulps: u32, lost: usize| BoxTestRecord {
-            pad_ulps,
-            rays: 10,
-            lost,
-            worst: None,
-        };
-        let mut records = vec![test(0, 7), test(2, 0), test(3, 1), test(4, 0)];
+        let test = |pad, lost| Findings::of([("pad-ulps/v1", pad), ("lost-hits/v1", lost)]);
+        let mut records = [(0.0, 7.0), (2.0, 0.0), (3.0, 1.0), (4.0, 0.0)]
+            .map(|(pad, lost)| test(pad, lost))
+            .to_vec();
         assert_eq!(smallest_sound_pad(records.iter()), Some(4));
-        records.push(test(16, 0));
+        records.push(test(16.0, 0.0));
         assert_eq!(smallest_sound_pad(records.iter()), Some(4));
-        assert_eq!(smallest_sound_pad([test(0, 1)].iter()), None);
+        assert_eq!(smallest_sound_pad([test(0.0, 1.0)].iter()), None);
     }
 }

@@ -9,9 +9,6 @@ use crate::scene::{Assembly, MAX_COORDINATE, Material, SceneData};
 use glam::{DVec3, Vec3};
 use std::fmt;
 
-/// Longest distance of rays that have no end.
-pub const FAR: f32 = crate::measure::rays::FAR;
-
 /// What the right answers are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Truth {
@@ -143,19 +140,9 @@ impl Random {
     }
 }
 
-/// A ray without an end.
-pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
-    Ray {
-        origin: origin.to_array(),
-        t_min: 0.0,
-        direction: direction.to_array(),
-        t_max: FAR,
-    }
-}
-
 /// A ray through a point; its direction is the rounded difference.
 pub fn towards(origin: Vec3, target: Vec3) -> Ray {
-    ray(origin, target - origin)
+    Ray::new(origin, target - origin)
 }
 
 impl Maker {
@@ -345,13 +332,10 @@ pub fn parse_ray(text: &str) -> Result<Ray, String> {
         })
         .collect();
     match numbers?[..] {
-        [ox, oy, oz, dx, dy, dz] => Ok(ray(Vec3::new(ox, oy, oz), Vec3::new(dx, dy, dz))),
-        [ox, oy, oz, dx, dy, dz, t_min, t_max] => Ok(Ray {
-            origin: [ox, oy, oz],
-            t_min,
-            direction: [dx, dy, dz],
-            t_max,
-        }),
+        [ox, oy, oz, dx, dy, dz] => Ok(Ray::new([ox, oy, oz], [dx, dy, dz])),
+        [ox, oy, oz, dx, dy, dz, t_min, t_max] => {
+            Ok(Ray::new([ox, oy, oz], [dx, dy, dz]).between(t_min, t_max))
+        }
         ref others => Err(format!(
             "a ray is `ox oy oz dx dy dz t_min t_max`, or the first six; there are {} numbers",
             others.len()
@@ -373,14 +357,8 @@ mod tests {
                     return x;
                 }
             };
-            let origin = [float(), float(), float()];
-            let direction = [float(), -0.0, float()];
-            let ray = Ray {
-                origin,
-                t_min: float(),
-                direction,
-                t_max: float(),
-            };
+            let ray = Ray::new([float(), float(), float()], [float(), -0.0, float()]);
+            let ray = ray.between(float(), float());
             let back = parse_ray(&ray_text(&ray)).unwrap();
             assert_eq!(bytemuck::bytes_of(&back), bytemuck::bytes_of(&ray));
         }

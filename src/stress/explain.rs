@@ -2,7 +2,6 @@
 
 use super::bench;
 use super::shot_meshes;
-use super::tally::oracle_ray;
 use crate::accel::watch::{Event, watch};
 use crate::accel::{AccelKind, BuiltAccel, Counters, Hit, NO_HIT, Ray, Space, TriangleSoup};
 use crate::oracle::exact_truths;
@@ -96,7 +95,7 @@ fn oracle_text(scene: &SceneData, ray: &Ray) -> String {
     if !ray.is_ray() {
         return format!("{:12} this is no ray, and hits nothing\n", "oracle");
     }
-    let truths = exact_truths(&scene.triangles, &[oracle_ray(ray)]);
+    let truths = exact_truths(&scene.triangles, &[*ray]);
     let hits = truths.first().map_or(&[][..], |truth| &truth.hits);
     let mut text = match hits.is_empty() {
         true => format!("{:12} nothing is hit\n", "oracle"),

@@ -21,11 +21,12 @@ pub mod suite;
 pub mod tally;
 pub mod targets;
 
-use crate::accel::triangle::TriangleTest;
-use crate::accel::{AccelRegistry, Intersection};
+use crate::accel::triangle::AnyTriangleTest;
+use crate::accel::{AccelRegistry, Intersection, TriangleRegistry};
 use crate::gpu::capture as capture_environment;
 use crate::gpu::{Gpu, GpuError, probe_arithmetic};
-use record::{Line, Record, SuiteRecord};
+use crate::measure::record::Key;
+use record::{Line, Record, SuiteRecord, about_all, skipped};
 use std::path::PathBuf;
 use std::time::{Instant, SystemTime};
 use suite::{BRUTE_FORCE, Progress, Suite};
@@ -84,7 +85,8 @@ impl StressOptions {
         let registry = AccelRegistry::default();
         let structures = registry.iter().map(|kind| kind.name());
         check_names("structure", &self.accels, structures)?;
-        let tests = TriangleTest::ALL.iter().map(|t| t.name());
+        let tests = TriangleRegistry::default();
+        let tests = tests.iter().map(|test| test.name());
         check_names("triangle test", &self.triangles, tests)
     }
 
@@ -140,14 +142,12 @@ pub fn run(
     settings.check()?;
     let probe = probe_arithmetic(gpu)?;
     let first = first_record(gpu, settings, probe.is_exact());
-    let mut records = vec![Line::about_all(Record::Suite(first))];
+    let mut records = vec![about_all(Record::Suite(first))];
     let mut tests = tests(settings);
     tests.retain(|test| match Suite::with(*test).kept_by(&probe) {
         Ok(()) => true,
         Err(reason) => {
-            let what = test.name().to_owned();
-            let skipped = Record::Skipped(record::SkippedRecord { what, reason });
-            records.push(Line::about_all(skipped));
+            records.push(skipped(Key::default(), test.name().to_owned(), reason));
             false
         }
     });
@@ -170,14 +170,13 @@ pub fn run(
             records.extend(suite.costs(progress)?);
         }
         progress("accumulation and sampling");
-        let figures = numerics::run(gpu, settings.quick)?;
-        let figures = figures.into_iter().map(Record::Figure);
-        records.extend(figures.map(Line::about_all));
+        let gauges = numerics::run(gpu, settings.quick)?.into_iter();
+        records.extend(gauges.map(Record::Gauge).map(about_all));
     }
     let targets = targets::targets(&records);
-    records.extend(targets.into_iter().map(Record::Target).map(Line::about_all));
+    records.extend(targets.into_iter().map(Record::Target).map(about_all));
     let wall_s = start.elapsed().as_secs_f64();
-    records.push(Line::about_all(Record::Finished { wall_s }));
+    records.push(about_all(Record::Finished { wall_s }));
     Ok(records)
 }
 
@@ -225,11 +224,12 @@ fn kinds(settings: &StressOptions) -> Vec<suite::Kind> {
 }
 
 /// The triangle tests to try, the default first.
-fn tests(settings: &StressOptions) -> Vec<TriangleTest> {
-    let wanted = |test: &TriangleTest| {
+fn tests(settings: &StressOptions) -> Vec<AnyTriangleTest> {
+    let wanted = |test: &AnyTriangleTest| {
         settings.triangles.is_empty() || settings.triangles.iter().any(|t| t == test.name())
     };
-    let mut tests: Vec<TriangleTest> = TriangleTest::ALL.into_iter().filter(wanted).collect();
+    let mut tests: Vec<AnyTriangleTest> =
+        TriangleRegistry::default().iter().filter(wanted).collect();
     tests.sort_by_key(|test| *test != Intersection::default().triangle);
     tests
 }

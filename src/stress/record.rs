@@ -1,13 +1,20 @@
 //! Records of the suite: one JSON line per cell, shot series, target and so on, in `stress.jsonl`.
 
+use super::numerics::Gauge;
 use super::place::Place;
+use super::tally::Errors;
 use crate::gpu::Environment;
-#[cfg(test)]
-use crate::measure::record::SCHEMA;
-use crate::measure::record::{RecordError, STRESS_FILE, Verdict, read_lines, text_of};
+use crate::measure::figure::figure;
+use crate::measure::record::{
+    Key, Ran, RecordError, STRESS_FILE, SkippedRecord, Verdict, read_lines, text_of,
+};
 use crate::report::{ReportError, write_file};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// Version tag of every line; bumped together with any change of a field's meaning.
+pub const SCHEMA: &str = "raystone-stress/2";
 
 /// A line of the file.
 pub type Line = crate::measure::record::Line<Record>;
@@ -19,17 +26,17 @@ pub enum Record {
     /// First line: where and how.
     Suite(SuiteRecord),
     /// A triangle test, a structure and a family.
-    Cell(CellRecord),
-    /// Shots at one closed mesh.
-    Shots(ShotsRecord),
-    /// A box test.
-    BoxTest(BoxTestRecord),
-    /// A ray offset.
-    Offset(OffsetRecord),
-    /// Cost of a triangle test.
-    Cost(CostRecord),
+    Cell(Findings),
+    /// Shots at one closed mesh from inside, or at a plane: every miss is a crack.
+    Shots(Findings),
+    /// How many hits a box test loses.
+    BoxTest(Findings),
+    /// What a ray offset does.
+    Offset(Findings),
+    /// What a triangle test costs.
+    Cost(Findings),
     /// Accumulation and sampling.
-    Figure(super::numerics::Figure),
+    Gauge(Gauge),
     /// A target of the default configuration.
     Target(TargetRecord),
     /// What was not done, and why.
@@ -39,6 +46,20 @@ pub enum Record {
         /// Wall time, seconds.
         wall_s: f64,
     },
+}
+
+impl Record {
+    /// What was found, in a line of which figures are told.
+    pub fn findings(&self) -> Option<&Findings> {
+        match self {
+            Self::Cell(found)
+            | Self::Shots(found)
+            | Self::BoxTest(found)
+            | Self::Offset(found)
+            | Self::Cost(found) => Some(found),
+            _ => None,
+        }
+    }
 }
 
 /// Where and how the suite ran.
@@ -101,107 +122,64 @@ pub struct Rung {
     pub point_ulp: Option<Quantiles>,
 }
 
-/// A triangle test, a structure and a family.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CellRecord {
-    /// Rays, over all rungs.
-    pub rays: usize,
-    /// Misses where something is hit exactly.
-    pub false_misses: usize,
-    /// Those that the rounding of one test cannot explain.
-    pub unexplained_misses: usize,
-    /// Those from inside a closed mesh.
-    pub cracks: usize,
-    /// Hits where nothing is hit exactly.
-    pub false_hits: usize,
-    /// Those that rounding cannot explain.
-    pub unexplained_hits: usize,
-    /// Hits of another triangle than any that is hit exactly.
-    pub wrong_triangle: usize,
-    /// Hits of a triangle behind another by more than rounding: the order of hits is wrong.
-    pub not_nearest: usize,
-    /// Rays of which only rounding decides whether the interval holds the hit.
-    pub borderline: usize,
-    /// Answers that differ from brute force with the same test in any bit.
-    pub differing: usize,
-    /// Any-hit answers that differ from brute force; absent where they were not asked for.
-    pub any_differing: Option<usize>,
-    /// Differences within 4 ulp on an adapter that does not compute like the host.
-    pub ties: usize,
-    /// Error of the distance, ulp.
-    pub t_ulp: Option<Quantiles>,
-    /// Error of the distance, relative.
-    pub t_relative: Option<Quantiles>,
-    /// Error of the hit point, ulp of its greatest coordinate.
-    pub point_ulp: Option<Quantiles>,
-    /// Error of the hit point, relative to the way of the ray.
-    pub point_relative: Option<Quantiles>,
-    /// Time against ordinary rays in the same mesh, the greatest of all cases that were timed.
-    pub slowdown: Option<f64>,
-    /// Error words of kernels and structures that could not be built, with the case.
+/// What was found of one thing.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Findings {
+    /// Figures by their ids in the table of figures; absent where they were not asked for.
+    pub figures: BTreeMap<String, f64>,
+    /// Errors of right hits.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub errors: Option<Errors<Quantiles>>,
+    /// Error words of kernels, and structures that could not be built, with the case.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub failures: Vec<String>,
     /// The ray to look at first.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub worst: Option<Worst>,
-    /// The cases.
+    /// The cases of a cell.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rungs: Vec<Rung>,
 }
 
-/// Shots at one closed mesh from inside, or at a plane: every miss is a crack.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ShotsRecord {
-    /// Triangles of the mesh.
-    pub triangles: usize,
-    /// Rays.
-    pub rays: usize,
-    /// Rays that missed.
-    pub misses: usize,
-    /// Of the misses that were looked up, those that hit something exactly.
-    pub confirmed: usize,
-    /// The kernel's errors, in words.
-    pub failure: Option<String>,
-    /// The first miss.
-    pub worst: Option<Worst>,
-}
+impl Findings {
+    /// These figures, by id.
+    pub fn of<'a>(figures: impl IntoIterator<Item = (&'a str, f64)>) -> Self {
+        let mut found = Self::default();
+        for (id, value) in figures {
+            found.add(id, value);
+        }
+        found
+    }
 
-/// How many hits a box test loses.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct BoxTestRecord {
-    /// Pad, ulp.
-    pub pad_ulps: u32,
-    /// Rays.
-    pub rays: usize,
-    /// Answers that differ from brute force.
-    pub lost: usize,
-    /// The first of them.
-    pub worst: Option<Worst>,
-}
+    /// Adds to a figure, which begins at 0.
+    ///
+    /// # Panics
+    /// The table of figures has no such row.
+    pub fn add(&mut self, id: &str, value: f64) {
+        *self.figures.entry(figure(id).id.to_string()).or_default() += value;
+    }
 
-/// What a ray offset does.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct OffsetRecord {
-    /// Rays that were spawned.
-    pub rays: usize,
-    /// Rays that hit the triangle they start from.
-    pub self_intersections: usize,
-    /// Rays that left the closed mesh.
-    pub leaks: usize,
-    /// Greatest distance between a ray's origin and the point it leaves, in bounds of the point's error
-    /// (its box along the normal, and a unit of each coordinate).
-    #[serde(default)]
-    pub farthest: f64,
-}
+    /// A figure, if it was asked for.
+    ///
+    /// # Panics
+    /// As [`Findings::add`].
+    pub fn get(&self, id: &str) -> Option<f64> {
+        self.figures.get(&*figure(id).id).copied()
+    }
 
-/// What a triangle test costs.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CostRecord {
-    /// Bytes it reads of a triangle.
-    pub bytes: u32,
-    /// Nanoseconds per test in the brute-force kernel, on the whole adapter.
-    pub ns_per_test: f64,
-    /// Time through the default structure against Möller–Trumbore.
-    pub traversal_ratio: f64,
-    /// Triangle tests per ray in that traversal.
-    pub tests_per_ray: f64,
+    /// A figure that is a count; 0 where it was not asked for.
+    ///
+    /// # Panics
+    /// As [`Findings::add`].
+    pub fn count(&self, id: &str) -> usize {
+        self.get(id).map_or(0, |count| count as usize)
+    }
+
+    /// Answers that differ from brute force, of closest and of any hits.
+    pub fn differing(&self) -> usize {
+        self.count("differing/v1") + self.count("any-differing/v1")
+    }
 }
 
 /// A target of the default configuration.
@@ -219,13 +197,23 @@ pub struct TargetRecord {
     pub note: String,
 }
 
-/// What was not done.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SkippedRecord {
-    /// What.
-    pub what: String,
-    /// Why.
-    pub reason: String,
+/// A line of a key.
+pub fn line(key: Key, record: Record) -> Line {
+    Line {
+        schema: SCHEMA.to_owned(),
+        ..Line::new(key, Ran::default(), record)
+    }
+}
+
+/// A line about the whole suite.
+pub fn about_all(record: Record) -> Line {
+    line(Key::default(), record)
+}
+
+/// A line about what was not done, and why.
+pub fn skipped(key: Key, cell: String, reason: impl Into<String>) -> Line {
+    let reason = reason.into();
+    line(key, Record::Skipped(SkippedRecord { cell, reason }))
 }
 
 /// Writes all lines at once: the file is whole or absent.
@@ -249,7 +237,7 @@ pub fn write(dir: &Path, lines: &[Line]) -> Result<PathBuf, ReportError> {
 /// # Errors
 /// A missing file, another schema, or a line that is no record.
 pub fn read(dir: &Path) -> Result<Vec<Line>, RecordError> {
-    Ok(read_lines(&dir.join(STRESS_FILE))?.lines)
+    Ok(read_lines(&dir.join(STRESS_FILE), SCHEMA)?.lines)
 }
 
 #[cfg(test)]
@@ -266,14 +254,14 @@ mod tests {
             verdict: Verdict::Pass,
             note: String::new(),
         });
-        let lines = [target, Record::Finished { wall_s: 1.5 }].map(Line::about_all);
+        let lines = [target, Record::Finished { wall_s: 1.5 }].map(about_all);
         let path = write(dir.path(), &lines).unwrap();
         assert_eq!(read(dir.path()).unwrap(), lines);
         let text = std::fs::read_to_string(&path).unwrap();
-        std::fs::write(&path, text.replacen(SCHEMA, "raystone-stress/1", 1)).unwrap();
+        std::fs::write(&path, text.replacen(SCHEMA, "raystone/2", 1)).unwrap();
         let error = read(dir.path()).unwrap_err().to_string();
         assert!(
-            error.contains(":1:") && error.contains("raystone-stress/1") && error.contains(SCHEMA),
+            error.contains(":1:") && error.contains("raystone/2") && error.contains(SCHEMA),
             "{error}"
         );
     }

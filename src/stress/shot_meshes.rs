@@ -1,14 +1,12 @@
 //! The closed meshes that shots are aimed at, with points inside them to shoot from.
 
-use super::case::{Random, ray, towards};
+use super::case::{Random, towards};
 use super::place::Place;
 use super::shapes::{self, Mesh, RADIUS};
-use super::tally::oracle_ray;
 use crate::accel::Ray;
 use crate::geometry::Triangle;
 use crate::oracle::{Side, exact_truths};
-use crate::params::{Params, Variant};
-use crate::scene::{Bounds, LoadOptions, load};
+use crate::scene::{self, Bounds};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -129,7 +127,7 @@ impl ShotMesh {
         match aim {
             // Rays from above go down, not anywhere.
             0 if self.name == PLANE => towards(origin, random.on(&triangle)),
-            0 => ray(origin, random.direction().as_vec3()),
+            0 => Ray::new(origin, random.direction().as_vec3()),
             1 => towards(origin, random.vertex(&triangle)),
             _ => towards(origin, random.on_edge(&triangle)),
         }
@@ -138,20 +136,13 @@ impl ShotMesh {
 
 /// A model with its holes closed, and points inside it.
 fn model(path: &str, place: Place, seed: u64) -> Result<(Mesh, Vec<Vec3>), String> {
-    let variant = Variant {
-        name: path.to_owned(),
-        params: Params::default(),
-        label: path.to_owned(),
-    };
-    let scene = load(&variant, &LoadOptions::default()).map_err(|e| e.to_string())?;
+    let scene = scene::named(path).map_err(|e| e.to_string())?;
     let mesh = shapes::model(&scene.triangles, &place);
     let mut random = Random::with_stream(seed, 78);
     let tried: Vec<Ray> = (0..TRIED)
         .map(|_| {
-            ray(
-                place.point(0.7 * RADIUS * random.in_cube()),
-                random.direction().as_vec3(),
-            )
+            let origin = place.point(0.7 * RADIUS * random.in_cube());
+            Ray::new(origin, random.direction().as_vec3())
         })
         .collect();
     let origins = inside(&mesh, &tried);
@@ -178,8 +169,7 @@ fn within_border(plane: &[Triangle]) -> Mesh {
 
 /// Origins of those rays that leave the mesh an odd number of times, through insides only.
 fn inside(mesh: &[Triangle], rays: &[Ray]) -> Vec<Vec3> {
-    let lines: Vec<_> = rays.iter().map(oracle_ray).collect();
-    let truths = exact_truths(mesh, &lines);
+    let truths = exact_truths(mesh, rays);
     let is_inside = |truth: &crate::oracle::ExactTruth| {
         truth.hits.len() % 2 == 1 && truth.hits.iter().all(|hit| hit.side == Side::Inside)
     };
@@ -217,7 +207,7 @@ mod tests {
             (0..40)
                 .map(|_| {
                     let origin = (radius * random.direction()).as_vec3();
-                    ray(origin, random.direction().as_vec3())
+                    Ray::new(origin, random.direction().as_vec3())
                 })
                 .collect()
         };

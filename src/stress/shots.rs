@@ -3,15 +3,14 @@
 
 use super::bench;
 use super::place::Place;
-use super::record::{Line, Record, ShotsRecord, SkippedRecord, Worst};
+use super::record::{Findings, Line, Record, Worst, line, skipped};
 use super::shot_meshes::{AIMS, FAMILY, PLANE, SPHERE, ShotMesh};
 use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite, key};
-use super::tally::oracle_ray;
 use super::{StressError, case};
-use crate::accel::triangle::TriangleTest;
+use crate::accel::triangle::AnyTriangleTest;
 use crate::accel::{NO_HIT, Ray, Traced};
 use crate::integrator::Stage;
-use crate::measure::record::{Ran, axis};
+use crate::measure::record::{Key, axis};
 use crate::oracle::exact_truths;
 use std::sync::Arc;
 
@@ -19,10 +18,6 @@ use std::sync::Arc;
 const CHUNK: usize = 1 << 17;
 /// Misses that are looked up in the oracle, a series.
 const LOOKED_UP: usize = 64;
-
-fn skipped(what: String, reason: String) -> Line {
-    Line::about_all(Record::Skipped(SkippedRecord { what, reason }))
-}
 
 impl Suite<'_> {
     /// Shoots at every mesh, through every structure with the default test and through the plain one
@@ -36,7 +31,11 @@ impl Suite<'_> {
         let model = model.map(|path| path.to_string_lossy().into_owned());
         let model = model.unwrap_or_default();
         if model.is_empty() {
-            records.push(skipped("shots at a model".into(), "none was given".into()));
+            records.push(skipped(
+                Key::default(),
+                "shots at a model".into(),
+                "none was given",
+            ));
         }
         for place in [Place::ORDINARY, Place::FAR] {
             for name in [SPHERE, PLANE, &model]
@@ -49,7 +48,8 @@ impl Suite<'_> {
                 match ShotMesh::named(name, place, self.settings.seed) {
                     Ok(target) => self.shoot_at(&target, &mut records, progress)?,
                     Err(reason) => {
-                        records.push(skipped(format!("shots at {name}, {place}"), reason))
+                        let what = format!("shots at {name}, {place}");
+                        records.push(skipped(Key::default(), what, reason));
                     }
                 }
             }
@@ -65,7 +65,7 @@ impl Suite<'_> {
     ) -> Result<(), StressError> {
         let scene = Arc::new(case::scene(target.mesh.clone(), None));
         let (mesh, place) = (target.short_name(), target.place);
-        let mut series: Vec<(TriangleTest, Kind, Vec<Line>)> = Vec::new();
+        let mut series: Vec<(AnyTriangleTest, Kind, Vec<Line>)> = Vec::new();
         for (row, test) in self.tests.iter().enumerate() {
             let kinds = self.kinds.iter().filter(|kind| match row {
                 0 => kind.name() != BRUTE_FORCE,
@@ -84,12 +84,12 @@ impl Suite<'_> {
                         let series = self.series(target, &stage, &traced, name, aim)?;
                         let key = key(*test, *kind).with(axis::MESH, mesh);
                         let key = key.with(axis::PLACE, place).with(axis::AIM, aimed_at);
-                        records.push(Line::new(key, Ran::default(), Record::Shots(series)));
+                        records.push(line(key, Record::Shots(series)));
                     }
                 }
                 Err(reason) => {
                     let what = format!("{}, {}, {mesh}, {place}", name.0, name.1);
-                    records.push(skipped(what, reason))
+                    records.push(skipped(Key::default(), what, reason));
                 }
             }
             Ok(())
@@ -106,47 +106,45 @@ impl Suite<'_> {
         traced: &Traced,
         (triangle, accel): (&str, &str),
         aim: usize,
-    ) -> Result<ShotsRecord, StressError> {
-        let mut record = ShotsRecord {
-            triangles: target.mesh.len(),
-            rays: 0,
-            misses: 0,
-            confirmed: 0,
-            failure: None,
-            worst: None,
-        };
-        let mut missed: Vec<Ray> = Vec::new();
-        let mut chunk = 0;
-        while record.rays < self.settings.shots {
-            let count = CHUNK.min(self.settings.shots - record.rays);
+    ) -> Result<Findings, StressError> {
+        let mut failures = Vec::new();
+        let mut looked_up: Vec<Ray> = Vec::new();
+        let (mut shot, mut misses, mut chunk) = (0, 0, 0);
+        while shot < self.settings.shots {
+            let count = CHUNK.min(self.settings.shots - shot);
             let stream = (aim as u64) << 32 | chunk;
             let rays = target.shots(aim, self.settings.seed, stream, count);
             let found = stage.closest(traced, &rays)?;
-            record.rays += count;
+            shot += count;
             chunk += 1;
-            let misses = found
-                .answers
-                .iter()
-                .zip(&rays)
-                .filter(|(hit, _)| hit.triangle == NO_HIT);
-            for (_, ray) in misses {
-                record.misses += 1;
-                if missed.len() < LOOKED_UP {
-                    missed.push(*ray);
-                }
-            }
-            if found.errors != 0 {
-                record.failure = bench::error_text(found.errors);
+            let answers = found.answers.iter().zip(&rays);
+            let missed: Vec<Ray> = answers
+                .filter(|(hit, _)| hit.triangle == NO_HIT)
+                .map(|(_, ray)| *ray)
+                .collect();
+            misses += missed.len();
+            looked_up.extend(missed.iter().take(LOOKED_UP - looked_up.len()));
+            failures.extend(bench::error_text(found.errors));
+            if !failures.is_empty() {
                 break;
             }
         }
-        let lines: Vec<_> = missed.iter().map(oracle_ray).collect();
-        let truths = exact_truths(&target.mesh, &lines);
-        record.confirmed = truths.iter().filter(|truth| !truth.hits.is_empty()).count();
-        record.worst = missed.first().map(|ray| Worst {
+        let truths = exact_truths(&target.mesh, &looked_up);
+        let confirmed = truths.iter().filter(|truth| !truth.hits.is_empty()).count();
+        let worst = looked_up.first().map(|ray| Worst {
             what: format!("crack in the {}", target.label()),
             replay: self.replay_at(FAMILY, &target.label(), (accel, triangle), ray),
         });
-        Ok(record)
+        let counts = [
+            ("triangles/v1", target.mesh.len()),
+            ("rays/v1", shot),
+            ("misses/v1", misses),
+            ("confirmed-misses/v1", confirmed),
+        ];
+        Ok(Findings {
+            failures,
+            worst,
+            ..Findings::of(counts.map(|(id, count)| (id, count as f64)))
+        })
     }
 }

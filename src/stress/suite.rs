@@ -4,10 +4,10 @@ use super::bench::{self, Expected};
 use super::case::{Address, Case, Truth, ray_text};
 use super::families::{FAMILIES, Family};
 use super::place::Place;
-use super::record::{CellRecord, Line, Record, SkippedRecord};
-use super::tally::{Judge, Outcome, Tally};
+use super::record::{Findings, Line, Record, Rung, line, skipped};
+use super::tally::{CaseJudge, Outcome, Tally};
 use super::{StressError, StressOptions};
-use crate::accel::triangle::TriangleTest;
+use crate::accel::triangle::AnyTriangleTest;
 use crate::accel::{
     AccelKind, BuiltAccel, Hit, Intersection, NO_HIT, Ray, Space, Traced, TriangleSoup,
 };
@@ -15,7 +15,7 @@ use crate::gpu::{Gpu, GpuError};
 use crate::integrator::Stage;
 use crate::measure::gate;
 use crate::measure::rays::RaySet;
-use crate::measure::record::{Key, Ran, RayClass, axis};
+use crate::measure::record::{Key, RayClass, axis};
 
 /// Is told what is being done, by any thread.
 pub type Progress<'a> = dyn Fn(&str) + Sync + 'a;
@@ -41,11 +41,11 @@ pub struct Suite<'a> {
     /// Structures, brute force among them if asked for.
     pub kinds: Vec<Kind>,
     /// Triangle tests, the default first.
-    pub tests: Vec<TriangleTest>,
+    pub tests: Vec<AnyTriangleTest>,
 }
 
 /// What everything through a structure with a triangle test has in common.
-pub(super) fn key(test: TriangleTest, kind: Kind) -> Key {
+pub(super) fn key(test: AnyTriangleTest, kind: Kind) -> Key {
     let key = Key::default().with(axis::TRIANGLE, test.name());
     key.with(axis::ACCEL, kind.name())
 }
@@ -54,15 +54,29 @@ pub(super) fn key(test: TriangleTest, kind: Kind) -> Key {
 #[derive(Default)]
 struct OpenCell {
     tally: Tally,
-    rungs: Vec<super::record::Rung>,
+    rungs: Vec<Rung>,
     slowdown: Option<f64>,
     failures: Vec<String>,
     asked_any: bool,
 }
 
+impl OpenCell {
+    fn findings(self) -> Findings {
+        let mut found = self.tally.findings(self.asked_any);
+        if let Some(slowdown) = self.slowdown {
+            found.add("slowdown/v1", slowdown);
+        }
+        Findings {
+            failures: self.failures,
+            rungs: self.rungs,
+            ..found
+        }
+    }
+}
+
 impl Suite<'_> {
     /// The default triangle test with the default box test.
-    pub fn with(triangle: TriangleTest) -> Intersection {
+    pub fn with(triangle: AnyTriangleTest) -> Intersection {
         Intersection {
             triangle,
             ..Intersection::default()
@@ -116,7 +130,7 @@ impl Suite<'_> {
             (self.tests.iter()).map(|_| row().collect()).collect();
         let mut timed = 0;
         for case in &cases {
-            let judge = Judge::new(case);
+            let judge = CaseJudge::new(case);
             for (test, row) in self.tests.iter().zip(&mut cells) {
                 self.case(case, &judge, *test, row)?;
             }
@@ -129,14 +143,13 @@ impl Suite<'_> {
         for (test, row) in self.tests.iter().zip(cells) {
             for (kind, cell) in row {
                 let key = key(*test, kind).with(axis::FAMILY, family.name);
-                let record = match cell.rungs.is_empty() && cell.failures.is_empty() {
-                    true => Record::Skipped(SkippedRecord {
-                        what: format!("{}, {}, {}", test.name(), kind.name(), family.name),
-                        reason: "every case of it is left to other cells".into(),
-                    }),
-                    false => Record::Cell(cell.record()),
-                };
-                records.push(Line::new(key, Ran::default(), record));
+                records.push(match cell.rungs.is_empty() && cell.failures.is_empty() {
+                    true => {
+                        let what = format!("{}, {}, {}", test.name(), kind.name(), family.name);
+                        skipped(key, what, "every case of it is left to other cells")
+                    }
+                    false => line(key, Record::Cell(cell.findings())),
+                });
             }
         }
         Ok(records)
@@ -153,7 +166,7 @@ impl Suite<'_> {
     }
 
     /// Other tests than the default one climb few rungs through structures other than the plain one.
-    fn takes(&self, case: &Case, test: TriangleTest, kind: Kind) -> bool {
+    fn takes(&self, case: &Case, test: AnyTriangleTest, kind: Kind) -> bool {
         let is_default = Some(&test) == self.tests.first();
         let stands_for_all = kind.name() == PLAIN || kind.name() == BRUTE_FORCE;
         let coarse = Place::ladder(true).contains(&case.place);
@@ -162,7 +175,7 @@ impl Suite<'_> {
 
     /// Whether any hit is asked for: with the default test; through the plain structure only if it has to
     /// be quick, since every kernel has to be compiled.
-    fn asks_any(&self, test: TriangleTest, kind: Kind) -> bool {
+    fn asks_any(&self, test: AnyTriangleTest, kind: Kind) -> bool {
         let is_default = Some(&test) == self.tests.first();
         is_default && (!self.settings.quick || kind.name() == PLAIN)
     }
@@ -170,8 +183,8 @@ impl Suite<'_> {
     fn case(
         &self,
         case: &Case,
-        judge: &Judge,
-        test: TriangleTest,
+        judge: &CaseJudge,
+        test: AnyTriangleTest,
         cells: &mut [(Kind, OpenCell)],
     ) -> Result<(), StressError> {
         let soup = TriangleSoup::new(&case.scene).intersecting(Self::with(test));
@@ -234,7 +247,7 @@ impl Suite<'_> {
     }
 
     /// The command that shows what a structure does with a ray of a case.
-    pub fn replay(&self, case: &Case, kind: &str, test: TriangleTest, ray: &Ray) -> String {
+    pub fn replay(&self, case: &Case, kind: &str, test: AnyTriangleTest, ray: &Ray) -> String {
         self.replay_at(case.family, &case.label, (kind, test.name()), ray)
     }
 
@@ -262,12 +275,12 @@ impl Suite<'_> {
 struct Trace<'a> {
     suite: &'a Suite<'a>,
     case: &'a Case,
-    judge: &'a Judge<'a>,
+    judge: &'a CaseJudge<'a>,
     stage: &'a Stage,
     expected: &'a Expected,
     /// Answers whose outcomes are known.
     judged: Vec<(&'a Hit, &'a Outcome)>,
-    test: TriangleTest,
+    test: AnyTriangleTest,
 }
 
 impl Trace<'_> {
@@ -300,7 +313,7 @@ impl Trace<'_> {
             errors |= any.errors;
             for (index, (any, hit)) in any.answers.iter().zip(expected).enumerate() {
                 if *any != (hit.triangle != NO_HIT) {
-                    tally.any_differing += 1;
+                    tally.count("any-differing/v1", 1);
                     tally.note(7e9, "any hit differs from brute force", || replay(index));
                 }
             }
@@ -327,35 +340,7 @@ impl Trace<'_> {
         };
         let exact = self.suite.exact;
         let verdict = gate::compare(&set, hits, &found, &self.stage.soup, built.space(), exact);
-        tally.differing = verdict.wrong;
-        tally.ties = verdict.ties;
-    }
-}
-
-impl OpenCell {
-    fn record(self) -> CellRecord {
-        let tally = self.tally;
-        CellRecord {
-            rays: tally.rays,
-            false_misses: tally.false_misses,
-            unexplained_misses: tally.unexplained_misses,
-            cracks: tally.cracks,
-            false_hits: tally.false_hits,
-            unexplained_hits: tally.unexplained_hits,
-            wrong_triangle: tally.wrong_triangle,
-            not_nearest: tally.not_nearest,
-            borderline: tally.borderline,
-            differing: tally.differing,
-            any_differing: self.asked_any.then_some(tally.any_differing),
-            ties: tally.ties,
-            t_ulp: tally.quantiles(0),
-            t_relative: tally.quantiles(1),
-            point_ulp: tally.quantiles(2),
-            point_relative: tally.quantiles(3),
-            slowdown: self.slowdown,
-            failures: self.failures,
-            worst: tally.worst.map(|(_, worst)| worst),
-            rungs: self.rungs,
-        }
+        tally.count("differing/v1", verdict.wrong);
+        tally.count("ties/v1", verdict.ties);
     }
 }

@@ -1,14 +1,16 @@
 //! What came of each ray, and the sum over a cell.
 
 use super::case::{Case, Truth};
-use super::record::{Quantiles, Rung, Worst};
+use super::record::{Findings, Quantiles, Rung, Worst};
 use crate::accel::{Hit, NO_HIT, Ray};
 use crate::geometry::Triangle;
-use crate::oracle::{ExactTruth, ExactVerdict, OracleRay, exact_truths};
+use crate::oracle::{ExactTruth, ExactVerdict, exact_truths};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
-/// Errors of a right hit: of the distance and of the hit point, in ulp and relative.
-pub type Errors = [f64; 4];
+/// Errors of right hits: of the distance, in ulp and relative, and of the hit point, in ulp of its greatest
+/// coordinate and relative to the way of the ray.
+pub type Errors<T = f64> = [T; 4];
 
 /// What came of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,29 +22,17 @@ pub struct Outcome {
 }
 
 /// What is right for every ray of a case: found once, whatever traces the case.
-pub struct Judge<'a> {
+pub struct CaseJudge<'a> {
     case: &'a Case,
     /// Exact truths; empty where there is no exact truth.
     truths: Vec<ExactTruth>,
 }
 
-pub(super) fn oracle_ray(ray: &Ray) -> OracleRay {
-    OracleRay {
-        origin: ray.origin,
-        t_min: ray.t_min,
-        direction: ray.direction,
-        t_max: ray.t_max,
-    }
-}
-
-impl<'a> Judge<'a> {
+impl<'a> CaseJudge<'a> {
     /// Looks up the truth of every ray.
     pub fn new(case: &'a Case) -> Self {
         let truths = match case.truth {
-            Truth::Exact | Truth::Closed => {
-                let rays: Vec<_> = case.rays.iter().map(oracle_ray).collect();
-                exact_truths(&case.scene.triangles, &rays)
-            }
+            Truth::Exact | Truth::Closed => exact_truths(&case.scene.triangles, &case.rays),
             _ => Vec::new(),
         };
         Self { case, truths }
@@ -62,7 +52,7 @@ impl<'a> Judge<'a> {
             (Truth::Exact | Truth::Closed, _) => {
                 let ray = &self.case.rays[index];
                 let triangles = &self.case.scene.triangles;
-                let verdict = self.truths[index].judge(triangles, &oracle_ray(ray), answer);
+                let verdict = self.truths[index].judge(triangles, ray, answer);
                 let errors = match verdict {
                     ExactVerdict::Hit(t) => {
                         Some(errors(&triangles[hit.triangle as usize], ray, hit, t))
@@ -115,37 +105,30 @@ fn errors(triangle: &Triangle, ray: &Ray, hit: &Hit, t: f64) -> Errors {
     ]
 }
 
+/// What is counted of the rays of a cell.
+const COUNTED: [&str; 12] = [
+    "rays/v1",
+    "false-misses/v1",
+    "unexplained-misses/v1",
+    "cracks/v1",
+    "false-hits/v1",
+    "unexplained-hits/v1",
+    "wrong-triangle/v1",
+    "not-nearest/v1",
+    "borderline/v1",
+    "differing/v1",
+    "any-differing/v1",
+    "ties/v1",
+];
+
 /// Counts over the rays of a cell.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
-    /// Rays.
-    pub rays: usize,
-    /// Misses where something is hit exactly.
-    pub false_misses: usize,
-    /// Those that the rounding of one test cannot explain.
-    pub unexplained_misses: usize,
-    /// Those from inside a closed mesh: cracks.
-    pub cracks: usize,
-    /// Hits where nothing is hit exactly.
-    pub false_hits: usize,
-    /// Those that rounding cannot explain.
-    pub unexplained_hits: usize,
-    /// Hits of another triangle than any that is hit exactly.
-    pub wrong_triangle: usize,
-    /// Hits of a triangle behind another by more than rounding.
-    pub not_nearest: usize,
-    /// Rays of which only rounding decides whether the interval holds the hit.
-    pub borderline: usize,
-    /// Answers that differ from brute force with the same test in any bit, and are no ties.
-    pub differing: usize,
-    /// Any-hit answers that differ from brute force.
-    pub any_differing: usize,
-    /// Differences within 4 ulp, on an adapter that does not compute like the host.
-    pub ties: usize,
+    counts: BTreeMap<&'static str, usize>,
     /// Errors of right hits.
-    pub errors: Vec<Errors>,
-    /// The ray to look at first.
-    pub worst: Option<(f64, Worst)>,
+    errors: Vec<Errors>,
+    /// The ray to look at first, and how bad it is.
+    worst: Option<(f64, Worst)>,
 }
 
 /// How bad a verdict is, and what it is called.
@@ -162,23 +145,33 @@ fn badness(outcome: &Outcome) -> (f64, &'static str) {
 }
 
 impl Tally {
+    /// Adds to a count.
+    pub fn count(&mut self, id: &'static str, more: usize) {
+        *self.counts.entry(id).or_default() += more;
+    }
+
+    /// A count so far.
+    fn counted(&self, id: &str) -> usize {
+        self.counts.get(id).copied().unwrap_or(0)
+    }
+
     /// Adds a ray.
     pub fn add(&mut self, outcome: &Outcome, closed: bool, replay: impl FnOnce() -> String) {
-        self.rays += 1;
+        self.count("rays/v1", 1);
         match outcome.verdict {
             ExactVerdict::Miss | ExactVerdict::Hit(_) => {}
-            ExactVerdict::Borderline => self.borderline += 1,
+            ExactVerdict::Borderline => self.count("borderline/v1", 1),
             ExactVerdict::FalseMiss { explained } => {
-                self.false_misses += 1;
-                self.unexplained_misses += usize::from(!explained);
-                self.cracks += usize::from(closed);
+                self.count("false-misses/v1", 1);
+                self.count("unexplained-misses/v1", usize::from(!explained));
+                self.count("cracks/v1", usize::from(closed));
             }
             ExactVerdict::FalseHit { explained } => {
-                self.false_hits += 1;
-                self.unexplained_hits += usize::from(!explained);
+                self.count("false-hits/v1", 1);
+                self.count("unexplained-hits/v1", usize::from(!explained));
             }
-            ExactVerdict::WrongTriangle => self.wrong_triangle += 1,
-            ExactVerdict::NotNearest => self.not_nearest += 1,
+            ExactVerdict::WrongTriangle => self.count("wrong-triangle/v1", 1),
+            ExactVerdict::NotNearest => self.count("not-nearest/v1", 1),
         }
         self.errors.extend(outcome.errors);
         let (badness, what) = badness(outcome);
@@ -196,50 +189,55 @@ impl Tally {
 
     /// Adds the sums of another rung.
     pub fn join(&mut self, other: Self) {
-        self.rays += other.rays;
-        self.false_misses += other.false_misses;
-        self.unexplained_misses += other.unexplained_misses;
-        self.cracks += other.cracks;
-        self.false_hits += other.false_hits;
-        self.unexplained_hits += other.unexplained_hits;
-        self.wrong_triangle += other.wrong_triangle;
-        self.not_nearest += other.not_nearest;
-        self.borderline += other.borderline;
-        self.differing += other.differing;
-        self.any_differing += other.any_differing;
-        self.ties += other.ties;
+        for (id, count) in other.counts {
+            self.count(id, count);
+        }
         self.errors.extend(other.errors);
         if other.worst.as_ref().map(|w| w.0) > self.worst.as_ref().map(|w| w.0) {
             self.worst = other.worst;
         }
     }
 
-    /// Median, 99th percentile and maximum of one error.
-    pub fn quantiles(&self, which: usize) -> Option<Quantiles> {
-        let mut errors: Vec<f64> = self.errors.iter().map(|e| e[which]).collect();
-        if errors.is_empty() {
-            return None;
-        }
-        errors.sort_by(f64::total_cmp);
-        let at = |share: f64| errors[((errors.len() - 1) as f64 * share).round() as usize];
-        Some(Quantiles {
-            median: at(0.5),
-            p99: at(0.99),
-            max: at(1.0),
-        })
+    /// Median, 99th percentile and maximum of each error; `None` without a right hit.
+    fn quantiles(&self) -> Option<Errors<Quantiles>> {
+        let last = self.errors.len().checked_sub(1)?;
+        Some([0, 1, 2, 3].map(|which| {
+            let mut errors: Vec<f64> = self.errors.iter().map(|e| e[which]).collect();
+            errors.sort_by(f64::total_cmp);
+            let [median, p99, max] =
+                [0.5, 0.99, 1.0].map(|share| errors[(last as f64 * share).round() as usize]);
+            Quantiles { median, p99, max }
+        }))
     }
 
     /// The rung that this tally is of.
     pub fn rung(&self, case: &Case) -> Rung {
+        let errors = self.quantiles();
         Rung {
             label: case.label.clone(),
             place: case.place,
-            rays: self.rays,
-            false_misses: self.false_misses,
-            differing: self.differing,
-            t_ulp: self.quantiles(0),
-            point_ulp: self.quantiles(2),
+            rays: self.counted("rays/v1"),
+            false_misses: self.counted("false-misses/v1"),
+            differing: self.counted("differing/v1"),
+            t_ulp: errors.map(|e| e[0]),
+            point_ulp: errors.map(|e| e[2]),
         }
+    }
+
+    /// All of it; any hits only if they were asked for.
+    pub fn findings(self, asked_any: bool) -> Findings {
+        let counted = COUNTED
+            .iter()
+            .filter(|id| asked_any || **id != "any-differing/v1");
+        let mut found = Findings::of(counted.map(|id| (*id, self.counted(id) as f64)));
+        found.errors = self.quantiles();
+        if let Some([t, _, point, _]) = &found.errors {
+            let (t, point) = (t.p99, point.p99);
+            found.add("t-ulp-p99/v1", t);
+            found.add("point-ulp-p99/v1", point);
+        }
+        found.worst = self.worst.map(|(_, worst)| worst);
+        found
     }
 }
 
@@ -266,11 +264,8 @@ mod tests {
         }
         let worst = |tally: &Tally| tally.worst.as_ref().map(|w| w.1.replay.clone());
         assert_eq!(worst(&tally).as_deref(), Some("ray 99"));
-        let quantiles = tally.quantiles(0).unwrap();
-        assert_eq!(
-            (quantiles.median, quantiles.p99, quantiles.max),
-            (50.0, 98.0, 99.0)
-        );
+        let [t, ..] = tally.quantiles().unwrap();
+        assert_eq!((t.median, t.p99, t.max), (50.0, 98.0, 99.0));
         let mut other = Tally::default();
         let miss = Outcome {
             verdict: ExactVerdict::FalseMiss { explained: true },
@@ -279,8 +274,11 @@ mod tests {
         other.add(&miss, true, || "crack".into());
         other.add(&miss, false, || "silhouette".into());
         tally.join(other);
-        assert_eq!((tally.rays, tally.false_misses, tally.cracks), (102, 2, 1));
         assert_eq!(worst(&tally).as_deref(), Some("crack"));
-        assert_eq!(tally.unexplained_misses, 0);
+        let found = tally.findings(false);
+        let counts = ["rays/v1", "false-misses/v1", "cracks/v1"].map(|id| found.count(id));
+        assert_eq!(counts, [102, 2, 1]);
+        assert_eq!(found.get("unexplained-misses/v1"), Some(0.0));
+        assert_eq!(found.get("any-differing/v1"), None);
     }
 }

@@ -2,9 +2,7 @@
 
 use super::axes::smallest_sound_pad;
 use super::place::Place;
-use super::record::{
-    CellRecord, Line, OffsetRecord, Record, ShotsRecord, SuiteRecord, TargetRecord,
-};
+use super::record::{Findings, Line, Record, SuiteRecord, TargetRecord};
 use crate::accel::BoxTest;
 use crate::integrator::RayOffset;
 use crate::measure::record::{Key, Recorded, Verdict, axis};
@@ -44,8 +42,9 @@ pub fn targets(records: &[Line]) -> Vec<TargetRecord> {
     targets.extend(cell_targets(&cells));
     targets.extend(pad_target(records));
     targets.extend(offset_targets(records));
-    targets.extend(figure_target(records));
-    targets.extend(cost.map(|cost| cost_target(default, cost.traversal_ratio)));
+    targets.extend(gauge_target(records));
+    let ratio = cost.and_then(|cost| cost.get("traversal-ratio/v1"));
+    targets.extend(ratio.map(|ratio| cost_target(default, ratio)));
     targets
 }
 
@@ -55,12 +54,12 @@ pub fn suite(records: &[Line]) -> Option<&SuiteRecord> {
 }
 
 /// The cells.
-pub fn cells(records: &[Line]) -> impl Iterator<Item = Recorded<'_, CellRecord>> {
+pub fn cells(records: &[Line]) -> impl Iterator<Item = Recorded<'_, Findings>> {
     all!(records, Cell)
 }
 
 /// The series of shots.
-pub fn shots(records: &[Line]) -> impl Iterator<Item = Recorded<'_, ShotsRecord>> {
+pub fn shots(records: &[Line]) -> impl Iterator<Item = Recorded<'_, Findings>> {
     all!(records, Shots)
 }
 
@@ -87,10 +86,12 @@ fn target(
     }
 }
 
-fn shot_targets(shots: &[Recorded<ShotsRecord>], wanted: usize) -> Vec<TargetRecord> {
-    let name = |s: &Recorded<ShotsRecord>| {
+fn shot_targets(shots: &[Recorded<Findings>], wanted: usize) -> Vec<TargetRecord> {
+    let counts = |s: &Findings| ["misses/v1", "rays/v1"].map(|id| s.count(id));
+    let name = |s: &Recorded<Findings>| {
         let what = [axis::ACCEL, axis::MESH, axis::PLACE, axis::AIM].map(|axis| s.key.label(axis));
-        format!("{}: {} of {}", what.join(", "), s.misses, s.rays)
+        let [misses, rays] = counts(s);
+        format!("{}: {misses} of {rays}", what.join(", "))
     };
     let at = |place: Place| {
         let place = place.to_string();
@@ -99,9 +100,10 @@ fn shot_targets(shots: &[Recorded<ShotsRecord>], wanted: usize) -> Vec<TargetRec
     let ordinary = |random: bool| {
         at(Place::ORDINARY)
             .filter(move |s| (s.key.label(axis::AIM) == "random") == random)
-            .map(|s| (s.misses as f64, name(s)))
+            .map(|s| (counts(s)[0] as f64, name(s)))
     };
-    let far = at(Place::FAR).map(|s| (s.misses as f64 / s.rays.max(1) as f64, name(s)));
+    let share = |[misses, rays]: [usize; 2]| misses as f64 / rays.max(1) as f64;
+    let far = at(Place::FAR).map(|s| (share(counts(s)), name(s)));
     let misses = format!("watertight misses of {wanted} rays per mesh, ordinary scale");
     let aimed = format!("misses at vertices and edges of {wanted} shots");
     vec![
@@ -111,16 +113,17 @@ fn shot_targets(shots: &[Recorded<ShotsRecord>], wanted: usize) -> Vec<TargetRec
     ]
 }
 
-fn cell_targets(cells: &[Recorded<CellRecord>]) -> Vec<TargetRecord> {
-    let name = |c: &Recorded<CellRecord>, what: &str| {
+fn cell_targets(cells: &[Recorded<Findings>]) -> Vec<TargetRecord> {
+    let name = |c: &Recorded<Findings>, what: &str| {
         let [accel, family] = [axis::ACCEL, axis::FAMILY].map(|axis| c.key.label(axis));
         format!("{accel}, {family}: {what}")
     };
-    let cracks = cells.iter().map(|c| (c.cracks as f64, name(c, "cracks")));
+    let cracks = cells
+        .iter()
+        .map(|c| (c.count("cracks/v1") as f64, name(c, "cracks")));
     let differing = cells.iter().map(|c| {
-        let any = c.any_differing.unwrap_or(0);
         let replay = c.worst.as_ref().map_or("", |w| w.replay.as_str());
-        ((c.differing + any) as f64, name(c, replay))
+        (c.differing() as f64, name(c, replay))
     });
     let hangs = cells.iter().map(|c| {
         let raised = || c.failures.iter().filter(|f| !f.contains("not built"));
@@ -130,7 +133,7 @@ fn cell_targets(cells: &[Recorded<CellRecord>]) -> Vec<TargetRecord> {
     let strange = cells
         .iter()
         .filter(|c| c.key.label(axis::FAMILY) == NO_RAYS);
-    let slowdown = strange.filter_map(|c| Some((c.slowdown?, name(c, "slowdown"))));
+    let slowdown = strange.filter_map(|c| Some((c.get("slowdown/v1")?, name(c, "slowdown"))));
     vec![
         target(
             "cracks from inside closed meshes, all families and rungs",
@@ -159,10 +162,10 @@ fn pad_target(records: &[Line]) -> Option<TargetRecord> {
     all!(records, BoxTest).next()?;
     // Without a pad and a finite reciprocal, what WGSL leaves open decides.
     let padded = all!(records, BoxTest).filter(|t| t.key.label(axis::BOX_TEST) != "plain");
-    let found = smallest_sound_pad(padded.map(|t| t.body)).map_or(f64::MAX, f64::from);
+    let found = smallest_sound_pad(padded.map(|t| t.body)).map_or(f64::MAX, |pad| pad as f64);
     Some(target(
         "smallest pad of boxes that loses no hit here, ulp",
-        f64::from(BoxTest::DEFAULT_ULPS),
+        f64::from(BoxTest::default().pad_ulps),
         [(found, String::new())],
     ))
 }
@@ -170,16 +173,17 @@ fn pad_target(records: &[Line]) -> Option<TargetRecord> {
 /// Rays begun with the default offset: those that meet the triangle they leave, or escape; and how far they
 /// begin from the points they leave, since contact shadows and thin gaps end there.
 fn offset_targets(records: &[Line]) -> Vec<TargetRecord> {
-    let default = RayOffset::default().name();
-    let found = |figure: fn(&OffsetRecord) -> f64| {
+    let default = RayOffset::default().name;
+    let found = |figures: &'static [&'static str]| {
         let of_default = all!(records, Offset).filter(|o| o.key.label(axis::OFFSET) == default);
         of_default.map(move |o| {
             let [mesh, place] = [axis::MESH, axis::PLACE].map(|axis| o.key.label(axis));
-            (figure(o.body), format!("{mesh}, {place}"))
+            let value = figures.iter().filter_map(|id| o.get(id)).sum();
+            (value, format!("{mesh}, {place}"))
         })
     };
-    let bad = found(|o| (o.self_intersections + o.leaks) as f64);
-    let farthest = found(|o| o.farthest);
+    let bad = found(&["self-intersections/v1", "leaks/v1"]);
+    let farthest = found(&["farthest-begin/v1"]);
     let name = |what: &str, of: &str| format!("{what} with {default}{of}");
     let targets = [
         target(
@@ -200,9 +204,9 @@ fn offset_targets(records: &[Line]) -> Vec<TargetRecord> {
 }
 
 /// Accumulation and sampling: how many figures are beyond their alarm level.
-fn figure_target(records: &[Line]) -> Option<TargetRecord> {
-    all!(records, Figure).next()?;
-    let alarms = all!(records, Figure).filter(|f| !f.passed);
+fn gauge_target(records: &[Line]) -> Option<TargetRecord> {
+    all!(records, Gauge).next()?;
+    let alarms = all!(records, Gauge).filter(|f| !f.passed);
     let alarms: Vec<&str> = alarms.map(|f| f.body.name.as_str()).collect();
     Some(target(
         "figures of accumulation and sampling beyond their alarm level",
@@ -219,12 +223,12 @@ fn cost_target(triangle: &str, ratio: f64) -> TargetRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::record::Ran;
+    use crate::stress::record::{about_all, line};
 
     #[test]
     fn one_figure_beyond_its_alarm_fails_their_target_by_name() {
-        let figure = |name: &str, passed| {
-            Line::about_all(Record::Figure(crate::stress::numerics::Figure {
+        let gauge = |name: &str, passed| {
+            about_all(Record::Gauge(crate::stress::numerics::Gauge {
                 name: name.into(),
                 value: 2.0,
                 alarm: Some(1.0),
@@ -233,25 +237,18 @@ mod tests {
                 note: String::new(),
             }))
         };
-        let verdict = |records: &[Line]| figure_target(records).map(|t| (t.verdict, t.note));
+        let verdict = |records: &[Line]| gauge_target(records).map(|t| (t.verdict, t.note));
         assert_eq!(verdict(&[]), None);
-        let good = verdict(&[figure("sum", true)]);
+        let good = verdict(&[gauge("sum", true)]);
         assert_eq!(good, Some((Verdict::Pass, String::new())));
-        let bad = verdict(&[figure("sum", true), figure("acos", false)]);
+        let bad = verdict(&[gauge("sum", true), gauge("acos", false)]);
         assert_eq!(bad, Some((Verdict::Fail, "acos".into())));
     }
 
     fn shot(misses: usize, place: Place, aim: &str) -> Line {
-        let record = ShotsRecord {
-            triangles: 10,
-            rays: 1000,
-            misses,
-            confirmed: misses,
-            failure: None,
-            worst: None,
-        };
+        let found = Findings::of([("rays/v1", 1000.0), ("misses/v1", misses as f64)]);
         let key = Key::default().with(axis::PLACE, place).with(axis::AIM, aim);
-        Line::new(key, Ran::default(), Record::Shots(record))
+        line(key, Record::Shots(found))
     }
 
     #[test]

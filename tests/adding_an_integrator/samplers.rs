@@ -18,10 +18,6 @@ impl Sequence for Weyl {
         "multiples of the golden ratio (an example)"
     }
 
-    fn kernel(&self) -> &'static str {
-        "sampling/weyl"
-    }
-
     fn sources(&self) -> &'static [(&'static str, &'static str)] {
         &[("sampling/weyl", include_str!("kernels/sampling/weyl.wesl"))]
     }
@@ -52,10 +48,6 @@ impl Decorrelation for Rotation {
 
     fn description(&self) -> &'static str {
         "a random shift for each pixel and dimension (an example)"
-    }
-
-    fn kernel(&self) -> &'static str {
-        "sampling/rotation"
     }
 
     fn sources(&self) -> &'static [(&'static str, &'static str)] {

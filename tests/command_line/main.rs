@@ -4,6 +4,7 @@ mod models;
 mod pictures;
 mod points;
 
+use raystone::config::Axis;
 use raystone::discrepancy::Measure;
 use raystone::measure::metrics::METRICS;
 use raystone::run::Registries;
@@ -174,11 +175,11 @@ fn list_mentions_every_entry_of_every_registry() {
     let words = stdout(&listed);
     let catalogue = Registries::default().catalogue();
     let axes = [
-        ("scene", &catalogue.scene),
-        ("accel", &catalogue.accel),
-        ("sequence", &catalogue.sequence),
-        ("decorrelation", &catalogue.decorrelation),
-        ("integrator", &catalogue.integrator),
+        ("scene", &catalogue[Axis::Scene]),
+        ("accel", &catalogue[Axis::Accel]),
+        ("sequence", &catalogue[Axis::Sequence]),
+        ("decorrelation", &catalogue[Axis::Decorrelation]),
+        ("integrator", &catalogue[Axis::Integrator]),
     ];
     for (axis, entries) in axes {
         let one_axis = stdout(&run(&["list", axis]));
@@ -258,7 +259,9 @@ fn a_reader_that_goes_away_is_no_failure_but_a_full_disk_is() {
     let output = output
         .and_then(std::process::Child::wait_with_output)
         .expect("it starts");
-    assert!(error(&output, 2).contains("standard output"));
+    // What went wrong, and why.
+    let message = error(&output, 2);
+    assert!(message.contains("standard output: No space"), "{message}");
 }
 
 #[test]
@@ -285,8 +288,12 @@ fn verify_ends_with_0_where_hits_are_right_and_with_1_where_a_kernel_skips_a_tri
     let wrong = output(program(&arguments).arg("--kernels").arg(folder.path()));
     let words = stdout(&wrong);
     assert_eq!(wrong.status.code(), Some(1), "{words}");
-    assert!(
-        words.contains("FAILED") && words.contains("0 of 1 structures passed"),
-        "{words}"
-    );
+    for expected in [
+        "FAILED",
+        "0 of 1 structures passed",
+        "first wrong primary ray: ",
+    ] {
+        assert!(words.contains(expected), "{expected} is not in {words}");
+        assert!(!stdout(&right).contains(expected), "{expected}");
+    }
 }

@@ -59,13 +59,16 @@ fn catalogue() -> Catalogue {
             parameter("shuffle", ParamValue::Flag(false), ParamRange::Flag),
         ],
     ));
-    Catalogue {
-        scene: plain(&["cornell-box", "displaced-sphere", "teapot-in-a-stadium"]),
-        accel,
-        sequence,
-        decorrelation: plain(&["none", "cranley-patterson"]),
-        integrator: plain(&["primary", "ao", "path"]),
-    }
+    let mut catalogue = Catalogue::default();
+    catalogue[Axis::Scene] = plain(&["cornell-box", "displaced-sphere", "teapot-in-a-stadium"]);
+    catalogue[Axis::Accel] = accel;
+    catalogue[Axis::Sequence] = sequence;
+    catalogue[Axis::Decorrelation] = plain(&["none", "cranley-patterson"]);
+    catalogue[Axis::Integrator] = plain(&["primary", "ao", "path"]);
+    catalogue[Axis::Triangle] = plain(&["watertight", "pluecker"]);
+    catalogue[Axis::BoxTest] = plain(&["padded-16", "plain"]);
+    catalogue[Axis::Offset] = plain(&["error-bound", "none"]);
+    catalogue
 }
 
 const AXES: &str = "[axes]\nscene = [\"cornell-box\"]\naccel = [\"bvh\", \"uniform-grid\"]\n\
@@ -117,8 +120,8 @@ fn a_minimal_file_gets_the_documented_defaults() {
     assert_eq!(experiment.spp.max(), 32);
     assert!(experiment.runtime_checks);
     assert!(experiment.camera.is_none());
-    assert_eq!(labels(&experiment.axes.decorrelation), ["none"]);
-    assert_eq!(labels(&experiment.axes.integrator), ["path"]);
+    assert_eq!(labels(&experiment.axes[Axis::Decorrelation]), ["none"]);
+    assert_eq!(labels(&experiment.axes[Axis::Integrator]), ["path"]);
     assert_eq!(
         experiment.reference.sequence.params.0["hash"].to_string(),
         "pcg"
@@ -167,7 +170,7 @@ fn lists_of_parameters_make_variants_in_the_order_of_the_schema() {
          [sequence.pixel-hash]\nhash = \"wang\"\nshuffle = [false, true]\n",
     );
     assert_eq!(
-        labels(&experiment.axes.accel),
+        labels(&experiment.axes[Axis::Accel]),
         [
             "bvh",
             "uniform-grid(lambda=3)",
@@ -177,15 +180,15 @@ fn lists_of_parameters_make_variants_in_the_order_of_the_schema() {
         ]
     );
     assert_eq!(
-        experiment.axes.accel[1].params.0["lambda"],
+        experiment.axes[Axis::Accel][1].params.0["lambda"],
         ParamValue::Number(3.0)
     );
     assert_eq!(
-        experiment.axes.accel[2].params.0["max_cells"],
+        experiment.axes[Axis::Accel][2].params.0["max_cells"],
         ParamValue::Integer(8)
     );
     assert_eq!(
-        labels(&experiment.axes.sequence),
+        labels(&experiment.axes[Axis::Sequence]),
         [
             "pixel-hash(hash=wang)",
             "pixel-hash(hash=wang,shuffle=true)",
@@ -201,7 +204,7 @@ fn double_brackets_make_variants_side_by_side_and_none_twice() {
          [[accel.uniform-grid]]\nmax_cells = [4096, 8]\n",
     );
     assert_eq!(
-        labels(&experiment.axes.accel),
+        labels(&experiment.axes[Axis::Accel]),
         [
             "bvh",
             "uniform-grid(lambda=3)",
@@ -232,11 +235,11 @@ fn overrides_replace_values_of_the_file_and_are_cited() {
     assert_eq!(experiment.spp.max(), 4);
     assert_eq!(experiment.name, "other name");
     assert_eq!(
-        labels(&experiment.axes.scene),
+        labels(&experiment.axes[Axis::Scene]),
         ["dragon.ply", "cornell-box"]
     );
-    assert_eq!(experiment.axes.scene[0].name, "../models/dragon.ply");
-    assert_eq!(experiment.axes.accel.len(), 3);
+    assert_eq!(experiment.axes[Axis::Scene][0].name, "../models/dragon.ply");
+    assert_eq!(experiment.axes[Axis::Accel].len(), 3);
     assert_eq!(experiment.timing.rounds, 4);
     assert!(experiment.text.starts_with(&text));
     assert!(experiment.text.contains("# --set run.resolution=[32,16]\n"));
@@ -295,12 +298,12 @@ fn a_plan_measures_errors_once_and_times_every_cell() {
     assert_eq!(plan.times.len(), 7 * 2 * 3);
     assert_eq!(plan.streams.len(), 3);
     // Two samplers are randomised and need 4 renders, one is not and needs 1.
-    assert_eq!(plan.renders_planned, 2 * 2 * (4 + 4 + 1));
-    assert_eq!(plan.renders_full_product, 7 * 2 * (4 + 4 + 1));
+    assert_eq!(plan.renders_planned(), 2 * 2 * (4 + 4 + 1));
+    assert_eq!(plan.renders_full_product(), 7 * 2 * (4 + 4 + 1));
     let brute_force = plan
         .structures
         .iter()
-        .filter(|s| s.accel.name == "brute-force");
+        .filter(|s| s[Axis::Accel].name == "brute-force");
     assert_eq!(brute_force.count(), 1);
     let cells: Vec<usize> = plan.skipped.iter().map(|skipped| skipped.cells).collect();
     assert_eq!(cells, [2 * 4 * 2, 2 * 4]);
@@ -404,7 +407,11 @@ fn every_default_is_accepted_by_the_parser() {
         let Some(default) = key.default else { continue };
         let (section, name) = (key.section, key.name);
         let mut text = String::new();
-        if section != "axes" {
+        if section == "axes" {
+            if !AXES.contains(&format!("\n{name} = ")) {
+                text = format!("{name} = {default}\n");
+            }
+        } else {
             text = format!("[{section}]\n{name} = {default}\n");
         }
         if section == "camera" {
@@ -412,7 +419,6 @@ fn every_default_is_accepted_by_the_parser() {
         }
         good(&text);
     }
-    assert_eq!(Axis::ALL.len(), 6);
 }
 
 #[test]
@@ -434,9 +440,9 @@ fn committed_experiments_parse_and_plan() {
                 .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
             assert!(!plan.times.is_empty() && !plan.streams.is_empty());
             // The saving is in the structures.
-            match experiment.axes.accel.len() {
-                1 => assert_eq!(plan.renders_planned, plan.renders_full_product),
-                _ => assert!(plan.renders_planned < plan.renders_full_product),
+            match experiment.axes[Axis::Accel].len() {
+                1 => assert_eq!(plan.renders_planned(), plan.renders_full_product()),
+                _ => assert!(plan.renders_planned() < plan.renders_full_product()),
             }
             seen += 1;
         }

@@ -1,6 +1,7 @@
 //! What every kind of mistake is answered with.
 
 use crate::{AXES, assert_says, labels, parse, parse_with};
+use raystone::config::Axis;
 
 #[test]
 fn text_that_is_not_toml_names_its_line() {
@@ -312,7 +313,7 @@ fn parameters_of_an_entry_that_is_not_used_are_a_mistake() {
     // Left over rather than wrong, when the command line replaced the axis.
     let text = format!("{AXES}[accel.uniform-grid]\nlambda = 3\n");
     let narrowed = parse_with(&text, &["axes.accel=bvh"]).expect("left-over parameters");
-    assert_eq!(labels(&narrowed.axes.accel), ["bvh"]);
+    assert_eq!(labels(&narrowed.axes[Axis::Accel]), ["bvh"]);
     assert_says(
         parse_with(AXES, &["axes.accel=bvh", "accel.uniform-grid.lambda=4"]),
         &["--set accel.uniform-grid.lambda=4", "not in axes.accel"],

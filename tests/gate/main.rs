@@ -14,7 +14,7 @@ mod timed;
 use raystone::accel::AccelKind;
 use raystone::config::Gate;
 use raystone::gpu::{Gpu, probe_arithmetic};
-use raystone::measure::gate::{Judge, gate};
+use raystone::measure::gate::{Checks, Judge, gate};
 use raystone::measure::record::GateVerdict;
 use support::Stage;
 
@@ -27,7 +27,15 @@ fn judge(stage: &Stage, rays: u32) -> Judge {
         ao_length: 0.0,
         offset: 0.0,
     };
-    Judge::new(&stage.scene, &stage.soup, stage.camera, &settings, 1).expect("a judge")
+    Judge::new(
+        &stage.scene,
+        &stage.soup,
+        stage.camera,
+        &settings,
+        1,
+        Checks::Repeated,
+    )
+    .expect("a judge")
 }
 
 /// The verdict on one structure.

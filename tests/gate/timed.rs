@@ -1,37 +1,10 @@
 //! What is timed is looked at: a kernel that answers at first and slackens later gets no figure.
 
-use crate::support::records;
+use crate::support::{SMALL, records};
 use raystone::gpu::KernelLibrary;
 use raystone::measure::record::{StructureRecord, all_of};
 use std::path::Path;
 use std::process::Command;
-
-const EXPERIMENT: &str = r#"
-[run]
-name = "timed"
-replicates = 2
-resolution = [16, 16]
-spp = { pow2 = [0, 1] }
-[axes]
-scene = ["cornell-box"]
-accel = ["bvh"]
-sequence = ["pixel-hash"]
-decorrelation = ["none"]
-integrator = ["path"]
-[reference]
-spp = 8
-[timing]
-rounds = 3
-min_warmup_ms = 0
-max_warmup_ms = 1
-rays = 1024
-[gate]
-rays = 1024
-brute_force_tests = 1000
-oracle_rays = 16
-[discrepancy]
-points = 16
-"#;
 
 const KERNEL: &str = "integrator/trace_rays";
 /// Behind this line of the kernel the faults are planted.
@@ -76,7 +49,7 @@ fn plant(folder: &Path, fault: &str) {
 /// Runs the experiment with the kernels of `folder`; failure and number of timings of the structure.
 fn run(folder: &Path) -> (Option<String>, usize) {
     let experiment = folder.join("timed.toml");
-    std::fs::write(&experiment, EXPERIMENT).expect("an experiment");
+    std::fs::write(&experiment, SMALL).expect("an experiment");
     let out = folder.join("out");
     let output = Command::new(env!("CARGO_BIN_EXE_raystone"))
         .arg("run")

@@ -1,9 +1,9 @@
 //! Planted faults must fail on the rays at which grids went wrong.
 
-use crate::common::scenes;
-use crate::common::{self, Pcg, brute_force, build, default_params, trace};
+use crate::support::scenes;
+use crate::support::{self, Pcg, brute_force, build, default_params, kernels_with, trace};
 use crate::{grid, slanted, with};
-use raystone::gpu::{Gpu, KernelLibrary};
+use raystone::gpu::Gpu;
 use raystone::params::ParamValue;
 
 /// A fault in a kernel: where, what stands there, what replaces it.
@@ -96,28 +96,13 @@ const FAULTS: &[Fault] = &[
 
 /// A device whose kernel `fault.file` has the fault, or none.
 fn device(fault: &Fault, planted: bool) -> Gpu {
-    let library = KernelLibrary::default();
-    let mut text = library.text(fault.file).expect("a known kernel").to_owned();
-    assert_eq!(
-        text.matches(fault.from).count(),
-        1,
-        "`{}` in {}",
-        fault.from,
-        fault.file
-    );
-    if planted {
-        text = text.replace(fault.from, fault.to);
-    }
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let file = folder.path().join(fault.file).with_extension("wesl");
-    std::fs::create_dir_all(file.parent().expect("a parent")).expect("a folder");
-    std::fs::write(&file, text).expect("a written kernel");
-    common::open(library.with_folder(folder.path()).expect("the folder"))
+    let to = if planted { fault.to } else { fault.from };
+    support::open(kernels_with(fault.file, &[(fault.from, to)]))
 }
 
 #[test]
 fn planted_faults_turn_the_comparison_red() {
-    if !common::is_exact(common::gpu()) {
+    if !support::is_exact(support::gpu()) {
         return;
     }
     let mut rng = Pcg::new(5);
@@ -138,7 +123,7 @@ fn planted_faults_turn_the_comparison_red() {
         let built = build(kind, &soup, &params);
         let wrong = |gpu: &Gpu| {
             let found = trace(gpu, &*built, &soup, &rays, &[]);
-            common::differences(&expected, &found.hits).len()
+            support::differences(&expected, &found.hits).len()
         };
         assert_eq!(
             wrong(&device(fault, false)),

@@ -3,18 +3,18 @@
 //! border, with hits beyond the cell that lists them, and in scenes far from the origin. Kernels with
 //! planted faults must fail on the same rays.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod faults;
+#[path = "../support/mod.rs"]
+mod support;
 
-use common::scenes::{self, FAR};
-use common::{Pcg, assert_same_hits, brute_force, build, default_params, param_variants, trace};
 use glam::Vec3;
 use raystone::accel::{
     AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, Counters, Hit, NO_HIT, Ray,
     TriangleSoup,
 };
 use raystone::params::{ParamValue, Params};
+use support::scenes::{self, FAR};
+use support::{Pcg, assert_same_hits, brute_force, build, default_params, param_variants, trace};
 
 /// The grids; every name is registered.
 fn grids() -> Vec<&'static dyn AccelKind> {
@@ -234,8 +234,8 @@ fn twins_answer_the_rays_at_which_grids_went_wrong() {
 
 #[test]
 fn kernels_answer_the_rays_at_which_grids_went_wrong_and_count_like_their_twins() {
-    let gpu = common::gpu();
-    if !common::is_exact(gpu) {
+    let gpu = support::gpu();
+    if !support::is_exact(gpu) {
         return;
     }
     let mut rng = Pcg::new(2017);

@@ -1,12 +1,12 @@
 //! Closed surfaces from inside: which triangle tests lose rays.
 
-use crate::common::{Pcg, scenes};
+use crate::support::{Pcg, scenes};
 use crate::{ray, tests_of};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use raystone::accel::triangle::TriangleTest;
 use raystone::accel::{
-    BuildLog, BuiltBvh, BvhParameters, Counters, CpuTwin, NO_HIT, Ray, TriangleSoup,
+    BuildLog, BuiltBvh, BvhParameters, Counters, CpuTwin, NO_HIT, Ray, TriangleRegistry,
+    TriangleSoup,
 };
 
 /// A closed surface of triangles whose corners are shared to the bit: a sphere of radius 2 over the
@@ -119,14 +119,11 @@ fn closed_meshes() -> [(&'static str, DVec3, Vec<[Vec3; 3]>); 4] {
 
 #[test]
 fn closed_surfaces_are_watertight_and_another_test_leaks() {
-    let mut leaking = [0; TriangleTest::ALL.len()];
+    let mut leaking = vec![0; TriangleRegistry::default().iter().count()];
     for (mesh, centre, triangles) in closed_meshes() {
         let rays = inner_rays(&triangles, centre, 1_000_000);
-        for (index, triangle) in TriangleTest::ALL.into_iter().enumerate() {
-            let watertight = matches!(
-                triangle,
-                TriangleTest::Watertight | TriangleTest::Compensated
-            );
+        for (index, triangle) in TriangleRegistry::default().iter().enumerate() {
+            let watertight = triangle.is_watertight();
             let rays = if watertight {
                 &rays[..]
             } else {

@@ -2,26 +2,29 @@
 //! and closed surfaces from inside.
 
 mod closed;
-#[path = "../common/mod.rs"]
-mod common;
+#[path = "../support/mod.rs"]
+mod support;
 
 use closed::{ORDINARY, inner_rays, sphere};
-use common::{Pcg, assert_same_hits, build, default_params, scenes};
 use glam::Vec3;
-use raystone::accel::triangle::{TriangleRecord, TriangleTest, intersect_triangle};
+use raystone::accel::triangle::{
+    AnyTriangleTest, BaldwinWeber, TriangleRecord, TriangleTest as _, Watertight,
+    intersect_triangle,
+};
 use raystone::accel::{
     AccelRegistry, Ask, BoxTest, BuildLog, BuiltBvh, BvhParameters, Counters, Hit, Intersection,
-    NO_HIT, Ray, Traced, Tracer, TriangleBuffers, TriangleSoup,
+    NO_HIT, Ray, Traced, Tracer, TriangleBuffers, TriangleRegistry, TriangleSoup,
 };
 use raystone::config::Gate;
 use raystone::geometry::Triangle;
-use raystone::gpu::{Bindings, Composition, Dispatch, Gpu, KernelLibrary, groups_for};
-use raystone::integrator::RayOffset;
+use raystone::gpu::{Bindings, Composition, Gpu, KernelLibrary, Recording, groups_for};
+use raystone::integrator::{OffsetRegistry, offset};
 use raystone::measure::rays::record_rays;
 use raystone::params::{Params, Variant};
 use raystone::scene::{self, LoadOptions};
 use std::path::Path;
 use std::sync::OnceLock;
+use support::{Pcg, assert_same_hits, build, default_params, scenes};
 
 /// A device with the kernels of this test.
 fn gpu() -> &'static Gpu {
@@ -29,11 +32,11 @@ fn gpu() -> &'static Gpu {
     GPU.get_or_init(|| {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/intersectors/kernels");
         let library = KernelLibrary::default().with_folder(&folder);
-        common::open(library.expect("the kernels of this test"))
+        support::open(library.expect("the kernels of this test"))
     })
 }
 
-fn tests_of(triangle: TriangleTest) -> Intersection {
+fn tests_of(triangle: AnyTriangleTest) -> Intersection {
     Intersection {
         triangle,
         ..Default::default()
@@ -121,22 +124,21 @@ fn pairs_on_device(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
         )
         .buffer("rays", &gpu.storage("rays", rays).expect("fits"))
         .buffer("hits", &output);
-    gpu.run(&Dispatch {
-        pipeline: &pipeline,
-        bindings: &bindings,
-        groups: groups_for(rays.len() as u32),
-    })
-    .expect("runs");
-    gpu.read(&output).expect("reads")
+    let mut recording = Recording::new();
+    recording
+        .run("pairs", &pipeline, &bindings, groups_for(rays.len() as u32))
+        .download("hits", &output);
+    let played = gpu.play(&recording).expect("runs");
+    played.download("hits").expect("hits")
 }
 
 #[test]
 fn kernel_and_twin_of_every_test_agree_to_the_bit_on_pairs() {
-    if !common::is_exact(gpu()) {
+    if !support::is_exact(gpu()) {
         return;
     }
     let (triangles, rays) = pairs(120_000);
-    for triangle in TriangleTest::ALL {
+    for triangle in TriangleRegistry::default().iter() {
         let soup = scenes::soup(triangles.iter().copied()).intersecting(tests_of(triangle));
         let closest = |(ray, record): (&Ray, &TriangleRecord)| {
             let mut hit = Hit::miss(ray);
@@ -151,11 +153,11 @@ fn kernel_and_twin_of_every_test_agree_to_the_bit_on_pairs() {
         let hits = expected.iter().filter(|h| h.triangle != NO_HIT).count();
         assert!(hits > 30_000, "{}: only {hits} hits", triangle.name());
         // Negative control: the tests are not all the same.
-        if triangle != TriangleTest::default() {
+        if triangle != Intersection::default().triangle {
             let soup =
                 scenes::soup(triangles.iter().copied()).intersecting(Intersection::default());
             let other = pairs_on_device(&soup, &rays);
-            let different = common::differences(&expected, &other).len();
+            let different = support::differences(&expected, &other).len();
             assert!(different > 0, "{} is the default", triangle.name());
         }
     }
@@ -163,7 +165,7 @@ fn kernel_and_twin_of_every_test_agree_to_the_bit_on_pairs() {
 
 #[test]
 fn kernel_and_twin_of_every_offset_agree_to_the_bit() {
-    if !common::is_exact(gpu()) {
+    if !support::is_exact(gpu()) {
         return;
     }
     let mut rng = Pcg::new(5);
@@ -178,7 +180,7 @@ fn kernel_and_twin_of_every_offset_agree_to_the_bit() {
     let pad = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
     let words: Vec<[f32; 4]> = points.iter().flatten().copied().map(pad).collect();
     let gpu = gpu();
-    for offset in RayOffset::ALL {
+    for offset in OffsetRegistry::default().iter() {
         let kernel = offset.activate(Composition::new("intersectors/offsets"));
         let pipeline = gpu.pipeline(&kernel, true).expect("a sound kernel");
         let output = gpu.zeroed("hits", points.len() as u64 * 16).expect("fits");
@@ -186,38 +188,38 @@ fn kernel_and_twin_of_every_offset_agree_to_the_bit() {
         bindings
             .buffer("rays", &gpu.storage("rays", &words).expect("fits"))
             .buffer("hits", &output);
-        gpu.run(&Dispatch {
-            pipeline: &pipeline,
-            bindings: &bindings,
-            groups: groups_for(points.len() as u32),
-        })
-        .expect("runs");
-        let found: Vec<[f32; 4]> = gpu.read(&output).expect("reads");
+        let mut recording = Recording::new();
+        recording
+            .run(
+                "offsets",
+                &pipeline,
+                &bindings,
+                groups_for(points.len() as u32),
+            )
+            .download("hits", &output);
+        let played = gpu.play(&recording).expect("runs");
+        let found: Vec<[f32; 4]> = played.download("hits").expect("hits");
         let mut moved = 0;
         for ([p, n, error], found) in points.iter().zip(&found) {
-            let expected = offset.offset_point(*p, *n, *error);
+            let expected = (offset.offset_point)(*p, *n, *error);
             let same = (0..3).all(|a| expected[a].to_bits() == found[a].to_bits());
-            assert!(
-                same,
-                "{}: {p:?} {n:?}: {expected:?} {found:?}",
-                offset.name()
-            );
+            assert!(same, "{}: {p:?} {n:?}: {expected:?} {found:?}", offset.name);
             moved += usize::from(expected != *p);
         }
-        assert_eq!(offset == RayOffset::None, moved == 0, "{}", offset.name());
+        assert_eq!(*offset == offset::NONE, moved == 0, "{}", offset.name);
     }
 }
 
 #[test]
 fn every_structure_equals_brute_force_with_every_test() {
     let gpu = gpu();
-    let exact = common::is_exact(gpu);
+    let exact = support::is_exact(gpu);
     let mut rng = Pcg::new(3);
     let lattice = scenes::lattice_soup(&mut rng, 60, 6);
     let rays = scenes::lattice_rays(&mut rng, 400, 6);
-    for triangle in TriangleTest::ALL {
+    for triangle in TriangleRegistry::default().iter() {
         let soup = lattice.clone().intersecting(tests_of(triangle));
-        let expected = common::brute_force(&soup, &rays);
+        let expected = support::brute_force(&soup, &rays);
         assert!(expected.iter().any(|h| h.triangle != NO_HIT));
         assert_same_hits(
             "brute force in blocks",
@@ -237,7 +239,7 @@ fn every_structure_equals_brute_force_with_every_test() {
                 assert_same_hits(&format!("twin of {what}"), &rays, &expected, &found);
             }
             if exact {
-                let found = common::trace(gpu, &*built, &soup, &rays, &[]).hits;
+                let found = support::trace(gpu, &*built, &soup, &rays, &[]).hits;
                 assert_same_hits(&what, &rays, &expected, &found);
             }
         }
@@ -247,12 +249,13 @@ fn every_structure_equals_brute_force_with_every_test() {
 #[test]
 fn less_padded_boxes_are_another_kernel_and_the_twins_follow() {
     let gpu = gpu();
-    if !common::is_exact(gpu) {
+    if !support::is_exact(gpu) {
         return;
     }
     let triangles = sphere(8, ORDINARY);
     let rays = inner_rays(&triangles, ORDINARY, 4000);
-    for (box_test, name, _) in BoxTest::ALL {
+    for box_test in BoxTest::ALL {
+        let name = box_test.name;
         let tests = Intersection {
             box_test,
             ..Default::default()
@@ -270,7 +273,7 @@ fn less_padded_boxes_are_another_kernel_and_the_twins_follow() {
             let mut counters = Counters::default();
             let closest = |ray| twin.closest_hit(ray, &mut counters);
             let expected: Vec<Hit> = rays.iter().map(closest).collect();
-            let found = common::trace(gpu, &*built, &soup, &rays, &[]).hits;
+            let found = support::trace(gpu, &*built, &soup, &rays, &[]).hits;
             assert_same_hits(
                 &format!("{} with {name}", kind.name()),
                 &rays,
@@ -285,7 +288,7 @@ fn less_padded_boxes_are_another_kernel_and_the_twins_follow() {
 fn baldwin_and_weber_read_three_more_vectors_a_triangle() {
     let soup = scenes::soup([[Vec3::ZERO, Vec3::X, Vec3::Y]; 2]);
     assert_eq!(soup.words().len(), 6);
-    let soup = soup.intersecting(tests_of(TriangleTest::BaldwinWeber));
+    let soup = soup.intersecting(tests_of(&BaldwinWeber));
     assert_eq!(soup.words().len(), 12);
     assert_eq!(soup.records[1].transformed, 9);
     let record = TriangleRecord::new(
@@ -296,8 +299,8 @@ fn baldwin_and_weber_read_three_more_vectors_a_triangle() {
         0,
     );
     assert_eq!(record.transformed, 0);
-    assert_eq!(TriangleTest::BaldwinWeber.bytes(), 96);
-    assert_eq!(TriangleTest::Watertight.bytes(), 48);
+    assert_eq!(BaldwinWeber.bytes(), 96);
+    assert_eq!(Watertight.bytes(), 48);
 }
 
 /// Seconds of processor time that this program took on all threads: the software driver's included.
@@ -344,14 +347,15 @@ fn what_tests_cost_in_a_whole_traversal() {
         let soup = TriangleSoup::new(&scene);
         let tree = BuiltBvh::build(&soup, &params, &mut BuildLog::default()).expect("a BVH");
         let sets = record_rays(&scene, &soup, camera, &tree.twin(&soup), &settings, 1);
-        let prepared = TriangleTest::ALL.map(|test| {
+        let prepare = |test: AnyTriangleTest| {
             let soup = soup.clone().intersecting(tests_of(test));
             let tree = BuiltBvh::build(&soup, &params, &mut BuildLog::default()).expect("a BVH");
             let buffers = TriangleBuffers::upload(gpu(), &soup).expect("fits");
             (buffers, Traced::upload(gpu(), &tree).expect("fits"))
-        });
+        };
+        let prepared: Vec<_> = TriangleRegistry::default().iter().map(prepare).collect();
         for set in &sets {
-            let batches = prepared.each_ref().map(|(buffers, traced)| {
+            let batches = prepared.iter().map(|(buffers, traced)| {
                 let ask = Ask {
                     runtime_checks: false,
                     ..set.query().into()
@@ -359,27 +363,29 @@ fn what_tests_cost_in_a_whole_traversal() {
                 let tracer = Tracer::new(gpu(), buffers, traced, ask).expect("compiles");
                 tracer.batch(&set.rays).expect("fits")
             });
+            let batches: Vec<_> = batches.collect();
             for batch in &batches {
                 batch.trace().expect("traces");
             }
-            let mut ratios = [const { Vec::new() }; TriangleTest::ALL.len()];
+            let mut ratios = vec![Vec::new(); prepared.len()];
             let mut first_ns = Vec::new();
             for _ in 0..ROUNDS {
-                let seconds = batches.each_ref().map(|batch| {
+                let seconds = batches.iter().map(|batch| {
                     let start = processor_seconds();
                     for _ in 0..2 {
                         batch.trace().expect("traces");
                     }
                     processor_seconds() - start
                 });
+                let seconds: Vec<f64> = seconds.collect();
                 first_ns.push(seconds[0] * 5e8 / set.rays.len() as f64);
-                for (ratios, seconds_of_one) in ratios.iter_mut().zip(seconds) {
+                for (ratios, seconds_of_one) in ratios.iter_mut().zip(&seconds) {
                     ratios.push(seconds_of_one / seconds[0]);
                 }
             }
             first_ns.sort_by(f64::total_cmp);
             print!("{name} {:?}: {:.0} ns;", set.class, first_ns[ROUNDS / 2]);
-            for (test, ratios) in TriangleTest::ALL.iter().zip(&mut ratios) {
+            for (test, ratios) in TriangleRegistry::default().iter().zip(&mut ratios) {
                 ratios.sort_by(f64::total_cmp);
                 let [low, middle, high] = [1, ROUNDS / 2, ROUNDS - 2].map(|i| ratios[i]);
                 print!(" {} {middle:.3} [{low:.3}, {high:.3}]", test.name());

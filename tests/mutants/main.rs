@@ -25,8 +25,9 @@ use subject::Subject;
 use table::mutants;
 
 /// One fault of each kind, cheap ones.
-const SUBSET: [&str; 13] = [
+const SUBSET: [&str; 16] = [
     "tie-broken-the-other-way",
+    "last-triangle-forgotten",
     "child-dropped-by-the-builder",
     "near-and-far-swapped-in-order-only",
     "rope-reversed",
@@ -34,6 +35,8 @@ const SUBSET: [&str; 13] = [
     "quantisation-rounded-inwards-4",
     "dda-exits-early",
     "kd-near-and-far-swapped",
+    "octree-exits-early",
+    "last-instance-forgotten",
     "world-not-restored",
     "shift-reused-for-two-dimensions",
     "pair-of-one-number",

@@ -6,7 +6,7 @@ use glam::Vec3;
 use raystone::accel::{Hit, NO_HIT, Ray, TriangleSoup, brute_force_hits};
 use raystone::geometry::Triangle;
 use raystone::measure::gate::Judge;
-use raystone::measure::rays::{FAR, RaySet};
+use raystone::measure::rays::RaySet;
 use raystone::measure::record::{JudgeCheck, RayClass};
 use raystone::random::Pcg32;
 use raystone::scene::SceneData;
@@ -80,8 +80,8 @@ fn lattice_ray(random: &mut Pcg32) -> Ray {
     }
     let [t_min, t_max] = match random.below(4) {
         0 => [0.0, between(random, 0, EXTENT)],
-        1 => [0.5 * between(random, 0, EXTENT), FAR],
-        _ => [0.0, FAR],
+        1 => [0.5 * between(random, 0, EXTENT), Ray::FAR],
+        _ => [0.0, Ray::FAR],
     };
     Ray {
         origin,
@@ -102,12 +102,7 @@ fn aimed_ray(random: &mut Pcg32, soup: &TriangleSoup) -> Ray {
     };
     let unit = |random: &mut Pcg32| 3.0 * random.uniform() as f32 - 1.0;
     let origin = EXTENT as f32 * Vec3::from_array([0; 3].map(|_| unit(random)));
-    Ray {
-        origin: origin.to_array(),
-        t_min: 0.0,
-        direction: (target - origin).to_array(),
-        t_max: FAR,
-    }
+    Ray::new(origin, target - origin)
 }
 
 /// Every fourth ray that hits, ending exactly at its hit (which counts) and just before it.

@@ -9,7 +9,7 @@ use raystone::config::Gate;
 use raystone::geometry::{Camera, Triangle};
 use raystone::gpu::KernelLibrary;
 use raystone::image::Image;
-use raystone::measure::gate::Judge;
+use raystone::measure::gate::{Checks, Judge};
 use raystone::params::ParamValue;
 use raystone::scene::{LoadOptions, LoadReport, Material, SceneData, builtin_scenes, load};
 
@@ -143,7 +143,14 @@ fn scene((name, changes): &(&str, &[(&str, i64)])) -> Result<Case, CheckError> {
         .map(|&(key, value)| (key, ParamValue::Integer(value)))
         .collect();
     let stage = Stage::builtin(name, &changes)?;
-    let judge = Judge::new(&stage.scene, &stage.soup, stage.camera, &GATE, 1)?;
+    let judge = Judge::new(
+        &stage.scene,
+        &stage.soup,
+        stage.camera,
+        &GATE,
+        1,
+        Checks::Repeated,
+    )?;
     if judge.is_sound() {
         return Ok(Case { stage, judge });
     }

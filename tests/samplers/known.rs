@@ -1,6 +1,6 @@
 //! First points, tables and discrepancies that are published.
 
-use super::common::Pcg;
+use super::support::Pcg;
 use super::*;
 use raystone::discrepancy::star_2d;
 use raystone::sampling::hash::pixel_number;

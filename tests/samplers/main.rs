@@ -1,8 +1,6 @@
 //! Every registered sampler: the kernel's stream equals its twin's to the bit, the sequences are what
 //! the literature says they are, and what makes no sense is refused.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod decorrelations;
 mod known;
 mod nets;
@@ -10,13 +8,15 @@ mod pinned;
 mod projections;
 mod refusals;
 mod streams;
+#[path = "../support/mod.rs"]
+mod support;
 
-use common::param_variants;
 use raystone::params::{Entry, ParamValue, Variant};
 use raystone::sampling::{
     Coordinate, Demand, Sampler, SamplerError, SamplerRegistry, dimensions, to_unit,
 };
 use std::path::{Path, PathBuf};
+use support::param_variants;
 
 /// Width of the image that pixels lie in.
 const WIDTH: u32 = 192;

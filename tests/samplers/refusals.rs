@@ -1,6 +1,6 @@
 //! What makes no sense or goes beyond a limit is refused with a reason that says what to do.
 
-use super::common;
+use super::support;
 use super::*;
 use raystone::config::{Experiment, Plan};
 use raystone::run::{Registries, dump_stream};
@@ -101,7 +101,7 @@ fn a_folder_without_tables_is_refused_with_the_file_that_is_missing() {
 #[test]
 fn a_dimension_that_a_sampler_was_not_made_for_is_refused() {
     let beyond = [at(0, 2)];
-    let gpu = common::gpu();
+    let gpu = support::gpu();
     let error = dump_stream(gpu, &sampler("sobol", "none", &demand(4, 2)), &beyond);
     assert!(error.expect_err("it was accepted").contains("dimension 2"));
     assert!(dump_stream(gpu, &sampler("sobol", "none", &demand(4, 3)), &beyond).is_ok());

@@ -1,6 +1,6 @@
 //! Kernels against their twins, to the bit.
 
-use super::common::{self, Pcg};
+use super::support::{self, Pcg};
 use super::*;
 use raystone::measure::sampler_cost::sampler_cost;
 use raystone::measure::words::{Used, check_words, compare};
@@ -84,7 +84,7 @@ fn coordinates(sampler: &Sampler, count: usize, seed: u64) -> Vec<Coordinate> {
 
 /// The kernel's words.
 fn dump(sampler: &Sampler, coordinates: &[Coordinate]) -> Vec<u32> {
-    dump_stream(common::gpu(), sampler, coordinates)
+    dump_stream(support::gpu(), sampler, coordinates)
         .unwrap_or_else(|e| panic!("{}: {e}", sampler.label()))
 }
 
@@ -152,7 +152,7 @@ fn kernels_equal_their_twins_in_all_that_a_long_run_uses() {
                 size: [WIDTH, 144],
                 seeds: vec![0, 1, 8, 9001, 0x8000_0001, u32::MAX],
             };
-            let words = check_words(common::gpu(), &sampler, &used);
+            let words = check_words(support::gpu(), &sampler, &used);
             compared += words.unwrap_or_else(|e| panic!("{e}"));
             // One bit of one word must be seen, and the message says which.
             let coordinates = used.coordinates();
@@ -213,7 +213,7 @@ fn the_tables_of_heitz_are_read_by_kernel_and_twin_alike() {
 fn the_cost_of_a_sampler_is_measured_without_its_loop() {
     let cost = |sequence, decorrelation| {
         let sampler = sampler(sequence, decorrelation, &demand(256, 8));
-        let cost = sampler_cost(common::gpu(), &sampler).unwrap_or_else(|e| panic!("{e}"));
+        let (cost, _) = sampler_cost(support::gpu(), &sampler).unwrap_or_else(|e| panic!("{e}"));
         println!("{}: {cost:?}", sampler.label());
         cost.ns_per_sample
     };
@@ -233,5 +233,5 @@ fn the_cost_of_a_sampler_is_measured_without_its_loop() {
     // Divisions in a loop cost more than one product, whatever the adapter.
     assert!(cost("halton", "none").low > cost("rank1-lattice", "none").value);
     let flat = sampler("van-der-corput", "none", &demand(256, 1));
-    assert!(sampler_cost(common::gpu(), &flat).is_err());
+    assert!(sampler_cost(support::gpu(), &flat).is_err());
 }

@@ -1,6 +1,11 @@
-//! What the tests of integrators, gate and recovery share: one device per test program, scenes on
-//! it, renderers, kernels with planted faults, and samples with their standard error.
-#![allow(dead_code)] // Every test program uses its own part of this.
+//! What test programs share: one device for each, scenes and structures on it, rays and their answers,
+//! renderers, kernels with planted faults, samples with their standard error, runs.
+#![allow(dead_code, unused_imports)] // Every test program uses its own part of this.
+
+mod hits;
+pub mod scenes;
+
+pub use hits::*;
 
 use raystone::accel::{
     AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, Intersection, Traced,
@@ -8,6 +13,7 @@ use raystone::accel::{
 use raystone::config::{Experiment, Plan};
 use raystone::geometry::Camera;
 use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
+use raystone::integrator::RayOffset;
 use raystone::integrator::{self, IntegratorRegistry, RenderJob, Renderer};
 use raystone::measure::record::{Line, SCHEMA};
 use raystone::measure::statistics::{mean, variance};
@@ -42,6 +48,34 @@ pub fn is_exact(gpu: &Gpu) -> bool {
     }
     probe.is_exact()
 }
+
+/// A path tracer in the Cornell box with a plain BVH, with as little of all else as a run takes.
+pub const SMALL: &str = r#"
+[run]
+name = "small"
+replicates = 2
+resolution = [16, 16]
+spp = { pow2 = [0, 1] }
+[axes]
+scene = ["cornell-box"]
+accel = ["bvh"]
+sequence = ["pixel-hash"]
+decorrelation = ["none"]
+integrator = ["path"]
+[reference]
+spp = 8
+[timing]
+rounds = 3
+min_warmup_ms = 0
+max_warmup_ms = 1
+rays = 1024
+[gate]
+rays = 1024
+brute_force_tests = 1000
+oracle_rays = 16
+[discrepancy]
+points = 16
+"#;
 
 /// The embedded kernels with one text replaced in one of them. Panics unless `from` stands there
 /// exactly once, so that a fault is never planted beside the kernel.
@@ -117,7 +151,11 @@ impl Stage {
 
     /// A structure with its default parameters, built on this scene.
     pub fn build(&self, kind: &dyn AccelKind) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        kind.build(&self.soup, &defaults(kind), &mut BuildLog::default())
+        kind.build(
+            &self.soup,
+            &default_params(&kind.parameters()),
+            &mut BuildLog::default(),
+        )
     }
 
     /// [`Stage::build`], on the GPU.
@@ -145,6 +183,7 @@ impl Stage {
             camera: self.camera,
             sampler,
             integrator: &integrator.unwrap_or_else(|e| panic!("{e}")),
+            offset: RayOffset::default(),
             runtime_checks: true,
         };
         Renderer::new(gpu, &self.buffers, traced, &job, ray_counts)
@@ -166,17 +205,6 @@ pub fn from_file(path: &Path) -> SceneData {
         label: "file".to_owned(),
     };
     load(&variant, &LoadOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
-}
-
-/// Parameters of a structure at their defaults.
-pub fn defaults(kind: &dyn AccelKind) -> Params {
-    let schema = kind.parameters();
-    Params(
-        schema
-            .into_iter()
-            .map(|p| (p.name.to_owned(), p.default))
-            .collect(),
-    )
 }
 
 /// The registered structures; never none.

@@ -11,7 +11,7 @@ use blake3::Hasher;
 use raystone::accel::Query;
 use raystone::config::Gate;
 use raystone::discrepancy::{Budget, Measure, PointSet, measure};
-use raystone::measure::gate::Judge;
+use raystone::measure::gate::{Checks, Judge};
 use raystone::sampling::{Coordinate, to_unit};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -154,7 +154,14 @@ fn hits_and_counted_work() {
     }
     let mut found = Found::new();
     for (scene, stage) in scenes() {
-        let judge = Judge::remembered(&stage.scene, &stage.soup, stage.camera, &GATE, 1);
+        let judge = Judge::new(
+            &stage.scene,
+            &stage.soup,
+            stage.camera,
+            &GATE,
+            1,
+            Checks::Kept,
+        );
         let judge = judge.expect("a judge");
         for kind in structures() {
             let traced = stage.traced(gpu(), kind);

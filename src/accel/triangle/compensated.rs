@@ -6,7 +6,7 @@
 //! [`crate::gpu::ArithmeticProbe::exact_products`] tells.
 
 use super::watertight::{area_of, products, residual, shear, sheared};
-use super::{APART, Meeting, TriangleRecord};
+use super::{APART, Meeting, TriangleRecord, TriangleTest};
 use crate::accel::ray::Ray;
 
 /// The upper half of a significand.
@@ -20,41 +20,72 @@ pub fn product_error(a: f32, b: f32, p: f32) -> f32 {
     a2 * b2 - (((p - a1 * b1) - a2 * b1) - a1 * b2)
 }
 
-pub(super) fn meet(triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> Meeting {
-    let s = shear(ray, inverse);
-    let [a, b, c] = triangle.vertices().map(|v| sheared(&s, v));
-    let (p, q) = products([a, b, c]);
-    // Where both products round apart, their order is the sign already.
-    if !((0..3).all(|i| p[i] >= q[i]) || (0..3).all(|i| p[i] <= q[i])) {
-        return APART;
-    }
-    let first = [c, a, b];
-    let second = [b, c, a];
-    let e = [0, 1, 2].map(|i| {
-        let (first, second) = (first[i], second[i]);
-        (p[i] - q[i])
-            + (product_error(first[0], second[1], p[i]) - product_error(first[1], second[0], q[i]))
-    });
-    if !(e.iter().all(|e| *e >= 0.0) || e.iter().all(|e| *e <= 0.0)) {
-        return APART;
-    }
-    let w = e.map(f32::abs);
-    let area = area_of(w, p, q);
-    Meeting {
-        area,
-        t: (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * s.scale / area,
-        u: w[1],
-        v: w[2],
-    }
-}
+/// [`super::Watertight`] with exact edge signs.
+pub struct Compensated;
 
-pub(super) fn allowance(
-    triangle: &TriangleRecord,
-    ray: &Ray,
-    inverse: &[f32; 3],
-    found: &Meeting,
-) -> [f32; 3] {
-    residual(triangle, ray, inverse, found.area)
+impl TriangleTest for Compensated {
+    fn name(&self) -> &'static str {
+        "compensated"
+    }
+
+    fn description(&self) -> &'static str {
+        "watertight with edge functions from two-products: signs exact, if the adapter keeps them"
+    }
+
+    fn kernel(&self) -> &'static str {
+        "accel/triangle/compensated"
+    }
+
+    fn is_watertight(&self) -> bool {
+        true
+    }
+
+    fn needs_exact_products(&self) -> bool {
+        true
+    }
+
+    fn follows_watertight_signs(&self) -> bool {
+        true
+    }
+
+    fn meet(&self, triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> Meeting {
+        let s = shear(ray, inverse);
+        let [a, b, c] = triangle.vertices().map(|v| sheared(&s, v));
+        let (p, q) = products([a, b, c]);
+        // Where both products round apart, their order is the sign already.
+        if !((0..3).all(|i| p[i] >= q[i]) || (0..3).all(|i| p[i] <= q[i])) {
+            return APART;
+        }
+        let first = [c, a, b];
+        let second = [b, c, a];
+        let e = [0, 1, 2].map(|i| {
+            let (first, second) = (first[i], second[i]);
+            (p[i] - q[i])
+                + (product_error(first[0], second[1], p[i])
+                    - product_error(first[1], second[0], q[i]))
+        });
+        if !(e.iter().all(|e| *e >= 0.0) || e.iter().all(|e| *e <= 0.0)) {
+            return APART;
+        }
+        let w = e.map(f32::abs);
+        let area = area_of(w, p, q);
+        Meeting {
+            area,
+            t: (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * s.scale / area,
+            u: w[1],
+            v: w[2],
+        }
+    }
+
+    fn allowance(
+        &self,
+        triangle: &TriangleRecord,
+        ray: &Ray,
+        inverse: &[f32; 3],
+        found: &Meeting,
+    ) -> [f32; 3] {
+        residual(triangle, ray, inverse, found.area)
+    }
 }
 
 #[cfg(test)]

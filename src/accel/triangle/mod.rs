@@ -21,17 +21,22 @@ mod plane;
 mod pluecker;
 pub(super) mod watertight;
 
-pub use compensated::product_error;
-pub use plane::DISTANCE_PAD;
+pub use baldwin_weber::BaldwinWeber;
+pub use compensated::{Compensated, product_error};
+pub use moeller_trumbore::MoellerTrumbore;
+pub use plane::{DISTANCE_PAD, plane_error};
+pub use pluecker::Pluecker;
+pub use watertight::Watertight;
 
 use super::bounds::{Bounds, slabs};
 use super::intersection::Reciprocal;
 use super::ray::{Hit, Ray, SMALLEST_COMPONENT, SMALLEST_SLOPE};
 use super::watch::{self, Event};
 use crate::geometry::Triangle;
+use crate::params::Sources;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Relative widening of a triangle's own slab interval, 2⁻²¹: four ulp or more, which covers the
 /// subtraction, the reciprocal at WGSL's 2.5 ulp, and the product.
@@ -99,136 +104,120 @@ impl TriangleRecord {
     }
 }
 
-/// A ray–triangle test.
-#[derive(
-    Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum TriangleTest {
-    /// T. Möller, B. Trumbore, "Fast, minimum storage ray/triangle intersection", 1997.
-    MoellerTrumbore,
-    /// D. Baldwin, M. Weber, "Fast ray–triangle intersections by coordinate transformation", 2016.
-    BaldwinWeber,
-    /// Plücker coordinates with Embree's tolerance.
-    Pluecker,
-    /// S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", 2013.
-    #[default]
-    Watertight,
-    /// The same with exact edge signs.
-    Compensated,
-}
-
-impl TriangleTest {
-    /// Every test.
-    pub const ALL: [TriangleTest; 5] = [
-        Self::MoellerTrumbore,
-        Self::BaldwinWeber,
-        Self::Pluecker,
-        Self::Watertight,
-        Self::Compensated,
-    ];
-
+/// A ray–triangle test, registered by a line of [`super::registry`].
+pub trait TriangleTest: Send + Sync {
     /// Name as a user types it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::MoellerTrumbore => "moeller-trumbore",
-            Self::BaldwinWeber => "baldwin-weber",
-            Self::Pluecker => "pluecker",
-            Self::Watertight => "watertight",
-            Self::Compensated => "compensated",
-        }
-    }
-
-    /// The test of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|test| test.name() == name)
-    }
-
+    fn name(&self) -> &'static str;
     /// One line: what it is and where it comes from.
-    pub fn description(self) -> &'static str {
-        match self {
-            Self::MoellerTrumbore => {
-                "scalar triple products of edges and direction, division last (Möller, Trumbore 1997)"
-            }
-            Self::BaldwinWeber => {
-                "pre-transformed to the unit triangle, 48 bytes more a triangle (Baldwin, Weber 2016)"
-            }
-            Self::Pluecker => {
-                "Plücker products of edges and ray, accepted within Embree's tolerance of an ulp"
-            }
-            Self::Watertight => {
-                "sheared to the ray, edges by compared products, zero is inside (Woop, Benthin, Wald 2013)"
-            }
-            Self::Compensated => {
-                "watertight with edge functions from two-products: signs exact, if the adapter keeps them"
-            }
-        }
+    fn description(&self) -> &'static str;
+    /// Module of the kernel, relative to the kernel folder: it exports `meet` and `allowance`, whose twins
+    /// are the functions below.
+    fn kernel(&self) -> &'static str;
+    /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
+    fn sources(&self) -> Sources {
+        &[]
     }
-
-    /// Module of the kernel, relative to the kernel folder.
-    pub fn kernel(self) -> &'static str {
-        match self {
-            Self::MoellerTrumbore => "accel/triangle/moeller_trumbore",
-            Self::BaldwinWeber => "accel/triangle/baldwin_weber",
-            Self::Pluecker => "accel/triangle/pluecker",
-            Self::Watertight => "accel/triangle/watertight",
-            Self::Compensated => "accel/triangle/compensated",
-        }
+    /// Whether no ray slips through between the triangles of a closed mesh, not even along their edges: the
+    /// gate then asks for such rays.
+    fn is_watertight(&self) -> bool {
+        false
     }
-
-    /// Bytes that a test reads of a triangle: its record, and what was made of it beforehand.
-    pub fn bytes(self) -> u32 {
-        let transformed = if self == Self::BaldwinWeber { 48 } else { 0 };
-        size_of::<TriangleRecord>() as u32 + transformed
+    /// Whether it is another test where an adapter does not keep two-products.
+    fn needs_exact_products(&self) -> bool {
+        false
     }
-
-    /// What a test reads beside the record, three `vec4` computed beforehand; `None` if nothing.
-    pub fn transformed(self, triangle: &TriangleRecord) -> Option<[[u32; 4]; 3]> {
-        (self == Self::BaldwinWeber).then(|| baldwin_weber::transform(triangle).words())
+    /// Whether it accepts nothing but what the compared products of [`Watertight`] accept, so that brute
+    /// force may ask these first, for several triangles at once.
+    fn follows_watertight_signs(&self) -> bool {
+        false
     }
-
-    fn meet(self, triangle: &TriangleRecord, ray: &Ray, inverse: &Reciprocal) -> Meeting {
-        match self {
-            Self::MoellerTrumbore => moeller_trumbore::meet(triangle, ray),
-            Self::BaldwinWeber => baldwin_weber::meet(triangle, ray),
-            Self::Pluecker => pluecker::meet(triangle, ray),
-            Self::Watertight => watertight::meet(triangle, ray, inverse),
-            Self::Compensated => compensated::meet(triangle, ray, inverse),
-        }
+    /// What the kernel reads beside the record, three `vec4` computed beforehand; `None` if nothing.
+    fn transformed(&self, _triangle: &TriangleRecord) -> Option<[[u32; 4]; 3]> {
+        None
     }
-
+    /// Bytes that it reads of a triangle: its record, and what was made of it beforehand.
+    fn bytes(&self) -> u32 {
+        let transformed = self.transformed(&TriangleRecord::zeroed());
+        (size_of::<TriangleRecord>() + transformed.map_or(0, |words| size_of_val(&words))) as u32
+    }
+    /// Where the line of a ray meets a triangle, with the reciprocal of its direction.
+    fn meet(&self, triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> Meeting;
+    /// How far rounding may have carried the distance of `found` out of the triangle's slab of each axis,
+    /// scene units.
     fn allowance(
-        self,
+        &self,
         triangle: &TriangleRecord,
         ray: &Ray,
-        inverse: &Reciprocal,
+        inverse: &[f32; 3],
         found: &Meeting,
-    ) -> [f32; 3] {
-        match self {
-            Self::MoellerTrumbore => moeller_trumbore::allowance(triangle, ray, found),
-            Self::Pluecker => pluecker::allowance(triangle, ray, found),
-            Self::BaldwinWeber => baldwin_weber::allowance(triangle, ray, found),
-            Self::Watertight => watertight::allowance(triangle, ray, inverse, found),
-            Self::Compensated => compensated::allowance(triangle, ray, inverse, found),
+    ) -> [f32; 3];
+
+    /// Tests `ray` against `triangle`; a nearer hit, or an equally near one of a lower index, replaces
+    /// `hit`. What all tests share; it stands here so that each has a copy with its own `meet` in it.
+    fn intersect(&self, triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3], hit: &mut Hit) {
+        watch::note(Event::Triangle(triangle.id));
+        let found = self.meet(triangle, ray, inverse);
+        if found.area <= 0.0 || found.area.is_nan() {
+            return;
         }
+        let (near, far) = slabs(&triangle.bounds(), ray, *inverse);
+        let near = near.map(|x| x - x.abs() * TRIANGLE_PAD);
+        let far = far.map(|x| x + x.abs() * TRIANGLE_PAD);
+        let enter = near[0].max(near[1]).max(near[2]);
+        let exit = far[0].min(far[1]).min(far[2]);
+        let t = found.t.max(enter).min(exit);
+        let mut repaired = enter <= exit;
+        if t != found.t {
+            let allowed = self.allowance(triangle, ray, inverse, &found);
+            let within = |a: usize| (near[a] - found.t).max(found.t - far[a]) <= allowed[a];
+            repaired = repaired && within(0) && within(1) && within(2);
+        }
+        let nearer = t < hit.t || (t == hit.t && triangle.id < hit.triangle);
+        let within = t >= ray.t_min && t <= ray.t_max;
+        if repaired && within && nearer && !is_along(triangle, ray.direction) {
+            // None of the three is negative, but any may be −0, whose sign compilers do not keep.
+            *hit = Hit {
+                t: t.abs(),
+                triangle: triangle.id,
+                u: found.u.abs() / found.area,
+                v: found.v.abs() / found.area,
+            };
+            watch::note(Event::Nearest(*hit));
+        }
+    }
+}
+
+/// A test that was chosen.
+pub type AnyTriangleTest = &'static dyn TriangleTest;
+
+/// Tests are known by their names.
+impl PartialEq for dyn TriangleTest {
+    fn eq(&self, other: &Self) -> bool {
+        self.name() == other.name()
+    }
+}
+
+impl fmt::Debug for dyn TriangleTest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
     }
 }
 
 /// Where a ray's line meets a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Meeting {
+pub struct Meeting {
     /// What barycentrics are to be divided by; 0 if they do not meet.
-    area: f32,
+    pub area: f32,
     /// Distance, as computed.
-    t: f32,
+    pub t: f32,
     /// Weight of the second vertex times `area`, not negative but for the sign of zero.
-    u: f32,
+    pub u: f32,
     /// Weight of the third.
-    v: f32,
+    pub v: f32,
 }
 
 /// They do not meet.
-const APART: Meeting = Meeting {
+pub const APART: Meeting = Meeting {
     area: 0.0,
     t: 0.0,
     u: 0.0,
@@ -251,41 +240,12 @@ fn is_along(triangle: &TriangleRecord, direction: [f32; 3]) -> bool {
     (nx * dx + ny * dy + nz * dz).abs() <= (nx.abs() + ny.abs() + nz.abs()) * tilt
 }
 
-/// Tests `ray` against `triangle`; a nearer hit, or an equally near one of a lower index, replaces
-/// `hit`.
+/// Tests `ray` against `triangle` by the test of the reciprocal: see [`TriangleTest::intersect`].
 pub fn intersect_triangle(
     triangle: &TriangleRecord,
     ray: &Ray,
     inverse: Reciprocal,
     hit: &mut Hit,
 ) {
-    watch::note(Event::Triangle(triangle.id));
-    let found = inverse.triangle.meet(triangle, ray, &inverse);
-    if found.area <= 0.0 || found.area.is_nan() {
-        return;
-    }
-    let (near, far) = slabs(&triangle.bounds(), ray, *inverse);
-    let near = near.map(|x| x - x.abs() * TRIANGLE_PAD);
-    let far = far.map(|x| x + x.abs() * TRIANGLE_PAD);
-    let enter = near[0].max(near[1]).max(near[2]);
-    let exit = far[0].min(far[1]).min(far[2]);
-    let t = found.t.max(enter).min(exit);
-    let mut repaired = enter <= exit;
-    if t != found.t {
-        let allowed = inverse.triangle.allowance(triangle, ray, &inverse, &found);
-        let within = |a: usize| (near[a] - found.t).max(found.t - far[a]) <= allowed[a];
-        repaired = repaired && within(0) && within(1) && within(2);
-    }
-    let nearer = t < hit.t || (t == hit.t && triangle.id < hit.triangle);
-    let within = t >= ray.t_min && t <= ray.t_max;
-    if repaired && within && nearer && !is_along(triangle, ray.direction) {
-        // None of the three is negative, but any may be −0, whose sign compilers do not keep.
-        *hit = Hit {
-            t: t.abs(),
-            triangle: triangle.id,
-            u: found.u.abs() / found.area,
-            v: found.v.abs() / found.area,
-        };
-        watch::note(Event::Nearest(*hit));
-    }
+    inverse.triangle.intersect(triangle, ray, &inverse, hit);
 }

@@ -11,7 +11,7 @@ pub const DISTANCE_PAD: f32 = 9.536_743e-7;
 
 /// Bound on the rounding error of a distance to the plane that was computed from differences of
 /// vertices, [`DISTANCE_PAD`].
-pub(super) fn plane_error(triangle: &TriangleRecord, ray: &Ray, found: &Meeting) -> f32 {
+pub fn plane_error(triangle: &TriangleRecord, ray: &Ray, found: &Meeting) -> f32 {
     let TriangleRecord { v0, v1, v2, .. } = triangle;
     let [e1x, e1y, e1z] = [0, 1, 2].map(|a| v0[a] - v1[a]);
     let [e2x, e2y, e2z] = [0, 1, 2].map(|a| v2[a] - v0[a]);

@@ -3,7 +3,7 @@
 //! R. Davidovič and others, "3D rasterization: a bridge between rasterization and ray casting", 2012.
 
 use super::plane::plane_error;
-use super::{APART, Meeting, TriangleRecord};
+use super::{APART, Meeting, TriangleRecord, TriangleTest};
 use crate::accel::ray::Ray;
 
 /// Embree's tolerance, one ulp of 1.
@@ -29,37 +29,60 @@ fn normal(a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> [f32; 3] {
     })
 }
 
-pub(super) fn meet(triangle: &TriangleRecord, ray: &Ray) -> Meeting {
-    let add = |a: [f32; 3], b: [f32; 3]| [0, 1, 2].map(|i| a[i] + b[i]);
-    let subtract = |a: [f32; 3], b: [f32; 3]| [0, 1, 2].map(|i| a[i] - b[i]);
-    let d = ray.direction;
-    let [a, b, c] = triangle.vertices().map(|v| subtract(v, ray.origin));
-    let (e0, e1, e2) = (subtract(c, a), subtract(a, b), subtract(b, c));
-    let u = triple(e0, add(c, a), d);
-    let v = triple(e1, add(a, b), d);
-    let w = triple(e2, add(b, c), d);
-    let sum = u + v + w;
-    let area = sum.abs();
-    let slack = TOLERANCE * area;
-    let n = normal(e0, e1, e2);
-    let det = n[0] * d[0] + n[1] * d[1] + n[2] * d[2];
-    let inside = u.min(v).min(w) >= -slack || u.max(v).max(w) <= slack;
-    if !(inside && area > 0.0 && det.abs() > 0.0) {
-        return APART;
-    }
-    let flip = |x: f32| f32::from_bits(x.to_bits() ^ (sum.to_bits() & 0x8000_0000));
-    let clamp = |x: f32, high: f32| x.max(0.0).min(high);
-    let u = clamp(flip(u), area);
-    let v = clamp(flip(v), area - u);
-    let height = n[0] * a[0] + n[1] * a[1] + n[2] * a[2];
-    Meeting {
-        area,
-        t: height / det,
-        u,
-        v,
-    }
-}
+/// Plücker coordinates with Embree's tolerance.
+pub struct Pluecker;
 
-pub(super) fn allowance(triangle: &TriangleRecord, ray: &Ray, found: &Meeting) -> [f32; 3] {
-    [plane_error(triangle, ray, found); 3]
+impl TriangleTest for Pluecker {
+    fn name(&self) -> &'static str {
+        "pluecker"
+    }
+
+    fn description(&self) -> &'static str {
+        "Plücker products of edges and ray, accepted within Embree's tolerance of an ulp"
+    }
+
+    fn kernel(&self) -> &'static str {
+        "accel/triangle/pluecker"
+    }
+
+    fn meet(&self, triangle: &TriangleRecord, ray: &Ray, _: &[f32; 3]) -> Meeting {
+        let add = |a: [f32; 3], b: [f32; 3]| [0, 1, 2].map(|i| a[i] + b[i]);
+        let subtract = |a: [f32; 3], b: [f32; 3]| [0, 1, 2].map(|i| a[i] - b[i]);
+        let d = ray.direction;
+        let [a, b, c] = triangle.vertices().map(|v| subtract(v, ray.origin));
+        let (e0, e1, e2) = (subtract(c, a), subtract(a, b), subtract(b, c));
+        let u = triple(e0, add(c, a), d);
+        let v = triple(e1, add(a, b), d);
+        let w = triple(e2, add(b, c), d);
+        let sum = u + v + w;
+        let area = sum.abs();
+        let slack = TOLERANCE * area;
+        let n = normal(e0, e1, e2);
+        let det = n[0] * d[0] + n[1] * d[1] + n[2] * d[2];
+        let inside = u.min(v).min(w) >= -slack || u.max(v).max(w) <= slack;
+        if !(inside && area > 0.0 && det.abs() > 0.0) {
+            return APART;
+        }
+        let flip = |x: f32| f32::from_bits(x.to_bits() ^ (sum.to_bits() & 0x8000_0000));
+        let clamp = |x: f32, high: f32| x.max(0.0).min(high);
+        let u = clamp(flip(u), area);
+        let v = clamp(flip(v), area - u);
+        let height = n[0] * a[0] + n[1] * a[1] + n[2] * a[2];
+        Meeting {
+            area,
+            t: height / det,
+            u,
+            v,
+        }
+    }
+
+    fn allowance(
+        &self,
+        triangle: &TriangleRecord,
+        ray: &Ray,
+        _: &[f32; 3],
+        found: &Meeting,
+    ) -> [f32; 3] {
+        [plane_error(triangle, ray, found); 3]
+    }
 }

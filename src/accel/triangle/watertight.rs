@@ -12,7 +12,7 @@
 //! is edge-on the weights are nothing but rounding, and would place the hit anywhere in its box: it is
 //! no hit. A closed mesh has others there.
 
-use super::{APART, Meeting, TRIANGLE_PAD, TriangleRecord};
+use super::{APART, Meeting, TRIANGLE_PAD, TriangleRecord, TriangleTest};
 use crate::accel::ray::Ray;
 
 /// The axis along which the direction is longest.
@@ -91,20 +91,55 @@ pub fn products([a, b, c]: [[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
     )
 }
 
-pub(super) fn meet(triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> Meeting {
-    let s = shear(ray, inverse);
-    let [a, b, c] = triangle.vertices().map(|v| sheared(&s, v));
-    let (p, q) = products([a, b, c]);
-    if !((0..3).all(|i| p[i] >= q[i]) || (0..3).all(|i| p[i] <= q[i])) {
-        return APART;
+/// S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", 2013.
+pub struct Watertight;
+
+impl TriangleTest for Watertight {
+    fn name(&self) -> &'static str {
+        "watertight"
     }
-    let w = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
-    let area = area_of(w, p, q);
-    Meeting {
-        area,
-        t: (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * s.scale / area,
-        u: w[1],
-        v: w[2],
+
+    fn description(&self) -> &'static str {
+        "sheared to the ray, edges by compared products, zero is inside (Woop, Benthin, Wald 2013)"
+    }
+
+    fn kernel(&self) -> &'static str {
+        "accel/triangle/watertight"
+    }
+
+    fn is_watertight(&self) -> bool {
+        true
+    }
+
+    fn follows_watertight_signs(&self) -> bool {
+        true
+    }
+
+    fn meet(&self, triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> Meeting {
+        let s = shear(ray, inverse);
+        let [a, b, c] = triangle.vertices().map(|v| sheared(&s, v));
+        let (p, q) = products([a, b, c]);
+        if !((0..3).all(|i| p[i] >= q[i]) || (0..3).all(|i| p[i] <= q[i])) {
+            return APART;
+        }
+        let w = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
+        let area = area_of(w, p, q);
+        Meeting {
+            area,
+            t: (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * s.scale / area,
+            u: w[1],
+            v: w[2],
+        }
+    }
+
+    fn allowance(
+        &self,
+        triangle: &TriangleRecord,
+        ray: &Ray,
+        inverse: &[f32; 3],
+        found: &Meeting,
+    ) -> [f32; 3] {
+        residual(triangle, ray, inverse, found.area)
     }
 }
 
@@ -136,13 +171,4 @@ pub(super) fn residual(
     let along = places(2) / area * TRIANGLE_PAD;
     let errors = turned_back([across(0), across(1), along], s.axis);
     [0, 1, 2].map(|i| errors[i] * inverse[i].abs())
-}
-
-pub(super) fn allowance(
-    triangle: &TriangleRecord,
-    ray: &Ray,
-    inverse: &[f32; 3],
-    found: &Meeting,
-) -> [f32; 3] {
-    residual(triangle, ray, inverse, found.area)
 }

@@ -1,5 +1,17 @@
 //! Twin of `kernels/integrator/offset/error_bound.wesl`.
 
+use super::RayOffset;
+
+/// By the bound of the point's error.
+pub const ERROR_BOUND: RayOffset = RayOffset {
+    name: "error-bound",
+    description: "the rounding error of the point, from its triangle and the instances' transforms",
+    kernel: "integrator/offset/error_bound",
+    sources: &[],
+    is_unbiased: true,
+    offset_point,
+};
+
 /// The next number away from zero where the coordinate moved outwards, towards zero where inwards.
 fn next(x: f32, step: f32) -> f32 {
     let bits = x.to_bits() as i32;
@@ -12,7 +24,7 @@ fn next(x: f32, step: f32) -> f32 {
 
 /// Out of the box of the point's error, then one representable number farther.
 /// Source: M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 4th edition, 6.8.6.
-pub(super) fn offset_point(p: [f32; 3], n: [f32; 3], error: [f32; 3]) -> [f32; 3] {
+fn offset_point(p: [f32; 3], n: [f32; 3], error: [f32; 3]) -> [f32; 3] {
     let distance = n[0].abs() * error[0] + n[1].abs() * error[1] + n[2].abs() * error[2];
     let step = n.map(|n| n * distance);
     [0, 1, 2].map(|a| next(p[a] + step[a], step[a]))

@@ -5,89 +5,86 @@ mod fixed;
 mod integer;
 mod none;
 
+pub use error_bound::ERROR_BOUND;
+pub use fixed::FIXED;
+pub use integer::INTEGER;
+pub use none::NONE;
+
 use crate::accel::TriangleSoup;
 use crate::gpu::Composition;
+use crate::params::{Kinds, Named, Sources};
 use crate::scene::{Instance, row_sum_norm};
-use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// How the origin of a ray is moved off the surface that it leaves.
-#[derive(
-    Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum RayOffset {
-    /// Not at all.
-    None,
-    /// By the same distance everywhere.
-    Fixed,
-    /// C. Wächter, N. Binder, "A fast and robust method for avoiding self-intersection", 2019.
-    Integer,
-    /// By the bound of the point's error.
-    #[default]
-    ErrorBound,
+#[derive(Clone, Copy)]
+pub struct RayOffset {
+    /// Name as a user types it.
+    pub name: &'static str,
+    /// One line: what it is and where it comes from.
+    pub description: &'static str,
+    /// Module of the kernel, relative to the kernel folder: it exports `offset_point`.
+    pub kernel: &'static str,
+    /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
+    pub sources: Sources,
+    /// Whether images are claimed to be free of light that leaks and of surfaces that shadow themselves. The
+    /// bias of others is measured, and is no fault.
+    pub is_unbiased: bool,
+    /// The origin of a ray that leaves the point p on the side of the unit normal n, from p, n and what
+    /// [`position_error`] says of the point. Twin of the kernel's.
+    pub offset_point: fn([f32; 3], [f32; 3], [f32; 3]) -> [f32; 3],
+}
+
+/// Everything that can be named on the `offset` axis.
+pub type OffsetRegistry = Kinds<RayOffset>;
+
+impl Default for OffsetRegistry {
+    fn default() -> Self {
+        Self::new(&[NONE, FIXED, INTEGER, ERROR_BOUND])
+    }
+}
+
+impl Default for RayOffset {
+    fn default() -> Self {
+        ERROR_BOUND
+    }
+}
+
+/// Offsets are known by their names.
+impl PartialEq for RayOffset {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl fmt::Debug for RayOffset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name)
+    }
+}
+
+impl Named for RayOffset {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn description(&self) -> &'static str {
+        self.description
+    }
+
+    fn sources(&self) -> Sources {
+        self.sources
+    }
 }
 
 impl RayOffset {
-    /// Every offset.
-    pub const ALL: [RayOffset; 4] = [Self::None, Self::Fixed, Self::Integer, Self::ErrorBound];
-
-    /// Name as a user types it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Fixed => "fixed",
-            Self::Integer => "integer",
-            Self::ErrorBound => "error-bound",
-        }
-    }
-
-    /// The offset of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|offset| offset.name() == name)
-    }
-
-    /// One line: what it is and where it comes from.
-    pub fn description(self) -> &'static str {
-        match self {
-            Self::None => "rays start at the point that was hit",
-            Self::Fixed => "1e-4 scene units along the normal, whatever the scale",
-            Self::Integer => {
-                "up to 256 representable numbers along the normal (Wächter, Binder 2019)"
-            }
-            Self::ErrorBound => {
-                "the rounding error of the point, from its triangle and the instances' transforms"
-            }
-        }
-    }
-
-    /// Module of the kernel, relative to the kernel folder.
-    pub fn kernel(self) -> &'static str {
-        match self {
-            Self::None => "integrator/offset/none",
-            Self::Fixed => "integrator/offset/fixed",
-            Self::Integer => "integrator/offset/integer",
-            Self::ErrorBound => "integrator/offset/error_bound",
-        }
-    }
-
     /// `composition` with this offset, unless it chose another before.
     #[must_use]
     pub fn activate(self, composition: Composition) -> Composition {
         if composition.active.contains_key("offset") {
             composition
         } else {
-            composition.with("offset", self.kernel())
-        }
-    }
-
-    /// The origin of a ray that leaves the point `p` on the side of the unit normal `n`; `error` is
-    /// what [`position_error`] says of the point.
-    pub fn offset_point(self, p: [f32; 3], n: [f32; 3], error: [f32; 3]) -> [f32; 3] {
-        match self {
-            Self::None => none::offset_point(p, n, error),
-            Self::Fixed => fixed::offset_point(p, n, error),
-            Self::Integer => integer::offset_point(p, n, error),
-            Self::ErrorBound => error_bound::offset_point(p, n, error),
+            composition.with("offset", self.kernel)
         }
     }
 }
@@ -151,16 +148,12 @@ pub fn position_error(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::keys;
     use crate::random::Pcg32;
 
     #[test]
-    fn experiment_files_know_every_offset() {
-        assert_eq!(RayOffset::ALL.map(RayOffset::name), keys::RAY_OFFSETS);
-        for offset in RayOffset::ALL {
-            assert_eq!(RayOffset::named(offset.name()), Some(offset));
-            assert!(!offset.description().is_empty());
-        }
+    fn what_an_experiment_says_nothing_of_is_the_default_offset() {
+        let default = crate::config::Axis::Offset.default_name();
+        assert_eq!(default, Some(RayOffset::default().name));
     }
 
     #[test]

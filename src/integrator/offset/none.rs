@@ -1,6 +1,18 @@
 //! Twin of `kernels/integrator/offset/none.wesl`.
 
+use super::RayOffset;
+
+/// Not at all.
+pub const NONE: RayOffset = RayOffset {
+    name: "none",
+    description: "rays start at the point that was hit",
+    kernel: "integrator/offset/none",
+    sources: &[],
+    is_unbiased: false,
+    offset_point,
+};
+
 /// Rays start where the last one ended.
-pub(super) fn offset_point(p: [f32; 3], _n: [f32; 3], _error: [f32; 3]) -> [f32; 3] {
+fn offset_point(p: [f32; 3], _n: [f32; 3], _error: [f32; 3]) -> [f32; 3] {
     p
 }

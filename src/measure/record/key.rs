@@ -1,6 +1,7 @@
 //! What a figure is of: a value on each of some axes.
 
-use crate::params::{KERNELS_MARK, Params, Variant};
+use crate::config::{Axis, Cell};
+use crate::params::{Params, Variant};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -110,34 +111,34 @@ fn plain(label: &str) -> Variant {
     }
 }
 
-impl Key {
-    /// Nothing yet, or these kernels (the embedded ones are not named).
-    pub fn with_kernels(kernels: &Variant) -> Self {
-        Self::default().with(axis::KERNELS, kernels.kernels_label())
-    }
+/// What stands between a name and its kernels.
+pub(super) const KERNELS_MARK: &str = " @";
 
+impl From<&Cell> for Key {
+    fn from(cell: &Cell) -> Self {
+        let axes = Axis::ALL.into_iter();
+        let variants = axes.filter_map(|axis| Some((axis, cell.get(axis)?)));
+        variants.fold(Self::default(), |key, (axis, variant)| {
+            key.with_variant(axis.name(), variant)
+        })
+    }
+}
+
+impl Key {
     /// The same key with a name on an axis; an empty name leaves it out.
     #[must_use]
     pub fn with(self, axis: &str, label: impl fmt::Display) -> Self {
         self.with_variant(axis, &plain(&label.to_string()))
     }
 
-    /// The same key with a variant on an axis. The kernels that its label may end with are an axis of
-    /// their own, and have to be in the key already.
+    /// The same key with a variant on an axis; one without a name (the embedded kernels) leaves it out.
     #[must_use]
     pub fn with_variant(mut self, axis: &str, variant: &Variant) -> Self {
-        if variant.label.is_empty() {
+        if variant.name.is_empty() {
             self.0.remove(axis);
-            return self;
+        } else {
+            self.0.insert(axis.to_owned(), Written(variant.clone()));
         }
-        let mut variant = variant.clone();
-        let mark = format!("{KERNELS_MARK}{}", self.label(axis::KERNELS));
-        if mark.len() > KERNELS_MARK.len()
-            && let Some(stem) = variant.label.strip_suffix(&mark)
-        {
-            variant.label = stem.to_owned();
-        }
-        self.0.insert(axis.to_owned(), Written(variant));
         self
     }
 
@@ -232,7 +233,7 @@ mod tests {
         grid.params
             .0
             .insert("lambda".into(), crate::params::ParamValue::Number(3.0));
-        grid.label = "grid(lambda=3) @idea".into();
+        grid.label = "grid(lambda=3)".into();
         let key = Key::default()
             .with(axis::KERNELS, "idea")
             .with(axis::SCENE, "box");
@@ -249,6 +250,12 @@ mod tests {
             key.to_string(),
             "scene box, accel grid(lambda=3), kernels idea"
         );
-        assert!(Key::with_kernels(&Variant::default()).is_empty());
+        let embedded = Variant {
+            label: "embedded".into(),
+            ..Variant::default()
+        };
+        let cell = Cell::default().with(Axis::Accel, &grid);
+        let cell = cell.with(Axis::Kernels, &embedded);
+        assert_eq!(Key::from(&cell), key.only(&[axis::ACCEL]));
     }
 }

@@ -1,7 +1,7 @@
 //! Lines of `raystone/1`, whose bodies each held their own names of axes.
 
+use super::key::KERNELS_MARK;
 use super::{SCHEMA, axis};
-use crate::params::KERNELS_MARK;
 use serde_json::{Map, Value, json};
 
 /// The version before this one.

@@ -44,7 +44,7 @@ pub enum RecordError {
     },
     /// The records are of another version.
     #[error(
-        "{}:{line}: schema {found:?}, but this program reads {SCHEMA:?}; use the version that wrote it",
+        "{}:{line}: schema {found:?}, but this program reads {wanted:?}; use the version that wrote it",
         path.display()
     )]
     Schema {
@@ -54,6 +54,8 @@ pub enum RecordError {
         line: usize,
         /// The schema found.
         found: String,
+        /// The schema that is read.
+        wanted: &'static str,
     },
     /// A line is no record.
     #[error("{}:{line}: not a record: {source}; remove the line to read the rest", path.display())]
@@ -78,15 +80,18 @@ struct Tag {
 /// # Errors
 /// As there.
 pub fn read_records(dir: &Path) -> Result<Records, RecordError> {
-    read_lines(&dir.join(RECORDS_FILE))
+    read_lines(&dir.join(RECORDS_FILE), SCHEMA)
 }
 
-/// Reads a file of records, those of a run also if they are of the version before. A last line without its
+/// Reads a file of records of this schema, those of a run also if they are of the version before. A last line without its
 /// newline that does not parse is what a crash leaves: it is left out with a warning.
 ///
 /// # Errors
 /// A missing or empty file, a line of another schema, or a broken line elsewhere.
-pub fn read_lines<B: DeserializeOwned>(path: &Path) -> Result<Records<B>, RecordError> {
+pub fn read_lines<B: DeserializeOwned>(
+    path: &Path,
+    wanted: &'static str,
+) -> Result<Records<B>, RecordError> {
     // Bytes, because a crash can cut a line inside a character.
     let bytes = std::fs::read(path).map_err(|source| RecordError::Read {
         path: path.into(),
@@ -108,9 +113,13 @@ pub fn read_lines<B: DeserializeOwned>(path: &Path) -> Result<Records<B>, Record
             Ok(tag) if tag.schema == OLD_SCHEMA => {
                 serde_json::from_slice(row).and_then(|old| serde_json::from_value(renewed(old)))
             }
-            Ok(Tag { schema: found }) if found != SCHEMA => {
-                let path = path.into();
-                return Err(RecordError::Schema { path, line, found });
+            Ok(Tag { schema: found }) if found != wanted => {
+                return Err(RecordError::Schema {
+                    path: path.into(),
+                    line,
+                    found,
+                    wanted,
+                });
             }
             Err(_) if truncated => {
                 let file = path.file_name().unwrap_or_default().display();

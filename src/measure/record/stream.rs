@@ -137,7 +137,8 @@ pub struct PixelsAtCount {
 /// What drawing from a sampler costs, see [`crate::measure::sampler_cost`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SamplerCostRecord {
-    /// Nanoseconds of adapter time per two-dimensional sample, median; near zero it may be negative.
+    /// Nanoseconds of adapter time per two-dimensional sample, loop taken off: median of the rounds with
+    /// its 95 % interval. Near zero it may be negative.
     pub ns_per_sample: Interval,
     /// Nanoseconds of the empty loop that was taken off.
     pub loop_ns_per_sample: Interval,

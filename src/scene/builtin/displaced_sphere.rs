@@ -5,7 +5,6 @@ use super::super::builder::{Look, SceneBuilder};
 use super::BuiltinScene;
 use super::numeric::sin_cos_turns;
 use super::sphere::SphereGrid;
-use crate::geometry::Camera;
 use crate::parameters;
 use glam::{DVec3, Vec3};
 
@@ -28,12 +27,8 @@ impl BuiltinScene for DisplacedSphere {
         grid.push(&mut builder, 0, |direction| {
             (radius(direction) * direction).as_vec3()
         });
-        let look = Look {
-            materials: vec![Material::diffuse("grey", Vec3::splat(0.7))],
-            camera: Some(Camera::upright(Vec3::new(1.6, 1.3, 2.6), Vec3::ZERO, 40.0)),
-            environment: Vec3::ONE,
-            ..Look::default()
-        };
+        let grey = vec![Material::diffuse("grey", Vec3::splat(0.7))];
+        let look = Look::under_sky(grey, Vec3::new(1.6, 1.3, 2.6), Vec3::ZERO, 40.0);
         (builder, look)
     }
 }

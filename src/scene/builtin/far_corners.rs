@@ -7,7 +7,7 @@ use super::super::{Material, Transform};
 use super::BuiltinScene;
 use super::numeric::sin_cos_turns;
 use super::sphere::SphereGrid;
-use crate::geometry::{Camera, Triangle};
+use crate::geometry::Triangle;
 use crate::parameters;
 use crate::random::Pcg32;
 use glam::Vec3;
@@ -37,24 +37,17 @@ impl BuiltinScene for FarCorners {
         let mut builder = SceneBuilder::new(false, 2 * SHEET * SHEET + 2048);
         builder.add_object(ground());
         builder.add_object(bumpy());
-        let unmoved = Transform::new([Vec3::X, Vec3::Y, Vec3::Z], Vec3::ZERO);
-        builder.place(0, unmoved, 0);
+        builder.place(0, Transform::IDENTITY, 0);
         for to_world in places() {
             builder.place(1, to_world, 1);
         }
-        let look = Look {
-            materials: [(0.7, 0.7, 0.65), (0.75, 0.4, 0.3)]
-                .map(|color| Material::diffuse("corner", color.into()))
-                .into(),
-            camera: Some(Camera::upright(
-                Vec3::new(2.6, 1.9, 3.1),
-                Vec3::new(0.4, 0.3, 0.4),
-                40.0,
-            )),
-            environment: Vec3::ONE,
-            ..Look::default()
-        };
-        (builder, look)
+        let colors = [(0.7, 0.7, 0.65), (0.75, 0.4, 0.3)];
+        let materials = colors.map(|color| Material::diffuse("corner", color.into()));
+        let (eye, target) = (Vec3::new(2.6, 1.9, 3.1), Vec3::new(0.4, 0.3, 0.4));
+        (
+            builder,
+            Look::under_sky(materials.into(), eye, target, 40.0),
+        )
     }
 }
 
@@ -94,7 +87,7 @@ fn ground() -> Vec<Triangle> {
 
 /// Half of it lies in a plane of coordinates and is cut at binary fractions, half is wavy.
 fn sheet(builder: &mut SceneBuilder) {
-    let corner = |i: usize, k: usize| {
+    builder.push_grid(SHEET, 0, |i, k| {
         let [x, z] = [i, k].map(|n| n as f32 / SHEET as f32);
         let wave = f64::from(x) * 3.0;
         let y = if k > SHEET / 2 {
@@ -103,13 +96,7 @@ fn sheet(builder: &mut SceneBuilder) {
             0.0
         };
         Vec3::new(2.0 * x - 1.0, y - 0.5, 2.0 * z - 1.0)
-    };
-    for i in 0..SHEET {
-        for k in 0..SHEET {
-            let quad = [(i, k), (i, k + 1), (i + 1, k + 1), (i + 1, k)];
-            builder.push_quad(quad.map(|(i, k)| corner(i, k)), 0);
-        }
-    }
+    });
 }
 
 /// A closed object, uneven and not around its origin.
@@ -127,12 +114,9 @@ fn places() -> [Transform; 6] {
     let turned = |axis: f64, scale: Vec3, offset: Vec3| {
         let (s, c) = sin_cos_turns(axis);
         let (s, c) = (s as f32, c as f32);
-        let columns = [
-            Vec3::new(c, s, 0.0),
-            Vec3::new(-s * 0.6, c * 0.6, 0.8),
-            Vec3::new(s * 0.8, -c * 0.8, 0.6),
-        ];
-        let [x, y, z] = columns;
+        let x = Vec3::new(c, s, 0.0);
+        let y = Vec3::new(-s * 0.6, c * 0.6, 0.8);
+        let z = Vec3::new(s * 0.8, -c * 0.8, 0.6);
         Transform::new([x * scale.x, y * scale.y, z * scale.z], offset)
     };
     let even = Vec3::splat;

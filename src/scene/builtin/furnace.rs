@@ -69,13 +69,11 @@ impl BuiltinScene for WhiteFurnace {
         };
         let mut builder = SceneBuilder::new(false, grid.triangles());
         grid.push(&mut builder, 0, DVec3::as_vec3);
-        let look = Look {
-            materials: vec![Material::diffuse("white", Vec3::ONE)],
-            camera: Some(Camera::upright(Vec3::new(0.0, 0.0, 3.0), Vec3::ZERO, 45.0)),
-            environment: Vec3::ONE,
-            ..Look::default()
-        };
-        (builder, look)
+        let white = vec![Material::diffuse("white", Vec3::ONE)];
+        (
+            builder,
+            Look::under_sky(white, 3.0 * Vec3::Z, Vec3::ZERO, 45.0),
+        )
     }
 }
 

@@ -6,7 +6,7 @@ use super::super::{Material, Transform};
 use super::BuiltinScene;
 use super::numeric::sin_cos_turns;
 use super::sphere::SphereGrid;
-use crate::geometry::{Camera, Triangle};
+use crate::geometry::Triangle;
 use crate::parameters;
 use crate::random::Pcg32;
 use glam::{DMat3, DVec3, Mat3, Vec3};
@@ -38,8 +38,7 @@ impl BuiltinScene for Instances {
         "copies of four bumpy objects, moved, turned and scaled, under a white sky";
 
     fn build(&self) -> (SceneBuilder, Look) {
-        let count = self.count;
-        let detail = self.detail;
+        let Self { count, detail, .. } = *self;
         let mut pcg = Pcg32::with_stream(self.seed, Pcg32::DEFAULT_STREAM);
         let mut builder = SceneBuilder::new(false, count * detail);
         for index in 0..OBJECTS {
@@ -56,18 +55,9 @@ impl BuiltinScene for Instances {
             builder.place(index as u32 % OBJECTS, to_world, index as u32 % 3);
         }
         let colors = [(0.75, 0.4, 0.3), (0.4, 0.65, 0.4), (0.4, 0.5, 0.75)];
-        let look = Look {
-            materials: colors
-                .map(|color| Material::diffuse("copy", color.into()))
-                .into(),
-            camera: Some(Camera::upright(
-                Vec3::new(1.7, 1.3, 2.5),
-                Vec3::splat(0.5),
-                40.0,
-            )),
-            environment: Vec3::ONE,
-            ..Look::default()
-        };
+        let materials = colors.map(|color| Material::diffuse("copy", color.into()));
+        let eye = Vec3::new(1.7, 1.3, 2.5);
+        let look = Look::under_sky(materials.into(), eye, Vec3::splat(0.5), 40.0);
         (builder, look)
     }
 }

@@ -3,7 +3,6 @@
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
 use super::BuiltinScene;
-use crate::geometry::Camera;
 use crate::parameters;
 use glam::Vec3;
 
@@ -20,16 +19,8 @@ impl BuiltinScene for SingleTriangle {
     fn build(&self) -> (SceneBuilder, Look) {
         let mut builder = SceneBuilder::new(false, 1);
         builder.push([Vec3::X, Vec3::Y, Vec3::Z], 0);
-        let look = Look {
-            materials: vec![Material::diffuse("triangle", Vec3::splat(0.5))],
-            camera: Some(Camera::upright(
-                Vec3::splat(2.0),
-                Vec3::splat(1.0 / 3.0),
-                40.0,
-            )),
-            environment: Vec3::ONE,
-            ..Look::default()
-        };
+        let grey = vec![Material::diffuse("triangle", Vec3::splat(0.5))];
+        let look = Look::under_sky(grey, Vec3::splat(2.0), Vec3::splat(1.0 / 3.0), 40.0);
         (builder, look)
     }
 }

@@ -6,7 +6,6 @@ use super::super::builder::{Look, SceneBuilder};
 use super::BuiltinScene;
 use super::numeric::sin_cos_turns;
 use super::teapot_patches::tessellate;
-use crate::geometry::Camera;
 use crate::parameters;
 use glam::Vec3;
 
@@ -46,37 +45,19 @@ impl BuiltinScene for TeapotInAStadium {
         for triangle in tessellate(self.subdivision) {
             builder.push(triangle.map(|v| v + LIFT * Vec3::Y), TEAPOT);
         }
-        push_field(&mut builder);
+        let along = |i: usize| FIELD_EDGE * (i as f32 / FIELD_CELLS as f32 - 0.5);
+        builder.push_grid(FIELD_CELLS, FIELD, |i, k| {
+            Vec3::new(along(i), 0.0, along(k))
+        });
         push_rows(&mut builder);
-        let look = Look {
-            materials: vec![
-                Material::diffuse("teapot", Vec3::new(0.8, 0.55, 0.3)),
-                Material::diffuse("field", Vec3::new(0.3, 0.5, 0.25)),
-                Material::diffuse("row", Vec3::splat(0.6)),
-                Material::diffuse("other row", Vec3::new(0.3, 0.35, 0.55)),
-            ],
-            camera: Some(Camera::upright(
-                Vec3::new(2.5, 3.4, 8.2),
-                Vec3::new(0.2, 1.9, 0.0),
-                40.0,
-            )),
-            environment: Vec3::ONE,
-            ..Look::default()
-        };
-        (builder, look)
-    }
-}
-
-fn push_field(builder: &mut SceneBuilder) {
-    let at = |i: usize, k: usize| {
-        let coordinate = |i: usize| FIELD_EDGE * (i as f32 / FIELD_CELLS as f32 - 0.5);
-        Vec3::new(coordinate(i), 0.0, coordinate(k))
-    };
-    for i in 0..FIELD_CELLS {
-        for k in 0..FIELD_CELLS {
-            let quad = [at(i, k), at(i, k + 1), at(i + 1, k + 1), at(i + 1, k)];
-            builder.push_quad(quad, FIELD);
-        }
+        let materials = vec![
+            Material::diffuse("teapot", Vec3::new(0.8, 0.55, 0.3)),
+            Material::diffuse("field", Vec3::new(0.3, 0.5, 0.25)),
+            Material::diffuse("row", Vec3::splat(0.6)),
+            Material::diffuse("other row", Vec3::new(0.3, 0.35, 0.55)),
+        ];
+        let (eye, target) = (Vec3::new(2.5, 3.4, 8.2), Vec3::new(0.2, 1.9, 0.0));
+        (builder, Look::under_sky(materials, eye, target, 40.0))
     }
 }
 

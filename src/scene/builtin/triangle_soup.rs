@@ -3,7 +3,6 @@
 use super::super::Material;
 use super::super::builder::{Look, SceneBuilder};
 use super::BuiltinScene;
-use crate::geometry::Camera;
 use crate::parameters;
 use crate::random::Pcg32;
 use glam::Vec3;
@@ -26,8 +25,7 @@ impl BuiltinScene for TriangleSoup {
         "random triangles, centres uniform in the unit cube, under a white sky";
 
     fn build(&self) -> (SceneBuilder, Look) {
-        let count = self.triangles;
-        let size = self.size;
+        let (count, size) = (self.triangles, self.size);
         let mut pcg = Pcg32::with_stream(self.seed, Pcg32::DEFAULT_STREAM);
         let mut point = || Vec3::new(pcg.uniform_f32(), pcg.uniform_f32(), pcg.uniform_f32());
         let mut builder = SceneBuilder::new(false, count);
@@ -38,16 +36,8 @@ impl BuiltinScene for TriangleSoup {
         }
         let colors = [(0.75, 0.35, 0.3), (0.35, 0.65, 0.4), (0.35, 0.45, 0.75)];
         let materials = colors.map(|color| Material::diffuse("soup", color.into()));
-        let look = Look {
-            materials: materials.into(),
-            camera: Some(Camera::upright(
-                Vec3::new(1.7, 1.3, 2.5),
-                Vec3::splat(0.5),
-                40.0,
-            )),
-            environment: Vec3::ONE,
-            ..Look::default()
-        };
+        let eye = Vec3::new(1.7, 1.3, 2.5);
+        let look = Look::under_sky(materials.into(), eye, Vec3::splat(0.5), 40.0);
         (builder, look)
     }
 }

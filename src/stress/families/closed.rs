@@ -1,8 +1,9 @@
 //! Closed meshes: from inside, every miss is a crack.
 
-use super::super::case::{MakeMesh, Maker, Random, Truth, ray, towards};
+use super::super::case::{MakeMesh, Maker, Random, Truth, towards};
 use super::super::place::Place;
 use super::super::shapes::{RADIUS, cube, sphere};
+use crate::accel::Ray;
 use glam::{DVec3, Vec3};
 
 /// Bands of the sphere: 528 triangles.
@@ -39,7 +40,7 @@ fn outside(random: &mut Random, place: &Place) -> Vec3 {
 
 pub fn watertight(maker: &mut Maker) {
     maker.add_on_every_rung(MESHES, "", truth, |place, _, random| {
-        ray(inside(random, place), random.direction().as_vec3())
+        Ray::new(inside(random, place), random.direction().as_vec3())
     });
 }
 
@@ -119,7 +120,7 @@ pub fn mirror_chains(maker: &mut Maker) {
                         let (mut p, mut d) = (0.4 * random.in_cube(), random.direction());
                         for _ in 0..BOUNCES {
                             (p, d) = bounce(p, d);
-                            rays.push(ray(place.point(p), d.as_vec3()));
+                            rays.push(Ray::new(place.point(p), d.as_vec3()));
                         }
                     }
                     rays

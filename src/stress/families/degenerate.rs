@@ -1,6 +1,6 @@
 //! Meshes that are hard, with rays at their triangles.
 
-use super::super::case::{Maker, Random, Truth, ray, towards};
+use super::super::case::{Maker, Random, Truth, towards};
 use super::super::place::Place;
 use super::super::shapes::{Mesh, RADIUS, cube, plane, sphere};
 use super::closed::inside;
@@ -133,7 +133,7 @@ pub fn huge_and_tiny(maker: &mut Maker) {
             let near = inside(random, &place);
             let from = if random.below(2) == 0 { far } else { near };
             match from == target {
-                true => ray(from, Vec3::X),
+                true => Ray::new(from, Vec3::X),
                 false => towards(from, target),
             }
         });

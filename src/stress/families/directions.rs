@@ -1,9 +1,8 @@
 //! Ordinary meshes; directions, origins and intervals that are not.
 
-use super::super::case::{FAR, MakeMesh, Maker, Random, Truth, ray, towards};
+use super::super::case::{MakeMesh, Maker, Random, Truth, towards};
 use super::super::place::Place;
 use super::super::shapes::{RADIUS, cube, sphere};
-use super::super::tally::oracle_ray;
 use super::closed::{inside, truth};
 use crate::accel::Ray;
 use crate::geometry::Triangle;
@@ -38,7 +37,7 @@ pub fn axis_parallel(maker: &mut Maker) {
         }
         // Start outside, inside, or somewhere along the line beyond the mesh.
         let back = (random.one_of(&[0.5, 1.0, 3.0]) * 2.0 * RADIUS * place.scale) as f32;
-        ray(target - back * Vec3::from(direction), direction.into())
+        Ray::new(target - back * Vec3::from(direction), direction)
     });
 }
 
@@ -85,7 +84,7 @@ pub fn origins(maker: &mut Maker) {
             _ => inside(random, place),
         };
         match random.below(2) {
-            0 => ray(origin, random.direction().as_vec3()),
+            0 => Ray::new(origin, random.direction().as_vec3()),
             _ => towards(origin, random.on_mesh(mesh)),
         }
     });
@@ -95,22 +94,18 @@ pub fn interval_ends(maker: &mut Maker) {
     on_every_rung(maker, |place, mesh, random| {
         let triangle = random.one_of(mesh);
         let whole = towards(inside(random, place), random.on(&triangle));
-        let t = ExactCrossing::new(&triangle, &oracle_ray(&whole)).t as f32;
-        if !(t > 0.0 && t < FAR) {
+        let t = ExactCrossing::new(&triangle, &whole).t as f32;
+        if !(t > 0.0 && t < Ray::FAR) {
             return whole;
         }
         let (t_min, t_max) = match random.below(5) {
             0 => (0.0, t),
-            1 => (t, FAR),
+            1 => (t, Ray::FAR),
             2 => (t, t),
             3 => (0.0, t.next_down()),
-            _ => (t.next_up(), FAR),
+            _ => (t.next_up(), Ray::FAR),
         };
-        Ray {
-            t_min,
-            t_max,
-            ..whole
-        }
+        whole.between(t_min, t_max)
     });
 }
 
@@ -142,7 +137,7 @@ fn of_any_length(from: Vec3, mesh: &[Triangle], random: &mut Random) -> Ray {
         }
     }
     let length = 10_f64.powf(10.0 * random.signed()) as f32;
-    ray(from, length * direction)
+    Ray::new(from, length * direction)
 }
 
 /// A ray of any length from around the middle of a mesh.

@@ -1,6 +1,6 @@
 //! Numbers at the ends of f32, and beyond.
 
-use super::super::case::{FAR, Maker, Random, Truth, ray, towards};
+use super::super::case::{Maker, Random, Truth, towards};
 use super::super::place::Place;
 use super::super::shapes::{Mesh, RADIUS, cube, sphere};
 use super::closed::inside;
@@ -23,7 +23,7 @@ pub fn denormal(maker: &mut Maker) {
                     let from = inside(random, &place);
                     // The difference itself is too small for a direction.
                     let direction = (target.as_dvec3() - from.as_dvec3()) / scale;
-                    ray(from, direction.as_vec3())
+                    Ray::new(from, direction.as_vec3())
                 };
                 let rays = (0..).map(one).filter(Ray::is_ray);
                 rays.take(count).collect()
@@ -38,11 +38,11 @@ pub fn denormal(maker: &mut Maker) {
         for axis in 0..random.below(3) {
             direction[axis] = random.one_of(&tiny);
         }
-        ray(inside(random, &place), direction)
+        Ray::new(inside(random, &place), direction)
     });
     maker.add_each("origins", place, Truth::Exact, cube, |_, random| {
         let origin = [0; 3].map(|_| random.one_of(&tiny));
-        ray(origin.into(), random.direction().as_vec3())
+        Ray::new(origin, random.direction().as_vec3())
     });
 }
 
@@ -68,7 +68,7 @@ pub fn non_finite(maker: &mut Maker) {
     let mut add = |label: &str, truth: Truth, spoil: &dyn Fn(&mut Ray, &mut Random)| {
         let sphere = |_: &mut Random| sphere(12, &place);
         maker.add_each(label, place, truth, sphere, |_, random| {
-            let mut one = ray(inside(random, &place), random.direction().as_vec3());
+            let mut one = Ray::new(inside(random, &place), random.direction().as_vec3());
             spoil(&mut one, random);
             one
         });
@@ -123,10 +123,10 @@ pub fn random_bits(maker: &mut Maker) {
             let one = |i: usize| {
                 let from = vector(random);
                 match i % 4 {
-                    0 => ray(from, vector(random)),
+                    0 => Ray::new(from, vector(random)),
                     1 => Ray {
-                        t_max: number(random, FAR).abs(),
-                        ..ray(from, vector(random))
+                        t_max: number(random, Ray::FAR).abs(),
+                        ..Ray::new(from, vector(random))
                     },
                     _ => towards(from, random.on_mesh(mesh)),
                 }

@@ -1,9 +1,10 @@
 //! Instances under transforms that nearly flatten space.
 
-use super::super::case::{Maker, Random, ray};
+use super::super::case::{Maker, Random};
 use super::super::place::Place;
 use super::super::shapes::{RADIUS, sphere};
 use super::directions::from_the_middle;
+use crate::accel::Ray;
 use crate::scene::{Assembly, Transform};
 use glam::{DMat3, DQuat, DVec3, Vec3};
 
@@ -79,7 +80,7 @@ pub fn instances(maker: &mut Maker) {
                         let reach = if spread > 0.0 { 0.0 } else { 0.2 * RADIUS };
                         let p = (reach * random.in_cube()).as_vec3();
                         let from = instance.to_world.point(p);
-                        ray(from, random.direction().as_vec3())
+                        Ray::new(from, random.direction().as_vec3())
                     };
                     (0..count).map(one).collect()
                 },

@@ -1,7 +1,7 @@
 //! Words to floats in [0, 1). Judges `to_unit` of `kernels/sampling/sampler.wesl` through
 //! `kernels/stress/conversion.wesl`.
 
-use super::{Figure, NumericsError, U, evaluate, stage};
+use super::{Gauge, NumericsError, U, evaluate, rig};
 use crate::gpu::{Composition, Gpu, UniformValues, groups_for};
 use crate::integrator::with_sampler;
 
@@ -12,7 +12,7 @@ const TOP: u32 = 512;
 
 /// Whether every draw keeps its upper 24 bits and none is 1, over all values of these bits, or over
 /// every 16th of them where it has to be quick.
-pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
+pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let stride: u32 = if quick { 1 << 12 } else { 1 << 8 };
     let words = u32::MAX / stride + 1;
     let (mut wrong, mut largest) = (0_u64, 0.0_f64);
@@ -27,44 +27,25 @@ pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
         }
     }
     let top = convert(gpu, u32::MAX - (TOP - 1), 1, TOP)?;
-    let ones = |column: usize| top.iter().filter(|pair| pair[column] >= 1.0).count();
+    let ones = |column: usize| top.iter().filter(|pair| pair[column] >= 1.0).count() as f64;
     let tried = format!("of {words} words with lower bits of ones");
+    let of_top = format!("of the {TOP} largest words");
+    let naive = format!("{of_top}, 128 in IEEE arithmetic: why draws take the upper bits");
     Ok(vec![
-        Figure::checked(
-            "draws that lose one of 24 bits",
-            wrong as f64,
-            0.0,
-            "words",
-            tried,
-        ),
-        Figure::checked(
-            "largest draw",
-            largest,
-            1.0 - U,
-            "",
-            "1 would be outside of all tables",
-        ),
-        Figure::checked(
-            "draws that are 1",
-            ones(0) as f64,
-            0.0,
-            "words",
-            format!("of the {TOP} largest words"),
-        ),
-        Figure::shown(
-            "words that f32(x) · 2⁻³² makes 1",
-            ones(1) as f64,
-            "words",
-            format!(
-                "of the {TOP} largest words, 128 in IEEE arithmetic: why draws take the upper bits"
-            ),
-        ),
+        Gauge::new("draws that lose one of 24 bits", wrong as f64, tried)
+            .at_most(0.0)
+            .in_unit("words"),
+        Gauge::new("largest draw", largest, "1 would be outside of all tables").at_most(1.0 - U),
+        Gauge::new("draws that are 1", ones(0), &*of_top)
+            .at_most(0.0)
+            .in_unit("words"),
+        Gauge::new("words that f32(x) · 2⁻³² makes 1", ones(1), naive).in_unit("words"),
     ])
 }
 
 /// The draw and the naive conversion of `count` words from `first` on.
 fn convert(gpu: &Gpu, first: u32, stride: u32, count: u32) -> Result<Vec<[f32; 2]>, NumericsError> {
-    let sampler = stage::sampler("pixel-hash", 1)?;
+    let sampler = rig::sampler("pixel-hash", 1)?;
     let kernel = with_sampler(Composition::new("stress/conversion"), &sampler);
     let values = UniformValues::new()
         .u32("first", first)

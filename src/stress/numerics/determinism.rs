@@ -1,11 +1,12 @@
 //! The same seed twice, and in other slices: the same bits. The hashes tell adapters apart.
 
-use super::stage::{self, Stage};
-use super::{Figure, NumericsError};
+use super::rig::{self, Rig};
+use super::{Gauge, NumericsError};
 use crate::gpu::Gpu;
 use crate::image::Image;
 use crate::run::dump_stream;
 use crate::sampling::{Coordinate, dimensions};
+use crate::scene;
 
 const SIZE: u32 = 48;
 const SPP: u32 = 8;
@@ -14,18 +15,18 @@ const SEED: u32 = 5;
 const POINTS: u32 = 1 << 16;
 
 /// Renders and draws everything twice.
-pub fn figures(gpu: &Gpu) -> Result<Vec<Figure>, NumericsError> {
+pub fn figures(gpu: &Gpu) -> Result<Vec<Gauge>, NumericsError> {
     let mut figures = image(gpu)?;
     figures.push(stream(gpu)?);
     Ok(figures)
 }
 
-fn image(gpu: &Gpu) -> Result<Vec<Figure>, NumericsError> {
-    let stage = Stage::new(gpu, &stage::scene("cornell-box")?)?;
-    let path = stage::path(None)?;
-    let sampler = stage::sampler("sobol", path.facts.dimensions)?;
+fn image(gpu: &Gpu) -> Result<Vec<Gauge>, NumericsError> {
+    let rig = Rig::new(gpu, scene::named("cornell-box")?)?;
+    let path = rig::path(None)?;
+    let sampler = rig::sampler("sobol", path.facts.dimensions)?;
     let render = |spps: &[u32], seed| -> Result<Image, NumericsError> {
-        let renderer = stage.renderer(gpu, &path, &sampler, SIZE)?;
+        let renderer = rig.renderer(&path, &sampler, SIZE)?;
         let mut snapshots = renderer.render(spps, seed)?;
         // `render` returns as many as it was asked for, and it was asked for one at least.
         Ok(snapshots.swap_remove(spps.len() - 1).image)
@@ -42,26 +43,21 @@ fn image(gpu: &Gpu) -> Result<Vec<Figure>, NumericsError> {
         "{SIZE} × {SIZE} pixels at {SPP} spp, hash {}",
         hash(bytemuck::cast_slice(&first.pixels))
     );
-    Ok(vec![
-        Figure::checked(
-            "pixels that differ when rendered again",
-            differing(&again),
-            0.0,
-            "pixels",
-            note,
-        ),
-        Figure::checked(
+    Ok([
+        ("pixels that differ when rendered again", &again, &*note),
+        (
             "pixels that differ when rendered in slices",
-            differing(&in_slices),
-            0.0,
-            "pixels",
+            &in_slices,
             "1 + 2 + 5 samples in the place of 8",
         ),
-    ])
+    ]
+    .map(|(name, image, note)| Gauge::new(name, differing(image), note).at_most(0.0))
+    .map(|gauge| gauge.in_unit("pixels"))
+    .to_vec())
 }
 
-fn stream(gpu: &Gpu) -> Result<Figure, NumericsError> {
-    let sampler = stage::sampler("pixel-hash", dimensions::needed(6))?;
+fn stream(gpu: &Gpu) -> Result<Gauge, NumericsError> {
+    let sampler = rig::sampler("pixel-hash", dimensions::needed(6))?;
     let coordinates: Vec<Coordinate> = (0..POINTS)
         .map(|k| Coordinate {
             pixel: k % 97,
@@ -77,13 +73,10 @@ fn stream(gpu: &Gpu) -> Result<Figure, NumericsError> {
         "{POINTS} words, hash {}",
         hash(bytemuck::cast_slice(&first))
     );
-    Ok(Figure::checked(
-        "drawn words that differ when drawn again",
-        differing as f64,
-        0.0,
-        "words",
-        note,
-    ))
+    let name = "drawn words that differ when drawn again";
+    Ok(Gauge::new(name, differing as f64, note)
+        .at_most(0.0)
+        .in_unit("words"))
 }
 
 /// The beginning of the BLAKE3 hash: the same on two adapters where all bits are.

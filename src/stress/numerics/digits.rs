@@ -1,6 +1,6 @@
 //! Radical inverses at large indices against exact rationals.
 
-use super::{Figure, NumericsError, stage};
+use super::{Gauge, NumericsError, rig};
 use crate::gpu::Gpu;
 use crate::run::dump_stream;
 use crate::sampling::Coordinate;
@@ -9,8 +9,8 @@ use crate::sampling::Coordinate;
 const DIMENSIONS: u32 = 256;
 
 /// How far the adapter's words of `halton` lie from the exact points, for indices up to 2³² − 1.
-pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
-    let sampler = stage::sampler("halton", DIMENSIONS)?;
+pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
+    let sampler = rig::sampler("halton", DIMENSIONS)?;
     let step = if quick { 16 } else { 1 };
     let coordinates: Vec<Coordinate> = (0..DIMENSIONS)
         .step_by(step)
@@ -42,27 +42,18 @@ pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
         "{} indices and dimensions, the largest index 2³² − 1",
         words.len()
     );
+    let bound = "the bound is 32 · base · 2⁻³²: what truncated divisions lose";
+    let resolved = format!("in base {worst_base}; the float of a draw resolves 1");
     Ok(vec![
-        Figure::checked(
+        Gauge::new(
             "Halton words that differ from the host's",
             other as f64,
-            0.0,
-            "words",
-            &*tried,
-        ),
-        Figure::checked(
-            "error of Halton points over its bound",
-            beyond,
-            1.0,
-            "",
-            "the bound is 32 · base · 2⁻³²: what truncated divisions lose",
-        ),
-        Figure::shown(
-            "largest error of a Halton point",
-            lost / 256.0,
-            "2⁻²⁴",
-            format!("in base {worst_base}; the float of a draw resolves 1"),
-        ),
+            tried,
+        )
+        .at_most(0.0)
+        .in_unit("words"),
+        Gauge::new("error of Halton points over its bound", beyond, bound).at_most(1.0),
+        Gauge::new("largest error of a Halton point", lost / 256.0, resolved).in_unit("2⁻²⁴"),
     ])
 }
 

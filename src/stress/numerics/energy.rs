@@ -1,13 +1,14 @@
 //! What long paths lose or gain where nothing is absorbed: a closed box of albedo 1, a ball of glass.
 
-use super::stage::{self, Stage};
-use super::{Figure, NumericsError};
+use super::rig::{self, Rig};
+use super::{Gauge, NumericsError};
 use crate::gpu::Gpu;
+use crate::image::Image;
 use crate::integrator::{ConfiguredIntegrator, CountedRays, Integrator, IntegratorFacts};
 use crate::measure::statistics::{mean, variance};
 use crate::params::{Params, Variant};
 use crate::sampling::dimensions;
-use crate::scene::{DEFAULT_IOR, Material, SceneData};
+use crate::scene::{self, DEFAULT_IOR, Material, SceneData};
 use glam::Vec3;
 
 /// Bounces of the longest walk.
@@ -53,7 +54,7 @@ static WALK: Walk = Walk;
 
 /// The furnace box with walls of albedo 1 that emit `emission`.
 fn white_box(emission: f32) -> Result<SceneData, NumericsError> {
-    let mut scene = stage::scene("furnace-box")?;
+    let mut scene = scene::named("furnace-box")?;
     for material in &mut scene.materials {
         material.base_color = Vec3::ONE;
         material.emission = Vec3::splat(emission);
@@ -62,59 +63,52 @@ fn white_box(emission: f32) -> Result<SceneData, NumericsError> {
 }
 
 /// Energy left by walks of up to 64 bounces, and by the path tracer with light and roulette.
-pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
+pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let spp = SPP[usize::from(quick)];
     let mut figures = walk(gpu, spp)?;
-    let stage = Stage::new(gpu, &white_box(1.0)?)?;
+    let rig = Rig::new(gpu, white_box(1.0)?)?;
     for depth in PATH_DEPTHS[usize::from(quick)] {
-        figures.push(path(gpu, &stage, *depth, spp)?);
+        figures.push(path(&rig, *depth, spp)?);
     }
     figures.push(glass(gpu, spp)?);
     Ok(figures)
 }
 
 /// The radiance in a ball of glass under a white sky: the square of its index, wherever one looks.
-fn glass(gpu: &Gpu, spp: u32) -> Result<Figure, NumericsError> {
-    let mut scene = stage::scene("white-furnace")?;
+fn glass(gpu: &Gpu, spp: u32) -> Result<Gauge, NumericsError> {
+    let mut scene = scene::named("white-furnace")?;
     scene.materials = vec![Material::dielectric("glass", Vec3::ONE, DEFAULT_IOR)];
     if let Some(camera) = &mut scene.camera {
         camera.eye = Vec3::new(0.1, -0.2, 0.3);
     }
-    let stage = Stage::new(gpu, &scene)?;
-    let pixels = radiance(gpu, &stage, GLASS_DEPTH, spp)?;
+    let pixels = radiance(&Rig::new(gpu, scene)?, GLASS_DEPTH, spp)?;
     let truth = f64::from(DEFAULT_IOR * DEFAULT_IOR);
     let found = mean(&pixels).unwrap_or(f64::NAN);
-    Ok(Figure::checked(
-        "radiance in a ball of glass, off the square of its index",
-        (found / truth - 1.0).abs(),
-        1e-4,
-        "relative",
-        format!("{GLASS_DEPTH} bounces; nearly every path leaves at the first"),
-    ))
+    let name = "radiance in a ball of glass, off the square of its index";
+    let note = format!("{GLASS_DEPTH} bounces; nearly every path leaves at the first");
+    Ok(Gauge::new(name, (found / truth - 1.0).abs(), note)
+        .at_most(1e-4)
+        .in_unit("relative"))
 }
 
-fn walk(gpu: &Gpu, spp: u32) -> Result<Vec<Figure>, NumericsError> {
-    let stage = Stage::new(gpu, &white_box(0.0)?)?;
+fn walk(gpu: &Gpu, spp: u32) -> Result<Vec<Gauge>, NumericsError> {
+    let rig = Rig::new(gpu, white_box(0.0)?)?;
     let walk = ConfiguredIntegrator::new(&WALK, &Variant::default())?;
-    let sampler = stage::sampler("pixel-hash", walk.facts.dimensions)?;
-    let renderer = stage.renderer(gpu, &walk, &sampler, SIZE)?;
-    renderer.reset()?;
-    renderer.add_samples(0, spp, 1)?;
-    let image = renderer.image()?;
+    let image = image(&rig, &walk, spp)?;
     let walks = f64::from(SIZE * SIZE * spp);
     let drift = |(channel, bounces): (usize, u32)| {
         let pixels = image.pixels.iter().map(|p| f64::from(p[channel]));
         let left = mean(&pixels.collect::<Vec<_>>()).unwrap_or(f64::NAN);
-        Figure::checked(
-            &format!("energy lost or gained in {bounces} bounces of albedo 1"),
+        let leaked = 1.0 / walks;
+        Gauge::new(
+            format!("energy lost or gained in {bounces} bounces of albedo 1"),
             (left - 1.0).abs(),
-            f64::from(bounces) * 1e-6,
-            "relative",
             format!(
-                "{walks} walks in a closed box; one that leaks through an edge loses {:.1e}",
-                1.0 / walks
+                "{walks} walks in a closed box; one that leaks through an edge loses {leaked:.1e}"
             ),
         )
+        .at_most(f64::from(bounces) * 1e-6)
+        .in_unit("relative")
     };
     Ok([1, DEPTH / 2, DEPTH]
         .into_iter()
@@ -123,32 +117,32 @@ fn walk(gpu: &Gpu, spp: u32) -> Result<Vec<Figure>, NumericsError> {
         .collect())
 }
 
-/// The red channel of the path tracer's image.
-fn radiance(gpu: &Gpu, stage: &Stage, depth: i64, spp: u32) -> Result<Vec<f64>, NumericsError> {
-    let path = stage::path(Some(depth))?;
-    let sampler = stage::sampler("pixel-hash", path.facts.dimensions)?;
-    let renderer = stage.renderer(gpu, &path, &sampler, SIZE)?;
+fn image(rig: &Rig, integrator: &ConfiguredIntegrator, spp: u32) -> Result<Image, NumericsError> {
+    let sampler = rig::sampler("pixel-hash", integrator.facts.dimensions)?;
+    let renderer = rig.renderer(integrator, &sampler, SIZE)?;
     renderer.reset()?;
     renderer.add_samples(0, spp, 1)?;
-    let image = renderer.image()?;
+    Ok(renderer.image()?)
+}
+
+/// The red channel of the path tracer's image.
+fn radiance(rig: &Rig, depth: i64, spp: u32) -> Result<Vec<f64>, NumericsError> {
+    let image = image(rig, &rig::path(Some(depth))?, spp)?;
     Ok(image.pixels.iter().map(|p| f64::from(p[0])).collect())
 }
 
 /// The radiance of the path tracer after `depth` bounces: one emission for each surface met.
-fn path(gpu: &Gpu, stage: &Stage, depth: i64, spp: u32) -> Result<Figure, NumericsError> {
-    let pixels = radiance(gpu, stage, depth, spp)?;
+fn path(rig: &Rig, depth: i64, spp: u32) -> Result<Gauge, NumericsError> {
+    let pixels = radiance(rig, depth, spp)?;
     let expected = depth as f64 + 1.0;
     let error = (variance(&pixels).unwrap_or(f64::NAN) / pixels.len() as f64).sqrt();
     let drift = mean(&pixels).unwrap_or(f64::NAN) - expected;
-    Ok(Figure::checked(
-        &format!("energy of the path tracer after {depth} bounces, off the truth"),
+    let [relative, spread] = [drift, error].map(|x| x / expected);
+    Ok(Gauge::new(
+        format!("energy of the path tracer after {depth} bounces, off the truth"),
         drift.abs() / error,
-        5.0,
-        "standard errors",
-        format!(
-            "relative {:+.1e} ± {:.1e}",
-            drift / expected,
-            error / expected
-        ),
-    ))
+        format!("relative {relative:+.1e} ± {spread:.1e}"),
+    )
+    .at_most(5.0)
+    .in_unit("standard errors"))
 }

@@ -1,7 +1,7 @@
 //! Directions of the hemisphere at the ends of the unit square and for awkward normals. Judges
 //! `kernels/shading/hemisphere.wesl` through `kernels/stress/mappings.wesl`.
 
-use super::{Figure, NumericsError, U, evaluate};
+use super::{Gauge, NumericsError, U, evaluate};
 use crate::gpu::{Composition, Gpu, UniformValues, groups_for};
 use glam::DVec3;
 
@@ -12,7 +12,7 @@ const WGSL_SIN: f64 = 1.0 / 2048.0;
 const TWO_PI: f32 = 6.283_185_5;
 
 /// Lengths, sides and errors of what the kernel makes of each point.
-pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
+pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let (points, normals) = inputs(RANDOM[usize::from(quick)]);
     let (directions, functions) = map(gpu, &points, &normals)?;
     let mut worst = Worst::default();
@@ -22,49 +22,23 @@ pub fn figures(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
     }
     let tried = format!("of {} points and normals", points.len());
     let ends = "draws at both ends of the square included";
+    let inside = "how far below; a point of it would start inside";
+    let disc = "the disc under the hemisphere: all of it inside the unit circle up to this";
     Ok(vec![
-        Figure::checked(
-            "directions that are not finite",
-            worst.not_finite,
-            0.0,
-            "",
-            tried,
-        ),
-        Figure::checked(
-            "length of directions, off 1",
-            worst.length,
-            2.0 * WGSL_SIN,
-            "",
-            ends,
-        ),
-        Figure::checked(
-            "directions below their surface",
-            worst.below,
-            4.0 * U,
-            "cosine",
-            "how far below; a point of it would start inside",
-        ),
-        Figure::checked(
-            "radius of the disc, off √u",
-            worst.radius,
-            2.0 * WGSL_SIN,
-            "",
-            "the disc under the hemisphere: all of it inside the unit circle up to this",
-        ),
-        Figure::checked(
+        Gauge::new("directions that are not finite", worst.not_finite, tried).at_most(0.0),
+        Gauge::new("length of directions, off 1", worst.length, ends).at_most(2.0 * WGSL_SIN),
+        Gauge::new("directions below their surface", worst.below, inside)
+            .at_most(4.0 * U)
+            .in_unit("cosine"),
+        Gauge::new("radius of the disc, off √u", worst.radius, disc).at_most(2.0 * WGSL_SIN),
+        Gauge::new(
             "error of sin and cos in [0, 2π)",
             worst.sin,
-            WGSL_SIN,
-            "",
             "WGSL allows 2⁻¹¹",
-        ),
-        Figure::checked("error of √(1 − u)", worst.sqrt, 4.0 * U, "", ends),
-        Figure::shown(
-            "error of acos in [−1, 1]",
-            worst.acos,
-            "",
-            "no kernel calls it",
-        ),
+        )
+        .at_most(WGSL_SIN),
+        Gauge::new("error of √(1 − u)", worst.sqrt, ends).at_most(4.0 * U),
+        Gauge::new("error of acos in [−1, 1]", worst.acos, "no kernel calls it"),
     ])
 }
 

@@ -8,7 +8,7 @@ mod determinism;
 mod digits;
 mod energy;
 mod mappings;
-mod stage;
+mod rig;
 mod sums;
 
 use crate::gpu::{
@@ -19,9 +19,9 @@ use crate::sampling::SamplerError;
 use crate::scene::SceneError;
 use serde::{Deserialize, Serialize};
 
-/// One thing measured on an adapter.
+/// One thing measured on an adapter, with the level from which it is an alarm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Figure {
+pub struct Gauge {
     /// What was measured.
     pub name: String,
     /// The figure: the larger, the worse.
@@ -36,29 +36,32 @@ pub struct Figure {
     pub note: String,
 }
 
-impl Figure {
-    /// A figure that must not exceed `alarm`.
-    fn checked(name: &str, value: f64, alarm: f64, unit: &str, note: impl Into<String>) -> Self {
+impl Gauge {
+    /// A figure for comparison, a plain number.
+    fn new(name: impl Into<String>, value: f64, note: impl Into<String>) -> Self {
         Self {
-            name: name.to_owned(),
+            name: name.into(),
             value,
-            alarm: Some(alarm),
-            unit: unit.to_owned(),
-            passed: value <= alarm,
+            alarm: None,
+            unit: String::new(),
+            passed: !value.is_nan(),
             note: note.into(),
         }
     }
 
-    /// A figure for comparison.
-    fn shown(name: &str, value: f64, unit: &str, note: impl Into<String>) -> Self {
+    /// The same figure, which must not exceed this.
+    fn at_most(self, alarm: f64) -> Self {
         Self {
-            name: name.to_owned(),
-            value,
-            alarm: None,
-            unit: unit.to_owned(),
-            passed: !value.is_nan(),
-            note: note.into(),
+            alarm: Some(alarm),
+            passed: self.value <= alarm,
+            ..self
         }
+    }
+
+    /// The same figure in a unit.
+    fn in_unit(self, unit: &str) -> Self {
+        let unit = unit.to_owned();
+        Self { unit, ..self }
     }
 }
 
@@ -83,21 +86,13 @@ pub enum NumericsError {
     /// A stream of words cannot be drawn.
     #[error("{0}")]
     Stream(String),
-    /// A name that this module uses is not registered.
-    #[error("the numerical checks need {kind} `{name}`, which is not registered")]
-    Missing {
-        /// What it is.
-        kind: &'static str,
-        /// Its name.
-        name: &'static str,
-    },
 }
 
 /// Takes all figures on `gpu`; `quick` leaves out what takes long, at the cost of fewer numbers tried.
 ///
 /// # Errors
 /// A kernel does not compile or run, or memory is short.
-pub fn run(gpu: &Gpu, quick: bool) -> Result<Vec<Figure>, NumericsError> {
+pub fn run(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     let mut figures = sums::figures(gpu)?;
     figures.extend(conversion::figures(gpu, quick)?);
     figures.extend(digits::figures(gpu, quick)?);

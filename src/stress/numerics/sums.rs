@@ -1,6 +1,6 @@
 //! Sums of 2²⁰ terms in f32, in five ways, against exact ones. Judges `kernels/stress/sums.wesl`.
 
-use super::{Figure, NumericsError, U, evaluate, stage};
+use super::{Gauge, NumericsError, U, evaluate, rig};
 use crate::gpu::{Composition, Gpu, UniformValues};
 use crate::integrator::{BLOCK_SAMPLES, with_sampler};
 use crate::sampling::{Coordinate, Sampler};
@@ -43,15 +43,16 @@ const WAYS: [Way; 5] = [
 ];
 
 /// The largest relative error of each way, over a constant and over noise.
-pub fn figures(gpu: &Gpu) -> Result<Vec<Figure>, NumericsError> {
-    let sampler = stage::sampler("pixel-hash", 1)?;
+pub fn figures(gpu: &Gpu) -> Result<Vec<Gauge>, NumericsError> {
+    let sampler = rig::sampler("pixel-hash", 1)?;
     let terms = longest(gpu.loop_limit);
     let long = errors(gpu, &sampler, terms)?;
     let block = errors(gpu, &sampler, BLOCK_SAMPLES)?;
     let figure = |((name, alarm, note), error): (&Way, f64), n: u32, note_of_n: &str| {
         let name = format!("sum of {n} terms, {name}");
-        let note = format!("{note}{note_of_n}");
-        Figure::checked(&name, error, alarm(f64::from(n)), "relative", note)
+        Gauge::new(name, error, format!("{note}{note_of_n}"))
+            .at_most(alarm(f64::from(n)))
+            .in_unit("relative")
     };
     let mut figures: Vec<_> = WAYS
         .iter()

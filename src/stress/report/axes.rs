@@ -78,7 +78,7 @@ impl Kind {
 pub(super) fn tables(lines: &[Line]) -> Vec<Table> {
     let mut shots = SHOTS.table(lines);
     let rays = lines.iter().find_map(|line| match &line.body {
-        Record::Shots(shots) => Some(shots.rays),
+        Record::Shots(shots) => Some(shots.count("rays/v1")),
         _ => None,
     });
     shots.caption += &format!(" of {} shots each", format::count(rays.unwrap_or(0) as u64));
@@ -93,7 +93,7 @@ fn numerics(lines: &[Line]) -> Table {
     let heads = ["figure", "value", "alarm", ":unit", ":verdict", ":note"];
     let mut table = Table::new("Accumulation and sampling", &heads);
     for line in lines {
-        if let Record::Figure(f) = &line.body {
+        if let Record::Gauge(f) = &line.body {
             table.rows.push(vec![
                 f.name.clone().into(),
                 format::number(f.value).into(),

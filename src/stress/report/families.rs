@@ -8,14 +8,14 @@ use crate::report::format;
 use crate::report::pivot::{FIGURES_ALONE, Rows};
 use crate::report::values::Value;
 use crate::stress::families::FAMILIES;
-use crate::stress::record::{CellRecord, Line, Quantiles};
+use crate::stress::record::{Findings, Line, Quantiles};
 use crate::stress::suite::BRUTE_FORCE;
 use crate::stress::targets::cells;
 
 /// The families that were tried with a triangle test, each with its cells, brute force's first.
-fn rows<'a>(records: &'a [Line], test: &str) -> Vec<(&'static str, Vec<Recorded<'a, CellRecord>>)> {
+fn rows<'a>(records: &'a [Line], test: &str) -> Vec<(&'static str, Vec<Recorded<'a, Findings>>)> {
     let of = |family: &'static str| {
-        let is_of = |c: &Recorded<CellRecord>| {
+        let is_of = |c: &Recorded<Findings>| {
             c.key.label(axis::TRIANGLE) == test && c.key.label(axis::FAMILY) == family
         };
         let mut found: Vec<_> = cells(records).filter(is_of).collect();
@@ -29,7 +29,7 @@ fn rows<'a>(records: &'a [Line], test: &str) -> Vec<(&'static str, Vec<Recorded<
 /// What brute force with one triangle test gets wrong, and what other structures do otherwise.
 pub(super) fn count_table(records: &[Line], test: &str) -> Table {
     let families = rows(records, test);
-    let row = |(family, cells): &(&str, Vec<Recorded<CellRecord>>)| {
+    let row = |(family, cells): &(&str, Vec<Recorded<Findings>>)| {
         let differ = differing(cells).into();
         (cells[0].key.clone(), vec![(*family).into(), differ])
     };
@@ -38,7 +38,10 @@ pub(super) fn count_table(records: &[Line], test: &str) -> Table {
     // Not brute force's own, which visits all in any case.
     values.retain(|value| value.figure.id != "slowdown/v1");
     for (_, cells) in &families {
-        let slowest = cells.iter().filter_map(|c| c.slowdown).reduce(f64::max);
+        let slowest = cells
+            .iter()
+            .filter_map(|c| c.get("slowdown/v1"))
+            .reduce(f64::max);
         values.extend(Value::known(cells[0].key, [("slowdown/v1", slowest)]));
     }
     let heads = ["family", ":structures that differ"];
@@ -69,25 +72,18 @@ pub(super) fn count_table(records: &[Line], test: &str) -> Table {
     table
 }
 
-impl CellRecord {
-    /// Answers that are not brute force's.
-    fn all_differing(&self) -> usize {
-        self.differing + self.any_differing.unwrap_or(0)
-    }
-}
-
 /// The structures whose answers are not brute force's, or that failed; how many if they are more than a
 /// line takes.
-fn differing(of_family: &[Recorded<CellRecord>]) -> String {
+fn differing(of_family: &[Recorded<Findings>]) -> String {
     const MOST: usize = 3;
-    let differ: Vec<&Recorded<CellRecord>> = (of_family.iter())
-        .filter(|c| c.all_differing() > 0 || !c.failures.is_empty())
+    let differ: Vec<&Recorded<Findings>> = (of_family.iter())
+        .filter(|c| c.differing() > 0 || !c.failures.is_empty())
         .collect();
     if differ.is_empty() {
         return "none".into();
     }
     if differ.len() > MOST {
-        let most = differ.iter().map(|c| c.all_differing()).max().unwrap_or(0);
+        let most = differ.iter().map(|c| c.differing()).max().unwrap_or(0);
         let failed = differ.iter().filter(|c| !c.failures.is_empty()).count();
         return format!(
             "{} of {}, up to {most}; {failed} failed",
@@ -95,8 +91,8 @@ fn differing(of_family: &[Recorded<CellRecord>]) -> String {
             of_family.len()
         );
     }
-    let name = |c: &&Recorded<CellRecord>| {
-        let text = format!("{} {}", c.key.label(axis::ACCEL), c.all_differing());
+    let name = |c: &&Recorded<Findings>| {
+        let text = format!("{} {}", c.key.label(axis::ACCEL), c.differing());
         match c.failures.len() {
             0 => text,
             failed => format!("{text} ({failed} failed)"),
@@ -117,31 +113,22 @@ pub(super) fn error_table(records: &[Line], test: &str) -> Table {
     ];
     let mut table = Table::new(caption, &heads);
     for (family, of_family) in rows(records, test) {
-        let cell = of_family[0];
-        if cell.t_ulp.is_some() {
-            let errors = [
-                cell.t_ulp,
-                cell.t_relative,
-                cell.point_ulp,
-                cell.point_relative,
-            ];
-            let errors = errors.map(|quantiles| Cell::from(three(quantiles)));
-            table.rows.push([&[family.into()][..], &errors].concat());
+        if let Some(errors) = of_family[0].errors {
+            let mut row = vec![family.into()];
+            row.extend(errors.map(three));
+            table.rows.push(row);
         }
     }
     table
 }
 
-fn three(quantiles: Option<Quantiles>) -> String {
-    let Some(q) = quantiles else {
-        return format::ABSENT.into();
-    };
+fn three(of: Quantiles) -> Cell {
     // What is relative to nothing is held as the greatest number.
     let text = |x: f64| match x {
         f64::MAX => "∞".to_owned(),
         x => format::significant(x, 2),
     };
-    [q.median, q.p99, q.max].map(text).join(" / ")
+    [of.median, of.p99, of.max].map(text).join(" / ").into()
 }
 
 /// A mark per triangle test, structure and family.
@@ -169,12 +156,12 @@ pub(super) fn matrix_table(records: &[Line]) -> Table {
     table
 }
 
-fn mark(cell: &CellRecord) -> String {
-    let count = match cell.false_misses {
+fn mark(cell: &Findings) -> String {
+    let count = match cell.count("false-misses/v1") {
         0 => "·".to_owned(),
         n => n.to_string(),
     };
-    let differs = if cell.all_differing() > 0 { "!" } else { "" };
+    let differs = if cell.differing() > 0 { "!" } else { "" };
     let failed = if cell.failures.is_empty() { "" } else { "x" };
     count + differs + failed
 }
@@ -185,7 +172,7 @@ pub(super) fn worst_table(records: &[Line]) -> Table {
     let mut table = Table::new(caption, &heads);
     for cell in cells(records) {
         let Some(worst) = &cell.worst else { continue };
-        if cell.key.label(axis::ACCEL) == BRUTE_FORCE || cell.differing > 0 {
+        if cell.key.label(axis::ACCEL) == BRUTE_FORCE || cell.count("differing/v1") > 0 {
             let labels =
                 [axis::FAMILY, axis::TRIANGLE, axis::ACCEL].map(|axis| cell.key.label(axis));
             let row = labels.into_iter().chain([&*worst.what, &worst.replay]);

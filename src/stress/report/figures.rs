@@ -22,9 +22,11 @@ pub(super) fn heat_map(records: &[Line], test: &str) -> Option<Figure> {
     let columns: Vec<String> = columns.collect();
     let value = |accel: &str, family: &str| {
         let cell = cell(records, test, accel, family)?;
-        let lost = cell.cracks.max(cell.unexplained_misses);
-        let share = lost as f64 / cell.rays.max(1) as f64;
-        Some((1e6 * share, cell.differing > 0))
+        let lost = cell
+            .count("cracks/v1")
+            .max(cell.count("unexplained-misses/v1"));
+        let share = lost as f64 / cell.count("rays/v1").max(1) as f64;
+        Some((1e6 * share, cell.count("differing/v1") > 0))
     };
     let row = |accel: &String| columns.iter().map(|f| value(accel, f)).collect();
     let values: Vec<_> = rows.iter().map(row).collect();

@@ -7,14 +7,14 @@ mod values;
 
 #[cfg(test)]
 use crate::measure::record::Verdict;
-use crate::measure::record::{Recorded, axis};
+use crate::measure::record::{Recorded, SkippedRecord, axis};
 use crate::report::data::without_repeats;
 use crate::report::document::{Banner, Block, Check, Document, Section, Table, Tone};
 use crate::report::terminal::aligned;
 use crate::report::values::csv;
 use crate::report::{ReportError, format, write_file, write_page};
 use crate::stress::families::FAMILIES;
-use crate::stress::record::{CellRecord, Line, Record, SkippedRecord, TargetRecord};
+use crate::stress::record::{Findings, Line, Record, TargetRecord};
 use crate::stress::targets::{cells, shots, suite};
 use families::{count_table, error_table, matrix_table, worst_table};
 use figures::{curves, heat_map};
@@ -44,7 +44,7 @@ pub fn stress_tables(records: &[Line]) -> String {
         text += &(aligned(table) + "\n");
     }
     for skipped in skipped(records).filter(|s| !s.reason.starts_with("every case")) {
-        text += &format!("skipped: {}: {}\n", skipped.what, skipped.reason);
+        text += &format!("skipped: {}: {}\n", skipped.cell, skipped.reason);
     }
     checks(records)
         .iter()
@@ -73,7 +73,7 @@ fn document(records: &[Line]) -> Document {
                 rounding of a silhouette are in the tables.";
     let tests = triangles(records);
     let maps = tests.iter().map(|test| heat_map(records, test));
-    let left_out = skipped(records).map(|s| format!("{}: {}", s.what, s.reason));
+    let left_out = skipped(records).map(|s| format!("{}: {}", s.cell, s.reason));
     let left_out: Vec<String> = left_out.collect();
     let mut sections = vec![
         section(
@@ -182,7 +182,7 @@ fn cell<'a>(
     test: &str,
     accel: &str,
     family: &str,
-) -> Option<Recorded<'a, CellRecord>> {
+) -> Option<Recorded<'a, Findings>> {
     cells(records).find(|c| {
         let labels = [axis::TRIANGLE, axis::ACCEL, axis::FAMILY].map(|axis| c.key.label(axis));
         labels == [test, accel, family]

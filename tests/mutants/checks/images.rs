@@ -10,6 +10,7 @@ use glam::Vec3;
 use raystone::geometry::{Camera, Triangle};
 use raystone::gpu::KernelLibrary;
 use raystone::image::Image;
+use raystone::integrator::RayOffset;
 use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced};
 use raystone::measure::bias::{BiasOptions, BiasVerdict, check_bias};
 use raystone::measure::statistics::{mean, variance};
@@ -109,6 +110,7 @@ fn render(
         camera: stage.camera,
         sampler: &sampler,
         integrator: &integrator,
+        offset: RayOffset::default(),
         runtime_checks: true,
     };
     let renderer = Renderer::new(bench.gpu, &buffers, &traced, &job, false)?;

@@ -6,6 +6,7 @@ use crate::subject::{Changes, DEMAND, LONG_DEMAND, build, sampler};
 use crate::world::Stage;
 use raystone::discrepancy::{Budget, PointSet, net_quality, star_2d};
 use raystone::image::Image;
+use raystone::integrator::RayOffset;
 use raystone::integrator::integrand::functions;
 use raystone::integrator::{
     ConfiguredIntegrator, IntegratorRegistry, RenderJob, Renderer, SceneBuffers, Traced,
@@ -109,6 +110,7 @@ fn images(bench: &Bench, sampler: &Sampler, seeds: &[u32]) -> Result<Vec<Image>,
         camera: stage.camera,
         sampler,
         integrator: &integrator,
+        offset: RayOffset::default(),
         runtime_checks: true,
     };
     let renderer = Renderer::new(bench.gpu, &buffers, &traced, &job, false)?;

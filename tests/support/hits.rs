@@ -1,41 +1,12 @@
-//! What the conformance tests share: one device per test program, batches of rays through a
-//! structure's kernel, brute force on the host, and comparisons to the bit.
-#![allow(dead_code)] // Every test program uses its own part of this.
-
-pub mod scenes;
+//! Batches of rays through a structure's kernel, brute force on the host, and comparisons to the bit.
 
 use raystone::accel::triangle::intersect_triangle;
 use raystone::accel::{
     AccelKind, Ask, BuildLog, BuiltAccel, Counters, Hit, Query, Ray, Traced, Tracer,
     TriangleBuffers, TriangleSoup,
 };
-use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
+use raystone::gpu::Gpu;
 use raystone::params::{ParamRange, ParamValue, ParameterSchema, Params};
-use std::sync::OnceLock;
-
-/// The device that all tests of one program share, with the embedded kernels.
-pub fn gpu() -> &'static Gpu {
-    static GPU: OnceLock<Gpu> = OnceLock::new();
-    GPU.get_or_init(|| open(KernelLibrary::default()))
-}
-
-/// A device of its own, with other kernels.
-pub fn open(kernels: KernelLibrary) -> Gpu {
-    raystone::gpu::open(&AdapterChoice::Best, kernels)
-        .unwrap_or_else(|e| panic!("no adapter: run scripts/install-driver ({e})"))
-}
-
-/// Whether the adapter computes like the host; says so if it does not.
-pub fn is_exact(gpu: &Gpu) -> bool {
-    let probe = probe_arithmetic(gpu).expect("the probe runs");
-    if !probe.is_exact() {
-        println!(
-            "skipped: {} fuses or rounds differently ({probe:?})",
-            gpu.info.name
-        );
-    }
-    probe.is_exact()
-}
 
 /// A small deterministic generator (PCG-RXS-M-XS with 64 bits of state; O'Neill 2014).
 pub struct Pcg(u64);

@@ -1,0 +1,211 @@
+//! The product of the axes: its points, filters and excludes.
+
+use super::ConfigError;
+use super::axis_map::AxisMap;
+use super::cells::Cell;
+use super::error::Place;
+use super::experiment::{Axes, Exclude, Experiment};
+use super::keys::Axis;
+use super::pattern::Pattern;
+use super::plan::Skipped;
+use crate::params::Variant;
+use crate::text::nearest;
+
+/// Cells of the full product, before anything is left out.
+const MAX_CELLS: usize = 1 << 20;
+
+pub(super) fn check_size(experiment: &Experiment) -> Result<(), ConfigError> {
+    let lengths = Axis::ALL.map(|axis| experiment.axes[axis].len());
+    let cells = lengths.into_iter().fold(1, usize::saturating_mul);
+    if cells <= MAX_CELLS {
+        return Ok(());
+    }
+    Err(ConfigError::TooMany {
+        at: Place::File {
+            file: experiment.source.as_str().into(),
+            line: 1,
+        },
+        what: "the cells of all axes".to_owned(),
+        count: cells,
+        limit: MAX_CELLS,
+    })
+}
+
+/// What seeds mean to a sequence and a decorrelation: whether each gives another set of samples, or why
+/// the two make no sense together.
+pub(super) trait IsRandomised: Fn(&Variant, &Variant) -> Result<bool, String> {}
+impl<F: Fn(&Variant, &Variant) -> Result<bool, String>> IsRandomised for F {}
+
+/// A point of the product of some axes.
+#[derive(Clone)]
+pub(super) struct Point<'a>(AxisMap<Option<&'a Variant>>);
+
+impl Point<'_> {
+    fn get(&self, axis: Axis) -> Option<&Variant> {
+        self.0[axis]
+    }
+
+    /// Why its sequence and decorrelation make no sense together, if it has both and they do not.
+    pub fn refusal(&self, is_randomised: &impl IsRandomised) -> Option<String> {
+        let sequence = self.get(Axis::Sequence)?;
+        is_randomised(sequence, self.get(Axis::Decorrelation)?).err()
+    }
+
+    pub fn cell(&self, is_randomised: &impl IsRandomised) -> Cell {
+        let variants = self.0.iter();
+        let variants = variants.filter_map(|(axis, variant)| Some((axis, (*variant)?)));
+        let mut cell = variants.fold(Cell::default(), |cell, (axis, variant)| {
+            cell.with(axis, variant)
+        });
+        let pair = (self.get(Axis::Sequence), self.get(Axis::Decorrelation));
+        let randomised = match pair {
+            (Some(sequence), Some(decorrelation)) => is_randomised(sequence, decorrelation),
+            _ => Ok(false),
+        };
+        cell.randomised = randomised == Ok(true);
+        cell
+    }
+}
+
+/// Pairs of a sequence and a decorrelation that make no sense, with the full cells that they cost.
+pub(super) fn refused(full: &[Point], is_randomised: &impl IsRandomised) -> Vec<Skipped> {
+    let mut out: Vec<Skipped> = Vec::new();
+    for point in full {
+        let Some(reason) = point.refusal(is_randomised) else {
+            continue;
+        };
+        match out.iter_mut().find(|skipped| skipped.reason == reason) {
+            Some(skipped) => skipped.cells += 1,
+            None => out.push(Skipped {
+                cell: point.cell(is_randomised).on(&Cell::STREAM).to_string(),
+                reason,
+                cells: 1,
+            }),
+        }
+    }
+    out
+}
+
+/// What one exclude takes out of the filtered product.
+pub(super) fn excluded(
+    exclude: &Exclude,
+    full: &[Point],
+    filter: &Filter,
+) -> Result<Option<Skipped>, ConfigError> {
+    let covered: Vec<_> = full.iter().filter(|point| exclude.covers(point)).collect();
+    if covered.is_empty() && !exclude.lenient {
+        return Err(ConfigError::UselessExclude {
+            at: exclude.at.clone(),
+            exclude: exclude.to_string(),
+        });
+    }
+    let cells = covered.iter().filter(|point| filter.fits(point)).count();
+    Ok((cells > 0).then(|| Skipped {
+        cell: exclude.to_string(),
+        reason: format!("excluded by {}", exclude.at),
+        cells,
+    }))
+}
+
+/// All points of the product of the axes in `which`, the last one running fastest.
+pub(super) fn product<'a>(axes: &'a Axes, which: &[Axis]) -> Vec<Point<'a>> {
+    let mut points = vec![Point(AxisMap::default())];
+    for &axis in which {
+        points = points
+            .iter()
+            .flat_map(|point| {
+                axes[axis].iter().map(|variant| {
+                    let mut point = point.clone();
+                    point.0[axis] = Some(variant);
+                    point
+                })
+            })
+            .collect();
+    }
+    points
+}
+
+impl Exclude {
+    /// Whether the point has every axis that the exclude names, and fits on each.
+    pub(super) fn covers(&self, point: &Point) -> bool {
+        self.patterns.iter().all(|(axis, patterns)| {
+            let variant = point.get(*axis);
+            variant.is_some_and(|variant| patterns.iter().any(|p| p.matches(variant)))
+        })
+    }
+}
+
+/// What `--only` asks for.
+pub(super) struct Filter(Vec<(Axis, Vec<Pattern>)>);
+
+impl Filter {
+    pub fn parse(only: &[String], axes: &Axes) -> Result<Self, ConfigError> {
+        let mut filter: Vec<(Axis, Vec<Pattern>)> = Vec::new();
+        for text in only.iter().flat_map(|text| split_outside_brackets(text)) {
+            let fault = |problem: String| ConfigError::Only {
+                text: text.to_owned(),
+                problem,
+            };
+            let (name, pattern) = text
+                .split_once('=')
+                .ok_or_else(|| fault("no `=` in it".to_owned()))?;
+            let name = name.trim();
+            let axis = Axis::from_name(name).ok_or_else(|| {
+                let known = Axis::ALL.map(Axis::name);
+                let near = nearest(name, known).unwrap_or_default();
+                fault(format!(
+                    "unknown axis `{name}`; did you mean `{near}`? Known: {}",
+                    known.join(", ")
+                ))
+            })?;
+            let pattern = Pattern::new(pattern.trim());
+            let variants = &axes[axis];
+            if !variants.iter().any(|variant| pattern.matches(variant)) {
+                return Err(ConfigError::NoMatch {
+                    at: format!("--only {text}"),
+                    axis: axis.name(),
+                    pattern: pattern.to_string(),
+                    known: variants.iter().map(|v| v.label.clone()).collect(),
+                });
+            }
+            match filter.iter_mut().find(|(other, _)| *other == axis) {
+                Some((_, patterns)) => patterns.push(pattern),
+                None => filter.push((axis, vec![pattern])),
+            }
+        }
+        Ok(Self(filter))
+    }
+
+    /// Whether the point fits on every filtered axis that it has.
+    pub fn fits(&self, point: &Point) -> bool {
+        self.0.iter().all(|(axis, patterns)| {
+            let variant = point.get(*axis);
+            variant.is_none_or(|variant| patterns.iter().any(|p| p.matches(variant)))
+        })
+    }
+}
+
+/// Parts between commas, except commas in round brackets: labels such as `grid(a=1,b=2)` have them.
+fn split_outside_brackets(text: &str) -> impl Iterator<Item = &str> {
+    let mut depth = 0;
+    let parts = text.split(move |c| {
+        match c {
+            '(' => depth += 1,
+            ')' => depth -= 1,
+            _ => {}
+        }
+        c == ',' && depth == 0
+    });
+    parts.map(str::trim).filter(|part| !part.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::split_outside_brackets;
+
+    #[test]
+    fn commas_in_brackets_do_not_separate() {
+        let parts: Vec<_> = split_outside_brackets("accel=g(a=1,b=2), scene=x,,").collect();
+        assert_eq!(parts, ["accel=g(a=1,b=2)", "scene=x"]);
+    }
+}

@@ -1,0 +1,82 @@
+//! Scenes and samplers for the figures.
+
+use super::NumericsError;
+use crate::accel::{AccelRegistry, Intersection, Traced};
+use crate::gpu::Gpu;
+use crate::integrator::{
+    ConfiguredIntegrator, IntegratorRegistry, RayOffset, RenderJob, Renderer, Stage,
+};
+use crate::params::{ParamValue, Params, Variant};
+use crate::sampling::{Demand, Sampler, SamplerRegistry};
+use crate::scene::SceneData;
+
+/// What is called `name`, with these parameters set.
+fn variant(name: &str, set: &[(&str, ParamValue)]) -> Variant {
+    let set = set
+        .iter()
+        .map(|(key, value)| ((*key).to_owned(), value.clone()));
+    Variant {
+        name: name.to_owned(),
+        params: Params(set.collect()),
+        label: name.to_owned(),
+    }
+}
+
+/// A sequence without decorrelation, for so many dimensions.
+pub fn sampler(sequence: &str, dimensions: u32) -> Result<Sampler, NumericsError> {
+    let digits = [("digits", ParamValue::Name("plain".to_owned()))];
+    let set: &[_] = if sequence == "halton" { &digits } else { &[] };
+    let demand = Demand {
+        samples: None,
+        dimensions,
+        width: None,
+    };
+    let none = variant("none", &[]);
+    Ok(SamplerRegistry::default().sampler(&variant(sequence, set), &none, &demand)?)
+}
+
+/// The path tracer with `depth` bounces at most.
+pub fn path(depth: Option<i64>) -> Result<ConfiguredIntegrator, NumericsError> {
+    let depth = depth.map(|depth| ("max_depth", ParamValue::Integer(depth)));
+    let path = variant("path", depth.as_slice());
+    Ok(IntegratorRegistry::default().configured(&path)?)
+}
+
+/// A scene on the device, traced through the plain BVH.
+pub struct Rig {
+    stage: Stage,
+    traced: Traced,
+}
+
+impl Rig {
+    pub fn new(gpu: &Gpu, scene: SceneData) -> Result<Self, NumericsError> {
+        let stage = Stage::new(gpu, scene, Intersection::default())?;
+        let traced = stage.structure(&AccelRegistry::default(), "bvh")?;
+        Ok(Self { stage, traced })
+    }
+
+    /// A compiled image of `size` × `size` pixels.
+    pub fn renderer<'a>(
+        &'a self,
+        integrator: &ConfiguredIntegrator,
+        sampler: &Sampler,
+        size: u32,
+    ) -> Result<Renderer<'a>, NumericsError> {
+        let job = RenderJob {
+            size: [size; 2],
+            camera: self.stage.scene.view(1.0),
+            sampler,
+            integrator,
+            offset: RayOffset::default(),
+            runtime_checks: true,
+        };
+        let stage = &self.stage;
+        Ok(Renderer::new(
+            &stage.gpu,
+            &stage.buffers,
+            &self.traced,
+            &job,
+            false,
+        )?)
+    }
+}
