@@ -135,7 +135,7 @@ impl<'a> Pair<'a> {
     fn rows<'r>(&self, heads: &'r [&'r str]) -> Rows<'r> {
         let row = |s: &&Recorded<StreamRecord>| {
             let name = self.data.names.sampler(s.key).into();
-            let cells = [name, Cell::repeats(s.seeds as usize, s.randomised)];
+            let cells = [name, Cell::repeats(s.seeds, s.randomised)];
             let cells = cells.into_iter().take(heads.len());
             (s.key.clone(), cells.collect())
         };
