@@ -21,7 +21,7 @@ const RANDOM_SPP: u32 = 4;
 
 /// Whether the mean over seeds is right at any number of samples: a turned disc keeps its radii.
 fn is_unbiased(sampler: &Sampler) -> bool {
-    sampler.is_random() && sampler.decorrelation.name() != "disc-rotation"
+    sampler.is_random() && sampler.decorrelation_variant.name != "disc-rotation"
 }
 
 fn furnace(albedo: f64) -> Stage {
