@@ -6,7 +6,7 @@ use crate::report::document::Figure;
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::report::plot::heat::HeatMap;
 use crate::stress::families::FAMILIES;
-use crate::stress::place::Place;
+use crate::stress::placement::Placement;
 use crate::stress::record::Line;
 use crate::stress::suite::BRUTE_FORCE;
 
@@ -36,7 +36,7 @@ pub(super) fn heat_map(records: &[Line], test: &str) -> Option<Figure> {
 }
 
 /// A way along the rungs: its name, the title of its axis, where a rung is on it.
-type Sweep = (&'static str, &'static str, fn(&Place) -> Option<f64>);
+type Sweep = (&'static str, &'static str, fn(&Placement) -> Option<f64>);
 
 const SWEEPS: [Sweep; 2] = [
     ("scale", "scale", |at| (at.shift == 0.0).then_some(at.scale)),
