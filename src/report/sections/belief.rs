@@ -171,7 +171,7 @@ fn bias(data: &RunData) -> Check {
     );
     if let Some((.., record)) = records.first() {
         detail += &format!(
-            " (Welch's t of the whole image and, with Benjamini and Hochberg's correction, per tile, each at half of {})",
+            " (Student's t of the whole image and, with Benjamini and Hochberg's correction, per tile, each at half of {})",
             format::number(record.alpha)
         );
     }
