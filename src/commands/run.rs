@@ -7,8 +7,8 @@ use super::output::{self, print};
 use super::signals;
 use anyhow::Result;
 use clap::Args;
-use raystone::config::Experiment;
-use raystone::measure::record::{Body, Line, axis, read_records};
+use raystone::config::{Cell, Experiment};
+use raystone::measure::record::{Body, Line, read_records};
 use raystone::report::{failed_checks, terminal_tables, write_report};
 use raystone::run::{Existing, Kernels, Registries, RunError, RunSummary};
 use std::path::PathBuf;
@@ -115,19 +115,13 @@ fn plural(count: usize, one: &str, many: &str) -> String {
 
 /// The cell of a record and why it failed, if it did.
 fn failure(line: &Line) -> Option<String> {
-    let [scene, accel, integrator] =
-        [axis::SCENE, axis::ACCEL, axis::INTEGRATOR].map(|axis| line.key.label(axis));
-    let accel = format!("{accel}{}", line.key.kernels_mark());
-    match &line.body {
-        Body::Failed(failed) => Some(format!("{}: {}", failed.cell, failed.reason)),
-        Body::Structure(cell) => Some(format!("{scene}, {accel}: {}", cell.failure.as_ref()?)),
-        Body::Time(cell) => Some(format!(
-            "{scene}, {accel}, {integrator}, {}: {}",
-            line.key.sampler(),
-            cell.failure.as_ref()?
-        )),
-        _ => None,
-    }
+    let failure = match &line.body {
+        Body::Failed(failed) => return Some(format!("{}: {}", failed.cell, failed.reason)),
+        Body::Structure(record) => record.failure.as_ref()?,
+        Body::Time(record) => record.failure.as_ref()?,
+        _ => return None,
+    };
+    Some(format!("{}: {failure}", Cell::from(&line.key)))
 }
 
 /// `results/NAME`, where a name such as `../a b` cannot lead out of `results`.
