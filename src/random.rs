@@ -1,5 +1,6 @@
 //! The generators behind everything that is drawn at random on the host.
 
+use glam::DVec3;
 use rand_pcg::rand_core::Rng;
 
 /// PCG32 (XSH RR 64/32; O'Neill 2014): small, seeded, the same on every machine.
@@ -33,6 +34,29 @@ impl Pcg32 {
     /// A number in `[0, 1)` with 32 random bits.
     pub fn uniform(&mut self) -> f64 {
         f64::from(self.next_u32()) / 2f64.powi(32)
+    }
+
+    /// One of them.
+    pub fn one_of<T: Copy>(&mut self, of: &[T]) -> T {
+        of[self.below(of.len())]
+    }
+
+    /// A number in [−1, 1).
+    pub fn signed(&mut self) -> f64 {
+        2.0 * self.uniform() - 1.0
+    }
+
+    /// A point of the cube [−1, 1)³.
+    pub fn in_cube(&mut self) -> DVec3 {
+        DVec3::new(self.signed(), self.signed(), self.signed())
+    }
+
+    /// A unit vector.
+    pub fn direction(&mut self) -> DVec3 {
+        let z = self.signed();
+        let (sin, cos) = (std::f64::consts::TAU * self.uniform()).sin_cos();
+        let radius = (1.0 - z * z).max(0.0).sqrt();
+        DVec3::new(radius * cos, radius * sin, z)
     }
 
     /// A number in `[0, 1)` with 24 random bits.

@@ -30,9 +30,9 @@ use support::Stage;
 
 fn registries() -> Registries {
     let mut registries = Registries::default();
-    let weyl = Registered::sequence::<Weyl>();
+    let weyl = Registered::sequence::<Weyl>("weyl");
     registries.samplers.sequences.add(weyl);
-    let rotation = Registered::decorrelation::<Rotation>();
+    let rotation = Registered::decorrelation::<Rotation>("rotation");
     registries.samplers.decorrelations.add(rotation);
     registries.integrators.register(&Facing);
     registries.integrators.register(&Deferred);

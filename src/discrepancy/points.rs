@@ -173,25 +173,6 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_line_is_named() {
-        for (text, line, word) in [
-            ("0.5 0.5\n0.5\n", 2, "1 coordinates"),
-            ("0.5 NaN", 1, "NaN"),
-            ("\n\n0.5 1.5", 3, "1.5"),
-            ("0.5 -1e-9", 1, "-0.000000001"),
-            ("0.5 0.5\nhalf 0.5", 2, "`half`"),
-            ("inf 0", 1, "inf"),
-        ] {
-            let message = PointSet::parse(text).unwrap_err().to_string();
-            assert!(message.starts_with(&format!("line {line}:")), "{message}");
-            assert!(message.contains(word), "{message}");
-        }
-        for text in ["", "# nothing\n\n"] {
-            assert_eq!(PointSet::parse(text), Err(DiscrepancyError::Empty));
-        }
-    }
-
-    #[test]
     fn projections_name_the_dimension_that_is_not_there() {
         let points = PointSet::from_points(&[[0.1, 0.2, 0.3]]).unwrap();
         let pair = points.project(&[2, 0]).unwrap();

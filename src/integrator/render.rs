@@ -115,9 +115,10 @@ pub fn with_sampler(mut composition: Composition, sampler: &Sampler) -> Composit
     for (name, value) in sampler.constants() {
         composition = composition.constant(name, value);
     }
+    let [sequence, decorrelation] = sampler.kernels();
     composition
-        .with("sequence", &sampler.sequence.kernel())
-        .with("decorrelation", &sampler.decorrelation.kernel())
+        .with("sequence", &sequence)
+        .with("decorrelation", &decorrelation)
 }
 
 /// Samples for which an integrator's buffers between passes have room.

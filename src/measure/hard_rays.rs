@@ -96,7 +96,7 @@ impl<'a> Maker<'a> {
             }
             4 => {
                 let (origin, direction) = self.towards_a_triangle();
-                let length = LENGTHS[self.random.below(LENGTHS.len())];
+                let length = self.random.one_of(&LENGTHS);
                 (origin, direction.normalize_or(Vec3::X) * length)
             }
             5 => {
@@ -191,7 +191,7 @@ impl<'a> Maker<'a> {
                 NEXT_TO_ZERO[self.random.below(4) * self.random.below(2) + self.random.below(2)];
         }
         let sign = if self.random.below(2) == 0 { 1.0 } else { -1.0 };
-        direction[axis] = sign * LENGTHS[self.random.below(LENGTHS.len())];
+        direction[axis] = sign * self.random.one_of(&LENGTHS);
         origin[axis] -= sign * self.unit() * 2.0 * (self.high - self.low)[axis];
         (origin, direction)
     }
@@ -232,7 +232,7 @@ impl<'a> Maker<'a> {
         let longest = direction.abs().max_element();
         for axis in 0..3 {
             if direction[axis].abs() < longest && self.random.below(2) == 0 {
-                direction[axis] = NEXT_TO_ZERO[self.random.below(NEXT_TO_ZERO.len())];
+                direction[axis] = self.random.one_of(&NEXT_TO_ZERO);
             }
         }
         direction

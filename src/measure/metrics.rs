@@ -241,9 +241,7 @@ impl Reference {
             half_b,
         }
     }
-}
 
-impl Reference {
     /// The sample against the reference without one of its parts.
     fn without(&self, part: usize, pixel: usize, channel: usize, sample: &Sample) -> Sample {
         let half = (self.parts.len() / 2) as f64;

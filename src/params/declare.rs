@@ -6,6 +6,9 @@ use std::ops::RangeInclusive;
 /// A struct of parameters, declared by [`parameters!`](crate::parameters). Its default has every parameter
 /// at its own.
 pub trait Parameters: Default + Sized {
+    /// Its doc comment in one line: what a registry says of it.
+    const ABOUT: &'static str;
+
     /// Names, meanings, defaults and ranges, in the order of the declaration.
     fn schema() -> ParameterSchema;
 
@@ -261,7 +264,7 @@ macro_rules! parameters {
         $crate::parameters! { $($rest)* }
     };
     (
-        $(#[$meta:meta])*
+        $(#[doc = $about:literal])*
         $vis:vis struct $name:ident {
             $(
                 $(#[doc = $doc:literal])*
@@ -273,7 +276,7 @@ macro_rules! parameters {
         }
         $($rest:tt)*
     ) => {
-        $(#[$meta])*
+        $(#[doc = $about])*
         #[derive(Debug, Clone, PartialEq)]
         $vis struct $name {
             $($(#[doc = $doc])* pub $field: $type,)*
@@ -290,6 +293,8 @@ macro_rules! parameters {
         }
 
         impl $crate::params::Parameters for $name {
+            const ABOUT: &'static str = concat!($($about),*).trim_ascii();
+
             fn schema() -> $crate::params::ParameterSchema {
                 #[allow(unused_mut)]
                 let mut schema = Vec::new();

@@ -20,16 +20,13 @@ impl<T: ?Sized> Clone for Registered<T> {
 }
 
 impl<T: ?Sized> Registered<T> {
-    /// A kind whose parameters `P` declares; `make` is [`Parameters::from_params`] behind an `Arc<T>`.
-    pub fn new<P: Parameters>(
-        name: &str,
-        description: &str,
-        make: fn(&Params) -> Result<Arc<T>, ParamError>,
-    ) -> Self {
+    /// A kind that `P` declares, whose doc comment says what it is; `make` is [`Parameters::from_params`]
+    /// behind an `Arc<T>`.
+    pub fn new<P: Parameters>(name: &str, make: fn(&Params) -> Result<Arc<T>, ParamError>) -> Self {
         Self {
             entry: Entry {
                 name: name.to_owned(),
-                description: description.to_owned(),
+                description: P::ABOUT.to_owned(),
                 schema: P::schema(),
             },
             make,

@@ -17,7 +17,8 @@ use crate::parameters;
 use std::path::Path;
 
 parameters! {
-    /// The registry entry.
+    /// shifts by a void-and-cluster mask (Georgiev & Fajardo 2016), or the tables of Heitz et al.
+    /// (2019)
     pub struct BlueNoise {
         /// folder with the tables of Heitz et al. 2019, whose points then replace those of sobol; none is the mask
         tables: String = String::new();
@@ -102,14 +103,6 @@ fn read_tables(folder: &Path, samples: u32) -> Result<Vec<u32>, String> {
 }
 
 impl Decorrelation for BlueNoise {
-    fn name(&self) -> &'static str {
-        "blue-noise"
-    }
-
-    fn description(&self) -> &'static str {
-        "shifts by a void-and-cluster mask (Georgiev & Fajardo 2016), or the tables of Heitz et al. (2019)"
-    }
-
     fn by_count(&self) -> bool {
         self.folder().is_some()
     }

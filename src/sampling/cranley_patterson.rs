@@ -9,7 +9,7 @@ use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// a random shift modulo 1 for each pixel and dimension (Cranley & Patterson 1976)
     pub struct CranleyPatterson {
         /// Whether pixels differ.
         seeded: Seeded;
@@ -17,14 +17,6 @@ parameters! {
 }
 
 impl Decorrelation for CranleyPatterson {
-    fn name(&self) -> &'static str {
-        "cranley-patterson"
-    }
-
-    fn description(&self) -> &'static str {
-        "a random shift modulo 1 for each pixel and dimension (Cranley & Patterson 1976)"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

@@ -51,13 +51,10 @@ impl Partner<'_> {
 
 /// A decorrelation of pixels: the struct of its parameters, one line in the registry.
 pub trait Decorrelation: Send + Sync {
-    /// Name as a user types it.
-    fn name(&self) -> &'static str;
-    /// One line: what it is and where it comes from.
-    fn description(&self) -> &'static str;
-    /// Module of the kernel, relative to the kernel folder: by default the file of that name.
-    fn kernel(&self) -> String {
-        format!("sampling/{}", self.name().replace('-', "_"))
+    /// Module of the kernel, relative to the kernel folder, if it is not that of the name: `sampling/owen_sobol`
+    /// for `owen-sobol`.
+    fn kernel(&self) -> Option<&'static str> {
+        None
     }
     /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
     fn sources(&self) -> &'static [(&'static str, &'static str)] {
@@ -109,11 +106,8 @@ pub trait Decorrelation: Send + Sync {
 }
 
 impl Registered<dyn Decorrelation> {
-    /// The decorrelation that `D` declares.
-    pub fn decorrelation<D: Decorrelation + Parameters + 'static>() -> Self {
-        let default = D::default();
-        Self::new::<D>(default.name(), default.description(), |params| {
-            Ok(Arc::new(D::from_params(params)?))
-        })
+    /// The decorrelation that `D` declares, under this name; the doc comment of `D` describes it.
+    pub fn decorrelation<D: Decorrelation + Parameters + 'static>(name: &str) -> Self {
+        Self::new::<D>(name, |params| Ok(Arc::new(D::from_params(params)?)))
     }
 }

@@ -10,7 +10,7 @@ use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// random bits flipped for each pixel and dimension, keeps nets in base 2 (L'Ecuyer & Lemieux 2002)
     pub struct DigitalShift {
         /// Whether pixels differ.
         seeded: Seeded;
@@ -18,14 +18,6 @@ parameters! {
 }
 
 impl Decorrelation for DigitalShift {
-    fn name(&self) -> &'static str {
-        "digital-shift"
-    }
-
-    fn description(&self) -> &'static str {
-        "random bits flipped for each pixel and dimension, keeps nets in base 2 (L'Ecuyer & Lemieux 2002)"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

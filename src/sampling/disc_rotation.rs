@@ -10,7 +10,7 @@ use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// a random turn of the disc of each pair of dimensions, leaves rings (Dufay 2017 §5.3.2)
     pub struct DiscRotation {
         /// Whether pixels differ.
         seeded: Seeded;
@@ -18,14 +18,6 @@ parameters! {
 }
 
 impl Decorrelation for DiscRotation {
-    fn name(&self) -> &'static str {
-        "disc-rotation"
-    }
-
-    fn description(&self) -> &'static str {
-        "a random turn of the disc of each pair of dimensions, leaves rings (Dufay 2017 §5.3.2)"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

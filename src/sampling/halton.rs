@@ -11,7 +11,7 @@ use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// radical inverses in the first 256 primes, from index 0 (Halton 1960)
     pub struct Halton {
         /// What becomes of digits.
         rule: DigitRule;
@@ -86,14 +86,6 @@ impl DigitRule {
 }
 
 impl Sequence for Halton {
-    fn name(&self) -> &'static str {
-        "halton"
-    }
-
-    fn description(&self) -> &'static str {
-        "radical inverses in the first 256 primes, from index 0 (Halton 1960)"
-    }
-
     fn facts(&self) -> Facts {
         Facts {
             extensible: true,

@@ -11,7 +11,7 @@ use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// i/N and radical inverses in prime bases, for N known beforehand (Hammersley 1960)
     pub struct Hammersley {
         /// What becomes of digits.
         rule: DigitRule;
@@ -21,14 +21,6 @@ parameters! {
 const BASES: u32 = 3;
 
 impl Sequence for Hammersley {
-    fn name(&self) -> &'static str {
-        "hammersley"
-    }
-
-    fn description(&self) -> &'static str {
-        "i/N and radical inverses in prime bases, for N known beforehand (Hammersley 1960)"
-    }
-
     fn constants(&self) -> Vec<(&'static str, u32)> {
         self.rule.constants()
     }

@@ -10,7 +10,7 @@ use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// each pixel begins at a random index of the sequence (Dufay 2017 §5.3.2)
     pub struct IndexOffset {
         /// offsets are drawn from 0 to this, excluded
         offsets: u32 = 65_536, in 2..=1 << 24;
@@ -20,14 +20,6 @@ parameters! {
 }
 
 impl Decorrelation for IndexOffset {
-    fn name(&self) -> &'static str {
-        "index-offset"
-    }
-
-    fn description(&self) -> &'static str {
-        "each pixel begins at a random index of the sequence (Dufay 2017 §5.3.2)"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

@@ -11,7 +11,8 @@ use super::{Coordinate, Decorrelation, Demand, Partner, SamplerTable, Seeded, Se
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// a shift of at most K·N^(-1/s) for each pixel and dimension, keeps rays coherent (Dufay 2017
+    /// §5.4)
     pub struct MicroJitter {
         /// K of the amplitude; 0 takes Dufay's: 1.5 for hammersley, 2.5 else
         k: f64 = 0.0, in 0.0..=64.0;
@@ -56,14 +57,6 @@ impl MicroJitter {
 }
 
 impl Decorrelation for MicroJitter {
-    fn name(&self) -> &'static str {
-        "micro-jitter"
-    }
-
-    fn description(&self) -> &'static str {
-        "a shift of at most K·N^(-1/s) for each pixel and dimension, keeps rays coherent (Dufay 2017 §5.4)"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

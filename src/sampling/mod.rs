@@ -113,6 +113,18 @@ impl Sampler {
         )
     }
 
+    /// Modules of the kernels of sequence and decorrelation.
+    pub fn kernels(&self) -> [String; 2] {
+        let module = |own: Option<&str>, variant: &Variant| match own {
+            Some(module) => module.to_owned(),
+            None => format!("sampling/{}", variant.name.replace('-', "_")),
+        };
+        [
+            module(self.sequence.kernel(), &self.sequence_variant),
+            module(self.decorrelation.kernel(), &self.decorrelation_variant),
+        ]
+    }
+
     /// Constants of `package::active::constants`.
     pub fn constants(&self) -> Vec<(&'static str, u32)> {
         let [sequence, decorrelation] = self.shared_by_pixels.map(u32::from);

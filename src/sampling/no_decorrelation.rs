@@ -5,21 +5,13 @@ use super::{Coordinate, Decorrelation, Partner, SamplerTable};
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// every pixel uses the same points: coherent rays, structured error (Dufay 2017)
     pub struct NoDecorrelation {}
 }
 
 impl Decorrelation for NoDecorrelation {
-    fn name(&self) -> &'static str {
-        "none"
-    }
-
-    fn description(&self) -> &'static str {
-        "every pixel uses the same points: coherent rays, structured error (Dufay 2017)"
-    }
-
-    fn kernel(&self) -> String {
-        "sampling/no_decorrelation".to_owned()
+    fn kernel(&self) -> Option<&'static str> {
+        Some("sampling/no_decorrelation")
     }
 
     fn is_random(&self) -> bool {

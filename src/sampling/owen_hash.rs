@@ -11,7 +11,8 @@ use super::{Coordinate, Decorrelation, Partner, SamplerTable, Seeded, Seeding};
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// Owen scrambling and a nested shuffle of the index, by hashing, for each pixel (Burley 2020;
+    /// Vegdahl 2021)
     pub struct OwenHash {
         /// Whether pixels differ.
         seeded: Seeded;
@@ -19,14 +20,6 @@ parameters! {
 }
 
 impl Decorrelation for OwenHash {
-    fn name(&self) -> &'static str {
-        "owen-hash"
-    }
-
-    fn description(&self) -> &'static str {
-        "Owen scrambling and a nested shuffle of the index, by hashing, for each pixel (Burley 2020; Vegdahl 2021)"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

@@ -13,7 +13,7 @@ use super::{Coordinate, Demand, Facts, SamplerTable, Seeded, Seeding, Sequence};
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// Sobol points Owen-scrambled and shuffled by hashing, as the crate sobol_burley (Burley 2020)
     pub struct OwenSobol {
         /// Whether pixels differ.
         seeded: Seeded;
@@ -25,14 +25,6 @@ const INDEX_KEY: u32 = 0x79c6_8e4a;
 const SEED_FACTOR: u32 = 0x9c8f_2d3b;
 
 impl Sequence for OwenSobol {
-    fn name(&self) -> &'static str {
-        "owen-sobol"
-    }
-
-    fn description(&self) -> &'static str {
-        "Sobol points Owen-scrambled and shuffled by hashing, as the crate sobol_burley (Burley 2020)"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

@@ -7,7 +7,8 @@ use super::{Coordinate, Facts, SamplerTable, Seeded, Seeding, Sequence};
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// independent numbers: a hash of pixel, sample, dimension and seed (Jarzynski & Olano 2020; Wang
+    /// 1997; Dufay 2017 Alg. 5.1)
     pub struct PixelHash {
         /// which hash; trig is a negative control
         hash: Hash = Hash::Pcg;
@@ -30,14 +31,6 @@ const WANG: u32 = 1;
 const TRIG: u32 = 2;
 
 impl Sequence for PixelHash {
-    fn name(&self) -> &'static str {
-        "pixel-hash"
-    }
-
-    fn description(&self) -> &'static str {
-        "independent numbers: a hash of pixel, sample, dimension and seed (Jarzynski & Olano 2020; Wang 1997; Dufay 2017 Alg. 5.1)"
-    }
-
     fn seeding(&self) -> Seeding {
         self.seeded.seeding
     }

@@ -9,7 +9,8 @@ use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// progressive multi-jittered (0,2) points, a random set in a random order for each pair of
+    /// dimensions (Christensen et al. 2018)
     pub struct Pmj02 {
         /// seed of the generator: which of the random sets
         set: u32 = 1, in 0..=65_535;
@@ -17,14 +18,6 @@ parameters! {
 }
 
 impl Sequence for Pmj02 {
-    fn name(&self) -> &'static str {
-        "pmj02"
-    }
-
-    fn description(&self) -> &'static str {
-        "progressive multi-jittered (0,2) points, a random set in a random order for each pair of dimensions (Christensen et al. 2018)"
-    }
-
     fn facts(&self) -> Facts {
         Facts {
             base_2: true,

@@ -14,7 +14,8 @@ use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// additive recurrence: powers of a generalised golden ratio (Roberts 2018), beyond 8 dimensions
+    /// square roots of primes (Richtmyer 1951)
     pub struct R2 {
         /// all dimensions that are drawn; up to 8 it is the d of the ratio's equation x^(d+1) = x + 1
         dimensions: u32 = 2, in 1..=256;
@@ -36,14 +37,6 @@ fn generalised_golden_ratio(dimensions: u32) -> f64 {
 }
 
 impl Sequence for R2 {
-    fn name(&self) -> &'static str {
-        "r2"
-    }
-
-    fn description(&self) -> &'static str {
-        "additive recurrence: powers of a generalised golden ratio (Roberts 2018), beyond 8 dimensions square roots of primes (Richtmyer 1951)"
-    }
-
     fn facts(&self) -> Facts {
         Facts {
             extensible: true,

@@ -10,19 +10,12 @@ use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// extensible rank-1 lattice, generating vector searched component by component (Sloan & Reztsov
+    /// 2002)
     pub struct Rank1Lattice {}
 }
 
 impl Sequence for Rank1Lattice {
-    fn name(&self) -> &'static str {
-        "rank1-lattice"
-    }
-
-    fn description(&self) -> &'static str {
-        "extensible rank-1 lattice, generating vector searched component by component (Sloan & Reztsov 2002)"
-    }
-
     fn facts(&self) -> Facts {
         Facts {
             dimensions: Some(super::lattice_search::DIMENSIONS as u32),

@@ -22,25 +22,25 @@ impl Default for SamplerRegistry {
     fn default() -> Self {
         Self {
             sequences: Registry::new(vec![
-                Registered::sequence::<PixelHash>(),
-                Registered::sequence::<VanDerCorput>(),
-                Registered::sequence::<Hammersley>(),
-                Registered::sequence::<Halton>(),
-                Registered::sequence::<Sobol>(),
-                Registered::sequence::<OwenSobol>(),
-                Registered::sequence::<Pmj02>(),
-                Registered::sequence::<Rank1Lattice>(),
-                Registered::sequence::<R2>(),
+                Registered::sequence::<PixelHash>("pixel-hash"),
+                Registered::sequence::<VanDerCorput>("van-der-corput"),
+                Registered::sequence::<Hammersley>("hammersley"),
+                Registered::sequence::<Halton>("halton"),
+                Registered::sequence::<Sobol>("sobol"),
+                Registered::sequence::<OwenSobol>("owen-sobol"),
+                Registered::sequence::<Pmj02>("pmj02"),
+                Registered::sequence::<Rank1Lattice>("rank1-lattice"),
+                Registered::sequence::<R2>("r2"),
             ]),
             decorrelations: Registry::new(vec![
-                Registered::decorrelation::<NoDecorrelation>(),
-                Registered::decorrelation::<DiscRotation>(),
-                Registered::decorrelation::<IndexOffset>(),
-                Registered::decorrelation::<CranleyPatterson>(),
-                Registered::decorrelation::<DigitalShift>(),
-                Registered::decorrelation::<OwenHash>(),
-                Registered::decorrelation::<MicroJitter>(),
-                Registered::decorrelation::<BlueNoise>(),
+                Registered::decorrelation::<NoDecorrelation>("none"),
+                Registered::decorrelation::<DiscRotation>("disc-rotation"),
+                Registered::decorrelation::<IndexOffset>("index-offset"),
+                Registered::decorrelation::<CranleyPatterson>("cranley-patterson"),
+                Registered::decorrelation::<DigitalShift>("digital-shift"),
+                Registered::decorrelation::<OwenHash>("owen-hash"),
+                Registered::decorrelation::<MicroJitter>("micro-jitter"),
+                Registered::decorrelation::<BlueNoise>("blue-noise"),
             ]),
         }
     }
@@ -89,7 +89,7 @@ impl SamplerRegistry {
         let (second, decorrelation) =
             configured(&self.decorrelations, "decorrelation", decorrelation)?;
         let partner = Partner {
-            name: first.name(),
+            name: &sequence.name,
             facts: first.facts(),
         };
         if let Some(reason) = second.refusal(&partner) {
@@ -143,7 +143,7 @@ impl SamplerRegistry {
         let ((first, second), [sequence, decorrelation]) = self.pair(sequence, decorrelation)?;
         let facts = first.facts();
         let partner = Partner {
-            name: first.name(),
+            name: &sequence.name,
             facts,
         };
         let pair = || pair(&sequence, &decorrelation);

@@ -26,13 +26,10 @@ pub struct Facts {
 
 /// A sequence of points: the struct of its parameters, one line in the registry.
 pub trait Sequence: Send + Sync {
-    /// Name as a user types it.
-    fn name(&self) -> &'static str;
-    /// One line: what it is and where it comes from.
-    fn description(&self) -> &'static str;
-    /// Module of the kernel, relative to the kernel folder: by default the file of that name.
-    fn kernel(&self) -> String {
-        format!("sampling/{}", self.name().replace('-', "_"))
+    /// Module of the kernel, relative to the kernel folder, if it is not that of the name: `sampling/owen_sobol`
+    /// for `owen-sobol`.
+    fn kernel(&self) -> Option<&'static str> {
+        None
     }
     /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
     fn sources(&self) -> &'static [(&'static str, &'static str)] {
@@ -58,12 +55,9 @@ pub trait Sequence: Send + Sync {
 }
 
 impl Registered<dyn Sequence> {
-    /// The sequence that `S` declares.
-    pub fn sequence<S: Sequence + Parameters + 'static>() -> Self {
-        let default = S::default();
-        Self::new::<S>(default.name(), default.description(), |params| {
-            Ok(Arc::new(S::from_params(params)?))
-        })
+    /// The sequence that `S` declares, under this name; the doc comment of `S` describes it.
+    pub fn sequence<S: Sequence + Parameters + 'static>(name: &str) -> Self {
+        Self::new::<S>(name, |params| Ok(Arc::new(S::from_params(params)?)))
     }
 }
 

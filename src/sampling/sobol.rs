@@ -13,7 +13,8 @@ const DIMENSIONS: u32 = 21_201;
 const BITS: usize = 32;
 
 parameters! {
-    /// The registry entry.
+    /// (t, s)-sequence in base 2, 21201 dimensions of Joe & Kuo's D6 direction numbers (2008), from
+    /// index 0
     pub struct Sobol {}
 }
 
@@ -33,14 +34,6 @@ pub(super) fn direction_numbers(dimensions: u32, bits: usize) -> Vec<u32> {
 }
 
 impl Sequence for Sobol {
-    fn name(&self) -> &'static str {
-        "sobol"
-    }
-
-    fn description(&self) -> &'static str {
-        "(t, s)-sequence in base 2, 21201 dimensions of Joe & Kuo's D6 direction numbers (2008), from index 0"
-    }
-
     fn facts(&self) -> Facts {
         Facts {
             base_2: true,

@@ -5,7 +5,7 @@ use super::{Coordinate, Facts, SamplerTable, Sequence};
 use crate::parameters;
 
 parameters! {
-    /// The registry entry.
+    /// radical inverse in one base, one-dimensional, from index 0 (van der Corput 1935)
     pub struct VanDerCorput {
         /// base of the digits
         base: u32 = 2, in 2..=1024;
@@ -13,14 +13,6 @@ parameters! {
 }
 
 impl Sequence for VanDerCorput {
-    fn name(&self) -> &'static str {
-        "van-der-corput"
-    }
-
-    fn description(&self) -> &'static str {
-        "radical inverse in one base, one-dimensional, from index 0 (van der Corput 1935)"
-    }
-
     fn facts(&self) -> Facts {
         Facts {
             base_2: self.base == 2,

@@ -2,21 +2,22 @@
 
 use super::StressError;
 use super::bench::{self, Expected};
-use super::case::{self, Random};
+use super::case::{self};
 use super::families::Family;
-use super::place::Place;
+use super::placement::Placement;
 use super::record::{Findings, Line, Record, Worst, line};
 use super::shapes::{Mesh, cube, sphere};
 use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite};
 use crate::accel::triangle::AnyTriangleTest;
 use crate::accel::{
-    AccelKind as _, BoxTest, Bvh, Counters, Hit, Intersection, NO_HIT, Query, Ray, RayBatch,
-    Traced, TriangleSoup,
+    BoxTest, BuildLog, BuiltBvh, BvhParameters, Counters, CpuTwin as _, Hit, Intersection, NO_HIT,
+    Query, Ray, RayBatch, Traced, TriangleSoup,
 };
 use crate::gpu::Gpu;
 use crate::integrator::offset::{TransformError, position_error};
 use crate::integrator::{OffsetRegistry, RayOffset, Stage};
 use crate::measure::record::{Key, axis};
+use crate::random::Pcg32;
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -131,13 +132,13 @@ impl Suite<'_> {
         progress("ray offsets");
         let mut records = Vec::new();
         let rays = OFFSET_RAYS * self.settings.rays;
-        let places = [1e-6, 1.0, 1e6].map(|scale| Place { scale, shift: 0.0 });
+        let places = [1e-6, 1.0, 1e6].map(|scale| Placement { scale, shift: 0.0 });
         for place in places.into_iter().chain([
-            Place {
+            Placement {
                 scale: 1.0,
                 shift: 1e4,
             },
-            Place::FAR,
+            Placement::FAR,
         ]) {
             for (name, mesh) in closed_meshes(&place) {
                 for &offset in OffsetRegistry::default().iter() {
@@ -185,12 +186,12 @@ impl Suite<'_> {
 
     /// Least time of each triangle test through a structure over a sphere.
     fn times(&self, accel: &str, bands: usize, count: usize) -> Result<Vec<Timed>, StressError> {
-        let scene = Arc::new(case::scene(sphere(bands, &Place::ORDINARY), None));
+        let scene = Arc::new(case::scene(sphere(bands, &Placement::ORDINARY), None));
         let registry = crate::accel::AccelRegistry::default();
         let Some(kind) = registry.get(accel) else {
             return Ok(Vec::new());
         };
-        let mut random = Random::with_stream(self.settings.seed, 79);
+        let mut random = Pcg32::with_stream(self.settings.seed, 79);
         let mut one = || Ray::new(random.in_cube().as_vec3(), random.direction().as_vec3());
         let rays: Vec<Ray> = (0..count).map(|_| one()).collect();
         let mut batches: Vec<(Timed, RayBatch)> = Vec::new();
@@ -257,7 +258,7 @@ pub fn smallest_sound_pad<'a>(tests: impl Iterator<Item = &'a Findings>) -> Opti
 
 /// A sphere, a box, the box with faces in the planes of the axes, where coordinates are 0, and that one
 /// with two faces nearly, but not quite, in such planes.
-fn closed_meshes(place: &Place) -> [(&'static str, Mesh); 4] {
+fn closed_meshes(place: &Placement) -> [(&'static str, Mesh); 4] {
     let at = |tilt: f32| -> Mesh {
         let mut mesh = cube(5, place);
         let low = crate::scene::Bounds::of(&mesh).min;
@@ -282,12 +283,9 @@ fn closed_meshes(place: &Place) -> [(&'static str, Mesh); 4] {
 /// closed mesh cannot be left: chains that do either begin anew.
 fn bounce(mesh: &Mesh, offset: RayOffset, seed: u64, rays: usize) -> Result<Findings, StressError> {
     let soup = TriangleSoup::new(&case::scene(mesh.clone(), None));
-    let built = Bvh.build(&soup, &bench::default_params(&Bvh), &mut Default::default());
-    let built = built.map_err(|e| StressError::Build(e.to_string()))?;
-    let Some(twin) = built.cpu_twin(&soup) else {
-        return Err(StressError::Build("it has no twin".to_owned()));
-    };
-    let mut random = Random::with_stream(seed, 80);
+    let built = BuiltBvh::build(&soup, &BvhParameters::default(), &mut BuildLog::default())?;
+    let twin = built.twin(&soup);
+    let mut random = Pcg32::with_stream(seed, 80);
     let bounds = crate::scene::Bounds::of(mesh);
     let [low, high] = [bounds.min, bounds.max].map(|v| v.as_dvec3());
     let (centre, reach) = (0.5 * (low + high), 0.1 * (high - low).max_element());
@@ -352,7 +350,7 @@ mod tests {
 
     #[test]
     fn without_an_offset_chains_meet_their_own_triangle_and_with_a_bound_they_do_not() {
-        for (name, mesh) in closed_meshes(&Place::ORDINARY) {
+        for (name, mesh) in closed_meshes(&Placement::ORDINARY) {
             let count = |offset: RayOffset| {
                 let found = bounce(&mesh, offset, 1, 3000).unwrap();
                 found.count("self-intersections/v1") + found.count("leaks/v1")

@@ -8,19 +8,14 @@ use crate::accel::{
 use crate::gpu::{GpuError, kernel_errors};
 use crate::integrator::Stage;
 use crate::params::Params;
-
-/// Every parameter at its default.
-pub fn default_params(kind: &dyn AccelKind) -> Params {
-    let value = |p: &crate::params::Parameter| (p.name.to_owned(), p.default.clone());
-    Params(kind.parameters().iter().map(value).collect())
-}
+use crate::random::Pcg32;
 
 /// Builds a structure with its default parameters and checks its invariants.
 ///
 /// # Errors
 /// What it refuses or violates, in words.
 pub fn build(kind: &dyn AccelKind, soup: &TriangleSoup) -> Result<Box<dyn BuiltAccel>, String> {
-    build_with(kind, &default_params(kind), soup)
+    build_with(kind, &Params::default(), soup)
 }
 
 /// The same with these parameters.
@@ -105,7 +100,7 @@ pub fn repeated(rays: &[Ray], count: usize) -> Vec<Ray> {
 pub fn ordinary_rays(case: &Case, seed: u64, count: usize) -> Vec<Ray> {
     let bounds = case.scene.bounds();
     let (low, size) = (bounds.min.as_dvec3(), (bounds.max - bounds.min).as_dvec3());
-    let mut random = super::case::Random::with_stream(seed, 0x0c0d);
+    let mut random = Pcg32::with_stream(seed, 0x0c0d);
     let mut point = || (low + size * (0.5 * (random.in_cube() + glam::DVec3::ONE))).as_vec3();
     (0..count)
         .map(|_| super::case::towards(point(), point()))

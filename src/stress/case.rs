@@ -1,12 +1,12 @@
 //! One scene with rays that are hard for it.
 
-use super::place::Place;
-use super::shapes::Mesh;
+use super::placement::Placement;
+use super::shapes::{Mesh, cube, sphere};
 use crate::accel::Ray;
 use crate::geometry::Triangle;
 use crate::random::Pcg32;
 use crate::scene::{Assembly, MAX_COORDINATE, Material, SceneData};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use std::fmt;
 
 /// What the right answers are.
@@ -23,8 +23,24 @@ pub enum Truth {
     Miss,
 }
 
-/// A mesh at a place.
-pub type MakeMesh = fn(&Place) -> Mesh;
+/// How fine the meshes are on which most rays are tried: a closed sphere and a closed box.
+#[derive(Clone, Copy)]
+pub struct Meshes {
+    /// Bands of the sphere.
+    pub bands: usize,
+    /// Cells along an edge of the box.
+    pub cells: usize,
+}
+
+impl Meshes {
+    /// Both with their names, at a place.
+    pub fn at(self, place: &Placement) -> [(&'static str, Mesh); 2] {
+        [
+            ("sphere", sphere(self.bands, place)),
+            ("box", cube(self.cells, place)),
+        ]
+    }
+}
 
 /// A scene with rays.
 pub struct Case {
@@ -33,7 +49,7 @@ pub struct Case {
     /// What it is within the family; unique there.
     pub label: String,
     /// Where the mesh stands.
-    pub place: Place,
+    pub place: Placement,
     /// The triangles in world space, and what they are copies of.
     pub scene: SceneData,
     /// The rays.
@@ -55,89 +71,14 @@ pub struct Maker {
     pub cases: Vec<Case>,
 }
 
-/// Random numbers, points and directions.
-pub struct Random(Pcg32);
-
-impl Random {
-    fn new(seed: u64, family: &str, label: &str, what: u64) -> Self {
-        let bytes = family.bytes().chain([0]).chain(label.bytes());
-        // FNV-1a: the same on every machine.
-        let hash = bytes.fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
-        Self(Pcg32::with_stream(seed ^ hash, what))
-    }
-
-    /// A stream that belongs to nothing but its number.
-    pub fn with_stream(seed: u64, stream: u64) -> Self {
-        Self(Pcg32::with_stream(seed, stream))
-    }
-
-    /// 32 random bits.
-    pub fn bits(&mut self) -> u32 {
-        self.0.next_u32()
-    }
-
-    /// An index below `n`.
-    pub fn below(&mut self, n: usize) -> usize {
-        self.0.below(n.max(1))
-    }
-
-    /// One of them.
-    pub fn one_of<T: Copy>(&mut self, of: &[T]) -> T {
-        of[self.below(of.len())]
-    }
-
-    /// A number in [0, 1).
-    pub fn unit(&mut self) -> f64 {
-        self.0.uniform()
-    }
-
-    /// A number in [−1, 1).
-    pub fn signed(&mut self) -> f64 {
-        2.0 * self.unit() - 1.0
-    }
-
-    /// A point of the cube [−1, 1)³.
-    pub fn in_cube(&mut self) -> DVec3 {
-        DVec3::new(self.signed(), self.signed(), self.signed())
-    }
-
-    /// A unit vector.
-    pub fn direction(&mut self) -> DVec3 {
-        let z = self.signed();
-        let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
-        let radius = (1.0 - z * z).max(0.0).sqrt();
-        DVec3::new(radius * cos, radius * sin, z)
-    }
-
-    /// A point of a triangle's plane, inside it, rounded.
-    pub fn on(&mut self, triangle: &Triangle) -> Vec3 {
-        let root = self.unit().sqrt();
-        let v = self.unit();
-        let [a, b, c] = triangle.vertices.map(|p| p.as_dvec3());
-        (a + (b - a) * (root * (1.0 - v)) + (c - a) * (root * v)).as_vec3()
-    }
-
-    /// A point of an edge, as near as f32 comes.
-    pub fn on_edge(&mut self, triangle: &Triangle) -> Vec3 {
-        let k = self.below(3);
-        let [a, b] = [k, (k + 1) % 3].map(|k| triangle.vertices[k].as_dvec3());
-        // Middles are points of f32 more often than others.
-        let share = if self.below(4) == 0 { 0.5 } else { self.unit() };
-        (a + (b - a) * share).as_vec3()
-    }
-
-    /// A corner of a triangle.
-    pub fn vertex(&mut self, triangle: &Triangle) -> Vec3 {
-        triangle.vertices[self.below(3)]
-    }
-
-    /// A point of a random triangle, rounded.
-    pub fn on_mesh(&mut self, mesh: &[Triangle]) -> Vec3 {
-        let triangle = self.one_of(mesh);
-        self.on(&triangle)
-    }
+/// A stream of random numbers that belongs to a case and to what is made of it.
+fn stream(seed: u64, family: &str, label: &str, what: u64) -> Pcg32 {
+    let bytes = family.bytes().chain([0]).chain(label.bytes());
+    // FNV-1a: the same on every machine.
+    let hash = bytes.fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    Pcg32::with_stream(seed ^ hash, what)
 }
 
 /// A ray through a point; its direction is the rounded difference.
@@ -157,21 +98,21 @@ impl Maker {
     }
 
     /// The rungs of the ladder.
-    pub fn places(&self) -> Vec<Place> {
-        Place::ladder(self.quick)
+    pub fn places(&self) -> Vec<Placement> {
+        Placement::ladder(self.quick)
     }
 
     /// Adds a case: a mesh, and rays for it, each from random numbers of its own.
     pub fn add(
         &mut self,
         label: impl Into<String>,
-        place: Place,
+        place: Placement,
         truth: Truth,
-        mesh: impl FnOnce(&mut Random) -> Mesh,
-        rays: impl FnOnce(&[Triangle], &mut Random, usize) -> Vec<Ray>,
+        mesh: impl FnOnce(&mut Pcg32) -> Mesh,
+        rays: impl FnOnce(&[Triangle], &mut Pcg32, usize) -> Vec<Ray>,
     ) {
         let label = label.into();
-        let random = |what| Random::new(self.seed, self.family, &label, what);
+        let random = |what| stream(self.seed, self.family, &label, what);
         let triangles = mesh(&mut random(0));
         let rays = rays(&triangles, &mut random(1), self.rays);
         self.push(label, place, truth, scene(triangles, None), rays);
@@ -181,10 +122,10 @@ impl Maker {
     pub fn add_each(
         &mut self,
         label: impl Into<String>,
-        place: Place,
+        place: Placement,
         truth: Truth,
-        mesh: impl FnOnce(&mut Random) -> Mesh,
-        mut one: impl FnMut(&[Triangle], &mut Random) -> Ray,
+        mesh: impl FnOnce(&mut Pcg32) -> Mesh,
+        mut one: impl FnMut(&[Triangle], &mut Pcg32) -> Ray,
     ) {
         self.add(label, place, truth, mesh, |mesh, random, count| {
             (0..count).map(|_| one(mesh, random)).collect()
@@ -194,18 +135,21 @@ impl Maker {
     /// Adds each of these meshes at each place.
     pub fn add_on_every_rung(
         &mut self,
-        meshes: [(&str, MakeMesh); 2],
+        meshes: Meshes,
         suffix: &str,
-        truth: fn(&Place) -> Truth,
-        one: fn(&Place, &[Triangle], &mut Random) -> Ray,
+        truth: fn(&Placement) -> Truth,
+        one: fn(&Placement, &[Triangle], &mut Pcg32) -> Ray,
     ) {
         for place in self.places() {
-            for (name, mesh) in meshes {
+            for (name, mesh) in meshes.at(&place) {
                 let label = format!("{name}{suffix}, {place}");
-                let mesh = |_: &mut Random| mesh(&place);
-                self.add_each(label, place, truth(&place), mesh, |mesh, random| {
-                    one(&place, mesh, random)
-                });
+                self.add_each(
+                    label,
+                    place,
+                    truth(&place),
+                    |_| mesh,
+                    |mesh, random| one(&place, mesh, random),
+                );
             }
         }
     }
@@ -214,11 +158,11 @@ impl Maker {
     pub fn add_placed(
         &mut self,
         label: impl Into<String>,
-        assembly: impl FnOnce(&mut Random) -> Option<Assembly>,
-        rays: impl FnOnce(&Assembly, &mut Random, usize) -> Vec<Ray>,
+        assembly: impl FnOnce(&mut Pcg32) -> Option<Assembly>,
+        rays: impl FnOnce(&Assembly, &mut Pcg32, usize) -> Vec<Ray>,
     ) {
         let label = label.into();
-        let random = |what| Random::new(self.seed, self.family, &label, what);
+        let random = |what| stream(self.seed, self.family, &label, what);
         let Some(assembly) = assembly(&mut random(0)) else {
             return;
         };
@@ -226,13 +170,13 @@ impl Maker {
         let copies = assembly.instances().iter().flat_map(|i| assembly.copy(i));
         let triangles = copies.collect();
         let scene = scene(triangles, Some(assembly));
-        self.push(label, Place::ORDINARY, Truth::Hit, scene, rays);
+        self.push(label, Placement::ORDINARY, Truth::Hit, scene, rays);
     }
 
     fn push(
         &mut self,
         label: String,
-        place: Place,
+        place: Placement,
         truth: Truth,
         scene: SceneData,
         rays: Vec<Ray>,
@@ -349,10 +293,10 @@ mod tests {
 
     #[test]
     fn rays_and_addresses_read_back_to_the_same_bits() {
-        let mut random = Random::with_stream(5, 0);
+        let mut random = Pcg32::with_stream(5, 0);
         for _ in 0..2000 {
             let mut float = || loop {
-                let x = f32::from_bits(random.bits());
+                let x = f32::from_bits(random.next_u32());
                 if !x.is_nan() {
                     return x;
                 }

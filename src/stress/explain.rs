@@ -156,7 +156,7 @@ mod tests {
                 let name = kind.name();
                 assert_eq!(nodes, counters.nodes, "{name}");
                 assert_eq!(triangles, counters.triangle_tests, "{name}");
-                let params = bench::default_params(kind);
+                let params = Params::default();
                 let (text, equal) = explain(&case.scene, &soup, kind, &params, ray).unwrap();
                 assert!(equal && text.contains("exactly hit"), "{name}: {text}");
             }
@@ -167,23 +167,20 @@ mod tests {
     #[test]
     fn an_address_leads_back_to_its_scene_and_an_unknown_one_says_what_is_missing() {
         let cases = Family::named("needles").unwrap().cases(4, true, 5);
-        for case in &cases {
-            let address = case::Address {
-                family: "needles".into(),
-                label: case.label.clone(),
-                seed: 4,
-            };
-            assert_eq!(scene_of(&address).unwrap().triangles, case.scene.triangles);
-        }
-        let wrong = |family: &str, label: &str| {
-            let address = case::Address {
+        let scene_of = |family: &str, label: &str| {
+            scene_of(&case::Address {
                 family: family.into(),
                 label: label.into(),
-                seed: 1,
-            };
-            scene_of(&address).unwrap_err()
+                seed: 4,
+            })
         };
-        assert!(wrong("nails", "x").contains("nails"));
-        assert!(wrong("needles", "x").contains("`x`"));
+        for case in &cases {
+            let scene = scene_of("needles", &case.label).unwrap();
+            assert_eq!(scene.triangles, case.scene.triangles);
+        }
+        for (family, missing) in [("nails", "nails"), ("needles", "`x`")] {
+            let error = scene_of(family, "x").unwrap_err();
+            assert!(error.contains(missing), "{error}");
+        }
     }
 }

@@ -11,7 +11,7 @@ pub mod case;
 pub mod explain;
 pub mod families;
 pub mod numerics;
-pub mod place;
+pub mod placement;
 pub mod record;
 pub mod report;
 pub mod shapes;
@@ -22,7 +22,7 @@ pub mod tally;
 pub mod targets;
 
 use crate::accel::triangle::AnyTriangleTest;
-use crate::accel::{AccelRegistry, Intersection, TriangleRegistry};
+use crate::accel::{AccelError, AccelRegistry, Intersection, TriangleRegistry};
 use crate::gpu::capture as capture_environment;
 use crate::gpu::{Gpu, GpuError, probe_arithmetic};
 use crate::measure::record::Key;
@@ -111,7 +111,7 @@ pub enum StressError {
     Numerics(#[from] numerics::NumericsError),
     /// A tree that the suite itself needs.
     #[error("a tree of the suite is not built: {0}")]
-    Build(String),
+    Build(#[from] AccelError),
     /// A name that nothing has.
     #[error("unknown {what} `{name}`; there are: {known}")]
     Unknown {

@@ -1,7 +1,7 @@
 //! Records of the suite: one JSON line per cell, shot series, target and so on, in `stress.jsonl`.
 
 use super::numerics::Gauge;
-use super::place::Place;
+use super::placement::Placement;
 use super::tally::Errors;
 use crate::gpu::Environment;
 use crate::measure::figure::figure;
@@ -109,7 +109,7 @@ pub struct Rung {
     /// Label of the case.
     pub label: String,
     /// Where the mesh stands.
-    pub place: Place,
+    pub place: Placement,
     /// Rays.
     pub rays: usize,
     /// Misses where something is hit exactly.

@@ -1,7 +1,8 @@
 //! Meshes of the suite, modelled about two units around the origin in f64 and rounded once.
 
-use super::place::Place;
+use super::placement::Placement;
 use crate::geometry::Triangle;
+use crate::random::Pcg32;
 use glam::{DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
 
@@ -12,7 +13,7 @@ pub type Mesh = Vec<Triangle>;
 pub const RADIUS: f64 = 2.0;
 
 /// A closed grid of longitude and latitude, `bands` × 2 `bands`; the polar bands are fans.
-pub fn sphere(bands: usize, place: &Place) -> Mesh {
+pub fn sphere(bands: usize, place: &Placement) -> Mesh {
     let sectors = 2 * bands;
     let at = |band: usize, sector: usize| {
         // Both poles and the seam are the same point to the bit however they are reached.
@@ -38,14 +39,14 @@ pub fn sphere(bands: usize, place: &Place) -> Mesh {
 }
 
 /// A level square of `cells` × `cells` quadrilaterals, `side` units wide, through the origin.
-pub fn plane(cells: usize, side: f64, place: &Place) -> Mesh {
+pub fn plane(cells: usize, side: f64, place: &Placement) -> Mesh {
     grid(cells, place, |u, v| {
         DVec3::new(side * (u - 0.5), 0.0, side * (v - 0.5))
     })
 }
 
 /// A closed box, each face `cells` × `cells` quadrilaterals.
-pub fn cube(cells: usize, place: &Place) -> Mesh {
+pub fn cube(cells: usize, place: &Placement) -> Mesh {
     let face = |axis: usize, end: f64| {
         move |u: f64, v: f64| {
             let mut p = DVec3::ZERO;
@@ -61,7 +62,7 @@ pub fn cube(cells: usize, place: &Place) -> Mesh {
         .collect()
 }
 
-fn grid(cells: usize, place: &Place, at: impl Fn(f64, f64) -> DVec3) -> Mesh {
+fn grid(cells: usize, place: &Placement, at: impl Fn(f64, f64) -> DVec3) -> Mesh {
     let corner =
         |i: usize, k: usize| place.point(at(i as f64 / cells as f64, k as f64 / cells as f64));
     let mut mesh = Mesh::with_capacity(2 * cells * cells);
@@ -75,8 +76,38 @@ fn grid(cells: usize, place: &Place, at: impl Fn(f64, f64) -> DVec3) -> Mesh {
     mesh
 }
 
+/// A point of a triangle's plane, inside it, rounded.
+pub fn on(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
+    let root = random.uniform().sqrt();
+    let v = random.uniform();
+    let [a, b, c] = triangle.vertices.map(|p| p.as_dvec3());
+    (a + (b - a) * (root * (1.0 - v)) + (c - a) * (root * v)).as_vec3()
+}
+
+/// A point of an edge, as near as f32 comes.
+pub fn on_edge(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
+    let k = random.below(3);
+    let [a, b] = [k, (k + 1) % 3].map(|k| triangle.vertices[k].as_dvec3());
+    // Middles are points of f32 more often than others.
+    let share = match random.below(4) {
+        0 => 0.5,
+        _ => random.uniform(),
+    };
+    (a + (b - a) * share).as_vec3()
+}
+
+/// A corner of a triangle.
+pub fn vertex(triangle: &Triangle, random: &mut Pcg32) -> Vec3 {
+    random.one_of(&triangle.vertices)
+}
+
+/// A point of a random triangle, rounded.
+pub fn on_mesh(mesh: &[Triangle], random: &mut Pcg32) -> Vec3 {
+    on(&random.one_of(mesh), random)
+}
+
 /// A model moved and scaled so that it has the sphere's size, its holes closed by fans.
-pub fn model(triangles: &[Triangle], place: &Place) -> Mesh {
+pub fn model(triangles: &[Triangle], place: &Placement) -> Mesh {
     let points = || triangles.iter().flat_map(|t| t.vertices);
     let low = points().fold(Vec3::INFINITY, Vec3::min).as_dvec3();
     let high = points().fold(Vec3::NEG_INFINITY, Vec3::max).as_dvec3();
@@ -148,21 +179,21 @@ mod tests {
 
     #[test]
     fn sphere_and_box_are_closed_wherever_they_stand_and_the_plane_is_not() {
-        for place in Place::ladder(false) {
+        for place in Placement::ladder(false) {
             assert!(is_closed(&sphere(8, &place)), "{place}");
             assert!(is_closed(&cube(3, &place)), "{place}");
         }
-        assert!(!is_closed(&plane(4, 2.0, &Place::ORDINARY)));
-        assert_eq!(sphere(8, &Place::ORDINARY).len(), 2 * 16 * 7);
+        assert!(!is_closed(&plane(4, 2.0, &Placement::ORDINARY)));
+        assert_eq!(sphere(8, &Placement::ORDINARY).len(), 2 * 16 * 7);
     }
 
     #[test]
     fn a_model_with_holes_is_closed_by_fans() {
-        let mut mesh = sphere(8, &Place::ORDINARY);
+        let mut mesh = sphere(8, &Placement::ORDINARY);
         for hole in [3, 40, 41, 42, 100] {
             mesh.remove(hole);
         }
         assert!(!is_closed(&mesh));
-        assert!(is_closed(&model(&mesh, &Place::FAR)));
+        assert!(is_closed(&model(&mesh, &Placement::FAR)));
     }
 }

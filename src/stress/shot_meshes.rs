@@ -1,11 +1,12 @@
 //! The closed meshes that shots are aimed at, with points inside them to shoot from.
 
-use super::case::{Random, towards};
-use super::place::Place;
-use super::shapes::{self, Mesh, RADIUS};
+use super::case::towards;
+use super::placement::Placement;
+use super::shapes::{self, Mesh, RADIUS, on, on_edge, vertex};
 use crate::accel::Ray;
 use crate::geometry::Triangle;
 use crate::oracle::{Side, exact_truths};
+use crate::random::Pcg32;
 use crate::scene::{self, Bounds};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -34,7 +35,7 @@ const LEAST_ORIGINS: usize = 8;
 pub struct ShotMesh {
     name: String,
     /// Where it stands.
-    pub place: Place,
+    pub place: Placement,
     /// Its triangles.
     pub mesh: Mesh,
     /// What is aimed at: a plane ends, and past its border lies nothing.
@@ -47,8 +48,8 @@ impl ShotMesh {
     ///
     /// # Errors
     /// A model that cannot be read, or that has hardly an inside; in words.
-    pub fn named(name: &str, place: Place, seed: u64) -> Result<Self, String> {
-        let mut random = Random::with_stream(seed, 77);
+    pub fn named(name: &str, place: Placement, seed: u64) -> Result<Self, String> {
+        let mut random = Pcg32::with_stream(seed, 77);
         let mut inside = |reach: f64, above: f64| -> Vec<Vec3> {
             (0..512)
                 .map(|_| place.point(reach * random.in_cube() + above * glam::DVec3::Y))
@@ -80,8 +81,10 @@ impl ShotMesh {
     /// # Errors
     /// As for [`ShotMesh::named`], or the label is none.
     pub fn labelled(label: &str, seed: u64) -> Result<Self, String> {
-        let place = |place: &Place| label.ends_with(&format!(", {place}"));
-        let place = [Place::ORDINARY, Place::FAR].into_iter().find(place);
+        let place = |place: &Placement| label.ends_with(&format!(", {place}"));
+        let place = [Placement::ORDINARY, Placement::FAR]
+            .into_iter()
+            .find(place);
         let split = place.zip(label.rsplit_once(", "));
         let (place, (name, _)) =
             split.ok_or_else(|| format!("`{label}` is no mesh and place of shots"))?;
@@ -109,7 +112,7 @@ impl ShotMesh {
     pub fn shots(&self, aim: usize, seed: u64, stream: u64, count: usize) -> Vec<Ray> {
         const BLOCK: usize = 4096;
         let block = |block: usize| {
-            let mut random = Random::with_stream(seed, stream << 16 | block as u64);
+            let mut random = Pcg32::with_stream(seed, stream << 16 | block as u64);
             let rays = BLOCK.min(count - block * BLOCK);
             (0..rays)
                 .map(|_| self.shot(aim, &mut random))
@@ -121,24 +124,24 @@ impl ShotMesh {
             .collect()
     }
 
-    fn shot(&self, aim: usize, random: &mut Random) -> Ray {
+    fn shot(&self, aim: usize, random: &mut Pcg32) -> Ray {
         let origin = random.one_of(&self.origins);
         let triangle = random.one_of(&self.aims);
         match aim {
             // Rays from above go down, not anywhere.
-            0 if self.name == PLANE => towards(origin, random.on(&triangle)),
+            0 if self.name == PLANE => towards(origin, on(&triangle, random)),
             0 => Ray::new(origin, random.direction().as_vec3()),
-            1 => towards(origin, random.vertex(&triangle)),
-            _ => towards(origin, random.on_edge(&triangle)),
+            1 => towards(origin, vertex(&triangle, random)),
+            _ => towards(origin, on_edge(&triangle, random)),
         }
     }
 }
 
 /// A model with its holes closed, and points inside it.
-fn model(path: &str, place: Place, seed: u64) -> Result<(Mesh, Vec<Vec3>), String> {
+fn model(path: &str, place: Placement, seed: u64) -> Result<(Mesh, Vec<Vec3>), String> {
     let scene = scene::named(path).map_err(|e| e.to_string())?;
     let mesh = shapes::model(&scene.triangles, &place);
-    let mut random = Random::with_stream(seed, 78);
+    let mut random = Pcg32::with_stream(seed, 78);
     let tried: Vec<Ray> = (0..TRIED)
         .map(|_| {
             let origin = place.point(0.7 * RADIUS * random.in_cube());
@@ -186,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_mesh_is_found_again_by_its_label() {
-        for place in [Place::ORDINARY, Place::FAR] {
+        for place in [Placement::ORDINARY, Placement::FAR] {
             for name in [SPHERE, PLANE] {
                 let mesh = ShotMesh::named(name, place, 3).unwrap();
                 let again = ShotMesh::labelled(&mesh.label(), 3).unwrap();
@@ -201,8 +204,8 @@ mod tests {
 
     #[test]
     fn points_inside_a_closed_mesh_are_told_from_points_outside() {
-        let mesh = shapes::sphere(8, &Place::ORDINARY);
-        let mut random = Random::with_stream(1, 0);
+        let mesh = shapes::sphere(8, &Placement::ORDINARY);
+        let mut random = Pcg32::with_stream(1, 0);
         let mut rays = |radius: f64| -> Vec<Ray> {
             (0..40)
                 .map(|_| {

@@ -2,7 +2,7 @@
 //! every miss is a crack.
 
 use super::bench;
-use super::place::Place;
+use super::placement::Placement;
 use super::record::{Findings, Line, Record, Worst, line, skipped};
 use super::shot_meshes::{AIMS, FAMILY, PLANE, SPHERE, ShotMesh};
 use super::suite::{BRUTE_FORCE, Kind, PLAIN, Progress, Suite, key};
@@ -37,12 +37,12 @@ impl Suite<'_> {
                 "none was given",
             ));
         }
-        for place in [Place::ORDINARY, Place::FAR] {
+        for place in [Placement::ORDINARY, Placement::FAR] {
             for name in [SPHERE, PLANE, &model]
                 .into_iter()
                 .filter(|name| !name.is_empty())
             {
-                if self.settings.quick && name == model && place != Place::ORDINARY {
+                if self.settings.quick && name == model && place != Placement::ORDINARY {
                     continue;
                 }
                 match ShotMesh::named(name, place, self.settings.seed) {

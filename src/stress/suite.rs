@@ -3,7 +3,7 @@
 use super::bench::{self, Expected};
 use super::case::{Address, Case, Truth, ray_text};
 use super::families::{FAMILIES, Family};
-use super::place::Place;
+use super::placement::Placement;
 use super::record::{Findings, Line, Record, Rung, line, skipped};
 use super::tally::{CaseJudge, Outcome, Tally};
 use super::{StressError, StressOptions};
@@ -169,7 +169,7 @@ impl Suite<'_> {
     fn takes(&self, case: &Case, test: AnyTriangleTest, kind: Kind) -> bool {
         let is_default = Some(&test) == self.tests.first();
         let stands_for_all = kind.name() == PLAIN || kind.name() == BRUTE_FORCE;
-        let coarse = Place::ladder(true).contains(&case.place);
+        let coarse = Placement::ladder(true).contains(&case.place);
         is_default || stands_for_all || (coarse && !self.settings.quick)
     }
 

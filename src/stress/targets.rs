@@ -1,7 +1,7 @@
 //! What the default configuration promises, and whether it holds here.
 
 use super::axes::smallest_sound_pad;
-use super::place::Place;
+use super::placement::Placement;
 use super::record::{Findings, Line, Record, SuiteRecord, TargetRecord};
 use crate::accel::BoxTest;
 use crate::integrator::RayOffset;
@@ -93,17 +93,17 @@ fn shot_targets(shots: &[Recorded<Findings>], wanted: usize) -> Vec<TargetRecord
         let [misses, rays] = counts(s);
         format!("{}: {misses} of {rays}", what.join(", "))
     };
-    let at = |place: Place| {
+    let at = |place: Placement| {
         let place = place.to_string();
         (shots.iter()).filter(move |s| s.key.label(axis::PLACE) == place)
     };
     let ordinary = |random: bool| {
-        at(Place::ORDINARY)
+        at(Placement::ORDINARY)
             .filter(move |s| (s.key.label(axis::AIM) == "random") == random)
             .map(|s| (counts(s)[0] as f64, name(s)))
     };
     let share = |[misses, rays]: [usize; 2]| misses as f64 / rays.max(1) as f64;
-    let far = at(Place::FAR).map(|s| (share(counts(s)), name(s)));
+    let far = at(Placement::FAR).map(|s| (share(counts(s)), name(s)));
     let misses = format!("watertight misses of {wanted} rays per mesh, ordinary scale");
     let aimed = format!("misses at vertices and edges of {wanted} shots");
     vec![
@@ -245,7 +245,7 @@ mod tests {
         assert_eq!(bad, Some((Verdict::Fail, "acos".into())));
     }
 
-    fn shot(misses: usize, place: Place, aim: &str) -> Line {
+    fn shot(misses: usize, place: Placement, aim: &str) -> Line {
         let found = Findings::of([("rays/v1", 1000.0), ("misses/v1", misses as f64)]);
         let key = Key::default().with(axis::PLACE, place).with(axis::AIM, aim);
         line(key, Record::Shots(found))
@@ -260,9 +260,9 @@ mod tests {
         };
         let shots = |misses: [usize; 3]| {
             [
-                shot(misses[0], Place::ORDINARY, "random"),
-                shot(misses[1], Place::ORDINARY, "edges"),
-                shot(misses[2], Place::FAR, "random"),
+                shot(misses[0], Placement::ORDINARY, "random"),
+                shot(misses[1], Placement::ORDINARY, "edges"),
+                shot(misses[2], Placement::FAR, "random"),
             ]
         };
         assert_eq!(verdicts(&shots([0; 3])), [Verdict::Pass; 3]);

@@ -5,19 +5,11 @@ use raystone::sampling::hash::dimension_number;
 use raystone::sampling::{Coordinate, Decorrelation, Facts, Partner, SamplerTable, Sequence};
 
 parameters! {
-    /// The registry entry of the sequence.
+    /// multiples of the golden ratio (an example)
     pub struct Weyl {}
 }
 
 impl Sequence for Weyl {
-    fn name(&self) -> &'static str {
-        "weyl"
-    }
-
-    fn description(&self) -> &'static str {
-        "multiples of the golden ratio (an example)"
-    }
-
     fn sources(&self) -> &'static [(&'static str, &'static str)] {
         &[("sampling/weyl", include_str!("kernels/sampling/weyl.wesl"))]
     }
@@ -37,19 +29,11 @@ impl Sequence for Weyl {
 }
 
 parameters! {
-    /// The registry entry of the decorrelation.
+    /// a random shift for each pixel and dimension (an example)
     pub struct Rotation {}
 }
 
 impl Decorrelation for Rotation {
-    fn name(&self) -> &'static str {
-        "rotation"
-    }
-
-    fn description(&self) -> &'static str {
-        "a random shift for each pixel and dimension (an example)"
-    }
-
     fn sources(&self) -> &'static [(&'static str, &'static str)] {
         &[(
             "sampling/rotation",

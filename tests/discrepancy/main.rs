@@ -151,6 +151,9 @@ fn bad_input_ends_with_2_and_names_the_line_or_the_nearest_name() {
         ("0.5 nan\n", ["standard input:1", "NaN"]),
         ("0.5 0.5\n\n0.5\n", ["standard input:3", "have 2"]),
         ("0.5 abc\n", ["standard input:1", "`abc`"]),
+        ("\n\n0.5 -1e-9\n", ["standard input:3", "-0.000000001"]),
+        ("inf 0\n", ["standard input:1", "inf"]),
+        ("# nothing\n\n", ["standard input", "at least one point"]),
         ("", ["standard input", "at least one point"]),
     ] {
         let message = refusal(&[], input);

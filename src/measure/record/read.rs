@@ -191,17 +191,6 @@ mod tests {
     }
 
     #[test]
-    fn another_schema_is_named_in_the_error() {
-        let error = read(&GOOD.replace("raystone/2", "raystone/7"))
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains("raystone/7") && error.contains("raystone/2") && error.contains(":1"),
-            "{error}"
-        );
-    }
-
-    #[test]
     fn a_missing_and_an_empty_file_are_errors() {
         assert!(matches!(read(""), Err(RecordError::NoRecords { .. })));
         assert!(matches!(

@@ -1,27 +1,24 @@
 //! Closed meshes: from inside, every miss is a crack.
 
-use super::super::case::{MakeMesh, Maker, Random, Truth, towards};
-use super::super::place::Place;
-use super::super::shapes::{RADIUS, cube, sphere};
+use super::super::case::{Maker, Meshes, Truth, towards};
+use super::super::placement::Placement;
+use super::super::shapes::{RADIUS, on_edge, vertex};
 use crate::accel::Ray;
+use crate::random::Pcg32;
 use glam::{DVec3, Vec3};
 
-/// Bands of the sphere: 528 triangles.
-const BANDS: usize = 12;
-/// Cells along an edge of the box: 300 triangles.
-const CELLS: usize = 5;
+/// 528 and 300 triangles.
+const MESHES: Meshes = Meshes {
+    bands: 12,
+    cells: 5,
+};
 /// Bounces of a chain.
 const BOUNCES: usize = 100;
 /// How far inside the analytic surface a chain turns, as a fraction: facets lie within.
 const INSIDE: f64 = 0.98;
 
-const MESHES: [(&str, MakeMesh); 2] = [
-    ("sphere", |place| sphere(BANDS, place)),
-    ("box", |place| cube(CELLS, place)),
-];
-
 /// A mesh that rounding has crushed is as closed as before, but has no inside.
-pub fn truth(place: &Place) -> Truth {
+pub fn truth(place: &Placement) -> Truth {
     match place.keeps_shape() {
         true => Truth::Closed,
         false => Truth::Exact,
@@ -29,12 +26,12 @@ pub fn truth(place: &Place) -> Truth {
 }
 
 /// A point well inside the sphere and the box.
-pub fn inside(random: &mut Random, place: &Place) -> Vec3 {
+pub fn inside(random: &mut Pcg32, place: &Placement) -> Vec3 {
     place.point(0.45 * RADIUS * random.in_cube())
 }
 
 /// A point around the meshes.
-fn outside(random: &mut Random, place: &Place) -> Vec3 {
+fn outside(random: &mut Pcg32, place: &Placement) -> Vec3 {
     place.point(3.0 * RADIUS * random.direction())
 }
 
@@ -45,29 +42,29 @@ pub fn watertight(maker: &mut Maker) {
 }
 
 pub fn vertices(maker: &mut Maker) {
-    let exact = |_: &Place| Truth::Exact;
+    let exact = |_: &Placement| Truth::Exact;
     maker.add_on_every_rung(MESHES, "", truth, |place, mesh, random| {
         let triangle = random.one_of(mesh);
-        let vertex = random.vertex(&triangle);
+        let vertex = vertex(&triangle, random);
         towards(inside(random, place), vertex)
     });
     maker.add_on_every_rung(MESHES, " from outside", exact, |place, mesh, random| {
         let triangle = random.one_of(mesh);
-        let vertex = random.vertex(&triangle);
+        let vertex = vertex(&triangle, random);
         towards(outside(random, place), vertex)
     });
 }
 
 pub fn edges(maker: &mut Maker) {
-    let exact = |_: &Place| Truth::Exact;
+    let exact = |_: &Placement| Truth::Exact;
     maker.add_on_every_rung(MESHES, "", truth, |place, mesh, random| {
         let triangle = random.one_of(mesh);
         let from = inside(random, place);
-        towards(from, random.on_edge(&triangle))
+        towards(from, on_edge(&triangle, random))
     });
     maker.add_on_every_rung(MESHES, " from outside", exact, |place, mesh, random| {
         let triangle = random.one_of(mesh);
-        let target = random.on_edge(&triangle);
+        let target = on_edge(&triangle, random);
         towards(outside(random, place), target)
     });
 }
@@ -107,13 +104,13 @@ fn bounce_in_sphere(p: DVec3, d: DVec3) -> (DVec3, DVec3) {
 pub fn mirror_chains(maker: &mut Maker) {
     let bounces: [Bounce; 2] = [bounce_in_sphere, bounce_in_box];
     for place in maker.places() {
-        for ((name, mesh), bounce) in MESHES.into_iter().zip(bounces) {
+        for ((name, mesh), bounce) in MESHES.at(&place).into_iter().zip(bounces) {
             let label = format!("{name}, {place}");
             maker.add(
                 label,
                 place,
                 truth(&place),
-                |_| mesh(&place),
+                |_| mesh,
                 |_, random, count| {
                     let mut rays = Vec::with_capacity(count);
                     while rays.len() < count {

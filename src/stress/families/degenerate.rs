@@ -1,43 +1,44 @@
 //! Meshes that are hard, with rays at their triangles.
 
-use super::super::case::{Maker, Random, Truth, towards};
-use super::super::place::Place;
-use super::super::shapes::{Mesh, RADIUS, cube, plane, sphere};
+use super::super::case::{Maker, Truth, towards};
+use super::super::placement::Placement;
+use super::super::shapes::{Mesh, RADIUS, cube, on, on_edge, on_mesh, plane, sphere, vertex};
 use super::closed::inside;
 use crate::accel::Ray;
 use crate::geometry::Triangle;
 use crate::params::{ParamValue, Params, Variant};
+use crate::random::Pcg32;
 use crate::scene::{LoadOptions, load};
 use glam::{DVec3, Vec3};
 
 /// Rays at insides, edges and vertices of random triangles, from about the mesh.
-fn shots(place: Place) -> impl Fn(&[Triangle], &mut Random) -> Ray {
+fn shots(place: Placement) -> impl Fn(&[Triangle], &mut Pcg32) -> Ray {
     move |mesh, random| {
         let triangle = random.one_of(mesh);
         let target = match random.below(4) {
-            0 => random.vertex(&triangle),
-            1 => random.on_edge(&triangle),
-            _ => random.on(&triangle),
+            0 => vertex(&triangle, random),
+            1 => on_edge(&triangle, random),
+            _ => on(&triangle, random),
         };
         towards(place.point(2.0 * RADIUS * random.in_cube()), target)
     }
 }
 
 /// A triangle `1 : 10^-digits` in a random pose.
-fn needle(random: &mut Random, digits: f64) -> [DVec3; 3] {
+fn needle(random: &mut Pcg32, digits: f64) -> [DVec3; 3] {
     let start = RADIUS * random.in_cube();
     let along = random.direction();
     let aside = along.any_orthonormal_vector() * (RADIUS * 10f64.powf(-digits));
     [
         start,
         start + RADIUS * along,
-        start + RADIUS * along * random.unit() + aside,
+        start + RADIUS * along * random.uniform() + aside,
     ]
 }
 
 pub fn needles(maker: &mut Maker) {
     for place in maker.places() {
-        let mesh = |random: &mut Random| -> Mesh {
+        let mesh = |random: &mut Pcg32| -> Mesh {
             let one = |i: usize| needle(random, i as f64 * 6.0 / 255.0);
             let placed = |vertices: [DVec3; 3]| vertices.map(|v| place.point(v)).into();
             (0..256).map(one).map(placed).collect()
@@ -48,7 +49,7 @@ pub fn needles(maker: &mut Maker) {
     // A box a million times wider than high: its walls are closed by needles.
     for place in maker.places().into_iter().filter(|p| p.shift == 0.0) {
         let label = format!("flat box, {place}");
-        let flat = |_: &mut Random| {
+        let flat = |_: &mut Pcg32| {
             let flatten = |v: Vec3| Vec3::new(v.x, v.y * 1e-6, v.z);
             cube(4, &place)
                 .into_iter()
@@ -66,7 +67,7 @@ pub fn needles(maker: &mut Maker) {
 
 pub fn slivers(maker: &mut Maker) {
     for place in maker.places() {
-        let mesh = |random: &mut Random| {
+        let mesh = |random: &mut Pcg32| {
             let mut mesh = sphere(8, &place);
             let whole = mesh.len();
             for i in 0..whole {
@@ -91,7 +92,7 @@ pub fn slivers(maker: &mut Maker) {
 
 pub fn coincident(maker: &mut Maker) {
     for place in maker.places() {
-        let mesh = |random: &mut Random| {
+        let mesh = |random: &mut Pcg32| {
             let layer = plane(5, 2.0 * RADIUS, &place);
             let mut mesh = layer.clone();
             for copy in 0..5 {
@@ -114,7 +115,7 @@ pub fn coincident(maker: &mut Maker) {
 
 pub fn huge_and_tiny(maker: &mut Maker) {
     for place in maker.places() {
-        let mesh = |_: &mut Random| {
+        let mesh = |_: &mut Pcg32| {
             let far = 1e6 * RADIUS;
             let mut mesh = sphere(8, &place);
             mesh.extend(plane(6, 2.0 * far, &place));
@@ -128,7 +129,7 @@ pub fn huge_and_tiny(maker: &mut Maker) {
         };
         let label = format!("{place}");
         maker.add_each(label, place, Truth::Exact, mesh, |mesh, random| {
-            let target = random.on_mesh(mesh);
+            let target = on_mesh(mesh, random);
             let far = place.point(1e6 * RADIUS * random.in_cube());
             let near = inside(random, &place);
             let from = if random.below(2) == 0 { far } else { near };
@@ -140,14 +141,14 @@ pub fn huge_and_tiny(maker: &mut Maker) {
     }
     let scales: &[f64] = if maker.quick { &[] } else { &[1.0, 1e6] };
     for &scale in scales {
-        let place = Place { scale, shift: 0.0 };
+        let place = Placement { scale, shift: 0.0 };
         let Some(stadium) = stadium(scale as f32) else {
             continue;
         };
         let label = format!("stadium, {place}");
-        let mesh = |_: &mut Random| stadium;
+        let mesh = |_: &mut Pcg32| stadium;
         maker.add_each(label, place, Truth::Exact, mesh, |mesh, random| {
-            let target = random.on_mesh(mesh);
+            let target = on_mesh(mesh, random);
             let near = place.point(DVec3::new(3.0, 4.0, 8.0) * random.in_cube().abs());
             towards(near, target)
         });
@@ -171,7 +172,7 @@ fn stadium(scale: f32) -> Option<Mesh> {
 pub fn deep_trees(maker: &mut Maker) {
     let steps = 96;
     for (name, axes) in [("one axis", 1), ("three axes", 3)] {
-        let mesh = move |_: &mut Random| -> Mesh {
+        let mesh = move |_: &mut Pcg32| -> Mesh {
             let one = |i: usize| {
                 let size = 2f64.powi(-(i as i32));
                 let mut corner = DVec3::ZERO;
@@ -181,11 +182,11 @@ pub fn deep_trees(maker: &mut Maker) {
                 let [x, y] = [DVec3::X, DVec3::Y].map(|d| 0.4 * RADIUS * size * d);
                 let lean = DVec3::Z * (0.1 * RADIUS * size);
                 let vertices = [corner, corner + x + lean, corner + y - lean];
-                vertices.map(|v| Place::ORDINARY.point(v)).into()
+                vertices.map(|v| Placement::ORDINARY.point(v)).into()
             };
             (0..steps).map(one).collect()
         };
-        let place = Place::ORDINARY;
+        let place = Placement::ORDINARY;
         maker.add_each(name, place, Truth::Exact, mesh, shots(place));
     }
 }

@@ -1,23 +1,21 @@
 //! Ordinary meshes; directions, origins and intervals that are not.
 
-use super::super::case::{MakeMesh, Maker, Random, Truth, towards};
-use super::super::place::Place;
-use super::super::shapes::{RADIUS, cube, sphere};
+use super::super::case::{Maker, Meshes, Truth, towards};
+use super::super::placement::Placement;
+use super::super::shapes::{RADIUS, on, on_edge, on_mesh, sphere, vertex};
 use super::closed::{inside, truth};
 use crate::accel::Ray;
 use crate::geometry::Triangle;
 use crate::oracle::ExactCrossing;
+use crate::random::Pcg32;
 use crate::scene::Bounds;
 use glam::{DVec3, Vec3};
 
 /// A coarse sphere and a coarse box.
-const MESHES: [(&str, MakeMesh); 2] = [
-    ("sphere", |place| sphere(8, place)),
-    ("box", |place| cube(4, place)),
-];
+const MESHES: Meshes = Meshes { bands: 8, cells: 4 };
 
 /// Adds the meshes at each place with rays made one by one.
-fn on_every_rung(maker: &mut Maker, one: fn(&Place, &[Triangle], &mut Random) -> Ray) {
+fn on_every_rung(maker: &mut Maker, one: fn(&Placement, &[Triangle], &mut Pcg32) -> Ray) {
     maker.add_on_every_rung(MESHES, "", |_| Truth::Exact, one);
 }
 
@@ -25,9 +23,9 @@ pub fn axis_parallel(maker: &mut Maker) {
     on_every_rung(maker, |place, mesh, random| {
         let triangle = random.one_of(mesh);
         let target = match random.below(3) {
-            0 => random.vertex(&triangle),
-            1 => random.on_edge(&triangle),
-            _ => random.on(&triangle),
+            0 => vertex(&triangle, random),
+            1 => on_edge(&triangle, random),
+            _ => on(&triangle, random),
         };
         let mut direction = [0; 3].map(|_| random.one_of(&[0.0, -0.0]));
         let axis = random.below(3);
@@ -45,14 +43,14 @@ pub fn in_plane(maker: &mut Maker) {
     on_every_rung(maker, |_, mesh, random| {
         let triangle = random.one_of(mesh);
         let [a, b, _] = triangle.vertices;
-        let target = random.on(&triangle);
+        let target = on(&triangle, random);
         match random.below(3) {
             // Along an edge, from beyond it.
             0 => towards(a + (a - b), b),
             1 => towards(a, b),
             // Across the plane: exactly in it on the box, nearly on the sphere.
             _ => {
-                let from = a.as_dvec3() + (a - b).as_dvec3() * (1.0 + random.unit());
+                let from = a.as_dvec3() + (a - b).as_dvec3() * (1.0 + random.uniform());
                 towards(from.as_vec3(), target)
             }
         }
@@ -60,7 +58,7 @@ pub fn in_plane(maker: &mut Maker) {
 }
 
 /// A point of a plane that cuts the scene's box into equal cells.
-fn on_cell_border(bounds: &Bounds, random: &mut Random) -> Vec3 {
+fn on_cell_border(bounds: &Bounds, random: &mut Pcg32) -> Vec3 {
     let cells = 1 + random.below(8);
     let size = (bounds.max - bounds.min).as_dvec3();
     let mut p = bounds.min.as_dvec3() + size * (0.5 * (random.in_cube() + DVec3::ONE));
@@ -77,15 +75,15 @@ pub fn origins(maker: &mut Maker) {
         let triangle = random.one_of(mesh);
         let bounds = Bounds::of(mesh);
         let origin = match random.below(5) {
-            0 => random.vertex(&triangle),
-            1 => random.on_edge(&triangle),
-            2 => random.on(&triangle),
+            0 => vertex(&triangle, random),
+            1 => on_edge(&triangle, random),
+            2 => on(&triangle, random),
             3 => on_cell_border(&bounds, random),
             _ => inside(random, place),
         };
         match random.below(2) {
             0 => Ray::new(origin, random.direction().as_vec3()),
-            _ => towards(origin, random.on_mesh(mesh)),
+            _ => towards(origin, on_mesh(mesh, random)),
         }
     });
 }
@@ -93,7 +91,7 @@ pub fn origins(maker: &mut Maker) {
 pub fn interval_ends(maker: &mut Maker) {
     on_every_rung(maker, |place, mesh, random| {
         let triangle = random.one_of(mesh);
-        let whole = towards(inside(random, place), random.on(&triangle));
+        let whole = towards(inside(random, place), on(&triangle, random));
         let t = ExactCrossing::new(&triangle, &whole).t as f32;
         if !(t > 0.0 && t < Ray::FAR) {
             return whole;
@@ -123,11 +121,11 @@ const NOTHINGS: [f32; 8] = [
 
 /// A ray of any length from 10⁻¹⁰ to 10¹⁰, most often with a component or two that are next to nothing,
 /// and from the coordinates of a vertex along those.
-fn of_any_length(from: Vec3, mesh: &[Triangle], random: &mut Random) -> Ray {
+fn of_any_length(from: Vec3, mesh: &[Triangle], random: &mut Pcg32) -> Ray {
     let mut from = from;
     let mut direction = random.direction().as_vec3();
     let triangle = random.one_of(mesh);
-    let vertex = random.vertex(&triangle);
+    let vertex = vertex(&triangle, random);
     let first = random.below(3);
     for k in 0..random.below(3) {
         let axis = (first + k) % 3;
@@ -141,20 +139,20 @@ fn of_any_length(from: Vec3, mesh: &[Triangle], random: &mut Random) -> Ray {
 }
 
 /// A ray of any length from around the middle of a mesh.
-pub fn from_the_middle(place: &Place, mesh: &[Triangle], random: &mut Random) -> Ray {
+pub fn from_the_middle(place: &Placement, mesh: &[Triangle], random: &mut Pcg32) -> Ray {
     of_any_length(place.point(0.2 * RADIUS * random.in_cube()), mesh, random)
 }
 
 pub fn lengths(maker: &mut Maker) {
-    let meshes: [(&str, MakeMesh); 2] = [
-        ("sphere", |place| sphere(12, place)),
-        ("box", |place| cube(4, place)),
-    ];
+    let meshes = Meshes {
+        bands: 12,
+        ..MESHES
+    };
     maker.add_on_every_rung(meshes, "", truth, from_the_middle);
 }
 
 pub fn seams(maker: &mut Maker) {
-    let place = Place::ORDINARY;
+    let place = Placement::ORDINARY;
     for seam in [
         8.742_278e-8,
         -8.742_278e-8,
@@ -163,7 +161,7 @@ pub fn seams(maker: &mut Maker) {
         1e-30,
     ] {
         let noisy = |x: f32| if x.abs() < 1e-6 { seam } else { x };
-        let mesh = |_: &mut Random| {
+        let mesh = |_: &mut Pcg32| {
             let noisy = |v: Vec3| Vec3::from_array(v.to_array().map(noisy));
             let sphere = sphere(12, &place).into_iter();
             sphere.map(|t| t.map(noisy)).collect()

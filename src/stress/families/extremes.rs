@@ -1,17 +1,18 @@
 //! Numbers at the ends of f32, and beyond.
 
-use super::super::case::{Maker, Random, Truth, towards};
-use super::super::place::Place;
-use super::super::shapes::{Mesh, RADIUS, cube, sphere};
+use super::super::case::{Maker, Truth, towards};
+use super::super::placement::Placement;
+use super::super::shapes::{Mesh, RADIUS, cube, on_mesh, sphere};
 use super::closed::inside;
 use crate::accel::Ray;
 use crate::accel::ray::SMALLEST_DIRECTION;
+use crate::random::Pcg32;
 use crate::scene::MAX_COORDINATE;
 use glam::Vec3;
 
 pub fn denormal(maker: &mut Maker) {
     for scale in [1e-37, 1e-39, 1e-42] {
-        let place = Place { scale, shift: 0.0 };
+        let place = Placement { scale, shift: 0.0 };
         maker.add(
             format!("vertices, {place}"),
             place,
@@ -19,7 +20,7 @@ pub fn denormal(maker: &mut Maker) {
             |_| sphere(8, &place),
             |mesh, random, count| {
                 let one = |_| {
-                    let target = random.on_mesh(mesh);
+                    let target = on_mesh(mesh, random);
                     let from = inside(random, &place);
                     // The difference itself is too small for a direction.
                     let direction = (target.as_dvec3() - from.as_dvec3()) / scale;
@@ -30,9 +31,9 @@ pub fn denormal(maker: &mut Maker) {
             },
         );
     }
-    let place = Place::ORDINARY;
+    let place = Placement::ORDINARY;
     let tiny = [1e-30, 1e-38, 1e-40, 1e-45, -1e-45];
-    let cube = |_: &mut Random| cube(4, &place);
+    let cube = |_: &mut Pcg32| cube(4, &place);
     maker.add_each("directions", place, Truth::Exact, cube, |_, random| {
         let mut direction = random.direction().as_vec3();
         for axis in 0..random.below(3) {
@@ -64,9 +65,9 @@ const STRANGE: [(&str, [f32; 3]); 2] = [
 ];
 
 pub fn non_finite(maker: &mut Maker) {
-    let place = Place::ORDINARY;
-    let mut add = |label: &str, truth: Truth, spoil: &dyn Fn(&mut Ray, &mut Random)| {
-        let sphere = |_: &mut Random| sphere(12, &place);
+    let place = Placement::ORDINARY;
+    let mut add = |label: &str, truth: Truth, spoil: &dyn Fn(&mut Ray, &mut Pcg32)| {
+        let sphere = |_: &mut Pcg32| sphere(12, &place);
         maker.add_each(label, place, truth, sphere, |_, random| {
             let mut one = Ray::new(inside(random, &place), random.direction().as_vec3());
             spoil(&mut one, random);
@@ -94,10 +95,10 @@ pub fn non_finite(maker: &mut Maker) {
     });
 }
 
-/// Random bits that are a number no greater than `limit`.
-fn number(random: &mut Random, limit: f32) -> f32 {
+/// Pcg32 bits that are a number no greater than `limit`.
+fn number(random: &mut Pcg32, limit: f32) -> f32 {
     loop {
-        let x = f32::from_bits(random.bits());
+        let x = f32::from_bits(random.next_u32());
         if x.abs() <= limit {
             return x;
         }
@@ -105,7 +106,7 @@ fn number(random: &mut Random, limit: f32) -> f32 {
 }
 
 /// Triangles of random corners.
-fn shapeless(corner: impl Fn(&mut Random) -> Vec3) -> impl Fn(&mut Random) -> Mesh {
+fn shapeless(corner: impl Fn(&mut Pcg32) -> Vec3) -> impl Fn(&mut Pcg32) -> Mesh {
     move |random| {
         let mut one = || [0; 3].map(|_| corner(random)).into();
         (0..400).map(|_| one()).collect()
@@ -117,8 +118,8 @@ pub fn random_bits(maker: &mut Maker) {
         ("up to 1e9", 1e9),
         ("up to the limit of coordinates", MAX_COORDINATE),
     ] {
-        let vector = move |random: &mut Random| Vec3::from([0; 3].map(|_| number(random, limit)));
-        let (mesh, place) = (shapeless(vector), Place::ORDINARY);
+        let vector = move |random: &mut Pcg32| Vec3::from([0; 3].map(|_| number(random, limit)));
+        let (mesh, place) = (shapeless(vector), Placement::ORDINARY);
         maker.add(name, place, Truth::Exact, mesh, |mesh, random, count| {
             let one = |i: usize| {
                 let from = vector(random);
@@ -128,22 +129,22 @@ pub fn random_bits(maker: &mut Maker) {
                         t_max: number(random, Ray::FAR).abs(),
                         ..Ray::new(from, vector(random))
                     },
-                    _ => towards(from, random.on_mesh(mesh)),
+                    _ => towards(from, on_mesh(mesh, random)),
                 }
             };
             (0..).map(one).filter(Ray::is_ray).take(count).collect()
         });
     }
     // Even numbers of about the same size are rarely random bits, so that these rays often hit.
-    let place = Place {
+    let place = Placement {
         scale: RADIUS,
         shift: 0.0,
     };
-    let nearby = |random: &mut Random| f32::from_bits(0x3f00_0000 | random.bits() >> 8);
+    let nearby = |random: &mut Pcg32| f32::from_bits(0x3f00_0000 | random.next_u32() >> 8);
     let mesh = shapeless(move |random| Vec3::from([0; 3].map(|_| nearby(random))));
     let name = "random mantissas";
     maker.add_each(name, place, Truth::Exact, mesh, |mesh, random| {
-        let target = random.on_mesh(mesh);
+        let target = on_mesh(mesh, random);
         towards(place.point(random.in_cube()), target)
     });
 }

@@ -19,114 +19,60 @@ pub struct Family {
     make: fn(&mut Maker),
 }
 
-/// Every family.
-pub const FAMILIES: [Family; 19] = [
-    Family::new(
-        "watertight",
-        "closed meshes from inside, random directions",
-        closed::watertight,
-    ),
-    Family::new(
-        "vertices",
-        "shots at shared vertices of closed meshes, from inside and outside",
-        closed::vertices,
-    ),
-    Family::new(
-        "edges",
-        "shots at shared edges of closed meshes, from inside and outside",
-        closed::edges,
-    ),
-    Family::new(
-        "mirror-chains",
-        "every ray of a hundred mirror bounces inside a box and a sphere",
-        closed::mirror_chains,
-    ),
-    Family::new(
-        "axis-parallel",
-        "directions along axes and in planes of axes, zeros of both signs",
-        directions::axis_parallel,
-    ),
-    Family::new(
-        "lengths",
-        "closed meshes from inside, directions of length 1e-10 to 1e10, with next to nothing in them",
-        directions::lengths,
-    ),
-    Family::new(
-        "seams",
-        "the same with sin π and less for the 0 of a sphere's seams",
-        directions::seams,
-    ),
-    Family::new(
-        "in-plane",
-        "origin and direction in the plane of triangles",
-        directions::in_plane,
-    ),
-    Family::new(
-        "origins",
-        "origins on vertices, edges, triangles, boxes and cell borders",
-        directions::origins,
-    ),
-    Family::new(
-        "interval-ends",
-        "t_min and t_max exactly at the hit, and one ulp beside it",
-        directions::interval_ends,
-    ),
-    Family::new(
-        "needles",
-        "triangles up to a million times longer than wide",
-        degenerate::needles,
-    ),
-    Family::new(
-        "slivers",
-        "triangles of no area, nearly none, and duplicates, among ordinary ones",
-        degenerate::slivers,
-    ),
-    Family::new(
-        "coincident",
-        "layers at equal distance, and one ulp apart",
-        degenerate::coincident,
-    ),
-    Family::new(
-        "huge-and-tiny",
-        "a small mesh in a scene a million times larger; the teapot in its stadium",
-        degenerate::huge_and_tiny,
-    ),
-    Family::new(
-        "deep-trees",
-        "triangles that shrink geometrically towards a corner",
-        degenerate::deep_trees,
-    ),
-    Family::new(
-        "denormal",
-        "coordinates and directions below the smallest normal number",
-        extremes::denormal,
-    ),
-    Family::new(
-        "non-finite",
-        "NaN and infinity in every component of a ray",
-        extremes::non_finite,
-    ),
-    Family::new(
-        "random-bits",
-        "random bits as vertices and rays, as far as a loader lets them pass",
-        extremes::random_bits,
-    ),
-    Family::new(
-        "instances",
-        "closed objects under nearly degenerate transforms and scales up to a million, from inside",
-        placed::instances,
-    ),
-];
+/// Lists the families, each with its description as doc comment.
+macro_rules! families {
+    ($(#[doc = $what:literal] $name:literal => $make:path,)*) => {
+        /// Every family.
+        pub const FAMILIES: &[Family] = &[$(Family {
+            name: $name,
+            description: $what.trim_ascii(),
+            make: $make,
+        }),*];
+    };
+}
+
+families! {
+    /// closed meshes from inside, random directions
+    "watertight" => closed::watertight,
+    /// shots at shared vertices of closed meshes, from inside and outside
+    "vertices" => closed::vertices,
+    /// shots at shared edges of closed meshes, from inside and outside
+    "edges" => closed::edges,
+    /// every ray of a hundred mirror bounces inside a box and a sphere
+    "mirror-chains" => closed::mirror_chains,
+    /// directions along axes and in planes of axes, zeros of both signs
+    "axis-parallel" => directions::axis_parallel,
+    /// closed meshes from inside, directions of length 1e-10 to 1e10, with next to nothing in them
+    "lengths" => directions::lengths,
+    /// the same with sin π and less for the 0 of a sphere's seams
+    "seams" => directions::seams,
+    /// origin and direction in the plane of triangles
+    "in-plane" => directions::in_plane,
+    /// origins on vertices, edges, triangles, boxes and cell borders
+    "origins" => directions::origins,
+    /// t_min and t_max exactly at the hit, and one ulp beside it
+    "interval-ends" => directions::interval_ends,
+    /// triangles up to a million times longer than wide
+    "needles" => degenerate::needles,
+    /// triangles of no area, nearly none, and duplicates, among ordinary ones
+    "slivers" => degenerate::slivers,
+    /// layers at equal distance, and one ulp apart
+    "coincident" => degenerate::coincident,
+    /// a small mesh in a scene a million times larger; the teapot in its stadium
+    "huge-and-tiny" => degenerate::huge_and_tiny,
+    /// triangles that shrink geometrically towards a corner
+    "deep-trees" => degenerate::deep_trees,
+    /// coordinates and directions below the smallest normal number
+    "denormal" => extremes::denormal,
+    /// NaN and infinity in every component of a ray
+    "non-finite" => extremes::non_finite,
+    /// random bits as vertices and rays, as far as a loader lets them pass
+    "random-bits" => extremes::random_bits,
+    /// closed objects under nearly degenerate transforms and scales up to a million, from inside
+    "instances" => placed::instances,
+}
 
 impl Family {
-    const fn new(name: &'static str, description: &'static str, make: fn(&mut Maker)) -> Self {
-        Self {
-            name,
-            description,
-            make,
-        }
-    }
-
     /// The family of this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         FAMILIES.iter().find(|family| family.name == name)
@@ -147,7 +93,7 @@ mod tests {
 
     #[test]
     fn every_family_has_cases_with_rays_and_labels_that_differ() {
-        for family in &FAMILIES {
+        for family in FAMILIES {
             let cases = family.cases(1, false, 24);
             assert!(!cases.is_empty(), "{}", family.name);
             let labels: BTreeSet<&str> = cases.iter().map(|c| c.label.as_str()).collect();
@@ -180,7 +126,7 @@ mod tests {
 
     #[test]
     fn a_mesh_does_not_depend_on_the_number_of_rays_or_on_the_other_cases() {
-        for family in &FAMILIES {
+        for family in FAMILIES {
             let all = family.cases(3, false, 10);
             for case in family.cases(3, true, 50) {
                 let same = all.iter().find(|c| c.label == case.label);

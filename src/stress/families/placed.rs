@@ -1,25 +1,26 @@
 //! Instances under transforms that nearly flatten space.
 
-use super::super::case::{Maker, Random};
-use super::super::place::Place;
+use super::super::case::Maker;
+use super::super::placement::Placement;
 use super::super::shapes::{RADIUS, sphere};
 use super::directions::from_the_middle;
 use crate::accel::Ray;
+use crate::random::Pcg32;
 use crate::scene::{Assembly, Transform};
 use glam::{DMat3, DQuat, DVec3, Vec3};
 
 /// Instances in a scene.
 const COPIES: usize = 12;
 
-fn rotation(random: &mut Random) -> DMat3 {
-    let turn = std::f64::consts::TAU * random.unit();
+fn rotation(random: &mut Pcg32) -> DMat3 {
+    let turn = std::f64::consts::TAU * random.uniform();
     DMat3::from_quat(DQuat::from_axis_angle(random.direction(), turn))
 }
 
 /// Spheres, squeezed along a random direction to `thickness`, about the origin.
-fn squeezed(random: &mut Random, thickness: f64, spread: f64) -> Option<Assembly> {
+fn squeezed(random: &mut Pcg32, thickness: f64, spread: f64) -> Option<Assembly> {
     let mut assembly = Assembly::default();
-    let object = assembly.add_object(sphere(8, &Place::ORDINARY)).ok()?;
+    let object = assembly.add_object(sphere(8, &Placement::ORDINARY)).ok()?;
     for copy in 0..COPIES {
         let mirrored = if copy % 2 == 0 { 1.0 } else { -1.0 };
         let squeeze = DMat3::from_diagonal(DVec3::new(mirrored, 1.0, thickness));
@@ -35,12 +36,12 @@ fn squeezed(random: &mut Random, thickness: f64, spread: f64) -> Option<Assembly
 /// One sphere, scaled about the origin, and directions of every length.
 fn scaled(maker: &mut Maker) {
     for scale in [1e-6, 1e6] {
-        let place = Place { scale, shift: 0.0 };
+        let place = Placement { scale, shift: 0.0 };
         maker.add_placed(
             format!("{place}"),
             |_| {
                 let mut assembly = Assembly::default();
-                let object = assembly.add_object(sphere(12, &Place::ORDINARY)).ok()?;
+                let object = assembly.add_object(sphere(12, &Placement::ORDINARY)).ok()?;
                 let columns = [0, 1, 2].map(|k| (DMat3::IDENTITY.col(k) * scale).as_vec3());
                 let to_world = Transform::new(columns, Vec3::ZERO);
                 assembly.place(object, to_world).ok()?;

@@ -178,7 +178,7 @@ pub fn discrepancy(bench: &Bench, names: Names) -> Finding {
             "D* of {POINTS} points is {found:.4} > {most:.4}"
         )));
     }
-    if facts.base_2 && KEEP_NETS.contains(&sampler.decorrelation.name()) {
+    if facts.base_2 && KEEP_NETS.contains(&&*sampler.decorrelation_variant.name) {
         let set = PointSet::from_points(&points).map_err(other)?;
         let net = net_quality(&set, &Budget::seconds(60.0)).map_err(other)?;
         if net.t > 0 {
@@ -189,7 +189,7 @@ pub fn discrepancy(bench: &Bench, names: Names) -> Finding {
         return Ok(Some(fault));
     }
     let long = make(bench, names, &LONG_DEMAND)?;
-    let keeps = facts.base_2 && KEEP_NETS.contains(&long.decorrelation.name());
+    let keeps = facts.base_2 && KEEP_NETS.contains(&&*long.decorrelation_variant.name);
     Ok(keeps.then(|| projections::fault_of_axes(&long)).flatten())
 }
 
@@ -197,7 +197,7 @@ pub fn discrepancy(bench: &Bench, names: Names) -> Finding {
 pub fn integral(bench: &Bench, names: Names) -> Finding {
     let sampler = make(bench, names, &DEMAND)?;
     let facts = sampler.sequence.facts();
-    if !(facts.random || UNBIASED.contains(&sampler.decorrelation.name())) {
+    if !(facts.random || UNBIASED.contains(&&*sampler.decorrelation_variant.name)) {
         return Ok(None);
     }
     let exact = integrand()?.facts.exact;

@@ -8,14 +8,14 @@ const AWAY: DVec3 = DVec3::new(148_376.0 / 223_423.0, 1234.0 / 223_423.0, -1.0);
 
 /// A scale and a translation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Place {
+pub struct Placement {
     /// Factor on all coordinates.
     pub scale: f64,
     /// Greatest coordinate of the translation, after scaling.
     pub shift: f64,
 }
 
-impl Place {
+impl Placement {
     /// Where meshes are modelled: about two units around the origin.
     pub const ORDINARY: Self = Self {
         scale: 1.0,
@@ -66,7 +66,7 @@ impl Place {
     }
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for Placement {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match (self.scale, self.shift) {
             (1.0, 0.0) => write!(f, "ordinary"),
@@ -83,27 +83,28 @@ mod tests {
 
     #[test]
     fn the_far_place_is_that_of_embree() {
-        let centre = Place::FAR.point(DVec3::ZERO);
+        let centre = Placement::FAR.point(DVec3::ZERO);
         assert_eq!(centre, Vec3::new(148_376.0, 1234.0, -223_423.0));
     }
 
     #[test]
     fn the_ladder_reaches_from_ten_to_the_minus_eight_to_ten_to_the_eight_both_ways() {
-        let ladder = Place::ladder(false);
+        let ladder = Placement::ladder(false);
         for end in [1e-8, 1e8] {
             assert!(ladder.iter().any(|p| p.scale == end && p.shift == 0.0));
             assert!(ladder.iter().any(|p| p.scale == 1.0 && p.shift == end));
         }
-        assert_eq!(ladder[0], Place::ORDINARY);
-        let names: std::collections::BTreeSet<_> = ladder.iter().map(Place::to_string).collect();
+        assert_eq!(ladder[0], Placement::ORDINARY);
+        let names: std::collections::BTreeSet<_> =
+            ladder.iter().map(Placement::to_string).collect();
         assert_eq!(names.len(), ladder.len());
-        assert!(Place::ladder(true).iter().all(|p| ladder.contains(p)));
+        assert!(Placement::ladder(true).iter().all(|p| ladder.contains(p)));
     }
 
     #[test]
     fn a_mesh_that_rounding_has_crushed_has_no_inside() {
-        assert!(Place::FAR.keeps_shape() && Place::ORDINARY.keeps_shape());
-        let shifted = |shift| Place { scale: 1.0, shift };
+        assert!(Placement::FAR.keeps_shape() && Placement::ORDINARY.keeps_shape());
+        let shifted = |shift| Placement { scale: 1.0, shift };
         assert!(!shifted(1e8).keeps_shape() && !shifted(1e6).keeps_shape());
         assert!(shifted(1e4).keeps_shape());
     }
