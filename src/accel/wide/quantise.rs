@@ -327,7 +327,9 @@ mod tests {
                 direction: std::array::from_fn(|_| number(&mut random)),
                 t_max: 1e30,
             };
-            let inverse = Intersection::default().inverse(ray.direction);
+            let tests = Intersection::default();
+            let ray = tests.raised(&ray);
+            let inverse = tests.inverse(ray.direction);
             let mut frame = frame(grid.low, grid.exponent_word(0), ray.origin, inverse);
             for (axis, inverse) in inverse.iter().enumerate() {
                 let base = (grid.low[axis] - ray.origin[axis]) * inverse;
