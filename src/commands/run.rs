@@ -45,7 +45,7 @@ impl Run {
         let registries = Registries::default();
         let catalogue = registries.catalogue();
         let mut overrides = Vec::from_iter(self.device.kernels_override());
-        overrides.extend(self.experiment.set.iter().cloned());
+        overrides.extend(self.experiment.values.set.iter().cloned());
         let experiment = Experiment::load(&self.file, &overrides, &catalogue)?;
         let plan = plan(&experiment, &self.experiment.only, &registries)?;
         if self.dry_run {
@@ -60,9 +60,10 @@ impl Run {
             _ => Existing::Refuse,
         };
         let out = self.out.unwrap_or_else(|| default_folder(&experiment.name));
-        let mut options = self.device.options(out, self.quiet);
+        let mut options = self
+            .device
+            .options(out, &self.experiment.values, self.quiet);
         options.existing = existing;
-        options.allow_outside = self.experiment.allow_outside;
         signals::watch(options.interrupt.clone())?;
         match raystone::run::run(&experiment, &plan, &registries, &options) {
             Err(RunError::Interrupted) => signals::wait_for_end(),
