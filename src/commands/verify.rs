@@ -7,7 +7,7 @@ use anyhow::Result;
 use clap::Args;
 use raystone::config::{Axis, Catalogue, Experiment, Plan, Skipped};
 use raystone::measure::record::{ClassVerdict, GateVerdict, JudgeCheck};
-use raystone::report::document::{Cell, Table};
+use raystone::report::document::{Table, TableCell};
 use raystone::report::format::{count, ray_class};
 use raystone::report::terminal::aligned;
 use raystone::run::{Registries, Verified};
@@ -190,7 +190,7 @@ fn table(verified: &[Verified]) -> String {
             (Ok(_), false) => "FAILED",
         };
         let names = one.cell.labels(&[Axis::Accel]).join(", ");
-        let head = [one.cell[Axis::Scene].label.as_str(), &names, word].map(Cell::from);
+        let head = [one.cell[Axis::Scene].label.as_str(), &names, word].map(TableCell::from);
         match &one.verdict {
             Ok(verdict) => table.rows.extend(rows(head, verdict)),
             Err(_) => table.rows.push(head.into()),
@@ -207,7 +207,7 @@ fn table(verified: &[Verified]) -> String {
 }
 
 /// The rows of one structure; names and the judge's own checks stand in the first.
-fn rows(head: [Cell; 3], verdict: &GateVerdict) -> Vec<Vec<Cell>> {
+fn rows(head: [TableCell; 3], verdict: &GateVerdict) -> Vec<Vec<TableCell>> {
     let brute_force = &verdict.brute_force;
     let kept = brute_force.reused_unix_s.map_or("", |_| " (kept)");
     let rays = count(brute_force.rays as u64);
@@ -215,16 +215,16 @@ fn rows(head: [Cell; 3], verdict: &GateVerdict) -> Vec<Vec<Cell>> {
         format!("{} of {rays}{kept}", brute_force.wrong),
         oracle(&verdict.oracle),
     ];
-    let mut rows: Vec<Vec<Cell>> = Vec::new();
+    let mut rows: Vec<Vec<TableCell>> = Vec::new();
     for class in &verdict.classes {
-        let mut row = vec![Cell::default(); head.len()];
-        row.extend(counts(class).map(Cell::from));
+        let mut row = vec![TableCell::default(); head.len()];
+        row.extend(counts(class).map(TableCell::from));
         rows.push(row);
     }
     match rows.first_mut() {
         Some(first) => {
             first.splice(..head.len(), head);
-            first.extend(judge.map(Cell::from));
+            first.extend(judge.map(TableCell::from));
         }
         None => rows.push(head.into()),
     }

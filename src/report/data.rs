@@ -1,7 +1,7 @@
 //! Records sorted by what they speak of: scene, integrator, sampler.
 
 use super::names::Names;
-use super::samplers::Sampler;
+use super::samplers::MeasuredSampler;
 use crate::measure::figure::{FIGURES, Figure, figure};
 use crate::measure::gate::fault_text;
 use crate::measure::record::*;
@@ -60,7 +60,7 @@ pub struct View<'a> {
     /// The reference image.
     pub reference: Option<Recorded<'a, ReferenceRecord>>,
     /// Samplers in the order in which they first appear.
-    pub samplers: Vec<Sampler<'a>>,
+    pub samplers: Vec<MeasuredSampler<'a>>,
     /// Times of full cells.
     pub times: Vec<Measured<'a, TimeRecord>>,
 }
@@ -269,9 +269,9 @@ impl<'a> RunData<'a> {
         find_or_push(views, |view| view.key.agrees(key, &VIEW_AXES), new)
     }
 
-    fn sampler(&mut self, key: &'a Key) -> &mut Sampler<'a> {
+    fn sampler(&mut self, key: &'a Key) -> &mut MeasuredSampler<'a> {
         let name = self.names.sampler(key);
-        let new = || Sampler {
+        let new = || MeasuredSampler {
             key: key.only(&SAMPLER_AXES),
             name,
             replicates: Vec::new(),

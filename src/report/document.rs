@@ -30,7 +30,7 @@ impl Document {
             .sections
             .iter_mut()
             .flat_map(|section| &mut section.blocks);
-        let figures: Vec<&mut Figure> = blocks
+        let figures: Vec<&mut Illustration> = blocks
             .filter_map(|block| match block {
                 Block::Figures(figures) => Some(figures),
                 _ => None,
@@ -97,7 +97,7 @@ pub enum Block {
     /// A table.
     Table(Table),
     /// Plots; narrow ones stand side by side.
-    Figures(Vec<Figure>),
+    Figures(Vec<Illustration>),
     /// Pictures.
     Gallery(Gallery),
     /// Text as typed.
@@ -106,8 +106,8 @@ pub enum Block {
 
 impl Block {
     /// Plots, if any could be drawn.
-    pub fn figures(figures: impl IntoIterator<Item = Option<Figure>>) -> Option<Self> {
-        let figures: Vec<Figure> = figures.into_iter().flatten().collect();
+    pub fn figures(figures: impl IntoIterator<Item = Option<Illustration>>) -> Option<Self> {
+        let figures: Vec<Illustration> = figures.into_iter().flatten().collect();
         (!figures.is_empty()).then_some(Self::Figures(figures))
     }
 
@@ -167,7 +167,7 @@ pub struct Table {
     /// Heads of the columns; all but the first are aligned to the right unless `text`.
     pub columns: Vec<Column>,
     /// Rows, as long as `columns`.
-    pub rows: Vec<Vec<Cell>>,
+    pub rows: Vec<Vec<TableCell>>,
 }
 
 /// Head of a column.
@@ -181,7 +181,7 @@ pub struct Column {
 
 /// A cell of a table.
 #[derive(Debug, Clone, Default, Serialize)]
-pub struct Cell {
+pub struct TableCell {
     /// Main text.
     pub text: String,
     /// Smaller text behind it, for instance an interval.
@@ -190,7 +190,7 @@ pub struct Cell {
     pub tone: Tone,
 }
 
-impl Cell {
+impl TableCell {
     /// A figure with its interval or another smaller text.
     pub fn with_detail(text: impl Into<String>, detail: impl Into<String>) -> Self {
         Self {
@@ -222,7 +222,7 @@ impl Cell {
     }
 }
 
-impl<T: Into<String>> From<T> for Cell {
+impl<T: Into<String>> From<T> for TableCell {
     fn from(text: T) -> Self {
         Self {
             text: text.into(),
@@ -264,7 +264,7 @@ impl Table {
 
 /// A plot.
 #[derive(Debug, Clone, Serialize)]
-pub struct Figure {
+pub struct Illustration {
     /// File stem under `plots/`, unique.
     pub name: String,
     /// What it shows.
@@ -281,7 +281,7 @@ pub struct Figure {
     pub png: Vec<u8>,
 }
 
-impl Figure {
+impl Illustration {
     /// A plot that is not painted yet; wide drawings take the full width.
     pub fn new(name: impl Into<String>, caption: impl Into<String>, drawing: Drawing) -> Self {
         Self {

@@ -37,7 +37,8 @@ fn block(block: &Block) -> String {
         }
         Block::Table(content) => table(content),
         Block::Figures(figures) => {
-            let line = |f: &Figure| format!("![{}](plots/{}.png)\n\n", escape(&f.caption), f.name);
+            let line =
+                |f: &Illustration| format!("![{}](plots/{}.png)\n\n", escape(&f.caption), f.name);
             figures.iter().map(line).collect()
         }
         Block::Gallery(gallery) => {
@@ -95,7 +96,7 @@ mod tests {
     #[test]
     fn names_cannot_break_a_table_nor_texts_a_fence() {
         let mut content = Table::new("t", &["a", "b"]);
-        let failed = Cell::from("FAILED").toned(Tone::Bad);
+        let failed = TableCell::from("FAILED").toned(Tone::Bad);
         content.rows.push(vec!["x|y<b>".into(), failed]);
         let out = table(&content);
         assert!(out.ends_with("| x\\|y\\<b\\> | **FAILED** |\n"), "{out}");

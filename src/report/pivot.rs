@@ -1,6 +1,6 @@
 //! Tables of figures: rows by some axes of the key, columns by figure and another part of it.
 
-use super::document::{Cell, Table};
+use super::document::{Table, TableCell};
 use super::format;
 use super::values::Value;
 use crate::measure::record::Key;
@@ -15,7 +15,7 @@ pub const FIGURES_ALONE: Part<'static> = &|_| String::new();
 pub struct Rows<'a> {
     by: &'a [&'a str],
     heads: &'a [&'a str],
-    rows: Vec<(Key, Vec<Cell>)>,
+    rows: Vec<(Key, Vec<TableCell>)>,
 }
 
 impl<'a> Rows<'a> {
@@ -23,7 +23,7 @@ impl<'a> Rows<'a> {
     pub fn new(
         by: &'a [&'a str],
         heads: &'a [&'a str],
-        rows: impl IntoIterator<Item = (Key, Vec<Cell>)>,
+        rows: impl IntoIterator<Item = (Key, Vec<TableCell>)>,
     ) -> Self {
         let rows = rows.into_iter().collect();
         Self { by, heads, rows }
@@ -31,7 +31,7 @@ impl<'a> Rows<'a> {
 
     /// A row for each combination of labels in the values, in their order.
     pub fn of_labels(by: &'a [&'a str], heads: &'a [&'a str], values: &[Value]) -> Self {
-        let mut rows: Vec<(Key, Vec<Cell>)> = Vec::new();
+        let mut rows: Vec<(Key, Vec<TableCell>)> = Vec::new();
         for Value { key, .. } in values {
             if rows.iter().all(|(known, _)| !known.agrees(key, by)) {
                 let labels = by.iter().map(|axis| key.label(axis).into());
@@ -110,7 +110,7 @@ mod tests {
             let rays: Part = &|key| key.label(axis::RAYS).into();
             let table = rows.table(&values, "t", figures, rays);
             let heads = table.columns.iter().map(|c| c.title.clone());
-            let cells = |row: &Vec<Cell>| row.iter().map(Cell::flat).collect();
+            let cells = |row: &Vec<TableCell>| row.iter().map(TableCell::flat).collect();
             let rows: Vec<Vec<String>> = table.rows.iter().map(cells).collect();
             (heads.collect::<Vec<_>>(), rows)
         };

@@ -1,7 +1,7 @@
 //! A page about one point set: the set, its projections, disc and hemisphere, superposed pixels,
 //! spectra and the star discrepancy of all pairs of dimensions.
 
-use super::document::{Block, Document, Figure, Section};
+use super::document::{Block, Document, Illustration, Section};
 use super::format;
 use super::plot::heat::HeatMap;
 use super::plot::panels::{self, Panel};
@@ -83,7 +83,7 @@ impl PointPage {
     }
 
     /// The first two dimensions: square, discs and dome, then every shape of elementary intervals.
-    fn sets(&self) -> Result<Vec<Figure>, DiscrepancyError> {
+    fn sets(&self) -> Result<Vec<Illustration>, DiscrepancyError> {
         let points = self.pairs(0, 1)?;
         let cloud = |domain| Cloud::new(domain, points.clone());
         let square = Cloud {
@@ -114,13 +114,13 @@ impl PointPage {
             caption += " Lines: elementary intervals; tinted: an interval without a point.";
         }
         let drawing = panels::draw(&panels, 2, panels::square(WIDTH, 2));
-        let mut figures = vec![Figure::new("point-set", caption, drawing)];
+        let mut figures = vec![Illustration::new("point-set", caption, drawing)];
         figures.extend(self.net().map(|m| intervals(&points, m)));
         Ok(figures)
     }
 
     /// All pairs of the first dimensions, and the star discrepancy of all pairs.
-    fn projections(&self) -> Result<Vec<Figure>, DiscrepancyError> {
+    fn projections(&self) -> Result<Vec<Illustration>, DiscrepancyError> {
         let shown = self.dims.len().min(MOST_PROJECTED);
         let mut panels = Vec::new();
         for (i, j) in pairs_below(shown) {
@@ -139,7 +139,7 @@ impl PointPage {
         let caption = format!("Every pair of {of}: {drawn}.");
         let columns = panels.len().min(4);
         let drawing = panels::draw(&panels, columns, panels::square(WIDTH, 4));
-        let projections = Figure::new("projections", caption, drawing);
+        let projections = Illustration::new("projections", caption, drawing);
         let stars = self.stars()?;
         let names: Vec<String> = self.dims.iter().map(u32::to_string).collect();
         let worst = stars.iter().max_by(|a, b| a.2.total_cmp(&b.2));
@@ -151,7 +151,7 @@ impl PointPage {
                 names[*j],
                 format::number(*worst)
             );
-            Figure::new("pair-discrepancy", caption, drawing)
+            Illustration::new("pair-discrepancy", caption, drawing)
         });
         // The only pair of two dimensions is the set itself.
         let projections = (shown > 2).then_some(projections);
@@ -166,7 +166,7 @@ impl PointPage {
     }
 
     /// All pixels upon each other (Dufay 2017, Figs. 5.7 and 5.13).
-    fn copies(&self) -> Figure {
+    fn copies(&self) -> Illustration {
         let all: Vec<Pair> = self.copies.concat();
         let own = self.copies.first().cloned().unwrap_or_default();
         let first = own.len();
@@ -188,7 +188,7 @@ impl PointPage {
              another colour. Holes and stripes are directions that no pixel looks into.",
             self.points.len()
         );
-        Figure::new(
+        Illustration::new(
             "pixels",
             caption,
             panels::draw(&panels, 2, panels::square(WIDTH, 2)),
@@ -223,7 +223,7 @@ impl PointPage {
             self.names(0, 1)
         );
         let drawing = panels::draw(&panels, 3, panels::square(WIDTH, 3));
-        Ok(Block::Figures(vec![Figure::new(
+        Ok(Block::Figures(vec![Illustration::new(
             "spectrum", caption, drawing,
         )]))
     }
@@ -235,7 +235,7 @@ fn pairs_below(n: usize) -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// All shapes of elementary intervals of volume 1/N of 2^m points.
-fn intervals(points: &[Pair], m: u32) -> Figure {
+fn intervals(points: &[Pair], m: u32) -> Illustration {
     let panel = |a: u32| {
         let shape = [a, m - a];
         let empty = interval_counts(points, shape)
@@ -256,7 +256,7 @@ fn intervals(points: &[Pair], m: u32) -> Figure {
     let caption =
         "Every shape of elementary intervals of volume 1/N. A (0, m, 2)-net has one point in each.";
     let drawing = panels::draw(&panels, 4, panels::square(WIDTH, 4));
-    Figure::new("elementary-intervals", caption, drawing)
+    Illustration::new("elementary-intervals", caption, drawing)
 }
 
 #[cfg(test)]
@@ -302,7 +302,7 @@ mod tests {
     fn the_page_holds_every_picture_and_says_how_many_pixels() {
         let document = document(&page()).unwrap();
         let blocks = document.sections.iter().flat_map(|section| &section.blocks);
-        let figures: Vec<&Figure> = blocks
+        let figures: Vec<&Illustration> = blocks
             .flat_map(|block| match block {
                 Block::Figures(figures) => figures.as_slice(),
                 _ => &[],

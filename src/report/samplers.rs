@@ -15,7 +15,7 @@ pub const REFERENCE_SHARE: f64 = 0.1;
 
 /// A sampler under one scene, integrator, triangle test and box test.
 #[derive(Debug)]
-pub struct Sampler<'a> {
+pub struct MeasuredSampler<'a> {
     /// What it draws for what.
     pub key: Key,
     /// `sequence × decorrelation`, with what else tells it from others, see [`super::names`].
@@ -111,7 +111,7 @@ enum Without {
     Part(usize),
 }
 
-impl<'a> Sampler<'a> {
+impl<'a> MeasuredSampler<'a> {
     /// Whether no seed changes it, so that its one replicate is exact.
     pub fn is_deterministic(&self) -> bool {
         self.replicates
@@ -270,7 +270,7 @@ impl View<'_> {
     /// least of them.
     pub fn reference_fault(&self) -> Option<String> {
         let errors = || {
-            let of = |s: &Sampler| s.mean_errors(Metric::Rmse);
+            let of = |s: &MeasuredSampler| s.mean_errors(Metric::Rmse);
             self.samplers.iter().flat_map(of)
         };
         errors().next()?;

@@ -50,8 +50,8 @@ fn records(noise: f64, part_noise: f64, replicates: u32, g: &mut Pcg32) -> Vec<E
     (0..replicates).map(record).collect()
 }
 
-fn sampler(records: &[ErrorRecord]) -> Sampler<'_> {
-    Sampler {
+fn sampler(records: &[ErrorRecord]) -> MeasuredSampler<'_> {
+    MeasuredSampler {
         key: Key::default(),
         name: "a × b".into(),
         replicates: records.iter().collect(),

@@ -1,7 +1,7 @@
 //! The essence of a report for the end of a run.
 
 use super::data::RunData;
-use super::document::{Cell, Table};
+use super::document::{Table, TableCell};
 use super::samplers::Metric;
 use super::sections::{belief, run, samplers, structures, verdict};
 use super::values::{of_structures, of_view};
@@ -49,7 +49,7 @@ pub fn failed_checks(records: &[Line]) -> Vec<String> {
 /// would not fit a terminal, except in tables of text.
 pub fn aligned(table: &Table) -> String {
     let wordy = table.columns.iter().filter(|column| column.text).count() > 2;
-    let shown = |cell: &Cell| match wordy {
+    let shown = |cell: &TableCell| match wordy {
         true => cell.flat(),
         false => cell.text.clone(),
     };
@@ -86,7 +86,7 @@ mod tests {
         let mut table = Table::new("speed", &["structure", "Mrays/s"]);
         table
             .rows
-            .push(vec!["bvh".into(), Cell::with_detail("5.02", "[4, 6]")]);
+            .push(vec!["bvh".into(), TableCell::with_detail("5.02", "[4, 6]")]);
         table.rows.push(vec!["uniform-grid λ".into(), "1".into()]);
         let text = aligned(&table);
         let lines: Vec<&str> = text.lines().collect();

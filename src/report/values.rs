@@ -1,7 +1,7 @@
 //! What the records say, figure by figure: each value with its key. Tables and exports read these.
 
 use super::data::{RunData, SceneGroup, View};
-use super::document::Cell;
+use super::document::TableCell;
 use super::format;
 use super::samplers::Metric;
 use super::sections::{trade_off, verdict::Race};
@@ -71,12 +71,12 @@ impl Value<'_> {
     }
 
     /// The value as a table shows it.
-    pub fn cell(&self) -> Cell {
+    pub fn cell(&self) -> TableCell {
         let text = |value| format::figure(&self.figure, value);
         match self.reading {
             Reading::Word(word) => word.into(),
             Reading::Below(bound) => format!("<{}", text(bound)).into(),
-            Reading::Known(i) if i.low < i.high => Cell::with_detail(
+            Reading::Known(i) if i.low < i.high => TableCell::with_detail(
                 text(i.value),
                 format!("[{}, {}]", text(i.low), text(i.high)),
             ),

@@ -36,11 +36,11 @@ const FLAT: f32 = 0.01;
 pub struct Framing {
     bounds: Bounds,
     up: Vec3,
-    place: Place,
+    place: Standpoint,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Place {
+enum Standpoint {
     /// So far in this direction that everything is in the image.
     Outside { towards_eye: Vec3, room: bool },
     /// In a room.
@@ -67,7 +67,7 @@ impl Default for Framing {
                 max: Vec3::ONE,
             },
             up: Vec3::Y,
-            place: Place::Outside {
+            place: Standpoint::Outside {
                 towards_eye: three_quarter(Vec3::Y, 1.0, 1.0),
                 room: false,
             },
@@ -84,7 +84,7 @@ impl Framing {
         if bounds.is_empty() {
             return Self::default();
         }
-        let stage = Stage::new(&scene.triangles, &bounds);
+        let stage = UnitScene::new(&scene.triangles, &bounds);
         let (up, place) = match stage.boxes_per_ray() <= MOST_BOXES {
             true => stage.place(says_y),
             false => (Vec3::Y, Self::default().place),
@@ -94,7 +94,7 @@ impl Framing {
 
     /// Whether the scene is a room.
     pub fn is_room(&self) -> bool {
-        !matches!(self.place, Place::Outside { room: false, .. })
+        !matches!(self.place, Standpoint::Outside { room: false, .. })
     }
 
     /// To the right, upwards and to the front of the scene: unit vectors.
@@ -116,8 +116,8 @@ impl Framing {
     fn camera(&self, triangles: &[Triangle], aspect: f32) -> Camera {
         let (center, radius) = sphere_around(&self.bounds);
         let (eye, forward, fov) = match self.place {
-            Place::Inside { eye, forward } => (eye, 0.5 * forward, INSIDE_FOV),
-            Place::Outside { towards_eye, .. } => {
+            Standpoint::Inside { eye, forward } => (eye, 0.5 * forward, INSIDE_FOV),
+            Standpoint::Outside { towards_eye, .. } => {
                 let local = |v: Vec3| to_unit(v, center, radius);
                 let vertices = triangles.iter().flat_map(|t| t.vertices).map(local);
                 let (eye, distance) = fit(vertices, towards_eye, self.up, aspect);
@@ -191,7 +191,7 @@ fn basis(forward: Vec3, up: Vec3) -> [Vec3; 3] {
 }
 
 /// The scene moved to the unit sphere.
-struct Stage {
+struct UnitScene {
     bounds: Bounds,
     up: Vec3,
     solid: Vec<obvhs::triangle::Triangle>,
@@ -206,7 +206,7 @@ enum Seen {
     Front(f32),
 }
 
-impl Stage {
+impl UnitScene {
     fn new(triangles: &[Triangle], bounds: &Bounds) -> Self {
         let (center, radius) = sphere_around(bounds);
         let local = |v: Vec3| to_unit(v, center, radius);
@@ -260,7 +260,7 @@ impl Stage {
     }
 
     /// What is up, and where to look from.
-    fn place(mut self, says_y: bool) -> (Vec3, Place) {
+    fn place(mut self, says_y: bool) -> (Vec3, Standpoint) {
         if !says_y && self.stands_on_z() {
             self.up = Vec3::Z;
         }
@@ -273,7 +273,7 @@ impl Stage {
             Some(points) => self
                 .open_side(&points)
                 .unwrap_or_else(|| self.inside(&points)),
-            None => Place::Outside {
+            None => Standpoint::Outside {
                 towards_eye: self.side(),
                 room: false,
             },
@@ -349,11 +349,11 @@ impl Stage {
     }
 
     /// The view into a room without a wall on one side, such as the Cornell box.
-    fn open_side(&self, points: &[Vec3]) -> Option<Place> {
+    fn open_side(&self, points: &[Vec3]) -> Option<Standpoint> {
         let open = self
             .horizontal(4)
             .find(|&d| self.openness(points, -d) > OPEN_SIDE)?;
-        Some(Place::Outside {
+        Some(Standpoint::Outside {
             towards_eye: -open,
             room: true,
         })
@@ -375,9 +375,9 @@ impl Stage {
     }
 
     /// The view from near a wall, or what else is behind, that sees farthest.
-    fn inside(&self, points: &[Vec3]) -> Place {
+    fn inside(&self, points: &[Vec3]) -> Standpoint {
         let mut best = f32::NEG_INFINITY;
-        let mut place = Place::Outside {
+        let mut place = Standpoint::Outside {
             towards_eye: three_quarter(self.up, 1.0, 1.0),
             room: true,
         };
@@ -390,7 +390,7 @@ impl Stage {
                 let depth = self.look(eye, forward, INSIDE_FOV).depth;
                 if depth > best {
                     best = depth;
-                    place = Place::Inside { eye, forward };
+                    place = Standpoint::Inside { eye, forward };
                 }
             }
         }

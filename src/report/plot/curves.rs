@@ -5,7 +5,7 @@ use super::drawing::{DIM, Drawing, INK, Ink};
 use super::legend;
 use super::marker;
 use crate::measure::record::Interval;
-use crate::report::document::Figure;
+use crate::report::document::Illustration;
 
 /// One point of a curve, with the ends of its 95 % interval (equal to `y` where there is none).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,8 +96,8 @@ const PLOT_HEIGHT: f64 = 400.0;
 
 impl CurvePlot {
     /// The plot in a document, if there is anything to draw.
-    pub fn figure(&self, name: String, caption: impl Into<String>) -> Option<Figure> {
-        Some(Figure::new(name, caption, self.draw()?))
+    pub fn figure(&self, name: String, caption: impl Into<String>) -> Option<Illustration> {
+        Some(Illustration::new(name, caption, self.draw()?))
     }
 
     /// The picture; `None` when no curve has a point with positive coordinates.

@@ -52,7 +52,11 @@ pub fn section(data: &RunData) -> Option<Section> {
             Some(panels) => {
                 let drawing = panels::draw(&panels, 4, panels::square(WIDTH, 4));
                 let stem = format!("points-{index}-{}", file_stem(name));
-                figures.push(Figure::new(stem, format!("Points of {name}."), drawing));
+                figures.push(Illustration::new(
+                    stem,
+                    format!("Points of {name}."),
+                    drawing,
+                ));
             }
             None => missing.push(Block::Paragraph(format!(
                 "{name} is not drawn: the records hold none of its points."

@@ -4,7 +4,7 @@ use crate::measure::record::{FinishedRecord, StructureRecord, TimeRecord};
 use crate::report::data::{Measured, RunData, SceneGroup, View};
 use crate::report::document::*;
 use crate::report::format::{self, count, percent};
-use crate::report::samplers::Sampler;
+use crate::report::samplers::MeasuredSampler;
 
 /// Largest share of the wall time that the harness may take for itself.
 const OVERHEAD_TARGET: f64 = 0.1;
@@ -64,7 +64,7 @@ fn wall_table(finished: &FinishedRecord) -> Table {
         let share = Some(seconds / finished.wall_s).filter(|share| share.is_finite());
         let share = share.map_or(format::ABSENT.into(), percent);
         let cells = [name.into(), format::number(seconds), share];
-        table.rows.push(cells.map(Cell::from).into());
+        table.rows.push(cells.map(TableCell::from).into());
     }
     table
 }
@@ -91,7 +91,7 @@ fn failures(data: &RunData) -> Option<Section> {
             "FAILED" => Tone::Bad,
             _ => Tone::Note,
         };
-        let state = Cell::from(state).toned(tone);
+        let state = TableCell::from(state).toned(tone);
         table.rows.push(vec![cell.into(), state, reason.into()]);
     }
     let mut section = Section::new("failures", "Failed and skipped");
@@ -119,7 +119,7 @@ fn failed_cells(scene: &SceneGroup, view: &View) -> Vec<Failure> {
         );
         Some((cell, "FAILED", reason))
     };
-    let sampler = |sampler: &Sampler| {
+    let sampler = |sampler: &MeasuredSampler| {
         let cell = format!("{} · {} · {}", scene.name, sampler.name, view.name);
         Some((cell, "FAILED", sampler.fault()?))
     };

@@ -2,13 +2,13 @@
 
 use crate::measure::bias::BiasVerdict;
 use crate::report::data::{RunData, View};
-use crate::report::document::Figure;
+use crate::report::document::Illustration;
 use crate::report::format;
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::report::plot::histogram::Histogram;
 use crate::report::plot::panels::{self, Panel};
 use crate::report::plot::pareto::{CellPoint, ParetoPlot};
-use crate::report::samplers::{MeanError, Metric, Sampler, UNRESOLVED};
+use crate::report::samplers::{MeanError, MeasuredSampler, Metric, UNRESOLVED};
 
 /// What a caption says of points that a logarithmic plot cannot show.
 fn not_drawn(count: usize) -> String {
@@ -19,26 +19,27 @@ fn not_drawn(count: usize) -> String {
 }
 
 /// Error against samples and against seconds, in both metrics.
-pub fn error_figures(data: &RunData, stem: &str, view: &View) -> Vec<Option<Figure>> {
+pub fn error_figures(data: &RunData, stem: &str, view: &View) -> Vec<Option<Illustration>> {
     let mut figures = Vec::new();
     for metric in [Metric::RelMse, Metric::Rmse] {
         let name = metric.name();
         let means = view.samplers.iter().flat_map(|s| s.mean_errors(metric));
         let hidden = not_drawn(means.filter(|mean| !mean.resolved).count());
         // What stands behind a sampler's name, and what one sample per pixel is on the x axis.
-        let plot = |x_title: String, x_ticks, unit: &dyn Fn(&Sampler) -> Option<(String, f64)>| {
-            let curve = |s: &Sampler| {
-                let (says, x) = unit(s)?;
-                curve(data, s, metric, x, format!("{}{says}", s.name))
+        let plot =
+            |x_title: String, x_ticks, unit: &dyn Fn(&MeasuredSampler) -> Option<(String, f64)>| {
+                let curve = |s: &MeasuredSampler| {
+                    let (says, x) = unit(s)?;
+                    curve(data, s, metric, x, format!("{}{says}", s.name))
+                };
+                CurvePlot {
+                    x_title,
+                    x_ticks,
+                    y_title: format!("{name} (mean over replicates)"),
+                    curves: view.samplers.iter().filter_map(curve).collect(),
+                    guides: Vec::new(),
+                }
             };
-            CurvePlot {
-                x_title,
-                x_ticks,
-                y_title: format!("{name} (mean over replicates)"),
-                curves: view.samplers.iter().filter_map(curve).collect(),
-                guides: Vec::new(),
-            }
-        };
         let by_spp = plot("samples per pixel".into(), Ticks::PowersOfTwo, &|sampler| {
             let slope = sampler.slope(metric);
             let slope = slope.map(|slope| format!(": slope {}", format::slope(&slope)));
@@ -68,7 +69,7 @@ pub fn error_figures(data: &RunData, stem: &str, view: &View) -> Vec<Option<Figu
 
 fn curve(
     data: &RunData,
-    sampler: &Sampler,
+    sampler: &MeasuredSampler,
     metric: Metric,
     x_per_spp: f64,
     label: String,
@@ -86,13 +87,13 @@ fn curve(
 }
 
 /// Run time against error at the common spp.
-pub fn pareto_figure(data: &RunData, stem: &str, view: &View) -> Option<Figure> {
+pub fn pareto_figure(data: &RunData, stem: &str, view: &View) -> Option<Illustration> {
     let spp = view.common_spp()?;
     let names = view.timed_structures().into_iter();
     let structures = names.map(|name| (name.clone(), data.structure_look(&name)));
     let structures: Vec<(String, usize)> = structures.collect();
     let measured = view.samplers.iter().filter(|s| !s.replicates.is_empty());
-    let fair: Vec<&Sampler> = measured.filter(|s| s.fault().is_none()).collect();
+    let fair: Vec<&MeasuredSampler> = measured.filter(|s| s.fault().is_none()).collect();
     let samplers = fair
         .iter()
         .map(|s| (s.name.clone(), data.sampler_look(&s.name)));
@@ -130,12 +131,16 @@ pub fn pareto_figure(data: &RunData, stem: &str, view: &View) -> Option<Figure> 
          structures, so a structure moves a sampler only sideways.{}",
         not_drawn(hidden)
     );
-    Some(Figure::new(format!("{stem}-pareto"), caption, plot.draw()?))
+    Some(Illustration::new(
+        format!("{stem}-pareto"),
+        caption,
+        plot.draw()?,
+    ))
 }
 
 /// The p-values of every sampler that was checked.
-pub fn histograms(stem: &str, view: &View) -> Option<Figure> {
-    let panel = |sampler: &Sampler| {
+pub fn histograms(stem: &str, view: &View) -> Option<Illustration> {
+    let panel = |sampler: &MeasuredSampler| {
         let bias = sampler.bias?;
         let biased = bias.verdict == BiasVerdict::Biased;
         let counts = bias.p_histogram.clone();
@@ -150,5 +155,5 @@ pub fn histograms(stem: &str, view: &View) -> Option<Figure> {
     let panels: Vec<Panel> = view.samplers.iter().filter_map(panel).collect();
     let caption = "Bias check: p-values of all tiles per sampler; flat (dashed) without bias, red where biased.";
     let drawing = (!panels.is_empty()).then(|| panels::draw(&panels, 3, (273.0, 90.0)))?;
-    Some(Figure::new(format!("{stem}-bias"), caption, drawing))
+    Some(Illustration::new(format!("{stem}-bias"), caption, drawing))
 }

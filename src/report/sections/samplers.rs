@@ -9,7 +9,7 @@ use crate::report::data::{RunData, SAMPLER_ROW, SceneGroup, View, is_valid_time}
 use crate::report::document::*;
 use crate::report::pivot::{FIGURES_ALONE, Rows};
 use crate::report::plot::pareto::letter;
-use crate::report::samplers::{Metric, Sampler, UNRESOLVED};
+use crate::report::samplers::{MeasuredSampler, Metric, UNRESOLVED};
 use crate::report::values::{Value, number, of_view};
 use crate::report::{format, pictures};
 use std::path::Path;
@@ -46,11 +46,11 @@ pub const SAMPLER: [&str; 1] = ["sampler"];
 
 /// A row for each of some samplers, with further cells under further heads.
 pub fn rows<'a>(
-    samplers: impl IntoIterator<Item = &'a Sampler<'a>>,
+    samplers: impl IntoIterator<Item = &'a MeasuredSampler<'a>>,
     heads: &'a [&'a str],
-    further: impl Fn(&Sampler) -> Vec<Cell>,
+    further: impl Fn(&MeasuredSampler) -> Vec<TableCell>,
 ) -> Rows<'a> {
-    let row = |s: &Sampler| {
+    let row = |s: &MeasuredSampler| {
         let mut cells = vec![s.name.clone().into()];
         cells.extend(further(s));
         (s.key.clone(), cells)
@@ -83,7 +83,10 @@ pub fn error_table(view: &View, values: &[Value], metric: Metric) -> Table {
     );
     let measured = view.samplers.iter().filter(|s| !s.replicates.is_empty());
     let rows = rows(measured, &["sampler", "replicates"], |s| {
-        vec![Cell::repeats(s.replicates.len(), !s.is_deterministic())]
+        vec![TableCell::repeats(
+            s.replicates.len(),
+            !s.is_deterministic(),
+        )]
     });
     rows.table(
         &values,
@@ -106,11 +109,11 @@ fn bias_table(view: &View, values: &[Value]) -> Table {
         view.name,
         format::optional(level)
     );
-    let verdict = |sampler: &Sampler| match (sampler.fault(), sampler.bias) {
-        (Some(fault), _) => Cell::from(fault).toned(Tone::Bad),
+    let verdict = |sampler: &MeasuredSampler| match (sampler.fault(), sampler.bias) {
+        (Some(fault), _) => TableCell::from(fault).toned(Tone::Bad),
         (None, None) => "not tested".into(),
         (None, Some(bias)) if bias.verdict == BiasVerdict::NoBiasFound => {
-            Cell::from("no bias found").toned(Tone::Good)
+            TableCell::from("no bias found").toned(Tone::Good)
         }
         (None, Some(bias)) => bias.verdict.to_string().into(),
     };
@@ -135,7 +138,7 @@ pub fn efficiency_table(view: &View, values: &[Value]) -> Table {
     let caption = format!("Error per second with {}, {}", view.name, race.structure);
     let is_its = |value: &&Value| value.key.label(axis::ACCEL) == race.structure;
     let values: Vec<Value> = values.iter().filter(is_its).cloned().collect();
-    let timed = |s: &&Sampler| view.ms_per_spp(&race.structure, &s.name).is_some();
+    let timed = |s: &&MeasuredSampler| view.ms_per_spp(&race.structure, &s.name).is_some();
     let rows = rows(view.samplers.iter().filter(timed), &SAMPLER, |_| Vec::new());
     let figures = ["ms-per-spp/v1", "error-seconds/v1", "error-at-time/v1"];
     let part = |key: &Key| key.label(axis::SUBJECT).to_owned();
@@ -146,7 +149,7 @@ pub fn efficiency_table(view: &View, values: &[Value]) -> Table {
 fn time_table(data: &RunData, view: &View, values: &[Value]) -> Table {
     let structures = view.timed_structures();
     let row = |(i, name): (usize, &String)| {
-        let cell = Cell::with_detail(name.clone(), format!("({})", letter(i)));
+        let cell = TableCell::with_detail(name.clone(), format!("({})", letter(i)));
         (Key::default().with(axis::ACCEL, name), vec![cell])
     };
     let bounds = format::median_bounds(view.times.iter().map(|time| time.ms.len()));
@@ -167,7 +170,7 @@ fn time_table(data: &RunData, view: &View, values: &[Value]) -> Table {
         let row = structures.iter().position(|s| *s == time.structure);
         let column = table.columns.iter().position(|c| c.title == time.sampler);
         if let (Some(row), Some(column)) = (row, column) {
-            table.rows[row][column] = Cell::from(reason).toned(Tone::Bad);
+            table.rows[row][column] = TableCell::from(reason).toned(Tone::Bad);
         }
     }
     table

@@ -79,7 +79,7 @@ impl<'a> Pair<'a> {
         blocks
     }
 
-    fn figures(&self) -> Vec<Option<Figure>> {
+    fn figures(&self) -> Vec<Option<Illustration>> {
         let dufay = |factor, of| {
             let label = format!("{factor}/√N, fit of Dufay 2017 for {of}");
             Guide::new(label, factor, -0.5)
@@ -135,7 +135,7 @@ impl<'a> Pair<'a> {
     fn rows<'r>(&self, heads: &'r [&'r str]) -> Rows<'r> {
         let row = |s: &&Recorded<StreamRecord>| {
             let name = self.data.names.sampler(s.key).into();
-            let cells = [name, Cell::repeats(s.seeds, s.randomised)];
+            let cells = [name, TableCell::repeats(s.seeds, s.randomised)];
             let cells = cells.into_iter().take(heads.len());
             (s.key.clone(), cells.collect())
         };
@@ -219,7 +219,7 @@ fn worst_table(data: &RunData) -> Table {
             last.n.to_string(),
         ];
         let key = s.key.clone().with(axis::DIMENSIONS, pair_of_dimensions(s));
-        (key, cells.map(Cell::from).into())
+        (key, cells.map(TableCell::from).into())
     };
     let last = |(s, _, last): (&Recorded<StreamRecord>, usize, &FigureAtCount)| {
         let values = of_stream(s).into_iter();

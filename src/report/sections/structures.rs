@@ -26,7 +26,9 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
             "Speed per ray class. Bars: median; lines: {}. The same rays for all.",
             speed_bounds(scene)
         );
-        blocks.push(Block::Figures(vec![Figure::new(name, caption, drawing)]));
+        blocks.push(Block::Figures(vec![Illustration::new(
+            name, caption, drawing,
+        )]));
     }
     let values = of_structures(data, scene);
     let mut tables = vec![speed_table(scene, &values)];
@@ -84,7 +86,7 @@ pub const BY_RAYS: Part<'static> = &|key| key.label(axis::RAYS).to_owned();
 fn rows<'a>(
     structures: impl Iterator<Item = &'a Measured<'a, StructureRecord>>,
     heads: &'a [&'a str],
-    further: impl Fn(&StructureRecord) -> Cell,
+    further: impl Fn(&StructureRecord) -> TableCell,
 ) -> Rows<'a> {
     let row = |s: &Measured<StructureRecord>| {
         let cells = [s.structure.clone().into(), further(s)];
@@ -99,7 +101,7 @@ fn all_built<'a>(scene: &'a SceneGroup) -> impl Iterator<Item = &'a Measured<'a,
 }
 
 fn built<'a>(scene: &'a SceneGroup) -> Rows<'a> {
-    rows(all_built(scene), &["structure"], |_| Cell::default())
+    rows(all_built(scene), &["structure"], |_| TableCell::default())
 }
 
 /// Mrays/s, one row per structure and one column per ray class.
@@ -113,7 +115,7 @@ pub fn speed_table(scene: &SceneGroup, values: &[Value]) -> Table {
             Space::World => "",
             Space::Instances => "judged over instances",
         };
-        Cell::with_detail(verdict, judge).toned(tone)
+        TableCell::with_detail(verdict, judge).toned(tone)
     };
     let bounds = speed_bounds(scene);
     let caption = format!("Speed on {}, Mrays/s: median [{bounds}]", scene.name);
@@ -167,7 +169,7 @@ pub fn outside_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Ta
 /// Leaves by the references they hold.
 fn leaf_table(scene: &SceneGroup, values: &[Value]) -> Table {
     let with_leaves = all_built(scene).filter(|s| s.stats.leaf_histogram.iter().any(|n| *n > 0));
-    rows(with_leaves, &["structure"], |_| Cell::default()).table(
+    rows(with_leaves, &["structure"], |_| TableCell::default()).table(
         values,
         "Leaves (or cells) by the number of references they hold, share",
         &["leaf-share/v1"],

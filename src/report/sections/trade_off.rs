@@ -7,7 +7,7 @@ use crate::report::data::{Measured, STRUCTURE_AXES, SceneGroup, View};
 use crate::report::document::*;
 use crate::report::format;
 use crate::report::pivot::Rows;
-use crate::report::samplers::Sampler;
+use crate::report::samplers::MeasuredSampler;
 use crate::report::values::{Reading, Value};
 
 /// After how many thousand rays a structure has caught up with one that is built `extra_build_ms` faster.
@@ -80,8 +80,8 @@ pub fn break_even_table(scene: &SceneGroup, values: &[Value]) -> Option<Table> {
 }
 
 /// The sampler that most structures were timed with.
-fn most_timed<'a>(view: &'a View) -> Option<&'a Sampler<'a>> {
-    let timed = |s: &&Sampler| view.valid_times().filter(|t| t.sampler == s.name).count();
+fn most_timed<'a>(view: &'a View) -> Option<&'a MeasuredSampler<'a>> {
+    let timed = |s: &&MeasuredSampler| view.valid_times().filter(|t| t.sampler == s.name).count();
     view.samplers.iter().rev().max_by_key(timed)
 }
 
@@ -117,7 +117,7 @@ pub fn time_to_image_table(scene: &SceneGroup, view: &View, builds: &[Value]) ->
         let structure = value.key.label(axis::ACCEL);
         (value.key.clone(), vec![structure.into()])
     };
-    let mut rows: Vec<(Key, Vec<Cell>)> = times.iter().map(row).collect();
+    let mut rows: Vec<(Key, Vec<TableCell>)> = times.iter().map(row).collect();
     rows.dedup_by(|a, b| a.0.agrees(&b.0, &STRUCTURE_AXES));
     let values = [builds, &times].concat();
     let caption = format!(

@@ -7,7 +7,7 @@ use crate::report::data::{Measured, RunData, SceneGroup, View};
 use crate::report::document::*;
 use crate::report::format;
 use crate::report::ruling::{Contender, Ruling, judge};
-use crate::report::samplers::{MeanError, Metric, Sampler, error_after};
+use crate::report::samplers::{MeanError, MeasuredSampler, Metric, error_after};
 use crate::report::values::Value;
 
 /// The verdict box.
@@ -65,13 +65,13 @@ pub fn table(scene: &SceneGroup) -> Table {
     table
 }
 
-fn row(question: String, ruling: &Ruling) -> Vec<Cell> {
+fn row(question: String, ruling: &Ruling) -> Vec<TableCell> {
     let tone = match ruling {
         Ruling::Winner(..) => Tone::Good,
         Ruling::Nobody => Tone::Bad,
         Ruling::Withheld(_) | Ruling::Alone(_) | Ruling::Unclear(_) => Tone::Note,
     };
-    let answer = Cell::from(ruling.answer()).toned(tone);
+    let answer = TableCell::from(ruling.answer()).toned(tone);
     let (figure, next) = (ruling.figure(), ruling.runner_up());
     vec![question.into(), answer, figure.into(), next.into()]
 }
@@ -135,7 +135,7 @@ pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
 
 /// Compares the samplers that have no fault at one spp.
 pub fn best_per_sample(view: &View, spp: u32) -> Ruling {
-    let contender = |sampler: &Sampler| {
+    let contender = |sampler: &MeasuredSampler| {
         Some(Contender {
             name: sampler.name.clone(),
             figure: sampler.mean_error_at(Metric::RelMse, spp)?.error,
@@ -165,7 +165,7 @@ pub struct Race<'a> {
 }
 
 struct Runner<'a> {
-    sampler: &'a Sampler<'a>,
+    sampler: &'a MeasuredSampler<'a>,
     ms_per_spp: Interval,
     /// How often that was measured.
     rounds: usize,
@@ -191,7 +191,7 @@ impl<'a> Race<'a> {
     /// `None` without a sampler that has both errors and a time.
     pub fn new(view: &'a View<'a>) -> Option<Self> {
         let structure = view.fastest_structure()?;
-        let runner = |sampler: &'a Sampler<'a>| {
+        let runner = |sampler: &'a MeasuredSampler<'a>| {
             let time = view.time(&structure, &sampler.name)?;
             let ms_per_spp = time.ms_per_spp?;
             let means = sampler.mean_errors(Metric::RelMse);

@@ -3,7 +3,7 @@
 use super::values::of_line;
 use super::{cell, structures, triangles};
 use crate::measure::record::{Recorded, axis};
-use crate::report::document::{Cell, Table, Tone};
+use crate::report::document::{Table, TableCell, Tone};
 use crate::report::format;
 use crate::report::pivot::{FIGURES_ALONE, Rows};
 use crate::report::values::Value;
@@ -122,7 +122,7 @@ pub(super) fn error_table(records: &[Line], test: &str) -> Table {
     table
 }
 
-fn three(of: Quantiles) -> Cell {
+fn three(of: Quantiles) -> TableCell {
     // What is relative to nothing is held as the greatest number.
     let text = |x: f64| match x {
         f64::MAX => "∞".to_owned(),
@@ -143,7 +143,7 @@ pub(super) fn matrix_table(records: &[Line]) -> Table {
             let marks = families.iter().map(|f| cell(records, &test, &accel, f));
             let marks: Vec<_> = marks.map(|cell| cell.map(|c| mark(&c))).collect();
             if marks.iter().any(Option::is_some) {
-                let mut row: Vec<Cell> = vec![test.clone().into(), accel.into()];
+                let mut row: Vec<TableCell> = vec![test.clone().into(), accel.into()];
                 row.extend(
                     marks
                         .into_iter()
@@ -176,7 +176,7 @@ pub(super) fn worst_table(records: &[Line]) -> Table {
             let labels =
                 [axis::FAMILY, axis::TRIANGLE, axis::ACCEL].map(|axis| cell.key.label(axis));
             let row = labels.into_iter().chain([&*worst.what, &worst.replay]);
-            table.rows.push(row.map(Cell::from).collect());
+            table.rows.push(row.map(TableCell::from).collect());
         }
     }
     table

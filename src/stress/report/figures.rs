@@ -2,7 +2,7 @@
 
 use super::{cell, structures, triangles};
 use crate::measure::record::Interval;
-use crate::report::document::Figure;
+use crate::report::document::Illustration;
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::report::plot::heat::HeatMap;
 use crate::stress::families::FAMILIES;
@@ -13,7 +13,7 @@ use crate::stress::suite::BRUTE_FORCE;
 /// Families whose errors are drawn over the rungs.
 const CURVES: [&str; 4] = ["watertight", "edges", "axis-parallel", "needles"];
 
-pub(super) fn heat_map(records: &[Line], test: &str) -> Option<Figure> {
+pub(super) fn heat_map(records: &[Line], test: &str) -> Option<Illustration> {
     let is_tried = |accel: &str, family: &str| cell(records, test, accel, family).is_some();
     let mut rows = structures(records);
     rows.retain(|accel| FAMILIES.iter().any(|f| is_tried(accel, f.name)));
@@ -32,7 +32,11 @@ pub(super) fn heat_map(records: &[Line], test: &str) -> Option<Figure> {
     let values: Vec<_> = rows.iter().map(row).collect();
     let drawing = HeatMap::of_counts(rows, columns, &values).draw()?;
     let caption = format!("{test}: lost hits per million rays");
-    Some(Figure::new(format!("lost-hits-{test}"), caption, drawing))
+    Some(Illustration::new(
+        format!("lost-hits-{test}"),
+        caption,
+        drawing,
+    ))
 }
 
 /// A way along the rungs: its name, the title of its axis, where a rung is on it.
@@ -46,7 +50,7 @@ const SWEEPS: [Sweep; 2] = [
 ];
 
 /// Error of the distance over the rungs, one plot per family and sweep, one curve per triangle test.
-pub(super) fn curves(records: &[Line]) -> Vec<Option<Figure>> {
+pub(super) fn curves(records: &[Line]) -> Vec<Option<Illustration>> {
     let sweeps = CURVES
         .into_iter()
         .flat_map(|family| SWEEPS.map(|sweep| (family, sweep)));
