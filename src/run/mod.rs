@@ -105,7 +105,10 @@ impl RunError {
                 GpuError::LoopsCut { .. } | GpuError::Kernels(_) | GpuError::Samples { .. },
             ) => 1,
             Self::Gpu(
-                GpuError::NoAdapter | GpuError::UnknownAdapter { .. } | GpuError::NoDevice { .. },
+                GpuError::NoAdapter
+                | GpuError::UnknownAdapter { .. }
+                | GpuError::NoDevice { .. }
+                | GpuError::LoopsUnsound { .. },
             ) => 3,
             Self::EndedEarly { source, .. } => source.exit_code(),
             _ => 2,
