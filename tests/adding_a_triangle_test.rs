@@ -81,6 +81,7 @@ static CROOKED: AsPublished = AsPublished { crooked: true };
 fn run(registries: &Registries, axes: &str) -> Vec<Line> {
     let text = std::fs::read_to_string("tests/data/tiny.toml").expect("the experiment");
     let text = text.replace("[axes]\n", &format!("[axes]\n{axes}\n"));
+    let text = text.replace("replicates = 2", "replicates = 6");
     let folder = tempfile::tempdir().expect("a folder");
     support::run(&text, registries, folder.path(), None).1
 }

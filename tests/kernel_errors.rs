@@ -78,9 +78,9 @@ fn faults_of_all_kinds_are_told_with_file_and_line() {
         (
             "an unknown member",
             bvh,
-            "trace(ray, true).triangle",
-            "trace(ray, true).triangel",
-            "triangel",
+            "(inner.second != NONE)",
+            "(inner.secund != NONE)",
+            "secund",
         ),
         (
             "a syntax error",

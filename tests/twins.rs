@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 /// Kernel file → Rust file, where the stem differs.
 const OTHER_FILE: &[(&str, &str)] = &[
     ("accel/grid", "src/accel/grid/mod.rs"),
+    ("accel/query", "src/accel/twin.rs"),
     ("accel/triangle", "src/accel/triangle/mod.rs"),
     ("integrator/position_error", "src/integrator/offset/mod.rs"),
     ("accel/instance", "src/accel/instancing/instance.rs"),
@@ -147,9 +148,6 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
         "draws; the twin asks for coordinates",
     ),
 ];
-
-/// What every twin does the same around its `trace`: `src/accel/twin.rs`.
-const SHARED: [&str; 2] = ["closest_hit", "any_hit"];
 
 /// Free functions of a twin that no kernel needs, with the reason.
 const RUST_ONLY: &[(&str, &str, &str)] = &[
@@ -369,9 +367,8 @@ fn every_function_of_a_kernel_has_a_twin_of_the_same_name_and_the_other_way_roun
             let listed = KERNEL_ONLY
                 .iter()
                 .any(|(k, n, _)| *k == kernel && n == name);
-            let is_shared = SHARED.contains(&name.as_str()) && here.contains("trace");
             assert!(
-                listed || is_shared,
+                listed,
                 "{kernel}: fn {name} is not in {}",
                 twin_path(&kernel).display()
             );

@@ -2,40 +2,27 @@
 //! `kernels/accel/brute_force.wesl`.
 
 use super::intersection::Reciprocal;
-use super::ray::{Hit, Ray};
+use super::structure::prelude::*;
 use super::triangle::watertight::{Shear, products, shear, sheared};
 use super::triangle::{TriangleRecord, intersect_triangle};
-use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, StructureStats, TriangleSoup,
-};
 use crate::oracle::{GROUP, Groups, Line};
-use crate::params::{ParameterSchema, Params};
 use rayon::prelude::*;
+
+parameters! {
+    /// None.
+    pub struct NoParameters {}
+}
 
 /// The registry entry.
 pub struct BruteForce;
 
-impl AccelKind for BruteForce {
-    fn name(&self) -> &'static str {
-        "brute-force"
-    }
+impl Structure for BruteForce {
+    const NAME: &'static str = "brute-force";
+    const DESCRIPTION: &'static str =
+        "every triangle for every ray: the simplest judge, for small scenes";
+    type Parameters = NoParameters;
 
-    fn description(&self) -> &'static str {
-        "every triangle for every ray: the simplest judge, for small scenes"
-    }
-
-    fn parameters(&self) -> ParameterSchema {
-        Vec::new()
-    }
-
-    fn build(
-        &self,
-        soup: &TriangleSoup,
-        params: &Params,
-        _: &mut BuildLog,
-    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        params.completed(&self.parameters())?;
+    fn build(soup: &TriangleSoup, _: &NoParameters, _: &mut BuildLog) -> BuildResult {
         Ok(Box::new(Built {
             triangles: soup.records.len() as u32,
         }))
@@ -48,23 +35,16 @@ struct Built {
 
 impl BuiltAccel for Built {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
-        if soup.records.len() == self.triangles as usize {
-            Ok(())
-        } else {
-            Err(AccelError::Invalid(format!(
-                "built for {} triangles, given {}",
-                self.triangles,
-                soup.records.len()
-            )))
-        }
+        let (built, given) = (self.triangles as usize, soup.records.len());
+        ensure!(built == given, "built for {built} triangles, given {given}");
+        Ok(())
     }
 
     fn buffers(&self) -> GpuBuffers<'_> {
         let triangles = self.triangles as usize;
         GpuBuffers {
             kernel: "accel/brute_force",
-            features: Vec::new(),
-            uniforms: vec![super::limits(triangles, triangles)],
+            uniforms: vec![limits(triangles, triangles)],
             ..Default::default()
         }
     }
@@ -82,14 +62,14 @@ impl BuiltAccel for Built {
 }
 
 impl Traverse for Built {
-    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+    fn trace(&self, soup: &TriangleSoup, mut walk: Walk) -> Hit {
         for triangle in &soup.records {
-            query.test(triangle);
-            if query.is_answered() {
+            walk.test(triangle);
+            if walk.is_answered() {
                 break;
             }
         }
-        query.hit
+        walk.hit
     }
 }
 

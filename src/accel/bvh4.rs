@@ -4,23 +4,15 @@
 //! Source: H. Dammertz, J. Hanika, A. Keller, "Shallow bounding volume hierarchies for fast SIMD ray
 //! tracing of incoherent rays", EGSR 2008, with the quantised boxes of Ylitie, Karras & Laine 2017.
 
-use super::bounds::Bounds;
-use super::ray::Hit;
-use super::tree::TreeParameters;
-use super::twin::Query;
-use super::wide::Memory;
+use super::structure::prelude::*;
 use super::wide::{
-    Quantisation, Wide, WideChild, WideKind, WideNode, enter_four, frame, leave_four,
+    Quantisation, Wide, WideChild, WideKind, WideNode, WideParameters, enter_four, frame,
+    leave_four,
 };
-use super::{AccelError, AccelKind, BuildLog, BuiltAccel, TriangleSoup};
-use crate::parameters;
-use crate::params::{ParameterSchema, Parameters as _, Params};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
 const WIDTH: usize = 4;
-/// A slot counts its triangles in two bits.
-const MAX_LEAF: u32 = 3;
 const INDEX_MASK: u32 = 0x00ff_ffff;
 const MASK_SHIFT: u32 = 24;
 const SLOT_BITS: u32 = 2;
@@ -32,40 +24,16 @@ const LEAF: u32 = 0x8000_0000;
 const MISSED: u32 = 0xffff_ffff;
 const STACKED_MASK: u32 = 0xffff_ff00;
 
-parameters! {
-    /// The tree and where kernels read it from.
-    struct Options {
-        /// The binary tree that is collapsed.
-        tree: TreeParameters { leaf_size = MAX_LEAF as usize, in 1..=MAX_LEAF as usize; };
-        /// Where kernels read it from.
-        memory: Memory;
-    }
-}
-
 /// The registry entry.
 pub struct Bvh4;
 
-impl AccelKind for Bvh4 {
-    fn name(&self) -> &'static str {
-        "bvh4"
-    }
+impl Structure for Bvh4 {
+    const NAME: &'static str = "bvh4";
+    const DESCRIPTION: &'static str = "compressed 4-wide BVH, 48-byte nodes, nearest first, stack (Dammertz, Hanika & Keller 2008)";
+    type Parameters = WideParameters;
 
-    fn description(&self) -> &'static str {
-        "compressed 4-wide BVH, 48-byte nodes, nearest first, stack (Dammertz, Hanika & Keller 2008)"
-    }
-
-    fn parameters(&self) -> ParameterSchema {
-        Options::schema()
-    }
-
-    fn build(
-        &self,
-        soup: &TriangleSoup,
-        params: &Params,
-        log: &mut BuildLog,
-    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let options = Options::from_params(params)?;
-        Wide::<Node>::build(soup, &options.tree, &options.memory, log)
+    fn build(soup: &TriangleSoup, options: &WideParameters, log: &mut BuildLog) -> BuildResult {
+        Wide::<Node>::build(soup, options, log)
     }
 }
 
@@ -163,22 +131,22 @@ impl WideNode for Node {
         )
     }
 
-    fn trace(built: &Wide<Self>, mut query: Query) -> Hit {
-        let inverse = query.inverse;
+    fn trace(built: &Wide<Self>, mut walk: Walk) -> Hit {
+        let inverse = walk.inverse;
         let mut stack: Vec<(u32, u32)> = Vec::new();
         let (mut children, mut list) = (0, ROOT_LIST);
         let mut next_nearest = 0;
         loop {
             let place = child(children, list & SLOT_MASK) as usize;
-            query.visit(place);
-            query.counters.box_tests += WIDTH as u32;
+            walk.visit(place);
+            walk.counters.box_tests += WIDTH as u32;
             let node = &built.nodes[place];
             let rest = list >> SLOT_BITS;
             if rest != EMPTY_LIST {
                 stack.push((children, next_nearest & STACKED_MASK | rest));
-                query.count_stack(stack.len());
+                walk.count_stack(stack.len());
             }
-            let keys = sorted_keys(node, &query);
+            let keys = sorted_keys(node, &walk);
             let slots = list_of(keys);
             let node_bits = list_bits(keys, LEAF);
             let all_bits = list_bits(keys, MISSED);
@@ -188,15 +156,15 @@ impl WideNode for Node {
             next_nearest = keys[1] & DISTANCE_MASK;
             for place in (node_bits..all_bits).step_by(SLOT_BITS as usize) {
                 for triangle in &built.leaf_triangles[node.leaf(slots >> place & SLOT_MASK)] {
-                    query.test(triangle);
-                    if query.is_answered() {
-                        return query.hit;
+                    walk.test(triangle);
+                    if walk.is_answered() {
+                        return walk.hit;
                     }
                 }
             }
-            while list == EMPTY_LIST || f32::from_bits(nearest) > query.hit.t * inverse.pad {
+            while list == EMPTY_LIST || f32::from_bits(nearest) > walk.hit.t * inverse.pad {
                 let Some(below) = stack.pop() else {
-                    return query.hit;
+                    return walk.hit;
                 };
                 children = below.0;
                 list = below.1 & !STACKED_MASK;
@@ -208,8 +176,8 @@ impl WideNode for Node {
 }
 
 /// Keys of the children that are entered, in ascending order, then `MISSED`.
-fn sorted_keys(node: &Node, query: &Query) -> [u32; 4] {
-    let (ray, inverse) = (&query.ray, query.inverse);
+fn sorted_keys(node: &Node, walk: &Walk) -> [u32; 4] {
+    let (ray, inverse) = (&walk.ray, walk.inverse);
     let planes = frame(node.low, node.exponents, ray.origin, inverse);
     let words = |far: bool| -> [u32; 3] {
         std::array::from_fn(|axis| {
@@ -218,7 +186,7 @@ fn sorted_keys(node: &Node, query: &Query) -> [u32; 4] {
         })
     };
     let enter = enter_four(words(false), &planes, ray.t_min);
-    let leave = leave_four(words(true), &planes, query.hit.t);
+    let leave = leave_four(words(true), &planes, walk.hit.t);
     let mut keys = [0, 1, 2, 3].map(|slot: u32| {
         let i = slot as usize;
         let distance = enter[i].to_bits() & DISTANCE_MASK | slot;

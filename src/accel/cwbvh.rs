@@ -4,23 +4,15 @@
 //! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
 //! compressed wide BVHs", HPG 2017.
 
-use super::bounds::Bounds;
-use super::ray::Hit;
-use super::tree::TreeParameters;
-use super::twin::Query;
-use super::wide::Memory;
+use super::structure::prelude::*;
 use super::wide::{
-    Quantisation, Wide, WideChild, WideKind, WideNode, enter_four, frame, leave_four,
+    Quantisation, Wide, WideChild, WideKind, WideNode, WideParameters, enter_four, frame,
+    leave_four,
 };
-use super::{AccelError, AccelKind, BuildLog, BuiltAccel, TriangleSoup};
-use crate::parameters;
-use crate::params::{ParameterSchema, Parameters as _, Params};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
 const WIDTH: usize = 8;
-/// A slot counts its triangles in unary, in three bits.
-const MAX_LEAF: u32 = 3;
 const PLACES_SHIFT: u32 = 8;
 const SLOTS_MASK: u32 = 0xff;
 const ROOT: u32 = 0x100;
@@ -29,40 +21,17 @@ const MASK_SHIFT: u32 = 24;
 const COUNT_SHIFT: u32 = 5;
 const PLACE_MASK: u32 = 31;
 
-parameters! {
-    /// The tree and where kernels read it from.
-    struct Options {
-        /// The binary tree that is collapsed.
-        tree: TreeParameters { leaf_size = MAX_LEAF as usize, in 1..=MAX_LEAF as usize; };
-        /// Where kernels read it from.
-        memory: Memory;
-    }
-}
-
 /// The registry entry.
 pub struct Cwbvh;
 
-impl AccelKind for Cwbvh {
-    fn name(&self) -> &'static str {
-        "cwbvh"
-    }
+impl Structure for Cwbvh {
+    const NAME: &'static str = "cwbvh";
+    const DESCRIPTION: &'static str =
+        "compressed 8-wide BVH, 80-byte nodes, octant order, stack (Ylitie, Karras & Laine 2017)";
+    type Parameters = WideParameters;
 
-    fn description(&self) -> &'static str {
-        "compressed 8-wide BVH, 80-byte nodes, octant order, stack (Ylitie, Karras & Laine 2017)"
-    }
-
-    fn parameters(&self) -> ParameterSchema {
-        Options::schema()
-    }
-
-    fn build(
-        &self,
-        soup: &TriangleSoup,
-        params: &Params,
-        log: &mut BuildLog,
-    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let options = Options::from_params(params)?;
-        Wide::<Node>::build(soup, &options.tree, &options.memory, log)
+    fn build(soup: &TriangleSoup, options: &WideParameters, log: &mut BuildLog) -> BuildResult {
+        Wide::<Node>::build(soup, options, log)
     }
 }
 
@@ -193,25 +162,25 @@ impl WideNode for Node {
         )
     }
 
-    fn trace(built: &Wide<Self>, mut query: Query) -> Hit {
-        let inverse = query.inverse;
+    fn trace(built: &Wide<Self>, mut walk: Walk) -> Hit {
+        let inverse = walk.inverse;
         let backward = inverse.map(|x| x < 0.0);
         let octant = (0..3).fold(0, |bits, axis| bits | u32::from(backward[axis]) << axis);
         let mut stack = Vec::new();
         let mut group = (0, ROOT);
         loop {
-            query.counters.box_tests += WIDTH as u32;
+            walk.counters.box_tests += WIDTH as u32;
             let places = group.1 >> PLACES_SHIFT;
             let slot = bit_number(places & places.wrapping_neg()) ^ octant;
             let index = group.0 + (group.1 & ((1 << slot) - 1)).count_ones();
-            query.visit(index as usize);
+            walk.visit(index as usize);
             let left = places & (places - 1);
             if left != 0 {
                 stack.push((group.0, left << PLACES_SHIFT | group.1 & SLOTS_MASK));
-                query.count_stack(stack.len());
+                walk.count_stack(stack.len());
             }
             let node = &built.nodes[index as usize];
-            let slots = slot_bits(node, &query);
+            let slots = slot_bits(node, &walk);
             let inner = node.inner_mask();
             group = (
                 node.first_child & INDEX_MASK,
@@ -222,16 +191,16 @@ impl WideNode for Node {
                 let leaf = bit_number(leaves & leaves.wrapping_neg());
                 leaves &= leaves - 1;
                 for triangle in &built.leaf_triangles[node.leaf(leaf as usize)] {
-                    query.test(triangle);
-                    if query.is_answered() {
-                        return query.hit;
+                    walk.test(triangle);
+                    if walk.is_answered() {
+                        return walk.hit;
                     }
                 }
             }
             if group.1 < ROOT {
                 match stack.pop() {
                     Some(below) => group = below,
-                    None => return query.hit,
+                    None => return walk.hit,
                 }
             }
         }
@@ -244,8 +213,8 @@ fn bit_number(bit: u32) -> u32 {
 }
 
 /// Slots of a node whose boxes are entered, as bits.
-fn slot_bits(node: &Node, query: &Query) -> u32 {
-    let (ray, inverse) = (&query.ray, query.inverse);
+fn slot_bits(node: &Node, walk: &Walk) -> u32 {
+    let (ray, inverse) = (&walk.ray, walk.inverse);
     let planes = frame(node.low, node.exponents, ray.origin, inverse);
     let mut bits = 0;
     for half in [0, 4] {
@@ -257,7 +226,7 @@ fn slot_bits(node: &Node, query: &Query) -> u32 {
             })
         };
         let enter = enter_four(words(false), &planes, ray.t_min);
-        let leave = leave_four(words(true), &planes, query.hit.t);
+        let leave = leave_four(words(true), &planes, walk.hit.t);
         for i in 0..4 {
             bits |= u32::from(enter[i] <= leave[i]) << (half + i);
         }

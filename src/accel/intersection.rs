@@ -1,7 +1,7 @@
 //! How rays meet triangles and boxes: the choice that every structure follows, on the device by
 //! composition and on the host through [`Reciprocal`].
 
-use super::ray::{Ray, raised, safe_inverse};
+use super::ray::{Ray, raised};
 use super::triangle::{AnyTriangleTest, Watertight};
 use crate::gpu::{ArithmeticProbe, Composition};
 use crate::params::Named;
@@ -158,11 +158,7 @@ impl Intersection {
     /// What the tests need of a raised ray's direction, computed once a ray.
     pub fn inverse(&self, direction: [f32; 3]) -> Reciprocal {
         Reciprocal {
-            inverse: if self.box_test.finite {
-                safe_inverse(direction)
-            } else {
-                direction.map(|d| 1.0 / d)
-            },
+            inverse: direction.map(|d| 1.0 / d),
             pad: self.box_test.pad(),
             triangle: self.triangle,
         }
@@ -240,7 +236,13 @@ mod tests {
                 box_test,
                 ..Default::default()
             };
-            tests.inverse([0.0, -0.0, 2.0])
+            let ray = Ray {
+                origin: [0.0; 3],
+                t_min: 0.0,
+                direction: [0.0, -0.0, 2.0],
+                t_max: 1.0,
+            };
+            tests.inverse(tests.raised(&ray).direction)
         };
         let limit = 0.5 / SMALLEST_SLOPE;
         assert_eq!(*of(BoxTest::default()), [limit, -limit, 0.5]);

@@ -4,7 +4,7 @@
 use super::bounds::Bounds;
 use super::tree::Coverage;
 use super::triangle::TriangleRecord;
-use super::twin::Query;
+use super::twin::Walk;
 use super::{AccelError, NamedWords, TriangleSoup};
 
 /// Marks a reference to a leaf; bits 26–30 hold its count, bits 0–25 its first place.
@@ -121,10 +121,10 @@ impl LeafReader<'_> {
     }
 
     /// Tests the triangles of the leaf that `reference` names.
-    pub fn test_leaf(self, reference: u32, query: &mut Query) {
+    pub fn test_leaf(self, reference: u32, walk: &mut Walk) {
         let (first, count) = leaf_range(reference);
         for place in first..first + count {
-            query.test(self.load_leaf_triangle(place));
+            walk.test(self.load_leaf_triangle(place));
         }
     }
 }

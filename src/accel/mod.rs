@@ -2,11 +2,23 @@
 //!
 //! To add one, see `docs/adding-a-structure.md`.
 
+/// Returns [`AccelError::Invalid`] with this text unless something holds.
+macro_rules! ensure {
+    ($holds:expr, $($what:tt)+) => {
+        let holds: bool = $holds;
+        if !holds {
+            return Err($crate::accel::AccelError::Invalid(format!($($what)+)));
+        }
+    };
+}
+
 pub mod bounds;
 mod brute_force;
 mod bvh;
 mod bvh4;
 mod cwbvh;
+#[cfg(test)]
+mod fixtures;
 mod grid;
 mod instancing;
 mod intersection;
@@ -14,10 +26,12 @@ mod irregular_grid;
 mod kd_tree;
 mod leaf;
 mod octree;
+mod polygon;
 pub mod ray;
 mod registry;
 mod spatial;
 mod stats;
+mod structure;
 pub mod tracer;
 pub mod tree;
 pub mod triangle;
@@ -38,7 +52,8 @@ pub use kd_tree::KdTree;
 pub use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::{AccelRegistry, BoxRegistry, TriangleRegistry};
-pub use stats::{BuildLog, LEAF_HISTOGRAM_END, Phase, StructureStats, leaf_histogram};
+pub use stats::{BuildLog, LEAF_HISTOGRAM_END, Phase, StructureStats};
+pub use structure::Structure;
 pub use tracer::{
     Answers, Ask, Query, RayBatch, TracePasses, TraceSteps, Traced, Tracer, TriangleBuffers,
 };
@@ -47,7 +62,7 @@ pub use two_level_grid::TwoLevelGrid;
 pub use uniform_grid::UniformGrid;
 
 use crate::gpu::{Composition, UniformValues};
-use crate::params::{ParamError, ParameterSchema, Params};
+use crate::params::{ParamError, ParameterSchema, Params, Sources};
 use crate::scene::SceneData;
 use bytemuck::NoUninit;
 use serde::{Deserialize, Serialize};
@@ -102,17 +117,6 @@ impl AccelError {
             needed,
             limit,
         })
-    }
-
-    /// [`AccelError::Invalid`] unless `holds`.
-    ///
-    /// # Errors
-    /// It does not; `what` says what is violated.
-    pub(crate) fn ensure(holds: bool, what: impl FnOnce() -> String) -> Result<(), Self> {
-        match holds {
-            true => Ok(()),
-            false => Err(Self::Invalid(what())),
-        }
     }
 }
 
@@ -272,7 +276,8 @@ impl GpuBuffers<'_> {
     }
 }
 
-/// A kind of structure: one static per structure, one line in the registry.
+/// A kind of structure: one static per structure, one line in the registry. [`Structure`] is the shorter way to
+/// declare one whose name is known at compile time.
 pub trait AccelKind: Sync {
     /// Name as a user types it.
     fn name(&self) -> &'static str;
@@ -284,17 +289,19 @@ pub trait AccelKind: Sync {
     fn kernels(&self) -> Vec<String> {
         vec![format!("accel/{}", self.name().replace('-', "_"))]
     }
+    /// Paths and texts of the kernel modules that it brings along, because they are not the program's.
+    fn sources(&self) -> Sources {
+        &[]
+    }
     /// Builds the structure.
     ///
     /// # Errors
     /// A limit of the structure is exceeded.
-    fn build(
-        &self,
-        soup: &TriangleSoup,
-        params: &Params,
-        log: &mut BuildLog,
-    ) -> Result<Box<dyn BuiltAccel>, AccelError>;
+    fn build(&self, soup: &TriangleSoup, params: &Params, log: &mut BuildLog) -> BuildResult;
 }
+
+/// A built structure, or why there is none.
+pub type BuildResult = Result<Box<dyn BuiltAccel>, AccelError>;
 
 /// In which space a structure meets triangles, and so which judge it has to equal to the bit.
 #[derive(
@@ -313,7 +320,7 @@ pub enum Space {
 /// How a built structure is traced.
 #[derive(Clone)]
 pub enum Access {
-    /// Its kernel module exports `closest_hit` and `any_hit`, which other kernels import.
+    /// Its kernel module exports `trace(ray, any)`, which other kernels call through `accel/query`.
     Inline,
     /// It answers buffers of rays in passes of its own; kernels with a structure in them (those of
     /// integrators that trace) cannot use it.

@@ -63,6 +63,10 @@ impl Named for dyn AccelKind {
     fn parameters(&self) -> ParameterSchema {
         AccelKind::parameters(self)
     }
+
+    fn sources(&self) -> Sources {
+        AccelKind::sources(self)
+    }
 }
 
 impl Named for dyn TriangleTest {

@@ -18,7 +18,9 @@
 //! the exact one can make a difference.
 
 use super::bounds::Bounds;
+use super::polygon::Polygon;
 use super::triangle::{DISTANCE_PAD, TriangleRecord};
+use glam::DVec3;
 
 /// Cosine between ray and normal down to which margins cover the error of a hit, 2⁻⁵.
 const LEAST_COSINE: f64 = 0.03125;
@@ -162,61 +164,23 @@ pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// Box of the part of a triangle within `cell` grown by `margin`, itself grown by `margin`; `None` if
-/// there is no such part (I. Sutherland, G. Hodgman, "Reentrant polygon clipping", 1974).
-pub(super) fn clip(corners: &Corners, cell: &Bounds, margin: f64) -> Option<Bounds> {
-    // Each of six planes adds one corner at most.
-    let mut polygon = [[0.0; 3]; 9];
-    polygon[..3].copy_from_slice(corners);
-    let mut count = 3;
-    for axis in 0..3 {
-        for (plane, sign) in [
-            (f64::from(cell.min[axis]) - margin, 1.0),
-            (f64::from(cell.max[axis]) + margin, -1.0),
-        ] {
-            let inside = |p: &[f64; 3]| (p[axis] - plane) * sign;
-            if polygon[..count].iter().all(|p| inside(p) >= 0.0) {
-                continue;
-            }
-            let old = polygon;
-            let before = count;
-            count = 0;
-            for i in 0..before {
-                let (p, q) = (&old[i], &old[(i + 1) % before]);
-                let (from, to) = (inside(p), inside(q));
-                if from >= 0.0 {
-                    polygon[count] = *p;
-                    count += 1;
-                }
-                if (from >= 0.0) != (to >= 0.0) {
-                    let along = from / (from - to);
-                    polygon[count] = std::array::from_fn(|a| p[a] + along * (q[a] - p[a]));
-                    polygon[count][axis] = plane;
-                    count += 1;
-                }
-            }
-        }
-    }
-    let mut bounds = (count > 0).then_some(Bounds::EMPTY)?;
-    for corner in &polygon[..count] {
-        bounds = bounds.union(&Bounds {
-            min: corner.map(|c| (c - margin) as f32),
-            max: corner.map(|c| (c + margin) as f32),
-        });
-    }
-    Some(bounds)
-}
-
-/// The box that two overlapping boxes share.
-pub(super) fn intersection(a: &Bounds, b: &Bounds) -> Bounds {
-    Bounds {
-        min: std::array::from_fn(|axis| a.min[axis].max(b.min[axis])),
-        max: std::array::from_fn(|axis| a.max[axis].min(b.max[axis])),
-    }
+/// there is no such part.
+pub(super) fn clip(record: &TriangleRecord, cell: &Bounds, margin: f64) -> Option<Bounds> {
+    let part = Polygon::new(record).clipped(cell, margin);
+    let around = |all: Bounds, corner: &DVec3| {
+        all.union(&Bounds {
+            min: (*corner - margin).to_array().map(|c| c as f32),
+            max: (*corner + margin).to_array().map(|c| c as f32),
+        })
+    };
+    let bounds = part.corners().iter().fold(Bounds::EMPTY, around);
+    (!part.corners().is_empty()).then_some(bounds)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::fixtures::record;
 
     const CORNER: Corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
 
@@ -235,14 +199,15 @@ mod tests {
 
     #[test]
     fn clipping_gives_the_box_of_the_part_inside() {
-        let inside = clip(&CORNER, &cell([1.0, 1.0, -1.0], [2.5, 9.0, 1.0]), 0.0);
+        let corner = &record(0, CORNER.map(|v| v.map(|x| x as f32)));
+        let inside = clip(corner, &cell([1.0, 1.0, -1.0], [2.5, 9.0, 1.0]), 0.0);
         assert_eq!(inside, Some(cell([1.0, 1.0, 0.0], [2.5, 3.0, 0.0])));
         assert_eq!(
-            clip(&CORNER, &cell([2.125, 2.0, -1.0], [3.0, 3.0, 1.0]), 0.0),
+            clip(corner, &cell([2.125, 2.0, -1.0], [3.0, 3.0, 1.0]), 0.0),
             None
         );
         // In eighths, so that nothing is rounded.
-        let grown = clip(&CORNER, &cell([2.125, 2.0, -1.0], [3.0, 3.0, 1.0]), 0.5);
+        let grown = clip(corner, &cell([2.125, 2.0, -1.0], [3.0, 3.0, 1.0]), 0.5);
         assert_eq!(grown, Some(cell([1.125, 1.0, -0.5], [3.0, 2.875, 0.5])));
     }
 }

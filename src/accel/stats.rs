@@ -41,18 +41,21 @@ pub struct StructureStats {
 }
 
 impl StructureStats {
-    /// Leaves, references and histogram of cells that list so many triangles; all else is left 0.
-    pub(super) fn of_cells(lengths: impl Iterator<Item = usize>) -> Self {
+    /// Leaves, references and histogram of leaves or cells that list so many triangles; all else is left 0.
+    /// Those that list none are no leaves.
+    pub(super) fn of_leaves(counts: impl Iterator<Item = usize>) -> Self {
         let mut stats = Self::default();
-        let counted = lengths.inspect(|&length| {
-            stats.leaves += u64::from(length > 0);
-            stats.references += length as u64;
-        });
-        let leaf_histogram = leaf_histogram(counted);
-        Self {
-            leaf_histogram,
-            ..stats
+        let histogram = &mut stats.leaf_histogram;
+        for count in counts {
+            let place = count.min(LEAF_HISTOGRAM_END);
+            if histogram.len() <= place {
+                histogram.resize(place + 1, 0);
+            }
+            histogram[place] += 1;
+            stats.leaves += u64::from(count > 0);
+            stats.references += count as u64;
         }
+        stats
     }
 }
 
@@ -129,15 +132,3 @@ impl BuildLog {
 
 /// Longest entry of a leaf histogram; more references than this are counted there.
 pub const LEAF_HISTOGRAM_END: usize = 32;
-
-/// How many leaves or cells hold 0, 1, 2, … references; see [`StructureStats::leaf_histogram`].
-pub fn leaf_histogram(counts: impl Iterator<Item = usize>) -> Vec<u64> {
-    let mut histogram = Vec::new();
-    for count in counts.map(|c| c.min(LEAF_HISTOGRAM_END)) {
-        if histogram.len() <= count {
-            histogram.resize(count + 1, 0);
-        }
-        histogram[count] += 1;
-    }
-    histogram
-}

@@ -1,7 +1,7 @@
 //! Twins: the traversals of kernels in scalar Rust, with the same hits and the same counted work.
 //!
 //! A structure writes [`Traverse::trace`], the twin of the kernel's `trace`. What all of them begin
-//! and end with stands here.
+//! and end with stands here. Twin of `kernels/accel/query.wesl`.
 
 use super::TriangleSoup;
 use super::bounds::{Bounds, enter_box};
@@ -23,8 +23,8 @@ pub struct Counters {
     pub stack_high_water: u32,
 }
 
-/// One ray on its way through a structure.
-pub struct Query<'a> {
+/// One ray on its way through a structure, with what is asked and what was found so far.
+pub struct Walk<'a> {
     /// The ray as it is traced: see [`super::ray::raised`].
     pub ray: Ray,
     /// What tests need of its direction.
@@ -37,8 +37,8 @@ pub struct Query<'a> {
     pub counters: &'a mut Counters,
 }
 
-impl<'a> Query<'a> {
-    /// The question of `ray`, met by these tests.
+impl<'a> Walk<'a> {
+    /// The way of `ray`, met by these tests.
     pub fn new(ray: &Ray, any: bool, tests: Intersection, counters: &'a mut Counters) -> Self {
         let ray = tests.raised(ray);
         Self {
@@ -90,7 +90,7 @@ impl<'a> Query<'a> {
 /// A structure that can be traversed on the host.
 pub trait Traverse: Sync {
     /// Twin of the kernel's `trace`; `soup` is what the structure was built over.
-    fn trace(&self, soup: &TriangleSoup, query: Query) -> Hit;
+    fn trace(&self, soup: &TriangleSoup, walk: Walk) -> Hit;
 }
 
 /// What answers rays on the host.
@@ -107,12 +107,12 @@ pub struct Twin<'a, T>(pub &'a T, pub &'a TriangleSoup);
 impl<T: Traverse> CpuTwin for Twin<'_, T> {
     fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
         let Self(built, soup) = self;
-        built.trace(soup, Query::new(ray, false, soup.intersection, counters))
+        built.trace(soup, Walk::new(ray, false, soup.intersection, counters))
     }
 
     fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
         let Self(built, soup) = self;
-        let query = Query::new(ray, true, soup.intersection, counters);
-        built.trace(soup, query).triangle != NO_HIT
+        let walk = Walk::new(ray, true, soup.intersection, counters);
+        built.trace(soup, walk).triangle != NO_HIT
     }
 }

@@ -6,16 +6,9 @@
 //! One loop walks both levels: it steps through the parts of a top cell until it leaves the cell, and
 //! then finds its place in the next one.
 
-use super::grid::lists::{Lists, PartLists, check_lists};
+use super::grid::lists::{Lists, PartLists, check_lists, check_starts, in_runs};
 use super::grid::{Cut, Grid, GridBox, areas, check_words, clamped, finest, first_axis, outside};
-use super::ray::Hit;
-use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
-    TriangleSoup,
-};
-use crate::parameters;
-use crate::params::{ParameterSchema, Parameters as _, Params};
+use super::structure::prelude::*;
 use rayon::prelude::*;
 
 /// Most parts of a top cell along an axis: its resolution takes ten bits an axis.
@@ -23,12 +16,10 @@ const MOST_PARTS: u32 = 1023;
 /// Bits of a top cell's resolution for each axis.
 const PART_BITS: u32 = 10;
 const PART_MASK: u32 = 1023;
-/// Top cells that one task cuts.
-const RUN: usize = 64;
 
 parameters! {
     /// Resolutions of the two levels.
-    struct Options {
+    pub struct Options {
         /// top cells per triangle of the scene
         lambda1: f64 = 0.12, in 0.001..=1000.0;
         /// parts of a top cell per triangle in it
@@ -39,30 +30,17 @@ parameters! {
 /// The registry entry.
 pub struct TwoLevelGrid;
 
-impl AccelKind for TwoLevelGrid {
-    fn name(&self) -> &'static str {
-        "two-level-grid"
-    }
+impl Structure for TwoLevelGrid {
+    const NAME: &'static str = "two-level-grid";
+    const DESCRIPTION: &'static str =
+        "a coarse grid whose occupied cells are grids of their own (Kalojanov et al. 2011)";
+    type Parameters = Options;
 
-    fn description(&self) -> &'static str {
-        "a coarse grid whose occupied cells are grids of their own (Kalojanov et al. 2011)"
-    }
-
-    fn parameters(&self) -> ParameterSchema {
-        Options::schema()
-    }
-
-    fn build(
-        &self,
-        soup: &TriangleSoup,
-        params: &Params,
-        log: &mut BuildLog,
-    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let options = Options::from_params(params)?;
+    fn build(soup: &TriangleSoup, options: &Options, log: &mut BuildLog) -> BuildResult {
         let grid_box = log.phase("bounds", || GridBox::new(soup));
         let resolution = grid_box.resolution(soup.records.len(), options.lambda1, 4096);
         let grid = Grid::new(&grid_box, resolution);
-        let top = Lists::new(self.name(), &grid, soup, true, log)?;
+        let top = Lists::new(Self::NAME, &grid, soup, true, log)?;
         let built = log.phase("parts", || cut(grid, soup, &top, options.lambda2))?;
         Ok(Box::new(built))
     }
@@ -94,18 +72,10 @@ fn cut(grid: Grid, soup: &TriangleSoup, top: &Lists, lambda: f64) -> Result<Buil
         let ids = top.of(cell).iter();
         parts(&grid, ids.map(|&id| areas[id as usize]), lambda)
     };
-    let all_parts = |cell: usize| {
-        resolutions(cell)
-            .iter()
-            .map(|&r| u64::from(r))
-            .product::<u64>()
-    };
+    let all_parts = |cell: usize| resolutions(cell).map(u64::from).iter().product::<u64>();
     let occupied = |cell: &usize| !top.of(*cell).is_empty();
-    let needed: u64 = (0..tops)
-        .into_par_iter()
-        .filter(occupied)
-        .map(all_parts)
-        .sum();
+    let all = (0..tops).into_par_iter().filter(occupied);
+    let needed: u64 = all.map(all_parts).sum();
     check_words("cells of a two-level-grid", 2 * tops as u64 + needed + 1)?;
 
     let cut_run = |cells: std::ops::Range<usize>| {
@@ -123,17 +93,14 @@ fn cut(grid: Grid, soup: &TriangleSoup, top: &Lists, lambda: f64) -> Result<Buil
             let packed = x | y << PART_BITS | z << (2 * PART_BITS);
             run.top.push([run.starts.len() as u32, packed]);
             let begin = run.references.len() as u32;
-            let (_, starts) = lists.starts.split_last().unwrap_or((&0, &[]));
+            let Lists { starts, references } = &lists.lists;
+            let (_, starts) = starts.split_last().unwrap_or((&0, &[]));
             run.starts.extend(starts.iter().map(|s| begin + s));
-            run.references.extend_from_slice(&lists.references);
+            run.references.extend_from_slice(references);
         }
         run
     };
-    let ranges: Vec<_> = (0..tops)
-        .step_by(RUN)
-        .map(|c| c..(c + RUN).min(tops))
-        .collect();
-    let runs: Vec<Run> = ranges.into_par_iter().map(cut_run).collect();
+    let runs = in_runs(tops, cut_run);
     let references = runs.iter().map(|r| r.references.len() as u64).sum();
     check_words("references of a two-level-grid", references)?;
     Ok(Built::join(
@@ -195,33 +162,24 @@ impl Built {
         &self.references[self.cells[place] as usize..self.cells[place + 1] as usize]
     }
 
-    /// Lengths of the lists of all parts.
-    fn lengths(&self) -> impl Iterator<Item = usize> {
-        self.cells[self.first_part()..]
-            .windows(2)
-            .map(|w| (w[1] - w[0]) as usize)
+    /// Begins of the lists of all parts, and the end of the last.
+    fn starts(&self) -> &[u32] {
+        &self.cells[self.first_part()..]
     }
 
     fn check_order(&self) -> Result<(), AccelError> {
-        let wrong = |text: String| Err(AccelError::Invalid(text));
         let mut place = self.first_part() as u32;
         for cell in 0..self.grid.cells() as u32 {
             let (first, resolution) = self.top(self.grid.coordinates(cell));
-            if first != place {
-                return wrong(format!("top cell {cell}: its parts are those of another"));
-            }
+            ensure!(
+                first == place,
+                "top cell {cell}: its parts are those of another"
+            );
             place += resolution.iter().product::<u32>();
         }
-        let starts = &self.cells[self.first_part()..];
-        if place as usize + 1 != self.cells.len()
-            || starts.last() != Some(&(self.references.len() as u32))
-        {
-            return wrong("the cells do not cover the references".to_owned());
-        }
-        match starts.windows(2).position(|w| w[0] > w[1]) {
-            Some(part) => wrong(format!("part {part}: its list runs backwards")),
-            None => Ok(()),
-        }
+        let (parts, starts) = (place as usize - self.first_part(), self.starts());
+        let starts = starts.iter().map(|start| *start as usize);
+        check_starts(starts, parts, self.references.len())
     }
 }
 
@@ -258,21 +216,18 @@ impl BuiltAccel for Built {
                 NamedWords::new("cells", &self.cells),
                 NamedWords::new("references", &self.references),
             ],
-            uniforms: vec![
-                self.grid.uniform(),
-                super::limits(steps, self.references.len()),
-            ],
+            uniforms: vec![self.grid.uniform(), limits(steps, self.references.len())],
             constants: Vec::new(),
         }
     }
 
     fn stats(&self) -> StructureStats {
-        let parts = (self.cells.len() - self.first_part() - 1) as u64;
+        let lengths = self.starts().windows(2).map(|w| (w[1] - w[0]) as usize);
         StructureStats {
-            nodes: self.grid.cells() + parts,
+            nodes: self.grid.cells() + lengths.len() as u64,
             depth: Some(1),
             bytes: self.buffers().bytes(),
-            ..StructureStats::of_cells(self.lengths())
+            ..StructureStats::of_leaves(lengths)
         }
     }
 
@@ -287,13 +242,13 @@ fn find_part(place: [f32; 3], top: [u32; 3], parts: [u32; 3]) -> [u32; 3] {
 }
 
 impl Traverse for Built {
-    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+    fn trace(&self, soup: &TriangleSoup, mut walk: Walk) -> Hit {
         let grid = &self.grid;
-        let Some(enter) = query.enter(&grid.bounds) else {
-            return query.hit;
+        let Some(enter) = walk.enter(&grid.bounds) else {
+            return walk.hit;
         };
-        let ray = query.ray;
-        let inverse = query.inverse;
+        let ray = walk.ray;
+        let inverse = walk.inverse;
         let forward = inverse.map(|i| i >= 0.0);
         let entry = grid.in_cells(&ray, enter);
         let mut top: [u32; 3] = std::array::from_fn(|a| clamped(entry[a], grid.resolution[a]));
@@ -302,13 +257,13 @@ impl Traverse for Built {
         let mut part = find_part(entry, top, parts);
         loop {
             // The place of the cell's first part.
-            query.visit(first as usize);
+            walk.visit(first as usize);
             if resolution[0] != 0 {
                 let place = first + (part[2] * parts[1] + part[1]) * parts[0] + part[0];
-                query.test_list(soup, self.list(place as usize).iter().copied());
+                walk.test_list(soup, self.list(place as usize).iter().copied());
             }
-            if query.is_answered() {
-                return query.hit;
+            if walk.is_answered() {
+                return walk.hit;
             }
             let planes = std::array::from_fn(|a| {
                 top[a] as f32 + (part[a] + u32::from(forward[a])) as f32 / parts[a] as f32
@@ -316,8 +271,8 @@ impl Traverse for Built {
             let next = grid.distances(&ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
             // The exit must lie clearly behind the hit: an equally near one may wait next door.
-            if query.hit.t * inverse.pad < leave {
-                return query.hit;
+            if walk.hit.t * inverse.pad < leave {
+                return walk.hit;
             }
             let axis = first_axis(next, leave);
             let step = if forward[axis] { 1 } else { -1 };
@@ -327,7 +282,7 @@ impl Traverse for Built {
             }
             top[axis] = top[axis].wrapping_add_signed(step);
             if outside(top, grid.resolution) {
-                return query.hit;
+                return walk.hit;
             }
             (first, resolution) = self.top(top);
             parts = resolution.map(|r| r.max(1));

@@ -9,16 +9,9 @@
 //! nearest hit. With `skip = chebyshev` an empty cell knows how far the nearest list is, and the walk
 //! leaves the whole empty cube around it at once.
 
-use super::grid::lists::{Lists, check_lists};
+use super::grid::lists::{Lists, check_lists, check_starts};
 use super::grid::{Grid, GridBox, check_words, clamped, distance, first_axis, outside};
-use super::ray::{Hit, Ray};
-use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
-    TriangleSoup,
-};
-use crate::parameters;
-use crate::params::{ParameterSchema, Parameters as _, Params};
+use super::structure::prelude::*;
 use rayon::prelude::*;
 
 /// Bits of a cell's word that hold the begin of its list; the others hold the distance.
@@ -27,7 +20,7 @@ const START_MASK: u32 = 0x01ff_ffff;
 
 parameters! {
     /// Resolution, and how empty space is left.
-    struct Options {
+    pub struct Options {
         /// cells per triangle: resolution = extent · cbrt(λ · triangles / volume)
         lambda: f64 = 5.0, in 0.01..=1000.0;
         /// how empty space is left: cell by cell, or by the Chebyshev distance to the nearest list
@@ -37,7 +30,7 @@ parameters! {
     }
 
     /// How empty space is left.
-    enum Skip {
+    pub enum Skip {
         /// Cell by cell.
         None = "none",
         /// By the Chebyshev distance to the nearest list.
@@ -48,31 +41,17 @@ parameters! {
 /// The registry entry.
 pub struct UniformGrid;
 
-impl AccelKind for UniformGrid {
-    fn name(&self) -> &'static str {
-        "uniform-grid"
-    }
+impl Structure for UniformGrid {
+    const NAME: &'static str = "uniform-grid";
+    const DESCRIPTION: &'static str = "equal cells by Cleary's rule, 3D-DDA (Amanatides & Woo 1987), empty cubes skipped on demand";
+    type Parameters = Options;
 
-    fn description(&self) -> &'static str {
-        "equal cells by Cleary's rule, 3D-DDA (Amanatides & Woo 1987), empty cubes skipped on demand"
-    }
-
-    fn parameters(&self) -> ParameterSchema {
-        Options::schema()
-    }
-
-    fn build(
-        &self,
-        soup: &TriangleSoup,
-        params: &Params,
-        log: &mut BuildLog,
-    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let options = Options::from_params(params)?;
+    fn build(soup: &TriangleSoup, options: &Options, log: &mut BuildLog) -> BuildResult {
         let grid_box = log.phase("bounds", || GridBox::new(soup));
         let resolution = grid_box.resolution(soup.records.len(), options.lambda, 4096);
         let grid = Grid::new(&grid_box, resolution);
         let exact = options.exact_overlap;
-        let Lists { starts, references } = Lists::new(self.name(), &grid, soup, exact, log)?;
+        let Lists { starts, references } = Lists::new(Self::NAME, &grid, soup, exact, log)?;
         check_words("cells of a uniform-grid", starts.len() as u64)?;
         let mut built = Built {
             grid,
@@ -124,19 +103,12 @@ impl Built {
 
     fn check_order(&self) -> Result<(), AccelError> {
         let cells = self.grid.cells() as usize;
-        let is_covered =
-            self.cells.len() == cells + 1 && self.start(cells) == self.references.len();
-        AccelError::ensure(is_covered, || {
-            "the cells do not cover the references".into()
-        })?;
+        let starts = (0..self.cells.len()).map(|cell| self.start(cell));
+        check_starts(starts, cells, self.references.len())?;
         for cell in 0..cells {
-            AccelError::ensure(self.start(cell) <= self.start(cell + 1), || {
-                format!("cell {cell}: its list runs backwards")
-            })?;
             let is_near = self.cells[cell] >> START_BITS == 0;
-            AccelError::ensure(!self.skip || self.list(cell).is_empty() != is_near, || {
-                format!("cell {cell}: its distance contradicts its list")
-            })?;
+            let agree = !self.skip || self.list(cell).is_empty() != is_near;
+            ensure!(agree, "cell {cell}: its distance contradicts its list");
         }
         Ok(())
     }
@@ -164,7 +136,7 @@ impl BuiltAccel for Built {
             ],
             uniforms: vec![
                 self.grid.uniform(),
-                super::limits(steps as usize, self.references.len()),
+                limits(steps as usize, self.references.len()),
             ],
             constants: Vec::new(),
         }
@@ -175,7 +147,7 @@ impl BuiltAccel for Built {
         StructureStats {
             nodes: self.grid.cells(),
             bytes: self.buffers().bytes(),
-            ..StructureStats::of_cells(lengths)
+            ..StructureStats::of_leaves(lengths)
         }
     }
 
@@ -203,22 +175,22 @@ fn jump(
 }
 
 impl Traverse for Built {
-    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+    fn trace(&self, soup: &TriangleSoup, mut walk: Walk) -> Hit {
         let grid = &self.grid;
-        let Some(enter) = query.enter(&grid.bounds) else {
-            return query.hit;
+        let Some(enter) = walk.enter(&grid.bounds) else {
+            return walk.hit;
         };
-        let ray = query.ray;
-        let inverse = query.inverse;
+        let ray = walk.ray;
+        let inverse = walk.inverse;
         let forward = inverse.map(|i| i >= 0.0);
         let entry = grid.in_cells(&ray, enter);
         let mut cell: [u32; 3] = std::array::from_fn(|a| clamped(entry[a], grid.resolution[a]));
         loop {
             let index = grid.index(cell) as usize;
-            query.visit(index);
-            query.test_list(soup, self.list(index).iter().copied());
-            if query.is_answered() {
-                return query.hit;
+            walk.visit(index);
+            walk.test_list(soup, self.list(index).iter().copied());
+            if walk.is_answered() {
+                return walk.hit;
             }
             // Cells that can be left at once: the cube of empty ones, or this cell alone.
             let reach = self.reach(index);
@@ -229,8 +201,8 @@ impl Traverse for Built {
             let next = grid.distances(&ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
             // The exit must lie clearly behind the hit: an equally near one may wait next door.
-            if query.hit.t * inverse.pad < leave {
-                return query.hit;
+            if walk.hit.t * inverse.pad < leave {
+                return walk.hit;
             }
             let axis = first_axis(next, leave);
             let step = if forward[axis] { reach } else { -reach };
@@ -240,7 +212,7 @@ impl Traverse for Built {
             }
             cell[axis] = beyond;
             if outside(cell, grid.resolution) {
-                return query.hit;
+                return walk.hit;
             }
         }
     }

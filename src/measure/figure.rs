@@ -119,10 +119,10 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 67] = [
+pub static FIGURES: [Figure; 80] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
-    Figure::new("rays/v1", "number", "", Neither, Count, Exact),
+    Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
     Figure::new("hit-share/v1", "hit", "", Neither, Percent, Exact),
     Figure::new("nodes-per-ray/v1", "nodes/ray", "", Lower, THREE, Exact),
     Figure::new("box-tests-per-ray/v1", "box tests/ray", "", Lower, THREE, Exact),
@@ -141,17 +141,29 @@ pub static FIGURES: [Figure; 67] = [
     Figure::new("depth/v1", "depth", "", Lower, Count, Exact),
     Figure::new("sah-cost/v1", "SAH cost", "", Lower, THREE, Exact),
     Figure::new("epo/v1", "EPO", "", Lower, THREE, Exact),
+    Figure::new("leaf-share/v1", "share of the leaves", "", Neither, Percent, Exact),
+    Figure::new("break-even/v1", "break-even", "thousand rays", Lower, THREE, Single),
     // Full cells.
     Figure::new("ms-per-spp/v1", "time per sample per pixel", "ms", Lower, THREE, Median),
     Figure::new("cell-mrays-per-s/v1", "speed of the whole cell", "Mrays/s", Higher, THREE, Median),
+    Figure::new("time-to-image/v1", "build and rendering", "ms", Lower, THREE, Single),
+    Figure::new("error-seconds/v1", "unbiased relMSE × seconds", "", Lower, THREE, Single),
+    Figure::new("error-at-time/v1", "unbiased relMSE at equal time", "", Lower, THREE, Jackknife),
     // Errors of samplers.
     Figure::new("relmse-unbiased/v1", "unbiased relMSE", "", Lower, THREE, Jackknife),
     Figure::new("rmse-unbiased/v1", "unbiased RMSE", "", Lower, THREE, Jackknife),
     Figure::new("relmse-slope/v1", "slope of relMSE", "", Lower, Exponent, Jackknife),
     Figure::new("rmse-slope/v1", "slope of RMSE", "", Lower, Exponent, Jackknife),
-    Figure::new("bias-z/v1", "difference of the image's mean", "standard errors", Neither, THREE, Exact),
+    Figure::new("bias-tiles/v1", "tiles", "", Neither, Count, Exact),
+    Figure::new("bias-rejected/v1", "rejected", "", Lower, Count, Exact),
+    Figure::new("bias-least-p/v1", "smallest p of a tile", "", Neither, THREE, Exact),
+    Figure::new("bias-z/v1", "z of the image", "", Neither, THREE, Exact),
+    Figure::new("bias-p/v1", "p of the image", "", Neither, THREE, Exact),
+    Figure::new("bias-freedom/v1", "degrees of freedom", "", Neither, THREE, Exact),
     Figure::new("low-frequency-power/v1", "low-frequency power", "", Lower, THREE, Mean),
     Figure::new("neighbour-correlation/v1", "correlation", "", Lower, THREE, Mean),
+    Figure::new("luminance-rmse/v1", "RMSE", "", Lower, THREE, Single),
+    Figure::new("filtered-share/v1", "share of the RMSE after a filter", "", Lower, Percent, Single),
     Figure::new("reference-mse/v1", "MSE of the reference", "", Lower, THREE, Single),
     // Point sets.
     Figure::new("star-discrepancy/v1", "D*, star discrepancy", "", Lower, THREE, Mean),
@@ -164,6 +176,7 @@ pub static FIGURES: [Figure; 67] = [
     Figure::new("neighbour-angle/v1", "angle", "degrees", Neither, THREE, Single),
     Figure::new("coverage/v1", "coverage", "", Higher, Percent, Single),
     Figure::new("ns-per-sample/v1", "ns per sample", "", Lower, THREE, Median),
+    Figure::new("loop-ns/v1", "empty loop", "ns", Neither, THREE, Median),
     // Hard scenes and rays, judged exactly.
     Figure::new("false-misses/v1", "false misses", "", Lower, Count, Exact),
     Figure::new("unexplained-misses/v1", "unexplained misses", "", Lower, Count, Exact),

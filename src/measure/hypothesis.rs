@@ -18,13 +18,25 @@ pub struct WelchTest {
 ///
 /// Samples without any spread are compared as they are: p = 1 if equal, p = 0 if not. `None` if
 /// either side has fewer than two samples or one that is not finite.
+///
+/// Very small p-values of very few samples come up far too often: for two samples against eight that are three
+/// times as even, p ≤ 1e-4 in 1.8 % of all cases. [`capped_t_test`] does not do that.
 pub fn welch_t_test(a: &[f64], b: &[f64]) -> Option<WelchTest> {
-    welch_t_test_beyond(a, b, 0.0)
+    t_test(a, b, 0.0, f64::INFINITY)
 }
 
-/// Like [`welch_t_test`], for the hypothesis that the means differ by at most `margin ≥ 0` (in the
-/// unit of the samples): the difference is shortened by the margin first.
-pub fn welch_t_test_beyond(a: &[f64], b: &[f64], margin: f64) -> Option<WelchTest> {
+/// Like [`welch_t_test`], with no more degrees of freedom than `a` has by itself, and for the hypothesis that
+/// the means differ by at most `margin ≥ 0` (in the unit of the samples): the difference is shortened by the
+/// margin first.
+///
+/// Few samples of `a` may lie close together by chance. Welch and Satterthwaite then take their variance for
+/// small and count the degrees of freedom of `b` instead. With the cap, which the exact bound of Hsu (1938)
+/// has, too, p-values are no smaller than they should be if `b` has less noise than `a`, and larger else.
+pub fn capped_t_test(a: &[f64], b: &[f64], margin: f64) -> Option<WelchTest> {
+    t_test(a, b, margin, (a.len() as f64 - 1.0).max(1.0))
+}
+
+fn t_test(a: &[f64], b: &[f64], margin: f64, most_freedom: f64) -> Option<WelchTest> {
     let gap = mean(a)? - mean(b)?;
     let gap = gap.signum() * (gap.abs() - margin).max(0.0);
     let (va, vb) = (variance(a)? / a.len() as f64, variance(b)? / b.len() as f64);
@@ -32,11 +44,16 @@ pub fn welch_t_test_beyond(a: &[f64], b: &[f64], margin: f64) -> Option<WelchTes
     // As shares of the whole variance, so that tiny variances do not underflow when squared.
     let (share_a, share_b) = (va / (va + vb), vb / (va + vb));
     let freedom = 1.0 / (share_a * share_a / freedom_a + share_b * share_b / freedom_b);
-    let t = gap / (va + vb).sqrt();
-    let (t, degrees_of_freedom, p) = match (va + vb == 0.0, gap == 0.0) {
-        (true, true) => (0.0, freedom_a + freedom_b, 1.0),
-        (true, false) => (gap * f64::INFINITY, freedom_a + freedom_b, 0.0),
-        (false, _) => (t, freedom, student_t_two_sided(t, freedom)),
+    let spread = va + vb > 0.0;
+    let freedom = if spread { freedom } else { freedom_a + freedom_b };
+    let degrees_of_freedom = freedom.min(most_freedom);
+    let (t, p) = match (spread, gap == 0.0) {
+        (false, true) => (0.0, 1.0),
+        (false, false) => (gap * f64::INFINITY, 0.0),
+        (true, _) => {
+            let t = gap / (va + vb).sqrt();
+            (t, student_t_two_sided(t, degrees_of_freedom))
+        }
     };
     Some(WelchTest {
         t,

@@ -98,6 +98,14 @@ const VIEW_AXES: [&str; 4] = [
 /// What tells the structures of a scene apart.
 pub const STRUCTURE_AXES: [&str; 4] = [axis::ACCEL, axis::KERNELS, axis::TRIANGLE, axis::BOX_TEST];
 
+/// What tells the samplers of a view apart.
+pub const SAMPLER_ROW: [&str; 4] = [
+    axis::SEQUENCE,
+    axis::DECORRELATION,
+    axis::KERNELS,
+    axis::OFFSET,
+];
+
 /// What a sampler's errors are of, and what an image depends on: all but the structure.
 pub const SAMPLER_AXES: [&str; 8] = [
     axis::SCENE,

@@ -1,10 +1,9 @@
 //! The report as a document that HTML, Markdown and the terminal show alike.
 
 use super::ReportError;
-use super::format;
 use super::plot::drawing::Drawing;
 use super::plot::paint::{to_png, to_svg};
-use crate::measure::record::{Interval, Verdict};
+use crate::measure::record::Verdict;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -55,6 +54,14 @@ pub struct Banner {
     pub text: String,
 }
 
+impl Banner {
+    /// A line of this tone.
+    pub fn new(tone: Tone, text: impl Into<String>) -> Self {
+        let text = text.into();
+        Self { tone, text }
+    }
+}
+
 /// A section.
 #[derive(Debug, Clone, Serialize)]
 pub struct Section {
@@ -97,6 +104,28 @@ pub enum Block {
     Verbatim(String),
 }
 
+impl Block {
+    /// Plots, if any could be drawn.
+    pub fn figures(figures: impl IntoIterator<Item = Option<Figure>>) -> Option<Self> {
+        let figures: Vec<Figure> = figures.into_iter().flatten().collect();
+        (!figures.is_empty()).then_some(Self::Figures(figures))
+    }
+
+    /// Pictures, if there are any.
+    pub fn gallery(
+        caption: impl Into<String>,
+        items: Vec<Picture>,
+        scale: Option<ColorScale>,
+    ) -> Option<Self> {
+        let caption = caption.into();
+        (!items.is_empty()).then_some(Self::Gallery(Gallery {
+            caption,
+            items,
+            scale,
+        }))
+    }
+}
+
 /// How a text is meant.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -121,6 +150,13 @@ pub struct Check {
     pub title: String,
     /// The evidence.
     pub detail: String,
+}
+
+impl Check {
+    /// The check as a line of a terminal.
+    pub fn line(&self) -> String {
+        format!("{}  {}: {}\n", self.verdict.word(), self.title, self.detail)
+    }
 }
 
 /// A table.
@@ -164,15 +200,10 @@ impl Cell {
         }
     }
 
-    /// A figure with three digits and its interval, if it has one; a dash if it is absent.
-    pub fn of(figure: Option<Interval>) -> Self {
-        match figure {
-            Some(i) if i.low < i.high => {
-                Self::with_detail(format::number(i.value), format::bounds(&i))
-            }
-            Some(i) => format::number(i.value).into(),
-            None => format::ABSENT.into(),
-        }
+    /// How many replicates or seeds there are.
+    pub fn repeats(n: usize, randomised: bool) -> Self {
+        let detail = if randomised { "" } else { "deterministic" };
+        Self::with_detail(n.to_string(), detail)
     }
 
     /// The same cell with a tone.

@@ -1,5 +1,6 @@
 //! Numbers as text: three significant digits, units, and a dash for what is absent.
 
+use crate::gpu::Environment;
 use crate::measure::figure::{Figure, Shown};
 use crate::measure::record::{Interval, RayClass};
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
@@ -149,6 +150,19 @@ pub fn ray_class(class: RayClass) -> &'static str {
         RayClass::Chord => "chord",
         RayClass::Hard => "hard",
     }
+}
+
+/// Date, adapter and processor in one line.
+pub fn where_and_when(e: &Environment, unix_s: u64) -> String {
+    format!(
+        "{} on {} ({}, {} {}), {}",
+        utc(unix_s),
+        e.adapter,
+        e.backend,
+        e.driver,
+        e.driver_info,
+        e.cpu
+    )
 }
 
 /// Seconds since 1970 as `YYYY-MM-DD hh:mm UTC` (days to civil date by Hinnant's algorithm).

@@ -1,95 +1,78 @@
 //! The document as Markdown.
 
 use super::document::*;
-use std::fmt::Write;
 
 /// The summary: everything but the pictures, with plots linked under `plots/`.
 pub fn summary(document: &Document) -> String {
-    let mut out = format!(
-        "# {}\n\n{}\n",
-        escape(&document.title),
-        escape(&document.subtitle)
-    );
+    let (title, subtitle) = (escape(&document.title), escape(&document.subtitle));
+    let mut out = format!("# {title}\n\n{subtitle}\n");
     for banner in &document.banners {
-        push(&mut out, format_args!("\n> **{}**\n", escape(&banner.text)));
+        out += &format!("\n> **{}**\n", escape(&banner.text));
     }
     for section in &document.sections {
-        push(&mut out, format_args!("\n## {}\n", escape(&section.title)));
-        for block in &section.blocks {
-            out.push('\n');
-            push_block(&mut out, block);
+        out += &format!("\n## {}\n", escape(&section.title));
+        for content in &section.blocks {
+            out += &format!("\n{}", block(content));
         }
     }
     out
 }
 
-fn push_block(out: &mut String, block: &Block) {
+fn block(block: &Block) -> String {
     match block {
-        Block::Heading(text) => push(out, format_args!("### {}\n", escape(text))),
-        Block::Paragraph(text) => push(out, format_args!("{}\n", escape(text))),
+        Block::Heading(text) => format!("### {}\n", escape(text)),
+        Block::Paragraph(text) => format!("{}\n", escape(text)),
         Block::Verbatim(text) => {
             // A fence longer than any in the text.
-            let fence = "`".repeat(longest_run(text, '`').max(2) + 1);
-            push(out, format_args!("{fence}\n{}\n{fence}\n", text.trim_end()));
+            let runs = text.split(|c| c != '`').map(str::len);
+            let fence = "`".repeat(runs.max().unwrap_or(0).max(2) + 1);
+            format!("{fence}\n{}\n{fence}\n", text.trim_end())
         }
         Block::Checks(checks) => {
-            for check in checks {
+            let line = |check: &Check| {
                 let (title, detail) = (escape(&check.title), escape(&check.detail));
-                push(
-                    out,
-                    format_args!("- **{}** {title}: {detail}\n", check.verdict.word()),
-                );
-            }
+                format!("- **{}** {title}: {detail}\n", check.verdict.word())
+            };
+            checks.iter().map(line).collect()
         }
-        Block::Table(table) => push_table(out, table),
+        Block::Table(content) => table(content),
         Block::Figures(figures) => {
-            for figure in figures {
-                push(
-                    out,
-                    format_args!(
-                        "![{}](plots/{}.png)\n\n",
-                        escape(&figure.caption),
-                        figure.name
-                    ),
-                );
-            }
+            let line = |f: &Figure| format!("![{}](plots/{}.png)\n\n", escape(&f.caption), f.name);
+            figures.iter().map(line).collect()
         }
         Block::Gallery(gallery) => {
-            push(out, format_args!("{}:\n\n", escape(&gallery.caption)));
-            for item in &gallery.items {
+            let line = |item: &Picture| {
                 let caption = escape(&item.caption);
                 match item.data {
-                    Some(_) => push(out, format_args!("- [{caption}](<{}>)\n", item.path)),
-                    None => push(
-                        out,
-                        format_args!("- {caption}: {}\n", escape(&item.missing)),
-                    ),
+                    Some(_) => format!("- [{caption}](<{}>)\n", item.path),
+                    None => format!("- {caption}: {}\n", escape(&item.missing)),
                 }
-            }
+            };
+            let items: String = gallery.items.iter().map(line).collect();
+            format!("{}:\n\n{items}", escape(&gallery.caption))
         }
     }
 }
 
-fn push_table(out: &mut String, table: &Table) {
-    push(out, format_args!("{}\n\n|", escape(&table.caption)));
-    for column in &table.columns {
-        push(out, format_args!(" {} |", escape(&column.title)));
-    }
-    out.push_str("\n|");
-    for column in &table.columns {
-        out.push_str(if column.text { ":---|" } else { "---:|" });
-    }
+fn table(table: &Table) -> String {
+    let columns = || table.columns.iter();
+    let heads: String = columns()
+        .map(|column| format!(" {} |", escape(&column.title)))
+        .collect();
+    let rule = columns().map(|column| if column.text { ":---|" } else { "---:|" });
+    let rule: String = rule.collect();
+    let mut out = format!("{}\n\n|{heads}\n|{rule}", escape(&table.caption));
     for row in &table.rows {
-        out.push_str("\n|");
+        out += "\n|";
         for cell in row {
             let text = escape(&cell.flat());
-            match cell.tone {
-                Tone::Good | Tone::Bad => push(out, format_args!(" **{text}** |")),
-                _ => push(out, format_args!(" {text} |")),
-            }
+            out += &match cell.tone {
+                Tone::Good | Tone::Bad => format!(" **{text}** |"),
+                _ => format!(" {text} |"),
+            };
         }
     }
-    out.push('\n');
+    out + "\n"
 }
 
 /// Text that Markdown shows as it is.
@@ -105,34 +88,17 @@ fn escape(text: &str) -> String {
     escaped
 }
 
-fn longest_run(text: &str, wanted: char) -> usize {
-    text.split(|c| c != wanted).map(str::len).max().unwrap_or(0)
-}
-
-fn push(out: &mut String, arguments: std::fmt::Arguments) {
-    // Writing to a string cannot fail.
-    let _ = out.write_fmt(arguments);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn names_cannot_break_a_table() {
-        let mut table = Table::new("t", &["a", "b"]);
-        table
-            .rows
-            .push(vec!["x|y<b>".into(), Cell::from("FAILED").toned(Tone::Bad)]);
-        let mut out = String::new();
-        push_table(&mut out, &table);
+    fn names_cannot_break_a_table_nor_texts_a_fence() {
+        let mut content = Table::new("t", &["a", "b"]);
+        let failed = Cell::from("FAILED").toned(Tone::Bad);
+        content.rows.push(vec!["x|y<b>".into(), failed]);
+        let out = table(&content);
         assert!(out.ends_with("| x\\|y\\<b\\> | **FAILED** |\n"), "{out}");
-    }
-
-    #[test]
-    fn a_fence_is_longer_than_any_inside() {
-        let mut out = String::new();
-        push_block(&mut out, &Block::Verbatim("a ```` b".into()));
-        assert!(out.starts_with("`````\n"));
+        assert!(block(&Block::Verbatim("a ```` b".into())).starts_with("`````\n"));
     }
 }

@@ -1,43 +1,68 @@
-//! Tables of figures: rows by one part of the key, columns by figure and another part.
+//! Tables of figures: rows by some axes of the key, columns by figure and another part of it.
 
 use super::document::{Cell, Table};
 use super::format;
 use super::values::Value;
 use crate::measure::record::Key;
 
-/// A part of a key, as a row or column is called.
+/// A part of a key, as a column is called; empty where the figure names it.
 pub type Part<'a> = &'a dyn Fn(&Key) -> String;
 
-/// How values are laid out.
-pub struct Pivot<'a> {
-    /// What it shows.
-    pub caption: String,
-    /// Heads of the columns before the figures, as [`Table::new`] takes them.
-    pub heads: &'a [&'a str],
-    /// What tells rows apart, and the cells before their figures.
-    pub rows: Vec<(String, Vec<Cell>)>,
-    /// Which part of a key chooses the row.
-    pub row: Part<'a>,
-    /// Ids of the figures, in the order of their columns.
-    pub figures: &'a [&'a str],
-    /// Which part of a key makes columns of its own; none: one column per figure.
-    pub across: Option<Part<'a>>,
+/// One column per figure.
+pub const FIGURES_ALONE: Part<'static> = &|_| String::new();
+
+/// The rows of a table, and the columns that stand before the figures.
+pub struct Rows<'a> {
+    by: &'a [&'a str],
+    heads: &'a [&'a str],
+    rows: Vec<(Key, Vec<Cell>)>,
 }
 
-impl Pivot<'_> {
-    /// The table; a figure or part without a value has no column, a row may have dashes alone.
-    pub fn table(self, values: &[Value]) -> Table {
-        let part = |value: &Value| self.across.map_or(String::new(), |part| part(&value.key));
+impl<'a> Rows<'a> {
+    /// Rows that `by` tells apart, each with its cells under `heads` (as [`Table::new`] takes them).
+    pub fn new(
+        by: &'a [&'a str],
+        heads: &'a [&'a str],
+        rows: impl IntoIterator<Item = (Key, Vec<Cell>)>,
+    ) -> Self {
+        let rows = rows.into_iter().collect();
+        Self { by, heads, rows }
+    }
+
+    /// A row for each combination of labels in the values, in their order.
+    pub fn of_labels(by: &'a [&'a str], heads: &'a [&'a str], values: &[Value]) -> Self {
+        let mut rows: Vec<(Key, Vec<Cell>)> = Vec::new();
+        for Value { key, .. } in values {
+            if rows.iter().all(|(known, _)| !known.agrees(key, by)) {
+                let labels = by.iter().map(|axis| key.label(axis).into());
+                rows.push((key.clone(), labels.collect()));
+            }
+        }
+        Self { by, heads, rows }
+    }
+
+    /// The table of some figures, by id, in the order of their columns. A figure or part without a value
+    /// has no column, a row may have dashes alone; there is no table without any column.
+    pub fn table(
+        self,
+        values: &[Value],
+        caption: impl Into<String>,
+        figures: &[&str],
+        across: Part,
+    ) -> Table {
         let mut columns: Vec<(&Value, String)> = Vec::new();
-        for id in self.figures {
+        for id in figures {
             for value in values.iter().filter(|value| value.figure.id == *id) {
-                let column = (value, part(value));
-                if (columns.iter()).all(|c| c.0.figure.id != *id || c.1 != column.1) {
-                    columns.push(column);
+                let part = across(&value.key);
+                if (columns.iter()).all(|c| c.0.figure.id != *id || c.1 != part) {
+                    columns.push((value, part));
                 }
             }
         }
-        let mut table = Table::new(self.caption, self.heads);
+        if columns.is_empty() && self.heads.len() < 2 {
+            return Table::default();
+        }
+        let mut table = Table::new(caption, self.heads);
         for (value, part) in &columns {
             let shared = columns.iter().filter(|(_, other)| other == part).count() > 1;
             table.add_column(match (part.is_empty(), shared) {
@@ -46,23 +71,17 @@ impl Pivot<'_> {
                 (false, true) => format!("{}, {part}", value.figure.title),
             });
         }
-        for (name, mut cells) in self.rows {
-            let of_row: Vec<&Value> = values
-                .iter()
-                .filter(|v| (self.row)(&v.key) == name)
-                .collect();
-            cells.extend(columns.iter().map(|(first, column)| {
-                let is_it =
-                    |value: &&&Value| value.figure.id == first.figure.id && part(value) == *column;
-                let found = of_row.iter().find(is_it);
+        for (key, mut cells) in self.rows {
+            let in_row = values.iter().filter(|v| v.key.agrees(&key, self.by));
+            let in_row: Vec<&Value> = in_row.collect();
+            cells.extend(columns.iter().map(|(first, part)| {
+                let is_it = |v: &&&Value| v.figure.id == first.figure.id && across(&v.key) == *part;
+                let found = in_row.iter().find(is_it);
                 found.map_or_else(|| format::ABSENT.into(), |value| value.cell())
             }));
             table.rows.push(cells);
         }
-        match columns.is_empty() && self.heads.len() < 2 {
-            true => Table::default(),
-            false => table,
-        }
+        table
     }
 }
 
@@ -74,54 +93,32 @@ mod tests {
     #[test]
     fn a_pivot_puts_each_value_where_its_key_says_and_a_dash_where_there_is_none() {
         let key = |accel: &str, rays: &str| {
-            Key::default()
-                .with(axis::ACCEL, accel)
-                .with(axis::RAYS, rays)
+            (Key::default().with(axis::ACCEL, accel)).with(axis::RAYS, rays)
+        };
+        let known = Interval {
+            value: 2.0,
+            low: 1.0,
+            high: 3.0,
         };
         let values = [
-            Value::new(
-                &key("a", "x"),
-                "mrays-per-s/v1",
-                Interval {
-                    value: 2.0,
-                    low: 1.0,
-                    high: 3.0,
-                },
-            ),
-            Value::exact(&key("b", "y"), "mrays-per-s/v1", 4.0),
-            Value::exact(&key("b", "y"), "nodes-per-ray/v1", 9.0),
+            Value::new(&key("a", "x"), "mrays-per-s/v1", known),
+            Value::new(&key("b", "y"), "mrays-per-s/v1", 4.0),
+            Value::new(&key("b", "y"), "nodes-per-ray/v1", 9.0),
         ];
-        let pivot = |figures: &[&str]| {
-            Pivot {
-                caption: "t".into(),
-                heads: &["structure"],
-                rows: ["a", "b"]
-                    .map(|name| (name.into(), vec![name.into()]))
-                    .to_vec(),
-                row: &|key| key.label(axis::ACCEL).into(),
-                figures,
-                across: Some(&|key| key.label(axis::RAYS).into()),
-            }
-            .table(&values)
+        let table = |figures: &[&str]| {
+            let rows = Rows::of_labels(&[axis::ACCEL], &["structure"], &values);
+            let rays: Part = &|key| key.label(axis::RAYS).into();
+            let table = rows.table(&values, "t", figures, rays);
+            let heads = table.columns.iter().map(|c| c.title.clone());
+            let cells = |row: &Vec<Cell>| row.iter().map(Cell::flat).collect();
+            let rows: Vec<Vec<String>> = table.rows.iter().map(cells).collect();
+            (heads.collect::<Vec<_>>(), rows)
         };
-        let texts = |table: &Table| -> Vec<Vec<String>> {
-            table
-                .rows
-                .iter()
-                .map(|row| row.iter().map(Cell::flat).collect())
-                .collect()
-        };
-        let heads = |table: &Table| -> Vec<String> {
-            table.columns.iter().map(|c| c.title.clone()).collect()
-        };
-        let one = pivot(&["mrays-per-s/v1"]);
-        assert_eq!(heads(&one), ["structure", "x", "y"]);
-        assert_eq!(
-            texts(&one),
-            [["a", "2.00 [1.00, 3.00]", "–"], ["b", "–", "4.00"]]
-        );
-        let two = pivot(&["mrays-per-s/v1", "nodes-per-ray/v1"]);
-        assert_eq!(heads(&two), ["structure", "x", "speed, y", "nodes/ray, y"]);
-        assert!(pivot(&["epo/v1"]).rows.is_empty());
+        let (heads, rows) = table(&["mrays-per-s/v1"]);
+        assert_eq!(heads, ["structure", "x", "y"]);
+        assert_eq!(rows, [["a", "2.00 [1.00, 3.00]", "–"], ["b", "–", "4.00"]]);
+        let (heads, _) = table(&["mrays-per-s/v1", "nodes-per-ray/v1"]);
+        assert_eq!(heads, ["structure", "x", "speed, y", "nodes/ray, y"]);
+        assert!(table(&["epo/v1"]).1.is_empty());
     }
 }

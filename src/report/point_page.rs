@@ -3,7 +3,7 @@
 
 use super::document::{Block, Document, Figure, Section};
 use super::format;
-use super::plot::matrix::PairMatrix;
+use super::plot::heat::HeatMap;
 use super::plot::panels::{self, Panel};
 use super::plot::points::{Cloud, Domain, Pair, drawn_in_words, interval_counts};
 use super::plot::spectrum::{ColorBar, PeriodogramMap, RadialCurve, highest_frequency};
@@ -113,7 +113,7 @@ impl PointPage {
         if self.net().is_some() {
             caption += " Lines: elementary intervals; tinted: an interval without a point.";
         }
-        let drawing = panels::draw(&panels, 2, panels::side(WIDTH, 2));
+        let drawing = panels::draw(&panels, 2, panels::square(WIDTH, 2));
         let mut figures = vec![Figure::new("point-set", caption, drawing)];
         figures.extend(self.net().map(|m| intervals(&points, m)));
         Ok(figures)
@@ -138,13 +138,18 @@ impl PointPage {
         let drawn = drawn_in_words(self.points.len());
         let caption = format!("Every pair of {of}: {drawn}.");
         let columns = panels.len().min(4);
-        let drawing = panels::draw(&panels, columns, panels::side(WIDTH, 4));
+        let drawing = panels::draw(&panels, columns, panels::square(WIDTH, 4));
         let projections = Figure::new("projections", caption, drawing);
-        let matrix = self.matrix()?;
-        let discrepancies = matrix.draw().zip(matrix.worst()).map(|(drawing, (i, j, worst))| {
+        let stars = self.stars()?;
+        let names: Vec<String> = self.dims.iter().map(u32::to_string).collect();
+        let worst = stars.iter().max_by(|a, b| a.2.total_cmp(&b.2));
+        let drawing = HeatMap::of_pairs(&names, &stars).draw();
+        let discrepancies = drawing.zip(worst).map(|(drawing, (i, j, worst))| {
             let caption = format!(
-                "Exact star discrepancy of each pair of dimensions; the worst are {i} and {j} with {}.",
-                format::number(worst)
+                "Exact star discrepancy of each pair of dimensions; the worst are {} and {} with {}.",
+                names[*i],
+                names[*j],
+                format::number(*worst)
             );
             Figure::new("pair-discrepancy", caption, drawing)
         });
@@ -153,14 +158,11 @@ impl PointPage {
         Ok(projections.into_iter().chain(discrepancies).collect())
     }
 
-    fn matrix(&self) -> Result<PairMatrix, DiscrepancyError> {
+    /// D* of every pair of positions in `dims`.
+    fn stars(&self) -> Result<Vec<(usize, usize, f64)>, DiscrepancyError> {
         let star = |(i, j)| Ok((i, j, star_2d(&self.pairs(i, j)?)?));
         let pairs: Vec<_> = pairs_below(self.dims.len()).collect();
-        let values: Result<_, DiscrepancyError> = pairs.into_par_iter().map(star).collect();
-        Ok(PairMatrix {
-            dims: self.dims.clone(),
-            values: values?,
-        })
+        pairs.into_par_iter().map(star).collect()
     }
 
     /// All pixels upon each other (Dufay 2017, Figs. 5.7 and 5.13).
@@ -188,7 +190,7 @@ impl PointPage {
         Figure::new(
             "pixels",
             caption,
-            panels::draw(&panels, 2, panels::side(WIDTH, 2)),
+            panels::draw(&panels, 2, panels::square(WIDTH, 2)),
         )
     }
 
@@ -219,7 +221,7 @@ impl PointPage {
             pair.len(),
             self.names(0, 1)
         );
-        let drawing = panels::draw(&panels, 3, panels::side(WIDTH, 3));
+        let drawing = panels::draw(&panels, 3, panels::square(WIDTH, 3));
         Ok(Block::Figures(vec![Figure::new(
             "spectrum", caption, drawing,
         )]))
@@ -252,7 +254,7 @@ fn intervals(points: &[Pair], m: u32) -> Figure {
     let panels: Vec<Panel> = (0..=m).rev().map(panel).collect();
     let caption =
         "Every shape of elementary intervals of volume 1/N. A (0, m, 2)-net has one point in each.";
-    let drawing = panels::draw(&panels, 4, panels::side(WIDTH, 4));
+    let drawing = panels::draw(&panels, 4, panels::square(WIDTH, 4));
     Figure::new("elementary-intervals", caption, drawing)
 }
 
@@ -288,10 +290,10 @@ mod tests {
         let titles: Vec<_> = texts.iter().filter(|text| text.starts_with("x:")).collect();
         assert_eq!(titles, [&"x: 4, y: 5", &"x: 4, y: 9", &"x: 5, y: 9"]);
         // The third dimension is bad with both others: D* is that of its one value.
-        let matrix = page.matrix().unwrap();
+        let stars = page.stars().unwrap();
         let good = star_2d(&page.pairs(0, 1).unwrap()).unwrap();
-        assert_eq!(matrix.values[0], (0, 1, good));
-        assert!(matrix.values[1].2 >= 0.9 && matrix.values[2].2 >= 0.9 && good < 0.6);
+        assert_eq!(stars[0], (0, 1, good));
+        assert!(stars[1].2 >= 0.9 && stars[2].2 >= 0.9 && good < 0.6);
         assert!(page.pairs(0, 3).is_err());
     }
 

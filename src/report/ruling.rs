@@ -128,57 +128,59 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_winner_is_named_only_where_intervals_are_apart() {
-        let apart = vec![contender("slow", 3.0, 0.5), contender("fast", 5.0, 0.5)];
-        assert_eq!(judge(apart, Better::Higher).answer(), "fast");
-        let close = vec![contender("slow", 3.0, 1.5), contender("fast", 5.0, 0.6)];
-        assert_eq!(
-            judge(close, Better::Higher).answer(),
-            "no clear winner: fast, slow"
-        );
+    /// What is said of contenders with these figures, half intervals and spreads, called a, b, c.
+    fn said(better: Better, figures: &[(f64, f64, bool)]) -> [String; 3] {
+        let contenders = figures.iter().zip(["a", "b", "c"]);
+        let contenders = contenders.map(|((value, half, has_spread), name)| Contender {
+            has_spread: *has_spread,
+            ..contender(name, *value, *half)
+        });
+        let ruling = judge(contenders.collect(), better);
+        [ruling.answer(), ruling.figure(), ruling.runner_up()]
     }
 
     #[test]
-    fn a_third_that_overlaps_the_best_spoils_the_win() {
-        let wide = vec![
-            contender("a", 1.0, 0.1),
-            contender("b", 2.0, 0.1),
-            contender("c", 3.0, 2.5),
+    fn a_winner_is_named_only_where_intervals_are_apart_and_known() {
+        use Better::{Higher, Lower};
+        let answers = [
+            (Higher, &[(3.0, 0.5, true), (5.0, 0.5, true)][..], "b"),
+            (
+                Higher,
+                &[(3.0, 1.5, true), (5.0, 0.6, true)],
+                "no clear winner: b, a",
+            ),
+            // A third that overlaps the best spoils the win.
+            (
+                Lower,
+                &[(1.0, 0.1, true), (2.0, 0.1, true), (3.0, 2.5, true)],
+                "no clear winner: a, c",
+            ),
+            (
+                Lower,
+                &[(2.0, 0.0, true), (2.0, 0.0, true)],
+                "no clear winner: a, b",
+            ),
+            (Lower, &[(1.0, 0.1, true)], "a (alone)"),
+            (Lower, &[], "nothing measured"),
+            // Without spread nobody wins or is beaten.
+            (
+                Lower,
+                &[(1.0, 0.0, false), (8.0, 0.1, true), (9.0, 0.1, true)],
+                "b",
+            ),
+            (Lower, &[(1.0, 0.0, false), (9.0, 0.1, true)], "b (alone)"),
         ];
-        assert_eq!(judge(wide, Better::Lower).answer(), "no clear winner: a, c");
-    }
-
-    #[test]
-    fn without_spread_nobody_wins_or_is_beaten() {
-        let mut three = vec![
-            contender("a", 1.0, 0.0),
-            contender("b", 8.0, 0.1),
-            contender("c", 9.0, 0.1),
-        ];
-        assert_eq!(judge(three.clone(), Better::Lower).answer(), "a");
-        three[0].has_spread = false;
-        assert_eq!(judge(three.clone(), Better::Lower).answer(), "b");
-        three[1].has_spread = false;
-        assert_eq!(judge(three.clone(), Better::Lower).answer(), "c (alone)");
-        three[2].has_spread = false;
-        let nobody = judge(three, Better::Lower);
-        assert!(nobody.answer().starts_with("no winner: "), "{nobody:?}");
-        assert_eq!(
-            (nobody.figure(), nobody.runner_up()),
-            ("–".into(), "–".into())
-        );
-    }
-
-    #[test]
-    fn ties_have_no_winner_and_errors_of_nothing_no_ratio() {
-        let tie = vec![contender("a", 2.0, 0.0), contender("b", 2.0, 0.0)];
-        assert_eq!(judge(tie, Better::Lower).answer(), "no clear winner: a, b");
-        let exact = vec![contender("a", 0.0, 0.0), contender("b", 0.0, 0.0)];
-        assert_eq!(judge(exact, Better::Lower).runner_up(), "b 0");
-        let below = vec![contender("a", -1.0, 0.1), contender("b", 2.0, 0.1)];
-        let next = judge(below, Better::Lower).runner_up();
-        assert_eq!(next, "b 2.00 [1.90, 2.10]");
+        for (better, figures, answer) in answers {
+            assert_eq!(said(better, figures)[0], answer, "{figures:?}");
+        }
+        let [answer, figure, next] = said(Lower, &[(1.0, 0.0, false)]);
+        assert!(answer.starts_with("no winner: "), "{answer}");
+        assert_eq!([figure, next], ["–", "–"]);
+        // Errors of nothing have no ratio.
+        let next = |figures: &[_]| said(Lower, figures)[2].clone();
+        assert_eq!(next(&[(0.0, 0.0, true), (0.0, 0.0, true)]), "b 0");
+        let below = [(-1.0, 0.1, true), (2.0, 0.1, true)];
+        assert_eq!(next(&below), "b 2.00 [1.90, 2.10]");
     }
 
     #[test]
@@ -204,14 +206,5 @@ mod tests {
         });
         let wins = wins.count();
         assert!(wins <= 3, "{wins} winners in 300 draws of ten equals");
-    }
-
-    #[test]
-    fn nobody_and_somebody_alone_are_said_so() {
-        assert_eq!(judge(vec![], Better::Lower).answer(), "nothing measured");
-        assert_eq!(
-            judge(vec![contender("a", 1.0, 0.1)], Better::Lower).answer(),
-            "a (alone)"
-        );
     }
 }

@@ -38,20 +38,28 @@ pub enum Metric {
 }
 
 impl Metric {
+    /// Its row in the table of figures, that of its slope, how files are named after it, and what the
+    /// recorded metric's versioned id starts with.
+    const fn words(self) -> [&'static str; 4] {
+        match self {
+            Self::RelMse => [
+                "relmse-unbiased/v1",
+                "relmse-slope/v1",
+                "relmse",
+                "relmse-unbiased/",
+            ],
+            Self::Rmse => ["rmse-unbiased/v1", "rmse-slope/v1", "rmse", "mse-unbiased/"],
+        }
+    }
+
     /// Its row in the table of figures.
     pub fn figure(self) -> &'static str {
-        match self {
-            Self::RelMse => "relmse-unbiased/v1",
-            Self::Rmse => "rmse-unbiased/v1",
-        }
+        self.words()[0]
     }
 
     /// The row of its slope.
     pub fn slope_figure(self) -> &'static str {
-        match self {
-            Self::RelMse => "relmse-slope/v1",
-            Self::Rmse => "rmse-slope/v1",
-        }
+        self.words()[1]
     }
 
     /// How tables and axes name it.
@@ -61,18 +69,7 @@ impl Metric {
 
     /// How files are named after it.
     pub fn stem(self) -> &'static str {
-        match self {
-            Self::RelMse => "relmse",
-            Self::Rmse => "rmse",
-        }
-    }
-
-    /// What the recorded metric's versioned id starts with.
-    fn prefix(self) -> &'static str {
-        match self {
-            Self::RelMse => "relmse-unbiased/",
-            Self::Rmse => "mse-unbiased/",
-        }
+        self.words()[2]
     }
 
     /// From means of what was recorded. No true error is negative, so intervals end at 0. Negative means
@@ -130,31 +127,19 @@ impl<'a> Sampler<'a> {
 
     /// Why it may not win, however small its error.
     pub fn fault(&self) -> Option<String> {
-        let bad: usize = self
-            .replicates
-            .iter()
-            .map(|replicate| replicate.non_finite_pixels)
-            .sum();
+        let bad: usize = self.replicates.iter().map(|r| r.non_finite_pixels).sum();
         if bad > 0 {
             return Some(format!("{bad} NaN or infinite pixels"));
         }
-        let bias = self
-            .bias
-            .filter(|bias| bias.verdict == BiasVerdict::Biased)?;
-        let kind = if bias.by_design {
-            "biased by design"
-        } else {
-            "biased"
-        };
-        let tiles = format!("{kind}: {} of {} tiles rejected", bias.rejected, bias.tiles);
-        Some(match bias.p {
-            Some(p) => format!(
-                "{tiles}, image z = {} (p = {})",
-                format::optional(bias.z),
-                format::number(p)
-            ),
-            None => tiles,
-        })
+        let is_biased = |bias: &&BiasRecord| bias.verdict == BiasVerdict::Biased;
+        let bias = self.bias.filter(is_biased)?;
+        let design = if bias.by_design { " by design" } else { "" };
+        let tiles = format!("{} of {} tiles rejected", bias.rejected, bias.tiles);
+        let of_image = bias.p.map_or(String::new(), |p| {
+            let (z, p) = (format::optional(bias.z), format::number(p));
+            format!(", image z = {z} (p = {p})")
+        });
+        Some(format!("biased{design}: {tiles}{of_image}"))
     }
 
     /// The full id of a metric as recorded.
@@ -164,7 +149,7 @@ impl<'a> Sampler<'a> {
             .iter()
             .flat_map(|replicate| &replicate.errors);
         let mut ids = errors.flat_map(|error| error.metrics.keys());
-        ids.find(|id| id.starts_with(metric.prefix()))
+        ids.find(|id| id.starts_with(metric.words()[3]))
             .map(String::as_str)
     }
 

@@ -4,7 +4,7 @@ use super::data::RunData;
 use super::document::{Cell, Table};
 use super::samplers::Metric;
 use super::sections::{belief, run, samplers, structures, verdict};
-use super::values::of_structures;
+use super::values::{of_structures, of_view};
 use crate::measure::record::{Line, Verdict};
 
 /// Verdicts, speeds, errors and checks as aligned plain text.
@@ -13,31 +13,26 @@ pub fn terminal_tables(records: &[Line]) -> String {
     let mut tables = Vec::new();
     for scene in &data.scenes {
         let values = of_structures(&data, scene);
-        tables.push(structures::speed_table(&data, scene, &values));
+        tables.push(structures::speed_table(scene, &values));
         tables.push(structures::outside_table(&data, scene, &values));
         for view in &scene.views {
-            tables.push(samplers::error_table(&data, view, Metric::RelMse));
-            tables.push(samplers::efficiency_table(view));
+            let values = of_view(scene, view);
+            tables.push(samplers::error_table(view, &values, Metric::RelMse));
+            tables.push(samplers::efficiency_table(view, &values));
         }
         tables.push(verdict::table(scene));
     }
     let mut out = String::new();
     for table in tables.iter().filter(|table| !table.rows.is_empty()) {
-        out += &aligned(table);
-        out.push('\n');
+        out += &(aligned(table) + "\n");
     }
     if data.run.is_some_and(|run| run.environment.software) {
         out += "Software adapter: times compare structures on this adapter only.\n";
     }
     out += &run::overhead(&data).map_or(String::new(), |text| text + "\n");
-    for check in belief::checks(&data) {
-        out += &format!(
-            "{}  {}: {}\n",
-            check.verdict.word(),
-            check.title,
-            check.detail
-        );
-    }
+    belief::checks(&data)
+        .iter()
+        .for_each(|check| out += &check.line());
     out
 }
 
@@ -54,46 +49,32 @@ pub fn failed_checks(records: &[Line]) -> Vec<String> {
 /// would not fit a terminal, except in tables of text.
 pub fn aligned(table: &Table) -> String {
     let wordy = table.columns.iter().filter(|column| column.text).count() > 2;
-    let shown = |cell: &Cell| {
-        if wordy {
-            cell.flat()
-        } else {
-            cell.text.clone()
-        }
+    let shown = |cell: &Cell| match wordy {
+        true => cell.flat(),
+        false => cell.text.clone(),
     };
-    let heads: Vec<String> = table
-        .columns
-        .iter()
-        .map(|column| column.title.clone())
-        .collect();
-    let rows: Vec<Vec<String>> = table
-        .rows
-        .iter()
-        .map(|row| row.iter().map(shown).collect())
-        .collect();
+    let heads = table.columns.iter().map(|column| column.title.clone());
+    let rows = table.rows.iter().map(|row| row.iter().map(shown).collect());
+    let lines: Vec<Vec<String>> = std::iter::once(heads.collect()).chain(rows).collect();
     let width = |i: usize| {
-        let cells = rows.iter().filter_map(|row| row.get(i)).chain(heads.get(i));
+        let cells = lines.iter().filter_map(|line| line.get(i));
         cells.map(|text| text.chars().count()).max().unwrap_or(0)
     };
-    let widths: Vec<usize> = (0..heads.len()).map(width).collect();
-    let line = |cells: &[String]| {
-        let padded =
-            cells
-                .iter()
-                .zip(&table.columns)
-                .zip(&widths)
-                .map(|((text, column), &width)| {
-                    if column.text {
-                        format!("{text:<width$}")
-                    } else {
-                        format!("{text:>width$}")
-                    }
-                });
-        padded.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
+    let widths: Vec<usize> = (0..table.columns.len()).map(width).collect();
+    let padded = |(i, text): (usize, &String)| {
+        let width = widths[i];
+        match table.columns[i].text {
+            true => format!("{text:<width$}"),
+            false => format!("{text:>width$}"),
+        }
     };
-    let rule = "─".repeat(widths.iter().sum::<usize>() + 2 * widths.len().saturating_sub(1)) + "\n";
-    let body: String = rows.iter().map(|row| line(row)).collect();
-    format!("{}\n{}{rule}{body}", table.caption, line(&heads))
+    let line = |cells: &Vec<String>| {
+        let cells: Vec<String> = cells.iter().enumerate().map(padded).collect();
+        cells.join("  ").trim_end().to_owned() + "\n"
+    };
+    let rule = "─".repeat(widths.iter().sum::<usize>() + 2 * widths.len().saturating_sub(1));
+    let body: String = lines[1..].iter().map(line).collect();
+    format!("{}\n{}{rule}\n{body}", table.caption, line(&lines[0]))
 }
 
 #[cfg(test)]

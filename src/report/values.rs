@@ -4,10 +4,9 @@ use super::data::{RunData, SceneGroup, View};
 use super::document::Cell;
 use super::format;
 use super::samplers::Metric;
+use super::sections::{trade_off, verdict::Race};
 use crate::measure::figure::{Figure, figure};
-use crate::measure::record::{
-    FigureAtCount, Interval, Key, Recorded, StreamRecord, StructureRecord, axis,
-};
+use crate::measure::record::*;
 use std::borrow::Cow;
 
 /// A figure of one key.
@@ -28,29 +27,54 @@ pub enum Reading {
     Known(Interval),
     /// Only that it is below this: the reference resolves no more.
     Below(f64),
+    /// No number, for the reason that the word says.
+    Word(&'static str),
+}
+
+impl From<Interval> for Reading {
+    fn from(value: Interval) -> Self {
+        Self::Known(value)
+    }
+}
+
+impl From<f64> for Reading {
+    fn from(value: f64) -> Self {
+        Self::Known(Interval::exact(value))
+    }
 }
 
 impl Value<'static> {
     /// A figure of this crate.
-    pub fn new(key: &Key, id: &str, value: Interval) -> Self {
+    pub fn new(key: &Key, id: &str, reading: impl Into<Reading>) -> Self {
         Self {
             key: key.clone(),
             figure: Cow::Borrowed(figure(id)),
-            reading: Reading::Known(value),
+            reading: reading.into(),
         }
     }
 
-    /// One without an interval.
-    pub fn exact(key: &Key, id: &str, value: f64) -> Self {
-        Self::new(key, id, Interval::exact(value))
+    /// Those figures of a key that are known.
+    pub fn known<'i, T: Into<Reading>>(
+        key: &Key,
+        figures: impl IntoIterator<Item = (&'i str, Option<T>)>,
+    ) -> Vec<Self> {
+        let known = figures.into_iter();
+        let known = known.filter_map(|(id, value)| Some(Self::new(key, id, value?)));
+        known.collect()
     }
 }
 
 impl Value<'_> {
+    /// Whether the reference is too noisy for it.
+    pub fn is_unresolved(&self) -> bool {
+        matches!(self.reading, Reading::Below(_))
+    }
+
     /// The value as a table shows it.
     pub fn cell(&self) -> Cell {
         let text = |value| format::figure(&self.figure, value);
         match self.reading {
+            Reading::Word(word) => word.into(),
             Reading::Below(bound) => format!("<{}", text(bound)).into(),
             Reading::Known(i) if i.low < i.high => Cell::with_detail(
                 text(i.value),
@@ -61,21 +85,20 @@ impl Value<'_> {
     }
 }
 
+/// The number on an axis; 0 without one.
+pub fn number(key: &Key, axis: &str) -> usize {
+    key.label(axis).parse().unwrap_or(0)
+}
+
 /// Everything that a run found.
 pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
     let mut values = Vec::new();
     for scene in &data.scenes {
         values.extend(of_structures(data, scene));
-        for view in &scene.views {
-            values.extend(of_view(view));
-        }
+        values.extend(scene.views.iter().flat_map(|view| of_view(scene, view)));
     }
-    for stream in &data.streams {
-        values.extend(of_stream(stream));
-    }
-    for cost in &data.costs {
-        values.push(Value::new(cost.key, "ns-per-sample/v1", cost.ns_per_sample));
-    }
+    values.extend(data.streams.iter().flat_map(|s| of_stream(s)));
+    values.extend(data.costs.iter().flat_map(|c| of_cost(c)));
     values
 }
 
@@ -84,123 +107,169 @@ pub fn of_structures<'a>(data: &RunData<'a>, scene: &SceneGroup<'a>) -> Vec<Valu
     let triangles = scene.record.map_or(0, |record| record.triangles);
     let mut values = Vec::new();
     for s in &scene.structures {
-        let key = &s.key;
         if s.is_built() {
-            values.extend(of_build(key, s, triangles));
+            values.extend(of_build(&s.key, s, triangles));
         }
         if s.fault().is_none() {
-            values.extend(of_rays(key, s));
+            values.extend(s.timings.iter().flat_map(|timing| of_rays(&s.key, timing)));
         }
         values.extend(s.body.figures.iter().map(|(id, value)| Value {
-            key: key.clone(),
+            key: s.key.clone(),
             figure: data.figure(id),
             reading: Reading::Known(*value),
         }));
     }
+    values.extend(trade_off::break_even(scene));
     values
 }
+
+/// Classes of leaf sizes: title, least and greatest number of references.
+const LEAF_CLASSES: [(&str, usize, usize); 8] = [
+    ("0", 0, 0),
+    ("1", 1, 1),
+    ("2", 2, 2),
+    ("3", 3, 3),
+    ("4", 4, 4),
+    ("5–8", 5, 8),
+    ("9–16", 9, 16),
+    ("17 or more", 17, usize::MAX),
+];
 
 fn of_build(key: &Key, s: &StructureRecord, triangles: usize) -> Vec<Value<'static>> {
     let per_triangle = |x: u64| (triangles > 0).then(|| x as f64 / triangles as f64);
     let stats = &s.stats;
-    let of = |id: &str, value: Option<f64>| Some(Value::exact(key, id, value?));
-    [
-        of("build-ms/v1", Some(s.build_ms)),
-        of("build-peak-bytes/v1", s.build_peak_bytes.map(|n| n as f64)),
-        of("update-ms/v1", s.update_ms),
-        of("bytes/v1", Some(stats.bytes as f64)),
-        of("bytes-per-triangle/v1", per_triangle(stats.bytes)),
-        of("nodes/v1", Some(stats.nodes as f64)),
-        of("leaves/v1", Some(stats.leaves as f64)),
-        of("references/v1", Some(stats.references as f64)),
-        of("references-per-triangle/v1", per_triangle(stats.references)),
-        of("depth/v1", stats.depth.map(f64::from)),
-        of("sah-cost/v1", stats.sah_cost),
-        of("epo/v1", stats.epo),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
-}
-
-fn of_rays(key: &Key, s: &StructureRecord) -> Vec<Value<'static>> {
-    let mut values = Vec::new();
-    for timing in &s.timings {
-        let key = key
-            .clone()
-            .with(axis::RAYS, format::ray_class(timing.class));
-        values.push(Value::new(&key, "mrays-per-s/v1", timing.mrays_s));
-        let rays = [
-            ("rays/v1", timing.rays as f64),
-            ("hit-share/v1", timing.hit_fraction),
-        ];
-        let work = timing.counters.iter().flat_map(|work| {
-            [
-                ("nodes-per-ray/v1", work.nodes),
-                ("box-tests-per-ray/v1", work.box_tests),
-                ("triangle-tests-per-ray/v1", work.triangle_tests),
-                ("deepest-stack/v1", f64::from(work.stack_high_water)),
-            ]
-        });
-        for (id, value) in rays.into_iter().chain(work) {
-            values.push(Value::exact(&key, id, value));
-        }
-    }
+    let figures = [
+        ("build-ms/v1", Some(s.build_ms)),
+        ("build-peak-bytes/v1", s.build_peak_bytes.map(|n| n as f64)),
+        ("update-ms/v1", s.update_ms),
+        ("bytes/v1", Some(stats.bytes as f64)),
+        ("bytes-per-triangle/v1", per_triangle(stats.bytes)),
+        ("nodes/v1", Some(stats.nodes as f64)),
+        ("leaves/v1", Some(stats.leaves as f64)),
+        ("references/v1", Some(stats.references as f64)),
+        ("references-per-triangle/v1", per_triangle(stats.references)),
+        ("depth/v1", stats.depth.map(f64::from)),
+        ("sah-cost/v1", stats.sah_cost),
+        ("epo/v1", stats.epo),
+    ];
+    let all: u64 = stats.leaf_histogram.iter().sum();
+    let leaves = LEAF_CLASSES.iter().filter_map(|(title, least, greatest)| {
+        let sizes = stats.leaf_histogram.iter().enumerate();
+        let inside = sizes.filter(|(size, _)| least <= size && size <= greatest);
+        let leaves: u64 = inside.map(|(_, leaves)| leaves).sum();
+        let key = key.clone().with(axis::SUBJECT, title);
+        let share = leaves as f64 / all as f64;
+        (leaves > 0).then(|| Value::new(&key, "leaf-share/v1", share))
+    });
+    let mut values = Value::known(key, figures);
+    values.extend(leaves);
     values
 }
 
-/// Errors and times under one integrator.
-pub fn of_view(view: &View) -> Vec<Value<'static>> {
+fn of_rays(key: &Key, timing: &ClassTiming) -> Vec<Value<'static>> {
+    let key = (key.clone()).with(axis::RAYS, format::ray_class(timing.class));
+    let work = timing.counters;
+    let mut values = vec![Value::new(&key, "mrays-per-s/v1", timing.mrays_s)];
+    values.extend(Value::known(
+        &key,
+        [
+            ("rays/v1", Some(timing.rays as f64)),
+            ("hit-share/v1", Some(timing.hit_fraction)),
+            ("nodes-per-ray/v1", work.map(|w| w.nodes)),
+            ("box-tests-per-ray/v1", work.map(|w| w.box_tests)),
+            ("triangle-tests-per-ray/v1", work.map(|w| w.triangle_tests)),
+            (
+                "deepest-stack/v1",
+                work.map(|w| f64::from(w.stack_high_water)),
+            ),
+        ],
+    ));
+    values
+}
+
+/// Errors, times and bias checks of one view.
+pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
     let mut values = Vec::new();
     for sampler in &view.samplers {
         let key = &sampler.key;
         for metric in [Metric::RelMse, Metric::Rmse] {
-            values.extend(sampler.mean_errors(metric).iter().map(|mean| Value {
-                key: key.clone().with(axis::SPP, mean.spp),
-                figure: Cow::Borrowed(figure(metric.figure())),
-                reading: match mean.resolved {
+            for mean in sampler.mean_errors(metric) {
+                let reading = match mean.resolved {
                     true => Reading::Known(mean.error),
                     false => Reading::Below(mean.error.high.max(0.0)),
-                },
-            }));
-            let slope = sampler.slope(metric);
-            values.extend(slope.map(|slope| Value::new(key, metric.slope_figure(), slope)));
+                };
+                let key = key.clone().with(axis::SPP, mean.spp);
+                values.push(Value::new(&key, metric.figure(), reading));
+            }
+            let slope = (metric.slope_figure(), sampler.slope(metric));
+            values.extend(Value::known(key, [slope]));
         }
-        let z = sampler.bias.and_then(|bias| bias.z);
-        values.extend(z.map(|z| Value::exact(key, "bias-z/v1", z)));
-        if let Some(s) = sampler.spectrum {
-            let key = &key.clone().with(axis::SPP, s.spp);
-            let power = s
-                .low_frequency
-                .map(|x| Value::new(key, "low-frequency-power/v1", x));
-            let next = s
-                .autocorrelation
-                .map(|x| Value::new(key, "neighbour-correlation/v1", x));
-            values.extend(power.into_iter().chain(next));
+        values.extend(sampler.bias.into_iter().flat_map(|bias| of_bias(key, bias)));
+        let spectrum = sampler.spectrum.into_iter();
+        values.extend(spectrum.flat_map(|s| of_spectrum(key, s)));
+        for time in view.valid_times().filter(|t| t.sampler == sampler.name) {
+            let figures = [
+                ("ms-per-spp/v1", time.ms_per_spp),
+                ("cell-mrays-per-s/v1", time.mrays_s),
+            ];
+            values.extend(Value::known(&time.key, figures));
         }
     }
-    for time in view.valid_times() {
-        let key = &time.key;
-        let ms = time
-            .ms_per_spp
-            .map(|ms| Value::new(key, "ms-per-spp/v1", ms));
-        let rate = time
-            .mrays_s
-            .map(|rate| Value::new(key, "cell-mrays-per-s/v1", rate));
-        values.extend(ms.into_iter().chain(rate));
-    }
-    values.extend(
-        view.reference
-            .map(|reference| Value::exact(reference.key, "reference-mse/v1", reference.mse)),
-    );
+    let reference = view.reference.iter();
+    values.extend(reference.map(|r| Value::new(r.key, "reference-mse/v1", r.mse)));
+    values.extend(Race::new(view).iter().flat_map(Race::values));
+    values.extend(trade_off::times_to_image(scene, view));
     values
+}
+
+fn of_bias(key: &Key, bias: &BiasRecord) -> Vec<Value<'static>> {
+    let tested = bias.p.map(|p| {
+        [
+            ("bias-tiles/v1", Some(bias.tiles as f64)),
+            ("bias-rejected/v1", Some(bias.rejected as f64)),
+            ("bias-least-p/v1", Some(bias.min_p)),
+            ("bias-z/v1", bias.z),
+            ("bias-p/v1", Some(p)),
+            ("bias-freedom/v1", bias.degrees_of_freedom),
+        ]
+    });
+    Value::known(key, tested.into_iter().flatten())
+}
+
+/// The error that shares of filtered ones are taken of; `None` if there is none.
+pub fn unfiltered(spectrum: &SpectrumRecord) -> Option<f64> {
+    let at = spectrum.filtered.iter().find(|at| at.sigma == 0.0)?;
+    (at.rmse.value > 0.0).then_some(at.rmse.value)
+}
+
+fn of_spectrum(key: &Key, spectrum: &SpectrumRecord) -> Vec<Value<'static>> {
+    let key = &key.clone().with(axis::SPP, spectrum.spp);
+    let before = unfiltered(spectrum);
+    let mut values = Value::known(
+        key,
+        [
+            ("low-frequency-power/v1", spectrum.low_frequency),
+            ("neighbour-correlation/v1", spectrum.autocorrelation),
+            ("luminance-rmse/v1", before.map(Interval::exact)),
+        ],
+    );
+    for at in spectrum.filtered.iter().filter(|at| at.sigma > 0.0) {
+        let key = (key.clone()).with(axis::SUBJECT, format!("σ = {} px", at.sigma));
+        let share = before.map(|before| at.rmse.value / before);
+        values.extend(Value::known(&key, [("filtered-share/v1", share)]));
+    }
+    values
+}
+
+/// What a stream's dimensions are used for, with their numbers.
+pub fn pair_of_dimensions(stream: &StreamRecord) -> String {
+    let [a, b] = stream.dimensions;
+    format!("{} (dimensions {a} and {b})", stream.purpose)
 }
 
 /// Figures of a stream's points.
 pub fn of_stream(stream: &Recorded<StreamRecord>) -> Vec<Value<'static>> {
-    let [a, b] = stream.dimensions;
-    let what = format!("{} (dimensions {a} and {b})", stream.purpose);
-    let key = stream.key.clone().with(axis::DIMENSIONS, what);
+    let key = (stream.key.clone()).with(axis::DIMENSIONS, pair_of_dimensions(stream));
     let figures = &stream.figures;
     let at = |key: &Key, id: &str, counts: &[FigureAtCount]| -> Vec<Value> {
         let at =
@@ -210,25 +279,32 @@ pub fn of_stream(stream: &Recorded<StreamRecord>) -> Vec<Value<'static>> {
     let mut values = at(&key, "star-discrepancy/v1", &stream.star);
     values.extend(at(&key, "l2-star/v1", &figures.l2_star));
     values.extend(at(&key, "centered/v1", &figures.centered));
-    for (id, slope) in [
+    let exponents = [
         ("star-exponent/v1", figures.star_slope),
         ("l2-star-exponent/v1", figures.l2_star_slope),
-    ] {
-        values.extend(slope.map(|slope| Value::new(&key, id, slope)));
-    }
+    ];
+    values.extend(Value::known(&key, exponents));
     for integrand in &figures.integrands {
         let key = key.clone().with(axis::SUBJECT, &integrand.function);
         values.extend(at(&key, "integral-rmse/v1", &integrand.rmse));
-        let slope = integrand.slope;
-        values.extend(slope.map(|slope| Value::new(&key, "integral-exponent/v1", slope)));
+        let exponent = [("integral-exponent/v1", integrand.slope)];
+        values.extend(Value::known(&key, exponent));
     }
     for pixels in &figures.pixels {
         let key = key.clone().with(axis::POINTS, pixels.n);
         let angle = pixels.neighbour_angle.to_degrees();
-        values.push(Value::exact(&key, "neighbour-angle/v1", angle));
-        values.push(Value::exact(&key, "coverage/v1", pixels.coverage));
+        values.push(Value::new(&key, "neighbour-angle/v1", angle));
+        values.push(Value::new(&key, "coverage/v1", pixels.coverage));
     }
     values
+}
+
+/// What drawing costs.
+pub fn of_cost(cost: &Recorded<SamplerCostRecord>) -> [Value<'static>; 2] {
+    [
+        Value::new(cost.key, "ns-per-sample/v1", cost.ns_per_sample),
+        Value::new(cost.key, "loop-ns/v1", cost.loop_ns_per_sample.value),
+    ]
 }
 
 /// The values as comma-separated text: one line for each key and figure, a column for each axis.
@@ -245,25 +321,24 @@ pub fn csv(values: &[Value]) -> String {
         "figure", "title", "unit", "value", "low", "high", "interval",
     ];
     let mut text = line(axes.iter().chain(&named).map(|head| (*head).to_owned()));
-    for value in values {
-        let Figure {
-            id,
-            title,
-            unit,
-            spread,
-            ..
-        } = &*value.figure;
-        let numbers = match value.reading {
+    for Value {
+        key,
+        figure,
+        reading,
+    } in values
+    {
+        let numbers = match reading {
             Reading::Known(i) => [i.value, i.low, i.high].map(|x| x.to_string()),
             Reading::Below(bound) => [String::new(), String::new(), bound.to_string()],
+            Reading::Word(_) => Default::default(),
         };
-        let labels = axes.iter().map(|axis| value.key.label(axis).to_owned());
-        let row = [id, title, unit].map(ToString::to_string);
-        let row = row
-            .into_iter()
-            .chain(numbers)
-            .chain([spread.words().to_owned()]);
-        text += &line(labels.chain(row));
+        let spread = match reading {
+            Reading::Word(word) => (*word).to_owned(),
+            _ => figure.spread.words().to_owned(),
+        };
+        let labels = axes.iter().map(|axis| key.label(axis).to_owned());
+        let row = [&figure.id, &figure.title, &figure.unit].map(ToString::to_string);
+        text += &line(labels.chain(row).chain(numbers).chain([spread]));
     }
     text
 }
@@ -284,22 +359,22 @@ mod tests {
     fn a_line_of_the_export_holds_every_axis_and_quotes_what_needs_it() {
         let key = Key::default().with(axis::SCENE, "a,\"b\"");
         let other = Key::default().with(axis::ACCEL, "bvh");
-        let known = Value::new(
-            &key,
-            "build-ms/v1",
-            Interval {
-                value: 2.0,
-                low: 1.0,
-                high: 3.0,
-            },
-        );
-        let mut below = Value::exact(&other, "rmse-unbiased/v1", 0.0);
-        below.reading = Reading::Below(0.5);
+        let known = Interval {
+            value: 2.0,
+            low: 1.0,
+            high: 3.0,
+        };
+        let values = [
+            Value::new(&key, "build-ms/v1", known),
+            Value::new(&other, "rmse-unbiased/v1", Reading::Below(0.5)),
+            Value::new(&other, "break-even/v1", Reading::Word("never")),
+        ];
         assert_eq!(
-            csv(&[known, below]),
+            csv(&values),
             "scene,accel,figure,title,unit,value,low,high,interval\n\
              \"a,\"\"b\"\"\",,build-ms/v1,build,ms,2,1,3,measured once\n\
-             ,bvh,rmse-unbiased/v1,unbiased RMSE,,,,0.5,\"jackknife, Student's 95 % interval\"\n"
+             ,bvh,rmse-unbiased/v1,unbiased RMSE,,,,0.5,\"jackknife, Student's 95 % interval\"\n\
+             ,bvh,break-even/v1,break-even,thousand rays,,,,never\n"
         );
     }
 }

@@ -74,6 +74,7 @@ impl Registries {
         let decorrelations = decorrelations.map(|d| d.sources());
         let samplers = sequences.chain(decorrelations).flatten().copied();
         let others = (self.integrators.sources())
+            .chain(self.accel.sources())
             .chain(self.triangles.sources())
             .chain(self.offsets.sources());
         let sources: Vec<_> = samplers.chain(others).collect();

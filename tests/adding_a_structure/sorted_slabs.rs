@@ -2,17 +2,17 @@
 //! tests every box. The example of `docs/adding-a-structure.md`.
 
 use raystone::accel::bounds::Bounds;
-use raystone::accel::twin::{Query, Traverse, Twin};
+use raystone::accel::twin::{Traverse, Twin, Walk};
 use raystone::accel::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, CpuTwin, GpuBuffers, Hit, NamedWords,
+    AccelError, BuildLog, BuildResult, BuiltAccel, CpuTwin, GpuBuffers, Hit, NamedWords, Structure,
     StructureStats, TriangleSoup, limits,
 };
 use raystone::parameters;
-use raystone::params::{ParameterSchema, Parameters as _, Params};
+use raystone::params::Sources;
 
 parameters! {
     /// The parameters.
-    struct Slabs {
+    pub struct Slabs {
         /// triangles in a run
         run_length: usize = 16, in 1..=1024;
     }
@@ -21,32 +21,19 @@ parameters! {
 /// The registry entry.
 pub struct SortedSlabs;
 
-impl AccelKind for SortedSlabs {
-    fn name(&self) -> &'static str {
-        "sorted-slabs"
-    }
+impl Structure for SortedSlabs {
+    const NAME: &'static str = "sorted-slabs";
+    const DESCRIPTION: &'static str =
+        "triangles sorted along x in runs with one box each (an example)";
+    const SOURCES: Sources = &[(
+        "accel/sorted_slabs",
+        include_str!("kernels/accel/sorted_slabs.wesl"),
+    )];
+    type Parameters = Slabs;
 
-    fn description(&self) -> &'static str {
-        "triangles sorted along x in runs with one box each (an example)"
-    }
-
-    fn parameters(&self) -> ParameterSchema {
-        Slabs::schema()
-    }
-
-    fn build(
-        &self,
-        soup: &TriangleSoup,
-        params: &Params,
-        log: &mut BuildLog,
-    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let length = Slabs::from_params(params)?.run_length;
-        let order = log.phase("sort", || {
-            let centre = |id: u32| soup.records[id as usize].bounds().doubled_centre()[0];
-            let mut order: Vec<u32> = (0..soup.records.len() as u32).collect();
-            order.sort_by(|&a, &b| centre(a).total_cmp(&centre(b)).then(a.cmp(&b)));
-            order
-        });
+    fn build(soup: &TriangleSoup, slabs: &Slabs, log: &mut BuildLog) -> BuildResult {
+        let length = slabs.run_length;
+        let order = log.phase("sort", || sorted(soup));
         let runs = log.phase("boxes", || {
             let run = |(index, ids): (usize, &[u32])| {
                 let bounds = ids.iter().map(|&id| soup.records[id as usize].bounds());
@@ -64,15 +51,23 @@ impl AccelKind for SortedSlabs {
     }
 }
 
-struct Run {
-    bounds: Bounds,
-    first: u32,
-    end: u32,
+/// Triangles by their centres along x; of equal ones the lower index goes first.
+pub fn sorted(soup: &TriangleSoup) -> Vec<u32> {
+    let centre = |id: u32| soup.records[id as usize].bounds().doubled_centre()[0];
+    let mut order: Vec<u32> = (0..soup.records.len() as u32).collect();
+    order.sort_by(|&a, &b| centre(a).total_cmp(&centre(b)).then(a.cmp(&b)));
+    order
 }
 
-struct Built {
-    runs: Vec<Run>,
-    order: Vec<u32>,
+pub struct Run {
+    pub bounds: Bounds,
+    pub first: u32,
+    pub end: u32,
+}
+
+pub struct Built {
+    pub runs: Vec<Run>,
+    pub order: Vec<u32>,
 }
 
 impl BuiltAccel for Built {
@@ -139,19 +134,19 @@ impl BuiltAccel for Built {
 }
 
 impl Traverse for Built {
-    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+    fn trace(&self, soup: &TriangleSoup, mut walk: Walk) -> Hit {
         for (index, run) in self.runs.iter().enumerate() {
-            query.visit(index);
-            if query.enter(&run.bounds).is_none() {
+            walk.visit(index);
+            if walk.enter(&run.bounds).is_none() {
                 continue;
             }
             for &id in &self.order[run.first as usize..run.end as usize] {
-                query.test(&soup.records[id as usize]);
+                walk.test(&soup.records[id as usize]);
             }
-            if query.is_answered() {
+            if walk.is_answered() {
                 break;
             }
         }
-        query.hit
+        walk.hit
     }
 }

@@ -6,6 +6,7 @@ mod mistakes;
 use raystone::config::{Axis, Catalogue, ConfigError, Experiment, Plan, keys};
 use raystone::params::{Entry, ParamRange, ParamValue, Parameter, Variant};
 use raystone::run::Registries;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 fn entry(name: &str, schema: Vec<Parameter>) -> Entry {
@@ -319,6 +320,48 @@ fn a_plan_measures_errors_once_and_times_every_cell() {
     ] {
         assert!(text.contains(piece), "no `{piece}` in:\n{text}");
     }
+}
+
+#[test]
+fn tests_and_offsets_are_swept_where_they_matter() {
+    let text = AXES.replace(
+        "[axes]\n",
+        "[axes]\ntriangle = [\"watertight\", \"pluecker\"]\nbox_test = [\"padded-16\", \"plain\"]\n\
+         offset = [\"none\", \"error-bound\"]\n",
+    );
+    let exclude = "[[exclude]]\ntriangle = \"pluecker\"\nbox_test = \"plain\"\n";
+    let experiment = parse_with(&format!("{text}{exclude}"), &[]).expect("a good sweep");
+    let whole = plan(&experiment, &[]).expect("a plan");
+    // Three pairs of tests; 2 structures, which are the same with every offset; 2 sequences; 2 offsets.
+    assert_eq!(whole.structures.len(), 3 * 2);
+    assert_eq!(whole.samplers.len(), 3 * 2 * 2);
+    assert_eq!(whole.times.len(), 3 * 2 * 2 * 2);
+    assert_eq!(whole.streams.len(), 2);
+    assert!(
+        whole
+            .structures
+            .iter()
+            .all(|c| c.get(Axis::Offset).is_none())
+    );
+    let worlds: Vec<String> = (whole
+        .worlds(&whole.scenes[0])
+        .iter()
+        .map(ToString::to_string))
+    .collect();
+    assert_eq!(
+        worlds,
+        ["cornell-box", "cornell-box, plain", "cornell-box, pluecker"]
+    );
+    // What differs from the default stands behind the names, and no two cells are called the same.
+    let names: BTreeSet<String> = whole.times.iter().map(ToString::to_string).collect();
+    assert_eq!(names.len(), whole.times.len());
+    assert!(
+        names.contains("cornell-box, bvh, path, sobol × none"),
+        "{names:?}"
+    );
+    assert!(names.contains("cornell-box, bvh, path, sobol × none, pluecker, none"));
+    let some = plan(&experiment, &["triangle=pluecker,offset=error-bound"]).unwrap();
+    assert_eq!((some.structures.len(), some.times.len()), (2, 4));
 }
 
 #[test]

@@ -264,6 +264,23 @@ fn seeds_that_renders_share_are_refused_and_equal_numbers_that_do_not_meet_are_n
 }
 
 #[test]
+fn the_former_section_of_tests_says_where_its_keys_are() {
+    assert_says(
+        parse("[intersection]\ntriangle = \"pluecker\"\n"),
+        &[
+            "trial.toml:5",
+            "axes",
+            "`triangle`, `box_test` and `offset`",
+        ],
+    );
+    let text = AXES.replace("[axes]\n", "[axes]\ntriangle = \"watertigth\"\n");
+    assert_says(
+        parse_with(&text, &[]),
+        &["trial.toml:2", "triangle", "`watertigth`", "`watertight`"],
+    );
+}
+
+#[test]
 fn missing_empty_and_repeated_things_are_named() {
     assert_says(
         parse_with("[run]\nseed = 1\n", &[]),

@@ -113,6 +113,10 @@ const LONG: i64 = 20;
 
 /// Mean radiance under a white sky of a ball of this material, seen from there.
 fn ball(gpu: &Gpu, material: Material, eye: Vec3) -> Estimate {
+    ball_to(gpu, material, eye, LONG)
+}
+
+fn ball_to(gpu: &Gpu, material: Material, eye: Vec3, depth: i64) -> Estimate {
     let mut scene = builtin("white-furnace", &[]);
     scene.materials = vec![material];
     if let Some(camera) = &mut scene.camera {
@@ -121,7 +125,7 @@ fn ball(gpu: &Gpu, material: Material, eye: Vec3) -> Estimate {
     let stage = Stage::new(gpu, scene);
     let traced = stage.traced(gpu, structure("bvh"));
     let sampler = sampler("pixel-hash", "none");
-    let renderer = stage.renderer(gpu, &traced, &sampler, &path(LONG), SIZE, false);
+    let renderer = stage.renderer(gpu, &traced, &sampler, &path(depth), SIZE, false);
     Estimate::of(&replicate_means(&renderer, RANDOM_SPP, 16))
 }
 
@@ -129,7 +133,8 @@ const OUTSIDE: Vec3 = Vec3::new(0.0, 0.0, 3.0);
 const INSIDE: Vec3 = Vec3::new(0.1, -0.2, 0.3);
 
 /// What may be missing of 1: between facets, light that entered at a grazing angle meets the surface beyond
-/// the critical angle and goes round for more than [`LONG`] bounces.
+/// the critical angle and goes round for more than [`LONG`] bounces. It is 1.65 %, 1.09 % and 0.71 % with 4, 8
+/// and 16 bounces: two thirds are left whenever the depth doubles.
 const TRAPPED: f64 = 0.01;
 
 /// What a ball of glass with the index 1.5 shows that it should not, if anything.
@@ -153,6 +158,17 @@ fn glass_fault(gpu: &Gpu) -> Option<&'static str> {
     ]
     .into_iter()
     .find_map(|(what, is_right)| (!is_right).then_some(what))
+}
+
+#[test]
+fn what_a_ball_of_glass_keeps_gets_out_with_longer_paths() {
+    // With one seed a longer path begins like a shorter one, so that the differences are no noise.
+    let glass = || Material::dielectric("glass", Vec3::ONE, 1.5);
+    let kept = [4, 8, 16].map(|depth| 1.0 - ball_to(gpu(), glass(), OUTSIDE, depth).mean);
+    for pair in kept.windows(2) {
+        let left = pair[1] / pair[0];
+        assert!((0.5..0.8).contains(&left), "{kept:?}");
+    }
 }
 
 #[test]

@@ -63,7 +63,7 @@ fn samples_without_spread_are_equal_or_not() {
     assert_eq!((same.t, same.p), (0.0, 1.0));
     let different = welch_t_test(&[2.0, 2.0], &[2.1, 2.1]).unwrap();
     assert_eq!((different.t, different.p), (f64::NEG_INFINITY, 0.0));
-    let within = welch_t_test_beyond(&[2.0, 2.0], &[2.1, 2.1], 0.2).unwrap();
+    let within = capped_t_test(&[2.0, 2.0], &[2.1, 2.1], 0.2).unwrap();
     assert_eq!(within.p, 1.0);
     assert_eq!(welch_t_test(&[1.0], &[1.0, 2.0]), None);
     assert_eq!(welch_t_test(&[1.0, f64::NAN], &[1.0, 2.0]), None);
@@ -93,6 +93,39 @@ fn p_values_are_uniform_when_the_means_are_equal_and_small_when_not() {
         .map(|_| welch_t_test(&normal(0.0), &normal(2.0)).unwrap().p)
         .collect();
     assert!(share_below(&apart, 0.05) > 0.9);
+}
+
+/// The share of small p-values among pairs of samples with equal means, as a multiple of what it should be:
+/// of Welch's test, and of the capped one. The second sample has eight, each with a third of the noise.
+fn shares_below(p: f64, replicates: usize, generator: &mut Pcg32) -> [f64; 2] {
+    const TRIALS: usize = 200_000;
+    let mut normal = |sigma: f64, count: usize| -> Vec<f64> {
+        let mut draw = || (0..12).map(|_| generator.uniform()).sum::<f64>() - 6.0;
+        (0..count).map(|_| sigma * draw()).collect()
+    };
+    let mut below = [0; 2];
+    for _ in 0..TRIALS {
+        let (ours, reference) = (normal(3.0, replicates), normal(1.0, 8));
+        let tests = [
+            welch_t_test(&ours, &reference),
+            capped_t_test(&ours, &reference, 0.0),
+        ];
+        for (count, test) in below.iter_mut().zip(tests) {
+            *count += usize::from(test.expect("two samples or more").p <= p);
+        }
+    }
+    below.map(|count| count as f64 / TRIALS as f64 / p)
+}
+
+#[test]
+fn few_replicates_cry_wolf_by_welch_and_not_with_the_cap() {
+    let mut generator = Pcg32::new(11);
+    for replicates in [2, 3, 5, 8] {
+        let [welch, capped] = shares_below(1e-3, replicates, &mut generator);
+        assert!(capped < 1.2, "{replicates}: {capped}");
+        // Negative control: the test without a cap.
+        assert!(replicates > 3 || welch > 5.0, "{replicates}: {welch}");
+    }
 }
 
 #[test]

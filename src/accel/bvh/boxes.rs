@@ -8,7 +8,7 @@
 use super::super::bounds::Bounds;
 use super::super::leaf::{LEAF, LeafReader, Leaves, leaf_reference};
 use super::super::tree::{Coverage, NodeKind, Tree};
-use super::super::twin::Query;
+use super::super::twin::Walk;
 use super::super::{AccelError, Ray, TriangleSoup};
 use super::layout::{Inner, Nodes};
 use super::options::NodeOrder;
@@ -119,58 +119,49 @@ impl Boxes {
         max_depth: u32,
         link_of: impl Fn(u32, u32, u32) -> u32,
     ) -> Result<(), AccelError> {
-        let invalid =
-            |index: u32, what: &str| Err(AccelError::Invalid(format!("node {index}: {what}")));
+        ensure!(self.0[0].link == NONE, "the root leads somewhere");
         let mut coverage = Coverage::new(soup, self.0.len());
-        coverage.node(ROOT as usize)?;
         coverage.node(1)?;
-        let mut stack = vec![(ROOT, NONE, Bounds::EVERYTHING, 0)];
-        while let Some((index, link, around, depth)) = stack.pop() {
-            let node = &self.0[index as usize];
-            if depth > max_depth {
-                return invalid(index, &format!("deeper than {max_depth} levels"));
-            }
-            if node.link != link {
-                return invalid(index, &format!("it leads to {}, not {link}", node.link));
-            }
+        coverage.descend(max_depth + 1, |coverage, index, around, below| {
+            let node = &self.0[index];
             if node.content == NONE {
-                continue;
+                return Ok(());
             }
             let bounds = node.bounds();
-            if !around.contains(&bounds) {
-                return invalid(index, "its box leaves its parent's");
-            }
+            ensure!(around.contains(&bounds), "its box leaves its parent's");
             if node.content >= LEAF {
-                leaves.cover(&mut coverage, soup, node.content, &bounds)?;
-                continue;
+                return leaves.cover(coverage, soup, node.content, &bounds);
             }
-            if node.content >> AXIS_SHIFT > 2 {
-                return invalid(index, "there is no axis 3");
-            }
+            ensure!(node.content >> AXIS_SHIFT <= 2, "there is no axis 3");
             let first = node.content & CHILD_MASK;
             for child in [first, first ^ 1] {
-                coverage.node(child as usize)?;
-                stack.push((child, link_of(node.link, index, child), bounds, depth + 1));
+                let link = self.0.get(child as usize).map(|child| child.link);
+                let right = link_of(node.link, index as u32, child);
+                ensure!(
+                    link == Some(right),
+                    "child {child} leads to {link:?}, not {right}"
+                );
+                below.push((child as usize, bounds));
             }
-        }
-        coverage.is_complete()
+            Ok(())
+        })
     }
 }
 
 impl Nodes for Boxes {
-    fn visit(&self, node: u32, leaves: LeafReader, query: &mut Query) -> Inner {
-        query.visit(node as usize);
+    fn visit(&self, node: u32, leaves: LeafReader, walk: &mut Walk) -> Inner {
+        walk.visit(node as usize);
         let node = &self.0[node as usize];
         let mut inner = Inner {
             first: NONE,
             second: NONE,
             side: 0,
         };
-        if query.enter(&node.bounds()).is_some() {
+        if walk.enter(&node.bounds()).is_some() {
             if node.content >= LEAF {
-                leaves.test_leaf(node.content, query);
+                leaves.test_leaf(node.content, walk);
             } else {
-                inner.side = near_side(node.content, &query.ray);
+                inner.side = near_side(node.content, &walk.ray);
                 inner.first = (node.content & CHILD_MASK) + inner.side;
                 inner.second = inner.first ^ 1;
             }
@@ -178,10 +169,10 @@ impl Nodes for Boxes {
         inner
     }
 
-    fn second_child(&self, node: u32, from: u32, query: &mut Query) -> u32 {
-        query.visit(node as usize);
+    fn second_child(&self, node: u32, from: u32, walk: &mut Walk) -> u32 {
+        walk.visit(node as usize);
         let content = self.0[node as usize].content;
-        if from & 1 == near_side(content, &query.ray) {
+        if from & 1 == near_side(content, &walk.ray) {
             from ^ 1
         } else {
             NONE
@@ -192,8 +183,8 @@ impl Nodes for Boxes {
         self.0[node as usize].link
     }
 
-    fn child(&self, node: u32, side: u32, query: &mut Query) -> u32 {
-        query.visit(node as usize);
+    fn child(&self, node: u32, side: u32, walk: &mut Walk) -> u32 {
+        walk.visit(node as usize);
         (self.0[node as usize].content & CHILD_MASK) + side
     }
 }

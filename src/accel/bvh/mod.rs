@@ -16,18 +16,12 @@ mod short_stack;
 mod stack;
 
 use super::leaf::{COUNT_MASK, LeafReader, Leaves};
-use super::ray::Hit;
+use super::structure::prelude::*;
 use super::tree::{Coverage, NodeKind, Tree};
-use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
-    TriangleSoup,
-};
-use crate::params::{ParameterSchema, Parameters as _, Params};
 use boxes::Boxes;
 use octant_roped::Octants;
 pub use options::BvhParameters;
-use options::{Options, RopedParameters, Traversal};
+use options::{LeafTriangles, RopedParameters, Traversal};
 use pairs::Pairs;
 
 /// The root.
@@ -38,53 +32,26 @@ const NONE: u32 = 0x8000_0000;
 /// The registry entry `bvh`.
 pub struct Bvh;
 
-impl AccelKind for Bvh {
-    fn name(&self) -> &'static str {
-        "bvh"
-    }
+impl Structure for Bvh {
+    const NAME: &'static str = "bvh";
+    const DESCRIPTION: &'static str = "binary BVH with a choice of traversal and layout, by default a stack, near child first (Aila & Laine 2009)";
+    type Parameters = BvhParameters;
 
-    fn description(&self) -> &'static str {
-        "binary BVH with a choice of traversal and layout, by default a stack, near child first (Aila & Laine 2009)"
-    }
-
-    fn parameters(&self) -> ParameterSchema {
-        BvhParameters::schema()
-    }
-
-    fn build(
-        &self,
-        soup: &TriangleSoup,
-        params: &Params,
-        log: &mut BuildLog,
-    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let params = BvhParameters::from_params(params)?;
-        Ok(Box::new(BuiltBvh::build(soup, &params, log)?))
+    fn build(soup: &TriangleSoup, params: &BvhParameters, log: &mut BuildLog) -> BuildResult {
+        Ok(Box::new(BuiltBvh::build(soup, params, log)?))
     }
 }
 
 /// The registry entry `roped-bvh`.
 pub struct RopedBvh;
 
-impl AccelKind for RopedBvh {
-    fn name(&self) -> &'static str {
-        "roped-bvh"
-    }
+impl Structure for RopedBvh {
+    const NAME: &'static str = "roped-bvh";
+    const DESCRIPTION: &'static str = "the tree of `bvh` with skip pointers: no stack, fixed order (Smits 1998, Dufay 2017 Alg. 4.4)";
+    type Parameters = RopedParameters;
 
-    fn description(&self) -> &'static str {
-        "the tree of `bvh` with skip pointers: no stack, fixed order (Smits 1998, Dufay 2017 Alg. 4.4)"
-    }
-
-    fn parameters(&self) -> ParameterSchema {
-        RopedParameters::schema()
-    }
-
-    fn build(
-        &self,
-        soup: &TriangleSoup,
-        params: &Params,
-        log: &mut BuildLog,
-    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let params = RopedParameters::from_params(params)?.into();
+    fn build(soup: &TriangleSoup, params: &RopedParameters, log: &mut BuildLog) -> BuildResult {
+        let params = params.clone().into();
         Ok(Box::new(BuiltBvh::build(soup, &params, log)?))
     }
 }
@@ -98,7 +65,7 @@ enum NodeArray {
 
 /// A built BVH.
 pub struct BuiltBvh {
-    options: Options,
+    params: BvhParameters,
     stats: StructureStats,
     nodes: NodeArray,
     leaves: Leaves,
@@ -115,25 +82,26 @@ impl BuiltBvh {
         params: &BvhParameters,
         log: &mut BuildLog,
     ) -> Result<Self, AccelError> {
-        let options = Options::new(params)?;
+        params.check()?;
         let mut tree = Tree::build(soup, &params.tree, log)?;
         tree.note_epo(soup);
         let depth = tree.depth();
-        options.check_depth(depth)?;
+        params.check_depth(depth)?;
         check_leaves(&tree)?;
         let (nodes, leaves) = log.phase("layout", || {
-            let nodes = match options.traversal {
-                Traversal::Roped => NodeArray::Boxes(roped::rope(Boxes::new(&tree, options.order))),
-                Traversal::OctantRoped => {
-                    NodeArray::Octants(Octants::new(&Boxes::new(&tree, options.order)))
-                }
-                _ if options.boxes => NodeArray::Boxes(Boxes::new(&tree, options.order)),
-                _ => NodeArray::Pairs(Pairs::new(&tree, options.order)),
+            let order = params.layout.node_order;
+            let boxes = || Boxes::new(&tree, order);
+            let nodes = match params.traversal {
+                Traversal::Roped => NodeArray::Boxes(roped::rope(boxes())),
+                Traversal::OctantRoped => NodeArray::Octants(Octants::new(&boxes())),
+                _ if params.has_boxes() => NodeArray::Boxes(boxes()),
+                _ => NodeArray::Pairs(Pairs::new(&tree, order)),
             };
-            (nodes, Leaves::new(soup, &tree.order, options.indexed))
+            let indexed = params.layout.triangles == LeafTriangles::Indexed;
+            (nodes, Leaves::new(soup, &tree.order, indexed))
         });
         let mut built = Self {
-            options,
+            params: params.clone(),
             stats: tree.stats(),
             nodes,
             leaves: leaves?,
@@ -182,7 +150,7 @@ impl BuiltAccel for BuiltBvh {
                 )
             }
             NodeArray::Octants(octants) => octants.validate(soup, leaves, depth),
-            NodeArray::Boxes(boxes) if self.options.traversal == Traversal::Roped => {
+            NodeArray::Boxes(boxes) if self.params.traversal == Traversal::Roped => {
                 let rope = |link, _, child| roped::rope_of(link, child);
                 boxes.validate(soup, leaves, depth, rope)
             }
@@ -191,19 +159,17 @@ impl BuiltAccel for BuiltBvh {
     }
 
     fn buffers(&self) -> GpuBuffers<'_> {
-        let mut features = self.options.features();
+        let params = &self.params;
+        let mut features = params.features();
         features.extend(self.leaves.features());
-        let stack_entries = self.options.stack_entries(self.depth);
+        let stack_entries = params.stack_entries(self.depth);
         let nodes = self.node_words();
         let count = 4 * nodes.words.len() / nodes.element_bytes as usize;
         GpuBuffers {
-            kernel: self.options.kernel(),
+            kernel: params.kernel(),
             features,
             arrays: vec![nodes, self.leaves.words()],
-            uniforms: vec![super::limits(
-                self.options.step_fuse(count, self.depth),
-                count,
-            )],
+            uniforms: vec![limits(params.step_fuse(count, self.depth), count)],
             constants: (stack_entries > 0)
                 .then_some(("STACK_ENTRIES", stack_entries))
                 .into_iter()
@@ -225,30 +191,29 @@ impl BuiltAccel for BuiltBvh {
 }
 
 impl Traverse for BuiltBvh {
-    fn trace(&self, soup: &TriangleSoup, query: Query) -> Hit {
+    fn trace(&self, soup: &TriangleSoup, walk: Walk) -> Hit {
         let leaves = LeafReader {
             leaves: &self.leaves,
             soup,
         };
-        let options = &self.options;
-        let entries = options.stack_entries(self.depth) as usize;
-        match (&self.nodes, options.traversal) {
-            (NodeArray::Octants(octants), _) => octant_roped::trace(octants, leaves, query),
-            (NodeArray::Boxes(boxes), Traversal::Roped) => roped::trace(boxes, leaves, query),
+        let entries = self.params.stack_entries(self.depth) as usize;
+        match (&self.nodes, self.params.traversal) {
+            (NodeArray::Octants(octants), _) => octant_roped::trace(octants, leaves, walk),
+            (NodeArray::Boxes(boxes), Traversal::Roped) => roped::trace(boxes, leaves, walk),
             (NodeArray::Boxes(boxes), Traversal::ParentPointer) => {
-                parent_pointer::trace(boxes, leaves, query)
+                parent_pointer::trace(boxes, leaves, walk)
             }
             (NodeArray::Boxes(boxes), Traversal::ShortStack) => {
-                short_stack::trace(boxes, entries, leaves, query)
+                short_stack::trace(boxes, entries, leaves, walk)
             }
-            (NodeArray::Boxes(boxes), _) => stack::trace(boxes, leaves, query),
+            (NodeArray::Boxes(boxes), _) => stack::trace(boxes, leaves, walk),
             (NodeArray::Pairs(pairs), Traversal::ParentPointer) => {
-                parent_pointer::trace(pairs, leaves, query)
+                parent_pointer::trace(pairs, leaves, walk)
             }
             (NodeArray::Pairs(pairs), Traversal::ShortStack) => {
-                short_stack::trace(pairs, entries, leaves, query)
+                short_stack::trace(pairs, entries, leaves, walk)
             }
-            (NodeArray::Pairs(pairs), _) => stack::trace(pairs, leaves, query),
+            (NodeArray::Pairs(pairs), _) => stack::trace(pairs, leaves, walk),
         }
     }
 }

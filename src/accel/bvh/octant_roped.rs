@@ -3,7 +3,7 @@
 
 use super::super::leaf::{LEAF, LeafReader, Leaves};
 use super::super::ray::Hit;
-use super::super::twin::Query;
+use super::super::twin::Walk;
 use super::super::{AccelError, TriangleSoup};
 use super::boxes::{AXIS_SHIFT, BoxNode, Boxes, CHILD_MASK};
 use super::{NONE, ROOT};
@@ -74,38 +74,34 @@ impl Octants {
     ) -> Result<(), AccelError> {
         let boxes = Boxes(self.0.iter().map(|n| n.node).collect());
         boxes.validate(soup, leaves, max_depth, |_, _, _| NONE)?;
-        let invalid =
-            |index: usize| AccelError::Invalid(format!("node {index}: a rope leads astray"));
-        if self.0[ROOT as usize].ropes != [NONE; 8] {
-            return Err(invalid(ROOT as usize));
-        }
+        let root = self.0[ROOT as usize].ropes;
+        ensure!(root == [NONE; 8], "node {ROOT}: a rope leads astray");
         for parent in self.0.iter().filter(|n| n.node.content < LEAF) {
             let first = parent.node.content & CHILD_MASK;
             for child in [first, first + 1] {
-                if self.0[child as usize].ropes != ropes_of(parent, child) {
-                    return Err(invalid(child as usize));
-                }
+                let right = self.0[child as usize].ropes == ropes_of(parent, child);
+                ensure!(right, "node {child}: a rope leads astray");
             }
         }
         Ok(())
     }
 }
 
-pub(super) fn trace(octants: &Octants, leaves: LeafReader, mut query: Query) -> Hit {
-    let octant = octant_of(query.ray.direction);
+pub(super) fn trace(octants: &Octants, leaves: LeafReader, mut walk: Walk) -> Hit {
+    let octant = octant_of(walk.ray.direction);
     let mut current = ROOT;
     loop {
-        if current == NONE || query.is_answered() {
-            return query.hit;
+        if current == NONE || walk.is_answered() {
+            return walk.hit;
         }
-        query.visit(current as usize);
+        walk.visit(current as usize);
         let OctantNode { node, ropes } = &octants.0[current as usize];
-        let entered = query.enter(&node.bounds()).is_some();
+        let entered = walk.enter(&node.bounds()).is_some();
         if entered && node.content < LEAF {
             current = (node.content & CHILD_MASK) + near_side(node.content, octant);
         } else {
             if entered {
-                leaves.test_leaf(node.content, &mut query);
+                leaves.test_leaf(node.content, &mut walk);
             }
             current = ropes[octant as usize];
         }

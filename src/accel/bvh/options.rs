@@ -123,30 +123,16 @@ impl From<RopedParameters> for BvhParameters {
     }
 }
 
-/// The choices of one built structure, free of contradictions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Options {
-    pub traversal: Traversal,
-    /// Nodes of 32 bytes with their own box instead of 64 with both children's.
-    pub boxes: bool,
-    pub indexed: bool,
-    pub order: NodeOrder,
-    /// Feature of the kernel for a stack outside function memory.
-    stack_feature: Option<&'static str>,
-    short_stack_entries: u32,
-}
-
-impl Options {
-    /// The choices that `params` make.
+impl BvhParameters {
+    /// Whether the choices go together.
     ///
     /// # Errors
     /// Two of them contradict each other.
-    pub fn new(params: &BvhParameters) -> Result<Self, AccelError> {
-        let traversal = params.traversal;
+    pub(super) fn check(&self) -> Result<(), AccelError> {
         let contradiction = |why: &str| Err(AccelError::Contradiction(why.to_owned()));
-        let has_stack = matches!(traversal, Traversal::Stack | Traversal::ShortStack);
-        match (traversal, params.node_bytes) {
-            _ if !has_stack && params.stack_memory != StackMemory::Function => contradiction(
+        let has_stack = matches!(self.traversal, Traversal::Stack | Traversal::ShortStack);
+        match (self.traversal, self.node_bytes) {
+            _ if !has_stack && self.stack_memory != StackMemory::Function => contradiction(
                 "stack_memory: this traversal has no stack; leave it at `function`, or take \
                  traversal = stack or short-stack",
             ),
@@ -157,33 +143,24 @@ impl Options {
                 "node_bytes = 32: a box and eight ropes need 64; traversal = parent-pointer with \
                  node_bytes = 32 walks in the same order",
             ),
-            _ => Ok(Self {
-                traversal,
-                boxes: params.node_bytes == NodeBytes::Own || traversal == Traversal::Roped,
-                indexed: params.layout.triangles == LeafTriangles::Indexed,
-                order: params.layout.node_order,
-                stack_feature: match params.stack_memory {
-                    StackMemory::Function => None,
-                    StackMemory::Private => Some("stack_private"),
-                    StackMemory::Workgroup => Some("stack_workgroup"),
-                },
-                short_stack_entries: match traversal {
-                    Traversal::ShortStack => params.short_stack_entries,
-                    _ => 0,
-                },
-            }),
+            _ => Ok(()),
         }
+    }
+
+    /// Whether nodes have 32 bytes with their own box instead of 64 with both children's.
+    pub(super) fn has_boxes(&self) -> bool {
+        self.node_bytes == NodeBytes::Own || self.traversal == Traversal::Roped
     }
 
     /// Whether a tree of this depth can be walked.
     ///
     /// # Errors
     /// Its stack does not fit into workgroup memory, or its trail into two words.
-    pub fn check_depth(&self, depth: u32) -> Result<(), AccelError> {
+    pub(super) fn check_depth(&self, depth: u32) -> Result<(), AccelError> {
         if self.traversal == Traversal::ShortStack {
             AccelError::check_limit("levels of a restart trail", depth, TRAIL_LEVELS)?;
         }
-        if self.stack_feature == Some("stack_workgroup") {
+        if self.stack_memory == StackMemory::Workgroup {
             let bytes = self.stack_entries(depth) * LANES * 4;
             let what = "bytes of stacks in workgroup memory";
             AccelError::check_limit(what, bytes, WORKGROUP_BYTES)?;
@@ -193,7 +170,7 @@ impl Options {
 
     /// Entries of the kernel's stack for a tree of this depth; 0 if it has none. One entry is pushed
     /// a level at most; a multiple of 16, so that scenes of like depth share a kernel.
-    pub fn stack_entries(&self, depth: u32) -> u32 {
+    pub(super) fn stack_entries(&self, depth: u32) -> u32 {
         match self.traversal {
             Traversal::Stack => depth.max(1).next_multiple_of(16),
             Traversal::ShortStack => self.short_stack_entries,
@@ -202,7 +179,7 @@ impl Options {
     }
 
     /// Steps that a traversal of `nodes` nodes and this depth takes at most.
-    pub fn step_fuse(&self, nodes: usize, depth: u32) -> usize {
+    pub(super) fn step_fuse(&self, nodes: usize, depth: u32) -> usize {
         match self.traversal {
             Traversal::Stack | Traversal::Roped | Traversal::OctantRoped => nodes + 1,
             // Down once, up from both children.
@@ -214,7 +191,7 @@ impl Options {
     }
 
     /// Module of the kernel.
-    pub fn kernel(&self) -> &'static str {
+    pub(super) fn kernel(&self) -> &'static str {
         match self.traversal {
             Traversal::Stack => "accel/bvh/stack",
             Traversal::ParentPointer => "accel/bvh/parent_pointer",
@@ -225,14 +202,18 @@ impl Options {
     }
 
     /// Features of the kernel, less those of the leaves.
-    pub fn features(&self) -> Vec<&'static str> {
-        let mut out: Vec<_> = self.stack_feature.into_iter().collect();
-        if self.boxes && self.traversal != Traversal::Roped {
-            out.push("boxes");
-        }
-        if self.traversal == Traversal::ShortStack {
-            out.push("short_stack");
-        }
-        out
+    pub(super) fn features(&self) -> Vec<&'static str> {
+        let boxes = self.has_boxes() && self.traversal != Traversal::Roped;
+        let features = [
+            (self.stack_memory == StackMemory::Private, "stack_private"),
+            (
+                self.stack_memory == StackMemory::Workgroup,
+                "stack_workgroup",
+            ),
+            (boxes, "boxes"),
+            (self.traversal == Traversal::ShortStack, "short_stack"),
+        ];
+        let on = features.into_iter().filter(|(on, _)| *on);
+        on.map(|(_, name)| name).collect()
     }
 }

@@ -6,7 +6,7 @@ use super::super::AccelError;
 use super::super::bounds::{Bounds, enter_box};
 use super::super::leaf::{LEAF, LeafReader, leaf_reference};
 use super::super::tree::{Coverage, NodeKind, Tree};
-use super::super::twin::Query;
+use super::super::twin::Walk;
 use super::NONE;
 use super::layout::{Inner, Nodes};
 use super::options::NodeOrder;
@@ -127,43 +127,38 @@ impl Pairs {
 pub(in crate::accel) fn validate<'a>(
     (first, nodes): (u32, &[Pair]),
     max_depth: u32,
-    mut coverage: Coverage<'a>,
+    coverage: Coverage<'a>,
     cover: impl Fn(&mut Coverage<'a>, u32, &Bounds) -> Result<(), AccelError>,
 ) -> Result<(), AccelError> {
-    coverage.node(0)?;
-    let mut stack = vec![(first, NONE, Bounds::EVERYTHING, 1)];
-    while let Some((index, parent, around, depth)) = stack.pop() {
-        let ensure =
-            |holds, what: &str| AccelError::ensure(holds, || format!("node {index}: {what}"));
-        let node = &nodes[(index - first) as usize];
-        AccelError::ensure(depth <= max_depth.max(1), || {
-            format!("node {index}: deeper than {max_depth} levels")
-        })?;
-        ensure(node.parent == parent, "its parent is another node")?;
-        for (reference, bounds) in node.children() {
+    let is_root = nodes.first().is_none_or(|root| root.parent == NONE);
+    ensure!(is_root, "the root has a parent");
+    coverage.descend(max_depth.max(1), |coverage, index, around, below| {
+        for (reference, bounds) in nodes[index].children() {
             if reference == NONE {
                 continue;
             }
             let inside = around.contains(&bounds);
-            ensure(inside, "a child's box leaves its own")?;
-            if reference < LEAF {
-                let place = reference.checked_sub(first);
-                coverage.node(place.map_or(nodes.len(), |place| place as usize))?;
-                stack.push((reference, index, bounds, depth + 1));
-            } else {
-                cover(&mut coverage, reference, &bounds)?;
+            ensure!(inside, "a child's box leaves its own");
+            if reference >= LEAF {
+                cover(coverage, reference, &bounds)?;
+                continue;
             }
+            let place = reference.wrapping_sub(first) as usize;
+            let parent = nodes.get(place).map(|child| child.parent);
+            let is_own = parent == Some(index as u32 + first);
+            ensure!(is_own, "the parent of node {reference} is {parent:?}");
+            below.push((place, bounds));
         }
-    }
-    coverage.is_complete()
+        Ok(())
+    })
 }
 
 impl Nodes for Pairs {
-    fn visit(&self, node: u32, leaves: LeafReader, query: &mut Query) -> Inner {
-        query.visit(node as usize);
+    fn visit(&self, node: u32, leaves: LeafReader, walk: &mut Walk) -> Inner {
+        walk.visit(node as usize);
         let [(left, left_box), (right, right_box)] = self.0[node as usize].children();
-        let left = (query.enter(&left_box), left);
-        let right = (query.enter(&right_box), right);
+        let left = (walk.enter(&left_box), left);
+        let right = (walk.enter(&right_box), right);
         let swap = right.0.is_some_and(|r| left.0.is_none_or(|l| r < l));
         let (mut near, mut far) = (left, right);
         if swap {
@@ -176,16 +171,16 @@ impl Nodes for Pairs {
         };
         if near.0.is_some() {
             if near.1 >= LEAF {
-                leaves.test_leaf(near.1, query);
+                leaves.test_leaf(near.1, walk);
             } else {
                 inner.first = near.1;
             }
         }
         // The far child is looked at again: the near one may have brought a nearer hit.
-        let entered = far.0.is_some_and(|e| e <= query.hit.t * query.inverse.pad);
-        if entered && !query.is_answered() {
+        let entered = far.0.is_some_and(|e| e <= walk.hit.t * walk.inverse.pad);
+        if entered && !walk.is_answered() {
             if far.1 >= LEAF {
-                leaves.test_leaf(far.1, query);
+                leaves.test_leaf(far.1, walk);
             } else if inner.first == NONE {
                 inner.first = far.1;
                 inner.side ^= 1;
@@ -196,10 +191,10 @@ impl Nodes for Pairs {
         inner
     }
 
-    fn second_child(&self, node: u32, from: u32, query: &mut Query) -> u32 {
-        query.visit(node as usize);
-        query.counters.box_tests += 2;
-        let (ray, inverse) = (&query.ray, query.inverse);
+    fn second_child(&self, node: u32, from: u32, walk: &mut Walk) -> u32 {
+        walk.visit(node as usize);
+        walk.counters.box_tests += 2;
+        let (ray, inverse) = (&walk.ray, walk.inverse);
         let enter = |bounds| enter_box(bounds, ray, inverse, ray.t_max);
         let [(left, left_box), (right, right_box)] = self.0[node as usize].children();
         let (enter_left, enter_right) = (enter(&left_box), enter(&right_box));
@@ -209,7 +204,7 @@ impl Nodes for Pairs {
         } else {
             (left, right, enter_right)
         };
-        let entered = enter.is_some_and(|e| e <= query.hit.t * query.inverse.pad);
+        let entered = enter.is_some_and(|e| e <= walk.hit.t * walk.inverse.pad);
         if from == near && far < LEAF && entered {
             far
         } else {
@@ -221,8 +216,8 @@ impl Nodes for Pairs {
         self.0[node as usize].parent
     }
 
-    fn child(&self, node: u32, side: u32, query: &mut Query) -> u32 {
-        query.visit(node as usize);
+    fn child(&self, node: u32, side: u32, walk: &mut Walk) -> u32 {
+        walk.visit(node as usize);
         let pair = &self.0[node as usize];
         if side == 0 { pair.left } else { pair.right }
     }

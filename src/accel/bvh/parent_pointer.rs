@@ -6,23 +6,23 @@
 
 use super::super::leaf::LeafReader;
 use super::super::ray::Hit;
-use super::super::twin::Query;
+use super::super::twin::Walk;
 use super::layout::Nodes;
 use super::{NONE, ROOT};
 
-pub(super) fn trace(nodes: &impl Nodes, leaves: LeafReader, mut query: Query) -> Hit {
+pub(super) fn trace(nodes: &impl Nodes, leaves: LeafReader, mut walk: Walk) -> Hit {
     let mut current = ROOT;
     // The child that we come from, NONE on the way down.
     let mut from_child = NONE;
     loop {
         let next = if from_child == NONE {
-            let inner = nodes.visit(current, leaves, &mut query);
-            if query.is_answered() {
-                return query.hit;
+            let inner = nodes.visit(current, leaves, &mut walk);
+            if walk.is_answered() {
+                return walk.hit;
             }
             inner.first
         } else {
-            nodes.second_child(current, from_child, &mut query)
+            nodes.second_child(current, from_child, &mut walk)
         };
         if next != NONE {
             current = next;
@@ -31,7 +31,7 @@ pub(super) fn trace(nodes: &impl Nodes, leaves: LeafReader, mut query: Query) ->
             from_child = current;
             current = nodes.parent(current);
             if current == NONE {
-                return query.hit;
+                return walk.hit;
             }
         }
     }

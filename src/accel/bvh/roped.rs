@@ -4,7 +4,7 @@
 
 use super::super::leaf::{LEAF, LeafReader};
 use super::super::ray::Hit;
-use super::super::twin::Query;
+use super::super::twin::Walk;
 use super::boxes::{Boxes, CHILD_MASK};
 use super::{NONE, ROOT};
 
@@ -32,18 +32,18 @@ pub(super) fn rope(mut boxes: Boxes) -> Boxes {
     boxes
 }
 
-pub(super) fn trace(boxes: &Boxes, leaves: LeafReader, mut query: Query) -> Hit {
+pub(super) fn trace(boxes: &Boxes, leaves: LeafReader, mut walk: Walk) -> Hit {
     let mut current = ROOT;
     loop {
-        if current == NONE || query.is_answered() {
-            return query.hit;
+        if current == NONE || walk.is_answered() {
+            return walk.hit;
         }
-        query.visit(current as usize);
+        walk.visit(current as usize);
         let node = &boxes.0[current as usize];
-        if query.enter(&node.bounds()).is_none() {
+        if walk.enter(&node.bounds()).is_none() {
             current = node.link;
         } else if node.content >= LEAF {
-            leaves.test_leaf(node.content, &mut query);
+            leaves.test_leaf(node.content, &mut walk);
             current = node.link;
         } else {
             current = node.content & CHILD_MASK;

@@ -7,24 +7,19 @@
 
 use super::super::leaf::LeafReader;
 use super::super::ray::Hit;
-use super::super::twin::Query;
+use super::super::twin::Walk;
 use super::layout::Nodes;
 use super::{NONE, ROOT};
 use std::collections::VecDeque;
 
-pub(super) fn trace(
-    nodes: &impl Nodes,
-    entries: usize,
-    leaves: LeafReader,
-    mut query: Query,
-) -> Hit {
+pub(super) fn trace(nodes: &impl Nodes, entries: usize, leaves: LeafReader, mut walk: Walk) -> Hit {
     let mut stack = VecDeque::with_capacity(entries);
-    let push = |stack: &mut VecDeque<u32>, query: &mut Query, node| {
+    let push = |stack: &mut VecDeque<u32>, walk: &mut Walk, node| {
         if stack.len() == entries {
             stack.pop_front();
         }
         stack.push_back(node);
-        query.count_stack(stack.len());
+        walk.count_stack(stack.len());
     };
     let (mut side, mut pending) = (0_u64, 0_u64);
     let mut current = ROOT;
@@ -35,29 +30,29 @@ pub(super) fn trace(
         if level < restart_end {
             let taken = (side >> level & 1) as u32;
             if pending >> level & 1 == 1 {
-                let other = nodes.child(current, taken ^ 1, &mut query);
-                push(&mut stack, &mut query, other);
+                let other = nodes.child(current, taken ^ 1, &mut walk);
+                push(&mut stack, &mut walk, other);
             }
-            current = nodes.child(current, taken, &mut query);
+            current = nodes.child(current, taken, &mut walk);
             level += 1;
             continue;
         }
-        let inner = nodes.visit(current, leaves, &mut query);
-        if query.is_answered() {
-            return query.hit;
+        let inner = nodes.visit(current, leaves, &mut walk);
+        if walk.is_answered() {
+            return walk.hit;
         }
         if inner.first != NONE {
             side = side & !(1 << level) | u64::from(inner.side) << level;
             if inner.second != NONE {
                 pending |= 1 << level;
-                push(&mut stack, &mut query, inner.second);
+                push(&mut stack, &mut walk, inner.second);
             }
             current = inner.first;
             level += 1;
             continue;
         }
         if pending == 0 {
-            return query.hit;
+            return walk.hit;
         }
         level = pending.ilog2();
         pending ^= 1 << level;

@@ -58,18 +58,12 @@ pub fn chebyshev([nx, ny, nz]: [u32; 3], occupied: impl Fn(usize) -> bool + Sync
 
 /// Distances along one line, forwards and backwards.
 fn sweep(line: &mut [u8]) {
-    let mut near = FARTHEST;
-    let mut step = |distance: &mut u8| {
-        near = (*distance).min((near + 1).min(FARTHEST));
-        *distance = near;
+    let step = |near: u8, distance: &mut u8| {
+        *distance = (*distance).min((near + 1).min(FARTHEST));
+        *distance
     };
-    line.iter_mut().for_each(&mut step);
-    near = FARTHEST;
-    let mut step = |distance: &mut u8| {
-        near = (*distance).min((near + 1).min(FARTHEST));
-        *distance = near;
-    };
-    line.iter_mut().rev().for_each(&mut step);
+    line.iter_mut().fold(FARTHEST, step);
+    line.iter_mut().rev().fold(FARTHEST, step);
 }
 
 /// The lower envelope of the functions max(|i − k|, g(k)) over a line; keeps memory between lines.
@@ -128,6 +122,7 @@ impl Envelope {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Pcg32;
 
     fn brute_force(size: [i32; 3], occupied: &[bool]) -> Vec<u8> {
         let cells: Vec<[i32; 3]> = (0..size[2])
@@ -146,11 +141,8 @@ mod tests {
 
     #[test]
     fn distances_equal_brute_force_and_a_forgotten_cell_is_seen() {
-        let mut state = 1u32;
-        let mut random = move |n: u32| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 16) % n
-        };
+        let mut generator = Pcg32::new(1);
+        let mut random = |n: u32| generator.below(n as usize) as u32;
         let mut sensitive = 0;
         for case in 0..300 {
             let size = [1 + random(9), 1 + random(9), 1 + random(9)];

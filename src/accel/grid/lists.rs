@@ -9,6 +9,7 @@ use super::raster::Raster;
 use super::{Grid, MAX_WORDS, check_words};
 use crate::accel::BuildLog;
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Buckets of a sort; more would spill the write buffers, fewer the counters.
@@ -19,9 +20,11 @@ const ENOUGH: u64 = 16 * MAX_WORDS;
 const REPORT: u64 = 1 << 16;
 /// Fewest triangles of a run.
 const LEAST_RUN: usize = 2048;
+/// Cells that one task cuts.
+const RUN: usize = 64;
 
 /// Cell `c` lists `references[starts[c]..starts[c + 1]]`, triangles ascending.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Lists {
     /// Begin of each cell, and the end of the last.
     pub starts: Vec<u32>,
@@ -164,21 +167,15 @@ fn sort_bucket<I: Iterator<Item = (u32, u32)>>(
 pub struct PartLists {
     raster: Raster,
     pairs: Vec<(u32, u32)>,
-    /// As in [`Lists`].
-    pub starts: Vec<u32>,
-    /// As in [`Lists`].
-    pub references: Vec<u32>,
+    /// What was filled last.
+    pub lists: Lists,
 }
 
 impl PartLists {
     /// Lists `ids`, which ascend, in the cells of `grid`.
     pub fn fill(&mut self, grid: &Grid, soup: &TriangleSoup, ids: &[u32]) {
-        let Self {
-            raster,
-            pairs,
-            starts,
-            references,
-        } = self;
+        let Self { raster, pairs, .. } = self;
+        let Lists { starts, references } = &mut self.lists;
         pairs.clear();
         for &id in ids {
             raster.rows(grid, &soup.records[id as usize], true, |first, cells| {
@@ -191,19 +188,38 @@ impl PartLists {
         references.clear();
         references.resize(pairs.len(), 0);
         starts[cells] = pairs.len() as u32;
-        sort_bucket(
-            0,
-            0,
-            || pairs.iter().copied(),
-            &mut starts[..cells],
-            references,
-        );
+        let (starts, pairs) = (&mut starts[..cells], || pairs.iter().copied());
+        sort_bucket(0, 0, pairs, starts, references);
     }
+}
 
-    /// The list of a cell.
-    pub fn of(&self, cell: usize) -> &[u32] {
-        &self.references[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+/// What tasks make of runs of cells, in their order; the number of threads does not matter.
+pub fn in_runs<T: Send>(cells: usize, work: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
+    let runs = (0..cells.div_ceil(RUN)).into_par_iter();
+    let of_run = |run: usize| run * RUN..((run + 1) * RUN).min(cells);
+    runs.map(|run| work(of_run(run))).collect()
+}
+
+/// Checks that lists begin where the ones before them end, and that they hold all references.
+///
+/// # Errors
+/// The first for which it does not hold.
+pub fn check_starts(
+    starts: impl ExactSizeIterator<Item = usize>,
+    cells: usize,
+    references: usize,
+) -> Result<(), AccelError> {
+    ensure!(starts.len() == cells + 1, "the cells are not all of them");
+    let mut end = 0;
+    for (cell, start) in starts.enumerate() {
+        ensure!(
+            start >= end,
+            "cell {cell}: the list before it runs backwards"
+        );
+        end = start;
     }
+    ensure!(end == references, "the cells do not cover the references");
+    Ok(())
 }
 
 /// Checks what every grid promises: each triangle of the scene lies in the grid, and the cells at
@@ -218,26 +234,21 @@ pub fn check_lists(
     references: impl Iterator<Item = u32>,
     is_listed: impl Fn([f32; 3], u32) -> bool,
 ) -> Result<(), AccelError> {
-    let wrong = |text: String| Err(AccelError::Invalid(text));
-    let triangles = soup.records.len();
     for id in references {
-        if id as usize >= triangles {
-            return wrong(format!("triangle {id} is listed and does not exist"));
-        }
+        let exists = (id as usize) < soup.records.len();
+        ensure!(exists, "triangle {id} is listed and does not exist");
     }
     for record in &soup.records {
         let id = record.id;
-        if !grid.bounds.contains(&record.bounds()) {
-            return wrong(format!("triangle {id} lies outside the grid"));
-        }
-        let [a, b, c] = super::raster::corners(record);
+        let inside = grid.bounds.contains(&record.bounds());
+        ensure!(inside, "triangle {id} lies outside the grid");
+        let [a, b, c] = record.vertices();
         let centroid = std::array::from_fn(|i| (a[i] + b[i] + c[i]) / 3.0);
         for position in [a, b, c, centroid] {
-            if !is_listed(position, id) {
-                return wrong(format!(
-                    "triangle {id} is not listed in the cell of {position:?}"
-                ));
-            }
+            ensure!(
+                is_listed(position, id),
+                "triangle {id} is not listed in the cell of {position:?}"
+            );
         }
     }
     Ok(())

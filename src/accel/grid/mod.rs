@@ -148,7 +148,7 @@ pub fn areas(soup: &TriangleSoup) -> Vec<f32> {
 fn bounds_of(records: &[TriangleRecord]) -> Bounds {
     let around = |chunk: &[TriangleRecord]| {
         chunk.iter().fold(Bounds::EMPTY, |bounds, record| {
-            let [min, max] = raster::extremes(&raster::corners(record));
+            let [min, max] = raster::extremes(&record.vertices());
             bounds.union(&Bounds { min, max })
         })
     };

@@ -10,11 +10,6 @@ use super::super::spatial::cross;
 use super::super::triangle::TriangleRecord;
 use super::Grid;
 
-/// Corners of a triangle.
-pub fn corners(record: &TriangleRecord) -> [[f32; 3]; 3] {
-    record.vertices()
-}
-
 /// Least and greatest coordinates.
 pub fn extremes(corners: &[[f32; 3]; 3]) -> [[f32; 3]; 2] {
     let pick = |first: fn(f32, f32) -> bool| {
@@ -46,7 +41,7 @@ impl Raster {
         exact: bool,
         mut row: impl FnMut(u32, u32),
     ) {
-        let corners = corners(record);
+        let corners = record.vertices();
         let [low, high] = extremes(&corners);
         let first: [u32; 3] = std::array::from_fn(|a| grid.coordinate(a, low[a] - grid.margin[a]));
         let last: [u32; 3] = std::array::from_fn(|a| grid.coordinate(a, high[a] + grid.margin[a]));
@@ -238,19 +233,10 @@ impl Plane {
 mod tests {
     use super::super::{Grid, GridBox};
     use super::*;
-    use crate::accel::TriangleSoup;
+    use crate::accel::fixtures::{random_triangle, soup};
     use crate::accel::spatial::dot;
-    use crate::geometry::Triangle;
-    use glam::Vec3;
+    use crate::random::Pcg32;
     use std::collections::BTreeSet;
-
-    fn random() -> impl FnMut() -> f32 {
-        let mut state = 7u32;
-        move || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / (1 << 24) as f32
-        }
-    }
 
     /// The separating-axis test with all 13 axes, for one cell grown by `grow` cells.
     fn overlaps(corners: &[[f64; 3]; 3], cell: [u32; 3], grow: [f64; 3]) -> bool {
@@ -273,25 +259,13 @@ mod tests {
 
     #[test]
     fn rows_hold_the_cells_of_the_separating_axis_test_and_no_others() {
-        let mut random = random();
+        let mut random = Pcg32::new(7);
         let mut fewer_than_box = 0;
         for case in 0..400 {
             let size = [0.05, 0.3, 1.0][case % 3];
-            let mut point = |at: Vec3, s: f32| at + s * Vec3::new(random(), random(), random());
-            let at = point(Vec3::ZERO, 1.0);
-            let corners = [point(at, size), point(at, size), point(at, size)];
-            let record = TriangleRecord::new(&Triangle { vertices: corners }, 0, 0);
-            let far = TriangleRecord::new(
-                &Triangle {
-                    vertices: [Vec3::ZERO, Vec3::splat(2.0), Vec3::new(2.0, 0.0, 1.0)],
-                },
-                1,
-                0,
-            );
-            let soup = TriangleSoup {
-                records: vec![record, far],
-                ..Default::default()
-            };
+            let far = [[0.0; 3], [2.0; 3], [2.0, 0.0, 1.0]];
+            let soup = soup([random_triangle(&mut random, 1.0, size), far]);
+            let record = soup.records[0];
             let grid = Grid::new(&GridBox::new(&soup), [9, 7, 8]);
             let listed = |exact: bool| {
                 let mut cells = BTreeSet::new();
@@ -301,7 +275,7 @@ mod tests {
                 cells
             };
             let sat = |margins: f64| -> BTreeSet<u32> {
-                let shape = Shape::new(&grid, &super::corners(&record), margins);
+                let shape = Shape::new(&grid, &record.vertices(), margins);
                 let all = (0..grid.cells() as u32)
                     .filter(|&cell| overlaps(&shape.corners, grid.coordinates(cell), shape.grow));
                 all.collect()

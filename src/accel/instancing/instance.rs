@@ -7,7 +7,7 @@ use super::super::intersection::{Intersection, Reciprocal};
 use super::super::leaf::{LEAF, leaf_range};
 use super::super::ray::{Hit, Ray};
 use super::super::triangle::{TriangleRecord, intersect_triangle};
-use super::super::twin::Query;
+use super::super::twin::Walk;
 use super::forest::Forest;
 use crate::scene::{Instance, Transform};
 use bytemuck::{Pod, Zeroable};
@@ -82,18 +82,22 @@ pub(super) struct Level {
     high_origin: [f32; 3],
 }
 
-/// The level of the boxes that are tested with `ray`, grown by `growth` for each unit of the origin's
+/// The level of the boxes that are tested with a raised ray, grown by `growth` for each unit of the origin's
 /// greatest coordinate.
 pub(super) fn level(ray: &Ray, growth: f32, tests: Intersection) -> Level {
-    let ray = tests.raised(ray);
     let [x, y, z] = ray.origin.map(f32::abs);
     let grown = growth * x.max(y).max(z);
     Level {
-        ray,
+        ray: *ray,
         inverse: tests.inverse(ray.direction),
         low_origin: ray.origin.map(|x| x + grown),
         high_origin: ray.origin.map(|x| x - grown),
     }
+}
+
+/// The level of the object of an entry.
+pub(super) fn object_level(entry: &Entry, ray: &Ray, tests: Intersection) -> Level {
+    level(&tests.raised(&entry.object_ray(ray)), 0.0, tests)
 }
 
 /// Distance at which the segment up to `t_best` enters the grown and padded box, or `None`.
@@ -115,14 +119,14 @@ pub(super) fn leaf(
     reference: u32,
     first_id: u32,
     level: &Level,
-    query: &mut Query,
+    walk: &mut Walk,
 ) {
     let (first, count) = leaf_range(reference);
     for triangle in &triangles[first..first + count] {
-        query.counters.triangle_tests += 1;
+        walk.counters.triangle_tests += 1;
         let id = triangle.id + first_id;
         let triangle = TriangleRecord { id, ..*triangle };
-        intersect_triangle(&triangle, &level.ray, level.inverse, &mut query.hit);
+        intersect_triangle(&triangle, &level.ray, level.inverse, &mut walk.hit);
     }
 }
 
@@ -130,13 +134,13 @@ pub(super) fn leaf(
 pub(super) fn near_and_far(
     (place, node): (u32, &Pair),
     level: &Level,
-    query: &mut Query,
+    walk: &mut Walk,
 ) -> [(Option<f32>, u32); 2] {
-    query.visit(place as usize);
-    query.counters.box_tests += 2;
+    walk.visit(place as usize);
+    walk.counters.box_tests += 2;
     let [(left, left_box), (right, right_box)] = node.children();
-    let enter_left = enter_grown(level, &left_box, query.hit.t);
-    let enter_right = enter_grown(level, &right_box, query.hit.t);
+    let enter_left = enter_grown(level, &left_box, walk.hit.t);
+    let enter_right = enter_grown(level, &right_box, walk.hit.t);
     let swap = enter_right.is_some_and(|r| enter_left.is_none_or(|l| r < l));
     if swap {
         [(enter_right, right), (enter_left, left)]
@@ -151,41 +155,41 @@ pub(super) fn is_open(enter: Option<f32>, level: &Level, hit: &Hit) -> bool {
 }
 
 /// Traces the object below `entry.node`, near child first.
-pub(super) fn trace_object(forest: &Forest, entry: &Entry, query: &mut Query) {
-    let level = level(&entry.object_ray(&query.ray), 0.0, forest.intersection);
+pub(super) fn trace_object(forest: &Forest, entry: &Entry, walk: &mut Walk) {
+    let level = object_level(entry, &walk.ray, forest.intersection);
     let node = |index: u32| &forest.nodes[index as usize];
-    walk(node, entry.node, &level, query, |reference, query| {
-        leaf(&forest.triangles, reference, entry.first_id, &level, query);
+    descend(node, entry.node, &level, walk, |reference, walk| {
+        leaf(&forest.triangles, reference, entry.first_id, &level, walk);
     });
 }
 
 /// The loop of both levels where one is inside the other: `visit` gets the references of leaves.
-pub(super) fn walk<'a>(
+pub(super) fn descend<'a>(
     node: impl Fn(u32) -> &'a Pair,
     root: u32,
     level: &Level,
-    query: &mut Query,
-    visit: impl Fn(u32, &mut Query),
+    walk: &mut Walk,
+    visit: impl Fn(u32, &mut Walk),
 ) {
     let mut stack = Vec::new();
     let mut current = root;
     loop {
-        let children = near_and_far((current, node(current)), level, query);
+        let children = near_and_far((current, node(current)), level, walk);
         let mut next = NOTHING;
         for (enter, reference) in children {
-            if !is_open(enter, level, &query.hit) || reference == NOTHING {
+            if !is_open(enter, level, &walk.hit) || reference == NOTHING {
                 continue;
             }
             if reference >= LEAF {
-                visit(reference, query);
-                if query.is_answered() {
+                visit(reference, walk);
+                if walk.is_answered() {
                     return;
                 }
             } else if next == NOTHING {
                 next = reference;
             } else {
                 stack.push(reference);
-                query.count_stack(stack.len());
+                walk.count_stack(stack.len());
             }
         }
         if next == NOTHING {

@@ -4,27 +4,21 @@
 //! Sources: the meta-BVH of J. Dufay's thesis (2017, §4.1.5), parts of instances in the upper level by
 //! C. Benthin et al. (HPG 2017), see [`super::top`].
 
-use super::super::bounds::Bounds;
 use super::super::bvh::pairs::Pair;
 use super::super::leaf::{FIRST_MASK, LEAF, leaf_reference};
-use super::super::ray::Hit;
-use super::super::tree::TreeParameters;
-use super::super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::super::{AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, Space, TriangleSoup};
-use super::instance::{Entry, NOTHING, is_open, leaf, level, near_and_far};
+use super::super::structure::prelude::*;
+use super::super::tree::{Coverage, TreeParameters};
+use super::instance::{Entry, NOTHING, is_open, leaf, level, near_and_far, object_level};
 use super::top::Top;
 use super::world_box::BoxMap;
-use super::{Base, Upper, clamped, meta_bvh_nested};
-use crate::accel::StructureStats;
-use crate::parameters;
-use crate::params::{ParameterSchema, Parameters as _, Params};
+use super::{Base, Layout, TwoLevel, Upper, clamped, meta_bvh_nested};
 
 /// Stands for the size of the stack when an object was entered, outside of any.
 const OUTSIDE: u32 = u32::MAX;
 
 parameters! {
     /// The objects' trees, and what is above them.
-    struct Options {
+    pub struct Options {
         /// The objects' trees.
         tree: TreeParameters;
         /// most entries of the upper level per instance; 0 and 1 open none
@@ -34,7 +28,7 @@ parameters! {
     }
 
     /// How both levels are walked.
-    enum Loop {
+    pub enum Loop {
         /// In one loop.
         One = "one",
         /// One loop inside the other.
@@ -45,38 +39,21 @@ parameters! {
 /// The registry entry.
 pub struct MetaBvh;
 
-impl AccelKind for MetaBvh {
-    fn name(&self) -> &'static str {
-        "meta-bvh"
-    }
+impl Structure for MetaBvh {
+    const NAME: &'static str = "meta-bvh";
+    const DESCRIPTION: &'static str = "BVH over the instances above those of their objects (Dufay 2017; re-braiding: Benthin 2017)";
+    type Parameters = Options;
 
-    fn description(&self) -> &'static str {
-        "BVH over the instances above those of their objects (Dufay 2017; re-braiding: Benthin 2017)"
-    }
-
-    fn parameters(&self) -> ParameterSchema {
-        Options::schema()
-    }
-
-    fn build(
-        &self,
-        soup: &TriangleSoup,
-        params: &Params,
-        log: &mut BuildLog,
-    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let options = Options::from_params(params)?;
+    fn build(soup: &TriangleSoup, options: &Options, log: &mut BuildLog) -> BuildResult {
         let base = Base::build(soup, &options.tree, log)?;
         let rebraid = options.rebraid;
         check_entries(base.instances.len(), rebraid)?;
-        let top = log.phase("upper level", || {
-            Top::build(&base.instances, &base.forest, rebraid)
-        });
-        Ok(Box::new(Built {
-            base,
-            top,
+        let upper = Instances {
+            top: Top::default(),
             rebraid,
             nested: options.r#loop == Loop::Nested,
-        }))
+        };
+        TwoLevel::build(upper, base, "upper level", log)
     }
 }
 
@@ -87,21 +64,28 @@ fn check_entries(instances: usize, rebraid: usize) -> Result<(), AccelError> {
     AccelError::check_limit(what, needed, FIRST_MASK)
 }
 
-pub(super) struct Built {
-    pub(super) base: Base,
-    pub(super) top: Top,
+/// A BVH over the instances.
+struct Instances {
+    top: Top,
     rebraid: usize,
     nested: bool,
 }
 
-impl Built {
+/// Both levels as the traversals see them.
+#[derive(Clone, Copy)]
+pub(super) struct Levels<'a> {
+    pub base: &'a Base,
+    pub top: &'a Top,
+}
+
+impl<'a> Levels<'a> {
     /// The root of the upper level, behind the nodes of all objects.
-    pub(super) fn root(&self) -> u32 {
+    pub fn root(&self) -> u32 {
         self.base.forest.nodes.len() as u32
     }
 
     /// A node of either level.
-    pub(super) fn node(&self, index: u32) -> &Pair {
+    pub fn node(&self, index: u32) -> &'a Pair {
         let objects = &self.base.forest.nodes;
         let index = index as usize;
         objects
@@ -110,13 +94,8 @@ impl Built {
     }
 
     /// The entry behind a leaf reference of the upper level.
-    pub(super) fn load_entry(&self, reference: u32) -> &Entry {
+    pub fn load_entry(&self, reference: u32) -> &'a Entry {
         &self.top.entries[(reference & FIRST_MASK) as usize]
-    }
-
-    /// Stack entries of the upper level: one for each level at most.
-    fn top_stack_entries(&self) -> u32 {
-        self.top.depth.max(1)
     }
 
     /// Visits that no ray exceeds: every upper node once, and below every entry all of its object.
@@ -132,53 +111,35 @@ impl Built {
     /// Checks the tree of the upper level: boxes, and that every entry is reached once.
     fn validate_top(&self) -> Result<(), AccelError> {
         let maps: Vec<BoxMap> = self.base.instances.iter().map(BoxMap::new).collect();
-        let ensure = |holds, what: &dyn Fn() -> String| {
-            AccelError::ensure(holds, || format!("upper level: {}", what()))
-        };
-        let first = self.root();
-        let mut nodes = vec![false; self.top.nodes.len()];
-        let mut entries = vec![false; self.top.entries.len()];
-        let mut stack = vec![(first, Bounds::EVERYTHING, 1)];
-        while let Some((index, around, depth)) = stack.pop() {
-            let place = index.wrapping_sub(first) as usize;
-            let fits = depth <= self.top_stack_entries();
-            ensure(fits, &|| format!("node {place} is deeper than the stack"))?;
-            let is_new = nodes.get(place) == Some(&false);
-            ensure(is_new, &|| {
-                format!("node {place} is missing or reached twice")
-            })?;
-            nodes[place] = true;
-            for (reference, bounds) in self.top.nodes[place].children() {
+        let (nothing, nodes) = (TriangleSoup::default(), self.top.nodes.len());
+        // Entries are counted behind the nodes.
+        let coverage = Coverage::new(&nothing, nodes + self.top.entries.len());
+        coverage.descend(self.top.levels(), |coverage, index, around, below| {
+            for (reference, bounds) in self.top.nodes[index].children() {
                 if reference == NOTHING {
                     continue;
                 }
-                let what = || format!("node {place}: a child's box leaves its own");
-                ensure(around.contains(&bounds), &what)?;
+                let inside = around.contains(&bounds);
+                ensure!(inside, "a child's box leaves its own");
                 if reference < LEAF {
-                    stack.push((reference, bounds, depth + 1));
+                    let place = reference.wrapping_sub(self.root()) as usize;
+                    ensure!(place < nodes, "there is no node {reference}");
+                    below.push((place, bounds));
                     continue;
                 }
-                let entry = (reference & FIRST_MASK) as usize;
-                let is_new = reference == leaf_reference(entry as u32, 1)
-                    && entries.get(entry) == Some(&false);
-                ensure(is_new, &|| {
-                    format!("entry {entry} is missing or reached twice")
-                })?;
-                entries[entry] = true;
-                let part = &self.top.entries[entry];
+                let entry = reference & FIRST_MASK;
+                let is_one = reference == leaf_reference(entry, 1);
+                ensure!(is_one, "the leaf of entry {entry} has others");
+                coverage.node(nodes + entry as usize)?;
+                let part = &self.top.entries[entry as usize];
                 let object_box = self.base.forest.nodes[part.node as usize].bounds();
                 let map = &maps[part.instance as usize];
                 let inside = bounds.contains(&map.world_box(&object_box));
-                ensure(inside, &|| format!("entry {entry} sticks out of its box"))?;
+                ensure!(inside, "entry {entry} sticks out of its box");
                 let grown = map.growth() <= self.top.growth;
-                ensure(grown, &|| {
-                    format!("entry {entry} needs more growth of boxes")
-                })?;
+                ensure!(grown, "entry {entry} needs more growth of boxes");
             }
-        }
-        let all_reached = nodes.iter().chain(&entries).all(|seen| *seen);
-        ensure(all_reached, &|| {
-            "a node or entry is never reached".to_owned()
+            Ok(())
         })
     }
 
@@ -189,12 +150,11 @@ impl Built {
         for (index, entry) in self.top.entries.iter().enumerate() {
             let instance = instances.get(entry.instance as usize);
             let expected = instance.map(|i| Entry::new(entry.instance, i, entry.node));
-            AccelError::ensure(expected == Some(*entry), || {
-                format!(
-                    "entry {index} is not instance {} as it stands",
-                    entry.instance
-                )
-            })?;
+            ensure!(
+                expected == Some(*entry),
+                "entry {index} is not instance {} as it stands",
+                entry.instance
+            );
             parts[entry.instance as usize].push(entry.node);
         }
         for (index, (instance, parts)) in instances.iter().zip(&mut parts).enumerate() {
@@ -208,128 +168,118 @@ impl Built {
                     continue;
                 }
                 let children = self.base.forest.nodes[node as usize].children();
-                AccelError::ensure(children.iter().all(|(child, _)| *child < LEAF), || {
-                    format!("instance {index}: triangles below node {node} are in no entry")
-                })?;
+                ensure!(
+                    children.iter().all(|(child, _)| *child < LEAF),
+                    "instance {index}: triangles below node {node} are in no entry"
+                );
                 stack.extend(children.map(|(child, _)| child));
             }
             let all = parts.len();
-            AccelError::ensure(found == all, || {
-                format!("instance {index}: {all} entries, of which {found} are parts of their own")
-            })?;
+            ensure!(
+                found == all,
+                "instance {index}: {all} entries, of which {found} are parts of their own"
+            );
         }
         Ok(())
     }
 }
 
-impl BuiltAccel for Built {
-    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
-        self.base.validate(soup)?;
-        self.validate_parts()?;
-        self.validate_top()
+impl Upper for Instances {
+    fn place(&mut self, base: &Base) {
+        self.top = Top::build(&base.instances, &base.forest, self.rebraid);
     }
 
-    fn buffers(&self) -> GpuBuffers<'_> {
-        let nodes = self.base.forest.nodes.len();
-        let (objects, upper) = (self.base.forest.stack_entries(), self.top_stack_entries());
+    fn validate(&self, base: &Base) -> Result<(), AccelError> {
+        let top = &self.top;
+        let levels = Levels { base, top };
+        levels.validate_parts()?;
+        let checked = levels.validate_top();
+        checked.map_err(|e| AccelError::Invalid(format!("upper level: {e}")))
+    }
+
+    fn layout(&self, base: &Base) -> Layout<'_> {
+        let top = &self.top;
+        let (nodes, objects) = (base.forest.nodes.len(), base.forest.stack_entries());
         // Nested loops have a stack each, of the same size.
         let (kernel, stack_entries) = match self.nested {
-            true => ("accel/meta_bvh_nested", objects.max(upper)),
-            false => ("accel/meta_bvh", objects + upper),
+            true => ("accel/meta_bvh_nested", objects.max(top.levels())),
+            false => ("accel/meta_bvh", objects + top.levels()),
         };
-        self.base.buffers(&Upper {
+        Layout {
             kernel,
             parts: [
-                bytemuck::cast_slice(&self.top.nodes),
-                bytemuck::cast_slice(&self.top.entries),
+                bytemuck::cast_slice(&top.nodes),
+                bytemuck::cast_slice(&top.entries),
             ],
-            step_fuse: self.step_fuse(),
-            entries: self.top.entries.len(),
+            step_fuse: Levels { base, top }.step_fuse(),
+            entries: top.entries.len(),
             root: nodes,
-            first_entry: nodes + self.top.nodes.len(),
-            growth: self.top.growth,
+            first_entry: nodes + top.nodes.len(),
+            growth: top.growth,
             stack_entries,
-        })
-    }
-
-    fn divisible(&self) -> &'static [&'static str] {
-        &["nodes", "leaf_triangles"]
-    }
-
-    fn stats(&self) -> StructureStats {
-        let forest = &self.base.forest;
-        let below = forest.stats.depth.unwrap_or(0);
-        StructureStats {
-            bytes: self.buffers().bytes(),
-            nodes: forest.stats.nodes + self.top.nodes.len() as u64,
-            depth: Some(self.top.depth + below),
-            ..forest.stats.clone()
         }
     }
 
-    fn space(&self) -> Space {
-        self.base.space()
+    fn figures(&self, objects: &StructureStats) -> StructureStats {
+        StructureStats {
+            nodes: objects.nodes + self.top.nodes.len() as u64,
+            depth: Some(self.top.depth + objects.depth.unwrap_or(0)),
+            ..objects.clone()
+        }
     }
 
-    fn update(&mut self, soup: &TriangleSoup) -> Option<Result<(), AccelError>> {
-        Some(self.base.update(soup).map(|()| {
-            self.top = Top::build(&self.base.instances, &self.base.forest, self.rebraid);
-        }))
-    }
-
-    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
-        Some(Box::new(Twin(self, soup)))
+    fn trace(&self, base: &Base, walk: Walk) -> Hit {
+        let top = &self.top;
+        match self.nested {
+            true => meta_bvh_nested::trace(Levels { base, top }, walk),
+            false => trace(Levels { base, top }, walk),
+        }
     }
 }
 
-impl Traverse for Built {
-    fn trace(&self, _: &TriangleSoup, mut query: Query) -> Hit {
-        if self.nested {
-            return meta_bvh_nested::trace(self, query);
+fn trace(levels: Levels, mut walk: Walk) -> Hit {
+    let triangles = &levels.base.forest.triangles;
+    let tests = levels.base.forest.intersection;
+    let world = level(&walk.ray, levels.top.growth, tests);
+    let mut stack: Vec<u32> = Vec::new();
+    // The level that is traversed: the world, or the object that was entered with `floor` entries
+    // on the stack.
+    let (mut here, mut floor, mut first_id) = (world, OUTSIDE, 0);
+    let mut current = levels.root();
+    loop {
+        let children = near_and_far((current, levels.node(current)), &here, &mut walk);
+        let mut next = NOTHING;
+        for (enter, reference) in children {
+            if !is_open(enter, &here, &walk.hit) {
+                continue;
+            }
+            if floor != OUTSIDE && reference >= LEAF {
+                leaf(triangles, reference, first_id, &here, &mut walk);
+                if walk.is_answered() {
+                    return walk.hit;
+                }
+            } else if next == NOTHING {
+                next = reference;
+            } else if reference != NOTHING {
+                stack.push(reference);
+                walk.count_stack(stack.len());
+            }
         }
-        let triangles = &self.base.forest.triangles;
-        let tests = self.base.forest.intersection;
-        let world = level(&query.ray, self.top.growth, tests);
-        let mut stack: Vec<u32> = Vec::new();
-        // The level that is traversed: the world, or the object that was entered with `floor` entries
-        // on the stack.
-        let (mut here, mut floor, mut first_id) = (world, OUTSIDE, 0);
-        let mut current = self.root();
-        loop {
-            let children = near_and_far((current, self.node(current)), &here, &mut query);
-            let mut next = NOTHING;
-            for (enter, reference) in children {
-                if !is_open(enter, &here, &query.hit) {
-                    continue;
-                }
-                if floor != OUTSIDE && reference >= LEAF {
-                    leaf(triangles, reference, first_id, &here, &mut query);
-                    if query.is_answered() {
-                        return query.hit;
-                    }
-                } else if next == NOTHING {
-                    next = reference;
-                } else if reference != NOTHING {
-                    stack.push(reference);
-                    query.count_stack(stack.len());
-                }
+        if next == NOTHING {
+            if stack.len() as u32 == floor {
+                (here, floor) = (world, OUTSIDE);
             }
-            if next == NOTHING {
-                if stack.len() as u32 == floor {
-                    (here, floor) = (world, OUTSIDE);
-                }
-                match stack.pop() {
-                    Some(reference) => next = reference,
-                    None => return query.hit,
-                }
+            match stack.pop() {
+                Some(reference) => next = reference,
+                None => return walk.hit,
             }
-            if floor == OUTSIDE && next >= LEAF {
-                let entry = self.load_entry(next);
-                here = level(&entry.object_ray(&query.ray), 0.0, tests);
-                (floor, first_id, next) = (stack.len() as u32, entry.first_id, entry.node);
-            }
-            current = next;
         }
+        if floor == OUTSIDE && next >= LEAF {
+            let entry = levels.load_entry(next);
+            here = object_level(entry, &walk.ray, tests);
+            (floor, first_id, next) = (stack.len() as u32, entry.first_id, entry.node);
+        }
+        current = next;
     }
 }
 

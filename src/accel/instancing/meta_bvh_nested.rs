@@ -2,22 +2,17 @@
 //! level. Twin of `kernels/accel/meta_bvh_nested.wesl`.
 
 use super::super::ray::Hit;
-use super::super::twin::Query;
-use super::instance::{level, trace_object, walk};
-use super::meta_bvh::Built;
+use super::super::twin::Walk;
+use super::instance::{descend, level, trace_object};
+use super::meta_bvh::Levels;
 
-pub(super) fn trace(built: &Built, mut query: Query) -> Hit {
-    let forest = &built.base.forest;
-    let world = level(&query.ray, built.top.growth, forest.intersection);
-    let node = |index| built.node(index);
-    walk(
-        node,
-        built.root(),
-        &world,
-        &mut query,
-        |reference, query| {
-            trace_object(forest, built.load_entry(reference), query);
-        },
-    );
-    query.hit
+pub(super) fn trace(levels: Levels, mut walk: Walk) -> Hit {
+    let forest = &levels.base.forest;
+    let world = level(&walk.ray, levels.top.growth, forest.intersection);
+    let node = |index| levels.node(index);
+    let enter = |reference, walk: &mut Walk| {
+        trace_object(forest, levels.load_entry(reference), walk);
+    };
+    descend(node, levels.root(), &world, &mut walk, enter);
+    walk.hit
 }

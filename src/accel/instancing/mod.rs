@@ -28,15 +28,33 @@ pub use object_list::ObjectList;
 pub use placed::Placed;
 
 use super::bvh::pairs::Pair;
+use super::structure::prelude::*;
 use super::tree::TreeParameters;
-use super::{AccelError, BuildLog, GpuBuffers, NamedWords, Space, TriangleSoup, limits};
+use super::{Space, limits};
 use crate::gpu::UniformValues;
 use crate::scene::Instance;
 use forest::Forest;
 use placed::View;
 
+/// What stands above the trees of the objects.
+trait Upper: Send + Sync + 'static {
+    /// Puts it up anew over the instances as they stand.
+    fn place(&mut self, base: &Base);
+    /// Checks it against the instances.
+    ///
+    /// # Errors
+    /// The first violated invariant.
+    fn validate(&self, base: &Base) -> Result<(), AccelError>;
+    /// As kernels bind it.
+    fn layout(&self, base: &Base) -> Layout<'_>;
+    /// Figures of the whole, given those of the objects.
+    fn figures(&self, objects: &StructureStats) -> StructureStats;
+    /// Twin of the kernel's `trace`.
+    fn trace(&self, base: &Base, walk: Walk) -> Hit;
+}
+
 /// An upper level as kernels bind it.
-struct Upper<'a> {
+struct Layout<'a> {
     kernel: &'static str,
     /// What lies behind the nodes of the objects.
     parts: [&'a [u32]; 2],
@@ -48,6 +66,64 @@ struct Upper<'a> {
     first_entry: usize,
     growth: f32,
     stack_entries: u32,
+}
+
+/// A two-level structure.
+struct TwoLevel<U> {
+    base: Base,
+    upper: U,
+}
+
+impl<U: Upper> TwoLevel<U> {
+    /// An upper level over the objects' trees; putting it up is a phase of this name.
+    fn build(mut upper: U, base: Base, phase: &str, log: &mut BuildLog) -> BuildResult {
+        log.phase(phase, || upper.place(&base));
+        Ok(Box::new(Self { base, upper }))
+    }
+}
+
+impl<U: Upper> BuiltAccel for TwoLevel<U> {
+    fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
+        self.base.validate(soup)?;
+        self.upper.validate(&self.base)
+    }
+
+    fn buffers(&self) -> GpuBuffers<'_> {
+        self.base.buffers(&self.upper.layout(&self.base))
+    }
+
+    fn divisible(&self) -> &'static [&'static str] {
+        &["nodes", "leaf_triangles"]
+    }
+
+    fn stats(&self) -> StructureStats {
+        StructureStats {
+            bytes: self.buffers().bytes(),
+            ..self.upper.figures(&self.base.forest.stats)
+        }
+    }
+
+    fn space(&self) -> Space {
+        match self.base.instances.iter().all(Instance::is_identity) {
+            true => Space::World,
+            false => Space::Instances,
+        }
+    }
+
+    fn update(&mut self, soup: &TriangleSoup) -> Option<Result<(), AccelError>> {
+        let updated = self.base.update(soup);
+        Some(updated.map(|()| self.upper.place(&self.base)))
+    }
+
+    fn cpu_twin<'a>(&'a self, soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
+        Some(Box::new(Twin(self, soup)))
+    }
+}
+
+impl<U: Upper> Traverse for TwoLevel<U> {
+    fn trace(&self, _: &TriangleSoup, walk: Walk) -> Hit {
+        self.upper.trace(&self.base, walk)
+    }
 }
 
 /// What both structures are built from: the BVHs of the objects and where these stand.
@@ -70,7 +146,7 @@ impl Base {
     }
 
     /// Buffers of the objects with an upper level behind their nodes.
-    fn buffers(&self, top: &Upper) -> GpuBuffers<'_> {
+    fn buffers(&self, top: &Layout) -> GpuBuffers<'_> {
         let forest = &self.forest;
         let nodes: &[u32] = bytemuck::cast_slice(&forest.nodes);
         let [first, second] = top.parts;
@@ -100,14 +176,6 @@ impl Base {
         }
     }
 
-    fn space(&self) -> Space {
-        if self.instances.iter().all(Instance::is_identity) {
-            Space::World
-        } else {
-            Space::Instances
-        }
-    }
-
     /// Takes over the transforms of `soup`.
     fn update(&mut self, soup: &TriangleSoup) -> Result<(), AccelError> {
         let moved = View::of(soup);
@@ -126,26 +194,23 @@ impl Base {
             .eq(view.instances.iter().map(key));
         let sizes = view.objects.iter().map(|object| object.records.len());
         let same_objects = self.forest.roots.iter().map(|r| r.object_size).eq(sizes);
-        AccelError::ensure(same_instances && same_objects, || {
-            format!(
-                "built for {} instances of {} objects, given {} of {}: other ones need a new build",
-                self.instances.len(),
-                self.forest.roots.len(),
-                view.instances.len(),
-                view.objects.len()
-            )
-        })
+        ensure!(
+            same_instances && same_objects,
+            "built for {} instances of {} objects, given {} of {}: other ones need a new build",
+            self.instances.len(),
+            self.forest.roots.len(),
+            view.instances.len(),
+            view.objects.len()
+        );
+        Ok(())
     }
 
     /// Checks objects and transforms against those of `soup`.
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
         let view = View::of(soup);
         self.has_instances_of(&view)?;
-        let mut pairs = self.instances.iter().zip(view.instances.iter());
-        if let Some(index) = pairs.position(|(a, b)| a != b) {
-            return Err(AccelError::Invalid(format!(
-                "instance {index} was moved after the build"
-            )));
+        for (index, (own, given)) in self.instances.iter().zip(&*view.instances).enumerate() {
+            ensure!(own == given, "instance {index} was moved after the build");
         }
         self.forest.validate(&view.objects)
     }

@@ -35,6 +35,11 @@ pub(super) struct Top {
 }
 
 impl Top {
+    /// Levels of nodes, at least one, and so the entries of a stack for them.
+    pub(super) fn levels(&self) -> u32 {
+        self.depth.max(1)
+    }
+
     /// Builds the upper level over the instances as they stand, with up to `rebraid` entries for an
     /// instance on average.
     pub(super) fn build(instances: &[Instance], forest: &Forest, rebraid: usize) -> Self {

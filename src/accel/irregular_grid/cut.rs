@@ -1,7 +1,7 @@
 //! First phase: top cells by Cleary's rule, each cut into a power of two of voxels by its own count of
 //! triangles, and cells of one voxel; empty octants are one cell from the start.
 
-use super::super::grid::lists::{Lists, PartLists};
+use super::super::grid::lists::{Lists, PartLists, in_runs};
 use super::super::grid::{Cut, Grid, GridBox, areas, check_words, finest};
 use super::super::{AccelError, TriangleSoup};
 use super::voxels::{Block, Cell, Entry, Map};
@@ -17,8 +17,6 @@ const MOST_LOG: u32 = 6;
 /// block, is cut again.
 const LEAST_BUNCH: usize = 32;
 const BUNCHED: usize = 4;
-/// Top cells that one task cuts.
-const RUN: usize = 64;
 
 /// Cuts the scene; phases `bounds`, `insert`, `sort` and `build`.
 pub fn cut(
@@ -43,10 +41,6 @@ pub fn cut(
         };
         let needed: u64 = (0..tops).into_par_iter().map(voxels).sum();
         check_words(&format!("voxels of an {name}"), needed)?;
-        let ranges: Vec<_> = (0..tops)
-            .step_by(RUN)
-            .map(|c| c..(c + RUN).min(tops))
-            .collect();
         let cut_run = |cells: std::ops::Range<usize>| {
             let mut run = Run {
                 fine: &fine,
@@ -63,8 +57,7 @@ pub fn cut(
             }
             run.made
         };
-        let runs: Vec<Pieces> = ranges.into_par_iter().map(cut_run).collect();
-        Ok(join(fine, top, shift, runs))
+        Ok(join(fine, top, shift, in_runs(tops, cut_run)))
     })
 }
 
@@ -179,7 +172,7 @@ struct Run<'a> {
 /// A block that is being filled.
 struct Open<'a> {
     block: Block,
-    lists: &'a PartLists,
+    lists: &'a Lists,
     lowest: [u32; 3],
     /// Logarithm of the voxels along a side of one of its entries.
     size: u32,
@@ -209,7 +202,7 @@ impl Run<'_> {
         self.made.entries.resize(end, 0);
         let open = Open {
             block,
-            lists: &lists,
+            lists: &lists.lists,
             lowest,
             size: size - log,
             count: ids.len(),

@@ -19,15 +19,8 @@ mod voxels;
 use self::voxels::{Cell, Map};
 use super::grid::lists::check_lists;
 use super::grid::{Grid, check_words, clamped, first_axis, outside};
-use super::ray::Hit;
-use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
-    TriangleSoup,
-};
+use super::structure::prelude::*;
 use crate::gpu::UniformValues;
-use crate::parameters;
-use crate::params::{ParameterSchema, Parameters as _, Params};
 
 /// Bits of an entry that hold the logarithm of its block's side; 0: the rest is a cell.
 const LOG_BITS: u32 = 2;
@@ -39,7 +32,7 @@ const EMPTY: u32 = 0xffff_ffff;
 
 parameters! {
     /// How cells are cut, merged and expanded.
-    struct Options {
+    pub struct Options {
         /// top cells per triangle of the scene
         lambda1: f64 = 0.12, in 0.001..=100.0;
         /// voxels of a top cell per triangle in it, rounded up to a power of two an axis
@@ -57,27 +50,14 @@ parameters! {
 /// The registry entry.
 pub struct IrregularGrid;
 
-impl AccelKind for IrregularGrid {
-    fn name(&self) -> &'static str {
-        "irregular-grid"
-    }
+impl Structure for IrregularGrid {
+    const NAME: &'static str = "irregular-grid";
+    const DESCRIPTION: &'static str =
+        "two-level grid with cells merged by SAH and expanded (Pérard-Gayot et al. 2017)";
+    type Parameters = Options;
 
-    fn description(&self) -> &'static str {
-        "two-level grid with cells merged by SAH and expanded (Pérard-Gayot et al. 2017)"
-    }
-
-    fn parameters(&self) -> ParameterSchema {
-        Options::schema()
-    }
-
-    fn build(
-        &self,
-        soup: &TriangleSoup,
-        params: &Params,
-        log: &mut BuildLog,
-    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let options = Options::from_params(params)?;
-        let mut partition = cut::cut(self.name(), soup, &options, log)?;
+    fn build(soup: &TriangleSoup, options: &Options, log: &mut BuildLog) -> BuildResult {
+        let mut partition = cut::cut(Self::NAME, soup, options, log)?;
         log.phase("merge", || merge::merge(&mut partition, options.alpha));
         log.phase("expand", || {
             expand::expand(&mut partition, options.expansions)
@@ -188,13 +168,11 @@ impl Built {
 
     /// Checks that lists are whole, and that a box lists what the cells at its corners do.
     fn check_cells(&self) -> Result<(), AccelError> {
-        let wrong = |text: String| Err(AccelError::Invalid(text));
         let references = self.words.len() - self.first_reference;
         for number in 0..self.count() as u32 {
             let cell = self.load_cell(number);
-            if cell.list != EMPTY && cell.list as usize >= references {
-                return wrong(format!("cell {number}: its list does not exist"));
-            }
+            let exists = cell.list == EMPTY || (cell.list as usize) < references;
+            ensure!(exists, "cell {number}: its list does not exist");
             let own: Vec<u32> = self.list(cell.list).collect();
             for corner in 0..8 {
                 let voxel = std::array::from_fn(|a| {
@@ -204,18 +182,15 @@ impl Built {
                         cell.max[a] - 1
                     }
                 });
-                if (0..3).any(|a| voxel[a] < 0 || voxel[a] >= self.fine.resolution[a] as i32) {
-                    return wrong(format!("cell {number} lies outside the grid"));
-                }
-                let other = self.load_cell(self.find_cell(voxel.map(|v| v as u32)));
-                if self
-                    .list(other.list)
-                    .any(|id| own.binary_search(&id).is_err())
-                {
-                    return wrong(format!(
-                        "cell {number}: voxel {voxel:?} in its box lists more"
-                    ));
-                }
+                let voxel = voxel.map(|v| v as u32);
+                let inside = !outside(voxel, self.fine.resolution);
+                ensure!(inside, "cell {number} lies outside the grid");
+                let other = self.load_cell(self.find_cell(voxel));
+                let mut others = self.list(other.list);
+                ensure!(
+                    others.all(|id| own.binary_search(&id).is_ok()),
+                    "cell {number}: voxel {voxel:?} in its box lists more"
+                );
             }
         }
         Ok(())
@@ -224,9 +199,9 @@ impl Built {
 
 impl BuiltAccel for Built {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
-        if self.words.len() > self.first_reference && self.words[self.words.len() - 1] & LAST == 0 {
-            return Err(AccelError::Invalid("the last list has no end".to_owned()));
-        }
+        let last = self.words[self.first_reference..].last();
+        let ends = last.is_none_or(|last| last & LAST != 0);
+        ensure!(ends, "the last list has no end");
         self.check_cells()?;
         let is_listed = |position: [f32; 3], id: u32| {
             let voxel = std::array::from_fn(|a| self.fine.coordinate(a, position[a]));
@@ -256,7 +231,7 @@ impl BuiltAccel for Built {
             uniforms: vec![
                 self.fine.uniform(),
                 ("voxels", voxels),
-                super::limits(steps as usize, self.count()),
+                limits(steps as usize, self.count()),
             ],
             constants: Vec::new(),
         }
@@ -267,7 +242,7 @@ impl BuiltAccel for Built {
         StructureStats {
             nodes: self.count() as u64,
             bytes: self.buffers().bytes(),
-            ..StructureStats::of_cells(lists.map(|list| self.list(list).count()))
+            ..StructureStats::of_leaves(lists.map(|list| self.list(list).count()))
         }
     }
 
@@ -277,23 +252,23 @@ impl BuiltAccel for Built {
 }
 
 impl Traverse for Built {
-    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
+    fn trace(&self, soup: &TriangleSoup, mut walk: Walk) -> Hit {
         let grid = &self.fine;
-        let Some(enter) = query.enter(&grid.bounds) else {
-            return query.hit;
+        let Some(enter) = walk.enter(&grid.bounds) else {
+            return walk.hit;
         };
-        let ray = query.ray;
-        let inverse = query.inverse;
+        let ray = walk.ray;
+        let inverse = walk.inverse;
         let forward = inverse.map(|i| i >= 0.0);
         let entry = grid.in_cells(&ray, enter);
         let mut voxel: [u32; 3] = std::array::from_fn(|a| clamped(entry[a], grid.resolution[a]));
         loop {
             let place = self.find_cell(voxel);
-            query.visit(place as usize);
+            walk.visit(place as usize);
             let cell = self.load_cell(place);
-            query.test_list(soup, self.list(cell.list));
-            if query.is_answered() {
-                return query.hit;
+            walk.test_list(soup, self.list(cell.list));
+            if walk.is_answered() {
+                return walk.hit;
             }
             let planes = std::array::from_fn(|a| {
                 (if forward[a] { cell.max[a] } else { cell.min[a] }) as f32
@@ -301,8 +276,8 @@ impl Traverse for Built {
             let next = grid.distances(&ray, *inverse, planes);
             let leave = next[0].min(next[1]).min(next[2]);
             // The exit must lie clearly behind the hit: an equally near one may wait next door.
-            if query.hit.t * inverse.pad < leave {
-                return query.hit;
+            if walk.hit.t * inverse.pad < leave {
+                return walk.hit;
             }
             let axis = first_axis(next, leave);
             let place = grid.in_cells(&ray, leave);
@@ -321,7 +296,7 @@ impl Traverse for Built {
                 place[a].max(low as f32).min(high as f32) as u32
             });
             if outside(voxel, grid.resolution) {
-                return query.hit;
+                return walk.hit;
             }
         }
     }
@@ -330,33 +305,21 @@ impl Traverse for Built {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Triangle;
-    use glam::Vec3;
+    use crate::accel::fixtures::{random_triangle, soup};
+    use crate::random::Pcg32;
 
     /// Triangles of all sizes, bunched in one corner.
-    fn soup() -> TriangleSoup {
-        let mut state = 3u32;
-        let mut random = move || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / (1 << 24) as f32
-        };
-        let records = (0..400).map(|id| {
-            let size = [0.02, 0.2, 3.0][id % 3];
-            let bunched = if id % 2 == 0 { 0.1 } else { 4.0 };
-            let mut point = |s: f32| s * Vec3::new(random(), random(), random());
-            let at = point(bunched);
-            let vertices = [at, at + point(size), at + point(size)];
-            super::super::triangle::TriangleRecord::new(&Triangle { vertices }, id as u32, 0)
-        });
-        TriangleSoup {
-            records: records.collect(),
-            ..Default::default()
-        }
+    fn bunched() -> TriangleSoup {
+        let mut random = Pcg32::new(3);
+        soup((0..400).map(|id| {
+            let spread = if id % 2 == 0 { 0.1 } else { 4.0 };
+            random_triangle(&mut random, spread, [0.02, 0.2, 3.0][id % 3])
+        }))
     }
 
     fn cut_soup() -> Partition {
         let log = &mut BuildLog::default();
-        cut::cut("irregular-grid", &soup(), &Options::default(), log)
+        cut::cut("irregular-grid", &bunched(), &Options::default(), log)
             .unwrap_or_else(|e| panic!("{e}"))
     }
 

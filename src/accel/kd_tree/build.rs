@@ -6,7 +6,9 @@
 
 use super::{Node, Options};
 use crate::accel::bounds::Bounds;
-use crate::accel::spatial::{Margin, clip, corners, intersection};
+use crate::accel::spatial::{Margin, clip};
+use crate::accel::tree::NodeKind;
+use crate::accel::tree::grow::{Grown, PARALLEL_GRAIN, grow};
 use crate::accel::{AccelError, BuildLog, TriangleSoup};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -15,8 +17,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub(super) const MAX_REFERENCES: u64 = 1 << 28;
 /// Indices of items share a word with the kind of an event.
 const MAX_ITEMS: u64 = 1 << 30;
-/// Cells of fewer triangles are built by one thread.
-const PARALLEL_GRAIN: usize = 4096;
 
 /// Nodes and references in their final places.
 pub(super) struct KdTree {
@@ -37,8 +37,7 @@ pub(super) fn build(
     let count = soup.records.len() as u64;
     AccelError::check_limit("triangles of a kd-tree", count, MAX_ITEMS - 1)?;
     let settings = Settings {
-        traversal_cost: options.traversal_cost,
-        intersection_cost: options.intersection_cost,
+        options,
         kept_if_empty: 1.0 - options.empty_bonus,
         max_depth: match options.max_depth {
             0 => default_depth(soup.records.len()),
@@ -48,12 +47,20 @@ pub(super) fn build(
         soup,
         references: AtomicU64::new(0),
     };
-    let root = log.phase("sort", || Cell::root(soup, bounds));
-    let subtree = log.phase("sah-events", || build_subtree(root, 0, &settings));
+    let cell = log.phase("sort", || Cell::root(soup, bounds));
+    let grown = log.phase("sah-events", || {
+        grow(
+            cell,
+            |cell| cell.items.len(),
+            |cell, depth, order| cell.node(depth, &settings, order),
+        )
+    });
     // Beyond the limit cells are not divided: how many there would be is not known.
     let made = settings.references.into_inner().min(MAX_REFERENCES + 1);
     AccelError::check_limit("references of a kd-tree, at least", made, MAX_REFERENCES)?;
-    Ok(log.phase("layout", || lay_out(subtree)))
+    let nodes = log.phase("layout", || lay_out(&grown));
+    let references = grown.order;
+    Ok(KdTree { nodes, references })
 }
 
 /// Depth where trees usually stop to gain: 8 + 1.3 log2 N (Havran 2000).
@@ -62,8 +69,7 @@ pub(super) fn default_depth(triangles: usize) -> u32 {
 }
 
 struct Settings<'a> {
-    traversal_cost: f32,
-    intersection_cost: f32,
+    options: &'a Options,
     /// What of its cost a split keeps that cuts off empty space.
     kept_if_empty: f32,
     max_depth: u32,
@@ -162,9 +168,30 @@ impl Cell {
         }
     }
 
+    /// The plane that divides the cell, axis and position, and both halves; what a leaf lists is appended to
+    /// `order`, and its plane of no meaning.
+    fn node(
+        self,
+        depth: u32,
+        settings: &Settings,
+        order: &mut Vec<u32>,
+    ) -> ((usize, f32), Option<[Cell; 2]>) {
+        let given_up = settings.references.load(Ordering::Relaxed) > MAX_REFERENCES;
+        let ends = depth >= settings.max_depth || given_up;
+        let split = (!ends).then(|| self.best_split(settings)).flatten();
+        let Some(split) = split else {
+            let made = self.items.len() as u64;
+            settings.references.fetch_add(made, Ordering::Relaxed);
+            order.extend(self.items.iter().map(|item| item.id));
+            return ((0, 0.0), None);
+        };
+        let plane = (split.axis, split.position);
+        (plane, Some(self.divide(&split, settings)))
+    }
+
     /// The split of least cost, if it costs less than a leaf.
     fn best_split(&self, settings: &Settings) -> Option<Split> {
-        let leaf_cost = settings.intersection_cost * self.items.len() as f32;
+        let leaf_cost = settings.options.intersection_cost * self.items.len() as f32;
         let sweep = |axis: usize| self.sweep(axis, settings);
         let best = if self.items.len() > PARALLEL_GRAIN {
             let mut splits = [None; 3];
@@ -186,7 +213,8 @@ impl Cell {
         let extent = self.bounds.extent();
         let (width, depth) = (extent[(axis + 1) % 3], extent[(axis + 2) % 3]);
         let half_area = |length: f32| width * depth + length * (width + depth);
-        let scale = settings.intersection_cost / half_area(high - low).max(f32::MIN_POSITIVE);
+        let scale =
+            settings.options.intersection_cost / half_area(high - low).max(f32::MIN_POSITIVE);
         let mut best: Option<Split> = None;
         let (mut below, mut above) = (0, self.items.len() as u32);
         let events = &self.events[axis];
@@ -210,7 +238,7 @@ impl Cell {
                         1.0
                     };
                     let tests = cost_below * below as f32 + cost_above * above as f32;
-                    let cost = kept * (settings.traversal_cost + tests);
+                    let cost = kept * (settings.options.traversal_cost + tests);
                     if best.is_none_or(|b| cost < b.cost) {
                         best = Some(Split {
                             axis,
@@ -289,13 +317,13 @@ const ELSEWHERE: u32 = u32::MAX;
 
 /// The box of an item within half a cell; `None` if the half is clearly missed.
 fn part_within(item: &Item, half: &Bounds, settings: &Settings) -> Option<Bounds> {
-    let by_box = intersection(&item.bounds, half);
+    let by_box = item.bounds.intersection(half);
     let Some(margin) = &settings.margin else {
         return Some(by_box);
     };
     let record = &settings.soup.records[item.id as usize];
-    let part = clip(&corners(record), half, margin.of(record))?;
-    let clipped = intersection(&by_box, &part);
+    let part = clip(record, half, margin.of(record))?;
+    let clipped = by_box.intersection(&part);
     let overlaps = (0..3).all(|a| clipped.min[a] <= clipped.max[a]);
     Some(if overlaps { clipped } else { by_box })
 }
@@ -335,92 +363,20 @@ fn distribute(
     halves
 }
 
-/// A subtree under construction. Those above the parallel grain are joined by reference and laid out
-/// once in the end.
-enum Subtree {
-    /// Root in front, children relative to it.
-    Whole(KdTree),
-    Inner(usize, f32, Box<(Subtree, Subtree)>),
-}
-
-fn build_subtree(cell: Cell, depth: u32, settings: &Settings) -> Subtree {
-    if cell.items.len() <= PARALLEL_GRAIN {
-        let mut tree = KdTree {
-            nodes: vec![Node::EMPTY],
-            references: Vec::new(),
+/// Brings the children of a node side by side.
+fn lay_out(grown: &Grown<(usize, f32)>) -> Vec<Node> {
+    let mut nodes = vec![Node::EMPTY; grown.nodes.len()];
+    let mut places = vec![0; grown.nodes.len()];
+    let mut next = 1;
+    for (index, ((axis, position), kind)) in grown.nodes.iter().enumerate() {
+        nodes[places[index]] = match *kind {
+            NodeKind::Leaf { first, count } => Node::leaf(first as usize, count as usize),
+            NodeKind::Inner { left, right } => {
+                (places[left as usize], places[right as usize]) = (next, next + 1);
+                next += 2;
+                Node::inner(*axis, *position, next - 2)
+            }
         };
-        append(cell, depth, 0, settings, &mut tree);
-        let made = tree.references.len() as u64;
-        settings.references.fetch_add(made, Ordering::Relaxed);
-        return Subtree::Whole(tree);
     }
-    let Some(split) = next_split(&cell, depth, settings) else {
-        let references: Vec<u32> = cell.items.iter().map(|item| item.id).collect();
-        let made = references.len() as u64;
-        settings.references.fetch_add(made, Ordering::Relaxed);
-        let nodes = vec![Node::leaf(0, references.len())];
-        return Subtree::Whole(KdTree { nodes, references });
-    };
-    let [below, above] = cell.divide(&split, settings);
-    let children = rayon::join(
-        || build_subtree(below, depth + 1, settings),
-        || build_subtree(above, depth + 1, settings),
-    );
-    Subtree::Inner(split.axis, split.position, Box::new(children))
-}
-
-fn next_split(cell: &Cell, depth: u32, settings: &Settings) -> Option<Split> {
-    let given_up = settings.references.load(Ordering::Relaxed) > MAX_REFERENCES;
-    if depth >= settings.max_depth || given_up {
-        return None;
-    }
-    cell.best_split(settings)
-}
-
-/// Builds on one thread into `tree`; the root of the subtree gets the place `slot`.
-fn append(cell: Cell, depth: u32, slot: usize, settings: &Settings, tree: &mut KdTree) {
-    let Some(split) = next_split(&cell, depth, settings) else {
-        tree.nodes[slot] = Node::leaf(tree.references.len(), cell.items.len());
-        tree.references
-            .extend(cell.items.iter().map(|item| item.id));
-        return;
-    };
-    let children = tree.nodes.len();
-    tree.nodes.extend([Node::EMPTY; 2]);
-    tree.nodes[slot] = Node::inner(split.axis, split.position, children);
-    let [below, above] = cell.divide(&split, settings);
-    append(below, depth + 1, children, settings, tree);
-    append(above, depth + 1, children + 1, settings, tree);
-}
-
-fn lay_out(subtree: Subtree) -> KdTree {
-    let mut tree = KdTree {
-        nodes: vec![Node::EMPTY],
-        references: Vec::new(),
-    };
-    place(subtree, 0, &mut tree);
-    tree
-}
-
-/// Appends a subtree to the final arrays and frees it; its root gets the place `slot`.
-fn place(subtree: Subtree, slot: usize, tree: &mut KdTree) {
-    match subtree {
-        Subtree::Whole(part) => {
-            // The root moves elsewhere, so that all others are one place nearer.
-            let node_offset = tree.nodes.len() - 1;
-            let moved = |node: &Node| node.moved_by(node_offset, tree.references.len());
-            let root = moved(&part.nodes[0]);
-            let others: Vec<Node> = part.nodes[1..].iter().map(moved).collect();
-            tree.nodes[slot] = root;
-            tree.nodes.extend(others);
-            tree.references.extend(part.references);
-        }
-        Subtree::Inner(axis, position, children) => {
-            let first = tree.nodes.len();
-            tree.nodes.extend([Node::EMPTY; 2]);
-            tree.nodes[slot] = Node::inner(axis, position, first);
-            place(children.0, first, tree);
-            place(children.1, first + 1, tree);
-        }
-    }
+    nodes
 }

@@ -10,15 +10,8 @@ mod build;
 mod validate;
 
 use super::bounds::{Bounds, slab};
-use super::ray::Hit;
-use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
-    TriangleSoup,
-};
+use super::structure::prelude::*;
 use crate::gpu::UniformValues;
-use crate::parameters;
-use crate::params::{ParameterSchema, Parameters as _, Params};
 use bytemuck::{Pod, Zeroable};
 
 /// Low bits of [`Node::link`]: the axis of the plane, or [`LEAF`].
@@ -32,7 +25,7 @@ const END_PAD: f32 = 1.000_004;
 
 parameters! {
     /// Which cells are divided, and what they list.
-    struct Options {
+    pub struct Options {
         /// deepest leaf; 0 stands for 8 + 1.3 log2 of the number of triangles
         max_depth: u32 = 0, in 0..=64;
         /// SAH cost of visiting an inner node
@@ -49,26 +42,12 @@ parameters! {
 /// The registry entry.
 pub struct KdTree;
 
-impl AccelKind for KdTree {
-    fn name(&self) -> &'static str {
-        "kd-tree"
-    }
+impl Structure for KdTree {
+    const NAME: &'static str = "kd-tree";
+    const DESCRIPTION: &'static str = "kd-tree, SAH over all box faces in O(N log N) (Wald & Havran 2006), leaf references, stack";
+    type Parameters = Options;
 
-    fn description(&self) -> &'static str {
-        "kd-tree, SAH over all box faces in O(N log N) (Wald & Havran 2006), leaf references, stack"
-    }
-
-    fn parameters(&self) -> ParameterSchema {
-        Options::schema()
-    }
-
-    fn build(
-        &self,
-        soup: &TriangleSoup,
-        params: &Params,
-        log: &mut BuildLog,
-    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let options = Options::from_params(params)?;
+    fn build(soup: &TriangleSoup, options: &Options, log: &mut BuildLog) -> BuildResult {
         let bounds = if soup.records.is_empty() {
             Bounds {
                 min: [0.0; 3],
@@ -77,7 +56,7 @@ impl AccelKind for KdTree {
         } else {
             soup.bounds()
         };
-        let tree = build::build(soup, bounds, &options, log)?;
+        let tree = build::build(soup, bounds, options, log)?;
         let mut built = Built {
             bounds,
             clipped: options.clip,
@@ -149,18 +128,6 @@ impl Node {
             },
         }
     }
-
-    /// The node after what it refers to moved up by this many places.
-    fn moved_by(self, nodes: usize, references: usize) -> Self {
-        match self.content() {
-            Content::Leaf { first, count } => Self::leaf(first + references, count),
-            Content::Inner {
-                axis,
-                position,
-                children,
-            } => Self::inner(axis, position, children + nodes),
-        }
-    }
 }
 
 /// Both halves of a cell.
@@ -212,12 +179,10 @@ impl Built {
         StructureStats {
             nodes: self.nodes.len() as u64,
             leaves: counts.len() as u64,
-            references: self.references.len() as u64,
-            leaf_histogram: super::leaf_histogram(counts.into_iter()),
             depth: Some(deepest),
-            epo: None,
             sah_cost: (root_area > 0.0).then(|| cost / root_area),
             bytes: self.buffers().bytes(),
+            ..StructureStats::of_leaves(counts.into_iter())
         }
     }
 }
@@ -241,7 +206,7 @@ impl BuiltAccel for Built {
             ],
             uniforms: vec![
                 ("tree", tree),
-                super::limits(self.nodes.len() + 1, self.nodes.len()),
+                limits(self.nodes.len() + 1, self.nodes.len()),
             ],
             // One entry for each level at most; a multiple of 16, so that scenes of like depth share
             // a kernel.
@@ -259,21 +224,21 @@ impl BuiltAccel for Built {
 }
 
 impl Traverse for Built {
-    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
-        let ray = query.ray;
-        let inverse = query.inverse;
-        query.counters.box_tests += 1;
+    fn trace(&self, soup: &TriangleSoup, mut walk: Walk) -> Hit {
+        let ray = walk.ray;
+        let inverse = walk.inverse;
+        walk.counters.box_tests += 1;
         let (enter, end) = slab(&self.bounds, &ray, *inverse);
         let mut enter = enter.max(ray.t_min);
-        let mut exit = end.min(query.hit.t);
+        let mut exit = end.min(walk.hit.t);
         if enter > exit * inverse.pad {
-            return query.hit;
+            return walk.hit;
         }
         // Far sides that wait, with the distance where the ray enters them.
         let mut stack: Vec<(usize, f32)> = Vec::new();
         let mut current = 0;
         loop {
-            query.visit(current);
+            walk.visit(current);
             match self.nodes[current].content() {
                 Content::Inner {
                     axis,
@@ -289,25 +254,25 @@ impl Traverse for Built {
                         current = far;
                     } else {
                         stack.push((far, enter.max(plane)));
-                        query.count_stack(stack.len());
+                        walk.count_stack(stack.len());
                         exit = exit.min(plane);
                         current = near;
                     }
                 }
                 Content::Leaf { first, count } => {
                     let ids = &self.references[first..first + count];
-                    query.test_list(soup, ids.iter().copied());
-                    if query.is_answered() {
-                        return query.hit;
+                    walk.test_list(soup, ids.iter().copied());
+                    if walk.is_answered() {
+                        return walk.hit;
                     }
                     match stack.pop() {
-                        Some((far, distance)) if distance <= query.hit.t * END_PAD => {
+                        Some((far, distance)) if distance <= walk.hit.t * END_PAD => {
                             (current, enter) = (far, distance);
                         }
-                        _ => return query.hit,
+                        _ => return walk.hit,
                     }
                     // A cell ends where the one waiting below it begins.
-                    exit = stack.last().map_or(end, |(_, next)| *next).min(query.hit.t);
+                    exit = stack.last().map_or(end, |(_, next)| *next).min(walk.hit.t);
                 }
             }
         }

@@ -1,22 +1,7 @@
 //! Faults in a built tree that `validate()` must find.
 
 use super::*;
-use crate::geometry::Triangle;
-use glam::Vec3;
-
-/// A 6 × 6 × 2 lattice of triangles, two layers of each of which cross the planes between cells.
-fn soup() -> TriangleSoup {
-    let triangle = |i: usize| {
-        let at = Vec3::new((i % 6) as f32, (i / 6 % 6) as f32, (i / 36) as f32);
-        let vertices = [
-            at,
-            at + Vec3::new(1.2, 0.1, 0.3),
-            at + Vec3::new(0.2, 1.3, 0.1),
-        ];
-        super::super::triangle::TriangleRecord::new(&Triangle { vertices }, i as u32, 0)
-    };
-    (0..72).map(triangle).collect::<Vec<_>>().into()
-}
+use crate::accel::fixtures::lattice;
 
 fn built(soup: &TriangleSoup, clip: bool) -> Built {
     let options = Options {
@@ -50,7 +35,7 @@ fn first_of(node: Node) -> (usize, usize) {
 
 #[test]
 fn validation_finds_planted_faults() {
-    let soup = soup();
+    let soup = lattice(2);
     let plant = |what: &str, fault: &dyn Fn(&mut Built)| {
         for clip in [false, true] {
             let mut built = built(&soup, clip);

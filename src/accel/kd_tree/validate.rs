@@ -13,44 +13,41 @@ use crate::accel::{AccelError, TriangleSoup};
 /// The first of these that does not hold.
 pub(super) fn validate(built: &Built, soup: &TriangleSoup) -> Result<(), AccelError> {
     for record in &soup.records {
-        AccelError::ensure(built.bounds.contains(&record.bounds()), || {
-            format!("triangle {} lies outside the tree", record.id)
-        })?;
+        let inside = built.bounds.contains(&record.bounds());
+        ensure!(inside, "triangle {} lies outside the tree", record.id);
     }
     for &id in &built.references {
-        AccelError::ensure((id as usize) < soup.records.len(), || {
-            format!("triangle {id} does not exist")
-        })?;
+        let exists = (id as usize) < soup.records.len();
+        ensure!(exists, "triangle {id} does not exist");
     }
     let counts = built.nodes.iter().map(|node| match node.content() {
         Content::Leaf { count, .. } => count,
         Content::Inner { .. } => 0,
     });
     let (listed, all) = (counts.sum::<usize>(), built.references.len());
-    AccelError::ensure(listed == all, || {
-        format!("leaves list {listed} of {all} references")
-    })?;
+    ensure!(listed == all, "leaves list {listed} of {all} references");
     let no_triangles = TriangleSoup::default();
-    let mut walk = Walk {
+    let mut check = Check {
         built,
         soup,
         nodes: Coverage::new(&no_triangles, built.nodes.len()),
     };
-    let lost = walk.lacking(0, &built.bounds, (0..soup.records.len() as u32).collect())?;
-    AccelError::ensure(lost.is_empty(), || {
-        format!("triangle {} is missing in a leaf that it touches", lost[0])
-    })?;
-    walk.nodes.is_complete()
+    let lost = check.lacking(0, &built.bounds, (0..soup.records.len() as u32).collect())?;
+    ensure!(
+        lost.is_empty(),
+        "triangles {lost:?} are missing in leaves that they touch"
+    );
+    check.nodes.is_complete()
 }
 
 /// On the way down.
-struct Walk<'a> {
+struct Check<'a> {
     built: &'a Built,
     soup: &'a TriangleSoup,
     nodes: Coverage<'a>,
 }
 
-impl Walk<'_> {
+impl Check<'_> {
     /// Those of `triangles`, all of which the cell of node `index` must list, that its leaves lack.
     fn lacking(
         &mut self,
@@ -63,9 +60,10 @@ impl Walk<'_> {
             Content::Leaf { first, count } => {
                 let listed = self.built.references.get(first..first + count);
                 let ascends = listed.is_some_and(|ids| ids.is_sorted_by(|a, b| a < b));
-                AccelError::ensure(ascends, || {
-                    format!("leaf {index}: its references lie outside the array or do not ascend")
-                })?;
+                ensure!(
+                    ascends,
+                    "leaf {index}: its references lie outside the array or do not ascend"
+                );
                 triangles.retain(|id| listed.is_none_or(|ids| ids.binary_search(id).is_err()));
                 return Ok(triangles);
             }
@@ -76,9 +74,7 @@ impl Walk<'_> {
             } => (axis, position, children),
         };
         let inside = cell.min[axis] <= position && position <= cell.max[axis];
-        AccelError::ensure(inside, || {
-            format!("node {index}: its plane lies outside its cell")
-        })?;
+        ensure!(inside, "node {index}: its plane lies outside its cell");
         let cells = halves(cell, axis, position);
         let (mut sides, planar) = self.sides(&cells, axis, position, triangles);
         // What lies in the plane may be on either side.

@@ -76,16 +76,15 @@ pub(super) fn default_depth(triangles: usize) -> u32 {
 struct Settings<'a> {
     soup: &'a TriangleSoup,
     space: &'a RootCell,
+    options: &'a Options,
     max_depth: u32,
-    leaf_size: usize,
-    traversal_cost: f64,
     /// Set if triangles are clipped.
     margin: Option<Margin>,
     boxes: Vec<Bounds>,
 }
 
 impl<'a> Settings<'a> {
-    fn new(soup: &'a TriangleSoup, space: &'a RootCell, options: &Options) -> Self {
+    fn new(soup: &'a TriangleSoup, space: &'a RootCell, options: &'a Options) -> Self {
         Self {
             soup,
             space,
@@ -93,8 +92,7 @@ impl<'a> Settings<'a> {
                 0 => default_depth(soup.records.len()),
                 depth => depth,
             },
-            leaf_size: options.leaf_size,
-            traversal_cost: options.traversal_cost,
+            options,
             margin: options.clip.then(|| Margin::new(&soup.bounds())),
             boxes: soup.records.par_iter().map(|r| r.bounds()).collect(),
         }
@@ -122,7 +120,7 @@ impl<'a> Settings<'a> {
 
     /// The children of a cell; `None` if it is to be a leaf.
     fn divide(&self, position: [u32; 3], triangles: &[u32], depth: u32) -> Option<Children> {
-        if triangles.len() <= self.leaf_size {
+        if triangles.len() <= self.options.leaf_size {
             return None;
         }
         let octants: Vec<u8> = triangles
@@ -131,7 +129,7 @@ impl<'a> Settings<'a> {
             .collect();
         let listed: u32 = octants.iter().map(|mask| mask.count_ones()).sum();
         // Every child has a quarter of the area of its parent.
-        let cost = self.traversal_cost + 0.25 * f64::from(listed);
+        let cost = self.options.traversal_cost + 0.25 * f64::from(listed);
         if cost >= triangles.len() as f64 {
             return None;
         }
@@ -202,14 +200,10 @@ fn assemble(
             continue;
         };
         let block = tree.nodes.len() / 8;
-        let mut filled = 0;
+        let (mut filled, mut start) = (0, 0);
         for octant in 0..8 {
-            let start = if octant == 0 {
-                0
-            } else {
-                children.ends[octant - 1]
-            };
-            if start < children.ends[octant] {
+            let end = children.ends[octant];
+            if start < end {
                 filled |= 1 << octant;
                 next_cells.push(Open {
                     slot: 8 * block + octant,
@@ -217,6 +211,7 @@ fn assemble(
                     first: next_triangles.len() + start,
                 });
             }
+            start = end;
         }
         next_triangles.extend(children.triangles);
         tree.nodes.extend([0; 8]);

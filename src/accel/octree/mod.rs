@@ -10,16 +10,8 @@
 mod build;
 mod validate;
 
-use super::bounds::Bounds;
-use super::ray::{Hit, Ray};
-use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{
-    AccelError, AccelKind, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
-    TriangleSoup,
-};
+use super::structure::prelude::*;
 use crate::gpu::UniformValues;
-use crate::parameters;
-use crate::params::{ParameterSchema, Parameters as _, Params};
 
 /// Marks the word of a leaf; the other bits are its first place in the references.
 const LEAF: u32 = 0x8000_0000;
@@ -36,7 +28,7 @@ const DEEPEST: u32 = 20;
 
 parameters! {
     /// Which cells are divided, and what they list.
-    struct Options {
+    pub struct Options {
         /// deepest leaf; 0 stands for 2 + log4 of the number of triangles
         max_depth: u32 = 0, in 0..=DEEPEST;
         /// cells of no more triangles are not divided
@@ -51,28 +43,15 @@ parameters! {
 /// The registry entry.
 pub struct Octree;
 
-impl AccelKind for Octree {
-    fn name(&self) -> &'static str {
-        "octree"
-    }
+impl Structure for Octree {
+    const NAME: &'static str = "octree";
+    const DESCRIPTION: &'static str =
+        "octree by exact triangle–box overlap, parametric descent (Revelles, Ureña & Lastra 2000)";
+    type Parameters = Options;
 
-    fn description(&self) -> &'static str {
-        "octree by exact triangle–box overlap, parametric descent (Revelles, Ureña & Lastra 2000)"
-    }
-
-    fn parameters(&self) -> ParameterSchema {
-        Options::schema()
-    }
-
-    fn build(
-        &self,
-        soup: &TriangleSoup,
-        params: &Params,
-        log: &mut BuildLog,
-    ) -> Result<Box<dyn BuiltAccel>, AccelError> {
-        let options = Options::from_params(params)?;
+    fn build(soup: &TriangleSoup, options: &Options, log: &mut BuildLog) -> BuildResult {
         let space = RootCell::around(soup);
-        let tree = log.phase("levels", || build::build(soup, &space, &options))?;
+        let tree = log.phase("levels", || build::build(soup, &space, options))?;
         Ok(Box::new(Built {
             space,
             clipped: options.clip,
@@ -171,7 +150,7 @@ impl Built {
     }
 
     /// Word, position and depth of every cell that holds anything, from the root.
-    fn walk(&self, mut visit: impl FnMut(u32, [u32; 3], u32)) {
+    fn each_cell(&self, mut visit: impl FnMut(u32, [u32; 3], u32)) {
         let mut stack = vec![(self.nodes[0], [0; 3], 0)];
         while let Some((word, position, depth)) = stack.pop() {
             visit(word, position, depth);
@@ -205,7 +184,7 @@ impl BuiltAccel for Built {
             ],
             uniforms: vec![
                 ("space", space),
-                super::limits(self.nodes.len() + 1, self.references.len()),
+                limits(self.nodes.len() + 1, self.references.len()),
             ],
             // One entry for each level and one for the root; a multiple of 8, so that scenes of like
             // depth share a kernel.
@@ -216,7 +195,7 @@ impl BuiltAccel for Built {
     fn stats(&self) -> StructureStats {
         let mut counts = Vec::new();
         let (mut cost, mut cells, mut filled) = (0.0, 0, 0);
-        self.walk(|word, _, depth| {
+        self.each_cell(|word, _, depth| {
             let weight = if word & LEAF != 0 {
                 let count = self.list(word & !LEAF).map_or(0, <[u32]>::len);
                 counts.push(count);
@@ -228,18 +207,15 @@ impl BuiltAccel for Built {
             filled += 1;
             cost += weight * 0.25_f64.powi(depth as i32);
         });
-        let leaves = counts.len() as u64;
+        // Octants that nothing reaches into are leaves as well.
         let empty = cells + 1 - filled;
         let counts = counts.into_iter().chain((0..empty).map(|_| 0));
         StructureStats {
             nodes: cells as u64 + 1,
-            leaves,
-            references: self.references.len() as u64,
-            leaf_histogram: super::leaf_histogram(counts),
             depth: Some(self.depth),
-            epo: None,
             sah_cost: (!self.references.is_empty()).then_some(cost),
             bytes: self.buffers().bytes(),
+            ..StructureStats::of_leaves(counts)
         }
     }
 
@@ -286,9 +262,9 @@ fn visited(enter: f32, exit: f32, middle: [f32; 3], pad: f32) -> u32 {
 
 impl Built {
     /// Tests the triangles of the leaf that begins at `first`.
-    fn leaf(&self, first: u32, soup: &TriangleSoup, query: &mut Query) {
+    fn leaf(&self, first: u32, soup: &TriangleSoup, walk: &mut Walk) {
         for reference in &self.references[first as usize..] {
-            query.test(&soup.records[(reference & !LAST) as usize]);
+            walk.test(&soup.records[(reference & !LAST) as usize]);
             if reference & LAST != 0 {
                 return;
             }
@@ -303,9 +279,9 @@ impl Built {
 }
 
 impl Traverse for Built {
-    fn trace(&self, soup: &TriangleSoup, mut query: Query) -> Hit {
-        let ray = query.ray;
-        let inverse = query.inverse;
+    fn trace(&self, soup: &TriangleSoup, mut walk: Walk) -> Hit {
+        let ray = walk.ray;
+        let inverse = walk.inverse;
         let mirror = inverse.map(|i| u32::from(i < 0.0));
         let flip = mirror[0] | mirror[1] << 1 | mirror[2] << 2;
         // The cell whose children are being visited: its block and the children to come. At first one
@@ -317,7 +293,7 @@ impl Traverse for Built {
         loop {
             while open & FILLED_MASK == 0 {
                 let Some(parent) = stack.pop() else {
-                    return query.hit;
+                    return walk.hit;
                 };
                 open = parent;
                 position = position.map(|p| p >> 1);
@@ -330,22 +306,22 @@ impl Traverse for Built {
             let first: [u32; 3] = std::array::from_fn(|a| child[a] + mirror[a]);
             let near = self.distances(first, half, &ray, *inverse);
             let enter = near[0].max(near[1]).max(near[2]).max(ray.t_min);
-            if enter > query.hit.t * END_PAD {
-                return query.hit;
+            if enter > walk.hit.t * END_PAD {
+                return walk.hit;
             }
             let place = ((open >> INNER_SHIFT) * 8 + octant) as usize;
-            query.visit(place);
+            walk.visit(place);
             let word = self.nodes[place];
             if word & LEAF != 0 {
-                self.leaf(word & !LEAF, soup, &mut query);
-                if query.is_answered() {
-                    return query.hit;
+                self.leaf(word & !LEAF, soup, &mut walk);
+                if walk.is_answered() {
+                    return walk.hit;
                 }
                 continue;
             }
             let last = std::array::from_fn(|a| child[a] + 1 - mirror[a]);
             let far = self.distances(last, half, &ray, *inverse);
-            let exit = far[0].min(far[1]).min(far[2]).min(query.hit.t);
+            let exit = far[0].min(far[1]).min(far[2]).min(walk.hit.t);
             let middle = self.distances(
                 child.map(|c| 2 * c + 1),
                 half.map(|h| 0.5 * h),
@@ -353,7 +329,7 @@ impl Traverse for Built {
                 *inverse,
             );
             stack.push(open);
-            query.count_stack(stack.len());
+            walk.count_stack(stack.len());
             let filled = mirrored(word & FILLED_MASK, flip);
             open = word & !FILLED_MASK | visited(enter, exit, middle, inverse.pad) & filled;
             (position, size) = (child, half);

@@ -12,39 +12,36 @@ use crate::accel::{AccelError, TriangleSoup};
 pub(super) fn validate(built: &Built, soup: &TriangleSoup) -> Result<(), AccelError> {
     let root = built.space.cell([0; 3], 0);
     for record in &soup.records {
-        AccelError::ensure(root.contains(&record.bounds()), || {
-            format!("triangle {} lies outside the tree", record.id)
-        })?;
+        let inside = root.contains(&record.bounds());
+        ensure!(inside, "triangle {} lies outside the tree", record.id);
     }
     if soup.records.is_empty() && built.nodes[0] == 0 && built.references.is_empty() {
         return Ok(());
     }
     let no_triangles = TriangleSoup::default();
-    let mut walk = Walk {
+    let mut check = Check {
         built,
         soup,
         blocks: Coverage::new(&no_triangles, built.nodes.len() / 8),
         listed: 0,
     };
-    walk.blocks.node(0)?;
+    check.blocks.node(0)?;
     let all: Vec<u32> = (0..soup.records.len() as u32).collect();
-    walk.cell(built.nodes[0], [0; 3], 0, &all)?;
-    let (listed, all) = (walk.listed, built.references.len());
-    AccelError::ensure(listed == all, || {
-        format!("leaves list {listed} of {all} references")
-    })?;
-    walk.blocks.is_complete()
+    check.cell(built.nodes[0], [0; 3], 0, &all)?;
+    let (listed, all) = (check.listed, built.references.len());
+    ensure!(listed == all, "leaves list {listed} of {all} references");
+    check.blocks.is_complete()
 }
 
 /// On the way down.
-struct Walk<'a> {
+struct Check<'a> {
     built: &'a Built,
     soup: &'a TriangleSoup,
     blocks: Coverage<'a>,
     listed: usize,
 }
 
-impl Walk<'_> {
+impl Check<'_> {
     /// A cell, which must list `triangles`.
     fn cell(
         &mut self,
@@ -53,33 +50,27 @@ impl Walk<'_> {
         depth: u32,
         triangles: &[u32],
     ) -> Result<(), AccelError> {
-        let ensure = |holds: bool, what: &dyn Fn() -> String| {
-            AccelError::ensure(holds, || {
-                format!("cell {position:?} at depth {depth}: {}", what())
-            })
-        };
+        let here = format!("cell {position:?} at depth {depth}");
         if word & LEAF != 0 {
             let list = self.built.list(word & !LEAF).unwrap_or_default();
-            ensure(!list.is_empty(), &|| {
-                "its references lie outside the array".to_owned()
-            })?;
+            ensure!(
+                !list.is_empty(),
+                "{here}: its references lie outside the array"
+            );
             self.listed += list.len();
             let ids: Vec<u32> = list.iter().map(|r| r & !LAST).collect();
-            for id in &ids {
-                let exists = (*id as usize) < self.soup.records.len();
-                ensure(exists, &|| format!("triangle {id} does not exist"))?;
-            }
             let ascend = ids.is_sorted_by(|a, b| a < b);
-            ensure(ascend, &|| "its references do not ascend".to_owned())?;
+            ensure!(ascend, "{here}: its references do not ascend");
+            let last = ids[ids.len() - 1] as usize;
+            let exists = last < self.soup.records.len();
+            ensure!(exists, "{here}: triangle {last} does not exist");
             for id in triangles {
-                ensure(ids.binary_search(id).is_ok(), &|| {
-                    format!("triangle {id} touches it and is not listed")
-                })?;
+                let listed = ids.binary_search(id).is_ok();
+                ensure!(listed, "{here}: triangle {id} touches it and is not listed");
             }
             return Ok(());
         }
-        let is_deeper = depth > self.built.depth;
-        ensure(!is_deeper, &|| "deeper than the tree".to_owned())?;
+        ensure!(depth <= self.built.depth, "{here}: deeper than the tree");
         let block = (word >> INNER_SHIFT) as usize;
         self.blocks.node(block)?;
         for octant in 0..8 {
@@ -87,9 +78,11 @@ impl Walk<'_> {
             if word >> octant & 1 == 1 {
                 let child = self.built.nodes[8 * block + octant as usize];
                 self.cell(child, RootCell::child(position, octant), depth + 1, &inside)?;
-            } else if let Some(id) = inside.first() {
-                let what = || format!("triangle {id} touches octant {octant}, which is empty");
-                ensure(false, &what)?;
+            } else {
+                ensure!(
+                    inside.is_empty(),
+                    "{here}: triangles {inside:?} touch octant {octant}, which is empty"
+                );
             }
         }
         Ok(())

@@ -7,10 +7,11 @@
 //!
 //! Source: I. Wald, "On fast construction of SAH-based bounding volume hierarchies", 2007.
 
-use super::TreeNode;
+use super::Tree;
+use super::grow::grow;
 use super::parameters::{MAX_BINS, SAH_DEPTH, TreeParameters};
 use super::reference::{Box3, Reference, bounds_of};
-use super::subtree::{PARALLEL_GRAIN, Subtree, leaf, make_inner};
+use crate::accel::bounds::Bounds;
 use glam::Vec3A;
 use rayon::prelude::*;
 
@@ -19,58 +20,24 @@ const EXHAUSTIVE: usize = 4;
 /// Nodes of more references are binned by several threads.
 const PARALLEL_BINNING: usize = 1 << 16;
 
-/// The tree over `references`, which are brought into the order of the leaves.
-pub(super) fn build(references: &mut [Reference], settings: &TreeParameters) -> Subtree {
-    let bounds = bounds_of(references);
-    grow(references, bounds, 0, settings, 0)
-}
-
-/// The subtree over `references`, which begin at `first` in the whole order.
-fn grow(
-    references: &mut [Reference],
-    bounds: Box3,
-    first: u32,
-    settings: &TreeParameters,
-    depth: u32,
-) -> Subtree {
-    if references.len() <= PARALLEL_GRAIN {
-        let mut nodes = Vec::with_capacity(references.len());
-        append(references, bounds, first, settings, depth, &mut nodes);
-        return Subtree::Whole(nodes);
-    }
-    let Some((middle, [low_bounds, high_bounds])) = split(references, bounds, settings, depth)
-    else {
-        return Subtree::leaf(bounds, first, references.len());
-    };
-    let (low, high) = references.split_at_mut(middle);
-    let second = first + middle as u32;
-    let (low, high) = rayon::join(
-        || grow(low, low_bounds, first, settings, depth + 1),
-        || grow(high, high_bounds, second, settings, depth + 1),
+/// The tree over `references`.
+pub(super) fn build(mut references: Vec<Reference>, settings: &TreeParameters) -> Tree {
+    let bounds = bounds_of(&references);
+    let whole = (&mut references[..], bounds);
+    let tree = grow(
+        whole,
+        |part| part.0.len(),
+        |(part, bounds), depth, order| {
+            let node = Bounds::from(bounds);
+            let Some((middle, boxes)) = split(part, bounds, settings, depth) else {
+                order.extend(part.iter().map(|r| r.id));
+                return (node, None);
+            };
+            let (low, high) = part.split_at_mut(middle);
+            (node, Some([(low, boxes[0]), (high, boxes[1])]))
+        },
     );
-    Subtree::inner(bounds, low, high)
-}
-
-/// The same on one thread, straight into `nodes`.
-fn append(
-    references: &mut [Reference],
-    bounds: Box3,
-    first: u32,
-    settings: &TreeParameters,
-    depth: u32,
-    nodes: &mut Vec<TreeNode>,
-) {
-    let here = nodes.len();
-    nodes.push(leaf(bounds, first, references.len()));
-    let Some((middle, [low_bounds, high_bounds])) = split(references, bounds, settings, depth)
-    else {
-        return;
-    };
-    let (low, high) = references.split_at_mut(middle);
-    append(low, low_bounds, first, settings, depth + 1, nodes);
-    make_inner(nodes, here);
-    let second = first + middle as u32;
-    append(high, high_bounds, second, settings, depth + 1, nodes);
+    tree.into()
 }
 
 /// Partitions `references`; returns where the second half starts and the boxes of both. `None` makes a

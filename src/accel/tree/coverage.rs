@@ -14,6 +14,9 @@ use crate::accel::bounds::Bounds;
 use crate::accel::triangle::TriangleRecord;
 use crate::accel::{AccelError, TriangleSoup};
 
+/// A node that is still to be looked at, and the box that it must lie in.
+pub type Below = (usize, Bounds);
+
 /// Bookkeeping of `validate()`: every node reached once, and every triangle in a leaf that contains
 /// its box or in several that together cover it. More leaves than needed are a waste, which
 /// `references` of the statistics shows, but no fault.
@@ -24,10 +27,6 @@ pub struct Coverage<'a> {
     contained: Vec<bool>,
     /// Leaves that contain a part of a triangle.
     parts: Vec<(u32, Bounds)>,
-}
-
-fn invalid(what: String) -> AccelError {
-    AccelError::Invalid(what)
 }
 
 impl<'a> Coverage<'a> {
@@ -41,21 +40,48 @@ impl<'a> Coverage<'a> {
         }
     }
 
+    /// Goes down from node 0 and checks that every node is reached once, none on more than `most_levels`
+    /// levels, and nothing is missed. `look` checks a node, given the box around it, and appends its children
+    /// with theirs.
+    ///
+    /// # Errors
+    /// The first violated invariant, with the node.
+    pub fn descend(
+        mut self,
+        most_levels: u32,
+        look: impl Fn(&mut Self, usize, &Bounds, &mut Vec<Below>) -> Result<(), AccelError>,
+    ) -> Result<(), AccelError> {
+        let mut open = vec![(0, Bounds::EVERYTHING, 1)];
+        let mut below = Vec::new();
+        while let Some((index, around, level)) = open.pop() {
+            self.node(index)?;
+            ensure!(
+                level <= most_levels,
+                "node {index}: deeper than {most_levels} levels"
+            );
+            if index < self.nodes.len() {
+                look(&mut self, index, &around, &mut below)
+                    .map_err(|e| AccelError::Invalid(format!("node {index}: {e}")))?;
+            }
+            let deeper = |(child, bounds)| (child, bounds, level + 1);
+            open.extend(below.drain(..).map(deeper));
+        }
+        self.is_complete()
+    }
+
     /// Notes that a node is reached.
     ///
     /// # Errors
     /// It does not exist or was reached before.
     pub fn node(&mut self, index: usize) -> Result<(), AccelError> {
-        match self.nodes.get_mut(index) {
-            // The root of an empty scene is no node.
-            None if index == 0 => Ok(()),
-            None => Err(invalid(format!("node {index} does not exist"))),
-            Some(true) => Err(invalid(format!("node {index} is reached twice"))),
-            Some(seen) => {
-                *seen = true;
-                Ok(())
-            }
-        }
+        // The root of an empty scene is no node.
+        let Some(seen) = self.nodes.get_mut(index) else {
+            ensure!(index == 0, "node {index} does not exist");
+            return Ok(());
+        };
+        ensure!(!*seen, "node {index} is reached twice");
+        *seen = true;
+        Ok(())
     }
 
     /// Notes the triangles of a leaf with these bounds; `None` is a range outside the array.
@@ -68,26 +94,24 @@ impl<'a> Coverage<'a> {
         triangles: Option<&[TriangleRecord]>,
         bounds: &Bounds,
     ) -> Result<(), AccelError> {
-        let Some(triangles) = triangles else {
-            return Err(invalid("a leaf lies outside the triangle array".to_owned()));
-        };
+        ensure!(
+            triangles.is_some(),
+            "a leaf lies outside the triangle array"
+        );
+        let triangles = triangles.unwrap_or_default();
         for (place, triangle) in triangles.iter().enumerate() {
             let id = triangle.id;
-            if self.soup.records.get(id as usize) != Some(triangle) {
-                return Err(invalid(format!("triangle {id} is not the scene's")));
-            }
-            if triangles[..place].iter().any(|other| other.id == id) {
-                return Err(invalid(format!("triangle {id} is in one leaf twice")));
-            }
+            let scenes = self.soup.records.get(id as usize);
+            ensure!(scenes == Some(triangle), "triangle {id} is not the scene's");
+            let is_new = triangles[..place].iter().all(|other| other.id != id);
+            ensure!(is_new, "triangle {id} is in one leaf twice");
             let own = triangle.bounds();
             if bounds.contains(&own) {
                 self.contained[id as usize] = true;
-            } else if meet(bounds, &own) {
-                self.parts.push((id, *bounds));
             } else {
-                return Err(invalid(format!(
-                    "triangle {id} lies outside its leaf's box"
-                )));
+                let reaches = meet(bounds, &own);
+                ensure!(reaches, "triangle {id} lies outside its leaf's box");
+                self.parts.push((id, *bounds));
             }
         }
         Ok(())
@@ -101,26 +125,30 @@ impl<'a> Coverage<'a> {
         self.parts.sort_by_key(|(id, _)| *id);
         for parts in self.parts.chunk_by(|a, b| a.0 == b.0) {
             let id = parts[0].0;
-            let boxes: Vec<Bounds> = parts.iter().map(|(_, bounds)| *bounds).collect();
-            let own = self.soup.records[id as usize].bounds();
             if self.contained[id as usize] {
                 continue;
             }
-            if !covers(&boxes, &own) {
-                return Err(invalid(format!(
-                    "triangle {id} sticks out of its leaf's box, or its {} leaves do not cover it",
-                    boxes.len()
-                )));
-            }
+            let boxes: Vec<Bounds> = parts.iter().map(|(_, bounds)| *bounds).collect();
+            let own = self.soup.records[id as usize].bounds();
+            ensure!(
+                covers(&boxes, &own),
+                "triangle {id} sticks out of its leaf's box, or its {} leaves do not cover it",
+                boxes.len()
+            );
             self.contained[id as usize] = true;
         }
-        if let Some(lost) = self.contained.iter().position(|seen| !seen) {
-            return Err(invalid(format!("triangle {lost} is in no leaf")));
+        let missed = |seen: &[bool]| seen.iter().position(|seen| !seen);
+        if let Some(lost) = missed(&self.contained) {
+            return Err(AccelError::Invalid(format!(
+                "triangle {lost} is in no leaf"
+            )));
         }
-        match self.nodes.iter().position(|seen| !seen) {
-            Some(orphan) => Err(invalid(format!("node {orphan} is never reached"))),
-            None => Ok(()),
+        if let Some(orphan) = missed(&self.nodes) {
+            return Err(AccelError::Invalid(format!(
+                "node {orphan} is never reached"
+            )));
         }
+        Ok(())
     }
 }
 
@@ -161,16 +189,10 @@ fn covers(boxes: &[Bounds], whole: &Bounds) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Triangle;
-    use glam::Vec3;
+    use crate::accel::fixtures;
 
     fn soup() -> TriangleSoup {
-        let vertices = [
-            Vec3::ZERO,
-            Vec3::new(4.0, 2.0, 0.0),
-            Vec3::new(0.0, 2.0, 8.0),
-        ];
-        vec![TriangleRecord::new(&Triangle { vertices }, 0, 0)].into()
+        fixtures::soup([[[0.0; 3], [4.0, 2.0, 0.0], [0.0, 2.0, 8.0]]])
     }
 
     fn slab(from: [f32; 3], to: [f32; 3]) -> Bounds {

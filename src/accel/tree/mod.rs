@@ -7,6 +7,7 @@
 mod binned;
 mod coverage;
 mod depth;
+pub(super) mod grow;
 mod leaves;
 mod parameters;
 mod ploc;
@@ -18,6 +19,7 @@ mod subtree;
 mod sweep;
 
 pub use coverage::Coverage;
+pub(super) use leaves::distinct;
 pub use parameters::{Builder, Preset, TreeParameters};
 
 use super::bounds::Bounds;
@@ -101,21 +103,15 @@ impl Tree {
     }
 
     /// The tree of the builder alone.
-    fn grow(mut references: Vec<Reference>, settings: &TreeParameters) -> Result<Tree, AccelError> {
-        let (subtree, order) = match settings.builder {
-            Builder::Binned => {
-                let subtree = binned::build(&mut references, settings);
-                (subtree, references.iter().map(|r| r.id).collect())
-            }
+    fn grow(references: Vec<Reference>, settings: &TreeParameters) -> Result<Tree, AccelError> {
+        Ok(match settings.builder {
+            Builder::Binned => binned::build(references, settings),
             Builder::Sweep => sweep::build(&references, Axes::All, settings),
             Builder::LongestAxisSweep => sweep::build(&references, Axes::Longest, settings),
-            Builder::Sbvh => sbvh::build(std::mem::take(&mut references), settings),
-            Builder::Ploc => return ploc::build(&references, settings, false),
-            Builder::PlocReinsertion => return ploc::build(&references, settings, true),
-        };
-        drop(references);
-        let nodes = subtree.lay_out();
-        Ok(Tree::new(nodes, order))
+            Builder::Sbvh => sbvh::build(references, settings),
+            Builder::Ploc => ploc::build(&references, settings, false)?,
+            Builder::PlocReinsertion => ploc::build(&references, settings, true)?,
+        })
     }
 
     fn new(nodes: Vec<TreeNode>, order: Vec<u32>) -> Self {

@@ -3,9 +3,8 @@
 use super::{NodeKind, Tree, TreeNode};
 use crate::accel::StructureStats;
 use crate::accel::TriangleSoup;
-use crate::accel::bounds::Bounds;
+use crate::accel::polygon::Polygon;
 use crate::accel::triangle::TriangleRecord;
-use glam::DVec3;
 use rayon::prelude::*;
 
 /// Triangles whose overlap one task sums up: a constant, so that the sum does not depend on the
@@ -32,28 +31,20 @@ impl Tree {
     /// Figures of the tree; `bytes` is left 0. SAH with both constants 1: sum over
     /// inner nodes of A(node) / A(root) plus sum over leaves of A(leaf) · triangles / A(root).
     pub fn stats(&self) -> StructureStats {
-        let mut stats = StructureStats {
-            nodes: self.nodes.len() as u64,
-            references: self.order.len() as u64,
-            ..Default::default()
-        };
-        let Some(root) = self.nodes.first() else {
-            return stats;
-        };
         let leaves = self.nodes.iter().filter_map(|node| match node.kind {
             NodeKind::Inner { .. } => None,
             NodeKind::Leaf { count, .. } => Some(count as usize),
         });
-        stats.leaf_histogram = crate::accel::leaf_histogram(leaves);
-        let mut cost = 0.0_f64;
-        for node in &self.nodes {
-            stats.leaves += u64::from(matches!(node.kind, NodeKind::Leaf { .. }));
-            cost += f64::from(node.bounds.half_area()) * weight(node.kind);
+        let mut stats = StructureStats::of_leaves(leaves);
+        if let Some(root) = self.nodes.first() {
+            let cost = |node: &TreeNode| f64::from(node.bounds.half_area()) * weight(node.kind);
+            let cost = self.nodes.iter().fold(0.0, |sum, node| sum + cost(node));
+            let root_area = f64::from(root.bounds.half_area());
+            stats.nodes = self.nodes.len() as u64;
+            stats.sah_cost = (root_area > 0.0).then(|| cost / root_area);
+            stats.depth = Some(self.depth());
+            stats.epo = self.epo;
         }
-        let root_area = f64::from(root.bounds.half_area());
-        stats.sah_cost = (root_area > 0.0).then(|| cost / root_area);
-        stats.depth = Some(self.depth());
-        stats.epo = self.epo;
         stats
     }
 
@@ -179,7 +170,7 @@ impl OverlapWalk<'_> {
     fn overlap(&mut self, node: u32, end: u32, polygon: &Polygon) -> f64 {
         self.visits += 1;
         let TreeNode { bounds, kind } = self.tree.nodes[node as usize];
-        let inside = polygon.clipped(&bounds);
+        let inside = polygon.clipped(&bounds, 0.0);
         let area = inside.area();
         if area <= 0.0 {
             return 0.0;
@@ -196,127 +187,17 @@ impl OverlapWalk<'_> {
     }
 }
 
-/// A convex polygon: a triangle cut by up to six planes has at most nine corners.
-#[derive(Clone, Copy)]
-struct Polygon {
-    corners: [DVec3; 9],
-    count: usize,
-}
-
-impl Polygon {
-    fn new(triangle: &TriangleRecord) -> Self {
-        let mut corners = [DVec3::ZERO; 9];
-        for (corner, vertex) in corners.iter_mut().zip(triangle.triangle().vertices) {
-            *corner = vertex.as_dvec3();
-        }
-        Self { corners, count: 3 }
-    }
-
-    fn area(&self) -> f64 {
-        let [origin, rest @ ..] = &self.corners[..self.count] else {
-            return 0.0;
-        };
-        let fan = rest.windows(2);
-        let sum: DVec3 = fan.map(|p| (p[0] - origin).cross(p[1] - origin)).sum();
-        0.5 * sum.length()
-    }
-
-    /// The part inside a box (Sutherland & Hodgman 1974).
-    fn clipped(&self, bounds: &Bounds) -> Polygon {
-        let mut polygon = *self;
-        for axis in 0..3 {
-            let (low, high) = (f64::from(bounds.min[axis]), f64::from(bounds.max[axis]));
-            let corners = &polygon.corners[..polygon.count];
-            let outside = |inside: fn(f64, f64) -> bool, border: f64| {
-                corners.iter().any(|c| !inside(c[axis], border))
-            };
-            let (below, above) = (outside(|x, b| x >= b, low), outside(|x, b| x <= b, high));
-            if below {
-                polygon = polygon.cut(axis, low, 1.0);
-            }
-            if above {
-                polygon = polygon.cut(axis, high, -1.0);
-            }
-        }
-        polygon
-    }
-
-    /// The part where `sign · (x − border)` is not negative.
-    fn cut(&self, axis: usize, border: f64, sign: f64) -> Polygon {
-        let mut out = Polygon {
-            corners: [DVec3::ZERO; 9],
-            count: 0,
-        };
-        let mut push = |corner| {
-            // Rounding may make a sliver cross a plane once more than geometry allows.
-            if let Some(place) = out.corners.get_mut(out.count) {
-                *place = corner;
-                out.count += 1;
-            }
-        };
-        for index in 0..self.count {
-            let (a, b) = (self.corners[index], self.corners[(index + 1) % self.count]);
-            let (from, to) = (sign * (a[axis] - border), sign * (b[axis] - border));
-            if from >= 0.0 {
-                push(a);
-            }
-            if (from < 0.0) != (to < 0.0) {
-                let mut crossing = a + (b - a) * (from / (from - to));
-                crossing[axis] = border;
-                push(crossing);
-            }
-        }
-        out
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::tree::TreeNode;
-    use crate::geometry::Triangle;
-    use glam::Vec3;
-
-    fn record(id: u32, vertices: [[f32; 3]; 3]) -> TriangleRecord {
-        let vertices = vertices.map(Vec3::from);
-        TriangleRecord::new(&Triangle { vertices }, id, 0)
-    }
-
-    fn unit_box() -> Bounds {
-        Bounds {
-            min: [0.0; 3],
-            max: [1.0; 3],
-        }
-    }
-
-    #[test]
-    fn a_clipped_triangle_has_the_area_that_geometry_gives() {
-        let area = |vertices| {
-            Polygon::new(&record(0, vertices))
-                .clipped(&unit_box())
-                .area()
-        };
-        let inside = [[0.0, 0.0, 0.5], [1.0, 0.0, 0.5], [0.0, 1.0, 0.5]];
-        assert_eq!(area(inside), 0.5);
-        // Twice the size: the corner square of side 1.
-        let larger = [[0.0, 0.0, 0.5], [2.0, 0.0, 0.5], [0.0, 2.0, 0.5]];
-        assert_eq!(area(larger), 1.0);
-        // The plane x + y + z = 3/2 cuts a cube in a regular hexagon of side √½.
-        let third = [[-9.0, 5.25, 5.25], [5.25, -9.0, 5.25], [5.25, 5.25, -9.0]];
-        let hexagon = 1.5 * 3.0_f64.sqrt() * 0.5;
-        assert!((area(third) - hexagon).abs() < 1e-12, "{}", area(third));
-        assert_eq!(area(inside.map(|[x, y, z]| [x + 3.0, y, z])), 0.0);
-    }
+    use crate::accel::fixtures::soup;
 
     /// Two leaves, the second of them a box whose lower half the first triangle reaches into.
     fn two_leaves() -> (Tree, TriangleSoup) {
-        let soup = TriangleSoup {
-            records: vec![
-                record(0, [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]]),
-                record(1, [[0.0, 0.0, 0.0], [1.0, 0.0, 3.0], [1.0, 1.0, 3.0]]),
-            ],
-            ..Default::default()
-        };
+        let soup = soup([
+            [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]],
+            [[0.0, 0.0, 0.0], [1.0, 0.0, 3.0], [1.0, 1.0, 3.0]],
+        ]);
         let [a, b] = [0, 1].map(|i| soup.records[i].bounds());
         let leaf = |first| NodeKind::Leaf { first, count: 1 };
         let inner = NodeKind::Inner { left: 1, right: 2 };

@@ -9,51 +9,44 @@
 //!
 //! Source: M. Stich, H. Friedrich, A. Dietrich, "Spatial splits in bounding volume hierarchies", 2009.
 
+use super::Tree;
 use super::binned::{best_bin_split, median_split};
+use super::grow::grow;
 use super::parameters::{SAH_DEPTH, TreeParameters};
 use super::reference::{Box3, Reference, bounds_of};
-use super::subtree::{PARALLEL_GRAIN, Subtree};
+use crate::accel::bounds::Bounds;
 
-/// The tree, with the order of the leaves. There are at most twice as many references as triangles.
-pub(super) fn build(references: Vec<Reference>, settings: &TreeParameters) -> (Subtree, Vec<u32>) {
-    let bounds = bounds_of(&references);
+/// The tree. There are at most twice as many references as triangles.
+pub(super) fn build(references: Vec<Reference>, settings: &TreeParameters) -> Tree {
+    let budget = references.len();
+    let side = Side::of(references);
     let spatial = Spatial {
         settings,
-        least_overlap: settings.spatial_alpha * bounds.half_area(),
+        least_overlap: settings.spatial_alpha * side.bounds.half_area(),
     };
-    let budget = references.len();
-    let grown = spatial.grow(references, bounds, budget, 0);
-    let mut order = Vec::new();
-    (grown.subtree(&mut order), order)
+    // A side may make so many new references.
+    let divide = |(side, budget): (Side, usize), depth, order: &mut Vec<u32>| {
+        let Side { references, bounds } = &side;
+        let (node, count) = (Bounds::from(*bounds), references.len());
+        let areas = references.iter().map(|r| r.bounds().half_area());
+        if settings.must_be_leaf(*bounds, areas) {
+            order.extend(references.iter().map(|r| r.id));
+            return (node, None);
+        }
+        let [low, high] = spatial.split(side, budget, depth);
+        let sum = low.references.len() + high.references.len();
+        let left = budget - (sum - count);
+        // Each side gets its share of what is left.
+        let low_budget = (left as u64 * low.references.len() as u64 / sum as u64) as usize;
+        (node, Some([(low, low_budget), (high, left - low_budget)]))
+    };
+    grow((side, budget), |part| part.0.references.len(), divide).into()
 }
 
 struct Spatial<'a> {
     settings: &'a TreeParameters,
     /// Half area of overlap from which on spatial splits are tried.
     least_overlap: f32,
-}
-
-/// A subtree with the references of its leaves.
-enum Grown {
-    Leaf(Box3, Vec<u32>),
-    Inner(Box3, Box<(Grown, Grown)>),
-}
-
-impl Grown {
-    fn subtree(self, order: &mut Vec<u32>) -> Subtree {
-        match self {
-            Grown::Leaf(bounds, ids) => {
-                let first = order.len() as u32;
-                order.extend_from_slice(&ids);
-                Subtree::leaf(bounds, first, ids.len())
-            }
-            Grown::Inner(bounds, children) => {
-                let (low, high) = *children;
-                let low = low.subtree(order);
-                Subtree::inner(bounds, low, high.subtree(order))
-            }
-        }
-    }
 }
 
 /// References of one side of a split.
@@ -70,35 +63,11 @@ impl Side {
 }
 
 impl Spatial<'_> {
-    /// The subtree over `references`, with at most `budget` new ones.
-    fn grow(&self, references: Vec<Reference>, bounds: Box3, budget: usize, depth: u32) -> Grown {
-        let count = references.len();
-        let areas = references.iter().map(|r| r.bounds().half_area());
-        if self.settings.must_be_leaf(bounds, areas) {
-            return Grown::Leaf(bounds, references.iter().map(|r| r.id).collect());
-        }
-        let [low, high] = self.split(references, bounds, budget, depth);
-        let sum = low.references.len() + high.references.len();
-        let left = budget - (sum - count);
-        // Each side gets its share of what is left.
-        let low_budget = (left as u64 * low.references.len() as u64 / sum as u64) as usize;
-        let grow_low = || self.grow(low.references, low.bounds, low_budget, depth + 1);
-        let grow_high = || self.grow(high.references, high.bounds, left - low_budget, depth + 1);
-        let children = if count <= PARALLEL_GRAIN {
-            (grow_low(), grow_high())
-        } else {
-            rayon::join(grow_low, grow_high)
-        };
-        Grown::Inner(bounds, Box::new(children))
-    }
-
-    fn split(
-        &self,
-        mut references: Vec<Reference>,
-        bounds: Box3,
-        budget: usize,
-        depth: u32,
-    ) -> [Side; 2] {
+    fn split(&self, side: Side, budget: usize, depth: u32) -> [Side; 2] {
+        let Side {
+            mut references,
+            bounds,
+        } = side;
         let deep = depth >= SAH_DEPTH;
         let object = (!deep)
             .then(|| best_bin_split(&references, bounds, self.settings.bins))

@@ -13,10 +13,11 @@
 //! order. Sources: I. Wald, V. Havran, "On building fast kd-trees for ray tracing, and on doing that
 //! in O(N log N)", 2006; the longest axis alone: A. Dufay, 2017, chapter 4.
 
-use super::TreeNode;
+use super::Tree;
+use super::grow::grow;
 use super::parameters::{SAH_DEPTH, TreeParameters};
 use super::reference::{Box3, Reference};
-use super::subtree::{PARALLEL_GRAIN, Subtree, leaf, make_inner};
+use crate::accel::bounds::Bounds;
 use rayon::prelude::*;
 
 /// Which axes are tried.
@@ -26,12 +27,8 @@ pub(super) enum Axes {
     Longest,
 }
 
-/// The tree, with the order of the leaves in place of the references.
-pub(super) fn build(
-    references: &[Reference],
-    axes: Axes,
-    settings: &TreeParameters,
-) -> (Subtree, Vec<u32>) {
+/// The tree over `references`.
+pub(super) fn build(references: &[Reference], axes: Axes, settings: &TreeParameters) -> Tree {
     let mut lists = [0, 1, 2].map(|axis| {
         let mut list: Vec<u32> = (0..references.len() as u32).collect();
         list.par_sort_unstable_by(|&a, &b| {
@@ -39,19 +36,32 @@ pub(super) fn build(
         });
         list
     });
-    let mut scratch = vec![0; references.len()];
     let sweep = Sweep {
         references,
         axes,
         settings,
     };
-    let [x, y, z] = &mut lists;
-    let subtree = sweep.grow([x, y, z], &mut scratch, 0, 0);
-    let order = lists[0]
-        .iter()
-        .map(|&place| references[place as usize].id)
-        .collect();
-    (subtree, order)
+    let (mut scratch, mut areas) = (vec![0; references.len()], vec![0.0; references.len()]);
+    // The sorted lists of a node: the same references along x, y and z. Beside them memory of their length.
+    let lists = lists.each_mut().map(|list| &mut list[..]);
+    let whole = (lists, &mut scratch[..], &mut areas[..]);
+    let tree = grow(
+        whole,
+        |part| part.0[0].len(),
+        |(lists, scratch, areas), depth, order| {
+            let bounds = sweep.bounds_of(lists[0]);
+            let Some(split) = sweep.split(&lists, bounds, areas, depth) else {
+                order.extend(lists[0].iter().map(|&place| sweep.reference(place).id));
+                return (Bounds::from(bounds), None);
+            };
+            let (low, high) = sweep.divide(lists, scratch, split);
+            let scratch = scratch.split_at_mut(low[0].len());
+            let areas = areas.split_at_mut(low[0].len());
+            let halves = [(low, scratch.0, areas.0), (high, scratch.1, areas.1)];
+            (Bounds::from(bounds), Some(halves))
+        },
+    );
+    tree.into()
 }
 
 struct Sweep<'a> {
@@ -64,56 +74,6 @@ struct Sweep<'a> {
 type Lists<'a> = [&'a mut [u32]; 3];
 
 impl Sweep<'_> {
-    /// The subtree over the references of `lists`, which begin at `first` in the whole order.
-    fn grow(&self, lists: Lists, scratch: &mut [u32], first: u32, depth: u32) -> Subtree {
-        let bounds = self.bounds_of(lists[0]);
-        if lists[0].len() <= PARALLEL_GRAIN {
-            let mut nodes = Vec::with_capacity(lists[0].len());
-            let mut areas = vec![0.0; lists[0].len()];
-            self.append(lists, scratch, first, depth, &mut areas, &mut nodes);
-            return Subtree::Whole(nodes);
-        }
-        let count = lists[0].len();
-        let mut areas = vec![0.0; count];
-        let Some(split) = self.split(&lists, bounds, &mut areas, depth) else {
-            return Subtree::leaf(bounds, first, count);
-        };
-        drop(areas);
-        let (low, high) = self.divide(lists, scratch, split);
-        let middle = low[0].len();
-        let (low_scratch, high_scratch) = scratch.split_at_mut(middle);
-        let (low, high) = rayon::join(
-            || self.grow(low, low_scratch, first, depth + 1),
-            || self.grow(high, high_scratch, first + middle as u32, depth + 1),
-        );
-        Subtree::inner(bounds, low, high)
-    }
-
-    /// The same on one thread, straight into `nodes`. `areas` is scratch.
-    fn append(
-        &self,
-        lists: Lists,
-        scratch: &mut [u32],
-        first: u32,
-        depth: u32,
-        areas: &mut [f32],
-        nodes: &mut Vec<TreeNode>,
-    ) {
-        let bounds = self.bounds_of(lists[0]);
-        let here = nodes.len();
-        nodes.push(leaf(bounds, first, lists[0].len()));
-        let Some(split) = self.split(&lists, bounds, areas, depth) else {
-            return;
-        };
-        let (low, high) = self.divide(lists, scratch, split);
-        let middle = low[0].len();
-        let (low_scratch, high_scratch) = scratch.split_at_mut(middle);
-        self.append(low, low_scratch, first, depth + 1, areas, nodes);
-        make_inner(nodes, here);
-        let second = first + middle as u32;
-        self.append(high, high_scratch, second, depth + 1, areas, nodes);
-    }
-
     fn reference(&self, place: u32) -> &Reference {
         &self.references[place as usize]
     }

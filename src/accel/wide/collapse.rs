@@ -5,9 +5,9 @@
 //! compressed wide BVHs", HPG 2017, section 3.2.
 
 use crate::accel::bounds::Bounds;
-use crate::accel::tree::{NodeKind, Tree, TreeParameters};
+use crate::accel::tree::{NodeKind, Tree, TreeParameters, distinct};
 use crate::accel::triangle::TriangleRecord;
-use crate::accel::{StructureStats, TriangleSoup, leaf_histogram};
+use crate::accel::{StructureStats, TriangleSoup};
 
 /// Most children of a node here; the cost table of a node has one entry less.
 const MAX_WIDTH: usize = 8;
@@ -60,47 +60,14 @@ pub struct WideTree {
     pub depth: u32,
 }
 
-/// What the collapse is to achieve.
-#[derive(Debug, Clone, Copy)]
-pub struct CollapseSettings {
-    /// Most children of a node, 2 to 8.
-    pub width: usize,
-    /// Most triangles in a leaf.
-    pub leaf_size: u32,
-    /// SAH cost of visiting a node.
-    pub traversal_cost: f32,
-    /// SAH cost of testing a triangle.
-    pub intersection_cost: f32,
-}
-
-impl CollapseSettings {
-    /// Settings from the parameters of the binary tree.
-    pub fn new(width: usize, parameters: &TreeParameters) -> Self {
-        Self {
-            width,
-            leaf_size: parameters.leaf_size as u32,
-            traversal_cost: parameters.traversal_cost,
-            intersection_cost: parameters.intersection_cost,
-        }
-    }
-}
-
 impl WideTree {
     /// Figures of the tree; `bytes` is left 0. SAH with both constants 1, as for binary trees.
     pub fn stats(&self) -> StructureStats {
         let children = || self.nodes.iter().flatten().filter(|c| !c.is_nothing());
-        let mut stats = StructureStats {
-            nodes: self.nodes.len() as u64,
-            references: self.order.len() as u64,
-            depth: Some(self.depth),
-            ..Default::default()
-        };
         let leaves = children().filter_map(|child| match child.kind {
             WideKind::Node(_) => None,
             WideKind::Leaf { count, .. } => Some(count as usize),
         });
-        stats.leaf_histogram = leaf_histogram(leaves);
-        stats.leaves = stats.leaf_histogram.iter().sum();
         let weighted = children().map(|child| {
             let weight = match child.kind {
                 WideKind::Node(_) => 1,
@@ -112,8 +79,12 @@ impl WideTree {
             .iter()
             .fold(Bounds::EMPTY, |b, child| b.union(&child.bounds));
         let root_area = f64::from(root.half_area());
-        stats.sah_cost = (root_area > 0.0).then(|| 1.0 + weighted.sum::<f64>() / root_area);
-        stats
+        StructureStats {
+            nodes: self.nodes.len() as u64,
+            depth: Some(self.depth),
+            sah_cost: (root_area > 0.0).then(|| 1.0 + weighted.sum::<f64>() / root_area),
+            ..StructureStats::of_leaves(leaves)
+        }
     }
 
     /// The triangles in the order of the leaves.
@@ -124,11 +95,13 @@ impl WideTree {
             .collect()
     }
 
-    /// Collapses `tree`, whose leaves must hold at most `leaf_size` triangles. `arrange` may permute
+    /// Collapses `tree`, whose leaves must hold at most `leaf_size` triangles, to nodes of 2 to 8 children.
+    /// `arrange` may permute
     /// the children of a node (given its box) before they get their places.
     pub fn collapse(
         tree: &Tree,
-        settings: &CollapseSettings,
+        width: usize,
+        settings: &TreeParameters,
         mut arrange: impl FnMut(&Bounds, &mut Vec<WideChild>),
     ) -> WideTree {
         let mut out = WideTree {
@@ -139,12 +112,13 @@ impl WideTree {
         if tree.nodes.is_empty() {
             return out;
         }
-        let costs = Costs::new(tree, settings);
+        let costs = Costs::new(tree, width, settings);
         // Wide nodes whose children are still to be found, as (place, binary node, depth).
         let mut open = vec![(0_u32, 0_u32, 1_u32)];
+        let mut listed = Vec::new();
         while let Some((place, binary, depth)) = open.pop() {
             out.depth = out.depth.max(depth);
-            let mut roots = Vec::with_capacity(settings.width);
+            let mut roots = Vec::with_capacity(width);
             costs.children(binary, &mut roots);
             let mut children: Vec<WideChild> = roots
                 .iter()
@@ -166,8 +140,11 @@ impl WideTree {
                     WideKind::Leaf { count: 0, .. } => continue,
                     WideKind::Leaf { first: root, .. } => {
                         let first = out.order.len() as u32;
-                        append_triangles(tree, root, &mut out.order);
-                        let count = distinct_from(&mut out.order, first as usize);
+                        listed.clear();
+                        append_triangles(tree, root, &mut listed);
+                        // Spatial splits may list a triangle twice.
+                        out.order.extend(distinct(&listed));
+                        let count = out.order.len() as u32 - first;
                         WideKind::Leaf { first, count }
                     }
                 };
@@ -193,33 +170,22 @@ fn append_triangles(tree: &Tree, root: u32, order: &mut Vec<u32>) {
     }
 }
 
-/// Drops what spatial splits listed twice from the entries after `first`; returns how many are left.
-fn distinct_from(order: &mut Vec<u32>, first: usize) -> u32 {
-    let mut kept = first;
-    for place in first..order.len() {
-        if !order[first..kept].contains(&order[place]) {
-            order[kept] = order[place];
-            kept += 1;
-        }
-    }
-    order.truncate(kept);
-    (kept - first) as u32
-}
-
 /// Least costs of representing the subtree of each binary node by 1, 2, … `width` − 1 children of a
 /// wide node (C(n, i) of the paper), and how many triangles it holds.
 struct Costs<'a> {
     tree: &'a Tree,
-    settings: CollapseSettings,
+    width: usize,
+    settings: &'a TreeParameters,
     cost: Vec<[f32; MAX_WIDTH - 1]>,
     triangles: Vec<u32>,
 }
 
 impl<'a> Costs<'a> {
-    fn new(tree: &'a Tree, settings: &CollapseSettings) -> Self {
+    fn new(tree: &'a Tree, width: usize, settings: &'a TreeParameters) -> Self {
         let mut costs = Self {
             tree,
-            settings: *settings,
+            width,
+            settings,
             cost: vec![[f32::INFINITY; MAX_WIDTH - 1]; tree.nodes.len()],
             triangles: vec![0; tree.nodes.len()],
         };
@@ -240,9 +206,8 @@ impl<'a> Costs<'a> {
             NodeKind::Inner { left, right } => (left as usize, right as usize),
         };
         self.triangles[node] = self.triangles[left].saturating_add(self.triangles[right]);
-        let width = self.settings.width;
         let mut least = self.leaf_cost(node).min(self.inner_cost(node, left, right));
-        for children in 1..width {
+        for children in 1..self.width {
             if children > 1 {
                 least = least.min(self.shared(left, right, children).0);
             }
@@ -252,7 +217,7 @@ impl<'a> Costs<'a> {
 
     fn leaf_cost(&self, node: usize) -> f32 {
         let count = self.triangles[node];
-        if count > self.settings.leaf_size {
+        if count as usize > self.settings.leaf_size {
             return f32::INFINITY;
         }
         self.tree.nodes[node].bounds.half_area() * count as f32 * self.settings.intersection_cost
@@ -260,7 +225,7 @@ impl<'a> Costs<'a> {
 
     fn inner_cost(&self, node: usize, left: usize, right: usize) -> f32 {
         let area = self.tree.nodes[node].bounds.half_area();
-        area * self.settings.traversal_cost + self.shared(left, right, self.settings.width).0
+        area * self.settings.traversal_cost + self.shared(left, right, self.width).0
     }
 
     /// Least cost of two subtrees with `children` children in all, and how many the left one gets.
@@ -294,7 +259,7 @@ impl<'a> Costs<'a> {
     /// Binary roots of the children of the wide node at `node`.
     fn children(&self, node: u32, out: &mut Vec<u32>) {
         match self.tree.nodes[node as usize].kind {
-            NodeKind::Inner { left, right } => self.split(left, right, self.settings.width, out),
+            NodeKind::Inner { left, right } => self.split(left, right, self.width, out),
             NodeKind::Leaf { .. } => out.push(node),
         }
     }
@@ -362,12 +327,11 @@ mod tests {
         tree
     }
 
-    fn settings(width: usize) -> CollapseSettings {
-        CollapseSettings {
-            width,
+    fn settings() -> TreeParameters {
+        TreeParameters {
             leaf_size: 3,
-            traversal_cost: 1.0,
             intersection_cost: 0.6,
+            ..TreeParameters::default()
         }
     }
 
@@ -417,7 +381,7 @@ mod tests {
             let tree = random_tree(4 + random.below(5) as u32, &mut random);
             let triangles: Vec<u32> = (0..tree.nodes.len()).map(|n| below(&tree, n)).collect();
             for width in [2, 3, 4] {
-                let wide = WideTree::collapse(&tree, &settings(width), |_, _| ());
+                let wide = WideTree::collapse(&tree, width, &settings(), |_, _| ());
                 let found = cost_of(&wide, 0, &tree.nodes[0].bounds);
                 let least = least_cost(&tree, 0, &|n| triangles[n], width);
                 assert!(
@@ -435,12 +399,5 @@ mod tests {
                 below(tree, left as usize) + below(tree, right as usize)
             }
         }
-    }
-
-    #[test]
-    fn triangles_that_spatial_splits_listed_twice_stand_in_a_leaf_once() {
-        let mut order = vec![7, 7, 1, 2, 1];
-        assert_eq!(distinct_from(&mut order, 2), 2);
-        assert_eq!(order, [7, 7, 1, 2]);
     }
 }

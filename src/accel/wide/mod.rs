@@ -7,22 +7,21 @@ mod quantise;
 pub use collapse::{WideChild, WideKind};
 pub use quantise::{Quantisation, enter_four, frame, leave_four};
 
-use super::bounds::Bounds;
-use super::ray::Hit;
+use super::structure::prelude::*;
 use super::tree::{Coverage, NodeKind, Tree, TreeParameters};
 use super::triangle::TriangleRecord;
-use super::twin::{CpuTwin, Query, Traverse, Twin};
-use super::{
-    AccelError, BuildLog, BuiltAccel, GpuBuffers, NamedWords, StructureStats, TriangleSoup,
-};
-use crate::parameters;
 use bytemuck::Pod;
-use collapse::{CollapseSettings, WideTree};
+use collapse::WideTree;
 use std::ops::Range;
 
+/// Most triangles that a slot of either structure can count, in bits or in unary.
+const MAX_LEAF: usize = 3;
+
 parameters! {
-    /// Where kernels read a wide structure from.
-    pub struct Memory {
+    /// The tree, and where kernels read a wide structure from.
+    pub struct WideParameters {
+        /// The binary tree that is collapsed.
+        tree: TreeParameters { leaf_size = MAX_LEAF, in 1..=MAX_LEAF; };
         /// read nodes and triangles as texels of textures instead of from buffers
         texels: bool = true;
     }
@@ -64,7 +63,7 @@ pub trait WideNode: Pod + Send + Sync {
     /// Node and triangles in a slot; at most one of them, if the structure is valid.
     fn content(&self, slot: usize) -> (Option<usize>, Option<Range<usize>>);
     /// Twin of the kernel's `trace`.
-    fn trace(built: &Wide<Self>, query: Query) -> Hit;
+    fn trace(built: &Wide<Self>, walk: Walk) -> Hit;
 }
 
 /// A built wide structure.
@@ -84,17 +83,15 @@ impl<N: WideNode> Wide<N> {
     /// The tree cannot be built, or there are more nodes than an index can name.
     pub fn build(
         soup: &TriangleSoup,
-        parameters: &TreeParameters,
-        memory: &Memory,
+        parameters: &WideParameters,
         log: &mut BuildLog,
-    ) -> Result<Box<dyn BuiltAccel>, AccelError>
+    ) -> BuildResult
     where
         N: 'static,
     {
-        let tree = wide_tree(soup, parameters, log)?;
-        let settings = CollapseSettings::new(N::WIDTH, parameters);
+        let tree = wide_tree(soup, &parameters.tree, log)?;
         let wide = log.phase("collapse", || {
-            WideTree::collapse(&tree, &settings, N::arrange)
+            WideTree::collapse(&tree, N::WIDTH, &parameters.tree, N::arrange)
         });
         let what = format!("nodes of a {}", N::STRUCTURE);
         AccelError::check_limit(what, wide.nodes.len() as u64, N::MOST_NODES)?;
@@ -109,7 +106,7 @@ impl<N: WideNode> Wide<N> {
                 },
                 nodes,
                 leaf_triangles,
-                texels: memory.texels,
+                texels: parameters.texels,
             }
         })))
     }
@@ -122,29 +119,22 @@ impl<N: WideNode> Wide<N> {
 
 impl<N: WideNode> BuiltAccel for Wide<N> {
     fn validate(&self, soup: &TriangleSoup) -> Result<(), AccelError> {
-        let invalid = |index, what: &str| Err(AccelError::Invalid(format!("node {index}: {what}")));
-        let mut coverage = Coverage::new(soup, self.nodes.len());
-        let mut open = vec![(0, Bounds::EVERYTHING, 1)];
-        while let Some((index, around, depth)) = open.pop() {
-            coverage.node(index)?;
-            if depth > self.depth() {
-                return invalid(index, &format!("deeper than the stack of {}", self.depth()));
-            }
+        let coverage = Coverage::new(soup, self.nodes.len());
+        coverage.descend(self.depth(), |coverage, index, around, below| {
             let node = &self.nodes[index];
             for slot in 0..N::WIDTH {
                 // What is below must lie in every decoded box on the way.
                 let bounds = around.intersection(&node.bounds(slot));
-                match node.content(slot) {
-                    (Some(_), Some(_)) => {
-                        return invalid(index, &format!("slot {slot} is a leaf and a node"));
-                    }
-                    (Some(child), None) => open.push((child, bounds, depth + 1)),
-                    (None, Some(leaf)) => coverage.leaf(self.leaf_triangles.get(leaf), &bounds)?,
-                    (None, None) => {}
+                let (child, leaf) = node.content(slot);
+                let is_one = child.is_none() || leaf.is_none();
+                ensure!(is_one, "slot {slot} is a leaf and a node");
+                below.extend(child.map(|child| (child, bounds)));
+                if let Some(leaf) = leaf {
+                    coverage.leaf(self.leaf_triangles.get(leaf), &bounds)?;
                 }
             }
-        }
-        coverage.is_complete()
+            Ok(())
+        })
     }
 
     fn buffers(&self) -> GpuBuffers<'_> {
@@ -159,7 +149,7 @@ impl<N: WideNode> BuiltAccel for Wide<N> {
                 NamedWords::new("nodes", &self.nodes),
                 NamedWords::new("leaf_triangles", &self.leaf_triangles),
             ],
-            uniforms: vec![super::limits(self.nodes.len(), self.nodes.len())],
+            uniforms: vec![limits(self.nodes.len(), self.nodes.len())],
             // A multiple of 8, so that scenes of like depth share a kernel, and one to spare.
             constants: vec![("STACK_ENTRIES", (self.depth() + 1).next_multiple_of(8))],
         }
@@ -175,7 +165,7 @@ impl<N: WideNode> BuiltAccel for Wide<N> {
 }
 
 impl<N: WideNode> Traverse for Wide<N> {
-    fn trace(&self, _: &TriangleSoup, query: Query) -> Hit {
-        N::trace(self, query)
+    fn trace(&self, _: &TriangleSoup, walk: Walk) -> Hit {
+        N::trace(self, walk)
     }
 }

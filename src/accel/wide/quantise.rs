@@ -322,8 +322,9 @@ mod tests {
             let grid = Quantisation::new(&whole);
             let planes = grid.around(&inner);
             let mut vector = || std::array::from_fn(|_| number(&mut random));
-            let ray = Ray::new(vector(), vector());
-            let inverse = Intersection::default().inverse(ray.direction);
+            let tests = Intersection::default();
+            let ray = tests.raised(&Ray::new(vector(), vector()));
+            let inverse = tests.inverse(ray.direction);
             let mut frame = frame(grid.low, grid.exponent_word(0), ray.origin, inverse);
             for (axis, inverse) in inverse.iter().enumerate() {
                 let base = (grid.low[axis] - ray.origin[axis]) * inverse;

@@ -61,7 +61,7 @@ pub struct ErrorRecord {
     pub error_map: Option<String>,
 }
 
-/// Bias check of one sampler: Welch's t of the replicates against the reference, for the whole image and
+/// Bias check of one sampler: a t-test of the replicates against the reference, for the whole image and
 /// per tile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BiasRecord {
@@ -77,7 +77,7 @@ pub struct BiasRecord {
     /// Histogram of the p-values in ten equal bins: flat when there is no bias.
     pub p_histogram: Vec<usize>,
     /// Difference of the mean luminance of all replicates from the reference's beyond what rounding
-    /// explains, in standard errors (Welch's t); absent where it is not testable or has no spread.
+    /// explains, in standard errors; absent where it is not testable or has no spread.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub z: Option<f64>,
     /// p-value of `z`.

@@ -4,13 +4,6 @@ use super::drawing::{Anchor, DIM, Drawing, FONT_PX, GRID, INK, Point};
 use super::paint::text_width;
 use crate::report::format;
 
-/// How values map to a length.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Scale {
-    Linear,
-    Log,
-}
-
 /// A tick: a gridline, with a label unless that is empty.
 #[derive(Debug, Clone, PartialEq)]
 struct Tick {
@@ -21,7 +14,7 @@ struct Tick {
 /// One axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    scale: Scale,
+    is_log: bool,
     min: f64,
     max: f64,
     ticks: Vec<Tick>,
@@ -34,22 +27,28 @@ impl Axis {
         let max = if max > 0.0 { max } else { 1.0 };
         let rough = max / 6.0;
         let power = 10f64.powf(rough.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0]
-            .iter()
-            .map(|m| m * power)
-            .find(|s| *s >= rough)
-            .unwrap_or(rough);
+        let steps = [1.0, 2.0, 5.0, 10.0].map(|m| m * power);
+        let step = steps.into_iter().find(|s| *s >= rough).unwrap_or(rough);
         let decimals = (-step.log10().floor()).max(0.0) as usize;
-        let ticks = (0..=(max / step).ceil() as usize)
-            .map(|i| Tick {
-                value: i as f64 * step,
-                label: format!("{:.decimals$}", i as f64 * step),
-            })
-            .filter(|tick| tick.value <= max * 1.001)
-            .collect();
+        let values = (0..=(max / step).ceil() as usize).map(|i| i as f64 * step);
+        let shown = values.filter(|value| *value <= max * 1.001);
+        let tick = |value| Tick {
+            value,
+            label: format!("{value:.decimals$}"),
+        };
         Self {
-            scale: Scale::Linear,
+            is_log: false,
             min: 0.0,
+            max,
+            ticks: shown.map(tick).collect(),
+            title: title.into(),
+        }
+    }
+
+    fn logarithmic([min, max]: [f64; 2], ticks: Vec<Tick>, title: &str) -> Self {
+        Self {
+            is_log: true,
+            min,
             max,
             ticks,
             title: title.into(),
@@ -62,22 +61,14 @@ impl Axis {
         let (low, high) = positive_range(values)?;
         let (first, last) = (low.log2().floor() as i32, high.log2().ceil() as i32);
         let stride = ((last - first) / 9 + 1) as usize;
-        let ticks = (first..=last)
-            .step_by(stride)
-            .map(|e| 2f64.powi(e))
-            .map(|value| Tick {
-                value,
-                label: plain(value),
-            })
-            .collect();
-        let (min, max) = (low / 1.12, high * 1.12);
-        Some(Self {
-            scale: Scale::Log,
-            min,
-            max,
-            ticks,
-            title: title.into(),
-        })
+        let tick = |exponent| {
+            let value = 2f64.powi(exponent);
+            let label = plain(value);
+            Tick { value, label }
+        };
+        let ticks = (first..=last).step_by(stride).map(tick).collect();
+        let range = [low / 1.12, high * 1.12];
+        Some(Self::logarithmic(range, ticks, title))
     }
 
     /// Logarithmic over the values, ticks at powers of ten, with 2 and 5 between them where there is
@@ -85,17 +76,14 @@ impl Axis {
     pub fn log10(values: impl Iterator<Item = f64>, title: &str) -> Option<Self> {
         let (low, high) = positive_range(values)?;
         // Some air, and at least a factor of three so that there are ticks.
-        let air = ((high / low).powf(0.05))
-            .max(1.1)
-            .max((3.0 * low / high).sqrt());
+        let air = (high / low).powf(0.05).max(1.1);
+        let air = air.max((3.0 * low / high).sqrt());
         let (min, max) = (low / air, high * air);
         let decades = (max / min).log10();
-        let labelled: &[u32] = if decades < 1.2 {
-            &[1, 2, 3, 4, 5, 6, 8]
-        } else if decades < 3.0 {
-            &[1, 2, 5]
-        } else {
-            &[1]
+        let labelled: &[u32] = match decades {
+            _ if decades < 1.2 => &[1, 2, 3, 4, 5, 6, 8],
+            _ if decades < 3.0 => &[1, 2, 5],
+            _ => &[1],
         };
         let mut ticks = Vec::new();
         let stride = (decades / 8.0).ceil().max(1.0) as i32;
@@ -103,23 +91,14 @@ impl Axis {
             for mantissa in 1..10 {
                 let value = f64::from(mantissa) * 10f64.powi(exponent);
                 let shown = labelled.contains(&mantissa) && exponent.rem_euclid(stride) == 0;
-                let label = if shown {
-                    decimal_or_power(mantissa, exponent)
-                } else {
-                    String::new()
-                };
+                let label = shown.then(|| decimal_or_power(mantissa, exponent));
                 if (min..=max).contains(&value) && (shown || decades < 4.0) {
+                    let label = label.unwrap_or_default();
                     ticks.push(Tick { value, label });
                 }
             }
         }
-        Some(Self {
-            scale: Scale::Log,
-            min,
-            max,
-            ticks,
-            title: title.into(),
-        })
+        Some(Self::logarithmic([min, max], ticks, title))
     }
 
     /// Largest value shown.
@@ -134,9 +113,9 @@ impl Axis {
 
     /// Position of a value as a share of the axis, 0 to 1; clamped.
     pub fn share(&self, value: f64) -> f64 {
-        let share = match self.scale {
-            Scale::Linear => (value - self.min) / (self.max - self.min),
-            Scale::Log => (value / self.min).ln() / (self.max / self.min).ln(),
+        let share = match self.is_log {
+            false => (value - self.min) / (self.max - self.min),
+            true => (value / self.min).ln() / (self.max / self.min).ln(),
         };
         if share.is_nan() {
             0.0
@@ -145,209 +124,168 @@ impl Axis {
         }
     }
 
-    /// Draws it as the only axis of a plot: gridlines from `top` to `bottom`, labels below.
-    pub fn draw_below(&self, drawing: &mut Drawing, left: f64, right: f64, top: f64, bottom: f64) {
+    fn labelled(&self) -> impl Iterator<Item = &Tick> {
+        self.ticks.iter().filter(|tick| !tick.label.is_empty())
+    }
+
+    /// Draws it from left to right: gridlines from `top` to `bottom`, labels and title below.
+    pub fn draw_across(
+        &self,
+        drawing: &mut Drawing,
+        (left, right): (f64, f64),
+        (top, bottom): (f64, f64),
+    ) {
+        let at = |tick: &Tick| left + self.share(tick.value) * (right - left);
         for tick in &self.ticks {
-            let x = left + self.share(tick.value) * (right - left);
-            drawing.line(vec![(x, top), (x, bottom)], GRID, grid_width(tick));
-            drawing.text((x, bottom + 14.0), &tick.label, INK, Anchor::Middle);
+            drawing.line(
+                vec![(at(tick), top), (at(tick), bottom)],
+                GRID,
+                tick.width(),
+            );
         }
         drawing.line(vec![(left, top), (left, bottom), (right, bottom)], DIM, 1.0);
-        drawing.text(
-            ((left + right) / 2.0, bottom + 38.0),
-            &self.title,
-            INK,
-            Anchor::Middle,
-        );
+        let mut free_from = 0.0;
+        for tick in self.labelled() {
+            let half = text_width(&tick.label) / 2.0;
+            if at(tick) - half >= free_from {
+                drawing.text((at(tick), bottom + 14.0), &tick.label, INK, Anchor::Middle);
+                free_from = at(tick) + half + 8.0;
+            }
+        }
+        let middle = ((left + right) / 2.0, bottom + 38.0);
+        drawing.text(middle, &self.title, INK, Anchor::Middle);
+    }
+
+    /// Draws it from bottom to top: gridlines from `left` to `right`, labels and title on the left.
+    fn draw_up(&self, drawing: &mut Drawing, (left, right): (f64, f64), (top, bottom): (f64, f64)) {
+        let at = |tick: &Tick| bottom - self.share(tick.value) * (bottom - top);
+        for tick in &self.ticks {
+            drawing.line(
+                vec![(left, at(tick)), (right, at(tick))],
+                GRID,
+                tick.width(),
+            );
+        }
+        let mut free_to = f64::INFINITY;
+        for tick in self.labelled() {
+            if at(tick) + FONT_PX / 2.0 <= free_to {
+                drawing.text((left - 7.0, at(tick)), &tick.label, INK, Anchor::End);
+                free_to = at(tick) - FONT_PX / 2.0 - 3.0;
+            }
+        }
+        drawing.upward_text((14.0, (top + bottom) / 2.0), &self.title, INK);
     }
 
     /// Width of the widest tick label in pixels.
     fn label_width(&self) -> f64 {
-        self.ticks
-            .iter()
-            .map(|tick| text_width(&tick.label))
-            .fold(0.0, f64::max)
+        let widths = self.ticks.iter().map(|tick| text_width(&tick.label));
+        widths.fold(0.0, f64::max)
+    }
+}
+
+impl Tick {
+    /// Width of its gridline, pixels.
+    fn width(&self) -> f64 {
+        if self.label.is_empty() { 0.5 } else { 1.0 }
     }
 }
 
 fn positive_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    values
-        .filter(|v| v.is_finite() && *v > 0.0)
-        .fold(None, |range, v| {
-            range.map_or(Some((v, v)), |(a, b): (f64, f64)| {
-                Some((a.min(v), b.max(v)))
-            })
-        })
+    let positive = values.filter(|v| v.is_finite() && *v > 0.0);
+    let ends = positive.map(|v| (v, v));
+    ends.reduce(|(low, high), (v, _)| (low.min(v), high.max(v)))
 }
 
 fn plain(value: f64) -> String {
-    if value >= 1.0 {
-        format!("{value}")
-    } else {
-        format::significant(value, 2)
+    match value >= 1.0 {
+        true => format!("{value}"),
+        false => format::significant(value, 2),
     }
 }
 
 /// `0.02`, `1000`, or `2·10⁻⁵` where that is shorter.
 fn decimal_or_power(mantissa: u32, exponent: i32) -> String {
-    if (-2..=4).contains(&exponent) {
+    if (-3..=4).contains(&exponent) {
         let decimals = (-exponent).max(0) as usize;
         return format!("{:.decimals$}", f64::from(mantissa) * 10f64.powi(exponent));
     }
-    let power: String = exponent
-        .to_string()
-        .chars()
-        .map(|c| match c {
-            '-' => '⁻',
-            digit => {
-                ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][digit as usize - '0' as usize]
-            }
-        })
-        .collect();
-    if mantissa == 1 {
-        format!("10{power}")
-    } else {
-        format!("{mantissa}·10{power}")
+    const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    let raised = |c: char| c.to_digit(10).map_or('⁻', |digit| RAISED[digit as usize]);
+    let power: String = exponent.to_string().chars().map(raised).collect();
+    match mantissa {
+        1 => format!("10{power}"),
+        _ => format!("{mantissa}·10{power}"),
     }
 }
 
-/// The rectangle that two axes span.
+/// Two axes and the rectangle that they span.
 #[derive(Debug, Clone)]
-pub struct Frame {
+pub struct Axes {
     /// Axis from left to right.
     pub x: Axis,
     /// Axis from bottom to top.
     pub y: Axis,
-    left: f64,
-    top: f64,
-    right: f64,
-    bottom: f64,
+    /// Left and right edge.
+    across: (f64, f64),
+    /// Upper and lower edge.
+    up: (f64, f64),
 }
 
-impl Frame {
+impl Axes {
     /// Axes in the upper `height` pixels of a drawing `width` pixels wide; room is left for labels.
     pub fn new(x: Axis, y: Axis, width: f64, height: f64) -> Self {
         let left = (y.label_width() + 44.0).max(60.0);
         Self {
             x,
             y,
-            left,
-            top: 14.0,
-            right: width - 18.0,
-            bottom: height - 52.0,
+            across: (left, width - 18.0),
+            up: (14.0, height - 52.0),
         }
     }
 
     /// Pixel of a point.
     pub fn at(&self, x: f64, y: f64) -> Point {
-        (
-            self.left + self.x.share(x) * (self.right - self.left),
-            self.bottom - self.y.share(y) * (self.bottom - self.top),
-        )
+        let ((left, right), (top, bottom)) = (self.across, self.up);
+        let x = left + self.x.share(x) * (right - left);
+        (x, bottom - self.y.share(y) * (bottom - top))
     }
 
     /// Draws gridlines, ticks, labels and titles.
     pub fn draw(&self, drawing: &mut Drawing) {
-        for tick in &self.x.ticks {
-            let x = self.at(tick.value, self.y.min).0;
-            drawing.line(
-                vec![(x, self.top), (x, self.bottom)],
-                GRID,
-                grid_width(tick),
-            );
-        }
-        for tick in &self.y.ticks {
-            let y = self.at(self.x.min, tick.value).1;
-            drawing.line(
-                vec![(self.left, y), (self.right, y)],
-                GRID,
-                grid_width(tick),
-            );
-        }
-        let corners = vec![
-            (self.left, self.top),
-            (self.left, self.bottom),
-            (self.right, self.bottom),
-        ];
-        drawing.line(corners, DIM, 1.0);
-        let mut free_from = 0.0;
-        for tick in self.x.ticks.iter().filter(|tick| !tick.label.is_empty()) {
-            let x = self.at(tick.value, self.y.min).0;
-            let half = text_width(&tick.label) / 2.0;
-            if x - half >= free_from {
-                drawing.text((x, self.bottom + 14.0), &tick.label, INK, Anchor::Middle);
-                free_from = x + half + 8.0;
-            }
-        }
-        let mut free_to = f64::INFINITY;
-        for tick in self.y.ticks.iter().filter(|tick| !tick.label.is_empty()) {
-            let y = self.at(self.x.min, tick.value).1;
-            if y + FONT_PX / 2.0 <= free_to {
-                drawing.text((self.left - 7.0, y), &tick.label, INK, Anchor::End);
-                free_to = y - FONT_PX / 2.0 - 3.0;
-            }
-        }
-        let middle = (self.left + self.right) / 2.0;
-        drawing.text(
-            (middle, self.bottom + 38.0),
-            &self.x.title,
-            INK,
-            Anchor::Middle,
-        );
-        drawing.upward_text((14.0, (self.top + self.bottom) / 2.0), &self.y.title, INK);
+        self.y.draw_up(drawing, self.across, self.up);
+        self.x.draw_across(drawing, self.across, self.up);
     }
-}
-
-fn grid_width(tick: &Tick) -> f64 {
-    if tick.label.is_empty() { 0.5 } else { 1.0 }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn labels(axis: &Axis) -> Vec<&str> {
-        axis.ticks
-            .iter()
-            .map(|t| t.label.as_str())
-            .filter(|l| !l.is_empty())
-            .collect()
+    fn labels(axis: Option<Axis>) -> Vec<String> {
+        let axis = axis.expect("an axis");
+        axis.labelled().map(|tick| tick.label.clone()).collect()
     }
 
     #[test]
-    fn log2_ticks_are_powers_of_two_and_few() {
-        let axis = Axis::log2([1.0, 2.0, 4.0, 32.0].into_iter(), "spp").unwrap();
-        assert_eq!(labels(&axis), ["1", "2", "4", "8", "16", "32"]);
-        let long = Axis::log2([1.0, 65536.0].into_iter(), "N").unwrap();
-        assert!(labels(&long).len() <= 9, "{:?}", labels(&long));
-    }
-
-    #[test]
-    fn log10_ticks_read_well_over_short_and_long_ranges() {
-        let short = Axis::log10([0.02, 0.05].into_iter(), "error").unwrap();
-        assert!(labels(&short).contains(&"0.03"), "{:?}", labels(&short));
-        let long = Axis::log10([2e-6, 3.0].into_iter(), "error").unwrap();
-        assert!(
-            labels(&long).contains(&"10⁻⁵") && labels(&long).contains(&"1"),
-            "{:?}",
-            labels(&long)
-        );
-        let single = Axis::log10([0.5].into_iter(), "error").unwrap();
-        assert!(labels(&single).len() >= 2, "{:?}", labels(&single));
-    }
-
-    #[test]
-    fn values_without_a_logarithm_make_no_axis() {
-        assert!(Axis::log10([0.0, -1.0, f64::NAN].into_iter(), "").is_none());
-        assert!(Axis::log2(std::iter::empty(), "").is_none());
+    fn ticks_read_well_over_short_and_long_ranges() {
+        let log2 = |values: &[f64]| Axis::log2(values.iter().copied(), "");
+        let log10 = |values: &[f64]| Axis::log10(values.iter().copied(), "");
+        let powers = ["1", "2", "4", "8", "16", "32"];
+        assert_eq!(labels(log2(&[1.0, 2.0, 4.0, 32.0])), powers);
+        assert!(labels(log2(&[1.0, 65536.0])).len() <= 9);
+        assert!(labels(log10(&[0.02, 0.05])).contains(&"0.03".into()));
+        let long = labels(log10(&[2e-6, 3.0]));
+        let has = |label: &str| long.iter().any(|known| known == label);
+        assert!(has("10⁻⁵") && has("1"), "{long:?}");
+        assert!(labels(log10(&[0.5])).len() >= 2);
+        assert!(log10(&[0.0, -1.0, f64::NAN]).is_none() && log2(&[]).is_none());
     }
 
     #[test]
     fn shares_run_from_zero_to_one() {
         let axis = Axis::linear(7.0, "rate");
-        assert_eq!(axis.share(0.0), 0.0);
-        assert_eq!(axis.share(7.0), 1.0);
-        assert_eq!(labels(&axis), ["0", "2", "4", "6"]);
+        assert_eq!([axis.share(0.0), axis.share(7.0)], [0.0, 1.0]);
+        assert_eq!(labels(Some(axis)), ["0", "2", "4", "6"]);
         let log = Axis::log10([1.0, 100.0].into_iter(), "").unwrap();
         assert!((log.share(10.0) - 0.5).abs() < 1e-12);
     }

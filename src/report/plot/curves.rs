@@ -1,10 +1,11 @@
 //! Log–log curves with bands: error against samples or seconds, discrepancy against points.
 
-use super::axis::{Axis, Frame};
-use super::drawing::{Anchor, DIM, Drawing, INK, Ink};
+use super::axis::{Axes, Axis};
+use super::drawing::{DIM, Drawing, INK, Ink};
+use super::legend;
 use super::marker;
-use super::paint::fit_text;
 use crate::measure::record::Interval;
+use crate::report::document::Figure;
 
 /// One point of a curve, with the ends of its 95 % interval (equal to `y` where there is none).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,6 +56,17 @@ pub struct Guide {
     pub exponent: f64,
 }
 
+impl Guide {
+    /// `y = factor · x^exponent`.
+    pub fn new(label: impl Into<String>, factor: f64, exponent: f64) -> Self {
+        Self {
+            label: label.into(),
+            factor,
+            exponent,
+        }
+    }
+}
+
 /// Spacing of the ticks of the x axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ticks {
@@ -81,16 +93,18 @@ pub struct CurvePlot {
 
 const WIDTH: f64 = 580.0;
 const PLOT_HEIGHT: f64 = 400.0;
-const LEGEND_ROW: f64 = 21.0;
 
 impl CurvePlot {
+    /// The plot in a document, if there is anything to draw.
+    pub fn figure(&self, name: String, caption: impl Into<String>) -> Option<Figure> {
+        Some(Figure::new(name, caption, self.draw()?))
+    }
+
     /// The picture; `None` when no curve has a point with positive coordinates.
     pub fn draw(&self) -> Option<Drawing> {
         let points = || {
-            self.curves
-                .iter()
-                .flat_map(|curve| &curve.points)
-                .filter(|p| drawable(p))
+            let points = self.curves.iter().flat_map(|curve| &curve.points);
+            points.filter(|p| drawable(p))
         };
         let xs = points().map(|p| p.x);
         let x = match self.x_ticks {
@@ -98,55 +112,31 @@ impl CurvePlot {
             Ticks::PowersOfTen => Axis::log10(xs, &self.x_title)?,
         };
         let ends = [x.min() * 1.05, x.max() / 1.05];
-        let guide_ys = self
-            .guides
-            .iter()
-            .flat_map(|guide| ends.map(|x| guide.at(x)));
-        let y = Axis::log10(
-            points()
-                .flat_map(|p| [p.y, shown_low(p), p.high])
-                .chain(guide_ys),
-            &self.y_title,
-        )?;
+        let guides = self.guides.iter();
+        let guide_ys = guides.flat_map(|guide| ends.map(|x| guide.at(x)));
+        let ys = points().flat_map(|p| [p.y, shown_low(p), p.high]);
+        let y = Axis::log10(ys.chain(guide_ys), &self.y_title)?;
         let rows = self.curves.len() + self.guides.len();
-        let mut drawing = Drawing::new(WIDTH, PLOT_HEIGHT + rows as f64 * LEGEND_ROW + 8.0);
-        let frame = Frame::new(x, y, WIDTH, PLOT_HEIGHT);
-        frame.draw(&mut drawing);
+        let mut drawing = Drawing::new(WIDTH, PLOT_HEIGHT + legend::height(rows));
+        let axes = Axes::new(x, y, WIDTH, PLOT_HEIGHT);
+        axes.draw(&mut drawing);
+        let mut rows = legend::Rows::new(PLOT_HEIGHT, (16.0, WIDTH));
+        for curve in &self.curves {
+            curve.draw(&axes, &mut drawing);
+            let (ink, exact) = (marker::ink(curve.look), curve.exact);
+            rows.add(&mut drawing, &curve.label, INK, |drawing, y| {
+                curve_line(drawing, &[(16.0, y), (50.0, y)], ink, exact);
+                marker::draw(drawing, curve.look, (33.0, y), 4.5, ink);
+            });
+        }
         for (i, guide) in self.guides.iter().enumerate() {
-            let line = ends.map(|x| frame.at(x, guide.at(x)));
+            let line = ends.map(|x| axes.at(x, guide.at(x)));
             guide_line(&mut drawing, &line, i);
+            rows.add(&mut drawing, &guide.label, DIM, |drawing, y| {
+                guide_line(drawing, &[(16.0, y), (50.0, y)], i);
+            });
         }
-        for curve in &self.curves {
-            curve.draw(&frame, &mut drawing);
-        }
-        self.draw_legend(&mut drawing);
         Some(drawing)
-    }
-
-    fn draw_legend(&self, drawing: &mut Drawing) {
-        let mut y = PLOT_HEIGHT + LEGEND_ROW / 2.0;
-        for curve in &self.curves {
-            let ink = marker::ink(curve.look);
-            curve_line(drawing, &[(16.0, y), (50.0, y)], ink, curve.exact);
-            marker::draw(drawing, curve.look, (33.0, y), 4.5, ink);
-            drawing.text(
-                (60.0, y),
-                fit_text(&curve.label, WIDTH - 66.0),
-                INK,
-                Anchor::Start,
-            );
-            y += LEGEND_ROW;
-        }
-        for (i, guide) in self.guides.iter().enumerate() {
-            guide_line(drawing, &[(16.0, y), (50.0, y)], i);
-            drawing.text(
-                (60.0, y),
-                fit_text(&guide.label, WIDTH - 66.0),
-                DIM,
-                Anchor::Start,
-            );
-            y += LEGEND_ROW;
-        }
     }
 }
 
@@ -157,19 +147,19 @@ impl Guide {
 }
 
 impl Curve {
-    fn draw(&self, frame: &Frame, drawing: &mut Drawing) {
+    fn draw(&self, axes: &Axes, drawing: &mut Drawing) {
         let ink = marker::ink(self.look);
         let points: Vec<&CurvePoint> = self.points.iter().filter(|p| drawable(p)).collect();
         // An interval that reaches 0 ends at the bottom of the axis.
-        let upper = points.iter().map(|p| frame.at(p.x, p.high));
+        let upper = points.iter().map(|p| axes.at(p.x, p.high));
         let lower = points
             .iter()
             .rev()
-            .map(|p| frame.at(p.x, p.low.max(frame.y.min())));
+            .map(|p| axes.at(p.x, p.low.max(axes.y.min())));
         if points.iter().any(|p| p.low < p.high) {
             drawing.area(upper.chain(lower).collect(), ink.with_alpha(0.22));
         }
-        let line: Vec<_> = points.iter().map(|p| frame.at(p.x, p.y)).collect();
+        let line: Vec<_> = points.iter().map(|p| axes.at(p.x, p.y)).collect();
         if line.len() > 1 {
             curve_line(drawing, &line, ink, self.exact);
         }
@@ -217,56 +207,19 @@ mod tests {
                 exact: false,
                 points,
             }],
-            guides: vec![Guide {
-                label: "2.5/√N".into(),
-                factor: 2.5,
-                exponent: -0.5,
-            }],
+            guides: vec![Guide::new("2.5/√N", 2.5, -0.5)],
         }
     }
 
     #[test]
-    fn a_plot_names_axes_curves_and_guides() {
-        let points = vec![
-            CurvePoint {
-                x: 1.0,
-                y: 0.5,
-                low: 0.4,
-                high: 0.6,
-            },
-            CurvePoint {
-                x: 2.0,
-                y: 0.25,
-                low: 0.2,
-                high: 0.3,
-            },
-        ];
-        let drawing = plot(points).draw().unwrap();
+    fn a_plot_names_axes_curves_and_guides_and_leaves_out_zero_errors() {
+        let at = |x, y| CurvePoint::new(x, &Interval::exact(y));
+        let drawing = plot(vec![at(1.0, 0.5), at(2.0, 0.25)]).draw().unwrap();
         for text in ["samples per pixel", "relMSE", "sobol", "2.5/√N", "1", "2"] {
-            assert!(
-                drawing.texts().contains(&text),
-                "{text} in {:?}",
-                drawing.texts()
-            );
+            assert!(drawing.texts().contains(&text), "{text}");
         }
-    }
-
-    #[test]
-    fn a_single_point_is_drawn_and_zero_errors_are_not() {
-        let one = CurvePoint {
-            x: 4.0,
-            y: 0.5,
-            low: 0.5,
-            high: 0.5,
-        };
-        assert!(plot(vec![one]).draw().is_some());
-        let zero = CurvePoint {
-            x: 4.0,
-            y: 0.0,
-            low: 0.0,
-            high: 0.0,
-        };
-        assert!(plot(vec![zero]).draw().is_none());
+        assert!(plot(vec![at(4.0, 0.5)]).draw().is_some());
+        assert!(plot(vec![at(4.0, 0.0)]).draw().is_none());
         assert!(plot(vec![]).draw().is_none());
     }
 }

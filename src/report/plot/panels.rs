@@ -1,4 +1,4 @@
-//! Small multiples: square panels of one size in rows.
+//! Small multiples: panels of one size in rows.
 
 use super::drawing::{Anchor, DIM, Drawing, INK, Point};
 use super::paint::fit_text;
@@ -12,25 +12,26 @@ const GAP: f64 = 20.0;
 /// White around all panels, pixels.
 const MARGIN: f64 = 10.0;
 
-/// The square that a panel is drawn in.
+/// The rectangle that a panel is drawn in.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Area {
     /// Left edge, pixels.
     pub left: f64,
     /// Upper edge, pixels.
     pub top: f64,
-    /// Side, pixels.
-    pub side: f64,
+    /// Width and height, pixels.
+    pub size: (f64, f64),
 }
 
 impl Area {
     /// Pixel of a point of the unit square, whose origin is the lower left corner.
     pub fn at(&self, [x, y]: [f64; 2]) -> Point {
-        (self.left + x * self.side, self.top + (1.0 - y) * self.side)
+        let (width, height) = self.size;
+        (self.left + x * width, self.top + (1.0 - y) * height)
     }
 
     /// Draws the edges.
-    pub fn frame(&self, drawing: &mut Drawing) {
+    pub fn outline(&self, drawing: &mut Drawing) {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]];
         drawing.line(corners.map(|c| self.at(c)).into(), DIM, 1.0);
     }
@@ -38,7 +39,7 @@ impl Area {
 
 /// What a panel shows.
 pub trait Content {
-    /// Draws it into the square.
+    /// Draws it into the rectangle.
     fn draw(&self, drawing: &mut Drawing, area: Area);
 }
 
@@ -67,33 +68,35 @@ impl Panel {
     }
 }
 
-/// Side of panels of which `columns` fill a drawing of `width` pixels.
-pub fn side(width: f64, columns: usize) -> f64 {
+/// Size of square panels of which `columns` fill a drawing of `width` pixels.
+pub fn square(width: f64, columns: usize) -> (f64, f64) {
     let columns = columns.max(1) as f64;
-    ((width - 2.0 * MARGIN - (columns - 1.0) * GAP) / columns).floor()
+    let side = ((width - 2.0 * MARGIN - (columns - 1.0) * GAP) / columns).floor();
+    (side, side)
 }
 
 /// The panels row by row, `columns` in a row; without panels an empty drawing of the height of one
 /// margin.
-pub fn draw(panels: &[Panel], columns: usize, side: f64) -> Drawing {
+pub fn draw(panels: &[Panel], columns: usize, (width, height): (f64, f64)) -> Drawing {
     let columns = columns.clamp(1, panels.len().max(1));
     let rows = panels.len().div_ceil(columns) as f64;
-    let step = (side + GAP, TITLE + side + NOTE);
-    let width = 2.0 * MARGIN + columns as f64 * step.0 - GAP;
-    let mut drawing = Drawing::new(width, MARGIN + rows * step.1);
+    let step = (width + GAP, TITLE + height + NOTE);
+    let all = 2.0 * MARGIN + columns as f64 * step.0 - GAP;
+    let mut drawing = Drawing::new(all, MARGIN + rows * step.1);
     for (i, panel) in panels.iter().enumerate() {
         let area = Area {
             left: MARGIN + (i % columns) as f64 * step.0,
             top: TITLE + (i / columns) as f64 * step.1,
-            side,
+            size: (width, height),
         };
-        let middle = area.left + side / 2.0;
-        let room = side + GAP - 6.0;
-        let title = fit_text(&panel.title, room);
-        drawing.text((middle, area.top - 13.0), title, INK, Anchor::Middle);
+        let middle = area.left + width / 2.0;
+        let mut text = |text: &str, y, ink| {
+            let text = fit_text(text, width + GAP - 6.0);
+            drawing.text((middle, y), text, ink, Anchor::Middle);
+        };
+        text(&panel.title, area.top - 13.0, INK);
+        text(&panel.note, area.top + height + 12.0, DIM);
         panel.content.draw(&mut drawing, area);
-        let note = fit_text(&panel.note, room);
-        drawing.text((middle, area.top + side + 12.0), note, DIM, Anchor::Middle);
     }
     drawing
 }
@@ -106,31 +109,25 @@ mod tests {
 
     impl Content for Nothing {
         fn draw(&self, drawing: &mut Drawing, area: Area) {
-            area.frame(drawing);
+            area.outline(drawing);
         }
     }
 
     #[test]
-    fn panels_fill_rows_of_the_width_asked_for() {
-        let panels: Vec<Panel> = (0..5)
-            .map(|i| Panel::new(i.to_string(), "", Nothing))
-            .collect();
-        let drawing = draw(&panels, 4, side(900.0, 4));
+    fn panels_fill_rows_of_the_width_asked_for_with_the_origin_below_on_the_left() {
+        let panels = [(); 5].map(|()| Panel::new("title", "", Nothing));
+        let drawing = draw(&panels, 4, square(900.0, 4));
         assert!((drawing.width - 900.0).abs() < 4.0, "{}", drawing.width);
         assert_eq!(drawing.shapes.len(), 15);
-        let one_row = draw(&panels[..4], 4, side(900.0, 4));
+        let one_row = draw(&panels[..4], 4, square(900.0, 4));
         assert!(drawing.height > 1.8 * one_row.height - 20.0);
-        assert!(draw(&[], 4, 100.0).shapes.is_empty());
-    }
-
-    #[test]
-    fn the_origin_lies_below_on_the_left() {
+        assert!(draw(&[], 4, (100.0, 100.0)).shapes.is_empty());
         let area = Area {
             left: 10.0,
             top: 20.0,
-            side: 100.0,
+            size: (100.0, 50.0),
         };
-        assert_eq!(area.at([0.0, 0.0]), (10.0, 120.0));
+        assert_eq!(area.at([0.0, 0.0]), (10.0, 70.0));
         assert_eq!(area.at([1.0, 1.0]), (110.0, 20.0));
     }
 }

@@ -1,9 +1,9 @@
 //! Run time against error: one point per cell, the Pareto front drawn and named.
 
-use super::axis::{Axis, Frame};
+use super::axis::{Axes, Axis};
 use super::drawing::{Anchor, DIM, Drawing, INK, Point};
+use super::legend;
 use super::marker;
-use super::paint::fit_text;
 use crate::measure::record::Interval;
 use crate::measure::statistics::pareto_front;
 
@@ -37,7 +37,6 @@ pub struct ParetoPlot {
 
 const WIDTH: f64 = 900.0;
 const PLOT_HEIGHT: f64 = 480.0;
-const LEGEND_ROW: f64 = 21.0;
 
 /// Letter of a structure: a, b, …, z, then a number.
 pub fn letter(index: usize) -> String {
@@ -50,12 +49,9 @@ pub fn letter(index: usize) -> String {
 impl ParetoPlot {
     /// Indices of the points of the front, by growing time.
     pub fn front(&self) -> Vec<usize> {
-        let points: Vec<_> = self
-            .points
-            .iter()
-            .map(|p| (p.seconds.value, p.error.value))
-            .collect();
-        pareto_front(&points)
+        let points = self.points.iter();
+        let points = points.map(|p| (p.seconds.value, p.error.value));
+        pareto_front(&points.collect::<Vec<_>>())
     }
 
     /// Name of a point: structure · sampler.
@@ -68,80 +64,72 @@ impl ParetoPlot {
 
     /// The picture; `None` without a point with positive time and error.
     pub fn draw(&self) -> Option<Drawing> {
-        let times = self
-            .points
-            .iter()
-            .flat_map(|p| [p.seconds.value, p.seconds.low, p.seconds.high]);
+        let ends = |i: Interval| [i.value, i.low, i.high];
+        let times = self.points.iter().flat_map(|p| ends(p.seconds));
         let errors = self.points.iter().flat_map(|p| {
             // Not down to an end that happens to lie close to 0.
-            [
-                p.error.value,
-                p.error.low.max(p.error.value / 30.0),
-                p.error.high,
-            ]
+            let low = p.error.low.max(p.error.value / 30.0);
+            ends(Interval { low, ..p.error })
         });
         let x = Axis::log10(times, &self.x_title)?;
         let y = Axis::log10(errors, &self.y_title)?;
         let front = self.front();
-        let legend = self.structures.len().max(self.samplers.len()) + front.len() + 2;
-        let mut drawing = Drawing::new(
-            WIDTH,
-            PLOT_HEIGHT + (legend as f64 + 0.4) * LEGEND_ROW + 12.0,
-        );
-        let frame = Frame::new(x, y, WIDTH, PLOT_HEIGHT);
-        frame.draw(&mut drawing);
-        self.draw_front(&frame, &front, &mut drawing);
+        let rows = self.structures.len().max(self.samplers.len()) + front.len() + 2;
+        let mut drawing = Drawing::new(WIDTH, PLOT_HEIGHT + legend::height(rows) + legend::ROW);
+        let axes = Axes::new(x, y, WIDTH, PLOT_HEIGHT);
+        axes.draw(&mut drawing);
+        self.draw_front(&axes, &front, &mut drawing);
         for point in &self.points {
-            self.draw_point(point, &frame, &mut drawing);
+            self.draw_point(point, &axes, &mut drawing);
         }
-        self.draw_labels(&frame, &front, &mut drawing);
+        self.draw_labels(&axes, &front, &mut drawing);
         self.draw_legend(&front, &mut drawing);
         Some(drawing)
     }
 
     /// A staircase: what is above and right of it is beaten.
-    fn draw_front(&self, frame: &Frame, front: &[usize], drawing: &mut Drawing) {
+    fn draw_front(&self, axes: &Axes, front: &[usize], drawing: &mut Drawing) {
         let mut stairs: Vec<(f64, f64)> = Vec::new();
         for &i in front {
-            let (x, y) = frame.at(self.points[i].seconds.value, self.points[i].error.value);
+            let (x, y) = axes.at(self.points[i].seconds.value, self.points[i].error.value);
             let from = stairs
                 .last()
-                .map_or(frame.at(frame.x.min(), frame.y.max()).1, |last| last.1);
+                .map_or(axes.at(axes.x.min(), axes.y.max()).1, |last| last.1);
             stairs.extend([(x, from), (x, y)]);
         }
         if let Some(&(_, y)) = stairs.last() {
-            stairs.push((frame.at(frame.x.max(), frame.y.min()).0, y));
+            stairs.push((axes.at(axes.x.max(), axes.y.min()).0, y));
         }
         drawing.dashed_line(&stairs, DIM, 1.4, 6.0, 4.0);
     }
 
-    fn draw_point(&self, point: &CellPoint, frame: &Frame, drawing: &mut Drawing) {
+    fn draw_point(&self, point: &CellPoint, axes: &Axes, drawing: &mut Drawing) {
         let ink = marker::ink(self.structures[point.structure].1);
         let (seconds, error) = (point.seconds, point.error);
         let whiskers = [
             [
-                frame.at(seconds.low, error.value),
-                frame.at(seconds.high, error.value),
+                axes.at(seconds.low, error.value),
+                axes.at(seconds.high, error.value),
             ],
             [
-                frame.at(seconds.value, error.low.max(frame.y.min())),
-                frame.at(seconds.value, error.high),
+                axes.at(seconds.value, error.low.max(axes.y.min())),
+                axes.at(seconds.value, error.high),
             ],
         ];
         for ends in whiskers {
             drawing.line(ends.to_vec(), ink.with_alpha(0.5), 1.2);
         }
-        let at = frame.at(seconds.value, error.value);
+        let at = axes.at(seconds.value, error.value);
         marker::draw(drawing, self.samplers[point.sampler].1, at, 5.5, ink);
     }
 
     /// Ranks of the front and letters of the structures, each where it covers no marker and no other
     /// label; in a crowd a letter is left out rather than made unreadable.
-    fn draw_labels(&self, frame: &Frame, front: &[usize], drawing: &mut Drawing) {
+    fn draw_labels(&self, axes: &Axes, front: &[usize], drawing: &mut Drawing) {
         const CLEAR: f64 = 12.0;
         let at = |i: usize| {
             let point: &CellPoint = &self.points[i];
-            frame.at(point.seconds.value, point.error.value)
+            axes.at(point.seconds.value, point.error.value)
         };
         let mut taken: Vec<Point> = (0..self.points.len()).map(at).collect();
         let ranks = front
@@ -169,48 +157,32 @@ impl ParetoPlot {
     }
 
     fn draw_legend(&self, front: &[usize], drawing: &mut Drawing) {
-        let top = PLOT_HEIGHT + LEGEND_ROW / 2.0;
-        let middle = WIDTH * 0.5;
-        drawing.text(
-            (16.0, top),
-            "structure (colour, letter)",
-            DIM,
-            Anchor::Start,
-        );
-        drawing.text((middle, top), "sampler (marker)", DIM, Anchor::Start);
+        let mut left = legend::Rows::new(PLOT_HEIGHT, (16.0, WIDTH / 2.0));
+        left.title(drawing, "structure (colour, letter)", DIM);
         for (i, (name, look)) in self.structures.iter().enumerate() {
-            let y = top + (i + 1) as f64 * LEGEND_ROW;
-            drawing.bar((18.0, y - 5.0), (34.0, y + 5.0), marker::ink(*look));
-            drawing.text((44.0, y), letter(i), INK, Anchor::Start);
-            drawing.text((66.0, y), fit_text(name, middle - 80.0), INK, Anchor::Start);
+            left.add(drawing, name, INK, |drawing, y| {
+                drawing.bar((18.0, y - 5.0), (34.0, y + 5.0), marker::ink(*look));
+                drawing.text((42.0, y), letter(i), INK, Anchor::Start);
+            });
         }
-        for (i, (name, look)) in self.samplers.iter().enumerate() {
-            let y = top + (i + 1) as f64 * LEGEND_ROW;
-            marker::draw(drawing, *look, (middle + 8.0, y), 5.0, DIM);
-            drawing.text(
-                (middle + 26.0, y),
-                fit_text(name, middle - 40.0),
-                INK,
-                Anchor::Start,
-            );
+        let mut right = legend::Rows::new(PLOT_HEIGHT, (WIDTH / 2.0, WIDTH));
+        right.title(drawing, "sampler (marker)", DIM);
+        for (name, look) in &self.samplers {
+            right.add(drawing, name, INK, |drawing, y| {
+                marker::draw(drawing, *look, (WIDTH / 2.0 + 20.0, y), 5.0, DIM);
+            });
         }
-        let rows = self.structures.len().max(self.samplers.len()) + 1;
-        let mut y = top + (rows as f64 + 0.4) * LEGEND_ROW;
-        drawing.text(
-            (16.0, y),
+        left.y = left.y.max(right.y) + legend::ROW / 2.0;
+        left.title(
+            drawing,
             "Pareto front: no cell is both faster and better",
             DIM,
-            Anchor::Start,
         );
+        let mut fronts = legend::Rows::new(left.y - legend::ROW / 2.0, (16.0, WIDTH));
         for (rank, &i) in front.iter().enumerate() {
-            y += LEGEND_ROW;
-            drawing.text((34.0, y), (rank + 1).to_string(), INK, Anchor::End);
-            drawing.text(
-                (44.0, y),
-                fit_text(&self.name(&self.points[i]), WIDTH - 60.0),
-                INK,
-                Anchor::Start,
-            );
+            fronts.add(drawing, &self.name(&self.points[i]), INK, |drawing, y| {
+                drawing.text((34.0, y), (rank + 1).to_string(), INK, Anchor::End);
+            });
         }
     }
 }
@@ -221,16 +193,11 @@ mod tests {
 
     #[test]
     fn the_picture_names_the_front() {
-        let exact = |value| Interval {
-            value,
-            low: value,
-            high: value,
-        };
         let point = |structure, seconds, error| CellPoint {
             structure,
             sampler: 0,
-            seconds: exact(seconds),
-            error: exact(error),
+            seconds: Interval::exact(seconds),
+            error: Interval::exact(error),
         };
         let plot = ParetoPlot {
             x_title: "seconds".into(),

@@ -34,13 +34,13 @@ pub struct RadialCurve(pub Vec<f64>);
 impl Content for RadialCurve {
     fn draw(&self, drawing: &mut Drawing, area: Area) {
         // Labels stand inside the frame, so that panels may stand close together.
-        let left = LABELS / area.side;
+        let left = LABELS / area.size.0;
         let across = |power| [[left, share(power)], [1.0, share(power)]].map(|end| area.at(end));
         for power in [0.1, 1.0, 10.0] {
             drawing.line(across(power).into(), GRID, 1.0);
         }
         drawing.dashed_line(&across(1.0), DIM, 1.2, 5.0, 4.0);
-        area.frame(drawing);
+        area.outline(drawing);
         for (power, label) in [
             (0.01, "0.01"),
             (0.1, "0.1"),
@@ -49,7 +49,7 @@ impl Content for RadialCurve {
             (100.0, "100"),
         ] {
             let (x, y) = area.at([left, share(power)]);
-            let y = y.clamp(area.top + 10.0, area.top + area.side - 10.0);
+            let y = y.clamp(area.top + 10.0, area.top + area.size.1 - 10.0);
             drawing.text((x - 6.0, y), label, DIM, Anchor::End);
         }
         let last = self.0.len().max(2) as f64;
@@ -76,11 +76,11 @@ impl Content for PeriodogramMap {
         let rgb = rows.flat_map(|y| (-highest..=highest).map(move |x| (x, y)));
         drawing.rasters.push(Raster {
             at: (area.left, area.top),
-            size: (area.side, area.side),
+            size: area.size,
             columns: 2 * self.0.highest + 1,
             rgb: rgb.map(|(x, y)| color(x, y)).collect(),
         });
-        area.frame(drawing);
+        area.outline(drawing);
     }
 }
 
@@ -96,7 +96,7 @@ impl Content for ColorBar {
             .map(|i| viridis(i as f32 / (STEPS - 1) as f32));
         drawing.rasters.push(Raster {
             at: (left, area.top),
-            size: (width, area.side),
+            size: (width, area.size.1),
             columns: 1,
             rgb: rgb.collect(),
         });
@@ -108,7 +108,7 @@ impl Content for ColorBar {
             (100.0, "≥ 100"),
         ] {
             let (_, y) = area.at([0.0, share(power)]);
-            let y = y.clamp(area.top + 7.0, area.top + area.side - 7.0);
+            let y = y.clamp(area.top + 7.0, area.top + area.size.1 - 7.0);
             drawing.text((left + width + 8.0, y), label, INK, Anchor::Start);
         }
     }
@@ -136,11 +136,8 @@ mod tests {
         let found = periodogram(&point, 4, &Budget::seconds(60.0)).unwrap();
         let curve = RadialCurve(found.radial());
         let map = PeriodogramMap(found);
-        let drawing = panels::draw(
-            &[Panel::new("", "", map), Panel::new("", "", curve)],
-            2,
-            100.0,
-        );
+        let panels = [Panel::new("", "", map), Panel::new("", "", curve)];
+        let drawing = panels::draw(&panels, 2, (100.0, 100.0));
         let pixels = &drawing.rasters[0].rgb;
         assert_eq!((pixels.len(), pixels[40]), (81, [255; 3]));
         assert!(

@@ -1,7 +1,7 @@
 //! Why to believe the figures: every check of the run, with what it rests on.
 
 use crate::measure::bias::BiasVerdict;
-use crate::measure::record::{BiasRecord, GateVerdict, JudgeCheck, TimeRecord, Verdict, axis};
+use crate::measure::record::{GateVerdict, JudgeCheck, TimeRecord, Verdict, axis};
 use crate::report::data::{Measured, RunData, SAMPLER_AXES, SceneGroup};
 use crate::report::document::*;
 use crate::report::format::{self, count, plural};
@@ -50,34 +50,28 @@ fn check(title: impl Into<String>, tested: bool, wrong: bool, detail: String) ->
 
 fn gate(scene: &SceneGroup) -> Check {
     let title = format!("Hits equal to the bit: {}", scene.name);
-    let gates: Vec<&GateVerdict> = scene
-        .structures
-        .iter()
-        .filter_map(|s| s.gate.as_ref())
-        .collect();
-    let classes = || gates.iter().flat_map(|gate| &gate.classes);
+    let gates = scene.structures.iter().filter_map(|s| s.gate.as_ref());
+    let classes = || gates.clone().flat_map(|gate| &gate.classes);
     let rays: usize = classes().map(|class| class.rays).sum();
     let wrong: usize = classes().map(|class| class.wrong).sum();
     let ties: usize = classes().map(|class| class.ties).sum();
-    let faulty: Vec<String> = scene
-        .structures
-        .iter()
-        .filter_map(|s| Some(format!("{} FAILED: {}", s.structure, s.fault()?)))
-        .collect();
-    if gates.is_empty() && faulty.is_empty() {
-        return check(title, false, false, String::new());
-    }
     let mut detail = format!(
         "{} through {}: id, t, u, v; {} differ, {}.",
         plural(rays, "ray"),
-        plural(gates.len(), "structure"),
+        plural(gates.clone().count(), "structure"),
         count(wrong as u64),
         plural(ties, "tie"),
     );
-    for fault in &faulty {
-        detail += &format!(" {fault}.");
+    let faulty = || {
+        scene
+            .structures
+            .iter()
+            .filter_map(|s| Some((s, s.fault()?)))
+    };
+    for (s, fault) in faulty() {
+        detail += &format!(" {} FAILED: {fault}.", s.structure);
     }
-    check(title, rays > 0, !faulty.is_empty(), detail)
+    check(title, rays > 0, faulty().next().is_some(), detail)
 }
 
 fn judge(data: &RunData, title: &str, pick: fn(&GateVerdict) -> &JudgeCheck) -> Check {
@@ -167,61 +161,43 @@ fn bias(data: &RunData) -> Check {
         .flat_map(|(scene, view)| view.samplers.iter().map(move |s| (scene, view, s)))
         .filter_map(|(scene, view, s)| Some((scene, view, s, s.bias?)))
         .collect();
-    let with = |verdict: BiasVerdict, by_design: bool| {
-        let is_it = |r: &&BiasRecord| r.verdict == verdict && r.by_design == by_design;
-        records.iter().map(|r| r.3).filter(is_it).count()
-    };
-    let clean = with(BiasVerdict::NoBiasFound, false) + with(BiasVerdict::NoBiasFound, true);
-    let (biased, by_design) = (
-        with(BiasVerdict::Biased, false),
-        with(BiasVerdict::Biased, true),
-    );
+    let with = |verdict: BiasVerdict| records.iter().filter(move |r| r.3.verdict == verdict);
+    let clean = with(BiasVerdict::NoBiasFound).count();
+    let by_design = with(BiasVerdict::Biased).filter(|r| r.3.by_design).count();
+    let biased = with(BiasVerdict::Biased).count() - by_design;
     let mut detail = format!(
         "{clean} without a bias found, {biased} biased, {by_design} biased by design, {} not testable",
         records.len() - clean - biased - by_design
     );
     if let Some((.., record)) = records.first() {
         detail += &format!(
-            " (Welch's t of the whole image and, with Benjamini and Hochberg's correction, per tile, each at half of {})",
+            " (Student's t of the whole image and, with Benjamini and Hochberg's correction, per tile, each at half of {})",
             format::number(record.alpha)
         );
     }
-    for (scene, view, sampler, _) in records
-        .iter()
-        .filter(|r| r.3.verdict == BiasVerdict::Biased)
-    {
+    for (scene, view, sampler, _) in with(BiasVerdict::Biased) {
+        let fault = sampler.fault().unwrap_or_default();
         detail += &format!(
-            "; {} on {}, {}: {}",
-            sampler.name,
-            scene.name,
-            view.name,
-            sampler.fault().unwrap_or_default()
+            "; {} on {}, {}: {fault}",
+            sampler.name, scene.name, view.name
         );
     }
     check("Samplers without bias", clean > 0, biased > 0, detail + ".")
 }
 
 fn finite_pixels(data: &RunData) -> Check {
-    let replicates: Vec<_> = data
-        .views()
-        .flat_map(|(_, view)| &view.samplers)
+    let samplers = || data.views().flat_map(|(_, view)| &view.samplers);
+    let images = samplers().flat_map(|s| &s.replicates).count();
+    let pixels = samplers()
         .flat_map(|s| &s.replicates)
-        .collect();
-    let bad: usize = replicates
-        .iter()
-        .map(|replicate| replicate.non_finite_pixels)
-        .sum();
+        .map(|r| r.non_finite_pixels);
+    let bad: usize = pixels.sum();
     let detail = format!(
         "{} in {}.",
         plural(bad, "non-finite pixel"),
-        plural(replicates.len(), "image")
+        plural(images, "image")
     );
-    check(
-        "Every pixel finite",
-        !replicates.is_empty(),
-        bad > 0,
-        detail,
-    )
+    check("Every pixel finite", images > 0, bad > 0, detail)
 }
 
 /// A reference that is itself noisy bounds from below what errors can be told apart.

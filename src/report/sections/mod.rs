@@ -8,7 +8,7 @@ pub mod samplers;
 pub mod spectrum;
 pub mod streams;
 pub mod structures;
-mod trade_off;
+pub mod trade_off;
 pub mod verdict;
 
 use super::data::{RunData, SceneGroup};
@@ -142,7 +142,7 @@ fn scene_section(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -
         let stem = format!("scene-{index}-{}-{number}", file_stem(&view.name));
         section
             .blocks
-            .extend(samplers::blocks(dir, data, &stem, view));
+            .extend(samplers::blocks(dir, data, &stem, scene, view));
     }
     section
 }

@@ -50,7 +50,7 @@ pub fn section(data: &RunData) -> Option<Section> {
     for (index, (name, found)) in found.into_iter().enumerate() {
         match found.and_then(|(_, points)| panels(name, points)) {
             Some(panels) => {
-                let drawing = panels::draw(&panels, 4, panels::side(WIDTH, 4));
+                let drawing = panels::draw(&panels, 4, panels::square(WIDTH, 4));
                 let stem = format!("points-{index}-{}", file_stem(name));
                 figures.push(Figure::new(stem, format!("Points of {name}."), drawing));
             }

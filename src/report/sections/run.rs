@@ -1,6 +1,6 @@
 //! The run itself: economy of the plan, wall time, what failed, where it ran.
 
-use crate::measure::record::{StructureRecord, TimeRecord};
+use crate::measure::record::{FinishedRecord, StructureRecord, TimeRecord};
 use crate::report::data::{Measured, RunData, SceneGroup, View};
 use crate::report::document::*;
 use crate::report::format::{self, count, percent};
@@ -53,28 +53,18 @@ pub fn overhead(data: &RunData) -> Option<String> {
     ))
 }
 
-fn wall_table(finished: &crate::measure::record::FinishedRecord) -> Table {
+fn wall_table(finished: &FinishedRecord) -> Table {
     let mut table = Table::new("Where the wall time went", &["part", "seconds", "share"]);
-    let mut parts: Vec<(&str, f64)> = finished
-        .parts_s
-        .iter()
-        .map(|(name, s)| (name.as_str(), *s))
-        .collect();
+    let parts = finished.parts_s.iter().map(|(name, s)| (name.as_str(), *s));
+    let mut parts: Vec<(&str, f64)> = parts.collect();
     parts.sort_by(|a, b| b.1.total_cmp(&a.1));
     parts.push(("overhead", finished.overhead_s));
     parts.push(("whole run", finished.wall_s));
     for (name, seconds) in parts {
-        let share = seconds / finished.wall_s;
-        let share = if share.is_finite() {
-            percent(share)
-        } else {
-            format::ABSENT.into()
-        };
-        table.rows.push(vec![
-            name.into(),
-            format::number(seconds).into(),
-            share.into(),
-        ]);
+        let share = Some(seconds / finished.wall_s).filter(|share| share.is_finite());
+        let share = share.map_or(format::ABSENT.into(), percent);
+        let cells = [name.into(), format::number(seconds), share];
+        table.rows.push(cells.map(Cell::from).into());
     }
     table
 }
@@ -142,60 +132,48 @@ fn failed_cells(scene: &SceneGroup, view: &View) -> Vec<Failure> {
 fn environment(data: &RunData) -> Option<Section> {
     let run = data.run?;
     let e = &run.environment;
-    let yes_no = |flag| if flag { "yes" } else { "no" };
-    let commit = e.commit.as_ref().map_or(format::ABSENT.into(), |commit| {
-        format!(
-            "{commit}{}",
-            if e.dirty == Some(true) {
-                " with uncommitted changes"
-            } else {
-                ""
-            }
-        )
-    });
-    let denormals = match e.denormals {
-        Some(kept) => if kept { "kept" } else { "taken for 0" }.to_owned(),
-        None => format::ABSENT.into(),
+    let yes_no = |flag| if flag { "yes" } else { "no" }.to_owned();
+    let dirty = match e.dirty {
+        Some(true) => " with uncommitted changes",
+        _ => "",
     };
+    let commit = e.commit.as_ref().map(|commit| format!("{commit}{dirty}"));
+    let denormals = e
+        .denormals
+        .map(|kept| if kept { "kept" } else { "taken for 0" });
     let loops = e.loop_limit.map_or("run to their end".into(), |limit| {
         let limit = count(u64::from(limit));
         format!("END IN SILENCE after {limit} turns in all; kernels check for it")
     });
-    let rows: [(&str, String); 14] = [
+    let threads = format::plural(e.cpu_threads, "thread");
+    let rows = [
         ("experiment", run.experiment.clone()),
         ("started", format::utc(run.started_unix_s)),
         ("adapter", e.adapter.clone()),
         ("device type", e.device_type.clone()),
         ("backend", e.backend.clone()),
         ("driver", format!("{} {}", e.driver, e.driver_info)),
-        ("software adapter", yes_no(e.software).into()),
-        ("GPU timestamps", yes_no(e.timestamps).into()),
+        ("software adapter", yes_no(e.software)),
+        ("GPU timestamps", yes_no(e.timestamps)),
         ("loops", loops),
-        ("denormal numbers", denormals),
-        (
-            "processor",
-            format!("{}, {}", e.cpu, format::plural(e.cpu_threads, "thread")),
-        ),
+        ("denormal numbers", denormals.unwrap_or_default().into()),
+        ("processor", format!("{}, {threads}", e.cpu)),
         ("system", e.os.clone()),
         ("raystone", e.version.clone()),
-        ("commit", commit),
+        ("commit", commit.unwrap_or_default()),
     ];
     let mut table = Table::new("Environment", &["what", ":value"]);
-    let or_absent = |text: String| {
-        if text.trim().is_empty() {
-            format::ABSENT.to_owned()
-        } else {
-            text
-        }
-    };
-    table
-        .rows
-        .extend(rows.map(|(what, value)| vec![what.into(), or_absent(value).into()]));
+    for (what, value) in rows {
+        let value = match value.trim().is_empty() {
+            true => format::ABSENT.into(),
+            false => value,
+        };
+        table.rows.push(vec![what.into(), value.into()]);
+    }
     let mut section = Section::new("environment", "Where it ran");
     section.blocks.extend(table.into_block());
     section.blocks.push(Block::Heading("Experiment".into()));
-    section
-        .blocks
-        .push(Block::Verbatim(run.experiment_text.clone()));
+    let text = Block::Verbatim(run.experiment_text.clone());
+    section.blocks.push(text);
     Some(section)
 }

@@ -3,13 +3,12 @@
 
 use super::file_stem;
 use crate::measure::figure::figure;
-use crate::measure::record::{FigureAtCount, Interval, Key, Recorded, StreamRecord, axis};
-use crate::report::data::RunData;
+use crate::measure::record::{FigureAtCount, Key, Recorded, StreamRecord, axis};
+use crate::report::data::{RunData, SAMPLER_ROW};
 use crate::report::document::*;
-use crate::report::format;
-use crate::report::pivot::Pivot;
+use crate::report::pivot::{FIGURES_ALONE, Part, Rows};
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
-use crate::report::values::{Value, of_stream};
+use crate::report::values::{Value, number, of_cost, of_stream, pair_of_dimensions};
 
 /// Columns of a table over N at most.
 const COLUMNS: usize = 8;
@@ -30,18 +29,16 @@ pub fn section(data: &RunData) -> Option<Section> {
     let mut section = Section::new("discrepancy", "Streams: discrepancy and integration error");
     section.blocks.push(Block::Paragraph(TAPPED.into()));
     section.blocks.extend(worst_table(data).into_block());
-    let mut pairs: Vec<(&str, [u32; 2])> = Vec::new();
+    let mut pairs: Vec<Pair> = Vec::new();
     for stream in data.streams.iter().filter(|s| s.named) {
-        if !pairs.contains(&(&stream.purpose, stream.dimensions)) {
-            pairs.push((&stream.purpose, stream.dimensions));
+        let what = pair_of_dimensions(stream);
+        match pairs.iter_mut().find(|pair| pair.what == what) {
+            Some(pair) => pair.streams.push(stream),
+            None => pairs.push(Pair::new(data, what, stream)),
         }
     }
-    for (purpose, dimensions) in pairs {
-        let is_of =
-            |s: &&Recorded<StreamRecord>| s.purpose == purpose && s.dimensions == dimensions;
-        let streams = data.streams.iter().filter(is_of).copied().collect();
-        section.blocks.extend(Pair::new(data, streams).blocks());
-    }
+    let blocks = pairs.iter().flat_map(Pair::blocks);
+    section.blocks.extend(blocks);
     section.blocks.extend(cost_table(data).into_block());
     Some(section)
 }
@@ -53,90 +50,76 @@ struct Pair<'a> {
     what: String,
     /// Start of file names.
     stem: String,
-    streams: Vec<Recorded<'a, StreamRecord>>,
+    streams: Vec<&'a Recorded<'a, StreamRecord>>,
 }
 
 impl<'a> Pair<'a> {
-    fn new(data: &'a RunData<'a>, streams: Vec<Recorded<'a, StreamRecord>>) -> Self {
-        let (purpose, [a, b]) = streams
-            .first()
-            .map_or(("", [0, 0]), |s| (&s.purpose, s.dimensions));
+    fn new(data: &'a RunData, what: String, first: &'a Recorded<StreamRecord>) -> Self {
+        let [a, b] = first.dimensions;
         Self {
             data,
-            what: format!("{purpose} (dimensions {a} and {b})"),
-            stem: format!("discrepancy-{}-{a}-{b}", file_stem(purpose)),
-            streams,
+            what,
+            stem: format!("discrepancy-{}-{a}-{b}", file_stem(&first.purpose)),
+            streams: vec![first],
         }
     }
 
     fn blocks(&self) -> Vec<Block> {
-        let mut blocks = vec![Block::Heading(self.what.clone())];
-        let figures = self.figures();
-        if !figures.is_empty() {
-            blocks.push(Block::Figures(figures));
-        }
+        let values: Vec<Value> = self.streams.iter().flat_map(|s| of_stream(s)).collect();
         let tables = [
-            self.ranking_table(),
-            self.count_table("star-discrepancy/v1"),
-            self.count_table("l2-star/v1"),
-            self.count_table("centered/v1"),
-            self.pixel_table(),
+            self.ranking_table(&values),
+            self.count_table(&values, "star-discrepancy/v1"),
+            self.count_table(&values, "l2-star/v1"),
+            self.count_table(&values, "centered/v1"),
+            self.pixel_table(&values),
         ];
+        let mut blocks = vec![Block::Heading(self.what.clone())];
+        blocks.extend(Block::figures(self.figures()));
         blocks.extend(tables.into_iter().filter_map(Table::into_block));
         blocks
     }
 
-    fn figures(&self) -> Vec<Figure> {
-        let guide = |factor, of| Guide {
-            label: format!("{factor}/√N, fit of Dufay 2017 for {of}"),
-            factor,
-            exponent: -0.5,
+    fn figures(&self) -> Vec<Option<Figure>> {
+        let dufay = |factor, of| {
+            let label = format!("{factor}/√N, fit of Dufay 2017 for {of}");
+            Guide::new(label, factor, -0.5)
         };
-        let guides = vec![guide(2.5, "Halton"), guide(1.5, "Hammersley")];
-        let mut plots = vec![(
-            String::new(),
-            "exact star discrepancy of the first N points".to_owned(),
-            self.plot("star discrepancy D*", guides, star),
-        )];
-        for name in PLOTTED {
-            let values = |s: &StreamRecord| {
-                let found = s.figures.integrands.iter().find(|i| i.function == name);
-                found.map_or(Vec::new(), |i| i.rmse.clone())
-            };
-            plots.push((
-                format!("-{name}"),
-                format!("RMSE of the integral of integrand:{name} over the first N points"),
-                self.plot(&format!("RMSE of {name}"), Vec::new(), values),
-            ));
-        }
-        let figure = |(ending, says, plot): (String, String, CurvePlot)| {
+        let guides = vec![dufay(2.5, "Halton"), dufay(1.5, "Hammersley")];
+        let figure = |ending: String, says: String, plot: CurvePlot| {
             let caption = format!(
                 "{}: {says}. Bands: 95 % interval over seeds; dashed curves: deterministic.",
                 self.what
             );
-            Some(Figure::new(
-                format!("{}{ending}", self.stem),
-                caption,
-                plot.draw()?,
-            ))
+            plot.figure(format!("{}{ending}", self.stem), caption)
         };
-        plots.into_iter().filter_map(figure).collect()
+        let star = self.plot("star discrepancy D*", guides, |s| &s.star);
+        let says = "exact star discrepancy of the first N points".to_owned();
+        let mut figures = vec![figure(String::new(), says, star)];
+        figures.extend(PLOTTED.map(|name| {
+            let says = format!("RMSE of the integral of integrand:{name} over the first N points");
+            let plot = self.plot(&format!("RMSE of {name}"), Vec::new(), |s| {
+                let found = s.figures.integrands.iter().find(|i| i.function == name);
+                found.map_or(&[], |i| i.rmse.as_slice())
+            });
+            figure(format!("-{name}"), says, plot)
+        }));
+        figures
     }
 
     fn plot(
         &self,
         y_title: &str,
         guides: Vec<Guide>,
-        values: impl Fn(&StreamRecord) -> Vec<FigureAtCount>,
+        values: impl Fn(&StreamRecord) -> &[FigureAtCount],
     ) -> CurvePlot {
-        let curve = |stream: &Recorded<StreamRecord>| {
-            let name = self.data.names.sampler(stream.key);
-            let point = |at: FigureAtCount| CurvePoint::new(at.n as f64, &at.value);
+        let curve = |stream: &&Recorded<'a, StreamRecord>| {
+            let label = self.data.names.sampler(stream.key);
+            let point = |at: &FigureAtCount| CurvePoint::new(at.n as f64, &at.value);
             Curve {
-                look: self.data.sampler_look(&name),
-                label: name,
+                look: self.data.sampler_look(&label),
+                label,
                 exact: !stream.randomised,
-                points: values(stream).into_iter().map(point).collect(),
+                points: values(stream).iter().map(point).collect(),
             }
         };
         let curves = self.streams.iter().map(curve);
@@ -149,14 +132,24 @@ impl<'a> Pair<'a> {
         }
     }
 
+    fn rows<'r>(&self, heads: &'r [&'r str]) -> Rows<'r> {
+        let row = |s: &&Recorded<StreamRecord>| {
+            let name = self.data.names.sampler(s.key).into();
+            let cells = [name, Cell::repeats(s.seeds, s.randomised)];
+            let cells = cells.into_iter().take(heads.len());
+            (s.key.clone(), cells.collect())
+        };
+        Rows::new(&SAMPLER_ROW, heads, self.streams.iter().map(row))
+    }
+
     /// Exponents side by side: D* and errors do not rank alike.
-    fn ranking_table(&self) -> Table {
-        let functions: Vec<&str> = self.streams.first().map_or(Vec::new(), |s| {
-            let integrands = s.figures.integrands.iter();
-            integrands.map(|i| i.function.as_str()).collect()
-        });
-        let largest = self.streams.iter().filter_map(|s| s.star.last());
-        let most = largest.map(|at| at.n).max().unwrap_or(0);
+    fn ranking_table(&self, values: &[Value]) -> Table {
+        let most = |s: &&Recorded<StreamRecord>| Some(s.star.last()?.n);
+        let most = self.streams.iter().filter_map(most).max().unwrap_or(0);
+        let is_shown = |v: &&Value| {
+            v.figure.id != "star-discrepancy/v1" || number(&v.key, axis::POINTS) == most
+        };
+        let values: Vec<Value> = values.iter().filter(is_shown).cloned().collect();
         let caption = format!(
             "{}: D* at N = {most}, and exponents of N fitted over all N [95 % interval over seeds]: of D*, and of \
              the RMSE of each integrand. Plain Monte Carlo has −0.5 everywhere. A small D* is no promise of a small \
@@ -164,37 +157,21 @@ impl<'a> Pair<'a> {
              way round",
             self.what
         );
-        let mut table = Table::new(caption, &["sampler", "D*", "D* exponent"]);
-        if functions.is_empty() {
-            return table;
-        }
-        functions.iter().for_each(|name| table.add_column(*name));
-        for stream in &self.streams {
-            let last = stream.star.last().filter(|at| at.n == most);
-            let mut row = vec![
-                Cell::from(self.data.names.sampler(stream.key)),
-                format::optional(last.map(|at| at.value.value)).into(),
-                slope_cell(stream.figures.star_slope),
-            ];
-            row.extend(functions.iter().map(|name| {
-                let found = stream.figures.integrands.iter();
-                let found = found.filter(|i| i.function == *name).find_map(|i| i.slope);
-                slope_cell(found)
-            }));
-            table.rows.push(row);
-        }
-        table
-    }
-
-    fn values(&self) -> Vec<Value<'static>> {
-        self.streams.iter().flat_map(of_stream).collect()
+        let figures = [
+            "star-discrepancy/v1",
+            "star-exponent/v1",
+            "integral-exponent/v1",
+        ];
+        let function = |key: &Key| key.label(axis::SUBJECT).to_owned();
+        self.rows(&["sampler"])
+            .table(&values, caption, &figures, &function)
     }
 
     /// One figure by N: mean over seeds.
-    fn count_table(&self, id: &str) -> Table {
-        let mut values = self.values();
-        values.retain(|value| value.figure.id == id);
-        let n = |value: &Value| value.key.label(axis::POINTS).parse::<usize>().unwrap_or(0);
+    fn count_table(&self, values: &[Value], id: &str) -> Table {
+        let n = |value: &Value| number(&value.key, axis::POINTS);
+        let of_figure = values.iter().filter(|value| value.figure.id == id);
+        let mut values: Vec<Value> = of_figure.cloned().collect();
         values.sort_by_key(n);
         let mut counts: Vec<usize> = values.iter().map(n).collect();
         counts.dedup();
@@ -205,111 +182,75 @@ impl<'a> Pair<'a> {
         if values.is_empty() {
             return Table::default();
         }
-        let row = |s: &Recorded<StreamRecord>| {
-            let name = self.data.names.sampler(s.key);
-            (name.clone(), vec![name.into(), seeds_cell(s)])
-        };
-        Pivot {
-            caption: format!(
-                "{} of {}: mean over seeds [95 % interval]",
-                figure(id).title,
-                self.what
-            ),
-            heads: &["sampler", "seeds"],
-            rows: self.streams.iter().map(row).collect(),
-            row: &|key| self.data.names.sampler(key),
-            figures: &[id],
-            across: Some(&points),
-        }
-        .table(&values)
+        let title = &figure(id).title;
+        let caption = format!("{title} of {}: mean over seeds [95 % interval]", self.what);
+        self.rows(&["sampler", "seeds"])
+            .table(&values, caption, &[id], BY_POINTS)
     }
 
     /// Coherence and coverage.
-    fn pixel_table(&self) -> Table {
-        let row = |s: &Recorded<StreamRecord>| {
-            (
-                self.data.names.sampler(s.key),
-                vec![self.data.names.sampler(s.key).into()],
-            )
-        };
-        Pivot {
-            caption: format!(
-                "{}: mean angle between the directions of neighbouring pixels at the same sample, degrees (0: fully \
-                 coherent), and share of a grid of 4√N × 4√N cells that the points of 150 pixels fall into",
-                self.what
-            ),
-            heads: &["sampler"],
-            rows: self.streams.iter().map(row).collect(),
-            row: &|key| self.data.names.sampler(key),
-            figures: &["neighbour-angle/v1", "coverage/v1"],
-            across: Some(&points),
-        }
-        .table(&self.values())
+    fn pixel_table(&self, values: &[Value]) -> Table {
+        let caption = format!(
+            "{}: mean angle between the directions of neighbouring pixels at the same sample, degrees (0: fully \
+             coherent), and share of a grid of 4√N × 4√N cells that the points of 150 pixels fall into",
+            self.what
+        );
+        let figures = ["neighbour-angle/v1", "coverage/v1"];
+        self.rows(&["sampler"])
+            .table(values, caption, &figures, BY_POINTS)
     }
 }
 
-fn points(key: &Key) -> String {
-    format!("N = {}", key.label(axis::POINTS))
-}
+const BY_POINTS: Part<'static> = &|key| format!("N = {}", key.label(axis::POINTS));
 
 /// The pair of dimensions with the greatest D* of each sampler.
 fn worst_table(data: &RunData) -> Table {
-    let caption = "The worst pair of dimensions of each sampler, by D* in one pixel among all pairs that the \
-                   integrators draw: mean D* over seeds [95 % interval]";
-    let columns = ["sampler", "dimensions", "purpose", "of pairs", "N", "D*"];
-    let mut table = Table::new(caption, &columns);
-    for stream in &data.streams {
-        let (Some(of), Some(last)) = (stream.worst_of, stream.star.last()) else {
-            continue;
-        };
-        let [a, b] = stream.dimensions;
-        table.rows.push(vec![
-            data.names.sampler(stream.key).into(),
-            format!("{a} and {b}").into(),
-            stream.purpose.as_str().into(),
-            of.to_string().into(),
-            last.n.to_string().into(),
-            Cell::of(Some(last.value)),
-        ]);
+    let worst = || {
+        data.streams
+            .iter()
+            .filter_map(|s| Some((s, s.worst_of?, s.star.last()?)))
+    };
+    let row = |(s, of, last): (&Recorded<StreamRecord>, usize, &FigureAtCount)| {
+        let name = data.names.sampler(s.key);
+        let cells = [
+            name,
+            pair_of_dimensions(s),
+            of.to_string(),
+            last.n.to_string(),
+        ];
+        let key = s.key.clone().with(axis::DIMENSIONS, pair_of_dimensions(s));
+        (key, cells.map(Cell::from).into())
+    };
+    let last = |(s, _, last): (&Recorded<StreamRecord>, usize, &FigureAtCount)| {
+        let values = of_stream(s).into_iter();
+        let is_last = |v: &Value| number(&v.key, axis::POINTS) == last.n;
+        values.filter(is_last).collect::<Vec<_>>()
+    };
+    let values: Vec<Value> = worst().flat_map(last).collect();
+    if values.is_empty() {
+        return Table::default();
     }
-    table
+    let by = [&SAMPLER_ROW[..], &[axis::DIMENSIONS]].concat();
+    let heads = ["sampler", ":dimensions", "of pairs", "N"];
+    Rows::new(&by, &heads, worst().map(row)).table(
+        &values,
+        "The worst pair of dimensions of each sampler, by D* in one pixel among all pairs that the integrators draw: \
+         mean D* over seeds [95 % interval]",
+        &["star-discrepancy/v1"],
+        FIGURES_ALONE,
+    )
 }
 
 /// What drawing costs.
 fn cost_table(data: &RunData) -> Table {
-    let caption = "Cost of drawing on this adapter, nanoseconds per two-dimensional sample: median [95 % interval], \
-                   empty loop taken off, all units of the adapter together";
-    let mut table = Table::new(caption, &["sampler", "ns per sample", "empty loop, ns"]);
-    for cost in &data.costs {
-        table.rows.push(vec![
-            data.names.sampler(cost.key).into(),
-            Cell::of(Some(cost.ns_per_sample)),
-            format::number(cost.loop_ns_per_sample.value).into(),
-        ]);
-    }
-    table
-}
-
-fn star(stream: &StreamRecord) -> Vec<FigureAtCount> {
-    stream.star.clone()
-}
-
-fn seeds_cell(stream: &StreamRecord) -> Cell {
-    let seeds = stream.seeds.to_string();
-    if stream.randomised {
-        seeds.into()
-    } else {
-        Cell::with_detail(seeds, "deterministic")
-    }
-}
-
-fn slope_cell(slope: Option<Interval>) -> Cell {
-    let Some(slope) = slope else {
-        return format::ABSENT.into();
-    };
-    let text = format::slope(&slope);
-    match text.split_once(' ') {
-        Some((value, bounds)) => Cell::with_detail(value, bounds),
-        None => text.into(),
-    }
+    let values: Vec<Value> = data.costs.iter().flat_map(of_cost).collect();
+    let row = |key: &Key| (key.clone(), vec![data.names.sampler(key).into()]);
+    let rows = data.costs.iter().map(|cost| row(cost.key));
+    Rows::new(&SAMPLER_ROW, &["sampler"], rows).table(
+        &values,
+        "Cost of drawing on this adapter, nanoseconds per two-dimensional sample: median [95 % interval], empty loop \
+         taken off, all units of the adapter together",
+        &["ns-per-sample/v1", "loop-ns/v1"],
+        FIGURES_ALONE,
+    )
 }

@@ -6,9 +6,9 @@ use super::verdict::ray_classes;
 use crate::accel::{Phase, Space};
 use crate::image::viridis_css;
 use crate::measure::record::{RayClass, StructureRecord, axis};
-use crate::report::data::{Measured, RunData, SceneGroup};
+use crate::report::data::{Measured, RunData, STRUCTURE_AXES, SceneGroup};
 use crate::report::document::*;
-use crate::report::pivot::Pivot;
+use crate::report::pivot::{FIGURES_ALONE, Part, Rows};
 use crate::report::plot::rates::{Bar, RatePlot};
 use crate::report::values::{Value, of_structures};
 use crate::report::{format, pictures};
@@ -16,11 +16,10 @@ use std::path::Path;
 
 /// Everything on the structures of the scene with this index.
 pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> Vec<Block> {
-    let mut blocks = Vec::new();
     if scene.structures.is_empty() {
-        return blocks;
+        return Vec::new();
     }
-    blocks.push(Block::Heading("Structures".into()));
+    let mut blocks = vec![Block::Heading("Structures".into())];
     if let Some(drawing) = rate_plot(data, scene).draw() {
         let name = format!("scene-{index}-{}-rates", file_stem(scene.name));
         let caption = format!(
@@ -29,18 +28,17 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
         );
         blocks.push(Block::Figures(vec![Figure::new(name, caption, drawing)]));
     }
-    let classes = ray_classes(scene);
     let values = of_structures(data, scene);
-    let mut tables = vec![speed_table(data, scene, &values)];
-    tables.extend(trade_off::break_even_table(scene, &classes));
+    let mut tables = vec![speed_table(scene, &values)];
+    tables.extend(trade_off::break_even_table(scene, &values));
     let views = scene.views.iter();
-    tables.extend(views.filter_map(|view| trade_off::time_to_image_table(scene, view)));
+    tables.extend(views.filter_map(|view| trade_off::time_to_image_table(scene, view, &values)));
     tables.extend([
-        build_table(data, scene, &values),
-        shape_table(data, scene, &values),
+        build_table(scene, &values),
+        built(scene).table(&values, SHAPE, &SHAPE_FIGURES, FIGURES_ALONE),
         outside_table(data, scene, &values),
-        leaf_table(scene),
-        work_table(data, scene, &values),
+        leaf_table(scene, &values),
+        work_table(scene, &values),
     ]);
     blocks.extend(tables.into_iter().filter_map(Table::into_block));
     blocks.extend(heat_maps(dir, scene));
@@ -50,15 +48,6 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
 fn speed_bounds(scene: &SceneGroup) -> String {
     let timings = scene.structures.iter().flat_map(|s| &s.timings);
     format::median_bounds(timings.map(|timing| timing.ms.len()))
-}
-
-/// What stands where a structure has no figure.
-fn word_instead(structure: &StructureRecord) -> &'static str {
-    if structure.fault().is_some() {
-        "FAILED"
-    } else {
-        "not timed"
-    }
 }
 
 fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
@@ -73,9 +62,7 @@ fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
         Bar {
             label: s.structure.clone(),
             look: data.structure_look(&s.structure),
-            rate: timing
-                .filter(|_| fault.is_none())
-                .map(|timing| timing.mrays_s),
+            rate: timing.filter(|_| fault.is_none()).map(|t| t.mrays_s),
             instead: fault.map_or("not timed".into(), |fault| format!("FAILED: {fault}")),
         }
     };
@@ -90,18 +77,34 @@ fn rate_plot(data: &RunData, scene: &SceneGroup) -> RatePlot {
     }
 }
 
-/// A row for each of some structures.
+/// Columns by class of rays.
+pub const BY_RAYS: Part<'static> = &|key| key.label(axis::RAYS).to_owned();
+
+/// A row for each of some structures, with a further cell if there is a second head.
 fn rows<'a>(
     structures: impl Iterator<Item = &'a Measured<'a, StructureRecord>>,
-) -> Vec<(String, Vec<Cell>)> {
-    structures
-        .map(|s| (s.structure.clone(), vec![s.structure.clone().into()]))
-        .collect()
+    heads: &'a [&'a str],
+    further: impl Fn(&StructureRecord) -> Cell,
+) -> Rows<'a> {
+    let row = |s: &Measured<StructureRecord>| {
+        let cells = [s.structure.clone().into(), further(s)];
+        let cells = cells.into_iter().take(heads.len());
+        (s.key.clone(), cells.collect())
+    };
+    Rows::new(&STRUCTURE_AXES, heads, structures.map(row))
+}
+
+fn all_built<'a>(scene: &'a SceneGroup) -> impl Iterator<Item = &'a Measured<'a, StructureRecord>> {
+    scene.structures.iter().filter(|s| s.is_built())
+}
+
+fn built<'a>(scene: &'a SceneGroup) -> Rows<'a> {
+    rows(all_built(scene), &["structure"], |_| Cell::default())
 }
 
 /// Mrays/s, one row per structure and one column per ray class.
-pub fn speed_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
-    let row = |s: &Measured<StructureRecord>| {
+pub fn speed_table(scene: &SceneGroup, values: &[Value]) -> Table {
+    let gate = |s: &StructureRecord| {
         let (verdict, tone) = match s.fault() {
             None => ("passed", Tone::Good),
             Some(_) => ("FAILED", Tone::Bad),
@@ -110,151 +113,84 @@ pub fn speed_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Tabl
             Space::World => "",
             Space::Instances => "judged over instances",
         };
-        let gate = Cell::with_detail(verdict, judge).toned(tone);
-        (s.structure.clone(), vec![s.structure.clone().into(), gate])
+        Cell::with_detail(verdict, judge).toned(tone)
     };
-    Pivot {
-        caption: format!(
-            "Speed on {}, Mrays/s: median [{}]",
-            scene.name,
-            speed_bounds(scene)
-        ),
-        heads: &["structure", ":gate"],
-        rows: scene.structures.iter().map(row).collect(),
-        row: &|key| data.names.structure(key),
-        figures: &["mrays-per-s/v1"],
-        across: Some(&|key| key.label(axis::RAYS).to_owned()),
-    }
-    .table(values)
+    let bounds = speed_bounds(scene);
+    let caption = format!("Speed on {}, Mrays/s: median [{bounds}]", scene.name);
+    let rows = rows(scene.structures.iter(), &["structure", ":gate"], gate);
+    rows.table(values, caption, &["mrays-per-s/v1"], BY_RAYS)
 }
 
 /// What the build took.
-fn build_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
-    let updated = built(scene).any(|s| s.update_ms.is_some());
-    let update = match updated {
+fn build_table(scene: &SceneGroup, values: &[Value]) -> Table {
+    let update = match all_built(scene).any(|s| s.update_ms.is_some()) {
         true => "; update: all instances moved, objects kept (median of 5)",
         false => "",
     };
-    let row = |s: &Measured<StructureRecord>| {
+    let phases = |s: &StructureRecord| {
         let phase = |phase: &Phase| format!("{} {}", phase.name, format::number(phase.ms));
         let phases: Vec<String> = s.build.iter().map(phase).collect();
-        (
-            s.structure.clone(),
-            vec![s.structure.clone().into(), phases.join(" + ").into()],
-        )
+        phases.join(" + ").into()
     };
-    Pivot {
-        caption: format!("Build (one each){update}"),
-        heads: &["structure", ":phases of the build, ms"],
-        rows: built(scene).map(row).collect(),
-        row: &|key| data.names.structure(key),
-        figures: &["build-ms/v1", "build-peak-bytes/v1", "update-ms/v1"],
-        across: None,
-    }
-    .table(values)
-}
-
-fn built<'a>(scene: &'a SceneGroup) -> impl Iterator<Item = &'a Measured<'a, StructureRecord>> {
-    scene.structures.iter().filter(|s| s.is_built())
+    let heads = ["structure", ":phases of the build, ms"];
+    rows(all_built(scene), &heads, phases).table(
+        values,
+        format!("Build (one each){update}"),
+        &["build-ms/v1", "build-peak-bytes/v1", "update-ms/v1"],
+        FIGURES_ALONE,
+    )
 }
 
 /// Size and quality of what was built.
-fn shape_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
-    Pivot {
-        caption: "Size and shape (nodes, leaves: cells where there are cells; SAH and end-point overlap with both \
-                  constants 1)"
-            .into(),
-        heads: &["structure"],
-        rows: rows(built(scene)),
-        row: &|key| data.names.structure(key),
-        figures: &[
-            "bytes/v1",
-            "bytes-per-triangle/v1",
-            "nodes/v1",
-            "leaves/v1",
-            "references/v1",
-            "references-per-triangle/v1",
-            "depth/v1",
-            "sah-cost/v1",
-            "epo/v1",
-        ],
-        across: None,
-    }
-    .table(values)
-}
+const SHAPE: &str = "Size and shape (nodes, leaves: cells where there are cells; SAH and end-point overlap with \
+                     both constants 1)";
+const SHAPE_FIGURES: [&str; 9] = [
+    "bytes/v1",
+    "bytes-per-triangle/v1",
+    "nodes/v1",
+    "leaves/v1",
+    "references/v1",
+    "references-per-triangle/v1",
+    "depth/v1",
+    "sah-cost/v1",
+    "epo/v1",
+];
 
 /// Figures that this program does not measure itself.
 pub fn outside_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
     let from_outside = data.run.iter().flat_map(|run| &run.figures);
     let ids: Vec<&str> = from_outside.map(|figure| &*figure.id).collect();
-    Pivot {
-        caption: format!("Further figures on {}", scene.name),
-        heads: &["structure"],
-        rows: rows(built(scene)),
-        row: &|key| data.names.structure(key),
-        figures: &ids,
-        across: None,
-    }
-    .table(values)
+    let caption = format!("Further figures on {}", scene.name);
+    built(scene).table(values, caption, &ids, FIGURES_ALONE)
 }
 
-/// Classes of leaf sizes: title, least and greatest number of references.
-const LEAF_CLASSES: [(&str, usize, usize); 8] = [
-    ("0", 0, 0),
-    ("1", 1, 1),
-    ("2", 2, 2),
-    ("3", 3, 3),
-    ("4", 4, 4),
-    ("5–8", 5, 8),
-    ("9–16", 9, 16),
-    ("17 or more", 17, usize::MAX),
-];
-
-/// Histogram of leaves by the references they hold.
-fn leaf_table(scene: &SceneGroup) -> Table {
-    let mut table = Table::new(
+/// Leaves by the references they hold.
+fn leaf_table(scene: &SceneGroup, values: &[Value]) -> Table {
+    let with_leaves = all_built(scene).filter(|s| s.stats.leaf_histogram.iter().any(|n| *n > 0));
+    rows(with_leaves, &["structure"], |_| Cell::default()).table(
+        values,
         "Leaves (or cells) by the number of references they hold, share",
-        &["structure"],
-    );
-    for (title, ..) in LEAF_CLASSES {
-        table.add_column(title);
-    }
-    for s in built(scene) {
-        let histogram = &s.stats.leaf_histogram;
-        let all: u64 = histogram.iter().sum();
-        if all == 0 {
-            continue;
-        }
-        let mut row = vec![s.structure.clone().into()];
-        row.extend(LEAF_CLASSES.map(|(_, least, greatest)| {
-            let inside = |(k, n): (usize, &u64)| (least <= k && k <= greatest).then_some(*n);
-            let leaves: u64 = histogram.iter().enumerate().filter_map(inside).sum();
-            if leaves == 0 {
-                return format::ABSENT.into();
-            }
-            Cell::from(format::percent(leaves as f64 / all as f64))
-        }));
-        table.rows.push(row);
-    }
-    table
+        &["leaf-share/v1"],
+        &|key| key.label(axis::SUBJECT).to_owned(),
+    )
 }
 
 /// Counted work per ray.
-fn work_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
-    let passed = scene.structures.iter().filter(|s| s.fault().is_none());
-    let rows = passed.flat_map(|s| {
-        s.body.timings.iter().map(|timing| {
-            let class = format::ray_class(timing.class);
-            let cells = vec![s.structure.clone().into(), class.into()];
-            (format!("{} {class}", s.structure), cells)
+fn work_table(scene: &SceneGroup, values: &[Value]) -> Table {
+    let by = [&[axis::RAYS], &STRUCTURE_AXES[..]].concat();
+    let passed = || scene.structures.iter().filter(|s| s.fault().is_none());
+    let rows = ray_classes(scene).into_iter().flat_map(|class| {
+        let timed = passed().filter(move |s| s.timings.iter().any(|t| t.class == class));
+        timed.map(move |s| {
+            let class = format::ray_class(class);
+            let key = s.key.clone().with(axis::RAYS, class);
+            (key, vec![class.into(), s.structure.clone().into()])
         })
     });
-    Pivot {
-        caption: "Counted work per ray (means over a class, from a separate run)".into(),
-        heads: &["structure", ":rays"],
-        rows: rows.collect(),
-        row: &|key| format!("{} {}", data.names.structure(key), key.label(axis::RAYS)),
-        figures: &[
+    Rows::new(&by, &["class", ":structure"], rows).table(
+        values,
+        "Counted work per ray (means over a class, from a separate run)",
+        &[
             "rays/v1",
             "hit-share/v1",
             "nodes-per-ray/v1",
@@ -262,36 +198,30 @@ fn work_table(data: &RunData, scene: &SceneGroup, values: &[Value]) -> Table {
             "triangle-tests-per-ray/v1",
             "deepest-stack/v1",
         ],
-        across: None,
-    }
-    .table(values)
+        FIGURES_ALONE,
+    )
 }
 
 fn heat_maps(dir: &Path, scene: &SceneGroup) -> Option<Block> {
-    let mapped = || {
-        scene
-            .structures
-            .iter()
-            .filter_map(|s| Some((s, s.body.heat_map.as_deref()?)))
-    };
-    let maxima: Vec<f64> = mapped().filter_map(|(s, _)| s.heat_map_max).collect();
-    let top = maxima.first().copied();
-    let shared = maxima.iter().all(|max| Some(*max) == top);
-    let items: Vec<Picture> = mapped()
-        .map(|(s, path)| {
-            let caption = match s.heat_map_max.filter(|_| !shared) {
-                Some(max) => format!("{} (top of scale {})", s.structure, format::number(max)),
-                None => s.structure.clone(),
-            };
-            let caption = if s.fault().is_some() {
-                format!("{caption}: {}", word_instead(s))
-            } else {
-                caption
-            };
-            pictures::load(dir, path, caption)
-        })
+    let mapped: Vec<_> = (scene.structures.iter())
+        .filter_map(|s| Some((s, s.body.heat_map.as_deref()?)))
         .collect();
-    let label = |share: f64| match top.filter(|_| shared) {
+    let maxima: Vec<f64> = mapped.iter().filter_map(|(s, _)| s.heat_map_max).collect();
+    let shared = maxima
+        .first()
+        .filter(|top| maxima.iter().all(|max| max == *top));
+    let picture = |(s, path): &(&Measured<StructureRecord>, &str)| {
+        let mut caption = s.structure.clone();
+        if let Some(max) = s.heat_map_max.filter(|_| shared.is_none()) {
+            caption += &format!(" (top of scale {})", format::number(max));
+        }
+        if s.fault().is_some() {
+            caption += ": FAILED";
+        }
+        pictures::load(dir, path, caption)
+    };
+    let items: Vec<Picture> = mapped.iter().map(picture).collect();
+    let label = |share: f64| match shared {
         Some(top) => format::number(top * share),
         None => format::percent(share),
     };
@@ -300,10 +230,5 @@ fn heat_maps(dir: &Path, scene: &SceneGroup) -> Option<Block> {
         title: "nodes + triangle tests per primary ray".into(),
         labels: [0.0, 0.25, 0.5, 0.75, 1.0].map(label).to_vec(),
     });
-    let caption = "Traversal cost of primary rays".into();
-    (!items.is_empty()).then_some(Block::Gallery(Gallery {
-        caption,
-        items,
-        scale,
-    }))
+    Block::gallery("Traversal cost of primary rays", items, scale)
 }

@@ -1,45 +1,26 @@
 //! What a build costs against what it gains: break-even in rays, and time to an image.
 
-use crate::measure::record::{Interval, RayClass, StructureRecord};
+use super::structures::BY_RAYS;
+use crate::measure::record::*;
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
 use crate::report::data::{Measured, STRUCTURE_AXES, SceneGroup, View};
 use crate::report::document::*;
 use crate::report::format;
+use crate::report::pivot::Rows;
+use crate::report::samplers::Sampler;
+use crate::report::values::{Reading, Value};
 
-/// When a structure that is built more slowly has paid for itself.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum BreakEven {
-    /// It overtakes after so many million rays.
-    After(f64),
-    /// It traces no faster.
-    Never,
-    /// The intervals of the two speeds overlap.
-    Undecided,
-}
-
-impl BreakEven {
-    /// Of a structure against one that is built `extra_build_ms` faster. Speeds in Mrays/s.
-    pub fn new(extra_build_ms: f64, slow_build: &Interval, fast_build: &Interval) -> Self {
-        if slow_build.high < fast_build.low {
-            return Self::Never;
-        }
-        if slow_build.low <= fast_build.high {
-            return Self::Undecided;
-        }
-        let seconds_per_million = 1.0 / fast_build.value - 1.0 / slow_build.value;
-        Self::After(extra_build_ms.max(0.0) * 1e-3 / seconds_per_million)
+/// After how many thousand rays a structure has caught up with one that is built `extra_build_ms` faster.
+/// Speeds in Mrays/s.
+fn caught_up(extra_build_ms: f64, slow_build: &Interval, fast_build: &Interval) -> Reading {
+    if slow_build.high < fast_build.low {
+        return Reading::Word("never");
     }
-
-    fn cell(self) -> Cell {
-        match self {
-            Self::After(millions) if millions < 0.1 => {
-                format::count((millions * 1e6) as u64).into()
-            }
-            Self::After(millions) => format!("{} M", format::number(millions)).into(),
-            Self::Never => "never".into(),
-            Self::Undecided => "undecided".into(),
-        }
+    if slow_build.low <= fast_build.high {
+        return Reading::Word("undecided");
     }
+    let seconds_per_million = 1.0 / fast_build.value - 1.0 / slow_build.value;
+    (extra_build_ms.max(0.0) / seconds_per_million).into()
 }
 
 /// Speed in a class, if it was measured often enough to have a 95 % interval.
@@ -48,116 +29,128 @@ fn rate<'a>(structure: &Measured<'a, StructureRecord>, class: RayClass) -> Optio
     (timing.ms.len() >= LEAST_FOR_MEDIAN).then_some(&timing.mrays_s)
 }
 
-/// Rays after which each structure has caught up with the one that is built fastest, per class.
-pub fn break_even_table(scene: &SceneGroup, classes: &[RayClass]) -> Option<Table> {
-    let passed: Vec<&Measured<StructureRecord>> = scene
-        .structures
-        .iter()
+/// The structures with speeds: the one that is built fastest, and the others.
+fn by_build<'a>(
+    scene: &'a SceneGroup,
+) -> Option<(
+    &'a Measured<'a, StructureRecord>,
+    Vec<&'a Measured<'a, StructureRecord>>,
+)> {
+    let passed = scene.structures.iter();
+    let mut passed: Vec<_> = passed
         .filter(|s| s.fault().is_none() && !s.timings.is_empty())
         .collect();
-    let first = passed
-        .iter()
-        .min_by(|a, b| a.build_ms.total_cmp(&b.build_ms))?;
+    let least = (passed.iter().enumerate())
+        .min_by(|a, b| a.1.build_ms.total_cmp(&b.1.build_ms))?
+        .0;
+    Some((passed.remove(least), passed))
+}
+
+/// Rays after which each structure has caught up with the one that is built fastest, per class.
+pub fn break_even(scene: &SceneGroup) -> Vec<Value<'static>> {
+    let Some((first, others)) = by_build(scene) else {
+        return Vec::new();
+    };
+    let of = |s: &&Measured<StructureRecord>| {
+        let extra_ms = s.build_ms - first.build_ms;
+        let in_class = |timing: &ClassTiming| {
+            let (own, other) = (rate(s, timing.class)?, rate(first, timing.class)?);
+            let key = (s.key.clone()).with(axis::RAYS, format::ray_class(timing.class));
+            let reading = caught_up(extra_ms, own, other);
+            Some(Value::new(&key, "break-even/v1", reading))
+        };
+        s.timings.iter().filter_map(in_class).collect::<Vec<_>>()
+    };
+    others.iter().flat_map(of).collect()
+}
+
+/// The table of [`break_even`].
+pub fn break_even_table(scene: &SceneGroup, values: &[Value]) -> Option<Table> {
+    let (first, others) = by_build(scene)?;
     let caption = format!(
-        "Break-even: rays after which a structure, its build included, overtakes {}, which is built fastest ({} ms)",
+        "Break-even: thousand rays after which a structure, its build included, overtakes {}, which is built \
+         fastest ({} ms)",
         first.structure,
         format::number(first.build_ms)
     );
-    let mut table = Table::new(caption, &["structure", "build, ms"]);
-    for class in classes {
-        table.add_column(format::ray_class(*class));
-    }
-    for structure in passed.iter().filter(|s| !std::ptr::eq(s.body, first.body)) {
-        let extra_ms = structure.build_ms - first.build_ms;
-        let mut row = vec![
-            structure.structure.clone().into(),
-            format::number(structure.build_ms).into(),
-        ];
-        row.extend(classes.iter().map(|class| {
-            match (rate(structure, *class), rate(first, *class)) {
-                (Some(own), Some(other)) => BreakEven::new(extra_ms, own, other).cell(),
-                _ => format::ABSENT.into(),
-            }
-        }));
-        table.rows.push(row);
-    }
-    Some(table)
+    let row = |s: &Measured<StructureRecord>| (s.key.clone(), vec![s.structure.clone().into()]);
+    let rows = Rows::new(&STRUCTURE_AXES, &["structure"], others.into_iter().map(row));
+    let figures = ["build-ms/v1", "break-even/v1"];
+    Some(rows.table(values, caption, &figures, BY_RAYS))
 }
 
-/// Build and rendering together, for one image of few samples and one of many. All structures with
-/// the sampler that most of them were timed with.
-pub fn time_to_image_table(scene: &SceneGroup, view: &View) -> Option<Table> {
-    let structures = view.timed_structures();
-    let timed = |sampler: &str| {
-        let valid = |s: &&String| view.ms_per_spp(s, sampler).is_some();
-        structures.iter().filter(valid).count()
+/// The sampler that most structures were timed with.
+fn most_timed<'a>(view: &'a View) -> Option<&'a Sampler<'a>> {
+    let timed = |s: &&Sampler| view.valid_times().filter(|t| t.sampler == s.name).count();
+    view.samplers.iter().rev().max_by_key(timed)
+}
+
+/// Build and rendering together with that sampler, for one image of few samples and one of many.
+pub fn times_to_image(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
+    let errors = view.samplers.iter().flat_map(|s| &s.replicates);
+    let spps = errors.flat_map(|r| &r.errors).map(|e| e.spp);
+    let (Some(sampler), Some(most)) = (most_timed(view), spps.max()) else {
+        return Vec::new();
     };
-    let sampler = view.samplers.iter().rev().max_by_key(|s| timed(&s.name))?;
-    let most_spp = view
-        .samplers
-        .iter()
-        .flat_map(|s| &s.replicates)
-        .flat_map(|r| &r.errors)
-        .map(|e| e.spp)
-        .max()?;
-    let caption = format!(
-        "Time to image: build + rendering by {} with {}, ms",
-        view.name, sampler.name
-    );
-    let mut table = Table::new(caption, &["structure", "build"]);
-    let mut counts = vec![1, most_spp];
+    let mut counts = vec![1, most];
     counts.dedup();
-    for spp in &counts {
-        table.add_column(format!("build + {spp} spp"));
-    }
-    for name in &structures {
-        let Some(time) = view.time(name, &sampler.name) else {
-            continue;
-        };
+    let of = |time: &Measured<TimeRecord>| {
         let is_it = |s: &&Measured<StructureRecord>| s.key.agrees(&time.key, &STRUCTURE_AXES);
-        let built = scene.structures.iter().find(is_it);
-        let (Some(built), Some(ms)) = (built, time.ms_per_spp) else {
-            continue;
+        let built = scene.structures.iter().find(is_it)?;
+        let ms = time.ms_per_spp?;
+        let total = |spp: &u32| {
+            let total = built.build_ms + ms.value * f64::from(*spp);
+            let key = time.key.clone().with(axis::SPP, spp);
+            Value::new(&key, "time-to-image/v1", total)
         };
-        let total = |spp: u32| format::number(built.build_ms + ms.value * f64::from(spp));
-        let mut row = vec![name.clone().into(), format::number(built.build_ms).into()];
-        row.extend(counts.iter().map(|&spp| total(spp).into()));
-        table.rows.push(row);
-    }
-    Some(table)
+        Some(counts.iter().map(total).collect::<Vec<_>>())
+    };
+    let timed = view.valid_times().filter(|t| t.sampler == sampler.name);
+    timed.filter_map(of).flatten().collect()
+}
+
+/// The table of [`times_to_image`].
+pub fn time_to_image_table(scene: &SceneGroup, view: &View, builds: &[Value]) -> Option<Table> {
+    let times = times_to_image(scene, view);
+    let sampler = &most_timed(view)?.name;
+    let row = |value: &Value| {
+        let structure = value.key.label(axis::ACCEL);
+        (value.key.clone(), vec![structure.into()])
+    };
+    let mut rows: Vec<(Key, Vec<Cell>)> = times.iter().map(row).collect();
+    rows.dedup_by(|a, b| a.0.agrees(&b.0, &STRUCTURE_AXES));
+    let values = [builds, &times].concat();
+    let caption = format!(
+        "Time to image: build + rendering by {} with {sampler}, ms",
+        view.name
+    );
+    let spp = |key: &Key| match key.label(axis::SPP) {
+        "" => "build".to_owned(),
+        spp => format!("build + {spp} spp"),
+    };
+    let figures = ["build-ms/v1", "time-to-image/v1"];
+    let rows = Rows::new(&STRUCTURE_AXES, &["structure"], rows);
+    (!times.is_empty()).then(|| rows.table(&values, caption, &figures, &spp))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn speed(value: f64) -> Interval {
-        Interval {
+    #[test]
+    fn a_slower_build_pays_after_the_rays_that_make_up_for_it_never_or_undecided() {
+        let speed = |value: f64| Interval {
             value,
             low: value * 0.95,
             high: value * 1.05,
-        }
-    }
-
-    #[test]
-    fn a_slower_build_pays_after_the_rays_that_make_up_for_it() {
-        // 100 ms more; 1 s/M rays against 2 s/M rays: after 0.1 M rays.
-        let found = BreakEven::new(100.0, &speed(1.0), &speed(0.5));
-        let BreakEven::After(millions) = found else {
-            panic!("{found:?}")
         };
-        assert!((millions - 0.1).abs() < 1e-12, "{millions}");
-    }
-
-    #[test]
-    fn a_slower_structure_never_pays_and_overlapping_speeds_decide_nothing() {
-        assert_eq!(
-            BreakEven::new(100.0, &speed(0.5), &speed(1.0)),
-            BreakEven::Never
-        );
-        assert_eq!(
-            BreakEven::new(100.0, &speed(1.0), &speed(0.98)),
-            BreakEven::Undecided
-        );
+        let of = |slow, fast| caught_up(100.0, &speed(slow), &speed(fast));
+        // 100 ms more; 1 s/M rays against 2 s/M rays: after 100,000 rays.
+        let Reading::Known(found) = of(1.0, 0.5) else {
+            panic!("no number");
+        };
+        assert!((found.value - 100.0).abs() < 1e-9, "{found:?}");
+        assert_eq!(of(0.5, 1.0), Reading::Word("never"));
+        assert_eq!(of(1.0, 0.98), Reading::Word("undecided"));
     }
 }

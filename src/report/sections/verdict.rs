@@ -1,13 +1,14 @@
 //! Who wins, per scene.
 
 use crate::measure::figure::figure;
-use crate::measure::record::{ClassTiming, Interval, RayClass, StructureRecord};
+use crate::measure::record::{ClassTiming, Interval, RayClass, StructureRecord, axis};
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
 use crate::report::data::{Measured, RunData, SceneGroup, View};
 use crate::report::document::*;
 use crate::report::format;
 use crate::report::ruling::{Contender, Ruling, judge};
 use crate::report::samplers::{MeanError, Metric, Sampler, error_after};
+use crate::report::values::Value;
 
 /// The verdict box.
 pub fn section(data: &RunData) -> Section {
@@ -16,18 +17,15 @@ pub fn section(data: &RunData) -> Section {
         let verdicts = table(scene).into_block();
         let none = || Block::Paragraph(format!("On {} nothing could be compared.", scene.name));
         section.blocks.push(verdicts.unwrap_or_else(none));
-        section.blocks.extend(left_out(scene).map(Block::Paragraph));
-        section.blocks.extend(unranked(scene).map(Block::Paragraph));
+        section.blocks.extend(apart(scene));
     }
-    if section.blocks.is_empty() {
-        section
-            .blocks
-            .push(Block::Paragraph("Nothing was measured.".into()));
-    } else {
-        let rule =
-            "A winner is named only where its 95 % interval is apart from that of every other.";
-        section.blocks.push(Block::Paragraph(rule.into()));
-    }
+    let rule = match section.blocks.is_empty() {
+        true => "Nothing was measured.",
+        false => {
+            "A winner is named only where its 95 % interval is apart from that of every other."
+        }
+    };
+    section.blocks.push(Block::Paragraph(rule.into()));
     section
 }
 
@@ -43,27 +41,23 @@ pub fn table(scene: &SceneGroup) -> Table {
         ],
     );
     for class in ray_classes(scene) {
-        let ruling = fastest(scene, class);
-        table.rows.push(row(
-            format!("fastest, {} rays (Mrays/s)", format::ray_class(class)),
-            &ruling,
-        ));
+        let question = format!("fastest, {} rays (Mrays/s)", format::ray_class(class));
+        table.rows.push(row(question, &fastest(scene, class)));
     }
+    let metric = Metric::RelMse.name();
     for view in &scene.views {
         if let Some(spp) = view.common_spp() {
             let question = format!(
-                "least error per sample: {}, {} at {spp} spp",
-                view.name,
-                Metric::RelMse.name()
+                "least error per sample: {}, {metric} at {spp} spp",
+                view.name
             );
             table.rows.push(row(question, &best_per_sample(view, spp)));
         }
         if let Some(race) = Race::new(view) {
-            let seconds = format::number(race.seconds);
             let question = format!(
-                "least error per second: {}, {} after {seconds} s",
+                "least error per second: {}, {metric} after {} s",
                 view.name,
-                Metric::RelMse.name()
+                format::number(race.seconds)
             );
             table.rows.push(row(question, &race.ruling()));
         }
@@ -77,48 +71,39 @@ fn row(question: String, ruling: &Ruling) -> Vec<Cell> {
         Ruling::Nobody => Tone::Bad,
         Ruling::Withheld(_) | Ruling::Alone(_) | Ruling::Unclear(_) => Tone::Note,
     };
-    vec![
-        question.into(),
-        Cell::from(ruling.answer()).toned(tone),
-        ruling.figure().into(),
-        ruling.runner_up().into(),
-    ]
+    let answer = Cell::from(ruling.answer()).toned(tone);
+    let (figure, next) = (ruling.figure(), ruling.runner_up());
+    vec![question.into(), answer, figure.into(), next.into()]
 }
 
-/// Who may not win, with the reason.
-fn left_out(scene: &SceneGroup) -> Option<String> {
-    let structures = scene
-        .structures
-        .iter()
-        .filter_map(|s| Some(format!("{} ({})", s.structure, s.fault()?)));
-    let samplers = scene.views.iter().flat_map(|view| {
-        let fault = |s: &Sampler| Some(format!("{} with {} ({})", s.name, view.name, s.fault()?));
-        view.samplers.iter().filter_map(fault)
-    });
-    let names: Vec<String> = structures.chain(samplers).collect();
-    (!names.is_empty()).then(|| {
-        format!(
-            "Left out of the comparison on {}: {}.",
-            scene.name,
-            names.join("; ")
-        )
-    })
-}
-
-/// Who is shown without being ranked.
-fn unranked(scene: &SceneGroup) -> Option<String> {
-    let samplers = scene.views.iter().flat_map(|view| {
-        let single = view.samplers.iter().filter(|s| s.replicates.len() == 1);
-        single.map(|s| format!("{} with {}", s.name, view.name))
-    });
-    let names: Vec<String> = samplers.collect();
-    (!names.is_empty()).then(|| {
-        format!(
-            "Shown, but not ranked on {}, since one image tells nothing of their spread: {}.",
-            scene.name,
-            names.join("; ")
-        )
-    })
+/// Who may not win, with the reason, and who is shown without being ranked.
+fn apart(scene: &SceneGroup) -> Vec<Block> {
+    let faulty =
+        (scene.structures.iter()).filter_map(|s| Some(format!("{} ({})", s.structure, s.fault()?)));
+    let samplers = || {
+        let views = scene.views.iter();
+        views.flat_map(|view| view.samplers.iter().map(move |s| (s, &view.name)))
+    };
+    let biased =
+        samplers().filter_map(|(s, view)| Some(format!("{} with {view} ({})", s.name, s.fault()?)));
+    let single = samplers().filter(|(s, _)| s.replicates.len() == 1);
+    let single = single.map(|(s, view)| format!("{} with {view}", s.name));
+    let said = [
+        (
+            format!("Left out of the comparison on {}", scene.name),
+            faulty.chain(biased).collect::<Vec<_>>(),
+        ),
+        (
+            format!(
+                "Shown, but not ranked on {}, since one image tells nothing of their spread",
+                scene.name
+            ),
+            single.collect(),
+        ),
+    ];
+    let said = said.into_iter().filter(|(_, names)| !names.is_empty());
+    let said = said.map(|(what, names)| format!("{what}: {}.", names.join("; ")));
+    said.map(Block::Paragraph).collect()
 }
 
 /// Ray classes that some structure was timed on.
@@ -231,6 +216,37 @@ impl<'a> Race<'a> {
             view,
             runners,
         })
+    }
+
+    /// What a second buys: error × time at the common spp, and the errors when the race ends.
+    pub fn values(&self) -> Vec<Value<'static>> {
+        let metric = Metric::RelMse;
+        let mut values = Vec::new();
+        for sampler in &self.view.samplers {
+            let Some(time) = self.view.time(&self.structure, &sampler.name) else {
+                continue;
+            };
+            let ms = time.ms_per_spp.map(|ms| ms.value);
+            let at = (self.view.common_spp()).and_then(|spp| sampler.mean_error_at(metric, spp));
+            if let (Some(ms), Some(mean)) = (ms, at.filter(|mean| mean.resolved)) {
+                let product = mean.error.value * f64::from(mean.spp) * ms / 1000.0;
+                let what = format!("{} × seconds at {} spp", metric.name(), mean.spp);
+                let key = time.key.clone().with(axis::SUBJECT, what);
+                values.push(Value::new(&key, "error-seconds/v1", product));
+            }
+            let what = format!("{} after {} s", metric.name(), format::number(self.seconds));
+            let key = time.key.clone().with(axis::SUBJECT, what);
+            let end = self.error_of(&sampler.name);
+            let end = end.map(|e| {
+                if sampler.is_ranked() {
+                    e
+                } else {
+                    Interval::exact(e.value)
+                }
+            });
+            values.extend(Value::known(&key, [("error-at-time/v1", end)]));
+        }
+        values
     }
 
     /// Error of a sampler when the race ends.

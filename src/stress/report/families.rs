@@ -1,22 +1,16 @@
 //! Tables of families, structures and their worst rays.
 
+use super::values::of_line;
 use super::{cell, structures, triangles};
 use crate::measure::record::{Recorded, axis};
 use crate::report::document::{Cell, Table, Tone};
 use crate::report::format;
+use crate::report::pivot::{FIGURES_ALONE, Rows};
+use crate::report::values::Value;
 use crate::stress::families::FAMILIES;
 use crate::stress::record::{Findings, Line, Quantiles};
 use crate::stress::suite::BRUTE_FORCE;
 use crate::stress::targets::cells;
-
-fn three(of: Quantiles) -> Cell {
-    // What is relative to nothing is held as the greatest number.
-    let text = |x: f64| match x {
-        f64::MAX => "∞".to_owned(),
-        x => format::significant(x, 2),
-    };
-    [of.median, of.p99, of.max].map(text).join(" / ").into()
-}
 
 /// The families that were tried with a triangle test, each with its cells, brute force's first.
 fn rows<'a>(records: &'a [Line], test: &str) -> Vec<(&'static str, Vec<Recorded<'a, Findings>>)> {
@@ -34,45 +28,46 @@ fn rows<'a>(records: &'a [Line], test: &str) -> Vec<(&'static str, Vec<Recorded<
 
 /// What brute force with one triangle test gets wrong, and what other structures do otherwise.
 pub(super) fn count_table(records: &[Line], test: &str) -> Table {
-    let mut table = Table::new(
-        format!("{test}: brute force against the exact oracle; (…) is not explained by rounding"),
+    let families = rows(records, test);
+    let row = |(family, cells): &(&str, Vec<Recorded<Findings>>)| {
+        let differ = differing(cells).into();
+        (cells[0].key.clone(), vec![(*family).into(), differ])
+    };
+    let judged = |line: &&Line| families.iter().any(|(_, cells)| *cells[0].key == line.key);
+    let mut values: Vec<Value> = records.iter().filter(judged).flat_map(of_line).collect();
+    // Not brute force's own, which visits all in any case.
+    values.retain(|value| value.figure.id != "slowdown/v1");
+    for (_, cells) in &families {
+        let slowest = cells
+            .iter()
+            .filter_map(|c| c.get("slowdown/v1"))
+            .reduce(f64::max);
+        values.extend(Value::known(cells[0].key, [("slowdown/v1", slowest)]));
+    }
+    let heads = ["family", ":structures that differ"];
+    let mut table = Rows::new(&[axis::FAMILY], &heads, families.iter().map(row)).table(
+        &values,
+        format!("{test}: brute force against the exact oracle; unexplained: not by rounding"),
         &[
-            "family",
-            "rays",
-            "false misses",
-            "cracks",
-            "false hits",
-            "wrong triangle",
-            "not nearest",
-            "borderline",
-            "slowdown",
-            ":structures that differ",
+            "rays/v1",
+            "false-misses/v1",
+            "unexplained-misses/v1",
+            "cracks/v1",
+            "false-hits/v1",
+            "unexplained-hits/v1",
+            "wrong-triangle/v1",
+            "not-nearest/v1",
+            "borderline/v1",
+            "slowdown/v1",
         ],
+        FIGURES_ALONE,
     );
-    for (family, of_family) in rows(records, test) {
-        let cell = of_family[0];
-        let slowdowns = of_family.iter().filter_map(|c| c.get("slowdown/v1"));
-        let count = |id: &str| format::count(cell.count(id) as u64);
-        let both = |all: &str, unexplained: &str| match cell.count(all) {
-            0 => "0".to_owned(),
-            _ => format!("{} ({})", count(all), count(unexplained)),
-        };
-        let tone = match cell.count("cracks/v1") {
-            0 => Tone::Plain,
-            _ => Tone::Bad,
-        };
-        table.rows.push(vec![
-            family.into(),
-            count("rays/v1").into(),
-            both("false-misses/v1", "unexplained-misses/v1").into(),
-            Cell::from(count("cracks/v1")).toned(tone),
-            both("false-hits/v1", "unexplained-hits/v1").into(),
-            count("wrong-triangle/v1").into(),
-            count("not-nearest/v1").into(),
-            count("borderline/v1").into(),
-            format::optional(slowdowns.reduce(f64::max)).into(),
-            differing(&of_family).into(),
-        ]);
+    let cracks = table.columns.iter().position(|c| c.title == "cracks");
+    for row in &mut table.rows {
+        let cell = cracks.and_then(|column| row.get_mut(column));
+        if let Some(cell) = cell.filter(|cell| cell.text != "0") {
+            cell.tone = Tone::Bad;
+        }
     }
     table
 }
@@ -84,6 +79,9 @@ fn differing(of_family: &[Recorded<Findings>]) -> String {
     let differ: Vec<&Recorded<Findings>> = (of_family.iter())
         .filter(|c| c.differing() > 0 || !c.failures.is_empty())
         .collect();
+    if differ.is_empty() {
+        return "none".into();
+    }
     if differ.len() > MOST {
         let most = differ.iter().map(|c| c.differing()).max().unwrap_or(0);
         let failed = differ.iter().filter(|c| !c.failures.is_empty()).count();
@@ -94,10 +92,10 @@ fn differing(of_family: &[Recorded<Findings>]) -> String {
         );
     }
     let name = |c: &&Recorded<Findings>| {
-        let accel = c.key.label(axis::ACCEL);
+        let text = format!("{} {}", c.key.label(axis::ACCEL), c.differing());
         match c.failures.len() {
-            0 => format!("{accel} {}", c.differing()),
-            failed => format!("{accel} {} ({failed} failed)", c.differing()),
+            0 => text,
+            failed => format!("{text} ({failed} failed)"),
         }
     };
     differ.iter().map(name).collect::<Vec<_>>().join(", ")
@@ -105,16 +103,15 @@ fn differing(of_family: &[Recorded<Findings>]) -> String {
 
 /// How exact the right hits of brute force are.
 pub(super) fn error_table(records: &[Line], test: &str) -> Table {
-    let mut table = Table::new(
-        format!("{test}: errors of right hits, median / p99 / max"),
-        &[
-            "family",
-            "error of t, ulp",
-            "of t, relative",
-            "of the point, ulp",
-            "of the point, relative",
-        ],
-    );
+    let caption = format!("{test}: errors of right hits, median / p99 / max");
+    let heads = [
+        "family",
+        "error of t, ulp",
+        "of t, relative",
+        "of the point, ulp",
+        "of the point, relative",
+    ];
+    let mut table = Table::new(caption, &heads);
     for (family, of_family) in rows(records, test) {
         if let Some(errors) = of_family[0].errors {
             let mut row = vec![family.into()];
@@ -125,69 +122,61 @@ pub(super) fn error_table(records: &[Line], test: &str) -> Table {
     table
 }
 
+fn three(of: Quantiles) -> Cell {
+    // What is relative to nothing is held as the greatest number.
+    let text = |x: f64| match x {
+        f64::MAX => "∞".to_owned(),
+        x => format::significant(x, 2),
+    };
+    [of.median, of.p99, of.max].map(text).join(" / ").into()
+}
+
 /// A mark per triangle test, structure and family.
 pub(super) fn matrix_table(records: &[Line]) -> Table {
-    let mut table = Table::new(
-        "false misses per triangle test, structure and family; · none, ! differs from brute force, x failed",
-        &["triangle", ":structure"],
-    );
-    let families: Vec<&str> = FAMILIES
-        .iter()
-        .map(|f| f.name)
-        .filter(|name| cells(records).any(|c| c.key.label(axis::FAMILY) == *name))
-        .collect();
+    let caption = "False misses per triangle test, structure and family; · none, ! differs from brute force, x failed";
+    let mut table = Table::new(caption, &["triangle", ":structure"]);
+    let tried = |name: &&str| cells(records).any(|c| c.key.label(axis::FAMILY) == *name);
+    let families: Vec<&str> = FAMILIES.iter().map(|f| f.name).filter(tried).collect();
     families.iter().for_each(|name| table.add_column(*name));
     for test in triangles(records) {
         for accel in structures(records) {
-            let row: Vec<Option<Recorded<Findings>>> = families
-                .iter()
-                .map(|f| cell(records, &test, &accel, f))
-                .collect();
-            if row.iter().all(Option::is_none) {
-                continue;
+            let marks = families.iter().map(|f| cell(records, &test, &accel, f));
+            let marks: Vec<_> = marks.map(|cell| cell.map(|c| mark(&c))).collect();
+            if marks.iter().any(Option::is_some) {
+                let mut row: Vec<Cell> = vec![test.clone().into(), accel.into()];
+                row.extend(
+                    marks
+                        .into_iter()
+                        .map(|mark| mark.unwrap_or_default().into()),
+                );
+                table.rows.push(row);
             }
-            let mut cells: Vec<Cell> = vec![test.clone().into(), accel.clone().into()];
-            cells.extend(
-                row.iter()
-                    .map(|cell| cell.map_or_else(|| "".into(), |c| mark(&c).into())),
-            );
-            table.rows.push(cells);
         }
     }
     table
 }
 
 fn mark(cell: &Findings) -> String {
-    let mut text = match cell.count("false-misses/v1") {
+    let count = match cell.count("false-misses/v1") {
         0 => "·".to_owned(),
         n => n.to_string(),
     };
-    if cell.differing() > 0 {
-        text.push('!');
-    }
-    if !cell.failures.is_empty() {
-        text.push('x');
-    }
-    text
+    let differs = if cell.differing() > 0 { "!" } else { "" };
+    let failed = if cell.failures.is_empty() { "" } else { "x" };
+    count + differs + failed
 }
 
 pub(super) fn worst_table(records: &[Line]) -> Table {
-    let mut table = Table::new(
-        "The ray to look at first in each cell of brute force and of structures that differ from it",
-        &["family", ":triangle", ":structure", ":what", ":replay"],
-    );
+    let caption = "The ray to look at first in each cell of brute force and of structures that differ from it";
+    let heads = ["family", ":triangle", ":structure", ":what", ":replay"];
+    let mut table = Table::new(caption, &heads);
     for cell in cells(records) {
         let Some(worst) = &cell.worst else { continue };
-        let [family, triangle, accel] =
-            [axis::FAMILY, axis::TRIANGLE, axis::ACCEL].map(|axis| cell.key.label(axis));
-        if accel == BRUTE_FORCE || cell.count("differing/v1") > 0 {
-            table.rows.push(vec![
-                family.into(),
-                triangle.into(),
-                accel.into(),
-                worst.what.clone().into(),
-                worst.replay.clone().into(),
-            ]);
+        if cell.key.label(axis::ACCEL) == BRUTE_FORCE || cell.count("differing/v1") > 0 {
+            let labels =
+                [axis::FAMILY, axis::TRIANGLE, axis::ACCEL].map(|axis| cell.key.label(axis));
+            let row = labels.into_iter().chain([&*worst.what, &worst.replay]);
+            table.rows.push(row.map(Cell::from).collect());
         }
     }
     table

@@ -1,10 +1,12 @@
 //! Maps of lost hits, and errors over the rungs.
 
 use super::{cell, structures, triangles};
+use crate::measure::record::Interval;
 use crate::report::document::Figure;
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::report::plot::heat::HeatMap;
 use crate::stress::families::FAMILIES;
+use crate::stress::placement::Placement;
 use crate::stress::record::Line;
 use crate::stress::suite::BRUTE_FORCE;
 
@@ -12,21 +14,13 @@ use crate::stress::suite::BRUTE_FORCE;
 const CURVES: [&str; 4] = ["watertight", "edges", "axis-parallel", "needles"];
 
 pub(super) fn heat_map(records: &[Line], test: &str) -> Option<Figure> {
-    let tried = |accel: &String| {
-        FAMILIES
-            .iter()
-            .any(|f| cell(records, test, accel, f.name).is_some())
-    };
-    let rows: Vec<String> = structures(records).into_iter().filter(tried).collect();
-    let columns: Vec<String> = FAMILIES
-        .iter()
-        .map(|f| f.name.to_owned())
-        .filter(|f| {
-            rows.iter()
-                .any(|accel| cell(records, test, accel, f).is_some())
-        })
-        .collect();
-    let value = |accel: &String, family: &String| {
+    let is_tried = |accel: &str, family: &str| cell(records, test, accel, family).is_some();
+    let mut rows = structures(records);
+    rows.retain(|accel| FAMILIES.iter().any(|f| is_tried(accel, f.name)));
+    let columns = FAMILIES.iter().map(|f| f.name.to_owned());
+    let columns = columns.filter(|f| rows.iter().any(|accel| is_tried(accel, f)));
+    let columns: Vec<String> = columns.collect();
+    let value = |accel: &str, family: &str| {
         let cell = cell(records, test, accel, family)?;
         let lost = cell
             .count("cracks/v1")
@@ -34,73 +28,74 @@ pub(super) fn heat_map(records: &[Line], test: &str) -> Option<Figure> {
         let share = lost as f64 / cell.count("rays/v1").max(1) as f64;
         Some((1e6 * share, cell.count("differing/v1") > 0))
     };
-    let values = rows
-        .iter()
-        .map(|accel| columns.iter().map(|family| value(accel, family)).collect())
-        .collect();
-    let map = HeatMap {
-        rows,
-        columns,
-        values,
-    };
+    let row = |accel: &String| columns.iter().map(|f| value(accel, f)).collect();
+    let values: Vec<_> = rows.iter().map(row).collect();
+    let drawing = HeatMap::of_counts(rows, columns, &values).draw()?;
     let caption = format!("{test}: lost hits per million rays");
-    let name = format!("lost-hits-{test}");
-    Some(Figure::new(name, caption, map.draw()?))
+    Some(Figure::new(format!("lost-hits-{test}"), caption, drawing))
 }
 
+/// A way along the rungs: its name, the title of its axis, where a rung is on it.
+type Sweep = (&'static str, &'static str, fn(&Placement) -> Option<f64>);
+
+const SWEEPS: [Sweep; 2] = [
+    ("scale", "scale", |at| (at.shift == 0.0).then_some(at.scale)),
+    ("shift", "translation, units", |at| {
+        (at.shift != 0.0).then_some(at.shift)
+    }),
+];
+
 /// Error of the distance over the rungs, one plot per family and sweep, one curve per triangle test.
-pub(super) fn curves(records: &[Line]) -> Vec<Figure> {
-    let mut figures = Vec::new();
-    for family in CURVES {
-        for (sweep, title) in [("scale", "scale"), ("shift", "translation, units")] {
-            let curve = |(look, test): (usize, &String)| {
-                let cell = cell(records, test, BRUTE_FORCE, family)?;
-                let first = cell.rungs.first()?.label.split(", ").next()?.to_owned();
-                let mut points: Vec<CurvePoint> = (cell.rungs.iter())
-                    .filter(|r| r.label.starts_with(&first))
-                    .filter(|r| (sweep == "scale") == (r.place.shift == 0.0))
-                    .filter_map(|r| {
-                        let q = r.t_ulp?;
-                        let x = if sweep == "scale" {
-                            r.place.scale
-                        } else {
-                            r.place.shift
-                        };
-                        Some(CurvePoint {
-                            x,
-                            y: q.p99,
-                            low: q.median.max(1e-3).min(q.p99),
-                            high: q.p99,
-                        })
-                    })
-                    .collect();
-                points.sort_by(|a, b| a.x.total_cmp(&b.x));
-                let label = format!("{test}, {first}");
-                Some(Curve {
-                    label,
-                    look,
-                    exact: false,
-                    points,
-                })
-            };
-            let plot = CurvePlot {
-                x_title: title.into(),
-                x_ticks: Ticks::PowersOfTen,
-                y_title: "error of t, ulp".into(),
-                curves: triangles(records)
-                    .iter()
-                    .enumerate()
-                    .filter_map(curve)
-                    .collect(),
-                guides: Vec::new(),
-            };
-            let caption = format!(
-                "{family}: error of the distance, median (end of the band) to 99th percentile (line)."
-            );
-            let drawn = plot.draw();
-            figures
-                .extend(drawn.map(|d| Figure::new(format!("error-{family}-{sweep}"), caption, d)));
+pub(super) fn curves(records: &[Line]) -> Vec<Option<Figure>> {
+    let sweeps = CURVES
+        .into_iter()
+        .flat_map(|family| SWEEPS.map(|sweep| (family, sweep)));
+    let figure = |(family, sweep): (&str, Sweep)| {
+        let (name, x_title, _) = sweep;
+        let curve = |(look, test): (usize, &String)| curve(records, family, sweep, look, test);
+        let plot = CurvePlot {
+            x_title: x_title.into(),
+            x_ticks: Ticks::PowersOfTen,
+            y_title: "error of t (99th percentile), ulp".into(),
+            curves: (triangles(records).iter().enumerate())
+                .filter_map(curve)
+                .collect(),
+            guides: Vec::new(),
+        };
+        let caption = format!("{family}: 99th percentile of the error of the distance over rungs.");
+        plot.figure(format!("error-{family}-{name}"), caption)
+    };
+    sweeps.map(figure).collect()
+}
+
+fn curve(
+    records: &[Line],
+    family: &str,
+    (.., on_axis): Sweep,
+    look: usize,
+    test: &str,
+) -> Option<Curve> {
+    let cell = cell(records, test, BRUTE_FORCE, family)?;
+    let first = cell.rungs.first()?.label.split(", ").next()?;
+    let of_first = cell.rungs.iter().filter(|r| r.label.starts_with(first));
+    let mut points: Vec<CurvePoint> = Vec::new();
+    for rung in of_first {
+        let (Some(x), Some(q)) = (on_axis(&rung.place), rung.t_ulp) else {
+            continue;
+        };
+        // Of several cases in one place the worst counts.
+        match points.iter_mut().find(|point| point.x == x) {
+            Some(known) if known.y >= q.p99 => {}
+            Some(known) => *known = CurvePoint::new(x, &Interval::exact(q.p99)),
+            None => points.push(CurvePoint::new(x, &Interval::exact(q.p99))),
         }
     }
-    figures
+    points.sort_by(|a, b| a.x.total_cmp(&b.x));
+    (points.len() > 1).then_some(())?;
+    Some(Curve {
+        label: format!("{test}, {first}"),
+        look,
+        exact: false,
+        points,
+    })
 }

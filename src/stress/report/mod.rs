@@ -16,7 +16,6 @@ use crate::report::{ReportError, format, write_file, write_page};
 use crate::stress::families::FAMILIES;
 use crate::stress::record::{Findings, Line, Record, TargetRecord};
 use crate::stress::targets::{cells, shots, suite};
-use axes::{extras, shot_table};
 use families::{count_table, error_table, matrix_table, worst_table};
 use figures::{curves, heat_map};
 use std::path::{Path, PathBuf};
@@ -37,77 +36,97 @@ pub fn write_stress_page(dir: &Path, records: &[Line]) -> Result<PathBuf, Report
 
 /// Targets, families and the matrix as aligned plain text.
 pub fn stress_tables(records: &[Line]) -> String {
-    let mut text = String::new();
-    let mut tables: Vec<Table> = triangles(records)
-        .iter()
-        .flat_map(|test| [count_table(records, test), error_table(records, test)])
-        .collect();
+    let mut tables = by_test(records);
     tables.push(matrix_table(records));
-    let values = values::values(records);
-    tables.push(shot_table(records, &values));
-    tables.extend(extras(records, &values));
+    tables.extend(axes::tables(records));
+    let mut text = String::new();
     for table in tables.iter().filter(|table| !table.rows.is_empty()) {
-        text += &aligned(table);
-        text.push('\n');
+        text += &(aligned(table) + "\n");
     }
     for skipped in skipped(records).filter(|s| !s.reason.starts_with("every case")) {
         text += &format!("skipped: {}: {}\n", skipped.cell, skipped.reason);
     }
-    for check in checks(records) {
-        text += &format!(
-            "{}  {}: {}\n",
-            check.verdict.word(),
-            check.title,
-            check.detail
-        );
-    }
+    checks(records)
+        .iter()
+        .for_each(|check| text += &check.line());
     text
 }
 
+/// The tables of families, test by test.
+fn by_test(records: &[Line]) -> Vec<Table> {
+    let tests = triangles(records);
+    let tables = tests
+        .iter()
+        .flat_map(|test| [count_table(records, test), error_table(records, test)]);
+    tables.collect()
+}
+
 fn document(records: &[Line]) -> Document {
-    let mut verdict = Section::new("targets", "Targets of the default configuration");
-    verdict.blocks.push(Block::Checks(checks(records)));
-    let mut maps = Section::new("maps", "Where hits are lost");
-    maps.blocks.push(Block::Paragraph(
-        "Cracks in closed meshes, and misses elsewhere that the rounding of one triangle test cannot \
-         explain, per million rays; a cell with a mark also differs from brute force. Rays lost within \
-         rounding of a silhouette are in the tables."
-            .into(),
-    ));
-    let map = |test: &String| heat_map(records, test);
-    maps.blocks.push(Block::Figures(
-        triangles(records).iter().filter_map(map).collect(),
-    ));
-    let mut tables = Section::new("families", "Families");
-    tables.blocks.push(family_legend());
-    for test in triangles(records) {
-        for table in [count_table(records, &test), error_table(records, &test)] {
-            tables.blocks.extend(table.into_block());
-        }
-    }
-    let mut errors = Section::new("errors", "Error against scale and translation");
-    errors.blocks.push(Block::Figures(curves(records)));
-    let mut rest = Section::new("axes", "Shots, box tests, offsets, cost");
-    let values = values::values(records);
-    rest.blocks
-        .extend(shot_table(records, &values).into_block());
-    let extras = extras(records, &values);
-    rest.blocks
-        .extend(extras.into_iter().filter_map(Table::into_block));
-    let mut worst = Section::new("worst", "Worst rays");
-    worst.blocks.extend(worst_table(records).into_block());
-    let left_out: Vec<String> = skipped(records)
-        .map(|s| format!("{}: {}", s.cell, s.reason))
-        .collect();
-    if !left_out.is_empty() {
-        worst.blocks.push(Block::Heading("Left out".into()));
-        worst.blocks.push(Block::Verbatim(left_out.join("\n")));
-    }
+    let section = |id: &str, title: &str, blocks: Vec<Block>| Section {
+        id: id.into(),
+        title: title.into(),
+        blocks,
+    };
+    let shown = |tables: Vec<Table>| tables.into_iter().filter_map(Table::into_block);
+    let lost = "Cracks in closed meshes, and misses elsewhere that the rounding of one triangle test cannot \
+                explain, per million rays; a cell with a mark also differs from brute force. Rays lost within \
+                rounding of a silhouette are in the tables.";
+    let tests = triangles(records);
+    let maps = tests.iter().map(|test| heat_map(records, test));
+    let left_out = skipped(records).map(|s| format!("{}: {}", s.cell, s.reason));
+    let left_out: Vec<String> = left_out.collect();
+    let mut sections = vec![
+        section(
+            "targets",
+            "Targets of the default configuration",
+            vec![Block::Checks(checks(records))],
+        ),
+        section(
+            "maps",
+            "Where hits are lost",
+            [Block::Paragraph(lost.into())]
+                .into_iter()
+                .chain(Block::figures(maps))
+                .collect(),
+        ),
+        section(
+            "families",
+            "Families",
+            [family_legend()]
+                .into_iter()
+                .chain(shown(by_test(records)))
+                .collect(),
+        ),
+        section(
+            "errors",
+            "Error against scale and translation",
+            Block::figures(curves(records)).into_iter().collect(),
+        ),
+        section(
+            "axes",
+            "Shots, box tests, offsets, cost",
+            shown(axes::tables(records)).collect(),
+        ),
+        section(
+            "worst",
+            "Worst rays",
+            shown(vec![worst_table(records)]).collect(),
+        ),
+        section(
+            "left-out",
+            "Left out",
+            match left_out.is_empty() {
+                true => Vec::new(),
+                false => vec![Block::Verbatim(left_out.join("\n"))],
+            },
+        ),
+    ];
+    sections.retain(|section| !section.blocks.is_empty());
     Document {
         title: "Raystone: numerical stress suite".into(),
         subtitle: subtitle(records),
         banners: banners(records),
-        sections: vec![verdict, maps, tables, errors, rest, worst],
+        sections,
     }
 }
 
@@ -115,41 +134,31 @@ fn subtitle(records: &[Line]) -> String {
     let Some(suite) = suite(records) else {
         return "The first record is missing.".into();
     };
-    let e = &suite.environment;
     format!(
-        "{} on {} ({}, {} {}), {}, seed {}{}",
-        format::utc(suite.started_unix_s),
-        e.adapter,
-        e.backend,
-        e.driver,
-        e.driver_info,
-        e.cpu,
+        "{}, seed {}{}",
+        format::where_and_when(&suite.environment, suite.started_unix_s),
         suite.seed,
         if suite.quick { ", quick" } else { "" }
     )
 }
 
 fn banners(records: &[Line]) -> Vec<Banner> {
-    let mut banners = Vec::new();
-    let mut add = |tone, text: &str| {
-        banners.push(Banner {
-            tone,
-            text: text.into(),
-        })
-    };
-    if suite(records).is_some_and(|s| !s.exact_adapter) {
-        add(
+    let finished = |line: &Line| matches!(line.body, Record::Finished { .. });
+    let said = [
+        (
+            suite(records).is_some_and(|s| !s.exact_adapter),
             Tone::Note,
             "This adapter does not compute like the host: differences within 4 ulp are ties.",
-        );
-    }
-    if !records
-        .iter()
-        .any(|line| matches!(line.body, Record::Finished { .. }))
-    {
-        add(Tone::Bad, "The suite did not finish.");
-    }
-    banners
+        ),
+        (
+            !records.iter().any(finished),
+            Tone::Bad,
+            "The suite did not finish.",
+        ),
+    ];
+    let said = said.into_iter().filter(|(holds, ..)| *holds);
+    said.map(|(_, tone, text)| Banner::new(tone, text))
+        .collect()
 }
 
 /// Triangle tests in the order in which they were tried, the default first.
@@ -196,24 +205,18 @@ fn checks(records: &[Line]) -> Vec<Check> {
 }
 
 fn check(target: &TargetRecord) -> Check {
-    let detail = match target.found {
-        None => "not looked at.".to_owned(),
-        Some(found) => {
-            let note = match target.note.is_empty() {
-                true => String::new(),
-                false => format!(" ({})", target.note),
-            };
-            format!(
-                "{}, limit {}{note}",
-                format::number(found),
-                format::number(target.limit)
-            )
-        }
+    let note = match target.note.is_empty() {
+        true => String::new(),
+        false => format!(" ({})", target.note),
     };
+    let [found, limit] = [target.found.unwrap_or(0.0), target.limit].map(format::number);
     Check {
         verdict: target.verdict,
         title: target.target.clone(),
-        detail,
+        detail: match target.found {
+            None => "not looked at.".to_owned(),
+            Some(_) => format!("{found}, limit {limit}{note}"),
+        },
     }
 }
 

@@ -30,7 +30,7 @@ pub const MUTANTS: &[Mutant] = &[
         text(
             "accel/uniform_grid",
             "let forward = inverse >= vec3<f32>(0.0);",
-            "let forward = given.direction > vec3<f32>(0.0);",
+            "let forward = (inverse >= vec3<f32>(0.0)) & (inverse < vec3<f32>(1e12));",
         ),
         UNIFORM,
         Check::Lattice,
@@ -41,7 +41,7 @@ pub const MUTANTS: &[Mutant] = &[
         text(
             "accel/two_level_grid",
             "let forward = inverse >= vec3<f32>(0.0);",
-            "let forward = given.direction > vec3<f32>(0.0);",
+            "let forward = (inverse >= vec3<f32>(0.0)) & (inverse < vec3<f32>(1e12));",
         ),
         TWO_LEVEL,
         Check::Lattice,
@@ -52,7 +52,7 @@ pub const MUTANTS: &[Mutant] = &[
         text(
             "accel/irregular_grid",
             "let forward = inverse >= vec3<f32>(0.0);",
-            "let forward = given.direction > vec3<f32>(0.0);",
+            "let forward = (inverse >= vec3<f32>(0.0)) & (inverse < vec3<f32>(1e12));",
         ),
         IRREGULAR,
         Check::Lattice,
@@ -63,7 +63,7 @@ pub const MUTANTS: &[Mutant] = &[
         text(
             "accel/uniform_grid",
             "let forward = inverse >= vec3<f32>(0.0);",
-            "let forward = given.direction >= vec3<f32>(0.0);",
+            "let forward = (inverse >= vec3<f32>(0.0)) | (inverse < vec3<f32>(-1e12));",
         ),
         UNIFORM,
         Check::Lattice,
@@ -74,7 +74,7 @@ pub const MUTANTS: &[Mutant] = &[
         text(
             "accel/bvh4",
             "let backward = inverse < vec3<f32>(0.0);",
-            "let backward = given.direction < vec3<f32>(0.0);",
+            "let backward = (inverse < vec3<f32>(0.0)) & (inverse > vec3<f32>(-1e12));",
         ),
         WIDE4,
         Check::Lattice,
@@ -85,7 +85,7 @@ pub const MUTANTS: &[Mutant] = &[
         text(
             "accel/cwbvh",
             "let backward = inverse < vec3<f32>(0.0);",
-            "let backward = given.direction < vec3<f32>(0.0);",
+            "let backward = (inverse < vec3<f32>(0.0)) & (inverse > vec3<f32>(-1e12));",
         ),
         WIDE8,
         Check::Lattice,
@@ -107,7 +107,7 @@ pub const MUTANTS: &[Mutant] = &[
         text(
             "accel/octree",
             "let mirror = vec3<u32>(inverse < vec3<f32>(0.0));",
-            "let mirror = vec3<u32>(given.direction < vec3<f32>(0.0));",
+            "let mirror = vec3<u32>((inverse < vec3<f32>(0.0)) & (inverse > vec3<f32>(-1e12)));",
         ),
         OCTREE,
         Check::Lattice,

@@ -1,0 +1,114 @@
+//! Triangles cut by boxes.
+
+use super::bounds::Bounds;
+use super::triangle::TriangleRecord;
+use glam::DVec3;
+
+/// A convex polygon: a triangle cut by up to six planes has at most nine corners.
+#[derive(Clone, Copy)]
+pub(super) struct Polygon {
+    corners: [DVec3; 9],
+    count: usize,
+}
+
+impl Polygon {
+    /// A triangle.
+    pub fn new(triangle: &TriangleRecord) -> Self {
+        let mut corners = [DVec3::ZERO; 9];
+        for (corner, vertex) in corners.iter_mut().zip(triangle.triangle().vertices) {
+            *corner = vertex.as_dvec3();
+        }
+        Self { corners, count: 3 }
+    }
+
+    /// Its corners; none if nothing is left.
+    pub fn corners(&self) -> &[DVec3] {
+        &self.corners[..self.count]
+    }
+
+    /// Its area.
+    pub fn area(&self) -> f64 {
+        let [origin, rest @ ..] = self.corners() else {
+            return 0.0;
+        };
+        let fan = rest.windows(2);
+        let sum: DVec3 = fan.map(|p| (p[0] - origin).cross(p[1] - origin)).sum();
+        0.5 * sum.length()
+    }
+
+    /// The part inside a box that is grown by `margin` (I. Sutherland, G. Hodgman, "Reentrant polygon
+    /// clipping", 1974).
+    pub fn clipped(&self, bounds: &Bounds, margin: f64) -> Polygon {
+        let mut polygon = *self;
+        for axis in 0..3 {
+            for (border, sign) in [
+                (f64::from(bounds.min[axis]) - margin, 1.0),
+                (f64::from(bounds.max[axis]) + margin, -1.0),
+            ] {
+                let is_inside = |corner: &DVec3| (corner[axis] - border) * sign >= 0.0;
+                if !polygon.corners().iter().all(is_inside) {
+                    polygon = polygon.cut(axis, border, sign);
+                }
+            }
+        }
+        polygon
+    }
+
+    /// The part where `sign · (x − border)` is not negative.
+    fn cut(&self, axis: usize, border: f64, sign: f64) -> Polygon {
+        let mut out = Polygon {
+            corners: [DVec3::ZERO; 9],
+            count: 0,
+        };
+        let mut push = |corner| {
+            // Rounding may make a sliver cross a plane once more than geometry allows.
+            if let Some(place) = out.corners.get_mut(out.count) {
+                *place = corner;
+                out.count += 1;
+            }
+        };
+        for index in 0..self.count {
+            let (a, b) = (self.corners[index], self.corners[(index + 1) % self.count]);
+            let (from, to) = (sign * (a[axis] - border), sign * (b[axis] - border));
+            if from >= 0.0 {
+                push(a);
+            }
+            if (from < 0.0) != (to < 0.0) {
+                let mut crossing = a + (b - a) * (from / (from - to));
+                crossing[axis] = border;
+                push(crossing);
+            }
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::fixtures::record;
+
+    const UNIT: Bounds = Bounds {
+        min: [0.0; 3],
+        max: [1.0; 3],
+    };
+
+    #[test]
+    fn a_clipped_triangle_has_the_area_that_geometry_gives() {
+        let area = |vertices| {
+            Polygon::new(&record(0, vertices))
+                .clipped(&UNIT, 0.0)
+                .area()
+        };
+        let inside = [[0.0, 0.0, 0.5], [1.0, 0.0, 0.5], [0.0, 1.0, 0.5]];
+        assert_eq!(area(inside), 0.5);
+        // Twice the size: the corner square of side 1.
+        let larger = [[0.0, 0.0, 0.5], [2.0, 0.0, 0.5], [0.0, 2.0, 0.5]];
+        assert_eq!(area(larger), 1.0);
+        // The plane x + y + z = 3/2 cuts a cube in a regular hexagon of side √½.
+        let third = [[-9.0, 5.25, 5.25], [5.25, -9.0, 5.25], [5.25, 5.25, -9.0]];
+        let hexagon = 1.5 * 3.0_f64.sqrt() * 0.5;
+        assert!((area(third) - hexagon).abs() < 1e-12, "{}", area(third));
+        assert_eq!(area(inside.map(|[x, y, z]| [x + 3.0, y, z])), 0.0);
+    }
+}

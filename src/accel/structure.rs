@@ -1,0 +1,57 @@
+//! What the file of a structure begins with: the declaration of its registry entry, and the vocabulary.
+
+use super::{AccelKind, BuildLog, BuildResult, TriangleSoup};
+use crate::params::{ParameterSchema, Parameters, Params, Sources};
+
+/// A registry entry whose name and parameters are known at compile time. Every one is an [`AccelKind`].
+pub trait Structure: Sync {
+    /// Name as a user types it.
+    const NAME: &'static str;
+    /// One line: what it is and where it comes from.
+    const DESCRIPTION: &'static str;
+    /// See [`AccelKind::sources`].
+    const SOURCES: Sources = &[];
+    /// What it can be set to, declared by [`parameters!`](crate::parameters).
+    type Parameters: Parameters;
+
+    /// Builds the structure; phases are timed in `log`.
+    ///
+    /// # Errors
+    /// A limit of the structure is exceeded.
+    fn build(soup: &TriangleSoup, options: &Self::Parameters, log: &mut BuildLog) -> BuildResult;
+}
+
+impl<S: Structure> AccelKind for S {
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    fn description(&self) -> &'static str {
+        Self::DESCRIPTION
+    }
+
+    fn parameters(&self) -> ParameterSchema {
+        S::Parameters::schema()
+    }
+
+    fn sources(&self) -> Sources {
+        Self::SOURCES
+    }
+
+    fn build(&self, soup: &TriangleSoup, params: &Params, log: &mut BuildLog) -> BuildResult {
+        S::build(soup, &S::Parameters::from_params(params)?, log)
+    }
+}
+
+/// What the files of structures name, whatever they build.
+pub(super) mod prelude {
+    pub use super::super::bounds::Bounds;
+    pub use super::super::ray::{Hit, Ray};
+    pub use super::super::twin::{CpuTwin, Traverse, Twin, Walk};
+    pub use super::super::{
+        AccelError, BuildLog, BuildResult, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
+        TriangleSoup, limits,
+    };
+    pub use super::Structure;
+    pub use crate::parameters;
+}

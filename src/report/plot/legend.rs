@@ -1,0 +1,50 @@
+//! Rows of a legend below a plot.
+
+use super::drawing::{Anchor, Drawing, Ink};
+use super::paint::fit_text;
+
+/// Height of a row, pixels.
+pub const ROW: f64 = 21.0;
+
+/// Height of so many rows, with white below.
+pub fn height(rows: usize) -> f64 {
+    rows as f64 * ROW + 8.0
+}
+
+/// Rows from the top down, in one column of a drawing.
+pub struct Rows {
+    /// Middle of the next row.
+    pub y: f64,
+    /// Where samples begin and texts end.
+    left: f64,
+    right: f64,
+}
+
+impl Rows {
+    /// Rows from `top` on, between `left` and `right`.
+    pub fn new(top: f64, (left, right): (f64, f64)) -> Self {
+        let y = top + ROW / 2.0;
+        Self { y, left, right }
+    }
+
+    /// Adds a row: what `sample` draws at its height, and the text behind it, shortened to its place.
+    pub fn add(
+        &mut self,
+        drawing: &mut Drawing,
+        text: &str,
+        ink: Ink,
+        sample: impl FnOnce(&mut Drawing, f64),
+    ) {
+        sample(drawing, self.y);
+        let left = self.left + 44.0;
+        let text = fit_text(text, self.right - left - 6.0);
+        drawing.text((left, self.y), text, ink, Anchor::Start);
+        self.y += ROW;
+    }
+
+    /// Adds a row of text alone.
+    pub fn title(&mut self, drawing: &mut Drawing, text: &str, ink: Ink) {
+        drawing.text((self.left, self.y), text, ink, Anchor::Start);
+        self.y += ROW;
+    }
+}
