@@ -45,7 +45,11 @@ fn t_test(a: &[f64], b: &[f64], margin: f64, most_freedom: f64) -> Option<WelchT
     let (share_a, share_b) = (va / (va + vb), vb / (va + vb));
     let freedom = 1.0 / (share_a * share_a / freedom_a + share_b * share_b / freedom_b);
     let spread = va + vb > 0.0;
-    let freedom = if spread { freedom } else { freedom_a + freedom_b };
+    let freedom = if spread {
+        freedom
+    } else {
+        freedom_a + freedom_b
+    };
     let degrees_of_freedom = freedom.min(most_freedom);
     let (t, p) = match (spread, gap == 0.0) {
         (false, true) => (0.0, 1.0),
