@@ -116,8 +116,11 @@ fn closest(test: Test32, triangles: &[Triangle], ray: &Ray) -> ClosestHit {
     best
 }
 
+/// Whether a fault is the expected one.
+type IsFault = fn(&Fault) -> bool;
+
 #[track_caller]
-fn assert_wrong(verdict: Verdict, expected: fn(&Fault) -> bool) {
+fn assert_wrong(verdict: Verdict, expected: IsFault) {
     match verdict {
         Verdict::Wrong(fault) if expected(&fault) => assert!(!fault.to_string().is_empty()),
         other => panic!("unexpected verdict {other:?}"),
@@ -142,7 +145,7 @@ fn known_hits_and_misses_agree() {
 fn planted_faults_are_wrong_each_for_its_own_reason() {
     let scene = [corner(3.0), corner(1.0), corner(-2.0)];
     let through = towards(0.25, 0.3);
-    let faults: [(ClosestHit, fn(&Fault) -> bool); 7] = [
+    let faults: [(ClosestHit, IsFault); 7] = [
         (None, |f| matches!(f, Fault::FalseMiss { id: 1, .. })),
         (Some((0, 4.0)), |f| {
             matches!(f, Fault::NotNearest { nearer: 1, .. })
