@@ -8,10 +8,8 @@ use raystone::accel::{
     AccelKind, Counters, CpuTwin, Hit, InstanceJudge, MetaBvh, NO_HIT, ObjectList, Placed, Ray,
     Space, TriangleSoup, brute_force_hits, brute_force_instances,
 };
-use raystone::config::Gate;
 use raystone::geometry::Triangle;
-use raystone::gpu::probe_arithmetic;
-use raystone::measure::gate::{Checks, Judge, compare, gate};
+use raystone::measure::gate::{Checks, compare};
 use raystone::measure::hard_rays::HARD_RAYS;
 use raystone::measure::record::{StructureRecord, TimeRecord, all_of, axis};
 use raystone::params::{ParamValue, Params};
@@ -319,22 +317,7 @@ fn the_gate_judges_each_structure_in_its_space_and_sees_the_difference() {
     }
     let changes = [("count", ParamValue::Integer(16))];
     let stage = Stage::builtin(gpu, "instances", &changes);
-    let settings = Gate {
-        rays: 1024,
-        brute_force_tests: 20_000_000,
-        oracle_rays: 256,
-        ao_length: 0.0,
-        offset: 0.0,
-    };
-    let judge = Judge::new(
-        &stage.scene,
-        &stage.soup,
-        stage.camera,
-        &settings,
-        1,
-        Checks::Repeated,
-    );
-    let judge = judge.expect("a judge");
+    let judge = stage.judge(Checks::Repeated, [1024, 20_000_000, 256]);
     let over_instances = judge.instances.as_deref().expect("a judge of instances");
     for judge in [&judge, over_instances] {
         assert!(judge.is_sound(), "{:?}", judge.first_wrong);
@@ -346,19 +329,8 @@ fn the_gate_judges_each_structure_in_its_space_and_sees_the_difference() {
         ];
         assert!(ambiguous * 4 < rays, "{oracle:?}");
     }
-    let probe = probe_arithmetic(gpu).expect("the probe runs");
     for kind in support::structures() {
-        let traced = stage.traced(gpu, kind);
-        let soup = &stage.soup;
-        let verdict = gate(
-            gpu,
-            &stage.buffers.triangles,
-            soup,
-            &traced,
-            &judge,
-            &probe,
-            true,
-        );
+        let verdict = stage.verdict(gpu, &stage.traced(gpu, kind), &judge);
         let verdict = verdict.unwrap_or_else(|e| panic!("{}: {e}", kind.name()));
         assert!(verdict.passed, "{}: {verdict:?}", kind.name());
     }

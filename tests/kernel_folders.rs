@@ -376,7 +376,7 @@ fn patterns_choose_among_kernels() {
         let labels = plan
             .structures
             .iter()
-            .map(|cell| cell.labels(&[Axis::Accel]).join(" @"));
+            .map(|cell| cell.labels(&[Axis::Accel]).join(" "));
         labels.collect::<Vec<_>>()
     };
     assert_eq!(plan(&[], ""), ["bvh", "bvh @idea"]);

@@ -5,10 +5,8 @@
 mod support;
 
 use raystone::accel::AccelKind;
-use raystone::config::Gate;
-use raystone::gpu::probe_arithmetic;
 use raystone::integrator::Traced;
-use raystone::measure::gate::{Checks, Judge, gate};
+use raystone::measure::gate::{Checks, Judge};
 use std::path::{Path, PathBuf};
 use support::*;
 
@@ -67,16 +65,7 @@ fn fault(stage: &Stage, kind: &dyn AccelKind, judge: &Judge) -> Option<String> {
             return None;
         }
     };
-    let probe = probe_arithmetic(gpu()).expect("the probe runs");
-    match gate(
-        gpu(),
-        &stage.buffers.triangles,
-        &stage.soup,
-        &traced,
-        judge,
-        &probe,
-        true,
-    ) {
+    match stage.verdict(gpu(), &traced, judge) {
         Ok(verdict) if verdict.passed => None,
         Ok(verdict) => Some(format!("{verdict:?}")),
         Err(error) => Some(error.to_string()),
@@ -93,22 +82,7 @@ fn every_structure_passes_the_gate_on_real_models() {
         }
         let stage = Stage::new(gpu(), from_file(&path));
         let rays = rays_by_flag().unwrap_or(FEW_RAYS);
-        let settings = Gate {
-            rays,
-            brute_force_tests: 500_000_000,
-            oracle_rays: 512,
-            ao_length: 0.0,
-            offset: 0.0,
-        };
-        let judge = Judge::new(
-            &stage.scene,
-            &stage.soup,
-            stage.camera,
-            &settings,
-            1,
-            Checks::Repeated,
-        );
-        let judge = judge.expect("a judge");
+        let judge = stage.judge(Checks::Repeated, [rays, 500_000_000, 512]);
         assert!(
             judge.is_sound(),
             "{}: {:?}",

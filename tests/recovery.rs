@@ -5,7 +5,7 @@
 mod folder;
 mod support;
 
-use raystone::config::Plan;
+use raystone::config::{Cell, Plan};
 use raystone::gpu::{AdapterChoice, GpuError, KernelLibrary};
 use raystone::integrator::SceneBuffers;
 use raystone::measure::record::{Body, Line, axis};
@@ -59,24 +59,20 @@ struct Outcome {
 
 /// What a record is about, and whether it tells of a failure.
 fn subject(line: &Line) -> (String, bool) {
-    let [scene, accel, integrator] =
-        [axis::SCENE, axis::ACCEL, axis::INTEGRATOR].map(|axis| line.key.label(axis));
-    let sampler = line.key.sampler();
-    let cell = format!("{scene}, {integrator}, {sampler}");
+    let [scene, integrator] = [axis::SCENE, axis::INTEGRATOR].map(|axis| line.key.label(axis));
+    let cell = Cell::from(&line.key);
+    let sampler = cell.on(&Cell::STREAM);
     let failed = |failure: &Option<String>| failure.is_some();
     match &line.body {
         Body::Run(_) => ("run".to_owned(), false),
         Body::Scene(_) => (format!("scene {scene}"), false),
-        Body::Structure(r) => (format!("{scene}, {accel}"), failed(&r.failure)),
+        Body::Structure(r) => (cell.to_string(), failed(&r.failure)),
         Body::Reference(_) => (format!("reference {scene}, {integrator}"), false),
         Body::Error(r) => (format!("replicate {} of {cell}", r.replicate), false),
         Body::Bias(_) => (format!("bias of {cell}"), false),
         Body::Spectrum(_) => (format!("spectrum of {cell}"), false),
         Body::SamplerCost(_) => (format!("cost of {sampler}"), false),
-        Body::Time(r) => (
-            format!("{scene}, {accel}, {integrator}, {sampler}"),
-            failed(&r.failure),
-        ),
+        Body::Time(r) => (cell.to_string(), failed(&r.failure)),
         Body::Stream(r) => (format!("stream {sampler}, {:?}", r.dimensions), false),
         Body::Skipped(r) => (format!("skipped {}", r.cell), false),
         Body::Failed(r) => (r.cell.clone(), true),

@@ -24,9 +24,10 @@ pub struct DeviceArguments {
 
 impl DeviceArguments {
     /// Options of the library; a progress bar needs a terminal.
-    pub fn options(&self, out: PathBuf, quiet: bool) -> RunOptions {
+    pub fn options(&self, out: PathBuf, values: &ValueArguments, quiet: bool) -> RunOptions {
         RunOptions {
             out,
+            allow_outside: values.allow_outside,
             adapter: self.adapter.clone().unwrap_or_default(),
             warn: Some(super::output::warn),
             progress: !quiet && std::io::stderr().is_terminal(),
@@ -56,20 +57,27 @@ impl DeviceArguments {
     }
 }
 
+/// Values laid over those of an experiment.
+#[derive(Args)]
+pub struct ValueArguments {
+    /// Value laid over the file or the defaults: `--set run.replicates=16`, `--set axes.accel=bvh,roped-bvh`,
+    /// `--set camera.eye=[0,1,5]`; the last one of a key counts
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Let glTF models name files outside their folder, and OBJ models absolute paths
+    #[arg(long)]
+    pub allow_outside: bool,
+}
+
 /// Changes of an experiment.
 #[derive(Args)]
 pub struct ExperimentArguments {
-    /// Value laid over the file: `--set run.replicates=16`, `--set axes.accel=bvh,roped-bvh`; the
-    /// last one of a key counts
-    #[arg(long, value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
+    #[command(flatten)]
+    pub values: ValueArguments,
     /// Keep the cells that fit: `--only 'accel=*bvh,sequence=sobol'`; patterns of one axis are
     /// alternatives
     #[arg(long, value_name = "AXIS=PATTERN,…")]
     pub only: Vec<String>,
-    /// Let glTF models name files outside their folder, and OBJ models absolute paths
-    #[arg(long)]
-    pub allow_outside: bool,
 }
 
 /// An override `key=value` whose value is the list of these texts, whatever characters are in them.

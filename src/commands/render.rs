@@ -1,6 +1,6 @@
 //! `raystone render`.
 
-use super::arguments::{DeviceArguments, list_override, plan};
+use super::arguments::{DeviceArguments, ValueArguments, list_override, plan};
 use super::output::print;
 use anyhow::{Result, bail};
 use clap::Args;
@@ -55,13 +55,8 @@ pub struct Render {
     /// Seed [default: 1]
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
-    /// Let a glTF model name files outside its folder, and an OBJ model absolute paths
-    #[arg(long)]
-    allow_outside: bool,
-    /// Any other value of an experiment file: `--set camera.eye=[0,1,5]`, `--set
-    /// integrator.path.max_depth=3`
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
+    #[command(flatten)]
+    values: ValueArguments,
     /// Picture to write; the ending chooses the format: tone-mapped .png, or linear radiance in .exr,
     /// .hdr, .pfm, .npy
     #[arg(long, short, value_name = "FILE", default_value = "render.png")]
@@ -80,8 +75,7 @@ impl Render {
         check_is_one(&experiment)?;
         let plan = plan(&experiment, &[], &registries)?;
         // Only the picture is written: no folder is needed.
-        let mut options = self.device.options(PathBuf::new(), false);
-        options.allow_outside = self.allow_outside;
+        let options = self.device.options(PathBuf::new(), &self.values, false);
         let rendering =
             raystone::run::render(&experiment, &plan, &registries, &options, &self.output)?;
         super::output::tell(summary(&rendering, experiment.resolution).trim_end());
@@ -113,7 +107,7 @@ impl Render {
             overrides.push(format!("reference.seed={}", seed.wrapping_add(1)));
         }
         overrides.extend(self.device.kernels_override());
-        overrides.extend(self.set.iter().cloned());
+        overrides.extend(self.values.set.iter().cloned());
         overrides
     }
 }

@@ -7,8 +7,8 @@ use super::output::{self, print};
 use super::signals;
 use anyhow::Result;
 use clap::Args;
-use raystone::config::Experiment;
-use raystone::measure::record::{Body, Line, axis, read_records};
+use raystone::config::{Cell, Experiment};
+use raystone::measure::record::{Body, Line, read_records};
 use raystone::report::{failed_checks, terminal_tables, write_report};
 use raystone::run::{Existing, Kernels, Registries, RunError, RunSummary};
 use std::path::PathBuf;
@@ -45,7 +45,7 @@ impl Run {
         let registries = Registries::default();
         let catalogue = registries.catalogue();
         let mut overrides = Vec::from_iter(self.device.kernels_override());
-        overrides.extend(self.experiment.set.iter().cloned());
+        overrides.extend(self.experiment.values.set.iter().cloned());
         let experiment = Experiment::load(&self.file, &overrides, &catalogue)?;
         let plan = plan(&experiment, &self.experiment.only, &registries)?;
         if self.dry_run {
@@ -60,9 +60,10 @@ impl Run {
             _ => Existing::Refuse,
         };
         let out = self.out.unwrap_or_else(|| default_folder(&experiment.name));
-        let mut options = self.device.options(out, self.quiet);
+        let mut options = self
+            .device
+            .options(out, &self.experiment.values, self.quiet);
         options.existing = existing;
-        options.allow_outside = self.experiment.allow_outside;
         signals::watch(options.interrupt.clone())?;
         match raystone::run::run(&experiment, &plan, &registries, &options) {
             Err(RunError::Interrupted) => signals::wait_for_end(),
@@ -115,19 +116,13 @@ fn plural(count: usize, one: &str, many: &str) -> String {
 
 /// The cell of a record and why it failed, if it did.
 fn failure(line: &Line) -> Option<String> {
-    let [scene, accel, integrator] =
-        [axis::SCENE, axis::ACCEL, axis::INTEGRATOR].map(|axis| line.key.label(axis));
-    let accel = format!("{accel}{}", line.key.kernels_mark());
-    match &line.body {
-        Body::Failed(failed) => Some(format!("{}: {}", failed.cell, failed.reason)),
-        Body::Structure(cell) => Some(format!("{scene}, {accel}: {}", cell.failure.as_ref()?)),
-        Body::Time(cell) => Some(format!(
-            "{scene}, {accel}, {integrator}, {}: {}",
-            line.key.sampler(),
-            cell.failure.as_ref()?
-        )),
-        _ => None,
-    }
+    let failure = match &line.body {
+        Body::Failed(failed) => return Some(format!("{}: {}", failed.cell, failed.reason)),
+        Body::Structure(record) => record.failure.as_ref()?,
+        Body::Time(record) => record.failure.as_ref()?,
+        _ => return None,
+    };
+    Some(format!("{}: {failure}", Cell::from(&line.key)))
 }
 
 /// `results/NAME`, where a name such as `../a b` cannot lead out of `results`.

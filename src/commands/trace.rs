@@ -1,6 +1,6 @@
 //! `raystone trace`.
 
-use super::arguments::{list_override, warn_of};
+use super::arguments::{ValueArguments, list_override, warn_of};
 use super::failure::FAILED;
 use super::output::print;
 use anyhow::{Result, anyhow};
@@ -36,12 +36,8 @@ pub struct Trace {
     /// Box test [default: the one of runs]
     #[arg(long)]
     box_test: Option<String>,
-    /// Let a glTF model name files outside its folder, and an OBJ model absolute paths
-    #[arg(long)]
-    allow_outside: bool,
-    /// Parameter as in an experiment file: `--set accel.bvh.traversal=short-stack`
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
+    #[command(flatten)]
+    values: ValueArguments,
 }
 
 impl Trace {
@@ -83,7 +79,7 @@ impl Trace {
             list_override(&format!("axes.{axis}"), std::slice::from_ref(name))
         };
         let mut overrides: Vec<String> = named.map(one).collect();
-        overrides.extend(self.set.iter().cloned());
+        overrides.extend(self.values.set.iter().cloned());
         let experiment =
             Experiment::parse(&text(&catalogue), "raystone trace", &overrides, &catalogue)?;
         let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d))?;
@@ -97,7 +93,7 @@ impl Trace {
         }
         let options = LoadOptions {
             textures: false,
-            allow_outside: self.allow_outside,
+            allow_outside: self.values.allow_outside,
             ..LoadOptions::default()
         };
         let scene = load(variant, &options)?;

@@ -62,14 +62,15 @@ impl Verify {
         };
         let mut plan = plan(&experiment, &self.experiment.only, &registries)?;
         if self.file.is_none() {
-            spare_brute_force(&mut plan, self.experiment.allow_outside)?;
+            spare_brute_force(&mut plan, self.experiment.values.allow_outside)?;
         }
         for skipped in &plan.skipped {
             tell(&format!("left out: {}: {}", skipped.cell, skipped.reason));
         }
         // Nothing is written: no folder is needed.
-        let mut options = self.device.options(PathBuf::new(), false);
-        options.allow_outside = self.experiment.allow_outside;
+        let options = self
+            .device
+            .options(PathBuf::new(), &self.experiment.values, false);
         let rays = experiment.gate.rays;
         let verified = raystone::run::verify(&experiment, &plan, &registries, &options, rays)?;
         print(&table(&verified))?;
@@ -99,7 +100,7 @@ impl Verify {
         }
         overrides.extend(self.rays.map(|rays| format!("gate.rays={rays}")));
         overrides.extend(self.device.kernels_override());
-        overrides.extend(self.experiment.set.iter().cloned());
+        overrides.extend(self.experiment.values.set.iter().cloned());
         overrides
     }
 }

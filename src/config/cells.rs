@@ -76,19 +76,24 @@ impl Cell {
         axes.all(|(axis, variant)| variant.is_none() || *variant == self.variants[axis])
     }
 
-    /// Labels on these axes, and behind them those of tests, offset and kernels where they are not the
-    /// default ones: what tells cells of a run apart.
-    pub fn labels(&self, axes: &[Axis]) -> Vec<&str> {
-        let named = axes.iter().map(|&axis| self[axis].label.as_str());
+    /// Labels on these axes, and behind them tests, offset and kernels (`offset none`, `@idea`) where they
+    /// are not the default ones: what tells cells of a run apart.
+    pub fn labels(&self, axes: &[Axis]) -> Vec<String> {
+        let named = axes.iter().map(|&axis| self[axis].label.clone());
         named.chain(self.unusual()).collect()
     }
 
-    fn unusual(&self) -> impl Iterator<Item = &str> {
+    fn unusual(&self) -> impl Iterator<Item = String> {
         let further = [Axis::Triangle, Axis::BoxTest, Axis::Offset, Axis::Kernels];
         further.into_iter().filter_map(|axis| {
             let variant = self.get(axis)?;
-            (Some(variant.label.as_str()) != axis.default_name() && !variant.name.is_empty())
-                .then_some(variant.label.as_str())
+            if variant.name.is_empty() || Some(variant.label.as_str()) == axis.default_name() {
+                return None;
+            }
+            Some(match axis {
+                Axis::Kernels => format!("@{variant}"),
+                axis => format!("{axis} {variant}"),
+            })
         })
     }
 }
@@ -110,7 +115,7 @@ impl fmt::Display for Cell {
         if let Some(sequence) = self.get(Axis::Sequence) {
             parts.push(format!("{sequence} × {}", self[Axis::Decorrelation]));
         }
-        parts.extend(self.unusual().map(str::to_owned));
+        parts.extend(self.unusual());
         f.write_str(&parts.join(", "))
     }
 }

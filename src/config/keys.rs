@@ -75,7 +75,7 @@ impl fmt::Display for Axis {
 
 /// What values a key takes. Ranges include both ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Kind {
+pub enum ValueKind {
     /// Any text but the empty one.
     Text,
     /// `true` or `false`.
@@ -128,7 +128,7 @@ pub enum Kind {
     Patterns(Axis),
 }
 
-impl fmt::Display for Kind {
+impl fmt::Display for ValueKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Text => write!(f, "a text that is not empty"),
@@ -167,20 +167,20 @@ impl fmt::Display for Kind {
 
 /// One key of an experiment file.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Key {
+pub struct KeyRow {
     /// Section that the key stands in.
     pub section: &'static str,
     /// Name of the key.
     pub name: &'static str,
     /// Allowed values.
-    pub kind: Kind,
+    pub kind: ValueKind,
     /// Default as TOML text; a key without one must be given where its section is used.
     pub default: Option<&'static str>,
     /// What it means, with its unit.
     pub meaning: &'static str,
 }
 
-impl Key {
+impl KeyRow {
     /// The dotted path, as messages and `--set` write it.
     pub fn path(&self) -> String {
         format!("{}.{}", self.section, self.name)
@@ -190,11 +190,11 @@ impl Key {
 const fn key(
     section: &'static str,
     name: &'static str,
-    kind: Kind,
+    kind: ValueKind,
     default: Option<&'static str>,
     meaning: &'static str,
-) -> Key {
-    Key {
+) -> KeyRow {
+    KeyRow {
         section,
         name,
         kind,
@@ -203,47 +203,47 @@ const fn key(
     }
 }
 
-const fn integer(min: i64, max: i64) -> Kind {
-    Kind::Integer { min, max }
+const fn integer(min: i64, max: i64) -> ValueKind {
+    ValueKind::Integer { min, max }
 }
 
-const SEED: Kind = integer(0, u32::MAX as i64);
+const SEED: ValueKind = integer(0, u32::MAX as i64);
 
 /// All keys, in the order of the documentation. Parameters of registry entries (`[accel.NAME]` and
 /// so on) are not here: they come from the registries.
 #[rustfmt::skip]
-pub const KEYS: &[Key] = &[
-    key("run", "name", Kind::Text, None, "Name of the run in the report; without it, the name of the file."),
+pub const KEYS: &[KeyRow] = &[
+    key("run", "name", ValueKind::Text, None, "Name of the run in the report; without it, the name of the file."),
     key("run", "replicates", integer(1, 1024), Some("8"), "Independent seeds per randomised sampler; the unit of every interval of an error."),
     key("run", "seed", SEED, Some("1"), "Seed of the first replicate."),
-    key("run", "resolution", Kind::IntegerPair { min: 16, max: 8192 }, Some("[192, 144]"), "Width and height of every image, pixels."),
-    key("run", "spp", Kind::Exponents { max: 16 }, Some("{ pow2 = [0, 5] }"), "Samples per pixel at which the error is taken: 2^lo, …, 2^hi."),
-    key("run", "runtime_checks", Kind::Flag, Some("true"), "Keep the bounds checks and loop bounds that the driver layer adds to kernels."),
-    key("axes", "scene", Kind::Names(Axis::Scene), None, "Scenes: built-in names, or paths of .obj, .gltf, .glb or .ply files, relative to the current directory. Not needed if all integrators are `integrand:*`."),
-    key("axes", "accel", Kind::Names(Axis::Accel), None, "Acceleration structures. Not needed if all integrators are `integrand:*`."),
-    key("axes", "sequence", Kind::Names(Axis::Sequence), None, "Sample sequences."),
-    key("axes", "decorrelation", Kind::Names(Axis::Decorrelation), Some("[\"none\"]"), "How the pixels' sample points are made different."),
-    key("axes", "integrator", Kind::Names(Axis::Integrator), Some("[\"path\"]"), "What is computed from the hits."),
-    key("axes", "triangle", Kind::Names(Axis::Triangle), Some("[\"watertight\"]"), "Ray-triangle tests, of all structures and of the judge."),
-    key("axes", "box_test", Kind::Names(Axis::BoxTest), Some("[\"padded-16\"]"), "Ray-box tests: reciprocal and pad. Hits are proven for `padded-16` alone; the others are there to be measured."),
-    key("axes", "offset", Kind::Names(Axis::Offset), Some("[\"error-bound\"]"), "How rays that leave a surface are moved off it by integrators. References are always rendered with `error-bound`."),
-    key("axes", "kernels", Kind::Names(Axis::Kernels), Some("[\"\"]"), "Folders whose kernels (`*.wesl`) replace the embedded ones of the same path, or join them, relative to the current directory; `\"\"` are the embedded ones."),
-    key("camera", "eye", Kind::Vector, None, "Position of the pinhole, scene units."),
-    key("camera", "target", Kind::Vector, None, "Point that projects to the centre of the image, scene units."),
-    key("camera", "up", Kind::Vector, Some("[0, 1, 0]"), "Up direction; not parallel to the viewing direction."),
-    key("camera", "fov", Kind::Number { min: 1.0, max: 179.0 }, Some("40"), "Vertical field of view, degrees."),
-    key("exclude", "scene", Kind::Patterns(Axis::Scene), None, "Cells of these scenes …"),
-    key("exclude", "accel", Kind::Patterns(Axis::Accel), None, "… with these structures …"),
-    key("exclude", "sequence", Kind::Patterns(Axis::Sequence), None, "… these sequences …"),
-    key("exclude", "decorrelation", Kind::Patterns(Axis::Decorrelation), None, "… these decorrelations …"),
-    key("exclude", "integrator", Kind::Patterns(Axis::Integrator), None, "… these integrators …"),
-    key("exclude", "triangle", Kind::Patterns(Axis::Triangle), None, "… these triangle tests …"),
-    key("exclude", "box_test", Kind::Patterns(Axis::BoxTest), None, "… these box tests …"),
-    key("exclude", "offset", Kind::Patterns(Axis::Offset), None, "… these offsets …"),
-    key("exclude", "kernels", Kind::Patterns(Axis::Kernels), None, "… and these kernels are left out."),
+    key("run", "resolution", ValueKind::IntegerPair { min: 16, max: 8192 }, Some("[192, 144]"), "Width and height of every image, pixels."),
+    key("run", "spp", ValueKind::Exponents { max: 16 }, Some("{ pow2 = [0, 5] }"), "Samples per pixel at which the error is taken: 2^lo, …, 2^hi."),
+    key("run", "runtime_checks", ValueKind::Flag, Some("true"), "Keep the bounds checks and loop bounds that the driver layer adds to kernels."),
+    key("axes", "scene", ValueKind::Names(Axis::Scene), None, "Scenes: built-in names, or paths of .obj, .gltf, .glb or .ply files, relative to the current directory. Not needed if all integrators are `integrand:*`."),
+    key("axes", "accel", ValueKind::Names(Axis::Accel), None, "Acceleration structures. Not needed if all integrators are `integrand:*`."),
+    key("axes", "sequence", ValueKind::Names(Axis::Sequence), None, "Sample sequences."),
+    key("axes", "decorrelation", ValueKind::Names(Axis::Decorrelation), Some("[\"none\"]"), "How the pixels' sample points are made different."),
+    key("axes", "integrator", ValueKind::Names(Axis::Integrator), Some("[\"path\"]"), "What is computed from the hits."),
+    key("axes", "triangle", ValueKind::Names(Axis::Triangle), Some("[\"watertight\"]"), "Ray-triangle tests, of all structures and of the judge."),
+    key("axes", "box_test", ValueKind::Names(Axis::BoxTest), Some("[\"padded-16\"]"), "Ray-box tests: reciprocal and pad. Hits are proven for `padded-16` alone; the others are there to be measured."),
+    key("axes", "offset", ValueKind::Names(Axis::Offset), Some("[\"error-bound\"]"), "How rays that leave a surface are moved off it by integrators. References are always rendered with `error-bound`."),
+    key("axes", "kernels", ValueKind::Names(Axis::Kernels), Some("[\"\"]"), "Folders whose kernels (`*.wesl`) replace the embedded ones of the same path, or join them, relative to the current directory; `\"\"` are the embedded ones."),
+    key("camera", "eye", ValueKind::Vector, None, "Position of the pinhole, scene units."),
+    key("camera", "target", ValueKind::Vector, None, "Point that projects to the centre of the image, scene units."),
+    key("camera", "up", ValueKind::Vector, Some("[0, 1, 0]"), "Up direction; not parallel to the viewing direction."),
+    key("camera", "fov", ValueKind::Number { min: 1.0, max: 179.0 }, Some("40"), "Vertical field of view, degrees."),
+    key("exclude", "scene", ValueKind::Patterns(Axis::Scene), None, "Cells of these scenes …"),
+    key("exclude", "accel", ValueKind::Patterns(Axis::Accel), None, "… with these structures …"),
+    key("exclude", "sequence", ValueKind::Patterns(Axis::Sequence), None, "… these sequences …"),
+    key("exclude", "decorrelation", ValueKind::Patterns(Axis::Decorrelation), None, "… these decorrelations …"),
+    key("exclude", "integrator", ValueKind::Patterns(Axis::Integrator), None, "… these integrators …"),
+    key("exclude", "triangle", ValueKind::Patterns(Axis::Triangle), None, "… these triangle tests …"),
+    key("exclude", "box_test", ValueKind::Patterns(Axis::BoxTest), None, "… these box tests …"),
+    key("exclude", "offset", ValueKind::Patterns(Axis::Offset), None, "… these offsets …"),
+    key("exclude", "kernels", ValueKind::Patterns(Axis::Kernels), None, "… and these kernels are left out."),
     key("reference", "spp", integer(2, 1 << 24), Some("4096"), "Samples per pixel of the reference image, both halves together."),
-    key("reference", "sequence", Kind::Name(Axis::Sequence), Some("\"pixel-hash\""), "Sequence of the reference, with its default parameters."),
-    key("reference", "decorrelation", Kind::Name(Axis::Decorrelation), Some("\"none\""), "Decorrelation of the reference, with its default parameters."),
+    key("reference", "sequence", ValueKind::Name(Axis::Sequence), Some("\"pixel-hash\""), "Sequence of the reference, with its default parameters."),
+    key("reference", "decorrelation", ValueKind::Name(Axis::Decorrelation), Some("\"none\""), "Decorrelation of the reference, with its default parameters."),
     key("reference", "seed", SEED, Some("9001"), "What the seeds of the reference's parts are hashed from; none of them may be a replicate's."),
     key("timing", "rounds", integer(3, 1000), Some("9"), "Timed rounds; each times every cell of a scene once, in random order."),
     key("timing", "spp", integer(1, 1024), Some("1"), "Samples per pixel of each timed render."),
@@ -253,10 +253,10 @@ pub const KEYS: &[Key] = &[
     key("gate", "rays", integer(256, 1 << 24), Some("32768"), "Rays per class that every structure must answer as the judge does."),
     key("gate", "brute_force_tests", integer(0, 1_000_000_000_000), Some("2_000_000_000"), "Ray-triangle tests spent on checking the judge itself against brute force (at least 2,000 rays are)."),
     key("gate", "oracle_rays", integer(0, 1 << 20), Some("2048"), "Rays of the judge that the double-precision oracle decides again."),
-    key("gate", "ao_length", Kind::Number { min: 0.0, max: 1e16 }, Some("0"), "Length of recorded AO rays, scene units; 0 is a tenth of the scene's diagonal."),
-    key("gate", "offset", Kind::Number { min: 0.0, max: 1e16 }, Some("0"), "How far rays that start on a surface are moved off it, scene units; 0 is 1e-5 of the scene's diagonal."),
-    key("discrepancy", "points", Kind::PowerOfTwo { min: 2, max: 65_536 }, Some("4096"), "Star discrepancy is taken at N = 2, 4, 8, … up to this many points."),
-    key("discrepancy", "pairs", Kind::DimensionPairs { max: 255 }, Some("[[0, 1], [2, 3], [4, 5], [0, 2], [1, 3], [2, 4]]"), "Pairs of dimensions of the path's table; the worst of all pairs that the integrators draw is measured as well."),
+    key("gate", "ao_length", ValueKind::Number { min: 0.0, max: 1e16 }, Some("0"), "Length of recorded AO rays, scene units; 0 is a tenth of the scene's diagonal."),
+    key("gate", "offset", ValueKind::Number { min: 0.0, max: 1e16 }, Some("0"), "How far rays that start on a surface are moved off it, scene units; 0 is 1e-5 of the scene's diagonal."),
+    key("discrepancy", "points", ValueKind::PowerOfTwo { min: 2, max: 65_536 }, Some("4096"), "Star discrepancy is taken at N = 2, 4, 8, … up to this many points."),
+    key("discrepancy", "pairs", ValueKind::DimensionPairs { max: 255 }, Some("[[0, 1], [2, 3], [4, 5], [0, 2], [1, 3], [2, 4]]"), "Pairs of dimensions of the path's table; the worst of all pairs that the integrators draw is measured as well."),
     key("discrepancy", "seeds", integer(1, 1024), Some("8"), "Seeds measured where the stream is randomised."),
 ];
 
@@ -264,7 +264,7 @@ pub const KEYS: &[Key] = &[
 pub const OPTIONAL_SECTIONS: &[&str] = &["camera", "exclude"];
 
 /// The row of a key, if there is one.
-pub fn find(section: &str, name: &str) -> Option<&'static Key> {
+pub fn find(section: &str, name: &str) -> Option<&'static KeyRow> {
     KEYS.iter()
         .find(|key| key.section == section && key.name == name)
 }
@@ -307,7 +307,7 @@ mod tests {
 
     #[test]
     fn no_key_stands_twice_and_sections_are_contiguous() {
-        let paths: BTreeSet<_> = KEYS.iter().map(Key::path).collect();
+        let paths: BTreeSet<_> = KEYS.iter().map(KeyRow::path).collect();
         assert_eq!(paths.len(), KEYS.len());
         let sections = sections();
         let distinct: BTreeSet<_> = sections.iter().collect();

@@ -189,7 +189,9 @@ impl Plan {
         )?;
         for scene in &self.scenes {
             let cells = self.structures.iter().filter(|c| c[Axis::Scene] == *scene);
-            let accels: Vec<_> = cells.map(|c| c.labels(&[Axis::Accel]).join(" ")).collect();
+            let accels: Vec<_> = cells
+                .map(|c| c.labels(&[Axis::Accel]).join(" · "))
+                .collect();
             writeln!(text, "  {scene}: {}", accels.join(", "))?;
         }
         writeln!(

@@ -2,7 +2,7 @@
 
 use super::error::{ConfigError, Place};
 use super::experiment::SppRange;
-use super::keys::{self, Key, Kind};
+use super::keys::{self, KeyRow, ValueKind};
 use super::tree::{Item, Table, Value};
 use glam::Vec3;
 
@@ -44,7 +44,7 @@ impl<'t> Section<'t> {
     ///
     /// # Panics
     /// If the parser asks for a key that has no row: a programming error.
-    fn key(&self, name: &str) -> &'static Key {
+    fn key(&self, name: &str) -> &'static KeyRow {
         match keys::find(self.name, name) {
             Some(key) => key,
             None => panic!("{}.{name} has no row in KEYS", self.name),
@@ -103,7 +103,7 @@ impl<'t> Section<'t> {
         let item = self.item(name)?;
         let x = number(item).ok_or_else(|| self.wrong_type(name, item))?;
         match self.key(name).kind {
-            Kind::Number { min, max } if (min..=max).contains(&x) => Ok(x),
+            ValueKind::Number { min, max } if (min..=max).contains(&x) => Ok(x),
             _ => Err(self.out_of_range(name, &item.at, x)),
         }
     }
@@ -114,8 +114,8 @@ impl<'t> Section<'t> {
             return Err(self.wrong_type(name, item));
         };
         let allowed = match self.key(name).kind {
-            Kind::Integer { min, max } => (min..=max).contains(&x),
-            Kind::PowerOfTwo { min, max } => (min..=max).contains(&x) && x.count_ones() == 1,
+            ValueKind::Integer { min, max } => (min..=max).contains(&x),
+            ValueKind::PowerOfTwo { min, max } => (min..=max).contains(&x) && x.count_ones() == 1,
             _ => false,
         };
         match allowed {
@@ -131,7 +131,7 @@ impl<'t> Section<'t> {
 
     pub fn unsigned_pair(&self, name: &str) -> Result<[u32; 2], ConfigError> {
         let item = self.item(name)?;
-        let Kind::IntegerPair { min, max } = self.key(name).kind else {
+        let ValueKind::IntegerPair { min, max } = self.key(name).kind else {
             return Err(self.wrong_type(name, item));
         };
         self.pair(name, item, min, max)
@@ -157,7 +157,8 @@ impl<'t> Section<'t> {
 
     pub fn exponents(&self, name: &str) -> Result<SppRange, ConfigError> {
         let item = self.item(name)?;
-        let (Value::Table(table), Kind::Exponents { max }) = (&item.value, self.key(name).kind)
+        let (Value::Table(table), ValueKind::Exponents { max }) =
+            (&item.value, self.key(name).kind)
         else {
             return Err(self.wrong_type(name, item));
         };
@@ -181,7 +182,8 @@ impl<'t> Section<'t> {
 
     pub fn dimension_pairs(&self, name: &str) -> Result<Vec<[u32; 2]>, ConfigError> {
         let item = self.item(name)?;
-        let (Value::List(items), Kind::DimensionPairs { max }) = (&item.value, self.key(name).kind)
+        let (Value::List(items), ValueKind::DimensionPairs { max }) =
+            (&item.value, self.key(name).kind)
         else {
             return Err(self.wrong_type(name, item));
         };

@@ -211,54 +211,39 @@ impl<'a> RunData<'a> {
     }
 
     fn name_competitors(&mut self) {
-        let (mut structures, mut samplers) = (Vec::new(), Vec::new());
-        for scene in &self.scenes {
+        let structures = self.scenes.iter().flat_map(|scene| {
             let measured = scene.structures.iter().map(|s| s.structure.clone());
-            let timed = scene.views.iter().flat_map(View::timed_structures);
-            structures.extend(measured.chain(timed));
-            samplers.extend(
-                scene
-                    .views
-                    .iter()
-                    .flat_map(|view| &view.samplers)
-                    .map(|s| s.name.clone()),
-            );
-        }
-        samplers.extend(self.streams.iter().map(|s| self.names.sampler(s.key)));
-        self.structures = without_repeats(structures);
-        self.samplers = without_repeats(samplers);
+            measured.chain(scene.views.iter().flat_map(View::timed_structures))
+        });
+        let of_views = self.views().flat_map(|(_, view)| &view.samplers);
+        let of_streams = self.streams.iter().map(|s| self.names.sampler(s.key));
+        let samplers = of_views.map(|s| s.name.clone()).chain(of_streams);
+        let samplers = without_repeats(samplers.collect());
+        self.structures = without_repeats(structures.collect());
+        self.samplers = samplers;
     }
 
     /// A row of the table of figures; of one that nobody describes only the id is known.
     pub fn figure(&self, id: &str) -> Cow<'a, Figure> {
         let from_outside = self.run.iter().flat_map(|run| &run.figures);
-        let known = FIGURES
-            .iter()
-            .chain(from_outside)
-            .find(|figure| figure.id == id);
-        known.map(Cow::Borrowed).unwrap_or_else(|| {
-            Cow::Owned(Figure {
-                id: id.to_owned().into(),
-                title: id.to_owned().into(),
-                ..figure("epo/v1").clone()
-            })
-        })
+        let mut known = FIGURES.iter().chain(from_outside);
+        let unknown = || Figure {
+            id: id.to_owned().into(),
+            title: id.to_owned().into(),
+            ..figure("epo/v1").clone()
+        };
+        let known = known.find(|figure| figure.id == id);
+        known.map_or_else(|| Cow::Owned(unknown()), Cow::Borrowed)
     }
 
     /// Look of a structure in plots.
     pub fn structure_look(&self, name: &str) -> usize {
-        self.structures
-            .iter()
-            .position(|known| known == name)
-            .unwrap_or(0)
+        place(&self.structures, name)
     }
 
     /// Look of a sampler in plots.
     pub fn sampler_look(&self, name: &str) -> usize {
-        self.samplers
-            .iter()
-            .position(|known| known == name)
-            .unwrap_or(0)
+        place(&self.samplers, name)
     }
 
     fn scene(&mut self, name: &'a str) -> &mut SceneGroup<'a> {
@@ -332,18 +317,13 @@ impl View<'_> {
     /// samplers the one with the least geometric mean of the times.
     pub fn fastest_structure(&self) -> Option<String> {
         let score = |name: &String| {
-            let logs: Vec<f64> = self
-                .samplers
-                .iter()
-                .filter_map(|sampler| self.ms_per_spp(name, &sampler.name))
-                .map(|ms| ms.value.ln())
-                .collect();
+            let samplers = self.samplers.iter();
+            let times = samplers.filter_map(|s| self.ms_per_spp(name, &s.name));
+            let logs: Vec<f64> = times.map(|ms| ms.value.ln()).collect();
             (logs.len(), logs.iter().sum::<f64>() / logs.len() as f64)
         };
-        let scored = self
-            .timed_structures()
-            .into_iter()
-            .map(|name| (score(&name), name));
+        let names = self.timed_structures().into_iter();
+        let scored = names.map(|name| (score(&name), name));
         scored
             .filter(|((count, _), _)| *count > 0)
             .min_by(|((n, a), _), ((m, b), _)| m.cmp(n).then(a.total_cmp(b)))
@@ -364,14 +344,17 @@ impl StructureRecord {
 
     /// Why the structure gets no figures; `None` when it passed the gate.
     pub fn fault(&self) -> Option<String> {
-        if let Some(failure) = &self.failure {
-            return Some(failure.clone());
+        match (&self.failure, &self.gate) {
+            (Some(failure), _) => Some(failure.clone()),
+            (None, None) => Some("not gated".into()),
+            (None, Some(gate)) => (!gate.passed).then(|| fault_text(gate, None)),
         }
-        let Some(gate) = &self.gate else {
-            return Some("not gated".into());
-        };
-        (!gate.passed).then(|| fault_text(gate, None))
     }
+}
+
+fn place(names: &[String], name: &str) -> usize {
+    let mut names = names.iter();
+    names.position(|known| known == name).unwrap_or(0)
 }
 
 /// The names, each once, in their order.

@@ -48,11 +48,13 @@ pub fn bounds(interval: &Interval) -> String {
 
 /// `value [low, high]`; the interval is left out where it has no width.
 pub fn interval(interval: &Interval) -> String {
-    let value = number(interval.value);
-    if interval.low == interval.high {
-        value
-    } else {
-        format!("{value} {}", bounds(interval))
+    with_bounds(interval, number)
+}
+
+fn with_bounds(i: &Interval, text: impl Fn(f64) -> String) -> String {
+    match i.low == i.high {
+        true => text(i.value),
+        false => format!("{} [{}, {}]", text(i.value), text(i.low), text(i.high)),
     }
 }
 
@@ -68,17 +70,11 @@ pub fn median_bounds(samples: impl Iterator<Item = usize>) -> String {
 
 /// A slope with its interval; the interval is left out where it has no width.
 pub fn slope(interval: &Interval) -> String {
-    let text = |x: f64| format!("{x:.2}").replace('-', "−");
-    if interval.low == interval.high {
-        text(interval.value)
-    } else {
-        format!(
-            "{} [{}, {}]",
-            text(interval.value),
-            text(interval.low),
-            text(interval.high)
-        )
-    }
+    with_bounds(interval, exponent)
+}
+
+fn exponent(value: f64) -> String {
+    format!("{value:.2}").replace('-', "−")
 }
 
 /// An integer with thin groups of three: `262,267`.
@@ -117,7 +113,7 @@ pub fn figure(figure: &Figure, value: f64) -> String {
         Shown::Count => count(value as u64),
         Shown::Bytes => bytes(value as u64),
         Shown::Percent => percent(value),
-        Shown::Exponent => format!("{value:.2}").replace('-', "−"),
+        Shown::Exponent => exponent(value),
     }
 }
 
@@ -194,28 +190,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_keep_three_digits_at_any_size() {
-        assert_eq!(number(9.999), "10.0");
-        assert_eq!(number(0.001234), "0.00123");
-        assert_eq!(number(0.0001234), "1.23e-4");
-        assert_eq!(number(123_456.0), "123456");
-        assert_eq!(number(1_234_567.0), "1.23e6");
-        assert_eq!(number(-0.5), "-0.500");
-    }
-
-    #[test]
-    fn absent_is_a_dash_and_never_zero() {
+    fn numbers_keep_three_digits_at_any_size_and_absent_is_a_dash() {
+        for (value, text) in [
+            (9.999, "10.0"),
+            (0.001234, "0.00123"),
+            (0.0001234, "1.23e-4"),
+            (123_456.0, "123456"),
+            (1_234_567.0, "1.23e6"),
+            (-0.5, "-0.500"),
+            (0.0, "0"),
+            (f64::NAN, "–"),
+        ] {
+            assert_eq!(number(value), text);
+        }
         assert_eq!(optional(None), "–");
-        assert_eq!(optional(Some(0.0)), "0");
-        assert_eq!(number(f64::NAN), "–");
-    }
-
-    #[test]
-    fn units_and_groups_are_right() {
-        assert_eq!(count(262_267), "262,267");
-        assert_eq!(count(100), "100");
-        assert_eq!(bytes(1023), "1023 B");
-        assert_eq!(bytes(3 << 20), "3.00 MiB");
+        assert_eq!([count(262_267), count(100)], ["262,267", "100"]);
+        assert_eq!([bytes(1023), bytes(3 << 20)], ["1023 B", "3.00 MiB"]);
         assert_eq!(percent(0.043), "4.3 %");
     }
 

@@ -168,13 +168,14 @@ impl PointPage {
     /// All pixels upon each other (Dufay 2017, Figs. 5.7 and 5.13).
     fn copies(&self) -> Figure {
         let all: Vec<Pair> = self.copies.concat();
-        let first = self.copies.first().map_or(0, Vec::len);
-        let own = self
-            .copies
-            .first()
-            .filter(|own| own.len() <= MOST_HIGHLIGHTED);
+        let own = self.copies.first().cloned().unwrap_or_default();
+        let first = own.len();
+        let highlighted = match first <= MOST_HIGHLIGHTED {
+            true => own,
+            false => Vec::new(),
+        };
         let cloud = |domain| Cloud {
-            highlighted: own.cloned().unwrap_or_default(),
+            highlighted: highlighted.clone(),
             ..Cloud::new(domain, all.clone())
         };
         let pixels = format::plural(self.copies.len(), "pixel");
@@ -300,10 +301,8 @@ mod tests {
     #[test]
     fn the_page_holds_every_picture_and_says_how_many_pixels() {
         let document = document(&page()).unwrap();
-        let figures: Vec<&Figure> = document
-            .sections
-            .iter()
-            .flat_map(|section| &section.blocks)
+        let blocks = document.sections.iter().flat_map(|section| &section.blocks);
+        let figures: Vec<&Figure> = blocks
             .flat_map(|block| match block {
                 Block::Figures(figures) => figures.as_slice(),
                 _ => &[],
@@ -319,17 +318,11 @@ mod tests {
             "spectrum",
         ];
         assert_eq!(names, expected);
-        assert!(
-            figures[4].caption.contains("2 pixels") && figures[4].caption.contains("4 of 4 each")
-        );
+        let caption = &figures[4].caption;
+        assert!(caption.contains("2 pixels") && caption.contains("4 of 4 each"));
         let texts = figures[1].drawing.texts();
-        assert_eq!(
-            texts
-                .iter()
-                .filter(|text| **text == "one point in each")
-                .count(),
-            3
-        );
+        let full = texts.iter().filter(|text| **text == "one point in each");
+        assert_eq!(full.count(), 3);
         assert_eq!(document.subtitle, "4 points, dimensions 4, 5, 9; by hand");
     }
 }

@@ -264,8 +264,7 @@ fn error_record(
             Axis::Decorrelation,
         ];
         let labels = cell.labels(&axes);
-        let draw =
-            |kind, picture: &Picture| session.picture(&[&[kind], &labels[..]].concat(), picture);
+        let draw = |kind, picture: &Picture| session.picture(kind, &labels, picture);
         record.image = draw("image", &tone_map(&last.image, yardstick.exposure))?;
         let map = error_map(&last.image, reference, ERROR_MAP_FULL_SCALE, viridis);
         record.error_map = draw("error", &map.map_err(|e| e.to_string())?)?;

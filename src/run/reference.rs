@@ -159,7 +159,7 @@ fn finish_reference(
     let exposure = automatic_exposure(reference.image());
     let labels = cell.labels(&[Axis::Scene, Axis::Integrator]);
     let picture = tone_map(reference.image(), exposure);
-    let image = session.picture(&[&["reference"], &labels[..]].concat(), &picture)?;
+    let image = session.picture("reference", &labels, &picture)?;
     line.body.image = image.unwrap_or_default();
     let done = format!("reference {}: done", labels.join(", "));
     if !session.is_done(&done) {

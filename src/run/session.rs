@@ -242,13 +242,20 @@ impl<'a> Session<'a> {
         self.progress.set_message(message.into());
     }
 
-    /// Writes a picture of what `parts` name: its path relative to the run's folder. One that cannot be
-    /// written is a warning, and costs no figure.
-    pub fn picture(&self, parts: &[&str], picture: &Picture) -> Result<Option<String>, RunError> {
+    /// Writes a picture of this kind, of what the labels name: its path relative to the run's folder. One that
+    /// cannot be written is a warning, and costs no figure.
+    pub fn picture(
+        &self,
+        kind: &str,
+        labels: &[String],
+        picture: &Picture,
+    ) -> Result<Option<String>, RunError> {
+        let labels = labels.iter().map(String::as_str);
+        let parts: Vec<&str> = std::iter::once(kind).chain(labels).collect();
         let Some(folder) = &self.folder else {
             return Ok(None);
         };
-        let (relative, path) = folder.image(parts);
+        let (relative, path) = folder.image(&parts);
         match write_png(&path, picture) {
             Ok(()) => Ok(Some(relative)),
             Err(error) => {

@@ -222,8 +222,7 @@ pub(super) fn draw_heat_maps(
             pixels: structure.costs.iter().map(|c| viridis(c / scale)).collect(),
         };
         let labels = structure.cell.labels(&[Axis::Scene, Axis::Accel]);
-        let names = [&["heat"], &labels[..]].concat();
-        structure.record.body.heat_map = session.picture(&names, &picture)?;
+        structure.record.body.heat_map = session.picture("heat", &labels, &picture)?;
         structure.record.body.heat_map_max = Some(f64::from(scale));
     }
     Ok(gated)

@@ -16,31 +16,21 @@ pub(super) fn split(bytes: &[u8]) -> Result<Chunks<'_>, (usize, String)> {
     if !bytes.starts_with(MAGIC) {
         return Ok((bytes, None));
     }
+    let there = bytes.len();
     let word = |at: usize| {
         let word = bytes.get(at..).and_then(<[u8]>::first_chunk);
-        let ends_here = || {
-            (
-                bytes.len(),
-                "the file ends in the middle of a header".to_owned(),
-            )
-        };
-        word.map(|word| u32::from_le_bytes(*word) as usize)
-            .ok_or_else(ends_here)
+        let word = word.map(|word| u32::from_le_bytes(*word) as usize);
+        word.ok_or_else(|| (there, "the file ends in the middle of a header".to_owned()))
     };
     let version = word(4)?;
     if version != 2 {
-        return Err((
-            4,
-            format!("version {version} of binary glTF; only version 2 can be read"),
-        ));
+        let problem = format!("version {version} of binary glTF; only version 2 can be read");
+        return Err((4, problem));
     }
     let length = word(8)?;
-    if !(HEADER_BYTES..=bytes.len()).contains(&length) {
-        let there = bytes.len();
-        return Err((
-            8,
-            format!("{length} bytes are announced, {there} are there"),
-        ));
+    if !(HEADER_BYTES..=there).contains(&length) {
+        let problem = format!("{length} bytes are announced, {there} are there");
+        return Err((8, problem));
     }
     let (mut json, mut binary) = (None, None);
     let mut at = HEADER_BYTES;
@@ -49,11 +39,9 @@ pub(super) fn split(bytes: &[u8]) -> Result<Chunks<'_>, (usize, String)> {
         word(at + 4)?;
         let (kind, rest) = bytes[at + 4..].split_at(4);
         let chunk = rest.get(..chunk_length).ok_or_else(|| {
-            let there = rest.len();
-            (
-                at,
-                format!("a chunk of {chunk_length} bytes is announced, {there} are there"),
-            )
+            let left = rest.len();
+            let problem = format!("a chunk of {chunk_length} bytes is announced, {left} are there");
+            (at, problem)
         })?;
         match kind {
             JSON if json.is_none() && !chunk.starts_with(MAGIC) => json = Some(chunk),

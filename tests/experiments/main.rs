@@ -350,7 +350,11 @@ fn tests_and_offsets_are_swept_where_they_matter() {
     .collect();
     assert_eq!(
         worlds,
-        ["cornell-box", "cornell-box, plain", "cornell-box, pluecker"]
+        [
+            "cornell-box",
+            "cornell-box, box_test plain",
+            "cornell-box, triangle pluecker"
+        ]
     );
     // What differs from the default stands behind the names, and no two cells are called the same.
     let names: BTreeSet<String> = whole.times.iter().map(ToString::to_string).collect();
@@ -359,7 +363,7 @@ fn tests_and_offsets_are_swept_where_they_matter() {
         names.contains("cornell-box, bvh, path, sobol × none"),
         "{names:?}"
     );
-    assert!(names.contains("cornell-box, bvh, path, sobol × none, pluecker, none"));
+    assert!(names.contains("cornell-box, bvh, path, sobol × none, triangle pluecker, offset none"));
     let some = plan(&experiment, &["triangle=pluecker,offset=error-bound"]).unwrap();
     assert_eq!((some.structures.len(), some.times.len()), (2, 4));
 }

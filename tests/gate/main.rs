@@ -12,46 +12,21 @@ mod support;
 mod timed;
 
 use raystone::accel::AccelKind;
-use raystone::config::Gate;
-use raystone::gpu::{Gpu, probe_arithmetic};
-use raystone::measure::gate::{Checks, Judge, gate};
+use raystone::gpu::Gpu;
+use raystone::measure::gate::{Checks, Judge};
 use raystone::measure::record::GateVerdict;
 use support::Stage;
 
 /// The judge of a scene with `rays` rays of each class.
 fn judge(stage: &Stage, rays: u32) -> Judge {
-    let settings = Gate {
-        rays,
-        brute_force_tests: 20_000_000,
-        oracle_rays: 512,
-        ao_length: 0.0,
-        offset: 0.0,
-    };
-    Judge::new(
-        &stage.scene,
-        &stage.soup,
-        stage.camera,
-        &settings,
-        1,
-        Checks::Repeated,
-    )
-    .expect("a judge")
+    stage.judge(Checks::Repeated, [rays, 20_000_000, 512])
 }
 
 /// The verdict on one structure.
 fn verdict(gpu: &Gpu, stage: &Stage, kind: &dyn AccelKind, judge: &Judge) -> GateVerdict {
     let traced = stage.traced(gpu, kind);
-    let probe = probe_arithmetic(gpu).expect("the probe runs");
-    gate(
-        gpu,
-        &stage.buffers.triangles,
-        &stage.soup,
-        &traced,
-        judge,
-        &probe,
-        true,
-    )
-    .unwrap_or_else(|e| panic!("{}: {e}", kind.name()))
+    let verdict = stage.verdict(gpu, &traced, judge);
+    verdict.unwrap_or_else(|e| panic!("{}: {e}", kind.name()))
 }
 
 /// Wrong rays of all classes.

@@ -10,12 +10,13 @@ pub use hits::*;
 use raystone::accel::{
     AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, Intersection, Traced,
 };
-use raystone::config::{Experiment, Plan};
+use raystone::config::{Experiment, Gate, Plan};
 use raystone::geometry::Camera;
-use raystone::gpu::{AdapterChoice, Gpu, KernelLibrary, probe_arithmetic};
+use raystone::gpu::{AdapterChoice, Gpu, GpuError, KernelLibrary, probe_arithmetic};
 use raystone::integrator::RayOffset;
 use raystone::integrator::{self, IntegratorRegistry, RenderJob, Renderer};
-use raystone::measure::record::{Line, SCHEMA};
+use raystone::measure::gate::{Checks, Judge, gate};
+use raystone::measure::record::{GateVerdict, Line, SCHEMA};
 use raystone::measure::statistics::{mean, variance};
 use raystone::params::{Entry, ParamValue, Params, Variant};
 use raystone::run::{Registries, RunOptions, RunSummary};
@@ -164,6 +165,30 @@ impl Stage {
             .build(kind)
             .unwrap_or_else(|e| panic!("{} does not build: {e}", kind.name()));
         Traced::upload(gpu, &*built).expect("buffers that fit")
+    }
+
+    /// The judge of this scene: rays of each class, triangles that brute force tests, rays of the oracle.
+    pub fn judge(&self, checks: Checks, [rays, brute_force_tests, oracle_rays]: [u32; 3]) -> Judge {
+        let settings = Gate {
+            rays,
+            brute_force_tests: brute_force_tests.into(),
+            oracle_rays,
+            ao_length: 0.0,
+            offset: 0.0,
+        };
+        Judge::new(&self.scene, &self.soup, self.camera, &settings, 1, checks).expect("a judge")
+    }
+
+    /// The verdict on what is on the GPU.
+    pub fn verdict(
+        &self,
+        gpu: &Gpu,
+        traced: &Traced,
+        judge: &Judge,
+    ) -> Result<GateVerdict, GpuError> {
+        let probe = probe_arithmetic(gpu)?;
+        let triangles = &self.buffers.triangles;
+        gate(gpu, triangles, &self.soup, traced, judge, &probe, true)
     }
 
     /// A compiled image of `size` pixels. The AO radius is a fraction of the scene's diagonal, as

@@ -9,9 +9,8 @@ mod support;
 
 use blake3::Hasher;
 use raystone::accel::Query;
-use raystone::config::Gate;
 use raystone::discrepancy::{Budget, Measure, PointSet, measure};
-use raystone::measure::gate::{Checks, Judge};
+use raystone::measure::gate::Checks;
 use raystone::sampling::{Coordinate, to_unit};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -139,14 +138,6 @@ fn looks() -> Vec<(&'static str, Stage)> {
     ]
 }
 
-const GATE: Gate = Gate {
-    rays: 256,
-    brute_force_tests: 1,
-    oracle_rays: 1,
-    ao_length: 0.0,
-    offset: 0.0,
-};
-
 #[test]
 fn hits_and_counted_work() {
     if !is_exact(gpu()) {
@@ -154,15 +145,7 @@ fn hits_and_counted_work() {
     }
     let mut found = Found::new();
     for (scene, stage) in scenes() {
-        let judge = Judge::new(
-            &stage.scene,
-            &stage.soup,
-            stage.camera,
-            &GATE,
-            1,
-            Checks::Kept,
-        );
-        let judge = judge.expect("a judge");
+        let judge = stage.judge(Checks::Kept, [256, 1, 1]);
         for kind in structures() {
             let traced = stage.traced(gpu(), kind);
             let (mut hits, mut work) = (Hasher::new(), Hasher::new());

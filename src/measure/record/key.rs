@@ -111,15 +111,23 @@ fn plain(label: &str) -> Variant {
     }
 }
 
-/// What stands between a name and its kernels.
-pub(super) const KERNELS_MARK: &str = " @";
-
 impl From<&Cell> for Key {
     fn from(cell: &Cell) -> Self {
         let axes = Axis::ALL.into_iter();
         let variants = axes.filter_map(|axis| Some((axis, cell.get(axis)?)));
         variants.fold(Self::default(), |key, (axis, variant)| {
             key.with_variant(axis.name(), variant)
+        })
+    }
+}
+
+/// The cell that a line is of, for its name.
+impl From<&Key> for Cell {
+    fn from(key: &Key) -> Self {
+        let axes = Axis::ALL.into_iter();
+        let variants = axes.filter_map(|axis| Some((axis, key.get(axis.name())?)));
+        variants.fold(Self::default(), |cell, (axis, variant)| {
+            cell.with(axis, variant)
         })
     }
 }
@@ -180,11 +188,6 @@ impl Key {
         )
     }
 
-    /// Label of the structure, with the kernels.
-    pub fn structure(&self) -> String {
-        format!("{}{}", self.label(axis::ACCEL), self.kernels_mark())
-    }
-
     /// Whether two keys have the same labels on these axes.
     pub fn agrees(&self, other: &Self, axes: &[&str]) -> bool {
         axes.iter()
@@ -194,21 +197,6 @@ impl Key {
     /// Whether no axis matters.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
-    }
-
-    /// ` @` and the kernels in the place of the embedded ones; empty for these.
-    pub fn kernels_mark(&self) -> String {
-        match self.label(axis::KERNELS) {
-            "" => String::new(),
-            kernels => format!("{KERNELS_MARK}{kernels}"),
-        }
-    }
-
-    /// `sequence × decorrelation`, with the kernels.
-    pub fn sampler(&self) -> String {
-        let [sequence, decorrelation] =
-            [axis::SEQUENCE, axis::DECORRELATION].map(|axis| self.label(axis));
-        format!("{sequence} × {decorrelation}{}", self.kernels_mark())
     }
 }
 
@@ -239,7 +227,7 @@ mod tests {
             .with(axis::SCENE, "box");
         let key = key.with_variant(axis::ACCEL, &grid);
         assert_eq!(key.label(axis::ACCEL), "grid(lambda=3)");
-        assert_eq!(key.kernels_mark(), " @idea");
+        assert_eq!(Cell::from(&key).to_string(), "box, grid(lambda=3), @idea");
         let text = serde_json::to_string(&key).unwrap();
         assert!(
             text.contains(r#""scene":"box""#) && text.contains("lambda"),

@@ -1,6 +1,5 @@
 //! Lines of `raystone/1`, whose bodies each held their own names of axes.
 
-use super::key::KERNELS_MARK;
 use super::{SCHEMA, axis};
 use serde_json::{Map, Value, json};
 
@@ -16,6 +15,9 @@ const IN_BODY: [&str; 5] = [
     axis::INTEGRATOR,
 ];
 const IN_RAN: [&str; 4] = [axis::KERNELS, axis::TRIANGLE, axis::BOX_TEST, axis::OFFSET];
+
+/// What stood between a name and its kernels.
+const KERNELS_MARK: &str = " @";
 
 /// The same line in the present schema.
 pub fn renewed(mut line: Value) -> Value {

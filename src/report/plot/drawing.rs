@@ -135,24 +135,21 @@ impl Drawing {
 
     /// Adds a line of text.
     pub fn text(&mut self, at: Point, text: impl Into<String>, ink: Ink, anchor: Anchor) {
-        self.shapes.push(Shape::Text {
-            at,
-            text: text.into(),
-            ink,
-            anchor,
-            upwards: false,
-        });
+        self.add_text(at, text.into(), ink, anchor, false);
     }
 
     /// Adds a line of text that reads upwards.
     pub fn upward_text(&mut self, at: Point, text: impl Into<String>, ink: Ink) {
-        let anchor = Anchor::Middle;
+        self.add_text(at, text.into(), ink, Anchor::Middle, true);
+    }
+
+    fn add_text(&mut self, at: Point, text: String, ink: Ink, anchor: Anchor, upwards: bool) {
         self.shapes.push(Shape::Text {
             at,
-            text: text.into(),
+            text,
             ink,
             anchor,
-            upwards: true,
+            upwards,
         });
     }
 

@@ -35,10 +35,8 @@ pub fn document(dir: &Path, data: &RunData, warnings: &[String]) -> Document {
 }
 
 fn title(data: &RunData) -> String {
-    data.run.map_or_else(
-        || "Raystone report".into(),
-        |run| format!("Raystone: {}", run.name),
-    )
+    let run = data.run.map(|run| format!("Raystone: {}", run.name));
+    run.unwrap_or_else(|| "Raystone report".into())
 }
 
 fn subtitle(data: &RunData) -> String {
@@ -46,64 +44,36 @@ fn subtitle(data: &RunData) -> String {
         return "The record of the run itself is missing.".into();
     };
     let e = &run.environment;
-    format!(
-        "{} on {} ({}, {} {}), {}, {}",
-        format::utc(run.started_unix_s),
-        e.adapter,
-        e.backend,
-        e.driver,
-        e.driver_info,
-        e.cpu,
-        e.os
-    )
+    let place = format::where_and_when(e, run.started_unix_s);
+    format!("{place}, {}", e.os)
 }
 
 fn banners(data: &RunData, warnings: &[String]) -> Vec<Banner> {
+    let note = |text: &str| Banner::new(Tone::Note, text);
+    let bad = |text: &str| Banner::new(Tone::Bad, text);
     let mut banners = Vec::new();
-    let mut add = |tone, text: &str| {
-        banners.push(Banner {
-            tone,
-            text: text.into(),
-        })
-    };
-    if let Some(run) = data.run {
-        if run.environment.software {
-            add(
-                Tone::Note,
-                "Software adapter: times compare structures on this adapter only.",
-            );
-        }
-        if !run.environment.timestamps {
-            add(
-                Tone::Note,
-                "This adapter has no GPU timestamps: all times are wall clock.",
-            );
-        }
-    } else {
-        add(
-            Tone::Bad,
+    match data.run.map(|run| &run.environment) {
+        None => banners.push(bad(
             "The first record of the run is missing: where and what it ran is unknown.",
-        );
+        )),
+        Some(e) => {
+            let software = "Software adapter: times compare structures on this adapter only.";
+            let unstamped = "This adapter has no GPU timestamps: all times are wall clock.";
+            banners.extend(e.software.then(|| note(software)));
+            banners.extend((!e.timestamps).then(|| note(unstamped)));
+        }
     }
-    for folder in data.run.iter().flat_map(|run| &run.kernels) {
-        add(Tone::Note, &kernels_banner(folder));
-    }
+    let folders = data.run.iter().flat_map(|run| &run.kernels);
+    banners.extend(folders.map(|folder| note(&kernels_banner(folder))));
+    let shown = "this report shows what was recorded until then.";
     if let Some(ended) = data.interrupted {
-        let text = format!(
-            "The run was interrupted after {} s ({}): this report shows what was recorded until then.",
-            format::number(ended.wall_s),
-            ended.reason
-        );
-        add(Tone::Bad, &text);
+        let (seconds, reason) = (format::number(ended.wall_s), &ended.reason);
+        let text = format!("The run was interrupted after {seconds} s ({reason}): {shown}");
+        banners.push(bad(&text));
     } else if data.finished.is_none() {
-        add(
-            Tone::Bad,
-            "The run did not finish: this report shows what was recorded until then.",
-        );
+        banners.push(bad(&format!("The run did not finish: {shown}")));
     }
-    for warning in warnings {
-        add(Tone::Note, warning);
-    }
+    banners.extend(warnings.iter().map(|warning| note(warning)));
     banners
 }
 
@@ -134,15 +104,12 @@ fn kernels_banner(folder: &KernelFolder) -> String {
 
 fn scene_section(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> Section {
     let mut section = Section::new(format!("scene-{index}"), format!("Scene: {}", scene.name));
-    section.blocks.extend(facts(scene));
-    section
-        .blocks
-        .extend(structures::blocks(dir, data, index, scene));
+    let blocks = &mut section.blocks;
+    blocks.extend(facts(scene));
+    blocks.extend(structures::blocks(dir, data, index, scene));
     for (number, view) in scene.views.iter().enumerate() {
         let stem = format!("scene-{index}-{}-{number}", file_stem(&view.name));
-        section
-            .blocks
-            .extend(samplers::blocks(dir, data, &stem, scene, view));
+        blocks.extend(samplers::blocks(dir, data, &stem, scene, view));
     }
     section
 }
