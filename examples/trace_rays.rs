@@ -6,12 +6,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let gpu = gpu::open(&Default::default(), Default::default())?;
     let stage = Stage::new(&gpu, scene::named("cornell-box")?, Default::default())?;
     let traced = stage.structure(&AccelRegistry::default(), "cwbvh")?;
-    let ray = |x: f32| Ray {
-        origin: [x, 273.0, -500.0],
-        t_min: 0.0,
-        direction: [0.0, 0.0, 1.0],
-        t_max: f32::MAX,
-    };
+    let ray = |x: f32| Ray::new([x, 273.0, -500.0], [0.0, 0.0, 1.0]);
     for hit in stage.closest(&traced, &[ray(100.0), ray(400.0)])?.answers {
         println!("triangle {} at {}", hit.triangle, hit.t);
     }

@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
 
 /// One triangle in world space, vertices in the order of the file (f32, scene units).
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -63,6 +65,44 @@ impl Ray {
     }
 }
 
+/// Eight numbers, which read back to the same bits: origin, direction, t_min, t_max.
+impl fmt::Display for Ray {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ([ox, oy, oz], [dx, dy, dz]) = (self.origin, self.direction);
+        let (t_min, t_max) = (self.t_min, self.t_max);
+        write!(
+            f,
+            "{ox:?} {oy:?} {oz:?} {dx:?} {dy:?} {dz:?} {t_min:?} {t_max:?}"
+        )
+    }
+}
+
+/// Reads eight numbers, or six and takes [`Ray::new`]; an error says in words what is not a number, or how many
+/// there are.
+impl FromStr for Ray {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let words = text.split(|c: char| c.is_whitespace() || c == ',');
+        let number = |word: &str| {
+            let number = word.parse::<f32>();
+            number.map_err(|_| format!("`{word}` is not a number"))
+        };
+        let numbers: Result<Vec<f32>, String> =
+            words.filter(|word| !word.is_empty()).map(number).collect();
+        match numbers?[..] {
+            [ox, oy, oz, dx, dy, dz] => Ok(Self::new([ox, oy, oz], [dx, dy, dz])),
+            [ox, oy, oz, dx, dy, dz, t_min, t_max] => {
+                Ok(Self::new([ox, oy, oz], [dx, dy, dz]).between(t_min, t_max))
+            }
+            ref others => Err(format!(
+                "a ray is `ox oy oz dx dy dz t_min t_max`, or the first six; there are {} numbers",
+                others.len()
+            )),
+        }
+    }
+}
+
 /// A pinhole camera. Rays start at `eye`; pixel (0, 0) is the top left one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
@@ -84,6 +124,32 @@ impl Camera {
             target,
             up: Vec3::Y,
             vertical_fov_degrees,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Pcg32;
+
+    #[test]
+    fn rays_read_back_to_the_same_bits() {
+        let mut random = Pcg32::new(5);
+        for _ in 0..2000 {
+            let mut float = || loop {
+                let x = f32::from_bits(random.next_u32());
+                if !x.is_nan() {
+                    return x;
+                }
+            };
+            let ray = Ray::new([float(), float(), float()], [float(), -0.0, float()]);
+            let ray = ray.between(float(), float());
+            let back: Ray = ray.to_string().parse().unwrap();
+            assert_eq!(bytemuck::bytes_of(&back), bytemuck::bytes_of(&ray));
+        }
+        for (text, wrong) in [("1 2 3", "3 numbers"), ("1 2 3 4 5 six", "`six`")] {
+            assert!(text.parse::<Ray>().unwrap_err().contains(wrong));
         }
     }
 }

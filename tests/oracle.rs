@@ -116,8 +116,11 @@ fn closest(test: Test32, triangles: &[Triangle], ray: &Ray) -> ClosestHit {
     best
 }
 
+/// Whether a fault is the expected one.
+type IsFault = fn(&Fault) -> bool;
+
 #[track_caller]
-fn assert_wrong(verdict: Verdict, expected: fn(&Fault) -> bool) {
+fn assert_wrong(verdict: Verdict, expected: IsFault) {
     match verdict {
         Verdict::Wrong(fault) if expected(&fault) => assert!(!fault.to_string().is_empty()),
         other => panic!("unexpected verdict {other:?}"),
@@ -142,28 +145,28 @@ fn known_hits_and_misses_agree() {
 fn planted_faults_are_wrong_each_for_its_own_reason() {
     let scene = [corner(3.0), corner(1.0), corner(-2.0)];
     let through = towards(0.25, 0.3);
-    let judged = |answer| judge(&scene, through, answer);
-    assert_wrong(judged(None), |f| {
-        matches!(f, Fault::FalseMiss { id: 1, .. })
-    });
-    assert_wrong(judged(Some((0, 4.0))), |f| {
-        matches!(f, Fault::NotNearest { nearer: 1, .. })
-    });
-    assert_wrong(judged(Some((0, 2.0))), |f| {
-        matches!(f, Fault::Distance { id: 0, .. })
-    });
-    assert_wrong(judged(Some((1, 2.00001))), |f| {
-        matches!(f, Fault::Distance { .. })
-    });
-    assert_wrong(judged(Some((1, f32::NAN))), |f| {
-        matches!(f, Fault::OutOfInterval { .. })
-    });
-    assert_wrong(judged(Some((2, -1.0))), |f| {
-        matches!(f, Fault::OutOfInterval { .. })
-    });
-    assert_wrong(judged(Some((3, 2.0))), |f| {
-        matches!(f, Fault::NoSuchTriangle { .. })
-    });
+    let faults: [(ClosestHit, IsFault); 7] = [
+        (None, |f| matches!(f, Fault::FalseMiss { id: 1, .. })),
+        (Some((0, 4.0)), |f| {
+            matches!(f, Fault::NotNearest { nearer: 1, .. })
+        }),
+        (Some((0, 2.0)), |f| {
+            matches!(f, Fault::Distance { id: 0, .. })
+        }),
+        (Some((1, 2.00001)), |f| matches!(f, Fault::Distance { .. })),
+        (Some((1, f32::NAN)), |f| {
+            matches!(f, Fault::OutOfInterval { .. })
+        }),
+        (Some((2, -1.0)), |f| {
+            matches!(f, Fault::OutOfInterval { .. })
+        }),
+        (Some((3, 2.0)), |f| {
+            matches!(f, Fault::NoSuchTriangle { .. })
+        }),
+    ];
+    for (answer, expected) in faults {
+        assert_wrong(judge(&scene, through, answer), expected);
+    }
     let beside = judge(&scene, towards(0.75, 0.75), Some((1, 2.0)));
     assert_wrong(beside, |f| matches!(f, Fault::FalseHit { id: 1, .. }));
 }

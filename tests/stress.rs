@@ -107,33 +107,25 @@ fn a_test_that_refuses_rays_through_edges_is_seen_to_leak() {
     );
 }
 
-fn program(arguments: &[&str]) -> std::process::Output {
-    Command::new(env!("CARGO_BIN_EXE_raystone"))
-        .args(arguments)
+/// The program with the words of a line, and one more argument; its exit status and all that it says.
+fn program(line: &str, last: Option<&str>) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_raystone"))
+        .args(line.split_whitespace().chain(last))
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .output()
-        .expect("the program starts")
+        .expect("the program starts");
+    let text = [output.stdout, output.stderr].concat();
+    (
+        output.status.code(),
+        String::from_utf8_lossy(&text).into_owned(),
+    )
 }
 
 #[test]
 fn trace_shows_every_node_and_the_answers_of_structure_brute_force_and_oracle() {
-    let ray = "1 1 3 0 0 -1 0 1e30";
-    let output = program(&[
-        "trace",
-        "--scene",
-        "single-triangle",
-        "--accel",
-        "bvh",
-        "--ray",
-        ray,
-    ]);
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{text} {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    let ray = Some("1 1 3 0 0 -1 0 1e30");
+    let (status, text) = program("trace --scene single-triangle --accel bvh --ray", ray);
+    assert_eq!(status, Some(0), "{text}");
     for part in [
         "node 0",
         "triangle tests",
@@ -143,61 +135,27 @@ fn trace_shows_every_node_and_the_answers_of_structure_brute_force_and_oracle() 
     ] {
         assert!(text.contains(part), "{part} in {text}");
     }
-    let case = "stress:needles:scattered, ordinary:1";
-    let output = program(&[
-        "trace",
-        "--scene",
-        case,
-        "--accel",
-        "kd-tree",
-        "--ray",
-        "0 0 9 0 0 -1",
-    ]);
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    let case = "--scene=stress:needles:scattered, ordinary:1";
+    let (status, text) = program("trace --accel kd-tree --ray=0,0,9,0,0,-1", Some(case));
+    assert_eq!(status, Some(0), "{text}");
 }
 
 #[test]
 fn unknown_names_and_broken_rays_are_answered_with_two_and_what_there_is() {
-    for (arguments, part) in [
-        (vec!["stress", "--family", "nails"], "needles"),
-        (vec!["stress", "--triangle", "wet"], "watertight"),
-        (vec!["stress", "--accel", "bhv"], "bvh"),
+    for (line, part) in [
+        ("stress --family nails", "needles"),
+        ("stress --triangle wet", "watertight"),
+        ("stress --accel bhv", "bvh"),
+        ("trace --scene cornell-box --ray 1,2,3", "3 numbers"),
+        ("trace --scene stress:nails:a:1 --ray 0,0,0,0,0,1", "nails"),
         (
-            vec!["trace", "--scene", "cornell-box", "--ray", "1 2 3"],
-            "3 numbers",
-        ),
-        (
-            vec![
-                "trace",
-                "--scene",
-                "stress:nails:a:1",
-                "--ray",
-                "0 0 0 0 0 1",
-            ],
-            "nails",
-        ),
-        (
-            vec![
-                "trace",
-                "--scene",
-                "cornell-box",
-                "--triangle",
-                "x",
-                "--ray",
-                "0 0 0 0 0 1",
-            ],
+            "trace --scene cornell-box --triangle x --ray 0,0,0,0,0,1",
             "watertight",
         ),
     ] {
-        let output = program(&arguments);
-        let text = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
-        assert!(text.contains(part), "{arguments:?}: {text}");
+        let (status, text) = program(line, None);
+        assert_eq!(status, Some(2), "{line}: {text}");
+        assert!(text.contains(part), "{line}: {text}");
     }
 }
 
@@ -206,9 +164,8 @@ fn a_folder_that_another_run_writes_is_left_to_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().to_str().expect("a path in UTF-8");
     let lock = raystone::run::lock_folder(folder.path()).expect("nobody writes it");
-    let output = program(&["stress", "--family", "seams", "--out", out]);
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{text}");
+    let (status, text) = program("stress --family seams --out", Some(out));
+    assert_eq!(status, Some(2), "{text}");
     assert!(text.contains("another run is writing"), "{text}");
     drop(lock);
     raystone::run::lock_folder(folder.path()).expect("nobody writes it any more");

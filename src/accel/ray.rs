@@ -2,6 +2,7 @@
 
 pub use crate::geometry::Ray;
 use bytemuck::{Pod, Zeroable};
+use std::fmt;
 
 /// Triangle index of a miss.
 pub const NO_HIT: u32 = u32::MAX;
@@ -64,6 +65,16 @@ impl Hit {
     }
 }
 
+impl fmt::Display for Hit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { t, triangle, u, v } = self;
+        match *triangle {
+            NO_HIT => f.write_str("misses"),
+            _ => write!(f, "hits triangle {triangle} at t {t:?} u {u:?} v {v:?}"),
+        }
+    }
+}
+
 /// The direction with components that are too short raised to the shortest, sign kept: to
 /// [`SMALLEST_SLOPE`] of the longest, and at least to [`SMALLEST_COMPONENT`].
 fn raised_direction(d: [f32; 3]) -> [f32; 3] {
@@ -97,12 +108,7 @@ mod tests {
     use super::*;
 
     fn along(direction: [f32; 3]) -> Ray {
-        Ray {
-            origin: [0.0; 3],
-            t_min: 0.0,
-            direction,
-            t_max: 1.0,
-        }
+        Ray::new([0.0; 3], direction)
     }
 
     #[test]

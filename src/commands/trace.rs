@@ -5,12 +5,12 @@ use super::failure::FAILED;
 use super::output::print;
 use anyhow::{Result, anyhow};
 use clap::Args;
-use raystone::accel::TriangleSoup;
+use raystone::accel::{Ray, TriangleSoup};
 use raystone::config::{Axis, Catalogue, Cell, Experiment, Plan};
 use raystone::params::Variant;
 use raystone::run::Registries;
 use raystone::scene::{LoadOptions, SceneData, load};
-use raystone::stress::case::{Address, parse_ray};
+use raystone::stress::case::Address;
 use raystone::stress::explain::{explain, scene_of};
 use std::process::ExitCode;
 
@@ -42,7 +42,7 @@ pub struct Trace {
 
 impl Trace {
     pub fn execute(self) -> Result<ExitCode> {
-        let ray = parse_ray(&self.ray).map_err(|e| anyhow!("--ray: {e}"))?;
+        let ray = self.ray.parse::<Ray>().map_err(|e| anyhow!("--ray: {e}"))?;
         let registries = Registries::default();
         let cell = self.cell(&registries)?;
         let scene = self.load(&cell[Axis::Scene])?;

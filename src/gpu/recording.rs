@@ -4,7 +4,7 @@ use super::adapter::Gpu;
 use super::bindings::{Bindings, Storage};
 use super::buffers::Elapsed;
 use super::pipeline::{Pipeline, WORKGROUP_SIZE};
-use super::{GpuError, Player};
+use super::{Composition, GpuError, Player, UniformValues};
 use bytemuck::Pod;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -190,6 +190,34 @@ impl Gpu {
     /// As [`Player::play`].
     pub fn play(&self, recording: &Recording) -> Result<Played, GpuError> {
         Player::new(self).play(recording)
+    }
+
+    /// Runs a kernel once, with one uniform, and brings back what it writes to the outputs, each so many bytes.
+    ///
+    /// # Errors
+    /// As [`Player::play`].
+    pub fn evaluate(
+        &self,
+        kernel: &Composition,
+        (uniform, values): (&str, UniformValues),
+        inputs: &[(&str, &[u8])],
+        outputs: &[(&str, u64)],
+        groups: [u32; 3],
+    ) -> Result<Played, GpuError> {
+        let mut bindings = Bindings::new();
+        bindings.uniform(uniform, values);
+        for (name, content) in inputs {
+            bindings.buffer(name, &self.storage(name, content)?);
+        }
+        for (name, bytes) in outputs {
+            bindings.buffer(name, Storage::scratch(name, *bytes));
+        }
+        let mut recording = Recording::new();
+        recording.run(uniform, &self.pipeline(kernel, true)?, &bindings, groups);
+        for (name, bytes) in outputs {
+            recording.download(name, Storage::scratch(name, *bytes));
+        }
+        self.play(&recording)
     }
 
     /// Copies a buffer to the host.

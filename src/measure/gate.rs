@@ -9,7 +9,7 @@
 //! see [`super::instance_judge`].
 
 use super::instance_judge;
-use super::kept_checks::KeptChecks;
+use super::kept_checks::{self, KeptChecks};
 use super::rays::{RaySet, record_rays};
 use super::record::{ClassVerdict, GateVerdict, JudgeCheck};
 use crate::accel::triangle::TriangleRecord;
@@ -74,7 +74,9 @@ impl Judge {
         judge.instances = instance_judge::new(soup, &judge.sets, seed)?.map(Box::new);
         let kept = match past {
             Checks::Repeated => None,
-            Checks::Kept => KeptChecks::of(&judge, &scene.hash, soup.intersection, settings),
+            Checks::Kept => kept_checks::folder().and_then(|folder| {
+                KeptChecks::of(folder, &judge, &scene.hash, soup.intersection, settings)
+            }),
         };
         if !kept.as_ref().is_some_and(|kept| kept.restore(&mut judge)) {
             judge.check(scene, soup, settings);
@@ -199,9 +201,8 @@ impl Judge {
                 }
                 Verdict::Wrong(fault) => {
                     self.oracle.wrong += 1;
-                    self.first_wrong.get_or_insert_with(|| {
-                        format!("{} | judge {} | f64: {fault}", ray_text(ray), hit_text(hit))
-                    });
+                    self.first_wrong
+                        .get_or_insert_with(|| format!("ray {ray} | judge {hit} | f64: {fault}"));
                 }
             }
         }
@@ -434,34 +435,7 @@ impl Meeting {
     }
 }
 
+/// A ray as `raystone trace --ray` takes it, with two answers.
 fn describe(ray: &Ray, left: &str, a: &Hit, right: &str, b: &Hit) -> String {
-    format!(
-        "{} | {left} {} | {right} {}",
-        ray_text(ray),
-        hit_text(a),
-        hit_text(b)
-    )
-}
-
-/// A ray as replayable text: nine significant digits give back the same f32.
-fn ray_text(ray: &Ray) -> String {
-    let three = |[x, y, z]: [f32; 3]| format!("{x:?} {y:?} {z:?}");
-    format!(
-        "ray {} / {} / {:?} {:?}",
-        three(ray.origin),
-        three(ray.direction),
-        ray.t_min,
-        ray.t_max
-    )
-}
-
-fn hit_text(hit: &Hit) -> String {
-    if hit.triangle == NO_HIT {
-        "misses".to_owned()
-    } else {
-        format!(
-            "hits {} at t {:?} u {:?} v {:?}",
-            hit.triangle, hit.t, hit.u, hit.v
-        )
-    }
+    format!("ray {ray} | {left} {a} | {right} {b}")
 }

@@ -41,24 +41,24 @@ fn t_test(a: &[f64], b: &[f64], margin: f64, most_freedom: f64) -> Option<WelchT
     let gap = gap.signum() * (gap.abs() - margin).max(0.0);
     let (va, vb) = (variance(a)? / a.len() as f64, variance(b)? / b.len() as f64);
     let (freedom_a, freedom_b) = ((a.len() - 1) as f64, (b.len() - 1) as f64);
-    if va + vb == 0.0 {
-        let (t, p) = match gap == 0.0 {
-            true => (0.0, 1.0),
-            false => (gap * f64::INFINITY, 0.0),
-        };
-        let degrees_of_freedom = (freedom_a + freedom_b).min(most_freedom);
-        return Some(WelchTest {
-            t,
-            degrees_of_freedom,
-            p,
-        });
-    }
-    let t = gap / (va + vb).sqrt();
     // As shares of the whole variance, so that tiny variances do not underflow when squared.
     let (share_a, share_b) = (va / (va + vb), vb / (va + vb));
-    let degrees_of_freedom = 1.0 / (share_a * share_a / freedom_a + share_b * share_b / freedom_b);
-    let degrees_of_freedom = degrees_of_freedom.min(most_freedom);
-    let p = student_t_two_sided(t, degrees_of_freedom);
+    let freedom = 1.0 / (share_a * share_a / freedom_a + share_b * share_b / freedom_b);
+    let spread = va + vb > 0.0;
+    let freedom = if spread {
+        freedom
+    } else {
+        freedom_a + freedom_b
+    };
+    let degrees_of_freedom = freedom.min(most_freedom);
+    let (t, p) = match (spread, gap == 0.0) {
+        (false, true) => (0.0, 1.0),
+        (false, false) => (gap * f64::INFINITY, 0.0),
+        (true, _) => {
+            let t = gap / (va + vb).sqrt();
+            (t, student_t_two_sided(t, degrees_of_freedom))
+        }
+    };
     Some(WelchTest {
         t,
         degrees_of_freedom,

@@ -11,7 +11,7 @@ use crate::accel::Intersection;
 use crate::atomic::write_atomic;
 use crate::config::Gate;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::SystemTime;
 
 /// Names a folder for kept checks in place of the user's cache folder; `off` keeps none.
@@ -32,18 +32,9 @@ struct Content {
 }
 
 impl KeptChecks {
-    /// The place for a judge with these rays; `None` without a folder or an identity of the program.
+    /// The place in a folder for a judge with these rays; `None` without an identity of the program.
     pub fn of(
-        judge: &Judge,
-        scene_hash: &str,
-        intersection: Intersection,
-        settings: &Gate,
-    ) -> Option<Self> {
-        Self::within(&folder()?, judge, scene_hash, intersection, settings)
-    }
-
-    fn within(
-        folder: &Path,
+        folder: PathBuf,
         judge: &Judge,
         scene_hash: &str,
         intersection: Intersection,
@@ -59,7 +50,7 @@ impl KeptChecks {
             hasher.update(bytemuck::cast_slice(&set.truth));
         }
         Some(Self {
-            folder: folder.to_owned(),
+            folder,
             key: hasher.finalize().to_hex().to_string(),
         })
     }
@@ -125,8 +116,8 @@ impl KeptChecks {
     }
 }
 
-/// The folder of kept checks.
-fn folder() -> Option<PathBuf> {
+/// The folder of kept checks, if they are to be kept.
+pub(super) fn folder() -> Option<PathBuf> {
     let named = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
     match named(CACHE_VARIABLE) {
         Some(value) if value == "off" => None,
@@ -154,6 +145,7 @@ mod tests {
     use crate::accel::{Hit, Ray};
     use crate::measure::rays::RaySet;
     use crate::measure::record::RayClass;
+    use std::path::Path;
 
     fn judge(t: f32) -> Judge {
         let checked = JudgeCheck {
@@ -182,7 +174,13 @@ mod tests {
     };
 
     fn place(folder: &Path, judge: &Judge, gate: &Gate) -> KeptChecks {
-        let place = KeptChecks::within(folder, judge, "scene", Intersection::default(), gate);
+        let place = KeptChecks::of(
+            folder.to_owned(),
+            judge,
+            "scene",
+            Intersection::default(),
+            gate,
+        );
         place.expect("a program")
     }
 

@@ -5,7 +5,7 @@
 //! from a buffer and imports the same modules as the renderer, under the same constants and with the same
 //! table.
 
-use crate::gpu::{Bindings, Composition, Gpu, GpuError, Recording, UniformValues, groups_for};
+use crate::gpu::{Composition, Gpu, UniformValues, groups_for};
 use crate::integrator::with_sampler;
 use crate::random::Pcg32;
 use crate::sampling::{Coordinate, Sampler};
@@ -168,35 +168,19 @@ pub fn dump_stream(
         .iter()
         .map(|c| [c.pixel, c.sample, c.dimension, c.seed])
         .collect();
-    let run = || {
-        let pipeline = gpu.pipeline(&composition(sampler), true)?;
-        let stream = gpu.zeroed("stream", words.len() as u64 * 4)?;
-        let mut bindings = Bindings::new();
-        bindings
-            .buffer("coordinates", &gpu.storage("coordinates", &words)?)
-            .buffer(
-                "sampler_table",
-                &gpu.storage("sampler_table", sampler.table.words())?,
-            )
-            .buffer("stream", &stream)
-            .uniform(
-                "dump",
-                UniformValues::new().u32("count", words.len() as u32),
-            );
-        let mut recording = Recording::new();
-        recording
-            .run(
-                "words",
-                &pipeline,
-                &bindings,
-                groups_for(words.len() as u32),
-            )
-            .download("stream", &stream);
-        let mut out: Vec<u32> = gpu.play(&recording)?.download("stream")?;
-        out.truncate(words.len());
-        Ok::<_, GpuError>(out)
-    };
-    run().map_err(|e| e.to_string())
+    let count = words.len() as u32;
+    let played = gpu.evaluate(
+        &composition(sampler),
+        ("dump", UniformValues::new().u32("count", count)),
+        &[
+            ("coordinates", bytemuck::cast_slice(&words)),
+            ("sampler_table", bytemuck::cast_slice(sampler.table.words())),
+        ],
+        &[("stream", u64::from(count) * 4)],
+        groups_for(count),
+    );
+    let stream = played.and_then(|played| played.download("stream"));
+    stream.map_err(|e| e.to_string())
 }
 
 #[cfg(test)]

@@ -113,7 +113,11 @@ impl Suite<'_> {
                 record.add("lost-hits/v1", 1.0);
                 record.worst.get_or_insert_with(|| {
                     let test = Intersection::default().triangle;
-                    let replay = self.replay(case, kind.name(), test, &case.rays[index]);
+                    let replay = self.replay(
+                        [case.family, &case.label],
+                        [kind.name(), test.name()],
+                        &case.rays[index],
+                    );
                     Worst {
                         what: "lost hit".into(),
                         replay: format!("{replay} --box-test {}", box_test.name),

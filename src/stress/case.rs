@@ -256,58 +256,12 @@ impl fmt::Display for Address {
     }
 }
 
-/// A ray as eight numbers, which read back to the same bits: origin, direction, t_min, t_max.
-pub fn ray_text(ray: &Ray) -> String {
-    let [o, d] = [ray.origin, ray.direction].map(|[x, y, z]| format!("{x:?} {y:?} {z:?}"));
-    format!("{o} {d} {:?} {:?}", ray.t_min, ray.t_max)
-}
-
-/// Reads the text of a ray: eight numbers, or six and the whole line.
-///
-/// # Errors
-/// What is not a number, or how many there are, in words.
-pub fn parse_ray(text: &str) -> Result<Ray, String> {
-    let numbers: Result<Vec<f32>, String> = text
-        .split(|c: char| c.is_whitespace() || c == ',')
-        .filter(|word| !word.is_empty())
-        .map(|word| {
-            word.parse()
-                .map_err(|_| format!("`{word}` is not a number"))
-        })
-        .collect();
-    match numbers?[..] {
-        [ox, oy, oz, dx, dy, dz] => Ok(Ray::new([ox, oy, oz], [dx, dy, dz])),
-        [ox, oy, oz, dx, dy, dz, t_min, t_max] => {
-            Ok(Ray::new([ox, oy, oz], [dx, dy, dz]).between(t_min, t_max))
-        }
-        ref others => Err(format!(
-            "a ray is `ox oy oz dx dy dz t_min t_max`, or the first six; there are {} numbers",
-            others.len()
-        )),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn rays_and_addresses_read_back_to_the_same_bits() {
-        let mut random = Pcg32::with_stream(5, 0);
-        for _ in 0..2000 {
-            let mut float = || loop {
-                let x = f32::from_bits(random.next_u32());
-                if !x.is_nan() {
-                    return x;
-                }
-            };
-            let ray = Ray::new([float(), float(), float()], [float(), -0.0, float()]);
-            let ray = ray.between(float(), float());
-            let back = parse_ray(&ray_text(&ray)).unwrap();
-            assert_eq!(bytemuck::bytes_of(&back), bytemuck::bytes_of(&ray));
-        }
-        assert!(parse_ray("1 2 3").unwrap_err().contains("3 numbers"));
-        assert!(parse_ray("1 2 3 4 5 six").unwrap_err().contains("`six`"));
+    fn addresses_read_back() {
         let address = Address {
             family: "needles".into(),
             label: "scale 1e-8: a".into(),

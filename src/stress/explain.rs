@@ -46,8 +46,8 @@ pub fn explain(
     let expected = expected.of(built.space())[0];
     let any = is_ray && twin.any_hit(ray, &mut Counters::default());
     let equal = hit.same_bits(&expected) && any == (expected.triangle != NO_HIT);
-    let _ = writeln!(text, "{:12} {}", kind.name(), hit_text(&hit));
-    let _ = writeln!(text, "{:12} {}", judge_name(&*built), hit_text(&expected));
+    let _ = writeln!(text, "{:12} {hit}", kind.name());
+    let _ = writeln!(text, "{:12} {expected}", judge_name(&*built));
     let _ = writeln!(text, "{:12} {}", "any hit", if any { "yes" } else { "no" });
     text += &oracle_text(scene, ray);
     text += match equal {
@@ -79,16 +79,6 @@ fn steps(events: &[Event]) -> String {
         };
     }
     text.trim_start().to_owned() + "\n"
-}
-
-fn hit_text(hit: &Hit) -> String {
-    if hit.triangle == NO_HIT {
-        return "misses".into();
-    }
-    format!(
-        "hits triangle {} at t {:?} u {:?} v {:?}",
-        hit.triangle, hit.t, hit.u, hit.v
-    )
 }
 
 fn oracle_text(scene: &SceneData, ray: &Ray) -> String {

@@ -133,7 +133,7 @@ impl Suite<'_> {
         let confirmed = truths.iter().filter(|truth| !truth.hits.is_empty()).count();
         let worst = looked_up.first().map(|ray| Worst {
             what: format!("crack in the {}", target.label()),
-            replay: self.replay_at(FAMILY, &target.label(), (accel, triangle), ray),
+            replay: self.replay([FAMILY, &target.label()], [accel, triangle], ray),
         });
         let counts = [
             ("triangles/v1", target.mesh.len()),

@@ -1,7 +1,7 @@
 //! The cells: every family through every structure with every triangle test.
 
 use super::bench::{self, Expected};
-use super::case::{Address, Case, Truth, ray_text};
+use super::case::{Address, Case, Truth};
 use super::families::{FAMILIES, Family};
 use super::placement::Placement;
 use super::record::{Findings, Line, Record, Rung, line, skipped};
@@ -246,28 +246,14 @@ impl Suite<'_> {
         Ok(())
     }
 
-    /// The command that shows what a structure does with a ray of a case.
-    pub fn replay(&self, case: &Case, kind: &str, test: AnyTriangleTest, ray: &Ray) -> String {
-        self.replay_at(case.family, &case.label, (kind, test.name()), ray)
-    }
-
-    /// The same with structure and triangle test by name.
-    pub fn replay_at(
-        &self,
-        family: &str,
-        label: &str,
-        (kind, test): (&str, &str),
-        ray: &Ray,
-    ) -> String {
+    /// The command that shows what a structure with a triangle test does with a ray of a family's case.
+    pub fn replay(&self, [family, label]: [&str; 2], [kind, test]: [&str; 2], ray: &Ray) -> String {
         let address = Address {
             family: family.to_owned(),
             label: label.to_owned(),
             seed: self.settings.seed,
         };
-        format!(
-            "raystone trace --scene '{address}' --accel {kind} --triangle {test} --ray '{}'",
-            ray_text(ray)
-        )
+        format!("raystone trace --scene '{address}' --accel {kind} --triangle {test} --ray '{ray}'")
     }
 }
 
@@ -291,7 +277,8 @@ impl Trace<'_> {
         let expected = self.expected.of(built.space());
         let replay = |index: usize| {
             let ray = &case.rays[index];
-            self.suite.replay(case, kind.name(), self.test, ray)
+            let names = [kind.name(), self.test.name()];
+            self.suite.replay([case.family, &case.label], names, ray)
         };
         let mut errors = found.errors;
         let mut tally = Tally::default();

@@ -75,12 +75,7 @@ fn ray(rng: &mut Pcg32, instance: &Instance, triangle: &Triangle) -> Ray {
     }
     let origin = goal - direction * away;
     let scale = 10.0_f32.powf(2.0 * signed(rng));
-    Ray {
-        origin: origin.to_array(),
-        t_min: 0.0,
-        direction: ((goal - origin) * scale).to_array(),
-        t_max: 1e30,
-    }
+    Ray::new(origin, (goal - origin) * scale)
 }
 
 /// Hits of rays at single triangles in instances, and how many of them the world box would cull,

@@ -1,7 +1,7 @@
 //! A bound on the depth of trees whose builder knows none.
 
+use super::grow::lay_out;
 use super::parameters::SAH_DEPTH;
-use super::subtree::{depth_first, make_inner};
 use super::{NodeKind, Tree, TreeNode};
 
 /// Deepest leaf that a tree of so many references may have.
@@ -15,25 +15,40 @@ pub(super) fn limit_depth(tree: Tree) -> Tree {
     if tree.depth() <= depth_limit(tree.order.len()) {
         return tree;
     }
-    let mut nodes = Vec::with_capacity(tree.nodes.len());
-    depth_first((0, 0), &mut nodes, |(index, depth), nodes| {
-        let node = tree.nodes[index as usize];
-        match node.kind {
-            NodeKind::Inner { .. } if depth == SAH_DEPTH => {
-                balance(&leaves_below(&tree, index), nodes);
-                None
-            }
-            NodeKind::Inner { left, right } => {
-                nodes.push(node);
-                Some([(left, depth + 1), (right, depth + 1)])
-            }
-            NodeKind::Leaf { .. } => {
-                nodes.push(node);
-                None
-            }
+    lay_out(Part::Below(0), |part, depth, order| {
+        let mut leaves = match part {
+            Part::Below(index) => match tree.nodes[index as usize].kind {
+                NodeKind::Inner { left, right } if depth < SAH_DEPTH => {
+                    let bounds = tree.nodes[index as usize].bounds;
+                    return (bounds, Some([left, right].map(Part::Below)));
+                }
+                _ => leaves_below(&tree, index),
+            },
+            Part::Balanced(leaves) => leaves,
+        };
+        let boxes = leaves.iter().map(|leaf| leaf.bounds);
+        let bounds = boxes.fold(leaves[0].bounds, |all, bounds| all.union(&bounds));
+        if let [
+            TreeNode {
+                kind: NodeKind::Leaf { first, count },
+                ..
+            },
+        ] = leaves[..]
+        {
+            order.extend_from_slice(&tree.order[first as usize..(first + count) as usize]);
+            return (bounds, None);
         }
-    });
-    Tree::new(nodes, tree.order)
+        let high = leaves.split_off(leaves.len() / 2);
+        (bounds, Some([leaves, high].map(Part::Balanced)))
+    })
+}
+
+/// What becomes a subtree.
+enum Part {
+    /// A node of the tree as it was.
+    Below(u32),
+    /// A balanced tree over these leaves, at least one.
+    Balanced(Vec<TreeNode>),
 }
 
 fn leaves_below(tree: &Tree, root: u32) -> Vec<TreeNode> {
@@ -47,21 +62,6 @@ fn leaves_below(tree: &Tree, root: u32) -> Vec<TreeNode> {
         }
     }
     leaves
-}
-
-/// Appends a balanced subtree over `leaves`, at least one.
-fn balance(leaves: &[TreeNode], nodes: &mut Vec<TreeNode>) {
-    let here = nodes.len();
-    nodes.push(leaves[0]);
-    if leaves.len() > 1 {
-        nodes[here].bounds = leaves
-            .iter()
-            .fold(leaves[0].bounds, |bounds, leaf| bounds.union(&leaf.bounds));
-        let (low, high) = leaves.split_at(leaves.len() / 2);
-        balance(low, nodes);
-        make_inner(nodes, here);
-        balance(high, nodes);
-    }
 }
 
 #[cfg(test)]

@@ -31,6 +31,17 @@ pub(in crate::accel) fn grow<P: Send, N: Send>(
     grown
 }
 
+/// Lays out a tree whose nodes are known, on one thread: `look` tells of a node its box and its children, or
+/// appends what it lists.
+pub(super) fn lay_out<P>(
+    root: P,
+    look: impl Fn(P, u32, &mut Vec<u32>) -> (Bounds, Option<[P; 2]>),
+) -> Tree {
+    let mut grown = Grown::with_room(0);
+    grown.append(root, 0, &look);
+    grown.into()
+}
+
 fn subtree<P: Send, N: Send>(
     part: P,
     depth: u32,
@@ -71,14 +82,21 @@ impl<N> Grown<N> {
         depth: u32,
         split: &impl Fn(P, u32, &mut Vec<u32>) -> (N, Option<[P; 2]>),
     ) {
-        let first = self.order.len();
-        match split(part, depth, &mut self.order) {
-            (node, None) => self.push_leaf(node, first),
-            (node, Some([low, high])) => {
-                let here = self.push_inner(node);
-                self.append(low, depth + 1, split);
-                self.end_first_child(here);
-                self.append(high, depth + 1, split);
+        // What is to be divided, with the parent whose second child it is. No recursion: trees that are only laid
+        // out may be of any depth.
+        let mut open = vec![(part, depth, None)];
+        while let Some((part, depth, second_of)) = open.pop() {
+            if let Some(parent) = second_of {
+                self.end_first_child(parent);
+            }
+            let first = self.order.len();
+            match split(part, depth, &mut self.order) {
+                (node, None) => self.push_leaf(node, first),
+                (node, Some([low, high])) => {
+                    let here = self.push_inner(node);
+                    open.push((high, depth + 1, Some(here)));
+                    open.push((low, depth + 1, None));
+                }
             }
         }
     }

@@ -15,7 +15,6 @@ mod quality;
 mod reference;
 mod reinsertion;
 mod sbvh;
-mod subtree;
 mod sweep;
 
 pub use coverage::Coverage;

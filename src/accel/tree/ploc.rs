@@ -5,10 +5,11 @@
 
 use super::Tree;
 use super::depth::limit_depth;
+use super::grow::lay_out;
 use super::parameters::{Preset, TreeParameters};
 use super::reference::{Box3, Reference};
-use super::subtree::{depth_first, leaf};
 use crate::accel::AccelError;
+use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::PlocBuilder;
@@ -18,9 +19,9 @@ use obvhs::{Boundable, BvhBuildParams};
 const LARGEST_COORDINATE: f32 = 1e18;
 
 impl Boundable for Reference {
-    fn aabb(&self) -> obvhs::aabb::Aabb {
+    fn aabb(&self) -> Aabb {
         let Box3 { min, max } = self.bounds();
-        obvhs::aabb::Aabb { min, max }
+        Aabb { min, max }
     }
 }
 
@@ -72,22 +73,14 @@ pub(super) fn build(
 
 /// The nodes in depth-first order.
 fn take_over(bvh: &Bvh2) -> Tree {
-    let mut nodes = Vec::with_capacity(bvh.nodes.len());
-    let mut order = Vec::with_capacity(bvh.primitive_indices.len());
-    depth_first(0, &mut nodes, |index, nodes| {
+    lay_out(0, |index: u32, _, order| {
         let node = &bvh.nodes[index as usize];
-        let bounds = Box3 {
-            min: node.aabb().min,
-            max: node.aabb().max,
-        };
+        let Aabb { min, max } = *node.aabb();
         let (first, count) = (node.first_index, node.prim_count);
-        nodes.push(leaf(bounds, order.len() as u32, count as usize));
         if !node.is_leaf() {
-            return Some([first, first + 1]);
+            return (Box3 { min, max }.into(), Some([first, first + 1]));
         }
-        let entries = first as usize..(first + count) as usize;
-        order.extend_from_slice(&bvh.primitive_indices[entries]);
-        None
-    });
-    Tree::new(nodes, order)
+        order.extend_from_slice(&bvh.primitive_indices[first as usize..(first + count) as usize]);
+        (Box3 { min, max }.into(), None)
+    })
 }

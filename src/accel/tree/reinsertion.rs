@@ -9,9 +9,9 @@
 //! hierarchy optimization", 2018 (rounds).
 
 use super::depth::depth_limit;
+use super::grow::lay_out;
 use super::parameters::TreeParameters;
 use super::reference::Box3;
-use super::subtree::{depth_first, leaf};
 use super::{NodeKind, Tree, TreeNode};
 use rayon::prelude::*;
 
@@ -260,18 +260,14 @@ impl Hierarchy {
 
     /// The tree in depth-first order, with the leaves as consecutive runs of a new order.
     fn lay_out(&self, old_order: &[u32]) -> Tree {
-        let mut nodes = Vec::with_capacity(self.nodes.len());
-        let mut order = Vec::with_capacity(old_order.len());
-        depth_first(ROOT, &mut nodes, |index, nodes| {
+        lay_out(ROOT, |index, _, order| {
             let node = self.node(index);
-            let entries = node.first as usize..(node.first + node.count) as usize;
-            nodes.push(leaf(node.bounds, order.len() as u32, entries.len()));
             if node.count == 0 {
-                return Some([node.first, node.first + 1]);
+                return (node.bounds.into(), Some([node.first, node.first + 1]));
             }
+            let entries = node.first as usize..(node.first + node.count) as usize;
             order.extend_from_slice(&old_order[entries]);
-            None
-        });
-        Tree::new(nodes, order)
+            (node.bounds.into(), None)
+        })
     }
 }

@@ -321,14 +321,9 @@ mod tests {
             let inner = part(&whole, &mut random);
             let grid = Quantisation::new(&whole);
             let planes = grid.around(&inner);
-            let ray = Ray {
-                origin: std::array::from_fn(|_| number(&mut random)),
-                t_min: 0.0,
-                direction: std::array::from_fn(|_| number(&mut random)),
-                t_max: 1e30,
-            };
+            let mut vector = || std::array::from_fn(|_| number(&mut random));
             let tests = Intersection::default();
-            let ray = tests.raised(&ray);
+            let ray = tests.raised(&Ray::new(vector(), vector()));
             let inverse = tests.inverse(ray.direction);
             let mut frame = frame(grid.low, grid.exponent_word(0), ray.origin, inverse);
             for (axis, inverse) in inverse.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! Words to floats in [0, 1). Judges `to_unit` of `kernels/sampling/sampler.wesl` through
 //! `kernels/stress/conversion.wesl`.
 
-use super::{Gauge, NumericsError, U, evaluate, rig};
+use super::{Gauge, NumericsError, U, rig};
 use crate::gpu::{Composition, Gpu, UniformValues, groups_for};
 use crate::integrator::with_sampler;
 
@@ -53,6 +53,6 @@ fn convert(gpu: &Gpu, first: u32, stride: u32, count: u32) -> Result<Vec<[f32; 2
         .u32("count", count);
     let units = [("units", u64::from(count) * 8)];
     let uniform = ("conversion", values);
-    let played = evaluate(gpu, &kernel, uniform, &[], &units, groups_for(count))?;
+    let played = gpu.evaluate(&kernel, uniform, &[], &units, groups_for(count))?;
     Ok(played.download("units")?)
 }

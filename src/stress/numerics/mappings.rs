@@ -1,7 +1,7 @@
 //! Directions of the hemisphere at the ends of the unit square and for awkward normals. Judges
 //! `kernels/shading/hemisphere.wesl` through `kernels/stress/mappings.wesl`.
 
-use super::{Gauge, NumericsError, U, evaluate};
+use super::{Gauge, NumericsError, U};
 use crate::gpu::{Composition, Gpu, UniformValues, groups_for};
 use glam::DVec3;
 
@@ -160,8 +160,7 @@ fn map(
     normals: &Vectors,
 ) -> Result<(Vectors, Vectors), NumericsError> {
     let (count, bytes) = (points.len() as u32, points.len() as u64 * 16);
-    let played = evaluate(
-        gpu,
+    let played = gpu.evaluate(
         &Composition::new("stress/mappings"),
         ("mappings", UniformValues::new().u32("count", count)),
         &[

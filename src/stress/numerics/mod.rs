@@ -11,9 +11,7 @@ mod mappings;
 mod rig;
 mod sums;
 
-use crate::gpu::{
-    Bindings, Composition, Gpu, GpuError, Played, Player, Recording, Storage, UniformValues,
-};
+use crate::gpu::{Gpu, GpuError};
 use crate::integrator::{IntegratorError, StageError};
 use crate::sampling::SamplerError;
 use crate::scene::SceneError;
@@ -100,31 +98,6 @@ pub fn run(gpu: &Gpu, quick: bool) -> Result<Vec<Gauge>, NumericsError> {
     figures.extend(energy::figures(gpu, quick)?);
     figures.extend(determinism::figures(gpu)?);
     Ok(figures)
-}
-
-/// Runs a kernel once, with one uniform, and brings back what it writes to the outputs, each so many bytes.
-fn evaluate(
-    gpu: &Gpu,
-    kernel: &Composition,
-    (uniform, values): (&str, UniformValues),
-    inputs: &[(&str, &[u8])],
-    outputs: &[(&str, u64)],
-    groups: [u32; 3],
-) -> Result<Played, GpuError> {
-    let mut bindings = Bindings::new();
-    bindings.uniform(uniform, values);
-    for (name, content) in inputs {
-        bindings.buffer(name, &gpu.storage(name, content)?);
-    }
-    for (name, bytes) in outputs {
-        bindings.buffer(name, Storage::scratch(name, *bytes));
-    }
-    let mut recording = Recording::new();
-    recording.run(uniform, &gpu.pipeline(kernel, true)?, &bindings, groups);
-    for (name, bytes) in outputs {
-        recording.download(name, Storage::scratch(name, *bytes));
-    }
-    Player::new(gpu).play(&recording)
 }
 
 /// Half the distance from 1 to the next f32, the unit of rounding errors.

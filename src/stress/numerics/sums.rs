@@ -1,6 +1,6 @@
 //! Sums of 2²⁰ terms in f32, in five ways, against exact ones. Judges `kernels/stress/sums.wesl`.
 
-use super::{Gauge, NumericsError, U, evaluate, rig};
+use super::{Gauge, NumericsError, U, rig};
 use crate::gpu::{Composition, Gpu, UniformValues};
 use crate::integrator::{BLOCK_SAMPLES, with_sampler};
 use crate::sampling::{Coordinate, Sampler};
@@ -116,8 +116,7 @@ fn totals(
         .u32("seed", SEED)
         .u32("zero", 0);
     let table = bytemuck::cast_slice(sampler.table.words());
-    let played = evaluate(
-        gpu,
+    let played = gpu.evaluate(
         &kernel,
         ("sums", values),
         &[("sampler_table", table)],
