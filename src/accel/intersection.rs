@@ -155,7 +155,7 @@ impl Intersection {
         }
     }
 
-    /// What the tests need of a raised ray's direction, computed once a ray.
+    /// What the tests need of a raised ray's direction, computed once per ray.
     pub fn inverse(&self, direction: [f32; 3]) -> Reciprocal {
         Reciprocal {
             inverse: direction.map(|d| 1.0 / d),

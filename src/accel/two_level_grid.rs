@@ -11,7 +11,7 @@ use super::grid::{Cut, Grid, GridBox, areas, check_words, clamped, finest, first
 use super::structure::prelude::*;
 use rayon::prelude::*;
 
-/// Most parts of a top cell along an axis: its resolution takes ten bits an axis.
+/// Most parts of a top cell along an axis: its resolution takes ten bits per axis.
 const MOST_PARTS: u32 = 1023;
 /// Bits of a top cell's resolution for each axis.
 const PART_BITS: u32 = 10;

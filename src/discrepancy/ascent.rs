@@ -30,7 +30,7 @@ pub(super) fn ascend_on(
 
 /// A difference that a box really has: a lower bound of the star discrepancy, at least 0.
 pub(super) fn ascend(points: &PointSet, seed: u64, budget: &Budget) -> f64 {
-    let grid = Grid::new(points);
+    let grid = Lattice::new(points);
     let size = points.len() * points.dim();
     let steps = (WORK / size).min(STEPS * size).max(4 * WALKS);
     let mut best = 0.0f64;
@@ -55,7 +55,7 @@ enum Side {
 }
 
 /// The points as ranks among the distinct coordinates of each dimension.
-struct Grid {
+struct Lattice {
     n: usize,
     /// By dimension: 0, the distinct coordinates in order, 1.
     coordinates: Vec<Vec<f64>>,
@@ -63,7 +63,7 @@ struct Grid {
     ranks: Vec<Vec<u32>>,
 }
 
-impl Grid {
+impl Lattice {
     fn new(points: &PointSet) -> Self {
         let mut coordinates = Vec::new();
         let mut ranks = Vec::new();
@@ -99,7 +99,7 @@ impl Grid {
 }
 
 struct Walker<'a> {
-    grid: &'a Grid,
+    grid: &'a Lattice,
     side: Side,
     random: SplitMix64,
     /// By point: dimensions in which it is outside the present box.

@@ -73,7 +73,7 @@ struct Entry {
 
 /// Corners from `low` to just below `high` in each dimension.
 #[derive(Clone, Copy)]
-struct Cell<const D: usize> {
+struct Orthant<const D: usize> {
     low: [f64; D],
     high: [f64; D],
     /// Parts of the search's lists: points that vary in a dimension, sorted by that coordinate.
@@ -111,7 +111,7 @@ struct Search<const D: usize> {
 const OUT: u32 = 1 << 31;
 
 impl<const D: usize> Search<D> {
-    fn root(&mut self, points: &PointSet) -> Cell<D> {
+    fn root(&mut self, points: &PointSet) -> Orthant<D> {
         let dim = points.dim();
         for d in 0..dim {
             let entry = |(id, value)| Entry {
@@ -122,7 +122,7 @@ impl<const D: usize> Search<D> {
             self.lists[d] = column.enumerate().map(entry).collect();
             self.lists[d].sort_unstable_by(|a, b| a.value.total_cmp(&b.value));
         }
-        Cell {
+        Orthant {
             // Dimensions that the points do not have are fixed at 1.
             low: std::array::from_fn(|d| if d < dim { 0.0 } else { 1.0 }),
             high: [1.0; D],
@@ -134,7 +134,7 @@ impl<const D: usize> Search<D> {
     }
 
     /// Looks for worse boxes in a cell; `None` if the time is over.
-    fn explore(&mut self, mut cell: Cell<D>) -> Option<()> {
+    fn explore(&mut self, mut cell: Orthant<D>) -> Option<()> {
         self.cells += 1;
         if self.cells.is_multiple_of(256) && self.budget.is_spent() {
             return None;
@@ -156,7 +156,7 @@ impl<const D: usize> Search<D> {
     }
 
     /// Explores the two halves of a cell that has a varying point.
-    fn halve(&mut self, cell: &Cell<D>) -> Option<()> {
+    fn halve(&mut self, cell: &Orthant<D>) -> Option<()> {
         let size = |d: &usize| cell.lists[*d][1] - cell.lists[*d][0];
         let dim = (0..D).max_by_key(size)?;
         let [begin, end] = cell.lists[dim];
@@ -169,7 +169,13 @@ impl<const D: usize> Search<D> {
     }
 
     /// Corners at or above `at`: points up to there no longer vary in this dimension.
-    fn upper_half(&mut self, cell: &Cell<D>, dim: usize, at: f64, tied: [usize; 2]) -> Option<()> {
+    fn upper_half(
+        &mut self,
+        cell: &Orthant<D>,
+        dim: usize,
+        at: f64,
+        tied: [usize; 2],
+    ) -> Option<()> {
         let [begin, end] = cell.lists[dim];
         let after = tied[1];
         let mut upper = *cell;
@@ -188,7 +194,7 @@ impl<const D: usize> Search<D> {
     }
 
     /// Corners below `at`: points from there on are in no box.
-    fn lower_half(&mut self, cell: &Cell<D>, dim: usize, at: f64, first: usize) -> Option<()> {
+    fn lower_half(&mut self, cell: &Orthant<D>, dim: usize, at: f64, first: usize) -> Option<()> {
         let [begin, end] = cell.lists[dim];
         let mut lower = *cell;
         lower.high[dim] = at;
@@ -219,7 +225,7 @@ impl<const D: usize> Search<D> {
     }
 
     /// Bounds of both differences over the cell, as sums over dimensions.
-    fn bound(&self, cell: &Cell<D>) -> Bound {
+    fn bound(&self, cell: &Orthant<D>) -> Bound {
         let list = |d: usize| &self.lists[d][cell.lists[d][0]..cell.lists[d][1]];
         // Closed boxes end at points at most, open ones begin to matter at points.
         let last = std::array::from_fn(|d| list(d).last().map_or(cell.low[d], |e| e.value));
@@ -256,7 +262,7 @@ impl<const D: usize> Search<D> {
     }
 
     /// Exact differences in a cell where each point varies in one dimension.
-    fn solve(&mut self, cell: &Cell<D>) {
+    fn solve(&mut self, cell: &Orthant<D>) {
         for (values, (list, part)) in self
             .values
             .iter_mut()

@@ -109,8 +109,8 @@ impl SceneBuffers {
 /// Words of a material without its parameters.
 const MATERIAL_WORDS: usize = 12;
 
-/// Content of `shading_tables`, in this order: three `vec4` a material, parameters of materials, lights,
-/// six words of texture coordinates a triangle, texels.
+/// Content of `shading_tables`, in this order: three `vec4` per material, parameters of materials, lights,
+/// six words of texture coordinates per triangle, texels.
 ///
 /// A material: base colour and number of its kind; emission and place of its parameters, in `vec4`; place of its
 /// first texel, in words, width and height of its texture, and 1 if it has one.

@@ -31,7 +31,7 @@ struct Loop<'a> {
 }
 
 impl Loop<'_> {
-    /// Milliseconds of one dispatch that draws `samples` samples a pixel, or does not.
+    /// Milliseconds of one dispatch that draws `samples` samples per pixel, or does not.
     fn run(&self, kernel: &Composition, samples: u32) -> Result<f64, GpuError> {
         let mut bindings = self.bindings.clone();
         let values = UniformValues::new()

@@ -9,7 +9,7 @@
 //! and scrambled by tiles of 128×128 pixels that were optimised for one number of samples. They bring
 //! their own points, which take the place of those of `sobol`.
 //!
-//! Words: the image's width, then the mask or points, ranking and scrambling, four bytes a word.
+//! Words: the image's width, then the mask or points, ranking and scrambling, four bytes per word.
 
 use super::hash::pcg_hash;
 use super::{Coordinate, Decorrelation, Demand, Partner, SamplerTable, void_and_cluster};
@@ -80,11 +80,11 @@ fn read_words(folder: &Path, name: &str, bytes: usize) -> Result<Vec<u32>, Strin
         .collect())
 }
 
-/// Points, ranking and scrambling for `samples` samples a pixel. There is no ranking of one sample.
+/// Points, ranking and scrambling for `samples` samples per pixel. There is no ranking of one sample.
 fn read_tables(folder: &Path, samples: u32) -> Result<Vec<u32>, String> {
     if !samples.is_power_of_two() || samples > HEITZ_LIMIT {
         return Err(format!(
-            "the tables of Heitz et al. are for 1, 2, 4, … {HEITZ_LIMIT} samples a pixel, not {samples}"
+            "the tables of Heitz et al. are for 1, 2, 4, … {HEITZ_LIMIT} samples per pixel, not {samples}"
         ));
     }
     let tile = 8 * (TILE_SIZE * TILE_SIZE) as usize;

@@ -3,7 +3,7 @@
 //!
 //! Source: B. Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020, as the crate
 //! `sobol_burley` computes it: the numbers of a pixel are `sobol_burley::sample(sample, dimension,
-//! pixel_number)` to the bit. Words: 16 direction numbers a dimension, bits in reverse order, which is
+//! pixel_number)` to the bit. Words: 16 direction numbers per dimension, bits in reverse order, which is
 //! why 2¹⁶ samples are its limit.
 
 use super::hash::pixel_number;

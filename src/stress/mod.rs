@@ -32,7 +32,7 @@ use std::time::{Instant, SystemTime};
 use suite::{BRUTE_FORCE, Progress, Suite};
 use thiserror::Error;
 
-/// Rays a case and shots a mesh: of the whole suite, and of the quick one.
+/// Rays per case and shots per mesh: of the whole suite, and of the quick one.
 const RAYS: (usize, usize) = (512, 128);
 const SHOTS: (usize, usize) = (1_000_000, 16_384);
 /// Rays of a timed comparison.

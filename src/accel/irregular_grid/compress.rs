@@ -1,4 +1,4 @@
-//! Last phase: 16 bytes a cell, four bytes an entry of the map and a reference.
+//! Last phase: 16 bytes per cell, four bytes per entry of the map and a reference.
 
 use super::voxels::{Block, Cell, Entry, Map};
 use super::{EMPTY, LAST, LOG_BITS, Partition};
@@ -11,7 +11,7 @@ const RUN: usize = 64;
 
 /// The arrays of the kernel.
 pub struct Compressed {
-    /// Four words a cell.
+    /// Four words per cell.
     pub cells: Vec<u32>,
     /// Entries of the map, then references.
     pub words: Vec<u32>,

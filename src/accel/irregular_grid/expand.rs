@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 /// Grows all boxes `passes` times along each axis. Boxes of a step are computed from those before it.
 pub fn expand(partition: &mut Partition, passes: u32) {
-    // Two bits an axis: down and up are blocked for good, since lists never change.
+    // Two bits per axis: down and up are blocked for good, since lists never change.
     let mut blocked = vec![0u8; partition.cells.len()];
     for _ in 0..passes {
         for axis in 0..3 {

@@ -6,7 +6,7 @@
 //!
 //! The build has four phases, a file each: [`cut`] makes voxels where triangles are, [`merge`] joins
 //! cells by the surface area heuristic, [`expand`] lets their boxes grow over neighbours that list
-//! nothing more, [`compress`] writes 16 bytes a cell. Voxels have 16-bit coordinates, and a ray keeps
+//! nothing more, [`compress`] writes 16 bytes per cell. Voxels have 16-bit coordinates, and a ray keeps
 //! the voxel it is in: on leaving a box it steps across the exit plane by integers, and its other two
 //! coordinates may only move forward and within the box.
 
@@ -96,7 +96,7 @@ struct Built {
     fine: Grid,
     /// A top cell has 2^`shift` voxels along each axis.
     shift: u32,
-    /// Four words a cell: coordinates of the lowest voxel and of the one past the highest, 16 bits
+    /// Four words per cell: coordinates of the lowest voxel and of the one past the highest, 16 bits
     /// each, and the place of its list.
     cells: Vec<u32>,
     /// Entries, each place << [`LOG_BITS`] | logarithm; then references, the last of a list marked by

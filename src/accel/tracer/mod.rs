@@ -52,9 +52,9 @@ impl From<Query> for Ask {
 /// Where rays are read and answers written.
 #[derive(Debug, Clone)]
 pub struct RayBuffers {
-    /// 32 bytes a ray: origin, `t_min`, direction, `t_max`.
+    /// 32 bytes per ray: origin, `t_min`, direction, `t_max`.
     pub rays: Storage,
-    /// 16 bytes a ray: a hit (`t`, triangle, u, v), or 1 or 0 and zeros for [`Query::Any`]; 32 where work
+    /// 16 bytes per ray: a hit (`t`, triangle, u, v), or 1 or 0 and zeros for [`Query::Any`]; 32 where work
     /// is counted, the counters first.
     pub answers: Storage,
     /// At least 4 bytes: the kernels' error word, to which bits are added.

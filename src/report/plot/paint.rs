@@ -77,7 +77,7 @@ pub fn to_svg(drawing: &Drawing) -> Result<String, ReportError> {
     ))
 }
 
-/// The drawing as a PNG file of twice its size, smoothed by 2×2 samples a pixel.
+/// The drawing as a PNG file of twice its size, smoothed by 2×2 samples per pixel.
 pub fn to_png(drawing: &Drawing) -> Result<Vec<u8>, ReportError> {
     const SCALE: f64 = 4.0;
     let (width, height) = scaled_size(drawing, SCALE);

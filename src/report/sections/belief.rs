@@ -188,7 +188,12 @@ fn bias(data: &RunData) -> Check {
             true => NOTHING.into(),
             false => detail + ".",
         },
-        ..check("Samplers without bias", clean > 0, biased > 0, String::new())
+        ..check(
+            "Samplers without bias",
+            clean > 0,
+            biased > 0,
+            String::new(),
+        )
     }
 }
 

@@ -165,7 +165,7 @@ pub fn repeat_direction_number(table: &mut [u32]) -> usize {
     copy(table, HEADER + 32 + 3, HEADER + 32 + 2)
 }
 
-/// Two words a dimension: the base, and where its permutation begins. In base 3 the digit 1 becomes what
+/// Two words per dimension: the base, and where its permutation begins. In base 3 the digit 1 becomes what
 /// 2 becomes.
 pub fn repeat_digit(table: &mut [u32]) -> usize {
     let first = HEADER
@@ -180,7 +180,7 @@ pub fn repeat_component(table: &mut [u32]) -> usize {
     copy(table, HEADER + 1, HEADER)
 }
 
-/// A word for the greatest index, then two words a point.
+/// A word for the greatest index, then two words per point.
 pub fn repeat_point(table: &mut [u32]) -> usize {
     copy(table, HEADER + 3, HEADER + 1) + copy(table, HEADER + 4, HEADER + 2)
 }
