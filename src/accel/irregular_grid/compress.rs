@@ -1,6 +1,6 @@
 //! Last phase: 16 bytes per cell, four bytes per entry of the map and a reference.
 
-use super::voxels::{Block, Cell, Entry, Map};
+use super::voxels::{Block, Entry, GridCell, Map};
 use super::{EMPTY, LAST, LOG_BITS, Partition};
 use rayon::prelude::*;
 
@@ -45,7 +45,7 @@ pub fn compress(partition: &Partition) -> Compressed {
 }
 
 /// Words of a cell: six coordinates of 16 bits and the place of its list.
-fn pack(cell: &Cell, list: u32) -> [u32; 4] {
+fn pack(cell: &GridCell, list: u32) -> [u32; 4] {
     let [x, y, z] = cell.min.map(u32::from);
     let [u, v, w] = cell.max.map(u32::from);
     [x | y << 16, z | u << 16, v | w << 16, list]
@@ -92,7 +92,7 @@ struct Writer<'a> {
 impl Writer<'_> {
     fn entry(&mut self, word: u32) -> u32 {
         match Map::decode(word) {
-            Entry::Cell(cell) => cell << LOG_BITS,
+            Entry::GridCell(cell) => cell << LOG_BITS,
             Entry::Block(number) => {
                 let block = self.map.blocks[number as usize];
                 self.cube(block, [0; 3], block.log)
@@ -115,7 +115,7 @@ impl Writer<'_> {
                 .iter()
                 .all(|&word| word == first)
         });
-        if log == 0 || (uniform && matches!(Map::decode(first), Entry::Cell(_))) {
+        if log == 0 || (uniform && matches!(Map::decode(first), Entry::GridCell(_))) {
             return self.entry(first);
         }
         // As few levels as possible, of sides as equal as possible.

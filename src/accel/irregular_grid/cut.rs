@@ -4,7 +4,7 @@
 use super::super::grid::lists::{Lists, PartLists, in_runs};
 use super::super::grid::{Cut, Grid, GridBox, areas, check_words, finest};
 use super::super::{AccelError, TriangleSoup};
-use super::voxels::{Block, Cell, Entry, Map};
+use super::voxels::{Block, Entry, GridCell, Map};
 use super::{Options, Partition};
 use crate::accel::BuildLog;
 use rayon::prelude::*;
@@ -99,7 +99,7 @@ struct Pieces {
     top: Vec<u32>,
     entries: Vec<u32>,
     blocks: Vec<Block>,
-    cells: Vec<Cell>,
+    cells: Vec<GridCell>,
     pool: Vec<u32>,
 }
 
@@ -109,10 +109,10 @@ fn join(fine: Grid, top: [u32; 3], shift: u32, runs: Vec<Pieces>) -> Partition {
     let total = |length: fn(&Pieces) -> usize| runs.iter().map(length).sum::<usize>();
     let mut entries = Vec::with_capacity(tops + total(|run| run.entries.len()));
     let mut blocks = Vec::with_capacity(total(|run| run.blocks.len()));
-    let mut cells: Vec<Cell> = Vec::with_capacity(total(|run| run.cells.len()));
+    let mut cells: Vec<GridCell> = Vec::with_capacity(total(|run| run.cells.len()));
     let mut pool = Vec::with_capacity(total(|run| run.pool.len()));
     let moved = |word: &u32, cells: usize, blocks: usize| match Map::decode(*word) {
-        Entry::Cell(_) => word + cells as u32,
+        Entry::GridCell(_) => word + cells as u32,
         Entry::Block(_) => word + blocks as u32,
     };
     let (mut cells_before, mut blocks_before) = (0, 0);
@@ -138,7 +138,7 @@ fn join(fine: Grid, top: [u32; 3], shift: u32, runs: Vec<Pieces>) -> Partition {
             ..*b
         }));
         let begin = pool.len() as u32;
-        cells.extend(run.cells.iter().map(|c| Cell {
+        cells.extend(run.cells.iter().map(|c| GridCell {
             first: c.first + begin,
             ..*c
         }));
@@ -215,14 +215,14 @@ impl Run<'_> {
 
     fn cell(&mut self, lowest: [u32; 3], size: u32, ids: &[u32]) -> u32 {
         let number = self.made.cells.len() as u32;
-        self.made.cells.push(Cell {
+        self.made.cells.push(GridCell {
             min: lowest.map(|v| v as u16),
             max: lowest.map(|v| (v + (1 << size)) as u16),
             first: self.made.pool.len() as u32,
             count: ids.len() as u32,
         });
         self.made.pool.extend_from_slice(ids);
-        Map::encode(Entry::Cell(number))
+        Map::encode(Entry::GridCell(number))
     }
 
     /// Fills the entries of an aligned cube of 2^`log` parts of a block.

@@ -2,7 +2,7 @@
 //! ray jumps farther. Voxels keep their cells; only the boxes overlap.
 
 use super::Partition;
-use super::voxels::{Cell, is_subset};
+use super::voxels::{GridCell, is_subset};
 use rayon::prelude::*;
 
 /// Grows all boxes `passes` times along each axis. Boxes of a step are computed from those before it.
@@ -22,7 +22,7 @@ pub fn expand(partition: &mut Partition, passes: u32) {
     }
 }
 
-fn grow(partition: &Partition, cell: &Cell, axis: usize, blocked: &mut u8) -> Cell {
+fn grow(partition: &Partition, cell: &GridCell, axis: usize, blocked: &mut u8) -> GridCell {
     let mut grown = *cell;
     let [down, up] = [1u8 << (2 * axis), 2 << (2 * axis)];
     if *blocked & down == 0 {
@@ -42,7 +42,7 @@ fn grow(partition: &Partition, cell: &Cell, axis: usize, blocked: &mut u8) -> Ce
 
 /// How far the box may grow along an axis; `None` if a neighbour lists what the cell does not, or the
 /// grid ends.
-fn reach(partition: &Partition, cell: &Cell, axis: usize, up: bool) -> Option<u16> {
+fn reach(partition: &Partition, cell: &GridCell, axis: usize, up: bool) -> Option<u16> {
     let map = &partition.map;
     let end = (map.top[axis] << map.shift) as u16;
     let [a, b] = [(axis + 1) % 3, (axis + 2) % 3];

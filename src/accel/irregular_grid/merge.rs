@@ -6,7 +6,7 @@
 //! not depend on the order of work. Rounds go on while they leave fewer than α times the cells.
 
 use super::Partition;
-use super::voxels::{Cell, Entry, Map, is_subset, push_union, union_length};
+use super::voxels::{Entry, GridCell, Map, is_subset, push_union, union_length};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
@@ -37,7 +37,7 @@ pub fn merge(partition: &mut Partition, alpha: f64) {
 
 struct State<'a> {
     map: &'a Map,
-    cells: &'a mut Vec<Cell>,
+    cells: &'a mut Vec<GridCell>,
     pool: &'a mut Vec<u32>,
     voxel: [f32; 3],
     /// Cells that still exist, ascending.
@@ -144,12 +144,12 @@ impl<'a> State<'a> {
         if begins_here { other } else { NONE }
     }
 
-    fn pays(&self, cell: &Cell, neighbour: &Cell, axis: usize) -> bool {
+    fn pays(&self, cell: &GridCell, neighbour: &GridCell, axis: usize) -> bool {
         let area = |min: [u16; 3], max: [u16; 3]| {
             let [x, y, z] = [0, 1, 2].map(|a| f32::from(max[a] - min[a]) * self.voxel[a]);
             x * y + y * z + z * x
         };
-        let cost = |c: &Cell| area(c.min, c.max) * (c.count + 1) as f32;
+        let cost = |c: &GridCell| area(c.min, c.max) * (c.count + 1) as f32;
         let apart = cost(cell) + cost(neighbour);
         let mut max = cell.max;
         max[axis] = neighbour.max[axis];
@@ -224,8 +224,8 @@ fn renumber(partition: &mut Partition, alive: &[u32], owner: &mut [u32]) {
         number[old as usize] = new as u32;
     }
     partition.map.entries.par_iter_mut().for_each(|word| {
-        if let Entry::Cell(cell) = Map::decode(*word) {
-            *word = Map::encode(Entry::Cell(number[owner[cell as usize] as usize]));
+        if let Entry::GridCell(cell) = Map::decode(*word) {
+            *word = Map::encode(Entry::GridCell(number[owner[cell as usize] as usize]));
         }
     });
     let cells = &partition.cells;

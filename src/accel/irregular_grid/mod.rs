@@ -16,7 +16,7 @@ mod expand;
 mod merge;
 mod voxels;
 
-use self::voxels::{Cell, Map};
+use self::voxels::{GridCell, Map};
 use super::grid::lists::check_lists;
 use super::grid::{Grid, check_words, clamped, first_axis, outside};
 use super::structure::prelude::*;
@@ -86,7 +86,7 @@ struct Partition {
     /// The voxels.
     fine: Grid,
     map: Map,
-    cells: Vec<Cell>,
+    cells: Vec<GridCell>,
     /// Lists of cells.
     pool: Vec<u32>,
 }
@@ -323,8 +323,8 @@ mod tests {
             .unwrap_or_else(|e| panic!("{e}"))
     }
 
-    fn volume(cells: &[Cell]) -> u64 {
-        let side = |c: &Cell, a: usize| u64::from(c.max[a] - c.min[a]);
+    fn volume(cells: &[GridCell]) -> u64 {
+        let side = |c: &GridCell, a: usize| u64::from(c.max[a] - c.min[a]);
         cells
             .iter()
             .map(|c| side(c, 0) * side(c, 1) * side(c, 2))
@@ -340,7 +340,7 @@ mod tests {
         expand::expand(&mut partition, 3);
         assert!(volume(&partition.cells) > before);
         let overlap =
-            |a: &Cell, b: &Cell| (0..3).all(|i| a.min[i] < b.max[i] && b.min[i] < a.max[i]);
+            |a: &GridCell, b: &GridCell| (0..3).all(|i| a.min[i] < b.max[i] && b.min[i] < a.max[i]);
         let mut foreign = 0;
         for grown in &partition.cells {
             for tile in &tiles {

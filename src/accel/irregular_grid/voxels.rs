@@ -6,7 +6,7 @@ const BLOCK: u32 = 1 << 31;
 
 /// A box of voxels with a list of triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Cell {
+pub struct GridCell {
     /// Lowest voxel.
     pub min: [u16; 3],
     /// One past the highest voxel.
@@ -17,7 +17,7 @@ pub struct Cell {
     pub count: u32,
 }
 
-impl Cell {
+impl GridCell {
     /// The cell's list, triangles ascending.
     pub fn list<'a>(&self, pool: &'a [u32]) -> &'a [u32] {
         &pool[self.first as usize..(self.first + self.count) as usize]
@@ -37,7 +37,7 @@ pub struct Block {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Entry {
     /// A cell, by number.
-    Cell(u32),
+    GridCell(u32),
     /// A block, by number.
     Block(u32),
 }
@@ -59,7 +59,7 @@ impl Map {
     /// Word of an entry.
     pub fn encode(entry: Entry) -> u32 {
         match entry {
-            Entry::Cell(cell) => cell,
+            Entry::GridCell(cell) => cell,
             Entry::Block(block) => block | BLOCK,
         }
     }
@@ -67,7 +67,7 @@ impl Map {
     /// Entry of a word.
     pub fn decode(word: u32) -> Entry {
         if word & BLOCK == 0 {
-            Entry::Cell(word)
+            Entry::GridCell(word)
         } else {
             Entry::Block(word & !BLOCK)
         }

@@ -47,7 +47,7 @@ pub(super) fn build(
         soup,
         references: AtomicU64::new(0),
     };
-    let cell = log.phase("sort", || Cell::root(soup, bounds));
+    let cell = log.phase("sort", || Region::root(soup, bounds));
     let grown = log.phase("sah-events", || {
         grow(
             cell,
@@ -88,7 +88,7 @@ struct Item {
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+enum PlaneKind {
     End,
     Planar,
     Start,
@@ -103,7 +103,7 @@ struct Event {
 }
 
 impl Event {
-    fn new(position: f32, item: u32, kind: Kind) -> Self {
+    fn new(position: f32, item: u32, kind: PlaneKind) -> Self {
         let word = item | (kind as u32) << 30;
         Self { position, word }
     }
@@ -122,15 +122,15 @@ impl Event {
 fn push_events(bounds: &Bounds, axis: usize, item: u32, events: &mut Vec<Event>) {
     let (low, high) = (bounds.min[axis], bounds.max[axis]);
     if low == high {
-        events.push(Event::new(low, item, Kind::Planar));
+        events.push(Event::new(low, item, PlaneKind::Planar));
     } else {
-        events.push(Event::new(low, item, Kind::Start));
-        events.push(Event::new(high, item, Kind::End));
+        events.push(Event::new(low, item, PlaneKind::Start));
+        events.push(Event::new(high, item, PlaneKind::End));
     }
 }
 
 /// A cell to be built: what touches it, and along each axis the sorted events of that.
-struct Cell {
+struct Region {
     bounds: Bounds,
     items: Vec<Item>,
     events: [Vec<Event>; 3],
@@ -146,7 +146,7 @@ struct Split {
     cost: f32,
 }
 
-impl Cell {
+impl Region {
     fn root(soup: &TriangleSoup, bounds: Bounds) -> Self {
         let item = |(id, record): (usize, &crate::accel::triangle::TriangleRecord)| Item {
             bounds: record.bounds(),
@@ -175,7 +175,7 @@ impl Cell {
         depth: u32,
         settings: &Settings,
         order: &mut Vec<u32>,
-    ) -> ((usize, f32), Option<[Cell; 2]>) {
+    ) -> ((usize, f32), Option<[Region; 2]>) {
         let given_up = settings.references.load(Ordering::Relaxed) > MAX_REFERENCES;
         let ends = depth >= settings.max_depth || given_up;
         let split = (!ends).then(|| self.best_split(settings)).flatten();
@@ -259,12 +259,12 @@ impl Cell {
     }
 
     /// Both halves. Items on one side keep their events; those on both get new ones, which are few.
-    fn divide(self, split: &Split, settings: &Settings) -> [Cell; 2] {
+    fn divide(self, split: &Split, settings: &Settings) -> [Region; 2] {
         let axis = split.axis;
         let mut bounds = [self.bounds; 2];
         bounds[0].max[axis] = split.position;
         bounds[1].min[axis] = split.position;
-        let mut halves = bounds.map(|bounds| Cell {
+        let mut halves = bounds.map(|bounds| Region {
             bounds,
             items: Vec::new(),
             events: [Vec::new(), Vec::new(), Vec::new()],
