@@ -233,10 +233,16 @@ fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Resul
         }
     };
     for cell in session.plan.worlds(variant) {
+        // After a lost device worlds that are complete are not built again.
+        let done = format!("world {cell}: done");
+        if session.is_done(&done) {
+            continue;
+        }
         run_world(session, device, &loaded, &cell)?;
         if device.gpu.lost().is_some() {
             break;
         }
+        session.finish(done);
     }
     Ok(())
 }
