@@ -7,22 +7,22 @@ use glam::DVec3;
 /// A convex polygon: a triangle cut by up to six planes has at most nine corners.
 #[derive(Clone, Copy)]
 pub(super) struct Polygon {
-    corners: [DVec3; 9],
+    corners: [[f64; 3]; 9],
     count: usize,
 }
 
 impl Polygon {
     /// A triangle.
     pub fn new(triangle: &TriangleRecord) -> Self {
-        let mut corners = [DVec3::ZERO; 9];
-        for (corner, vertex) in corners.iter_mut().zip(triangle.triangle().vertices) {
-            *corner = vertex.as_dvec3();
+        let mut corners = [[0.0; 3]; 9];
+        for (corner, vertex) in corners.iter_mut().zip(triangle.vertices()) {
+            *corner = vertex.map(f64::from);
         }
         Self { corners, count: 3 }
     }
 
     /// Its corners; none if nothing is left.
-    pub fn corners(&self) -> &[DVec3] {
+    pub fn corners(&self) -> &[[f64; 3]] {
         &self.corners[..self.count]
     }
 
@@ -31,8 +31,11 @@ impl Polygon {
         let [origin, rest @ ..] = self.corners() else {
             return 0.0;
         };
+        let from_origin = |corner: [f64; 3]| DVec3::from(corner) - DVec3::from(*origin);
         let fan = rest.windows(2);
-        let sum: DVec3 = fan.map(|p| (p[0] - origin).cross(p[1] - origin)).sum();
+        let sum: DVec3 = fan
+            .map(|p| from_origin(p[0]).cross(from_origin(p[1])))
+            .sum();
         0.5 * sum.length()
     }
 
@@ -45,41 +48,40 @@ impl Polygon {
                 (f64::from(bounds.min[axis]) - margin, 1.0),
                 (f64::from(bounds.max[axis]) + margin, -1.0),
             ] {
-                let is_inside = |corner: &DVec3| (corner[axis] - border) * sign >= 0.0;
+                let is_inside = |corner: &[f64; 3]| (corner[axis] - border) * sign >= 0.0;
                 if !polygon.corners().iter().all(is_inside) {
-                    polygon = polygon.cut(axis, border, sign);
+                    polygon.cut(axis, border, sign);
                 }
             }
         }
         polygon
     }
 
-    /// The part where `sign · (x − border)` is not negative.
-    fn cut(&self, axis: usize, border: f64, sign: f64) -> Polygon {
-        let mut out = Polygon {
-            corners: [DVec3::ZERO; 9],
-            count: 0,
-        };
+    /// Leaves the part where `sign · (x − border)` is not negative.
+    fn cut(&mut self, axis: usize, border: f64, sign: f64) {
+        let before = *self;
+        self.count = 0;
         let mut push = |corner| {
             // Rounding may make a sliver cross a plane once more than geometry allows.
-            if let Some(place) = out.corners.get_mut(out.count) {
+            if let Some(place) = self.corners.get_mut(self.count) {
                 *place = corner;
-                out.count += 1;
+                self.count += 1;
             }
         };
-        for index in 0..self.count {
-            let (a, b) = (self.corners[index], self.corners[(index + 1) % self.count]);
+        let corners = before.corners();
+        let nexts = corners.iter().cycle().skip(1);
+        for (a, b) in corners.iter().zip(nexts) {
             let (from, to) = (sign * (a[axis] - border), sign * (b[axis] - border));
             if from >= 0.0 {
-                push(a);
+                push(*a);
             }
             if (from < 0.0) != (to < 0.0) {
-                let mut crossing = a + (b - a) * (from / (from - to));
+                let along = from / (from - to);
+                let mut crossing: [f64; 3] = std::array::from_fn(|i| a[i] + (b[i] - a[i]) * along);
                 crossing[axis] = border;
                 push(crossing);
             }
         }
-        out
     }
 }
 

@@ -20,7 +20,6 @@
 use super::bounds::Bounds;
 use super::polygon::Polygon;
 use super::triangle::{DISTANCE_PAD, TriangleRecord};
-use glam::DVec3;
 
 /// Cosine between ray and normal down to which margins cover the error of a hit, 2⁻⁵.
 const LEAST_COSINE: f64 = 0.03125;
@@ -167,10 +166,10 @@ pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 /// there is no such part.
 pub(super) fn clip(record: &TriangleRecord, cell: &Bounds, margin: f64) -> Option<Bounds> {
     let part = Polygon::new(record).clipped(cell, margin);
-    let around = |all: Bounds, corner: &DVec3| {
+    let around = |all: Bounds, corner: &[f64; 3]| {
         all.union(&Bounds {
-            min: (*corner - margin).to_array().map(|c| c as f32),
-            max: (*corner + margin).to_array().map(|c| c as f32),
+            min: corner.map(|c| (c - margin) as f32),
+            max: corner.map(|c| (c + margin) as f32),
         })
     };
     let bounds = part.corners().iter().fold(Bounds::EMPTY, around);
