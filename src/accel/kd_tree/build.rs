@@ -15,6 +15,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// More references than this (1 GiB) are refused while they are made.
 pub(super) const MAX_REFERENCES: u64 = 1 << 28;
+/// Subtrees tell of their references by so many: threads that write to one counter wait for each other.
+const COUNTED: usize = 1024;
 /// Indices of items share a word with the kind of an event.
 const MAX_ITEMS: u64 = 1 << 30;
 
@@ -56,7 +58,7 @@ pub(super) fn build(
         )
     });
     // Beyond the limit cells are not divided: how many there would be is not known.
-    let made = settings.references.into_inner().min(MAX_REFERENCES + 1);
+    let made = (grown.order.len() as u64).min(MAX_REFERENCES + 1);
     AccelError::check_limit("references of a kd-tree, at least", made, MAX_REFERENCES)?;
     let nodes = log.phase("layout", || lay_out(&grown));
     let references = grown.order;
@@ -180,9 +182,13 @@ impl Region {
         let ends = depth >= settings.max_depth || given_up;
         let split = (!ends).then(|| self.best_split(settings)).flatten();
         let Some(split) = split else {
-            let made = self.items.len() as u64;
-            settings.references.fetch_add(made, Ordering::Relaxed);
+            let before = order.len() / COUNTED;
             order.extend(self.items.iter().map(|item| item.id));
+            let made = order.len() / COUNTED - before;
+            if made > 0 {
+                let made = (made * COUNTED) as u64;
+                settings.references.fetch_add(made, Ordering::Relaxed);
+            }
             return ((0, 0.0), None);
         };
         let plane = (split.axis, split.position);
