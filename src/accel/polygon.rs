@@ -69,9 +69,11 @@ impl Polygon {
             }
         };
         let corners = before.corners();
-        let nexts = corners.iter().cycle().skip(1);
-        for (a, b) in corners.iter().zip(nexts) {
-            let (from, to) = (sign * (a[axis] - border), sign * (b[axis] - border));
+        let Some(mut b) = corners.first() else { return };
+        let mut to = sign * (b[axis] - border);
+        for next in corners.iter().skip(1).chain(corners.first()) {
+            let (a, from) = (b, to);
+            (b, to) = (next, sign * (next[axis] - border));
             if from >= 0.0 {
                 push(*a);
             }
