@@ -36,7 +36,7 @@ impl fmt::Display for Place {
 #[derive(Debug, Error)]
 pub enum ConfigError {
     /// The file cannot be read.
-    #[error("cannot read the experiment file {}: {source}", path.display())]
+    #[error("cannot read the experiment file {}: {source}; name a .toml file, such as experiments/quick.toml", path.display())]
     Read {
         /// The file.
         path: PathBuf,
