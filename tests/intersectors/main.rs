@@ -315,7 +315,7 @@ fn processor_seconds() -> f64 {
 /// Not a check: processor time of every test through the plain BVH on a software adapter, for each class
 /// of rays, as a multiple of the first test's. Rounds alternate, so that load from outside hits all alike.
 #[test]
-#[ignore = "a measurement of minutes"]
+#[ignore = "no check but a measurement of minutes, by hand: `cargo test --release --test intersectors -- --ignored --nocapture` (docs/performance.md)"]
 #[cfg(target_os = "linux")]
 fn what_tests_cost_in_a_whole_traversal() {
     const ROUNDS: usize = 7;
