@@ -9,11 +9,11 @@ use raystone::discrepancy::Measure;
 use raystone::measure::metrics::METRICS;
 use raystone::params::{Entry, Parameter};
 use raystone::run::Registries;
-use raystone::scene::MATERIAL_KINDS;
+use raystone::scene::{LIGHT_KINDS, MATERIAL_KINDS};
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-/// List everything that can be named: scenes, structures, samplers, integrators, materials, metrics,
+/// List everything that can be named: scenes, structures, samplers, integrators, materials, lights, metrics,
 /// measures, adapters
 #[derive(Args)]
 pub struct List {
@@ -35,6 +35,8 @@ enum Topic {
     Integrator,
     #[value(alias = "materials")]
     Material,
+    #[value(alias = "lights")]
+    Light,
     #[value(alias = "triangles")]
     Triangle,
     #[value(alias = "box-tests", alias = "box")]
@@ -71,6 +73,10 @@ impl List {
                 Topic::Material => named(
                     "material: how surfaces scatter light, as model files say",
                     MATERIAL_KINDS.map(|kind| (kind.name, kind.description)),
+                ),
+                Topic::Light => named(
+                    "light: what shines, beside the sky",
+                    LIGHT_KINDS.map(|kind| (kind.name, kind.description)),
                 ),
                 Topic::Metric => metrics(),
                 Topic::Measure => measures(),

@@ -112,7 +112,7 @@ pub fn render(
         format.write(file, image).map_err(input)
     })?;
     rendering.samples_s = compiled.elapsed().as_secs_f64();
-    rendering.rays = renderer.ray_counts()?.iter().sum();
+    rendering.rays = renderer.ray_counts()?[..TRACED_CLASSES].iter().sum();
     rendering.non_finite_pixels = image.non_finite_pixels();
     rendering.total_s = start.elapsed().as_secs_f64();
     session.progress.finish_and_clear();

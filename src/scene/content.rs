@@ -85,6 +85,9 @@ impl SceneData {
             hash.bytes(bytemuck::cast_slice(&material.parameters));
             hash.bytes(&texture.to_le_bytes());
             hash.vectors(&[material.base_color, material.emission]);
+            if !material.emits_both_sides {
+                hash.bytes(b"front");
+            }
             // The derived Debug text is a total, deterministic image of the plain fields.
             hash.bytes(format!("{:?}", material.source).as_bytes());
         }
@@ -97,6 +100,10 @@ impl SceneData {
             hash.vectors(&[camera.eye, camera.target, camera.up, lens]);
         }
         hash.vectors(&[self.environment]);
+        for light in &self.lights {
+            // As above: fields are plain, and their text has all their digits.
+            hash.bytes(format!("{light:?}").as_bytes());
+        }
         if let Some(sky) = &self.daylight {
             hash.vectors(&[sky.up, sky.key, Vec3::splat(sky.reach)]);
         }
@@ -129,19 +136,27 @@ impl Hash {
 #[cfg(test)]
 mod tests {
     use crate::scene::builtin::tests::load_default;
-    use crate::scene::{Daylight, MIRROR};
+    use crate::scene::{Daylight, Light, MIRROR};
+    use glam::Vec3;
 
     #[test]
     fn the_hash_sees_every_part_of_the_scene() {
         let scene = load_default("cornell-box");
         type Change = fn(&mut crate::scene::SceneData);
-        let changes: [(&str, Change); 10] = [
+        let changes: [(&str, Change); 12] = [
             ("vertex", |s| s.triangles[3].vertices[1].x += 1e-3),
             ("material id", |s| s.material_ids[0] = 1),
             ("reflectance", |s| s.materials[0].base_color.y += 1e-3),
             ("kind", |s| s.materials[0].kind = &MIRROR),
             ("parameter", |s| s.materials[0].parameters.push(1.5)),
             ("emission", |s| s.materials[0].emission.z += 1e-3),
+            ("sides of emission", |s| s.materials[0].emits_both_sides = false),
+            ("light", |s| {
+                s.lights.push(Light::Point {
+                    position: Vec3::X,
+                    intensity: Vec3::ONE,
+                });
+            }),
             ("source", |s| s.materials[0].source.ior = Some(1.5)),
             ("camera", |s| s.camera = None),
             ("environment", |s| s.environment.x += 1e-3),

@@ -17,6 +17,7 @@ mod gltf_container;
 mod gltf_files;
 mod gltf_material;
 mod instances;
+mod light;
 mod material;
 mod mtl;
 mod obj;
@@ -31,6 +32,7 @@ pub use daylight::Daylight;
 pub use error::SceneError;
 pub use framing::Framing;
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
+pub use light::{LIGHT_KINDS, Light, LightKind, LightList, ListedLight, Parallelogram, Source};
 pub use material::{
     DEFAULT_IOR, DIELECTRIC, DIFFUSE, MATERIAL_KINDS, MIRROR, Material, MaterialKind,
     MaterialSource,
@@ -103,6 +105,8 @@ pub struct SceneData {
     pub camera: Option<Camera>,
     /// Constant radiance of the environment, linear RGB; zero is a black sky.
     pub environment: Vec3,
+    /// Lights without triangles.
+    pub lights: Vec<Light>,
     /// The sky over a scene that brings no light; its radiance is a multiple of `environment`.
     pub daylight: Option<Daylight>,
     /// Where to look from, if the scene brings no camera.

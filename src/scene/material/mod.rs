@@ -56,8 +56,10 @@ pub struct Material {
     pub base_color: Vec3,
     /// Index into [`super::SceneData::textures`] of the base-colour texture.
     pub base_color_texture: Option<u32>,
-    /// Emitted radiance, linear RGB, both sides of the triangle.
+    /// Emitted radiance, linear RGB.
     pub emission: Vec3,
+    /// Whether triangles emit from both sides, or only from the one whence their corners turn counter-clockwise.
+    pub emits_both_sides: bool,
     /// What else the file said.
     pub source: MaterialSource,
 }
@@ -71,6 +73,7 @@ impl Material {
             base_color,
             base_color_texture: None,
             emission: Vec3::ZERO,
+            emits_both_sides: true,
             source: MaterialSource::default(),
         }
     }
