@@ -12,8 +12,23 @@ fn composition(structure: &str) -> Composition {
         .constant("STACK_ENTRIES", 32)
         .constant("SHARED_SEQUENCE", 0)
         .constant("SHARED_DECORRELATION", 0)
-        .constant("MAX_DEPTH", 4);
-    for feature in ["textures", "lights", "mirror", "dielectric", "daylight"] {
+        .constant("MAX_DEPTH", 4)
+        .constant("ROULETTE_DEPTH", 3)
+        .constant("CLAMP", 0);
+    for feature in [
+        "next_event",
+        "found_emission",
+        "power_heuristic",
+        "clamped",
+        "sphere_lights",
+        "roulette",
+        "textures",
+        "lights",
+        "rectangle_lights",
+        "mirror",
+        "dielectric",
+        "daylight",
+    ] {
         out = out.feature(feature, true);
     }
     out
@@ -112,9 +127,9 @@ fn faults_of_all_kinds_are_told_with_file_and_line() {
         ),
         (
             "a fault in a shader",
-            "shading/light/triangles",
-            "let root = sqrt(point.x)",
-            "let root = sqrt(point.w)",
+            "shading/light/flat",
+            "let towards = point.position - origin",
+            "let towards = point.position - origin.w",
             "",
         ),
     ] {

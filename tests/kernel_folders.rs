@@ -53,7 +53,7 @@ fn write(folder: &Path, file: &str, text: impl AsRef<[u8]>) {
 /// The path tracer without the weights of multiple importance sampling: emission is counted twice.
 fn without_weights(folder: &Path) {
     let text = embedded("integrator/path");
-    let weight = "weight = density / (density + light_pdf(surface, hit.t));";
+    let weight = "weight = found_weight(density, light_pdf(leaving, surface, hit));";
     assert_eq!(text.matches(weight).count(), 1);
     let faulty = text.replace(weight, "weight = 1.0;");
     write(folder, "integrator/path.wesl", faulty);

@@ -53,7 +53,7 @@ impl LightTables {
                 }
                 Source::Parallelogram(of) => {
                     owners.extend(of.triangles.map(|id| [id, number, 0, 0]));
-                    of.triangles[0]
+                    scene.material_ids[of.triangles[0] as usize]
                 }
                 Source::Light(place) => {
                     tables.infinite += u32::from(scene.lights[place as usize].is_infinite());

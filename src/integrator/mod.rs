@@ -6,6 +6,7 @@ mod kind;
 mod light_tables;
 pub mod offset;
 mod passes;
+pub mod path;
 mod registry;
 mod render;
 mod slice;

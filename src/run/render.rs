@@ -9,7 +9,7 @@ use crate::accel::{AccelError, TriangleSoup};
 use crate::config::{Axis, Experiment, Plan};
 use crate::gpu::probe_arithmetic;
 use crate::image::{FileFormat, Image};
-use crate::integrator::{Renderer, Stage, StageError, Traced};
+use crate::integrator::{Renderer, Stage, StageError, TRACED_CLASSES, Traced};
 use crate::params::Variant;
 use crate::scene::{self, LoadOptions, LoadReport};
 use indicatif::ProgressStyle;

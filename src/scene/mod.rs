@@ -15,6 +15,7 @@ mod gltf;
 mod gltf_accessor;
 mod gltf_container;
 mod gltf_files;
+mod gltf_lights;
 mod gltf_material;
 mod instances;
 mod light;
