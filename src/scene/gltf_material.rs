@@ -142,7 +142,11 @@ fn convert(material: &gltf::Material<'_>, files: &Files, warnings: &mut Vec<Stri
     };
     let name = material.name();
     let name = name.map_or_else(|| format!("material {index}"), str::to_owned);
-    Material::described(name, &description, &files.model, warnings).emitting(emitted(emission))
+    Material {
+        emission: emitted(emission),
+        emits_both_sides: material.double_sided(),
+        ..Material::described(name, &description, &files.model, warnings)
+    }
 }
 
 fn image_source<'a>(

@@ -72,8 +72,11 @@ pub struct Material {
     pub base_color: Vec3,
     /// Index into [`super::SceneData::textures`] of the base-colour texture.
     pub base_color_texture: Option<u32>,
-    /// Emitted radiance, linear RGB, both sides of the triangle.
+    /// Emitted radiance, linear RGB.
     pub emission: Vec3,
+    /// Whether both sides of the triangle emit, or only that from which its corners turn counter-clockwise (glTF without
+    /// `doubleSided`).
+    pub emits_both_sides: bool,
     /// What else the file said.
     pub source: MaterialSource,
 }
@@ -87,6 +90,7 @@ impl Material {
             base_color: reflectance(look.base_color),
             base_color_texture: None,
             emission: Vec3::ZERO,
+            emits_both_sides: true,
             source: MaterialSource::default(),
         }
     }
@@ -120,6 +124,17 @@ impl Material {
     pub fn emitting(self, radiance: Vec3) -> Self {
         Self {
             emission: radiance,
+            emits_both_sides: true,
+            ..self
+        }
+    }
+
+    /// The same material, emitting `radiance` (linear RGB) from the side on which the triangle's corners turn
+    /// counter-clockwise alone.
+    pub fn emitting_from_front(self, radiance: Vec3) -> Self {
+        Self {
+            emission: radiance,
+            emits_both_sides: false,
             ..self
         }
     }
