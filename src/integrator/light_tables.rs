@@ -1,6 +1,7 @@
 //! The lights of a scene as kernels read them: the part of `shading_tables` that
 //! `kernels/shading/light/table.wesl` takes apart.
 
+use super::tables::emits_in_front;
 use crate::gpu::UniformValues;
 use crate::scene::{LIGHT_KINDS, Light, LightList, ListedLight, SceneData, Source};
 use glam::Vec3;
@@ -38,7 +39,7 @@ impl LightTables {
         let total: f64 = list.lights.iter().map(|light| light.power).sum();
         let mut tables = Self {
             lights: list.lights.len() as u32,
-            one_sided: (scene.materials.iter()).any(|m| !m.emits_both_sides && m.emission != Vec3::ZERO),
+            one_sided: scene.materials.iter().any(emits_in_front),
             ..Self::default()
         };
         let mut owners = Vec::new();

@@ -4,7 +4,10 @@ use super::light_tables::LightTables;
 use super::offset::TransformError;
 use crate::accel::{TriangleBuffers, TriangleSoup};
 use crate::gpu::{Bindings, Gpu, GpuError};
-use crate::scene::{DIFFUSE, Daylight, LIGHT_KINDS, LightList, MATERIAL_KINDS, MaterialKind, SceneData};
+use crate::scene::{
+    DIFFUSE, Daylight, LIGHT_KINDS, LightList, MATERIAL_KINDS, Material, MaterialKind, SceneData,
+};
+use glam::Vec3;
 
 /// What a scene makes kernels carry; absent features are not in the kernel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -26,9 +29,9 @@ pub struct SceneFeatures {
 impl SceneFeatures {
     /// Feature names as kernels write them, with whether they are on. Diffuse, which every kernel has, is none.
     pub fn flags(&self) -> Vec<(&'static str, bool)> {
-        let kinds = MATERIAL_KINDS.iter().map(|kind| kind.name);
+        let kinds = MATERIAL_KINDS.iter().map(|kind| kind.feature);
         let mut flags: Vec<_> = kinds.zip(self.materials).collect();
-        flags.retain(|(name, _)| *name != DIFFUSE.name);
+        flags.retain(|(name, _)| *name != DIFFUSE.feature);
         flags.extend([
             ("textures", self.textures),
             ("lights", self.lights),
@@ -126,7 +129,7 @@ impl Tables {
             words.resize(words.len().next_multiple_of(4), 0);
             let [r, g, b] = material.base_color.to_array().map(f32::to_bits);
             let [er, eg, eb] = material.emission.to_array().map(f32::to_bits);
-            let one_sided = u32::from(!material.emits_both_sides) << 31;
+            let one_sided = u32::from(emits_in_front(material)) << 31;
             let kind = number(material.kind) | one_sided;
             let row = [r, g, b, kind, er, eg, eb, parameters];
             let first = MATERIAL_WORDS * index;
@@ -143,6 +146,11 @@ impl Tables {
             first_uv,
         }
     }
+}
+
+/// Whether the material emits, and from its front alone.
+pub(super) fn emits_in_front(material: &Material) -> bool {
+    !material.emits_both_sides && material.emission != Vec3::ZERO
 }
 
 /// Of a kind of material, in kernels.

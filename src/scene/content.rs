@@ -86,7 +86,7 @@ impl SceneData {
             hash.bytes(&texture.to_le_bytes());
             hash.vectors(&[material.base_color, material.emission]);
             if !material.emits_both_sides {
-                hash.bytes(b"front");
+                hash.bytes(b"one-sided");
             }
             // The derived Debug text is a total, deterministic image of the plain fields.
             hash.bytes(format!("{:?}", material.source).as_bytes());
@@ -150,7 +150,7 @@ mod tests {
             ("kind", |s| s.materials[0].kind = &MIRROR),
             ("parameter", |s| s.materials[0].parameters.push(1.5)),
             ("emission", |s| s.materials[0].emission.z += 1e-3),
-            ("sides of emission", |s| s.materials[0].emits_both_sides = false),
+            ("sides", |s| s.materials[0].emits_both_sides = false),
             ("light", |s| {
                 s.lights.push(Light::Point {
                     position: Vec3::X,
