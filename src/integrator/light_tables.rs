@@ -1,10 +1,15 @@
 //! The lights of a scene as kernels read them: the part of `shading_tables` that
 //! `kernels/shading/light/table.wesl` takes apart.
 
+use super::environment_tables::environment_rows;
+use super::light_tree::{LightBounds, tree_rows};
 use super::tables::emits_in_front;
 use crate::gpu::UniformValues;
-use crate::scene::{LIGHT_KINDS, Light, LightList, ListedLight, SceneData, Source};
+use crate::scene::{
+    IesProfile, LIGHT_KINDS, Light, LightList, ListedLight, Photometry, SceneData, Source,
+};
 use glam::Vec3;
+use std::f64::consts::FRAC_PI_2;
 
 /// `vec4` a light: its head and three of its kind.
 const LIGHT_ROWS: usize = 4;
@@ -23,7 +28,10 @@ pub struct LightTables {
     pub kinds: [bool; LIGHT_KINDS.len()],
     /// Whether some surface emits from its front alone.
     pub one_sided: bool,
-    /// Rows of the lights, then of the emissive triangles, each of which knows its light.
+    /// Where the tree over lights with a place begins among the rows, and the leaves of the lights in it.
+    tree: [u32; 2],
+    /// Rows of the lights, then of the emissive triangles, each of which knows its light, of profiles and maps, and
+    /// of the tree.
     rows: Vec<[u32; 4]>,
     /// Where the rows begin in `shading_tables`, in `vec4`.
     first: u32,
@@ -43,6 +51,8 @@ impl LightTables {
             ..Self::default()
         };
         let mut owners = Vec::new();
+        let mut extras = Vec::new();
+        let mut bounds = Vec::new();
         let mut below = 0.0;
         for (number, light) in (0..).zip(&list.lights) {
             below += light.power;
@@ -57,17 +67,26 @@ impl LightTables {
                     scene.material_ids[of.triangles[0] as usize]
                 }
                 Source::Light(place) => {
-                    tables.infinite += u32::from(scene.lights[place as usize].is_infinite());
-                    0
+                    let light = &scene.lights[place as usize];
+                    tables.infinite += u32::from(light.is_infinite());
+                    let link = LIGHT_ROWS * list.lights.len() + owners.len() + extras.len();
+                    extras.extend(extra_rows(light));
+                    link as u32
                 }
             };
             let part = |x: f64| ((x / total) as f32).to_bits();
             tables.rows.push([kind, link, part(below), part(light.power)]);
             tables.rows.extend(own_rows(scene, light));
             tables.kinds[kind as usize] = true;
+            bounds.extend(light_bounds(scene, light));
         }
         tables.emitters = owners.len() as u32;
         tables.rows.append(&mut owners);
+        tables.rows.append(&mut extras);
+        let mut tree = tree_rows(&bounds);
+        let leaves = tables.rows.len() + tree.len() - bounds.len();
+        tables.tree = [tables.rows.len() as u32, leaves as u32];
+        tables.rows.append(&mut tree);
         let is_sphere = |light: &ListedLight| light.kind(scene).name == "sphere";
         let first = list.lights.iter().position(is_sphere).unwrap_or_default();
         let spheres = list.lights.iter().filter(|light| is_sphere(light)).count();
@@ -96,6 +115,8 @@ impl LightTables {
             .u32("first_light", self.first)
             .u32("emitters", self.emitters)
             .u32("first_emitter", self.first + self.lights * LIGHT_ROWS as u32)
+            .u32("first_tree", self.first + self.tree[0])
+            .u32("first_leaf", self.first + self.tree[1])
             .u32("first_sphere", first_sphere)
             .u32("spheres", spheres)
     }
@@ -149,5 +170,99 @@ fn light_rows(light: &Light) -> [[u32; 4]; LIGHT_ROWS - 1] {
             direction,
             irradiance,
         } => [row(unit(direction), 0.0), row(*irradiance, 0.0), none],
+        Light::Ies {
+            position,
+            rotation,
+            color,
+            ..
+        } => [
+            row(*position, 0.0),
+            row(*color, 0.0),
+            rotation.to_array().map(f32::to_bits),
+        ],
+        Light::Environment { scale, turn, .. } => [
+            row(Vec3::new(turn.cos(), turn.sin(), 0.0), 0.0),
+            row(Vec3::splat(*scale), 0.0),
+            none,
+        ],
+    }
+}
+
+/// What a light has beyond its rows.
+fn extra_rows(light: &Light) -> Vec<[u32; 4]> {
+    match light {
+        Light::Ies { profile, .. } => ies_rows(profile),
+        Light::Environment { map, .. } => environment_rows(map),
+        _ => Vec::new(),
+    }
+}
+
+/// Type of photometry and numbers of angles; vertical and horizontal angles; candela.
+fn ies_rows(profile: &IesProfile) -> Vec<[u32; 4]> {
+    let photometry = match profile.photometry {
+        Photometry::C => 0,
+        Photometry::B => 1,
+        Photometry::A => 2,
+    };
+    let counts = [&profile.vertical, &profile.horizontal].map(|angles| angles.len() as u32);
+    let mut rows = vec![[photometry, counts[0], counts[1], 0]];
+    let lists = [&profile.vertical, &profile.horizontal, &profile.candela];
+    let words: Vec<u32> = lists.into_iter().flatten().map(|x| x.to_bits()).collect();
+    rows.extend(words.chunks(4).map(|four| {
+        let mut row = [0; 4];
+        row[..four.len()].copy_from_slice(four);
+        row
+    }));
+    rows
+}
+
+/// Where a light is and shines, if it has a place.
+fn light_bounds(scene: &SceneData, listed: &ListedLight) -> Option<LightBounds> {
+    let power = listed.power;
+    let flat = |corners: &[Vec3], normal: Vec3, triangle: u32| {
+        let corners = || corners.iter().map(|c| c.as_dvec3());
+        let material = scene.material_ids[triangle as usize] as usize;
+        LightBounds {
+            min: corners().reduce(|a, b| a.min(b)).unwrap_or_default(),
+            max: corners().reduce(|a, b| a.max(b)).unwrap_or_default(),
+            power,
+            axis: normal.as_dvec3().normalize_or_zero(),
+            normals: 0.0,
+            spread: FRAC_PI_2,
+            both_sides: scene.materials[material].emits_both_sides,
+        }
+    };
+    let place = match listed.source {
+        Source::Triangle(id) => {
+            let [a, b, c] = scene.triangles[id as usize].vertices;
+            return Some(flat(&[a, b, c], (b - a).cross(c - a), id));
+        }
+        Source::Parallelogram(of) => {
+            let (a, [u, v]) = (of.corner, of.edges);
+            let corners = [a, a + u, a + v, a + u + v];
+            return Some(flat(&corners, u.cross(v), of.triangles[0]));
+        }
+        Source::Light(place) => place,
+    };
+    let around = |center: &Vec3, radius: f32| {
+        let [center, radius] = [center.as_dvec3(), glam::DVec3::splat(radius.into())];
+        LightBounds::everywhere(center - radius, center + radius, power)
+    };
+    match &scene.lights[place as usize] {
+        Light::Sphere { center, radius, .. } => Some(around(center, *radius)),
+        Light::Point { position, .. } | Light::Ies { position, .. } => Some(around(position, 0.0)),
+        Light::Spot {
+            position,
+            direction,
+            inner,
+            outer,
+            ..
+        } => Some(LightBounds {
+            axis: direction.as_dvec3().normalize_or_zero(),
+            normals: f64::from(*inner),
+            spread: f64::from(outer - inner),
+            ..around(position, 0.0)
+        }),
+        Light::Directional { .. } | Light::Environment { .. } => None,
     }
 }

@@ -2,8 +2,11 @@
 
 mod builtin;
 pub mod integrand;
+mod alias;
+mod environment_tables;
 mod kind;
 mod light_tables;
+mod light_tree;
 pub mod offset;
 mod passes;
 pub mod path;

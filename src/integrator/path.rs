@@ -36,6 +36,8 @@ parameters! {
         Power = "power",
         /// Nothing: all are alike.
         Uniform = "uniform",
+        /// What it contributes at the point, about, by a hierarchy of lights (Conty Estevez & Kulla 2018).
+        Tree = "tree",
     }
 
     /// How many lights are sampled at each vertex.
@@ -74,6 +76,7 @@ impl PathParameters {
             ("next_event", self.strategy != Strategy::Bsdf),
             ("found_emission", self.strategy != Strategy::Light),
             ("uniform_lights", self.light_choice == LightChoice::Uniform),
+            ("light_tree", self.light_choice == LightChoice::Tree),
             ("all_lights", self.lights == Lights::All),
             ("power_heuristic", self.strategy == Strategy::MisPower),
             ("roulette", self.roulette != Roulette::Never),

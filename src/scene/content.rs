@@ -1,9 +1,13 @@
 //! Questions asked of a loaded scene: extent, size in bytes, emitters, content hash.
 
-use super::{Bounds, InstanceError, SceneData, Transform};
+use super::{
+    Bounds, EnvironmentMap, InstanceError, Light, LightList, SceneData, SceneError, Transform,
+};
 use crate::geometry::Triangle;
 use glam::{Vec2, Vec3};
 use std::mem::size_of_val;
+use std::path::Path;
+use std::sync::Arc;
 
 /// Changed whenever the order or meaning of the hashed bytes changes.
 const HASH_VERSION: &[u8] = b"raystone scene 2";
@@ -37,6 +41,30 @@ impl SceneData {
         }
         self.hash = self.content_hash();
         Ok(())
+    }
+
+    /// The scene lit by an environment map, in the place of a constant radiance or the sky of scenes without a light.
+    ///
+    /// # Errors
+    /// The map cannot be read.
+    pub(super) fn under(mut self, file: &Path) -> Result<Self, SceneError> {
+        let map = EnvironmentMap::read(file, &mut self.report.warnings)?;
+        if let Some(sky) = self.daylight.take() {
+            let note = sky.note();
+            self.report.warnings.retain(|line| *line != note);
+        }
+        self.environment = Vec3::ZERO;
+        self.lights.push(Light::Environment {
+            map: Arc::new(map),
+            scale: 1.0,
+            turn: 0.0,
+        });
+        let problems = LightList::of(&self).problems;
+        let new = problems.into_iter().filter(|line| !self.report.warnings.contains(line));
+        let new: Vec<String> = new.collect();
+        self.report.warnings.extend(new);
+        self.hash = self.content_hash();
+        Ok(self)
     }
 
     /// Bytes of the scene's arrays: triangles, texture coordinates, material indices, texels.

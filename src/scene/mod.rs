@@ -9,6 +9,7 @@ pub mod builtin;
 mod camera;
 mod content;
 mod daylight;
+mod environment;
 mod error;
 mod framing;
 mod gltf;
@@ -17,6 +18,7 @@ mod gltf_container;
 mod gltf_files;
 mod gltf_lights;
 mod gltf_material;
+mod ies;
 mod instances;
 mod light;
 mod material;
@@ -30,8 +32,10 @@ pub use builder::{DEFAULT_ALBEDO, MAX_COORDINATE};
 pub use builtin::builtin_scenes;
 pub use camera::Bounds;
 pub use daylight::Daylight;
+pub use environment::EnvironmentMap;
 pub use error::SceneError;
 pub use framing::Framing;
+pub use ies::{IesError, IesProfile, Photometry};
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 pub use light::{LIGHT_KINDS, Light, LightKind, LightList, ListedLight, Parallelogram, Source};
 pub use material::{
@@ -40,7 +44,7 @@ pub use material::{
 };
 
 use crate::geometry::{Camera, Triangle};
-use crate::params::{Params, Variant};
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params, Variant};
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::io::Read as _;
@@ -162,6 +166,30 @@ pub fn named(name: &str) -> Result<SceneData, SceneError> {
 /// # Errors
 /// [`SceneError`]: unknown name, unreadable or malformed file, no triangles, coordinates too large.
 pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, SceneError> {
+    let mut variant = variant.clone();
+    let around = variant.params.0.remove(ENVIRONMENT);
+    let scene = load_alone(&variant, options)?;
+    match around {
+        Some(ParamValue::Name(file)) if !file.is_empty() => scene.under(Path::new(&file)),
+        _ => Ok(scene),
+    }
+}
+
+/// The parameter of every scene that names an environment map.
+const ENVIRONMENT: &str = "environment";
+
+/// What every scene has as parameters, built in or not.
+pub fn common_parameters() -> ParameterSchema {
+    vec![Parameter {
+        name: ENVIRONMENT,
+        description: "equirectangular Radiance HDR file that lights the scene from all around; none if empty",
+        default: ParamValue::Name(String::new()),
+        range: ParamRange::Text,
+    }]
+}
+
+/// The scene of a variant without its environment map.
+fn load_alone(variant: &Variant, options: &LoadOptions) -> Result<SceneData, SceneError> {
     if let Some(scene) = builtin::build(variant) {
         return scene;
     }

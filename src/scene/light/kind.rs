@@ -61,6 +61,13 @@ kind!(
     "a point that shines into a cone, with or without decay (glTF KHR_lights_punctual, candela)"
 );
 kind!(
+    IES,
+    "ies",
+    "ies_lights",
+    "colour",
+    "a point with the measured intensities of a luminaire (IES LM-63, candela)"
+);
+kind!(
     DIRECTIONAL,
     "directional",
     "directional_lights",
@@ -68,10 +75,26 @@ kind!(
     "light from infinitely far away (glTF KHR_lights_punctual, lux)"
 );
 
+kind!(
+    ENVIRONMENT,
+    "environment",
+    "environment_map",
+    "radiance",
+    "radiance from all around by an equirectangular map (Radiance HDR)"
+);
+
 /// The table of kinds, in the order in which lights are numbered; a kind's place is its number in
 /// `kernels/shading/light/table.wesl`.
-pub static LIGHT_KINDS: [&LightKind; 6] =
-    [&TRIANGLE, &RECTANGLE, &SPHERE, &POINT, &SPOT, &DIRECTIONAL];
+pub static LIGHT_KINDS: [&LightKind; 8] = [
+    &TRIANGLE,
+    &RECTANGLE,
+    &SPHERE,
+    &POINT,
+    &SPOT,
+    &IES,
+    &DIRECTIONAL,
+    &ENVIRONMENT,
+];
 
 impl LightKind {
     /// Its place in [`LIGHT_KINDS`].

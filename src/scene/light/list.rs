@@ -115,7 +115,12 @@ impl LightList {
         for (_, place, light) in others {
             let power = light.power(radius);
             let name = light.kind().name;
-            if let Some(problem) = light.problem() {
+            let is_second = matches!(light, Light::Environment { .. })
+                && list.lights.last().is_some_and(|last| last.kind(scene) == light.kind());
+            if is_second {
+                let line = format!("light {place} ({name}) is left out: there is one already");
+                list.problems.push(line);
+            } else if let Some(problem) = light.problem() {
                 let line = format!("light {place} ({name}) is left out: {problem}");
                 list.problems.push(line);
             } else if power > 0.0 && power.is_finite() {

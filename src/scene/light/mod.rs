@@ -8,7 +8,9 @@ mod list;
 pub use kind::{LIGHT_KINDS, LightKind};
 pub use list::{LightList, ListedLight, Parallelogram, Source};
 
-use glam::{DVec3, Vec3};
+use super::{EnvironmentMap, IesProfile};
+use glam::{DVec3, Quat, Vec3};
+use std::sync::Arc;
 
 /// A light that has no triangles. Colours are linear RGB in the radiance unit of the scene (times its unit of length
 /// squared for intensities).
@@ -45,6 +47,26 @@ pub enum Light {
         /// Whether light falls off with the square of the distance.
         decay: bool,
     },
+    /// A point with the measured intensities of a luminaire.
+    Ies {
+        /// Place.
+        position: Vec3,
+        /// Takes the axes of [`IesProfile`] to those of the scene; of length 1.
+        rotation: Quat,
+        /// What multiplies the candela of the profile.
+        color: Vec3,
+        /// The measured intensities.
+        profile: Arc<IesProfile>,
+    },
+    /// Radiance from all around, in the place of a constant one. A scene has one at most.
+    Environment {
+        /// Radiance by direction.
+        map: Arc<EnvironmentMap>,
+        /// What multiplies it.
+        scale: f32,
+        /// By how much it is turned about +y, radians, counter-clockwise seen from above.
+        turn: f32,
+    },
     /// Light from infinitely far away.
     Directional {
         /// Where the light travels; of any length above 0.
@@ -67,7 +89,9 @@ impl Light {
             Self::Sphere { .. } => &kind::SPHERE,
             Self::Point { .. } => &kind::POINT,
             Self::Spot { .. } => &kind::SPOT,
+            Self::Ies { .. } => &kind::IES,
             Self::Directional { .. } => &kind::DIRECTIONAL,
+            Self::Environment { .. } => &kind::ENVIRONMENT,
         }
     }
 
@@ -76,13 +100,15 @@ impl Light {
         match self {
             Self::Sphere { radiance, .. } => *radiance,
             Self::Point { intensity, .. } | Self::Spot { intensity, .. } => *intensity,
+            Self::Ies { color, .. } => *color,
             Self::Directional { irradiance, .. } => *irradiance,
+            Self::Environment { scale, .. } => Vec3::splat(*scale),
         }
     }
 
     /// Whether it has no place: no tree over places can hold it.
     pub fn is_infinite(&self) -> bool {
-        matches!(self, Self::Directional { .. })
+        matches!(self, Self::Directional { .. } | Self::Environment { .. })
     }
 
     /// Luminous power in a scene whose bounding sphere has this radius: what lights are chosen by. Without decay and for
@@ -105,7 +131,11 @@ impl Light {
                 let flux = TAU * ((1.0 - inner) + (inner - outer) / 3.0) * color;
                 if *decay { flux } else { flux * scene_radius * scene_radius }
             }
+            Self::Ies { profile, .. } => profile.lumens() * color,
             Self::Directional { .. } => disk * color,
+            Self::Environment { map, scale, .. } => {
+                disk * f64::from(*scale) * map.weights().iter().sum::<f64>()
+            }
         }
     }
 
@@ -138,7 +168,17 @@ impl Light {
                 let fits = *inner >= 0.0 && inner <= outer && *outer <= std::f32::consts::PI;
                 fits.then_some(()).ok_or("its cone is none: 0 ≤ inner ≤ outer ≤ π does not hold")
             }),
+            Self::Ies {
+                position, rotation, ..
+            } => placed(position).and(
+                (rotation.is_finite() && rotation.is_normalized())
+                    .then_some(())
+                    .ok_or("its rotation is none"),
+            ),
             Self::Directional { direction, .. } => aimed(direction),
+            Self::Environment { turn, .. } => {
+                (turn.is_finite().then_some(())).ok_or("its turn is not finite")
+            }
         };
         found.err().map(str::to_owned)
     }
