@@ -167,10 +167,12 @@ pub fn named(name: &str) -> Result<SceneData, SceneError> {
 /// [`SceneError`]: unknown name, unreadable or malformed file, no triangles, coordinates too large.
 pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, SceneError> {
     let mut variant = variant.clone();
-    let around = variant.params.0.remove(ENVIRONMENT);
+    let mut common = Params::default();
+    common.0.extend(variant.params.0.remove_entry(ENVIRONMENT));
+    let common = common.completed(&common_parameters())?;
     let scene = load_alone(&variant, options)?;
-    match around {
-        Some(ParamValue::Name(file)) if !file.is_empty() => scene.under(Path::new(&file)),
+    match common.0.get(ENVIRONMENT) {
+        Some(ParamValue::Name(file)) if !file.is_empty() => scene.under(Path::new(file)),
         _ => Ok(scene),
     }
 }
