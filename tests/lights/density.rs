@@ -3,6 +3,7 @@
 use crate::support::*;
 use crate::{lamp, towards};
 use glam::Vec3;
+use raystone::geometry::Triangle;
 use raystone::gpu::{Gpu, KernelLibrary};
 use raystone::integrator::{
     ConfiguredIntegrator, CountedRays, Integrator, IntegratorFacts, RayOffset, RenderJob, Renderer,
@@ -135,7 +136,8 @@ fn scenes() -> Vec<(&'static str, SceneData)> {
     for place in [[1.6, 1.5, 0.0], [-1.5, 2.5, -1.5], [0.9, 1.1, 1.7]] {
         let corner = |x: f32, z: f32| Vec3::from(place) + Vec3::new(x, 0.1 * x, z);
         let [a, b, c, d] = [corner(0.0, 0.0), corner(0.4, 0.0), corner(0.4, 0.6), corner(0.0, 0.6)];
-        squares.triangles.extend([[a, b, c].into(), [a, c, d].into()]);
+        let halves = [[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices });
+        squares.triangles.extend(halves);
         squares.material_ids.extend([1, 1]);
     }
     all.push(("squares", squares));
