@@ -1,6 +1,7 @@
 //! Measuring: the gate, the timing protocol, image metrics, statistics, records.
 
 pub mod bias;
+pub mod comparison;
 pub mod figure;
 pub mod gate;
 pub mod hard_rays;
@@ -11,9 +12,11 @@ pub mod memory;
 pub mod metrics;
 pub mod rays;
 pub mod record;
+pub mod replicates;
 pub mod sampler_cost;
 pub mod spectrum;
 pub mod statistics;
+pub mod stopping;
 pub mod stream;
 pub mod timing;
 pub mod words;
