@@ -66,7 +66,9 @@ impl LogFigure {
         let mut logs: Vec<f64> = times.iter().map(|time| time.ln()).collect();
         logs.sort_unstable_by(f64::total_cmp);
         let cut = (TRIMMED * logs.len() as f64) as usize;
-        let kept = logs.get(cut..logs.len() - cut).filter(|kept| kept.len() > 1)?;
+        let kept = logs
+            .get(cut..logs.len() - cut)
+            .filter(|kept| kept.len() > 1)?;
         let (least, greatest) = (kept[0], kept[kept.len() - 1]);
         let log = kept.iter().sum::<f64>() / kept.len() as f64;
         let (n, h) = (logs.len() as f64, kept.len() as f64);
@@ -246,7 +248,11 @@ pub fn places(points: &[[LogFigure; 2]]) -> Vec<Place> {
         };
         let is_ahead_of = |other: &[LogFigure; 2]| {
             let same = |k: usize| is_same(&points[i][k], &other[k]);
-            let level = if same(0) || same(1) { LEVEL } else { 0.5 * LEVEL };
+            let level = if same(0) || same(1) {
+                LEVEL
+            } else {
+                0.5 * LEVEL
+            };
             let better = |k: usize| chance_that_less(&points[i][k], &other[k]) <= level;
             same(0) && same(1) || better(0) || better(1)
         };

@@ -28,7 +28,10 @@ pub fn is_met_by(rule: &StopRule, replicates: &[&ErrorRecord], spp: u32, looks: 
     let all = Replicates(replicates);
     let errors = replicates.iter().flat_map(|r| &r.errors);
     let mut ids = errors.flat_map(|e| e.metrics.keys());
-    let Some(id) = ids.find(|id| id.starts_with(METRIC)).filter(|_| all.have_spread()) else {
+    let Some(id) = ids
+        .find(|id| id.starts_with(METRIC))
+        .filter(|_| all.have_spread())
+    else {
         return false;
     };
     let error = all.log_figure(id, |without| Some(all.mean(id, spp, without)?.ln()));

@@ -205,6 +205,9 @@ mod tests {
         // Errors of nothing have no ratio.
         let next = |figures: &[_]| said(Lower, figures)[2].clone();
         assert_eq!(next(&[(0.0, 0.0, true), (0.0, 0.0, true)]), "b 0");
-        assert_eq!(next(&[(1.0, 0.0, true), (2.0, 0.0, true)]), "b 2.00 (2.00×)");
+        assert_eq!(
+            next(&[(1.0, 0.0, true), (2.0, 0.0, true)]),
+            "b 2.00 (2.00×)"
+        );
     }
 }

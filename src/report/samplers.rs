@@ -5,9 +5,7 @@ use super::format;
 use crate::measure::bias::BiasVerdict;
 use crate::measure::comparison::LogFigure;
 use crate::measure::figure::figure;
-use crate::measure::record::{
-    BiasRecord, ErrorRecord, Interval, Key, SpectrumRecord, TimeRecord,
-};
+use crate::measure::record::{BiasRecord, ErrorRecord, Interval, Key, SpectrumRecord, TimeRecord};
 use crate::measure::replicates::{Replicates, Without};
 use crate::measure::statistics::{
     LEAST_FOR_MEDIAN, jackknife_interval, log_log_fit, positive_interval,
@@ -170,7 +168,10 @@ impl<'a> MeasuredSampler<'a> {
             let exact = by_reference.low == by_reference.high;
             Some(MeanError {
                 spp,
-                error: metric.shown(positive_interval(value, &self.all().sources(id, estimate)?)?),
+                error: metric.shown(positive_interval(
+                    value,
+                    &self.all().sources(id, estimate)?,
+                )?),
                 resolved: by_reference.low > 0.0 || exact && value >= 0.0,
             })
         };
@@ -243,7 +244,10 @@ impl<'a> MeasuredSampler<'a> {
                 slope
             })
         };
-        jackknife_interval(estimate(Without::Nothing)?, &self.all().sources(id, estimate)?)
+        jackknife_interval(
+            estimate(Without::Nothing)?,
+            &self.all().sources(id, estimate)?,
+        )
     }
 
     fn all(&self) -> Replicates<'_> {

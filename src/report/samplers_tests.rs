@@ -195,7 +195,9 @@ fn errors_on_one_reference_are_compared_without_the_noise_that_they_share() {
     };
     let (a, b) = (of(NOISE), of(1.15 * NOISE));
     let log = |records: &[ErrorRecord]| {
-        sampler(records).log_error(Metric::RelMse, [1, 1], 0.0).unwrap()
+        sampler(records)
+            .log_error(Metric::RelMse, [1, 1], 0.0)
+            .unwrap()
     };
     let (a, b) = (log(&a), log(&b));
     let together = a.compared_with(&b).p;

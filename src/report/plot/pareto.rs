@@ -210,7 +210,11 @@ mod tests {
             sampler: 0,
             seconds: Interval::exact(seconds),
             error: Interval::exact(error),
-            place: if structure == 0 { Place::Front } else { Place::Open },
+            place: if structure == 0 {
+                Place::Front
+            } else {
+                Place::Open
+            },
         };
         let plot = ParetoPlot {
             x_title: "seconds".into(),

@@ -83,7 +83,9 @@ pub fn table(scene: &SceneGroup) -> Table {
         ],
     );
     let rulings = rulings(scene);
-    let rows = rulings.into_iter().map(|(question, ruling)| row(question, &ruling));
+    let rows = rulings
+        .into_iter()
+        .map(|(question, ruling)| row(question, &ruling));
     table.rows.extend(rows);
     table
 }
@@ -97,7 +99,13 @@ fn row(question: String, ruling: &Ruling) -> Vec<TableCell> {
     let answer = TableCell::from(ruling.answer()).toned(tone);
     let (figure, next) = (ruling.figure(), ruling.runner_up());
     let pairs = ruling.comparisons().to_string();
-    vec![question.into(), answer, figure.into(), next.into(), pairs.into()]
+    vec![
+        question.into(),
+        answer,
+        figure.into(),
+        next.into(),
+        pairs.into(),
+    ]
 }
 
 /// Who may not win, with the reason, and who is shown without being ranked.
@@ -163,8 +171,7 @@ pub fn best_per_sample(view: &View, spp: u32) -> Ruling {
         Some(Contender {
             name: sampler.name.clone(),
             figure: sampler.mean_error_at(Metric::RelMse, spp)?.error,
-            log: (sampler.log_error(Metric::RelMse, [spp; 2], 0.0))
-                .filter(|_| sampler.is_ranked()),
+            log: (sampler.log_error(Metric::RelMse, [spp; 2], 0.0)).filter(|_| sampler.is_ranked()),
         })
     };
     let fair = view.samplers.iter().filter(|s| s.fault().is_none());
@@ -230,7 +237,10 @@ impl<'a> Runner<'a> {
         let error = |spps, share| self.sampler.log_error(Metric::RelMse, spps, share);
         // At a point of the curve, errors are taken to fall as one over the samples.
         let slope = match a < b {
-            true => (error([b; 2], 0.0)?.log - error([a; 2], 0.0)?.log) / (f64::from(b) / f64::from(a)).ln(),
+            true => {
+                (error([b; 2], 0.0)?.log - error([a; 2], 0.0)?.log)
+                    / (f64::from(b) / f64::from(a)).ln()
+            }
             false => -1.0,
         };
         Some(error([a, b], share)?.with_noise(self.noise(slope)))
@@ -246,7 +256,10 @@ impl<'a> Runner<'a> {
     /// Seconds until the error falls to `target`.
     fn seconds_to(&self, target: f64) -> Option<LogFigure> {
         let spp = self.sampler.spp_to(Metric::RelMse, target)?;
-        Some(spp.scaled(self.time.log.exp() / 1000.0).with_noise(self.noise(1.0)))
+        Some(
+            spp.scaled(self.time.log.exp() / 1000.0)
+                .with_noise(self.noise(1.0)),
+        )
     }
 }
 
@@ -280,7 +293,13 @@ impl<'a> Race<'a> {
         }
         let last = |runner: &Runner| {
             let (spp, _) = runner.curve.last()?;
-            Some(runner.sampler.mean_error_at(Metric::RelMse, *spp)?.error.value)
+            Some(
+                runner
+                    .sampler
+                    .mean_error_at(Metric::RelMse, *spp)?
+                    .error
+                    .value,
+            )
         };
         let most = self.runners.iter().filter_map(last).reduce(f64::max)?;
         let unit = 10f64.powf(most.log10().floor() - 1.0);
@@ -318,7 +337,11 @@ impl<'a> Race<'a> {
                 let to = format!("to {metric} {}", format::significant(target, 2));
                 let spp = sampler.spp_to(Metric::RelMse, target);
                 add(format!("spp {to}"), "spp-to-error/v1", spp);
-                add(format!("seconds {to}"), "seconds-to-error/v1", runner.seconds_to(target));
+                add(
+                    format!("seconds {to}"),
+                    "seconds-to-error/v1",
+                    runner.seconds_to(target),
+                );
             }
         }
         values
