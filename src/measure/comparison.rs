@@ -52,7 +52,8 @@ impl LogFigure {
                 shared: Vec::new(),
             });
         }
-        all().all(|x| x.is_finite()).then(|| Self {
+        let is_finite = all().all(|x| x.is_finite());
+        is_finite.then(|| Self {
             log,
             own: own.iter().filter_map(|s| Spread::jackknife(s)).collect(),
             shared,

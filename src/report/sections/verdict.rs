@@ -94,7 +94,7 @@ fn row(question: String, ruling: &Ruling) -> Vec<TableCell> {
     let tone = match ruling {
         Ruling::Winner(..) => Tone::Good,
         Ruling::Nobody => Tone::Bad,
-        Ruling::Withheld(_) | Ruling::Alone(_) | Ruling::Unclear(_) => Tone::Note,
+        Ruling::Withheld(_) | Ruling::Alone(_) | Ruling::Unclear(..) => Tone::Note,
     };
     let answer = TableCell::from(ruling.answer()).toned(tone);
     let (figure, next) = (ruling.figure(), ruling.runner_up());
