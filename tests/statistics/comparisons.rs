@@ -154,7 +154,7 @@ fn intervals_of_times_and_of_errors_per_second_cover_the_truth() {
     }
     println!("{covered:?} of {trials}");
     for count in covered {
-        let share = f64::from(count) / f64::from(trials);
+        let share = count as f64 / trials as f64;
         assert!((0.93..=0.97).contains(&share), "{covered:?}");
     }
     // Negative control.
