@@ -134,14 +134,15 @@ impl LogFigure {
         }
     }
 
-    /// What the figure exceeds with probability `chance` at most: the end of a one-sided interval.
+    /// What the figure exceeds with probability `chance` at most: the upper end of the interval that misses with
+    /// that chance on either side together. Skewed figures are missed almost only where they lie above.
     pub fn upper(&self, chance: f64) -> f64 {
         let spread = self.spread();
         if self.is_exact(spread) {
             return self.log.exp();
         }
-        let quantile = student_t_quantile(2.0 * chance, spread.freedom);
-        (self.log + quantile * spread.variance.sqrt()).exp()
+        let half = student_t_quantile(chance, spread.freedom) * spread.variance.sqrt();
+        (self.log + half).exp()
     }
 
     fn is_exact(&self, spread: Spread) -> bool {

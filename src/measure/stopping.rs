@@ -3,8 +3,8 @@
 //! A rule that looks at an estimate again and again and stops when it is small stops when it is small by chance: the
 //! error that it then reports is too small, and the claim is wrong more often than one look would have it. Two
 //! things bound that. It looks only at the powers of two of an experiment, a handful of times, and at the upper end of
-//! a one-sided interval whose chance to miss is shared out among the looks (Bonferroni): whatever the looks have in
-//! common, the true error is above the target in at most 1 − confidence of all cells that stop. The error figure of the
+//! an interval whose chance to miss is shared out among the looks (Bonferroni): whatever the looks have in
+//! common, a cell is ended with its true error above the target with a probability of at most 1 − confidence. The error figure of the
 //! cell itself is the mean over its replicates as always: where the target is met with room, stopping tells nothing
 //! of it; where it is met by a hair, it is too small by at most about the half width of that interval.
 
