@@ -10,6 +10,7 @@ mod camera;
 mod content;
 mod daylight;
 mod error;
+mod export;
 mod framing;
 mod gltf;
 mod gltf_accessor;
@@ -29,6 +30,7 @@ pub use builtin::builtin_scenes;
 pub use camera::Bounds;
 pub use daylight::Daylight;
 pub use error::SceneError;
+pub use export::{ExportError, MITSUBA_FILE, MitsubaSettings, export_mitsuba};
 pub use framing::Framing;
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 pub use material::{
