@@ -35,8 +35,8 @@ pub use export::{ExportError, MITSUBA_FILE, MitsubaSettings, export_mitsuba};
 pub use framing::Framing;
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 pub use material::{
-    DEFAULT_IOR, DIELECTRIC, DIFFUSE, MATERIAL_KINDS, MIRROR, Material, MaterialKind,
-    MaterialSource,
+    COOK_TORRANCE, CookTorrance, DEFAULT_IOR, DIELECTRIC, DIFFUSE, Fresnel, MATERIAL_KINDS, MIRROR,
+    Masking, Material, MaterialKind, MaterialSource, PHONG, PRINCIPLED, reflectance_of_ior,
 };
 
 use crate::geometry::{Camera, Triangle};
