@@ -34,7 +34,9 @@ pub(super) fn resolve(
         });
     }
     let what = match axis {
-        Axis::Scene => "scene (neither built in nor a path of a .obj, .gltf, .glb, .ply or Nori .xml file)",
+        Axis::Scene => {
+            "scene (neither built in nor a path of a .obj, .gltf, .glb, .ply or Nori .xml file)"
+        }
         axis => axis.name(),
     };
     Err(ConfigError::Unknown {

@@ -25,7 +25,11 @@ const SIZE: [f64; 2] = [1280.0, 720.0];
 ///
 /// # Errors
 /// [`SceneError`]: XML that is broken (with its line), no `<scene>` at its root, a number that is none, a mesh that does not load.
-pub(super) fn load(path: &Path, name: &str, options: &LoadOptions) -> Result<SceneData, SceneError> {
+pub(super) fn load(
+    path: &Path,
+    name: &str,
+    options: &LoadOptions,
+) -> Result<SceneData, SceneError> {
     let bytes = error::read(path)?;
     guarded(path, || {
         let text = std::str::from_utf8(&bytes);
@@ -67,7 +71,10 @@ impl Reader<'_> {
                 "camera" | "integrator" | "sampler" => {}
                 "emitter" => {
                     let kind = node.attribute("type").unwrap_or_default();
-                    self.warn(node, &format!("the emitter `{kind}` is not known, left out"));
+                    self.warn(
+                        node,
+                        &format!("the emitter `{kind}` is not known, left out"),
+                    );
                 }
                 other => self.warn(node, &format!("`<{other}>` is not known, left out")),
             }
@@ -100,9 +107,8 @@ impl Reader<'_> {
     }
 
     fn mesh(&mut self, node: Node<'_, '_>, mirror: Option<DMat4>) -> Result<(), SceneError> {
-        let file = property(node, "filename").ok_or_else(|| {
-            self.broken(node, "a mesh without `<string name=\"filename\" …>`")
-        })?;
+        let file = property(node, "filename")
+            .ok_or_else(|| self.broken(node, "a mesh without `<string name=\"filename\" …>`"))?;
         let relative = Path::new(file);
         if relative.is_absolute() && !self.options.allow_outside {
             let problem = format!("`{file}` is an absolute path, which only --allow-outside reads");
@@ -151,8 +157,12 @@ impl Reader<'_> {
 
     fn bsdf(&mut self, node: Node<'_, '_>, name: &str) -> Result<Material, SceneError> {
         let kind = node.attribute("type").unwrap_or_default();
-        let inside = self.number(node, "intIOR")?.map_or(INSIDE_IOR, |v| v as f32);
-        let outside = self.number(node, "extIOR")?.map_or(OUTSIDE_IOR, |v| v as f32);
+        let inside = self
+            .number(node, "intIOR")?
+            .map_or(INSIDE_IOR, |v| v as f32);
+        let outside = self
+            .number(node, "extIOR")?
+            .map_or(OUTSIDE_IOR, |v| v as f32);
         Ok(match kind {
             "diffuse" => {
                 let albedo = self.color(node, "albedo")?.unwrap_or(Vec3::splat(ALBEDO));
@@ -165,11 +175,17 @@ impl Reader<'_> {
             "dielectric" => Material::dielectric(name, Vec3::ONE, inside / outside),
             "microfacet" => {
                 let base = self.color(node, "kd")?.unwrap_or(Vec3::splat(ALBEDO));
-                self.warn(node, "`microfacet` is not rendered yet; drawn as its diffuse part");
+                self.warn(
+                    node,
+                    "`microfacet` is not rendered yet; drawn as its diffuse part",
+                );
                 Material::diffuse(name, reflectance(base))
             }
             other => {
-                self.warn(node, &format!("the material `{other}` is not known; drawn as diffuse"));
+                self.warn(
+                    node,
+                    &format!("the material `{other}` is not known; drawn as diffuse"),
+                );
                 Material::diffuse(name, Vec3::splat(ALBEDO))
             }
         })
@@ -190,7 +206,11 @@ impl Reader<'_> {
                 "translate" => DMat4::from_translation(value("value")?),
                 "scale" => DMat4::from_scale(value("value")?),
                 "rotate" => {
-                    let angle = step.attribute("angle").unwrap_or_default().trim().parse::<f64>();
+                    let angle = step
+                        .attribute("angle")
+                        .unwrap_or_default()
+                        .trim()
+                        .parse::<f64>();
                     let angle = angle.map_err(|_| self.broken(step, "`angle` is not a number"))?;
                     let axis = value("axis")?.normalize_or_zero();
                     DMat4::from_axis_angle(axis, angle.to_radians())
@@ -213,8 +233,15 @@ impl Reader<'_> {
         Ok(DMat4::from_cols_array(&rows).transpose())
     }
 
-    fn vector(&self, node: Node<'_, '_>, text: Option<&str>, name: &str) -> Result<DVec3, SceneError> {
-        let three = text.and_then(numbers).and_then(|n| <[f64; 3]>::try_from(n).ok());
+    fn vector(
+        &self,
+        node: Node<'_, '_>,
+        text: Option<&str>,
+        name: &str,
+    ) -> Result<DVec3, SceneError> {
+        let three = text
+            .and_then(numbers)
+            .and_then(|n| <[f64; 3]>::try_from(n).ok());
         let problem = || self.broken(node, &format!("`{name}` is not three numbers"));
         three.map(DVec3::from).ok_or_else(problem)
     }
@@ -237,7 +264,10 @@ impl Reader<'_> {
 
     fn warn(&mut self, node: Node<'_, '_>, what: &str) {
         let line = line_of(node);
-        self.builder.report.warnings.push(format!("line {line}: {what}"));
+        self.builder
+            .report
+            .warnings
+            .push(format!("line {line}: {what}"));
     }
 
     fn broken(&self, node: Node<'_, '_>, problem: &str) -> SceneError {
@@ -251,7 +281,9 @@ fn line_of(node: Node<'_, '_>) -> u32 {
 
 /// The value of the property `name` among the children of a node: `<float name="fov" value="30"/>`.
 fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
-    let mut properties = node.children().filter(|n| n.attribute("name") == Some(name));
+    let mut properties = node
+        .children()
+        .filter(|n| n.attribute("name") == Some(name));
     properties.find_map(|n| n.attribute("value"))
 }
 
@@ -259,7 +291,9 @@ fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
 fn numbers(text: &str) -> Option<Vec<f64>> {
     let words = text.split(|c: char| c == ',' || c.is_whitespace());
     let words = words.filter(|word| !word.is_empty());
-    words.map(|w| w.parse().ok().filter(|v: &f64| v.is_finite())).collect()
+    words
+        .map(|w| w.parse().ok().filter(|v: &f64| v.is_finite()))
+        .collect()
 }
 
 /// Columns to the left, upwards and forwards, and the eye.

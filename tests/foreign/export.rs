@@ -2,7 +2,9 @@
 //! the ignored test runs.
 
 use crate::support::builtin;
-use raystone::scene::{DIELECTRIC, MITSUBA_FILE, MitsubaSettings, SceneData, Texture, export_mitsuba};
+use raystone::scene::{
+    DIELECTRIC, MITSUBA_FILE, MitsubaSettings, SceneData, Texture, export_mitsuba,
+};
 use std::fs;
 use std::process::Command;
 use tempfile::TempDir;
@@ -37,15 +39,32 @@ fn every_triangle_is_written_once_and_an_emitter_with_its_back() {
     assert!(xml.contains(r#"<integer name="max_depth" value="7"/>"#));
     assert!(xml.contains(r#"<rfilter type="box"/>"#));
     assert_eq!(xml.matches(r#"<emitter type="area">"#).count(), 2);
-    assert_eq!(exported(&scene, true).1.matches(r#"<emitter type="area">"#).count(), 1);
+    assert_eq!(
+        exported(&scene, true)
+            .1
+            .matches(r#"<emitter type="area">"#)
+            .count(),
+        1
+    );
     let meshes = fs::read_dir(folder.path().join("meshes")).unwrap();
-    let written: usize = meshes.map(|e| faces(&fs::read(e.unwrap().path()).unwrap())).sum();
-    assert_eq!(written, scene.triangles.len() + 2, "the lamp's back is two more");
+    let written: usize = meshes
+        .map(|e| faces(&fs::read(e.unwrap().path()).unwrap()))
+        .sum();
+    assert_eq!(
+        written,
+        scene.triangles.len() + 2,
+        "the lamp's back is two more"
+    );
     let document = roxmltree::Document::parse(&xml).unwrap();
     let refs = document.descendants().filter(|n| n.has_tag_name("ref"));
     for reference in refs {
         let id = reference.attribute("id").unwrap();
-        assert!(document.descendants().any(|n| n.has_tag_name("bsdf") && n.attribute("id") == Some(id)), "{id}");
+        assert!(
+            document
+                .descendants()
+                .any(|n| n.has_tag_name("bsdf") && n.attribute("id") == Some(id)),
+            "{id}"
+        );
     }
 }
 
@@ -92,12 +111,20 @@ fn textures_keep_their_factor_and_skies_are_written() {
     assert!(has(&scene, "textures/0.exr"));
     scene.environment = glam::Vec3::ONE;
     scene.daylight = None;
-    assert!(exported(&scene, false).1.contains(r#"<emitter type="constant">"#));
+    assert!(
+        exported(&scene, false)
+            .1
+            .contains(r#"<emitter type="constant">"#)
+    );
     scene.daylight = Some(raystone::scene::Daylight::default());
     assert!(has(&scene, "textures/sky.exr"));
     scene.materials[0].kind = &DIELECTRIC;
     scene.materials[0].parameters = vec![1.5, 0.0];
-    assert!(exported(&scene, false).1.contains(r#"<bsdf type="dielectric" id="material-0">"#));
+    assert!(
+        exported(&scene, false)
+            .1
+            .contains(r#"<bsdf type="dielectric" id="material-0">"#)
+    );
 }
 
 /// What the script ends with where Mitsuba cannot be installed.
@@ -110,7 +137,9 @@ fn mitsuba_renders_the_same_cornell_box_and_not_one_with_a_darker_wall() {
     let validate = |more: &[&str]| {
         let mut command = Command::new(format!("{root}/scripts/validate"));
         command.env("RAYSTONE", env!("CARGO_BIN_EXE_raystone"));
-        command.args(["scene", "cornell-box", "--size", "64x64", "--fronts-only"]).args(more);
+        command
+            .args(["scene", "cornell-box", "--size", "64x64", "--fronts-only"])
+            .args(more);
         command.status().unwrap().code()
     };
     let first = validate(&[]);
@@ -119,5 +148,8 @@ fn mitsuba_renders_the_same_cornell_box_and_not_one_with_a_darker_wall() {
         return;
     }
     assert_eq!(first, Some(0));
-    assert_eq!(validate(&["--control", "0.63 0.065 0.05=>0.599 0.062 0.0475"]), Some(1));
+    assert_eq!(
+        validate(&["--control", "0.63 0.065 0.05=>0.599 0.062 0.0475"]),
+        Some(1)
+    );
 }

@@ -41,7 +41,12 @@ fn disk(height: f64, radius: f64, offset: f64) -> f64 {
 fn compare(light: &[DVec3], irradiance: impl Fn(DVec3) -> f64, brighter: f32) -> f64 {
     let camera = Camera::upright(Vec3::new(2.5, 1.0, -2.0), Vec3::new(0.2, 0.0, 0.3), 12.0);
     let corner = |x: f32, z: f32| Vec3::new(x, 0.0, z);
-    let plane = vec![corner(-9.0, -9.0), corner(-9.0, 9.0), corner(9.0, 9.0), corner(9.0, -9.0)];
+    let plane = vec![
+        corner(-9.0, -9.0),
+        corner(-9.0, 9.0),
+        corner(9.0, 9.0),
+        corner(9.0, -9.0),
+    ];
     let lamp = light.iter().map(|c| c.as_vec3()).collect();
     let materials = vec![
         Material::diffuse("plane", Vec3::splat(ALBEDO as f32)),
@@ -71,7 +76,9 @@ fn compare(light: &[DVec3], irradiance: impl Fn(DVec3) -> f64, brighter: f32) ->
 
 /// Seen from below, corners turn counter-clockwise.
 fn rectangle() -> Vec<DVec3> {
-    [(-0.4, -0.3), (0.4, -0.3), (0.4, 0.5), (-0.4, 0.5)].map(|(x, z)| DVec3::new(x, HEIGHT, z)).to_vec()
+    [(-0.4, -0.3), (0.4, -0.3), (0.4, 0.5), (-0.4, 0.5)]
+        .map(|(x, z)| DVec3::new(x, HEIGHT, z))
+        .to_vec()
 }
 
 /// A regular polygon of the area of a circle.

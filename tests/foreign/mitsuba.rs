@@ -19,7 +19,11 @@ const STORED_REPLICATES: usize = 16;
 /// The pixels of a portable float map of [`EDGE`] × [`EDGE`] pixels, from the top.
 fn pixels(bytes: &[u8]) -> Vec<[f32; 3]> {
     let data = bytes.strip_prefix(b"PF\n64 64\n-1.0\n").expect("a header");
-    let floats = data.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b));
+    let floats = data
+        .as_chunks::<4>()
+        .0
+        .iter()
+        .map(|b| f32::from_le_bytes(*b));
     let floats: Vec<f32> = floats.collect();
     let rows = floats.as_chunks::<3>().0.chunks(EDGE as usize).rev();
     rows.flatten().copied().collect()
@@ -32,16 +36,25 @@ fn stored() -> Moments {
     let variance = pixels(include_bytes!("../data/mitsuba-cornell-box-variance.pfm"));
     Moments {
         mean: mean.iter().map(luminance).collect(),
-        variance: variance.iter().map(|v| luminance(&v.map(f32::sqrt)).powi(2)).collect(),
+        variance: variance
+            .iter()
+            .map(|v| luminance(&v.map(f32::sqrt)).powi(2))
+            .collect(),
         replicates: STORED_REPLICATES,
     }
 }
 
 /// What distinguishes an image of the scene from Mitsuba's Cornell box: nothing, if all is well.
 fn faults(scene: SceneData) -> Vec<String> {
-    let (ours, theirs) = (replicates(scene, 6, [EDGE; 2], SPP, REPLICATES).moments(), stored());
+    let (ours, theirs) = (
+        replicates(scene, 6, [EDGE; 2], SPP, REPLICATES).moments(),
+        stored(),
+    );
     let (ratio, accepted) = (ours.total() / theirs.total(), ours.accepted(&theirs));
-    println!("ratio of the means {ratio:.5}, {:.2} % of pixels accepted", 100.0 * accepted);
+    println!(
+        "ratio of the means {ratio:.5}, {:.2} % of pixels accepted",
+        100.0 * accepted
+    );
     let mut faults = Vec::new();
     if (ratio - 1.0).abs() > RATIO {
         faults.push("mean".to_owned());

@@ -45,7 +45,11 @@ fn transforms_act_in_their_order_and_the_field_of_view_is_that_of_the_width() {
     let scene = loaded(&scene(moved, "")).unwrap();
     let close = |a: Vec3, b: Vec3| (a - b).abs().max_element() < 1e-6;
     let [a, b, c] = scene.triangles[0].vertices;
-    assert!(close(a, Vec3::X) && close(b, Vec3::new(1.0, 2.0, 0.0)) && close(c, Vec3::new(-1.0, 0.0, 0.0)));
+    assert!(
+        close(a, Vec3::X)
+            && close(b, Vec3::new(1.0, 2.0, 0.0))
+            && close(c, Vec3::new(-1.0, 0.0, 0.0))
+    );
     assert_eq!(scene.materials[0].emission, Vec3::new(3.0, 2.0, 1.0));
     assert_eq!(scene.materials[0].base_color, Vec3::splat(0.5));
     let camera = scene.camera.unwrap();
@@ -53,7 +57,11 @@ fn transforms_act_in_their_order_and_the_field_of_view_is_that_of_the_width() {
     // tan(45°) over the half width is ½ over the half height.
     let expected = 2.0 * 0.5_f32.atan().to_degrees();
     assert!((camera.vertical_fov_degrees - expected).abs() < 1e-4);
-    assert!(scene.report.warnings.is_empty(), "{:?}", scene.report.warnings);
+    assert!(
+        scene.report.warnings.is_empty(),
+        "{:?}",
+        scene.report.warnings
+    );
 }
 
 #[test]
@@ -84,7 +92,11 @@ fn materials_are_those_of_the_file() {
     assert_eq!(glass.materials[0].kind, &DIELECTRIC);
     assert!((glass.materials[0].parameters[0] - 1.6 / 1.000277).abs() < 1e-6);
     let unknown = of(r#"<bsdf type="velvet"/>"#);
-    assert!(unknown.report.warnings[0].contains("line 10: the material `velvet`"), "{:?}", unknown.report);
+    assert!(
+        unknown.report.warnings[0].contains("line 10: the material `velvet`"),
+        "{:?}",
+        unknown.report
+    );
 }
 
 #[test]
@@ -93,13 +105,22 @@ fn a_broken_scene_is_answered_with_its_line() {
     for (xml, expected) in [
         ("<scene><mesh></scene>", "line 1"),
         ("<thing/>", "no `<scene>`"),
-        ("<scene>\n<mesh type=\"obj\"/></scene>", "line 2): a mesh without"),
-        ("<scene><mesh><string name=\"filename\" value=\"/etc/x.obj\"/></mesh></scene>", "absolute path"),
+        (
+            "<scene>\n<mesh type=\"obj\"/></scene>",
+            "line 2): a mesh without",
+        ),
+        (
+            "<scene><mesh><string name=\"filename\" value=\"/etc/x.obj\"/></mesh></scene>",
+            "absolute path",
+        ),
         ("<scene/>", "no triangles"),
     ] {
         let found = answer(xml);
         assert!(found.contains(expected), "{found}");
     }
-    let number = scene(r#"<transform name="toWorld"><scale value="1 x 1"/></transform>"#, "");
+    let number = scene(
+        r#"<transform name="toWorld"><scale value="1 x 1"/></transform>"#,
+        "",
+    );
     assert!(answer(&number).contains("`value` is not three numbers"));
 }

@@ -41,7 +41,12 @@ impl Wall {
     }
 
     fn quad(&self, [s0, s1]: [f64; 2], [t0, t1]: [f64; 2]) -> [DVec3; 4] {
-        [self.at(s0, t0), self.at(s1, t0), self.at(s1, t1), self.at(s0, t1)]
+        [
+            self.at(s0, t0),
+            self.at(s1, t0),
+            self.at(s1, t1),
+            self.at(s0, t1),
+        ]
     }
 }
 
@@ -94,9 +99,20 @@ fn patches() -> Vec<Patch> {
 }
 
 /// Radiance that arrives at a point of a wall over all patches, times cosine over π: to be multiplied by the albedo.
-fn gathered(point: DVec3, normal: DVec3, wall: usize, patches: &[Patch], radiance: &[DVec3]) -> DVec3 {
-    let others = patches.iter().zip(radiance).filter(|(patch, _)| patch.wall != wall);
-    others.map(|(patch, l)| *l * (polygon(point, normal, &patch.corners) / PI)).sum()
+fn gathered(
+    point: DVec3,
+    normal: DVec3,
+    wall: usize,
+    patches: &[Patch],
+    radiance: &[DVec3],
+) -> DVec3 {
+    let others = patches
+        .iter()
+        .zip(radiance)
+        .filter(|(patch, _)| patch.wall != wall);
+    others
+        .map(|(patch, l)| *l * (polygon(point, normal, &patch.corners) / PI))
+        .sum()
 }
 
 /// Radiance of every patch after so many bounces.
@@ -173,7 +189,13 @@ fn excess(albedos: [[f64; 3]; 4], patches: &[Patch], radiance: &[DVec3]) -> f64 
             }
         };
         let materials = albedos.iter().enumerate().map(material).collect();
-        let images = replicates(scene_of(&polygons(), materials, camera), BOUNCES as i64, SIZE, 256, 8);
+        let images = replicates(
+            scene_of(&polygons(), materials, camera),
+            BOUNCES as i64,
+            SIZE,
+            256,
+            8,
+        );
         let means: Vec<f64> = images.0.iter().map(|image| image.mean()).collect();
         let found = Estimate::of(&means);
         let [forward, right, up] = camera.basis(SIZE).map(Vec3::as_dvec3);
@@ -198,9 +220,16 @@ fn excess(albedos: [[f64; 3]; 4], patches: &[Patch], radiance: &[DVec3]) -> f64 
 #[test]
 fn a_box_without_blocks_is_as_bright_as_radiosity_says_and_a_grey_too_dark_is_found() {
     let patches = patches();
-    let whole: f64 = patches.iter().map(|p| polygon(DVec3::new(0.5, 0.0, 0.5), DVec3::Y, &p.corners) / PI).sum();
+    let whole: f64 = patches
+        .iter()
+        .map(|p| polygon(DVec3::new(0.5, 0.0, 0.5), DVec3::Y, &p.corners) / PI)
+        .sum();
     // All directions but those through the open side, whose factor is that of the back wall.
-    let back: f64 = patches.iter().filter(|p| p.wall == 1).map(|p| polygon(DVec3::new(0.5, 0.0, 0.5), DVec3::Y, &p.corners) / PI).sum();
+    let back: f64 = patches
+        .iter()
+        .filter(|p| p.wall == 1)
+        .map(|p| polygon(DVec3::new(0.5, 0.0, 0.5), DVec3::Y, &p.corners) / PI)
+        .sum();
     assert!((whole + back - 1.0).abs() < 1e-9, "{whole} {back}");
     // The last bounce is gathered at the points that the camera sees.
     let radiance = solved(&patches, BOUNCES - 1);

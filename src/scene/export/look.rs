@@ -88,10 +88,7 @@ impl Export<'_> {
             let warning = "the sky is seen through what is far, which Mitsuba cannot: the room will be darker";
             self.warnings.push(warning.to_owned());
         }
-        self.write_radiance(
-            "textures/sky.exr",
-            &sky_image(daylight, scene.environment)?,
-        )?;
+        self.write_radiance("textures/sky.exr", &sky_image(daylight, scene.environment)?)?;
         self.xml += r#"    <emitter type="envmap">
         <string name="filename" value="textures/sky.exr"/>
     </emitter>
@@ -141,7 +138,11 @@ fn picture(texture: &Texture) -> Picture {
     Picture {
         width: texture.width,
         height: texture.height,
-        pixels: texture.texels.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect(),
+        pixels: texture
+            .texels
+            .iter()
+            .map(|[r, g, b, _]| [*r, *g, *b])
+            .collect(),
     }
 }
 
