@@ -7,14 +7,17 @@
 use super::builder::{Look, SceneBuilder};
 use super::error::{self, guarded};
 use super::material::{emitted, reflectance};
-use super::{LoadOptions, MIRROR, Material, SceneData, SceneError, obj};
+use super::{
+    CookTorrance, Fresnel, LoadOptions, MIRROR, Masking, Material, SceneData, SceneError, obj,
+};
 use crate::geometry::Camera;
 use glam::{DMat4, DVec3, DVec4, Vec3};
 use roxmltree::{Document, Node};
 use std::path::Path;
 
-/// What Nori takes where a file says nothing: albedo of `diffuse`, indices of BK7 glass and of air.
+/// What Nori takes where a file says nothing: albedo of `diffuse`, roughness of `microfacet`, indices of BK7 glass and of air.
 const ALBEDO: f32 = 0.5;
+const ALPHA: f32 = 0.1;
 const INSIDE_IOR: f32 = 1.5046;
 const OUTSIDE_IOR: f32 = 1.000277;
 /// Field of view in x, degrees, and size of the image.
@@ -150,7 +153,7 @@ impl Reader<'_> {
                 continue;
             }
             let radiance = self.color(emitter, "radiance")?.unwrap_or(Vec3::ZERO);
-            material = material.emitting(emitted(radiance));
+            material = material.emitting_from_front(emitted(radiance));
         }
         Ok(material)
     }
@@ -175,11 +178,25 @@ impl Reader<'_> {
             "dielectric" => Material::dielectric(name, Vec3::ONE, inside / outside),
             "microfacet" => {
                 let base = self.color(node, "kd")?.unwrap_or(Vec3::splat(ALBEDO));
-                self.warn(
-                    node,
-                    "`microfacet` is not rendered yet; drawn as its diffuse part",
-                );
-                Material::diffuse(name, reflectance(base))
+                let alpha = self.number(node, "alpha")?.map_or(ALPHA, |v| v as f32);
+                let base = reflectance(base);
+                let of = CookTorrance {
+                    diffuse: base,
+                    specular: Vec3::splat(1.0 - base.max_element()),
+                    roughness: alpha,
+                    ior: inside / outside,
+                    masking: Masking::Smith,
+                    fresnel: Fresnel::Exact,
+                };
+                let material = Material::cook_torrance(name, &of);
+                let drawn = material.parameters.get(3).copied().unwrap_or(alpha);
+                if drawn != alpha {
+                    let what = format!(
+                        "an alpha of {alpha} is beyond what is rendered; drawn with {drawn}"
+                    );
+                    self.warn(node, &what);
+                }
+                material
             }
             other => {
                 self.warn(

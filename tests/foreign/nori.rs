@@ -2,7 +2,9 @@
 
 use glam::Vec3;
 use raystone::params::{Params, Variant};
-use raystone::scene::{DIELECTRIC, LoadOptions, MIRROR, SceneData, SceneError, load};
+use raystone::scene::{
+    COOK_TORRANCE, DIELECTRIC, LoadOptions, MIRROR, SceneData, SceneError, load,
+};
 use std::fs;
 use tempfile::TempDir;
 
@@ -91,9 +93,25 @@ fn materials_are_those_of_the_file() {
     let glass = of(r#"<bsdf type="dielectric"><float name="intIOR" value="1.6"/></bsdf>"#);
     assert_eq!(glass.materials[0].kind, &DIELECTRIC);
     assert!((glass.materials[0].parameters[0] - 1.6 / 1.000277).abs() < 1e-6);
+    let rough = of(
+        r#"<bsdf type="microfacet"><color name="kd" value="0.1 0.2 0.3"/><float name="alpha" value="0.05"/></bsdf>"#,
+    );
+    let rough = &rough.materials[0];
+    assert_eq!(
+        (rough.kind, rough.base_color),
+        (&COOK_TORRANCE, Vec3::new(0.1, 0.2, 0.3))
+    );
+    let expected = [0.7, 0.7, 0.7, 0.05, 1.5046 / 1.000277, 1.0, 1.0];
+    let close = |(a, b): (&f32, f32)| (a - b).abs() < 1e-6;
+    assert!(
+        rough.parameters.iter().zip(expected).all(close),
+        "{:?}",
+        rough.parameters
+    );
+    assert!(!rough.emits_both_sides);
     let unknown = of(r#"<bsdf type="velvet"/>"#);
     assert!(
-        unknown.report.warnings[0].contains("line 10: the material `velvet`"),
+        unknown.report.warnings[0].contains("line 9: the material `velvet`"),
         "{:?}",
         unknown.report
     );

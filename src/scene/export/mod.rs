@@ -146,7 +146,8 @@ impl Export<'_> {
         let gap = GAP * min.abs().max(max.abs()).max_element();
         for (id, material) in (0u32..).zip(&scene.materials) {
             let emits = material.emission.max_element() > 0.0;
-            let sides = 1 + usize::from(emits && !fronts_only);
+            let both = emits && material.emits_both_sides && !fronts_only;
+            let sides = 1 + usize::from(both);
             for back in [None, Some(gap)].into_iter().take(sides) {
                 let Some(bytes) = mesh::ply(scene, id, back) else {
                     continue;
