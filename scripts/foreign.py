@@ -100,10 +100,22 @@ def export(scene, size, flags, folder):
     return done.stdout.strip()
 
 
-def theirs(mitsuba, file, spp, seed, sampler="multijitter", scale=None):
-    """An image of Mitsuba's as an array; `scale` multiplies every emitter, for negative controls."""
+def teach(file):
+    """Imports the materials that an exported scene brings, once for all: every scene's are the same."""
+    path = Path(file).parent / "materials.py"
+    if path.exists() and "raystone_materials" not in sys.modules:
+        import importlib.util
+
+        found = importlib.util.spec_from_file_location("raystone_materials", path)
+        sys.modules["raystone_materials"] = module = importlib.util.module_from_spec(found)
+        found.loader.exec_module(module)
+
+
+def theirs(mitsuba, file, spp, seed, sampler="multijitter"):
+    """An image of Mitsuba's as an array."""
     import numpy
 
+    teach(file)
     scene = mitsuba.load_file(file, sampler=sampler)
     return numpy.array(mitsuba.render(scene, spp=spp, seed=seed), dtype=numpy.float64)
 

@@ -1,4 +1,4 @@
-//! Scenes of the educational renderer [Nori](https://wjakob.github.io/nori/) (XML with OBJ meshes): transforms, the perspective
+//! Scenes of the educational renderer [Nori](https://wjakob.github.io/nori/) (XML with OBJ meshes, here also PLY): transforms, the perspective
 //! camera, area emitters, and its materials.
 //!
 //! Nori's camera may be mirrored (a scale of −1 in its transform), which ours cannot. The scene is mirrored instead, at
@@ -8,7 +8,7 @@ use super::builder::{Look, SceneBuilder};
 use super::error::{self, guarded};
 use super::material::{emitted, reflectance};
 use super::{
-    CookTorrance, Fresnel, LoadOptions, MIRROR, Masking, Material, SceneData, SceneError, obj,
+    CookTorrance, Fresnel, LoadOptions, MIRROR, Masking, Material, SceneData, SceneError, obj, ply,
 };
 use crate::geometry::Camera;
 use glam::{DMat4, DVec3, DVec4, Vec3};
@@ -122,7 +122,10 @@ impl Reader<'_> {
             textures: false,
             ..*self.options
         };
-        let mesh = obj::load(&path, file, &plain)?;
+        let mesh = match super::extension(&path).as_str() {
+            "ply" => ply::load(&path, file)?,
+            _ => obj::load(&path, file, &plain)?,
+        };
         let to_world = mirror.unwrap_or(DMat4::IDENTITY) * self.to_world(node)?;
         let material = self.material(node, file)?;
         let id = self.look.materials.len() as u32;

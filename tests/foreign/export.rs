@@ -3,7 +3,7 @@
 
 use crate::support::builtin;
 use raystone::scene::{
-    DIELECTRIC, MITSUBA_FILE, MitsubaSettings, SceneData, Texture, export_mitsuba,
+    DIELECTRIC, MITSUBA_FILE, Material, MitsubaSettings, SceneData, Texture, export_mitsuba,
 };
 use std::fs;
 use std::process::Command;
@@ -118,6 +118,13 @@ fn textures_keep_their_factor_and_skies_are_written() {
     );
     scene.daylight = Some(raystone::scene::Daylight::default());
     assert!(has(&scene, "textures/sky.exr"));
+    let plain = scene.materials[0].clone();
+    scene.materials[0] = Material::principled("paint", glam::Vec3::ONE, 0.5, 0.25, 0.04);
+    let (folder, xml, said) = exported(&scene, false);
+    assert!(xml.contains(r#"<bsdf type="raystone-principled" id="material-0">"#));
+    assert!(xml.contains(r#"<float name="p1" value="0.25"/>"#), "{xml}");
+    assert!(folder.path().join("materials.py").exists() && said[0].contains("materials.py"));
+    scene.materials[0] = plain;
     scene.materials[0].kind = &DIELECTRIC;
     scene.materials[0].parameters = vec![1.5, 0.0];
     assert!(

@@ -2,10 +2,17 @@
 
 use super::{Export, ExportError, vector};
 use crate::image::{Image, Picture};
-use crate::scene::{DIELECTRIC, DIFFUSE, Daylight, MIRROR, Material, SceneData, Texture};
+use crate::scene::{
+    COOK_TORRANCE, DIELECTRIC, DIFFUSE, Daylight, MIRROR, Material, PHONG, PRINCIPLED, SceneData,
+    Texture,
+};
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
 use std::fmt::Write as _;
+
+/// Python that teaches Mitsuba the materials that it lacks, and the file that it is written to.
+const MATERIALS: &str = include_str!("materials.py");
+const MATERIALS_FILE: &str = "materials.py";
 
 /// Size of the map that stands for a sky with a gradient, texels.
 const SKY_SIZE: [u32; 2] = [1024, 512];
@@ -15,10 +22,24 @@ impl Export<'_> {
     pub(super) fn material(&mut self, scene: &SceneData, id: usize) -> Result<(), ExportError> {
         let material = &scene.materials[id];
         let color = self.color(scene, id)?;
-        if ![&DIFFUSE, &MIRROR, &DIELECTRIC].contains(&material.kind) {
+        let known = [&DIFFUSE, &MIRROR, &DIELECTRIC];
+        let by_formula = [&PHONG, &COOK_TORRANCE, &PRINCIPLED].contains(&material.kind);
+        if by_formula && !self.needs_materials {
+            self.needs_materials = true;
+            self.write(MATERIALS_FILE, MATERIALS.as_bytes())?;
+            self.warnings.push(format!(
+                "some materials are those of {MATERIALS_FILE}, which has to be imported in Python before the scene is loaded"
+            ));
+        } else if !by_formula && !known.contains(&material.kind) {
             self.warnings.push(format!(
                 "material {}: {} has no counterpart in Mitsuba, written as diffuse",
                 material.name, material.kind.name
+            ));
+        }
+        if material.kind == &DIELECTRIC && parameter(material, 2) > 0.0 {
+            self.warnings.push(format!(
+                "material {}: Mitsuba takes Fresnel's equations, not Schlick's polynomial",
+                material.name
             ));
         }
         let id = format!("id=\"material-{id}\"");
@@ -35,6 +56,7 @@ impl Export<'_> {
 "#,
                 color.named("specular_reflectance")
             ),
+            _ if by_formula => write!(self.xml, "{}", formula(material, &color, &id)),
             _ => write!(
                 self.xml,
                 r#"    <bsdf type="twosided" {id}>
@@ -116,9 +138,25 @@ impl Color {
     }
 }
 
+fn parameter(material: &Material, at: usize) -> f32 {
+    material.parameters.get(at).copied().unwrap_or_default()
+}
+
+/// A material of [`MATERIALS_FILE`], which takes the same numbers in the same order.
+fn formula(material: &Material, color: &Color, id: &str) -> String {
+    let kind = material.kind.name;
+    let mut text = format!(
+        "    <bsdf type=\"raystone-{kind}\" {id}>\n        {}\n",
+        color.named("base")
+    );
+    for (k, value) in material.parameters.iter().enumerate() {
+        let _ = writeln!(text, "        <float name=\"p{k}\" value=\"{value}\"/>");
+    }
+    text + "    </bsdf>\n"
+}
+
 fn dielectric(material: &Material, id: &str) -> String {
-    let parameter = |at: usize| material.parameters.get(at).copied().unwrap_or_default();
-    let kind = match parameter(1) > 0.0 {
+    let kind = match parameter(material, 1) > 0.0 {
         true => "thindielectric",
         false => "dielectric",
     };
@@ -129,7 +167,7 @@ fn dielectric(material: &Material, id: &str) -> String {
         <rgb name="specular_transmittance" value="{}"/>
     </bsdf>
 "#,
-        parameter(0),
+        parameter(material, 0),
         vector(material.base_color)
     )
 }

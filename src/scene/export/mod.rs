@@ -67,6 +67,7 @@ pub fn export_mitsuba(
     let mut export = Export {
         folder,
         warnings: Vec::new(),
+        needs_materials: false,
         xml: String::new(),
     };
     for name in ["", "meshes", "textures"] {
@@ -90,6 +91,8 @@ pub fn export_mitsuba(
 struct Export<'a> {
     folder: &'a Path,
     warnings: Vec<String>,
+    /// Whether a material is one of those that Mitsuba has to be taught.
+    needs_materials: bool,
     /// The text so far.
     xml: String,
 }
