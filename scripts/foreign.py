@@ -189,29 +189,26 @@ def student(t, freedom):
     return numpy.clip(numpy.where(swap, 1 - front * h, front * h), 0, 1)
 
 
-def picture(array, file, exposure=None):
-    """Writes a tone-mapped PNG (x / (1 + x), sRGB); the exposure that it took."""
-    import mitsuba
+def pictures(ours, theirs, file):
+    """Writes two mean images, tone-mapped alike, and their relative difference side by side as a PNG. The difference is white where both
+    agree, red where the first is brighter, blue where it is darker, saturated at 10 %."""
     import numpy
 
-    array = numpy.asarray(array)
-    light = numpy.maximum(array @ numpy.array(LUMINANCE), 0)
-    exposure = exposure or 0.36 / numpy.exp(numpy.log(light[light > 1e-6]).mean())
-    bright = light * exposure
-    mapped = array * (exposure * (1 + bright / 16) / (1 + bright))[..., None]
-    save(mapped, file)
-    return exposure
+    # Small enough for a page.
+    edge = max(1, ours.shape[1] // 160)
+    ours, theirs = tiles(ours, edge), tiles(theirs, edge)
+    light = numpy.maximum(theirs @ numpy.array(LUMINANCE), 0)
+    exposure = 0.36 / numpy.exp(numpy.log(light[light > 1e-6]).mean())
 
+    def mapped(image):
+        bright = numpy.maximum(image @ numpy.array(LUMINANCE), 0) * exposure
+        return image * (exposure * (1 + bright / 16) / (1 + bright))[..., None]
 
-def difference(ours, theirs, file):
-    """Writes the relative difference of the means as a PNG: white where they agree, red where ours is brighter, blue where it is
-    darker, saturated at 10 %."""
-    import numpy
-
-    a, b = (numpy.asarray(x).mean(axis=0) @ numpy.array(LUMINANCE) for x in (ours, theirs))
+    a, b = ours @ numpy.array(LUMINANCE), light
     d = numpy.clip((a - b) / numpy.maximum(b, 1e-3 * b.mean()) / 0.1, -1, 1)
     red, blue = 1 - numpy.maximum(-d, 0), 1 - numpy.maximum(d, 0)
-    save(numpy.stack([red, 1 - abs(d), blue], axis=-1) ** 2.2, file)
+    difference = numpy.stack([red, 1 - abs(d), blue], axis=-1) ** 2.2
+    save(numpy.concatenate([mapped(ours), mapped(theirs), difference], axis=1), file)
 
 
 def save(linear, file):
