@@ -18,6 +18,7 @@ pub mod spectrum;
 pub mod statistics;
 pub mod stream;
 pub mod timing;
+pub mod trial_scenes;
 pub mod words;
 
 pub use kept_checks::CACHE_VARIABLE;

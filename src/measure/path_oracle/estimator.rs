@@ -230,10 +230,8 @@ impl PathOracle<'_> {
         let uv = walk.draw_2d(at_bounce(0, DIRECTION));
         let direction = bsdf::cosine_direction(surface.normal, uv);
         let direction = walk.rounding.direction(direction);
-        let bounds = self.scene.bounds();
-        let diagonal = bounds.max.as_dvec3() - bounds.min.as_dvec3();
         let free = Segment {
-            length: walk.rounding.number(radius * diagonal.length()),
+            length: walk.rounding.number(radius * self.diagonal),
             ..surface.leave(direction, &mut walk.rounding)
         };
         let blocked = self.hits.blocked(&free);
@@ -306,7 +304,7 @@ impl PathOracle<'_> {
         let Some(light) = light.filter(|l| l.density > 0.0 && l.density.is_finite()) else {
             return DVec3::ZERO;
         };
-        let Some(Reflected { value, density }) = bsdf.evaluate(light.direction) else {
+        let Some(Reflected { value, density }) = bsdf.evaluate(light.direction, &mut walk.rounding) else {
             return DVec3::ZERO;
         };
         let shadow = Segment {

@@ -100,6 +100,8 @@ pub struct PathOracle<'a> {
     hits: Hits<'a>,
     lights: Lights,
     textures: Textures<'a>,
+    /// Of the box of all triangles.
+    diagonal: f64,
 }
 
 /// What is estimated, of which image.
@@ -126,7 +128,14 @@ impl<'a> PathOracle<'a> {
             hits: Hits::new(&scene.triangles),
             lights: Lights::new(scene),
             textures: Textures::new(scene),
+            diagonal: diagonal(scene),
         })
+    }
+
+    /// Whether colours come from textures.
+    pub fn is_textured(&self) -> bool {
+        let mut materials = self.scene.materials.iter();
+        materials.any(|m| m.base_color_texture.is_some())
     }
 
     /// The path of one sample, computed in f64 throughout, or with the roundings of f32 played.
@@ -145,6 +154,11 @@ impl<'a> PathOracle<'a> {
             branch: walk.branch,
         }
     }
+}
+
+fn diagonal(scene: &SceneData) -> f64 {
+    let bounds = scene.bounds();
+    (bounds.max.as_dvec3() - bounds.min.as_dvec3()).length()
 }
 
 /// What a path carries along.

@@ -32,6 +32,11 @@ pub(super) struct Surface<'a> {
 }
 
 impl Surface<'_> {
+    /// From where a light is seen: kernels take the start of the shadow ray, off the surface.
+    pub fn seen_from(&self, rounding: &mut Rounding) -> DVec3 {
+        self.position + self.geometric * rounding.offset(self.offset)
+    }
+
     /// The ray that leaves in this direction.
     pub fn leave(&self, direction: DVec3, rounding: &mut Rounding) -> Segment {
         let side = direction.dot(self.geometric).signum();

@@ -9,7 +9,7 @@ impl Bsdf for Diffuse<'_> {
         bounce(self, cosine_direction(self.0.normal, uv), rounding)
     }
 
-    fn evaluate(&self, direction: DVec3) -> Option<Reflected> {
+    fn evaluate(&self, direction: DVec3, _: &mut Rounding) -> Option<Reflected> {
         let density = cosine_density(self.0.normal, direction);
         is_above(self.0, direction).then(|| Reflected {
             value: self.0.base * density,

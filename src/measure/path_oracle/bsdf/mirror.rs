@@ -15,7 +15,7 @@ impl Bsdf for Mirror<'_> {
         })
     }
 
-    fn evaluate(&self, _: DVec3) -> Option<Reflected> {
+    fn evaluate(&self, _: DVec3, _: &mut Rounding) -> Option<Reflected> {
         None
     }
 

@@ -1,9 +1,13 @@
 //! Materials, one file each, from `docs/shading.md`.
 
+mod cook_torrance;
 mod dielectric;
 mod diffuse;
 mod mirror;
+mod phong;
+mod principled;
 
+use super::luminance;
 use super::rounding::Rounding;
 use super::surface::Surface;
 use crate::scene::SceneData;
@@ -35,7 +39,7 @@ pub(super) trait Bsdf {
     /// Where the path goes on; `None` ends it.
     fn sample(&self, uv: [f64; 2], rounding: &mut Rounding) -> Option<Bounce>;
     /// Value and density of a direction.
-    fn evaluate(&self, direction: DVec3) -> Option<Reflected>;
+    fn evaluate(&self, direction: DVec3, rounding: &mut Rounding) -> Option<Reflected>;
     /// Whether all lobes are delta: light samples are not taken then.
     fn is_delta(&self) -> bool {
         false
@@ -45,8 +49,13 @@ pub(super) trait Bsdf {
 type Make = for<'a> fn(&'a Surface<'a>) -> Box<dyn Bsdf + 'a>;
 
 /// Kinds of materials by name.
-const KINDS: [(&str, Make); 3] = [
+const KINDS: [(&str, Make); 6] = [
     ("diffuse", |s| Box::new(diffuse::Diffuse(s))),
+    ("phong", |s| Box::new(phong::Phong::new(s))),
+    ("cook-torrance", |s| {
+        Box::new(cook_torrance::CookTorrance::new(s))
+    }),
+    ("principled", |s| Box::new(principled::Principled::new(s))),
     ("mirror", |s| Box::new(mirror::Mirror(s))),
     ("dielectric", |s| Box::new(dielectric::Dielectric(s))),
 ];
@@ -104,6 +113,38 @@ pub(super) fn mirrored(o: DVec3, n: DVec3) -> DVec3 {
     (2.0 * n.dot(o) * n - o).normalize()
 }
 
+/// Parameter number `place` of the material.
+pub(super) fn parameter(surface: &Surface, place: usize) -> f64 {
+    let parameters = &surface.material.parameters;
+    parameters.get(place).copied().unwrap_or_default().into()
+}
+
+/// The colour whose components are the first three parameters.
+pub(super) fn colour(surface: &Surface) -> DVec3 {
+    DVec3::from_array([0, 1, 2].map(|place| parameter(surface, place)))
+}
+
+/// Whether the first of two lobes is chosen, of probability `p`, and the number that is left of `u`.
+pub(super) fn choose(u: f64, p: f64, rounding: &mut Rounding) -> (bool, f64) {
+    let u = rounding.share(u).clamp(0.0, 1.0);
+    match u < p {
+        true => (true, u / p),
+        false => (false, (u - p) / (1.0 - p)),
+    }
+}
+
+/// Probability of the diffuse lobe beside a specular one of this colour.
+pub(super) fn diffuse_share(base: DVec3, specular: DVec3) -> f64 {
+    let (base, specular) = (luminance(base), luminance(specular));
+    match base + specular > 0.0 {
+        true => base / (base + specular),
+        false => 1.0,
+    }
+}
+
+/// The least n·o that is told apart from 0.
+pub(super) const LEAST_COSINE: f64 = 1e-7;
+
 /// Whether light that arrives from there is reflected at all.
 pub(super) fn is_above(surface: &Surface, direction: DVec3) -> bool {
     direction.dot(surface.normal) > 0.0 && direction.dot(surface.geometric) > 0.0
@@ -116,7 +157,7 @@ pub(super) fn bounce(
     rounding: &mut Rounding,
 ) -> Option<Bounce> {
     let direction = rounding.direction(direction);
-    let Reflected { value, density } = bsdf.evaluate(direction)?;
+    let Reflected { value, density } = bsdf.evaluate(direction, rounding)?;
     (density > 0.0).then(|| Bounce {
         direction,
         weight: value / density,

@@ -52,7 +52,7 @@ impl EmissiveTriangles {
         let root = u.sqrt();
         let point = a * (1.0 - root) + b * (root * (1.0 - v)) + c * (root * v);
         let terms = a.abs() + b.abs() + c.abs();
-        let to_light = rounding.point(point, terms) - surface.position;
+        let to_light = rounding.point(point, terms) - surface.seen_from(rounding);
         let distance = to_light.length();
         let direction = to_light / distance;
         let normal = (b - a).cross(c - a).normalize();
