@@ -91,7 +91,10 @@ impl Verify {
         let bad_input = verified.iter().any(|v| v.bad_input);
         if !paths.is_empty() {
             let right = paths.len() - failed_paths;
-            print(&format!("{right} of {} integrators did not fail\n", paths.len()))?;
+            print(&format!(
+                "{right} of {} integrators did not fail\n",
+                paths.len()
+            ))?;
         }
         Ok(match failed + failed_paths {
             0 => ExitCode::SUCCESS,
@@ -237,8 +240,17 @@ fn paths_table(judged: &[&(Cell, PathsRecord)]) -> String {
             Verdict::Open => "not judged",
         };
         let names = cell.labels(&[Axis::Integrator]).join(", ");
-        let numbers = [record.paths, record.wrong, record.flips, record.ill_conditioned];
-        let mut row: Vec<TableCell> = vec![cell[Axis::Scene].label.as_str().into(), names.into(), word.into()];
+        let numbers = [
+            record.paths,
+            record.wrong,
+            record.flips,
+            record.ill_conditioned,
+        ];
+        let mut row: Vec<TableCell> = vec![
+            cell[Axis::Scene].label.as_str().into(),
+            names.into(),
+            word.into(),
+        ];
         row.extend(numbers.map(|n| TableCell::from(count(n as u64))));
         row.push(format!("{:.1e}", record.median).into());
         table.rows.push(row);

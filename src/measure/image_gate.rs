@@ -209,7 +209,9 @@ fn out_of_bounds(record: &PathsRecord, textured: bool) -> Option<String> {
     } = *record;
     let over = |what: &str, found: usize, share: f64| {
         let most = most(paths, share);
-        (found > most).then(|| format!("{found} of {paths} paths {what}, at most {most} are explained by rounding"))
+        (found > most).then(|| {
+            format!("{found} of {paths} paths {what}, at most {most} are explained by rounding")
+        })
     };
     let off = record.median > median;
     over("take another branch", flips, FLIPS)

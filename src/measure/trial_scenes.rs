@@ -4,7 +4,9 @@
 
 use crate::geometry::{Camera, Triangle};
 use crate::params::ParamValue;
-use crate::scene::{self, MIRROR, Material, SceneData, SceneError, Texture};
+use crate::scene::{
+    self, CookTorrance, Fresnel, MIRROR, Masking, Material, SceneData, SceneError, Texture,
+};
 use glam::{Vec2, Vec3, vec2, vec3};
 use std::f32::consts::{PI, TAU};
 
@@ -25,10 +27,28 @@ pub struct TrialScene {
 /// A built-in scene is missing.
 pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
     let mut lamps_trials = vec![("path", vec![depth(8)])];
-    for (strategy, roulette) in [("mis-power", "albedo"), ("bsdf", "none"), ("light", "albedo")] {
-        lamps_trials.push(("path", vec![word("strategy", strategy), word("roulette", roulette), depth(5)]));
+    for (strategy, roulette) in [
+        ("mis-power", "albedo"),
+        ("bsdf", "none"),
+        ("light", "albedo"),
+    ] {
+        lamps_trials.push((
+            "path",
+            vec![
+                word("strategy", strategy),
+                word("roulette", roulette),
+                depth(5),
+            ],
+        ));
     }
-    lamps_trials.push(("path", vec![("clamp", ParamValue::Number(0.25)), depth(4), ("roulette_depth", ParamValue::Integer(1))]));
+    lamps_trials.push((
+        "path",
+        vec![
+            ("clamp", ParamValue::Number(0.25)),
+            depth(4),
+            ("roulette_depth", ParamValue::Integer(1)),
+        ],
+    ));
     let occlusion = |radius| ("ao", vec![("radius", ParamValue::Number(radius))]);
     let primary = || ("primary", vec![]);
     Ok(vec![
@@ -41,12 +61,24 @@ pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
             trials: vec![("path", vec![depth(12)])],
         },
         TrialScene {
+            scene: glossy()?,
+            trials: vec![
+                ("path", vec![depth(6)]),
+                ("path", vec![depth(3), word("strategy", "bsdf")]),
+            ],
+        },
+        TrialScene {
             scene: textured()?,
             trials: vec![("path", vec![depth(4)]), primary()],
         },
         TrialScene {
             scene: scene::named("instances")?,
-            trials: vec![("path", vec![depth(6)]), occlusion(0.02), occlusion(0.3), primary()],
+            trials: vec![
+                ("path", vec![depth(6)]),
+                occlusion(0.02),
+                occlusion(0.3),
+                primary(),
+            ],
         },
     ])
 }
@@ -130,7 +162,12 @@ impl Mesh {
         for row in 0..ROWS {
             for column in 0..2 * ROWS {
                 let (next, below) = (column + 1, row + 1);
-                let [a, b, c, d] = [at(row, column), at(row, next), at(below, next), at(below, column)];
+                let [a, b, c, d] = [
+                    at(row, column),
+                    at(row, next),
+                    at(below, next),
+                    at(below, column),
+                ];
                 if row > 0 {
                     self.triangle([a, b, c], [Vec2::ZERO; 3], material);
                 }
@@ -169,7 +206,11 @@ fn camera(eye: Vec3, target: Vec3, up: Vec3) -> Camera {
 /// Lamps of all sizes and colours over a floor between two walls: one large and dim, one small and bright, one in the
 /// plane of a wall, one on edge, one hidden behind a block, one that faces away.
 fn lamps() -> Result<SceneData, SceneError> {
-    let camera = camera(vec3(2.3, 2.2, 3.7), vec3(-0.4, 0.7, -0.3), vec3(0.1, 1.0, -0.05));
+    let camera = camera(
+        vec3(2.3, 2.2, 3.7),
+        vec3(-0.4, 0.7, -0.3),
+        vec3(0.1, 1.0, -0.05),
+    );
     let mut mesh = Mesh::new("lamps", camera, vec3(0.02, 0.03, 0.05))?;
     let wall = |name, r, g, b| Material::diffuse(name, vec3(r, g, b));
     let [floor, red, blue, block] = [
@@ -192,19 +233,50 @@ fn lamps() -> Result<SceneData, SceneError> {
     mesh.block(vec3(-0.6, 0.0, -0.5), vec3(0.9, 1.1, 0.7), block);
     mesh.ball(vec3(1.0, 0.4, 0.9), 0.4, block);
     mesh.plain([vec3(-1.0, 3.2, -1.5), 2.0 * Vec3::X, 1.5 * Vec3::Z], dim);
-    mesh.plain([vec3(0.9, 1.9, -0.9), 0.04 * Vec3::X, 0.05 * Vec3::Z], bright);
+    mesh.plain(
+        [vec3(0.9, 1.9, -0.9), 0.04 * Vec3::X, 0.05 * Vec3::Z],
+        bright,
+    );
     // Standing on the floor, along the wall: light grazes both.
     mesh.plain([vec3(-1.9, 0.0, -1.9), 0.6 * Vec3::Y, 1.4 * Vec3::Z], green);
-    mesh.triangle([vec3(1.4, 0.05, -1.2), vec3(1.5, 0.9, -1.3), vec3(1.6, 0.05, -0.6)], [Vec2::ZERO; 3], violet);
+    mesh.triangle(
+        [
+            vec3(1.4, 0.05, -1.2),
+            vec3(1.5, 0.9, -1.3),
+            vec3(1.6, 0.05, -0.6),
+        ],
+        [Vec2::ZERO; 3],
+        violet,
+    );
     // In the shadow of the block, and facing away from all else.
-    mesh.triangle([vec3(-0.5, 0.2, -0.9), vec3(0.2, 0.3, -0.9), vec3(-0.1, 0.8, -0.8)], [Vec2::ZERO; 3], green);
-    mesh.triangle([vec3(2.6, 0.3, 0.2), vec3(2.6, 1.2, 0.6), vec3(2.7, 0.4, 0.9)], [Vec2::ZERO; 3], violet);
+    mesh.triangle(
+        [
+            vec3(-0.5, 0.2, -0.9),
+            vec3(0.2, 0.3, -0.9),
+            vec3(-0.1, 0.8, -0.8),
+        ],
+        [Vec2::ZERO; 3],
+        green,
+    );
+    mesh.triangle(
+        [
+            vec3(2.6, 0.3, 0.2),
+            vec3(2.6, 1.2, 0.6),
+            vec3(2.7, 0.4, 0.9),
+        ],
+        [Vec2::ZERO; 3],
+        violet,
+    );
     Ok(mesh.done(Vec::new()))
 }
 
 /// Balls of glass, one in another, a pane, a mirror behind, tints, and a lamp that is seen through all of them.
 fn glass() -> Result<SceneData, SceneError> {
-    let camera = camera(vec3(0.3, 1.3, 4.1), vec3(0.1, 0.8, 0.0), vec3(-0.08, 1.0, 0.0));
+    let camera = camera(
+        vec3(0.3, 1.3, 4.1),
+        vec3(0.1, 0.8, 0.0),
+        vec3(-0.08, 1.0, 0.0),
+    );
     let mut mesh = Mesh::new("glass", camera, vec3(0.5, 0.6, 0.9))?;
     let [floor, mirror, clear, green, dense, pane, lamp] = [
         Material::diffuse("floor", vec3(0.6, 0.55, 0.5)),
@@ -217,12 +289,74 @@ fn glass() -> Result<SceneData, SceneError> {
     ]
     .map(|m| mesh.material(m));
     mesh.plain([vec3(-4.0, 0.0, -4.0), 8.0 * Vec3::Z, 8.0 * Vec3::X], floor);
-    mesh.plain([vec3(-2.0, 0.1, -2.0), 4.0 * Vec3::X, 2.5 * Vec3::Y], mirror);
+    mesh.plain(
+        [vec3(-2.0, 0.1, -2.0), 4.0 * Vec3::X, 2.5 * Vec3::Y],
+        mirror,
+    );
     mesh.ball(vec3(-0.7, 0.75, 0.2), 0.7, clear);
     mesh.ball(vec3(-0.7, 0.75, 0.2), 0.35, dense);
     mesh.block(vec3(0.5, 0.1, -0.4), vec3(0.8, 1.2, 0.8), green);
-    mesh.plain([vec3(-1.8, 0.2, 1.1), vec3(1.9, 0.0, 0.4), 1.4 * Vec3::Y], pane);
+    mesh.plain(
+        [vec3(-1.8, 0.2, 1.1), vec3(1.9, 0.0, 0.4), 1.4 * Vec3::Y],
+        pane,
+    );
     mesh.plain([vec3(-0.8, 2.9, -0.6), 1.4 * Vec3::X, 1.2 * Vec3::Z], lamp);
+    Ok(mesh.done(Vec::new()))
+}
+
+/// A row of balls of every glossy kind over a glossy floor, between two lamps and a sheet.
+fn glossy() -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(0.5, 2.4, 5.2), vec3(0.0, 0.6, 0.0), Vec3::Y);
+    let mut mesh = Mesh::new("glossy", camera, vec3(0.2, 0.25, 0.3))?;
+    let cook = |masking, fresnel, roughness| {
+        let of = CookTorrance {
+            diffuse: vec3(0.3, 0.2, 0.1),
+            specular: vec3(0.5, 0.6, 0.4),
+            roughness,
+            ior: 1.7,
+            masking,
+            fresnel,
+        };
+        Material::cook_torrance("cook-torrance", &of)
+    };
+    let principled = |metallic, roughness, f0| {
+        Material::principled("principled", vec3(0.9, 0.6, 0.4), metallic, roughness, f0)
+    };
+    let phong =
+        |exponent| Material::phong("phong", vec3(0.3, 0.1, 0.5), vec3(0.4, 0.5, 0.3), exponent);
+    let balls = [
+        phong(3.0),
+        phong(150.0),
+        cook(Masking::VCavities, Fresnel::Schlick, 0.4),
+        cook(Masking::Smith, Fresnel::Exact, 0.15),
+        principled(0.0, 0.3, 0.04),
+        principled(1.0, 0.5, 0.04),
+        principled(0.5, 0.9, 0.08),
+        Material::dielectric("glass", vec3(0.9, 1.0, 0.9), 1.5).with_schlick(),
+    ];
+    for (place, material) in balls.into_iter().enumerate() {
+        let material = mesh.material(material);
+        let (column, row) = ((place % 4) as f32, (place / 4) as f32);
+        mesh.ball(
+            vec3(1.1 * column - 1.7, 0.5, 1.2 * row - 0.6),
+            0.48,
+            material,
+        );
+    }
+    let floor = mesh.material(principled(0.2, 0.6, 0.05));
+    let one_sided = Material::diffuse("lamp", Vec3::splat(0.3)).emitting(vec3(6.0, 7.0, 8.0));
+    let both = Material::diffuse("sheet", Vec3::splat(0.5)).emitting(vec3(2.0, 1.5, 1.0));
+    let [one_sided, both] = [one_sided, both].map(|m| mesh.material(m));
+    mesh.plain([vec3(-4.0, 0.0, -4.0), 8.0 * Vec3::Z, 8.0 * Vec3::X], floor);
+    mesh.plain(
+        [vec3(-1.0, 2.6, -1.0), 2.0 * Vec3::X, 1.5 * Vec3::Z],
+        one_sided,
+    );
+    mesh.plain(
+        [vec3(-2.6, 0.2, -1.5), 1.2 * Vec3::Y, 2.0 * Vec3::Z],
+        one_sided,
+    );
+    mesh.plain([vec3(2.7, 0.2, -1.5), 1.2 * Vec3::Y, 2.0 * Vec3::Z], both);
     Ok(mesh.done(Vec::new()))
 }
 
@@ -243,17 +377,40 @@ fn textured() -> Result<SceneData, SceneError> {
     ]
     .map(|m| mesh.material(m));
     let to = |x: f32, y: f32| vec2(x, y);
-    mesh.quad([vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::Z, 4.0 * Vec3::X], [to(-1.3, 0.2), to(2.4, 3.1)], floor);
-    mesh.quad([vec3(-2.0, 0.0, -1.5), 4.0 * Vec3::X, 2.0 * Vec3::Y], [to(0.1, 0.9), to(0.8, 0.05)], wall);
-    mesh.quad([vec3(-1.6, 0.0, -1.0), vec3(0.3, 0.0, 1.8), 1.2 * Vec3::Y], [to(0.0, 0.0), to(-1.0, 2.0)], mirror);
-    mesh.quad([vec3(-0.5, 2.3, -0.5), 1.0 * Vec3::X, 0.8 * Vec3::Z], [to(0.0, 0.0), to(1.0, 1.0)], lamp);
+    mesh.quad(
+        [vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::Z, 4.0 * Vec3::X],
+        [to(-1.3, 0.2), to(2.4, 3.1)],
+        floor,
+    );
+    mesh.quad(
+        [vec3(-2.0, 0.0, -1.5), 4.0 * Vec3::X, 2.0 * Vec3::Y],
+        [to(0.1, 0.9), to(0.8, 0.05)],
+        wall,
+    );
+    mesh.quad(
+        [vec3(-1.6, 0.0, -1.0), vec3(0.3, 0.0, 1.8), 1.2 * Vec3::Y],
+        [to(0.0, 0.0), to(-1.0, 2.0)],
+        mirror,
+    );
+    mesh.quad(
+        [vec3(-0.5, 2.3, -0.5), 1.0 * Vec3::X, 0.8 * Vec3::Z],
+        [to(0.0, 0.0), to(1.0, 1.0)],
+        lamp,
+    );
     mesh.block(vec3(0.2, 0.0, -0.6), vec3(0.5, 0.7, 0.4), plain);
     let texture = |name: &str, width: u32, height: u32, seed: u32| Texture {
         name: name.to_owned(),
         width,
         height,
         texels: (0..width * height)
-            .map(|i| [(i * 73 + seed) % 256, (i * i * 31 + 90) % 256, (i * 17 + seed) % 64, 255])
+            .map(|i| {
+                [
+                    (i * 73 + seed) % 256,
+                    (i * i * 31 + 90) % 256,
+                    (i * 17 + seed) % 64,
+                    255,
+                ]
+            })
             .map(|texel| texel.map(|c| c as u8))
             .collect(),
     };

@@ -90,7 +90,13 @@ fn judge_and_record(
         Ok(judged) => judged,
         Err(reason) => (PathsRecord::not_judged(reason), Ran::default()),
     };
-    session.judged.insert(key(world, cell), record.fault.clone());
+    if world.gpu.lost().is_some() {
+        // Judged again on the next device.
+        return Ok(record);
+    }
+    session
+        .judged
+        .insert(key(world, cell), record.fault.clone());
     if let Some(reason) = &record.not_judged {
         session.tell_warning(&format!("{cell}: paths are not judged: {reason}"));
     }
@@ -122,7 +128,9 @@ fn made(
     let spp = session.experiment.spp.max();
     let demand = integrator.demand(spp, SIZE[0]);
     let (sequence, decorrelation) = (&cell[Axis::Sequence], &cell[Axis::Decorrelation]);
-    let sampler = registries.samplers.sampler(sequence, decorrelation, &demand);
+    let sampler = registries
+        .samplers
+        .sampler(sequence, decorrelation, &demand);
     let sampler = sampler.map_err(|e| e.to_string())?;
     let view = View {
         estimator,
@@ -138,9 +146,17 @@ fn made(
         seed: seed.unwrap_or_default(),
     };
     let (answers, ran) = session.clock.time("gate", || {
-        render(world, traced, cell, (&integrator, offset, &sampler), &pixels)
+        render(
+            world,
+            traced,
+            cell,
+            (&integrator, offset, &sampler),
+            &pixels,
+        )
     })?;
-    let record = session.clock.time("judge", || judge(&oracle, &view, &answers));
+    let record = session
+        .clock
+        .time("judge", || judge(&oracle, &view, &answers));
     Ok((record, ran))
 }
 
@@ -161,7 +177,10 @@ fn render(
     (integrator, offset, sampler): (&ConfiguredIntegrator, RayOffset, &Sampler),
     pixels: &Pixels,
 ) -> Result<(Vec<Answer>, Ran), String> {
-    let gpu = world.device.of(&cell[Axis::Kernels]).map_err(|e| e.to_string())?;
+    let gpu = world
+        .device
+        .of(&cell[Axis::Kernels])
+        .map_err(|e| e.to_string())?;
     let job = RenderJob {
         size: pixels.size,
         camera: world.camera,

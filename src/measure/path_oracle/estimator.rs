@@ -1,12 +1,14 @@
 //! What a sample is: primary visibility, ambient occlusion, path tracing.
 
-use super::bsdf::{self, Bsdf, Bounce, Reflected};
+use super::bsdf::{self, Bounce, Bsdf, Reflected};
 use super::hits::{SHORT, Segment};
 use super::surface::Surface;
 use super::{PathOracle, Vertex, Walk};
 use crate::integrator::ConfiguredIntegrator;
 use crate::params::{ParamValue, Params};
-use crate::sampling::dimensions::{DIRECTION, LIGHT_CHOICE, LIGHT_POINT, PIXEL, ROULETTE, at_bounce};
+use crate::sampling::dimensions::{
+    DIRECTION, LIGHT_CHOICE, LIGHT_POINT, PIXEL, ROULETTE, at_bounce,
+};
 use glam::DVec3;
 
 /// What a sample of an image is.
@@ -263,7 +265,8 @@ impl PathOracle<'_> {
                 break;
             }
             let bsdf = bsdf::of(&surface);
-            if !(self.lights.are_none() || bsdf.is_delta() || rules.strategy == Strategy::Material) {
+            if !(self.lights.are_none() || bsdf.is_delta() || rules.strategy == Strategy::Material)
+            {
                 let direct = self.direct(walk, &surface, &*bsdf, depth, rules.strategy);
                 state.radiance += rules.clamped(depth, state.throughput * direct);
                 if let Some(vertex) = walk.vertices.last_mut() {
@@ -304,7 +307,8 @@ impl PathOracle<'_> {
         let Some(light) = light.filter(|l| l.density > 0.0 && l.density.is_finite()) else {
             return DVec3::ZERO;
         };
-        let Some(Reflected { value, density }) = bsdf.evaluate(light.direction, &mut walk.rounding) else {
+        let Some(Reflected { value, density }) = bsdf.evaluate(light.direction, &mut walk.rounding)
+        else {
             return DVec3::ZERO;
         };
         let shadow = Segment {
@@ -374,4 +378,3 @@ impl PathOracle<'_> {
         true
     }
 }
-

@@ -87,7 +87,10 @@ impl PathOracle<'_> {
             side,
             material,
             base,
-            emission: material.emission.as_dvec3(),
+            emission: match material.emits_both_sides || side > 0.0 {
+                true => material.emission.as_dvec3(),
+                false => DVec3::ZERO,
+            },
             offset: OFFSET * reach,
         }
     }

@@ -52,7 +52,11 @@ fn of_integrator(
     let changes = changes.iter().cloned();
     let variant = Variant {
         name: (*name).to_owned(),
-        params: Params(changes.map(|(key, value)| (key.to_owned(), value)).collect()),
+        params: Params(
+            changes
+                .map(|(key, value)| (key.to_owned(), value))
+                .collect(),
+        ),
         ..Variant::default()
     };
     let integrator = IntegratorRegistry::default().configured(&variant);

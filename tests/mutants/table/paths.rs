@@ -138,17 +138,29 @@ pub const MUTANTS: &[Mutant] = &[
     fault(
         "occlusion-radius-a-percent",
         "rays of ambient occlusion are a fiftieth too long",
-        text("integrator/ao", "direction, frame.ao_radius", "direction, 1.02 * frame.ao_radius"),
+        text(
+            "integrator/ao",
+            "direction, frame.ao_radius",
+            "direction, 1.02 * frame.ao_radius",
+        ),
     ),
     fault(
         "occlusion-of-the-next-bounce",
         "directions of ambient occlusion are drawn from another bounce",
-        text("integrator/ao", "at_bounce(0u, DIRECTION)", "at_bounce(1u, DIRECTION)"),
+        text(
+            "integrator/ao",
+            "at_bounce(0u, DIRECTION)",
+            "at_bounce(1u, DIRECTION)",
+        ),
     ),
     fault(
         "primary-without-cosine",
         "primary visibility does not shade",
-        text("integrator/primary", "abs(dot(surface.normal, ray.direction))", "sqrt(abs(dot(surface.normal, ray.direction)))"),
+        text(
+            "integrator/primary",
+            "abs(dot(surface.normal, ray.direction))",
+            "sqrt(abs(dot(surface.normal, ray.direction)))",
+        ),
     ),
     fault(
         "primary-without-emission",
@@ -158,27 +170,47 @@ pub const MUTANTS: &[Mutant] = &[
     fault(
         "draws-clamped",
         "no number above 0.9 is drawn",
-        text("sampling/sampler", "return to_unit(x);", "return min(to_unit(x), 0.9);"),
+        text(
+            "sampling/sampler",
+            "return to_unit(x);",
+            "return min(to_unit(x), 0.9);",
+        ),
     ),
     fault(
         "draws-of-sixteen-bits",
         "numbers have sixteen bits",
-        text("sampling/sampler", "return f32(x >> 8u) * 5.9604645e-8;", "return f32(x >> 16u) / 65536.0;"),
+        text(
+            "sampling/sampler",
+            "return f32(x >> 8u) * 5.9604645e-8;",
+            "return f32(x >> 16u) / 65536.0;",
+        ),
     ),
     fault(
         "draws-a-dimension-late",
         "two numbers are drawn from dimensions one apart from the right ones",
-        text("sampling/dimensions", "const DIRECTION: u32 = 0u;", "const DIRECTION: u32 = 1u;"),
+        text(
+            "sampling/dimensions",
+            "const DIRECTION: u32 = 0u;",
+            "const DIRECTION: u32 = 1u;",
+        ),
     ),
     fault(
         "pixels-off-by-half",
         "samples lie in the first half of their pixel",
-        text("integrator/frame", "vec2<f32>(pixel) + sample_2d(sampler)", "vec2<f32>(pixel) + 0.5 * sample_2d(sampler)"),
+        text(
+            "integrator/frame",
+            "vec2<f32>(pixel) + sample_2d(sampler)",
+            "vec2<f32>(pixel) + 0.5 * sample_2d(sampler)",
+        ),
     ),
     fault(
         "aspect-ignored",
         "the height of the image counts as its width",
-        text("integrator/frame", "vec2<f32>(f32(frame.width), f32(frame.height))", "vec2<f32>(f32(frame.width), f32(frame.width))"),
+        text(
+            "integrator/frame",
+            "vec2<f32>(f32(frame.width), f32(frame.height))",
+            "vec2<f32>(f32(frame.width), f32(frame.width))",
+        ),
     ),
     fault(
         "cosine-density-half-again",
@@ -210,12 +242,20 @@ pub const MUTANTS: &[Mutant] = &[
     fault(
         "azimuth-three-quarters",
         "directions leave out a quarter of the turn",
-        text("shading/hemisphere", "let angle = TWO_PI * u.y;", "let angle = 0.75 * TWO_PI * u.y;"),
+        text(
+            "shading/hemisphere",
+            "let angle = TWO_PI * u.y;",
+            "let angle = 0.75 * TWO_PI * u.y;",
+        ),
     ),
     fault(
         "height-of-directions",
         "directions are steeper than they should be",
-        text("shading/hemisphere", "sqrt(1.0 - u.x)", "sqrt(1.0 - 0.98 * u.x)"),
+        text(
+            "shading/hemisphere",
+            "sqrt(1.0 - u.x)",
+            "sqrt(1.0 - 0.98 * u.x)",
+        ),
     ),
     fault(
         "basis-left-handed",
@@ -225,17 +265,29 @@ pub const MUTANTS: &[Mutant] = &[
     fault(
         "side-inverted",
         "inside and outside of glass are exchanged",
-        text("shading/surface", "select(-1.0, 1.0, from_outside)", "select(1.0, -1.0, from_outside)"),
+        text(
+            "shading/surface",
+            "select(-1.0, 1.0, from_outside)",
+            "select(1.0, -1.0, from_outside)",
+        ),
     ),
     fault(
         "shadow-of-the-offset",
         "rays start ten thousand times too far from their surface",
-        text("integrator/position_error", "return POSITION_ERROR *", "return 10000.0 * POSITION_ERROR *"),
+        text(
+            "integrator/position_error",
+            "return POSITION_ERROR *",
+            "return 10000.0 * POSITION_ERROR *",
+        ),
     ),
     fault(
         "offset-a-hundredfold",
         "rays start a hundred times too far from their surface",
-        text("integrator/position_error", "return POSITION_ERROR *", "return 100.0 * POSITION_ERROR *"),
+        text(
+            "integrator/position_error",
+            "return POSITION_ERROR *",
+            "return 100.0 * POSITION_ERROR *",
+        ),
     ),
     fault(
         "next-ray-a-little-inside",
@@ -250,7 +302,10 @@ pub const MUTANTS: &[Mutant] = &[
     fault(
         "emission-of-the-frame-thrice",
         "lamps are three times as bright in the camera",
-        path_text("var weight = 1.0;", "var weight = select(1.0, 3.0, depth == 0u);"),
+        path_text(
+            "var weight = 1.0;",
+            "var weight = select(1.0, 3.0, depth == 0u);",
+        ),
     ),
     fault(
         "first-bounce-full-weight",

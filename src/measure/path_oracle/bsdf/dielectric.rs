@@ -46,7 +46,10 @@ impl Bsdf for Dielectric<'_> {
         let reflectance = passed.map_or(1.0, |(exact, beyond)| {
             let r = match parameter(surface, 2) > 0.5 {
                 false => exact,
-                true => schlick(normal_reflectance(index), if from > to { beyond } else { cos }),
+                true => schlick(
+                    normal_reflectance(index),
+                    if from > to { beyond } else { cos },
+                ),
             };
             if is_thin { 2.0 * r / (1.0 + r) } else { r }
         });

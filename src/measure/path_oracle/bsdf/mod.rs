@@ -100,7 +100,10 @@ pub(super) fn around(n: DVec3, local: DVec3) -> DVec3 {
 /// A direction whose density is cos / π.
 pub(super) fn cosine_direction(n: DVec3, [u, v]: [f64; 2]) -> DVec3 {
     let (sin, cos) = (TAU * v).sin_cos();
-    around(n, DVec3::new(u.sqrt() * cos, u.sqrt() * sin, (1.0 - u).sqrt()))
+    around(
+        n,
+        DVec3::new(u.sqrt() * cos, u.sqrt() * sin, (1.0 - u).sqrt()),
+    )
 }
 
 /// Density of [`cosine_direction`].

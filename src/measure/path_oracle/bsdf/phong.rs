@@ -44,7 +44,9 @@ impl Bsdf for Phong<'_> {
 
     fn evaluate(&self, direction: DVec3, rounding: &mut Rounding) -> Option<Reflected> {
         let cosine = cosine_density(self.surface.normal, direction);
-        let towards = rounding.number(direction.dot(self.mirror())).clamp(0.0, 1.0);
+        let towards = rounding
+            .number(direction.dot(self.mirror()))
+            .clamp(0.0, 1.0);
         let lobe = (self.exponent + 1.0) / TAU * towards.powf(self.exponent);
         is_above(self.surface, direction).then(|| Reflected {
             value: self.surface.base * cosine + self.specular * lobe,

@@ -76,7 +76,10 @@ impl<'a> Principled<'a> {
         let radius = (1.0 - z * z).max(0.0).sqrt();
         let (sin, cos) = (TAU * u).sin_cos();
         let sum = DVec3::new(radius * cos, radius * sin, z) + seen;
-        around(n, DVec3::new(alpha * sum.x, alpha * sum.y, sum.z).normalize())
+        around(
+            n,
+            DVec3::new(alpha * sum.x, alpha * sum.y, sum.z).normalize(),
+        )
     }
 }
 

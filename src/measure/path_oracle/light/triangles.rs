@@ -47,7 +47,8 @@ impl EmissiveTriangles {
         let place = self.rows.partition_point(|(_, sum)| *sum <= choice);
         let (id, _) = *self.rows.get(place).or(self.rows.last())?;
         let material = scene.material_ids[id as usize] as usize;
-        let radiance = scene.materials[material].emission.as_dvec3();
+        let material = &scene.materials[material];
+        let radiance = material.emission.as_dvec3();
         let [a, b, c] = scene.triangles[id as usize].vertices.map(|v| v.as_dvec3());
         let root = u.sqrt();
         let point = a * (1.0 - root) + b * (root * (1.0 - v)) + c * (root * v);
@@ -56,7 +57,11 @@ impl EmissiveTriangles {
         let distance = to_light.length();
         let direction = to_light / distance;
         let normal = (b - a).cross(c - a).normalize();
-        let density = self.over_solid_angle(radiance, distance, normal.dot(direction));
+        let away = normal.dot(direction);
+        if away >= 0.0 && !material.emits_both_sides {
+            return None;
+        }
+        let density = self.over_solid_angle(radiance, distance, away);
         Some(LightSample {
             direction,
             distance,
