@@ -81,7 +81,13 @@ pub fn probing(library: KernelLibrary) -> Gpu {
 }
 
 /// Mean colours of images of `size` pixels, one for each seed.
-pub fn probe(gpu: &Gpu, scene: SceneData, of: &'static Probe, size: u32, [spp, seeds]: [u32; 2]) -> Vec<[f64; 3]> {
+pub fn probe(
+    gpu: &Gpu,
+    scene: SceneData,
+    of: &'static Probe,
+    size: u32,
+    [spp, seeds]: [u32; 2],
+) -> Vec<[f64; 3]> {
     let stage = Stage::new(gpu, scene);
     let traced = stage.traced(gpu, structure("bvh"));
     let integrator = ConfiguredIntegrator::new(of, &Variant::default()).expect("no parameters");
@@ -97,7 +103,11 @@ pub fn probe(gpu: &Gpu, scene: SceneData, of: &'static Probe, size: u32, [spp, s
     let renderer = Renderer::new(gpu, &stage.buffers, &traced, &job, false);
     let renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
     let one = |seed| {
-        let image = renderer.render(&[spp], seed).expect("a render").remove(0).image;
+        let image = renderer
+            .render(&[spp], seed)
+            .expect("a render")
+            .remove(0)
+            .image;
         let count = image.pixels.len() as f64;
         [0, 1, 2].map(|c| image.pixels.iter().map(|p| f64::from(p[c])).sum::<f64>() / count)
     };
@@ -109,9 +119,18 @@ pub fn sky() -> Light {
     let texel = |k: i32| {
         let (x, y) = (k % 16, k / 16);
         let sun = if (x, y) == (3, 2) { 40.0 } else { 0.0 };
-        Vec3::new(0.2 + sun, 0.3 + 0.05 * x as f32 + sun, 0.5 + 0.1 * y as f32 + 0.9 * sun)
+        Vec3::new(
+            0.2 + sun,
+            0.3 + 0.05 * x as f32 + sun,
+            0.5 + 0.1 * y as f32 + 0.9 * sun,
+        )
     };
-    let map = EnvironmentMap::new("sky", [16, 8], (0..128).map(texel).collect(), &mut Vec::new());
+    let map = EnvironmentMap::new(
+        "sky",
+        [16, 8],
+        (0..128).map(texel).collect(),
+        &mut Vec::new(),
+    );
     Light::Environment {
         map: Arc::new(map.expect("a map")),
         scale: 1.5,
@@ -121,7 +140,9 @@ pub fn sky() -> Light {
 
 /// Scenes, each with its part of lights that rays can find.
 fn scenes() -> Vec<(&'static str, SceneData)> {
-    let mut all: Vec<_> = ["rectangle", "disk", "sphere"].map(|kind| (kind, lamp(kind))).into();
+    let mut all: Vec<_> = ["rectangle", "disk", "sphere"]
+        .map(|kind| (kind, lamp(kind)))
+        .into();
     let mut several = lamp("sphere");
     for (k, x) in [1.2_f32, -1.0, 2.2].into_iter().enumerate() {
         several.lights.push(Light::Sphere {
@@ -135,7 +156,12 @@ fn scenes() -> Vec<(&'static str, SceneData)> {
     let mut squares = lamp("rectangle");
     for place in [[1.6, 1.5, 0.0], [-1.5, 2.5, -1.5], [0.9, 1.1, 1.7]] {
         let corner = |x: f32, z: f32| Vec3::from(place) + Vec3::new(x, 0.1 * x, z);
-        let [a, b, c, d] = [corner(0.0, 0.0), corner(0.4, 0.0), corner(0.4, 0.6), corner(0.0, 0.6)];
+        let [a, b, c, d] = [
+            corner(0.0, 0.0),
+            corner(0.4, 0.0),
+            corner(0.4, 0.6),
+            corner(0.0, 0.6),
+        ];
         let halves = [[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices });
         squares.triangles.extend(halves);
         squares.material_ids.extend([1, 1]);
