@@ -261,7 +261,6 @@ fn push_block(builder: &mut SceneBuilder, corner: Vec3, size: Vec3) {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{load_default, load_with};
-    use super::*;
     use crate::params::ParamValue;
     use crate::scene::LightList;
 
