@@ -174,7 +174,7 @@ fn exponent_of(text: &str) -> Result<u32, String> {
     ))
 }
 
-fn parse_size(text: &str) -> Result<[u32; 2], String> {
+pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let parsed = text
         .split_once(['x', 'X', '×'])
         .and_then(|(width, height)| {
