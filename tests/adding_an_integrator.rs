@@ -172,7 +172,7 @@ fn passes_give_the_image_of_a_single_kernel_through_every_structure() {
             let what = format!("{scene} through {}", kind.name());
             assert!(last(&passes, &[1, 3, 4]) == expected, "{what}");
             let counts = passes.ray_counts().expect("counts");
-            assert_eq!(counts, [24 * 16 * 4, 0, 0, 0], "{what}");
+            assert_eq!(counts, [24 * 16 * 4, 0, 0, 0, 0], "{what}");
         }
         let job = renderer(&gpu, &stage, &bvh, &Deferred, [24, 16]);
         assert_ne!(job.kernel_hash(), one.kernel_hash());

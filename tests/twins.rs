@@ -111,6 +111,7 @@ const NO_TWIN: &[(&str, &str)] = &[
     ("shading/light/tree", "judged by tests/lights"),
     ("shading/light/table", "the layout of lights"),
     ("shading/material", "judged by images, not by a twin"),
+    ("shading/normals", "judged in f64 by tests/materials"),
     ("shading/surface", "judged by images, not by a twin"),
     ("shading/texture", "judged by images, not by a twin"),
 ];

@@ -2,6 +2,7 @@
 
 use super::light_tables::LightTables;
 use super::offset::TransformError;
+use super::surface_tables::{MATERIAL_WORDS, Places, SurfaceFeatures, append};
 use crate::accel::{TriangleBuffers, TriangleSoup};
 use crate::gpu::{Bindings, Gpu, GpuError};
 use crate::scene::{
@@ -12,8 +13,8 @@ use glam::Vec3;
 /// What a scene makes kernels carry; absent features are not in the kernel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SceneFeatures {
-    /// Some material has a base-colour texture.
-    pub textures: bool,
+    /// Textures and normals.
+    pub surfaces: SurfaceFeatures,
     /// There are lights that can be sampled.
     pub lights: bool,
     /// Which of [`LIGHT_KINDS`] they are of.
@@ -33,12 +34,12 @@ impl SceneFeatures {
         let mut flags: Vec<_> = kinds.zip(self.materials).collect();
         flags.retain(|(name, _)| *name != DIFFUSE.feature);
         flags.extend([
-            ("textures", self.textures),
             ("lights", self.lights),
             ("one_sided_lights", self.one_sided_lights),
             ("daylight", self.daylight),
         ]);
         flags.extend(LightTables::flags(&self.light_kinds));
+        flags.extend(self.surfaces.flags());
         flags
     }
 }
@@ -61,6 +62,8 @@ pub struct SceneBuffers {
     pub lights: LightTables,
     /// Where texture coordinates begin in `shading_tables`, in words.
     pub first_uv: u32,
+    /// Where normals begin in `shading_tables`, in words.
+    pub first_normal: u32,
     /// Length of the diagonal of the scene's box, scene units.
     pub diagonal: f64,
 }
@@ -71,13 +74,9 @@ impl SceneBuffers {
     /// # Errors
     /// A buffer exceeds the adapter's limit.
     pub fn upload(gpu: &Gpu, scene: &SceneData, soup: &TriangleSoup) -> Result<Self, GpuError> {
-        let textured = scene.uvs.len() == scene.triangles.len()
-            && scene
-                .materials
-                .iter()
-                .any(|m| m.base_color_texture.is_some());
+        let surfaces = SurfaceFeatures::of(scene);
         let mut lights = LightTables::of(scene, &LightList::of(scene));
-        let tables = Tables::of(scene, &mut lights, textured);
+        let tables = Tables::of(scene, &mut lights, &surfaces);
         let triangles = TriangleBuffers::upload(gpu, soup)?;
         let mut bindings = triangles.bindings.clone();
         bindings.buffer(
@@ -89,7 +88,7 @@ impl SceneBuffers {
             triangles,
             transform_error: TransformError::of(soup),
             features: SceneFeatures {
-                textures: textured,
+                surfaces,
                 lights: lights.lights > 0,
                 light_kinds: lights.kinds,
                 one_sided_lights: lights.one_sided,
@@ -100,28 +99,25 @@ impl SceneBuffers {
             environment: scene.environment.to_array(),
             daylight: scene.daylight.unwrap_or_default(),
             lights,
-            first_uv: tables.first_uv,
+            first_uv: tables.places.first_uv,
+            first_normal: tables.places.first_normal,
             diagonal: f64::from(2.0 * scene.bounds().radius()),
         })
     }
 }
 
-/// Words of a material without its parameters.
-const MATERIAL_WORDS: usize = 12;
-
-/// Content of `shading_tables`, in this order: three `vec4` per material, parameters of materials, lights,
-/// six words of texture coordinates per triangle, texels.
+/// Content of `shading_tables`, in this order: three `vec4` per material, parameters of materials, lights, and what
+/// [`surface_tables`](super::surface_tables) appends.
 ///
-/// A material: base colour and number of its kind, with the highest bit set where it emits from its front alone; emission and place of its parameters, in `vec4`; place of its
-/// first texel, in words, width and height of its texture, and 1 if it has one.
+/// A material: base colour and number of its kind, with the highest bit set where it emits from its front alone; emission
+/// and place of its parameters, in `vec4`; places of its textures, 0 where it has none.
 struct Tables {
     words: Vec<u32>,
-    /// In words.
-    first_uv: u32,
+    places: Places,
 }
 
 impl Tables {
-    fn of(scene: &SceneData, lights: &mut LightTables, textured: bool) -> Self {
+    fn of(scene: &SceneData, lights: &mut LightTables, surfaces: &SurfaceFeatures) -> Self {
         let mut words = vec![0; MATERIAL_WORDS * scene.materials.len()];
         for (index, material) in scene.materials.iter().enumerate() {
             let parameters = words.len() as u32 / 4;
@@ -136,12 +132,9 @@ impl Tables {
             words[first..first + row.len()].copy_from_slice(&row);
         }
         lights.append(&mut words);
-        let first_uv = words.len() as u32;
-        if textured {
-            push_textures(scene, &mut words);
-        }
+        let places = append(scene, surfaces, &mut words);
         words.resize(words.len().next_multiple_of(4), 0);
-        Self { words, first_uv }
+        Self { words, places }
     }
 }
 
@@ -154,21 +147,4 @@ pub(super) fn emits_in_front(material: &Material) -> bool {
 fn number(kind: &MaterialKind) -> u32 {
     let place = MATERIAL_KINDS.iter().position(|known| *known == kind);
     place.unwrap_or_default() as u32
-}
-
-/// Appends texture coordinates and texels, and tells the materials where theirs are.
-fn push_textures(scene: &SceneData, words: &mut Vec<u32>) {
-    let texels: usize = scene.textures.iter().map(|t| t.texels.len()).sum();
-    words.reserve_exact(6 * scene.uvs.len() + texels + 3);
-    let uvs = scene.uvs.iter().flatten();
-    words.extend(uvs.flat_map(|uv| [uv.x.to_bits(), uv.y.to_bits()]));
-    for (id, texture) in (0_u32..).zip(&scene.textures) {
-        let row = [words.len() as u32, texture.width, texture.height, 1];
-        words.extend(texture.texels.iter().map(|t| u32::from_le_bytes(*t)));
-        for (index, material) in scene.materials.iter().enumerate() {
-            if material.base_color_texture == Some(id) {
-                words[MATERIAL_WORDS * index + 8..][..4].copy_from_slice(&row);
-            }
-        }
-    }
 }

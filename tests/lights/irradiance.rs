@@ -65,7 +65,7 @@ fn a_sphere_is_seen_casts_a_shadow_and_shines_inside() {
     }];
     for strategy in ["mis-balance", "light", "bsdf"] {
         let what = path_with(1, &[("strategy", strategy)]);
-        let found = estimate(gpu(), &scene, towards([0.0, 0.0]), &what, 64);
+        let found = estimate(gpu(), &scene, towards([0.0, 0.0]), &what, 256);
         // The eye is inside, too, and sees the floor first.
         assert!(
             found.agrees_with(0.5) && found.error < 3e-3,
