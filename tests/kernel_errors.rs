@@ -18,9 +18,13 @@ fn composition(structure: &str) -> Composition {
     for feature in [
         "next_event",
         "found_emission",
+        "power_heuristic",
+        "clamped",
+        "sphere_lights",
         "roulette",
         "textures",
         "lights",
+        "rectangle_lights",
         "mirror",
         "dielectric",
         "daylight",
@@ -123,9 +127,9 @@ fn faults_of_all_kinds_are_told_with_file_and_line() {
         ),
         (
             "a fault in a shader",
-            "shading/light/triangles",
-            "let root = sqrt(point.x)",
-            "let root = sqrt(point.w)",
+            "shading/light/flat",
+            "let towards = point.position - origin",
+            "let towards = point.position - origin.w",
             "",
         ),
     ] {

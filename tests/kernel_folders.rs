@@ -59,7 +59,7 @@ fn changed(folder: &Path, from: &str, to: &str) {
 
 /// The path tracer without the weights of multiple importance sampling: emission is counted twice.
 fn without_weights(folder: &Path) {
-    let weight = "weight = mis_weight(density, light_pdf(surface, hit.t));";
+    let weight = "weight = found_weight(density, light_pdf(leaving, surface, hit));";
     changed(folder, weight, "weight = 1.0;");
 }
 

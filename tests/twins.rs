@@ -101,7 +101,15 @@ const NO_TWIN: &[(&str, &str)] = &[
     ),
     ("shading/lights", "the table of lights; judged by images"),
     ("shading/light/sky", "judged by images, not by a twin"),
-    ("shading/light/triangles", "judged by images, not by a twin"),
+    ("shading/light/choice", "judged by tests/lights"),
+    ("shading/light/delta", "judged by tests/lights"),
+    ("shading/light/environment", "judged by tests/lights"),
+    ("shading/light/flat", "judged by images, not by a twin"),
+    ("shading/light/ies", "judged by tests/lights"),
+    ("shading/light/sample", "what a sample of a light is"),
+    ("shading/light/sphere", "judged by tests/lights"),
+    ("shading/light/tree", "judged by tests/lights"),
+    ("shading/light/table", "the layout of lights"),
     ("shading/material", "judged by images, not by a twin"),
     ("shading/surface", "judged by images, not by a twin"),
     ("shading/texture", "judged by images, not by a twin"),
@@ -487,4 +495,15 @@ fn kinds_of_materials_have_the_numbers_of_their_rows() {
     assert_eq!(numbered(&table), names);
     let swapped = table.replace("MIRROR: u32 = 4u", "MIRROR: u32 = 7u");
     assert_ne!(numbered(&swapped), names);
+}
+
+#[test]
+fn kinds_of_lights_have_the_numbers_of_their_rows() {
+    let constants = values(&constants(&kernel_text("shading/light/table")));
+    for (number, kind) in (0..).zip(raystone::scene::LIGHT_KINDS) {
+        let name = kind.name.to_uppercase();
+        assert_eq!(constants.get(&name), Some(&number), "{name}");
+    }
+    // And NO_LIGHT.
+    assert_eq!(constants.len(), raystone::scene::LIGHT_KINDS.len() + 1);
 }

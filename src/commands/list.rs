@@ -9,11 +9,11 @@ use raystone::discrepancy::Measure;
 use raystone::measure::metrics::METRICS;
 use raystone::params::{Entry, Parameter};
 use raystone::run::Registries;
-use raystone::scene::MATERIAL_KINDS;
+use raystone::scene::{LIGHT_KINDS, MATERIAL_KINDS};
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-/// List everything that can be named: scenes, structures, samplers, integrators, materials, metrics,
+/// List everything that can be named: scenes, structures, samplers, integrators, materials, lights, metrics,
 /// measures, adapters
 #[derive(Args)]
 pub struct List {
@@ -35,6 +35,8 @@ enum Topic {
     Integrator,
     #[value(alias = "materials")]
     Material,
+    #[value(alias = "lights")]
+    Light,
     #[value(alias = "triangles")]
     Triangle,
     #[value(alias = "box-tests", alias = "box")]
@@ -69,6 +71,7 @@ impl List {
                 Topic::BoxTest => axis(Axis::BoxTest),
                 Topic::Offset => axis(Axis::Offset),
                 Topic::Material => materials(),
+                Topic::Light => lights(),
                 Topic::Metric => metrics(),
                 Topic::Measure => measures(),
                 // Drivers are loaded, and may print, only where they are asked for.
@@ -108,6 +111,16 @@ fn entries(axis: Axis, entries: &[Entry]) -> String {
         if let Some((from, names)) = shared {
             let _ = writeln!(text, "  {:width$}    as `{from}`: {}", "", names.join(", "));
         }
+    }
+    text
+}
+
+fn lights() -> String {
+    let width = LIGHT_KINDS.iter().map(|kind| kind.name.len()).max();
+    let width = width.unwrap_or(0);
+    let mut text = "light: what shines, besides a constant sky\n".to_owned();
+    for kind in LIGHT_KINDS {
+        let _ = writeln!(text, "  {:width$}  {}", kind.name, kind.description);
     }
     text
 }

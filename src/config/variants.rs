@@ -30,7 +30,10 @@ pub(super) fn resolve(
         return Ok(Entry {
             name: text.to_owned(),
             description: description.to_owned(),
-            schema: Vec::new(),
+            schema: match axis {
+                Axis::Scene => crate::scene::common_parameters(),
+                _ => Vec::new(),
+            },
         });
     }
     let what = match axis {

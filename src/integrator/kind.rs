@@ -17,10 +17,14 @@ pub enum CountedRays {
     Ao,
     /// From surface to surface.
     Bounce,
+    /// Not traced, because the light cannot contribute: behind the surface, dark on this side, outside of its cone.
+    Skipped,
 }
 
 /// Names of [`CountedRays`] in records, in their order.
-pub const RAY_COUNT_CLASSES: [&str; 4] = ["primary", "shadow", "ao", "bounce"];
+pub const RAY_COUNT_CLASSES: [&str; 5] = ["primary", "shadow", "ao", "bounce", "skipped"];
+/// How many of them, from the first on, are traced.
+pub const TRACED_CLASSES: usize = 4;
 
 /// What others have to know of an integrator with its parameters.
 #[derive(Debug, Clone, Default, PartialEq)]

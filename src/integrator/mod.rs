@@ -2,7 +2,11 @@
 
 mod builtin;
 pub mod integrand;
+mod alias;
+mod environment_tables;
 mod kind;
+mod light_tables;
+mod light_tree;
 pub mod offset;
 mod passes;
 pub mod path;
@@ -15,11 +19,12 @@ mod tables;
 pub use crate::accel::Traced;
 pub use kind::{
     ConfiguredIntegrator, CountedRays, Integrator, IntegratorError, IntegratorFacts,
-    RAY_COUNT_CLASSES,
+    RAY_COUNT_CLASSES, TRACED_CLASSES,
 };
 pub use offset::{OffsetRegistry, RayOffset};
 pub use passes::ImageSteps;
 pub use registry::IntegratorRegistry;
 pub use render::{BLOCK_SAMPLES, RenderJob, Renderer, Snapshot, rounding_bound, with_sampler};
 pub use stage::{Stage, StageError};
+pub use light_tables::LightTables;
 pub use tables::{SceneBuffers, SceneFeatures};

@@ -30,6 +30,24 @@ parameters! {
         Never = "none",
     }
 
+    /// What decides which light is sampled.
+    pub enum LightChoice {
+        /// Its power.
+        Power = "power",
+        /// Nothing: all are alike.
+        Uniform = "uniform",
+        /// What it contributes at the point, about, by a hierarchy of lights (Conty Estevez & Kulla 2018).
+        Tree = "tree",
+    }
+
+    /// How many lights are sampled at each vertex.
+    pub enum Lights {
+        /// One.
+        One = "one",
+        /// Each once.
+        All = "all",
+    }
+
     /// Parameters of `path`.
     pub struct PathParameters {
         /// most bounces of a path
@@ -37,6 +55,10 @@ parameters! {
         /// how directions of the material and samples of lights are joined: by the balance or the power
         /// heuristic, or one of them alone
         strategy: Strategy = Strategy::MisBalance;
+        /// what decides which light is sampled
+        light_choice: LightChoice = LightChoice::Power;
+        /// how many lights are sampled at each vertex
+        lights: Lights = Lights::One;
         /// what Russian roulette goes by
         roulette: Roulette = Roulette::Throughput;
         /// bounces before roulette
@@ -53,6 +75,9 @@ impl PathParameters {
         vec![
             ("next_event", self.strategy != Strategy::Bsdf),
             ("found_emission", self.strategy != Strategy::Light),
+            ("uniform_lights", self.light_choice == LightChoice::Uniform),
+            ("light_tree", self.light_choice == LightChoice::Tree),
+            ("all_lights", self.lights == Lights::All),
             ("power_heuristic", self.strategy == Strategy::MisPower),
             ("roulette", self.roulette != Roulette::Never),
             ("roulette_by_albedo", self.roulette == Roulette::Albedo),

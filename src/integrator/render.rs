@@ -4,7 +4,7 @@
 //! Every image that it hands out was checked: no kernel raised its error word, and every pixel took
 //! exactly the samples asked for.
 
-use super::kind::ConfiguredIntegrator;
+use super::kind::{ConfiguredIntegrator, RAY_COUNT_CLASSES};
 use super::offset::RayOffset;
 use super::passes::{ImageSteps, Passes};
 use super::slice::{Slice, job_uniform};
@@ -428,7 +428,7 @@ impl<'a> Renderer<'a> {
     ///
     /// # Errors
     /// As for [`Renderer::image`].
-    pub fn ray_counts(&self) -> Result<[u64; 4], GpuError> {
+    pub fn ray_counts(&self) -> Result<[u64; RAY_COUNT_CLASSES.len()], GpuError> {
         self.check()?;
         let words: Vec<u32> = self.gpu.read(&self.status)?;
         Ok(std::array::from_fn(|c| {

@@ -21,7 +21,9 @@ pub(super) fn job_uniform(job: &RenderJob, scene: &SceneBuffers) -> UniformValue
     let [width, height] = job.size;
     let [forward, right, up] = job.camera.basis(job.size).map(|v| v.to_array());
     let ao_radius = job.integrator.facts.ao_radius.unwrap_or(0.0) * scene.diagonal;
-    UniformValues::new()
+    let values = UniformValues::new();
+    let values = scene.lights.uniform(values);
+    values
         .vec("eye", &job.camera.eye.to_array())
         .vec("forward", &forward)
         .vec("right", &right)
@@ -29,10 +31,7 @@ pub(super) fn job_uniform(job: &RenderJob, scene: &SceneBuffers) -> UniformValue
         .vec("environment", &scene.environment)
         .u32("width", width)
         .u32("height", height)
-        .u32("lights", scene.lights)
-        .u32("first_light", scene.first_light)
         .u32("first_uv", scene.first_uv)
-        .f32("light_power", scene.light_power)
         .f32("ao_radius", ao_radius as f32)
         .f32("transform_scale", scene.transform_error.scale)
         .f32("transform_shift", scene.transform_error.shift)

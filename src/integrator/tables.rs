@@ -1,9 +1,12 @@
 //! Scene buffers for shading: canonical triangles, materials, lights, textures.
 
+use super::light_tables::LightTables;
 use super::offset::TransformError;
 use crate::accel::{TriangleBuffers, TriangleSoup};
 use crate::gpu::{Bindings, Gpu, GpuError};
-use crate::scene::{DIFFUSE, Daylight, MATERIAL_KINDS, MaterialKind, SceneData};
+use crate::scene::{
+    DIFFUSE, Daylight, LIGHT_KINDS, LightList, MATERIAL_KINDS, Material, MaterialKind, SceneData,
+};
 use glam::Vec3;
 
 /// What a scene makes kernels carry; absent features are not in the kernel.
@@ -11,8 +14,12 @@ use glam::Vec3;
 pub struct SceneFeatures {
     /// Some material has a base-colour texture.
     pub textures: bool,
-    /// There are lights that can be sampled: materials that emit.
+    /// There are lights that can be sampled.
     pub lights: bool,
+    /// Which of [`LIGHT_KINDS`] they are of.
+    pub light_kinds: [bool; LIGHT_KINDS.len()],
+    /// Some surface emits from its front alone.
+    pub one_sided_lights: bool,
     /// The environment is the sky over a scene without a light.
     pub daylight: bool,
     /// Which of [`MATERIAL_KINDS`] some material is of.
@@ -28,8 +35,10 @@ impl SceneFeatures {
         flags.extend([
             ("textures", self.textures),
             ("lights", self.lights),
+            ("one_sided_lights", self.one_sided_lights),
             ("daylight", self.daylight),
         ]);
+        flags.extend(LightTables::flags(&self.light_kinds));
         flags
     }
 }
@@ -48,21 +57,12 @@ pub struct SceneBuffers {
     pub environment: [f32; 3],
     /// The sky; kernels without its feature do not read it.
     pub daylight: Daylight,
-    /// Number of emissive triangles.
-    pub lights: u32,
-    /// Where they begin in `shading_tables`, in `vec4`.
-    pub first_light: u32,
-    /// Sum over emissive triangles of area times luminance.
-    pub light_power: f32,
+    /// What is sampled.
+    pub lights: LightTables,
     /// Where texture coordinates begin in `shading_tables`, in words.
     pub first_uv: u32,
     /// Length of the diagonal of the scene's box, scene units.
     pub diagonal: f64,
-}
-
-/// Relative luminance of linear sRGB, as in `kernels/shading/light/triangles.wesl`.
-fn luminance(c: Vec3) -> f32 {
-    0.212_671 * c.x + 0.715_160 * c.y + 0.072_169 * c.z
 }
 
 impl SceneBuffers {
@@ -76,8 +76,8 @@ impl SceneBuffers {
                 .materials
                 .iter()
                 .any(|m| m.base_color_texture.is_some());
-        let (lights, light_power) = light_words(scene);
-        let tables = Tables::of(scene, &lights, textured);
+        let mut lights = LightTables::of(scene, &LightList::of(scene));
+        let tables = Tables::of(scene, &mut lights, textured);
         let triangles = TriangleBuffers::upload(gpu, soup)?;
         let mut bindings = triangles.bindings.clone();
         bindings.buffer(
@@ -90,16 +90,16 @@ impl SceneBuffers {
             transform_error: TransformError::of(soup),
             features: SceneFeatures {
                 textures: textured,
-                lights: !lights.is_empty(),
+                lights: lights.lights > 0,
+                light_kinds: lights.kinds,
+                one_sided_lights: lights.one_sided,
                 daylight: scene.daylight.is_some(),
                 materials: MATERIAL_KINDS
                     .map(|kind| scene.materials.iter().any(|m| m.kind == kind)),
             },
             environment: scene.environment.to_array(),
             daylight: scene.daylight.unwrap_or_default(),
-            lights: lights.len() as u32,
-            first_light: tables.first_light,
-            light_power,
+            lights,
             first_uv: tables.first_uv,
             diagonal: f64::from(2.0 * scene.bounds().radius()),
         })
@@ -112,18 +112,16 @@ const MATERIAL_WORDS: usize = 12;
 /// Content of `shading_tables`, in this order: three `vec4` per material, parameters of materials, lights,
 /// six words of texture coordinates per triangle, texels.
 ///
-/// A material: base colour and number of its kind; emission and place of its parameters, in `vec4`; place of its
+/// A material: base colour and number of its kind, with the highest bit set where it emits from its front alone; emission and place of its parameters, in `vec4`; place of its
 /// first texel, in words, width and height of its texture, and 1 if it has one.
 struct Tables {
     words: Vec<u32>,
-    /// In `vec4`.
-    first_light: u32,
     /// In words.
     first_uv: u32,
 }
 
 impl Tables {
-    fn of(scene: &SceneData, lights: &[[u32; 4]], textured: bool) -> Self {
+    fn of(scene: &SceneData, lights: &mut LightTables, textured: bool) -> Self {
         let mut words = vec![0; MATERIAL_WORDS * scene.materials.len()];
         for (index, material) in scene.materials.iter().enumerate() {
             let parameters = words.len() as u32 / 4;
@@ -131,12 +129,13 @@ impl Tables {
             words.resize(words.len().next_multiple_of(4), 0);
             let [r, g, b] = material.base_color.to_array().map(f32::to_bits);
             let [er, eg, eb] = material.emission.to_array().map(f32::to_bits);
-            let row = [r, g, b, number(material.kind), er, eg, eb, parameters];
+            let one_sided = u32::from(emits_in_front(material)) << 31;
+            let kind = number(material.kind) | one_sided;
+            let row = [r, g, b, kind, er, eg, eb, parameters];
             let first = MATERIAL_WORDS * index;
             words[first..first + row.len()].copy_from_slice(&row);
         }
-        let first_light = words.len() as u32 / 4;
-        words.extend_from_slice(lights.as_flattened());
+        lights.append(&mut words);
         let first_uv = words.len() as u32;
         if textured {
             push_textures(scene, &mut words);
@@ -144,10 +143,14 @@ impl Tables {
         words.resize(words.len().next_multiple_of(4), 0);
         Self {
             words,
-            first_light,
             first_uv,
         }
     }
+}
+
+/// Whether the material emits, and from its front alone.
+pub(super) fn emits_in_front(material: &Material) -> bool {
+    !material.emits_both_sides && material.emission != Vec3::ZERO
 }
 
 /// Of a kind of material, in kernels.
@@ -171,28 +174,4 @@ fn push_textures(scene: &SceneData, words: &mut Vec<u32>) {
             }
         }
     }
-}
-
-/// One row per emissive triangle: index and cumulative probability; and the total power.
-fn light_words(scene: &SceneData) -> (Vec<[u32; 4]>, f32) {
-    let mut powers = Vec::new();
-    for (id, (triangle, material)) in scene.triangles.iter().zip(&scene.material_ids).enumerate() {
-        let emission = scene.materials[*material as usize].emission;
-        let [a, b, c] = triangle.vertices.map(|v| v.as_dvec3());
-        let area = 0.5 * (b - a).cross(c - a).length();
-        let power = area * f64::from(luminance(emission));
-        if power > 0.0 {
-            powers.push((id as u32, power));
-        }
-    }
-    let total: f64 = powers.iter().map(|(_, p)| p).sum();
-    let mut sum = 0.0;
-    let rows = powers
-        .iter()
-        .map(|(id, power)| {
-            sum += power;
-            [*id, ((sum / total) as f32).to_bits(), 0, 0]
-        })
-        .collect();
-    (rows, total as f32)
 }

@@ -9,7 +9,7 @@ use crate::accel::{AccelError, TriangleSoup};
 use crate::config::{Axis, Experiment, Plan};
 use crate::gpu::probe_arithmetic;
 use crate::image::{FileFormat, Image};
-use crate::integrator::{Renderer, Stage, StageError, Traced};
+use crate::integrator::{Renderer, Stage, StageError, TRACED_CLASSES, Traced};
 use crate::params::Variant;
 use crate::scene::{self, LoadOptions, LoadReport};
 use indicatif::ProgressStyle;
@@ -112,7 +112,7 @@ pub fn render(
         format.write(file, image).map_err(input)
     })?;
     rendering.samples_s = compiled.elapsed().as_secs_f64();
-    rendering.rays = renderer.ray_counts()?.iter().sum();
+    rendering.rays = renderer.ray_counts()?[..TRACED_CLASSES].iter().sum();
     rendering.non_finite_pixels = image.non_finite_pixels();
     rendering.total_s = start.elapsed().as_secs_f64();
     session.progress.finish_and_clear();

@@ -10,7 +10,7 @@ use super::world::World;
 use crate::accel::Space;
 use crate::config::{Axis, Cell};
 use crate::gpu::{Elapsed, GpuError};
-use crate::integrator::{RAY_COUNT_CLASSES, Renderer};
+use crate::integrator::{RAY_COUNT_CLASSES, Renderer, TRACED_CLASSES};
 use crate::measure::record::{Body, Key, Line, Ran, TimeRecord};
 use crate::measure::statistics::median_interval;
 use crate::measure::timing::{Measured, Samples, Watch, interleave};
@@ -42,7 +42,7 @@ impl Measured for Timed<'_> {
 /// What does not depend on the structure, per sampler, integrator and space in which structures meet
 /// triangles: the counted rays, and the hash of the image of the run that counted them, which was
 /// rendered once into fresh buffers.
-type Shared = BTreeMap<String, ([u64; 4], String)>;
+type Shared = BTreeMap<String, ([u64; RAY_COUNT_CLASSES.len()], String)>;
 
 fn key(cell: &Cell, space: Space) -> String {
     format!("{} in {space:?}", cell.on(&Cell::SAMPLER))
@@ -202,7 +202,7 @@ fn finish(
             (rays, image)
         }
     };
-    let total: u64 = rays.iter().sum();
+    let total: u64 = rays[..TRACED_CLASSES].iter().sum();
     let spp = f64::from(item.spp);
     let per_spp: Vec<f64> = samples.ms.iter().map(|ms| ms / spp).collect();
     let rates: Vec<f64> = samples
@@ -248,7 +248,7 @@ fn count_rays(
     world: &World,
     structure: &Gated,
     item: &Timed,
-) -> Result<([u64; 4], String), String> {
+) -> Result<([u64; RAY_COUNT_CLASSES.len()], String), String> {
     let renderer = renderer(session, world, structure, &item.cell, [true, true])?;
     let counted = session.clock.time("gpu", || {
         renderer.reset()?;

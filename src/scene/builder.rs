@@ -1,7 +1,7 @@
 //! Gathers triangles from a loader and turns them into a checked [`SceneData`].
 
 use super::{
-    Assembly, Daylight, Framing, InstanceError, LoadReport, Material, SceneData, SceneError,
+    Assembly, Daylight, Framing, InstanceError, Light, LightList, LoadReport, Material, SceneData, SceneError,
     Texture, Transform,
 };
 use crate::geometry::{Camera, Triangle};
@@ -31,6 +31,7 @@ pub(super) struct Look {
     pub textures: Vec<Texture>,
     pub camera: Option<Camera>,
     pub environment: Vec3,
+    pub lights: Vec<Light>,
 }
 
 impl Look {
@@ -209,12 +210,15 @@ impl SceneBuilder {
             assembly,
             camera: look.camera,
             environment: look.environment,
+            lights: look.lights,
             daylight: None,
             framing: None,
             hash: String::new(),
             report: self.report,
         };
-        let unlit = scene.environment == Vec3::ZERO && scene.emitters().is_empty();
+        let list = LightList::of(&scene);
+        scene.report.warnings.extend(list.problems);
+        let unlit = scene.environment == Vec3::ZERO && list.lights.is_empty();
         if unlit || scene.camera.is_none() {
             let framing = Framing::of(&scene);
             if unlit {

@@ -1,9 +1,13 @@
 //! Questions asked of a loaded scene: extent, size in bytes, emitters, content hash.
 
-use super::{Bounds, InstanceError, SceneData, Transform};
+use super::{
+    Bounds, EnvironmentMap, InstanceError, Light, LightList, SceneData, SceneError, Transform,
+};
 use crate::geometry::Triangle;
 use glam::{Vec2, Vec3};
 use std::mem::size_of_val;
+use std::path::Path;
+use std::sync::Arc;
 
 /// Changed whenever the order or meaning of the hashed bytes changes.
 const HASH_VERSION: &[u8] = b"raystone scene 2";
@@ -37,6 +41,30 @@ impl SceneData {
         }
         self.hash = self.content_hash();
         Ok(())
+    }
+
+    /// The scene lit by an environment map, in the place of a constant radiance or the sky of scenes without a light.
+    ///
+    /// # Errors
+    /// The map cannot be read.
+    pub(super) fn under(mut self, file: &Path) -> Result<Self, SceneError> {
+        let map = EnvironmentMap::read(file, &mut self.report.warnings)?;
+        if let Some(sky) = self.daylight.take() {
+            let note = sky.note();
+            self.report.warnings.retain(|line| *line != note);
+        }
+        self.environment = Vec3::ZERO;
+        self.lights.push(Light::Environment {
+            map: Arc::new(map),
+            scale: 1.0,
+            turn: 0.0,
+        });
+        let problems = LightList::of(&self).problems;
+        let new = problems.into_iter().filter(|line| !self.report.warnings.contains(line));
+        let new: Vec<String> = new.collect();
+        self.report.warnings.extend(new);
+        self.hash = self.content_hash();
+        Ok(self)
     }
 
     /// Bytes of the scene's arrays: triangles, texture coordinates, material indices, texels.
@@ -100,6 +128,10 @@ impl SceneData {
             hash.vectors(&[camera.eye, camera.target, camera.up, lens]);
         }
         hash.vectors(&[self.environment]);
+        for light in &self.lights {
+            // As above: fields are plain, and their text has all their digits.
+            hash.bytes(format!("{light:?}").as_bytes());
+        }
         if let Some(sky) = &self.daylight {
             hash.vectors(&[sky.up, sky.key, Vec3::splat(sky.reach)]);
         }
@@ -132,13 +164,14 @@ impl Hash {
 #[cfg(test)]
 mod tests {
     use crate::scene::builtin::tests::load_default;
-    use crate::scene::{Daylight, MIRROR};
+    use crate::scene::{Daylight, Light, MIRROR};
+    use glam::Vec3;
 
     #[test]
     fn the_hash_sees_every_part_of_the_scene() {
         let scene = load_default("cornell-box");
         type Change = fn(&mut crate::scene::SceneData);
-        let changes: [(&str, Change); 11] = [
+        let changes: [(&str, Change); 12] = [
             ("vertex", |s| s.triangles[3].vertices[1].x += 1e-3),
             ("material id", |s| s.material_ids[0] = 1),
             ("reflectance", |s| s.materials[0].base_color.y += 1e-3),
@@ -146,6 +179,12 @@ mod tests {
             ("parameter", |s| s.materials[0].parameters.push(1.5)),
             ("emission", |s| s.materials[0].emission.z += 1e-3),
             ("sides", |s| s.materials[0].emits_both_sides = false),
+            ("light", |s| {
+                s.lights.push(Light::Point {
+                    position: Vec3::X,
+                    intensity: Vec3::ONE,
+                });
+            }),
             ("source", |s| s.materials[0].source.ior = Some(1.5)),
             ("camera", |s| s.camera = None),
             ("environment", |s| s.environment.x += 1e-3),

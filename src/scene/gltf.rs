@@ -6,9 +6,10 @@ use super::error::{self, guarded};
 use super::gltf_accessor::check_accessors;
 use super::gltf_container;
 use super::gltf_files::Files;
+use super::gltf_lights;
 use super::gltf_material::{self, Mapping};
 use super::texture::decode_all;
-use super::{InstanceError, LoadOptions, SceneData, SceneError, Transform};
+use super::{InstanceError, Light, LoadOptions, SceneData, SceneError, Transform};
 use crate::geometry::{Camera, Triangle};
 use glam::{Mat4, Vec2, Vec3};
 use gltf::mesh::Mode;
@@ -88,6 +89,7 @@ fn build(
         mappings: &palette.mappings,
         builder: SceneBuilder::new(!palette.images.is_empty(), 0),
         camera: None,
+        lights: Vec::new(),
         copies: Copies::new(document),
         lines_or_points: 0,
         deformed: 0,
@@ -97,6 +99,7 @@ fn build(
     let Geometry {
         mut builder,
         camera,
+        lights,
         ..
     } = geometry;
     builder.report.warnings.append(&mut palette.warnings);
@@ -110,6 +113,7 @@ fn build(
         materials: palette.materials,
         textures,
         camera,
+        lights,
         ..Look::default()
     };
     builder.finish(name, look)
@@ -152,6 +156,7 @@ struct Geometry<'a> {
     mappings: &'a [Option<Mapping>],
     builder: SceneBuilder,
     camera: Option<Camera>,
+    lights: Vec<Light>,
     /// `None` where no nodes share a mesh, or once a node could not be made an instance.
     copies: Option<Copies>,
     lines_or_points: usize,
@@ -210,6 +215,9 @@ impl<'a> Geometry<'a> {
     fn read_node(&mut self, node: &gltf::Node<'a>, world: Mat4) -> Result<(), SceneError> {
         if let (None, Some(camera)) = (self.camera, node.camera()) {
             self.camera = self.read_camera(&camera, world);
+        }
+        if let Some(light) = node.light() {
+            self.lights.push(gltf_lights::read(&light, world));
         }
         let Some(mesh) = node.mesh() else {
             return Ok(());

@@ -9,6 +9,7 @@ pub mod builtin;
 mod camera;
 mod content;
 mod daylight;
+mod environment;
 mod error;
 mod export;
 mod framing;
@@ -16,8 +17,11 @@ mod gltf;
 mod gltf_accessor;
 mod gltf_container;
 mod gltf_files;
+mod gltf_lights;
 mod gltf_material;
+mod ies;
 mod instances;
+mod light;
 mod material;
 mod mtl;
 mod nori;
@@ -30,17 +34,20 @@ pub use builder::{DEFAULT_ALBEDO, MAX_COORDINATE};
 pub use builtin::builtin_scenes;
 pub use camera::Bounds;
 pub use daylight::Daylight;
+pub use environment::EnvironmentMap;
 pub use error::SceneError;
 pub use export::{ExportError, MITSUBA_FILE, MitsubaSettings, export_mitsuba};
 pub use framing::Framing;
+pub use ies::{IesError, IesProfile, Photometry};
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
+pub use light::{LIGHT_KINDS, Light, LightKind, LightList, ListedLight, Parallelogram, Source};
 pub use material::{
     COOK_TORRANCE, CookTorrance, DEFAULT_IOR, DIELECTRIC, DIFFUSE, Fresnel, MATERIAL_KINDS, MIRROR,
     Masking, Material, MaterialKind, MaterialSource, PHONG, PRINCIPLED, reflectance_of_ior,
 };
 
 use crate::geometry::{Camera, Triangle};
-use crate::params::{Params, Variant};
+use crate::params::{ParamRange, ParamValue, Parameter, ParameterSchema, Params, Variant};
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::io::Read as _;
@@ -106,6 +113,8 @@ pub struct SceneData {
     pub camera: Option<Camera>,
     /// Constant radiance of the environment, linear RGB; zero is a black sky.
     pub environment: Vec3,
+    /// Lights without triangles.
+    pub lights: Vec<Light>,
     /// The sky over a scene that brings no light; its radiance is a multiple of `environment`.
     pub daylight: Option<Daylight>,
     /// Where to look from, if the scene brings no camera.
@@ -160,6 +169,32 @@ pub fn named(name: &str) -> Result<SceneData, SceneError> {
 /// # Errors
 /// [`SceneError`]: unknown name, unreadable or malformed file, no triangles, coordinates too large.
 pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, SceneError> {
+    let mut variant = variant.clone();
+    let mut common = Params::default();
+    common.0.extend(variant.params.0.remove_entry(ENVIRONMENT));
+    let common = common.completed(&common_parameters())?;
+    let scene = load_alone(&variant, options)?;
+    match common.0.get(ENVIRONMENT) {
+        Some(ParamValue::Name(file)) if !file.is_empty() => scene.under(Path::new(file)),
+        _ => Ok(scene),
+    }
+}
+
+/// The parameter of every scene that names an environment map.
+const ENVIRONMENT: &str = "environment";
+
+/// What every scene has as parameters, built in or not.
+pub fn common_parameters() -> ParameterSchema {
+    vec![Parameter {
+        name: ENVIRONMENT,
+        description: "equirectangular Radiance HDR file that lights the scene from all around; none if empty",
+        default: ParamValue::Name(String::new()),
+        range: ParamRange::Text,
+    }]
+}
+
+/// The scene of a variant without its environment map.
+fn load_alone(variant: &Variant, options: &LoadOptions) -> Result<SceneData, SceneError> {
     if let Some(scene) = builtin::build(variant) {
         return scene;
     }

@@ -209,6 +209,7 @@ pub fn scene(triangles: Mesh, assembly: Option<Assembly>) -> SceneData {
         assembly,
         camera: None,
         environment: Vec3::ONE,
+        lights: Vec::new(),
         daylight: None,
         framing: None,
         hash: String::new(),

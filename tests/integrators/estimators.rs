@@ -64,7 +64,7 @@ fn a_fault_in_a_heuristic_or_a_roulette_moves_the_mean() {
         (
             Strategy::MisBalance,
             Roulette::Never,
-            "weight = mis_weight(density, light_pdf(surface, hit.t));",
+            "weight = found_weight(density, light_pdf(leaving, surface, hit));",
             "weight = 1.0;",
         ),
         (
@@ -76,8 +76,8 @@ fn a_fault_in_a_heuristic_or_a_roulette_moves_the_mean() {
         (
             Strategy::Light,
             Roulette::Never,
-            "@if(!found_emission) weight = 0.0;",
-            "",
+            "@if(!found_emission) return 0.0;",
+            "@if(!found_emission) return 1.0;",
         ),
         (
             Strategy::Light,

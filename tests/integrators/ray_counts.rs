@@ -9,9 +9,12 @@ const SIZE: [u32; 2] = [16, 16];
 const SPP: u32 = 16;
 const SAMPLES: u64 = 16 * 16 * SPP as u64;
 
-/// Primary, shadow, AO and bounce rays of an image: one answer for all `kinds` of structures.
-fn counts(stage: &Stage, what: &Variant, kinds: &[&dyn AccelKind]) -> [u64; 4] {
-    assert_eq!(RAY_COUNT_CLASSES, ["primary", "shadow", "ao", "bounce"]);
+/// Primary, shadow, AO and bounce rays of an image, and those skipped: one answer for all `kinds` of structures.
+fn counts(stage: &Stage, what: &Variant, kinds: &[&dyn AccelKind]) -> [u64; 5] {
+    assert_eq!(
+        RAY_COUNT_CLASSES,
+        ["primary", "shadow", "ao", "bounce", "skipped"]
+    );
     let sampler = sampler("pixel-hash", "none");
     let mut all = Vec::new();
     for kind in kinds {
@@ -30,7 +33,8 @@ fn counts(stage: &Stage, what: &Variant, kinds: &[&dyn AccelKind]) -> [u64; 4] {
 #[test]
 fn a_closed_box_has_the_rays_that_its_bounces_ask_for() {
     let stage = Stage::builtin(gpu(), "furnace-box", &[("albedo", ParamValue::Number(0.8))]);
-    let [primary, shadow, ao, bounce] = counts(&stage, &path(3), &structures());
+    let [primary, shadow, ao, bounce, skipped] = counts(&stage, &path(3), &structures());
+    assert_eq!(shadow + skipped, 3 * SAMPLES);
     assert_eq!([primary, ao, bounce], [SAMPLES, 0, 3 * SAMPLES]);
     // A point of the emitter lies on the surface's own wall once in six draws: no ray then.
     let fraction = shadow as f64 / (3 * SAMPLES) as f64;
@@ -40,7 +44,7 @@ fn a_closed_box_has_the_rays_that_its_bounces_ask_for() {
         (fraction - expected).abs() < 5.0 * error,
         "{fraction} of the draws cost a ray"
     );
-    let [primary, shadow, ao, bounce] =
+    let [primary, shadow, ao, bounce, _] =
         counts(&stage, &integrator_variant("ao", &[]), &structures());
     assert_eq!([primary, shadow, ao, bounce], [SAMPLES, 0, SAMPLES, 0]);
 }
@@ -50,10 +54,10 @@ fn an_open_scene_has_fewer_rays_after_the_first_hit() {
     let sphere = [("triangles", ParamValue::Integer(2000))];
     let bvh = [structure("bvh")];
     let stage = Stage::builtin(gpu(), "displaced-sphere", &sphere);
-    let [primary, shadow, ao, bounce] = counts(&stage, &integrator_variant("ao", &[]), &bvh);
+    let [primary, shadow, ao, bounce, _] = counts(&stage, &integrator_variant("ao", &[]), &bvh);
     assert_eq!([primary, shadow, bounce], [SAMPLES, 0, 0]);
     assert!(ao > SAMPLES / 10 && ao < primary, "{ao}");
-    let [primary, shadow, none, bounce] = counts(&stage, &path(1), &bvh);
+    let [primary, shadow, none, bounce, _] = counts(&stage, &path(1), &bvh);
     assert_eq!([primary, shadow, none], [SAMPLES, 0, 0], "no emitter");
     // With one bounce, each first hit has one further ray in either integrator.
     assert_eq!(bounce, ao);

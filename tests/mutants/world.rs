@@ -124,6 +124,7 @@ pub fn plain_scene(name: String, triangles: Vec<Triangle>) -> SceneData {
         assembly: None,
         camera: None,
         environment: Vec3::ONE,
+        lights: Vec::new(),
         daylight: None,
         framing: None,
         hash: String::new(),

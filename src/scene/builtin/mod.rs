@@ -7,6 +7,7 @@ mod displaced_sphere;
 mod far_corners;
 mod furnace;
 mod instances;
+mod lamps;
 pub(super) mod numeric;
 mod single_triangle;
 mod sphere;
@@ -15,7 +16,7 @@ mod teapot_patches;
 mod triangle_soup;
 
 use super::builder::{Look, SceneBuilder};
-use super::{SceneData, SceneError};
+use super::{SceneData, SceneError, common_parameters};
 use crate::params::{Entry, ParamError, ParameterSchema, Parameters, Params, Variant};
 
 /// A built-in scene: the struct of its parameters.
@@ -49,7 +50,7 @@ impl Builtin {
 }
 
 /// The registry.
-const BUILTINS: [Builtin; 9] = [
+const BUILTINS: [Builtin; 12] = [
     Builtin::of::<cornell_box::CornellBox>(),
     Builtin::of::<displaced_sphere::DisplacedSphere>(),
     Builtin::of::<triangle_soup::TriangleSoup>(),
@@ -59,6 +60,9 @@ const BUILTINS: [Builtin; 9] = [
     Builtin::of::<furnace::WhiteFurnace>(),
     Builtin::of::<single_triangle::SingleTriangle>(),
     Builtin::of::<far_corners::FarCorners>(),
+    Builtin::of::<lamps::LampScene>(),
+    Builtin::of::<lamps::Luminaire>(),
+    Builtin::of::<lamps::ManyLights>(),
 ];
 
 /// The built-in scenes with their parameters, for the parser, lists and docs.
@@ -68,7 +72,7 @@ pub fn builtin_scenes() -> Vec<Entry> {
         .map(|scene| Entry {
             name: scene.name.to_owned(),
             description: scene.description.to_owned(),
-            schema: (scene.schema)(),
+            schema: (scene.schema)().into_iter().chain(common_parameters()).collect(),
         })
         .collect()
 }
@@ -176,6 +180,9 @@ pub(in crate::scene) mod tests {
                     ParamRange::Number { min, .. } => ParamValue::Number(min),
                     _ => continue,
                 };
+                if least == parameter.default {
+                    continue;
+                }
                 let scene = load_with(&entry.name, &[(parameter.name, least)]);
                 assert_ne!(scene.hash, load_default(&entry.name).hash);
                 parameters += 1;

@@ -1,0 +1,177 @@
+//! Environment maps: equirectangular radiance from all around.
+
+use super::SceneError;
+use super::light::luminance;
+use glam::Vec3;
+use std::f64::consts::PI;
+use std::fmt;
+use std::path::Path;
+
+/// Radiance in all directions, bilinear between the centres of texels, linear RGB. Row 0 is the zenith, +y; column
+/// c has its centre in the direction (−sin φ sin θ, cos θ, −cos φ sin θ), φ = 2π (c + 0.5)/width.
+#[derive(Clone, PartialEq)]
+pub struct EnvironmentMap {
+    /// The file.
+    pub name: String,
+    /// Texels around.
+    pub width: u32,
+    /// Texels from zenith to nadir.
+    pub height: u32,
+    /// Row by row, finite and not negative.
+    pub texels: Vec<Vec3>,
+}
+
+/// Name, size and a hash of the content.
+impl fmt::Debug for EnvironmentMap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let hash = blake3::hash(bytemuck::cast_slice::<Vec3, u8>(&self.texels));
+        let [width, height] = [self.width, self.height];
+        write!(f, "EnvironmentMap({width} × {height}, {hash})")
+    }
+}
+
+/// Texels around that a map may have; larger ones are halved. In kernels each takes 24 bytes.
+const MOST_WIDTH: u32 = 2048;
+
+impl EnvironmentMap {
+    /// Reads an HDR file. Texels that are negative, infinite or NaN are taken as 0, with a warning.
+    ///
+    /// # Errors
+    /// The file cannot be read or is no picture.
+    pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Self, SceneError> {
+        let malformed = |problem: String| SceneError::malformed(path, "", problem);
+        let bytes = super::error::read(path)?;
+        let decoded = image::load_from_memory(&bytes);
+        let decoded = decoded.map_err(|e| {
+            malformed(format!("it is no environment map in Radiance HDR format ({e})"))
+        })?;
+        let picture = decoded.into_rgb32f();
+        let (width, height) = picture.dimensions();
+        let texels = picture.pixels().map(|p| Vec3::from(p.0)).collect();
+        Self::new(&path.display().to_string(), [width, height], texels, warnings).map_err(malformed)
+    }
+
+    /// A map of these texels, row by row, of which those that are negative, infinite or NaN become 0.
+    ///
+    /// # Errors
+    /// There are not `width · height` texels, or none.
+    pub fn new(
+        name: &str,
+        [width, height]: [u32; 2],
+        mut texels: Vec<Vec3>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, String> {
+        if texels.is_empty() || texels.len() != width as usize * height as usize {
+            let count = texels.len();
+            return Err(format!("it has {count} texels, not {width} × {height}"));
+        }
+        let mut broken = 0;
+        for texel in &mut texels {
+            if !(texel.is_finite() && texel.min_element() >= 0.0) {
+                broken += 1;
+                *texel = Vec3::select(texel.is_finite_mask(), *texel, Vec3::ZERO).max(Vec3::ZERO);
+            }
+        }
+        if broken > 0 {
+            let all = texels.len();
+            warnings.push(format!(
+                "{name}: {broken} of {all} texels are negative, infinite or NaN in some colour, which is taken as 0"
+            ));
+        }
+        let mut map = Self {
+            name: name.to_owned(),
+            width,
+            height,
+            texels,
+        };
+        if map.width > MOST_WIDTH {
+            warnings.push(format!(
+                "{name}: reduced from {width} × {height} to at most {MOST_WIDTH} texels around"
+            ));
+            while map.width > MOST_WIDTH {
+                map = map.halved();
+            }
+        }
+        Ok(map)
+    }
+
+    /// Means of 2 × 2 texels; of an odd number the last is left alone.
+    fn halved(&self) -> Self {
+        let [width, height] = [self.width.div_ceil(2), self.height.div_ceil(2)];
+        let mean = |x: u32, y: u32| {
+            let columns = 2 * x..(2 * x + 2).min(self.width);
+            let rows = 2 * y..(2 * y + 2).min(self.height);
+            let count = (columns.len() * rows.len()) as f32;
+            let texels = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+            texels.map(|(x, y)| self.texel(x, y)).sum::<Vec3>() / count
+        };
+        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        Self {
+            name: self.name.clone(),
+            width,
+            height,
+            texels: places.map(|(x, y)| mean(x, y)).collect(),
+        }
+    }
+
+    fn texel(&self, x: u32, y: u32) -> Vec3 {
+        self.texels[(y * self.width + x) as usize]
+    }
+
+    /// Solid angle of a texel of this row, steradian.
+    pub fn solid_angle(&self, row: u32) -> f64 {
+        let cosine = |row: u32| (PI * f64::from(row) / f64::from(self.height)).cos();
+        2.0 * PI / f64::from(self.width) * (cosine(row) - cosine(row + 1))
+    }
+
+    /// What a texel is chosen by: the mean luminance of the bilinear function over it, times its solid angle; row by row.
+    pub fn weights(&self) -> Vec<f64> {
+        let [w, h] = [self.width, self.height];
+        let light: Vec<f64> = self.texels.iter().map(|t| luminance(*t)).collect();
+        let at = |x: u32, y: u32| light[(y * w + x) as usize];
+        // The function falls linearly from centre to centre: 1/8, 3/4 and 1/8 of three neighbours.
+        let along = |x: u32, y: u32| {
+            0.75 * at(x, y) + 0.125 * (at((x + w - 1) % w, y) + at((x + 1) % w, y))
+        };
+        let places = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
+        places
+            .map(|(x, y)| {
+                let [above, below] = [y.saturating_sub(1), (y + 1).min(h - 1)];
+                let mean = 0.75 * along(x, y) + 0.125 * (along(x, above) + along(x, below));
+                mean * self.solid_angle(y)
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn broken_texels_are_counted_and_black() {
+        let mut texels = vec![Vec3::ONE; 8];
+        texels[3] = Vec3::new(f32::NAN, 2.0, -1.0);
+        texels[5] = Vec3::new(1.0, f32::INFINITY, 1.0);
+        let mut warnings = Vec::new();
+        let map = EnvironmentMap::new("sky.hdr", [4, 2], texels, &mut warnings).expect("a map");
+        assert_eq!(map.texels[3], Vec3::new(0.0, 2.0, 0.0));
+        assert_eq!(map.texels[5], Vec3::new(1.0, 0.0, 1.0));
+        assert!(warnings[0].contains("sky.hdr: 2 of 8 texels"), "{warnings:?}");
+        assert!(EnvironmentMap::new("x", [4, 2], vec![Vec3::ONE; 7], &mut warnings).is_err());
+    }
+
+    #[test]
+    fn an_even_map_has_weights_of_its_solid_angle_and_large_ones_are_halved() {
+        let mut warnings = Vec::new();
+        let size = [5, 4];
+        let map = EnvironmentMap::new("x", size, vec![Vec3::ONE; 20], &mut warnings).expect("a map");
+        let sum: f64 = map.weights().iter().sum();
+        assert!((sum / (4.0 * PI * luminance(Vec3::ONE)) - 1.0).abs() < 1e-12, "{sum}");
+        assert!(warnings.is_empty());
+        let texels: Vec<Vec3> = (0..4098 * 2).map(|k| Vec3::splat((k % 2) as f32)).collect();
+        let map = EnvironmentMap::new("x", [4098, 2], texels, &mut warnings).expect("a map");
+        assert_eq!((map.width, map.height, warnings.len()), (1025, 1, 1));
+        assert!(map.texels.iter().all(|t| (t.x - 0.5).abs() < 1e-6));
+    }
+}

@@ -1,0 +1,386 @@
+//! Reading LM-63.
+
+use super::{IesProfile, Photometry};
+use thiserror::Error;
+
+/// Why there is no photometry.
+#[derive(Debug, Error)]
+pub enum IesError {
+    /// The operating system refused the file.
+    #[error("{file}: cannot read the photometric file ({source}); check the path and its permissions")]
+    Read {
+        /// The file.
+        file: String,
+        /// The reason.
+        source: std::io::Error,
+    },
+    /// The content breaks LM-63.
+    #[error("{file}, line {line}: {problem}; repair the file or ask the maker of the luminaire for another")]
+    Malformed {
+        /// The file.
+        file: String,
+        /// From 1.
+        line: usize,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+/// Angles and intensities that a file may have at most.
+const MOST_ANGLES: usize = 10_000;
+/// Two angles are the same up to this, degrees.
+const SAME: f32 = 1e-3;
+
+/// The numbers after `TILT=`, each with its line.
+struct Numbers<'a> {
+    file: &'a str,
+    words: Vec<(usize, &'a str)>,
+    next: usize,
+    last_line: usize,
+}
+
+impl<'a> Numbers<'a> {
+    fn error(&self, line: usize, problem: impl Into<String>) -> IesError {
+        IesError::Malformed {
+            file: self.file.to_owned(),
+            line,
+            problem: problem.into(),
+        }
+    }
+
+    fn line(&self) -> usize {
+        let read = self.next.saturating_sub(1);
+        self.words.get(read).map_or(self.last_line, |(line, _)| *line)
+    }
+
+    fn here(&self, problem: impl Into<String>) -> IesError {
+        self.error(self.line(), problem)
+    }
+
+    fn number(&mut self, what: &str) -> Result<f64, IesError> {
+        let Some((line, word)) = self.words.get(self.next) else {
+            return Err(self.error(self.last_line, format!("the file ends where {what} should be")));
+        };
+        self.next += 1;
+        match word.parse::<f64>() {
+            Ok(x) if x.is_finite() => Ok(x),
+            _ => Err(self.error(*line, format!("{what} should be a number, not `{word}`"))),
+        }
+    }
+
+    fn count(&mut self, what: &str) -> Result<usize, IesError> {
+        let x = self.number(what)?;
+        match x >= 1.0 && x <= MOST_ANGLES as f64 && x.fract() == 0.0 {
+            true => Ok(x as usize),
+            false => Err(self.here(format!("{what} is {x}, not an integer from 1 to {MOST_ANGLES}"))),
+        }
+    }
+
+    fn list(&mut self, count: usize, what: &str) -> Result<Vec<f32>, IesError> {
+        let one = |k| {
+            let number = self.number(&format!("{what} {} of {count}", k + 1));
+            number.map(|x| x as f32)
+        };
+        (0..count).map(one).collect()
+    }
+
+    fn angles(&mut self, count: usize, what: &str) -> Result<Vec<f32>, IesError> {
+        let angles = self.list(count, what)?;
+        match angles.windows(2).find(|pair| pair[1] <= pair[0]) {
+            None => Ok(angles),
+            Some(pair) => Err(self.here(format!(
+                "{what}s must ascend, but {} follows {}",
+                pair[1], pair[0]
+            ))),
+        }
+    }
+}
+
+impl IesProfile {
+    /// Reads the text of a file called `file`.
+    ///
+    /// # Errors
+    /// It breaks the standard: says in which line and how.
+    pub fn parse(file: &str, text: &str) -> Result<Self, IesError> {
+        let malformed = |line, problem: String| IesError::Malformed {
+            file: file.to_owned(),
+            line,
+            problem,
+        };
+        let lines: Vec<&str> = text.lines().collect();
+        let tilt = lines.iter().position(|line| line.trim_start().starts_with("TILT"));
+        let Some(tilt) = tilt else {
+            let problem = "there is no line `TILT=`: this is no LM-63 file".to_owned();
+            return Err(malformed(lines.len().max(1), problem));
+        };
+        let value = lines[tilt].split_once('=').map_or("", |(_, value)| value.trim());
+        let separators = |c: char| c.is_whitespace() || c == ',';
+        let words = (tilt + 2..).zip(&lines[tilt + 1..]).flat_map(|(line, text)| {
+            let words = text.split(separators).filter(|word| !word.is_empty());
+            words.map(move |word| (line, word))
+        });
+        let mut numbers = Numbers {
+            file,
+            words: words.collect(),
+            next: 0,
+            last_line: lines.len(),
+        };
+        match value {
+            "NONE" => {}
+            "INCLUDE" => skip_tilt(&mut numbers)?,
+            other => {
+                let problem = format!(
+                    "TILT={other} names another file, which is not read; write TILT=NONE or include it"
+                );
+                return Err(malformed(tilt + 1, problem));
+            }
+        }
+        profile(file, &mut numbers)
+    }
+}
+
+/// Factors for lamps that are tilted: a luminaire is shown as it was measured.
+fn skip_tilt(numbers: &mut Numbers) -> Result<(), IesError> {
+    numbers.number("the lamp-to-luminaire geometry")?;
+    let pairs = numbers.count("the number of tilt angles")?;
+    numbers.angles(pairs, "tilt angle")?;
+    numbers.list(pairs, "tilt factor")?;
+    Ok(())
+}
+
+fn profile(file: &str, numbers: &mut Numbers) -> Result<IesProfile, IesError> {
+    let lamps = numbers.number("the number of lamps")?;
+    let lumens = numbers.number("the lumens per lamp")?;
+    let multiplier = numbers.number("the candela multiplier")?;
+    let vertical_count = numbers.count("the number of vertical angles")?;
+    let horizontal_count = numbers.count("the number of horizontal angles")?;
+    let photometry = match numbers.number("the photometric type")? {
+        1.0 => Photometry::C,
+        2.0 => Photometry::B,
+        3.0 => Photometry::A,
+        other => return Err(numbers.here(format!("the photometric type is {other}, not 1, 2 or 3"))),
+    };
+    for what in ["the unit of length", "the width", "the length", "the height"] {
+        numbers.number(what)?;
+    }
+    let ballast = numbers.number("the ballast factor")?;
+    let ballast_lamp = numbers.number("the ballast-lamp factor")?;
+    let factor = multiplier * ballast * ballast_lamp;
+    if factor <= 0.0 {
+        return Err(numbers.here(format!("its factors multiply to {factor}, which is not above 0")));
+    }
+    let input_watts = numbers.number("the input watts")?;
+    let vertical = numbers.angles(vertical_count, "vertical angle")?;
+    check_vertical(photometry, &vertical).map_err(|problem| numbers.here(problem))?;
+    let horizontal = numbers.angles(horizontal_count, "horizontal angle")?;
+    let last_angle = numbers.line();
+    let mut candela = Vec::with_capacity(horizontal_count * vertical_count);
+    for _ in 0..horizontal_count {
+        for value in numbers.list(vertical_count, "candela value")? {
+            if value < 0.0 {
+                return Err(numbers.here(format!("the candela value {value} is below 0")));
+            }
+            candela.push((f64::from(value) * factor) as f32);
+        }
+    }
+    let mut out = IesProfile {
+        name: file.to_owned(),
+        photometry,
+        vertical,
+        horizontal,
+        candela,
+        rated_lumens: (lumens > 0.0).then_some(lumens * lamps),
+        input_watts,
+        warnings: Vec::new(),
+    };
+    out.unfold().map_err(|problem| numbers.error(last_angle, problem))?;
+    Ok(out)
+}
+
+fn is(a: f32, b: f32) -> bool {
+    (a - b).abs() < SAME
+}
+
+fn check_vertical(photometry: Photometry, angles: &[f32]) -> Result<(), String> {
+    let (first, last) = (angles[0], angles[angles.len() - 1]);
+    let (starts, ends): (&[f32], &[f32]) = match photometry {
+        Photometry::C => (&[0.0, 90.0], &[90.0, 180.0]),
+        _ => (&[-90.0, 0.0], &[90.0]),
+    };
+    // Luminaires that shine only a little upwards are cut off in practice.
+    let fits = starts.iter().any(|s| is(*s, first)) && last <= ends[ends.len() - 1] + SAME;
+    match fits && last > first {
+        true => Ok(()),
+        false => Err(format!("vertical angles from {first} to {last} are none of the standard")),
+    }
+}
+
+impl IesProfile {
+    /// Completes the horizontal angles by the symmetry that they stand for.
+    fn unfold(&mut self) -> Result<(), String> {
+        let [first, last] = [self.horizontal[0], self.horizontal[self.horizontal.len() - 1]];
+        let unknown = || format!("horizontal angles from {first} to {last} are none of the standard");
+        if self.photometry != Photometry::C {
+            return match is(last, 90.0) {
+                true if is(first, -90.0) => Ok(()),
+                true if is(first, 0.0) => {
+                    self.mirror(0.0);
+                    Ok(())
+                }
+                _ => Err(unknown()),
+            };
+        }
+        match (first, last) {
+            _ if self.horizontal.len() == 1 => Ok(()),
+            _ if is(first, 0.0) && is(last, 90.0) => {
+                self.mirror(90.0);
+                self.mirror(180.0);
+                Ok(())
+            }
+            _ if is(first, 0.0) && is(last, 180.0) => {
+                self.mirror(180.0);
+                Ok(())
+            }
+            _ if is(first, 90.0) && is(last, 270.0) => {
+                self.mirror(270.0);
+                self.turn_to_zero();
+                Ok(())
+            }
+            _ if is(first, 0.0) && is(last, 360.0) => Ok(()),
+            _ if is(first, 0.0) && last > 180.0 && last < 360.0 => {
+                let gap = 360.0 - last;
+                let step = last - self.horizontal[self.horizontal.len() - 2];
+                if gap > 1.5 * step {
+                    return Err(unknown());
+                }
+                self.warnings.push(format!(
+                    "{}: the horizontal angle 360 is missing, and taken to be that of 0",
+                    self.name
+                ));
+                self.horizontal.push(360.0);
+                self.candela.extend_from_within(..self.vertical.len());
+                Ok(())
+            }
+            _ => Err(unknown()),
+        }
+    }
+
+    /// Adds the other angles mirrored at the first or last one, `about`.
+    fn mirror(&mut self, about: f32) {
+        let rows = self.vertical.len();
+        let columns: Vec<(f32, Vec<f32>)> = self
+            .horizontal
+            .iter()
+            .zip(self.candela.chunks(rows))
+            .map(|(h, column)| (*h, column.to_vec()))
+            .collect();
+        let others = columns.iter().filter(|(h, _)| !is(*h, about));
+        let mut all: Vec<_> = others.map(|(h, column)| (2.0 * about - h, column.clone())).collect();
+        all.extend(columns.iter().cloned());
+        self.set_columns(all);
+    }
+
+    /// From angles between 90 and 450 to those between 0 and 360.
+    fn turn_to_zero(&mut self) {
+        let rows = self.vertical.len();
+        let columns = self.horizontal.iter().zip(self.candela.chunks(rows));
+        let mut all: Vec<(f32, Vec<f32>)> = columns
+            .map(|(h, column)| (if *h > 360.0 + SAME { h - 360.0 } else { *h }, column.to_vec()))
+            .collect();
+        // 90 stands there as 450, too, and 0 only as 360.
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        all.dedup_by(|a, b| is(a.0, b.0));
+        if let Some(full) = all.last().filter(|(h, _)| is(*h, 360.0)).cloned() {
+            all.insert(0, (0.0, full.1));
+        }
+        self.set_columns(all);
+        if !is(self.horizontal[0], 0.0) {
+            // No measured angle lies at 360: between its neighbours.
+            let (low, high) = (self.horizontal.len() - 1, 0);
+            let [a, b] = [360.0 - self.horizontal[low], self.horizontal[high]];
+            let column = |k: usize| self.candela[k * rows..][..rows].to_vec();
+            let between: Vec<f32> = column(low)
+                .into_iter()
+                .zip(column(high))
+                .map(|(x, y)| (x * b + y * a) / (a + b))
+                .collect();
+            let mut all: Vec<(f32, Vec<f32>)> = vec![(0.0, between.clone()), (360.0, between)];
+            all.extend((0..self.horizontal.len()).map(|k| (self.horizontal[k], column(k))));
+            self.set_columns(all);
+        }
+    }
+
+    fn set_columns(&mut self, mut columns: Vec<(f32, Vec<f32>)>) {
+        columns.sort_by(|a, b| a.0.total_cmp(&b.0));
+        self.horizontal = columns.iter().map(|(h, _)| *h).collect();
+        self.candela = columns.into_iter().flat_map(|(_, column)| column).collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(tilt: &str, kind: u32, horizontal: &str, candela: &str) -> String {
+        let count = horizontal.split(' ').count();
+        format!(
+            "IESNA:LM-63-2002\n[TEST] none\nTILT={tilt}\n1 1000 2.0 3 {count} {kind} 2 0 0 0\n0.5 1 40\n0 45 90\n{horizontal}\n{candela}\n"
+        )
+    }
+
+    #[test]
+    fn symmetric_ranges_are_unfolded() {
+        let read = |horizontal: &str, candela: &str| {
+            IesProfile::parse("x.ies", &file("NONE", 1, horizontal, candela)).expect("a profile")
+        };
+        let axial = read("0", "5 4 3");
+        assert_eq!((axial.horizontal, axial.candela), (vec![0.0], vec![5.0, 4.0, 3.0]));
+        let quadrant = read("0 45 90", "5 1 1 5 2 2 5 3 3");
+        assert_eq!(quadrant.horizontal, [0.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0, 360.0]);
+        let at_45: Vec<f32> = quadrant.candela.chunks(3).map(|c| c[1]).collect();
+        assert_eq!(at_45, [1.0, 2.0, 3.0, 2.0, 1.0, 2.0, 3.0, 2.0, 1.0]);
+        let half = read("0 90 180", "5 1 1 5 2 2 5 3 3");
+        assert_eq!(half.horizontal, [0.0, 90.0, 180.0, 270.0, 360.0]);
+        let other = read("90 180 270", "5 1 1 5 2 2 5 3 3");
+        let at_45: Vec<f32> = other.candela.chunks(3).map(|c| c[1]).collect();
+        assert_eq!(other.horizontal, [0.0, 90.0, 180.0, 270.0, 360.0]);
+        assert_eq!(at_45, [2.0, 1.0, 2.0, 3.0, 2.0]);
+        let open = read("0 90 180 270", "5 1 1 5 2 2 5 3 3 5 4 4");
+        assert_eq!((open.horizontal[4], open.candela[13]), (360.0, 1.0));
+        assert_eq!(open.warnings.len(), 1);
+        assert_eq!(open.rated_lumens, Some(1000.0));
+    }
+
+    #[test]
+    fn tilt_factors_are_skipped_and_factors_multiplied() {
+        let text = file("INCLUDE\n1\n2\n0 90\n1 0.9", 2, "0 90", "2 1 0 2 1 0");
+        let found = IesProfile::parse("x.ies", &text).expect("a profile");
+        assert_eq!(found.horizontal, [-90.0, 0.0, 90.0]);
+        assert_eq!((found.candela[0], found.input_watts), (2.0, 40.0));
+    }
+
+    #[test]
+    fn errors_name_file_and_line() {
+        let good = file("NONE", 1, "0 90", "5 1 1 5 2 2");
+        for (from, to, line, what) in [
+            ("TILT=NONE", "no tilt", 8, "TILT"),
+            ("TILT=NONE", "TILT=lamp.tlt", 3, "lamp.tlt"),
+            ("1000", "many", 4, "`many`"),
+            (" 1 2 0 0 0", " 4 2 0 0 0", 4, "photometric type"),
+            ("0 45 90", "0 45 45", 6, "ascend"),
+            ("0 45 90", "0 45 200", 6, "vertical"),
+            ("\n0 90\n", "\n0 80\n", 7, "horizontal"),
+            ("5 2 2", "5 2", 8, "candela value 3 of 3"),
+            ("5 2 2", "5 -2 2", 8, "below 0"),
+            ("1000 2.0", "1000 0", 5, "not above 0"),
+            ("1000 2.0", "1000 nan", 4, "`nan`"),
+            ("2.0 3 2", "2.0 3.5 2", 4, "integer"),
+        ] {
+            assert!(good.contains(from), "{from}");
+            let error = IesProfile::parse("x.ies", &good.replacen(from, to, 1));
+            let text = error.expect_err(to).to_string();
+            let place = format!("x.ies, line {line}: ");
+            assert!(text.starts_with(&place) && text.contains(what), "{to}: {text}");
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The table of kinds of lights.
+
+use std::fmt;
+
+/// A kind of light.
+pub struct LightKind {
+    /// Name.
+    pub name: &'static str,
+    /// One line: what it is, and in which unit.
+    pub description: &'static str,
+    /// What its colour is called.
+    pub color: &'static str,
+    /// The feature that brings its kernel into those of a scene.
+    pub feature: &'static str,
+}
+
+macro_rules! kind {
+    ($id:ident, $name:literal, $feature:literal, $color:literal, $description:literal) => {
+        pub(super) static $id: LightKind = LightKind {
+            name: $name,
+            description: $description,
+            color: $color,
+            feature: $feature,
+        };
+    };
+}
+
+kind!(
+    TRIANGLE,
+    "triangle",
+    "triangle_lights",
+    "radiance",
+    "a triangle of an emissive material (MTL Ke, glTF emissive)"
+);
+kind!(
+    RECTANGLE,
+    "rectangle",
+    "rectangle_lights",
+    "radiance",
+    "two triangles of an emissive material that form a parallelogram, as one light"
+);
+kind!(
+    SPHERE,
+    "sphere",
+    "sphere_lights",
+    "radiance",
+    "an analytic sphere: visible, casts shadows, reflects nothing"
+);
+kind!(
+    POINT,
+    "point",
+    "point_lights",
+    "intensity",
+    "a point of even intensity (glTF KHR_lights_punctual, candela)"
+);
+kind!(
+    SPOT,
+    "spot",
+    "spot_lights",
+    "intensity",
+    "a point that shines into a cone, with or without decay (glTF KHR_lights_punctual, candela)"
+);
+kind!(
+    IES,
+    "ies",
+    "ies_lights",
+    "colour",
+    "a point with the measured intensities of a luminaire (IES LM-63, candela)"
+);
+kind!(
+    DIRECTIONAL,
+    "directional",
+    "directional_lights",
+    "irradiance",
+    "light from infinitely far away (glTF KHR_lights_punctual, lux)"
+);
+
+kind!(
+    ENVIRONMENT,
+    "environment",
+    "environment_map",
+    "radiance",
+    "radiance from all around by an equirectangular map (Radiance HDR)"
+);
+
+/// The table of kinds, in the order in which lights are numbered; a kind's place is its number in
+/// `kernels/shading/light/table.wesl`.
+pub static LIGHT_KINDS: [&LightKind; 8] = [
+    &TRIANGLE,
+    &RECTANGLE,
+    &SPHERE,
+    &POINT,
+    &SPOT,
+    &IES,
+    &DIRECTIONAL,
+    &ENVIRONMENT,
+];
+
+impl LightKind {
+    /// Its place in [`LIGHT_KINDS`].
+    pub fn number(&self) -> u32 {
+        let place = LIGHT_KINDS.iter().position(|known| *known == self);
+        place.unwrap_or_default() as u32
+    }
+}
+
+impl PartialEq for LightKind {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl fmt::Debug for LightKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name)
+    }
+}

@@ -1,0 +1,108 @@
+//! Environment maps: irradiance against a sum over directions, files, and what is said of broken ones.
+
+use crate::density::sky;
+use crate::support::*;
+use crate::{estimate, lamp, path_with, towards};
+use glam::Vec3;
+use raystone::gpu::Gpu;
+use raystone::params::ParamValue;
+use raystone::scene::{Light, SceneData};
+use std::f64::consts::{PI, TAU};
+
+/// Bilinear radiance of the map, written from its description.
+fn radiance(light: &Light, polar: f64, azimuth: f64) -> f64 {
+    let Light::Environment { map, scale, turn } = light else {
+        panic!("no environment");
+    };
+    let (width, height) = (map.width as usize, map.height as usize);
+    // A turn by +a about y takes the azimuth φ, measured from −z towards −x, to φ + a.
+    let around = (azimuth - f64::from(*turn)).rem_euclid(TAU) / TAU * width as f64 - 0.5;
+    let down = (polar / PI * height as f64 - 0.5).clamp(0.0, height as f64 - 1.0);
+    let column = around.floor();
+    let left = column.rem_euclid(width as f64) as usize;
+    let (row, s, t) = (down.floor() as usize, around - column, down.fract());
+    let at = |x: usize, y: usize| {
+        let texel = map.texels[y.min(height - 1) * width + x % width];
+        f64::from(texel.x + texel.y + texel.z) / 3.0
+    };
+    let along = |y: usize| (1.0 - s) * at(left, y) + s * at(left + 1, y);
+    f64::from(*scale) * ((1.0 - t) * along(row) + t * along(row + 1))
+}
+
+/// Irradiance of a floor with the normal +y.
+fn irradiance(light: &Light) -> f64 {
+    let (rows, columns) = (1000, 2000);
+    let cell = 0.5 * PI / f64::from(rows) * TAU / f64::from(columns);
+    let mut sum = 0.0;
+    for row in 0..rows {
+        let polar = 0.5 * PI * (f64::from(row) + 0.5) / f64::from(rows);
+        for column in 0..columns {
+            let azimuth = TAU * (f64::from(column) + 0.5) / f64::from(columns);
+            sum += radiance(light, polar, azimuth) * polar.cos() * polar.sin() * cell;
+        }
+    }
+    sum
+}
+
+fn floor() -> SceneData {
+    let mut scene = lamp("point");
+    scene.lights = vec![sky()];
+    scene
+}
+
+/// What is wrong with the irradiance of a floor below the map, if something is.
+pub fn fault(gpu: &Gpu) -> Option<String> {
+    let scene = floor();
+    let expected = irradiance(&scene.lights[0]) * 0.5 / PI;
+    for (strategy, spp) in [("mis-balance", 512), ("light", 1024), ("bsdf", 1024)] {
+        let what = path_with(1, &[("strategy", strategy)]);
+        let found = estimate(gpu, &scene, towards([0.0, 0.0]), &what, spp);
+        if !(found.agrees_with(expected) && found.error < 0.005 * expected) {
+            return Some(format!("{strategy}: {found:?}, not {expected}"));
+        }
+    }
+    // The camera sees it as it is.
+    for (polar, azimuth) in [(0.3_f64, 0.2_f64), (1.1, 2.0), (1.4, 4.4), (0.05, 6.0)] {
+        let (sin, cos) = polar.sin_cos();
+        let towards = Vec3::new((-azimuth.sin() * sin) as f32, cos as f32, (-azimuth.cos() * sin) as f32);
+        let camera = raystone::geometry::Camera {
+            eye: Vec3::Y,
+            target: Vec3::Y + towards,
+            up: Vec3::X,
+            vertical_fov_degrees: 0.01,
+        };
+        let expected = radiance(&scene.lights[0], polar, azimuth);
+        let found = estimate(gpu, &scene, camera, &path_with(1, &[]), 4).mean;
+        if (found / expected - 1.0).abs() > 2e-3 {
+            return Some(format!("seen at {polar}, {azimuth}: {found}, not {expected}"));
+        }
+    }
+    None
+}
+
+#[test]
+fn a_floor_below_a_map_has_the_irradiance_of_a_sum_over_directions() {
+    assert_eq!(fault(gpu()), None);
+}
+
+#[test]
+fn a_scene_takes_a_map_from_a_file_and_tells_what_is_wrong_with_it() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let load = |name: &str, texels: [f32; 3]| {
+        let file = folder.path().join(name);
+        let picture = image::Rgb32FImage::from_pixel(8, 4, image::Rgb(texels));
+        picture.save(&file).expect("a picture");
+        let name = ParamValue::Name(file.display().to_string());
+        builtin("single-triangle", &[("environment", name)])
+    };
+    let plain = load("white.hdr", [1.0; 3]);
+    assert_eq!((plain.lights.len(), plain.environment), (1, Vec3::ZERO));
+    assert!(plain.report.warnings.is_empty(), "{:?}", plain.report);
+    assert_ne!(plain.hash, builtin("single-triangle", &[]).hash);
+    let black = load("black.hdr", [0.0; 3]);
+    let told = &black.report.warnings;
+    assert!(told.len() == 1 && told[0].contains("its power is 0"), "{told:?}");
+    // A white furnace by a map: what is reflected is the colour.
+    let found = estimate(gpu(), &plain, plain.camera.expect("a camera"), &path_with(1, &[]), 16);
+    assert!(found.mean > 0.49 && found.mean < 1.01, "{found:?}");
+}
