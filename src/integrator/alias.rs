@@ -17,9 +17,13 @@ pub(super) fn alias_table(weights: &[f64]) -> Vec<AliasEntry> {
         .map(|w| if total > 0.0 { w / total * count } else { 1.0 })
         .collect();
     let mut table: Vec<AliasEntry> = (0..weights.len() as u32)
-        .map(|alias| AliasEntry { threshold: 1.0, alias })
+        .map(|alias| AliasEntry {
+            threshold: 1.0,
+            alias,
+        })
         .collect();
-    let (mut small, mut large): (Vec<usize>, Vec<usize>) = (0..weights.len()).partition(|i| part[*i] < 1.0);
+    let (mut small, mut large): (Vec<usize>, Vec<usize>) =
+        (0..weights.len()).partition(|i| part[*i] < 1.0);
     while let (Some(low), Some(&high)) = (small.pop(), large.last()) {
         table[low] = AliasEntry {
             threshold: part[low] as f32,
@@ -63,11 +67,17 @@ mod tests {
             }
             for (found, weight) in found.iter().zip(&weights) {
                 let expected = weight / total * count as f64;
-                assert!((found - expected).abs() < 1e-6 * count as f64, "{found}, {expected}");
+                assert!(
+                    (found - expected).abs() < 1e-6 * count as f64,
+                    "{found}, {expected}"
+                );
                 assert!(*weight > 0.0 || *found == 0.0);
             }
         }
-        let alike = AliasEntry { threshold: 1.0, alias: 0 };
+        let alike = AliasEntry {
+            threshold: 1.0,
+            alias: 0,
+        };
         assert_eq!(alias_table(&[0.0, 0.0])[0], alike);
     }
 }

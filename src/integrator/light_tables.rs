@@ -75,7 +75,9 @@ impl LightTables {
                 }
             };
             let part = |x: f64| ((x / total) as f32).to_bits();
-            tables.rows.push([kind, link, part(below), part(light.power)]);
+            tables
+                .rows
+                .push([kind, link, part(below), part(light.power)]);
             tables.rows.extend(own_rows(scene, light));
             tables.kinds[kind as usize] = true;
             bounds.extend(light_bounds(scene, light));
@@ -114,7 +116,10 @@ impl LightTables {
             .u32("infinite_lights", self.infinite)
             .u32("first_light", self.first)
             .u32("emitters", self.emitters)
-            .u32("first_emitter", self.first + self.lights * LIGHT_ROWS as u32)
+            .u32(
+                "first_emitter",
+                self.first + self.lights * LIGHT_ROWS as u32,
+            )
             .u32("first_tree", self.first + self.tree[0])
             .u32("first_leaf", self.first + self.tree[1])
             .u32("first_sphere", first_sphere)

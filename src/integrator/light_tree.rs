@@ -131,7 +131,12 @@ pub(super) fn light_tree(lights: &[LightBounds]) -> (Vec<TreeNode>, Vec<u32>) {
         let [left, right] = cut(lights, members);
         let child = nodes.len();
         nodes[node].child = child as u32;
-        nodes.extend([TreeNode { parent: node as u32, ..none }; 2]);
+        nodes.extend(
+            [TreeNode {
+                parent: node as u32,
+                ..none
+            }; 2],
+        );
         todo.extend([(child + 1, right), (child, left)]);
     }
     (nodes, leaves)
@@ -141,7 +146,10 @@ pub(super) fn light_tree(lights: &[LightBounds]) -> (Vec<TreeNode>, Vec<u32>) {
 fn cut(lights: &[LightBounds], mut members: Vec<u32>) -> [Vec<u32>; 2] {
     let center = |light: &u32| lights[*light as usize].center();
     let low = members.iter().map(center).fold(DVec3::INFINITY, DVec3::min);
-    let high = members.iter().map(center).fold(DVec3::NEG_INFINITY, DVec3::max);
+    let high = members
+        .iter()
+        .map(center)
+        .fold(DVec3::NEG_INFINITY, DVec3::max);
     let extent = high - low;
     let bucket = |light: &u32, axis: usize| {
         let along = (center(light)[axis] - low[axis]) / extent[axis];
@@ -169,7 +177,9 @@ fn cut(lights: &[LightBounds], mut members: Vec<u32>) -> [Vec<u32>; 2] {
         }
     }
     if let Some((_, axis, place)) = best {
-        let (left, right) = members.iter().partition(|light| bucket(light, axis) < place);
+        let (left, right) = members
+            .iter()
+            .partition(|light| bucket(light, axis) < place);
         return [left, right];
     }
     let right = members.split_off(members.len() / 2);
@@ -182,7 +192,8 @@ const SLACK: f64 = 0.01;
 /// Rows of `shading_tables`: four `vec4` a node, then for each light its leaf. Boxes are rounded outwards.
 pub(super) fn tree_rows(lights: &[LightBounds]) -> Vec<[u32; 4]> {
     let (nodes, leaves) = light_tree(lights);
-    let vector = |v: DVec3, round: fn(f32) -> f32| v.as_vec3().to_array().map(|x| round(x).to_bits());
+    let vector =
+        |v: DVec3, round: fn(f32) -> f32| v.as_vec3().to_array().map(|x| round(x).to_bits());
     let mut rows = Vec::with_capacity(4 * nodes.len() + leaves.len());
     for node in &nodes {
         let bounds = &node.bounds;
@@ -195,7 +206,12 @@ pub(super) fn tree_rows(lights: &[LightBounds]) -> Vec<[u32; 4]> {
             [ax, ay, az, (bounds.power as f32).to_bits()],
             [bx, by, bz, (bounds.normals.cos() as f32).to_bits()],
             [x, y, z, (spread.cos() as f32).to_bits()],
-            [node.child, node.parent, node.light, u32::from(bounds.both_sides)],
+            [
+                node.child,
+                node.parent,
+                node.light,
+                u32::from(bounds.both_sides),
+            ],
         ]);
     }
     rows.extend(leaves.iter().map(|leaf| [*leaf, 0, 0, 0]));
@@ -231,7 +247,9 @@ mod tests {
             if count == 50 {
                 // All at one place: nothing to cut by.
                 let first = lights[0];
-                lights.iter_mut().for_each(|l| (l.min, l.max) = (first.min, first.max));
+                lights
+                    .iter_mut()
+                    .for_each(|l| (l.min, l.max) = (first.min, first.max));
             }
             let (nodes, leaves) = light_tree(&lights);
             assert_eq!(nodes.len(), 2 * count);

@@ -1,9 +1,9 @@
 //! Integrators: what is traced per sample, and the renderer that runs them.
 
-mod builtin;
-pub mod integrand;
 mod alias;
+mod builtin;
 mod environment_tables;
+pub mod integrand;
 mod kind;
 mod light_tables;
 mod light_tree;
@@ -21,10 +21,10 @@ pub use kind::{
     ConfiguredIntegrator, CountedRays, Integrator, IntegratorError, IntegratorFacts,
     RAY_COUNT_CLASSES, TRACED_CLASSES,
 };
+pub use light_tables::LightTables;
 pub use offset::{OffsetRegistry, RayOffset};
 pub use passes::ImageSteps;
 pub use registry::IntegratorRegistry;
 pub use render::{BLOCK_SAMPLES, RenderJob, Renderer, Snapshot, rounding_bound, with_sampler};
 pub use stage::{Stage, StageError};
-pub use light_tables::LightTables;
 pub use tables::{SceneBuffers, SceneFeatures};

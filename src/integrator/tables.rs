@@ -141,10 +141,7 @@ impl Tables {
             push_textures(scene, &mut words);
         }
         words.resize(words.len().next_multiple_of(4), 0);
-        Self {
-            words,
-            first_uv,
-        }
+        Self { words, first_uv }
     }
 }
 

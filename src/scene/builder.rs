@@ -1,8 +1,8 @@
 //! Gathers triangles from a loader and turns them into a checked [`SceneData`].
 
 use super::{
-    Assembly, Daylight, Framing, InstanceError, Light, LightList, LoadReport, Material, SceneData, SceneError,
-    Texture, Transform,
+    Assembly, Daylight, Framing, InstanceError, Light, LightList, LoadReport, Material, SceneData,
+    SceneError, Texture, Transform,
 };
 use crate::geometry::{Camera, Triangle};
 use glam::{Vec2, Vec3};

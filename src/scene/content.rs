@@ -60,7 +60,9 @@ impl SceneData {
             turn: 0.0,
         });
         let problems = LightList::of(&self).problems;
-        let new = problems.into_iter().filter(|line| !self.report.warnings.contains(line));
+        let new = problems
+            .into_iter()
+            .filter(|line| !self.report.warnings.contains(line));
         let new: Vec<String> = new.collect();
         self.report.warnings.extend(new);
         self.hash = self.content_hash();

@@ -43,12 +43,20 @@ impl EnvironmentMap {
         let bytes = super::error::read(path)?;
         let decoded = image::load_from_memory(&bytes);
         let decoded = decoded.map_err(|e| {
-            malformed(format!("it is no environment map in Radiance HDR format ({e})"))
+            malformed(format!(
+                "it is no environment map in Radiance HDR format ({e})"
+            ))
         })?;
         let picture = decoded.into_rgb32f();
         let (width, height) = picture.dimensions();
         let texels = picture.pixels().map(|p| Vec3::from(p.0)).collect();
-        Self::new(&path.display().to_string(), [width, height], texels, warnings).map_err(malformed)
+        Self::new(
+            &path.display().to_string(),
+            [width, height],
+            texels,
+            warnings,
+        )
+        .map_err(malformed)
     }
 
     /// A map of these texels, row by row, of which those that are negative, infinite or NaN become 0.
@@ -157,7 +165,10 @@ mod tests {
         let map = EnvironmentMap::new("sky.hdr", [4, 2], texels, &mut warnings).expect("a map");
         assert_eq!(map.texels[3], Vec3::new(0.0, 2.0, 0.0));
         assert_eq!(map.texels[5], Vec3::new(1.0, 0.0, 1.0));
-        assert!(warnings[0].contains("sky.hdr: 2 of 8 texels"), "{warnings:?}");
+        assert!(
+            warnings[0].contains("sky.hdr: 2 of 8 texels"),
+            "{warnings:?}"
+        );
         assert!(EnvironmentMap::new("x", [4, 2], vec![Vec3::ONE; 7], &mut warnings).is_err());
     }
 
@@ -165,9 +176,13 @@ mod tests {
     fn an_even_map_has_weights_of_its_solid_angle_and_large_ones_are_halved() {
         let mut warnings = Vec::new();
         let size = [5, 4];
-        let map = EnvironmentMap::new("x", size, vec![Vec3::ONE; 20], &mut warnings).expect("a map");
+        let map =
+            EnvironmentMap::new("x", size, vec![Vec3::ONE; 20], &mut warnings).expect("a map");
         let sum: f64 = map.weights().iter().sum();
-        assert!((sum / (4.0 * PI * luminance(Vec3::ONE)) - 1.0).abs() < 1e-12, "{sum}");
+        assert!(
+            (sum / (4.0 * PI * luminance(Vec3::ONE)) - 1.0).abs() < 1e-12,
+            "{sum}"
+        );
         assert!(warnings.is_empty());
         let texels: Vec<Vec3> = (0..4098 * 2).map(|k| Vec3::splat((k % 2) as f32)).collect();
         let map = EnvironmentMap::new("x", [4098, 2], texels, &mut warnings).expect("a map");

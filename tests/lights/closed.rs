@@ -11,7 +11,14 @@ const STRENGTH: f64 = 10.0;
 pub const PLACES: [[f64; 2]; 3] = [[0.0, 0.0], [0.7, 0.3], [-1.6, 1.1]];
 
 /// Kinds of lamps.
-pub const LAMPS: [&str; 6] = ["rectangle", "disk", "sphere", "point", "spot", "directional"];
+pub const LAMPS: [&str; 6] = [
+    "rectangle",
+    "disk",
+    "sphere",
+    "point",
+    "spot",
+    "directional",
+];
 
 /// Irradiance of a plane with the normal +y by an even polygon above it that faces it (J. Lambert, "Photometria",
 /// 1760): half the sum over edges of the angle that each fills times the cosine of the plane through it.
@@ -62,5 +69,8 @@ fn a_polygon_of_many_corners_is_a_disk() {
     let disk = PI * STRENGTH * 0.25 / (0.25 + HEIGHT * HEIGHT);
     let area = 32.0 * (TAU / 64.0).sin() / PI;
     let found = irradiance("disk", [0.0, 0.0]);
-    assert!((found / (disk * area) - 1.0).abs() < 2e-4, "{found}, {disk}");
+    assert!(
+        (found / (disk * area) - 1.0).abs() < 2e-4,
+        "{found}, {disk}"
+    );
 }

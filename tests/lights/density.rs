@@ -80,7 +80,13 @@ pub fn probing(library: KernelLibrary) -> Gpu {
 }
 
 /// Mean colours of images of `size` pixels, one for each seed.
-pub fn probe(gpu: &Gpu, scene: SceneData, of: &'static Probe, size: u32, [spp, seeds]: [u32; 2]) -> Vec<[f64; 3]> {
+pub fn probe(
+    gpu: &Gpu,
+    scene: SceneData,
+    of: &'static Probe,
+    size: u32,
+    [spp, seeds]: [u32; 2],
+) -> Vec<[f64; 3]> {
     let stage = Stage::new(gpu, scene);
     let traced = stage.traced(gpu, structure("bvh"));
     let integrator = ConfiguredIntegrator::new(of, &Variant::default()).expect("no parameters");
@@ -96,7 +102,11 @@ pub fn probe(gpu: &Gpu, scene: SceneData, of: &'static Probe, size: u32, [spp, s
     let renderer = Renderer::new(gpu, &stage.buffers, &traced, &job, false);
     let renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
     let one = |seed| {
-        let image = renderer.render(&[spp], seed).expect("a render").remove(0).image;
+        let image = renderer
+            .render(&[spp], seed)
+            .expect("a render")
+            .remove(0)
+            .image;
         let count = image.pixels.len() as f64;
         [0, 1, 2].map(|c| image.pixels.iter().map(|p| f64::from(p[c])).sum::<f64>() / count)
     };
@@ -108,9 +118,18 @@ pub fn sky() -> Light {
     let texel = |k: i32| {
         let (x, y) = (k % 16, k / 16);
         let sun = if (x, y) == (3, 2) { 40.0 } else { 0.0 };
-        Vec3::new(0.2 + sun, 0.3 + 0.05 * x as f32 + sun, 0.5 + 0.1 * y as f32 + 0.9 * sun)
+        Vec3::new(
+            0.2 + sun,
+            0.3 + 0.05 * x as f32 + sun,
+            0.5 + 0.1 * y as f32 + 0.9 * sun,
+        )
     };
-    let map = EnvironmentMap::new("sky", [16, 8], (0..128).map(texel).collect(), &mut Vec::new());
+    let map = EnvironmentMap::new(
+        "sky",
+        [16, 8],
+        (0..128).map(texel).collect(),
+        &mut Vec::new(),
+    );
     Light::Environment {
         map: Arc::new(map.expect("a map")),
         scale: 1.5,
@@ -120,7 +139,9 @@ pub fn sky() -> Light {
 
 /// Scenes, each with its part of lights that rays can find.
 fn scenes() -> Vec<(&'static str, SceneData)> {
-    let mut all: Vec<_> = ["rectangle", "disk", "sphere"].map(|kind| (kind, lamp(kind))).into();
+    let mut all: Vec<_> = ["rectangle", "disk", "sphere"]
+        .map(|kind| (kind, lamp(kind)))
+        .into();
     let mut several = lamp("sphere");
     for (k, x) in [1.2_f32, -1.0, 2.2].into_iter().enumerate() {
         several.lights.push(Light::Sphere {
@@ -134,8 +155,15 @@ fn scenes() -> Vec<(&'static str, SceneData)> {
     let mut squares = lamp("rectangle");
     for place in [[1.6, 1.5, 0.0], [-1.5, 2.5, -1.5], [0.9, 1.1, 1.7]] {
         let corner = |x: f32, z: f32| Vec3::from(place) + Vec3::new(x, 0.1 * x, z);
-        let [a, b, c, d] = [corner(0.0, 0.0), corner(0.4, 0.0), corner(0.4, 0.6), corner(0.0, 0.6)];
-        squares.triangles.extend([[a, b, c].into(), [a, c, d].into()]);
+        let [a, b, c, d] = [
+            corner(0.0, 0.0),
+            corner(0.4, 0.0),
+            corner(0.4, 0.6),
+            corner(0.0, 0.6),
+        ];
+        squares
+            .triangles
+            .extend([[a, b, c].into(), [a, c, d].into()]);
         squares.material_ids.extend([1, 1]);
     }
     all.push(("squares", squares));

@@ -64,7 +64,11 @@ pub fn fault(gpu: &Gpu) -> Option<String> {
     // The camera sees it as it is.
     for (polar, azimuth) in [(0.3_f64, 0.2_f64), (1.1, 2.0), (1.4, 4.4), (0.05, 6.0)] {
         let (sin, cos) = polar.sin_cos();
-        let towards = Vec3::new((-azimuth.sin() * sin) as f32, cos as f32, (-azimuth.cos() * sin) as f32);
+        let towards = Vec3::new(
+            (-azimuth.sin() * sin) as f32,
+            cos as f32,
+            (-azimuth.cos() * sin) as f32,
+        );
         let camera = raystone::geometry::Camera {
             eye: Vec3::Y,
             target: Vec3::Y + towards,
@@ -74,7 +78,9 @@ pub fn fault(gpu: &Gpu) -> Option<String> {
         let expected = radiance(&scene.lights[0], polar, azimuth);
         let found = estimate(gpu, &scene, camera, &path_with(1, &[]), 4).mean;
         if (found / expected - 1.0).abs() > 2e-3 {
-            return Some(format!("seen at {polar}, {azimuth}: {found}, not {expected}"));
+            return Some(format!(
+                "seen at {polar}, {azimuth}: {found}, not {expected}"
+            ));
         }
     }
     None
@@ -101,8 +107,17 @@ fn a_scene_takes_a_map_from_a_file_and_tells_what_is_wrong_with_it() {
     assert_ne!(plain.hash, builtin("single-triangle", &[]).hash);
     let black = load("black.hdr", [0.0; 3]);
     let told = &black.report.warnings;
-    assert!(told.len() == 1 && told[0].contains("its power is 0"), "{told:?}");
+    assert!(
+        told.len() == 1 && told[0].contains("its power is 0"),
+        "{told:?}"
+    );
     // A white furnace by a map: what is reflected is the colour.
-    let found = estimate(gpu(), &plain, plain.camera.expect("a camera"), &path_with(1, &[]), 16);
+    let found = estimate(
+        gpu(),
+        &plain,
+        plain.camera.expect("a camera"),
+        &path_with(1, &[]),
+        16,
+    );
     assert!(found.mean > 0.49 && found.mean < 1.01, "{found:?}");
 }

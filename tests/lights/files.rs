@@ -15,7 +15,9 @@ fn photometry() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes/ies");
     let found = std::fs::read_dir(&folder).map(|entries| {
         let files = entries.flatten().map(|entry| entry.path());
-        files.filter(|path| path.extension().is_some_and(|e| e == "ies")).collect()
+        files
+            .filter(|path| path.extension().is_some_and(|e| e == "ies"))
+            .collect()
     });
     let mut files: Vec<PathBuf> = found.unwrap_or_default();
     files.sort();
@@ -43,7 +45,10 @@ fn uneven(kind: u32) -> String {
     };
     let column = |k: u32| format!("{} {} {} {} {}", 90, 40 + 7 * k, 70, 20 + 3 * k, 5);
     let columns: Vec<String> = [0, 3, 1, 8, 0].map(column).into();
-    format!("TILT=NONE\n1 -1 2.5 5 5 {kind} 2 0 0 0\n0.5 1 0\n{vertical}\n{horizontal}\n{}\n", columns.join("\n"))
+    format!(
+        "TILT=NONE\n1 -1 2.5 5 5 {kind} 2 0 0 0\n0.5 1 0\n{vertical}\n{horizontal}\n{}\n",
+        columns.join("\n")
+    )
 }
 
 fn flux(gpu: &Gpu, file: &Path) -> f64 {
@@ -62,7 +67,8 @@ pub fn fault(gpu: &Gpu) -> Option<String> {
         let expected = IesProfile::read(&file).expect("a profile").lumens();
         let found = flux(gpu, &file);
         let error = found / expected - 1.0;
-        (error.is_nan() || error.abs() > 0.002).then(|| format!("type {kind}: {found} lm, not {expected}"))
+        (error.is_nan() || error.abs() > 0.002)
+            .then(|| format!("type {kind}: {found} lm, not {expected}"))
     })
 }
 
@@ -73,13 +79,23 @@ fn the_flux_of_luminaires_is_that_of_their_files() {
     for file in photometry() {
         let profile = IesProfile::read(&file).unwrap_or_else(|e| panic!("{e}"));
         let exact = profile.lumens();
-        let name = file.file_name().expect("a name").to_string_lossy().into_owned();
+        let name = file
+            .file_name()
+            .expect("a name")
+            .to_string_lossy()
+            .into_owned();
         let found = flux(&gpu, &file);
         let published = PUBLISHED.iter().find(|(known, _)| *known == name);
         println!("{name}: {found:.2} lm in the kernel, {exact:.2} exact, {published:?} published");
-        assert!((found / exact - 1.0).abs() < 0.005, "{name}: {found}, not {exact}");
+        assert!(
+            (found / exact - 1.0).abs() < 0.005,
+            "{name}: {found}, not {exact}"
+        );
         if let Some((_, lumens)) = published {
-            assert!((found / lumens - 1.0).abs() < 0.005, "{name}: {found}, not {lumens}");
+            assert!(
+                (found / lumens - 1.0).abs() < 0.005,
+                "{name}: {found}, not {lumens}"
+            );
         }
     }
 }
@@ -98,13 +114,19 @@ fn the_floor_below_a_luminaire_has_the_illuminance_of_its_file() {
     let below = estimate(gpu(), &scene, camera, &path_with(1, &[]), 4).mean;
     // 90 units of 2.5 · 0.5 candela straight down, 2 units away.
     let expected = 90.0 * 1.25 / 4.0 * 0.5 / PI;
-    assert!((below / expected - 1.0).abs() < 3e-3, "{below}, not {expected}");
+    assert!(
+        (below / expected - 1.0).abs() < 3e-3,
+        "{below}, not {expected}"
+    );
     // At 45 degrees towards +z the horizontal angle is 90, between 60 and 180.
     camera = towards([0.0, 2.0]);
     let beside = estimate(gpu(), &scene, camera, &path_with(1, &[]), 4).mean;
     let candela = 1.25 * 70.0;
     let expected = candela * 0.5_f64.sqrt() / 8.0 * 0.5 / PI;
-    assert!((beside / expected - 1.0).abs() < 3e-3, "{beside}, not {expected}");
+    assert!(
+        (beside / expected - 1.0).abs() < 3e-3,
+        "{beside}, not {expected}"
+    );
 }
 
 const MODEL: &str = r#"{"asset":{"version":"2.0"},"extensionsUsed":["KHR_lights_punctual"],
@@ -134,10 +156,17 @@ fn lights_of_gltf_models_are_where_their_nodes_are() {
         intensity: Vec3::new(8.0, 4.0, 2.0),
     };
     assert_eq!(scene.lights[0], point);
-    let Light::Directional { direction, irradiance } = scene.lights[1] else {
+    let Light::Directional {
+        direction,
+        irradiance,
+    } = scene.lights[1]
+    else {
         panic!("{:?}", scene.lights[1]);
     };
-    assert!(direction.distance(Vec3::NEG_Y) < 1e-6, "{direction}: turned from -z");
+    assert!(
+        direction.distance(Vec3::NEG_Y) < 1e-6,
+        "{direction}: turned from -z"
+    );
     assert_eq!(irradiance, Vec3::splat(3.0));
     let spot = Light::Spot {
         position: Vec3::Y,
@@ -149,5 +178,9 @@ fn lights_of_gltf_models_are_where_their_nodes_are() {
     };
     assert_eq!(scene.lights[2], spot);
     assert!(scene.daylight.is_none());
-    assert!(scene.report.warnings[0].contains("light 3 (point)"), "{:?}", scene.report);
+    assert!(
+        scene.report.warnings[0].contains("light 3 (point)"),
+        "{:?}",
+        scene.report
+    );
 }

@@ -52,7 +52,10 @@ fn a_sphere_is_seen_casts_a_shadow_and_shines_inside() {
     let [below, beside] = [[0.0, 0.0], [1.9, 0.0]].map(|place| radiance(&scene, place));
     scene.lights.push(behind);
     let [below_too, beside_too] = [[0.0, 0.0], [1.9, 0.0]].map(|place| radiance(&scene, place));
-    assert!((below_too / below - 1.0).abs() < 0.02, "{below_too}, {below}");
+    assert!(
+        (below_too / below - 1.0).abs() < 0.02,
+        "{below_too}, {below}"
+    );
     assert!(beside_too > 10.0 * beside, "{beside_too}, {beside}");
     // From inside all directions above the floor show it: π times its radiance.
     scene.lights = vec![Light::Sphere {
@@ -64,7 +67,10 @@ fn a_sphere_is_seen_casts_a_shadow_and_shines_inside() {
         let what = path_with(1, &[("strategy", strategy)]);
         let found = estimate(gpu(), &scene, towards([0.0, 0.0]), &what, 64);
         // The eye is inside, too, and sees the floor first.
-        assert!(found.agrees_with(0.5) && found.error < 3e-3, "{strategy}: {found:?}");
+        assert!(
+            found.agrees_with(0.5) && found.error < 3e-3,
+            "{strategy}: {found:?}"
+        );
     }
 }
 
@@ -120,6 +126,8 @@ fn shadow_rays_to_where_no_light_comes_from_are_skipped() {
     }];
     assert_eq!(count(&scene), (0, 256), "behind the surface");
     scene = lamp("rectangle");
-    scene.triangles[2..].iter_mut().for_each(|t| t.vertices.swap(0, 1));
+    scene.triangles[2..]
+        .iter_mut()
+        .for_each(|t| t.vertices.swap(0, 1));
     assert_eq!(count(&scene), (0, 256), "dark on this side");
 }

@@ -63,7 +63,12 @@ const SHINING: u32 = 1;
 fn on_floor(half: f32, lights: Vec<Light>) -> (SceneBuilder, Look) {
     let mut builder = SceneBuilder::default();
     let corner = |x: f32, z: f32| Vec3::new(x * half, 0.0, z * half);
-    let corners = [corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
+    let corners = [
+        corner(-1.0, -1.0),
+        corner(-1.0, 1.0),
+        corner(1.0, 1.0),
+        corner(1.0, -1.0),
+    ];
     builder.push_quad(corners, FLOOR);
     let lamp = Material {
         emits_both_sides: false,
@@ -87,7 +92,8 @@ const HEIGHT: f32 = 2.0;
 
 impl BuiltinScene for LampScene {
     const NAME: &'static str = "lamp";
-    const DESCRIPTION: &'static str = "a floor below one light of a kind: its irradiance is known in closed form";
+    const DESCRIPTION: &'static str =
+        "a floor below one light of a kind: its irradiance is known in closed form";
 
     fn build(&self) -> (SceneBuilder, Look) {
         let position = HEIGHT * Vec3::Y;
@@ -152,7 +158,10 @@ impl Luminaire {
                 Some(profile)
             }
             Err(error) => {
-                builder.report.warnings.push(format!("{error}; there is no luminaire"));
+                builder
+                    .report
+                    .warnings
+                    .push(format!("{error}; there is no luminaire"));
                 None
             }
         }
@@ -165,7 +174,11 @@ impl Luminaire {
             false => self.lumens,
         };
         let measured = profile.lumens();
-        if wanted > 0.0 && measured > 0.0 { (wanted / measured) as f32 } else { 1.0 }
+        if wanted > 0.0 && measured > 0.0 {
+            (wanted / measured) as f32
+        } else {
+            1.0
+        }
     }
 }
 
@@ -174,7 +187,8 @@ const LUMENS_PER_WATT: f64 = 683.0;
 
 impl BuiltinScene for Luminaire {
     const NAME: &'static str = "luminaire";
-    const DESCRIPTION: &'static str = "a floor below a luminaire with the intensities of an IES file";
+    const DESCRIPTION: &'static str =
+        "a floor below a luminaire with the intensities of an IES file";
 
     fn build(&self) -> (SceneBuilder, Look) {
         let (mut builder, mut look) = on_floor(2.0 * self.height, Vec::new());
@@ -194,7 +208,8 @@ impl BuiltinScene for Luminaire {
 
 impl BuiltinScene for ManyLights {
     const NAME: &'static str = "many-lights";
-    const DESCRIPTION: &'static str = "blocks on a floor below many small lamps of unequal power and colour";
+    const DESCRIPTION: &'static str =
+        "blocks on a floor below many small lamps of unequal power and colour";
 
     fn build(&self) -> (SceneBuilder, Look) {
         let mut random = Pcg32::new(20);
@@ -217,7 +232,10 @@ impl BuiltinScene for ManyLights {
             };
             look.materials.push(material);
             let at = |x: f32, z: f32| place + edge * Vec3::new(x, 0.0, z);
-            builder.push_quad([at(0.0, 0.0), at(1.0, 0.0), at(1.0, 1.0), at(0.0, 1.0)], lamp);
+            builder.push_quad(
+                [at(0.0, 0.0), at(1.0, 0.0), at(1.0, 1.0), at(0.0, 1.0)],
+                lamp,
+            );
         }
         (builder, look)
     }
@@ -230,7 +248,12 @@ fn push_block(builder: &mut SceneBuilder, corner: Vec3, size: Vec3) {
     builder.push_quad(around.map(|[x, z]| at(x, 1.0, z)), FLOOR);
     for k in 0..4 {
         let ([ax, az], [bx, bz]) = (around[k], around[(k + 1) % 4]);
-        let wall = [at(ax, 0.0, az), at(bx, 0.0, bz), at(bx, 1.0, bz), at(ax, 1.0, az)];
+        let wall = [
+            at(ax, 0.0, az),
+            at(bx, 0.0, bz),
+            at(bx, 1.0, bz),
+            at(ax, 1.0, az),
+        ];
         builder.push_quad(wall, FLOOR);
     }
 }
@@ -269,16 +292,29 @@ mod tests {
     fn a_luminaire_is_scaled_to_lumens_or_watts_and_a_missing_file_is_told() {
         let power = |changes: &[(&str, ParamValue)]| {
             let scene = load_with("luminaire", changes);
-            LightList::of(&scene).lights.first().map(|light| light.power)
+            LightList::of(&scene)
+                .lights
+                .first()
+                .map(|light| light.power)
         };
         let near = |found: Option<f64>, lumens: f64| {
-            assert!((found.expect("a light") / lumens - 1.0).abs() < 1e-6, "{found:?}");
+            assert!(
+                (found.expect("a light") / lumens - 1.0).abs() < 1e-6,
+                "{found:?}"
+            );
         };
         near(power(&[]), 400.0 * std::f64::consts::PI);
         near(power(&[("lumens", ParamValue::Number(70.0))]), 70.0);
         near(power(&[("watts", ParamValue::Number(2.0))]), 1366.0);
-        let scene = load_with("luminaire", &[("file", ParamValue::Name("none.ies".to_owned()))]);
-        assert!(scene.report.warnings[0].contains("none.ies"), "{:?}", scene.report);
+        let scene = load_with(
+            "luminaire",
+            &[("file", ParamValue::Name("none.ies".to_owned()))],
+        );
+        assert!(
+            scene.report.warnings[0].contains("none.ies"),
+            "{:?}",
+            scene.report
+        );
         assert!(scene.daylight.is_some());
     }
 

@@ -72,7 +72,10 @@ pub fn builtin_scenes() -> Vec<Entry> {
         .map(|scene| Entry {
             name: scene.name.to_owned(),
             description: scene.description.to_owned(),
-            schema: (scene.schema)().into_iter().chain(common_parameters()).collect(),
+            schema: (scene.schema)()
+                .into_iter()
+                .chain(common_parameters())
+                .collect(),
         })
         .collect()
 }

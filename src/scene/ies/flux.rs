@@ -37,7 +37,11 @@ impl IesProfile {
             Photometry::A => (y.atan2(x.hypot(z)), x.atan2(z)),
         };
         let (v, h) = (v.to_degrees(), h.to_degrees());
-        let h = if self.horizontal.len() == 1 { f64::from(self.horizontal[0]) } else { h };
+        let h = if self.horizontal.len() == 1 {
+            f64::from(self.horizontal[0])
+        } else {
+            h
+        };
         let cell = bracket(&self.vertical, v).zip(bracket(&self.horizontal, h));
         cell.map_or(0.0, |((row, s), (column, t))| {
             let last = self.horizontal.len() - 1;
@@ -133,7 +137,10 @@ mod tests {
         let angles = [-90.0, -40.0, 0.0, 35.0, 90.0];
         for photometry in [Photometry::A, Photometry::B, Photometry::C] {
             let (vertical, horizontal) = match photometry {
-                Photometry::C => ([0.0, 20.0, 50.0, 100.0, 180.0], [0.0, 50.0, 180.0, 300.0, 360.0]),
+                Photometry::C => (
+                    [0.0, 20.0, 50.0, 100.0, 180.0],
+                    [0.0, 50.0, 180.0, 300.0, 360.0],
+                ),
                 _ => (angles, angles),
             };
             let mut profile = even(photometry, &vertical, &horizontal);
@@ -143,7 +150,9 @@ mod tests {
             let last = profile.candela.len() - 5;
             profile.candela.copy_within(..5, last);
             let count = 400_000;
-            let sum: f64 = (0..count).map(|_| profile.intensity(random.direction())).sum();
+            let sum: f64 = (0..count)
+                .map(|_| profile.intensity(random.direction()))
+                .sum();
             let found = 4.0 * PI * sum / f64::from(count);
             let error = found / profile.lumens() - 1.0;
             assert!(error.abs() < 0.01, "{photometry:?}: {error}");

@@ -7,7 +7,9 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum IesError {
     /// The operating system refused the file.
-    #[error("{file}: cannot read the photometric file ({source}); check the path and its permissions")]
+    #[error(
+        "{file}: cannot read the photometric file ({source}); check the path and its permissions"
+    )]
     Read {
         /// The file.
         file: String,
@@ -15,7 +17,9 @@ pub enum IesError {
         source: std::io::Error,
     },
     /// The content breaks LM-63.
-    #[error("{file}, line {line}: {problem}; repair the file or ask the maker of the luminaire for another")]
+    #[error(
+        "{file}, line {line}: {problem}; repair the file or ask the maker of the luminaire for another"
+    )]
     Malformed {
         /// The file.
         file: String,
@@ -50,7 +54,9 @@ impl<'a> Numbers<'a> {
 
     fn line(&self) -> usize {
         let read = self.next.saturating_sub(1);
-        self.words.get(read).map_or(self.last_line, |(line, _)| *line)
+        self.words
+            .get(read)
+            .map_or(self.last_line, |(line, _)| *line)
     }
 
     fn here(&self, problem: impl Into<String>) -> IesError {
@@ -59,7 +65,10 @@ impl<'a> Numbers<'a> {
 
     fn number(&mut self, what: &str) -> Result<f64, IesError> {
         let Some((line, word)) = self.words.get(self.next) else {
-            return Err(self.error(self.last_line, format!("the file ends where {what} should be")));
+            return Err(self.error(
+                self.last_line,
+                format!("the file ends where {what} should be"),
+            ));
         };
         self.next += 1;
         match word.parse::<f64>() {
@@ -72,7 +81,9 @@ impl<'a> Numbers<'a> {
         let x = self.number(what)?;
         match x >= 1.0 && x <= MOST_ANGLES as f64 && x.fract() == 0.0 {
             true => Ok(x as usize),
-            false => Err(self.here(format!("{what} is {x}, not an integer from 1 to {MOST_ANGLES}"))),
+            false => Err(self.here(format!(
+                "{what} is {x}, not an integer from 1 to {MOST_ANGLES}"
+            ))),
         }
     }
 
@@ -108,17 +119,23 @@ impl IesProfile {
             problem,
         };
         let lines: Vec<&str> = text.lines().collect();
-        let tilt = lines.iter().position(|line| line.trim_start().starts_with("TILT"));
+        let tilt = lines
+            .iter()
+            .position(|line| line.trim_start().starts_with("TILT"));
         let Some(tilt) = tilt else {
             let problem = "there is no line `TILT=`: this is no LM-63 file".to_owned();
             return Err(malformed(lines.len().max(1), problem));
         };
-        let value = lines[tilt].split_once('=').map_or("", |(_, value)| value.trim());
+        let value = lines[tilt]
+            .split_once('=')
+            .map_or("", |(_, value)| value.trim());
         let separators = |c: char| c.is_whitespace() || c == ',';
-        let words = (tilt + 2..).zip(&lines[tilt + 1..]).flat_map(|(line, text)| {
-            let words = text.split(separators).filter(|word| !word.is_empty());
-            words.map(move |word| (line, word))
-        });
+        let words = (tilt + 2..)
+            .zip(&lines[tilt + 1..])
+            .flat_map(|(line, text)| {
+                let words = text.split(separators).filter(|word| !word.is_empty());
+                words.map(move |word| (line, word))
+            });
         let mut numbers = Numbers {
             file,
             words: words.collect(),
@@ -158,16 +175,25 @@ fn profile(file: &str, numbers: &mut Numbers) -> Result<IesProfile, IesError> {
         1.0 => Photometry::C,
         2.0 => Photometry::B,
         3.0 => Photometry::A,
-        other => return Err(numbers.here(format!("the photometric type is {other}, not 1, 2 or 3"))),
+        other => {
+            return Err(numbers.here(format!("the photometric type is {other}, not 1, 2 or 3")));
+        }
     };
-    for what in ["the unit of length", "the width", "the length", "the height"] {
+    for what in [
+        "the unit of length",
+        "the width",
+        "the length",
+        "the height",
+    ] {
         numbers.number(what)?;
     }
     let ballast = numbers.number("the ballast factor")?;
     let ballast_lamp = numbers.number("the ballast-lamp factor")?;
     let factor = multiplier * ballast * ballast_lamp;
     if factor <= 0.0 {
-        return Err(numbers.here(format!("its factors multiply to {factor}, which is not above 0")));
+        return Err(numbers.here(format!(
+            "its factors multiply to {factor}, which is not above 0"
+        )));
     }
     let input_watts = numbers.number("the input watts")?;
     let vertical = numbers.angles(vertical_count, "vertical angle")?;
@@ -193,7 +219,8 @@ fn profile(file: &str, numbers: &mut Numbers) -> Result<IesProfile, IesError> {
         input_watts,
         warnings: Vec::new(),
     };
-    out.unfold().map_err(|problem| numbers.error(last_angle, problem))?;
+    out.unfold()
+        .map_err(|problem| numbers.error(last_angle, problem))?;
     Ok(out)
 }
 
@@ -211,15 +238,21 @@ fn check_vertical(photometry: Photometry, angles: &[f32]) -> Result<(), String> 
     let fits = starts.iter().any(|s| is(*s, first)) && last <= ends[ends.len() - 1] + SAME;
     match fits && last > first {
         true => Ok(()),
-        false => Err(format!("vertical angles from {first} to {last} are none of the standard")),
+        false => Err(format!(
+            "vertical angles from {first} to {last} are none of the standard"
+        )),
     }
 }
 
 impl IesProfile {
     /// Completes the horizontal angles by the symmetry that they stand for.
     fn unfold(&mut self) -> Result<(), String> {
-        let [first, last] = [self.horizontal[0], self.horizontal[self.horizontal.len() - 1]];
-        let unknown = || format!("horizontal angles from {first} to {last} are none of the standard");
+        let [first, last] = [
+            self.horizontal[0],
+            self.horizontal[self.horizontal.len() - 1],
+        ];
+        let unknown =
+            || format!("horizontal angles from {first} to {last} are none of the standard");
         if self.photometry != Photometry::C {
             return match is(last, 90.0) {
                 true if is(first, -90.0) => Ok(()),
@@ -275,7 +308,9 @@ impl IesProfile {
             .map(|(h, column)| (*h, column.to_vec()))
             .collect();
         let others = columns.iter().filter(|(h, _)| !is(*h, about));
-        let mut all: Vec<_> = others.map(|(h, column)| (2.0 * about - h, column.clone())).collect();
+        let mut all: Vec<_> = others
+            .map(|(h, column)| (2.0 * about - h, column.clone()))
+            .collect();
         all.extend(columns.iter().cloned());
         self.set_columns(all);
     }
@@ -285,7 +320,12 @@ impl IesProfile {
         let rows = self.vertical.len();
         let columns = self.horizontal.iter().zip(self.candela.chunks(rows));
         let mut all: Vec<(f32, Vec<f32>)> = columns
-            .map(|(h, column)| (if *h > 360.0 + SAME { h - 360.0 } else { *h }, column.to_vec()))
+            .map(|(h, column)| {
+                (
+                    if *h > 360.0 + SAME { h - 360.0 } else { *h },
+                    column.to_vec(),
+                )
+            })
             .collect();
         // 90 stands there as 450, too, and 0 only as 360.
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -334,9 +374,15 @@ mod tests {
             IesProfile::parse("x.ies", &file("NONE", 1, horizontal, candela)).expect("a profile")
         };
         let axial = read("0", "5 4 3");
-        assert_eq!((axial.horizontal, axial.candela), (vec![0.0], vec![5.0, 4.0, 3.0]));
+        assert_eq!(
+            (axial.horizontal, axial.candela),
+            (vec![0.0], vec![5.0, 4.0, 3.0])
+        );
         let quadrant = read("0 45 90", "5 1 1 5 2 2 5 3 3");
-        assert_eq!(quadrant.horizontal, [0.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0, 360.0]);
+        assert_eq!(
+            quadrant.horizontal,
+            [0.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0, 360.0]
+        );
         let at_45: Vec<f32> = quadrant.candela.chunks(3).map(|c| c[1]).collect();
         assert_eq!(at_45, [1.0, 2.0, 3.0, 2.0, 1.0, 2.0, 3.0, 2.0, 1.0]);
         let half = read("0 90 180", "5 1 1 5 2 2 5 3 3");
@@ -380,7 +426,10 @@ mod tests {
             let error = IesProfile::parse("x.ies", &good.replacen(from, to, 1));
             let text = error.expect_err(to).to_string();
             let place = format!("x.ies, line {line}: ");
-            assert!(text.starts_with(&place) && text.contains(what), "{to}: {text}");
+            assert!(
+                text.starts_with(&place) && text.contains(what),
+                "{to}: {text}"
+            );
         }
     }
 }

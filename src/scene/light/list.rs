@@ -25,20 +25,22 @@ impl Parallelogram {
     /// The parallelogram that two triangles form, if they do: they share the ends of a diagonal, turn the same way, and
     /// the fourth corner is where the other three put it.
     pub fn of(first: u32, a: &Triangle, b: &Triangle) -> Option<Self> {
-        (0..3).flat_map(|i| (0..3).map(move |k| (i, k))).find_map(|(i, k)| {
-            let corner = |t: &Triangle, n: usize| t.vertices[n % 3];
-            // Around a: corner, own, end of the diagonal; around b: own, corner, end.
-            let [own, end, start] = [0, 1, 2].map(|n| corner(a, i + n));
-            let [other, from, to] = [0, 1, 2].map(|n| corner(b, k + n));
-            let [p, q, r, s] = [own, other, start, end].map(Vec3::as_dvec3);
-            let miss = (p + q - r - s).length();
-            let shared = from == start && to == end;
-            (shared && miss <= TOLERANCE * (s - r).length()).then(|| Self {
-                triangles: [first, first + 1],
-                corner: start,
-                edges: [own - start, other - start],
+        (0..3)
+            .flat_map(|i| (0..3).map(move |k| (i, k)))
+            .find_map(|(i, k)| {
+                let corner = |t: &Triangle, n: usize| t.vertices[n % 3];
+                // Around a: corner, own, end of the diagonal; around b: own, corner, end.
+                let [own, end, start] = [0, 1, 2].map(|n| corner(a, i + n));
+                let [other, from, to] = [0, 1, 2].map(|n| corner(b, k + n));
+                let [p, q, r, s] = [own, other, start, end].map(Vec3::as_dvec3);
+                let miss = (p + q - r - s).length();
+                let shared = from == start && to == end;
+                (shared && miss <= TOLERANCE * (s - r).length()).then(|| Self {
+                    triangles: [first, first + 1],
+                    corner: start,
+                    edges: [own - start, other - start],
+                })
             })
-        })
     }
 
     /// Area, scene units squared.
@@ -102,7 +104,8 @@ impl LightList {
         for material in &scene.materials {
             if !material.emission.is_finite() {
                 let problem = "its emission is not finite: it is dark";
-                list.problems.push(format!("material `{}`: {problem}", material.name));
+                list.problems
+                    .push(format!("material `{}`: {problem}", material.name));
             }
         }
         list.push_emitters(scene);
@@ -116,7 +119,10 @@ impl LightList {
             let power = light.power(radius);
             let name = light.kind().name;
             let is_second = matches!(light, Light::Environment { .. })
-                && list.lights.last().is_some_and(|last| last.kind(scene) == light.kind());
+                && list
+                    .lights
+                    .last()
+                    .is_some_and(|last| last.kind(scene) == light.kind());
             if is_second {
                 let line = format!("light {place} ({name}) is left out: there is one already");
                 list.problems.push(line);
@@ -160,7 +166,11 @@ impl LightList {
                 }
                 None => (Source::Triangle(id), a.map_or(0.0, area)),
             };
-            let sides = if scene.materials[of].emits_both_sides { 2.0 } else { 1.0 };
+            let sides = if scene.materials[of].emits_both_sides {
+                2.0
+            } else {
+                1.0
+            };
             let power = area * luminance(scene.materials[of].emission) * PI * sides;
             if power > 0.0 {
                 self.lights.push(ListedLight {
@@ -185,8 +195,8 @@ mod tests {
 
     #[test]
     fn two_triangles_with_a_common_diagonal_are_one_parallelogram_whatever_corner_comes_first() {
-        let [a, b, c, d] = [[0.0, 0.0], [2.0, 0.0], [3.0, 1.0], [1.0, 1.0]]
-            .map(|[x, y]| Vec3::new(x, y, 0.0));
+        let [a, b, c, d] =
+            [[0.0, 0.0], [2.0, 0.0], [3.0, 1.0], [1.0, 1.0]].map(|[x, y]| Vec3::new(x, y, 0.0));
         for turn in 0..9 {
             let mut pair = [[a, b, c], [a, c, d]];
             pair[0].rotate_left(turn % 3);

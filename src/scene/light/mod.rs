@@ -129,7 +129,11 @@ impl Light {
                 // The square of a linear step between the cosines has a mean of a third.
                 let [inner, outer] = [inner, outer].map(|angle| f64::from(*angle).cos());
                 let flux = TAU * ((1.0 - inner) + (inner - outer) / 3.0) * color;
-                if *decay { flux } else { flux * scene_radius * scene_radius }
+                if *decay {
+                    flux
+                } else {
+                    flux * scene_radius * scene_radius
+                }
             }
             Self::Ies { profile, .. } => profile.lumens() * color,
             Self::Directional { .. } => disk * color,
@@ -166,7 +170,8 @@ impl Light {
                 ..
             } => placed(position).and(aimed(direction)).and({
                 let fits = *inner >= 0.0 && inner <= outer && *outer <= std::f32::consts::PI;
-                fits.then_some(()).ok_or("its cone is none: 0 ≤ inner ≤ outer ≤ π does not hold")
+                fits.then_some(())
+                    .ok_or("its cone is none: 0 ≤ inner ≤ outer ≤ π does not hold")
             }),
             Self::Ies {
                 position, rotation, ..
