@@ -5,7 +5,7 @@
 use crate::geometry::{Camera, Triangle};
 use crate::params::ParamValue;
 use crate::scene::{
-    self, CookTorrance, Fresnel, MIRROR, Masking, Material, SceneData, SceneError, Texture,
+    self, CookTorrance, Fresnel, Light, MIRROR, Masking, Material, SceneData, SceneError, Texture,
 };
 use glam::{Vec2, Vec3, vec2, vec3};
 use std::f32::consts::{PI, TAU};
