@@ -5,7 +5,7 @@
 use crate::geometry::{Camera, Triangle};
 use crate::params::ParamValue;
 use crate::scene::{
-    self, CookTorrance, Fresnel, MIRROR, Masking, Material, SceneData, SceneError, Texture,
+    self, CookTorrance, Fresnel, Light, MIRROR, Masking, Material, SceneData, SceneError, Texture,
     TextureUse,
 };
 use glam::{Vec2, Vec3, vec2, vec3};
@@ -56,6 +56,21 @@ pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
         TrialScene {
             scene: lamps()?,
             trials: lamps_trials,
+        },
+        TrialScene {
+            scene: points()?,
+            trials: vec![
+                ("path", vec![depth(4)]),
+                (
+                    "path",
+                    vec![
+                        depth(3),
+                        word("lights", "all"),
+                        word("strategy", "mis-power"),
+                    ],
+                ),
+                ("path", vec![depth(3), word("light_choice", "uniform")]),
+            ],
         },
         TrialScene {
             scene: glass()?,
@@ -271,6 +286,50 @@ fn lamps() -> Result<SceneData, SceneError> {
     Ok(mesh.done(Vec::new()))
 }
 
+/// Lights without triangles, of every kind but measured ones and maps, over a floor with a block and a lamp.
+fn points() -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(-1.2, 1.9, 3.4), vec3(0.1, 0.5, 0.0), Vec3::Y);
+    let mut mesh = Mesh::new("points", camera, Vec3::ZERO)?;
+    let floor = mesh.material(Material::diffuse("floor", vec3(0.7, 0.6, 0.5)));
+    let block = Material::phong("block", vec3(0.4, 0.5, 0.3), Vec3::splat(0.3), 20.0);
+    let block = mesh.material(block);
+    let lamp = Material::diffuse("lamp", Vec3::splat(0.2)).emitting_from_front(vec3(3.0, 2.0, 4.0));
+    let lamp = mesh.material(lamp);
+    mesh.plain([vec3(-3.0, 0.0, -3.0), 6.0 * Vec3::Z, 6.0 * Vec3::X], floor);
+    mesh.plain([vec3(-3.0, 0.0, -2.0), 6.0 * Vec3::X, 4.0 * Vec3::Y], floor);
+    mesh.block(vec3(-0.4, 0.0, -0.5), vec3(0.7, 0.9, 0.6), block);
+    mesh.plain([vec3(1.5, 0.2, -1.0), vec3(0.0, 0.3, 1.2), Vec3::Y], lamp);
+    let mut scene = mesh.done(Vec::new());
+    let spot = |x: f32, decay| Light::Spot {
+        position: vec3(x, 2.5, 1.0),
+        direction: vec3(-0.5 * x, -1.6, -0.6),
+        intensity: vec3(2.0, 3.0, 2.5),
+        inner: 0.25,
+        outer: 0.6,
+        decay,
+    };
+    let ball = |center, radius, power: f32| Light::Sphere {
+        center,
+        radius,
+        radiance: power * vec3(1.0, 0.8, 0.5),
+    };
+    scene.lights = vec![
+        Light::Point {
+            position: vec3(-1.5, 1.2, 0.8),
+            intensity: vec3(1.0, 0.3, 0.2),
+        },
+        spot(0.8, true),
+        spot(-0.9, false),
+        ball(vec3(0.9, 1.6, 0.3), 0.25, 6.0),
+        ball(vec3(-0.9, 0.05, 0.9), 0.04, 300.0),
+        Light::Directional {
+            direction: vec3(0.4, -1.0, -0.7),
+            irradiance: vec3(0.2, 0.3, 0.6),
+        },
+    ];
+    Ok(scene)
+}
+
 /// Balls of glass, one in another, a pane, a mirror behind, tints, and a lamp that is seen through all of them.
 fn glass() -> Result<SceneData, SceneError> {
     let camera = camera(
@@ -305,7 +364,7 @@ fn glass() -> Result<SceneData, SceneError> {
     Ok(mesh.done(Vec::new()))
 }
 
-/// A row of balls of every glossy kind over a glossy floor, between two lamps and a sheet.
+/// A row of balls of every glossy kind over a glossy floor, between two lamps of one side and a sheet.
 fn glossy() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(0.5, 2.4, 5.2), vec3(0.0, 0.6, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("glossy", camera, vec3(0.2, 0.25, 0.3))?;
@@ -345,7 +404,8 @@ fn glossy() -> Result<SceneData, SceneError> {
         );
     }
     let floor = mesh.material(principled(0.2, 0.6, 0.05));
-    let one_sided = Material::diffuse("lamp", Vec3::splat(0.3)).emitting(vec3(6.0, 7.0, 8.0));
+    let one_sided =
+        Material::diffuse("lamp", Vec3::splat(0.3)).emitting_from_front(vec3(6.0, 7.0, 8.0));
     let both = Material::diffuse("sheet", Vec3::splat(0.5)).emitting(vec3(2.0, 1.5, 1.0));
     let [one_sided, both] = [one_sided, both].map(|m| mesh.material(m));
     mesh.plain([vec3(-4.0, 0.0, -4.0), 8.0 * Vec3::Z, 8.0 * Vec3::X], floor);

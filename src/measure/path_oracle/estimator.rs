@@ -2,6 +2,7 @@
 
 use super::bsdf::{self, Bounce, Bsdf, Reflected};
 use super::hits::{SHORT, Segment};
+use super::light::{Choice, moved};
 use super::surface::Surface;
 use super::{PathOracle, Vertex, Walk};
 use crate::integrator::ConfiguredIntegrator;
@@ -35,6 +36,7 @@ pub struct PathRules {
     roulette: Roulette,
     /// First bounce with roulette.
     roulette_depth: u32,
+    choice: Choice,
     /// Greatest component of a contribution of bounce 1 and later; 0 is none.
     clamp: f64,
 }
@@ -95,6 +97,12 @@ impl Reader<'_> {
         }
     }
 
+    fn light_choice(&mut self) -> Result<Choice, String> {
+        let by = [("power", Choice::Power), ("uniform", Choice::Uniform)];
+        let by = self.choice("light_choice", &by)?;
+        self.choice("lights", &[("one", by), ("all", Choice::All)])
+    }
+
     /// Whether all parameters were asked for.
     fn finish(&self) -> Result<(), String> {
         let unknown = |key: &&String| !self.known.contains(&key.as_str());
@@ -142,6 +150,7 @@ impl Estimator {
                     ],
                 )?,
                 roulette_depth: read.number("roulette_depth", 3.0) as u32,
+                choice: read.light_choice()?,
                 clamp: read.number("clamp", 0.0),
             }),
             _ => return Err(format!("integrator `{name}`")),
@@ -157,6 +166,17 @@ impl Strategy {
         match self {
             Self::Both(power) => 1.0 / (1.0 + (other / own).powi(power)),
             Self::Material | Self::Light => 1.0,
+        }
+    }
+}
+
+impl Strategy {
+    /// What emission counts that a direction of this density has found; `other` is that of light samples.
+    fn found(self, density: Option<f64>, other: impl Fn() -> f64) -> f64 {
+        match (density, self) {
+            (None, _) => 1.0,
+            (Some(_), Self::Light) => 0.0,
+            (Some(density), _) => self.weight(density, other()),
         }
     }
 }
@@ -251,6 +271,15 @@ impl PathOracle<'_> {
         };
         for depth in 0..=rules.max_depth {
             let met = self.meet(walk, &state.ray);
+            let end = met
+                .as_ref()
+                .map_or(f64::INFINITY, |(_, distance)| *distance);
+            if let Some((radiance, density)) = self.sphere_met(&state.ray, end, rules.choice) {
+                walk.decide(4);
+                let found = radiance * rules.strategy.found(state.density, || density);
+                state.radiance += rules.clamped(depth, state.throughput * found);
+                break;
+            }
             let leaves = |distance: f64| depth > 0 && self.escapes(distance);
             let met = met.filter(|(_, d)| !leaves(walk.rounding.number(*d)));
             let Some((surface, distance)) = met else {
@@ -259,7 +288,8 @@ impl PathOracle<'_> {
                 state.radiance += rules.clamped(depth, light);
                 break;
             };
-            let found = self.found(&surface, distance, &state, rules.strategy);
+            let other = || self.light_density(&surface, distance, rules.choice);
+            let found = surface.emission * rules.strategy.found(state.density, other);
             state.radiance += rules.clamped(depth, state.throughput * found);
             if depth == rules.max_depth {
                 break;
@@ -267,7 +297,7 @@ impl PathOracle<'_> {
             let bsdf = bsdf::of(&surface);
             if !(self.lights.are_none() || bsdf.is_delta() || rules.strategy == Strategy::Material)
             {
-                let direct = self.direct(walk, &surface, &*bsdf, depth, rules.strategy);
+                let direct = self.direct(walk, &surface, &*bsdf, depth, rules);
                 state.radiance += rules.clamped(depth, state.throughput * direct);
                 if let Some(vertex) = walk.vertices.last_mut() {
                     vertex.direct = state.throughput * direct;
@@ -280,51 +310,62 @@ impl PathOracle<'_> {
         walk.rounding.colour(state.radiance)
     }
 
-    /// Emission that a path has met, weighted.
-    fn found(&self, surface: &Surface, distance: f64, state: &State, strategy: Strategy) -> DVec3 {
-        let weight = match state.density {
-            Some(density) if surface.emission.max_element() > 0.0 => match strategy {
-                Strategy::Light => 0.0,
-                _ => strategy.weight(density, self.light_density(surface, distance)),
-            },
-            _ => 1.0,
-        };
-        surface.emission * weight
-    }
-
-    /// Light from one point of a light, reflected and weighted.
+    /// Light from one point of a light, or of all lights, reflected and weighted.
     fn direct(
         &self,
         walk: &mut Walk,
         surface: &Surface,
         bsdf: &dyn Bsdf,
         depth: u32,
-        strategy: Strategy,
+        rules: &PathRules,
     ) -> DVec3 {
         let point = walk.draw_2d(at_bounce(depth, LIGHT_POINT));
-        let choice = walk.draw(at_bounce(depth, LIGHT_CHOICE));
-        let light = self.light_sample(surface, choice, point, &mut walk.rounding);
-        let Some(light) = light.filter(|l| l.density > 0.0 && l.density.is_finite()) else {
+        let number = walk.draw(at_bounce(depth, LIGHT_CHOICE));
+        let chosen = (self.lights).chosen(rules.choice, number, &mut walk.rounding);
+        let mut sum = DVec3::ZERO;
+        for (light, share) in chosen {
+            let point = match rules.choice {
+                Choice::All => moved(point, light),
+                _ => point,
+            };
+            sum += self.of_light(walk, surface, bsdf, (light, share, point), rules.strategy);
+        }
+        sum
+    }
+
+    /// Light from a point of a light that was chosen with probability `share`.
+    fn of_light(
+        &self,
+        walk: &mut Walk,
+        surface: &Surface,
+        bsdf: &dyn Bsdf,
+        (place, share, point): (usize, f64, [f64; 2]),
+        strategy: Strategy,
+    ) -> DVec3 {
+        walk.decide(place as u64);
+        let light = self.light_sample(surface, place, point, &mut walk.rounding);
+        let Some(light) = light.filter(|l| l.density.is_none_or(f64::is_finite)) else {
             return DVec3::ZERO;
         };
-        let Some(Reflected { value, density }) = bsdf.evaluate(light.direction, &mut walk.rounding)
-        else {
+        let reflected = bsdf.evaluate(light.direction, &mut walk.rounding);
+        let Some(Reflected { value, density }) = reflected else {
             return DVec3::ZERO;
         };
         let shadow = Segment {
-            to: Some(light.triangle),
+            to: light.triangle,
             length: light.distance * (1.0 - SHORT),
             ..surface.leave(light.direction, &mut walk.rounding)
         };
-        let blocked = self.hits.blocked(&shadow);
-        walk.decide(u64::from(light.triangle) << 1 | u64::from(blocked));
-        match blocked {
-            true => DVec3::ZERO,
-            false => {
-                let weight = strategy.weight(light.density, density);
-                value * light.radiance * (weight / light.density)
-            }
+        let blocked = self.shadowed(&shadow, place);
+        walk.decide(blocked.into());
+        if blocked {
+            return DVec3::ZERO;
         }
+        let weight = match light.density {
+            Some(own) => strategy.weight(share * own, density) / own,
+            None => 1.0,
+        };
+        value * light.radiance * (weight / share)
     }
 
     /// Takes a path to its next ray; false if it ends.

@@ -126,7 +126,7 @@ impl<'a> PathOracle<'a> {
         Ok(Self {
             scene,
             hits: Hits::new(&scene.triangles),
-            lights: Lights::new(scene),
+            lights: Lights::new(scene)?,
             textures: Textures::new(scene),
             diagonal: diagonal(scene),
         })

@@ -105,8 +105,8 @@ pub const MUTANTS: &[Mutant] = &[
     path(
         "deep-sky-lost",
         "rays that leave after five bounces bring nothing",
-        "result += limited(throughput * escaped_radiance(ray.direction), depth);",
-        "if (depth < 5u) { result += limited(throughput * escaped_radiance(ray.direction), depth); }",
+        "result += limited(throughput * escaped_radiance(ray.direction) * weight, depth);",
+        "if (depth < 5u) { result += limited(throughput * escaped_radiance(ray.direction) * weight, depth); }",
     ),
     path(
         "grazing-rays-end",
@@ -303,14 +303,17 @@ pub const MUTANTS: &[Mutant] = &[
         "emission-of-the-frame-thrice",
         "lamps are three times as bright in the camera",
         path_text(
-            "var weight = 1.0;",
-            "var weight = select(1.0, 3.0, depth == 0u);",
+            "throughput * emission * weight",
+            "throughput * emission * weight * select(1.0, 3.0, depth == 0u)",
         ),
     ),
     fault(
         "first-bounce-full-weight",
         "emission that the first bounce finds has full weight",
-        path_text("if (density > 0.0) {", "if (density > 0.0 && depth > 1u) {"),
+        path_text(
+            "weight = found_weight(density, light_pdf(leaving, surface, hit));",
+            "if (depth > 1u) { weight = found_weight(density, light_pdf(leaving, surface, hit)); }",
+        ),
     ),
 ];
 

@@ -1,0 +1,54 @@
+//! Triangles and parallelograms: points on them evenly.
+
+use super::LightSample;
+use crate::measure::path_oracle::rounding::Rounding;
+use crate::measure::path_oracle::texture::Textures;
+use crate::scene::{SceneData, Source};
+use glam::DVec3;
+
+pub(super) fn sample(
+    (scene, textures): (&SceneData, &Textures),
+    source: Source,
+    from: DVec3,
+    [u, v]: [f64; 2],
+    rounding: &mut Rounding,
+) -> Option<LightSample> {
+    let (id, point, [x, y], area) = match source {
+        Source::Triangle(id) => {
+            let [a, b, c] = scene.triangles[id as usize].vertices.map(|v| v.as_dvec3());
+            let root = u.sqrt();
+            let point = a * (1.0 - root) + b * (root * (1.0 - v)) + c * (root * v);
+            let edges = [b - a, c - a];
+            (id, point, edges, 0.5 * edges[0].cross(edges[1]).length())
+        }
+        Source::Parallelogram(of) => {
+            let edges = of.edges.map(|e| e.as_dvec3());
+            let point = of.corner.as_dvec3() + u * edges[0] + v * edges[1];
+            (
+                of.triangles[0],
+                point,
+                edges,
+                edges[0].cross(edges[1]).length(),
+            )
+        }
+        Source::Light(_) => return None,
+    };
+    let material = &scene.materials[scene.material_ids[id as usize] as usize];
+    let to_light = rounding.point(point, point.abs() + x.abs() + y.abs()) - from;
+    let distance = to_light.length();
+    let direction = to_light / distance;
+    let away = x.cross(y).normalize().dot(direction);
+    if away >= 0.0 && !material.emits_both_sides {
+        return None;
+    }
+    // Parallelograms have no texture.
+    let root = u.sqrt();
+    let at = textures.coordinates(id, [root * (1.0 - v), root * v]);
+    Some(LightSample {
+        direction,
+        distance,
+        radiance: material.emission.as_dvec3() * textures.colour(material.emission_texture, at),
+        density: Some(distance * distance / (area * away.abs())),
+        triangle: Some(id),
+    })
+}
