@@ -38,17 +38,24 @@ pub enum Metric {
 }
 
 impl Metric {
-    /// Its row in the table of figures, that of its slope, how files are named after it, and what the
-    /// recorded metric's versioned id starts with.
-    const fn words(self) -> [&'static str; 4] {
+    /// Its row in the table of figures, that of its slope, how files are named after it, what the recorded
+    /// metric's versioned id starts with, and that of the metric that is left for a reference of one image.
+    const fn words(self) -> [&'static str; 5] {
         match self {
             Self::RelMse => [
                 "relmse-unbiased/v1",
                 "relmse-slope/v1",
                 "relmse",
                 "relmse-unbiased/",
+                "relmse/",
             ],
-            Self::Rmse => ["rmse-unbiased/v1", "rmse-slope/v1", "rmse", "mse-unbiased/"],
+            Self::Rmse => [
+                "rmse-unbiased/v1",
+                "rmse-slope/v1",
+                "rmse",
+                "mse-unbiased/",
+                "mse/",
+            ],
         }
     }
 
@@ -148,9 +155,10 @@ impl<'a> MeasuredSampler<'a> {
             .replicates
             .iter()
             .flat_map(|replicate| &replicate.errors);
-        let mut ids = errors.flat_map(|error| error.metrics.keys());
-        ids.find(|id| id.starts_with(metric.words()[3]))
-            .map(String::as_str)
+        let ids = errors.flat_map(|error| error.metrics.keys());
+        let [.., unbiased, plain] = metric.words();
+        let id = |prefix| ids.clone().find(|id| id.starts_with(prefix));
+        id(unbiased).or_else(|| id(plain)).map(String::as_str)
     }
 
     /// Mean error by growing spp, over the replicates that have it.
@@ -277,7 +285,8 @@ impl View<'_> {
         let Some(reference) = self.reference else {
             return Some("the reference has no record".into());
         };
-        if reference.exact.is_some() {
+        // Of a file no more is known than that the user takes it for right.
+        if reference.exact.is_some() || reference.file.is_some() {
             return None;
         }
         if let Some(mean) = errors().find(|mean| !mean.resolved) {
@@ -286,14 +295,15 @@ impl View<'_> {
         let least = errors()
             .map(|mean| mean.error.value.powi(2))
             .reduce(f64::min)?;
-        if reference.mse == 0.0 {
+        let own = reference.mse.unwrap_or(f64::NAN);
+        if own == 0.0 {
             // Rounding apart, equal parts are right only of a scene without noise.
             let noisy = least.sqrt() > 1e-4 * reference.mean;
             let reason = "the parts of the reference do not differ, so that its noise is unknown: its \
                           sampler must be one that seeds change";
             return noisy.then(|| reason.into());
         }
-        let share = reference.mse / least;
+        let share = own / least;
         // A share that is no number is a fault, too.
         (share.is_nan() || share > REFERENCE_SHARE).then(|| {
             format!(

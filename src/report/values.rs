@@ -216,7 +216,8 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
         }
     }
     let reference = view.reference.iter();
-    values.extend(reference.map(|r| Value::new(r.key, "reference-mse/v1", r.mse)));
+    let mse = reference.filter_map(|r| Some(Value::new(r.key, "reference-mse/v1", r.mse?)));
+    values.extend(mse);
     values.extend(Race::new(view).iter().flat_map(Race::values));
     values.extend(trade_off::times_to_image(scene, view));
     values

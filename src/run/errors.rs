@@ -1,6 +1,6 @@
 //! Error: once per scene, integrator and sampler, through the fastest gated structure.
 
-use super::images::{self, Estimator};
+use super::images::{self, Estimator, attributes};
 use super::reference::{Yardstick, reference, reference_structure};
 use super::session::{Session, content_hash};
 use super::structures::Gated;
@@ -168,7 +168,24 @@ fn sampler_error(
     kernels.dedup();
     let tables: String = passes.iter().map(|pass| pass.table.as_str()).collect();
     let blank = Line::new(Key::from(cell), Ran::kernel(kernels.join("+")), ());
-    let hash = content_hash(&blank, &world.scene.hash, &[("sampler table", &tables)]);
+    let reference = image_hash(yardstick.reference.image());
+    let [drawn, camera] = [
+        format!(
+            "{:?}",
+            (
+                &session.experiment.spp,
+                session.experiment.seeds().replicates
+            )
+        ),
+        format!("{:?}", (world.camera, session.experiment.resolution)),
+    ];
+    let made_of = [
+        ("sampler table", tables.as_str()),
+        ("reference", &reference),
+        ("spp and seeds", &drawn),
+        ("camera and size", &camera),
+    ];
+    let hash = content_hash(&blank, &world.scene.hash, &made_of);
     let line = |body| blank.clone().hashed(&hash).with_body(|()| body);
     let seeds = session.experiment.seeds().replicates;
     let seeds = seeds.into_iter().take(session.plan.renders(cell) as usize);
@@ -191,11 +208,48 @@ fn sampler_error(
         session.progress.inc(1);
     }
     session.finish(cell.to_string());
+    write_spread(session, cell, &finals)?;
     let bias = bias_record(session, cell, &finals, yardstick)?;
     session.write(&line(Body::Bias(bias)))?;
     let spectrum = spectrum_record(session, &finals, yardstick)?;
     session.write(&line(Body::Spectrum(spectrum)))?;
     Ok(())
+}
+
+/// The axes that tell the images of samplers apart.
+const IMAGE_AXES: [Axis; 4] = [
+    Axis::Scene,
+    Axis::Integrator,
+    Axis::Sequence,
+    Axis::Decorrelation,
+];
+
+/// Linear images of what all replicates say together, if the run was asked for images: their mean, and the
+/// variance of one of them, by pixel and channel.
+fn write_spread(session: &Session, cell: &Cell, replicates: &[Image]) -> Result<(), Fault> {
+    if session.options.images.is_none() || replicates.len() < 2 {
+        return Ok(());
+    }
+    let labels = cell.labels(&IMAGE_AXES);
+    let seeds = &session.experiment.seeds().replicates[..replicates.len()];
+    let seeds: Vec<String> = seeds.iter().map(u32::to_string).collect();
+    let about = attributes(
+        cell,
+        &sampler_label(cell),
+        session.experiment.spp.max(),
+        seeds.join(" "),
+    );
+    let mean = Image::mean_of(replicates).map_err(|e| e.to_string())?;
+    session.linear("mean", &labels, &mean, &about)?;
+    let variance = Image::variance_of(replicates).map_err(|e| e.to_string())?;
+    session.linear("variance", &labels, &variance, &about)?;
+    Ok(())
+}
+
+/// `sequence × decorrelation`.
+fn sampler_label(cell: &Cell) -> String {
+    let labels = [&cell[Axis::Sequence], &cell[Axis::Decorrelation]].map(|v| v.label.as_str());
+    labels.join(" × ")
 }
 
 /// The spectra of all replicates, at the highest number of samples.
@@ -257,15 +311,11 @@ fn error_record(
         error_map: None,
     };
     if replicate == 0 {
-        let axes = [
-            Axis::Scene,
-            Axis::Integrator,
-            Axis::Sequence,
-            Axis::Decorrelation,
-        ];
-        let labels = cell.labels(&axes);
+        let labels = cell.labels(&IMAGE_AXES);
         let draw = |kind, picture: &Picture| session.picture(kind, &labels, picture);
         record.image = draw("image", &tone_map(&last.image, yardstick.exposure))?;
+        let about = attributes(cell, &sampler_label(cell), last.spp, seed);
+        session.linear("image", &labels, &last.image, &about)?;
         let map = error_map(&last.image, reference, ERROR_MAP_FULL_SCALE, viridis);
         record.error_map = draw("error", &map.map_err(|e| e.to_string())?)?;
     }

@@ -1,4 +1,4 @@
-//! What the images of a run are made with, and their compiled kernels.
+//! What the images of a run are made with, their compiled kernels, and what their files say of it.
 
 use super::kernels::Device;
 use super::session::Session;
@@ -6,6 +6,7 @@ use super::words;
 use super::world::World;
 use crate::config::{Axis, Cell};
 use crate::geometry::Camera;
+use crate::image::Attribute;
 use crate::integrator::{ConfiguredIntegrator, RayOffset, RenderJob, Renderer, Traced};
 use crate::params::Variant;
 use crate::sampling::Sampler;
@@ -14,6 +15,31 @@ use crate::sampling::Sampler;
 pub(super) fn unfit(session: &Session, integrator: &Variant, traced: &Traced) -> Option<String> {
     let integrator = session.registries.integrators.configured(integrator);
     integrator.ok()?.refusal(traced)
+}
+
+/// What an image file says of its making: name and value, of those that are known.
+pub(super) fn attributes(
+    cell: &Cell,
+    sampler: &str,
+    spp: u32,
+    seed: impl ToString,
+) -> Vec<Attribute<'static>> {
+    let label = |axis| cell.get(axis).map(|v: &Variant| v.label.clone());
+    let commit = option_env!("RAYSTONE_COMMIT").map(str::to_owned);
+    let software = format!("raystone {}", env!("CARGO_PKG_VERSION"));
+    let known = [
+        ("software", Some(software)),
+        ("commit", commit),
+        ("scene", label(Axis::Scene)),
+        ("integrator", label(Axis::Integrator)),
+        ("sampler", Some(sampler.to_owned())),
+        ("spp", Some(spp.to_string())),
+        ("seed", Some(seed.to_string())),
+    ];
+    let known = known.into_iter();
+    known
+        .filter_map(|(name, value)| Some((name, value?)))
+        .collect()
 }
 
 /// What is computed per sample, what draws the samples, and the kernels of both.

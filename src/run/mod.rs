@@ -8,6 +8,7 @@ mod folder;
 mod images;
 mod kernels;
 mod reference;
+mod reference_file;
 mod registries;
 mod render;
 mod session;
@@ -26,6 +27,7 @@ pub use render::{Rendering, render};
 
 use crate::config::{Cell, Experiment, Plan};
 use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
+use crate::image::FileFormat;
 use crate::measure::record::GateVerdict;
 pub use crate::measure::words::dump_stream;
 use crate::params::Variant;
@@ -48,6 +50,8 @@ pub struct RunOptions {
     pub warn: Option<fn(&str)>,
     /// Which adapter.
     pub adapter: AdapterChoice,
+    /// Whether, and in which format, linear radiance is written beside the pictures of a run.
+    pub images: Option<&'static FileFormat>,
     /// Whether models may name files outside their folder: see [`crate::scene::LoadOptions`].
     pub allow_outside: bool,
     /// Whether to draw a progress bar on standard error.

@@ -13,12 +13,16 @@ pub struct ReferenceRecord {
     /// The value of every pixel, if it is known: then this is the reference.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact: Option<f64>,
-    /// Sampler, as `sequence × decorrelation`; `exact` if there was none.
+    /// The file it was read from, if it was not rendered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Sampler, as `sequence × decorrelation`; `exact` or `file` if there was none.
     pub sampler: String,
     /// Seconds it took.
     pub seconds: f64,
-    /// Estimated mean squared error of the reference itself, from its two halves.
-    pub mse: f64,
+    /// Estimated mean squared error of the reference itself, from its two halves; absent where it is one
+    /// image of which no more is known.
+    pub mse: Option<f64>,
     /// Tone-mapped PNG relative to the run's folder; empty if it could not be written.
     pub image: String,
     /// Mean radiance over pixels and channels.

@@ -181,9 +181,10 @@ fn galleries(dir: &Path, view: &View) -> [Option<Block>; 2] {
     let mut renders = Vec::new();
     let mut errors = Vec::new();
     if let Some(reference) = view.reference.filter(|r| !r.image.is_empty()) {
-        let caption = match reference.exact {
-            Some(value) => format!("reference: the exact value, {value}"),
-            None => format!(
+        let caption = match (reference.exact, &reference.file) {
+            (Some(value), _) => format!("reference: the exact value, {value}"),
+            (None, Some(file)) => format!("reference: {file}"),
+            (None, None) => format!(
                 "reference: {} spp of {}, {} s",
                 format::count(u64::from(reference.spp)),
                 reference.sampler,
