@@ -2,6 +2,7 @@
 
 pub mod bias;
 pub mod figure;
+pub mod flip;
 pub mod gate;
 pub mod hard_rays;
 pub mod hypothesis;
@@ -12,6 +13,7 @@ pub mod metrics;
 pub mod rays;
 pub mod record;
 pub mod sampler_cost;
+mod shown;
 pub mod spectrum;
 pub mod statistics;
 pub mod stream;
