@@ -3,7 +3,7 @@
 use crate::{error, output, program, text};
 use raystone::image::{Image, read_linear};
 use raystone::measure::record::{
-    BiasRecord, ErrorRecord, Line, Recorded, ReferenceRecord, all_of, read_records,
+    BiasRecord, Body, ErrorRecord, Line, Recorded, ReferenceRecord, all_of, read_records,
 };
 use std::path::{Path, PathBuf};
 
@@ -115,12 +115,13 @@ fn a_run_writes_linear_images_and_takes_one_as_the_reference_of_another() {
             .all(|b| format!("{:?}", b.verdict).contains("NotTestable"))
     );
     // Another image is another cell.
-    let hashes = |lines: &[Line]| {
-        errors(lines)
+    let hashes = |lines: &[Line]| -> Vec<String> {
+        let errors = lines
             .iter()
-            .map(|e| e.hash.to_owned())
-            .collect::<Vec<_>>()
+            .filter(|line| matches!(line.body, Body::Error(_)));
+        errors.map(|line| line.hash.clone()).collect()
     };
+    assert_eq!(hashes(&first).len(), 3);
     assert_ne!(hashes(&first), hashes(&second));
 }
 

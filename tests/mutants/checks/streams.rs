@@ -41,9 +41,15 @@ const SIZE: u32 = 64;
 const REPLICATES: u32 = 16;
 const STANDARD_ERRORS: f64 = 5.0;
 /// Decorrelations that leave a net in base 2 a net …
-const KEEP_NETS: [&str; 3] = ["none", "digital-shift", "owen-hash"];
+const KEEP_NETS: [&str; 4] = ["none", "digital-shift", "linear-scramble", "owen-hash"];
 /// … and those whose mean over seeds is right at any number of samples.
-const UNBIASED: [&str; 3] = ["cranley-patterson", "digital-shift", "owen-hash"];
+const UNBIASED: [&str; 5] = [
+    "cranley-patterson",
+    "cranley-patterson-micro-jitter",
+    "digital-shift",
+    "linear-scramble",
+    "owen-hash",
+];
 /// The smooth function that images show.
 const INTEGRAND: &str = "integrand:exponential";
 
