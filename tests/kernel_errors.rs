@@ -12,8 +12,19 @@ fn composition(structure: &str) -> Composition {
         .constant("STACK_ENTRIES", 32)
         .constant("SHARED_SEQUENCE", 0)
         .constant("SHARED_DECORRELATION", 0)
-        .constant("MAX_DEPTH", 4);
-    for feature in ["textures", "lights", "mirror", "dielectric", "daylight"] {
+        .constant("MAX_DEPTH", 4)
+        .constant("ROULETTE_DEPTH", 3)
+        .constant("CLAMP", 0);
+    for feature in [
+        "next_event",
+        "found_emission",
+        "roulette",
+        "textures",
+        "lights",
+        "mirror",
+        "dielectric",
+        "daylight",
+    ] {
         out = out.feature(feature, true);
     }
     out

@@ -68,10 +68,7 @@ impl List {
                 Topic::Triangle => axis(Axis::Triangle),
                 Topic::BoxTest => axis(Axis::BoxTest),
                 Topic::Offset => axis(Axis::Offset),
-                Topic::Material => named(
-                    "material: how surfaces scatter light, as model files say",
-                    MATERIAL_KINDS.map(|kind| (kind.name, kind.description)),
-                ),
+                Topic::Material => materials(),
                 Topic::Metric => metrics(),
                 Topic::Measure => measures(),
                 // Drivers are loaded, and may print, only where they are asked for.
@@ -113,12 +110,16 @@ fn entries(axis: Axis, entries: &[Entry]) -> String {
     text
 }
 
-fn named<const N: usize>(title: &str, entries: [(&str, &str); N]) -> String {
-    let width = entries.iter().map(|(name, _)| name.len()).max();
+fn materials() -> String {
+    let width = MATERIAL_KINDS.iter().map(|kind| kind.name.len()).max();
     let width = width.unwrap_or(0);
-    let mut text = format!("{title}\n");
-    for (name, description) in entries {
-        let _ = writeln!(text, "  {name:width$}  {description}");
+    let mut text = "material: how surfaces scatter light, as model files say\n".to_owned();
+    for kind in MATERIAL_KINDS {
+        let _ = writeln!(text, "  {:width$}  {}", kind.name, kind.description);
+        if !kind.parameters.is_empty() {
+            let parameters = kind.parameters.join("; ");
+            let _ = writeln!(text, "  {:width$}    base colour; {parameters}", "");
+        }
     }
     text
 }

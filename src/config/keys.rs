@@ -216,7 +216,7 @@ const SEED: ValueKind = integer(0, u32::MAX as i64);
 #[rustfmt::skip]
 pub const KEYS: &[KeyRow] = &[
     key("run", "name", ValueKind::Text, None, "Name of the run in the report; without it, the name of the file."),
-    key("run", "replicates", integer(1, 1024), Some("8"), "Independent seeds per randomised sampler; the unit of every interval of an error."),
+    key("run", "replicates", integer(1, 1024), Some("16"), "Independent seeds per randomised sampler; the unit of every interval of an error."),
     key("run", "seed", SEED, Some("1"), "Seed of the first replicate."),
     key("run", "resolution", ValueKind::IntegerPair { min: 16, max: 8192 }, Some("[192, 144]"), "Width and height of every image, pixels."),
     key("run", "spp", ValueKind::Counts { max_exponent: 16 }, Some("{ pow2 = [0, 5] }"), "Samples per pixel at which the error is taken: 2^lo, …, 2^hi, or those listed, `[1, 3, 10]`."),
@@ -243,7 +243,7 @@ pub const KEYS: &[KeyRow] = &[
     key("exclude", "box_test", ValueKind::Patterns(Axis::BoxTest), None, "… these box tests …"),
     key("exclude", "offset", ValueKind::Patterns(Axis::Offset), None, "… these offsets …"),
     key("exclude", "kernels", ValueKind::Patterns(Axis::Kernels), None, "… and these kernels are left out."),
-    key("reference", "spp", integer(2, 1 << 24), Some("4096"), "Samples per pixel of the reference image, both halves together."),
+    key("reference", "spp", integer(2, 1 << 24), Some("16384"), "Samples per pixel of the reference image, both halves together."),
     key("reference", "sequence", ValueKind::Name(Axis::Sequence), Some("\"pixel-hash\""), "Sequence of the reference, with its default parameters."),
     key("reference", "decorrelation", ValueKind::Name(Axis::Decorrelation), Some("\"none\""), "Decorrelation of the reference, with its default parameters."),
     key("reference", "seed", SEED, Some("9001"), "What the seeds of the reference's parts are hashed from; none of them may be a replicate's."),

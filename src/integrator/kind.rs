@@ -35,6 +35,8 @@ pub struct IntegratorFacts {
     pub exact: Option<f64>,
     /// Length of AO rays as a fraction of the scene's diagonal, if it traces any.
     pub ao_radius: Option<f64>,
+    /// Whether the mean of its images is not the integral, by its parameters: a bias is no fault then.
+    pub is_biased: bool,
     /// Whether its kernels call `closest_hit` or `any_hit` themselves, and so need a structure whose
     /// traversal is a function.
     pub needs_inline: bool,
@@ -79,6 +81,10 @@ pub trait Integrator: Send + Sync {
     }
     /// Constants of `package::active::constants` that the kernel imports.
     fn constants(&self, _params: &Params) -> Vec<(&'static str, u32)> {
+        Vec::new()
+    }
+    /// Features that its kernels are composed with, and whether they are on.
+    fn features(&self, _params: &Params) -> Vec<(&'static str, bool)> {
         Vec::new()
     }
     /// What others have to know of it.

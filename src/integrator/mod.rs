@@ -5,6 +5,7 @@ pub mod integrand;
 mod kind;
 pub mod offset;
 mod passes;
+pub mod path;
 mod registry;
 mod render;
 mod slice;

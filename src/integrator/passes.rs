@@ -46,7 +46,8 @@ impl Passes {
             chosen = traced.compose(chosen);
         }
         let mut chosen = with_sampler(chosen, job.sampler).feature("ray_counts", ray_counts);
-        for (name, on) in scene.features.flags() {
+        let of_integrator = job.integrator.kind.features(&job.integrator.params);
+        for (name, on) in scene.features.flags().into_iter().chain(of_integrator) {
             chosen = chosen.feature(name, on);
         }
         for (name, value) in job.integrator.kind.constants(&job.integrator.params) {

@@ -1,7 +1,8 @@
 //! The registry of integrators: one line each.
 
-use super::builtin::{AmbientOcclusion, Path, Primary};
+use super::builtin::{AmbientOcclusion, Primary};
 use super::integrand::INTEGRANDS;
+use super::path::Path;
 use super::{ConfiguredIntegrator, Integrator, IntegratorError};
 use crate::params::{Kinds, Named, ParameterSchema, Sources, Variant};
 use crate::text::nearest;

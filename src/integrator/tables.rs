@@ -22,9 +22,9 @@ pub struct SceneFeatures {
 impl SceneFeatures {
     /// Feature names as kernels write them, with whether they are on. Diffuse, which every kernel has, is none.
     pub fn flags(&self) -> Vec<(&'static str, bool)> {
-        let kinds = MATERIAL_KINDS.iter().map(|kind| kind.name);
+        let kinds = MATERIAL_KINDS.iter().map(|kind| kind.feature);
         let mut flags: Vec<_> = kinds.zip(self.materials).collect();
-        flags.retain(|(name, _)| *name != DIFFUSE.name);
+        flags.retain(|(name, _)| *name != DIFFUSE.feature);
         flags.extend([
             ("textures", self.textures),
             ("lights", self.lights),

@@ -119,7 +119,7 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 80] = [
+pub static FIGURES: [Figure; 83] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
@@ -160,6 +160,9 @@ pub static FIGURES: [Figure; 80] = [
     Figure::new("bias-z/v1", "z of the image", "", Neither, THREE, Exact),
     Figure::new("bias-p/v1", "p of the image", "", Neither, THREE, Exact),
     Figure::new("bias-freedom/v1", "degrees of freedom", "", Neither, THREE, Exact),
+    Figure::new("bias-weighted-p/v1", "p of the weighted mean", "", Neither, THREE, Exact),
+    Figure::new("bias-weighted-freedom/v1", "its degrees of freedom", "", Neither, THREE, Exact),
+    Figure::new("bias-detectable/v1", "bias found in 90 % of cases", "%", Lower, Digits(2), Exact),
     Figure::new("low-frequency-power/v1", "low-frequency power", "", Lower, THREE, Mean),
     Figure::new("neighbour-correlation/v1", "correlation", "", Lower, THREE, Mean),
     Figure::new("luminance-rmse/v1", "RMSE", "", Lower, THREE, Single),

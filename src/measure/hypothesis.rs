@@ -1,4 +1,4 @@
-//! Tests of hypotheses: Welch's t and the Benjamini–Hochberg correction for many tests.
+//! Tests of hypotheses: Welch's t, and the corrections of Holm and of Benjamini and Hochberg for many tests.
 
 use super::statistics::{mean, variance};
 use statrs::function::{beta::checked_beta_reg, erf::erfc, gamma::ln_gamma};
@@ -12,6 +12,8 @@ pub struct WelchTest {
     pub degrees_of_freedom: f64,
     /// Probability of a `|t|` this large or larger if the means are equal.
     pub p: f64,
+    /// Standard error of the difference of the means.
+    pub standard_error: f64,
 }
 
 /// Welch's t-test of equal means (Welch 1947): the variances need not be equal.
@@ -63,6 +65,7 @@ fn t_test(a: &[f64], b: &[f64], margin: f64, most_freedom: f64) -> Option<WelchT
         t,
         degrees_of_freedom,
         p,
+        standard_error: (va + vb).sqrt(),
     })
 }
 
@@ -111,6 +114,25 @@ pub fn t_test_power(effect: f64, alpha: f64, degrees_of_freedom: f64) -> f64 {
     (0..STEPS).map(found).sum()
 }
 
+/// The least effect, in standard errors, that a two-sided t-test at level `alpha` finds with probability `power`
+/// in (0, 1): the inverse of [`t_test_power`], to 10⁻⁴.
+pub fn t_test_effect(power: f64, alpha: f64, degrees_of_freedom: f64) -> f64 {
+    let finds = |effect: f64| t_test_power(effect, alpha, degrees_of_freedom) >= power;
+    let (mut low, mut high) = (0.0, 1.0);
+    // With one degree of freedom and tiny levels, thousands of standard errors are needed.
+    while !finds(high) && high < 1e9 {
+        (low, high) = (high, 2.0 * high);
+    }
+    while high - low > 1e-4 * high {
+        let middle = 0.5 * (low + high);
+        match finds(middle) {
+            true => high = middle,
+            false => low = middle,
+        }
+    }
+    high
+}
+
 /// Probability that a standard normal number lies above `x`.
 fn normal_above(x: f64) -> f64 {
     0.5 * erfc(x * std::f64::consts::FRAC_1_SQRT_2)
@@ -129,4 +151,27 @@ pub fn benjamini_hochberg(p_values: &[f64], alpha: f64) -> Vec<bool> {
         .find(|&(k, &p)| p <= alpha * (k + 1) as f64 / m)
         .map_or(-1.0, |(_, &p)| p);
     p_values.iter().map(|&p| p <= threshold).collect()
+}
+
+/// The p-values corrected for their number, in their order: rejecting those of at most `alpha` rejects any true
+/// hypothesis with probability at most `alpha`, however the tests depend on each other (Holm 1979, step-down).
+/// NaN counts as 1.
+pub fn holm(p_values: &[f64]) -> Vec<f64> {
+    let p = |i: usize| {
+        if p_values[i].is_nan() {
+            1.0
+        } else {
+            p_values[i]
+        }
+    };
+    let mut order: Vec<usize> = (0..p_values.len()).collect();
+    order.sort_by(|&i, &j| p(i).total_cmp(&p(j)));
+    let mut corrected = vec![1.0; p_values.len()];
+    let mut largest: f64 = 0.0;
+    for (rank, &i) in order.iter().enumerate() {
+        let left = (p_values.len() - rank) as f64;
+        largest = largest.max((left * p(i)).min(1.0));
+        corrected[i] = largest;
+    }
+    corrected
 }

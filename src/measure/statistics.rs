@@ -4,7 +4,11 @@
 //! A figure that does not exist is `None`, never NaN: every function here answers `None` for an
 //! empty slice and for samples that are not all finite. Intervals are those of Student's t and of
 //! order statistics, because replicates are few: of eight samples a percentile bootstrap covers the
-//! mean in 89 % of all cases and not in 95 %.
+//! mean in 89 % of all cases and not in 95 %. Figures that are positive have theirs on logarithms, since
+//! they are skewed: of four samples with the distribution of χ² with two degrees of freedom, Student's interval
+//! covers the mean in 88 % of all cases, the one on logarithms in 94 %. No interval covers what samples do
+//! not show: where one image in ten has a firefly that outweighs all else, four images hold one in a third
+//! of all cases.
 
 use super::hypothesis::student_t_quantile;
 use super::record::Interval;
@@ -36,36 +40,94 @@ pub fn variance(samples: &[f64]) -> Option<f64> {
     (samples.len() > 1).then(|| sum / (samples.len() - 1) as f64)
 }
 
+/// What one source of noise makes of an estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spread {
+    /// Variance of the estimate.
+    pub variance: f64,
+    /// Degrees of freedom that the variance is known with, at least 1.
+    pub freedom: f64,
+}
+
+impl Spread {
+    /// From the estimates that leave out one of `n` parts each: the delete-one jackknife (Quenouille 1956,
+    /// Tukey 1958). Fewer than two say nothing.
+    pub fn jackknife(estimates: &[f64]) -> Option<Self> {
+        let n = estimates.len() as f64;
+        Some(Self {
+            variance: variance(estimates)? * (n - 1.0).powi(2) / n,
+            freedom: n - 1.0,
+        })
+    }
+
+    /// Of independent sources together: variances add, and degrees of freedom are those of Welch and
+    /// Satterthwaite. Of none there is no variance.
+    pub fn together(sources: &[Self]) -> Self {
+        let variance: f64 = sources.iter().map(|s| s.variance).sum();
+        // As shares of the whole variance, so that tiny variances do not underflow when squared.
+        let share = |s: &Self| (s.variance / variance).powi(2) / s.freedom;
+        let shares: f64 = sources.iter().map(share).sum();
+        Self {
+            variance,
+            freedom: if shares > 0.0 {
+                1.0 / shares
+            } else {
+                f64::INFINITY
+            },
+        }
+    }
+}
+
 /// 95 % interval of an estimate with several independent sources of noise. Each source gives the
-/// estimates that leave out one of its `n` parts (the delete-one jackknife, Quenouille 1956, Tukey
-/// 1958); variances add, and Student's t has the degrees of freedom of Welch and Satterthwaite. Noise
+/// estimates that leave out one of its parts, see [`Spread::jackknife`] and [`Spread::together`]. Noise
 /// that two sources only make together counts for both, so the interval is rather too wide.
 ///
 /// A source of fewer than two estimates says nothing; without any the interval has no width. `None`
 /// if something is not finite.
 pub fn jackknife_interval(value: f64, sources: &[Vec<f64>]) -> Option<Interval> {
-    let spread = |estimates: &Vec<f64>| {
-        let n = estimates.len() as f64;
-        Some((variance(estimates)? * (n - 1.0).powi(2) / n, n - 1.0))
-    };
     if !value.is_finite() || !sources.iter().flatten().all(|x| x.is_finite()) {
         return None;
     }
-    let spreads: Vec<(f64, f64)> = sources.iter().filter_map(spread).collect();
-    let whole: f64 = spreads.iter().map(|s| s.0).sum();
+    let spreads: Vec<Spread> = sources
+        .iter()
+        .filter_map(|s| Spread::jackknife(s))
+        .collect();
+    let whole = Spread::together(&spreads);
     // Estimates that differ by the rounding of their sums are equal.
-    if whole.sqrt() <= 4.0 * f64::EPSILON * value.abs() {
+    if whole.variance.sqrt() <= 4.0 * f64::EPSILON * value.abs() {
         return Some(Interval::exact(value));
     }
-    // As shares of the whole variance, so that tiny variances do not underflow when squared.
-    let shares = spreads
-        .iter()
-        .map(|(v, freedom)| (v / whole).powi(2) / freedom);
-    let half = student_t_quantile(ALPHA, 1.0 / shares.sum::<f64>()) * whole.sqrt();
+    let half = student_t_quantile(ALPHA, whole.freedom) * whole.variance.sqrt();
     Some(Interval {
         value,
         low: value - half,
         high: value + half,
+    })
+}
+
+/// [`jackknife_interval`] of a figure that is positive by its nature, taken on logarithms: it holds ratios as
+/// often above as below, is never negative, and covers more of what is skewed to the right. Where the value
+/// or one of the estimates is not positive, there are no logarithms, and the plain interval stands.
+pub fn positive_interval(value: f64, sources: &[Vec<f64>]) -> Option<Interval> {
+    let positive = |x: &f64| *x > 0.0;
+    if !positive(&value) || !sources.iter().flatten().all(positive) {
+        return jackknife_interval(value, sources);
+    }
+    let log = |estimates: &Vec<f64>| estimates.iter().map(|x| x.ln()).collect();
+    let logs: Vec<Vec<f64>> = sources.iter().map(log).collect();
+    let interval = jackknife_interval(value.ln(), &logs)?;
+    // The exponential of a logarithm is not the same number to the last digit.
+    let end = |log: f64| {
+        if log == interval.value {
+            value
+        } else {
+            log.exp()
+        }
+    };
+    Some(Interval {
+        value,
+        low: end(interval.low),
+        high: end(interval.high),
     })
 }
 
@@ -87,9 +149,12 @@ pub fn mean_interval(samples: &[f64]) -> Option<Interval> {
     interval_of(samples, raw_mean)
 }
 
-/// Root of the mean of squares with its 95 % interval, not below 0; of one square without width.
+/// Root of the mean of squares with its 95 % interval on logarithms ([`positive_interval`]); not below 0,
+/// of one square without width.
 pub fn root_mean_interval(squares: &[f64]) -> Option<Interval> {
-    let interval = interval_of(squares, |squares| raw_mean(squares).sqrt())?;
+    let root = |squares: &[f64]| raw_mean(squares).sqrt();
+    let estimates = leave_one_out(squares).map(|rest| root(&rest)).collect();
+    let interval = finite(squares).then(|| positive_interval(root(squares), &[estimates]))??;
     Some(Interval {
         low: interval.low.max(0.0),
         ..interval

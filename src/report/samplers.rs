@@ -5,13 +5,13 @@ use super::format;
 use crate::measure::bias::BiasVerdict;
 use crate::measure::figure::figure;
 use crate::measure::record::{BiasRecord, ErrorRecord, Interval, Key, SpectrumRecord};
-use crate::measure::statistics::{jackknife_interval, log_log_fit, mean};
+use crate::measure::statistics::{jackknife_interval, log_log_fit, mean, positive_interval};
 
 /// What an error is that its reference is too noisy for: its estimate is not clearly above 0.
 pub const UNRESOLVED: &str = "below what the reference can resolve";
 
 /// The part of the least measured error that the reference's own may be.
-pub const REFERENCE_SHARE: f64 = 0.1;
+pub const REFERENCE_SHARE: f64 = 0.01;
 
 /// A sampler under one scene, integrator, triangle test and box test.
 #[derive(Debug)]
@@ -146,7 +146,10 @@ impl<'a> MeasuredSampler<'a> {
             let (z, p) = (format::optional(bias.z), format::number(p));
             format!(", image z = {z} (p = {p})")
         });
-        Some(format!("biased{design}: {tiles}{of_image}"))
+        let weighted = bias.weighted_p.map_or(String::new(), |p| {
+            format!(", weighted mean p = {}", format::number(p))
+        });
+        Some(format!("biased{design}: {tiles}{of_image}{weighted}"))
     }
 
     /// The full id of a metric as recorded.
@@ -177,7 +180,7 @@ impl<'a> MeasuredSampler<'a> {
             let exact = by_reference.low == by_reference.high;
             Some(MeanError {
                 spp,
-                error: metric.shown(self.interval(id, value, estimate)?),
+                error: metric.shown(positive_interval(value, &self.sources(id, estimate)?)?),
                 resolved: by_reference.low > 0.0 || exact && value >= 0.0,
             })
         };
@@ -213,7 +216,7 @@ impl<'a> MeasuredSampler<'a> {
                 slope
             })
         };
-        self.interval(id, estimate(Without::Nothing)?, estimate)
+        jackknife_interval(estimate(Without::Nothing)?, &self.sources(id, estimate)?)
     }
 
     /// Mean of a recorded metric over replicates.
@@ -230,15 +233,15 @@ impl<'a> MeasuredSampler<'a> {
         mean(&values.collect::<Vec<f64>>())
     }
 
-    /// `value`, which is `estimate(Nothing)`, with its interval.
-    fn interval(
+    /// Estimates without each part of each source of noise: the halves of the reference, and the replicates. No
+    /// source for a single replicate, of whose own noise nothing is known.
+    fn sources(
         &self,
         id: &str,
-        value: f64,
         estimate: impl Fn(Without) -> Option<f64>,
-    ) -> Option<Interval> {
+    ) -> Option<Vec<Vec<f64>>> {
         if !self.is_ranked() {
-            return Some(Interval::exact(value));
+            return Some(Vec::new());
         }
         let mut sources = self.reference_estimates(id, &estimate)?;
         let replicates = 0..self.replicates.len();
@@ -246,7 +249,7 @@ impl<'a> MeasuredSampler<'a> {
             .map(|i| estimate(Without::Replicate(i)))
             .collect();
         sources.push(by_replicate?);
-        jackknife_interval(value, &sources)
+        Some(sources)
     }
 
     /// Estimates without each part of the reference, its halves apart; empty where parts are unknown.
@@ -306,10 +309,13 @@ impl View<'_> {
         let share = own / least;
         // A share that is no number is a fault, too.
         (share.is_nan() || share > REFERENCE_SHARE).then(|| {
+            let enough = f64::from(reference.spp) * share / REFERENCE_SHARE;
             format!(
-                "the reference has {} of the least mean squared error, more than {}",
+                "the reference has {} of the least mean squared error, more than {}: \
+                 `reference.spp = {}` would be enough",
                 format::percent(share),
-                format::percent(REFERENCE_SHARE)
+                format::percent(REFERENCE_SHARE),
+                rounded_up(enough)
             )
         })
     }
@@ -331,6 +337,12 @@ impl View<'_> {
             .find(|spp| sets.iter().all(|set| set.contains(spp)))
             .copied()
     }
+}
+
+/// The next number above with two significant digits, which leaves some room.
+fn rounded_up(value: f64) -> u64 {
+    let unit = 10f64.powf((value.max(1.0).log10().floor() - 1.0).max(0.0));
+    ((value / unit).floor() + 1.0) as u64 * unit as u64
 }
 
 /// Error after `seconds`, from a curve of `(seconds, error)`: log–log interpolation between the

@@ -232,6 +232,12 @@ fn of_bias(key: &Key, bias: &BiasRecord) -> Vec<Value<'static>> {
             ("bias-z/v1", bias.z),
             ("bias-p/v1", Some(p)),
             ("bias-freedom/v1", bias.degrees_of_freedom),
+            ("bias-weighted-p/v1", bias.weighted_p),
+            ("bias-weighted-freedom/v1", bias.weighted_degrees_of_freedom),
+            (
+                "bias-detectable/v1",
+                bias.detectable.map(|part| 100.0 * part),
+            ),
         ]
     });
     Value::known(key, tested.into_iter().flatten())

@@ -345,7 +345,7 @@ fn bias_record(
     } else {
         BiasVerdict::NotTestable("the sampler is deterministic, its error is not noise".to_owned())
     };
-    let whole = check.whole.filter(|_| cell.randomised);
+    let [whole, weighted] = [check.whole, check.weighted].map(|t| t.filter(|_| cell.randomised));
     Ok(BiasRecord {
         tiles: check.tiles,
         rejected: check.rejected.len(),
@@ -355,6 +355,9 @@ fn bias_record(
         z: whole.map(|test| test.t).filter(|t| t.is_finite()),
         p: whole.map(|test| test.p),
         degrees_of_freedom: whole.map(|test| test.degrees_of_freedom),
+        weighted_p: weighted.map(|test| test.p),
+        weighted_degrees_of_freedom: weighted.map(|test| test.degrees_of_freedom),
+        detectable: check.detectable.filter(|_| cell.randomised),
         by_design: cell.randomised && !session.registries.is_unbiased(cell),
         verdict,
     })

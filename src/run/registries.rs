@@ -98,6 +98,9 @@ impl Registries {
     pub fn is_unbiased(&self, cell: &Cell) -> bool {
         let claimed =
             (self.samplers).is_unbiased(&cell[Axis::Sequence], &cell[Axis::Decorrelation]);
-        claimed && self.offset(cell).is_ok_and(|offset| offset.is_unbiased)
+        let integrator = self.integrators.configured(&cell[Axis::Integrator]);
+        claimed
+            && self.offset(cell).is_ok_and(|offset| offset.is_unbiased)
+            && integrator.is_ok_and(|integrator| !integrator.facts.is_biased)
     }
 }

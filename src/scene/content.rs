@@ -85,6 +85,9 @@ impl SceneData {
             hash.bytes(bytemuck::cast_slice(&material.parameters));
             hash.bytes(&texture.to_le_bytes());
             hash.vectors(&[material.base_color, material.emission]);
+            if !material.emits_both_sides {
+                hash.bytes(b"one-sided");
+            }
             // The derived Debug text is a total, deterministic image of the plain fields.
             hash.bytes(format!("{:?}", material.source).as_bytes());
         }
@@ -135,13 +138,14 @@ mod tests {
     fn the_hash_sees_every_part_of_the_scene() {
         let scene = load_default("cornell-box");
         type Change = fn(&mut crate::scene::SceneData);
-        let changes: [(&str, Change); 10] = [
+        let changes: [(&str, Change); 11] = [
             ("vertex", |s| s.triangles[3].vertices[1].x += 1e-3),
             ("material id", |s| s.material_ids[0] = 1),
             ("reflectance", |s| s.materials[0].base_color.y += 1e-3),
             ("kind", |s| s.materials[0].kind = &MIRROR),
             ("parameter", |s| s.materials[0].parameters.push(1.5)),
             ("emission", |s| s.materials[0].emission.z += 1e-3),
+            ("sides", |s| s.materials[0].emits_both_sides = false),
             ("source", |s| s.materials[0].source.ior = Some(1.5)),
             ("camera", |s| s.camera = None),
             ("environment", |s| s.environment.x += 1e-3),

@@ -7,6 +7,8 @@ use std::path::{Component, Path, PathBuf};
 
 /// Finds and reads the files of a model, inside its folder unless told otherwise.
 pub(super) struct Files {
+    /// The model.
+    pub model: PathBuf,
     folder: PathBuf,
     allow_outside: bool,
 }
@@ -19,6 +21,7 @@ impl Files {
             _ => Path::new("."),
         };
         Self {
+            model: model.to_owned(),
             folder: folder.to_owned(),
             allow_outside: options.allow_outside,
         }

@@ -69,7 +69,7 @@ pub(super) fn read<'a>(
     // Place of each of the document's images in `palette.images`.
     let mut image_ids = vec![None; document.images().len()];
     for material in document.materials() {
-        let mut found = convert(&material);
+        let mut found = convert(&material, files, &mut palette.warnings);
         let info = base_color(&material).1.filter(|_| with_textures);
         let info = info.filter(|_| found.kind != &MIRROR);
         palette.mappings.push(info.as_ref().map(Mapping::of));
@@ -86,7 +86,9 @@ pub(super) fn read<'a>(
         .materials
         .push(Material::diffuse("default", Vec3::splat(DEFAULT_ALBEDO)));
     palette.mappings.push(None);
-    palette.warnings = warnings(document, &palette.materials);
+    palette
+        .warnings
+        .extend(warnings(document, &palette.materials));
     palette
 }
 
@@ -102,7 +104,7 @@ fn base_color<'a>(material: &gltf::Material<'a>) -> (Vec4, Option<gltf::texture:
     }
 }
 
-fn convert(material: &gltf::Material<'_>) -> Material {
+fn convert(material: &gltf::Material<'_>, files: &Files, warnings: &mut Vec<String>) -> Material {
     let (color, _) = base_color(material);
     let model = material.pbr_metallic_roughness();
     let gloss = material.pbr_specular_glossiness();
@@ -140,7 +142,11 @@ fn convert(material: &gltf::Material<'_>) -> Material {
     };
     let name = material.name();
     let name = name.map_or_else(|| format!("material {index}"), str::to_owned);
-    Material::described(name, &description).emitting(emitted(emission))
+    Material {
+        emission: emitted(emission),
+        emits_both_sides: material.double_sided(),
+        ..Material::described(name, &description, &files.model, warnings)
+    }
 }
 
 fn image_source<'a>(

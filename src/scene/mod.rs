@@ -32,8 +32,8 @@ pub use error::SceneError;
 pub use framing::Framing;
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 pub use material::{
-    DEFAULT_IOR, DIELECTRIC, DIFFUSE, MATERIAL_KINDS, MIRROR, Material, MaterialKind,
-    MaterialSource,
+    COOK_TORRANCE, CookTorrance, DEFAULT_IOR, DIELECTRIC, DIFFUSE, Fresnel, MATERIAL_KINDS, MIRROR,
+    Masking, Material, MaterialKind, MaterialSource, PHONG, PRINCIPLED, reflectance_of_ior,
 };
 
 use crate::geometry::{Camera, Triangle};

@@ -5,7 +5,7 @@ use super::error::read_regular;
 use super::material::{Description, Format, emitted};
 use super::text::normalised;
 use super::texture::{Encoded, ImageSource};
-use super::{DIELECTRIC, DIFFUSE, LoadOptions, Material, MaterialSource};
+use super::{DIELECTRIC, LoadOptions, MIRROR, Material, MaterialSource};
 use glam::Vec3;
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
@@ -65,9 +65,8 @@ impl Library {
         let text = readable_lines(&normalised(bytes), &path, &mut contents.warnings);
         let read = tobj::load_mtl_buf(&mut Cursor::new(text));
         let (materials, names) = read.inspect_err(|error| contents.warnings.push(unread(error)))?;
-        let folder = path.parent().unwrap_or(Path::new(""));
         for material in &materials {
-            contents.add(material, folder, &self.options);
+            contents.add(material, &path, &self.options);
         }
         Ok((materials, names))
     }
@@ -88,7 +87,9 @@ impl Library {
 }
 
 impl Contents {
-    fn add(&mut self, material: &tobj::Material, folder: &Path, options: &LoadOptions) {
+    /// Adds a material of the library `file`.
+    fn add(&mut self, material: &tobj::Material, file: &Path, options: &LoadOptions) {
+        let folder = file.parent().unwrap_or(Path::new(""));
         let texture = material
             .diffuse_texture
             .as_deref()
@@ -108,9 +109,11 @@ impl Contents {
             is_varied: false,
             source: &source,
         };
-        let found = Material::described(material.name.clone(), &description);
+        let name = material.name.clone();
+        let found = Material::described(name, &description, file, &mut self.warnings);
+        let is_textured = found.kind != &MIRROR && found.kind != &DIELECTRIC;
         self.materials.push(Material {
-            base_color_texture: texture.filter(|_| found.kind == &DIFFUSE),
+            base_color_texture: texture.filter(|_| is_textured),
             emission: emitted(material.emissive.unwrap_or_default()),
             ..found
         });

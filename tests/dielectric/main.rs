@@ -226,36 +226,52 @@ fn light_is_reflected_and_refracted_as_fresnel_and_snell_say() {
 
 #[test]
 fn planted_faults_are_seen() {
-    let file = "shading/bsdf/dielectric";
-    for (from, to, expected) in [
-        ("surface.side > 0.0", "surface.side < 0.0", "Snell's law"),
-        ("tint / (eta * eta)", "tint", "radiance in the other medium"),
+    let (file, fresnel) = ("shading/bsdf/dielectric", "shading/bsdf/fresnel");
+    for (file, from, to, expected) in [
         (
+            file,
+            "surface.side > 0.0",
+            "surface.side < 0.0",
+            "Snell's law",
+        ),
+        (
+            file,
+            "tint / (eta * eta)",
+            "tint",
+            "radiance in the other medium",
+        ),
+        (
+            file,
             "eta * eta);\n}\n",
             "1.0);\n}\n",
             "density of the other medium",
         ),
         (
+            fresnel,
             "        return 1.0;\n",
             "        return 0.0;\n",
             "law of reflection",
         ),
         (
+            fresnel,
             "cos_arriving - eta * cos_refracted",
             "cos_arriving - cos_refracted",
             "Fresnel's equations",
         ),
         (
+            file,
             "2.0 * reflectance / (1.0 + reflectance)",
             "reflectance",
             "Fresnel's equations",
         ),
         (
+            file,
             "arriving / eta + along",
             "arriving * eta + along",
             "Snell's law",
         ),
         (
+            file,
             "surface.arriving + 2.0 * cos",
             "surface.arriving - 2.0 * cos",
             "length of the direction",

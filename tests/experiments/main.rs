@@ -112,7 +112,7 @@ fn plan(experiment: &Experiment, only: &[&str]) -> Result<Plan, ConfigError> {
 fn a_minimal_file_gets_the_documented_defaults() {
     let experiment = good("");
     assert_eq!(experiment.name, "trial");
-    assert_eq!(experiment.replicates, 8);
+    assert_eq!(experiment.replicates, 16);
     assert_eq!(experiment.resolution, [192, 144]);
     assert_eq!(
         experiment.spp.counts().collect::<Vec<_>>(),
@@ -133,7 +133,7 @@ fn a_minimal_file_gets_the_documented_defaults() {
         experiment.discrepancy.pairs,
         [[0, 1], [2, 3], [4, 5], [0, 2], [1, 3], [2, 4]]
     );
-    assert_eq!(experiment.seeds().replicates.len(), 8);
+    assert_eq!(experiment.seeds().replicates.len(), 16);
 }
 
 #[test]

@@ -3,7 +3,8 @@
 
 mod bits;
 mod blocks;
-mod direct_light;
+mod estimators;
+
 mod furnace;
 mod model;
 mod ray_counts;

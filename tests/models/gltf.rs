@@ -42,6 +42,9 @@ fn glb_nodes_are_flattened_with_their_transforms() {
     let lamp = &scene.materials[0];
     assert_eq!(lamp.emission, Vec3::new(4.0, 2.0, 0.0));
     assert_eq!(lamp.base_color, Vec3::new(0.5, 0.6, 0.7));
+    assert_eq!(lamp.kind, &PRINCIPLED);
+    assert_eq!(lamp.parameters[..2], [0.0, 1.0]);
+    assert!((lamp.parameters[2] - 0.04).abs() < 1e-6);
     assert_eq!(scene.uvs[0][1], Vec2::new(2.25, 0.0));
     assert_eq!(scene.textures[0].width, 2);
 }

@@ -11,7 +11,8 @@ use glam::{Vec2, Vec3};
 use raystone::params::{Params, Variant};
 use raystone::random::Pcg32;
 use raystone::scene::{
-    DEFAULT_ALBEDO, DIELECTRIC, DIFFUSE, LoadOptions, MIRROR, Material, SceneData, SceneError, load,
+    DEFAULT_ALBEDO, DIELECTRIC, DIFFUSE, LoadOptions, MIRROR, Material, PHONG, PRINCIPLED,
+    SceneData, SceneError, load,
 };
 use std::fs;
 use std::path::Path;

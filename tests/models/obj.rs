@@ -37,7 +37,9 @@ fn obj_materials_and_textures_arrive() {
     let [wall, lamp, mirror, glass, pane] = &scene.materials[..] else {
         panic!("{:?}", scene.materials);
     };
-    assert_eq!(wall.base_color, Vec3::new(0.5, 0.25, 1.0));
+    // Kd reflects twice what arrives.
+    assert_eq!(wall.base_color, Vec3::new(0.25, 0.125, 1.0));
+    assert_eq!(wall.kind, &DIFFUSE);
     assert_eq!(wall.base_color_texture, Some(0));
     assert_eq!(
         scene.textures[0].texels,
@@ -55,9 +57,42 @@ fn obj_materials_and_textures_arrive() {
     assert_eq!(glass.parameters, [1.4, 0.0]);
     assert_eq!(glass.base_color, Vec3::new(0.5, 1.0, 0.75));
     assert_eq!(pane.kind, &DIFFUSE);
-    assert_eq!(scene.report.warnings.len(), 1, "{:?}", scene.report);
-    assert!(scene.report.warnings[0].contains("diffuse: pane"));
+    let [too_bright, partly] = &scene.report.warnings[..] else {
+        panic!("{:?}", scene.report);
+    };
+    assert!(too_bright.contains("m.mtl: material `wall` reflects 2.0000 times"));
+    assert!(partly.contains("diffuse: pane"));
     assert_eq!(scene.emitters(), [1]);
+}
+
+#[test]
+fn a_highlight_makes_phong_and_metalness_a_principled_material() {
+    let mtl = b"newmtl floor\nillum 2\nKd 0.5 0.5 0.5\nKs 0.25 0.25 0.25\nNs 20\nmap_Kd tex.png\n\
+        newmtl glaring\nillum 2\nKd 1 1 1\nKs 1 1 1\nNs 3\n\
+        newmtl dull\nillum 2\nKd 1 1 1\nKs 0 0 0\nNs 3\n\
+        newmtl brass\nillum 2\nKd 0.8 0.6 0.2\nKs 0 0 0\nNs 3\nPm 1\nPr 0.25\n";
+    let obj = format!("mtllib m.mtl\n{SQUARE}usemtl floor\nf 1 2 3\n");
+    let image = png();
+    let files: [(&str, &[u8]); 3] = [
+        ("a.obj", obj.as_bytes()),
+        ("m.mtl", mtl),
+        ("tex.png", &image),
+    ];
+    let scene = load_files("a.obj", &files).unwrap();
+    let [floor, glaring, dull, brass] = &scene.materials[..] else {
+        panic!("{:?}", scene.materials);
+    };
+    assert_eq!((floor.kind, glaring.kind), (&PHONG, &PHONG));
+    assert_eq!((dull.kind, brass.kind), (&DIFFUSE, &PRINCIPLED));
+    assert_eq!(floor.base_color_texture, Some(0));
+    assert_eq!(floor.parameters, [0.25, 0.25, 0.25, 20.0]);
+    assert_eq!(glaring.base_color, Vec3::splat(0.5));
+    assert_eq!(glaring.parameters, [0.5, 0.5, 0.5, 3.0]);
+    assert_eq!(brass.parameters[..2], [1.0, 0.25]);
+    let [warning, _sky] = &scene.report.warnings[..] else {
+        panic!("{:?}", scene.report);
+    };
+    assert!(warning.contains("`glaring` reflects 2.0000"), "{warning}");
 }
 
 #[test]

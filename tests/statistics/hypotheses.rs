@@ -187,3 +187,40 @@ fn benjamini_hochberg_steps_up() {
     assert_eq!(benjamini_hochberg(&[0.5, 0.2], 0.05), [false, false]);
     assert!(benjamini_hochberg(&[], 0.05).is_empty());
 }
+
+#[test]
+fn the_least_effect_that_a_t_test_finds_has_the_power_asked_for() {
+    for (power, alpha, freedom) in [(0.9, 0.005, 15.0), (0.9, 1e-4, 7.0), (0.5, 0.05, 1.0)] {
+        let effect = t_test_effect(power, alpha, freedom);
+        assert_close(t_test_power(effect, alpha, freedom), power, 1e-2);
+    }
+    // Of a normal number: 1.2816 above the critical 1.96.
+    assert_close(t_test_effect(0.9, 0.05, 1000.0), 1.2816 + 1.96, 5e-3);
+}
+
+#[test]
+fn holms_correction_steps_down() {
+    // The largest rank that holds carries on: 3 · 0.01, then 2 · 0.04, then 1 · 0.06 below that.
+    assert_close(holm(&[0.04, 0.01, 0.06])[0], 0.08, 1e-12);
+    assert_eq!(holm(&[0.04, 0.01, 0.06]), [0.08, 0.03, 0.08]);
+    assert_eq!(holm(&[0.7, 0.6]), [1.0, 1.0]);
+    assert_eq!(holm(&[f64::NAN, 0.01]), [1.0, 0.02]);
+    assert!(holm(&[]).is_empty());
+}
+
+#[test]
+fn holms_correction_keeps_the_chance_of_any_false_rejection() {
+    // Ten true hypotheses, each p twice so that the tests depend on each other.
+    let mut generator = Pcg32::new(12);
+    let trials = 4000;
+    let (mut corrected, mut plain) = (0, 0);
+    for _ in 0..trials {
+        let p: Vec<f64> = (0..5).map(|_| generator.uniform()).collect();
+        let p = [&p[..], &p[..]].concat();
+        corrected += usize::from(holm(&p).iter().any(|p| *p <= 0.05));
+        plain += usize::from(p.iter().any(|p| *p <= 0.05));
+    }
+    assert!(corrected <= trials * 6 / 100, "{corrected}");
+    // Negative control: without the correction.
+    assert!(plain > trials * 15 / 100, "{plain}");
+}

@@ -65,16 +65,17 @@ pub struct ErrorRecord {
     pub error_map: Option<String>,
 }
 
-/// Bias check of one sampler: a t-test of the replicates against the reference, for the whole image and
-/// per tile.
+/// Bias check of one sampler: t-tests of the replicates against the reference, for the whole image, for a mean in
+/// which noisy places count less, and per tile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BiasRecord {
     /// Tiles tested.
     pub tiles: usize,
     /// Tiles rejected after Benjamini–Hochberg at `alpha`.
     pub rejected: usize,
-    /// Bound on the probability of calling a sampler without bias biased: half of it is for the whole
-    /// image, half is the false-discovery rate among tiles.
+    /// Bound on the probability of calling a sampler without bias biased: a third of it is for the whole
+    /// image, a third for the weighted mean, a third is the false-discovery rate among tiles. (Half for the
+    /// image and half for tiles in records without `weighted_p`.)
     pub alpha: f64,
     /// Smallest p-value of a tile.
     pub min_p: f64,
@@ -90,6 +91,16 @@ pub struct BiasRecord {
     /// Degrees of freedom of `z`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<f64>,
+    /// Like `p`, of the mean in which noisy places count less; absent where there is no such test.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weighted_p: Option<f64>,
+    /// Degrees of freedom of that test.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weighted_degrees_of_freedom: Option<f64>,
+    /// The least bias, as a part of the radiance that all pixels share, that one of these two tests would have
+    /// found in 90 % of all cases.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub detectable: Option<f64>,
     /// Whether the sampler is one whose mean over seeds is not the integral, so that a bias is no fault.
     #[serde(default)]
     pub by_design: bool,

@@ -171,7 +171,7 @@ fn bias(data: &RunData) -> Check {
     );
     if let Some((.., record)) = records.first() {
         detail += &format!(
-            " (Student's t of the whole image and, with Benjamini and Hochberg's correction, per tile, each at half of {})",
+            " (Student's t of the whole image, of a mean in which noisy places count less and, with Benjamini and Hochberg's correction, per tile, each at a third of {})",
             format::number(record.alpha)
         );
     }

@@ -104,8 +104,8 @@ fn bias_table(view: &View, values: &[Value]) -> Table {
     let levels = view.samplers.iter().filter_map(|s| s.bias);
     let level = levels.map(|bias| bias.alpha).reduce(f64::min);
     let caption = format!(
-        "Bias check with {}: biased if the p of the image is at most half of {}, or tiles are rejected \
-         at the other half",
+        "Bias check with {}: biased if the p of the image or of the weighted mean is at most a third of {}, or \
+         tiles are rejected at another third; of a bias of all pixels below the last column it says nothing",
         view.name,
         format::optional(level)
     );
@@ -113,7 +113,10 @@ fn bias_table(view: &View, values: &[Value]) -> Table {
         (Some(fault), _) => TableCell::from(fault).toned(Tone::Bad),
         (None, None) => "not tested".into(),
         (None, Some(bias)) if bias.verdict == BiasVerdict::NoBiasFound => {
-            TableCell::from("no bias found").toned(Tone::Good)
+            let least = bias.detectable.map_or(String::new(), |part| {
+                format!(" (of {} % or more)", format::significant(100.0 * part, 2))
+            });
+            TableCell::from(format!("no bias found{least}")).toned(Tone::Good)
         }
         (None, Some(bias)) => bias.verdict.to_string().into(),
     };
@@ -124,6 +127,9 @@ fn bias_table(view: &View, values: &[Value]) -> Table {
         "bias-z/v1",
         "bias-p/v1",
         "bias-freedom/v1",
+        "bias-weighted-p/v1",
+        "bias-weighted-freedom/v1",
+        "bias-detectable/v1",
     ];
     let measured = view.samplers.iter().filter(|s| !s.replicates.is_empty());
     let rows = rows(measured, &["sampler", ":verdict"], |s| vec![verdict(s)]);

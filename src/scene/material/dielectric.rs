@@ -14,11 +14,13 @@ use glam::Vec3;
 /// The kind.
 pub static DIELECTRIC: MaterialKind = MaterialKind {
     name: "dielectric",
+    feature: "dielectric",
     description: "smooth glass: Fresnel reflection, refraction tinted by the base colour (MTL illum 4, 6, 7, 9; \
                   glTF transmission)",
     parameters: &[
         "index of refraction of the inside, relative to the outside",
         "1 if both surfaces of a wall are one triangle, else 0",
+        "Fresnel: 0 exact (also where it is missing), 1 Schlick",
     ],
     recognise,
 };
@@ -59,10 +61,14 @@ fn recognise(description: &Description<'_>) -> Option<Look> {
             (is_glass, description.base_color, is_thin)
         }
     };
-    is_glass.then(|| Look {
-        base_color: tint,
-        parameters: parameters(source.ior, is_thin),
-    })
+    is_glass.then(|| look(tint, source.ior, is_thin))
+}
+
+fn look(tint: Vec3, ior: Option<f32>, is_thin: bool) -> Look {
+    Look {
+        parameters: parameters(ior, is_thin),
+        ..Look::plain(tint)
+    }
 }
 
 /// The index and whether the wall is thin. What is no index (0 in glTF stands for infinity) is that of glass.
@@ -76,18 +82,21 @@ impl Material {
     /// The surface of a body of this index of refraction, whose corners turn counter-clockwise seen from outside. Light is
     /// multiplied by `tint` at every passage.
     pub fn dielectric(name: impl Into<String>, tint: Vec3, ior: f32) -> Self {
-        Self {
-            parameters: parameters(Some(ior), false),
-            ..Self::plain(name, &DIELECTRIC, tint)
-        }
+        Self::looking(name, &DIELECTRIC, look(tint, Some(ior), false))
     }
 
     /// The same as a wall without thickness: light passes straight on.
     pub fn thin_dielectric(name: impl Into<String>, tint: Vec3, ior: f32) -> Self {
-        Self {
-            parameters: parameters(Some(ior), true),
-            ..Self::plain(name, &DIELECTRIC, tint)
+        Self::looking(name, &DIELECTRIC, look(tint, Some(ior), true))
+    }
+
+    /// The same dielectric with Schlick's polynomial in place of Fresnel's equations. Other kinds stay what they are.
+    pub fn with_schlick(mut self) -> Self {
+        if self.kind == &DIELECTRIC {
+            self.parameters.truncate(2);
+            self.parameters.push(1.0);
         }
+        self
     }
 }
 

@@ -1,11 +1,12 @@
 //! Lambertian surfaces, and whatever no other kind recognises.
 
-use super::{Material, MaterialKind};
+use super::{Look, Material, MaterialKind};
 use glam::Vec3;
 
 /// The kind.
 pub static DIFFUSE: MaterialKind = MaterialKind {
     name: "diffuse",
+    feature: "diffuse",
     description: "Lambertian reflection of the (possibly textured) base colour",
     parameters: &[],
     recognise: |_| None,
@@ -14,6 +15,6 @@ pub static DIFFUSE: MaterialKind = MaterialKind {
 impl Material {
     /// A plain Lambertian material, `color` being linear RGB reflectance.
     pub fn diffuse(name: impl Into<String>, color: Vec3) -> Self {
-        Self::plain(name, &DIFFUSE, color)
+        Self::looking(name, &DIFFUSE, Look::plain(color))
     }
 }

@@ -1,11 +1,12 @@
 //! Perfect mirrors.
 
-use super::{Description, Format, Look, MaterialKind};
+use super::{Description, Format, Look, Material, MaterialKind};
 use glam::Vec3;
 
 /// The kind.
 pub static MIRROR: MaterialKind = MaterialKind {
     name: "mirror",
+    feature: "mirror",
     description: "perfect mirror tinted by the base colour (MTL illum 3, 5, 8; glTF smooth metal)",
     parameters: &[],
     recognise,
@@ -36,10 +37,7 @@ fn recognise(description: &Description<'_>) -> Option<Look> {
             )
         }
     };
-    is_mirror.then_some(Look {
-        base_color,
-        parameters: Vec::new(),
-    })
+    is_mirror.then(|| Look::plain(base_color))
 }
 
 /// A mirror by its illumination model whose specular part outshines a nearly black diffuse one.
@@ -47,6 +45,13 @@ fn outshines(illum: Option<u8>, diffuse: Vec3, specular: Vec3) -> bool {
     illum.is_some_and(|illum| ILLUM.contains(&illum))
         && specular.max_element() > 0.0
         && diffuse.max_element() <= 0.1 * specular.max_element()
+}
+
+impl Material {
+    /// A perfect mirror of this linear RGB reflectance.
+    pub fn mirror(name: impl Into<String>, color: Vec3) -> Self {
+        Self::looking(name, &MIRROR, Look::plain(color))
+    }
 }
 
 #[cfg(test)]

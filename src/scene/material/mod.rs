@@ -2,22 +2,31 @@
 //! `kernels/shading/bsdf/`, a file here with its line in [`MATERIAL_KINDS`], and its line in the table of
 //! kernels, `kernels/shading/bsdf.wesl`. No integrator knows of it. How the parts fit: `docs/shading.md`.
 
+mod cook_torrance;
 mod dielectric;
 mod diffuse;
 mod mirror;
+mod phong;
+mod principled;
 
+pub use cook_torrance::{COOK_TORRANCE, CookTorrance, Fresnel, Masking};
 pub use dielectric::{DEFAULT_IOR, DIELECTRIC};
 pub use diffuse::DIFFUSE;
 pub use mirror::MIRROR;
+pub use phong::PHONG;
+pub use principled::{PRINCIPLED, reflectance_of_ior};
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::path::Path;
 
 /// A kind of material.
 pub struct MaterialKind {
-    /// Name; also the feature that brings its kernel into those of a scene.
+    /// Name.
     pub name: &'static str,
+    /// The feature that brings its kernel into those of a scene: the name as kernels can write it.
+    pub feature: &'static str,
     /// One line: what it does with light.
     pub description: &'static str,
     /// What [`Material::parameters`] holds, in this order.
@@ -29,7 +38,14 @@ pub struct MaterialKind {
 
 /// The table of kinds; a kind's place is its number in `kernels/shading/bsdf.wesl`. Where a file's material
 /// fits several, the last counts.
-pub static MATERIAL_KINDS: [&MaterialKind; 3] = [&DIFFUSE, &MIRROR, &DIELECTRIC];
+pub static MATERIAL_KINDS: [&MaterialKind; 6] = [
+    &DIFFUSE,
+    &PHONG,
+    &COOK_TORRANCE,
+    &PRINCIPLED,
+    &MIRROR,
+    &DIELECTRIC,
+];
 
 impl PartialEq for MaterialKind {
     fn eq(&self, other: &Self) -> bool {
@@ -56,38 +72,51 @@ pub struct Material {
     pub base_color: Vec3,
     /// Index into [`super::SceneData::textures`] of the base-colour texture.
     pub base_color_texture: Option<u32>,
-    /// Emitted radiance, linear RGB, both sides of the triangle.
+    /// Emitted radiance, linear RGB.
     pub emission: Vec3,
+    /// Whether both sides of the triangle emit, or only that from which its corners turn counter-clockwise (glTF without
+    /// `doubleSided`).
+    pub emits_both_sides: bool,
     /// What else the file said.
     pub source: MaterialSource,
 }
 
 impl Material {
-    fn plain(name: impl Into<String>, kind: &'static MaterialKind, base_color: Vec3) -> Self {
+    fn looking(name: impl Into<String>, kind: &'static MaterialKind, look: Look) -> Self {
         Self {
             name: name.into(),
             kind,
-            parameters: Vec::new(),
-            base_color,
+            parameters: look.parameters,
+            base_color: reflectance(look.base_color),
             base_color_texture: None,
             emission: Vec3::ZERO,
+            emits_both_sides: true,
             source: MaterialSource::default(),
         }
     }
 
-    /// The material that a file describes, without texture and emission.
-    pub(super) fn described(name: String, description: &Description<'_>) -> Self {
+    /// The material that `file` describes, without texture and emission. One that would reflect more than
+    /// arrives is scaled, with a warning.
+    pub(super) fn described(
+        name: String,
+        description: &Description<'_>,
+        file: &Path,
+        warnings: &mut Vec<String>,
+    ) -> Self {
         let mut kinds = MATERIAL_KINDS.iter().rev();
         let found = kinds.find_map(|&kind| Some((kind, (kind.recognise)(description)?)));
-        let plain = Look {
-            base_color: description.base_color,
-            parameters: Vec::new(),
-        };
-        let (kind, look) = found.unwrap_or((&DIFFUSE, plain));
+        let plain = || (&DIFFUSE, Look::plain(description.base_color));
+        let (kind, look) = found.unwrap_or_else(plain);
+        if look.reflected > 1.0 + ROUNDING {
+            warnings.push(format!(
+                "{}: material `{name}` reflects {:.4} times what arrives; its colours are divided by that",
+                file.display(),
+                look.reflected
+            ));
+        }
         Self {
-            parameters: look.parameters,
             source: description.source.clone(),
-            ..Self::plain(name, kind, reflectance(look.base_color))
+            ..Self::looking(name, kind, look)
         }
     }
 
@@ -95,6 +124,17 @@ impl Material {
     pub fn emitting(self, radiance: Vec3) -> Self {
         Self {
             emission: radiance,
+            emits_both_sides: true,
+            ..self
+        }
+    }
+
+    /// The same material, emitting `radiance` (linear RGB) from the side on which the triangle's corners turn
+    /// counter-clockwise alone.
+    pub fn emitting_from_front(self, radiance: Vec3) -> Self {
+        Self {
+            emission: radiance,
+            emits_both_sides: false,
             ..self
         }
     }
@@ -149,6 +189,43 @@ pub(super) struct Description<'a> {
 struct Look {
     base_color: Vec3,
     parameters: Vec<f32>,
+    /// The largest part of light that the description reflects. Beyond 1, colours are divided by it.
+    reflected: f32,
+}
+
+impl Look {
+    /// One colour and no parameters.
+    fn plain(color: Vec3) -> Self {
+        Self {
+            parameters: Vec::new(),
+            ..Self::balanced(color, Vec3::ZERO, &[])
+        }
+    }
+
+    /// Two colours that reflect together, the second of which is the first of the parameters.
+    fn balanced(base: Vec3, specular: Vec3, others: &[f32]) -> Self {
+        let (base, specular) = (emitted(base), emitted(specular));
+        let reflected = (base + specular).max_element();
+        let scale = 1.0 / reflected.max(1.0);
+        let specular = (specular * scale).to_array();
+        Self {
+            base_color: base * scale,
+            parameters: [&specular, others].concat(),
+            reflected,
+        }
+    }
+}
+
+/// What is within it of 1 was meant to be 1.
+const ROUNDING: f32 = 1e-4;
+
+/// `x` within these bounds; the lower one where it is NaN.
+fn within(x: f32, least: f32, most: f32) -> f32 {
+    if x.is_nan() {
+        least
+    } else {
+        x.clamp(least, most)
+    }
 }
 
 /// Finite and within [0, 1].

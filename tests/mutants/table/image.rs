@@ -33,7 +33,7 @@ pub const MUTANTS: &[Mutant] = &[
         "emission that a ray finds has full weight besides next-event estimation",
         text(
             "integrator/path",
-            "weight = density / (density + light_pdf(surface, hit.t));",
+            "weight = mis_weight(density, light_pdf(surface, hit.t));",
             "weight = 1.0;",
         ),
         IMAGES,
@@ -44,7 +44,7 @@ pub const MUTANTS: &[Mutant] = &[
         "one of two weights is that of the power heuristic",
         text(
             "integrator/path",
-            "weight = density / (density + light_pdf(surface, hit.t));",
+            "weight = mis_weight(density, light_pdf(surface, hit.t));",
             "let other = light_pdf(surface, hit.t); weight = density * density / (density * density + other * other);",
         ),
         IMAGES,
