@@ -5,7 +5,9 @@ use super::format;
 use crate::measure::bias::BiasVerdict;
 use crate::measure::figure::figure;
 use crate::measure::record::{BiasRecord, ErrorRecord, Interval, Key, SpectrumRecord};
-use crate::measure::statistics::{jackknife_interval, log_log_fit, mean, positive_interval};
+use crate::measure::statistics::{
+    jackknife_interval, log_log_fit, mean, mean_interval, positive_interval,
+};
 
 /// What an error is that its reference is too noisy for: its estimate is not clearly above 0.
 pub const UNRESOLVED: &str = "below what the reference can resolve";
@@ -97,6 +99,18 @@ impl Metric {
     }
 }
 
+/// Metrics beside those that samplers are ranked by: figure and recorded id. They hold the noise of the
+/// reference.
+pub const FURTHER_METRICS: [(&str, &str); 7] = [
+    ("mae/v1", "mae/v1"),
+    ("relmse-trimmed/v1", "relmse-trimmed/top=0.1%/eps=1e-2/v1"),
+    ("mse-luminance/v1", "mse-luminance/v1"),
+    ("smape/v1", "smape/eps=1e-2/v1"),
+    ("psnr/v1", "psnr/tone-mapped/v1"),
+    ("ssim/v1", "ssim/tone-mapped/v1"),
+    ("flip/v1", "flip/tone-mapped/ppd=67/v1"),
+];
+
 /// Mean error at one number of samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeanError {
@@ -185,6 +199,17 @@ impl<'a> MeasuredSampler<'a> {
             })
         };
         spps.into_iter().filter_map(mean_at).collect()
+    }
+
+    /// The highest spp, and the figures of [`FURTHER_METRICS`] there: means over replicates.
+    pub fn further(&self) -> Option<(u32, Vec<(&'static str, Option<Interval>)>)> {
+        let spp = self.replicates.first()?.errors.last()?.spp;
+        let of = |id: &str| -> Vec<f64> {
+            let values = self.replicates.iter().filter_map(|r| value(r, spp, id));
+            values.collect()
+        };
+        let figures = FURTHER_METRICS.map(|(figure, id)| (figure, mean_interval(&of(id))));
+        Some((spp, figures.to_vec()))
     }
 
     /// Mean error at this spp.

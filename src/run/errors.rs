@@ -287,12 +287,15 @@ fn error_record(
     (replicate, seed): (u32, u32),
 ) -> Result<ErrorRecord, Fault> {
     let reference = &yardstick.reference;
+    let facts = session.registries.samplers.facts(&cell[Axis::Sequence]);
+    let base_2 = facts.is_ok_and(|facts| facts.base_2);
     let mut errors = Vec::new();
     let mut non_finite_pixels = 0;
     for snapshot in snapshots {
         let report = measure(&snapshot.image, reference).map_err(|e| e.to_string())?;
         non_finite_pixels = non_finite_pixels.max(report.non_finite_pixels);
         errors.push(ErrorAtSpp {
+            partial_net: base_2 && !snapshot.spp.is_power_of_two(),
             spp: snapshot.spp,
             metrics: report.metrics,
             without_part: report.without_part,

@@ -40,6 +40,9 @@ pub struct ErrorAtSpp {
     /// first half first: the reference's share in the metric's uncertainty.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub without_part: BTreeMap<String, Vec<f64>>,
+    /// Whether the points come from a net in base 2 of which so many samples are no whole one.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub partial_net: bool,
 }
 
 /// Error of one replicate.
@@ -126,6 +129,9 @@ pub struct SpectrumRecord {
     pub filtered: Vec<FilteredError>,
 }
 
+/// Quantiles of the spectra of single images: the middle, and outliers.
+pub const OUTLIER_QUANTILES: [f64; 4] = [0.5, 0.75, 0.95, 1.0];
+
 /// A point of a radial spectrum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PowerAt {
@@ -133,6 +139,10 @@ pub struct PowerAt {
     pub frequency: f64,
     /// Mean power around that frequency, white noise being 1.
     pub power: Interval,
+    /// Quantiles over replicates, [`OUTLIER_QUANTILES`], of the power in units of the mean variance of all
+    /// replicates: what a single image may have.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quantiles: Option<[f64; 4]>,
 }
 
 /// Error after a Gaussian filter.
