@@ -201,15 +201,18 @@ impl<'a> MeasuredSampler<'a> {
         spps.into_iter().filter_map(mean_at).collect()
     }
 
-    /// The highest spp, and the figures of [`FURTHER_METRICS`] there: means over replicates.
-    pub fn further(&self) -> Option<(u32, Vec<(&'static str, Option<Interval>)>)> {
-        let spp = self.replicates.first()?.errors.last()?.spp;
+    /// The highest spp.
+    pub fn highest_spp(&self) -> Option<u32> {
+        Some(self.replicates.first()?.errors.last()?.spp)
+    }
+
+    /// The figures of [`FURTHER_METRICS`] at this spp: means over replicates.
+    pub fn further(&self, spp: u32) -> [(&'static str, Option<Interval>); FURTHER_METRICS.len()] {
         let of = |id: &str| -> Vec<f64> {
             let values = self.replicates.iter().filter_map(|r| value(r, spp, id));
             values.collect()
         };
-        let figures = FURTHER_METRICS.map(|(figure, id)| (figure, mean_interval(&of(id))));
-        Some((spp, figures.to_vec()))
+        FURTHER_METRICS.map(|(figure, id)| (figure, mean_interval(&of(id))))
     }
 
     /// Mean error at this spp.

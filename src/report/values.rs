@@ -204,8 +204,9 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
             let slope = (metric.slope_figure(), sampler.slope(metric));
             values.extend(Value::known(key, [slope]));
         }
-        if let Some((spp, figures)) = sampler.further() {
-            values.extend(Value::known(&key.clone().with(axis::SPP, spp), figures));
+        if let Some(spp) = sampler.highest_spp() {
+            let key = key.clone().with(axis::SPP, spp);
+            values.extend(Value::known(&key, sampler.further(spp)));
         }
         values.extend(sampler.bias.into_iter().flat_map(|bias| of_bias(key, bias)));
         let spectrum = sampler.spectrum.into_iter();

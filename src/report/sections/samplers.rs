@@ -111,7 +111,7 @@ pub fn error_table(view: &View, values: &[Value], metric: Metric) -> Table {
 /// What other metrics say at the highest spp.
 fn further_table(view: &View, values: &[Value]) -> Table {
     let measured = view.samplers.iter().filter(|s| !s.replicates.is_empty());
-    let Some(spp) = (measured.clone()).find_map(|s| s.further().map(|(spp, _)| spp)) else {
+    let Some(spp) = measured.clone().find_map(MeasuredSampler::highest_spp) else {
         return Table::default();
     };
     let caption = format!(
