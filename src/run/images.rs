@@ -25,7 +25,11 @@ pub(super) fn attributes(
     seed: impl ToString,
 ) -> Vec<Attribute<'static>> {
     let label = |axis| cell.get(axis).map(|v: &Variant| v.label.clone());
-    let commit = option_env!("RAYSTONE_COMMIT").map(str::to_owned);
+    let changed = option_env!("RAYSTONE_DIRTY") == Some("true");
+    let commit = option_env!("RAYSTONE_COMMIT").map(|commit| match changed {
+        true => format!("{commit} with uncommitted changes"),
+        false => commit.to_owned(),
+    });
     let software = format!("raystone {}", env!("CARGO_PKG_VERSION"));
     let known = [
         ("software", Some(software)),
