@@ -198,8 +198,10 @@ mod tests {
             };
             AnyChannel::new(*name, samples)
         };
-        let mut attributes = LayerAttributes::default();
-        attributes.layer_name = name.map(Text::from);
+        let attributes = LayerAttributes {
+            layer_name: name.map(Text::from),
+            ..LayerAttributes::default()
+        };
         let channels = AnyChannels::sort(channels.iter().map(channel).collect());
         Layer::new((2, 1), attributes, Encoding::SMALL_LOSSLESS, channels)
     }
@@ -244,8 +246,10 @@ mod tests {
         let attributes = &meta.headers[0].own_attributes.other;
         let others = &meta.headers[0].shared_attributes.other;
         let mut found = attributes.iter().chain(others);
-        assert!(found.any(|(name, value)| name.to_string() == "seed"
-            && *value == AttributeValue::Text(Text::from("9001"))));
+        assert!(
+            found.any(|(name, value)| name.eq("seed")
+                && *value == AttributeValue::Text(Text::from("9001")))
+        );
     }
 
     #[test]
