@@ -86,7 +86,9 @@ impl List {
 fn entries(axis: Axis, entries: &[Entry]) -> String {
     let width = entries.iter().map(|e| e.name.len()).max().unwrap_or(0);
     let mut text = match axis {
-        Axis::Scene => "scene: built in, or the path of a .obj, .gltf, .glb or .ply file\n".into(),
+        Axis::Scene => {
+            "scene: built in, or the path of a .obj, .gltf, .glb, .ply or Nori .xml file\n".into()
+        }
         Axis::Triangle => "triangle: ray-triangle test of all structures\n".into(),
         Axis::BoxTest => "box_test: of all structures\n".into(),
         Axis::Offset => "offset: how rays leave a surface\n".into(),

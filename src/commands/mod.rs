@@ -5,6 +5,7 @@ mod arguments;
 mod discrepancy;
 mod doctor;
 mod estimate;
+mod export;
 mod failure;
 mod faults;
 mod list;
@@ -81,6 +82,8 @@ enum Command {
     Stress(stress::Stress),
     #[command(after_help = EXIT_CODES)]
     Trace(trace::Trace),
+    #[command(after_help = EXIT_CODES)]
+    ExportMitsuba(export::ExportMitsuba),
 }
 
 /// Reads the command line and does what it says; clap itself ends the program with 2 on bad usage.
@@ -96,6 +99,7 @@ pub fn main() -> ExitCode {
         Command::Report(command) => command.execute(),
         Command::Stress(command) => command.execute(),
         Command::Trace(command) => command.execute(),
+        Command::ExportMitsuba(command) => command.execute(),
     };
     done.unwrap_or_else(failure::end)
 }

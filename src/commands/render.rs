@@ -160,7 +160,7 @@ fn check_is_one(experiment: &Experiment) -> Result<()> {
     Ok(())
 }
 
-fn parse_size(text: &str) -> Result<[u32; 2], String> {
+pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let parsed = text
         .split_once(['x', 'X', '×'])
         .and_then(|(width, height)| {

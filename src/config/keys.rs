@@ -221,7 +221,7 @@ pub const KEYS: &[KeyRow] = &[
     key("run", "resolution", ValueKind::IntegerPair { min: 16, max: 8192 }, Some("[192, 144]"), "Width and height of every image, pixels."),
     key("run", "spp", ValueKind::Counts { max_exponent: 16 }, Some("{ pow2 = [0, 5] }"), "Samples per pixel at which the error is taken: 2^lo, …, 2^hi, or those listed, `[1, 3, 10]`."),
     key("run", "runtime_checks", ValueKind::Flag, Some("true"), "Keep the bounds checks and loop bounds that the driver layer adds to kernels."),
-    key("axes", "scene", ValueKind::Names(Axis::Scene), None, "Scenes: built-in names, or paths of .obj, .gltf, .glb or .ply files, relative to the current directory. Not needed if all integrators are `integrand:*`."),
+    key("axes", "scene", ValueKind::Names(Axis::Scene), None, "Scenes: built-in names, or paths of .obj, .gltf, .glb, .ply or Nori .xml files, relative to the current directory. Not needed if all integrators are `integrand:*`."),
     key("axes", "accel", ValueKind::Names(Axis::Accel), None, "Acceleration structures. Not needed if all integrators are `integrand:*`."),
     key("axes", "sequence", ValueKind::Names(Axis::Sequence), None, "Sample sequences."),
     key("axes", "decorrelation", ValueKind::Names(Axis::Decorrelation), Some("[\"none\"]"), "How the pixels' sample points are made different."),

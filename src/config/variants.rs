@@ -8,7 +8,7 @@ use crate::params::{Entry, ParamRange, ParamValue, Parameter, Variant};
 use std::path::Path;
 
 /// Ends of file names that make a scene name a path.
-const MODEL_EXTENSIONS: [&str; 4] = ["obj", "gltf", "glb", "ply"];
+const MODEL_EXTENSIONS: [&str; 5] = ["obj", "gltf", "glb", "ply", "xml"];
 
 /// The entry called `name`; also one made up for the path of a model or a folder of kernels.
 pub(super) fn resolve(
@@ -34,7 +34,9 @@ pub(super) fn resolve(
         });
     }
     let what = match axis {
-        Axis::Scene => "scene (neither built in nor a path of a .obj, .gltf, .glb or .ply file)",
+        Axis::Scene => {
+            "scene (neither built in nor a path of a .obj, .gltf, .glb, .ply or Nori .xml file)"
+        }
         axis => axis.name(),
     };
     Err(ConfigError::Unknown {

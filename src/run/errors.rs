@@ -1,6 +1,7 @@
 //! Error: once per scene, integrator and sampler, through the fastest gated structure.
 
 use super::images::{self, Estimator, attributes};
+use super::paths;
 use super::reference::{Yardstick, reference, reference_structure};
 use super::session::{Session, content_hash};
 use super::structures::Gated;
@@ -164,6 +165,7 @@ fn sampler_error(
 ) -> Result<(), Fault> {
     session.say(cell.to_string());
     let passes = passes(session, world, fastest, cell)?;
+    paths::check(session, world, &fastest.traced, cell)?;
     let mut kernels: Vec<_> = passes.iter().map(|p| p.renderer.kernel_hash()).collect();
     kernels.dedup();
     let tables: String = passes.iter().map(|pass| pass.table.as_str()).collect();

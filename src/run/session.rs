@@ -62,6 +62,8 @@ pub(super) struct Session<'a> {
     pub compared: HashSet<String>,
     /// What images are compared with, if it is not rendered.
     pub reference_file: Option<ReferenceFile>,
+    /// What is wrong with the integrators that were judged.
+    pub judged: BTreeMap<String, Option<String>>,
     /// `None`: nothing is written (gate alone, single images).
     folder: Option<Arc<Folder>>,
 }
@@ -114,6 +116,7 @@ impl<'a> Session<'a> {
             done: HashSet::new(),
             compared: HashSet::new(),
             reference_file: None,
+            judged: BTreeMap::new(),
             folder: None,
         }
     }

@@ -18,7 +18,7 @@ pub enum SceneError {
         hint: String,
     },
     /// The file's extension names no format that can be read.
-    #[error("{}: unknown model format; give a .obj, .gltf, .glb or .ply file", path.display())]
+    #[error("{}: unknown model format; give a .obj, .gltf, .glb, .ply or Nori .xml file", path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,

@@ -1,4 +1,4 @@
-//! Scenes: what is traced. Loaders for OBJ, glTF and PLY, built-in procedural scenes, cameras,
+//! Scenes: what is traced. Loaders for OBJ, glTF, PLY and Nori's XML, built-in procedural scenes, cameras,
 //! materials and emitters.
 //!
 //! A scene is one flat triangle soup in world space with per-triangle material indices. Structures
@@ -10,6 +10,7 @@ mod camera;
 mod content;
 mod daylight;
 mod error;
+mod export;
 mod framing;
 mod gltf;
 mod gltf_accessor;
@@ -19,6 +20,7 @@ mod gltf_material;
 mod instances;
 mod material;
 mod mtl;
+mod nori;
 mod obj;
 mod ply;
 mod text;
@@ -29,6 +31,7 @@ pub use builtin::builtin_scenes;
 pub use camera::Bounds;
 pub use daylight::Daylight;
 pub use error::SceneError;
+pub use export::{ExportError, MITSUBA_FILE, MitsubaSettings, export_mitsuba};
 pub use framing::Framing;
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 pub use material::{
@@ -151,8 +154,8 @@ pub fn named(name: &str) -> Result<SceneData, SceneError> {
     load(&variant, &LoadOptions::default())
 }
 
-/// Loads the scene that `variant` names: a built-in one, or the path of an OBJ, glTF, GLB or PLY
-/// file (relative to the working directory, extension in any case).
+/// Loads the scene that `variant` names: a built-in one, or the path of an OBJ, glTF, GLB, PLY
+/// or Nori XML file (relative to the working directory, extension in any case).
 ///
 /// # Errors
 /// [`SceneError`]: unknown name, unreadable or malformed file, no triangles, coordinates too large.
@@ -166,6 +169,7 @@ pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Scene
         "obj" => obj::load(path, name, options),
         "gltf" | "glb" => gltf::load(path, name, options),
         "ply" => ply::load(path, name),
+        "xml" => nori::load(path, name, options),
         _ if path.exists() => Err(SceneError::UnknownFormat {
             path: path.to_owned(),
         }),
@@ -189,6 +193,10 @@ pub fn check_model(path: &Path) -> Result<(), SceneError> {
         let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start);
         text.trim_ascii_start().starts_with(b"{")
     };
+    let xml = || {
+        let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start);
+        text.trim_ascii_start().starts_with(b"<")
+    };
     let (begins_well, expected) = match extension(path).as_str() {
         "obj" => (!start.contains(&0), "it is not text"),
         "gltf" | "glb" => (
@@ -196,6 +204,7 @@ pub fn check_model(path: &Path) -> Result<(), SceneError> {
             "it begins neither with `glTF` nor with `{`",
         ),
         "ply" => (start.starts_with(b"ply"), "it does not begin with `ply`"),
+        "xml" => (xml(), "it does not begin with `<`"),
         _ => {
             let path = path.to_owned();
             return Err(SceneError::UnknownFormat { path });

@@ -92,7 +92,7 @@ pub(super) fn hint(name: &str) -> String {
         None => {
             let names: Vec<_> = BUILTINS.iter().map(|scene| scene.name).collect();
             format!(
-                "built-in scenes are {}; a file ends in .obj, .gltf, .glb or .ply",
+                "built-in scenes are {}; a file ends in .obj, .gltf, .glb, .ply or .xml (Nori)",
                 names.join(", ")
             )
         }

@@ -1,0 +1,231 @@
+//! Materials, textures and skies in Mitsuba's words.
+
+use super::{Export, ExportError, vector};
+use crate::image::{Image, Picture};
+use crate::scene::{
+    COOK_TORRANCE, DIELECTRIC, DIFFUSE, Daylight, MIRROR, Material, PHONG, PRINCIPLED, SceneData,
+    Texture,
+};
+use glam::Vec3;
+use std::f32::consts::{PI, TAU};
+use std::fmt::Write as _;
+
+/// Python that teaches Mitsuba the materials that it lacks, and the file that it is written to.
+const MATERIALS: &str = include_str!("materials.py");
+const MATERIALS_FILE: &str = "materials.py";
+
+/// Size of the map that stands for a sky with a gradient, texels.
+const SKY_SIZE: [u32; 2] = [1024, 512];
+
+impl Export<'_> {
+    /// The material as a BSDF named by its number. Surfaces look the same from both sides, as ours do.
+    pub(super) fn material(&mut self, scene: &SceneData, id: usize) -> Result<(), ExportError> {
+        let material = &scene.materials[id];
+        let color = self.color(scene, id)?;
+        let known = [&DIFFUSE, &MIRROR, &DIELECTRIC];
+        let by_formula = [&PHONG, &COOK_TORRANCE, &PRINCIPLED].contains(&material.kind);
+        if by_formula && !self.needs_materials {
+            self.needs_materials = true;
+            self.write(MATERIALS_FILE, MATERIALS.as_bytes())?;
+            self.warnings.push(format!(
+                "some materials are those of {MATERIALS_FILE}, which has to be imported in Python before the scene is loaded"
+            ));
+        } else if !by_formula && !known.contains(&material.kind) {
+            self.warnings.push(format!(
+                "material {}: {} has no counterpart in Mitsuba, written as diffuse",
+                material.name, material.kind.name
+            ));
+        }
+        if material.kind == &DIELECTRIC && parameter(material, 2) > 0.0 {
+            self.warnings.push(format!(
+                "material {}: Mitsuba takes Fresnel's equations, not Schlick's polynomial",
+                material.name
+            ));
+        }
+        let id = format!("id=\"material-{id}\"");
+        let _ = match material.kind {
+            kind if kind == &DIELECTRIC => write!(self.xml, "{}", dielectric(material, &id)),
+            kind if kind == &MIRROR => write!(
+                self.xml,
+                r#"    <bsdf type="twosided" {id}>
+        <bsdf type="conductor">
+            <string name="material" value="none"/>
+            {}
+        </bsdf>
+    </bsdf>
+"#,
+                color.named("specular_reflectance")
+            ),
+            _ if by_formula => write!(self.xml, "{}", formula(material, &color, &id)),
+            _ => write!(
+                self.xml,
+                r#"    <bsdf type="twosided" {id}>
+        <bsdf type="diffuse">
+            {}
+        </bsdf>
+    </bsdf>
+"#,
+                color.named("reflectance")
+            ),
+        };
+        Ok(())
+    }
+
+    /// The base colour: constant, or a texture file. Mitsuba multiplies no colours, so that a texture with a factor is written as the
+    /// product, in floats.
+    fn color(&self, scene: &SceneData, id: usize) -> Result<Color, ExportError> {
+        let material = &scene.materials[id];
+        let factor = material.base_color;
+        let texture = material.base_color_texture.map(|index| index as usize);
+        let Some(texture) = texture.and_then(|index| scene.textures.get(index)) else {
+            return Ok(Color::Constant(factor));
+        };
+        if factor == Vec3::ONE {
+            let name = format!("textures/{id}.png");
+            self.write_picture(&name, &picture(texture))?;
+            return Ok(Color::Texture(name));
+        }
+        let name = format!("textures/{id}.exr");
+        self.write_radiance(&name, &product(texture, factor)?)?;
+        Ok(Color::Texture(name))
+    }
+
+    /// What surrounds the scene.
+    pub(super) fn sky(&mut self, scene: &SceneData) -> Result<(), ExportError> {
+        if scene.environment == Vec3::ZERO {
+            return Ok(());
+        }
+        let Some(daylight) = &scene.daylight else {
+            let radiance = vector(scene.environment);
+            let _ = write!(
+                self.xml,
+                r#"    <emitter type="constant">
+        <rgb name="radiance" value="{radiance}"/>
+    </emitter>
+"#
+            );
+            return Ok(());
+        };
+        if daylight.reach < f32::MAX {
+            let warning = "the sky is seen through what is far, which Mitsuba cannot: the room will be darker";
+            self.warnings.push(warning.to_owned());
+        }
+        self.write_radiance("textures/sky.exr", &sky_image(daylight, scene.environment)?)?;
+        self.xml += r#"    <emitter type="envmap">
+        <string name="filename" value="textures/sky.exr"/>
+    </emitter>
+"#;
+        Ok(())
+    }
+}
+
+/// A reflectance.
+enum Color {
+    Constant(Vec3),
+    Texture(String),
+}
+
+impl Color {
+    fn named(&self, name: &str) -> String {
+        match self {
+            Self::Constant(color) => {
+                format!("<rgb name=\"{name}\" value=\"{}\"/>", vector(*color))
+            }
+            Self::Texture(file) => format!(
+                "<texture name=\"{name}\" type=\"bitmap\"><string name=\"filename\" value=\"{file}\"/></texture>"
+            ),
+        }
+    }
+}
+
+fn parameter(material: &Material, at: usize) -> f32 {
+    material.parameters.get(at).copied().unwrap_or_default()
+}
+
+/// A material of [`MATERIALS_FILE`], which takes the same numbers in the same order.
+fn formula(material: &Material, color: &Color, id: &str) -> String {
+    let kind = material.kind.name;
+    let mut text = format!(
+        "    <bsdf type=\"raystone-{kind}\" {id}>\n        {}\n",
+        color.named("base")
+    );
+    for (k, value) in material.parameters.iter().enumerate() {
+        let _ = writeln!(text, "        <float name=\"p{k}\" value=\"{value}\"/>");
+    }
+    text + "    </bsdf>\n"
+}
+
+fn dielectric(material: &Material, id: &str) -> String {
+    let kind = match parameter(material, 1) > 0.0 {
+        true => "thindielectric",
+        false => "dielectric",
+    };
+    format!(
+        r#"    <bsdf type="{kind}" {id}>
+        <float name="int_ior" value="{}"/>
+        <float name="ext_ior" value="1"/>
+        <rgb name="specular_transmittance" value="{}"/>
+    </bsdf>
+"#,
+        parameter(material, 0),
+        vector(material.base_color)
+    )
+}
+
+fn picture(texture: &Texture) -> Picture {
+    Picture {
+        width: texture.width,
+        height: texture.height,
+        pixels: texture
+            .texels
+            .iter()
+            .map(|[r, g, b, _]| [*r, *g, *b])
+            .collect(),
+    }
+}
+
+/// The linear texels times `factor`.
+fn product(texture: &Texture, factor: Vec3) -> Result<Image, ExportError> {
+    let linear = |[r, g, b, _]: &[u8; 4]| {
+        let color = Vec3::from([r, g, b].map(|v| decoded(*v)));
+        (factor * color).to_array()
+    };
+    let texels = texture.texels.iter().map(linear).collect();
+    Ok(Image::new(texture.width, texture.height, texels)?)
+}
+
+/// The sky as a map of directions in Mitsuba's convention: from +y in the first row to −y, the middle of the first column
+/// beside −z, from there to +x.
+fn sky_image(daylight: &Daylight, scale: Vec3) -> Result<Image, ExportError> {
+    let [width, height] = SKY_SIZE;
+    let texel = |at: u32| {
+        let (column, row) = (at % width, at / width);
+        let phi = TAU * (column as f32 + 0.5) / width as f32;
+        let theta = PI * (row as f32 + 0.5) / height as f32;
+        let (sin, cos) = theta.sin_cos();
+        let direction = Vec3::new(phi.sin() * sin, cos, -phi.cos() * sin);
+        (scale * sky_radiance(daylight, direction)).to_array()
+    };
+    Ok(Image::new(
+        width,
+        height,
+        (0..width * height).map(texel).collect(),
+    )?)
+}
+
+/// A component of an sRGB texel as linear radiance (IEC 61966-2-1).
+fn decoded(encoded: u8) -> f32 {
+    let encoded = f32::from(encoded) / 255.0;
+    match encoded <= 0.04045 {
+        true => encoded / 12.92,
+        false => ((encoded + 0.055) / 1.055).powf(2.4),
+    }
+}
+
+/// The sky of `kernels/shading/light/sky.wesl` in a direction, times a white environment.
+fn sky_radiance(sky: &Daylight, direction: Vec3) -> Vec3 {
+    let t = ((direction.dot(sky.up) + 0.6) / 1.4).clamp(0.0, 1.0);
+    let grey = 0.12 + 0.38 * t * t * (3.0 - 2.0 * t);
+    let key = 10.0 * direction.dot(sky.key).max(0.0).powi(16);
+    Vec3::splat(grey) + key * Vec3::new(1.0, 0.96, 0.9)
+}

@@ -1,0 +1,326 @@
+//! Scenes of the educational renderer [Nori](https://wjakob.github.io/nori/) (XML with OBJ meshes, here also PLY): transforms, the perspective
+//! camera, area emitters, and its materials.
+//!
+//! Nori's camera may be mirrored (a scale of −1 in its transform), which ours cannot. The scene is mirrored instead, at
+//! the plane through the eye that is vertical in the image: the picture is the same.
+
+use super::builder::{Look, SceneBuilder};
+use super::error::{self, guarded};
+use super::material::{emitted, reflectance};
+use super::{
+    CookTorrance, Fresnel, LoadOptions, MIRROR, Masking, Material, SceneData, SceneError, obj, ply,
+};
+use crate::geometry::Camera;
+use glam::{DMat4, DVec3, DVec4, Vec3};
+use roxmltree::{Document, Node};
+use std::path::Path;
+
+/// What Nori takes where a file says nothing: albedo of `diffuse`, roughness of `microfacet`, indices of BK7 glass and of air.
+const ALBEDO: f32 = 0.5;
+const ALPHA: f32 = 0.1;
+const INSIDE_IOR: f32 = 1.5046;
+const OUTSIDE_IOR: f32 = 1.000277;
+/// Field of view in x, degrees, and size of the image.
+const FOV: f64 = 30.0;
+const SIZE: [f64; 2] = [1280.0, 720.0];
+
+/// Loads a Nori scene. Integrator and sampler of the file are not looked at.
+///
+/// # Errors
+/// [`SceneError`]: XML that is broken (with its line), no `<scene>` at its root, a number that is none, a mesh that does not load.
+pub(super) fn load(
+    path: &Path,
+    name: &str,
+    options: &LoadOptions,
+) -> Result<SceneData, SceneError> {
+    let bytes = error::read(path)?;
+    guarded(path, || {
+        let text = std::str::from_utf8(&bytes);
+        let text = text.map_err(|_| SceneError::malformed(path, "", "it is not UTF-8 text"))?;
+        let document = Document::parse(text).map_err(|e| {
+            SceneError::malformed(path, format!("line {}", e.pos().row), e.to_string())
+        })?;
+        let root = document.root_element();
+        if !root.has_tag_name("scene") {
+            let problem = "the root is no `<scene>`; of XML scenes only those of Nori are read";
+            return Err(SceneError::malformed(path, "", problem));
+        }
+        let mut reader = Reader {
+            path,
+            options,
+            builder: SceneBuilder::default(),
+            look: Look::default(),
+        };
+        reader.read(root)?;
+        reader.builder.finish(name, reader.look)
+    })
+}
+
+struct Reader<'a> {
+    path: &'a Path,
+    options: &'a LoadOptions,
+    builder: SceneBuilder,
+    look: Look,
+}
+
+impl Reader<'_> {
+    fn read(&mut self, root: Node<'_, '_>) -> Result<(), SceneError> {
+        let camera = root.children().find(|node| node.has_tag_name("camera"));
+        // Comes first: a mirrored camera moves the meshes.
+        let mirror = camera.map(|node| self.camera(node)).transpose()?.flatten();
+        for node in root.children().filter(Node::is_element) {
+            match node.tag_name().name() {
+                "mesh" => self.mesh(node, mirror)?,
+                "camera" | "integrator" | "sampler" => {}
+                "emitter" => {
+                    let kind = node.attribute("type").unwrap_or_default();
+                    self.warn(
+                        node,
+                        &format!("the emitter `{kind}` is not known, left out"),
+                    );
+                }
+                other => self.warn(node, &format!("`<{other}>` is not known, left out")),
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets the camera; the reflection that stands for a mirrored one.
+    fn camera(&mut self, node: Node<'_, '_>) -> Result<Option<DMat4>, SceneError> {
+        let to_world = self.to_world(node)?;
+        let [width, height] = ["width", "height"].map(|name| self.number(node, name));
+        let (width, height) = (width?.unwrap_or(SIZE[0]), height?.unwrap_or(SIZE[1]));
+        let fov = self.number(node, "fov")?.unwrap_or(FOV);
+        let half_width = (0.5 * fov.to_radians()).tan();
+        let vertical = 2.0 * (half_width * height / width).atan();
+        let [left, up, forward, eye] = to_world.to_cols_array_2d().map(DVec4::from_array);
+        let [left, up, forward, eye] = [left, up, forward, eye].map(|v| v.truncate());
+        self.look.camera = Some(Camera {
+            eye: eye.as_vec3(),
+            target: (eye + forward.normalize_or_zero()).as_vec3(),
+            up: up.normalize_or_zero().as_vec3(),
+            vertical_fov_degrees: vertical.to_degrees() as f32,
+        });
+        let mirrored = left.cross(up).dot(forward) < 0.0;
+        let normal = left.normalize_or_zero();
+        let column = |axis: DVec3| (axis - 2.0 * normal * normal.dot(axis)).extend(0.0);
+        let shift = 2.0 * normal * normal.dot(eye);
+        let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(column);
+        Ok(mirrored.then(|| DMat4::from_cols(x, y, z, shift.extend(1.0))))
+    }
+
+    fn mesh(&mut self, node: Node<'_, '_>, mirror: Option<DMat4>) -> Result<(), SceneError> {
+        let file = property(node, "filename")
+            .ok_or_else(|| self.broken(node, "a mesh without `<string name=\"filename\" …>`"))?;
+        let relative = Path::new(file);
+        if relative.is_absolute() && !self.options.allow_outside {
+            let problem = format!("`{file}` is an absolute path, which only --allow-outside reads");
+            return Err(self.broken(node, &problem));
+        }
+        let path = self.path.with_file_name("").join(relative);
+        let plain = LoadOptions {
+            textures: false,
+            ..*self.options
+        };
+        let mesh = match super::extension(&path).as_str() {
+            "ply" => ply::load(&path, file)?,
+            _ => obj::load(&path, file, &plain)?,
+        };
+        let to_world = mirror.unwrap_or(DMat4::IDENTITY) * self.to_world(node)?;
+        let material = self.material(node, file)?;
+        let id = self.look.materials.len() as u32;
+        self.look.materials.push(material);
+        self.builder.reserve(mesh.triangles.len());
+        for triangle in &mesh.triangles {
+            let moved = |v: Vec3| to_world.transform_point3(v.as_dvec3()).as_vec3();
+            let [a, b, c] = triangle.vertices.map(moved);
+            // A reflection turns corners; emitters and glass tell their sides by them.
+            let corners = match mirror {
+                Some(_) => [a, c, b],
+                None => [a, b, c],
+            };
+            self.builder.push(corners, id);
+        }
+        Ok(())
+    }
+
+    fn material(&mut self, mesh: Node<'_, '_>, name: &str) -> Result<Material, SceneError> {
+        let bsdf = mesh.children().find(|node| node.has_tag_name("bsdf"));
+        let mut material = match bsdf {
+            Some(bsdf) => self.bsdf(bsdf, name)?,
+            None => Material::diffuse(name, Vec3::splat(ALBEDO)),
+        };
+        for emitter in mesh.children().filter(|n| n.has_tag_name("emitter")) {
+            if emitter.attribute("type") != Some("area") {
+                self.warn(emitter, "an emitter of a mesh that is not `area`, left out");
+                continue;
+            }
+            let radiance = self.color(emitter, "radiance")?.unwrap_or(Vec3::ZERO);
+            material = material.emitting_from_front(emitted(radiance));
+        }
+        Ok(material)
+    }
+
+    fn bsdf(&mut self, node: Node<'_, '_>, name: &str) -> Result<Material, SceneError> {
+        let kind = node.attribute("type").unwrap_or_default();
+        let inside = self
+            .number(node, "intIOR")?
+            .map_or(INSIDE_IOR, |v| v as f32);
+        let outside = self
+            .number(node, "extIOR")?
+            .map_or(OUTSIDE_IOR, |v| v as f32);
+        Ok(match kind {
+            "diffuse" => {
+                let albedo = self.color(node, "albedo")?.unwrap_or(Vec3::splat(ALBEDO));
+                Material::diffuse(name, reflectance(albedo))
+            }
+            "mirror" => Material {
+                kind: &MIRROR,
+                ..Material::diffuse(name, Vec3::ONE)
+            },
+            "dielectric" => Material::dielectric(name, Vec3::ONE, inside / outside),
+            "microfacet" => {
+                let base = self.color(node, "kd")?.unwrap_or(Vec3::splat(ALBEDO));
+                let alpha = self.number(node, "alpha")?.map_or(ALPHA, |v| v as f32);
+                let base = reflectance(base);
+                let of = CookTorrance {
+                    diffuse: base,
+                    specular: Vec3::splat(1.0 - base.max_element()),
+                    roughness: alpha,
+                    ior: inside / outside,
+                    masking: Masking::Smith,
+                    fresnel: Fresnel::Exact,
+                };
+                let material = Material::cook_torrance(name, &of);
+                let drawn = material.parameters.get(3).copied().unwrap_or(alpha);
+                if drawn != alpha {
+                    let what = format!(
+                        "an alpha of {alpha} is beyond what is rendered; drawn with {drawn}"
+                    );
+                    self.warn(node, &what);
+                }
+                material
+            }
+            other => {
+                self.warn(
+                    node,
+                    &format!("the material `{other}` is not known; drawn as diffuse"),
+                );
+                Material::diffuse(name, Vec3::splat(ALBEDO))
+            }
+        })
+    }
+
+    /// The transform named `toWorld` of a node; what stands first in it acts first.
+    fn to_world(&self, node: Node<'_, '_>) -> Result<DMat4, SceneError> {
+        let is_it = |n: &Node<'_, '_>| {
+            n.has_tag_name("transform") && n.attribute("name").is_none_or(|name| name == "toWorld")
+        };
+        let mut all = DMat4::IDENTITY;
+        let Some(transform) = node.children().find(is_it) else {
+            return Ok(all);
+        };
+        for step in transform.children().filter(Node::is_element) {
+            let value = |name: &str| self.vector(step, step.attribute(name), name);
+            let one = match step.tag_name().name() {
+                "translate" => DMat4::from_translation(value("value")?),
+                "scale" => DMat4::from_scale(value("value")?),
+                "rotate" => {
+                    let angle = step
+                        .attribute("angle")
+                        .unwrap_or_default()
+                        .trim()
+                        .parse::<f64>();
+                    let angle = angle.map_err(|_| self.broken(step, "`angle` is not a number"))?;
+                    let axis = value("axis")?.normalize_or_zero();
+                    DMat4::from_axis_angle(axis, angle.to_radians())
+                }
+                "lookat" => look_at(value("origin")?, value("target")?, value("up")?),
+                "matrix" => self.matrix(step)?,
+                other => {
+                    return Err(self.broken(step, &format!("the transform `{other}` is not known")));
+                }
+            };
+            all = one * all;
+        }
+        Ok(all)
+    }
+
+    fn matrix(&self, step: Node<'_, '_>) -> Result<DMat4, SceneError> {
+        let numbers = numbers(step.attribute("value").unwrap_or_default());
+        let rows = numbers.and_then(|n| <[f64; 16]>::try_from(n).ok());
+        let rows = rows.ok_or_else(|| self.broken(step, "a matrix has 16 numbers"))?;
+        Ok(DMat4::from_cols_array(&rows).transpose())
+    }
+
+    fn vector(
+        &self,
+        node: Node<'_, '_>,
+        text: Option<&str>,
+        name: &str,
+    ) -> Result<DVec3, SceneError> {
+        let three = text
+            .and_then(numbers)
+            .and_then(|n| <[f64; 3]>::try_from(n).ok());
+        let problem = || self.broken(node, &format!("`{name}` is not three numbers"));
+        three.map(DVec3::from).ok_or_else(problem)
+    }
+
+    fn color(&self, node: Node<'_, '_>, name: &str) -> Result<Option<Vec3>, SceneError> {
+        let Some(text) = property(node, name) else {
+            return Ok(None);
+        };
+        let color = self.vector(node, Some(text), name)?;
+        Ok(Some(color.as_vec3()))
+    }
+
+    fn number(&self, node: Node<'_, '_>, name: &str) -> Result<Option<f64>, SceneError> {
+        let parse = |text: &str| {
+            let finite = text.trim().parse().ok().filter(|v: &f64| v.is_finite());
+            finite.ok_or_else(|| self.broken(node, &format!("`{name}` is not a number")))
+        };
+        property(node, name).map(parse).transpose()
+    }
+
+    fn warn(&mut self, node: Node<'_, '_>, what: &str) {
+        let line = line_of(node);
+        self.builder
+            .report
+            .warnings
+            .push(format!("line {line}: {what}"));
+    }
+
+    fn broken(&self, node: Node<'_, '_>, problem: &str) -> SceneError {
+        SceneError::malformed(self.path, format!("line {}", line_of(node)), problem)
+    }
+}
+
+fn line_of(node: Node<'_, '_>) -> u32 {
+    node.document().text_pos_at(node.range().start).row
+}
+
+/// The value of the property `name` among the children of a node: `<float name="fov" value="30"/>`.
+fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
+    let mut properties = node
+        .children()
+        .filter(|n| n.attribute("name") == Some(name));
+    properties.find_map(|n| n.attribute("value"))
+}
+
+/// Numbers between commas or spaces; nothing if one of them is none or not finite.
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    let words = text.split(|c: char| c == ',' || c.is_whitespace());
+    let words = words.filter(|word| !word.is_empty());
+    words
+        .map(|w| w.parse().ok().filter(|v: &f64| v.is_finite()))
+        .collect()
+}
+
+/// Columns to the left, upwards and forwards, and the eye.
+fn look_at(origin: DVec3, target: DVec3, up: DVec3) -> DMat4 {
+    let forward = (target - origin).normalize_or_zero();
+    let left = up.normalize_or_zero().cross(forward).normalize_or_zero();
+    let up = forward.cross(left);
+    let axis = |v: DVec3| v.extend(0.0);
+    DMat4::from_cols(axis(left), axis(up), axis(forward), origin.extend(1.0))
+}

@@ -1,0 +1,62 @@
+//! Whether two renderers have made the same image.
+
+use raystone::image::{Image, luminance};
+use raystone::measure::hypothesis::student_t_two_sided;
+
+/// Images of one scene with different seeds.
+pub struct Replicates(pub Vec<Image>);
+
+/// Mean luminances with the variances of these means, and from how many replicates both are.
+pub struct Moments {
+    pub mean: Vec<f64>,
+    pub variance: Vec<f64>,
+    pub replicates: usize,
+}
+
+impl Replicates {
+    pub fn moments(&self) -> Moments {
+        let n = self.0.len() as f64;
+        let pixels = self.0[0].pixels.len();
+        let values = |i: usize| self.0.iter().map(move |image| luminance(&image.pixels[i]));
+        let mean: Vec<f64> = (0..pixels).map(|i| values(i).sum::<f64>() / n).collect();
+        let spread = |i: usize| {
+            let squares: f64 = values(i).map(|v| (v - mean[i]).powi(2)).sum();
+            squares / (n - 1.0) / n
+        };
+        Moments {
+            variance: (0..pixels).map(spread).collect(),
+            mean,
+            replicates: self.0.len(),
+        }
+    }
+}
+
+impl Moments {
+    /// The mean over all pixels.
+    pub fn total(&self) -> f64 {
+        self.mean.iter().sum::<f64>() / self.mean.len() as f64
+    }
+
+    /// The share of pixels whose difference Welch's test accepts at the Šidák level 0.01 of all of them.
+    pub fn accepted(&self, other: &Self) -> f64 {
+        let level = 1.0 - 0.99_f64.powf(1.0 / self.mean.len() as f64);
+        let accepted = (0..self.mean.len()).filter(|&i| self.p(other, i) >= level);
+        accepted.count() as f64 / self.mean.len() as f64
+    }
+
+    fn p(&self, other: &Self, i: usize) -> f64 {
+        let (a, b) = (self.variance[i], other.variance[i]);
+        let difference = (self.mean[i] - other.mean[i]).abs();
+        // Rounding of sums of f32, in pixels that are the same in every replicate.
+        let rounding = 1e-5 * self.mean[i].abs().max(other.mean[i].abs());
+        if difference <= rounding {
+            return 1.0;
+        }
+        let freedom = |n: usize| n as f64 - 1.0;
+        let parts = a * a / freedom(self.replicates) + b * b / freedom(other.replicates);
+        if parts == 0.0 {
+            return 0.0;
+        }
+        student_t_two_sided(difference / (a + b).sqrt(), (a + b).powi(2) / parts)
+    }
+}
