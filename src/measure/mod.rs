@@ -1,6 +1,7 @@
 //! Measuring: the gate, the timing protocol, image metrics, statistics, records.
 
 pub mod bias;
+pub mod comparison;
 pub mod figure;
 pub mod flip;
 pub mod gate;
@@ -14,10 +15,12 @@ pub mod metrics;
 pub mod path_oracle;
 pub mod rays;
 pub mod record;
+pub mod replicates;
 pub mod sampler_cost;
 mod shown;
 pub mod spectrum;
 pub mod statistics;
+pub mod stopping;
 pub mod stream;
 pub mod timing;
 pub mod trial_scenes;

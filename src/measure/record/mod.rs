@@ -258,11 +258,6 @@ impl Interval {
             high: factor * self.high,
         }
     }
-
-    /// Whether two intervals have no point in common: only then is a winner named.
-    pub fn is_apart_from(&self, other: &Interval) -> bool {
-        self.low > other.high || other.low > self.high
-    }
 }
 
 /// What a check says.
