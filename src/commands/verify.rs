@@ -5,8 +5,8 @@ use super::failure::{BAD_INPUT, FAILED};
 use super::output::{print, tell};
 use anyhow::Result;
 use clap::Args;
-use raystone::config::{Axis, Catalogue, Experiment, Plan, Skipped};
-use raystone::measure::record::{ClassVerdict, GateVerdict, JudgeCheck};
+use raystone::config::{Axis, Catalogue, Cell, Experiment, Plan, Skipped};
+use raystone::measure::record::{ClassVerdict, GateVerdict, JudgeCheck, PathsRecord, Verdict};
 use raystone::report::document::{Table, TableCell};
 use raystone::report::format::{count, ray_class};
 use raystone::report::terminal::aligned;
@@ -18,6 +18,8 @@ use std::process::ExitCode;
 
 /// Scenes of the gate without an experiment file.
 const SCENES: [&str; 2] = ["cornell-box", "displaced-sphere"];
+/// Integrators of the gate without an experiment file.
+const INTEGRATORS: [&str; 3] = ["primary", "ao", "path"];
 /// The structure that tests every triangle.
 const BRUTE_FORCE: &str = "brute-force";
 /// Scenes from this size on are left to the other structures, unless brute force is asked for.
@@ -74,8 +76,11 @@ impl Verify {
         let rays = experiment.gate.rays;
         let verified = raystone::run::verify(&experiment, &plan, &registries, &options, rays)?;
         print(&table(&verified))?;
+        let paths: Vec<_> = verified.iter().flat_map(|v| &v.paths).collect();
+        print(&paths_table(&paths))?;
         let refused = verified.iter().filter(|v| v.refused).count();
         let failed = verified.iter().filter(|v| !passed(v)).count() - refused;
+        let failed_paths = paths.iter().filter(|(_, p)| p.fault.is_some()).count();
         let all = verified.len() - refused;
         print(&format!("{} of {all} structures passed\n", all - failed))?;
         if refused > 0 {
@@ -84,7 +89,14 @@ impl Verify {
             ))?;
         }
         let bad_input = verified.iter().any(|v| v.bad_input);
-        Ok(match failed {
+        if !paths.is_empty() {
+            let right = paths.len() - failed_paths;
+            print(&format!(
+                "{right} of {} integrators did not fail\n",
+                paths.len()
+            ))?;
+        }
+        Ok(match failed + failed_paths {
             0 => ExitCode::SUCCESS,
             _ if bad_input => ExitCode::from(BAD_INPUT),
             _ => ExitCode::from(FAILED),
@@ -115,10 +127,11 @@ fn defaults(catalogue: &Catalogue) -> String {
         .first()
         .map(|entry| entry.name.as_str());
     format!(
-        "[run]\nname = \"verify\"\n[axes]\nscene = {}\naccel = {}\nsequence = {}\n",
+        "[run]\nname = \"verify\"\n[axes]\nscene = {}\naccel = {}\nsequence = {}\nintegrator = {}\n",
         toml::Value::from(SCENES.to_vec()),
         toml::Value::from(accel),
         toml::Value::from(sequence.unwrap_or_default()),
+        toml::Value::from(INTEGRATORS.to_vec()),
     )
 }
 
@@ -204,6 +217,52 @@ fn table(verified: &[Verified]) -> String {
                   oracle: the judge against double precision, agree / ambiguous / wrong; \
                   kept: found on disk, checked before\n";
     format!("{}{legend}{details}", aligned(&table))
+}
+
+/// A row per integrator, and what went wrong below the table.
+fn paths_table(judged: &[&(Cell, PathsRecord)]) -> String {
+    let columns = [
+        "scene",
+        ":integrator",
+        ":verdict",
+        "paths",
+        "wrong",
+        "flips",
+        "ill-conditioned",
+        "median",
+    ];
+    let mut table = Table::new("Single paths against double precision", &columns);
+    let mut details = String::new();
+    for (cell, record) in judged {
+        let word = match record.verdict() {
+            Verdict::Pass => "passed",
+            Verdict::Fail => "FAILED",
+            Verdict::Open => "not judged",
+        };
+        let names = cell.labels(&[Axis::Integrator]).join(", ");
+        let numbers = [
+            record.paths,
+            record.wrong,
+            record.flips,
+            record.ill_conditioned,
+        ];
+        let mut row: Vec<TableCell> = vec![
+            cell[Axis::Scene].label.as_str().into(),
+            names.into(),
+            word.into(),
+        ];
+        row.extend(numbers.map(|n| TableCell::from(count(n as u64))));
+        row.push(format!("{:.1e}", record.median).into());
+        table.rows.push(row);
+        for detail in record.fault.iter().chain(&record.not_judged) {
+            // Writing to a string cannot fail.
+            let _ = writeln!(details, "{cell}: {detail}");
+        }
+    }
+    match judged.is_empty() {
+        true => String::new(),
+        false => format!("{}{details}", aligned(&table)),
+    }
 }
 
 /// The rows of one structure; names and the judge's own checks stand in the first.

@@ -8,6 +8,7 @@ use super::{Catalogue, ConfigError, parse};
 use crate::geometry::Camera;
 use crate::params::Variant;
 use crate::sampling::hash::pcg_hash;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::Path;
 
@@ -29,6 +30,8 @@ pub struct Experiment {
     pub resolution: [u32; 2],
     /// Samples per pixel at which errors are taken.
     pub spp: SppRange,
+    /// When a sampler is ended before the most samples.
+    pub stop: Option<StopRule>,
     /// Whether kernels keep the bounds checks and loop bounds of the driver layer.
     pub runtime_checks: bool,
     /// Camera for all scenes; `None` leaves it to each scene.
@@ -45,6 +48,15 @@ pub struct Experiment {
     pub gate: Gate,
     /// Star discrepancy of the streams.
     pub discrepancy: Discrepancy,
+}
+
+/// Ends a sampler at a power of two of samples where its relMSE is below a target.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct StopRule {
+    /// Target, positive.
+    pub relmse: f64,
+    /// Probability with which a sampler that is ended has it, in (0, 1).
+    pub confidence: f64,
 }
 
 /// The powers of two from `2^first` to `2^last`.

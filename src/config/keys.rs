@@ -106,6 +106,8 @@ pub enum ValueKind {
         /// Greatest exponent.
         max: i64,
     },
+    /// A table `{ relmse = x, confidence = p }`.
+    StopRule,
     /// Pairs of different dimensions.
     DimensionPairs {
         /// Greatest dimension.
@@ -144,6 +146,10 @@ impl fmt::Display for ValueKind {
                     "a table {{ pow2 = [lo, hi] }} with 0 <= lo <= hi <= {max}"
                 )
             }
+            Self::StopRule => write!(
+                f,
+                "a table {{ relmse = x, confidence = p }} with x > 0 and 0.5 <= p < 1"
+            ),
             Self::DimensionPairs { max } => {
                 write!(f, "a list of pairs of different dimensions in [0, {max}]")
             }
@@ -218,6 +224,7 @@ pub const KEYS: &[KeyRow] = &[
     key("run", "seed", SEED, Some("1"), "Seed of the first replicate."),
     key("run", "resolution", ValueKind::IntegerPair { min: 16, max: 8192 }, Some("[192, 144]"), "Width and height of every image, pixels."),
     key("run", "spp", ValueKind::Exponents { max: 16 }, Some("{ pow2 = [0, 5] }"), "Samples per pixel at which the error is taken: 2^lo, …, 2^hi."),
+    key("run", "stop", ValueKind::StopRule, None, "Ends a sampler at one of these numbers of samples where its relMSE is below x with probability p; without it, each takes them all."),
     key("run", "runtime_checks", ValueKind::Flag, Some("true"), "Keep the bounds checks and loop bounds that the driver layer adds to kernels."),
     key("axes", "scene", ValueKind::Names(Axis::Scene), None, "Scenes: built-in names, or paths of .obj, .gltf, .glb, .ply or Nori .xml files, relative to the current directory. Not needed if all integrators are `integrand:*`."),
     key("axes", "accel", ValueKind::Names(Axis::Accel), None, "Acceleration structures. Not needed if all integrators are `integrand:*`."),

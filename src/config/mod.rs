@@ -24,7 +24,7 @@ pub use cells::Cell;
 pub use error::{ConfigError, Place};
 pub use experiment::{
     Axes, Discrepancy, Exclude, Experiment, Gate, REFERENCE_PARTS, Reference, Seeds, SppRange,
-    Timing,
+    StopRule, Timing,
 };
 pub use keys::Axis;
 pub use pattern::Pattern;

@@ -49,6 +49,9 @@ pub(super) fn parse(
         seed: run.unsigned("seed")?,
         resolution: run.unsigned_pair("resolution")?,
         spp: run.exponents("spp")?,
+        stop: (run.has("stop"))
+            .then(|| run.stop_rule("stop"))
+            .transpose()?,
         runtime_checks: run.flag("runtime_checks")?,
         camera: reader.camera()?,
         excludes: reader.excludes(&axes)?,

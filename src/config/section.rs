@@ -1,7 +1,7 @@
 //! Typed reading of one section: every value is checked against its row in [`keys::KEYS`].
 
 use super::error::{ConfigError, Place};
-use super::experiment::SppRange;
+use super::experiment::{SppRange, StopRule};
 use super::keys::{self, KeyRow, ValueKind};
 use super::tree::{Item, Table, Value};
 use glam::Vec3;
@@ -178,6 +178,38 @@ impl<'t> Section<'t> {
             return Err(self.out_of_range(name, &pow2.at, format!("[{first}, {last}]")));
         }
         Ok(SppRange { first, last })
+    }
+
+    pub fn stop_rule(&self, name: &str) -> Result<StopRule, ConfigError> {
+        let item = self.item(name)?;
+        let Value::Table(table) = &item.value else {
+            return Err(self.wrong_type(name, item));
+        };
+        let known = ["relmse", "confidence"];
+        if let Some((other, item)) = table.iter().find(|(key, _)| !known.contains(&key.as_str())) {
+            return Err(ConfigError::Unknown {
+                at: item.at.clone(),
+                what: format!("key in `{}`", self.key(name).path()),
+                name: other.clone(),
+                known: known.map(str::to_owned).to_vec(),
+            });
+        }
+        let [relmse, confidence] = known.map(|key| {
+            let inner = table.get(key).ok_or_else(|| self.wrong_type(name, item))?;
+            let value = number(inner).ok_or_else(|| self.wrong_type(name, inner))?;
+            let allowed = match key {
+                "relmse" => value > 0.0 && value.is_finite(),
+                _ => (0.5..1.0).contains(&value),
+            };
+            match allowed {
+                true => Ok(value),
+                false => Err(self.out_of_range(name, &inner.at, format!("{key} = {value}"))),
+            }
+        });
+        Ok(StopRule {
+            relmse: relmse?,
+            confidence: confidence?,
+        })
     }
 
     pub fn dimension_pairs(&self, name: &str) -> Result<Vec<[u32; 2]>, ConfigError> {

@@ -119,7 +119,7 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 83] = [
+pub static FIGURES: [Figure; 85] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
@@ -147,8 +147,10 @@ pub static FIGURES: [Figure; 83] = [
     Figure::new("ms-per-spp/v1", "time per sample per pixel", "ms", Lower, THREE, Median),
     Figure::new("cell-mrays-per-s/v1", "speed of the whole cell", "Mrays/s", Higher, THREE, Median),
     Figure::new("time-to-image/v1", "build and rendering", "ms", Lower, THREE, Single),
-    Figure::new("error-seconds/v1", "unbiased relMSE × seconds", "", Lower, THREE, Single),
+    Figure::new("error-seconds/v1", "unbiased relMSE × seconds", "", Lower, THREE, Jackknife),
     Figure::new("error-at-time/v1", "unbiased relMSE at equal time", "", Lower, THREE, Jackknife),
+    Figure::new("spp-to-error/v1", "samples per pixel to an error", "", Lower, THREE, Jackknife),
+    Figure::new("seconds-to-error/v1", "time to an error", "s", Lower, THREE, Jackknife),
     // Errors of samplers.
     Figure::new("relmse-unbiased/v1", "unbiased relMSE", "", Lower, THREE, Jackknife),
     Figure::new("rmse-unbiased/v1", "unbiased RMSE", "", Lower, THREE, Jackknife),

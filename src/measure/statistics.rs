@@ -60,6 +60,15 @@ impl Spread {
         })
     }
 
+    /// With so many times the variance.
+    #[must_use]
+    pub fn times(self, factor: f64) -> Self {
+        Self {
+            variance: factor * self.variance,
+            ..self
+        }
+    }
+
     /// Of independent sources together: variances add, and degrees of freedom are those of Welch and
     /// Satterthwaite. Of none there is no variance.
     pub fn together(sources: &[Self]) -> Self {

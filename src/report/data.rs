@@ -23,6 +23,8 @@ pub struct RunData<'a> {
     pub scenes: Vec<SceneGroup<'a>>,
     /// Dumped streams.
     pub streams: Vec<Recorded<'a, StreamRecord>>,
+    /// Verdicts on integrators.
+    pub paths: Vec<Recorded<'a, PathsRecord>>,
     /// What drawing costs.
     pub costs: Vec<Recorded<'a, SamplerCostRecord>>,
     /// Cells left out.
@@ -165,6 +167,7 @@ impl<'a> RunData<'a> {
                     put(&mut scene.structures, measured, |a, b| a.key == b.key)
                 }
                 Body::Reference(_) => {}
+                Body::Paths(record) => put(&mut data.paths, line.of(record), |a, b| a.key == b.key),
                 Body::Time(record) => {
                     let key = competitor(line);
                     let measured = Measured {

@@ -1,6 +1,7 @@
-//! Who wins: named only where the intervals are apart.
+//! Who wins: named only where a test of the difference says so.
 
 use super::format;
+use crate::measure::comparison::{LogFigure, Pairs};
 use crate::measure::figure::Better;
 use crate::measure::record::Interval;
 
@@ -14,8 +15,9 @@ pub struct Contender {
     pub name: String,
     /// Its figure.
     pub figure: Interval,
-    /// Whether the spread is known; without it it is not ranked, neither as winner nor as beaten.
-    pub has_spread: bool,
+    /// What it is compared by; absent where the spread is not known: then it is not ranked, neither as winner
+    /// nor as beaten.
+    pub log: Option<LogFigure>,
 }
 
 /// The outcome of a comparison.
@@ -27,17 +29,18 @@ pub enum Ruling {
     Withheld(String),
     /// There was no competition.
     Alone(Contender),
-    /// The winner and the next one, whose intervals are apart.
-    Winner(Contender, Contender),
-    /// All whose intervals overlap the best one's, best first.
-    Unclear(Vec<Contender>),
+    /// The winner and the next one: the winner differs from every other. How many pairs were compared.
+    Winner(Contender, Contender, usize),
+    /// The best one and all that it does not differ from, best first. How many pairs were compared.
+    Unclear(Vec<Contender>, usize),
 }
 
-/// Judges the contenders.
+/// Judges the contenders: the best one wins if it differs from every other by Welch's test on logarithms, corrected
+/// for all pairs ([`Pairs`]).
 pub fn judge(mut contenders: Vec<Contender>, better: Better) -> Ruling {
     contenders.retain(|c| c.figure.value.is_finite());
     let measured = contenders.len();
-    contenders.retain(|c| c.has_spread);
+    contenders.retain(|c| c.log.is_some());
     if contenders.is_empty() && measured > 0 {
         return Ruling::Withheld("too few measurements to know their spread".into());
     }
@@ -49,18 +52,24 @@ pub fn judge(mut contenders: Vec<Contender>, better: Better) -> Ruling {
             by_value
         }
     });
-    let Some(best) = contenders.first().cloned() else {
-        return Ruling::Nobody;
+    let logs: Vec<&LogFigure> = contenders.iter().filter_map(|c| c.log.as_ref()).collect();
+    let pairs = Pairs::of(&logs);
+    // Medians, which sort them, and the means that are compared may disagree.
+    let in_order = |i: usize| match better {
+        Better::Higher => logs[0].log > logs[i].log,
+        Better::Lower | Better::Neither => logs[0].log < logs[i].log,
     };
-    let close: Vec<Contender> = contenders[1..]
-        .iter()
-        .filter(|c| !best.figure.is_apart_from(&c.figure))
-        .cloned()
-        .collect();
-    match contenders.get(1) {
-        None => Ruling::Alone(best),
-        Some(next) if close.is_empty() => Ruling::Winner(best, next.clone()),
-        Some(_) => Ruling::Unclear(std::iter::once(best).chain(close).collect()),
+    let is_close = |i: &usize| !(pairs.differ(0, *i) && in_order(*i));
+    let close: Vec<usize> = (1..logs.len()).filter(is_close).collect();
+    let count = pairs.count();
+    match &contenders[..] {
+        [] => Ruling::Nobody,
+        [only] => Ruling::Alone(only.clone()),
+        [best, next, ..] if close.is_empty() => Ruling::Winner(best.clone(), next.clone(), count),
+        [best, ..] => {
+            let close = close.iter().map(|i| contenders[*i].clone());
+            Ruling::Unclear(std::iter::once(best.clone()).chain(close).collect(), count)
+        }
     }
 }
 
@@ -71,15 +80,15 @@ impl Ruling {
             Self::Nobody => "nothing measured".into(),
             Self::Withheld(reason) => format!("no winner: {reason}"),
             Self::Alone(only) => format!("{} (alone)", only.name),
-            Self::Winner(best, _) => best.name.clone(),
-            Self::Unclear(close) => {
+            Self::Winner(best, ..) => best.name.clone(),
+            Self::Unclear(close, _) => {
                 let names: Vec<&str> = close.iter().map(|c| c.name.as_str()).collect();
                 let shown = &names[..names.len().min(MOST_NAMES)];
                 let more = match names.len() - shown.len() {
                     0 => String::new(),
                     more => format!(" and {more} more"),
                 };
-                format!("no clear winner: {}{more}", shown.join(", "))
+                format!("undecided: {}{more}", shown.join(", "))
             }
         }
     }
@@ -88,8 +97,8 @@ impl Ruling {
     pub fn figure(&self) -> String {
         match self {
             Self::Nobody | Self::Withheld(_) => format::ABSENT.into(),
-            Self::Alone(best) | Self::Winner(best, _) => format::interval(&best.figure),
-            Self::Unclear(close) => close
+            Self::Alone(best) | Self::Winner(best, ..) => format::interval(&best.figure),
+            Self::Unclear(close, _) => close
                 .first()
                 .map_or(format::ABSENT.into(), |c| format::interval(&c.figure)),
         }
@@ -98,8 +107,8 @@ impl Ruling {
     /// The next one with its figure and, of positive figures, the ratio of the two.
     pub fn runner_up(&self) -> String {
         let (best, next) = match self {
-            Self::Winner(best, next) => (best, next),
-            Self::Unclear(close) if close.len() > 1 => (&close[0], &close[1]),
+            Self::Winner(best, next, _) => (best, next),
+            Self::Unclear(close, _) if close.len() > 1 => (&close[0], &close[1]),
             _ => return format::ABSENT.into(),
         };
         let text = format!("{} {}", next.name, format::interval(&next.figure));
@@ -109,66 +118,83 @@ impl Ruling {
         let ratio = best.figure.value / next.figure.value;
         format!("{text} ({}×)", format::number(ratio.max(1.0 / ratio)))
     }
+
+    /// How many pairs were compared.
+    pub fn comparisons(&self) -> usize {
+        match self {
+            Self::Nobody | Self::Withheld(_) | Self::Alone(_) => 0,
+            Self::Winner(_, _, pairs) | Self::Unclear(_, pairs) => *pairs,
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::statistics::Spread;
 
-    fn contender(name: &str, value: f64, half: f64) -> Contender {
-        let figure = Interval {
-            value,
-            low: value - half,
-            high: value + half,
-        };
-        Contender {
-            name: name.into(),
-            figure,
-            has_spread: true,
-        }
-    }
-
-    /// What is said of contenders with these figures, half intervals and spreads, called a, b, c.
+    /// What is said of contenders with these figures, relative standard errors and known spreads, called a, b, c.
     fn said(better: Better, figures: &[(f64, f64, bool)]) -> [String; 3] {
         let contenders = figures.iter().zip(["a", "b", "c"]);
-        let contenders = contenders.map(|((value, half, has_spread), name)| Contender {
-            has_spread: *has_spread,
-            ..contender(name, *value, *half)
+        let contenders = contenders.map(|((value, error, has_spread), name)| {
+            let log = LogFigure {
+                log: value.ln(),
+                own: vec![Spread {
+                    variance: error * error,
+                    freedom: 15.0,
+                }],
+                shared: Vec::new(),
+            };
+            Contender {
+                name: name.into(),
+                figure: log.interval(),
+                log: has_spread.then_some(log),
+            }
         });
         let ruling = judge(contenders.collect(), better);
         [ruling.answer(), ruling.figure(), ruling.runner_up()]
     }
 
     #[test]
-    fn a_winner_is_named_only_where_intervals_are_apart_and_known() {
+    fn a_winner_is_named_only_where_the_difference_is_clear_and_spreads_are_known() {
         use Better::{Higher, Lower};
         let answers = [
-            (Higher, &[(3.0, 0.5, true), (5.0, 0.5, true)][..], "b"),
+            (Higher, &[(3.0, 0.05, true), (5.0, 0.05, true)][..], "b"),
             (
                 Higher,
-                &[(3.0, 1.5, true), (5.0, 0.6, true)],
-                "no clear winner: b, a",
+                &[(3.0, 0.5, true), (5.0, 0.2, true)],
+                "undecided: b, a",
             ),
-            // A third that overlaps the best spoils the win.
+            // Intervals that overlap, and a difference that is clear all the same.
+            (Lower, &[(1.0, 0.05, true), (1.2, 0.05, true)], "a"),
+            // A third that does not differ from the best spoils the win.
             (
                 Lower,
-                &[(1.0, 0.1, true), (2.0, 0.1, true), (3.0, 2.5, true)],
-                "no clear winner: a, c",
+                &[(1.0, 0.1, true), (2.0, 0.05, true), (3.0, 1.5, true)],
+                "undecided: a, c",
+            ),
+            // Three pairs need more than one: what was clear of two is not of three.
+            (
+                Lower,
+                &[(1.0, 0.055, true), (1.2, 0.055, true), (1.2, 0.055, true)],
+                "undecided: a, b, c",
             ),
             (
                 Lower,
                 &[(2.0, 0.0, true), (2.0, 0.0, true)],
-                "no clear winner: a, b",
+                "undecided: a, b",
             ),
             (Lower, &[(1.0, 0.1, true)], "a (alone)"),
             (Lower, &[], "nothing measured"),
             // Without spread nobody wins or is beaten.
             (
                 Lower,
-                &[(1.0, 0.0, false), (8.0, 0.1, true), (9.0, 0.1, true)],
+                &[(1.0, 0.0, false), (8.0, 0.01, true), (9.0, 0.01, true)],
                 "b",
             ),
             (Lower, &[(1.0, 0.0, false), (9.0, 0.1, true)], "b (alone)"),
+            // An error that is exactly 0.
+            (Lower, &[(0.0, 0.0, true), (9.0, 0.1, true)], "a"),
         ];
         for (better, figures, answer) in answers {
             assert_eq!(said(better, figures)[0], answer, "{figures:?}");
@@ -179,32 +205,9 @@ mod tests {
         // Errors of nothing have no ratio.
         let next = |figures: &[_]| said(Lower, figures)[2].clone();
         assert_eq!(next(&[(0.0, 0.0, true), (0.0, 0.0, true)]), "b 0");
-        let below = [(-1.0, 0.1, true), (2.0, 0.1, true)];
-        assert_eq!(next(&below), "b 2.00 [1.90, 2.10]");
-    }
-
-    #[test]
-    fn among_equals_a_winner_is_rare() {
-        use crate::measure::statistics::mean_interval;
-        use crate::random::Pcg32;
-        let mut generator = Pcg32::new(21);
-        let wins = (0..300).filter(|_| {
-            let mut figure = || {
-                let mut normal = || 20.0 + (0..12).map(|_| generator.uniform()).sum::<f64>();
-                let samples: Vec<f64> = (0..8).map(|_| normal()).collect();
-                mean_interval(&samples).unwrap()
-            };
-            let mut equals: Vec<Contender> = Vec::new();
-            for i in 0..10 {
-                let figure = figure();
-                equals.push(Contender {
-                    figure,
-                    ..contender(&i.to_string(), 0.0, 0.0)
-                });
-            }
-            matches!(judge(equals, Better::Lower), Ruling::Winner(..))
-        });
-        let wins = wins.count();
-        assert!(wins <= 3, "{wins} winners in 300 draws of ten equals");
+        assert_eq!(
+            next(&[(1.0, 0.0, true), (2.0, 0.0, true)]),
+            "b 2.00 (2.00×)"
+        );
     }
 }

@@ -3,9 +3,13 @@
 use super::data::View;
 use super::format;
 use crate::measure::bias::BiasVerdict;
+use crate::measure::comparison::LogFigure;
 use crate::measure::figure::figure;
-use crate::measure::record::{BiasRecord, ErrorRecord, Interval, Key, SpectrumRecord};
-use crate::measure::statistics::{jackknife_interval, log_log_fit, mean, positive_interval};
+use crate::measure::record::{BiasRecord, ErrorRecord, Interval, Key, SpectrumRecord, TimeRecord};
+use crate::measure::replicates::{Replicates, Without};
+use crate::measure::statistics::{
+    LEAST_FOR_MEDIAN, jackknife_interval, log_log_fit, positive_interval,
+};
 
 /// What an error is that its reference is too noisy for: its estimate is not clearly above 0.
 pub const UNRESOLVED: &str = "below what the reference can resolve";
@@ -103,14 +107,6 @@ pub struct MeanError {
     pub resolved: bool,
 }
 
-/// What an estimate leaves out, to see what it depends on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Without {
-    Nothing,
-    Replicate(usize),
-    Part(usize),
-}
-
 impl<'a> MeasuredSampler<'a> {
     /// Whether no seed changes it, so that its one replicate is exact.
     pub fn is_deterministic(&self) -> bool {
@@ -122,7 +118,7 @@ impl<'a> MeasuredSampler<'a> {
     /// Whether it may be compared with others: from one image nothing is known of the spread, not even
     /// of a deterministic sampler, which is lucky or not in this one scene.
     pub fn is_ranked(&self) -> bool {
-        self.replicates.len() > 1
+        self.all().have_spread()
     }
 
     /// Why it may not win, however small its error.
@@ -166,13 +162,16 @@ impl<'a> MeasuredSampler<'a> {
         spps.sort_unstable();
         spps.dedup();
         let mean_at = |spp| {
-            let estimate = |without| self.recorded_mean(id, spp, without);
+            let estimate = |without| self.all().mean(id, spp, without);
             let value = estimate(Without::Nothing)?;
-            let by_reference = jackknife_interval(value, &self.reference_estimates(id, estimate)?)?;
+            let by_reference = jackknife_interval(value, &self.all().of_reference(id, estimate)?)?;
             let exact = by_reference.low == by_reference.high;
             Some(MeanError {
                 spp,
-                error: metric.shown(positive_interval(value, &self.sources(id, estimate)?)?),
+                error: metric.shown(positive_interval(
+                    value,
+                    &self.all().sources(id, estimate)?,
+                )?),
                 resolved: by_reference.low > 0.0 || exact && value >= 0.0,
             })
         };
@@ -186,17 +185,54 @@ impl<'a> MeasuredSampler<'a> {
             .find(|mean| mean.spp == spp)
     }
 
+    /// What error is compared by that lies between those at two numbers of samples, with this share of the way on
+    /// logarithms. `None` unless both are positive, whatever is left out.
+    pub fn log_error(&self, metric: Metric, spps: [u32; 2], share: f64) -> Option<LogFigure> {
+        let id = self.metric_id(metric)?;
+        let power = if metric == Metric::Rmse { 0.5 } else { 1.0 };
+        self.all().log_figure(id, |without| {
+            let [a, b] = spps.map(|spp| self.all().mean(id, spp, without));
+            let (a, b) = (power * a?.ln(), power * b?.ln());
+            // 0 has no logarithm, but is itself.
+            Some(if a == b { a } else { a + share * (b - a) })
+        })
+    }
+
+    /// Samples per pixel at which the error falls to `target`, between the two neighbours where its mean does: by
+    /// interpolation on logarithms. `None` where it is above or below at all numbers of samples.
+    pub fn spp_to(&self, metric: Metric, target: f64) -> Option<LogFigure> {
+        let id = self.metric_id(metric)?;
+        let means = self.mean_errors(metric);
+        let means: Vec<&MeanError> = means.iter().filter(|mean| mean.resolved).collect();
+        let falls = |pair: &&[&MeanError]| {
+            let [a, b] = [0, 1].map(|i| pair[i].error.value);
+            a >= target && target >= b && a > b && b > 0.0
+        };
+        let spps = means.windows(2).find(falls)?;
+        let spps = [spps[0].spp, spps[1].spp];
+        let target = match metric {
+            Metric::RelMse => target,
+            Metric::Rmse => target * target,
+        };
+        self.all().log_figure(id, |without| {
+            let [a, b] = spps.map(|spp| self.all().mean(id, spp, without));
+            let (a, b) = (a?.ln(), b?.ln());
+            let [x, y] = spps.map(|spp| f64::from(spp).ln());
+            Some(x + (y - x) * (target.ln() - a) / (b - a))
+        })
+    }
+
     /// Slope of log error against log spp, over the spp that every replicate has and the reference
     /// resolves.
     pub fn slope(&self, metric: Metric) -> Option<Interval> {
         let id = self.metric_id(metric)?;
-        let everywhere = |spp| self.replicates.iter().all(|r| value(r, spp, id).is_some());
+        let everywhere = |spp| self.all().all_have(id, spp);
         let means = self.mean_errors(metric);
         let fitted = means.iter().filter(|m| m.resolved && everywhere(m.spp));
         let spps: Vec<u32> = fitted.map(|mean| mean.spp).collect();
         let estimate = |without| {
             let point = |&spp: &u32| {
-                let mean = self.recorded_mean(id, spp, without)?;
+                let mean = self.all().mean(id, spp, without)?;
                 Some((f64::from(spp), mean))
             };
             let points: Vec<(f64, f64)> = spps.iter().filter_map(point).collect();
@@ -208,64 +244,15 @@ impl<'a> MeasuredSampler<'a> {
                 slope
             })
         };
-        jackknife_interval(estimate(Without::Nothing)?, &self.sources(id, estimate)?)
+        jackknife_interval(
+            estimate(Without::Nothing)?,
+            &self.all().sources(id, estimate)?,
+        )
     }
 
-    /// Mean of a recorded metric over replicates.
-    fn recorded_mean(&self, id: &str, spp: u32, without: Without) -> Option<f64> {
-        let kept = self.replicates.iter().enumerate();
-        let kept = kept.filter(|(i, _)| without != Without::Replicate(*i));
-        let values = kept.filter_map(|(_, r)| match without {
-            Without::Part(part) => {
-                let at = r.errors.iter().find(|error| error.spp == spp)?;
-                at.without_part.get(id)?.get(part).copied()
-            }
-            _ => value(r, spp, id),
-        });
-        mean(&values.collect::<Vec<f64>>())
+    fn all(&self) -> Replicates<'_> {
+        Replicates(&self.replicates)
     }
-
-    /// Estimates without each part of each source of noise: the halves of the reference, and the replicates. No
-    /// source for a single replicate, of whose own noise nothing is known.
-    fn sources(
-        &self,
-        id: &str,
-        estimate: impl Fn(Without) -> Option<f64>,
-    ) -> Option<Vec<Vec<f64>>> {
-        if !self.is_ranked() {
-            return Some(Vec::new());
-        }
-        let mut sources = self.reference_estimates(id, &estimate)?;
-        let replicates = 0..self.replicates.len();
-        let by_replicate: Option<_> = replicates
-            .map(|i| estimate(Without::Replicate(i)))
-            .collect();
-        sources.push(by_replicate?);
-        Some(sources)
-    }
-
-    /// Estimates without each part of the reference, its halves apart; empty where parts are unknown.
-    fn reference_estimates(
-        &self,
-        id: &str,
-        estimate: impl Fn(Without) -> Option<f64>,
-    ) -> Option<Vec<Vec<f64>>> {
-        let errors = self.replicates.iter().flat_map(|r| &r.errors);
-        let known = errors.map(|e| e.without_part.get(id).map_or(0, Vec::len));
-        let half = known.min().unwrap_or(0) / 2;
-        let of = |parts: std::ops::Range<usize>| -> Option<Vec<f64>> {
-            parts.map(|part| estimate(Without::Part(part))).collect()
-        };
-        Some(vec![of(0..half)?, of(half..2 * half)?])
-    }
-}
-
-fn value(replicate: &ErrorRecord, spp: u32, id: &str) -> Option<f64> {
-    let at = replicate.errors.iter().find(|error| error.spp == spp)?;
-    at.metrics
-        .get(id)
-        .copied()
-        .filter(|value| value.is_finite())
 }
 
 impl View<'_> {
@@ -335,24 +322,30 @@ fn rounded_up(value: f64) -> u64 {
     ((value / unit).floor() + 1.0) as u64 * unit as u64
 }
 
-/// Error after `seconds`, from a curve of `(seconds, error)`: log–log interpolation between the
-/// neighbours, `None` outside the curve. An end of an interval below 0 counts as 0.
-pub fn error_after(curve: &[(f64, Interval)], seconds: f64) -> Option<Interval> {
-    let exact = |&&(x, _): &&(f64, Interval)| (x / seconds - 1.0).abs() < 1e-9;
-    if let Some(&(_, error)) = curve.iter().find(exact) {
-        return Some(error);
+/// Variance of a median over that of the trimmed mean that [`LogFigure::of_times`] takes, for normal noise.
+const MEDIAN_VARIANCE: f64 = 1.4;
+
+/// The median time per sample per pixel, milliseconds, with its noise: none where it was not measured often
+/// enough.
+pub fn log_time(time: &TimeRecord) -> Option<LogFigure> {
+    let log = time.ms_per_spp?.value.ln();
+    let often = time.ms.len() >= LEAST_FOR_MEDIAN;
+    let trimmed = LogFigure::of_times(&time.ms).filter(|_| often);
+    let noise = trimmed.and_then(|trimmed| trimmed.own.first().copied());
+    let noise = noise.map(|noise| noise.times(MEDIAN_VARIANCE));
+    Some(LogFigure::new(log, &[], Vec::new())?.with_noise(noise))
+}
+
+/// Where `seconds` lies on a curve of growing seconds: the indices of the neighbours, and the share of the way
+/// between them on logarithms; `None` outside the curve.
+pub fn place_on(curve: &[f64], seconds: f64) -> Option<([usize; 2], f64)> {
+    let exact = |x: &f64| (x / seconds - 1.0).abs() < 1e-9;
+    if let Some(i) = curve.iter().position(exact) {
+        return Some(([i, i], 0.0));
     }
-    let pair = curve
-        .windows(2)
-        .find(|pair| pair[0].0 < seconds && seconds < pair[1].0)?;
-    let share = (seconds / pair[0].0).ln() / (pair[1].0 / pair[0].0).ln();
-    let between = |a: f64, b: f64| a.max(0.0).powf(1.0 - share) * b.max(0.0).powf(share);
-    let (a, b) = (pair[0].1, pair[1].1);
-    Some(Interval {
-        value: between(a.value, b.value),
-        low: between(a.low, b.low),
-        high: between(a.high, b.high),
-    })
+    let i = (curve.windows(2)).position(|pair| pair[0] < seconds && seconds < pair[1])?;
+    let share = (seconds / curve[i]).ln() / (curve[i + 1] / curve[i]).ln();
+    Some(([i, i + 1], share))
 }
 
 #[cfg(test)]

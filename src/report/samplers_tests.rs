@@ -42,6 +42,7 @@ fn records(noise: f64, part_noise: f64, replicates: u32, g: &mut Pcg32) -> Vec<E
         seed: replicate,
         resolution: [PIXELS as u32, 1],
         errors: [1, 2, 4].map(&mut at).to_vec(),
+        stop: None,
         non_finite_pixels: 0,
         image_hash: String::new(),
         image: None,
@@ -139,16 +140,71 @@ fn one_replicate_is_shown_without_interval_and_not_ranked() {
 }
 
 #[test]
-fn interpolation_follows_a_power_law_and_ends_with_the_curve() {
-    let curve = [(1.0, Interval::exact(8.0)), (4.0, Interval::exact(2.0))];
-    assert!((error_after(&curve, 2.0).unwrap().value - 4.0).abs() < 1e-12);
-    assert_eq!(error_after(&curve, 4.0).unwrap().value, 2.0);
-    assert!(error_after(&curve, 5.0).is_none());
-    let wide = |value| Interval {
-        value,
-        low: -1.0,
-        high: 10.0,
+fn a_time_has_a_place_on_a_curve_and_none_outside() {
+    let curve = [1.0, 4.0, 16.0];
+    let (neighbours, share) = place_on(&curve, 8.0).unwrap();
+    assert_eq!(neighbours, [1, 2]);
+    assert!((share - 0.5).abs() < 1e-12);
+    assert_eq!(place_on(&curve, 4.0), Some(([1, 1], 0.0)));
+    assert_eq!(place_on(&curve, 17.0), None);
+    assert_eq!(place_on(&curve, 0.5), None);
+}
+
+#[test]
+fn what_samples_an_error_takes_has_an_interval_that_holds_the_truth() {
+    const TRIALS: usize = 400;
+    // The error of one sample falls as one over the samples: three are needed for a third of it.
+    let target = NOISE * NOISE / 3.0 / (TRUTH * TRUTH + 0.01);
+    let mut generator = Pcg32::new(35);
+    let (mut covered, mut narrowed) = (0, 0);
+    for _ in 0..TRIALS {
+        let records = records(NOISE, NOISE / 8.0, 8, &mut generator);
+        let sampler = sampler(&records);
+        let Some(spp) = sampler.spp_to(Metric::RelMse, target) else {
+            continue;
+        };
+        let interval = spp.interval();
+        let off = (interval.value / 3.0).ln().abs();
+        covered += usize::from(interval.low <= 3.0 && 3.0 <= interval.high);
+        narrowed += usize::from(off <= 0.5 * (interval.high / interval.value).ln());
+        assert_eq!(sampler.spp_to(Metric::RelMse, 100.0 * target), None);
+    }
+    let share = |count: usize| count as f64 / TRIALS as f64;
+    assert!((0.92..=0.98).contains(&share(covered)), "{covered}");
+    // Negative control: half of the width.
+    assert!(share(narrowed) < 0.8, "{narrowed}");
+}
+
+#[test]
+fn errors_on_one_reference_are_compared_without_the_noise_that_they_share() {
+    let mut generator = Pcg32::new(36);
+    // The reference is so noisy that it makes most of both intervals.
+    let parts: Vec<Image> = (0..8).map(|_| noisy(0.5 * NOISE, &mut generator)).collect();
+    let reference = Reference::from_parts(parts).unwrap();
+    let mut of = |noise: f64| -> Vec<ErrorRecord> {
+        let mut record = |replicate| {
+            let report = measure(&noisy(noise, &mut generator), &reference).unwrap();
+            let mut record = records(NOISE, NOISE, 1, &mut Pcg32::new(1)).remove(0);
+            record.replicate = replicate;
+            record.errors.truncate(1);
+            record.errors[0].metrics = report.metrics;
+            record.errors[0].without_part = report.without_part;
+            record
+        };
+        (0..16).map(&mut record).collect()
     };
-    let between = error_after(&[(1.0, wide(8.0)), (4.0, wide(2.0))], 2.0).unwrap();
-    assert!(between.low == 0.0 && (between.high - 10.0).abs() < 1e-9);
+    let (a, b) = (of(NOISE), of(1.15 * NOISE));
+    let log = |records: &[ErrorRecord]| {
+        sampler(records)
+            .log_error(Metric::RelMse, [1, 1], 0.0)
+            .unwrap()
+    };
+    let (a, b) = (log(&a), log(&b));
+    let together = a.compared_with(&b).p;
+    let apart = LogFigure {
+        shared: a.shared[..1].to_vec(),
+        ..a.clone()
+    };
+    assert!(together < apart.compared_with(&b).p, "{together}");
+    assert!(together < 0.01, "{together}");
 }

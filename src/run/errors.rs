@@ -1,12 +1,14 @@
 //! Error: once per scene, integrator and sampler, through the fastest gated structure.
 
 use super::images::{self, Estimator};
+use super::paths;
 use super::reference::{Yardstick, reference, reference_structure};
 use super::session::{Session, content_hash};
 use super::structures::Gated;
 use super::world::World;
 use super::{Fault, RunError};
-use crate::config::{Axis, Cell};
+use crate::config::{Axis, Cell, StopRule};
+use crate::gpu::GpuError;
 use crate::image::{Image, Picture, tone_map, viridis};
 use crate::integrator::{Renderer, Snapshot, rounding_bound};
 use crate::measure::bias::{BiasOptions, BiasVerdict, check_bias};
@@ -18,6 +20,7 @@ use crate::measure::spectrum::{
     ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power,
 };
 use crate::measure::statistics::mean_interval;
+use crate::measure::stopping::is_met_by;
 
 /// Relative error per pixel at the top of the colour scale of error maps.
 const ERROR_MAP_FULL_SCALE: f32 = 1.0;
@@ -164,43 +167,158 @@ fn sampler_error(
 ) -> Result<(), Fault> {
     session.say(cell.to_string());
     let passes = passes(session, world, fastest, cell)?;
+    paths::check(session, world, &fastest.traced, cell)?;
     let mut kernels: Vec<_> = passes.iter().map(|p| p.renderer.kernel_hash()).collect();
     kernels.dedup();
     let tables: String = passes.iter().map(|pass| pass.table.as_str()).collect();
     let blank = Line::new(Key::from(cell), Ran::kernel(kernels.join("+")), ());
-    let hash = content_hash(&blank, &world.scene.hash, &[("sampler table", &tables)]);
+    let rule = session.experiment.stop;
+    let stop = rule.map(|rule| format!("{rule:?}"));
+    let mut also = vec![("sampler table", tables.as_str())];
+    also.extend(stop.as_deref().map(|stop| ("stop", stop)));
+    let hash = content_hash(&blank, &world.scene.hash, &also);
     let line = |body| blank.clone().hashed(&hash).with_body(|()| body);
+    let replicates = match rule {
+        None => all_samples(session, cell, yardstick, &passes, &line)?,
+        Some(rule) => until_met(session, cell, yardstick, &passes, &line, rule)?,
+    };
+    session.finish(cell.to_string());
+    let spp = replicates.spp;
+    let finals = replicates.images;
+    let bias = bias_record(session, cell, &finals, yardstick)?;
+    session.write(&line(Body::Bias(bias)))?;
+    let spectrum = spectrum_record(session, spp, &finals, yardstick)?;
+    session.write(&line(Body::Spectrum(spectrum)))?;
+    Ok(())
+}
+
+/// The images of all replicates at the most samples per pixel that they took.
+struct Replicates {
+    spp: u32,
+    images: Vec<Image>,
+}
+
+/// The seeds of a sampler's replicates, by their numbers.
+fn replicates(session: &Session, cell: &Cell) -> Vec<(u32, u32)> {
     let seeds = session.experiment.seeds().replicates;
-    let seeds = seeds.into_iter().take(session.plan.renders(cell) as usize);
-    let mut finals = Vec::new();
-    for (replicate, seed) in (0..).zip(seeds) {
+    let count = session.plan.renders(cell) as usize;
+    (0..).zip(seeds.into_iter().take(count)).collect()
+}
+
+/// Each replicate at all numbers of samples, written as soon as it is there.
+fn all_samples(
+    session: &mut Session,
+    cell: &Cell,
+    yardstick: &Yardstick,
+    passes: &[Pass],
+    line: &impl Fn(Body) -> Line,
+) -> Result<Replicates, Fault> {
+    let mut images = Vec::new();
+    for (replicate, seed) in replicates(session, cell) {
         let mut snapshots = Vec::new();
-        for pass in &passes {
+        for pass in passes {
             let render = || pass.renderer.render(&pass.spps, seed);
             let rendered = session.clock.time("gpu", render);
             snapshots.extend(rendered.map_err(|e| e.to_string())?);
         }
         let record = error_record(session, cell, yardstick, &snapshots, (replicate, seed))?;
-        if record.non_finite_pixels > 0 {
-            let count = record.non_finite_pixels;
-            let reason = format!("replicate {replicate} has {count} pixels that are not finite");
-            return Err(reason.into());
-        }
+        check_finite(&record)?;
         session.write(&line(Body::Error(record)))?;
-        finals.extend(snapshots.into_iter().last().map(|s| s.image));
+        images.extend(snapshots.into_iter().last().map(|s| s.image));
         session.progress.inc(1);
     }
-    session.finish(cell.to_string());
-    let bias = bias_record(session, cell, &finals, yardstick)?;
-    session.write(&line(Body::Bias(bias)))?;
-    let spectrum = spectrum_record(session, &finals, yardstick)?;
-    session.write(&line(Body::Spectrum(spectrum)))?;
-    Ok(())
+    Ok(Replicates {
+        spp: session.experiment.spp.max(),
+        images,
+    })
+}
+
+/// All replicates at one number of samples after the other, until the rule is met, or to the last. Their records are
+/// written at the end.
+fn until_met(
+    session: &mut Session,
+    cell: &Cell,
+    yardstick: &Yardstick,
+    passes: &[Pass],
+    line: &impl Fn(Body) -> Line,
+    rule: StopRule,
+) -> Result<Replicates, Fault> {
+    let steps: Vec<(&Pass, u32)> = passes
+        .iter()
+        .flat_map(|pass| pass.spps.iter().map(move |spp| (pass, *spp)))
+        .collect();
+    let seeds = replicates(session, cell);
+    let mut snapshots: Vec<Vec<Snapshot>> = vec![Vec::new(); seeds.len()];
+    let mut records: Vec<ErrorRecord> = Vec::new();
+    for &(pass, spp) in &steps {
+        records.clear();
+        for (taken, &(replicate, seed)) in snapshots.iter_mut().zip(&seeds) {
+            let before = taken.last().filter(|_| pass.spps.len() > 1);
+            let further = || further_samples(pass, before, spp, seed);
+            let snapshot = session.clock.time("gpu", further);
+            taken.push(snapshot.map_err(|e| e.to_string())?);
+            let record = error_record(session, cell, yardstick, taken, (replicate, seed))?;
+            check_finite(&record)?;
+            records.push(record);
+        }
+        let all: Vec<&ErrorRecord> = records.iter().collect();
+        if is_met_by(&rule, &all, spp, steps.len()) {
+            break;
+        }
+    }
+    for record in &mut records {
+        record.stop = Some(rule);
+        session.write(&line(Body::Error(record.clone())))?;
+        session.progress.inc(1);
+    }
+    let last = snapshots
+        .into_iter()
+        .filter_map(|taken| taken.into_iter().last());
+    let last: Vec<Snapshot> = last.collect();
+    Ok(Replicates {
+        spp: last.first().map_or(0, |snapshot| snapshot.spp),
+        images: last.into_iter().map(|snapshot| snapshot.image).collect(),
+    })
+}
+
+/// The image at `spp` samples: those before, and the ones that are missing.
+fn further_samples(
+    pass: &Pass,
+    before: Option<&Snapshot>,
+    spp: u32,
+    seed: u32,
+) -> Result<Snapshot, GpuError> {
+    let renderer = &pass.renderer;
+    let done = before.map_or(0, |snapshot| snapshot.spp);
+    renderer.reset()?;
+    renderer.add_samples(done, spp - done, seed)?;
+    let mut image = renderer.image()?;
+    if let Some(before) = before {
+        let share = f64::from(done) / f64::from(spp);
+        let pairs = image.pixels.iter_mut().zip(&before.image.pixels);
+        for (new, old) in pairs.flat_map(|(new, old)| new.iter_mut().zip(old)) {
+            *new = (share * f64::from(*old) + (1.0 - share) * f64::from(*new)) as f32;
+        }
+    }
+    Ok(Snapshot { spp, image })
+}
+
+fn check_finite(record: &ErrorRecord) -> Result<(), String> {
+    match record.non_finite_pixels {
+        0 => Ok(()),
+        count => {
+            let replicate = record.replicate;
+            Err(format!(
+                "replicate {replicate} has {count} pixels that are not finite"
+            ))
+        }
+    }
 }
 
 /// The spectra of all replicates, at the highest number of samples.
 fn spectrum_record(
     session: &Session,
+    spp: u32,
     images: &[Image],
     yardstick: &Yardstick,
 ) -> Result<SpectrumRecord, String> {
@@ -216,7 +334,7 @@ fn spectrum_record(
         mean_interval(&values)
     };
     Ok(SpectrumRecord {
-        spp: session.experiment.spp.max(),
+        spp,
         replicates: spectra.len(),
         power: mean_power(&spectra),
         low_frequency: mean(|s| s.low_frequency),
@@ -251,6 +369,7 @@ fn error_record(
         seed,
         resolution: session.experiment.resolution,
         errors,
+        stop: None,
         non_finite_pixels,
         image_hash: image_hash(&last.image),
         image: None,

@@ -7,6 +7,7 @@ mod errors;
 mod folder;
 mod images;
 mod kernels;
+mod paths;
 mod reference;
 mod registries;
 mod render;
@@ -26,7 +27,7 @@ pub use render::{Rendering, render};
 
 use crate::config::{Cell, Experiment, Plan};
 use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
-use crate::measure::record::GateVerdict;
+use crate::measure::record::{GateVerdict, PathsRecord};
 pub use crate::measure::words::dump_stream;
 use crate::params::Variant;
 use kernels::Device;
@@ -157,6 +158,8 @@ pub struct Verified {
     pub bad_input: bool,
     /// Whether there is none because the driver ends loops too early for the structure.
     pub refused: bool,
+    /// Verdicts on integrators, through the first structure that passed with its kernels.
+    pub paths: Vec<(Cell, PathsRecord)>,
 }
 
 /// Runs a plan, writes `records.jsonl` and images to `options.out`, which another run cannot write
@@ -326,15 +329,18 @@ fn verify_cell(
         verdict: Err("no verdict".to_owned()),
         bad_input: matches!(world, Err(Absent::BadInput(_))),
         refused: false,
+        paths: Vec::new(),
     };
     match world {
         Err(Absent::BadInput(reason) | Absent::NotKept(reason)) => {
             verified.verdict = Err(reason.clone());
         }
         Ok(world) => {
-            let record = structures::build_and_gate(session, world, cell)?
-                .record
-                .body;
+            let candidate = structures::build_and_gate(session, world, cell)?;
+            if let Some(traced) = candidate.traced.as_ref().filter(|t| t.is_inline()) {
+                verified.paths = paths::verify(session, world, traced, cell)?;
+            }
+            let record = candidate.record.body;
             verified.refused = record.refused;
             verified.verdict = record.gate.ok_or(record.failure.unwrap_or_default());
         }

@@ -59,6 +59,8 @@ pub(super) struct Session<'a> {
     done: HashSet<String>,
     /// Samplers whose words were compared with the twin's.
     pub compared: HashSet<String>,
+    /// What is wrong with the integrators that were judged.
+    pub judged: BTreeMap<String, Option<String>>,
     /// `None`: nothing is written (gate alone, single images).
     folder: Option<Arc<Folder>>,
 }
@@ -108,6 +110,7 @@ impl<'a> Session<'a> {
             refused: BTreeMap::new(),
             done: HashSet::new(),
             compared: HashSet::new(),
+            judged: BTreeMap::new(),
             folder: None,
         }
     }

@@ -129,6 +129,7 @@ fn a_minimal_file_gets_the_documented_defaults() {
     );
     assert_eq!(experiment.timing.rounds, 9);
     assert_eq!(experiment.gate.rays, 32768);
+    assert_eq!(experiment.stop, None);
     assert_eq!(
         experiment.discrepancy.pairs,
         [[0, 1], [2, 3], [4, 5], [0, 2], [1, 3], [2, 4]]
@@ -141,6 +142,7 @@ fn every_section_is_read() {
     let experiment = good(
         "[run]\nname = \"n\"\nreplicates = 2\nseed = 7\nresolution = [64, 48]\n\
          spp = { pow2 = [1, 3] }\nruntime_checks = false\n\
+         stop = { relmse = 1e-3, confidence = 0.9 }\n\
          [camera]\neye = [0, 1, 2.5]\ntarget = [0, 0, 0]\nfov = 60\n\
          [reference]\nspp = 64\nsequence = \"sobol\"\ndecorrelation = \"cranley-patterson\"\n\
          seed = 3\n[timing]\nrounds = 5\nspp = 2\nmin_warmup_ms = 1\nmax_warmup_ms = 10\n\
@@ -152,6 +154,8 @@ fn every_section_is_read() {
     assert_eq!(experiment.resolution, [64, 48]);
     assert_eq!(experiment.spp.counts().collect::<Vec<_>>(), [2, 4, 8]);
     assert!(!experiment.runtime_checks);
+    let stop = experiment.stop.expect("a rule");
+    assert_eq!((stop.relmse, stop.confidence), (1e-3, 0.9));
     let camera = experiment.camera.expect("a camera");
     assert_eq!(camera.eye.to_array(), [0.0, 1.0, 2.5]);
     assert_eq!(camera.up.to_array(), [0.0, 1.0, 0.0]);

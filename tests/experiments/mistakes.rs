@@ -191,6 +191,14 @@ fn a_value_out_of_range_is_answered_with_the_range() {
             "[run]\nspp = { pow2 = [3, 2] }\n",
             [":6", "[3, 2]", "lo <= hi"],
         ),
+        (
+            "[run]\nstop = { relmse = 0, confidence = 0.95 }\n",
+            [":6", "`run.stop` = relmse = 0", "x > 0"],
+        ),
+        (
+            "[run]\nstop = { relmse = 1e-3, confidence = 1 }\n",
+            [":6", "confidence = 1", "p < 1"],
+        ),
         ("[run]\nname = \"\"\n", [":6", "`run.name`", "not empty"]),
         (
             "[timing]\nmin_warmup_ms = 50\nmax_warmup_ms = 49\n",

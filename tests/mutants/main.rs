@@ -165,6 +165,30 @@ fn every_fault_of_the_table_is_seen_or_explained() {
     assert!(report.is_passed(), "{}", report.verdict());
 }
 
+/// The gate of integrators alone sees the faults that images are checked for by other means, too.
+#[test]
+#[ignore = "minutes: all faults of integrators"]
+fn single_paths_show_every_fault_of_integrators() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let options = Options {
+        adapter: AdapterChoice::Best,
+        folder: folder.path().to_owned(),
+        names: Vec::new(),
+    };
+    let of_images = |m: &Mutant| matches!(m.subject, Subject::Integrators | Subject::Paths);
+    let by_paths = |m: Mutant| Mutant {
+        subject: Subject::Paths,
+        expected: Check::Paths,
+        ..m
+    };
+    let selected = mutants().into_iter().filter(of_images).map(by_paths);
+    let note = |outcome: &Outcome| println!("{}: {:?}", outcome.mutant.name, outcome.killed_by());
+    let report = plan::run_selected(&options, selected.collect(), &note);
+    let report = report.unwrap_or_else(|e| panic!("{e}"));
+    println!("{}", report.table());
+    assert!(report.is_passed(), "{}", report.verdict());
+}
+
 #[test]
 fn a_run_is_not_passed_with_a_survivor_or_a_red_control() {
     let (mut report, _) = run(&["tie-broken-the-other-way"]);

@@ -121,9 +121,17 @@ pub struct Options {
 /// An unknown name, a fault that no longer applies (whatever is selected: the whole table is
 /// checked), no adapter, or a check that cannot be carried out.
 pub fn run(options: &Options, progress: &(dyn Fn(&Outcome) + Sync)) -> Result<Report, MutantError> {
-    let start = Instant::now();
     check_table()?;
-    let selected = select(&options.names)?;
+    run_selected(options, select(&options.names)?, progress)
+}
+
+/// The same with these mutants.
+pub fn run_selected(
+    options: &Options,
+    selected: Vec<Mutant>,
+    progress: &(dyn Fn(&Outcome) + Sync),
+) -> Result<Report, MutantError> {
+    let start = Instant::now();
     let subjects = subjects_of(&selected);
     let world = World::new(options, &selected).map_err(|e| e.of("(none)"))?;
     let jobs: Vec<Job> = subjects

@@ -29,6 +29,8 @@ pub enum Subject {
     },
     /// The integrators, with a plain BVH and independent samples.
     Integrators,
+    /// Single paths of the integrators, with the same.
+    Paths,
 }
 
 impl Subject {
@@ -46,6 +48,7 @@ impl Subject {
                 decorrelation,
             } => format!("{} × {decorrelation}", with(sequence, changes)),
             Self::Integrators => "integrators".to_owned(),
+            Self::Paths => "single paths".to_owned(),
         }
     }
 
@@ -65,6 +68,7 @@ impl Subject {
                 Check::ThinWalls,
                 Check::Bias,
             ],
+            Self::Paths => &[Check::Paths],
         }
     }
 }

@@ -1,6 +1,7 @@
 //! What is recorded of the errors of samplers and of the references they are measured against.
 
 use super::Interval;
+use crate::config::StopRule;
 use crate::measure::bias::BiasVerdict;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -51,6 +52,9 @@ pub struct ErrorRecord {
     pub resolution: [u32; 2],
     /// Error at 1, 2, 4, … samples per pixel.
     pub errors: Vec<ErrorAtSpp>,
+    /// The rule that may have ended the sampler before the most samples of the experiment.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stop: Option<StopRule>,
     /// Pixels that were NaN or infinite (any is a failure).
     pub non_finite_pixels: usize,
     /// BLAKE3 of the f32 image at the highest spp.

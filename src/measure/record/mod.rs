@@ -5,6 +5,7 @@
 mod error;
 mod key;
 mod old;
+mod paths;
 mod read;
 mod run;
 mod stream;
@@ -12,6 +13,7 @@ mod structure;
 
 pub use error::*;
 pub use key::{Key, axis};
+pub use paths::PathsRecord;
 pub use read::{
     PARTIAL, RECORDS_FILE, RecordError, Records, STRESS_FILE, read_lines, read_records, text_of,
 };
@@ -125,6 +127,8 @@ pub enum Body {
     Scene(SceneRecord),
     /// A structure was built, gated and traced with the recorded rays.
     Structure(StructureRecord),
+    /// Single paths of an integrator were judged.
+    Paths(PathsRecord),
     /// A reference image was rendered.
     Reference(ReferenceRecord),
     /// Error of one replicate of a sampler against the reference, per spp.
@@ -176,6 +180,7 @@ kinds! {
     Run: RunRecord,
     Scene: SceneRecord,
     Structure: StructureRecord,
+    Paths: PathsRecord,
     Reference: ReferenceRecord,
     Error: ErrorRecord,
     Bias: BiasRecord,
@@ -252,11 +257,6 @@ impl Interval {
             low: factor * self.low,
             high: factor * self.high,
         }
-    }
-
-    /// Whether two intervals have no point in common: only then is a winner named.
-    pub fn is_apart_from(&self, other: &Interval) -> bool {
-        self.low > other.high || other.low > self.high
     }
 }
 

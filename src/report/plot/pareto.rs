@@ -4,6 +4,7 @@ use super::axis::{Axes, Axis};
 use super::drawing::{Anchor, DIM, Drawing, INK, Point};
 use super::legend;
 use super::marker;
+use crate::measure::comparison::Place;
 use crate::measure::record::Interval;
 use crate::measure::statistics::pareto_front;
 
@@ -18,6 +19,8 @@ pub struct CellPoint {
     pub seconds: Interval,
     /// Error of the image, positive.
     pub error: Interval,
+    /// Whether it is on the Pareto front, by a test.
+    pub place: Place,
 }
 
 /// The plot of one scene and integrator.
@@ -47,7 +50,7 @@ pub fn letter(index: usize) -> String {
 }
 
 impl ParetoPlot {
-    /// Indices of the points of the front, by growing time.
+    /// Indices of the points of the front as measured, by growing time: each is on it for certain, or that is open.
     pub fn front(&self) -> Vec<usize> {
         let points = self.points.iter();
         let points = points.map(|p| (p.seconds.value, p.error.value));
@@ -60,6 +63,15 @@ impl ParetoPlot {
             "{} · {}",
             self.structures[point.structure].0, self.samplers[point.sampler].0
         )
+    }
+
+    /// Label of a point of the front.
+    fn rank(&self, rank: usize, point: usize) -> String {
+        let open = match self.points[point].place {
+            Place::Front => "",
+            Place::Open | Place::Beaten => "?",
+        };
+        format!("{}{open}", rank + 1)
     }
 
     /// The picture; `None` without a point with positive time and error.
@@ -135,7 +147,7 @@ impl ParetoPlot {
         let ranks = front
             .iter()
             .enumerate()
-            .map(|(rank, &i)| (i, (rank + 1).to_string(), INK));
+            .map(|(rank, &i)| (i, self.rank(rank, i), INK));
         let letters = (0..self.points.len()).map(|i| (i, letter(self.points[i].structure), DIM));
         for (i, text, ink) in ranks.chain(letters) {
             let (x, y) = at(i);
@@ -175,13 +187,13 @@ impl ParetoPlot {
         left.y = left.y.max(right.y) + legend::ROW / 2.0;
         left.title(
             drawing,
-            "Pareto front: no cell is both faster and better",
+            "Pareto front: no cell is both faster and better (?: the noise leaves it open)",
             DIM,
         );
         let mut fronts = legend::Rows::new(left.y - legend::ROW / 2.0, (16.0, WIDTH));
         for (rank, &i) in front.iter().enumerate() {
             fronts.add(drawing, &self.name(&self.points[i]), INK, |drawing, y| {
-                drawing.text((34.0, y), (rank + 1).to_string(), INK, Anchor::End);
+                drawing.text((34.0, y), self.rank(rank, i), INK, Anchor::End);
             });
         }
     }
@@ -198,6 +210,11 @@ mod tests {
             sampler: 0,
             seconds: Interval::exact(seconds),
             error: Interval::exact(error),
+            place: if structure == 0 {
+                Place::Front
+            } else {
+                Place::Open
+            },
         };
         let plot = ParetoPlot {
             x_title: "seconds".into(),
@@ -207,6 +224,10 @@ mod tests {
             points: vec![point(0, 1.0, 0.1), point(1, 9.0, 0.1)],
         };
         let drawing = plot.draw().unwrap();
+        assert!(drawing.texts().contains(&"1") && !drawing.texts().contains(&"1?"));
+        let mut open = plot.clone();
+        open.points[0].place = Place::Open;
+        assert!(open.draw().unwrap().texts().contains(&"1?"));
         assert!(drawing.texts().contains(&"bvh · sobol × none"));
         assert!(!drawing.texts().contains(&"brute-force · sobol × none"));
     }

@@ -1,7 +1,7 @@
 //! Why to believe the figures: every check of the run, with what it rests on.
 
 use crate::measure::bias::BiasVerdict;
-use crate::measure::record::{GateVerdict, JudgeCheck, TimeRecord, Verdict, axis};
+use crate::measure::record::{GateVerdict, JudgeCheck, PathsRecord, TimeRecord, Verdict, axis};
 use crate::report::data::{Measured, RunData, SAMPLER_AXES, SceneGroup};
 use crate::report::document::*;
 use crate::report::format::{self, count, plural};
@@ -27,6 +27,7 @@ pub fn checks(data: &RunData) -> Vec<Check> {
         &gate.oracle
     }));
     checks.push(images(data));
+    checks.extend(paths(data));
     checks.push(bias(data));
     checks.push(finite_pixels(data));
     checks.push(reference_noise(data));
@@ -153,6 +154,34 @@ fn images(data: &RunData) -> Check {
         !unequal.is_empty(),
         detail + ".",
     )
+}
+
+/// Single paths of integrators against the oracle for images; nothing where a run judged none.
+fn paths(data: &RunData) -> Option<Check> {
+    let sum = |of: fn(&PathsRecord) -> usize| data.paths.iter().map(|p| of(p.body)).sum::<usize>();
+    let [judged, wrong] = [sum(|p| p.paths), sum(|p| p.wrong)];
+    let mut detail = format!(
+        "{} against double precision: {} differ; {} ill-conditioned, {} within rounding of a decision",
+        plural(judged, "path"),
+        count(wrong as u64),
+        count(sum(|p| p.ill_conditioned) as u64),
+        count(sum(|p| p.flips) as u64),
+    );
+    for one in &data.paths {
+        let [scene, integrator] = [axis::SCENE, axis::INTEGRATOR].map(|axis| one.key.label(axis));
+        if let Some(reason) = &one.not_judged {
+            detail += &format!("; {integrator} on {scene} is NOT JUDGED: {reason}");
+        }
+        if let Some(fault) = &one.fault {
+            detail += &format!("; {integrator} on {scene} FAILED: {fault}");
+        }
+    }
+    let failed = data.paths.iter().any(|p| p.fault.is_some());
+    (!data.paths.is_empty()).then(|| Check {
+        verdict: Verdict::new(judged > 0, failed),
+        title: "Integrators path by path".into(),
+        detail: detail + ".",
+    })
 }
 
 fn bias(data: &RunData) -> Check {

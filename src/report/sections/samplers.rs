@@ -146,7 +146,13 @@ pub fn efficiency_table(view: &View, values: &[Value]) -> Table {
     let values: Vec<Value> = values.iter().filter(is_its).cloned().collect();
     let timed = |s: &&MeasuredSampler| view.ms_per_spp(&race.structure, &s.name).is_some();
     let rows = rows(view.samplers.iter().filter(timed), &SAMPLER, |_| Vec::new());
-    let figures = ["ms-per-spp/v1", "error-seconds/v1", "error-at-time/v1"];
+    let figures = [
+        "ms-per-spp/v1",
+        "error-seconds/v1",
+        "error-at-time/v1",
+        "spp-to-error/v1",
+        "seconds-to-error/v1",
+    ];
     let part = |key: &Key| key.label(axis::SUBJECT).to_owned();
     rows.table(&values, caption, &figures, &part)
 }

@@ -1,13 +1,14 @@
 //! Who wins, per scene.
 
+use crate::measure::comparison::LogFigure;
 use crate::measure::figure::figure;
 use crate::measure::record::{ClassTiming, Interval, RayClass, StructureRecord, axis};
-use crate::measure::statistics::LEAST_FOR_MEDIAN;
+use crate::measure::statistics::{LEAST_FOR_MEDIAN, Spread};
 use crate::report::data::{Measured, RunData, SceneGroup, View};
 use crate::report::document::*;
 use crate::report::format;
 use crate::report::ruling::{Contender, Ruling, judge};
-use crate::report::samplers::{MeanError, MeasuredSampler, Metric, error_after};
+use crate::report::samplers::{MeanError, MeasuredSampler, Metric, log_time, place_on};
 use crate::report::values::Value;
 
 /// The verdict box.
@@ -20,13 +21,53 @@ pub fn section(data: &RunData) -> Section {
         section.blocks.extend(apart(scene));
     }
     let rule = match section.blocks.is_empty() {
-        true => "Nothing was measured.",
-        false => {
-            "A winner is named only where its 95 % interval is apart from that of every other."
-        }
+        true => "Nothing was measured.".to_owned(),
+        false => rule(data),
     };
-    section.blocks.push(Block::Paragraph(rule.into()));
+    section.blocks.push(Block::Paragraph(rule));
     section
+}
+
+/// How winners are found, and how many comparisons that took.
+fn rule(data: &RunData) -> String {
+    let rulings = || data.scenes.iter().flat_map(rulings);
+    let compared = || rulings().map(|(_, ruling)| ruling.comparisons());
+    let questions = compared().filter(|pairs| *pairs > 0).count();
+    format!(
+        "A winner is named only where it differs from every other: by Welch's test of the logarithms, with the noise of \
+         images, reference and times together, at 5 % for all pairs of a question (Holm's correction). Where a question \
+         stays undecided, those are named that do not differ from the best. {} made in {}.",
+        format::plural(compared().sum(), "comparison"),
+        format::plural(questions, "question")
+    )
+}
+
+/// Questions of one scene, each with what is ruled.
+fn rulings(scene: &SceneGroup) -> Vec<(String, Ruling)> {
+    let mut rulings = Vec::new();
+    for class in ray_classes(scene) {
+        let question = format!("fastest, {} rays (Mrays/s)", format::ray_class(class));
+        rulings.push((question, fastest(scene, class)));
+    }
+    let metric = Metric::RelMse.name();
+    for view in &scene.views {
+        if let Some(spp) = view.common_spp() {
+            let question = format!(
+                "least error per sample: {}, {metric} at {spp} spp",
+                view.name
+            );
+            rulings.push((question, best_per_sample(view, spp)));
+        }
+        if let Some(race) = Race::new(view) {
+            let question = format!(
+                "least error per second: {}, {metric} after {} s",
+                view.name,
+                format::number(race.seconds)
+            );
+            rulings.push((question, race.ruling()));
+        }
+    }
+    rulings
 }
 
 /// The verdicts on one scene.
@@ -38,30 +79,14 @@ pub fn table(scene: &SceneGroup) -> Table {
             ":answer",
             ":figure [95 % interval]",
             ":next best (ratio)",
+            "pairs compared",
         ],
     );
-    for class in ray_classes(scene) {
-        let question = format!("fastest, {} rays (Mrays/s)", format::ray_class(class));
-        table.rows.push(row(question, &fastest(scene, class)));
-    }
-    let metric = Metric::RelMse.name();
-    for view in &scene.views {
-        if let Some(spp) = view.common_spp() {
-            let question = format!(
-                "least error per sample: {}, {metric} at {spp} spp",
-                view.name
-            );
-            table.rows.push(row(question, &best_per_sample(view, spp)));
-        }
-        if let Some(race) = Race::new(view) {
-            let question = format!(
-                "least error per second: {}, {metric} after {} s",
-                view.name,
-                format::number(race.seconds)
-            );
-            table.rows.push(row(question, &race.ruling()));
-        }
-    }
+    let rulings = rulings(scene);
+    let rows = rulings
+        .into_iter()
+        .map(|(question, ruling)| row(question, &ruling));
+    table.rows.extend(rows);
     table
 }
 
@@ -69,11 +94,18 @@ fn row(question: String, ruling: &Ruling) -> Vec<TableCell> {
     let tone = match ruling {
         Ruling::Winner(..) => Tone::Good,
         Ruling::Nobody => Tone::Bad,
-        Ruling::Withheld(_) | Ruling::Alone(_) | Ruling::Unclear(_) => Tone::Note,
+        Ruling::Withheld(_) | Ruling::Alone(_) | Ruling::Unclear(..) => Tone::Note,
     };
     let answer = TableCell::from(ruling.answer()).toned(tone);
     let (figure, next) = (ruling.figure(), ruling.runner_up());
-    vec![question.into(), answer, figure.into(), next.into()]
+    let pairs = ruling.comparisons().to_string();
+    vec![
+        question.into(),
+        answer,
+        figure.into(),
+        next.into(),
+        pairs.into(),
+    ]
 }
 
 /// Who may not win, with the reason, and who is shown without being ranked.
@@ -119,12 +151,12 @@ pub fn ray_classes(scene: &SceneGroup) -> Vec<RayClass> {
 pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
     let contender = |s: &Measured<StructureRecord>| {
         let timing: &ClassTiming = s.timings.iter().find(|timing| timing.class == class)?;
-        let name = s.structure.clone();
-        let has_spread = timing.ms.len() >= LEAST_FOR_MEDIAN;
+        let often = timing.ms.len() >= LEAST_FOR_MEDIAN;
+        let ms = LogFigure::of_times(&timing.ms).filter(|_| often);
         s.fault().is_none().then_some(Contender {
-            name,
+            name: s.structure.clone(),
             figure: timing.mrays_s,
-            has_spread,
+            log: ms.map(|ms| ms.inverse().scaled(1e-3 * timing.rays as f64)),
         })
     };
     judge(
@@ -139,7 +171,7 @@ pub fn best_per_sample(view: &View, spp: u32) -> Ruling {
         Some(Contender {
             name: sampler.name.clone(),
             figure: sampler.mean_error_at(Metric::RelMse, spp)?.error,
-            has_spread: sampler.is_ranked(),
+            log: (sampler.log_error(Metric::RelMse, [spp; 2], 0.0)).filter(|_| sampler.is_ranked()),
         })
     };
     let fair = view.samplers.iter().filter(|s| s.fault().is_none());
@@ -166,24 +198,68 @@ pub struct Race<'a> {
 
 struct Runner<'a> {
     sampler: &'a MeasuredSampler<'a>,
-    ms_per_spp: Interval,
-    /// How often that was measured.
-    rounds: usize,
-    /// Seconds and error, by growing time; resolved ones only.
-    curve: Vec<(f64, Interval)>,
+    /// Milliseconds per sample per pixel.
+    time: LogFigure,
+    /// Samples per pixel and seconds, growing; those whose errors are resolved.
+    curve: Vec<(u32, f64)>,
 }
 
-impl Runner<'_> {
-    /// The error after so many seconds. Its interval also holds what the time per sample leaves open:
-    /// errors fall about as one over the number of samples, which the time decides on.
-    fn error_after(&self, seconds: f64) -> Option<Interval> {
-        let error = error_after(&self.curve, seconds)?;
-        let ms = self.ms_per_spp;
-        Some(Interval {
-            low: error.low * ms.low / ms.value,
-            high: error.high * ms.high / ms.value,
-            ..error
+impl<'a> Runner<'a> {
+    fn new(view: &View, structure: &str, sampler: &'a MeasuredSampler<'a>) -> Option<Self> {
+        let time = log_time(view.time(structure, &sampler.name)?)?;
+        let means = sampler.mean_errors(Metric::RelMse);
+        let resolved = means.iter().filter(|mean| mean.resolved);
+        let at = |m: &MeanError| (m.spp, f64::from(m.spp) * time.log.exp() / 1000.0);
+        Some(Self {
+            sampler,
+            curve: resolved.map(at).collect(),
+            time,
         })
+    }
+
+    /// Whether all its noise is known.
+    fn is_ranked(&self) -> bool {
+        self.sampler.is_ranked() && !self.time.own.is_empty()
+    }
+
+    /// The noise of the time in a figure that goes as this power of it; none beside an image whose own noise is not
+    /// known.
+    fn noise(&self, power: f64) -> Option<Spread> {
+        let noise = self.time.own.first().filter(|_| self.sampler.is_ranked())?;
+        Some(noise.times(power * power))
+    }
+
+    /// The error after so many seconds. A time per sample that is off by a part moves it along the curve.
+    fn error_after(&self, seconds: f64) -> Option<LogFigure> {
+        let times: Vec<f64> = self.curve.iter().map(|at| at.1).collect();
+        let (neighbours, share) = place_on(&times, seconds)?;
+        let [a, b] = neighbours.map(|i| self.curve[i].0);
+        let error = |spps, share| self.sampler.log_error(Metric::RelMse, spps, share);
+        // At a point of the curve, errors are taken to fall as one over the samples.
+        let slope = match a < b {
+            true => {
+                (error([b; 2], 0.0)?.log - error([a; 2], 0.0)?.log)
+                    / (f64::from(b) / f64::from(a)).ln()
+            }
+            false => -1.0,
+        };
+        Some(error([a, b], share)?.with_noise(self.noise(slope)))
+    }
+
+    /// Error × seconds, one over the efficiency.
+    fn error_seconds(&self, spp: u32) -> Option<LogFigure> {
+        let error = self.sampler.log_error(Metric::RelMse, [spp; 2], 0.0)?;
+        let seconds = f64::from(spp) * self.time.log.exp() / 1000.0;
+        Some(error.scaled(seconds).with_noise(self.noise(1.0)))
+    }
+
+    /// Seconds until the error falls to `target`.
+    fn seconds_to(&self, target: f64) -> Option<LogFigure> {
+        let spp = self.sampler.spp_to(Metric::RelMse, target)?;
+        Some(
+            spp.scaled(self.time.log.exp() / 1000.0)
+                .with_noise(self.noise(1.0)),
+        )
     }
 }
 
@@ -192,23 +268,13 @@ impl<'a> Race<'a> {
     pub fn new(view: &'a View<'a>) -> Option<Self> {
         let structure = view.fastest_structure()?;
         let runner = |sampler: &'a MeasuredSampler<'a>| {
-            let time = view.time(&structure, &sampler.name)?;
-            let ms_per_spp = time.ms_per_spp?;
-            let means = sampler.mean_errors(Metric::RelMse);
-            let resolved = means.iter().filter(|mean| mean.resolved);
-            let at = |m: &MeanError| (f64::from(m.spp) * ms_per_spp.value / 1000.0, m.error);
-            let curve: Vec<_> = resolved.map(at).collect();
-            (!curve.is_empty() && sampler.fault().is_none()).then_some(Runner {
-                sampler,
-                ms_per_spp,
-                rounds: time.ms.len(),
-                curve,
-            })
+            let runner = Runner::new(view, &structure, sampler)?;
+            (!runner.curve.is_empty() && sampler.fault().is_none()).then_some(runner)
         };
         let runners: Vec<Runner> = view.samplers.iter().filter_map(runner).collect();
         let seconds = runners
             .iter()
-            .filter_map(|r| Some(r.curve.last()?.0))
+            .filter_map(|r| Some(r.curve.last()?.1))
             .reduce(f64::min)?;
         Some(Self {
             seconds,
@@ -218,33 +284,65 @@ impl<'a> Race<'a> {
         })
     }
 
-    /// What a second buys: error × time at the common spp, and the errors when the race ends.
+    /// The error that samples and seconds are counted to: that of the rule that ends cells, else the least
+    /// that all of the race reach, rounded up to two digits.
+    fn target(&self) -> Option<f64> {
+        let stopped = self.view.samplers.iter().flat_map(|s| &s.replicates);
+        if let Some(rule) = stopped.filter_map(|r| r.stop.as_ref()).next() {
+            return Some(rule.relmse);
+        }
+        let last = |runner: &Runner| {
+            let (spp, _) = runner.curve.last()?;
+            Some(
+                runner
+                    .sampler
+                    .mean_error_at(Metric::RelMse, *spp)?
+                    .error
+                    .value,
+            )
+        };
+        let most = self.runners.iter().filter_map(last).reduce(f64::max)?;
+        let unit = 10f64.powf(most.log10().floor() - 1.0);
+        (most > 0.0).then(|| (most / unit).ceil() * unit)
+    }
+
+    /// What a second buys: error × time at the common spp, errors when the race ends, samples and seconds to an
+    /// error.
     pub fn values(&self) -> Vec<Value<'static>> {
-        let metric = Metric::RelMse;
+        let metric = Metric::RelMse.name();
+        let (common, target) = (self.view.common_spp(), self.target());
         let mut values = Vec::new();
         for sampler in &self.view.samplers {
             let Some(time) = self.view.time(&self.structure, &sampler.name) else {
                 continue;
             };
-            let ms = time.ms_per_spp.map(|ms| ms.value);
-            let at = (self.view.common_spp()).and_then(|spp| sampler.mean_error_at(metric, spp));
-            if let (Some(ms), Some(mean)) = (ms, at.filter(|mean| mean.resolved)) {
-                let product = mean.error.value * f64::from(mean.spp) * ms / 1000.0;
-                let what = format!("{} × seconds at {} spp", metric.name(), mean.spp);
+            let Some(runner) = Runner::new(self.view, &self.structure, sampler) else {
+                continue;
+            };
+            let mut add = |what: String, id: &str, figure: Option<LogFigure>| {
                 let key = time.key.clone().with(axis::SUBJECT, what);
-                values.push(Value::new(&key, "error-seconds/v1", product));
+                let figure = figure.map(|figure| figure.interval());
+                values.extend(Value::known(&key, [(id, figure)]));
+            };
+            let resolved = |spp: &u32| runner.curve.iter().any(|at| at.0 == *spp);
+            if let Some(spp) = common.filter(resolved) {
+                let what = format!("{metric} × seconds at {spp} spp");
+                add(what, "error-seconds/v1", runner.error_seconds(spp));
             }
-            let what = format!("{} after {} s", metric.name(), format::number(self.seconds));
-            let key = time.key.clone().with(axis::SUBJECT, what);
-            let end = self.error_of(&sampler.name);
-            let end = end.map(|e| {
-                if sampler.is_ranked() {
-                    e
-                } else {
-                    Interval::exact(e.value)
-                }
-            });
-            values.extend(Value::known(&key, [("error-at-time/v1", end)]));
+            let what = format!("{metric} after {} s", format::number(self.seconds));
+            let fair = sampler.fault().is_none();
+            let end = runner.error_after(self.seconds).filter(|_| fair);
+            add(what, "error-at-time/v1", end);
+            if let Some(target) = target {
+                let to = format!("to {metric} {}", format::significant(target, 2));
+                let spp = sampler.spp_to(Metric::RelMse, target);
+                add(format!("spp {to}"), "spp-to-error/v1", spp);
+                add(
+                    format!("seconds {to}"),
+                    "seconds-to-error/v1",
+                    runner.seconds_to(target),
+                );
+            }
         }
         values
     }
@@ -252,16 +350,18 @@ impl<'a> Race<'a> {
     /// Error of a sampler when the race ends.
     pub fn error_of(&self, sampler: &str) -> Option<Interval> {
         let is_it = |runner: &&Runner| runner.sampler.name == sampler;
-        self.runners.iter().find(is_it)?.error_after(self.seconds)
+        let runner = self.runners.iter().find(is_it)?;
+        Some(runner.error_after(self.seconds)?.interval())
     }
 
     /// Who has the least error when the race ends.
     pub fn ruling(&self) -> Ruling {
         let contender = |runner: &Runner| {
+            let log = runner.error_after(self.seconds)?;
             Some(Contender {
                 name: runner.sampler.name.clone(),
-                figure: runner.error_after(self.seconds)?,
-                has_spread: runner.sampler.is_ranked() && runner.rounds >= LEAST_FOR_MEDIAN,
+                figure: log.interval(),
+                log: Some(log).filter(|_| runner.is_ranked()),
             })
         };
         rank(

@@ -71,6 +71,14 @@ fn every_check_passes_on_a_clean_run_and_fails_on_its_planted_fault() {
         plant!(Time, t => t.image_equal = false),
     );
     fails(
+        "path by path",
+        plant!(Paths, p => p.fault = Some("pixel (1, 2)".to_owned())),
+    );
+    fails(
+        "path by path",
+        plant!(Paths, p => *p = PathsRecord::not_judged("material `mine`")),
+    );
+    fails(
         "without bias",
         plant!(Bias, b => b.verdict = BiasVerdict::Biased),
     );

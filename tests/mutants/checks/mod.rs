@@ -2,6 +2,7 @@
 
 mod hits;
 mod images;
+mod paths;
 mod projections;
 mod streams;
 
@@ -39,6 +40,8 @@ pub enum Check {
     ThinWalls,
     /// The image of the Cornell box has the mean of plain path tracing, tile by tile.
     Bias,
+    /// Single paths are those of the oracle for images.
+    Paths,
 }
 
 impl Check {
@@ -56,6 +59,7 @@ impl Check {
             Self::Occlusion => "occlusion",
             Self::ThinWalls => "thin-walls",
             Self::Bias => "bias",
+            Self::Paths => "paths",
         }
     }
 
@@ -127,6 +131,7 @@ impl<'a> Bench<'a> {
                 Check::Bias => images::bias(self),
                 _ => Ok(None),
             },
+            Subject::Paths => paths::paths(self),
         }
     }
 }

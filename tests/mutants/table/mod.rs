@@ -7,6 +7,7 @@ mod hard;
 mod image;
 mod instanced;
 mod late_samples;
+mod paths;
 mod samplers;
 mod wide;
 mod words;
@@ -27,6 +28,7 @@ pub fn mutants() -> Vec<Mutant> {
         samplers::MUTANTS,
         late_samples::MUTANTS,
         image::MUTANTS,
+        paths::MUTANTS,
     ]
     .concat()
 }

@@ -1,0 +1,237 @@
+//! The gate of integrators: single samples of single pixels, as the image kernel computes them, against the
+//! oracle for images ([`PathOracle`]). No error figure is printed for an integrator that fails.
+//!
+//! Each path is put into one of four classes:
+//!
+//! * it *agrees*: every channel within [`TOLERANCE`], relative, or below a floor of [`FLOOR`] of the mean radiance;
+//! * it is *ill-conditioned*: it differs by more, but by no more than [`SPREAD`] times what the same path does when a few
+//!   roundings of f32 are played in f64 ([`Rounding`]), all its decisions being the same: texture coordinates on long triangles,
+//!   grazing light;
+//! * it is a *flip*: with as many roundings the oracle decides otherwise somewhere (an edge, an occluder, a random number against a
+//!   probability) and then gives the kernel's answer. That decision had a margin below [`MOST_ROUNDINGS`] roundings;
+//! * else it is *wrong*: a fault of the kernels, or of the oracle.
+//!
+//! One wrong path fails. So do more flips than [`FLIPS`] of the paths beyond chance, or more ill-conditioned ones than
+//! [`ILL_CONDITIONED`] and a median difference above [`MEDIAN`], which no single path shows. Texture coordinates that repeat often have
+//! few digits left within a texel, so that the last two have bounds of their own where textures are.
+
+use super::path_oracle::{Path, PathId, PathOracle, Rounding, View};
+use super::record::PathsRecord;
+use crate::gpu::GpuError;
+use crate::integrator::Renderer;
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Relative difference of a channel that is agreement.
+pub const TOLERANCE: f64 = 1e-4;
+/// Radiance below which differences do not count, as a part of the mean radiance of the judged paths.
+pub const FLOOR: f64 = 1e-3;
+/// Roundings of f32 that are played, in this order.
+pub const SCALES: [f64; 3] = [4.0, 16.0, MOST_ROUNDINGS];
+/// The margin below which a decision may come out otherwise, in roundings of f32.
+pub const MOST_ROUNDINGS: f64 = 64.0;
+/// Part of the paths that may be flips.
+pub const FLIPS: f64 = 1e-3;
+/// Part of the paths that may be ill-conditioned: where nothing is textured, and else.
+pub const ILL_CONDITIONED: [f64; 2] = [0.02, 0.6];
+/// Greatest median of the relative differences: where nothing is textured, and else.
+pub const MEDIAN: [f64; 2] = [2e-5, 1e-3];
+/// Times that each scale is played.
+const TRIALS: u64 = 24;
+/// By this factor a kernel may differ more than the worst of the played paths of its branch.
+const SPREAD: f64 = 3.0;
+/// After so many wrong paths no more are looked at.
+const ENOUGH: usize = 16;
+
+/// A path as the kernel has it.
+#[derive(Debug, Clone, Copy)]
+pub struct Answer {
+    /// Which one.
+    pub id: PathId,
+    /// Its radiance.
+    pub radiance: DVec3,
+}
+
+/// What a path of a kernel is that does not agree.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Class {
+    IllConditioned,
+    Flip,
+    Wrong,
+}
+
+/// Which paths are judged.
+#[derive(Debug, Clone)]
+pub struct Pixels {
+    /// Width and height of the image, pixels.
+    pub size: [u32; 2],
+    /// Of so many pixels one, others with each sample.
+    pub every: u32,
+    /// Indices of samples.
+    pub samples: Vec<u32>,
+    /// Seed of the replicate.
+    pub seed: u32,
+}
+
+/// Renders single samples, each by itself.
+///
+/// # Errors
+/// A kernel raised its error word, or the device is lost or hangs.
+pub fn answers(renderer: &Renderer, pixels: &Pixels) -> Result<Vec<Answer>, GpuError> {
+    let [width, every] = [pixels.size[0], pixels.every.max(1)];
+    let mut out = Vec::new();
+    for (turn, &sample) in (0u32..).zip(&pixels.samples) {
+        renderer.reset()?;
+        renderer.add_samples(sample, 1, pixels.seed)?;
+        let image = renderer.image()?;
+        let numbered = (0u32..).zip(&image.pixels);
+        let chosen = numbered.filter(|(i, _)| (i + turn) % every == 0);
+        out.extend(chosen.map(|(i, pixel)| Answer {
+            id: PathId {
+                pixel: [i % width, i / width],
+                sample,
+                seed: pixels.seed,
+            },
+            radiance: DVec3::from_array(pixel.map(f64::from)),
+        }));
+    }
+    Ok(out)
+}
+
+/// Judges the answers of a kernel.
+pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecord {
+    let truth: Vec<Path> = (answers.par_iter())
+        .map(|answer| oracle.trace(view, answer.id, Rounding::none()))
+        .collect();
+    let mean = |c: DVec3| c.element_sum() / 3.0;
+    let sum: f64 = truth.iter().map(|path| mean(path.radiance)).sum();
+    let floor = FLOOR * sum / truth.len().max(1) as f64;
+    let differences: Vec<f64> = (answers.iter().zip(&truth))
+        .map(|(answer, path)| difference(answer.radiance, path.radiance, floor))
+        .collect();
+    // NaN differs.
+    let mut differing: Vec<usize> = (0..answers.len()).collect();
+    differing.retain(|&i| differences[i].is_nan() || differences[i] > TOLERANCE);
+    let wrong = AtomicUsize::new(0);
+    let class = |&i: &usize| {
+        if wrong.load(Ordering::Relaxed) >= ENOUGH {
+            return Class::Wrong;
+        }
+        let class = classify(oracle, view, &answers[i], &truth[i], floor);
+        wrong.fetch_add(usize::from(class == Class::Wrong), Ordering::Relaxed);
+        class
+    };
+    let classes: Vec<Class> = differing.par_iter().map(class).collect();
+    let of = |class: Class| classes.iter().filter(|c| **c == class).count();
+    let first_wrong = (differing.iter().zip(&classes)).find(|(_, c)| **c == Class::Wrong);
+    let agreeing = differences.iter().filter(|d| **d <= TOLERANCE);
+    let mut record = PathsRecord {
+        paths: answers.len(),
+        ill_conditioned: of(Class::IllConditioned),
+        flips: of(Class::Flip),
+        wrong: of(Class::Wrong),
+        median: median(&truth, &differences, floor),
+        worst: agreeing.copied().fold(0.0, f64::max),
+        ..PathsRecord::default()
+    };
+    record.fault = match first_wrong {
+        Some((&i, _)) => Some(describe(&answers[i], &truth[i])),
+        None => out_of_bounds(&record, oracle.is_textured()),
+    };
+    record
+}
+
+/// The greatest difference of a channel, relative to the oracle's, or to the floor.
+fn difference(kernel: DVec3, oracle: DVec3, floor: f64) -> f64 {
+    let relative = (kernel - oracle).abs() / oracle.abs().max(DVec3::splat(floor));
+    // Unlike `max_element`, this keeps NaN.
+    let [r, g, b] = relative.to_array();
+    match r.is_nan() || g.is_nan() || b.is_nan() {
+        true => f64::NAN,
+        false => r.max(g).max(b),
+    }
+}
+
+/// Median difference of the paths that found light.
+fn median(truth: &[Path], differences: &[f64], floor: f64) -> f64 {
+    let lit = truth.iter().zip(differences);
+    let lit = lit.filter(|(path, _)| path.radiance.max_element() > floor);
+    let mut lit: Vec<f64> = lit.map(|(_, d)| *d).collect();
+    lit.sort_by(f64::total_cmp);
+    lit.get(lit.len() / 2).copied().unwrap_or_default()
+}
+
+/// Plays roundings until a path of the oracle explains the kernel's.
+fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, floor: f64) -> Class {
+    let mut spread = 0.0_f64;
+    let mut near = TOLERANCE;
+    let mut others: Vec<DVec3> = Vec::new();
+    let off = difference(answer.radiance, truth.radiance, floor);
+    for (index, scale) in (0..).zip(SCALES) {
+        for trial in 0..TRIALS {
+            let rounding = Rounding::played(scale, TRIALS * index + trial);
+            let played = oracle.trace(view, answer.id, rounding);
+            match played.branch == truth.branch {
+                true => spread = spread.max(difference(played.radiance, truth.radiance, floor)),
+                false => others.push(played.radiance),
+            }
+            // Many roundings would excuse anything of a path that keeps its branch.
+            if off <= SPREAD * spread && scale == SCALES[0] {
+                return Class::IllConditioned;
+            }
+        }
+        if scale == SCALES[0] {
+            near += SPREAD * spread;
+        }
+        let explains = |other: &DVec3| difference(answer.radiance, *other, floor) <= near;
+        if others.iter().any(explains) {
+            return Class::Flip;
+        }
+    }
+    Class::Wrong
+}
+
+/// The most of `paths` that may be of a class with this share: six standard deviations above the mean.
+fn most(paths: usize, share: f64) -> usize {
+    let mean = share * paths as f64;
+    (mean + 6.0 * mean.sqrt()).ceil() as usize + 1
+}
+
+/// What the numbers of a record say against it, when no single path does.
+fn out_of_bounds(record: &PathsRecord, textured: bool) -> Option<String> {
+    let [share, median] = [ILL_CONDITIONED, MEDIAN].map(|bounds| bounds[usize::from(textured)]);
+    let PathsRecord {
+        paths,
+        flips,
+        ill_conditioned,
+        ..
+    } = *record;
+    let over = |what: &str, found: usize, share: f64| {
+        let most = most(paths, share);
+        (found > most).then(|| {
+            format!("{found} of {paths} paths {what}, at most {most} are explained by rounding")
+        })
+    };
+    let off = record.median > median;
+    over("take another branch", flips, FLIPS)
+        .or_else(|| over("are ill-conditioned", ill_conditioned, share))
+        .or_else(|| {
+            off.then(|| format!("half of the paths differ by {:.1e} or more", record.median))
+        })
+}
+
+/// Both answers, and the path, a line for each vertex.
+fn describe(answer: &Answer, truth: &Path) -> String {
+    let show = |c: DVec3| format!("({:.7e}, {:.7e}, {:.7e})", c.x, c.y, c.z);
+    let mut text = format!(
+        "{}: kernel {}, oracle {}",
+        answer.id,
+        show(answer.radiance),
+        show(truth.radiance)
+    );
+    for (number, vertex) in truth.vertices.iter().enumerate() {
+        text += &format!("; vertex {number}: {vertex}");
+    }
+    text
+}

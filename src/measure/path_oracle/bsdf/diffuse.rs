@@ -1,0 +1,19 @@
+//! f = base/π.
+
+use super::*;
+
+pub(super) struct Diffuse<'a>(pub &'a Surface<'a>);
+
+impl Bsdf for Diffuse<'_> {
+    fn sample(&self, uv: [f64; 2], rounding: &mut Rounding) -> Option<Bounce> {
+        bounce(self, cosine_direction(self.0.normal, uv), rounding)
+    }
+
+    fn evaluate(&self, direction: DVec3, _: &mut Rounding) -> Option<Reflected> {
+        let density = cosine_density(self.0.normal, direction);
+        is_above(self.0, direction).then(|| Reflected {
+            value: self.0.base * density,
+            density,
+        })
+    }
+}

@@ -1,0 +1,380 @@
+//! What a sample is: primary visibility, ambient occlusion, path tracing.
+
+use super::bsdf::{self, Bounce, Bsdf, Reflected};
+use super::hits::{SHORT, Segment};
+use super::surface::Surface;
+use super::{PathOracle, Vertex, Walk};
+use crate::integrator::ConfiguredIntegrator;
+use crate::params::{ParamValue, Params};
+use crate::sampling::dimensions::{
+    DIRECTION, LIGHT_CHOICE, LIGHT_POINT, PIXEL, ROULETTE, at_bounce,
+};
+use glam::DVec3;
+
+/// What a sample of an image is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Estimator {
+    /// Base colour of the first hit times the cosine to the viewer, and its emission.
+    Primary,
+    /// Whether a cosine-distributed ray of limited length is free.
+    Occlusion {
+        /// Its length, as a fraction of the diagonal of the scene's box.
+        radius: f64,
+    },
+    /// The radiance of a path.
+    Path(PathRules),
+}
+
+/// The rules of a path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathRules {
+    /// Most bounces.
+    max_depth: u32,
+    /// What light samples and found emission count.
+    strategy: Strategy,
+    roulette: Roulette,
+    /// First bounce with roulette.
+    roulette_depth: u32,
+    /// Greatest component of a contribution of bounce 1 and later; 0 is none.
+    clamp: f64,
+}
+
+/// How light is found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Strategy {
+    /// Both ways, weighted by densities to this power.
+    Both(i32),
+    /// By the directions of materials alone.
+    Material,
+    /// By points of lights alone.
+    Light,
+}
+
+/// With what probability paths survive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Roulette {
+    None,
+    Albedo,
+    Throughput,
+}
+
+/// The greatest probability of survival.
+const SURVIVAL: f64 = 0.95;
+
+/// Reads parameters and notes which were asked for.
+struct Reader<'a> {
+    name: &'a str,
+    params: &'a Params,
+    known: Vec<&'static str>,
+}
+
+impl Reader<'_> {
+    fn get(&mut self, key: &'static str) -> Option<&ParamValue> {
+        self.known.push(key);
+        self.params.0.get(key)
+    }
+
+    fn number(&mut self, key: &'static str, missing: f64) -> f64 {
+        match self.get(key) {
+            Some(ParamValue::Number(x)) => *x,
+            Some(ParamValue::Integer(x)) => *x as f64,
+            _ => missing,
+        }
+    }
+
+    fn choice<T: Copy>(&mut self, key: &'static str, of: &[(&str, T)]) -> Result<T, String> {
+        let name = self.name.to_owned();
+        match self.get(key) {
+            None => Ok(of[0].1),
+            Some(value) => {
+                let value = value.to_string();
+                let found = of.iter().find(|(word, _)| *word == value);
+                let found = found.map(|(_, meaning)| *meaning);
+                found.ok_or_else(|| format!("`{key} = {value}` of `{name}`"))
+            }
+        }
+    }
+
+    /// Whether all parameters were asked for.
+    fn finish(&self) -> Result<(), String> {
+        let unknown = |key: &&String| !self.known.contains(&key.as_str());
+        match self.params.0.keys().find(unknown) {
+            Some(key) => Err(format!("parameter `{key}` of integrator `{}`", self.name)),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Estimator {
+    /// The estimator of an integrator.
+    ///
+    /// # Errors
+    /// What of the integrator the oracle does not know.
+    pub fn of(integrator: &ConfiguredIntegrator) -> Result<Self, String> {
+        let name = integrator.kind.name();
+        let mut read = Reader {
+            name,
+            params: &integrator.params,
+            known: Vec::new(),
+        };
+        let estimator = match name {
+            "primary" => Self::Primary,
+            "ao" => Self::Occlusion {
+                radius: read.number("radius", 0.1),
+            },
+            "path" => Self::Path(PathRules {
+                max_depth: read.number("max_depth", 6.0) as u32,
+                strategy: read.choice(
+                    "strategy",
+                    &[
+                        ("mis-balance", Strategy::Both(1)),
+                        ("mis-power", Strategy::Both(2)),
+                        ("bsdf", Strategy::Material),
+                        ("light", Strategy::Light),
+                    ],
+                )?,
+                roulette: read.choice(
+                    "roulette",
+                    &[
+                        ("throughput", Roulette::Throughput),
+                        ("albedo", Roulette::Albedo),
+                        ("none", Roulette::None),
+                    ],
+                )?,
+                roulette_depth: read.number("roulette_depth", 3.0) as u32,
+                clamp: read.number("clamp", 0.0),
+            }),
+            _ => return Err(format!("integrator `{name}`")),
+        };
+        read.finish()?;
+        Ok(estimator)
+    }
+}
+
+impl Strategy {
+    /// What a sample of density `own` counts that the other way finds with density `other`.
+    fn weight(self, own: f64, other: f64) -> f64 {
+        match self {
+            Self::Both(power) => 1.0 / (1.0 + (other / own).powi(power)),
+            Self::Material | Self::Light => 1.0,
+        }
+    }
+}
+
+impl PathRules {
+    fn clamped(&self, depth: u32, light: DVec3) -> DVec3 {
+        let greatest = light.max_element();
+        match self.clamp > 0.0 && depth > 0 && greatest > self.clamp {
+            true => light * (self.clamp / greatest),
+            false => light,
+        }
+    }
+}
+
+/// Where a path is.
+struct State {
+    ray: Segment,
+    throughput: DVec3,
+    radiance: DVec3,
+    /// Density of the last direction, if light samples could have found it.
+    density: Option<f64>,
+    medium: f64,
+}
+
+impl PathOracle<'_> {
+    /// The radiance of a sample.
+    pub(super) fn estimate(&self, walk: &mut Walk) -> DVec3 {
+        let lens = walk.lens();
+        let direction = lens.direction(walk.id.pixel, walk.draw_2d(PIXEL));
+        let direction = walk.rounding.direction(direction);
+        let ray = Segment::endless(lens.eye, direction, None);
+        match walk.view.estimator {
+            Estimator::Primary => self.primary(walk, &ray),
+            Estimator::Occlusion { radius } => self.occlusion(walk, &ray, radius),
+            Estimator::Path(rules) => self.path(walk, ray, &rules),
+        }
+    }
+
+    /// The first thing on a ray, noted.
+    fn meet(&self, walk: &mut Walk, ray: &Segment) -> Option<(Surface<'_>, f64)> {
+        let terms = ray.origin.abs();
+        let seen = Segment {
+            origin: walk.rounding.point(ray.origin, terms),
+            ..*ray
+        };
+        let hit = self.hits.nearest(&seen);
+        walk.decide(hit.map_or(u64::MAX, |hit| hit.triangle.into()));
+        let hit = hit?;
+        let surface = self.surface(ray, &hit, &mut walk.rounding);
+        walk.vertices.push(Vertex {
+            position: surface.position,
+            triangle: hit.triangle,
+            material: surface.material.name.clone(),
+            throughput: DVec3::ONE,
+            direct: DVec3::ZERO,
+        });
+        Some((surface, hit.distance))
+    }
+
+    fn primary(&self, walk: &mut Walk, ray: &Segment) -> DVec3 {
+        match self.meet(walk, ray) {
+            None => self.escaped(ray.direction),
+            Some((surface, _)) => {
+                surface.base * surface.geometric.dot(surface.out).abs() + surface.emission
+            }
+        }
+    }
+
+    fn occlusion(&self, walk: &mut Walk, ray: &Segment, radius: f64) -> DVec3 {
+        let Some((surface, _)) = self.meet(walk, ray) else {
+            return DVec3::ONE;
+        };
+        let uv = walk.draw_2d(at_bounce(0, DIRECTION));
+        let direction = bsdf::cosine_direction(surface.normal, uv);
+        let direction = walk.rounding.direction(direction);
+        let free = Segment {
+            length: walk.rounding.number(radius * self.diagonal),
+            ..surface.leave(direction, &mut walk.rounding)
+        };
+        let blocked = self.hits.blocked(&free);
+        walk.decide(blocked.into());
+        DVec3::splat(if blocked { 0.0 } else { 1.0 })
+    }
+
+    fn path(&self, walk: &mut Walk, ray: Segment, rules: &PathRules) -> DVec3 {
+        let mut state = State {
+            ray,
+            throughput: DVec3::ONE,
+            radiance: DVec3::ZERO,
+            density: None,
+            medium: 1.0,
+        };
+        for depth in 0..=rules.max_depth {
+            let met = self.meet(walk, &state.ray);
+            let leaves = |distance: f64| depth > 0 && self.escapes(distance);
+            let met = met.filter(|(_, d)| !leaves(walk.rounding.number(*d)));
+            let Some((surface, distance)) = met else {
+                walk.decide(2);
+                let light = state.throughput * self.escaped(state.ray.direction);
+                state.radiance += rules.clamped(depth, light);
+                break;
+            };
+            let found = self.found(&surface, distance, &state, rules.strategy);
+            state.radiance += rules.clamped(depth, state.throughput * found);
+            if depth == rules.max_depth {
+                break;
+            }
+            let bsdf = bsdf::of(&surface);
+            if !(self.lights.are_none() || bsdf.is_delta() || rules.strategy == Strategy::Material)
+            {
+                let direct = self.direct(walk, &surface, &*bsdf, depth, rules.strategy);
+                state.radiance += rules.clamped(depth, state.throughput * direct);
+                if let Some(vertex) = walk.vertices.last_mut() {
+                    vertex.direct = state.throughput * direct;
+                }
+            }
+            if !self.go_on(walk, &surface, &*bsdf, depth, &mut state, rules) {
+                break;
+            }
+        }
+        walk.rounding.colour(state.radiance)
+    }
+
+    /// Emission that a path has met, weighted.
+    fn found(&self, surface: &Surface, distance: f64, state: &State, strategy: Strategy) -> DVec3 {
+        let weight = match state.density {
+            Some(density) if surface.emission.max_element() > 0.0 => match strategy {
+                Strategy::Light => 0.0,
+                _ => strategy.weight(density, self.light_density(surface, distance)),
+            },
+            _ => 1.0,
+        };
+        surface.emission * weight
+    }
+
+    /// Light from one point of a light, reflected and weighted.
+    fn direct(
+        &self,
+        walk: &mut Walk,
+        surface: &Surface,
+        bsdf: &dyn Bsdf,
+        depth: u32,
+        strategy: Strategy,
+    ) -> DVec3 {
+        let point = walk.draw_2d(at_bounce(depth, LIGHT_POINT));
+        let choice = walk.draw(at_bounce(depth, LIGHT_CHOICE));
+        let light = self.light_sample(surface, choice, point, &mut walk.rounding);
+        let Some(light) = light.filter(|l| l.density > 0.0 && l.density.is_finite()) else {
+            return DVec3::ZERO;
+        };
+        let Some(Reflected { value, density }) = bsdf.evaluate(light.direction, &mut walk.rounding)
+        else {
+            return DVec3::ZERO;
+        };
+        let shadow = Segment {
+            to: Some(light.triangle),
+            length: light.distance * (1.0 - SHORT),
+            ..surface.leave(light.direction, &mut walk.rounding)
+        };
+        let blocked = self.hits.blocked(&shadow);
+        walk.decide(u64::from(light.triangle) << 1 | u64::from(blocked));
+        match blocked {
+            true => DVec3::ZERO,
+            false => {
+                let weight = strategy.weight(light.density, density);
+                value * light.radiance * (weight / light.density)
+            }
+        }
+    }
+
+    /// Takes a path to its next ray; false if it ends.
+    fn go_on(
+        &self,
+        walk: &mut Walk,
+        surface: &Surface,
+        bsdf: &dyn Bsdf,
+        depth: u32,
+        state: &mut State,
+        rules: &PathRules,
+    ) -> bool {
+        let uv = walk.draw_2d(at_bounce(depth, DIRECTION));
+        let Some(bounce) = bsdf.sample(uv, &mut walk.rounding) else {
+            walk.decide(3);
+            return false;
+        };
+        let Bounce {
+            direction,
+            weight,
+            density,
+            medium,
+        } = bounce;
+        walk.decide(u64::from(direction.dot(surface.geometric) > 0.0));
+        state.throughput *= walk.rounding.colour(weight);
+        state.medium *= medium;
+        if let Some(vertex) = walk.vertices.last_mut() {
+            vertex.throughput = state.throughput;
+        }
+        let brightest = state.throughput.max_element() * state.medium;
+        if brightest <= 0.0 {
+            return false;
+        }
+        let survival = match rules.roulette {
+            Roulette::None => None,
+            Roulette::Throughput => Some(brightest),
+            Roulette::Albedo => Some(weight.max_element() * medium),
+        };
+        if let Some(survival) = survival.filter(|_| depth >= rules.roulette_depth) {
+            let survival = survival.min(SURVIVAL);
+            let ends = walk.draw(at_bounce(depth, ROULETTE)) >= walk.rounding.share(survival);
+            walk.decide(ends.into());
+            if ends {
+                return false;
+            }
+            state.throughput /= survival;
+        }
+        // Light samples find no direction of a delta lobe, and none at all where nothing can be sampled.
+        state.density = density;
+        state.ray = surface.leave(direction, &mut walk.rounding);
+        true
+    }
+}

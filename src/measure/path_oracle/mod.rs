@@ -1,0 +1,203 @@
+//! The oracle for images: what one sample of one pixel must be, in f64.
+//!
+//! A plain path tracer on the host, written from the section "Formulas" of `docs/shading.md` and from the papers
+//! that it names, not from the kernels. It reads the scene as it was loaded, draws the same words as the kernels
+//! through the samplers' twins, and finds its hits by testing all triangles near a ray: neither tables that were made for
+//! the device nor a structure can mislead it.
+//!
+//! A ray starts exactly on the surface that it leaves and passes over the triangle there; a shadow ray ends
+//! [`SHORT`] before its light. Offsets, with which kernels have to keep off a surface, are thus no part of the answer.
+//!
+//! What single precision may do to a path is found by playing it: see [`Rounding`].
+
+mod bsdf;
+mod camera;
+mod estimator;
+mod hits;
+mod light;
+mod rounding;
+mod surface;
+mod texture;
+
+pub use estimator::Estimator;
+pub use hits::SHORT;
+pub use rounding::Rounding;
+
+use crate::geometry::Camera;
+use crate::sampling::{Coordinate, Sampler, to_unit};
+use crate::scene::SceneData;
+use camera::Lens;
+use glam::DVec3;
+use hits::Hits;
+use light::Lights;
+use std::fmt;
+use texture::Textures;
+
+/// One sample of one pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PathId {
+    /// Column and row, from the top left.
+    pub pixel: [u32; 2],
+    /// Index of the sample.
+    pub sample: u32,
+    /// Seed of the replicate.
+    pub seed: u32,
+}
+
+impl fmt::Display for PathId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y] = self.pixel;
+        let (sample, seed) = (self.sample, self.seed);
+        write!(f, "pixel ({x}, {y}), sample {sample}, seed {seed}")
+    }
+}
+
+/// A vertex of a path, for people.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Vertex {
+    /// Where.
+    pub position: DVec3,
+    /// Which triangle.
+    pub triangle: u32,
+    /// Name of the material.
+    pub material: String,
+    /// Weight with which radiance that arrives from the next vertex counts, before roulette.
+    pub throughput: DVec3,
+    /// Radiance that the light sample of this vertex brought, weighted.
+    pub direct: DVec3,
+}
+
+impl fmt::Display for Vertex {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let show = |v: DVec3| format!("({:.7}, {:.7}, {:.7})", v.x, v.y, v.z);
+        write!(
+            f,
+            "{} on triangle {} ({}), throughput {}, direct light {}",
+            show(self.position),
+            self.triangle,
+            self.material,
+            show(self.throughput),
+            show(self.direct)
+        )
+    }
+}
+
+/// A path and what it found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    /// Radiance, linear RGB.
+    pub radiance: DVec3,
+    /// Its vertices from the camera on.
+    pub vertices: Vec<Vertex>,
+    /// A hash of all decisions: triangles, lobes, lights, what was occluded, where it ended. Paths of one
+    /// branch differ by rounding only.
+    pub branch: u64,
+}
+
+/// A scene as the oracle sees it.
+pub struct PathOracle<'a> {
+    scene: &'a SceneData,
+    hits: Hits<'a>,
+    lights: Lights,
+    textures: Textures<'a>,
+    /// Of the box of all triangles.
+    diagonal: f64,
+}
+
+/// What is estimated, of which image.
+pub struct View<'a> {
+    /// What a sample is.
+    pub estimator: Estimator,
+    /// Where the image is taken from.
+    pub camera: Camera,
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// What draws the numbers.
+    pub sampler: &'a Sampler,
+}
+
+impl<'a> PathOracle<'a> {
+    /// The oracle of a scene.
+    ///
+    /// # Errors
+    /// What the scene has that the oracle does not know: nothing can be judged then.
+    pub fn new(scene: &'a SceneData) -> Result<Self, String> {
+        bsdf::all_known(scene)?;
+        Ok(Self {
+            scene,
+            hits: Hits::new(&scene.triangles),
+            lights: Lights::new(scene),
+            textures: Textures::new(scene),
+            diagonal: diagonal(scene),
+        })
+    }
+
+    /// Whether colours come from textures.
+    pub fn is_textured(&self) -> bool {
+        let mut materials = self.scene.materials.iter();
+        materials.any(|m| m.base_color_texture.is_some())
+    }
+
+    /// The path of one sample, computed in f64 throughout, or with the roundings of f32 played.
+    pub fn trace(&self, view: &View, id: PathId, rounding: Rounding) -> Path {
+        let mut walk = Walk {
+            id,
+            view,
+            rounding,
+            vertices: Vec::new(),
+            branch: 0xcbf2_9ce4_8422_2325,
+        };
+        let radiance = self.estimate(&mut walk);
+        Path {
+            radiance,
+            vertices: walk.vertices,
+            branch: walk.branch,
+        }
+    }
+}
+
+fn diagonal(scene: &SceneData) -> f64 {
+    let bounds = scene.bounds();
+    (bounds.max.as_dvec3() - bounds.min.as_dvec3()).length()
+}
+
+/// What a path carries along.
+struct Walk<'a> {
+    id: PathId,
+    view: &'a View<'a>,
+    rounding: Rounding,
+    vertices: Vec<Vertex>,
+    branch: u64,
+}
+
+impl Walk<'_> {
+    /// The number of a dimension, in [0, 1).
+    fn draw(&self, dimension: u32) -> f64 {
+        let [x, y] = self.id.pixel;
+        f64::from(to_unit(self.view.sampler.sample_u32(Coordinate {
+            pixel: y * self.view.size[0] + x,
+            sample: self.id.sample,
+            dimension,
+            seed: self.id.seed,
+        })))
+    }
+
+    /// The numbers of a dimension and the next.
+    fn draw_2d(&self, dimension: u32) -> [f64; 2] {
+        [self.draw(dimension), self.draw(dimension + 1)]
+    }
+
+    /// Notes a decision (FNV-1a).
+    fn decide(&mut self, what: u64) {
+        self.branch = (self.branch ^ what).wrapping_mul(0x0100_0000_01b3);
+    }
+
+    fn lens(&self) -> Lens {
+        Lens::new(&self.view.camera, self.view.size)
+    }
+}
+
+/// Brightness of a colour, as docs/shading.md defines it.
+fn luminance(c: DVec3) -> f64 {
+    0.212_671 * c.x + 0.715_160 * c.y + 0.072_169 * c.z
+}

@@ -1,0 +1,83 @@
+//! What single precision may do to a path, played.
+//!
+//! A bound on the error of a path that is derived by hand would have to follow every decision (an edge, an occluder, a random
+//! number against a probability) and every ill-conditioned quotient. Instead the path is repeated in f64, with every
+//! quantity that a kernel rounds moved at random by as much as some roundings of f32: Monte Carlo arithmetic (D. Parker,
+//! "Monte Carlo arithmetic", 1997). What comes out is what a kernel may answer. A path that changes its decisions
+//! under so little is near a boundary, and its margin is the number of roundings that it took.
+
+use crate::random::Pcg32;
+use glam::DVec3;
+
+/// Half an ulp of 1 in f32.
+const EPSILON: f64 = 1.0 / (1u32 << 24) as f64;
+
+/// Roundings of a direction of unit length that was made of sines, cosines and roots, per component. Libraries of
+/// devices may be off by this much in these functions.
+const DIRECTION: f64 = 4.0;
+
+/// Moves quantities by roundings of f32, or leaves them as they are.
+pub struct Rounding {
+    random: Option<Pcg32>,
+    /// By how many roundings.
+    scale: f64,
+}
+
+impl Rounding {
+    /// No rounding.
+    pub fn none() -> Self {
+        Self {
+            random: None,
+            scale: 0.0,
+        }
+    }
+
+    /// Every quantity is moved by up to `roundings` roundings; `trial` chooses by how much.
+    pub fn played(roundings: f64, trial: u64) -> Self {
+        Self {
+            random: Some(Pcg32::new(trial)),
+            scale: roundings * EPSILON,
+        }
+    }
+
+    fn signed(&mut self) -> f64 {
+        (self.random.as_mut()).map_or(0.0, |random| self.scale * random.signed())
+    }
+
+    /// A number, by a fraction of itself.
+    pub fn number(&mut self, x: f64) -> f64 {
+        x * (1.0 + self.signed())
+    }
+
+    /// A number in [0, 1], by a fraction of 1.
+    pub fn share(&mut self, x: f64) -> f64 {
+        x + self.signed()
+    }
+
+    /// A colour, each component by itself.
+    pub fn colour(&mut self, c: DVec3) -> DVec3 {
+        c * (1.0 + self.vector())
+    }
+
+    fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.signed(), self.signed(), self.signed())
+    }
+
+    /// A unit vector.
+    pub fn direction(&mut self, d: DVec3) -> DVec3 {
+        match self.random {
+            None => d,
+            Some(_) => (d + DIRECTION * self.vector()).normalize(),
+        }
+    }
+
+    /// A point whose coordinates are sums of terms as large as `terms`.
+    pub fn point(&mut self, p: DVec3, terms: DVec3) -> DVec3 {
+        p + terms * self.vector()
+    }
+
+    /// How far a ray may start off its surface, where rays start at most `offset` off by one rounding.
+    pub fn offset(&mut self, offset: f64) -> f64 {
+        self.signed().abs() * offset
+    }
+}

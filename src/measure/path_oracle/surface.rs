@@ -1,0 +1,97 @@
+//! From a hit to what materials need.
+
+use super::PathOracle;
+use super::hits::{Hit, Segment};
+use super::rounding::Rounding;
+use crate::scene::Material;
+use glam::DVec3;
+
+/// Roundings of a point between the numbers of the file and a ray that leaves it. A kernel's bound is eight of the point and
+/// two times as many of the triangle's extent, and the ray starts by that off the surface: see
+/// [`crate::integrator::offset::position_error`].
+const OFFSET: f64 = 8.0;
+
+/// A point that was hit.
+pub(super) struct Surface<'a> {
+    pub triangle: u32,
+    pub position: DVec3,
+    /// To where the path came from.
+    pub out: DVec3,
+    /// Unit geometric normal on the side of `out`.
+    pub geometric: DVec3,
+    /// Unit shading normal on that side.
+    pub normal: DVec3,
+    /// 1 where the corners turn counter-clockwise seen from there, -1 where not.
+    pub side: f64,
+    pub material: &'a Material,
+    /// Base colour, with the texture.
+    pub base: DVec3,
+    pub emission: DVec3,
+    /// How far rays start off the surface by one rounding.
+    offset: f64,
+}
+
+impl Surface<'_> {
+    /// From where a light is seen: kernels take the start of the shadow ray, off the surface.
+    pub fn seen_from(&self, rounding: &mut Rounding) -> DVec3 {
+        self.position + self.geometric * rounding.offset(self.offset)
+    }
+
+    /// The ray that leaves in this direction.
+    pub fn leave(&self, direction: DVec3, rounding: &mut Rounding) -> Segment {
+        let side = direction.dot(self.geometric).signum();
+        let start = self.position + self.geometric * (side * rounding.offset(self.offset));
+        Segment::endless(start, direction, Some(self.triangle))
+    }
+}
+
+impl PathOracle<'_> {
+    pub(super) fn surface(
+        &self,
+        segment: &Segment,
+        hit: &Hit,
+        rounding: &mut Rounding,
+    ) -> Surface<'_> {
+        let corners = self.scene.triangles[hit.triangle as usize].vertices;
+        let [a, b, c] = corners.map(|v| v.as_dvec3());
+        let (e1, e2) = (b - a, c - a);
+        let terms = a.abs() + e1.abs() + e2.abs();
+        let exact = a + e1 * hit.weights[0] + e2 * hit.weights[1];
+        let position = rounding.point(exact, terms);
+        let area = e1.cross(e2);
+        // The rounding of a thin triangle's normal is that of its edges against its height.
+        let thinness = e1.length() * e2.length() / area.length();
+        let outward = rounding.point(area.normalize(), DVec3::splat(thinness));
+        let outward = outward.normalize();
+        let out = -segment.direction;
+        let side = match outward.dot(out) > 0.0 {
+            true => 1.0,
+            false => -1.0,
+        };
+        let id = self.scene.material_ids[hit.triangle as usize];
+        let material = &self.scene.materials[id as usize];
+        let weights = hit.weights.map(|w| rounding.share(w));
+        let uv = self.textures.coordinates(hit.triangle, weights);
+        let mut base = material.base_color.as_dvec3();
+        if let Some(texture) = material.base_color_texture {
+            base *= self.textures.colour(texture, uv);
+        }
+        let normal = side * outward;
+        let reach = normal.abs().dot(terms) + 2.0 * (e1.abs() + e2.abs()).max_element();
+        Surface {
+            triangle: hit.triangle,
+            position,
+            out,
+            geometric: normal,
+            normal,
+            side,
+            material,
+            base,
+            emission: match material.emits_both_sides || side > 0.0 {
+                true => material.emission.as_dvec3(),
+                false => DVec3::ZERO,
+            },
+            offset: OFFSET * reach,
+        }
+    }
+}

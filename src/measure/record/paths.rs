@@ -1,0 +1,42 @@
+//! What is recorded of the gate of integrators.
+
+use super::Verdict;
+use serde::{Deserialize, Serialize};
+
+/// Single paths of an integrator against the oracle for images, see [`crate::measure::image_gate`].
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct PathsRecord {
+    /// Paths judged; 0 if none could be.
+    pub paths: usize,
+    /// Paths that differ by no more than rounding makes them differ, all decisions being the same.
+    pub ill_conditioned: usize,
+    /// Paths that decide otherwise within rounding of a boundary.
+    pub flips: usize,
+    /// Paths that differ, not to be explained by rounding.
+    pub wrong: usize,
+    /// Median relative difference of the paths that found light.
+    pub median: f64,
+    /// Greatest relative difference of the paths that agree.
+    pub worst: f64,
+    /// What is wrong: the first wrong path with its vertices, or a number beyond its bound.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fault: Option<String>,
+    /// What there is no formula for in the oracle, so that nothing was judged.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub not_judged: Option<String>,
+}
+
+impl PathsRecord {
+    /// Nothing was judged, for this reason.
+    pub fn not_judged(reason: impl Into<String>) -> Self {
+        Self {
+            not_judged: Some(reason.into()),
+            ..Self::default()
+        }
+    }
+
+    /// What the gate says.
+    pub fn verdict(&self) -> Verdict {
+        Verdict::new(self.paths > 0, self.fault.is_some())
+    }
+}

@@ -1,0 +1,429 @@
+//! Small scenes with what single paths can go wrong with: unequal, small, grazing and hidden lamps, glass in glass, panes,
+//! mirrors, textures that repeat, and light from all sides. `raystone verify --images` and the tests of the gate judge paths on
+//! them, so that a fault of a kernel shows although the scenes of a user do without what it breaks.
+
+use crate::geometry::{Camera, Triangle};
+use crate::params::ParamValue;
+use crate::scene::{
+    self, CookTorrance, Fresnel, MIRROR, Masking, Material, SceneData, SceneError, Texture,
+};
+use glam::{Vec2, Vec3, vec2, vec3};
+use std::f32::consts::{PI, TAU};
+
+/// What is judged on a scene: integrator and the parameters that are not at their defaults.
+pub type Trial = (&'static str, Vec<(&'static str, ParamValue)>);
+
+/// A scene and what is judged on it.
+pub struct TrialScene {
+    /// The scene, with a camera.
+    pub scene: SceneData,
+    /// Integrators.
+    pub trials: Vec<Trial>,
+}
+
+/// All of them.
+///
+/// # Errors
+/// A built-in scene is missing.
+pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
+    let mut lamps_trials = vec![("path", vec![depth(8)])];
+    for (strategy, roulette) in [
+        ("mis-power", "albedo"),
+        ("bsdf", "none"),
+        ("light", "albedo"),
+    ] {
+        lamps_trials.push((
+            "path",
+            vec![
+                word("strategy", strategy),
+                word("roulette", roulette),
+                depth(5),
+            ],
+        ));
+    }
+    lamps_trials.push((
+        "path",
+        vec![
+            ("clamp", ParamValue::Number(0.25)),
+            depth(4),
+            ("roulette_depth", ParamValue::Integer(1)),
+        ],
+    ));
+    let occlusion = |radius| ("ao", vec![("radius", ParamValue::Number(radius))]);
+    let primary = || ("primary", vec![]);
+    Ok(vec![
+        TrialScene {
+            scene: lamps()?,
+            trials: lamps_trials,
+        },
+        TrialScene {
+            scene: glass()?,
+            trials: vec![("path", vec![depth(12)])],
+        },
+        TrialScene {
+            scene: glossy()?,
+            trials: vec![
+                ("path", vec![depth(6)]),
+                ("path", vec![depth(3), word("strategy", "bsdf")]),
+            ],
+        },
+        TrialScene {
+            scene: textured()?,
+            trials: vec![("path", vec![depth(4)]), primary()],
+        },
+        TrialScene {
+            scene: scene::named("instances")?,
+            trials: vec![
+                ("path", vec![depth(6)]),
+                occlusion(0.02),
+                occlusion(0.3),
+                primary(),
+            ],
+        },
+    ])
+}
+
+fn depth(depth: i64) -> (&'static str, ParamValue) {
+    ("max_depth", ParamValue::Integer(depth))
+}
+
+fn word(key: &'static str, value: &str) -> (&'static str, ParamValue) {
+    (key, ParamValue::Name(value.to_owned()))
+}
+
+/// A scene that grows.
+struct Mesh {
+    scene: SceneData,
+}
+
+impl Mesh {
+    /// Nothing but a camera under a sky of this radiance.
+    fn new(name: &str, camera: Camera, environment: Vec3) -> Result<Self, SceneError> {
+        let scene = SceneData {
+            name: name.to_owned(),
+            triangles: Vec::new(),
+            material_ids: Vec::new(),
+            materials: Vec::new(),
+            camera: Some(camera),
+            environment,
+            daylight: None,
+            ..scene::named("single-triangle")?
+        };
+        Ok(Self { scene })
+    }
+
+    fn material(&mut self, material: Material) -> u32 {
+        self.scene.materials.push(material);
+        self.scene.materials.len() as u32 - 1
+    }
+
+    fn triangle(&mut self, corners: [Vec3; 3], uv: [Vec2; 3], material: u32) {
+        self.scene.triangles.push(Triangle { vertices: corners });
+        self.scene.uvs.push(uv);
+        self.scene.material_ids.push(material);
+    }
+
+    /// A parallelogram whose texture coordinates run over `uv`.
+    fn quad(&mut self, [corner, along, across]: [Vec3; 3], uv: [Vec2; 2], material: u32) {
+        let p = |u: f32, v: f32| corner + u * along + v * across;
+        let t = |u: f32, v: f32| vec2(uv[0].x.lerp(uv[1].x, u), uv[0].y.lerp(uv[1].y, v));
+        let [a, b, c, d] = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+        for [a, b, c] in [[a, b, c], [a, c, d]] {
+            let corners = [a, b, c].map(|(u, v)| p(u, v));
+            self.triangle(corners, [a, b, c].map(|(u, v)| t(u, v)), material);
+        }
+    }
+
+    fn plain(&mut self, quad: [Vec3; 3], material: u32) {
+        self.quad(quad, [Vec2::ZERO, Vec2::ONE], material);
+    }
+
+    /// A box; corners turn counter-clockwise seen from outside.
+    fn block(&mut self, low: Vec3, size: Vec3, material: u32) {
+        let high = low + size;
+        let [x, y, z] = [Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z];
+        for [along, across] in [[x, y], [y, z], [z, x]] {
+            self.plain([low, across, along], material);
+            self.plain([high, -along, -across], material);
+        }
+    }
+
+    /// A ball of facets; corners turn counter-clockwise seen from outside.
+    fn ball(&mut self, centre: Vec3, radius: f32, material: u32) {
+        const ROWS: u32 = 9;
+        let at = |row: u32, column: u32| {
+            let (theta, phi) = (
+                PI * row as f32 / ROWS as f32,
+                TAU * column as f32 / (2 * ROWS) as f32 + 0.1,
+            );
+            let ring = theta.sin();
+            centre + radius * vec3(ring * phi.cos(), theta.cos(), ring * phi.sin())
+        };
+        for row in 0..ROWS {
+            for column in 0..2 * ROWS {
+                let (next, below) = (column + 1, row + 1);
+                let [a, b, c, d] = [
+                    at(row, column),
+                    at(row, next),
+                    at(below, next),
+                    at(below, column),
+                ];
+                if row > 0 {
+                    self.triangle([a, b, c], [Vec2::ZERO; 3], material);
+                }
+                if below < ROWS {
+                    self.triangle([a, c, d], [Vec2::ZERO; 3], material);
+                }
+            }
+        }
+    }
+
+    fn done(mut self, textures: Vec<Texture>) -> SceneData {
+        if textures.is_empty() {
+            self.scene.uvs.clear();
+        }
+        self.scene.textures = textures;
+        self.scene
+    }
+}
+
+fn silver(tint: Vec3) -> Material {
+    Material {
+        kind: &MIRROR,
+        ..Material::diffuse("mirror", tint)
+    }
+}
+
+fn camera(eye: Vec3, target: Vec3, up: Vec3) -> Camera {
+    Camera {
+        eye,
+        target,
+        up,
+        vertical_fov_degrees: 47.0,
+    }
+}
+
+/// Lamps of all sizes and colours over a floor between two walls: one large and dim, one small and bright, one in the
+/// plane of a wall, one on edge, one hidden behind a block, one that faces away.
+fn lamps() -> Result<SceneData, SceneError> {
+    let camera = camera(
+        vec3(2.3, 2.2, 3.7),
+        vec3(-0.4, 0.7, -0.3),
+        vec3(0.1, 1.0, -0.05),
+    );
+    let mut mesh = Mesh::new("lamps", camera, vec3(0.02, 0.03, 0.05))?;
+    let wall = |name, r, g, b| Material::diffuse(name, vec3(r, g, b));
+    let [floor, red, blue, block] = [
+        wall("floor", 0.7, 0.65, 0.5),
+        wall("red", 0.8, 0.2, 0.15),
+        wall("blue", 0.1, 0.25, 0.75),
+        wall("block", 0.85, 0.9, 0.8),
+    ]
+    .map(|m| mesh.material(m));
+    let mut lamp = |name, reflectance, emission| {
+        mesh.material(Material::diffuse(name, Vec3::splat(reflectance)).emitting(emission))
+    };
+    let dim = lamp("dim", 0.5, vec3(0.6, 0.5, 0.4));
+    let bright = lamp("bright", 0.0, vec3(160.0, 200.0, 90.0));
+    let green = lamp("green", 0.3, vec3(0.0, 3.0, 0.0));
+    let violet = lamp("violet", 0.2, vec3(4.0, 0.1, 6.0));
+    mesh.plain([vec3(-3.0, 0.0, -3.0), 6.0 * Vec3::Z, 6.0 * Vec3::X], floor);
+    mesh.plain([vec3(-2.0, 0.0, -3.0), 4.0 * Vec3::Y, 6.0 * Vec3::Z], red);
+    mesh.plain([vec3(-3.0, 0.0, -2.0), 6.0 * Vec3::X, 4.0 * Vec3::Y], blue);
+    mesh.block(vec3(-0.6, 0.0, -0.5), vec3(0.9, 1.1, 0.7), block);
+    mesh.ball(vec3(1.0, 0.4, 0.9), 0.4, block);
+    mesh.plain([vec3(-1.0, 3.2, -1.5), 2.0 * Vec3::X, 1.5 * Vec3::Z], dim);
+    mesh.plain(
+        [vec3(0.9, 1.9, -0.9), 0.04 * Vec3::X, 0.05 * Vec3::Z],
+        bright,
+    );
+    // Standing on the floor, along the wall: light grazes both.
+    mesh.plain([vec3(-1.9, 0.0, -1.9), 0.6 * Vec3::Y, 1.4 * Vec3::Z], green);
+    mesh.triangle(
+        [
+            vec3(1.4, 0.05, -1.2),
+            vec3(1.5, 0.9, -1.3),
+            vec3(1.6, 0.05, -0.6),
+        ],
+        [Vec2::ZERO; 3],
+        violet,
+    );
+    // In the shadow of the block, and facing away from all else.
+    mesh.triangle(
+        [
+            vec3(-0.5, 0.2, -0.9),
+            vec3(0.2, 0.3, -0.9),
+            vec3(-0.1, 0.8, -0.8),
+        ],
+        [Vec2::ZERO; 3],
+        green,
+    );
+    mesh.triangle(
+        [
+            vec3(2.6, 0.3, 0.2),
+            vec3(2.6, 1.2, 0.6),
+            vec3(2.7, 0.4, 0.9),
+        ],
+        [Vec2::ZERO; 3],
+        violet,
+    );
+    Ok(mesh.done(Vec::new()))
+}
+
+/// Balls of glass, one in another, a pane, a mirror behind, tints, and a lamp that is seen through all of them.
+fn glass() -> Result<SceneData, SceneError> {
+    let camera = camera(
+        vec3(0.3, 1.3, 4.1),
+        vec3(0.1, 0.8, 0.0),
+        vec3(-0.08, 1.0, 0.0),
+    );
+    let mut mesh = Mesh::new("glass", camera, vec3(0.5, 0.6, 0.9))?;
+    let [floor, mirror, clear, green, dense, pane, lamp] = [
+        Material::diffuse("floor", vec3(0.6, 0.55, 0.5)),
+        silver(vec3(0.9, 0.85, 0.8)),
+        Material::dielectric("clear", Vec3::ONE, 1.5),
+        Material::dielectric("green", vec3(0.7, 0.95, 0.8), 1.33),
+        Material::dielectric("bubble", Vec3::ONE, 0.7),
+        Material::thin_dielectric("pane", vec3(0.9, 0.8, 0.95), 1.6),
+        Material::diffuse("lamp", Vec3::splat(0.4)).emitting(vec3(9.0, 8.0, 6.0)),
+    ]
+    .map(|m| mesh.material(m));
+    mesh.plain([vec3(-4.0, 0.0, -4.0), 8.0 * Vec3::Z, 8.0 * Vec3::X], floor);
+    mesh.plain(
+        [vec3(-2.0, 0.1, -2.0), 4.0 * Vec3::X, 2.5 * Vec3::Y],
+        mirror,
+    );
+    mesh.ball(vec3(-0.7, 0.75, 0.2), 0.7, clear);
+    mesh.ball(vec3(-0.7, 0.75, 0.2), 0.35, dense);
+    mesh.block(vec3(0.5, 0.1, -0.4), vec3(0.8, 1.2, 0.8), green);
+    mesh.plain(
+        [vec3(-1.8, 0.2, 1.1), vec3(1.9, 0.0, 0.4), 1.4 * Vec3::Y],
+        pane,
+    );
+    mesh.plain([vec3(-0.8, 2.9, -0.6), 1.4 * Vec3::X, 1.2 * Vec3::Z], lamp);
+    Ok(mesh.done(Vec::new()))
+}
+
+/// A row of balls of every glossy kind over a glossy floor, between two lamps and a sheet.
+fn glossy() -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(0.5, 2.4, 5.2), vec3(0.0, 0.6, 0.0), Vec3::Y);
+    let mut mesh = Mesh::new("glossy", camera, vec3(0.2, 0.25, 0.3))?;
+    let cook = |masking, fresnel, roughness| {
+        let of = CookTorrance {
+            diffuse: vec3(0.3, 0.2, 0.1),
+            specular: vec3(0.5, 0.6, 0.4),
+            roughness,
+            ior: 1.7,
+            masking,
+            fresnel,
+        };
+        Material::cook_torrance("cook-torrance", &of)
+    };
+    let principled = |metallic, roughness, f0| {
+        Material::principled("principled", vec3(0.9, 0.6, 0.4), metallic, roughness, f0)
+    };
+    let phong =
+        |exponent| Material::phong("phong", vec3(0.3, 0.1, 0.5), vec3(0.4, 0.5, 0.3), exponent);
+    let balls = [
+        phong(3.0),
+        phong(150.0),
+        cook(Masking::VCavities, Fresnel::Schlick, 0.4),
+        cook(Masking::Smith, Fresnel::Exact, 0.15),
+        principled(0.0, 0.3, 0.04),
+        principled(1.0, 0.5, 0.04),
+        principled(0.5, 0.9, 0.08),
+        Material::dielectric("glass", vec3(0.9, 1.0, 0.9), 1.5).with_schlick(),
+    ];
+    for (place, material) in balls.into_iter().enumerate() {
+        let material = mesh.material(material);
+        let (column, row) = ((place % 4) as f32, (place / 4) as f32);
+        mesh.ball(
+            vec3(1.1 * column - 1.7, 0.5, 1.2 * row - 0.6),
+            0.48,
+            material,
+        );
+    }
+    let floor = mesh.material(principled(0.2, 0.6, 0.05));
+    let one_sided = Material::diffuse("lamp", Vec3::splat(0.3)).emitting(vec3(6.0, 7.0, 8.0));
+    let both = Material::diffuse("sheet", Vec3::splat(0.5)).emitting(vec3(2.0, 1.5, 1.0));
+    let [one_sided, both] = [one_sided, both].map(|m| mesh.material(m));
+    mesh.plain([vec3(-4.0, 0.0, -4.0), 8.0 * Vec3::Z, 8.0 * Vec3::X], floor);
+    mesh.plain(
+        [vec3(-1.0, 2.6, -1.0), 2.0 * Vec3::X, 1.5 * Vec3::Z],
+        one_sided,
+    );
+    mesh.plain(
+        [vec3(-2.6, 0.2, -1.5), 1.2 * Vec3::Y, 2.0 * Vec3::Z],
+        one_sided,
+    );
+    mesh.plain([vec3(2.7, 0.2, -1.5), 1.2 * Vec3::Y, 2.0 * Vec3::Z], both);
+    Ok(mesh.done(Vec::new()))
+}
+
+/// Textures that are not square, repeat, begin below 0 and are tinted, on a floor, a wall, a mirror and a lamp.
+fn textured() -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(1.7, 1.6, 2.4), vec3(0.0, 0.5, -0.2), Vec3::Y);
+    let mut mesh = Mesh::new("textured", camera, vec3(0.4, 0.5, 0.6))?;
+    let painted = |material: Material, texture| Material {
+        base_color_texture: Some(texture),
+        ..material
+    };
+    let [floor, wall, mirror, lamp, plain] = [
+        painted(Material::diffuse("floor", vec3(0.9, 0.7, 0.8)), 0),
+        painted(Material::diffuse("wall", Vec3::ONE), 1),
+        painted(silver(vec3(0.8, 0.9, 1.0)), 1),
+        painted(Material::diffuse("lamp", Vec3::splat(0.6)), 0).emitting(vec3(5.0, 4.0, 3.0)),
+        Material::diffuse("plain", vec3(0.4, 0.6, 0.5)),
+    ]
+    .map(|m| mesh.material(m));
+    let to = |x: f32, y: f32| vec2(x, y);
+    mesh.quad(
+        [vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::Z, 4.0 * Vec3::X],
+        [to(-1.3, 0.2), to(2.4, 3.1)],
+        floor,
+    );
+    mesh.quad(
+        [vec3(-2.0, 0.0, -1.5), 4.0 * Vec3::X, 2.0 * Vec3::Y],
+        [to(0.1, 0.9), to(0.8, 0.05)],
+        wall,
+    );
+    mesh.quad(
+        [vec3(-1.6, 0.0, -1.0), vec3(0.3, 0.0, 1.8), 1.2 * Vec3::Y],
+        [to(0.0, 0.0), to(-1.0, 2.0)],
+        mirror,
+    );
+    mesh.quad(
+        [vec3(-0.5, 2.3, -0.5), 1.0 * Vec3::X, 0.8 * Vec3::Z],
+        [to(0.0, 0.0), to(1.0, 1.0)],
+        lamp,
+    );
+    mesh.block(vec3(0.2, 0.0, -0.6), vec3(0.5, 0.7, 0.4), plain);
+    let texture = |name: &str, width: u32, height: u32, seed: u32| Texture {
+        name: name.to_owned(),
+        width,
+        height,
+        texels: (0..width * height)
+            .map(|i| {
+                [
+                    (i * 73 + seed) % 256,
+                    (i * i * 31 + 90) % 256,
+                    (i * 17 + seed) % 64,
+                    255,
+                ]
+            })
+            .map(|texel| texel.map(|c| c as u8))
+            .collect(),
+    };
+    Ok(mesh.done(vec![texture("wide", 7, 3, 12), texture("tall", 2, 5, 200)]))
+}
+
+/// Interpolation of numbers.
+trait Lerp {
+    fn lerp(self, to: Self, t: f32) -> Self;
+}
+
+impl Lerp for f32 {
+    fn lerp(self, to: Self, t: f32) -> Self {
+        self + t * (to - self)
+    }
+}

@@ -1,0 +1,192 @@
+//! The gate of integrators: kernels agree with the oracle for images path by path, and planted faults do not.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+use raystone::gpu::Gpu;
+use raystone::integrator::RayOffset;
+use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer};
+use raystone::measure::image_gate::{Pixels, answers, judge};
+use raystone::measure::path_oracle::{Estimator, PathOracle, View};
+use raystone::measure::record::{Body, PathsRecord, Verdict};
+use raystone::measure::trial_scenes::trial_scenes;
+use raystone::params::{ParamValue, Variant};
+use raystone::run::Registries;
+use raystone::sampling::Sampler;
+use raystone::scene::SceneData;
+use support::*;
+
+const SIZE: [u32; 2] = [26, 19];
+
+/// The verdict on an integrator on a scene.
+fn verdict(
+    gpu: &Gpu,
+    scene: &SceneData,
+    what: &Variant,
+    sampler: &Sampler,
+    samples: &[u32],
+) -> PathsRecord {
+    let stage = Stage::new(gpu, scene.clone());
+    let traced = stage.traced(gpu, structure("bvh"));
+    let integrator = IntegratorRegistry::default().configured(what);
+    let integrator = integrator.unwrap_or_else(|e| panic!("{e}"));
+    let job = RenderJob {
+        size: SIZE,
+        camera: stage.camera,
+        sampler,
+        integrator: &integrator,
+        offset: RayOffset::default(),
+        runtime_checks: true,
+    };
+    let renderer = Renderer::new(gpu, &stage.buffers, &traced, &job, false).expect("a kernel");
+    let pixels = Pixels {
+        size: SIZE,
+        every: 1,
+        samples: samples.to_vec(),
+        seed: 70_003,
+    };
+    let answers = answers(&renderer, &pixels).expect("an image");
+    let oracle = PathOracle::new(&stage.scene).expect("known materials");
+    let view = View {
+        estimator: Estimator::of(&integrator).expect("a known integrator"),
+        camera: stage.camera,
+        size: SIZE,
+        sampler,
+    };
+    let start = std::time::Instant::now();
+    let record = judge(&oracle, &view, &answers);
+    println!(
+        "{} {}: {:?} {record:?}",
+        scene.name,
+        what.name,
+        start.elapsed()
+    );
+    record
+}
+
+/// A sampler of independent numbers with as many dimensions as asked for.
+fn independent() -> Sampler {
+    sampler_of("pixel-hash", "none", 100_000)
+}
+
+#[test]
+fn single_paths_of_all_trial_scenes_are_those_of_the_oracle() {
+    for trial in trial_scenes().expect("scenes") {
+        for (name, changes) in &trial.trials {
+            let what = integrator_variant(name, changes);
+            let record = verdict(gpu(), &trial.scene, &what, &independent(), &[0, 3, 70_000]);
+            assert_eq!(record.fault, None, "{} {name}", trial.scene.name);
+            assert_eq!(record.verdict(), Verdict::Pass);
+        }
+    }
+}
+
+#[test]
+fn every_kind_of_sampler_is_judged_by_its_words() {
+    let scene = builtin("cornell-box", &[]);
+    for sampler in [
+        ("sobol", "none"),
+        ("halton", "cranley-patterson"),
+        ("rank1-lattice", "cranley-patterson"),
+    ] {
+        let sampler = sampler_of(sampler.0, sampler.1, 64);
+        let record = verdict(gpu(), &scene, &path(6), &sampler, &[0, 1, 63]);
+        assert_eq!(record.fault, None, "{}", sampler.label());
+    }
+}
+
+/// A fault in a kernel, and what it says.
+fn fault(module: &str, from: &str, to: &str) -> Option<String> {
+    let gpu = open(kernels_with(module, &[(from, to)]));
+    let scene = builtin("cornell-box", &[]);
+    verdict(&gpu, &scene, &path(4), &independent(), &[0, 1]).fault
+}
+
+#[test]
+fn a_half_percent_and_a_wrong_dimension_are_seen_with_the_path_told() {
+    let weight = "throughput *= next.weight;";
+    let found = fault(
+        "integrator/path",
+        weight,
+        "throughput *= 1.005 * next.weight;",
+    );
+    let found = found.expect("a fault of half a percent");
+    for part in [
+        "pixel (",
+        "sample 0, seed 70003",
+        "kernel (",
+        "oracle (",
+        "vertex 0: ",
+        "throughput",
+    ] {
+        assert!(found.contains(part), "{part} in {found}");
+    }
+    let found = fault(
+        "sampling/dimensions",
+        "const LIGHT_POINT: u32 = 2u;",
+        "const LIGHT_POINT: u32 = 3u;",
+    );
+    assert!(found.is_some());
+}
+
+#[test]
+fn a_run_gives_no_error_figure_for_an_integrator_whose_paths_are_wrong() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let kernels = folder.path().join("mine/integrator");
+    std::fs::create_dir_all(&kernels).expect("a folder");
+    let library = raystone::gpu::KernelLibrary::default();
+    let text = library.text("integrator/path").expect("a kernel");
+    let changed = text.replace(
+        "throughput *= next.weight;",
+        "throughput *= 1.01 * next.weight;",
+    );
+    assert_ne!(changed, text);
+    std::fs::write(kernels.join("path.wesl"), changed).expect("a file");
+    let mine = folder.path().join("mine").display().to_string();
+    let out = folder.path().join("out");
+    let text = SMALL.replace("[axes]", &format!("[axes]\nkernels = [\"\", \"{mine}\"]"));
+    let (summary, lines) = run(&text, &Registries::default(), &out, None);
+    assert_eq!(summary.failed, 1);
+    let judged: Vec<_> = lines
+        .iter()
+        .filter(|l| matches!(l.body, Body::Paths(_)))
+        .collect();
+    assert_eq!(judged.len(), 2);
+    let errors = lines.iter().filter(|l| matches!(l.body, Body::Error(_)));
+    let kernels = |l: &raystone::measure::record::Line| l.key.label("kernels").to_owned();
+    assert!(errors.clone().count() > 0 && errors.clone().all(|l| kernels(l).is_empty()));
+    let failed = lines.iter().find_map(|l| match &l.body {
+        Body::Failed(f) => Some(f.reason.clone()),
+        _ => None,
+    });
+    assert!(
+        failed
+            .expect("a failure")
+            .contains("failed the gate: pixel (")
+    );
+    let report = std::fs::read_to_string(out.join("index.html")).expect("a report");
+    assert!(report.contains("Integrators path by path"));
+}
+
+/// Figures of the oracle on scenes that the variable `SCENES` names.
+#[test]
+#[ignore = "measurement"]
+fn measure_scenes() {
+    let names = std::env::var("SCENES").unwrap_or_else(|_| "cornell-box".to_owned());
+    for name in names.split(',') {
+        let scene = match name.contains('/') {
+            true => from_file(name.as_ref()),
+            false => builtin(name, &[]),
+        };
+        let occlusion = integrator_variant("ao", &[("radius", ParamValue::Number(0.2))]);
+        for what in [integrator_variant("primary", &[]), occlusion, path(6)] {
+            verdict(
+                gpu(),
+                &scene,
+                &what,
+                &independent(),
+                &[0, 1, 2, 3, 4, 5, 6, 7],
+            );
+        }
+    }
+}

@@ -1,0 +1,309 @@
+//! Winners, Pareto fronts and stopping rules against simulations of known truth.
+
+use raystone::config::StopRule;
+use raystone::measure::comparison::*;
+use raystone::measure::statistics::{Spread, leave_one_out};
+use raystone::measure::stopping::is_met;
+use raystone::random::Pcg32;
+
+/// About normal, mean 0, variance 1.
+fn normal(generator: &mut Pcg32) -> f64 {
+    (0..12).map(|_| generator.uniform()).sum::<f64>() - 6.0
+}
+
+fn mean_of(samples: &[f64]) -> f64 {
+    samples.iter().sum::<f64>() / samples.len() as f64
+}
+
+/// The mean of some replicates.
+fn of_mean(samples: &[f64]) -> LogFigure {
+    let logs = leave_one_out(samples).map(|rest| mean_of(&rest).ln());
+    LogFigure::new(mean_of(samples).ln(), &[logs.collect()], Vec::new()).unwrap()
+}
+
+/// The mean error of replicates: log-normal, with a standard deviation of about `spread` of the mean.
+fn error(mean: f64, spread: f64, replicates: usize, g: &mut Pcg32) -> LogFigure {
+    let mut draw = || mean * (spread * normal(g) - 0.5 * spread * spread).exp();
+    of_mean(&(0..replicates).map(|_| draw()).collect::<Vec<_>>())
+}
+
+/// Seven times, one in ten of which was interrupted.
+fn times(median: f64, g: &mut Pcg32) -> Vec<f64> {
+    let mut draw = || {
+        let late = if g.uniform() < 0.1 { 1.5 } else { 1.0 };
+        median * late * (0.02 * normal(g)).exp()
+    };
+    (0..7).map(|_| draw()).collect()
+}
+
+/// Error × time.
+fn efficiency(error: LogFigure, time: &LogFigure) -> LogFigure {
+    error
+        .with_noise(time.own.first().copied())
+        .scaled(time.log.exp())
+}
+
+/// Whether the least of some figures differs from all others.
+fn has_winner(figures: &[LogFigure], differ: impl Fn(usize, usize) -> bool) -> bool {
+    let least = (0..figures.len()).min_by(|a, b| figures[*a].log.total_cmp(&figures[*b].log));
+    (0..figures.len()).all(|i| Some(i) == least || differ(least.unwrap(), i))
+}
+
+#[test]
+fn among_equals_a_difference_is_named_as_rarely_as_promised() {
+    let trials = 1000;
+    for replicates in [4, 16] {
+        let mut generator = Pcg32::new(61);
+        let (mut corrected, mut plain, mut winners) = (0, 0, 0);
+        for _ in 0..trials {
+            let g = &mut generator;
+            let figures: Vec<LogFigure> = (0..5)
+                .map(|_| {
+                    let time = LogFigure::of_times(&times(10.0, g)).unwrap();
+                    efficiency(error(1.0, 0.1, replicates, g), &time)
+                })
+                .collect();
+            let pairs = Pairs::of(&figures.iter().collect::<Vec<_>>());
+            assert_eq!(pairs.count(), 10);
+            let all = || (0..5).flat_map(|i| (0..i).map(move |j| (i, j)));
+            corrected += usize::from(all().any(|(i, j)| pairs.differ(i, j)));
+            let is_small = |(i, j): (usize, usize)| figures[i].compared_with(&figures[j]).p <= 0.05;
+            plain += usize::from(all().any(is_small));
+            winners += usize::from(has_winner(&figures, |i, j| pairs.differ(i, j)));
+        }
+        println!(
+            "{replicates}: {corrected} corrected, {plain} plain, {winners} winners in {trials}"
+        );
+        // 5 % is 50, and the standard deviation 7.
+        assert!(corrected <= 70, "{replicates}: {corrected}");
+        assert!(winners <= 15, "{replicates}: {winners}");
+        // Negative control: the tests without the correction.
+        assert!(plain > 150, "{replicates}: {plain}");
+    }
+}
+
+#[test]
+fn a_time_taken_as_exact_makes_winners_of_equals() {
+    let mut generator = Pcg32::new(62);
+    let trials = 500;
+    let (mut joined, mut median_alone) = (0, 0);
+    for _ in 0..trials {
+        let g = &mut generator;
+        // Errors are known well, times are not.
+        let mut pair = || {
+            let time = LogFigure::of_times(&times(10.0, g)).unwrap();
+            let error = error(1.0, 0.01, 16, g);
+            let exact = error.clone().scaled(time.log.exp());
+            [efficiency(error, &time), exact]
+        };
+        let (a, b) = (pair(), pair());
+        joined += usize::from(a[0].compared_with(&b[0]).p <= 0.05);
+        median_alone += usize::from(a[1].compared_with(&b[1]).p <= 0.05);
+    }
+    println!("{joined} with both, {median_alone} with errors alone, of {trials}");
+    assert!(joined <= 40, "{joined}");
+    assert!(median_alone > 150, "{median_alone}");
+}
+
+#[test]
+fn a_sampler_that_is_a_fifth_better_wins_although_intervals_overlap() {
+    let mut generator = Pcg32::new(63);
+    let trials = 300;
+    let (mut wins, mut apart) = (0, 0);
+    for _ in 0..trials {
+        let g = &mut generator;
+        let figures = [0.8, 1.0, 1.0].map(|mean| error(mean, 0.15, 16, g));
+        let pairs = Pairs::of(&figures.each_ref());
+        wins += usize::from(has_winner(&figures, |i, j| pairs.differ(i, j)) && pairs.differ(0, 1));
+        let ends = figures.each_ref().map(LogFigure::interval);
+        apart += usize::from(ends[1..].iter().all(|other| ends[0].high < other.low));
+    }
+    println!("{wins} by the test, {apart} by intervals apart, of {trials}");
+    assert!(wins > trials * 8 / 10, "{wins}");
+    assert!(wins > apart, "{wins}, {apart} by intervals");
+}
+
+#[test]
+fn an_interruption_moves_no_time() {
+    let calm = LogFigure::of_times(&[1.0, 1.01, 0.99, 1.0, 1.02, 0.98, 1.0]).unwrap();
+    let hit = LogFigure::of_times(&[1.0, 1.01, 0.99, 1.0, 90.0, 0.98, 1.0]).unwrap();
+    assert!((calm.log - hit.log).abs() < 0.005, "{calm:?} {hit:?}");
+    assert!(hit.own[0].variance < 4.0 * calm.own[0].variance);
+    assert_eq!(calm.own[0].freedom, 4.0);
+    assert_eq!(LogFigure::of_times(&[1.0]), None);
+    assert_eq!(LogFigure::of_times(&[0.0, 1.0, 1.0]), None);
+}
+
+#[test]
+fn intervals_of_times_and_of_errors_per_second_cover_the_truth() {
+    let mut generator = Pcg32::new(64);
+    let trials = 2000;
+    let mut covered = [0; 2];
+    let mut narrowed = 0;
+    for _ in 0..trials {
+        let g = &mut generator;
+        let even: Vec<f64> = (0..9).map(|_| 10.0 * (0.05 * normal(g)).exp()).collect();
+        let time = LogFigure::of_times(&even).unwrap();
+        let figures = [time.clone(), efficiency(error(2.0, 0.3, 8, g), &time)];
+        for ((count, figure), truth) in covered.iter_mut().zip(&figures).zip([10.0, 20.0]) {
+            let interval = figure.interval();
+            *count += usize::from(interval.low <= truth && truth <= interval.high);
+        }
+        let half = 0.6 * (figures[1].interval().high / figures[1].interval().value).ln();
+        narrowed += usize::from((figures[1].log - 20f64.ln()).abs() <= half);
+    }
+    println!("{covered:?} of {trials}");
+    for count in covered {
+        let share = count as f64 / trials as f64;
+        assert!((0.93..=0.97).contains(&share), "{covered:?}");
+    }
+    // Negative control.
+    assert!(narrowed < trials * 85 / 100, "{narrowed}");
+}
+
+/// A figure with this value and relative standard error.
+fn known(value: f64, error: f64) -> LogFigure {
+    LogFigure {
+        log: value.ln(),
+        own: vec![Spread {
+            variance: error * error,
+            freedom: 15.0,
+        }],
+        shared: Vec::new(),
+    }
+}
+
+#[test]
+fn a_point_is_on_the_front_or_beaten_only_where_that_is_clear() {
+    let point = |time: f64, error: f64| [known(time, 0.02), known(error, 0.02)];
+    let slower = |time: f64, of: &[LogFigure; 2]| [known(time, 0.02), of[1].clone()];
+    let best = point(1.0, 4.0);
+    let points = [
+        best.clone(),
+        // As good, through a slower structure.
+        slower(1.5, &best),
+        // As good, through one whose time hardly differs.
+        slower(1.01, &best),
+        point(4.0, 1.0),
+        point(5.0, 2.0),
+        // Faster than the fourth by as much as noise makes.
+        point(3.95, 1.01),
+    ];
+    use Place::{Beaten, Front, Open};
+    assert_eq!(places(&points), [Open, Beaten, Open, Open, Beaten, Open]);
+    let clear = [point(1.0, 4.0), point(4.0, 1.0), point(2.0, 2.0)];
+    assert_eq!(places(&clear), [Front; 3]);
+    assert_eq!(places(&clear[..1]), [Front]);
+    assert!(places(&[]).is_empty());
+}
+
+#[test]
+fn what_is_said_of_a_point_is_as_rarely_wrong_as_promised() {
+    let mut generator = Pcg32::new(65);
+    let trials = 1000;
+    // The first point and the last are equal in error, and equal in time: neither beats the other.
+    let (mut false_beaten, mut false_front, mut by_value) = (0, 0, 0);
+    for _ in 0..trials {
+        let g = &mut generator;
+        let mut point = |time: f64, mean: f64| {
+            [
+                LogFigure::of_times(&times(time, g)).unwrap(),
+                error(mean, 0.1, 16, g),
+            ]
+        };
+        let on_front = [point(1.0, 1.0), point(1.0, 1.0), point(2.0, 0.5)];
+        false_beaten += usize::from(places(&on_front)[0] == Place::Beaten);
+        // Beaten in truth, by so little that it is seldom seen.
+        let behind = [point(1.001, 1.005), point(1.0, 1.0)];
+        let found = places(&behind);
+        false_front += usize::from(found[0] == Place::Front);
+        let is_less = |k: usize| behind[0][k].log < behind[1][k].log;
+        by_value += usize::from(is_less(0) || is_less(1));
+    }
+    println!("{false_beaten} beaten, {false_front} on the front, {by_value} by value, of {trials}");
+    assert!(
+        false_beaten <= 70 && false_front <= 70,
+        "{false_beaten} {false_front}"
+    );
+    // Negative control: the front of the measured values.
+    assert!(by_value > trials / 2, "{by_value}");
+}
+
+const RULE: StopRule = StopRule {
+    relmse: 1.0,
+    confidence: 0.95,
+};
+
+/// At which of the looks a cell ends whose error falls as one over the samples, from `first` on: each replicate keeps
+/// its samples, so that looks are correlated. Also whether it would at `chance` for each look.
+fn ends_at(first: f64, replicates: usize, looks: usize, g: &mut Pcg32) -> [Option<usize>; 2] {
+    let mut sums = vec![0.0; replicates];
+    let mut samples = 0;
+    let mut ends = [None; 2];
+    for look in 0..looks {
+        while samples < 1 << look {
+            samples += 1;
+            // χ² with four degrees of freedom: the squared error of few pixels.
+            for sum in &mut sums {
+                *sum += (0..4).map(|_| normal(g).powi(2)).sum::<f64>() / 4.0;
+            }
+        }
+        let scale = first / f64::from(samples) / f64::from(samples);
+        let errors: Vec<f64> = sums.iter().map(|sum| sum * scale).collect();
+        let error = of_mean(&errors);
+        for (end, looks) in ends.iter_mut().zip([looks, 1]) {
+            if end.is_none() && is_met(&RULE, &error, looks) {
+                *end = Some(look);
+            }
+        }
+    }
+    ends
+}
+
+#[test]
+fn a_cell_that_ends_has_its_target_as_often_as_promised_however_often_it_was_looked_at() {
+    let mut generator = Pcg32::new(66);
+    let trials = 1500;
+    for replicates in [4, 16] {
+        // The hardest case: the error is a hair above the target at the last look.
+        let above = 1.001 * 2f64.powi(5);
+        let ends = |g: &mut Pcg32| ends_at(above, replicates, 6, g);
+        let wrong = (0..trials).filter(|_| ends(&mut generator)[0].is_some());
+        let wrong = wrong.count();
+        println!("{replicates}: {wrong} of {trials} end too early");
+        assert!(wrong <= trials * 6 / 100, "{replicates}: {wrong}");
+    }
+    // Errors about the target at several looks, as nested samples of one error make them: each look has its
+    // chance, and shared out they keep the whole.
+    let mut chances = [0; 2];
+    for _ in 0..trials {
+        let mut met = [false; 2];
+        for _ in 0..6 {
+            let error = error(1.001, 0.3, 16, &mut generator);
+            met[0] |= is_met(&RULE, &error, 6);
+            met[1] |= is_met(&RULE, &error, 1);
+        }
+        chances[0] += usize::from(met[0]);
+        chances[1] += usize::from(met[1]);
+    }
+    println!("{chances:?} of {trials}: shared out, and each look by itself");
+    assert!(chances[0] <= trials * 6 / 100, "{chances:?}");
+    // Negative control: the same confidence at each look.
+    assert!(chances[1] > trials * 12 / 100, "{chances:?}");
+}
+
+#[test]
+fn a_cell_with_room_to_its_target_ends_and_its_error_is_hardly_too_small() {
+    let mut generator = Pcg32::new(67);
+    let trials = 400;
+    let mut ended = [0; 6];
+    for _ in 0..trials {
+        if let Some(look) = ends_at(4.0, 16, 6, &mut generator)[0] {
+            ended[look] += 1;
+        }
+    }
+    println!("ended at look {ended:?}");
+    // The target is met at the third look exactly, so that the fourth, with half of the error, ends it.
+    assert!(ended[3] > trials * 8 / 10, "{ended:?}");
+    assert!(ended[0] + ended[1] == 0, "{ended:?}");
+}

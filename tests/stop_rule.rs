@@ -1,0 +1,103 @@
+//! A run whose samplers end where their error is small enough.
+
+mod support;
+
+use raystone::config::StopRule;
+use raystone::measure::record::{Body, ErrorRecord, Line, axis};
+use raystone::run::Registries;
+
+const EXPERIMENT: &str = r#"
+[run]
+name = "stop"
+replicates = 8
+resolution = [16, 16]
+spp = { pow2 = [0, 6] }
+[axes]
+scene = ["cornell-box"]
+accel = ["bvh"]
+sequence = ["pixel-hash", "sobol"]
+decorrelation = ["none"]
+integrator = ["path"]
+[reference]
+spp = 8192
+[timing]
+rounds = 3
+min_warmup_ms = 0
+max_warmup_ms = 1
+rays = 1024
+[gate]
+rays = 1024
+brute_force_tests = 1000
+oracle_rays = 16
+[discrepancy]
+points = 16
+"#;
+
+const METRIC: &str = "relmse-unbiased/eps=1e-2/v1";
+
+/// The records of a run.
+fn lines(text: &str) -> Vec<Line> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    support::run(text, &Registries::default(), folder.path(), None).1
+}
+
+/// The error records of a sequence.
+fn errors<'a>(lines: &'a [Line], sequence: &str) -> Vec<&'a ErrorRecord> {
+    let of = |line: &'a Line| match &line.body {
+        Body::Error(record) if line.key.label(axis::SEQUENCE) == sequence => Some(record),
+        _ => None,
+    };
+    lines.iter().filter_map(of).collect()
+}
+
+fn mean_at(records: &[&ErrorRecord], spp: u32) -> f64 {
+    let at = |r: &&ErrorRecord| {
+        r.errors
+            .iter()
+            .find(|e| e.spp == spp)
+            .map(|e| e.metrics[METRIC])
+    };
+    let values: Vec<f64> = records.iter().filter_map(at).collect();
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+#[test]
+fn a_sampler_ends_where_its_error_is_below_the_target_and_says_so() {
+    let all = lines(EXPERIMENT);
+    let full = errors(&all, "pixel-hash");
+    let target = mean_at(&full, 8);
+    let rule =
+        format!("spp = {{ pow2 = [0, 6] }}\nstop = {{ relmse = {target}, confidence = 0.95 }}");
+    let stopped = lines(&EXPERIMENT.replace("spp = { pow2 = [0, 6] }", &rule));
+    let ended = errors(&stopped, "pixel-hash");
+    assert_eq!(ended.len(), 8);
+    let last = ended[0].errors.last().expect("an error").spp;
+    // Half of the target is met at 16 samples, and what noise leaves open at 32.
+    assert!(last == 16 || last == 32, "{last}");
+    assert!(mean_at(&ended, last) < target);
+    for (ended, full) in ended.iter().zip(&full) {
+        let stop = StopRule {
+            relmse: target,
+            confidence: 0.95,
+        };
+        assert_eq!((ended.stop, full.stop), (Some(stop), None));
+        assert_eq!(
+            ended.errors.last().expect("an error").spp,
+            last,
+            "all replicates alike"
+        );
+        for (a, b) in ended.errors.iter().zip(&full.errors) {
+            let [a, b] = [a, b].map(|at| (at.spp, at.metrics[METRIC]));
+            // The same samples, added in another order.
+            assert!(a.0 == b.0 && (a.1 / b.1 - 1.0).abs() < 1e-4, "{a:?} {b:?}");
+        }
+    }
+    let spectrum = stopped.iter().find_map(|line| match &line.body {
+        Body::Spectrum(s) if line.key.label(axis::SEQUENCE) == "pixel-hash" => Some(s.spp),
+        _ => None,
+    });
+    assert_eq!(spectrum, Some(last));
+    // Of one image nothing is known of its spread: it takes all samples.
+    let single = errors(&stopped, "sobol");
+    assert_eq!((single.len(), single[0].errors.len()), (1, 7));
+}
