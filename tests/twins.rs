@@ -103,6 +103,7 @@ const NO_TWIN: &[(&str, &str)] = &[
     ("shading/light/sky", "judged by images, not by a twin"),
     ("shading/light/triangles", "judged by images, not by a twin"),
     ("shading/material", "judged by images, not by a twin"),
+    ("shading/normals", "judged in f64 by tests/materials"),
     ("shading/surface", "judged by images, not by a twin"),
     ("shading/texture", "judged by images, not by a twin"),
 ];
