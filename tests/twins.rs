@@ -210,6 +210,7 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
     ("sampling/dimensions", "needed", "planning"),
     ("sampling/r2", "generalised_golden_ratio", "makes the table"),
     ("sampling/sobol", "direction_numbers", "makes the table"),
+    ("sampling/jittered", "strata", "makes the table"),
     ("sampling/dimensions", "purpose", "words for the report"),
     (
         "sampling/dimensions",
