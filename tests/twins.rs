@@ -103,6 +103,7 @@ const NO_TWIN: &[(&str, &str)] = &[
     ("shading/light/sky", "judged by images, not by a twin"),
     ("shading/light/triangles", "judged by images, not by a twin"),
     ("shading/material", "judged by images, not by a twin"),
+    ("shading/normals", "judged in f64 by tests/materials"),
     ("shading/surface", "judged by images, not by a twin"),
     ("shading/texture", "judged by images, not by a twin"),
 ];
@@ -201,6 +202,7 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
     ("sampling/dimensions", "needed", "planning"),
     ("sampling/r2", "generalised_golden_ratio", "makes the table"),
     ("sampling/sobol", "direction_numbers", "makes the table"),
+    ("sampling/jittered", "strata", "makes the table"),
     ("sampling/dimensions", "purpose", "words for the report"),
     (
         "sampling/dimensions",

@@ -33,7 +33,7 @@ impl Estimate {
         let errors = plan.samplers.iter().map(|cell| {
             u64::from(plan.renders(cell)) * image(&cell[Axis::Integrator], experiment.spp.max())
         });
-        // One for each world and integrator.
+        // One for each world and integrator, unless it is read from a file.
         let part = |cell: &Cell| cell.on(&[&Cell::WORLD[..], &[Axis::Integrator]].concat());
         let mut references: Vec<Cell> = Vec::new();
         for cell in plan.samplers.iter().map(part) {
@@ -41,8 +41,10 @@ impl Estimate {
                 references.push(cell);
             }
         }
+        let rendered = experiment.reference.file.is_none();
         let references = references
             .iter()
+            .filter(|_| rendered)
             .map(|cell| image(&cell[Axis::Integrator], experiment.reference.spp));
         let timing = &experiment.timing;
         let rounds = u64::from(timing.rounds);

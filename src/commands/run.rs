@@ -8,10 +8,11 @@ use super::signals;
 use anyhow::Result;
 use clap::Args;
 use raystone::config::{Cell, Experiment};
+use raystone::image::FileFormat;
 use raystone::measure::record::{Body, Line, read_records};
 use raystone::report::{failed_checks, terminal_tables, write_report};
 use raystone::run::{Existing, Kernels, Registries, RunError, RunSummary};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Run an experiment file and write its records and report
@@ -30,6 +31,14 @@ pub struct Run {
     number: bool,
     #[command(flatten)]
     experiment: ExperimentArguments,
+    /// Image to compare with in place of a rendered reference, of the run's resolution: .exr, .hdr, .pfm, .npy;
+    /// short for --set reference.file=FILE
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
+    /// Also write linear radiance (reference, first replicate, mean and variance of all) in this format: exr,
+    /// hdr, pfm, npy
+    #[arg(long, value_name = "FORMAT", value_parser = linear_format)]
+    images: Option<&'static FileFormat>,
     /// Print the cells and an estimate of the time; start nothing
     #[arg(long)]
     dry_run: bool,
@@ -45,6 +54,7 @@ impl Run {
         let registries = Registries::default();
         let catalogue = registries.catalogue();
         let mut overrides = Vec::from_iter(self.device.kernels_override());
+        overrides.extend(self.reference.as_deref().map(reference_override));
         overrides.extend(self.experiment.values.set.iter().cloned());
         let experiment = Experiment::load(&self.file, &overrides, &catalogue)?;
         let plan = plan(&experiment, &self.experiment.only, &registries)?;
@@ -64,6 +74,7 @@ impl Run {
             .device
             .options(out, &self.experiment.values, self.quiet);
         options.existing = existing;
+        options.images = self.images;
         signals::watch(options.interrupt.clone())?;
         match raystone::run::run(&experiment, &plan, &registries, &options) {
             Err(RunError::Interrupted) => signals::wait_for_end(),
@@ -74,6 +85,22 @@ impl Run {
             summary => tell(&summary?, self.quiet),
         }
     }
+}
+
+/// The image to compare with as an override of an experiment.
+fn reference_override(file: &Path) -> String {
+    let file = toml::Value::from(file.display().to_string());
+    format!("reference.file={file}")
+}
+
+/// The format of linear images with this ending.
+fn linear_format(text: &str) -> Result<&'static FileFormat, String> {
+    let ending = text.trim_start_matches('.').to_ascii_lowercase();
+    let found = FileFormat::linear().find(|format| format.ending == ending);
+    found.ok_or_else(|| {
+        let known: Vec<&str> = FileFormat::linear().map(|format| format.ending).collect();
+        format!("linear radiance is written as one of {}", known.join(", "))
+    })
 }
 
 /// Writes the report of a run, prints its tables, and tells what failed.
@@ -141,7 +168,6 @@ fn default_folder(name: &str) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     #[test]
     fn the_default_folder_lies_below_results() {

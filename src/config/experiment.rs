@@ -10,7 +10,7 @@ use crate::params::Variant;
 use crate::sampling::hash::pcg_hash;
 use serde::{Deserialize, Serialize};
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What is run. Keys, ranges and defaults stand in [`super::keys::KEYS`] and
 /// `docs/experiments.md`.
@@ -29,7 +29,7 @@ pub struct Experiment {
     /// Width and height of every image, pixels.
     pub resolution: [u32; 2],
     /// Samples per pixel at which errors are taken.
-    pub spp: SppRange,
+    pub spp: SppCounts,
     /// When a sampler is ended before the most samples.
     pub stop: Option<StopRule>,
     /// Whether kernels keep the bounds checks and loop bounds of the driver layer.
@@ -50,7 +50,7 @@ pub struct Experiment {
     pub discrepancy: Discrepancy,
 }
 
-/// Ends a sampler at a power of two of samples where its relMSE is below a target.
+/// Ends a sampler at one of the numbers of samples where its relMSE is below a target.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StopRule {
     /// Target, positive.
@@ -59,14 +59,9 @@ pub struct StopRule {
     pub confidence: f64,
 }
 
-/// The powers of two from `2^first` to `2^last`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SppRange {
-    /// Least exponent.
-    pub first: u32,
-    /// Greatest exponent, at most 16.
-    pub last: u32,
-}
+/// Numbers of samples per pixel: at least one, ascending.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SppCounts(Vec<u32>);
 
 impl Experiment {
     /// Width of an image over its height.
@@ -76,15 +71,21 @@ impl Experiment {
     }
 }
 
-impl SppRange {
+impl SppCounts {
+    /// These numbers, if there is one, none is 0 and each is greater than the one before.
+    pub(super) fn new(counts: Vec<u32>) -> Option<Self> {
+        let ascend = counts.is_sorted_by(|a, b| a < b);
+        (ascend && counts.first().is_some_and(|least| *least > 0)).then_some(Self(counts))
+    }
+
     /// The numbers of samples per pixel, ascending.
-    pub fn counts(self) -> impl Iterator<Item = u32> {
-        (self.first..=self.last).map(|exponent| 1 << exponent)
+    pub fn counts(&self) -> impl Iterator<Item = u32> {
+        self.0.iter().copied()
     }
 
     /// The greatest number of samples per pixel: what one render takes.
-    pub fn max(self) -> u32 {
-        1 << self.last
+    pub fn max(&self) -> u32 {
+        self.0.last().copied().unwrap_or(1)
     }
 }
 
@@ -135,9 +136,11 @@ impl Seeds {
     }
 }
 
-/// How the reference image is rendered.
+/// Where the reference image comes from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {
+    /// A file that holds it, so that none is rendered.
+    pub file: Option<PathBuf>,
     /// Samples per pixel of both halves together.
     pub spp: u32,
     /// Its sequence, with default parameters.

@@ -101,10 +101,10 @@ pub enum ValueKind {
         /// Greatest value of each.
         max: i64,
     },
-    /// A table `{ pow2 = [lo, hi] }`: all powers of two from 2^lo to 2^hi.
-    Exponents {
+    /// A table `{ pow2 = [lo, hi] }`, all powers of two from 2^lo to 2^hi, or a list of ascending numbers.
+    Counts {
         /// Greatest exponent.
-        max: i64,
+        max_exponent: i64,
     },
     /// A table `{ relmse = x, confidence = p }`.
     StopRule,
@@ -140,10 +140,12 @@ impl fmt::Display for ValueKind {
             Self::IntegerPair { min, max } => {
                 write!(f, "a list of two integers in [{min}, {max}]")
             }
-            Self::Exponents { max } => {
+            Self::Counts { max_exponent } => {
                 write!(
                     f,
-                    "a table {{ pow2 = [lo, hi] }} with 0 <= lo <= hi <= {max}"
+                    "a table {{ pow2 = [lo, hi] }} with 0 <= lo <= hi <= {max_exponent}, or a list of ascending \
+                     integers in [1, {}]",
+                    1_i64 << max_exponent
                 )
             }
             Self::StopRule => write!(
@@ -223,7 +225,7 @@ pub const KEYS: &[KeyRow] = &[
     key("run", "replicates", integer(1, 1024), Some("16"), "Independent seeds per randomised sampler; the unit of every interval of an error."),
     key("run", "seed", SEED, Some("1"), "Seed of the first replicate."),
     key("run", "resolution", ValueKind::IntegerPair { min: 16, max: 8192 }, Some("[192, 144]"), "Width and height of every image, pixels."),
-    key("run", "spp", ValueKind::Exponents { max: 16 }, Some("{ pow2 = [0, 5] }"), "Samples per pixel at which the error is taken: 2^lo, …, 2^hi."),
+    key("run", "spp", ValueKind::Counts { max_exponent: 16 }, Some("{ pow2 = [0, 5] }"), "Samples per pixel at which the error is taken: 2^lo, …, 2^hi, or those listed, `[1, 3, 10]`."),
     key("run", "stop", ValueKind::StopRule, None, "Ends a sampler at one of these numbers of samples where its relMSE is below x with probability p; without it, each takes them all."),
     key("run", "runtime_checks", ValueKind::Flag, Some("true"), "Keep the bounds checks and loop bounds that the driver layer adds to kernels."),
     key("axes", "scene", ValueKind::Names(Axis::Scene), None, "Scenes: built-in names, or paths of .obj, .gltf, .glb, .ply or Nori .xml files, relative to the current directory. Not needed if all integrators are `integrand:*`."),
@@ -252,6 +254,7 @@ pub const KEYS: &[KeyRow] = &[
     key("reference", "sequence", ValueKind::Name(Axis::Sequence), Some("\"pixel-hash\""), "Sequence of the reference, with its default parameters."),
     key("reference", "decorrelation", ValueKind::Name(Axis::Decorrelation), Some("\"none\""), "Decorrelation of the reference, with its default parameters."),
     key("reference", "seed", SEED, Some("9001"), "What the seeds of the reference's parts are hashed from; none of them may be a replicate's."),
+    key("reference", "file", ValueKind::Text, None, "An image (.exr, .hdr, .pfm, .npy) of the run's resolution to compare with in place of a rendered one, relative to the current directory; its own noise is not known."),
     key("timing", "rounds", integer(3, 1000), Some("9"), "Timed rounds; each times every cell of a scene once, in random order."),
     key("timing", "spp", integer(1, 1024), Some("1"), "Samples per pixel of each timed render."),
     key("timing", "min_warmup_ms", integer(0, 60_000), Some("100"), "Least warm-up of a kernel before it is timed, milliseconds."),

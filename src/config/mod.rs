@@ -23,7 +23,7 @@ pub use axis_map::AxisMap;
 pub use cells::Cell;
 pub use error::{ConfigError, Place};
 pub use experiment::{
-    Axes, Discrepancy, Exclude, Experiment, Gate, REFERENCE_PARTS, Reference, Seeds, SppRange,
+    Axes, Discrepancy, Exclude, Experiment, Gate, REFERENCE_PARTS, Reference, Seeds, SppCounts,
     StopRule, Timing,
 };
 pub use keys::Axis;

@@ -11,7 +11,7 @@ use super::tree::{self, Item, Table, Value};
 use super::{Catalogue, variants};
 use crate::geometry::Camera;
 use crate::params::Variant;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Parses and checks an experiment; see [`Experiment::parse`].
 pub(super) fn parse(
@@ -48,7 +48,7 @@ pub(super) fn parse(
         replicates: run.unsigned("replicates")?,
         seed: run.unsigned("seed")?,
         resolution: run.unsigned_pair("resolution")?,
-        spp: run.exponents("spp")?,
+        spp: run.counts("spp")?,
         stop: (run.has("stop"))
             .then(|| run.stop_rule("stop"))
             .transpose()?,
@@ -62,6 +62,7 @@ pub(super) fn parse(
         discrepancy: reader.discrepancy()?,
     };
     check_reference_seed(&experiment, &reader)?;
+    check_reference_file(&experiment, &reader)?;
     Ok(experiment)
 }
 
@@ -159,6 +160,17 @@ fn check_reference_seed(experiment: &Experiment, reader: &Reader) -> Result<(), 
             experiment.seed
         ),
     })
+}
+
+/// One image cannot be what several scenes should look like.
+fn check_reference_file(experiment: &Experiment, reader: &Reader) -> Result<(), ConfigError> {
+    let scenes = experiment.axes[Axis::Scene].len();
+    if experiment.reference.file.is_none() || scenes == 1 {
+        return Ok(());
+    }
+    let expected =
+        format!("left out where `axes.scene` has {scenes} scenes: it is an image of one");
+    Err(reader.section("reference")?.not_allowed("file", &expected))
 }
 
 /// Reads sections of the merged tree.
@@ -304,7 +316,12 @@ impl<'t> Reader<'t> {
             let name = section.text(axis.name())?;
             variants::resolve(axis, item, name, self.catalogue)
         };
+        let file = match section.has("file") {
+            true => Some(PathBuf::from(section.text("file")?)),
+            false => None,
+        };
         Ok(Reference {
+            file,
             spp: section.unsigned("spp")?,
             sequence: entry(Axis::Sequence)?.default_variant(),
             decorrelation: entry(Axis::Decorrelation)?.default_variant(),

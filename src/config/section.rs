@@ -1,7 +1,7 @@
 //! Typed reading of one section: every value is checked against its row in [`keys::KEYS`].
 
 use super::error::{ConfigError, Place};
-use super::experiment::{SppRange, StopRule};
+use super::experiment::{SppCounts, StopRule};
 use super::keys::{self, KeyRow, ValueKind};
 use super::tree::{Item, Table, Value};
 use glam::Vec3;
@@ -155,12 +155,15 @@ impl<'t> Section<'t> {
         Ok([unsigned(first)?, unsigned(second)?])
     }
 
-    pub fn exponents(&self, name: &str) -> Result<SppRange, ConfigError> {
+    pub fn counts(&self, name: &str) -> Result<SppCounts, ConfigError> {
         let item = self.item(name)?;
-        let (Value::Table(table), ValueKind::Exponents { max }) =
-            (&item.value, self.key(name).kind)
-        else {
+        let ValueKind::Counts { max_exponent: max } = self.key(name).kind else {
             return Err(self.wrong_type(name, item));
+        };
+        let table = match &item.value {
+            Value::Table(table) => table,
+            Value::List(items) => return self.listed_counts(name, item, items, 1 << max),
+            _ => return Err(self.wrong_type(name, item)),
         };
         if let Some((other, item)) = table.iter().find(|(key, _)| *key != "pow2") {
             return Err(ConfigError::Unknown {
@@ -174,10 +177,28 @@ impl<'t> Section<'t> {
             .get("pow2")
             .ok_or_else(|| self.wrong_type(name, item))?;
         let [first, last] = self.pair(name, pow2, 0, max)?;
-        if first > last {
-            return Err(self.out_of_range(name, &pow2.at, format!("[{first}, {last}]")));
-        }
-        Ok(SppRange { first, last })
+        let powers = (first..=last).map(|exponent| 1 << exponent).collect();
+        SppCounts::new(powers)
+            .ok_or_else(|| self.out_of_range(name, &pow2.at, format!("[{first}, {last}]")))
+    }
+
+    fn listed_counts(
+        &self,
+        name: &str,
+        list: &Item,
+        items: &[Item],
+        max: i64,
+    ) -> Result<SppCounts, ConfigError> {
+        let count = |item: &Item| match item.value {
+            Value::Integer(x) if (1..=max).contains(&x) => {
+                u32::try_from(x).map_err(|_| self.out_of_range(name, &item.at, x))
+            }
+            Value::Integer(x) => Err(self.out_of_range(name, &item.at, x)),
+            _ => Err(self.wrong_type(name, item)),
+        };
+        let counts: Vec<u32> = items.iter().map(count).collect::<Result<_, _>>()?;
+        let written = format!("{counts:?}");
+        SppCounts::new(counts).ok_or_else(|| self.out_of_range(name, &list.at, written))
     }
 
     pub fn stop_rule(&self, name: &str) -> Result<StopRule, ConfigError> {

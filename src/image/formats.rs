@@ -1,19 +1,23 @@
 //! Files for rendered images. The ending of the file name decides: PNG is a picture to look at, the
 //! others keep the linear radiance of every pixel.
 
-use super::{Image, ImageError, automatic_exposure, encode_png, tone_map};
+use super::exr_file::{encode_exr, read_exr};
+use super::read::{Decode, read_hdr, read_npy, read_pfm};
+use super::{Attribute, Image, ImageError, automatic_exposure, encode_png, tone_map};
 use crate::atomic::write_atomic;
 use ::image::{ExtendedColorType, ImageFormat};
 use std::io::Cursor;
 use std::path::Path;
 
-/// A kind of file that an image can be written to.
+/// A kind of file that an image can be written to and, if it keeps linear values, read from.
+#[derive(Debug)]
 pub struct FileFormat {
     /// Ending of the file name, lower case, without the dot.
     pub ending: &'static str,
     /// One line: what the file holds.
     pub description: &'static str,
-    encode: fn(&Image) -> Result<Vec<u8>, image::ImageError>,
+    encode: fn(&Image, &[Attribute]) -> Result<Vec<u8>, image::ImageError>,
+    pub(super) decode: Option<Decode>,
 }
 
 /// Every format, in the order in which messages name them.
@@ -21,27 +25,32 @@ pub const FILE_FORMATS: [FileFormat; 5] = [
     FileFormat {
         ending: "png",
         description: "tone-mapped sRGB with 8 bits",
-        encode: |image| encode_png(&tone_map(image, automatic_exposure(image))),
+        encode: |image, _| encode_png(&tone_map(image, automatic_exposure(image))),
+        decode: None,
     },
     FileFormat {
         ending: "exr",
-        description: "OpenEXR, linear radiance as 32-bit floats",
-        encode: |image| Ok(encode_exr(image)),
+        description: "OpenEXR, linear radiance as 32-bit floats, with attributes",
+        encode: |image, attributes| Ok(encode_exr(image, attributes)),
+        decode: Some(read_exr),
     },
     FileFormat {
         ending: "hdr",
         description: "Radiance RGBE, linear radiance to 1 %",
-        encode: encode_hdr,
+        encode: |image, _| encode_hdr(image),
+        decode: Some(read_hdr),
     },
     FileFormat {
         ending: "pfm",
         description: "portable float map, linear radiance as 32-bit floats",
-        encode: |image| Ok(encode_pfm(image)),
+        encode: |image, _| Ok(encode_pfm(image)),
+        decode: Some(read_pfm),
     },
     FileFormat {
         ending: "npy",
         description: "NumPy array [height, width, 3] of 32-bit floats, linear radiance",
-        encode: |image| Ok(encode_npy(image)),
+        encode: |image, _| Ok(encode_npy(image)),
+        decode: Some(read_npy),
     },
 ];
 
@@ -59,13 +68,24 @@ impl FileFormat {
         })
     }
 
+    /// Those that keep linear values.
+    pub fn linear() -> impl Iterator<Item = &'static Self> {
+        FILE_FORMATS.iter().filter(|format| format.decode.is_some())
+    }
+
     /// Writes an image, whole or not at all. Radiance is kept as it is, NaN too, except by RGBE,
-    /// which has neither that nor negative numbers: it takes 0.
+    /// which has neither that nor negative numbers: it takes 0. EXR keeps the attributes, the others have no
+    /// place for them.
     ///
     /// # Errors
     /// [`ImageError::Encode`], [`ImageError::Write`].
-    pub fn write(&self, path: &Path, image: &Image) -> Result<(), ImageError> {
-        save(path, (self.encode)(image))
+    pub fn write(
+        &self,
+        path: &Path,
+        image: &Image,
+        attributes: &[Attribute],
+    ) -> Result<(), ImageError> {
+        save(path, (self.encode)(image, attributes))
     }
 }
 
@@ -106,58 +126,6 @@ fn in_range_of_rgbe(value: f32) -> f32 {
         true => value.min(1.6e38),
         false => 0.0,
     }
-}
-
-/// OpenEXR: one part of uncompressed scan lines, after "OpenEXR File Layout" of the Academy Software
-/// Foundation. Written here because the crate for it takes longer to build than all other formats.
-fn encode_exr(image: &Image) -> Vec<u8> {
-    const MAGIC_AND_VERSION: [u8; 8] = [0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0];
-    const FLOAT: u8 = 2;
-    // Channels in the order of the alphabet, and where they are in a pixel.
-    const CHANNELS: [(u8, usize); 3] = [(b'B', 2), (b'G', 1), (b'R', 0)];
-    let [right, bottom] = [image.width - 1, image.height - 1];
-    let window: Vec<u8> = [0, 0, right, bottom]
-        .iter()
-        .flat_map(|v| v.to_le_bytes())
-        .collect();
-    let mut channels = Vec::new();
-    for (name, _) in CHANNELS {
-        // Name, type, "perceptually linear" and three reserved bytes, sampling in x and y.
-        channels.extend([name, 0, FLOAT, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]);
-    }
-    channels.push(0);
-    let one = 1f32.to_le_bytes();
-    let attributes: [(&str, &str, &[u8]); 8] = [
-        ("channels", "chlist", &channels),
-        ("compression", "compression", &[0]),
-        ("dataWindow", "box2i", &window),
-        ("displayWindow", "box2i", &window),
-        ("lineOrder", "lineOrder", &[0]),
-        ("pixelAspectRatio", "float", &one),
-        ("screenWindowCenter", "v2f", &[0; 8]),
-        ("screenWindowWidth", "float", &one),
-    ];
-    let mut bytes = MAGIC_AND_VERSION.to_vec();
-    for (name, kind, value) in attributes {
-        bytes.extend_from_slice(format!("{name}\0{kind}\0").as_bytes());
-        bytes.extend_from_slice(&(value.len() as u32).to_le_bytes());
-        bytes.extend_from_slice(value);
-    }
-    bytes.push(0);
-    // Where each row begins, then the rows: number, bytes, one channel after the other.
-    let row_bytes = 12 * image.width;
-    let first_row = bytes.len() as u64 + 8 * u64::from(image.height);
-    for row in 0..u64::from(image.height) {
-        bytes.extend((first_row + row * (8 + u64::from(row_bytes))).to_le_bytes());
-    }
-    for (y, row) in (0u32..).zip(image.pixels.chunks(image.width as usize)) {
-        bytes.extend(y.to_le_bytes());
-        bytes.extend(row_bytes.to_le_bytes());
-        for (_, channel) in CHANNELS {
-            bytes.extend(row.iter().flat_map(|pixel| pixel[channel].to_le_bytes()));
-        }
-    }
-    bytes
 }
 
 /// Portable float map: rows from the bottom up; the negative scale says little endian.
@@ -206,7 +174,12 @@ mod tests {
     fn written(ending: &str, image: &Image) -> Vec<u8> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(format!("picture.{ending}"));
-        FileFormat::of(&path).unwrap().write(&path, image).unwrap();
+        let format = FileFormat::of(&path).unwrap();
+        let attributes = [
+            ("spp", "64".to_owned()),
+            ("sampler", "sobol × none".to_owned()),
+        ];
+        format.write(&path, image, &attributes).unwrap();
         std::fs::read(&path).unwrap()
     }
 
@@ -233,9 +206,12 @@ mod tests {
         assert_eq!(attribute(&bytes, "compression", "compression"), [0]);
         let channels = attribute(&bytes, "channels", "chlist");
         assert_eq!(channels.len(), 3 * 18 + 1);
-        // The table of rows follows the header, whose last attribute is a float, and a zero.
+        assert_eq!(attribute(&bytes, "spp", "string"), b"64");
+        let sampler = "sobol × none".as_bytes();
+        assert_eq!(attribute(&bytes, "sampler", "string"), sampler);
+        // The table of rows follows the header: its last attribute, and a zero.
         let table = bytes.len() - 3 * (8 + 60) - 3 * 8;
-        assert_eq!(bytes[table - 5..table], [0, 0, 0x80, 0x3f, 0]);
+        assert!(bytes[..table].ends_with(&[sampler, &[0]].concat()));
         for (y, row) in image.pixels.chunks(5).enumerate() {
             let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
             let at = word(table + 8 * y) as usize;

@@ -1,12 +1,16 @@
-//! Linear RGB images, pictures of them to look at, colour maps, and the files that they are written to.
+//! Linear RGB images, pictures of them to look at, colour maps, and the files that they are written to and read from.
 
 mod color;
+mod exr_file;
 mod formats;
 mod picture;
+mod read;
 
 pub use color::*;
+pub use exr_file::Attribute;
 pub use formats::*;
 pub use picture::*;
+pub use read::read_linear;
 
 use std::io;
 use std::path::PathBuf;
@@ -77,6 +81,22 @@ pub enum ImageError {
         /// Endings of all formats.
         known: String,
     },
+    /// A file could not be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: io::Error,
+    },
+    /// A file is not what its ending says, or not an image that is read.
+    #[error("cannot read {} as an image: {reason}", path.display())]
+    Decode {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// The encoder refused the picture.
     #[error("cannot encode {}: {source}", path.display())]
     Encode {
@@ -137,6 +157,28 @@ impl Image {
                 / n) as f32
         };
         let pixels = (0..first.pixels.len()).map(|i| [0, 1, 2].map(|c| mean(i, c)));
+        Self::new(first.width, first.height, pixels.collect())
+    }
+
+    /// Variance over several images of one size, by pixel and channel, of one of them: the sum of squares about
+    /// the mean over one less than their number.
+    ///
+    /// # Errors
+    /// [`ImageError::TooFew`] below two, [`ImageError::SizeMismatch`].
+    pub fn variance_of(images: &[Image]) -> Result<Self, ImageError> {
+        let [first, _, ..] = images else {
+            return Err(ImageError::TooFew { needed: 2 });
+        };
+        for image in images {
+            first.check_size(image, "an image of a variance")?;
+        }
+        let n = images.len() as f64;
+        let variance = |i: usize, c: usize| {
+            let values = || images.iter().map(|m| f64::from(m.pixels[i][c]));
+            let mean = values().sum::<f64>() / n;
+            (values().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)) as f32
+        };
+        let pixels = (0..first.pixels.len()).map(|i| [0, 1, 2].map(|c| variance(i, c)));
         Self::new(first.width, first.height, pixels.collect())
     }
 

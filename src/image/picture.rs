@@ -37,17 +37,20 @@ pub fn automatic_exposure(image: &Image) -> f32 {
     }
 }
 
-/// Tone-mapped picture: exposure, then the luminance curve L (1 + L / 16) / (1 + L) that maps 4 to
-/// white and keeps the hue (Reinhard et al. 2002, equation 4), clamp, sRGB encoding. Pixels that are
-/// not finite get [`NON_FINITE_COLOUR`].
+/// A finite pixel as it is shown: exposure, then the luminance curve L (1 + L / 16) / (1 + L) that maps 4 to
+/// white and keeps the hue (Reinhard et al. 2002, equation 4), clamp, sRGB encoding (IEC 61966-2-1) to [0, 1].
+pub fn displayed(pixel: &[f32; 3], exposure: f32) -> [f64; 3] {
+    let bright = luminance(pixel).max(0.0) * f64::from(exposure);
+    let scale = f64::from(exposure) * (1.0 + bright / 16.0) / (1.0 + bright);
+    pixel.map(|v| encode_srgb(f64::from(v) * scale))
+}
+
+/// Tone-mapped picture: every pixel as [`displayed`] in 8 bits. Pixels that are not finite get
+/// [`NON_FINITE_COLOUR`].
 pub fn tone_map(image: &Image, exposure: f32) -> Picture {
-    let map = |pixel: &[f32; 3]| {
-        if !is_finite(pixel) {
-            return NON_FINITE_COLOUR;
-        }
-        let bright = luminance(pixel).max(0.0) * f64::from(exposure);
-        let scale = f64::from(exposure) * (1.0 + bright / 16.0) / (1.0 + bright);
-        pixel.map(|v| encode_srgb(f64::from(v) * scale))
+    let map = |pixel: &[f32; 3]| match is_finite(pixel) {
+        true => displayed(pixel, exposure).map(|v| (v * 255.0).round() as u8),
+        false => NON_FINITE_COLOUR,
     };
     Picture {
         width: image.width,
@@ -78,14 +81,13 @@ pub(super) fn encode_png(picture: &Picture) -> Result<Vec<u8>, image::ImageError
     Ok(bytes.into_inner())
 }
 
-/// Clamp and encode (IEC 61966-2-1).
-fn encode_srgb(linear: f64) -> u8 {
+/// Clamp and encode.
+fn encode_srgb(linear: f64) -> f64 {
     let v = linear.clamp(0.0, 1.0);
-    let encoded = match v <= 0.0031308 {
+    match v <= 0.0031308 {
         true => 12.92 * v,
         false => 1.055 * v.powf(1.0 / 2.4) - 0.055,
-    };
-    (encoded * 255.0).round() as u8
+    }
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ mod registry;
 mod render;
 mod slice;
 mod stage;
+mod surface_tables;
 mod tables;
 
 pub use crate::accel::Traced;
@@ -22,4 +23,5 @@ pub use passes::ImageSteps;
 pub use registry::IntegratorRegistry;
 pub use render::{BLOCK_SAMPLES, RenderJob, Renderer, Snapshot, rounding_bound, with_sampler};
 pub use stage::{Stage, StageError};
+pub use surface_tables::SurfaceFeatures;
 pub use tables::{SceneBuffers, SceneFeatures};

@@ -32,6 +32,7 @@ pub(super) fn job_uniform(job: &RenderJob, scene: &SceneBuffers) -> UniformValue
         .u32("lights", scene.lights)
         .u32("first_light", scene.first_light)
         .u32("first_uv", scene.first_uv)
+        .u32("first_normal", scene.first_normal)
         .f32("light_power", scene.light_power)
         .f32("ao_radius", ao_radius as f32)
         .f32("transform_scale", scene.transform_error.scale)

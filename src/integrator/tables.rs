@@ -1,6 +1,7 @@
 //! Scene buffers for shading: canonical triangles, materials, lights, textures.
 
 use super::offset::TransformError;
+use super::surface_tables::{MATERIAL_WORDS, Places, SurfaceFeatures, append};
 use crate::accel::{TriangleBuffers, TriangleSoup};
 use crate::gpu::{Bindings, Gpu, GpuError};
 use crate::scene::{DIFFUSE, Daylight, MATERIAL_KINDS, MaterialKind, SceneData};
@@ -9,8 +10,8 @@ use glam::Vec3;
 /// What a scene makes kernels carry; absent features are not in the kernel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SceneFeatures {
-    /// Some material has a base-colour texture.
-    pub textures: bool,
+    /// Textures and normals.
+    pub surfaces: SurfaceFeatures,
     /// There are lights that can be sampled: materials that emit.
     pub lights: bool,
     /// The environment is the sky over a scene without a light.
@@ -25,11 +26,8 @@ impl SceneFeatures {
         let kinds = MATERIAL_KINDS.iter().map(|kind| kind.feature);
         let mut flags: Vec<_> = kinds.zip(self.materials).collect();
         flags.retain(|(name, _)| *name != DIFFUSE.feature);
-        flags.extend([
-            ("textures", self.textures),
-            ("lights", self.lights),
-            ("daylight", self.daylight),
-        ]);
+        flags.extend([("lights", self.lights), ("daylight", self.daylight)]);
+        flags.extend(self.surfaces.flags());
         flags
     }
 }
@@ -56,6 +54,8 @@ pub struct SceneBuffers {
     pub light_power: f32,
     /// Where texture coordinates begin in `shading_tables`, in words.
     pub first_uv: u32,
+    /// Where normals begin in `shading_tables`, in words.
+    pub first_normal: u32,
     /// Length of the diagonal of the scene's box, scene units.
     pub diagonal: f64,
 }
@@ -71,13 +71,9 @@ impl SceneBuffers {
     /// # Errors
     /// A buffer exceeds the adapter's limit.
     pub fn upload(gpu: &Gpu, scene: &SceneData, soup: &TriangleSoup) -> Result<Self, GpuError> {
-        let textured = scene.uvs.len() == scene.triangles.len()
-            && scene
-                .materials
-                .iter()
-                .any(|m| m.base_color_texture.is_some());
+        let surfaces = SurfaceFeatures::of(scene);
         let (lights, light_power) = light_words(scene);
-        let tables = Tables::of(scene, &lights, textured);
+        let tables = Tables::of(scene, &lights, &surfaces);
         let triangles = TriangleBuffers::upload(gpu, soup)?;
         let mut bindings = triangles.bindings.clone();
         bindings.buffer(
@@ -89,7 +85,7 @@ impl SceneBuffers {
             triangles,
             transform_error: TransformError::of(soup),
             features: SceneFeatures {
-                textures: textured,
+                surfaces,
                 lights: !lights.is_empty(),
                 daylight: scene.daylight.is_some(),
                 materials: MATERIAL_KINDS
@@ -100,30 +96,27 @@ impl SceneBuffers {
             lights: lights.len() as u32,
             first_light: tables.first_light,
             light_power,
-            first_uv: tables.first_uv,
+            first_uv: tables.places.first_uv,
+            first_normal: tables.places.first_normal,
             diagonal: f64::from(2.0 * scene.bounds().radius()),
         })
     }
 }
 
-/// Words of a material without its parameters.
-const MATERIAL_WORDS: usize = 12;
-
-/// Content of `shading_tables`, in this order: three `vec4` per material, parameters of materials, lights,
-/// six words of texture coordinates per triangle, texels.
+/// Content of `shading_tables`, in this order: three `vec4` per material, parameters of materials, lights, and what
+/// [`surface_tables`](super::surface_tables) appends.
 ///
-/// A material: base colour and number of its kind; emission and place of its parameters, in `vec4`; place of its
-/// first texel, in words, width and height of its texture, and 1 if it has one.
+/// A material: base colour and number of its kind; emission and place of its parameters, in `vec4`; places of its
+/// textures, 0 where it has none.
 struct Tables {
     words: Vec<u32>,
     /// In `vec4`.
     first_light: u32,
-    /// In words.
-    first_uv: u32,
+    places: Places,
 }
 
 impl Tables {
-    fn of(scene: &SceneData, lights: &[[u32; 4]], textured: bool) -> Self {
+    fn of(scene: &SceneData, lights: &[[u32; 4]], surfaces: &SurfaceFeatures) -> Self {
         let mut words = vec![0; MATERIAL_WORDS * scene.materials.len()];
         for (index, material) in scene.materials.iter().enumerate() {
             let parameters = words.len() as u32 / 4;
@@ -137,15 +130,12 @@ impl Tables {
         }
         let first_light = words.len() as u32 / 4;
         words.extend_from_slice(lights.as_flattened());
-        let first_uv = words.len() as u32;
-        if textured {
-            push_textures(scene, &mut words);
-        }
+        let places = append(scene, surfaces, &mut words);
         words.resize(words.len().next_multiple_of(4), 0);
         Self {
             words,
             first_light,
-            first_uv,
+            places,
         }
     }
 }
@@ -154,23 +144,6 @@ impl Tables {
 fn number(kind: &MaterialKind) -> u32 {
     let place = MATERIAL_KINDS.iter().position(|known| *known == kind);
     place.unwrap_or_default() as u32
-}
-
-/// Appends texture coordinates and texels, and tells the materials where theirs are.
-fn push_textures(scene: &SceneData, words: &mut Vec<u32>) {
-    let texels: usize = scene.textures.iter().map(|t| t.texels.len()).sum();
-    words.reserve_exact(6 * scene.uvs.len() + texels + 3);
-    let uvs = scene.uvs.iter().flatten();
-    words.extend(uvs.flat_map(|uv| [uv.x.to_bits(), uv.y.to_bits()]));
-    for (id, texture) in (0_u32..).zip(&scene.textures) {
-        let row = [words.len() as u32, texture.width, texture.height, 1];
-        words.extend(texture.texels.iter().map(|t| u32::from_le_bytes(*t)));
-        for (index, material) in scene.materials.iter().enumerate() {
-            if material.base_color_texture == Some(id) {
-                words[MATERIAL_WORDS * index + 8..][..4].copy_from_slice(&row);
-            }
-        }
-    }
 }
 
 /// One row per emissive triangle: index and cumulative probability; and the total power.

@@ -119,7 +119,7 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 85] = [
+pub static FIGURES: [Figure; 92] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
@@ -156,6 +156,13 @@ pub static FIGURES: [Figure; 85] = [
     Figure::new("rmse-unbiased/v1", "unbiased RMSE", "", Lower, THREE, Jackknife),
     Figure::new("relmse-slope/v1", "slope of relMSE", "", Lower, Exponent, Jackknife),
     Figure::new("rmse-slope/v1", "slope of RMSE", "", Lower, Exponent, Jackknife),
+    Figure::new("mae/v1", "MAE", "", Lower, THREE, Mean),
+    Figure::new("relmse-trimmed/v1", "relMSE without the 0.1 % worst", "", Lower, THREE, Mean),
+    Figure::new("mse-luminance/v1", "MSE of luminance", "", Lower, THREE, Mean),
+    Figure::new("smape/v1", "SMAPE", "", Lower, THREE, Mean),
+    Figure::new("psnr/v1", "PSNR", "dB", Higher, THREE, Mean),
+    Figure::new("ssim/v1", "SSIM", "", Higher, THREE, Mean),
+    Figure::new("flip/v1", "FLIP", "", Lower, THREE, Mean),
     Figure::new("bias-tiles/v1", "tiles", "", Neither, Count, Exact),
     Figure::new("bias-rejected/v1", "rejected", "", Lower, Count, Exact),
     Figure::new("bias-least-p/v1", "smallest p of a tile", "", Neither, THREE, Exact),

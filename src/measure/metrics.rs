@@ -1,18 +1,36 @@
 //! Error of images by versioned metrics.
 
-use crate::image::{Image, ImageError, NON_FINITE_COLOUR, Picture, is_finite};
+use super::shown::Shown;
+use crate::image::{
+    Image, ImageError, NON_FINITE_COLOUR, Picture, automatic_exposure, is_finite, luminance,
+};
 use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::{Arc, OnceLock};
 
 /// Added to the squared reference in relative metrics, so that dark pixels do not rule the mean.
 pub const RELATIVE_EPSILON: f64 = 1e-2;
 
 /// What an image is measured against: the mean of a reference, and its independent parts and their
 /// two halves if there are.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Reference {
     mean: Image,
     halves: Option<[Image; 2]>,
     parts: Vec<Image>,
+    /// The tone-mapped reference, made when it is first compared with.
+    shown: OnceLock<Arc<Shown>>,
+}
+
+impl fmt::Debug for Reference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (width, height) = (self.mean.width, self.mean.height);
+        write!(
+            f,
+            "a reference of {width}×{height} pixels in {} parts",
+            self.parts.len()
+        )
+    }
 }
 
 impl Reference {
@@ -32,6 +50,7 @@ impl Reference {
             mean,
             halves: None,
             parts: Vec::new(),
+            shown: OnceLock::new(),
         })
     }
 
@@ -74,6 +93,11 @@ impl Reference {
         &self.mean
     }
 
+    /// The exposure that the reference and what is compared with it are shown with.
+    pub fn exposure(&self) -> f32 {
+        automatic_exposure(&self.mean)
+    }
+
     /// Estimated mean squared error of the reference itself, mean (A − B)² / 4 over pixels and
     /// channels; absent without halves.
     pub fn own_mse(&self) -> Option<f64> {
@@ -86,15 +110,27 @@ impl Reference {
     }
 }
 
-/// One channel of one pixel, all that a metric sees.
+/// One channel of one pixel.
 pub(super) struct Sample {
+    channel: usize,
     value: f64,
     reference: f64,
     half_a: f64,
     half_b: f64,
 }
 
-/// An error metric: a mean over pixels and channels, then perhaps a root.
+/// How a metric is computed.
+enum Rule {
+    /// The mean of a term over pixels and channels, then perhaps a root.
+    Mean {
+        term: fn(&Sample) -> f64,
+        finish: fn(f64) -> f64,
+    },
+    /// From two images whose pixels are all finite; `None` where it has no finite value.
+    Whole(fn(&Comparison) -> Option<f64>),
+}
+
+/// An error metric.
 pub struct Metric {
     /// Name with its constants and version, as records carry it.
     pub id: &'static str,
@@ -102,60 +138,142 @@ pub struct Metric {
     pub description: &'static str,
     /// Whether it is absent for a reference without halves.
     pub needs_halves: bool,
-    term: fn(&Sample) -> f64,
-    finish: fn(f64) -> f64,
+    rule: Rule,
+}
+
+impl Metric {
+    const fn mean(id: &'static str, description: &'static str, term: fn(&Sample) -> f64) -> Self {
+        Self {
+            id,
+            description,
+            needs_halves: false,
+            rule: Rule::Mean {
+                term,
+                finish: |mean| mean,
+            },
+        }
+    }
+
+    const fn unbiased(self) -> Self {
+        Self {
+            needs_halves: true,
+            ..self
+        }
+    }
+
+    const fn whole(
+        id: &'static str,
+        description: &'static str,
+        value: fn(&Comparison) -> Option<f64>,
+    ) -> Self {
+        Self {
+            id,
+            description,
+            needs_halves: false,
+            rule: Rule::Whole(value),
+        }
+    }
 }
 
 /// Every metric, in the order of tables. A changed formula gets a new version in its id.
+#[rustfmt::skip]
 pub const METRICS: &[Metric] = &[
-    Metric {
-        id: "mse/v1",
-        description: "mean (v − r)²",
-        needs_halves: false,
-        term: |s| (s.value - s.reference).powi(2),
-        finish: |mean| mean,
-    },
+    Metric::mean("mse/v1", "mean (v − r)²", Sample::squared_error),
     Metric {
         id: "rmse/v1",
         description: "√ mean (v − r)²",
         needs_halves: false,
-        term: |s| (s.value - s.reference).powi(2),
-        finish: f64::sqrt,
+        rule: Rule::Mean { term: Sample::squared_error, finish: f64::sqrt },
     },
-    Metric {
-        id: "mae/v1",
-        description: "mean |v − r|",
-        needs_halves: false,
-        term: |s| (s.value - s.reference).abs(),
-        finish: |mean| mean,
-    },
-    Metric {
-        id: "relmse/eps=1e-2/v1",
-        description: "mean (v − r)² / (r² + 0.01)",
-        needs_halves: false,
-        term: Sample::relative_squared_error,
-        finish: |mean| mean,
-    },
-    Metric {
-        id: "mse-unbiased/v1",
-        description: "mean (v − A)(v − B): free of the reference's own noise, may be negative",
-        needs_halves: true,
-        term: |s| (s.value - s.half_a) * (s.value - s.half_b),
-        finish: |mean| mean,
-    },
-    Metric {
-        id: "relmse-unbiased/eps=1e-2/v1",
-        description: "mean (v − A)(v − B) / (((A + B) / 2)² + 0.01), may be negative",
-        needs_halves: true,
-        term: |s| (s.value - s.half_a) * (s.value - s.half_b) / s.relative_scale(),
-        finish: |mean| mean,
-    },
+    Metric::mean("mae/v1", "mean |v − r|", |s| (s.value - s.reference).abs()),
+    Metric::mean("relmse/eps=1e-2/v1", "mean (v − r)² / (r² + 0.01)", Sample::relative_squared_error),
+    Metric::mean("mse-unbiased/v1", "mean (v − A)(v − B): free of the reference's own noise, may be negative",
+        |s| (s.value - s.half_a) * (s.value - s.half_b)).unbiased(),
+    Metric::mean("relmse-unbiased/eps=1e-2/v1", "mean (v − A)(v − B) / (((A + B) / 2)² + 0.01), may be negative",
+        |s| (s.value - s.half_a) * (s.value - s.half_b) / s.relative_scale()).unbiased(),
+    Metric::mean("mse-red/v1", "mse of the red channel", |s| s.squared_error_of(0)),
+    Metric::mean("mse-green/v1", "mse of the green channel", |s| s.squared_error_of(1)),
+    Metric::mean("mse-blue/v1", "mse of the blue channel", |s| s.squared_error_of(2)),
+    Metric::whole("mse-luminance/v1", "mse of luminance", |c| c.mean_of_luminance(|v, r| (v - r).powi(2))),
+    Metric::whole("relmse-luminance/eps=1e-2/v1", "relmse of luminance",
+        |c| c.mean_of_luminance(|v, r| (v - r).powi(2) / (r * r + RELATIVE_EPSILON))),
+    Metric::whole("relmse-trimmed/top=0.1%/eps=1e-2/v1",
+        "relmse without the 0.1 % greatest terms: what it is but for a few outliers", |c| c.trimmed()),
+    Metric::mean("smape/eps=1e-2/v1", "mean |v − r| / (|v| + |r| + 0.01) (Vogels et al. 2018)",
+        |s| (s.value - s.reference).abs() / (s.value.abs() + s.reference.abs() + RELATIVE_EPSILON)),
+    Metric::whole("psnr/tone-mapped/v1", "10 log10 (1 / MSE) of the tone-mapped pictures, dB; absent for equal ones",
+        |c| Some(c.shown.psnr(c.shown_reference))),
+    Metric::whole("ssim/tone-mapped/v1",
+        "mean structural similarity of the luma of the tone-mapped pictures, Gaussian window σ = 1.5 (Wang et al. 2004)",
+        |c| c.shown.ssim(c.shown_reference)),
+    Metric::whole("flip/tone-mapped/ppd=67/v1",
+        "mean FLIP of the tone-mapped pictures at 67 pixels per degree (Andersson et al. 2020)",
+        |c| Some(c.shown.flip(c.shown_reference))),
 ];
 
+/// The part of the terms that the trimmed metric leaves out.
+const TRIMMED: f64 = 1e-3;
+
+/// Two images of one size, all finite.
+struct Comparison<'a> {
+    image: &'a Image,
+    reference: &'a Reference,
+    shown: Shown,
+    shown_reference: &'a Shown,
+}
+
+impl<'a> Comparison<'a> {
+    fn new(image: &'a Image, reference: &'a Reference) -> Self {
+        let exposure = reference.exposure();
+        let of_reference = || Arc::new(Shown::new(&reference.mean, exposure));
+        Self {
+            image,
+            reference,
+            shown: Shown::new(image, exposure),
+            shown_reference: reference.shown.get_or_init(of_reference),
+        }
+    }
+
+    fn mean_of_luminance(&self, term: fn(f64, f64) -> f64) -> Option<f64> {
+        let pairs = self.image.pixels.iter().zip(&self.reference.mean.pixels);
+        let sum: f64 = pairs.map(|(v, r)| term(luminance(v), luminance(r))).sum();
+        Some(sum / self.image.pixels.len() as f64)
+    }
+
+    /// As SimpleImageIO (P. Grittmann) rejects outliers: terms of pixels and channels by size.
+    fn trimmed(&self) -> Option<f64> {
+        let mut terms = Vec::with_capacity(3 * self.image.pixels.len());
+        for (i, pixel) in self.image.pixels.iter().enumerate() {
+            let term = |c: usize| {
+                self.reference
+                    .sample(i, c, pixel[c])
+                    .relative_squared_error()
+            };
+            terms.extend([0, 1, 2].map(term));
+        }
+        terms.sort_unstable_by(f64::total_cmp);
+        terms.truncate(terms.len() - (terms.len() as f64 * TRIMMED) as usize);
+        Some(terms.iter().sum::<f64>() / terms.len() as f64)
+    }
+}
+
 impl Sample {
+    /// (v − r)².
+    fn squared_error(&self) -> f64 {
+        (self.value - self.reference).powi(2)
+    }
+
+    /// What has the channel's mean squared error as its mean over all channels.
+    fn squared_error_of(&self, channel: usize) -> f64 {
+        match self.channel == channel {
+            true => 3.0 * self.squared_error(),
+            false => 0.0,
+        }
+    }
+
     /// (v − r)² / (r² + ε).
     pub(super) fn relative_squared_error(&self) -> f64 {
-        (self.value - self.reference).powi(2) / self.relative_scale()
+        self.squared_error() / self.relative_scale()
     }
 
     fn relative_scale(&self) -> f64 {
@@ -164,7 +282,7 @@ impl Sample {
 }
 
 /// Error of one image.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct ErrorReport {
     /// Metric id → value, over the finite pixels; metrics that cannot be computed are absent.
     pub metrics: BTreeMap<String, f64>,
@@ -176,14 +294,20 @@ pub struct ErrorReport {
     pub non_finite_pixels: usize,
 }
 
-/// Every metric of `image` against `reference`.
+/// Every metric of `image` against `reference`. Where pixels are not finite, what needs whole images is absent.
 ///
 /// # Errors
 /// [`ImageError::SizeMismatch`].
 pub fn measure(image: &Image, reference: &Reference) -> Result<ErrorReport, ImageError> {
     reference.mean.check_size(image, "the measured image")?;
-    let mut sums = [0.0; METRICS.len()];
-    let mut without = vec![[0.0; METRICS.len()]; reference.estimates()];
+    let present = |m: &&Metric| !m.needs_halves || reference.halves.is_some();
+    let means: Vec<_> = METRICS
+        .iter()
+        .filter(present)
+        .filter_map(Metric::term)
+        .collect();
+    let mut sums = vec![0.0; means.len()];
+    let mut without = vec![vec![0.0; means.len()]; reference.estimates()];
     let mut finite = 0usize;
     for (i, pixel) in image.pixels.iter().enumerate() {
         if !is_finite(pixel) {
@@ -192,38 +316,60 @@ pub fn measure(image: &Image, reference: &Reference) -> Result<ErrorReport, Imag
         finite += 1;
         for (c, &value) in pixel.iter().enumerate() {
             let sample = reference.sample(i, c, value);
-            for (sum, metric) in sums.iter_mut().zip(METRICS) {
-                *sum += (metric.term)(&sample);
+            for (sum, (_, term, _)) in sums.iter_mut().zip(&means) {
+                *sum += term(&sample);
             }
             for (part, sums) in without.iter_mut().enumerate() {
                 let sample = reference.without(part, i, c, &sample);
-                for (sum, metric) in sums.iter_mut().zip(METRICS).filter(|(_, m)| m.needs_halves) {
-                    *sum += (metric.term)(&sample);
+                let halves = sums
+                    .iter_mut()
+                    .zip(&means)
+                    .filter(|(_, (m, ..))| m.needs_halves);
+                for (sum, (_, term, _)) in halves {
+                    *sum += term(&sample);
                 }
             }
         }
     }
-    let present = |m: &Metric| finite > 0 && (!m.needs_halves || reference.halves.is_some());
-    let value = |m: &Metric, sum: f64| (m.finish)(sum / (3 * finite) as f64);
-    let metrics = METRICS.iter().zip(sums).filter(|(m, _)| present(m));
-    let by_part = METRICS
-        .iter()
-        .enumerate()
-        .filter(|(_, m)| m.needs_halves && present(m) && !without.is_empty());
-    Ok(ErrorReport {
-        metrics: metrics
-            .map(|(m, sum)| (m.id.to_owned(), value(m, sum)))
-            .collect(),
-        without_part: by_part
-            .map(|(k, m)| {
-                (
-                    m.id.to_owned(),
-                    without.iter().map(|sums| value(m, sums[k])).collect(),
-                )
-            })
-            .collect(),
+    let mut report = ErrorReport {
         non_finite_pixels: image.pixels.len() - finite,
-    })
+        ..ErrorReport::default()
+    };
+    if finite == 0 {
+        return Ok(report);
+    }
+    for (k, (metric, _, finish)) in means.iter().enumerate() {
+        let value = |sums: &Vec<f64>| finish(sums[k] / (3 * finite) as f64);
+        report.metrics.insert(metric.id.to_owned(), value(&sums));
+        if metric.needs_halves && !without.is_empty() {
+            let values = without.iter().map(value).collect();
+            report.without_part.insert(metric.id.to_owned(), values);
+        }
+    }
+    if report.non_finite_pixels == 0 {
+        let compared = Comparison::new(image, reference);
+        for metric in METRICS {
+            let Rule::Whole(value) = &metric.rule else {
+                continue;
+            };
+            let value = value(&compared).filter(|value| value.is_finite());
+            let value = value.map(|value| (metric.id.to_owned(), value));
+            report.metrics.extend(value);
+        }
+    }
+    Ok(report)
+}
+
+/// A metric that is a mean, with its term and what is done to the mean.
+type MeanMetric = (&'static Metric, fn(&Sample) -> f64, fn(f64) -> f64);
+
+impl Metric {
+    fn term(&'static self) -> Option<MeanMetric> {
+        match self.rule {
+            Rule::Mean { term, finish } => Some((self, term, finish)),
+            Rule::Whole(_) => None,
+        }
+    }
 }
 
 impl Reference {
@@ -235,6 +381,7 @@ impl Reference {
             None => (reference, reference),
         };
         Sample {
+            channel,
             value: f64::from(value),
             reference,
             half_a,
@@ -252,6 +399,7 @@ impl Reference {
             false => (sample.half_a, rest(sample.half_b)),
         };
         Sample {
+            channel,
             value: sample.value,
             reference: 0.5 * (half_a + half_b),
             half_a,

@@ -3,6 +3,7 @@
 pub mod bias;
 pub mod comparison;
 pub mod figure;
+pub mod flip;
 pub mod gate;
 pub mod hard_rays;
 pub mod hypothesis;
@@ -16,6 +17,7 @@ pub mod rays;
 pub mod record;
 pub mod replicates;
 pub mod sampler_cost;
+mod shown;
 pub mod spectrum;
 pub mod statistics;
 pub mod stopping;

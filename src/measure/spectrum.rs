@@ -1,11 +1,12 @@
 //! What the error of an image looks like, beyond its size: how it is spread over spatial frequencies,
 //! and what a blur leaves of it. Decorrelation changes these and leaves the RMSE as it is.
 //!
-//! The error is signed luminance, image minus reference. Sources: Celarek, Jakob, Wimmer & Lehtinen,
-//! "Quantifying the error of light transport algorithms", EGSR 2019 (spectra of error images);
+//! The error is signed luminance, image minus reference. Over replicates, the spectra of single images are an
+//! ensemble: its outliers show what a mean hides (fireflies raise all frequencies of a few images). Sources: Celarek, Jakob, Wimmer & Lehtinen,
+//! "Quantifying the error of light transport algorithms", EGSR 2019 (the error spectrum ensemble);
 //! Georgiev & Fajardo 2016 and the filter curves of OpenQMC (error after a Gaussian).
 
-use super::record::{FilteredError, PowerAt};
+use super::record::{FilteredError, OUTLIER_QUANTILES, PowerAt};
 use super::statistics::mean_interval;
 use crate::image::{Image, ImageError, luminance};
 use std::f64::consts::TAU;
@@ -26,6 +27,8 @@ pub struct ErrorSpectrum {
     /// of the mean over all frequencies but 0, so that white noise has power 1 everywhere. Empty for an
     /// error that is the same in all pixels.
     pub power: Vec<(f64, f64)>,
+    /// Variance of the error over the pixels: the unit of `power`.
+    pub variance: f64,
     /// Mean power up to [`LOW_FREQUENCY`]; white noise has 1.
     pub low_frequency: Option<f64>,
     /// Correlation of the error with that of the pixel to the right or below, −1 to 1; white noise has 0.
@@ -57,6 +60,7 @@ pub fn error_spectrum(error: &[f64], [width, height]: [usize; 2]) -> ErrorSpectr
     let filtered = SIGMAS.map(|sigma| root_mean_square(&gaussian(error, width, sigma)));
     let mut found = ErrorSpectrum {
         power: Vec::new(),
+        variance: squares / n,
         low_frequency: None,
         autocorrelation: None,
         filtered: filtered.to_vec(),
@@ -224,16 +228,38 @@ fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Means of the spectra over replicates with their intervals: power by frequency. Replicates that have
-/// none are left out.
+/// Quantile `q` by linear interpolation between the values in their order (Hyndman and Fan's type 7), which is
+/// what NumPy does.
+fn quantile(values: &[f64], q: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let place = q * (sorted.len() - 1) as f64;
+    let below = place as usize;
+    let above = (below + 1).min(sorted.len() - 1);
+    sorted[below] + (sorted[above] - sorted[below]) * (place - below as f64)
+}
+
+/// Means of the spectra over replicates with their intervals: power by frequency; and quantiles of the power of
+/// single images. Replicates that have none are left out.
 pub fn mean_power(spectra: &[ErrorSpectrum]) -> Vec<PowerAt> {
     let with_power: Vec<_> = spectra.iter().filter(|s| !s.power.is_empty()).collect();
     let Some(first) = with_power.first() else {
         return Vec::new();
     };
+    let variances = with_power.iter().map(|s| s.variance);
+    let variance = variances.sum::<f64>() / with_power.len() as f64;
     let at = |(i, &(frequency, _)): (usize, &(f64, f64))| {
         let values: Vec<f64> = with_power.iter().map(|s| s.power[i].1).collect();
-        mean_interval(&values).map(|power| PowerAt { frequency, power })
+        let absolute = with_power
+            .iter()
+            .map(|s| s.power[i].1 * s.variance / variance);
+        let absolute: Vec<f64> = absolute.collect();
+        mean_interval(&values).map(|power| PowerAt {
+            frequency,
+            power,
+            quantiles: (absolute.len() > 1)
+                .then(|| OUTLIER_QUANTILES.map(|q| quantile(&absolute, q))),
+        })
     };
     first.power.iter().enumerate().filter_map(at).collect()
 }
@@ -284,6 +310,41 @@ mod tests {
         let share = filtered[3].rmse.value / filtered[0].rmse.value;
         let theory = 1.0 / (4.0 * std::f64::consts::PI.sqrt());
         assert!((share / theory - 1.0).abs() < 0.1, "{share} vs {theory}");
+    }
+
+    #[test]
+    fn an_outlier_among_images_shows_in_the_upper_quantiles_alone() {
+        // numpy.quantile([3, 1, 4, 1, 5], …)
+        let values = [3.0, 1.0, 4.0, 1.0, 5.0];
+        let found = OUTLIER_QUANTILES.map(|q| quantile(&values, q));
+        for (found, expected) in found.into_iter().zip([3.0, 4.0, 4.8, 5.0]) {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        }
+        let mut generator = Pcg32::new(6);
+        let mut images: Vec<Vec<f64>> = (0..16).map(|_| white(&mut generator)).collect();
+        let spectra = |images: &[Vec<f64>]| -> Vec<ErrorSpectrum> {
+            images
+                .iter()
+                .map(|image| error_spectrum(image, SIZE))
+                .collect()
+        };
+        let calm = mean_power(&spectra(&images));
+        // A firefly is as bright at all frequencies.
+        images[3][1000] += 300.0;
+        let wild = mean_power(&spectra(&images));
+        for (calm, wild) in calm.iter().zip(&wild).skip(8) {
+            let ([.., calm_most], [middle, .., most]) =
+                (calm.quantiles.unwrap(), wild.quantiles.unwrap());
+            assert!(
+                calm_most < 2.0 && most > 10.0 && middle < 0.2,
+                "{calm:?} {wild:?}"
+            );
+            assert!(
+                (wild.power.value - 1.0).abs() < 0.3,
+                "each mean is of its own image"
+            );
+        }
+        assert!(mean_power(&spectra(&images[..1]))[0].quantiles.is_none());
     }
 
     #[test]

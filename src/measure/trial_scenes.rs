@@ -6,6 +6,7 @@ use crate::geometry::{Camera, Triangle};
 use crate::params::ParamValue;
 use crate::scene::{
     self, CookTorrance, Fresnel, MIRROR, Masking, Material, SceneData, SceneError, Texture,
+    TextureUse,
 };
 use glam::{Vec2, Vec3, vec2, vec3};
 use std::f32::consts::{PI, TAU};
@@ -365,7 +366,7 @@ fn textured() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(1.7, 1.6, 2.4), vec3(0.0, 0.5, -0.2), Vec3::Y);
     let mut mesh = Mesh::new("textured", camera, vec3(0.4, 0.5, 0.6))?;
     let painted = |material: Material, texture| Material {
-        base_color_texture: Some(texture),
+        base_color_texture: Some(TextureUse::plain(texture)),
         ..material
     };
     let [floor, wall, mirror, lamp, plain] = [

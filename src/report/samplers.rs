@@ -8,7 +8,7 @@ use crate::measure::figure::figure;
 use crate::measure::record::{BiasRecord, ErrorRecord, Interval, Key, SpectrumRecord, TimeRecord};
 use crate::measure::replicates::{Replicates, Without};
 use crate::measure::statistics::{
-    LEAST_FOR_MEDIAN, jackknife_interval, log_log_fit, positive_interval,
+    LEAST_FOR_MEDIAN, jackknife_interval, log_log_fit, mean_interval, positive_interval,
 };
 
 /// What an error is that its reference is too noisy for: its estimate is not clearly above 0.
@@ -42,17 +42,24 @@ pub enum Metric {
 }
 
 impl Metric {
-    /// Its row in the table of figures, that of its slope, how files are named after it, and what the
-    /// recorded metric's versioned id starts with.
-    const fn words(self) -> [&'static str; 4] {
+    /// Its row in the table of figures, that of its slope, how files are named after it, what the recorded
+    /// metric's versioned id starts with, and that of the metric that is left for a reference of one image.
+    const fn words(self) -> [&'static str; 5] {
         match self {
             Self::RelMse => [
                 "relmse-unbiased/v1",
                 "relmse-slope/v1",
                 "relmse",
                 "relmse-unbiased/",
+                "relmse/",
             ],
-            Self::Rmse => ["rmse-unbiased/v1", "rmse-slope/v1", "rmse", "mse-unbiased/"],
+            Self::Rmse => [
+                "rmse-unbiased/v1",
+                "rmse-slope/v1",
+                "rmse",
+                "mse-unbiased/",
+                "mse/",
+            ],
         }
     }
 
@@ -93,6 +100,18 @@ impl Metric {
         }
     }
 }
+
+/// Metrics beside those that samplers are ranked by: figure and recorded id. They hold the noise of the
+/// reference.
+pub const FURTHER_METRICS: [(&str, &str); 7] = [
+    ("mae/v1", "mae/v1"),
+    ("relmse-trimmed/v1", "relmse-trimmed/top=0.1%/eps=1e-2/v1"),
+    ("mse-luminance/v1", "mse-luminance/v1"),
+    ("smape/v1", "smape/eps=1e-2/v1"),
+    ("psnr/v1", "psnr/tone-mapped/v1"),
+    ("ssim/v1", "ssim/tone-mapped/v1"),
+    ("flip/v1", "flip/tone-mapped/ppd=67/v1"),
+];
 
 /// Mean error at one number of samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -147,9 +166,10 @@ impl<'a> MeasuredSampler<'a> {
             .replicates
             .iter()
             .flat_map(|replicate| &replicate.errors);
-        let mut ids = errors.flat_map(|error| error.metrics.keys());
-        ids.find(|id| id.starts_with(metric.words()[3]))
-            .map(String::as_str)
+        let ids = errors.flat_map(|error| error.metrics.keys());
+        let [.., unbiased, plain] = metric.words();
+        let id = |prefix| ids.clone().find(|id| id.starts_with(prefix));
+        id(unbiased).or_else(|| id(plain)).map(String::as_str)
     }
 
     /// Mean error by growing spp, over the replicates that have it.
@@ -176,6 +196,22 @@ impl<'a> MeasuredSampler<'a> {
             })
         };
         spps.into_iter().filter_map(mean_at).collect()
+    }
+
+    /// The highest spp.
+    pub fn highest_spp(&self) -> Option<u32> {
+        Some(self.replicates.first()?.errors.last()?.spp)
+    }
+
+    /// The figures of [`FURTHER_METRICS`] at this spp: means over replicates.
+    pub fn further(&self, spp: u32) -> [(&'static str, Option<Interval>); FURTHER_METRICS.len()] {
+        let of = |id: &str| -> Vec<f64> {
+            let errors = self.replicates.iter().flat_map(|r| &r.errors);
+            let errors = errors.filter(|error| error.spp == spp);
+            let values = errors.filter_map(|error| error.metrics.get(id).copied());
+            values.collect()
+        };
+        FURTHER_METRICS.map(|(figure, id)| (figure, mean_interval(&of(id))))
     }
 
     /// Mean error at this spp.
@@ -267,7 +303,8 @@ impl View<'_> {
         let Some(reference) = self.reference else {
             return Some("the reference has no record".into());
         };
-        if reference.exact.is_some() {
+        // Of a file no more is known than that the user takes it for right.
+        if reference.exact.is_some() || reference.file.is_some() {
             return None;
         }
         if let Some(mean) = errors().find(|mean| !mean.resolved) {
@@ -276,14 +313,15 @@ impl View<'_> {
         let least = errors()
             .map(|mean| mean.error.value.powi(2))
             .reduce(f64::min)?;
-        if reference.mse == 0.0 {
+        let own = reference.mse.unwrap_or(f64::NAN);
+        if own == 0.0 {
             // Rounding apart, equal parts are right only of a scene without noise.
             let noisy = least.sqrt() > 1e-4 * reference.mean;
             let reason = "the parts of the reference do not differ, so that its noise is unknown: its \
                           sampler must be one that seeds change";
             return noisy.then(|| reason.into());
         }
-        let share = reference.mse / least;
+        let share = own / least;
         // A share that is no number is a fault, too.
         (share.is_nan() || share > REFERENCE_SHARE).then(|| {
             let enough = f64::from(reference.spp) * share / REFERENCE_SHARE;

@@ -204,6 +204,10 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
             let slope = (metric.slope_figure(), sampler.slope(metric));
             values.extend(Value::known(key, [slope]));
         }
+        if let Some(spp) = sampler.highest_spp() {
+            let key = key.clone().with(axis::SPP, spp);
+            values.extend(Value::known(&key, sampler.further(spp)));
+        }
         values.extend(sampler.bias.into_iter().flat_map(|bias| of_bias(key, bias)));
         let spectrum = sampler.spectrum.into_iter();
         values.extend(spectrum.flat_map(|s| of_spectrum(key, s)));
@@ -216,7 +220,8 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
         }
     }
     let reference = view.reference.iter();
-    values.extend(reference.map(|r| Value::new(r.key, "reference-mse/v1", r.mse)));
+    let mse = reference.filter_map(|r| Some(Value::new(r.key, "reference-mse/v1", r.mse?)));
+    values.extend(mse);
     values.extend(Race::new(view).iter().flat_map(Race::values));
     values.extend(trade_off::times_to_image(scene, view));
     values

@@ -1,6 +1,6 @@
 //! Error: once per scene, integrator and sampler, through the fastest gated structure.
 
-use super::images::{self, Estimator};
+use super::images::{self, Estimator, IMAGE_AXES, attributes, sampler_label, write_spread};
 use super::paths;
 use super::reference::{Yardstick, reference, reference_structure};
 use super::session::{Session, content_hash};
@@ -172,11 +172,27 @@ fn sampler_error(
     kernels.dedup();
     let tables: String = passes.iter().map(|pass| pass.table.as_str()).collect();
     let blank = Line::new(Key::from(cell), Ran::kernel(kernels.join("+")), ());
+    let reference = image_hash(yardstick.reference.image());
+    let [drawn, camera] = [
+        format!(
+            "{:?}",
+            (
+                &session.experiment.spp,
+                session.experiment.seeds().replicates
+            )
+        ),
+        format!("{:?}", (world.camera, session.experiment.resolution)),
+    ];
     let rule = session.experiment.stop;
-    let stop = rule.map(|rule| format!("{rule:?}"));
-    let mut also = vec![("sampler table", tables.as_str())];
-    also.extend(stop.as_deref().map(|stop| ("stop", stop)));
-    let hash = content_hash(&blank, &world.scene.hash, &also);
+    let stop = rule.map(|rule| format!("{rule:?}")).unwrap_or_default();
+    let made_of = [
+        ("sampler table", tables.as_str()),
+        ("stop", &stop),
+        ("reference", &reference),
+        ("spp and seeds", &drawn),
+        ("camera and size", &camera),
+    ];
+    let hash = content_hash(&blank, &world.scene.hash, &made_of);
     let line = |body| blank.clone().hashed(&hash).with_body(|()| body);
     let replicates = match rule {
         None => all_samples(session, cell, yardstick, &passes, &line)?,
@@ -185,6 +201,7 @@ fn sampler_error(
     session.finish(cell.to_string());
     let spp = replicates.spp;
     let finals = replicates.images;
+    write_spread(session, cell, spp, &finals)?;
     let bias = bias_record(session, cell, &finals, yardstick)?;
     session.write(&line(Body::Bias(bias)))?;
     let spectrum = spectrum_record(session, spp, &finals, yardstick)?;
@@ -351,12 +368,15 @@ fn error_record(
     (replicate, seed): (u32, u32),
 ) -> Result<ErrorRecord, Fault> {
     let reference = &yardstick.reference;
+    let facts = session.registries.samplers.facts(&cell[Axis::Sequence]);
+    let base_2 = facts.is_ok_and(|facts| facts.base_2);
     let mut errors = Vec::new();
     let mut non_finite_pixels = 0;
     for snapshot in snapshots {
         let report = measure(&snapshot.image, reference).map_err(|e| e.to_string())?;
         non_finite_pixels = non_finite_pixels.max(report.non_finite_pixels);
         errors.push(ErrorAtSpp {
+            partial_net: base_2 && !snapshot.spp.is_power_of_two(),
             spp: snapshot.spp,
             metrics: report.metrics,
             without_part: report.without_part,
@@ -376,15 +396,11 @@ fn error_record(
         error_map: None,
     };
     if replicate == 0 {
-        let axes = [
-            Axis::Scene,
-            Axis::Integrator,
-            Axis::Sequence,
-            Axis::Decorrelation,
-        ];
-        let labels = cell.labels(&axes);
+        let labels = cell.labels(&IMAGE_AXES);
         let draw = |kind, picture: &Picture| session.picture(kind, &labels, picture);
         record.image = draw("image", &tone_map(&last.image, yardstick.exposure))?;
+        let about = attributes(cell, &sampler_label(cell), last.spp, seed);
+        session.linear("image", &labels, &last.image, &about)?;
         let map = error_map(&last.image, reference, ERROR_MAP_FULL_SCALE, viridis);
         record.error_map = draw("error", &map.map_err(|e| e.to_string())?)?;
     }

@@ -153,9 +153,10 @@ impl Folder {
         &self.out
     }
 
-    /// Name of an image as records have it, relative to the run's folder, and where to write it.
-    pub fn image(&self, parts: &[&str]) -> (String, PathBuf) {
-        let relative = format!("{}/{}.png", self.images, slug(parts));
+    /// Name of an image as records have it, relative to the run's folder, and where to write it; the ending
+    /// of the file without its dot.
+    pub fn image(&self, parts: &[&str], ending: &str) -> (String, PathBuf) {
+        let relative = format!("{}/{}.{ending}", self.images, slug(parts));
         let path = self.out.join(PARTIAL).join(&relative);
         (relative, path)
     }

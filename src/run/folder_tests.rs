@@ -27,7 +27,7 @@ fn image_names_are_short_and_distinct_even_where_case_is_ignored() {
 
 fn write(folder: &Folder, text: &str) {
     folder.append(&format!("{text}\n")).unwrap();
-    let (relative, path) = folder.image(&["heat"]);
+    let (relative, path) = folder.image(&["heat"], "png");
     fs::write(path, relative).unwrap();
 }
 

@@ -1,11 +1,13 @@
-//! What the images of a run are made with, and their compiled kernels.
+//! What the images of a run are made with, their compiled kernels, and what their files say of it.
 
+use super::Fault;
 use super::kernels::Device;
 use super::session::Session;
 use super::words;
 use super::world::World;
 use crate::config::{Axis, Cell};
 use crate::geometry::Camera;
+use crate::image::{Attribute, Image};
 use crate::integrator::{ConfiguredIntegrator, RayOffset, RenderJob, Renderer, Traced};
 use crate::params::Variant;
 use crate::sampling::Sampler;
@@ -14,6 +16,71 @@ use crate::sampling::Sampler;
 pub(super) fn unfit(session: &Session, integrator: &Variant, traced: &Traced) -> Option<String> {
     let integrator = session.registries.integrators.configured(integrator);
     integrator.ok()?.refusal(traced)
+}
+
+/// What an image file says of its making: name and value, of those that are known.
+pub(super) fn attributes(
+    cell: &Cell,
+    sampler: &str,
+    spp: u32,
+    seed: impl ToString,
+) -> Vec<Attribute<'static>> {
+    let label = |axis| cell.get(axis).map(|v: &Variant| v.label.clone());
+    let changed = option_env!("RAYSTONE_DIRTY") == Some("true");
+    let commit = option_env!("RAYSTONE_COMMIT").map(|commit| match changed {
+        true => format!("{commit} with uncommitted changes"),
+        false => commit.to_owned(),
+    });
+    let software = format!("raystone {}", env!("CARGO_PKG_VERSION"));
+    let known = [
+        ("software", Some(software)),
+        ("commit", commit),
+        ("scene", label(Axis::Scene)),
+        ("integrator", label(Axis::Integrator)),
+        ("sampler", Some(sampler.to_owned())),
+        ("spp", Some(spp.to_string())),
+        ("seed", Some(seed.to_string())),
+    ];
+    let known = known.into_iter();
+    known
+        .filter_map(|(name, value)| Some((name, value?)))
+        .collect()
+}
+
+/// The axes that tell the images of samplers apart.
+pub(super) const IMAGE_AXES: [Axis; 4] = [
+    Axis::Scene,
+    Axis::Integrator,
+    Axis::Sequence,
+    Axis::Decorrelation,
+];
+
+/// Linear images of what all replicates say together, if the run was asked for images: their mean, and the
+/// variance of one of them, by pixel and channel.
+pub(super) fn write_spread(
+    session: &Session,
+    cell: &Cell,
+    spp: u32,
+    replicates: &[Image],
+) -> Result<(), Fault> {
+    if session.options.images.is_none() || replicates.len() < 2 {
+        return Ok(());
+    }
+    let labels = cell.labels(&IMAGE_AXES);
+    let seeds = &session.experiment.seeds().replicates[..replicates.len()];
+    let seeds: Vec<String> = seeds.iter().map(u32::to_string).collect();
+    let about = attributes(cell, &sampler_label(cell), spp, seeds.join(" "));
+    let mean = Image::mean_of(replicates).map_err(|e| e.to_string())?;
+    session.linear("mean", &labels, &mean, &about)?;
+    let variance = Image::variance_of(replicates).map_err(|e| e.to_string())?;
+    session.linear("variance", &labels, &variance, &about)?;
+    Ok(())
+}
+
+/// `sequence × decorrelation`.
+pub(super) fn sampler_label(cell: &Cell) -> String {
+    let labels = [&cell[Axis::Sequence], &cell[Axis::Decorrelation]].map(|v| v.label.as_str());
+    labels.join(" × ")
 }
 
 /// What is computed per sample, what draws the samples, and the kernels of both.

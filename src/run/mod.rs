@@ -9,6 +9,7 @@ mod images;
 mod kernels;
 mod paths;
 mod reference;
+mod reference_file;
 mod registries;
 mod render;
 mod session;
@@ -27,6 +28,7 @@ pub use render::{Rendering, render};
 
 use crate::config::{Cell, Experiment, Plan};
 use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
+use crate::image::FileFormat;
 use crate::measure::record::{GateVerdict, PathsRecord};
 pub use crate::measure::words::dump_stream;
 use crate::params::Variant;
@@ -49,6 +51,8 @@ pub struct RunOptions {
     pub warn: Option<fn(&str)>,
     /// Which adapter.
     pub adapter: AdapterChoice,
+    /// Whether, and in which format, linear radiance is written beside the pictures of a run.
+    pub images: Option<&'static FileFormat>,
     /// Whether models may name files outside their folder: see [`crate::scene::LoadOptions`].
     pub allow_outside: bool,
     /// Whether to draw a progress bar on standard error.

@@ -1,6 +1,6 @@
 //! References: what images are compared with, and the exposure of their pictures.
 
-use super::images::Estimator;
+use super::images::{Estimator, attributes};
 use super::session::{Session, content_hash};
 use super::structures::{self, Gated};
 use super::world::World;
@@ -76,6 +76,9 @@ pub(super) fn reference(
     };
     let cell = cell.clone().with(Axis::Offset, &offset);
     let key = Key::from(&cell);
+    if session.reference_file.is_some() {
+        return file_reference(session, world, &cell);
+    }
     let integrator = (session.registries.integrators).configured(&cell[Axis::Integrator]);
     if let Some(value) = integrator.ok().and_then(|i| i.facts.exact) {
         return exact_reference(session, world, &cell, value);
@@ -111,6 +114,24 @@ pub(super) fn reference(
     )?)
 }
 
+/// The image of a file: nothing is rendered, and nothing is known of its noise or rounding.
+fn file_reference(session: &mut Session, world: &World, cell: &Cell) -> Result<Yardstick, Fault> {
+    let file = session.reference_file.as_ref();
+    let file = file.ok_or_else(|| "no reference was read".to_owned())?;
+    session.progress.inc(u64::from(REFERENCE_PARTS));
+    let reference = file.reference.clone();
+    let record = ReferenceRecord {
+        file: Some(file.name.clone()),
+        sampler: "file".to_owned(),
+        ..reference_record(&reference)
+    };
+    let line = Line::new(Key::from(cell), Ran::default(), record);
+    let half_ulp = f64::from(f32::EPSILON) / 2.0;
+    Ok(finish_reference(
+        session, world, cell, line, reference, half_ulp,
+    )?)
+}
+
 /// The constant image of a known value: nothing is rendered.
 fn exact_reference(
     session: &mut Session,
@@ -139,9 +160,10 @@ fn reference_record(reference: &Reference) -> ReferenceRecord {
     ReferenceRecord {
         spp: 0,
         exact: None,
+        file: None,
         sampler: "exact".to_owned(),
         seconds: 0.0,
-        mse: reference.own_mse().unwrap_or(f64::NAN),
+        mse: reference.own_mse(),
         image: String::new(),
         mean: reference.image().mean(),
     }
@@ -160,11 +182,32 @@ fn finish_reference(
     let labels = cell.labels(&[Axis::Scene, Axis::Integrator]);
     let picture = tone_map(reference.image(), exposure);
     let image = session.picture("reference", &labels, &picture)?;
+    let about = attributes(
+        cell,
+        &line.body.sampler,
+        line.body.spp,
+        session.experiment.reference.seed,
+    );
+    session.linear("reference", &labels, reference.image(), &about)?;
     line.body.image = image.unwrap_or_default();
     let done = format!("reference {}: done", labels.join(", "));
     if !session.is_done(&done) {
         let sampler = format!("{}, {} spp", line.body.sampler, line.body.spp);
-        let hash = content_hash(&line, &world.scene.hash, &[("sampler", &sampler)]);
+        let file = session.reference_file.as_ref();
+        let seeds = &session.experiment.seeds().reference_parts;
+        let [seeds, camera, size] = [
+            format!("{seeds:?}"),
+            format!("{:?}", world.camera),
+            format!("{:?}", session.experiment.resolution),
+        ];
+        let made_of = [
+            ("sampler", sampler.as_str()),
+            ("file", file.map_or("", |file| &file.hash)),
+            ("seeds", &seeds),
+            ("camera", &camera),
+            ("resolution", &size),
+        ];
+        let hash = content_hash(&line, &world.scene.hash, &made_of);
         session.write(&line.hashed(hash).with_body(Body::Reference))?;
         session.finish(done);
     }

@@ -1,7 +1,7 @@
 //! One picture, for `raystone render`. Nothing is judged or recorded, so that the first picture is
 //! there at once; the structure is validated on the host.
 
-use super::images::Estimator;
+use super::images::{Estimator, attributes};
 use super::kernels::{Device, Kernels};
 use super::session::Session;
 use super::{Registries, RunError, RunOptions};
@@ -105,11 +105,13 @@ pub fn render(
         non_finite_pixels: 0,
     };
     let compiled = Instant::now();
-    let image = add_all_samples(&session, &renderer, spp, |image| {
+    let image = add_all_samples(&session, &renderer, spp, |image, done| {
         if rendering.first_picture_s == 0.0 {
             rendering.first_picture_s = start.elapsed().as_secs_f64();
         }
-        format.write(file, image).map_err(input)
+        let sampler = estimator.sampler.label();
+        let about = attributes(cell, &sampler, done, experiment.seed);
+        format.write(file, image, &about).map_err(input)
     })?;
     rendering.samples_s = compiled.elapsed().as_secs_f64();
     rendering.rays = renderer.ray_counts()?.iter().sum();
@@ -136,13 +138,13 @@ fn build(session: &Session, stage: &Stage, accel: &Variant) -> Result<Traced, Ru
     })
 }
 
-/// Adds `spp` samples in steps of about [`STEP`]. `show` gets the image after the first, whenever the
+/// Adds `spp` samples in steps of about [`STEP`]. `show` gets the image and its samples after the first, whenever the
 /// samples have doubled and [`REFRESH`] is over, and at the end.
 fn add_all_samples(
     session: &Session,
     renderer: &Renderer,
     spp: u32,
-    mut show: impl FnMut(&Image) -> Result<(), RunError>,
+    mut show: impl FnMut(&Image, u32) -> Result<(), RunError>,
 ) -> Result<Image, RunError> {
     let seed = session.experiment.seed;
     let style =
@@ -164,7 +166,7 @@ fn add_all_samples(
         let due = done >= 2 * shown && last.elapsed() >= REFRESH;
         if shown == 0 || due || done == spp {
             let image = renderer.image()?;
-            show(&image)?;
+            show(&image, done)?;
             (shown, last) = (done, Instant::now());
             if done == spp {
                 return Ok(image);

@@ -1,18 +1,19 @@
 //! What lives as long as a run: records, clock, progress, cells already done.
 
 use super::folder::Folder;
+use super::reference_file::ReferenceFile;
 use super::{RunError, RunOptions};
 use crate::config::{Axis, Experiment, Plan, REFERENCE_PARTS, Skipped};
 use crate::gpu::Environment;
 use crate::gpu::Gpu;
-use crate::image::{Picture, write_png};
+use crate::image::{Attribute, Image, ImageError, Picture, write_png};
 use crate::measure::record::{
     Body, FinishedRecord, KernelFolder, Line, RunRecord, SkippedRecord, axis,
 };
 use crate::text::cell_hash;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::{BTreeMap, HashSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
@@ -59,6 +60,8 @@ pub(super) struct Session<'a> {
     done: HashSet<String>,
     /// Samplers whose words were compared with the twin's.
     pub compared: HashSet<String>,
+    /// What images are compared with, if it is not rendered.
+    pub reference_file: Option<ReferenceFile>,
     /// What is wrong with the integrators that were judged.
     pub judged: BTreeMap<String, Option<String>>,
     /// `None`: nothing is written (gate alone, single images).
@@ -73,10 +76,12 @@ impl<'a> Session<'a> {
         registries: &'a super::Registries,
         options: &'a RunOptions,
     ) -> Result<Self, RunError> {
+        let reference_file = ReferenceFile::load(experiment)?;
         let folder = Arc::new(Folder::open(&options.out, options.existing)?);
         options.interrupt.begin(&folder);
         let mut session = Self::unrecorded(experiment, plan, registries, options);
         session.folder = Some(folder);
+        session.reference_file = reference_file;
         Ok(session)
     }
 
@@ -110,6 +115,7 @@ impl<'a> Session<'a> {
             refused: BTreeMap::new(),
             done: HashSet::new(),
             compared: HashSet::new(),
+            reference_file: None,
             judged: BTreeMap::new(),
             folder: None,
         }
@@ -253,13 +259,39 @@ impl<'a> Session<'a> {
         labels: &[String],
         picture: &Picture,
     ) -> Result<Option<String>, RunError> {
+        self.image_file(kind, labels, "png", |path| write_png(path, picture))
+    }
+
+    /// Writes linear radiance beside the pictures, if the run was asked for it.
+    pub fn linear(
+        &self,
+        kind: &str,
+        labels: &[String],
+        image: &Image,
+        attributes: &[Attribute],
+    ) -> Result<(), RunError> {
+        let Some(format) = self.options.images else {
+            return Ok(());
+        };
+        let write = |path: &Path| format.write(path, image, attributes);
+        self.image_file(kind, labels, format.ending, write)?;
+        Ok(())
+    }
+
+    fn image_file(
+        &self,
+        kind: &str,
+        labels: &[String],
+        ending: &str,
+        write: impl Fn(&Path) -> Result<(), ImageError>,
+    ) -> Result<Option<String>, RunError> {
         let labels = labels.iter().map(String::as_str);
         let parts: Vec<&str> = std::iter::once(kind).chain(labels).collect();
         let Some(folder) = &self.folder else {
             return Ok(None);
         };
-        let (relative, path) = folder.image(&parts);
-        match write_png(&path, picture) {
+        let (relative, path) = folder.image(&parts, ending);
+        match write(&path) {
             Ok(()) => Ok(Some(relative)),
             Err(error) => {
                 self.warn(&parts.join(", "), error.to_string())?;

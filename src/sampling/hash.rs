@@ -31,3 +31,8 @@ pub fn pixel_number(at: Coordinate) -> u32 {
 pub fn dimension_number(at: Coordinate) -> u32 {
     pcg_hash(at.dimension.wrapping_add(pixel_number(at)))
 }
+
+/// A random number of the pixel, dimension and sample.
+pub fn sample_number(at: Coordinate) -> u32 {
+    pcg_hash(at.sample.wrapping_add(dimension_number(at)))
+}

@@ -1,12 +1,13 @@
-//! `micro-jitter`: a random shift of at most μ = K·N^(−1/s) for each pixel and dimension. Twin of
+//! `micro-jitter`: a random shift of at most μ = K·N^(−1/s) for each pixel and dimension, or for each sample. Twin of
 //! `kernels/sampling/micro_jitter.wesl`.
 //!
 //! Source: Dufay 2017, §5.4: at sample i all pixels use nearly the same point, hence nearly the same ray.
 //! K = 2.5 for Halton and 1.5 for Hammersley, s = 2; from μ = ½ on it is Cranley and Patterson's shift.
+//! With a shift of its own for each sample a set of points is jittered about its places, and rays stay as coherent.
 //! A shift that stops at the edges instead of wrapping is biased. Word: the width 2μ.
 
 use super::fixed_point::mul_high;
-use super::hash::dimension_number;
+use super::hash::{dimension_number, sample_number};
 use super::{Coordinate, Decorrelation, Demand, Partner, SamplerTable, Seeded, Seeding};
 use crate::parameters;
 
@@ -20,8 +21,18 @@ parameters! {
         s: u32 = 2, in 1..=64;
         /// what a shift beyond 0 or 1 does; clamp is biased
         edge: Edge = Edge::Wrap;
+        /// whether all samples of a pixel are shifted alike, as by Dufay, or each by its own
+        per: Per = Per::Pixel;
         /// Whether pixels differ.
         seeded: Seeded;
+    }
+
+    /// What has a shift of its own.
+    pub enum Per {
+        /// All samples of a pixel are shifted alike (Dufay 2017).
+        Pixel = "pixel",
+        /// Every sample.
+        Sample = "sample",
     }
 
     /// What a shift beyond the ends of [0, 1) does.
@@ -38,15 +49,19 @@ const HALTON_K: f64 = 2.5;
 const HAMMERSLEY_K: f64 = 1.5;
 
 impl MicroJitter {
-    /// The width 2μ of the shifts as a fraction of 2³².
-    fn width(&self, sequence: &str, samples: u32) -> u32 {
-        let k = match self.k {
+    /// K, where nothing else is said that for the sequence.
+    fn amplitude(&self, sequence: &str) -> f64 {
+        match self.k {
             0.0 if sequence == "hammersley" => HAMMERSLEY_K,
             0.0 => HALTON_K,
             k => k,
-        };
+        }
+    }
+
+    /// The width 2μ = 2K·N^(−1/s) of shifts as a fraction of 2³².
+    pub(super) fn width(k: f64, s: u32, samples: u32) -> u32 {
         let samples = f64::from(samples.max(1));
-        let root = match self.s {
+        let root = match s {
             1 => samples,
             2 => samples.sqrt(),
             s => samples.powf(1.0 / f64::from(s)),
@@ -75,11 +90,15 @@ impl Decorrelation for MicroJitter {
     }
 
     fn table(&self, partner: &Partner, demand: &Demand) -> Result<Vec<u32>, String> {
-        Ok(vec![self.width(partner.name, demand.samples.unwrap_or(1))])
+        let k = self.amplitude(partner.name);
+        Ok(vec![Self::width(k, self.s, demand.samples.unwrap_or(1))])
     }
 
     fn constants(&self) -> Vec<(&'static str, u32)> {
-        vec![("CLAMP", u32::from(self.edge == Edge::Clamp))]
+        vec![
+            ("CLAMP", u32::from(self.edge == Edge::Clamp)),
+            ("PER_SAMPLE", u32::from(self.per == Per::Sample)),
+        ]
     }
 
     fn index(&self, _: &SamplerTable, at: Coordinate) -> u32 {
@@ -88,7 +107,11 @@ impl Decorrelation for MicroJitter {
 
     fn decorrelate(&self, x: u32, table: &SamplerTable, at: Coordinate) -> u32 {
         let width = table.decorrelation_word(0);
-        let up = mul_high(dimension_number(at), width);
+        let random = match self.per {
+            Per::Pixel => dimension_number(at),
+            Per::Sample => sample_number(at),
+        };
+        let up = mul_high(random, width);
         let down = width >> 1;
         let moved = x.wrapping_add(up).wrapping_sub(down);
         let clamp = self.edge == Edge::Clamp;
@@ -115,8 +138,8 @@ mod tests {
             ("hammersley", 8, 0.5),
             ("halton", 1, 0.5),
         ] {
-            let found =
-                f64::from(MicroJitter::default().width(sequence, samples)) * 2.0_f64.powi(-33);
+            let k = MicroJitter::default().amplitude(sequence);
+            let found = f64::from(MicroJitter::width(k, 2, samples)) * 2.0_f64.powi(-33);
             assert!(
                 (found - f64::min(mu, 0.5)).abs() < 0.031 * f64::from(samples == 8) + 1e-9,
                 "{sequence} {samples}: {found}"

@@ -6,6 +6,7 @@
 
 mod blue_noise;
 mod cranley_patterson;
+mod cranley_patterson_micro_jitter;
 mod decorrelation;
 mod digital_shift;
 pub mod dimensions;
@@ -16,7 +17,9 @@ mod halton;
 mod hammersley;
 pub mod hash;
 mod index_offset;
+mod jittered;
 mod lattice_search;
+mod linear_scramble;
 mod micro_jitter;
 mod no_decorrelation;
 pub mod owen;
@@ -39,6 +42,7 @@ mod void_and_cluster;
 
 pub use blue_noise::BlueNoise;
 pub use cranley_patterson::CranleyPatterson;
+pub use cranley_patterson_micro_jitter::CranleyPattersonMicroJitter;
 pub use decorrelation::{Decorrelation, Partner};
 pub use digital_shift::DigitalShift;
 pub use disc_rotation::DiscRotation;
@@ -46,6 +50,8 @@ pub use error::SamplerError;
 pub use halton::Halton;
 pub use hammersley::Hammersley;
 pub use index_offset::IndexOffset;
+pub use jittered::Jittered;
+pub use linear_scramble::LinearScramble;
 pub use micro_jitter::MicroJitter;
 pub use no_decorrelation::NoDecorrelation;
 pub use owen_hash::OwenHash;

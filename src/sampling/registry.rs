@@ -1,10 +1,10 @@
 //! The registries of sequences and decorrelations: one line each.
 
 use super::{
-    BlueNoise, CranleyPatterson, Decorrelation, Demand, DigitalShift, DiscRotation, Facts, Halton,
-    Hammersley, IndexOffset, MicroJitter, NoDecorrelation, OwenHash, OwenSobol, Partner, PixelHash,
-    Pmj02, R2, Rank1Lattice, Sampler, SamplerError, SamplerTable, Seeding, Sequence, Sobol,
-    VanDerCorput,
+    BlueNoise, CranleyPatterson, CranleyPattersonMicroJitter, Decorrelation, Demand, DigitalShift,
+    DiscRotation, Facts, Halton, Hammersley, IndexOffset, Jittered, LinearScramble, MicroJitter,
+    NoDecorrelation, OwenHash, OwenSobol, Partner, PixelHash, Pmj02, R2, Rank1Lattice, Sampler,
+    SamplerError, SamplerTable, Seeding, Sequence, Sobol, VanDerCorput,
 };
 use crate::params::{Entry, Params, Registered, Registry, Variant};
 use std::sync::Arc;
@@ -23,6 +23,7 @@ impl Default for SamplerRegistry {
         Self {
             sequences: Registry::new(vec![
                 Registered::sequence::<PixelHash>("pixel-hash"),
+                Registered::sequence::<Jittered>("jittered"),
                 Registered::sequence::<VanDerCorput>("van-der-corput"),
                 Registered::sequence::<Hammersley>("hammersley"),
                 Registered::sequence::<Halton>("halton"),
@@ -38,8 +39,12 @@ impl Default for SamplerRegistry {
                 Registered::decorrelation::<IndexOffset>("index-offset"),
                 Registered::decorrelation::<CranleyPatterson>("cranley-patterson"),
                 Registered::decorrelation::<DigitalShift>("digital-shift"),
+                Registered::decorrelation::<LinearScramble>("linear-scramble"),
                 Registered::decorrelation::<OwenHash>("owen-hash"),
                 Registered::decorrelation::<MicroJitter>("micro-jitter"),
+                Registered::decorrelation::<CranleyPattersonMicroJitter>(
+                    "cranley-patterson-micro-jitter",
+                ),
                 Registered::decorrelation::<BlueNoise>("blue-noise"),
             ]),
         }

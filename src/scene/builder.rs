@@ -1,8 +1,8 @@
 //! Gathers triangles from a loader and turns them into a checked [`SceneData`].
 
 use super::{
-    Assembly, Daylight, Framing, InstanceError, LoadReport, Material, SceneData, SceneError,
-    Texture, Transform,
+    Assembly, Daylight, Framing, GEOMETRIC, InstanceError, LoadReport, Material, SceneData,
+    SceneError, Texture, Transform, normals,
 };
 use crate::geometry::{Camera, Triangle};
 use glam::{Vec2, Vec3};
@@ -50,6 +50,8 @@ impl Look {
 pub(super) struct SceneBuilder {
     triangles: Vec<Triangle>,
     uvs: Vec<[Vec2; 3]>,
+    /// Empty until a triangle has normals that are not its own.
+    normals: Vec<[u32; 3]>,
     material_ids: Vec<u32>,
     keep_uvs: bool,
     /// Objects and instances; given up if they do not account for every triangle.
@@ -80,17 +82,29 @@ impl SceneBuilder {
 
     /// Adds a triangle without texture coordinates.
     pub fn push(&mut self, vertices: [Vec3; 3], material: u32) {
-        self.push_textured(vertices, [Vec2::ZERO; 3], material);
+        self.push_corners(vertices, [Vec2::ZERO; 3], None, material);
     }
 
-    /// Adds a triangle. A non-finite vertex drops it, a zero area is counted.
-    pub fn push_textured(&mut self, vertices: [Vec3; 3], uvs: [Vec2; 3], material: u32) {
+    /// Adds a triangle with texture coordinates and perhaps normals. A non-finite vertex drops it, a zero area is counted.
+    pub fn push_corners(
+        &mut self,
+        vertices: [Vec3; 3],
+        uvs: [Vec2; 3],
+        normals: Option<[Vec3; 3]>,
+        material: u32,
+    ) {
         if !vertices.iter().all(|v| v.is_finite()) {
             self.report.dropped_non_finite += 1;
             return;
         }
         let triangle = Triangle { vertices };
         self.report.zero_area += usize::from(triangle.has_zero_area());
+        let words = normals.map(|n| normals::encode_corners(&triangle, n));
+        let words = words.unwrap_or([GEOMETRIC; 3]);
+        if !self.normals.is_empty() || words != [GEOMETRIC; 3] {
+            self.normals.resize(self.triangles.len(), [GEOMETRIC; 3]);
+            self.normals.push(words);
+        }
         self.triangles.push(triangle);
         self.material_ids.push(material);
         if self.keep_uvs {
@@ -203,6 +217,7 @@ impl SceneBuilder {
             name: name.to_owned(),
             triangles: self.triangles,
             uvs: if textured { self.uvs } else { Vec::new() },
+            normals: self.normals,
             material_ids: self.material_ids,
             materials: look.materials,
             textures: look.textures,

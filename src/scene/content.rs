@@ -1,6 +1,6 @@
 //! Questions asked of a loaded scene: extent, size in bytes, emitters, content hash.
 
-use super::{Bounds, InstanceError, SceneData, Transform};
+use super::{Bounds, InstanceError, SceneData, Transform, normals};
 use crate::geometry::Triangle;
 use glam::{Vec2, Vec3};
 use std::mem::size_of_val;
@@ -29,11 +29,18 @@ impl SceneData {
             instances,
         };
         let assembly = self.assembly.as_mut().ok_or(missing)?;
+        let before = assembly.instances().get(instance).map(|i| i.to_world);
         assembly.move_to(instance, to_world)?;
         let moved = &assembly.instances()[instance];
         let first = moved.first as usize;
+        let mut count = 0;
         for (triangle, copy) in self.triangles[first..].iter_mut().zip(assembly.copy(moved)) {
             *triangle = copy;
+            count += 1;
+        }
+        let corners = self.normals.iter_mut().skip(first).take(count);
+        for (words, from) in corners.zip(std::iter::repeat(before).flatten()) {
+            *words = normals::moved(*words, &from, &to_world);
         }
         self.hash = self.content_hash();
         Ok(())
@@ -43,6 +50,7 @@ impl SceneData {
     pub fn bytes(&self) -> usize {
         size_of_val(&self.triangles[..])
             + size_of_val(&self.uvs[..])
+            + size_of_val(&self.normals[..])
             + size_of_val(&self.material_ids[..])
             + self
                 .textures
@@ -80,7 +88,8 @@ impl SceneData {
         hash.bytes(bytemuck::cast_slice::<u32, u8>(&self.material_ids));
         hash.bytes(&self.materials.len().to_le_bytes());
         for material in &self.materials {
-            let texture = material.base_color_texture.map_or(-1, i64::from);
+            let texture = material.base_color_texture;
+            let texture = texture.map_or(-1, |used| i64::from(used.texture));
             hash.bytes(material.kind.name.as_bytes());
             hash.bytes(bytemuck::cast_slice(&material.parameters));
             hash.bytes(&texture.to_le_bytes());
@@ -90,6 +99,17 @@ impl SceneData {
             }
             // The derived Debug text is a total, deterministic image of the plain fields.
             hash.bytes(format!("{:?}", material.source).as_bytes());
+        }
+        for (id, material) in self.materials.iter().enumerate() {
+            for (slot, used) in material.texture_uses().iter().enumerate() {
+                let used = used.filter(|used| slot > 0 || !used.is_plain());
+                if let Some(used) = used {
+                    hash.bytes(format!("{id} {slot} {used:?}").as_bytes());
+                }
+            }
+        }
+        if !self.normals.is_empty() {
+            hash.bytes(bytemuck::cast_slice::<[u32; 3], u8>(&self.normals));
         }
         for texture in &self.textures {
             hash.bytes(bytemuck::cast_slice(&[texture.width, texture.height]));
@@ -132,13 +152,13 @@ impl Hash {
 #[cfg(test)]
 mod tests {
     use crate::scene::builtin::tests::load_default;
-    use crate::scene::{Daylight, MIRROR};
+    use crate::scene::{Daylight, MIRROR, TextureUse};
 
     #[test]
     fn the_hash_sees_every_part_of_the_scene() {
         let scene = load_default("cornell-box");
         type Change = fn(&mut crate::scene::SceneData);
-        let changes: [(&str, Change); 11] = [
+        let changes: [(&str, Change); 13] = [
             ("vertex", |s| s.triangles[3].vertices[1].x += 1e-3),
             ("material id", |s| s.material_ids[0] = 1),
             ("reflectance", |s| s.materials[0].base_color.y += 1e-3),
@@ -146,6 +166,10 @@ mod tests {
             ("parameter", |s| s.materials[0].parameters.push(1.5)),
             ("emission", |s| s.materials[0].emission.z += 1e-3),
             ("sides", |s| s.materials[0].emits_both_sides = false),
+            ("normal", |s| s.normals.push([1, 2, 3])),
+            ("texture", |s| {
+                s.materials[0].normal_texture = Some(TextureUse::plain(0));
+            }),
             ("source", |s| s.materials[0].source.ior = Some(1.5)),
             ("camera", |s| s.camera = None),
             ("environment", |s| s.environment.x += 1e-3),

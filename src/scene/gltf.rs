@@ -3,14 +3,14 @@
 
 use super::builder::{Look, SceneBuilder};
 use super::error::{self, guarded};
-use super::gltf_accessor::check_accessors;
+use super::gltf_accessor::{check_accessors, has_normals};
 use super::gltf_container;
 use super::gltf_files::Files;
-use super::gltf_material::{self, Mapping};
+use super::gltf_material;
 use super::texture::decode_all;
 use super::{InstanceError, LoadOptions, SceneData, SceneError, Transform};
 use crate::geometry::{Camera, Triangle};
-use glam::{Mat4, Vec2, Vec3};
+use glam::{DMat3, Mat4, Vec2, Vec3};
 use gltf::mesh::Mode;
 use std::borrow::Cow;
 use std::path::Path;
@@ -85,12 +85,13 @@ fn build(
     let mut geometry = Geometry {
         path,
         buffers,
-        mappings: &palette.mappings,
+        sets: &palette.sets,
         builder: SceneBuilder::new(!palette.images.is_empty(), 0),
         camera: None,
         copies: Copies::new(document),
         lines_or_points: 0,
         deformed: 0,
+        unread_normals: 0,
     };
     geometry.read_scene(document)?;
     geometry.report_left_out();
@@ -103,6 +104,7 @@ fn build(
     let textures = decode_all(
         &palette.images,
         options.max_texture_size,
+        builder.len(),
         &mut palette.materials,
         &mut builder.report,
     );
@@ -149,13 +151,15 @@ fn read_buffers(
 struct Geometry<'a> {
     path: &'a Path,
     buffers: &'a [Vec<u8>],
-    mappings: &'a [Option<Mapping>],
+    /// Of texture coordinates, for each material.
+    sets: &'a [Option<u32>],
     builder: SceneBuilder,
     camera: Option<Camera>,
     /// `None` where no nodes share a mesh, or once a node could not be made an instance.
     copies: Option<Copies>,
     lines_or_points: usize,
     deformed: usize,
+    unread_normals: usize,
 }
 
 /// Meshes that several nodes use become objects.
@@ -320,10 +324,10 @@ impl<'a> Geometry<'a> {
         let buffers = self.buffers;
         let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
         // The file's materials, then one for primitives that name none.
-        let last = self.mappings.len() - 1;
+        let last = self.sets.len() - 1;
         let material = primitive.material().index().unwrap_or(last);
-        let mapping = self.mappings[material].as_ref();
-        check_accessors(primitive, buffers, mapping)?;
+        let set = self.sets[material];
+        check_accessors(primitive, buffers, set)?;
         let local: Vec<Vec3> = reader
             .read_positions()
             .ok_or("its positions are missing or outside their buffer")?
@@ -341,17 +345,20 @@ impl<'a> Geometry<'a> {
                 positions.len()
             ));
         }
-        let read = |mapping: &Mapping| {
-            let uvs = reader.read_tex_coords(mapping.set)?.into_f32();
-            Some(uvs.map(|uv| mapping.apply(uv)).collect())
+        let read = |set: u32| {
+            let uvs = reader.read_tex_coords(set)?.into_f32();
+            Some(uvs.map(Vec2::from).collect())
         };
-        let uvs: Vec<Vec2> = mapping.and_then(read).unwrap_or_default();
+        let uvs: Vec<Vec2> = set.and_then(read).unwrap_or_default();
         let uv = |i: u32| uvs.get(i as usize).copied().unwrap_or_default();
+        let normals = self.read_normals(primitive, world);
+        let normal = |i: u32| normals.get(i as usize).copied().unwrap_or_default();
         let is_shared = self.copies.is_some();
         for_each_face(mode, &indices, |corners| {
             let vertices = corners.map(|i| positions[i as usize]);
-            self.builder
-                .push_textured(vertices, corners.map(uv), material as u32);
+            let normals = (!normals.is_empty()).then(|| corners.map(normal));
+            let (uvs, material) = (corners.map(uv), material as u32);
+            self.builder.push_corners(vertices, uvs, normals, material);
             if is_shared {
                 let vertices = corners.map(|i| local[i as usize]);
                 own.push(Triangle { vertices });
@@ -360,8 +367,31 @@ impl<'a> Geometry<'a> {
         Ok(())
     }
 
+    /// Normals in world space; none where the file has none that can be read.
+    fn read_normals(&mut self, primitive: &gltf::Primitive<'a>, world: Mat4) -> Vec<Vec3> {
+        match has_normals(primitive, self.buffers) {
+            None => return Vec::new(),
+            Some(false) => {
+                self.unread_normals += 1;
+                return Vec::new();
+            }
+            Some(true) => {}
+        }
+        let buffers = self.buffers;
+        let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
+        // In f64: a small scale must not make it singular.
+        let to_world = DMat3::from_mat4(world.as_dmat4()).inverse().transpose();
+        let moved = |n: [f32; 3]| (to_world * Vec3::from(n).as_dvec3()).normalize_or_zero();
+        let normals = reader.read_normals().into_iter().flatten();
+        normals.map(|n| moved(n).as_vec3()).collect()
+    }
+
     fn report_left_out(&mut self) {
         for (count, what) in [
+            (
+                self.unread_normals,
+                "primitives have normals that are not three 32-bit floats in their buffer: drawn flat",
+            ),
             (
                 self.lines_or_points,
                 "primitives of lines or points left out",

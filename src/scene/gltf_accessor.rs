@@ -1,7 +1,6 @@
 //! Checks of glTF accessors. The crate's readers take for granted that types fit, that strides are
 //! wide enough and that offsets and counts stay within their buffers, and panic where they do not.
 
-use super::gltf_material::Mapping;
 use gltf::Semantic;
 use gltf::accessor::{Accessor, DataType, Dimensions};
 use gltf::buffer::View;
@@ -13,7 +12,7 @@ use gltf::buffer::View;
 pub(super) fn check_accessors(
     primitive: &gltf::Primitive<'_>,
     buffers: &[Vec<u8>],
-    mapping: Option<&Mapping>,
+    set: Option<u32>,
 ) -> Result<(), String> {
     if let Some(positions) = primitive.get(&Semantic::Positions) {
         check_data(&positions, buffers).map_err(|p| format!("its positions {p}"))?;
@@ -28,10 +27,10 @@ pub(super) fn check_accessors(
             return Err("its indices are not unsigned integers".to_owned());
         }
     }
-    let Some(Mapping { set, .. }) = mapping else {
+    let Some(set) = set else {
         return Ok(());
     };
-    if let Some(uvs) = primitive.get(&Semantic::TexCoords(*set)) {
+    if let Some(uvs) = primitive.get(&Semantic::TexCoords(set)) {
         check_data(&uvs, buffers).map_err(|p| format!("its texture coordinates {p}"))?;
         let numbers = [DataType::U8, DataType::U16, DataType::F32];
         if uvs.dimensions() != Dimensions::Vec2 || !numbers.contains(&uvs.data_type()) {
@@ -39,6 +38,14 @@ pub(super) fn check_accessors(
         }
     }
     Ok(())
+}
+
+/// Whether the normals of a primitive can be read, if it has any.
+pub(super) fn has_normals(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>]) -> Option<bool> {
+    let normals = primitive.get(&Semantic::Normals)?;
+    let kind = (normals.dimensions(), normals.data_type());
+    let is_known = kind == (Dimensions::Vec3, DataType::F32);
+    Some(is_known && check_data(&normals, buffers).is_ok())
 }
 
 /// Checks that all elements of an accessor, and those that replace some of them, are there.

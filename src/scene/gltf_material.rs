@@ -2,94 +2,107 @@
 
 use super::builder::DEFAULT_ALBEDO;
 use super::gltf_files::Files;
+use super::gltf_texture::{Images, Placed};
 use super::material::{Description, Format, emitted};
-use super::texture::{Encoded, ImageSource};
-use super::{DIELECTRIC, DIFFUSE, MIRROR, Material, MaterialSource, approximation_warning};
-use glam::{Mat2, Vec2, Vec3, Vec4, Vec4Swizzles};
-use std::borrow::Cow;
+use super::texture::ImageSource;
+use super::{
+    DIELECTRIC, DIFFUSE, MIRROR, Material, MaterialSource, PRINCIPLED, approximation_warning,
+};
+use glam::{Vec3, Vec4, Vec4Swizzles};
 
 /// Roughness from which glass looks frosted.
 const FROSTED: f32 = 0.1;
+
+/// What is said of surfaces beyond what is rendered.
+const EXTENSIONS: [&str; 9] = [
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
+    "KHR_materials_iridescence",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_subsurface",
+    "KHR_materials_unlit",
+];
 
 /// All materials of a document and the images that they need.
 pub(super) struct Palette<'a> {
     /// The document's materials in order, then the default one.
     pub materials: Vec<Material>,
-    /// How the texture of each material is mapped, if it has one; parallel to `materials`.
-    pub mappings: Vec<Option<Mapping>>,
+    /// Which set of texture coordinates each material takes, if it has textures; parallel to `materials`.
+    pub sets: Vec<Option<u32>>,
     /// Images that some material uses; materials index into it.
     pub images: Vec<ImageSource<'a>>,
     pub warnings: Vec<String>,
 }
 
-/// Where a texture's coordinates come from: set `set` of the mesh, by `KHR_texture_transform` scaled, then
-/// rotated, then moved.
-pub(super) struct Mapping {
-    pub set: u32,
-    linear: Mat2,
-    offset: Vec2,
-}
-
-impl Mapping {
-    fn of(info: &gltf::texture::Info<'_>) -> Self {
-        let Some(transform) = info.texture_transform() else {
-            return Self {
-                set: info.tex_coord(),
-                linear: Mat2::IDENTITY,
-                offset: Vec2::ZERO,
-            };
-        };
-        let (sin, cos) = transform.rotation().sin_cos();
-        let rotation = Mat2::from_cols(Vec2::new(cos, -sin), Vec2::new(sin, cos));
-        Self {
-            set: transform.tex_coord().unwrap_or(info.tex_coord()),
-            linear: rotation * Mat2::from_diagonal(transform.scale().into()),
-            offset: transform.offset().into(),
-        }
-    }
-
-    pub fn apply(&self, uv: [f32; 2]) -> Vec2 {
-        self.linear * Vec2::from(uv) + self.offset
-    }
-}
-
 /// Reads all materials; images are found here and decoded later.
 pub(super) fn read<'a>(
-    files: &Files,
+    files: &'a Files,
     document: &gltf::Document,
     buffers: &'a [Vec<u8>],
     with_textures: bool,
 ) -> Palette<'a> {
-    let mut palette = Palette {
-        materials: Vec::new(),
-        mappings: Vec::new(),
-        images: Vec::new(),
-        warnings: Vec::new(),
-    };
-    // Place of each of the document's images in `palette.images`.
-    let mut image_ids = vec![None; document.images().len()];
+    let mut images = Images::new(files, document, buffers);
+    let (mut materials, mut sets, mut told) = (Vec::new(), Vec::new(), Vec::new());
+    let mut elsewhere = Vec::new();
     for material in document.materials() {
-        let mut found = convert(&material, files, &mut palette.warnings);
-        let info = base_color(&material).1.filter(|_| with_textures);
-        let info = info.filter(|_| found.kind != &MIRROR);
-        palette.mappings.push(info.as_ref().map(Mapping::of));
-        if let Some(image) = info.map(|info| info.texture().source()) {
-            let id = image_ids[image.index()].get_or_insert_with(|| {
-                palette.images.push(image_source(files, &image, buffers));
-                palette.images.len() as u32 - 1
-            });
-            found.base_color_texture = Some(*id);
+        let mut found = convert(&material, files, with_textures, &mut told);
+        let mut set = None;
+        if with_textures && textured(&material, &mut found, &mut images, &mut set) {
+            elsewhere.push(found.name.clone());
         }
-        palette.materials.push(found);
+        materials.push(found);
+        sets.push(set);
     }
-    palette
-        .materials
-        .push(Material::diffuse("default", Vec3::splat(DEFAULT_ALBEDO)));
-    palette.mappings.push(None);
-    palette
-        .warnings
-        .extend(warnings(document, &palette.materials));
-    palette
+    materials.push(Material::diffuse("default", Vec3::splat(DEFAULT_ALBEDO)));
+    sets.push(None);
+    told.extend(warnings(document, &materials));
+    let elsewhere = elsewhere.iter().map(String::as_str).collect();
+    told.extend(approximation_warning(
+        "textured by several sets of coordinates",
+        "if only the textures of the first were there",
+        elsewhere,
+    ));
+    Palette {
+        materials,
+        sets,
+        images: images.used,
+        warnings: told,
+    }
+}
+
+/// Gives `found` the textures of its material that it can use. Whether one was left out, because it takes another set of
+/// coordinates than those before it.
+fn textured(
+    material: &gltf::Material<'_>,
+    found: &mut Material,
+    images: &mut Images<'_>,
+    set: &mut Option<u32>,
+) -> bool {
+    let mut left_out = false;
+    let mut take = |placed: Placed| {
+        let is_ours = *set.get_or_insert(placed.set) == placed.set;
+        left_out |= !is_ours;
+        is_ours.then_some(placed.place)
+    };
+    let color = base_color(material).1.filter(|_| found.kind != &MIRROR);
+    found.base_color_texture = color.and_then(|info| take(images.place(&info)));
+    if found.kind == &PRINCIPLED {
+        let varied = material.pbr_metallic_roughness();
+        let varied = varied.metallic_roughness_texture();
+        found.metallic_roughness_texture = varied.and_then(|info| take(images.place(&info)));
+    }
+    if found.kind != &DIELECTRIC {
+        let bent = material.normal_texture();
+        found.normal_texture = bent.and_then(|info| take(images.place_normals(&info)));
+    }
+    if found.emission != Vec3::ZERO {
+        let shining = material.emissive_texture();
+        found.emission_texture = shining.and_then(|info| take(images.place(&info)));
+    }
+    left_out
 }
 
 /// Linear base colour and texture: the diffuse ones where `KHR_materials_pbrSpecularGlossiness`
@@ -104,14 +117,21 @@ fn base_color<'a>(material: &gltf::Material<'a>) -> (Vec4, Option<gltf::texture:
     }
 }
 
-fn convert(material: &gltf::Material<'_>, files: &Files, warnings: &mut Vec<String>) -> Material {
+fn convert(
+    material: &gltf::Material<'_>,
+    files: &Files,
+    with_textures: bool,
+    warnings: &mut Vec<String>,
+) -> Material {
     let (color, _) = base_color(material);
     let model = material.pbr_metallic_roughness();
     let gloss = material.pbr_specular_glossiness();
+    let emission =
+        emitted(material.emissive_factor()) * material.emissive_strength().unwrap_or(1.0);
     // A texture can make any part of the surface dark: better no light than light everywhere.
     let emission = match material.emissive_texture() {
-        Some(_) => Vec3::ZERO,
-        None => emitted(material.emissive_factor()) * material.emissive_strength().unwrap_or(1.0),
+        Some(_) if !with_textures => Vec3::ZERO,
+        _ => emission,
     };
     let index = material.index().unwrap_or(0);
     let source = MaterialSource {
@@ -138,6 +158,7 @@ fn convert(material: &gltf::Material<'_>, files: &Files, warnings: &mut Vec<Stri
             || material
                 .transmission()
                 .is_some_and(|t| t.transmission_texture().is_some()),
+        is_followed: with_textures,
         source: &source,
     };
     let name = material.name();
@@ -146,39 +167,6 @@ fn convert(material: &gltf::Material<'_>, files: &Files, warnings: &mut Vec<Stri
         emission: emitted(emission),
         emits_both_sides: material.double_sided(),
         ..Material::described(name, &description, &files.model, warnings)
-    }
-}
-
-fn image_source<'a>(
-    files: &Files,
-    image: &gltf::Image<'_>,
-    buffers: &'a [Vec<u8>],
-) -> ImageSource<'a> {
-    let index = image.index();
-    let (uri_name, encoded) = match image.source() {
-        gltf::image::Source::View { view, .. } => {
-            let range = view.offset()..view.offset().saturating_add(view.length());
-            let buffer = buffers.get(view.buffer().index());
-            let bytes = buffer.and_then(|data| data.get(range));
-            let missing = || Encoded::Missing("its bytes lie outside the buffer".to_owned());
-            let encoded = bytes.map_or_else(missing, |b| Encoded::Memory(Cow::Borrowed(b)));
-            (None, encoded)
-        }
-        gltf::image::Source::Uri { uri, .. } if uri.starts_with("data:") => {
-            let owned = |bytes| Encoded::Memory(Cow::Owned(bytes));
-            (None, files.read(uri).map_or_else(Encoded::Missing, owned))
-        }
-        gltf::image::Source::Uri { uri, .. } => (
-            Some(uri),
-            files.find(uri).map_or_else(Encoded::Missing, Encoded::File),
-        ),
-    };
-    ImageSource {
-        name: image
-            .name()
-            .or(uri_name)
-            .map_or_else(|| format!("image {index}"), str::to_owned),
-        encoded,
     }
 }
 
@@ -204,8 +192,13 @@ fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
             && m.source.metallic.is_some_and(|metal| metal > 0.5)
             && model.metallic_roughness_texture().is_none()
     });
-    let textured_light = of(&|_, original| {
-        original.emissive_texture().is_some() && emitted(original.emissive_factor()) != Vec3::ZERO
+    let glossy = of(&|_, original| {
+        let model = original.pbr_specular_glossiness();
+        model.is_some_and(|model| model.specular_glossiness_texture().is_some())
+    });
+    let extended = EXTENSIONS.iter().filter_map(|name| {
+        let names = of(&|_, original| original.extension_value(name).is_some());
+        approximation_warning(&format!("extended by {name}"), "if it were not", names)
     });
     [
         approximation_warning("transmissive", "diffuse", transmissive),
@@ -213,12 +206,13 @@ fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
         approximation_warning("cut out or blended by alpha", "diffuse", cut_out),
         approximation_warning("rough metal", "diffuse", metal),
         approximation_warning(
-            "lit by an emissive texture (drawn dark)",
-            "diffuse",
-            textured_light,
+            "of varying gloss",
+            "if the texture of it were white",
+            glossy,
         ),
     ]
     .into_iter()
     .flatten()
+    .chain(extended)
     .collect()
 }

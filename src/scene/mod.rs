@@ -17,14 +17,18 @@ mod gltf_accessor;
 mod gltf_container;
 mod gltf_files;
 mod gltf_material;
+mod gltf_texture;
 mod instances;
 mod material;
 mod mtl;
+mod mtl_texture;
 mod nori;
+mod normals;
 mod obj;
 mod ply;
 mod text;
 mod texture;
+mod texture_use;
 
 pub use builder::{DEFAULT_ALBEDO, MAX_COORDINATE};
 pub use builtin::builtin_scenes;
@@ -38,6 +42,8 @@ pub use material::{
     COOK_TORRANCE, CookTorrance, DEFAULT_IOR, DIELECTRIC, DIFFUSE, Fresnel, MATERIAL_KINDS, MIRROR,
     Masking, Material, MaterialKind, MaterialSource, PHONG, PRINCIPLED, reflectance_of_ior,
 };
+pub use normals::{GEOMETRIC, decode_normal, encode_normal};
+pub use texture_use::{TextureUse, Wrap};
 
 use crate::geometry::{Camera, Triangle};
 use crate::params::{Params, Variant};
@@ -46,7 +52,7 @@ use serde::{Deserialize, Serialize};
 use std::io::Read as _;
 use std::path::Path;
 
-/// An 8-bit sRGB texture, row by row from the top; wraps in both directions.
+/// An 8-bit texture, row by row from the top. What it is used for says how it is encoded: [`TextureUse`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     /// File or embedded name, for messages.
@@ -55,7 +61,7 @@ pub struct Texture {
     pub width: u32,
     /// Texels in y.
     pub height: u32,
-    /// `width * height` texels, sRGB-encoded RGBA8.
+    /// `width * height` texels, RGBA8.
     pub texels: Vec<[u8; 4]>,
 }
 
@@ -85,7 +91,7 @@ impl LoadReport {
 
 /// A loaded scene: flat world-space triangles and what shading needs.
 ///
-/// `triangles`, `uvs` and `material_ids` are parallel; `uvs` is empty when no material is textured.
+/// `triangles`, `uvs`, `normals` and `material_ids` are parallel; `uvs` is empty when no material is textured.
 #[derive(Debug, Clone)]
 pub struct SceneData {
     /// Name as the user typed it.
@@ -94,11 +100,13 @@ pub struct SceneData {
     pub triangles: Vec<Triangle>,
     /// Texture coordinates per corner, `v` pointing down (glTF convention); empty if unused.
     pub uvs: Vec<[Vec2; 3]>,
+    /// Normals of the corners, as [`encode_normal`] has them; empty where all are those of the triangles.
+    pub normals: Vec<[u32; 3]>,
     /// Index into `materials` for each triangle.
     pub material_ids: Vec<u32>,
     /// Materials; never empty.
     pub materials: Vec<Material>,
-    /// Base-colour textures.
+    /// Textures.
     pub textures: Vec<Texture>,
     /// What the triangles are copies of, if the scene consists of instances.
     pub assembly: Option<Assembly>,
@@ -119,7 +127,7 @@ pub struct SceneData {
 /// How a scene is loaded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LoadOptions {
-    /// Whether base-colour textures are decoded. Without them textured surfaces show their
+    /// Whether textures are decoded. Without them textured surfaces show their
     /// constant colour, and no texture coordinates are kept.
     pub textures: bool,
     /// Largest width and height of a texture, texels; larger ones are reduced, with a warning.

@@ -3,12 +3,13 @@
 use super::builder::DEFAULT_ALBEDO;
 use super::error::read_regular;
 use super::material::{Description, Format, emitted};
+use super::mtl_texture::{Statement, statement};
 use super::text::normalised;
 use super::texture::{Encoded, ImageSource};
-use super::{DIELECTRIC, LoadOptions, MIRROR, Material, MaterialSource};
+use super::{DIELECTRIC, LoadOptions, MIRROR, Material, MaterialSource, TextureUse};
 use glam::Vec3;
 use std::cell::RefCell;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt::Display;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -31,6 +32,8 @@ pub(super) struct Contents {
     pub materials: Vec<Material>,
     pub textures: Vec<ImageSource<'static>>,
     pub warnings: Vec<String>,
+    /// What statements say that is not rendered, with the materials.
+    unused: BTreeMap<&'static str, Vec<String>>,
     /// Places of the textures' paths in `textures`.
     texture_ids: HashMap<PathBuf, u32>,
 }
@@ -82,6 +85,12 @@ impl Library {
         let names = approximated.map(|m| m.name.as_str()).collect();
         let text = super::approximation_warning("partly transparent", "diffuse", names);
         contents.warnings.extend(text);
+        for (what, names) in &contents.unused {
+            let names = names.iter().map(String::as_str).collect();
+            let text =
+                super::approximation_warning(&format!("shaped by {what}"), "if it were not", names);
+            contents.warnings.extend(text);
+        }
         contents
     }
 }
@@ -90,11 +99,6 @@ impl Contents {
     /// Adds a material of the library `file`.
     fn add(&mut self, material: &tobj::Material, file: &Path, options: &LoadOptions) {
         let folder = file.parent().unwrap_or(Path::new(""));
-        let texture = material
-            .diffuse_texture
-            .as_deref()
-            .filter(|_| options.textures)
-            .map(|statement| self.texture(folder, &texture_path(statement), options));
         // The standard's default for a surface with a texture is to show it as it is.
         let unstated = if material.diffuse_texture.is_some() {
             1.0
@@ -107,32 +111,57 @@ impl Contents {
             format: Format::Mtl,
             base_color: diffuse,
             is_varied: false,
+            is_followed: false,
             source: &source,
         };
         let name = material.name.clone();
         let found = Material::described(name, &description, file, &mut self.warnings);
-        let is_textured = found.kind != &MIRROR && found.kind != &DIELECTRIC;
-        self.materials.push(Material {
-            base_color_texture: texture.filter(|_| is_textured),
-            emission: emitted(material.emissive.unwrap_or_default()),
+        let mut texture = |statement: Option<&str>, is_used: bool| {
+            let statement = statement.filter(|_| is_used && options.textures)?;
+            Some(self.texture(folder, statement, options))
+        };
+        let other = |key: &str| material.unknown_param.get(key).map(String::as_str);
+        let is_rough = found.kind != &MIRROR && found.kind != &DIELECTRIC;
+        let emission = emitted(material.emissive.unwrap_or_default());
+        let is_lamp = emission != Vec3::ZERO;
+        let textured = Material {
+            base_color_texture: texture(material.diffuse_texture.as_deref(), is_rough),
+            normal_texture: texture(other("norm"), found.kind != &DIELECTRIC),
+            emission_texture: texture(other("map_Ke"), is_lamp),
+            emission,
             ..found
-        });
+        };
+        let unused = [
+            ("map_Ks", material.specular_texture.is_some()),
+            ("map_Ns", material.shininess_texture.is_some()),
+            ("a bump map", material.normal_texture.is_some()),
+            ("map_d", material.dissolve_texture.is_some()),
+        ];
+        for (what, _) in unused.iter().filter(|(_, is_there)| *is_there) {
+            self.unused
+                .entry(what)
+                .or_default()
+                .push(textured.name.clone());
+        }
+        self.materials.push(textured);
     }
 
-    /// Index of the texture in `file`, each one once.
-    fn texture(&mut self, folder: &Path, file: &str, options: &LoadOptions) -> u32 {
+    /// The texture that a statement names, each file once.
+    fn texture(&mut self, folder: &Path, text: &str, options: &LoadOptions) -> TextureUse {
+        let Statement { file, place } = statement(text);
         let next = self.textures.len() as u32;
-        let path = folder.join(file);
-        *self.texture_ids.entry(path).or_insert_with_key(|path| {
+        let path = folder.join(&file);
+        let texture = *self.texture_ids.entry(path).or_insert_with_key(|path| {
             self.textures.push(ImageSource {
                 name: path.display().to_string(),
-                encoded: match relative(Path::new(file), options) {
+                encoded: match relative(Path::new(&file), options) {
                     Ok(()) => Encoded::File(path.clone()),
                     Err(error) => Encoded::Missing(error.to_string()),
                 },
             });
             next
-        })
+        });
+        TextureUse { texture, ..place }
     }
 }
 
@@ -176,30 +205,6 @@ fn source(material: &tobj::Material) -> MaterialSource {
     }
 }
 
-/// The file of a `map_Kd` statement: what follows its options (`-s 1 1 1 file.png`), with `/`
-/// between folders.
-fn texture_path(statement: &str) -> String {
-    let mut rest = statement.trim();
-    while rest.starts_with('-') {
-        let (option, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
-        rest = after.trim_start();
-        // -o, -s, -t take one to three numbers, -mm two, the others one word.
-        let (least, most) = match option {
-            "-o" | "-s" | "-t" => (1, 3),
-            "-mm" => (2, 2),
-            _ => (1, 1),
-        };
-        for taken in 0..most {
-            let (word, after) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
-            if taken >= least && word.parse::<f32>().is_err() {
-                break;
-            }
-            rest = after.trim_start();
-        }
-    }
-    rest.replace('\\', "/")
-}
-
 /// The text without the lines that would make `tobj` reject (or panic on) the whole library; a
 /// colour given as one number becomes three.
 fn readable_lines(text: &str, path: &Path, warnings: &mut Vec<String>) -> String {
@@ -240,19 +245,6 @@ fn readable_lines(text: &str, path: &Path, warnings: &mut Vec<String>) -> String
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn texture_options_are_skipped() {
-        for (statement, file) in [
-            ("a b.png", "a b.png"),
-            ("-s 1 1 1 -o 0 0 a.png", "a.png"),
-            ("-s 2 a.png", "a.png"),
-            ("-clamp on -mm 0 1 dir\\a.png", "dir/a.png"),
-            ("-s", ""),
-        ] {
-            assert_eq!(texture_path(statement), file, "{statement}");
-        }
-    }
 
     #[test]
     fn broken_statements_are_dropped_with_their_line_and_the_rest_is_kept() {

@@ -96,6 +96,7 @@ fn build(
     let textures = decode_all(
         &textures,
         options.max_texture_size,
+        builder.len(),
         &mut materials,
         &mut builder.report,
     );
@@ -115,9 +116,12 @@ fn push_mesh(builder: &mut SceneBuilder, mesh: &tobj::Mesh, material: u32) {
     };
     let corners = mesh.indices.as_chunks::<3>().0;
     let uv_corners = mesh.texcoord_indices.as_chunks::<3>().0;
+    let normal = |i: u32| Vec3::from_slice(&mesh.normals[3 * i as usize..]);
+    let normal_corners = mesh.normal_indices.as_chunks::<3>().0;
     for (k, corner) in corners.iter().enumerate() {
         let uvs = uv_corners.get(k).map_or([Vec2::ZERO; 3], |c| c.map(uv));
-        builder.push_textured(corner.map(position), uvs, material);
+        let normals = normal_corners.get(k).map(|c| c.map(normal));
+        builder.push_corners(corner.map(position), uvs, normals, material);
     }
 }
 

@@ -1,7 +1,7 @@
-//! Decoding of base-colour textures, all of a scene in parallel.
+//! Decoding of textures, all of a scene in parallel.
 
 use super::error::read_regular;
-use super::{LoadReport, Material, Texture};
+use super::{LoadReport, Material, Texture, TextureUse};
 use image::ImageReader;
 use image::imageops::FilterType;
 use rayon::prelude::*;
@@ -25,19 +25,31 @@ pub(super) struct ImageSource<'a> {
     pub encoded: Encoded<'a>,
 }
 
-/// Decodes `sources` in parallel; images wider or higher than `max_size` are reduced.
+/// Words that the tables of a scene may have: what software drivers bind, less 8 MiB for materials and lights.
+const MOST_WORDS: u64 = 30 << 20;
+/// Words of texture coordinates and normals of a triangle.
+const TRIANGLE_WORDS: u64 = 9;
+
+/// Decodes `sources` in parallel; images wider or higher than `max_size` are reduced, and all of them further until they fit beside
+/// `triangles` triangles into what an adapter binds.
 ///
 /// `materials` refer to `sources` on entry and to the returned list on exit. An image that cannot
-/// be decoded is a warning, and its materials keep their constant colour.
+/// be decoded is a warning, and its materials keep their constant.
 pub(super) fn decode_all(
     sources: &[ImageSource<'_>],
     max_size: u32,
+    triangles: usize,
     materials: &mut [Material],
     report: &mut LoadReport,
 ) -> Vec<Texture> {
+    let read: Vec<_> = sources.par_iter().map(read).collect();
+    let sizes = read.iter().flatten().map(|(_, size)| *size);
+    let room = MOST_WORDS.saturating_sub(TRIANGLE_WORDS * triangles as u64);
+    let max_size = fitting_size(&sizes.collect::<Vec<_>>(), max_size.max(1), room);
     let decoded: Vec<_> = sources
         .par_iter()
-        .map(|source| decode(source, max_size.max(1)))
+        .zip(read)
+        .map(|(source, read)| decode(source, &read?.0, max_size))
         .collect();
     let mut textures = Vec::new();
     let mut new_index = Vec::new();
@@ -55,17 +67,18 @@ pub(super) fn decode_all(
             }
             Err(problem) => {
                 report.warnings.push(format!(
-                    "texture {}: {problem}; drawn with the constant colour",
+                    "texture {}: {problem}; drawn with the constant",
                     source.name
                 ));
                 None
             }
         });
     }
-    for material in materials {
-        material.base_color_texture = material
-            .base_color_texture
-            .and_then(|index| new_index[index as usize]);
+    for slot in materials.iter_mut().flat_map(Material::texture_uses_mut) {
+        *slot = slot.and_then(|used| {
+            let texture = new_index[used.texture as usize]?;
+            Some(TextureUse { texture, ..used })
+        });
     }
     textures
 }
@@ -79,9 +92,25 @@ const MOST_TEXEL_BYTES: u64 = 4 * 1032;
 /// Bytes of texels that are always allowed.
 const FREE_TEXEL_BYTES: u64 = 1 << 20;
 
-/// Refuses an image that announces more texels than its bytes can hold, before there is memory for
+/// The greatest size up to `max_size`, halved so often that all texels have room, one word each.
+fn fitting_size(sizes: &[Size], max_size: u32, room: u64) -> u32 {
+    let needed = |limit: u32| -> u64 {
+        let one = |(width, height): &Size| {
+            let scale = (f64::from(limit) / f64::from((*width).max(*height).max(1))).min(1.0);
+            (f64::from(*width) * f64::from(*height) * scale * scale) as u64
+        };
+        sizes.iter().map(one).sum()
+    };
+    let mut limit = max_size;
+    while limit > 1 && needed(limit) > room {
+        limit /= 2;
+    }
+    limit
+}
+
+/// The size of an image; refuses one that announces more texels than its bytes can hold, before there is memory for
 /// them.
-fn check_size(bytes: &[u8]) -> Result<(), String> {
+fn checked_size(bytes: &[u8]) -> Result<Size, String> {
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let reader = reader.map_err(|e| e.to_string())?;
     let (width, height) = reader.into_dimensions().map_err(|e| e.to_string())?;
@@ -93,11 +122,11 @@ fn check_size(bytes: &[u8]) -> Result<(), String> {
             "{width}x{height} texels cannot be in {length} bytes"
         ));
     }
-    Ok(())
+    Ok((width, height))
 }
 
-/// The texture, and its size in the file if that was larger.
-fn decode(source: &ImageSource<'_>, max_size: u32) -> Result<(Texture, Option<Size>), String> {
+/// The bytes of an image and its size.
+fn read<'a>(source: &'a ImageSource<'_>) -> Result<(Cow<'a, [u8]>, Size), String> {
     let bytes = match &source.encoded {
         Encoded::File(path) => {
             Cow::Owned(read_regular(path).map_err(|e| format!("{}: {e}", path.display()))?)
@@ -105,8 +134,17 @@ fn decode(source: &ImageSource<'_>, max_size: u32) -> Result<(Texture, Option<Si
         Encoded::Memory(bytes) => Cow::Borrowed(bytes.as_ref()),
         Encoded::Missing(why) => return Err(why.clone()),
     };
-    check_size(&bytes)?;
-    let image = image::load_from_memory(&bytes).map_err(|e| e.to_string())?;
+    let size = checked_size(&bytes)?;
+    Ok((bytes, size))
+}
+
+/// The texture, and its size in the file if that was larger.
+fn decode(
+    source: &ImageSource<'_>,
+    bytes: &[u8],
+    max_size: u32,
+) -> Result<(Texture, Option<Size>), String> {
+    let image = image::load_from_memory(bytes).map_err(|e| e.to_string())?;
     let size = (image.width(), image.height());
     let larger = size.0 > max_size || size.1 > max_size;
     let image = if larger {
@@ -122,4 +160,20 @@ fn decode(source: &ImageSource<'_>, max_size: u32) -> Result<(Texture, Option<Si
         texels: image.as_raw().as_chunks::<4>().0.to_vec(),
     };
     Ok((texture, larger.then_some(size)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn textures_are_halved_until_they_fit_and_no_further() {
+        let sizes = [(1024, 512), (2048, 2048)];
+        assert_eq!(fitting_size(&sizes, 4096, 1 << 30), 4096);
+        let all = 1024 * 512 + 2048 * 2048;
+        assert_eq!(fitting_size(&sizes, 2048, all), 2048);
+        assert_eq!(fitting_size(&sizes, 2048, all - 1), 1024);
+        assert_eq!(fitting_size(&sizes, 1024, 1 << 17), 256);
+        assert_eq!(fitting_size(&sizes, 1024, 0), 1);
+    }
 }

@@ -204,6 +204,7 @@ pub fn scene(triangles: Mesh, assembly: Option<Assembly>) -> SceneData {
         material_ids: vec![0; triangles.len()],
         triangles,
         uvs: Vec::new(),
+        normals: Vec::new(),
         materials: vec![Material::diffuse("grey", Vec3::splat(0.5))],
         textures: Vec::new(),
         assembly,

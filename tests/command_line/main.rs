@@ -3,6 +3,7 @@
 mod models;
 mod pictures;
 mod points;
+mod references;
 
 use raystone::config::Axis;
 use raystone::discrepancy::Measure;
@@ -114,7 +115,7 @@ fn bad_usage_ends_with_2() {
     for arguments in [
         &["run"][..],
         &["dance"],
-        &["render", "--spp", "12"],
+        &["render", "--spp", "0"],
         &["render", "--size", "big"],
         &["list", "colours"],
         &[

@@ -31,15 +31,55 @@ impl Replicates {
     }
 }
 
+impl Replicates {
+    /// The same in tiles of `edge` × `edge` pixels.
+    pub fn tiled(&self, edge: u32) -> Self {
+        let tiled = |image: &Image| {
+            let [width, height] = [image.width, image.height].map(|n| n / edge);
+            let mean = |tile: u32| {
+                let (x, y) = (tile % width * edge, tile / width * edge);
+                let places = (0..edge * edge).map(|k| (y + k / edge) * image.width + x + k % edge);
+                let mut sum = [0.0; 3];
+                for pixel in places.map(|at| image.pixels[at as usize]) {
+                    sum = [0, 1, 2].map(|c| sum[c] + pixel[c] / (edge * edge) as f32);
+                }
+                sum
+            };
+            let tiles = (0..width * height).map(mean).collect();
+            Image::new(width, height, tiles).expect("whole tiles")
+        };
+        Self(self.0.iter().map(tiled).collect())
+    }
+}
+
 impl Moments {
+    /// Those of tiles of pixels whose noise is independent.
+    pub fn tiled(&self, width: usize, edge: usize) -> Self {
+        let across = width / edge;
+        let tiles = across * (self.mean.len() / width / edge);
+        let over = |values: &[f64], tile: usize| -> f64 {
+            let first = tile / across * edge * width + tile % across * edge;
+            let places = (0..edge * edge).map(|k| first + k / edge * width + k % edge);
+            places.map(|at| values[at]).sum::<f64>() / (edge * edge) as f64
+        };
+        let mean = (0..tiles).map(|tile| over(&self.mean, tile)).collect();
+        let share = (edge * edge) as f64;
+        let variance = (0..tiles).map(|tile| over(&self.variance, tile) / share);
+        Self {
+            mean,
+            variance: variance.collect(),
+            replicates: self.replicates,
+        }
+    }
+
     /// The mean over all pixels.
     pub fn total(&self) -> f64 {
         self.mean.iter().sum::<f64>() / self.mean.len() as f64
     }
 
-    /// The share of pixels whose difference Welch's test accepts at the Šidák level 0.01 of all of them.
-    pub fn accepted(&self, other: &Self) -> f64 {
-        let level = 1.0 - 0.99_f64.powf(1.0 / self.mean.len() as f64);
+    /// The share of pixels whose difference Welch's test accepts at the Šidák level `alpha` of all of them.
+    pub fn accepted(&self, other: &Self, alpha: f64) -> f64 {
+        let level = 1.0 - (1.0 - alpha).powf(1.0 / self.mean.len() as f64);
         let accepted = (0..self.mean.len()).filter(|&i| self.p(other, i) >= level);
         accepted.count() as f64 / self.mean.len() as f64
     }

@@ -100,7 +100,7 @@ fn textures_keep_their_factor_and_skies_are_written() {
         height: 1,
         texels: vec![[255, 0, 0, 255], [0, 0, 255, 255]],
     }];
-    scene.materials[0].base_color_texture = Some(0);
+    scene.materials[0].base_color_texture = Some(raystone::scene::TextureUse::plain(0));
     scene.materials[0].base_color = glam::Vec3::ONE;
     let has = |scene: &SceneData, file: &str| {
         let (folder, xml, _) = exported(scene, false);

@@ -13,6 +13,7 @@ mod support;
 use agreement::Replicates;
 use glam::{Vec2, Vec3};
 use raystone::geometry::{Camera, Triangle};
+use raystone::sampling::Sampler;
 use raystone::scene::{Material, SceneData};
 use support::{Stage, builtin, gpu, path, sampler, structure};
 
@@ -38,10 +39,22 @@ fn scene_of(polygons: &[(Vec<Vec3>, u32)], materials: Vec<Material>, camera: Cam
 
 /// Images of a scene by the path tracer with so many bounces, one for each seed.
 fn replicates(scene: SceneData, bounces: i64, size: [u32; 2], spp: u32, count: u32) -> Replicates {
+    let sampler = sampler("owen-sobol", "none");
+    replicates_by(&sampler, scene, bounces, size, spp, count)
+}
+
+/// The same by another sampler.
+fn replicates_by(
+    sampler: &Sampler,
+    scene: SceneData,
+    bounces: i64,
+    size: [u32; 2],
+    spp: u32,
+    count: u32,
+) -> Replicates {
     let stage = Stage::new(gpu(), scene);
     let traced = stage.traced(gpu(), structure("cwbvh"));
-    let sampler = sampler("owen-sobol", "none");
-    let renderer = stage.renderer(gpu(), &traced, &sampler, &path(bounces), size, false);
+    let renderer = stage.renderer(gpu(), &traced, sampler, &path(bounces), size, false);
     let one = |seed| {
         let mut shots = renderer.render(&[spp], seed).expect("the device renders");
         assert_eq!(renderer.error_word().expect("a status"), 0, "error word");

@@ -2,8 +2,8 @@
 //! pixel of its path tracer, `max_depth` 7. `scripts/validate store` renews them.
 
 use crate::agreement::Moments;
-use crate::replicates;
-use crate::support::builtin;
+use crate::support::{builtin, sampler_of};
+use crate::{replicates, replicates_by};
 use raystone::image::luminance;
 use raystone::scene::SceneData;
 
@@ -50,7 +50,7 @@ fn faults(scene: SceneData) -> Vec<String> {
         replicates(scene, 6, [EDGE; 2], SPP, REPLICATES).moments(),
         stored(),
     );
-    let (ratio, accepted) = (ours.total() / theirs.total(), ours.accepted(&theirs));
+    let (ratio, accepted) = (ours.total() / theirs.total(), ours.accepted(&theirs, 0.01));
     println!(
         "ratio of the means {ratio:.5}, {:.2} % of pixels accepted",
         100.0 * accepted
@@ -81,4 +81,44 @@ fn a_wall_five_percent_too_dark_and_a_light_one_percent_too_bright_are_found() {
     assert_eq!(wall, ["mean", "pixels"]);
     let light = box_with(|s| s.materials[3].emission *= 1.01);
     assert!(light.contains(&"mean".to_owned()), "{light:?}");
+}
+
+/// Each sequence with one decorrelation, and each decorrelation with one sequence.
+const SAMPLERS: [(&str, &str); 12] = [
+    ("pixel-hash", "none"),
+    ("pmj02", "cranley-patterson"),
+    ("halton", "cranley-patterson"),
+    ("hammersley", "cranley-patterson"),
+    ("r2", "cranley-patterson"),
+    ("rank1-lattice", "cranley-patterson"),
+    ("sobol", "cranley-patterson"),
+    ("sobol", "digital-shift"),
+    ("sobol", "owen-hash"),
+    ("sobol", "index-offset"),
+    ("sobol", "blue-noise"),
+    ("owen-sobol", "none"),
+];
+/// Pixels along the edge of a tile.
+const TILE: u32 = 8;
+
+#[test]
+fn all_samplers_make_the_image_of_mitsuba() {
+    const SPP: u32 = 16;
+    let theirs = stored().tiled(EDGE as usize, TILE as usize);
+    for (sequence, decorrelation) in SAMPLERS {
+        let sampler = sampler_of(sequence, decorrelation, SPP);
+        let scene = builtin("cornell-box", &[]);
+        let images = replicates_by(&sampler, scene, 6, [EDGE; 2], SPP, 8);
+        let ours = images.tiled(TILE).moments();
+        let (ratio, accepted) = (ours.total() / theirs.total(), ours.accepted(&theirs, 0.001));
+        println!("{sequence} x {decorrelation}: {ratio:.5}, {accepted}");
+        assert!(
+            accepted == 1.0,
+            "{sequence} x {decorrelation}: {accepted} of the tiles"
+        );
+        assert!(
+            (ratio - 1.0).abs() < 0.01,
+            "{sequence} x {decorrelation}: {ratio}"
+        );
+    }
 }

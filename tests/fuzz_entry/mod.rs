@@ -171,6 +171,7 @@ fn check_scene(scene: &SceneData) {
     assert!(triangles > 0, "no triangle");
     assert_eq!(scene.material_ids.len(), triangles);
     assert!(scene.uvs.is_empty() || scene.uvs.len() == triangles);
+    assert!(scene.normals.is_empty() || scene.normals.len() == triangles);
     let bounds = Bounds::of(&scene.triangles);
     let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
     assert!(largest <= MAX_COORDINATE, "{bounds:?}");
@@ -200,8 +201,12 @@ fn check_scene(scene: &SceneData) {
             emission.is_finite() && emission.min_element() >= 0.0,
             "{material:?}"
         );
-        let texture = material.base_color_texture.map_or(0, |id| id as usize + 1);
-        assert!(texture <= scene.textures.len(), "{material:?}");
+        for used in material.texture_uses().into_iter().flatten() {
+            assert!(
+                (used.texture as usize) < scene.textures.len(),
+                "{material:?}"
+            );
+        }
     }
     for texture in &scene.textures {
         let texels = texture.width as usize * texture.height as usize;

@@ -8,6 +8,7 @@ mod device;
 mod faults;
 mod quadrature;
 mod reference;
+mod surfaces;
 
 use device::{Answer, Ask, Device, rounded};
 use glam::DVec3;

@@ -45,7 +45,13 @@ fn glb_nodes_are_flattened_with_their_transforms() {
     assert_eq!(lamp.kind, &PRINCIPLED);
     assert_eq!(lamp.parameters[..2], [0.0, 1.0]);
     assert!((lamp.parameters[2] - 0.04).abs() < 1e-6);
-    assert_eq!(scene.uvs[0][1], Vec2::new(2.25, 0.0));
+    assert_eq!(scene.uvs[0][1], Vec2::new(1.0, 0.0));
+    let placed = lamp.base_color_texture.unwrap();
+    assert_eq!(
+        placed.linear * Vec2::ONE + placed.offset,
+        Vec2::new(2.25, 1.0)
+    );
+    assert!(!lamp.emits_both_sides, "not doubleSided");
     assert_eq!(scene.textures[0].width, 2);
 }
 
@@ -142,4 +148,72 @@ fn nodes_that_share_a_mesh_become_instances_of_one_object() {
     assert!(scene.assembly.is_none());
     let warning = &scene.report.warnings[0];
     assert!(warning.contains("cannot be inverted"), "{warning}");
+}
+
+/// The square with all the textures that a material may have, and normals that slant.
+#[test]
+fn all_textures_and_the_normals_of_a_gltf_material_arrive() {
+    let image = png();
+    let mut bin = square_bin(&image);
+    bin.resize(bin.len().next_multiple_of(4), 0);
+    let first = bin.len();
+    let normals = [
+        [0.0_f32, 0.0, 1.0],
+        [1.0, 0.0, 1.0],
+        [1.0, 0.0, 1.0],
+        [0.0; 3],
+    ];
+    bin.extend(normals.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+    let transform =
+        "\"extensions\":{\"KHR_texture_transform\":{\"offset\":[0.5,0],\"rotation\":1.5707964}}";
+    let json = square_json(image.len())
+        .replace("\"TEXCOORD_0\":1}", "\"TEXCOORD_0\":1,\"NORMAL\":3}")
+        .replace(
+            "\"metallicFactor\":0,",
+            "\"metallicFactor\":0.5,\"metallicRoughnessTexture\":{\"index\":1},",
+        )
+        .replace(
+            "{\"name\":\"lamp\",",
+            &format!(
+                "{{\"name\":\"lamp\",\"doubleSided\":true,\"emissiveTexture\":{{\"index\":0,\"texCoord\":1}},\
+                 \"normalTexture\":{{\"index\":1,\"scale\":0.5,{transform}}},"
+            ),
+        )
+        .replace(
+            "\"textures\":[{\"source\":0}]",
+            "\"textures\":[{\"source\":0},{\"source\":0,\"sampler\":0}],\
+             \"samplers\":[{\"wrapS\":33071,\"wrapT\":33648}]",
+        )
+        .replace(
+            "\"type\":\"SCALAR\"}",
+            "\"type\":\"SCALAR\"},{\"bufferView\":4,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"}",
+        )
+        .replace(
+            "}],\n    \"buffers\"",
+            &format!("}},{{\"buffer\":0,\"byteOffset\":{first},\"byteLength\":48}}],\n    \"buffers\""),
+        )
+        .replace(
+            &format!("\"buffers\":[{{\"byteLength\":{}}}]", 92 + image.len()),
+            &format!("\"buffers\":[{{\"byteLength\":{}}}]", bin.len()),
+        );
+    let scene = load_files("a.glb", &[("a.glb", &glb(&json, &bin))]).unwrap();
+    let lamp = &scene.materials[0];
+    assert_eq!(lamp.kind, &PRINCIPLED);
+    assert!(lamp.emits_both_sides);
+    let varied = lamp.metallic_roughness_texture.unwrap();
+    assert_eq!(varied.wrap, [Wrap::Clamp, Wrap::Mirrored]);
+    let bent = lamp.normal_texture.unwrap();
+    assert_eq!(bent.scale, 0.5);
+    let turned = bent.linear * Vec2::X + bent.offset;
+    assert!(turned.distance(Vec2::new(0.5, -1.0)) < 1e-6, "{turned}");
+    assert_eq!(scene.textures.len(), 1, "one image, used three times");
+    // The second instance is twice as large: its normals are not.
+    assert_eq!(scene.normals.len(), 4);
+    let slanted = decode_normal(scene.normals[2][1]).unwrap();
+    assert!(slanted.distance(DVec3::new(0.5, 0.0, 0.5).normalize()) < 1e-4);
+    assert_eq!(scene.normals[1][2], GEOMETRIC, "no length");
+    // Its set of coordinates is not that of the others.
+    assert_eq!(lamp.emission_texture, None);
+    let all = scene.report.warnings.join("\n");
+    assert!(all.contains("several sets of coordinates"), "{all}");
 }

@@ -7,12 +7,12 @@ mod ply;
 mod real;
 mod text;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use raystone::params::{Params, Variant};
 use raystone::random::Pcg32;
 use raystone::scene::{
-    DEFAULT_ALBEDO, DIELECTRIC, DIFFUSE, LoadOptions, MIRROR, Material, PHONG, PRINCIPLED,
-    SceneData, SceneError, load,
+    DEFAULT_ALBEDO, DIELECTRIC, DIFFUSE, GEOMETRIC, LoadOptions, MIRROR, Material, PHONG,
+    PRINCIPLED, SceneData, SceneError, TextureUse, Wrap, decode_normal, load,
 };
 use std::fs;
 use std::path::Path;

@@ -40,7 +40,7 @@ fn obj_materials_and_textures_arrive() {
     // Kd reflects twice what arrives.
     assert_eq!(wall.base_color, Vec3::new(0.25, 0.125, 1.0));
     assert_eq!(wall.kind, &DIFFUSE);
-    assert_eq!(wall.base_color_texture, Some(0));
+    assert_eq!(wall.base_color_texture, Some(TextureUse::plain(0)));
     assert_eq!(
         scene.textures[0].texels,
         [[255, 0, 0, 255], [0, 0, 255, 255]]
@@ -84,7 +84,7 @@ fn a_highlight_makes_phong_and_metalness_a_principled_material() {
     };
     assert_eq!((floor.kind, glaring.kind), (&PHONG, &PHONG));
     assert_eq!((dull.kind, brass.kind), (&DIFFUSE, &PRINCIPLED));
-    assert_eq!(floor.base_color_texture, Some(0));
+    assert_eq!(floor.base_color_texture, Some(TextureUse::plain(0)));
     assert_eq!(floor.parameters, [0.25, 0.25, 0.25, 20.0]);
     assert_eq!(glaring.base_color, Vec3::splat(0.5));
     assert_eq!(glaring.parameters, [0.5, 0.5, 0.5, 3.0]);
@@ -156,4 +156,56 @@ fn names_in_latin_1_do_not_stop_a_model() {
     bytes.extend(b"o T\xfcr\nf 1 2 3\n");
     let scene = load_files("a.obj", &[("a.obj", &bytes)]).unwrap();
     assert_eq!(scene.triangles.len(), 1);
+}
+
+#[test]
+fn normals_are_kept_where_they_bend_the_surface() {
+    let bent =
+        format!("{SQUARE}vn 0 0 1\nvn 1 0 1\nvn 0 0 0\nf 1//1 2//2 3//3\nf 1//1 3//1 4//1\n");
+    let scene = load_obj(&bent).unwrap();
+    let [first, second] = &scene.normals[..] else {
+        panic!("{:?}", scene.normals);
+    };
+    let slanted = decode_normal(first[1]).unwrap();
+    assert!(slanted.distance(DVec3::new(0.5, 0.0, 0.5).normalize()) < 1e-4);
+    assert_eq!((first[2], *second), (GEOMETRIC, [GEOMETRIC; 3]));
+    // Flat ones, on whatever side, tell nothing.
+    let flat = format!("{SQUARE}vn 0 0 1\nvn 0 0 -3\nf 1//1 2//2 3//1 4//2\n");
+    let without = load_obj(&format!("{SQUARE}f 1 2 3 4\n")).unwrap();
+    let flat = load_obj(&flat).unwrap();
+    assert!(flat.normals.is_empty());
+    assert_eq!(flat.hash, without.hash);
+    assert_ne!(scene.hash, without.hash);
+}
+
+#[test]
+fn statements_place_textures_and_what_has_none_says_so() {
+    let mtl = b"newmtl a\nKd 1 1 1\nmap_Kd -clamp on -s 2 2 -o 0.5 0 tex.png\nnorm -bm 0.5 tex.png\n\
+        map_Ks tex.png\nmap_bump tex.png\nnewmtl lamp\nKe 1 1 1\nmap_Ke gone.png\nmap_bump tex.png\n";
+    let obj = format!("mtllib m.mtl\n{SQUARE}usemtl a\nf 1 2 3\nusemtl lamp\nf 1 2 3\n");
+    let image = png();
+    let files: [(&str, &[u8]); 3] = [
+        ("a.obj", obj.as_bytes()),
+        ("m.mtl", mtl),
+        ("tex.png", &image),
+    ];
+    let scene = load_files("a.obj", &files).unwrap();
+    let [a, lamp] = &scene.materials[..] else {
+        panic!("{:?}", scene.materials);
+    };
+    let color = a.base_color_texture.unwrap();
+    assert_eq!(color.wrap, [Wrap::Clamp; 2]);
+    assert_eq!(color.linear * Vec2::ONE + color.offset, Vec2::new(2.5, 1.0));
+    assert_eq!(a.normal_texture.unwrap().scale, 0.5);
+    assert_eq!(scene.textures.len(), 1);
+    assert_eq!(lamp.emission, Vec3::ONE);
+    assert_eq!(lamp.emission_texture, None, "the constant");
+    let all = scene.report.warnings.join("\n");
+    for expected in [
+        "2 materials are shaped by a bump map",
+        "1 material is shaped by map_Ks, which is not rendered yet; drawn as if it were not: a",
+        "gone.png",
+    ] {
+        assert!(all.contains(expected), "{all} lacks {expected}");
+    }
 }

@@ -119,6 +119,7 @@ pub fn plain_scene(name: String, triangles: Vec<Triangle>) -> SceneData {
         material_ids: vec![0; triangles.len()],
         triangles,
         uvs: Vec::new(),
+        normals: Vec::new(),
         materials: vec![Material::diffuse("grey", Vec3::splat(0.5))],
         textures: Vec::new(),
         assembly: None,

@@ -46,6 +46,9 @@ fn numbers_are_uniform_over_pixels_where_a_scheme_promises_it() {
         ("rank1-lattice", "cranley-patterson"),
         ("halton", "index-offset"),
         ("sobol", "blue-noise"),
+        ("jittered", "none"),
+        ("sobol", "linear-scramble"),
+        ("halton", "cranley-patterson-micro-jitter"),
     ] {
         samplers.push(sampler(sequence, decorrelation, &demand));
     }

@@ -7,6 +7,7 @@ mod nets;
 mod pinned;
 mod projections;
 mod refusals;
+mod stratified;
 mod streams;
 #[path = "../support/mod.rs"]
 mod support;

@@ -32,6 +32,8 @@ fn prefixes_of_sobol_and_of_what_keeps_its_digits_are_nets_in_every_pixel() {
     for (sequence, decorrelation) in [
         ("sobol", "digital-shift"),
         ("sobol", "owen-hash"),
+        ("sobol", "linear-scramble"),
+        ("pmj02", "linear-scramble"),
         ("owen-sobol", "none"),
         ("pmj02", "none"),
         ("pmj02", "digital-shift"),

@@ -212,6 +212,7 @@ fn every_dimension_of_every_digital_sequence_is_even_and_pairs_of_pmj02_are_nets
         ("sobol", "none"),
         ("sobol", "owen-hash"),
         ("sobol", "digital-shift"),
+        ("sobol", "linear-scramble"),
         ("owen-sobol", "none"),
         ("pmj02", "none"),
         ("pmj02", "digital-shift"),

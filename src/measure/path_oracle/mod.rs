@@ -135,7 +135,7 @@ impl<'a> PathOracle<'a> {
     /// Whether colours come from textures.
     pub fn is_textured(&self) -> bool {
         let mut materials = self.scene.materials.iter();
-        materials.any(|m| m.base_color_texture.is_some())
+        materials.any(|m| m.texture_uses().iter().any(Option::is_some))
     }
 
     /// The path of one sample, computed in f64 throughout, or with the roundings of f32 played.

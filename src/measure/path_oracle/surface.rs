@@ -3,13 +3,16 @@
 use super::PathOracle;
 use super::hits::{Hit, Segment};
 use super::rounding::Rounding;
-use crate::scene::Material;
+use crate::scene::{Material, decode_normal};
 use glam::DVec3;
 
 /// Roundings of a point between the numbers of the file and a ray that leaves it. A kernel's bound is eight of the point and
 /// two times as many of the triangle's extent, and the ray starts by that off the surface: see
 /// [`crate::integrator::offset::position_error`].
 const OFFSET: f64 = 8.0;
+
+/// Square of the length below which normals of corners cancel each other.
+const LEAST_SQUARE: f64 = 1e-12;
 
 /// A point that was hit.
 pub(super) struct Surface<'a> {
@@ -26,6 +29,8 @@ pub(super) struct Surface<'a> {
     pub material: &'a Material,
     /// Base colour, with the texture.
     pub base: DVec3,
+    /// What metalness and roughness are multiplied by.
+    pub varied: [f64; 2],
     pub emission: DVec3,
     /// How far rays start off the surface by one rounding.
     offset: f64,
@@ -72,26 +77,53 @@ impl PathOracle<'_> {
         let material = &self.scene.materials[id as usize];
         let weights = hit.weights.map(|w| rounding.share(w));
         let uv = self.textures.coordinates(hit.triangle, weights);
-        let mut base = material.base_color.as_dvec3();
-        if let Some(texture) = material.base_color_texture {
-            base *= self.textures.colour(texture, uv);
+        let [colours, varied, bent, shining] = material.texture_uses();
+        let base = material.base_color.as_dvec3() * self.textures.colour(colours, uv);
+        let varied = self.textures.numbers(varied, uv);
+        let emission = material.emission.as_dvec3() * self.textures.colour(shining, uv);
+        let geometric = side * outward;
+        let mut normal = self.vertex_normal(hit.triangle, weights, outward);
+        let turn = if normal.dot(geometric) < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
+        if let Some(used) = bent.filter(|_| self.textures.are_mapped()) {
+            normal = self.textures.bent(used, hit.triangle, uv, normal);
         }
-        let normal = side * outward;
-        let reach = normal.abs().dot(terms) + 2.0 * (e1.abs() + e2.abs()).max_element();
+        normal *= turn;
+        if normal.dot(out) <= 0.0 {
+            normal = geometric;
+        }
+        let reach = geometric.abs().dot(terms) + 2.0 * (e1.abs() + e2.abs()).max_element();
         Surface {
             triangle: hit.triangle,
             position,
             out,
-            geometric: normal,
+            geometric,
             normal,
             side,
             material,
             base,
+            varied: [varied.z, varied.y],
             emission: match material.emits_both_sides || side > 0.0 {
-                true => material.emission.as_dvec3(),
+                true => emission,
                 false => DVec3::ZERO,
             },
             offset: OFFSET * reach,
+        }
+    }
+
+    /// Between the normals of the corners; that of the triangle, `outward`, where they have none.
+    fn vertex_normal(&self, triangle: u32, [u, v]: [f64; 2], outward: DVec3) -> DVec3 {
+        let Some(words) = self.scene.normals.get(triangle as usize) else {
+            return outward;
+        };
+        let [a, b, c] = words.map(|word| decode_normal(word).unwrap_or(outward));
+        let sum = a * (1.0 - u - v) + b * u + c * v;
+        match sum.length_squared() > LEAST_SQUARE {
+            true => sum.normalize(),
+            false => outward,
         }
     }
 }

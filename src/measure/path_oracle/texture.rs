@@ -1,7 +1,7 @@
 //! Textures: bilinear between texel centres, decoded before they are interpolated.
 
-use crate::scene::{SceneData, Texture};
-use glam::{DVec2, DVec3};
+use crate::scene::{SceneData, TextureUse, Wrap};
+use glam::{DMat2, DVec2, DVec3};
 
 /// The textures of a scene.
 pub(super) struct Textures<'a> {
@@ -27,6 +27,11 @@ impl<'a> Textures<'a> {
         }
     }
 
+    /// Whether triangles have texture coordinates; without them materials show their constants.
+    pub fn are_mapped(&self) -> bool {
+        self.mapped
+    }
+
     /// Texture coordinates of a point of a triangle.
     pub fn coordinates(&self, triangle: u32, [u, v]: [f64; 2]) -> DVec2 {
         if !self.mapped {
@@ -36,23 +41,65 @@ impl<'a> Textures<'a> {
         a * (1.0 - u - v) + b * u + c * v
     }
 
-    /// The colour of a texture there, linear.
-    pub fn colour(&self, texture: u32, at: DVec2) -> DVec3 {
-        self.bilinear(&self.scene.textures[texture as usize], at)
+    /// A linear colour there; white where there is no texture.
+    pub fn colour(&self, used: Option<TextureUse>, at: DVec2) -> DVec3 {
+        let used = used.filter(|_| self.mapped);
+        used.map_or(DVec3::ONE, |used| self.bilinear(&used, at, linear))
     }
 
-    fn bilinear(&self, texture: &Texture, at: DVec2) -> DVec3 {
+    /// Numbers as they are; 1 where there is no texture.
+    pub fn numbers(&self, used: Option<TextureUse>, at: DVec2) -> DVec3 {
+        let part = |byte| f64::from(byte) / 255.0;
+        let used = used.filter(|_| self.mapped);
+        used.map_or(DVec3::ONE, |used| self.bilinear(&used, at, part))
+    }
+
+    fn bilinear(&self, used: &TextureUse, at: DVec2, decode: fn(u8) -> f64) -> DVec3 {
+        let texture = &self.scene.textures[used.texture as usize];
         let size = DVec2::new(texture.width.into(), texture.height.into());
-        let place = at * size - 0.5;
+        let place = (used.linear.as_dmat2() * at + used.offset.as_dvec2()) * size - 0.5;
         let (cell, part) = (place.floor(), place - place.floor());
         let texel = |dx: f64, dy: f64| {
-            let column = (cell.x + dx).rem_euclid(size.x) as usize;
-            let row = (cell.y + dy).rem_euclid(size.y) as usize;
+            let column = wrapped(cell.x + dx, size.x, used.wrap[0]);
+            let row = wrapped(cell.y + dy, size.y, used.wrap[1]);
             let [r, g, b, _] = texture.texels[row * texture.width as usize + column];
-            DVec3::new(linear(r), linear(g), linear(b))
+            DVec3::new(decode(r), decode(g), decode(b))
         };
         let upper = texel(0.0, 0.0).lerp(texel(1.0, 0.0), part.x);
         let lower = texel(0.0, 1.0).lerp(texel(1.0, 1.0), part.x);
         upper.lerp(lower, part.y)
     }
+
+    /// Bends a normal by a map, in the frame of ∂p/∂u and ∂p/∂v.
+    pub fn bent(&self, used: TextureUse, triangle: u32, at: DVec2, normal: DVec3) -> DVec3 {
+        let [a, b, c] = self.scene.triangles[triangle as usize]
+            .vertices
+            .map(|v| v.as_dvec3());
+        let [ta, tb, tc] = self.scene.uvs[triangle as usize].map(|uv| uv.as_dvec2());
+        let of_texture = DMat2::from_cols(tb - ta, tc - ta);
+        if of_texture.determinant() == 0.0 {
+            return normal;
+        }
+        let inverse = of_texture.inverse();
+        let along = |x: DVec2| (b - a) * x.x + (c - a) * x.y;
+        let (du, dv) = (along(inverse.x_axis), along(inverse.y_axis));
+        let tangent = (du - normal * du.dot(normal)).normalize();
+        let across = normal.cross(tangent);
+        let up = across * -across.dot(dv).signum();
+        let map = 2.0 * self.numbers(Some(used), at) - 1.0;
+        let scale = f64::from(used.scale);
+        (scale * map.x * tangent + scale * map.y * up + map.z * normal).normalize()
+    }
+}
+
+fn wrapped(at: f64, size: f64, wrap: Wrap) -> usize {
+    let inside = match wrap {
+        Wrap::Repeat => at.rem_euclid(size),
+        Wrap::Clamp => at.clamp(0.0, size - 1.0),
+        Wrap::Mirrored => {
+            let there = at.rem_euclid(2.0 * size);
+            there.min(2.0 * size - 1.0 - there)
+        }
+    };
+    inside as usize
 }

@@ -14,12 +14,16 @@ pub struct ReferenceRecord {
     /// The value of every pixel, if it is known: then this is the reference.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact: Option<f64>,
-    /// Sampler, as `sequence × decorrelation`; `exact` if there was none.
+    /// The file it was read from, if it was not rendered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Sampler, as `sequence × decorrelation`; `exact` or `file` if there was none.
     pub sampler: String,
     /// Seconds it took.
     pub seconds: f64,
-    /// Estimated mean squared error of the reference itself, from its two halves.
-    pub mse: f64,
+    /// Estimated mean squared error of the reference itself, from its two halves; absent where it is one
+    /// image of which no more is known.
+    pub mse: Option<f64>,
     /// Tone-mapped PNG relative to the run's folder; empty if it could not be written.
     pub image: String,
     /// Mean radiance over pixels and channels.
@@ -37,6 +41,9 @@ pub struct ErrorAtSpp {
     /// first half first: the reference's share in the metric's uncertainty.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub without_part: BTreeMap<String, Vec<f64>>,
+    /// Whether the points come from a net in base 2 of which so many samples are no whole one.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub partial_net: bool,
 }
 
 /// Error of one replicate.
@@ -126,6 +133,9 @@ pub struct SpectrumRecord {
     pub filtered: Vec<FilteredError>,
 }
 
+/// Quantiles of the spectra of single images: the middle, and outliers.
+pub const OUTLIER_QUANTILES: [f64; 4] = [0.5, 0.75, 0.95, 1.0];
+
 /// A point of a radial spectrum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PowerAt {
@@ -133,6 +143,10 @@ pub struct PowerAt {
     pub frequency: f64,
     /// Mean power around that frequency, white noise being 1.
     pub power: Interval,
+    /// Quantiles over replicates, [`OUTLIER_QUANTILES`], of the power in units of the mean variance of all
+    /// replicates: what a single image may have.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quantiles: Option<[f64; 4]>,
 }
 
 /// Error after a Gaussian filter.

@@ -253,11 +253,12 @@ fn reference_noise(data: &RunData) -> Check {
             None => "no reference".into(),
             Some(reference) => {
                 tested = true;
-                match reference.exact {
-                    Some(_) => "exact".into(),
-                    None => format!(
+                match (reference.exact, &reference.file, reference.mse) {
+                    (Some(_), ..) => "exact".into(),
+                    (None, Some(file), _) => format!("{file}, of unknown noise"),
+                    (None, None, mse) => format!(
                         "MSE {} at {} spp",
-                        format::number(reference.mse),
+                        format::optional(mse),
                         count(u64::from(reference.spp))
                     ),
                 }

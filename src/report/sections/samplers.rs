@@ -9,7 +9,7 @@ use crate::report::data::{RunData, SAMPLER_ROW, SceneGroup, View, is_valid_time}
 use crate::report::document::*;
 use crate::report::pivot::{FIGURES_ALONE, Rows};
 use crate::report::plot::pareto::letter;
-use crate::report::samplers::{MeasuredSampler, Metric, UNRESOLVED};
+use crate::report::samplers::{FURTHER_METRICS, MeasuredSampler, Metric, UNRESOLVED};
 use crate::report::values::{Value, number, of_view};
 use crate::report::{format, pictures};
 use std::path::Path;
@@ -28,6 +28,7 @@ pub fn blocks(
     for metric in [Metric::RelMse, Metric::Rmse] {
         blocks.extend(error_table(view, &values, metric).into_block());
     }
+    blocks.extend(further_table(view, &values).into_block());
     blocks.extend(spectrum::blocks(data, stem, view, &values));
     blocks.extend(efficiency_table(view, &values).into_block());
     blocks.extend(Block::figures([pareto_figure(data, stem, view)]));
@@ -68,8 +69,11 @@ pub fn error_table(view: &View, values: &[Value], metric: Metric) -> Table {
     let Some(id) = id.filter(|_| !values.is_empty()) else {
         return Table::default();
     };
+    let errors = view.samplers.iter().flat_map(|s| &s.replicates);
+    let errors = errors.flat_map(|replicate| &replicate.errors);
+    let partial: Vec<u32> = errors.filter(|e| e.partial_net).map(|e| e.spp).collect();
     let caption = format!(
-        "{} with {}: mean [95 % interval] at each spp; metric {}{id}{}",
+        "{} with {}: mean [95 % interval] at each spp; metric {}{id}{}{}",
         metric.name(),
         view.name,
         match metric {
@@ -79,6 +83,10 @@ pub fn error_table(view: &View, values: &[Value], metric: Metric) -> Table {
         match values.iter().any(Value::is_unresolved) {
             true => format!("; <: {UNRESOLVED}"),
             false => String::new(),
+        },
+        match partial.is_empty() {
+            true => "",
+            false => "; †: no whole net of samplers in base 2",
         }
     );
     let measured = view.samplers.iter().filter(|s| !s.replicates.is_empty());
@@ -94,9 +102,25 @@ pub fn error_table(view: &View, values: &[Value], metric: Metric) -> Table {
         &shown,
         &|key| match key.label(axis::SPP) {
             "" => "slope".into(),
+            spp if partial.iter().any(|p| p.to_string() == spp) => format!("{spp} spp †"),
             spp => format!("{spp} spp"),
         },
     )
+}
+
+/// What other metrics say at the highest spp.
+fn further_table(view: &View, values: &[Value]) -> Table {
+    let measured = view.samplers.iter().filter(|s| !s.replicates.is_empty());
+    let Some(spp) = measured.clone().find_map(MeasuredSampler::highest_spp) else {
+        return Table::default();
+    };
+    let caption = format!(
+        "Other metrics with {} at {spp} spp: mean [95 % interval] over replicates, the noise of the reference \
+         included; PSNR, SSIM and FLIP of tone-mapped pictures; `raystone list metrics` has the formulas",
+        view.name
+    );
+    let figures = FURTHER_METRICS.map(|(figure, _)| figure);
+    rows(measured, &SAMPLER, |_| Vec::new()).table(values, caption, &figures, FIGURES_ALONE)
 }
 
 /// Verdict on the bias of every sampler.
@@ -193,9 +217,10 @@ fn galleries(dir: &Path, view: &View) -> [Option<Block>; 2] {
     let mut renders = Vec::new();
     let mut errors = Vec::new();
     if let Some(reference) = view.reference.filter(|r| !r.image.is_empty()) {
-        let caption = match reference.exact {
-            Some(value) => format!("reference: the exact value, {value}"),
-            None => format!(
+        let caption = match (reference.exact, &reference.file) {
+            (Some(value), _) => format!("reference: the exact value, {value}"),
+            (None, Some(file)) => format!("reference: {file}"),
+            (None, None) => format!(
                 "reference: {} spp of {}, {} s",
                 format::count(u64::from(reference.spp)),
                 reference.sampler,

@@ -84,8 +84,8 @@ fn every_check_passes_on_a_clean_run_and_fails_on_its_planted_fault() {
     );
     fails("finite", plant!(Error, e => e.non_finite_pixels = 1));
     let noise = "Reference noise";
-    fails(noise, plant!(Reference, f => f.mse = 1.0));
-    fails(noise, plant!(Reference, f => f.mse = 0.0));
+    fails(noise, plant!(Reference, f => f.mse = Some(1.0)));
+    fails(noise, plant!(Reference, f => f.mse = Some(0.0)));
     fails(
         noise,
         plant!(Error, e => figures(e).for_each(|value| *value = -1e-9)),

@@ -76,7 +76,9 @@ impl Export<'_> {
     fn color(&self, scene: &SceneData, id: usize) -> Result<Color, ExportError> {
         let material = &scene.materials[id];
         let factor = material.base_color;
-        let texture = material.base_color_texture.map(|index| index as usize);
+        let texture = material
+            .base_color_texture
+            .map(|used| used.texture as usize);
         let Some(texture) = texture.and_then(|index| scene.textures.get(index)) else {
             return Ok(Color::Constant(factor));
         };

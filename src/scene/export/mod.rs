@@ -189,7 +189,7 @@ impl Export<'_> {
 
     fn write_radiance(&self, name: &str, image: &Image) -> Result<(), ExportError> {
         let path = self.folder.join(name);
-        Ok(FileFormat::of(&path)?.write(&path, image)?)
+        Ok(FileFormat::of(&path)?.write(&path, image, &[])?)
     }
 
     fn write_picture(&self, name: &str, picture: &Picture) -> Result<(), ExportError> {

@@ -110,6 +110,7 @@ mod tests {
             format,
             base_color: Vec3::splat(0.25),
             is_varied: false,
+            is_followed: false,
             source: &source,
         };
         recognise(&description).map(|look| (look.base_color, look.parameters))

@@ -16,6 +16,7 @@ pub use mirror::MIRROR;
 pub use phong::PHONG;
 pub use principled::{PRINCIPLED, reflectance_of_ior};
 
+use super::TextureUse;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -70,8 +71,14 @@ pub struct Material {
     pub parameters: Vec<f32>,
     /// Linear RGB reflectance or tint, each in [0, 1]; multiplied by the texture if there is one.
     pub base_color: Vec3,
-    /// Index into [`super::SceneData::textures`] of the base-colour texture.
-    pub base_color_texture: Option<u32>,
+    /// What the base colour is multiplied by.
+    pub base_color_texture: Option<TextureUse>,
+    /// What the roughness (green) and the metalness (blue) of a principled material are multiplied by.
+    pub metallic_roughness_texture: Option<TextureUse>,
+    /// Directions of the normal in the frame of the texture.
+    pub normal_texture: Option<TextureUse>,
+    /// What the emission is multiplied by.
+    pub emission_texture: Option<TextureUse>,
     /// Emitted radiance, linear RGB.
     pub emission: Vec3,
     /// Whether both sides of the triangle emit, or only that from which its corners turn counter-clockwise (glTF without
@@ -89,6 +96,9 @@ impl Material {
             parameters: look.parameters,
             base_color: reflectance(look.base_color),
             base_color_texture: None,
+            metallic_roughness_texture: None,
+            normal_texture: None,
+            emission_texture: None,
             emission: Vec3::ZERO,
             emits_both_sides: true,
             source: MaterialSource::default(),
@@ -118,6 +128,27 @@ impl Material {
             source: description.source.clone(),
             ..Self::looking(name, kind, look)
         }
+    }
+
+    /// The uses of textures: of the base colour, of metalness and roughness, of the normal, of the emission. Kernels have them in
+    /// this order.
+    pub fn texture_uses(&self) -> [Option<TextureUse>; 4] {
+        [
+            self.base_color_texture,
+            self.metallic_roughness_texture,
+            self.normal_texture,
+            self.emission_texture,
+        ]
+    }
+
+    /// The same, to be changed.
+    pub(super) fn texture_uses_mut(&mut self) -> [&mut Option<TextureUse>; 4] {
+        [
+            &mut self.base_color_texture,
+            &mut self.metallic_roughness_texture,
+            &mut self.normal_texture,
+            &mut self.emission_texture,
+        ]
     }
 
     /// The same material, emitting `radiance` (linear RGB) from both sides.
@@ -182,6 +213,8 @@ pub(super) struct Description<'a> {
     pub base_color: Vec3,
     /// Whether a texture scales metalness, roughness or transmission: the numbers alone say nothing then.
     pub is_varied: bool,
+    /// Whether the texture of metalness and roughness will be there.
+    pub is_followed: bool,
     pub source: &'a MaterialSource,
 }
 

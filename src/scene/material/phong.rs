@@ -65,6 +65,7 @@ mod tests {
                 format: Format::Mtl,
                 base_color: Vec3::splat(0.5),
                 is_varied: false,
+                is_followed: false,
                 source: &source,
             };
             recognise(&description).map(|look| (look.base_color, look.parameters, look.reflected))

@@ -38,7 +38,7 @@ fn recognise(description: &Description<'_>) -> Option<Look> {
     let roughness = source.roughness.unwrap_or(1.0);
     let f0 = reflectance_of_ior(source.ior.unwrap_or(DEFAULT_IOR));
     match (description.format, source.metallic, source.specular) {
-        (_, Some(metallic), _) if !description.is_varied => {
+        (_, Some(metallic), _) if !description.is_varied || description.is_followed => {
             Some(look(description.base_color, metallic, roughness, f0))
         }
         (Format::Gltf, None, Some(specular)) => {
@@ -103,6 +103,7 @@ mod tests {
             format,
             base_color: Vec3::splat(0.5),
             is_varied: false,
+            is_followed: false,
             source: &source,
         };
         recognise(&description).map(|look| (look.base_color, look.parameters))

@@ -83,6 +83,79 @@ pub const MUTANTS: &[Mutant] = &[
         Check::Stream,
     ),
     row(
+        "strata-in-one-order",
+        "all pairs of dimensions visit their strata in the same order",
+        text(
+            "sampling/jittered",
+            "(s.dimension >> 1u) + (pixel_number(s) ^ PAIR_KEY)",
+            "pixel_number(s) ^ PAIR_KEY",
+        ),
+        sampler("jittered", &[], "none"),
+        Check::Stream,
+    ),
+    row(
+        "rows-for-columns",
+        "both coordinates of a stratum are its column",
+        text(
+            "sampling/jittered",
+            "i = stratum / columns;",
+            "i = stratum % columns;",
+        ),
+        sampler("jittered", &[], "none"),
+        Check::Stream,
+    ),
+    row(
+        "stratum-half-filled",
+        "points lie in the lower half of their stratum",
+        text(
+            "sampling/jittered",
+            "mul_high(random, width)",
+            "mul_high(random >> 1u, width)",
+        ),
+        sampler("jittered", &[], "none"),
+        Check::Stream,
+    ),
+    row(
+        "matrix-of-another-column",
+        "the diagonal of the random matrix is one column late",
+        text(
+            "sampling/linear_scramble",
+            ">> 1u)) >> column",
+            ">> 1u)) >> (column + 1u)",
+        ),
+        sampler("sobol", &[], "linear-scramble"),
+        Check::Stream,
+    ),
+    row(
+        "matrix-without-shift",
+        "digits are scrambled and not shifted",
+        text("sampling/linear_scramble", "var y = key;", "var y = 0u;"),
+        sampler("sobol", &[], "linear-scramble"),
+        Check::Stream,
+    ),
+    row(
+        "jitter-without-shift",
+        "of two decorrelations only the small one is left",
+        text(
+            "sampling/cranley_patterson_micro_jitter",
+            "x + dimension_number(s) + mul_high",
+            "x + mul_high",
+        ),
+        sampler("halton", &[], "cranley-patterson-micro-jitter"),
+        Check::Stream,
+    ),
+    row(
+        "jitter-shared-by-samples",
+        "the jitter of each sample is that of the pixel",
+        text(
+            "sampling/hash",
+            "pcg_hash(s.sample + dimension_number(s))",
+            "pcg_hash(dimension_number(s))",
+        ),
+        sampler("halton", &[], "cranley-patterson-micro-jitter"),
+        Check::Stream,
+    ),
+    row(
         "index-offset-of-the-dimension",
         "the point is not the same one in all dimensions",
         text(

@@ -22,6 +22,7 @@ pub(super) struct Principled<'a> {
 impl<'a> Principled<'a> {
     pub fn new(surface: &'a Surface<'a>) -> Self {
         let [metallic, roughness, f0] = [0, 1, 2].map(|place| parameter(surface, place));
+        let [metallic, roughness] = [metallic * surface.varied[0], roughness * surface.varied[1]];
         let n_o = surface.normal.dot(surface.out).max(LEAST_COSINE);
         let mut made = Self {
             surface,

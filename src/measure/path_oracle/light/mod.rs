@@ -49,7 +49,8 @@ impl PathOracle<'_> {
         rounding: &mut Rounding,
     ) -> Option<LightSample> {
         let lights = &self.lights.triangles;
-        lights.sample(self.scene, surface, choice, point, rounding)
+        let tables = (self.scene, &self.textures);
+        lights.sample(tables, surface, choice, point, rounding)
     }
 
     /// With what density [`PathOracle::light_sample`] finds the point of an emitter.

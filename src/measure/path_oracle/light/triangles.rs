@@ -4,6 +4,7 @@ use super::LightSample;
 use crate::measure::path_oracle::luminance;
 use crate::measure::path_oracle::rounding::Rounding;
 use crate::measure::path_oracle::surface::Surface;
+use crate::measure::path_oracle::texture::Textures;
 use crate::scene::SceneData;
 use glam::DVec3;
 
@@ -37,7 +38,7 @@ impl EmissiveTriangles {
 
     pub fn sample(
         &self,
-        scene: &SceneData,
+        (scene, textures): (&SceneData, &Textures),
         surface: &Surface,
         choice: f64,
         [u, v]: [f64; 2],
@@ -62,10 +63,11 @@ impl EmissiveTriangles {
             return None;
         }
         let density = self.over_solid_angle(radiance, distance, away);
+        let at = textures.coordinates(id, [root * (1.0 - v), root * v]);
         Some(LightSample {
             direction,
             distance,
-            radiance,
+            radiance: radiance * textures.colour(material.emission_texture, at),
             density,
             triangle: id,
         })
@@ -78,6 +80,6 @@ impl EmissiveTriangles {
 
     pub fn density(&self, emitter: &Surface, distance: f64) -> f64 {
         let cos = emitter.geometric.dot(emitter.out);
-        self.over_solid_angle(emitter.emission, distance, cos)
+        self.over_solid_angle(emitter.material.emission.as_dvec3(), distance, cos)
     }
 }

@@ -1,0 +1,348 @@
+//! Reading linear images: references by other renderers, and environment maps.
+
+use super::{FileFormat, Image, ImageError};
+use ::image::ImageDecoder;
+use ::image::codecs::hdr::HdrDecoder;
+use half::f16;
+use std::fs;
+use std::io::Cursor;
+use std::path::Path;
+
+/// Pixels of the largest image that is read: 1.5 GiB as three floats.
+pub(super) const MOST_PIXELS: u64 = 1 << 27;
+
+/// How the bytes of a file are read; the error says what is wrong with them.
+pub(super) type Decode = fn(&[u8]) -> Result<Image, String>;
+
+/// Reads linear RGB from a file; its ending chooses the format, upper and lower case being the same.
+///
+/// * **EXR**: half, float or integer channels. What is taken is R, G and B without a layer's name; else those
+///   of a layer called `rgba`, `rgb`, `color`, `combined` or `beauty`; else those of the only layer that has
+///   some. Y alone is grey. Alpha is left out: EXR's colours are multiplied by it already. Pixels of the display
+///   window outside of the data window are 0.
+/// * **HDR**: Radiance RGBE, over `EXPOSURE` and `COLORCORR` where the header has them.
+/// * **PFM**: `PF` and grey `Pf`, of both byte orders; the scale's size is not applied.
+/// * **NPY**: `[height, width, 3]`, `[height, width, 4]` (the fourth left out), `[height, width, 1]` or
+///   `[height, width]` (grey), of 16-, 32- or 64-bit floats in C order.
+///
+/// Values are what the file says, NaN and infinity too.
+///
+/// # Errors
+/// [`ImageError::UnknownFormat`], [`ImageError::Read`], [`ImageError::Decode`] with what is wrong.
+pub fn read_linear(path: &Path) -> Result<Image, ImageError> {
+    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+    let format = FileFormat::linear().find(|format| ending == format.ending);
+    let decode = format.and_then(|format| format.decode);
+    let decode = decode.ok_or_else(|| {
+        let known: Vec<String> = FileFormat::linear()
+            .map(|format| format!(".{}", format.ending))
+            .collect();
+        ImageError::UnknownFormat {
+            path: path.to_owned(),
+            known: known.join(", "),
+        }
+    })?;
+    let unreadable = |source| ImageError::Read {
+        path: path.to_owned(),
+        source,
+    };
+    // A pipe would never end.
+    if !fs::metadata(path).map_err(unreadable)?.is_file() {
+        return Err(unreadable(std::io::Error::other("it is no regular file")));
+    }
+    let bytes = fs::read(path).map_err(unreadable)?;
+    decode(&bytes).map_err(|reason| ImageError::Decode {
+        path: path.to_owned(),
+        reason,
+    })
+}
+
+/// The size of an image, if it is one that is read.
+pub(super) fn checked_size(width: u64, height: u64) -> Result<[u32; 2], String> {
+    let pixels = width.checked_mul(height);
+    match (u32::try_from(width), u32::try_from(height)) {
+        (Ok(w), Ok(h)) if pixels.is_some_and(|n| n > 0 && n <= MOST_PIXELS) => Ok([w, h]),
+        _ => Err(format!(
+            "{width} × {height} pixels, which is none or more than {MOST_PIXELS}"
+        )),
+    }
+}
+
+pub(super) fn read_hdr(bytes: &[u8]) -> Result<Image, String> {
+    // Some programs begin with the name of the encoding; the rest is the same.
+    let strict = !bytes.starts_with(b"#?RGBE");
+    let decoder = HdrDecoder::with_strictness(Cursor::new(bytes), strict);
+    let decoder = decoder.map_err(|e| e.to_string())?;
+    let header = decoder.metadata();
+    let [width, height] = checked_size(header.width.into(), header.height.into())?;
+    let mut values = vec![0.0_f32; 3 * width as usize * height as usize];
+    let target = bytemuck::cast_slice_mut(&mut values);
+    decoder.read_image(target).map_err(|e| e.to_string())?;
+    let exposure = header.exposure.unwrap_or(1.0);
+    let (r, g, b) = header.color_correction.unwrap_or((1.0, 1.0, 1.0));
+    let scale = [r, g, b].map(|correction| exposure * correction);
+    if scale.iter().any(|s| !s.is_finite() || *s <= 0.0) {
+        return Err(format!(
+            "the factors of EXPOSURE and COLORCORR are {scale:?}"
+        ));
+    }
+    let pixels = values
+        .chunks_exact(3)
+        .map(|p| [0, 1, 2].map(|c| p[c] / scale[c]));
+    Image::new(width, height, pixels.collect()).map_err(|e| e.to_string())
+}
+
+/// The next word of a header, and what follows its one white space.
+fn word(bytes: &[u8]) -> Option<(&str, &[u8])> {
+    let start = bytes.iter().position(|b| !b.is_ascii_whitespace())?;
+    let length = bytes[start..]
+        .iter()
+        .take(64)
+        .position(u8::is_ascii_whitespace)?;
+    let (word, rest) = bytes[start..].split_at(length);
+    Some((std::str::from_utf8(word).ok()?, &rest[1..]))
+}
+
+pub(super) fn read_pfm(bytes: &[u8]) -> Result<Image, String> {
+    let header = || {
+        let (kind, rest) = word(bytes)?;
+        let (width, rest) = word(rest)?;
+        let (height, rest) = word(rest)?;
+        let (scale, rest) = word(rest)?;
+        let channels = [("PF", 3), ("Pf", 1)];
+        let (_, channels) = channels.into_iter().find(|(name, _)| *name == kind)?;
+        let scale: f32 = scale.parse().ok().filter(|s| *s != 0.0)?;
+        Some((
+            channels,
+            width.parse().ok()?,
+            height.parse().ok()?,
+            scale,
+            rest,
+        ))
+    };
+    let header = header().ok_or("the header is not `PF` or `Pf`, width, height and scale")?;
+    let (channels, width, height, scale, data) = header;
+    let [width, height] = checked_size(width, height)?;
+    let float = match scale < 0.0 {
+        true => f32::from_le_bytes,
+        false => f32::from_be_bytes,
+    };
+    let values = floats(data, [width, height], channels, float)?;
+    // Rows go from the bottom up.
+    let rows = values.rchunks(width as usize);
+    Image::new(width, height, rows.flatten().copied().collect()).map_err(|e| e.to_string())
+}
+
+/// The pixels of an array [height, width, channels], each value made of `N` bytes.
+fn floats<const N: usize>(
+    data: &[u8],
+    [width, height]: [u32; 2],
+    channels: usize,
+    value: impl Fn([u8; N]) -> f32,
+) -> Result<Vec<[f32; 3]>, String> {
+    let expected = width as usize * height as usize * channels * N;
+    if data.len() != expected {
+        return Err(format!(
+            "{} bytes of values where {width} × {height} pixels of {channels} have {expected}",
+            data.len()
+        ));
+    }
+    let (values, _) = data.as_chunks::<N>();
+    let pixel = |of: &[[u8; N]]| match channels {
+        1 => [value(of[0]); 3],
+        _ => [0, 1, 2].map(|c| value(of[c])),
+    };
+    Ok(values.chunks_exact(channels).map(pixel).collect())
+}
+
+/// The text after `'key':` in the literal of an NPY header.
+fn entry<'a>(header: &'a str, key: &str) -> Option<&'a str> {
+    let (_, rest) = header.split_once(&format!("'{key}':"))?;
+    Some(rest.trim_start())
+}
+
+pub(super) fn read_npy(bytes: &[u8]) -> Result<Image, String> {
+    let parts = || {
+        let rest = bytes.strip_prefix(b"\x93NUMPY")?;
+        let (version, rest) = rest.split_at_checked(2)?;
+        // The header's length has two bytes in version 1 and four since.
+        let (length, rest) = rest.split_at_checked(if version[0] == 1 { 2 } else { 4 })?;
+        let length = length
+            .iter()
+            .rev()
+            .fold(0, |n, byte| n << 8 | usize::from(*byte));
+        let (header, data) = rest.split_at_checked(length)?;
+        Some((std::str::from_utf8(header).ok()?, data))
+    };
+    let (header, data) = parts().ok_or("it does not begin with a header of NumPy")?;
+    let kind = entry(header, "descr").and_then(|rest| rest.split('\'').nth(1));
+    let shape = entry(header, "shape").and_then(|rest| rest.strip_prefix('(')?.split(')').next());
+    let (Some(kind), Some(shape)) = (kind, shape) else {
+        return Err("its header has no `descr` or no `shape`".to_owned());
+    };
+    if entry(header, "fortran_order").is_some_and(|rest| rest.starts_with("True")) {
+        return Err("its array is in Fortran order; save numpy.ascontiguousarray of it".to_owned());
+    }
+    let sizes: Option<Vec<u64>> = shape
+        .split(',')
+        .map(str::trim)
+        .filter(|size| !size.is_empty())
+        .map(|size| size.parse().ok())
+        .collect();
+    let (size, channels) = match sizes.as_deref() {
+        Some([height, width]) => (checked_size(*width, *height)?, 1),
+        Some([height, width, channels @ (1 | 3 | 4)]) => {
+            (checked_size(*width, *height)?, *channels as usize)
+        }
+        _ => {
+            return Err(format!(
+                "its shape is ({shape}), not (height, width) or (height, width, 3)"
+            ));
+        }
+    };
+    let pixels = match kind {
+        "<f2" => floats(data, size, channels, |b| f16::from_le_bytes(b).to_f32()),
+        ">f2" => floats(data, size, channels, |b| f16::from_be_bytes(b).to_f32()),
+        "<f4" => floats(data, size, channels, f32::from_le_bytes),
+        ">f4" => floats(data, size, channels, f32::from_be_bytes),
+        "<f8" => floats(data, size, channels, |b| f64::from_le_bytes(b) as f32),
+        ">f8" => floats(data, size, channels, |b| f64::from_be_bytes(b) as f32),
+        _ => Err(format!(
+            "its values are `{kind}`, not floats of 16, 32 or 64 bits"
+        )),
+    }?;
+    Image::new(size[0], size[1], pixels).map_err(|e| e.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(name: &str, bytes: &[u8]) -> Result<Image, ImageError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        read_linear(&path)
+    }
+
+    fn refused(name: &str, bytes: &[u8]) -> String {
+        read(name, bytes).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn what_is_written_reads_back_the_same() {
+        let values = |i: usize| [i as f32 / 3.0, -2.5 * i as f32, 1e5 / (1 + i) as f32];
+        let mut pixels: Vec<[f32; 3]> = (0..15).map(values).collect();
+        pixels[6] = [f32::INFINITY, 1e-40, -0.0];
+        let image = Image::new(5, 3, pixels).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        for ending in ["exr", "PFM", "npy"] {
+            let path = folder.path().join(format!("a.{ending}"));
+            let format = FileFormat::of(&path).unwrap();
+            format.write(&path, &image, &[]).unwrap();
+            assert_eq!(read_linear(&path).unwrap(), image, "{ending}");
+        }
+        let grey = Image::new(2, 2, vec![[0.5; 3], [2.0; 3], [8.0; 3], [0.0; 3]]).unwrap();
+        let path = folder.path().join("a.hdr");
+        let format = FileFormat::of(&path).unwrap();
+        format.write(&path, &grey, &[]).unwrap();
+        assert_eq!(read_linear(&path).unwrap(), grey);
+    }
+
+    #[test]
+    fn exposure_and_correction_of_a_radiance_header_are_divided_out() {
+        let file = |header: &str| {
+            let mut bytes = format!("{header}FORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n").into_bytes();
+            bytes.extend([128, 64, 32, 129]);
+            bytes
+        };
+        let plain = read("a.hdr", &file("#?RADIANCE\n")).unwrap();
+        assert_eq!(plain.pixels, [[1.0, 0.5, 0.25]]);
+        assert_eq!(read("a.hdr", &file("#?RGBE\n")).unwrap(), plain);
+        let header = "#?RADIANCE\nEXPOSURE=2\nEXPOSURE=2\nCOLORCORR=1 2 0.5\n";
+        let scaled = read("a.hdr", &file(header)).unwrap();
+        assert_eq!(scaled.pixels, [[0.25, 0.0625, 0.125]]);
+        let dark = refused("a.hdr", &file("#?RADIANCE\nEXPOSURE=0\n"));
+        assert!(dark.contains("EXPOSURE"), "{dark}");
+    }
+
+    #[test]
+    fn float_maps_of_both_byte_orders_and_grey_ones_are_read_from_the_bottom_up() {
+        let mut big = b"Pf\n2 2\n1.0\n".to_vec();
+        big.extend(
+            [1.0_f32, 2.0, 3.0, 4.0]
+                .iter()
+                .flat_map(|v| v.to_be_bytes()),
+        );
+        let read_big = read("a.pfm", &big).unwrap();
+        assert_eq!(read_big.pixels, [[3.0; 3], [4.0; 3], [1.0; 3], [2.0; 3]]);
+        for (bytes, says) in [
+            (&b"P6\n2 2\n1.0\n"[..], "header"),
+            (&b"PF\n2 2\n0\n"[..], "header"),
+            (&big[..big.len() - 1], "15 bytes"),
+            (&b"PF\n400000 400000\n-1\n"[..], "400000 × 400000"),
+            (&b"PF\n0 5\n-1\n"[..], "0 × 5"),
+        ] {
+            let message = refused("a.pfm", bytes);
+            assert!(
+                message.contains(says) && message.contains("a.pfm"),
+                "{message}"
+            );
+        }
+    }
+
+    fn npy(version: u8, header: &str, data: &[u8]) -> Vec<u8> {
+        let mut bytes = b"\x93NUMPY".to_vec();
+        bytes.extend([version, 0]);
+        match version {
+            1 => bytes.extend((header.len() as u16).to_le_bytes()),
+            _ => bytes.extend((header.len() as u32).to_le_bytes()),
+        }
+        [&bytes, header.as_bytes(), data].concat()
+    }
+
+    #[test]
+    fn arrays_of_every_float_and_shape_are_read_and_others_refused() {
+        let header = |kind: &str, shape: &str| {
+            format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape}), }}\n")
+        };
+        let doubles: Vec<u8> = [1.0_f64, 2.0, 3.0, 9.0]
+            .iter()
+            .flat_map(|v| v.to_be_bytes())
+            .collect();
+        let four = read("a.npy", &npy(2, &header(">f8", "1, 1, 4"), &doubles)).unwrap();
+        assert_eq!(four.pixels, [[1.0, 2.0, 3.0]]);
+        let grey = read("a.npy", &npy(1, &header(">f8", "2, 2"), &doubles)).unwrap();
+        assert_eq!((grey.width, grey.pixels[3]), (2, [9.0; 3]));
+        let half = read("a.npy", &npy(1, &header("<f2", "1, 1, 1"), &[0, 0x3c])).unwrap();
+        assert_eq!(half.pixels, [[1.0; 3]]);
+        for (kind, shape, says) in [
+            ("<i4", "1, 1", "<i4"),
+            ("<f4", "4", "shape"),
+            ("<f4", "1, 1, 2", "shape"),
+            ("<f4", "1, 2, 3", "4 bytes"),
+        ] {
+            let message = refused("a.npy", &npy(1, &header(kind, shape), &[0; 4]));
+            assert!(message.contains(says), "{message}");
+        }
+        let turned = header("<f4", "1, 1").replace("False", "True");
+        assert!(refused("a.npy", &npy(1, &turned, &[0; 4])).contains("Fortran"));
+        assert!(refused("a.npy", b"\x93NUMPY\x01").contains("NumPy"));
+    }
+
+    #[test]
+    fn what_is_no_linear_image_is_refused_with_what_is() {
+        let message = refused("a.png", b"");
+        assert!(message.contains(".exr, .hdr, .pfm, .npy"), "{message}");
+        let missing = read_linear(Path::new("no/such.exr")).unwrap_err();
+        assert!(missing.to_string().contains("no/such.exr"), "{missing}");
+        let folder = tempfile::tempdir().unwrap();
+        let inner = folder.path().join("folder.exr");
+        fs::create_dir(&inner).unwrap();
+        let message = read_linear(&inner).unwrap_err().to_string();
+        assert!(message.contains("regular file"), "{message}");
+        for name in ["a.exr", "a.hdr"] {
+            assert!(refused(name, b"nothing of the kind").contains(name));
+        }
+    }
+}

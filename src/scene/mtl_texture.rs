@@ -1,0 +1,94 @@
+//! Texture statements of material libraries: options, then the file.
+
+use super::{TextureUse, Wrap};
+use glam::{Mat2, Vec2};
+
+/// What a statement such as `-s 2 2 -clamp on wall.png` says.
+pub(super) struct Statement {
+    /// With `/` between folders.
+    pub file: String,
+    /// Of a texture still to be numbered, for coordinates whose v points down.
+    pub place: TextureUse,
+}
+
+/// Reads the options `-s`, `-o`, `-clamp` and `-bm`, and skips the others.
+pub(super) fn statement(text: &str) -> Statement {
+    let mut place = TextureUse::plain(0);
+    let (mut scale, mut offset) = (Vec2::ONE, Vec2::ZERO);
+    let mut rest = text.trim();
+    while rest.starts_with('-') {
+        let (option, after) = first_word(rest);
+        rest = after;
+        // -o, -s, -t take one to three numbers, -mm two, the others one word.
+        let (least, most) = match option {
+            "-o" | "-s" | "-t" => (1, 3),
+            "-mm" => (2, 2),
+            _ => (1, 1),
+        };
+        let mut numbers = Vec::new();
+        for taken in 0..most {
+            let (word, after) = first_word(rest);
+            let number = word.parse::<f32>();
+            if taken >= least && number.is_err() {
+                break;
+            }
+            if taken == 0 && option == "-clamp" && word == "on" {
+                place.wrap = [Wrap::Clamp; 2];
+            }
+            numbers.extend(number.ok().filter(|x| x.is_finite()));
+            rest = after;
+        }
+        let pair = |default: Vec2| {
+            let part = |k: usize| numbers.get(k).copied().unwrap_or(default[k]);
+            Vec2::new(part(0), part(1))
+        };
+        match option {
+            "-s" => scale = pair(scale),
+            "-o" => offset = pair(offset),
+            "-bm" => place.scale = numbers.first().copied().unwrap_or(1.0),
+            _ => {}
+        }
+    }
+    // v' = s v + o upwards is v' = s v + 1 - s - o downwards.
+    place.linear = Mat2::from_diagonal(scale);
+    place.offset = Vec2::new(offset.x, 1.0 - scale.y - offset.y);
+    Statement {
+        file: rest.replace('\\', "/"),
+        place,
+    }
+}
+
+fn first_word(text: &str) -> (&str, &str) {
+    let (word, after) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+    (word, after.trim_start())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_are_read_or_skipped() {
+        for (text, file) in [
+            ("a b.png", "a b.png"),
+            ("-s 1 1 1 -o 0 0 a.png", "a.png"),
+            ("-clamp off -mm 0 1 dir\\a.png", "dir/a.png"),
+            ("-s", ""),
+        ] {
+            let found = statement(text);
+            assert_eq!(found.file, file, "{text}");
+            assert!(found.place.is_plain(), "{text}: {:?}", found.place);
+        }
+        let found = statement("-s 2 4 -o 0.5 0.25 -clamp on -bm 0.5 a.png");
+        assert_eq!(found.file, "a.png");
+        let place = found.place;
+        assert_eq!((place.wrap, place.scale), ([Wrap::Clamp; 2], 0.5));
+        // The upper left corner of the surface, v = 0 downwards, is v = 1 upwards.
+        let corner = place.linear * Vec2::ZERO + place.offset;
+        assert_eq!(corner, Vec2::new(0.5, 1.0 - (4.0 + 0.25)));
+        assert_eq!(
+            statement("-s 2 a.png").place.linear,
+            Mat2::from_diagonal(Vec2::new(2.0, 1.0))
+        );
+    }
+}
