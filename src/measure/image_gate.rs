@@ -41,6 +41,8 @@ pub const MEDIAN: [f64; 2] = [2e-5, 1e-3];
 const TRIALS: u64 = 24;
 /// By this factor a kernel may differ more than the worst of the played paths of its branch.
 const SPREAD: f64 = 3.0;
+/// A difference that the second of [`SCALES`] may excuse, too: several offsets add up on long paths in corners.
+const SLIGHT: f64 = 1e-3;
 /// After so many wrong paths no more are looked at.
 const ENOUGH: usize = 16;
 
@@ -177,7 +179,8 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
                 false => others.push(played.radiance),
             }
             // Many roundings would excuse anything of a path that keeps its branch.
-            if off <= SPREAD * spread && scale == SCALES[0] {
+            let is_excused = scale == SCALES[0] || off <= SLIGHT && scale == SCALES[1];
+            if off <= SPREAD * spread && is_excused {
                 return Class::IllConditioned;
             }
         }
