@@ -101,11 +101,20 @@ impl Reference {
     /// Estimated mean squared error of the reference itself, mean (A − B)² / 4 over pixels and
     /// channels; absent without halves.
     pub fn own_mse(&self) -> Option<f64> {
+        self.own_error(|_| 1.0)
+    }
+
+    /// The same of the relative error, each square over ((A + B) / 2)² + 0.01.
+    pub fn own_relmse(&self) -> Option<f64> {
+        self.own_error(|mean| mean * mean + RELATIVE_EPSILON)
+    }
+
+    fn own_error(&self, scale: impl Fn(f64) -> f64) -> Option<f64> {
         let [a, b] = self.halves.as_ref()?;
         let pairs = a.pixels.iter().flatten().zip(b.pixels.iter().flatten());
-        let sum: f64 = pairs
-            .map(|(&a, &b)| (f64::from(a) - f64::from(b)).powi(2))
-            .sum();
+        let pairs = pairs.map(|(&a, &b)| (f64::from(a), f64::from(b)));
+        let term = |(a, b): (f64, f64)| (a - b).powi(2) / scale(0.5 * (a + b));
+        let sum: f64 = pairs.map(term).sum();
         Some(sum / 4.0 / (3 * a.pixels.len()) as f64)
     }
 }

@@ -321,12 +321,21 @@ impl View<'_> {
                           sampler must be one that seeds change";
             return noisy.then(|| reason.into());
         }
-        let share = own / least;
+        // Samplers are ranked by relMSE; records of old runs know the reference's MSE alone.
+        let (share, what) = match reference.relmse {
+            None => (own / least, "mean squared error"),
+            Some(own) => {
+                let of = |s: &MeasuredSampler| s.mean_errors(Metric::RelMse);
+                let all = self.samplers.iter().flat_map(of);
+                let least = all.map(|mean| mean.error.value).reduce(f64::min)?;
+                (own / least, "relMSE")
+            }
+        };
         // A share that is no number is a fault, too.
         (share.is_nan() || share > REFERENCE_SHARE).then(|| {
             let enough = f64::from(reference.spp) * share / REFERENCE_SHARE;
             format!(
-                "the reference has {} of the least mean squared error, more than {}: \
+                "the reference has {} of the least {what}, more than {}: \
                  `reference.spp = {}` would be enough",
                 format::percent(share),
                 format::percent(REFERENCE_SHARE),

@@ -164,6 +164,7 @@ fn reference_record(reference: &Reference) -> ReferenceRecord {
         sampler: "exact".to_owned(),
         seconds: 0.0,
         mse: reference.own_mse(),
+        relmse: reference.own_relmse(),
         image: String::new(),
         mean: reference.image().mean(),
     }

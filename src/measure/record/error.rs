@@ -24,6 +24,9 @@ pub struct ReferenceRecord {
     /// Estimated mean squared error of the reference itself, from its two halves; absent where it is one
     /// image of which no more is known.
     pub mse: Option<f64>,
+    /// The same of the relative error, which samplers are ranked by.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relmse: Option<f64>,
     /// Tone-mapped PNG relative to the run's folder; empty if it could not be written.
     pub image: String,
     /// Mean radiance over pixels and channels.
