@@ -8,10 +8,11 @@ use super::builder::{Look, SceneBuilder};
 use super::error::{self, guarded};
 use super::material::{emitted, reflectance};
 use super::{
-    CookTorrance, Fresnel, LoadOptions, MIRROR, Masking, Material, SceneData, SceneError, obj, ply,
+    CookTorrance, Fresnel, LoadOptions, MIRROR, Masking, Material, SceneData, SceneError,
+    decode_normal, obj, ply,
 };
 use crate::geometry::Camera;
-use glam::{DMat4, DVec3, DVec4, Vec3};
+use glam::{DMat3, DMat4, DVec3, DVec4, Vec2, Vec3};
 use roxmltree::{Document, Node};
 use std::path::Path;
 
@@ -131,15 +132,23 @@ impl Reader<'_> {
         let id = self.look.materials.len() as u32;
         self.look.materials.push(material);
         self.builder.reserve(mesh.triangles.len());
-        for triangle in &mesh.triangles {
+        let of_normals = DMat3::from_mat4(to_world).inverse().transpose();
+        let normals = |index: usize| -> Option<[Vec3; 3]> {
+            let words = mesh.normals.get(index)?.map(decode_normal);
+            let turned = |n: Option<DVec3>| (of_normals * n.unwrap_or_default()).as_vec3();
+            words.iter().any(Option::is_some).then(|| words.map(turned))
+        };
+        for (index, triangle) in mesh.triangles.iter().enumerate() {
             let moved = |v: Vec3| to_world.transform_point3(v.as_dvec3()).as_vec3();
             let [a, b, c] = triangle.vertices.map(moved);
             // A reflection turns corners; emitters and glass tell their sides by them.
-            let corners = match mirror {
+            let turn = |[a, b, c]: [Vec3; 3]| match mirror {
                 Some(_) => [a, c, b],
                 None => [a, b, c],
             };
-            self.builder.push(corners, id);
+            let normals = normals(index).map(turn);
+            let uvs = [Vec2::ZERO; 3];
+            self.builder.push_corners(turn([a, b, c]), uvs, normals, id);
         }
         Ok(())
     }

@@ -30,6 +30,7 @@ fn scene_of(polygons: &[(Vec<Vec3>, u32)], materials: Vec<Material>, camera: Cam
         }
     }
     scene.uvs = Vec::<[Vec2; 3]>::new();
+    scene.normals = Vec::new();
     scene.materials = materials;
     scene.environment = Vec3::ZERO;
     scene.daylight = None;

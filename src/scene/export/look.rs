@@ -4,7 +4,7 @@ use super::{Export, ExportError, vector};
 use crate::image::{Image, Picture};
 use crate::scene::{
     COOK_TORRANCE, DIELECTRIC, DIFFUSE, Daylight, MIRROR, Material, PHONG, PRINCIPLED, SceneData,
-    Texture,
+    Texture, Wrap,
 };
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
@@ -34,6 +34,19 @@ impl Export<'_> {
             self.warnings.push(format!(
                 "material {}: {} has no counterpart in Mitsuba, written as diffuse",
                 material.name, material.kind.name
+            ));
+        }
+        if material.texture_uses()[1..].iter().any(Option::is_some) {
+            self.warnings.push(format!(
+                "material {}: of its textures only that of the base colour is written",
+                material.name
+            ));
+        }
+        let wraps = material.base_color_texture.map(|of| of.wrap);
+        if wraps.is_some_and(|wrap| wrap != [Wrap::Repeat; 2]) {
+            self.warnings.push(format!(
+                "material {}: its texture repeats in Mitsuba",
+                material.name
             ));
         }
         if material.kind == &DIELECTRIC && parameter(material, 2) > 0.0 {

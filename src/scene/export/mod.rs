@@ -152,7 +152,7 @@ impl Export<'_> {
             let both = emits && material.emits_both_sides && !fronts_only;
             let sides = 1 + usize::from(both);
             for back in [None, Some(gap)].into_iter().take(sides) {
-                let Some(bytes) = mesh::ply(scene, id, back) else {
+                let Some((bytes, smooth)) = mesh::ply(scene, id, back) else {
                     continue;
                 };
                 let side = ["", "-back"][usize::from(back.is_some())];
@@ -162,9 +162,10 @@ impl Export<'_> {
                     self.xml,
                     r#"    <shape type="ply">
         <string name="filename" value="{name}"/>
-        <boolean name="face_normals" value="true"/>
+        <boolean name="face_normals" value="{}"/>
         <ref id="material-{id}"/>
-"#
+"#,
+                    !smooth
                 );
                 if emits {
                     let radiance = vector(material.emission);
