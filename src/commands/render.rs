@@ -20,7 +20,7 @@ resolution = [512, 384]
 spp = { pow2 = [6, 6] }
 [axes]
 scene = ["cornell-box"]
-accel = ["bvh"]
+accel = ["cwbvh"]
 sequence = ["sobol"]
 decorrelation = ["cranley-patterson"]
 integrator = ["path"]
@@ -34,7 +34,7 @@ pub struct Render {
     /// Built-in scene or path of a model [default: cornell-box]
     #[arg(long)]
     scene: Option<String>,
-    /// Acceleration structure [default: bvh]
+    /// Acceleration structure [default: cwbvh]
     #[arg(long)]
     accel: Option<String>,
     /// Sample sequence [default: sobol]
