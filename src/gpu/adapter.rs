@@ -152,13 +152,14 @@ fn choose(found: Vec<wgpu::Adapter>, choice: &AdapterChoice) -> Result<wgpu::Ada
     }
 }
 
-/// WebGPU's defaults, and of the adapter's offer only larger buffers and more of them (for arrays in
-/// several parts): kernels stay portable.
+/// WebGPU's defaults, and of the adapter's offer only larger buffers, more of them (for arrays in several
+/// parts) and more storage textures (for arrays that are read as such): kernels stay portable.
 fn limits_to_ask(offer: &wgpu::Limits) -> wgpu::Limits {
     wgpu::Limits {
         max_buffer_size: offer.max_buffer_size,
         max_storage_buffer_binding_size: offer.max_storage_buffer_binding_size,
         max_storage_buffers_per_shader_stage: offer.max_storage_buffers_per_shader_stage,
+        max_storage_textures_per_shader_stage: offer.max_storage_textures_per_shader_stage,
         ..wgpu::Limits::default().using_resolution(offer.clone())
     }
 }

@@ -13,6 +13,10 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+/// Arrays that a kernel of images reads as textures, which software drivers load from in half the time:
+/// nodes and triangles of a structure, sampler words, triangles and shading tables of the scene.
+const STORAGE_TEXTURES: u32 = 5;
+
 /// What the passes of a job are composed with and bind, and those that were compiled.
 pub(super) struct Passes {
     gpu: Gpu,
@@ -54,6 +58,9 @@ impl Passes {
             chosen = chosen.constant(name, value);
         }
         let chosen = bindings.compose(chosen);
+        let in_parts = chosen.features.contains("triangles_1");
+        let most = gpu.limits.max_storage_textures_per_shader_stage;
+        let chosen = chosen.feature("scene_texels", most >= STORAGE_TEXTURES && !in_parts);
         bindings
             .buffer("status", status)
             .buffer("sampler_table", &table);
