@@ -38,14 +38,13 @@ pub fn decode_normal(word: u32) -> Option<DVec3> {
     if word == GEOMETRIC {
         return None;
     }
-    let part = |bits: u32| f64::from((bits as u16).cast_signed()) / LARGEST;
+    let part = |bits: u32| f64::from((bits as u16).cast_signed());
+    // Whole numbers: what lies in the plane z = 0 stays there.
     let (x, y) = (part(word), part(word >> 16));
-    let z = 1.0 - x.abs() - y.abs();
+    let z = LARGEST - x.abs() - y.abs();
+    let sign = |x: f64| if x >= 0.0 { 1.0 } else { -1.0 };
     let (x, y) = match z < 0.0 {
-        true => (
-            (1.0 - y.abs()) * 1.0_f64.copysign(x),
-            (1.0 - x.abs()) * 1.0_f64.copysign(y),
-        ),
+        true => ((LARGEST - y.abs()) * sign(x), (LARGEST - x.abs()) * sign(y)),
         false => (x, y),
     };
     Some(DVec3::new(x, y, z).normalize())

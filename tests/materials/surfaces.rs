@@ -419,7 +419,12 @@ fn faults_of_surfaces_are_seen() {
             "emission *= sample_color(places.x, uv)",
             "emission",
         ),
-        (normals, "1.0 - abs(p.yx)", "1.0 - abs(p.xy)", "normal"),
+        (
+            normals,
+            "(LARGEST - abs(y))",
+            "(LARGEST - abs(x))",
+            "normal",
+        ),
         (
             normals,
             "table_word(at + 1u)",
