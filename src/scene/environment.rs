@@ -34,22 +34,16 @@ impl fmt::Debug for EnvironmentMap {
 const MOST_WIDTH: u32 = 2048;
 
 impl EnvironmentMap {
-    /// Reads an HDR file. Texels that are negative, infinite or NaN are taken as 0, with a warning.
+    /// Reads a linear image of any format that [`crate::image::read_linear`] knows. Texels that are negative, infinite or NaN are taken as 0, with a warning.
     ///
     /// # Errors
     /// The file cannot be read or is no picture.
     pub fn read(path: &Path, warnings: &mut Vec<String>) -> Result<Self, SceneError> {
         let malformed = |problem: String| SceneError::malformed(path, "", problem);
-        let bytes = super::error::read(path)?;
-        let decoded = image::load_from_memory(&bytes);
-        let decoded = decoded.map_err(|e| {
-            malformed(format!(
-                "it is no environment map in Radiance HDR format ({e})"
-            ))
-        })?;
-        let picture = decoded.into_rgb32f();
-        let (width, height) = picture.dimensions();
-        let texels = picture.pixels().map(|p| Vec3::from(p.0)).collect();
+        super::error::open(path)?;
+        let map = crate::image::read_linear(path).map_err(|e| malformed(e.to_string()))?;
+        let (width, height) = (map.width, map.height);
+        let texels = map.pixels.into_iter().map(Vec3::from).collect();
         Self::new(
             &path.display().to_string(),
             [width, height],

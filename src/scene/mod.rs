@@ -195,7 +195,7 @@ const ENVIRONMENT: &str = "environment";
 pub fn common_parameters() -> ParameterSchema {
     vec![Parameter {
         name: ENVIRONMENT,
-        description: "equirectangular Radiance HDR file that lights the scene from all around; none if empty",
+        description: "equirectangular map (HDR, EXR, PFM or NPY) that lights the scene from all around; none if empty",
         default: ParamValue::Name(String::new()),
         range: ParamRange::Text,
     }]

@@ -5,6 +5,7 @@ use crate::support::*;
 use crate::{estimate, lamp, path_with, towards};
 use glam::Vec3;
 use raystone::gpu::Gpu;
+use raystone::image::{FileFormat, Image};
 use raystone::params::ParamValue;
 use raystone::scene::{Light, SceneData};
 use std::f64::consts::{PI, TAU};
@@ -96,14 +97,16 @@ fn a_scene_takes_a_map_from_a_file_and_tells_what_is_wrong_with_it() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let load = |name: &str, texels: [f32; 3]| {
         let file = folder.path().join(name);
-        let picture = image::Rgb32FImage::from_pixel(8, 4, image::Rgb(texels));
-        picture.save(&file).expect("a picture");
+        let picture = Image::new(8, 4, vec![texels; 32]).expect("a picture");
+        let format = FileFormat::of(&file).expect("a known ending");
+        format.write(&file, &picture, &[]).expect("a written file");
         let name = ParamValue::Name(file.display().to_string());
         builtin("single-triangle", &[("environment", name)])
     };
     let plain = load("white.hdr", [1.0; 3]);
     assert_eq!((plain.lights.len(), plain.environment), (1, Vec3::ZERO));
     assert!(plain.report.warnings.is_empty(), "{:?}", plain.report);
+    assert_eq!(load("white.exr", [1.0; 3]).hash, plain.hash);
     assert_ne!(plain.hash, builtin("single-triangle", &[]).hash);
     let black = load("black.hdr", [0.0; 3]);
     let told = &black.report.warnings;

@@ -80,7 +80,7 @@ kind!(
     "environment",
     "environment_map",
     "radiance",
-    "radiance from all around by an equirectangular map (Radiance HDR)"
+    "radiance from all around by an equirectangular map (HDR, EXR, PFM, NPY)"
 );
 
 /// The table of kinds, in the order in which lights are numbered; a kind's place is its number in
