@@ -67,7 +67,8 @@ fn subject(line: &Line) -> (String, bool) {
         Body::Run(_) => ("run".to_owned(), false),
         Body::Scene(_) => (format!("scene {scene}"), false),
         Body::Structure(r) => (cell.to_string(), failed(&r.failure)),
-        Body::Paths(_) => (format!("paths of {cell}"), false),
+        // Judged with the first sampler that gets so far.
+        Body::Paths(_) => (format!("paths of {scene}, {integrator}"), false),
         Body::Reference(_) => (format!("reference {scene}, {integrator}"), false),
         Body::Error(r) => (format!("replicate {} of {cell}", r.replicate), false),
         Body::Bias(_) => (format!("bias of {cell}"), false),
@@ -175,7 +176,6 @@ fn a_device_lost_at_a_sampler_fails_that_sampler_alone() {
         format!("replicate 1 of {cell}"),
         format!("bias of {cell}"),
         format!("spectrum of {cell}"),
-        format!("paths of {cell}"),
     ];
     check_the_rest(&disturbed, &set(&missing), &set([&cell]));
 }

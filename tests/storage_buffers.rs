@@ -44,7 +44,7 @@ fn a_path_tracer_with_textures_emitters_and_counters_binds_at_most_six() {
         let traced = stage.traced(gpu(), kind);
         let renderer = stage.renderer(gpu(), &traced, &sampler, &path(4), [8, 8], true);
         let found = storage_buffers(&renderer.kernel_text());
-        assert!((4..=MOST).contains(&found), "{}: {found}", kind.name());
+        assert!((2..=MOST).contains(&found), "{}: {found}", kind.name());
     }
 }
 

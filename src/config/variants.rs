@@ -4,7 +4,7 @@ use super::Catalogue;
 use super::error::ConfigError;
 use super::keys::Axis;
 use super::tree::{Item, Table, Value};
-use crate::params::{Entry, ParamRange, ParamValue, Parameter, Variant};
+use crate::params::{Entry, ParamRange, ParamValue, Parameter, ParameterSchema, Variant};
 use std::path::Path;
 
 /// Ends of file names that make a scene name a path.
@@ -30,10 +30,7 @@ pub(super) fn resolve(
         return Ok(Entry {
             name: text.to_owned(),
             description: description.to_owned(),
-            schema: match axis {
-                Axis::Scene => crate::scene::common_parameters(),
-                _ => Vec::new(),
-            },
+            schema: shared_parameters(entries),
         });
     }
     let what = match axis {
@@ -48,6 +45,18 @@ pub(super) fn resolve(
         name: text.to_owned(),
         known: entries.iter().map(|entry| entry.name.clone()).collect(),
     })
+}
+
+/// Parameters that all entries of an axis have: files have them, too.
+fn shared_parameters(entries: &[Entry]) -> ParameterSchema {
+    let Some((first, others)) = entries.split_first() else {
+        return Vec::new();
+    };
+    let is_shared = |parameter: &&Parameter| {
+        let has = |entry: &Entry| entry.schema.iter().any(|p| p.name == parameter.name);
+        others.iter().all(has)
+    };
+    first.schema.iter().filter(is_shared).cloned().collect()
 }
 
 fn is_path(text: &str) -> bool {

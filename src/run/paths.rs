@@ -1,6 +1,6 @@
 //! The gate of integrators: single paths against the oracle for images, before anything is rendered with them.
 
-use super::session::Session;
+use super::session::{Session, content_hash};
 use super::world::World;
 use super::{Fault, RunError};
 use crate::config::{Axis, Cell};
@@ -100,8 +100,10 @@ fn judge_and_record(
     if let Some(reason) = &record.not_judged {
         session.tell_warning(&format!("{cell}: paths are not judged: {reason}"));
     }
-    let line = Line::new(Key::from(cell), ran, record.clone());
-    session.write(&line.hashed(&world.scene.hash).with_body(Body::Paths))?;
+    let blank = Line::new(Key::from(cell), ran, ());
+    let hash = content_hash(&blank, &world.scene.hash, &[]);
+    let paths = record.clone();
+    session.write(&blank.hashed(&hash).with_body(|()| Body::Paths(paths)))?;
     Ok(record)
 }
 

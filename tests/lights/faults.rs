@@ -90,7 +90,7 @@ const FAULTS: &[(&str, &str, &str, Seen)] = &[
     (
         "sphere",
         "return 1.0 / (TWO_PI * cap_height(radius * radius / squared));",
-        "return 0.98 / (TWO_PI * cap_height(radius * radius / squared));",
+        "return 0.95 / (TWO_PI * cap_height(radius * radius / squared));",
         Density("several spheres"),
     ),
     (
