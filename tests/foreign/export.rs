@@ -138,7 +138,7 @@ fn textures_keep_their_factor_and_skies_are_written() {
 const SKIPPED: i32 = 77;
 
 #[test]
-#[ignore = "installs Mitsuba 3: cargo test --release --test foreign -- --ignored"]
+#[ignore = "installs Mitsuba 3; `scripts/validate` makes the same comparison, `cargo test --release --test foreign -- --ignored` this one"]
 fn mitsuba_renders_the_same_cornell_box_and_not_one_with_a_darker_wall() {
     let root = env!("CARGO_MANIFEST_DIR");
     let validate = |more: &[&str]| {

@@ -170,7 +170,7 @@ fn a_run_gives_no_error_figure_for_an_integrator_whose_paths_are_wrong() {
 
 /// Figures of the oracle on scenes that the variable `SCENES` names.
 #[test]
-#[ignore = "measurement"]
+#[ignore = "no check but a measurement: `cargo test --release --test image_gate -- --ignored --nocapture`"]
 fn measure_scenes() {
     let names = std::env::var("SCENES").unwrap_or_else(|_| "cornell-box".to_owned());
     for name in names.split(',') {

@@ -167,7 +167,7 @@ fn every_fault_of_the_table_is_seen_or_explained() {
 
 /// The gate of integrators alone sees the faults that images are checked for by other means, too.
 #[test]
-#[ignore = "minutes: all faults of integrators"]
+#[ignore = "some minutes: all faults of integrators by single paths; `cargo test --release --test mutants -- --ignored single_paths`"]
 fn single_paths_show_every_fault_of_integrators() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let options = Options {
