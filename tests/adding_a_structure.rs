@@ -64,7 +64,7 @@ fn verdicts(kernels: Option<&Path>) -> Vec<GateVerdict> {
     let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d));
     let plan = plan.unwrap_or_else(|e| panic!("{e}"));
     let options = RunOptions::default();
-    let verified = verify(&experiment, &plan, &registries, &options, 2000);
+    let verified = verify(&experiment, &plan, &registries, &options, 2000, false);
     let verified = verified.unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(verified.len(), 4, "two scenes with two lengths");
     let verdict = |v: raystone::run::Verified| v.verdict.unwrap_or_else(|e| panic!("{e}"));

@@ -24,7 +24,12 @@ fn composition(structure: &str) -> Composition {
         "roulette",
         "textures",
         "lights",
+        "many_lights",
         "rectangle_lights",
+        "background",
+        "several_materials",
+        "several_light_kinds",
+        "transforms",
         "mirror",
         "dielectric",
         "daylight",
@@ -128,8 +133,8 @@ fn faults_of_all_kinds_are_told_with_file_and_line() {
         (
             "a fault in a shader",
             "shading/light/flat",
-            "let towards = point.position - origin",
-            "let towards = point.position - origin.w",
+            "let towards = point.position - surface.position",
+            "let towards = point.position - surface.position.w",
             "",
         ),
     ] {

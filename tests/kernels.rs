@@ -21,7 +21,7 @@ fn render_features() -> Vec<&'static str> {
         .into_iter()
         .map(|(n, _)| n)
         .collect();
-    names.push("ray_counts");
+    names.extend(["carried", "ray_counts"]);
     names
 }
 

@@ -57,6 +57,7 @@ fn verdicts(kernels: &Path) -> Vec<(String, GateVerdict)> {
         &registries,
         &RunOptions::default(),
         2000,
+        false,
     );
     let verified = verified.unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(verified.len(), 3);

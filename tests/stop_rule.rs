@@ -6,32 +6,16 @@ use raystone::config::StopRule;
 use raystone::measure::record::{Body, ErrorRecord, Line, axis};
 use raystone::run::Registries;
 
-const EXPERIMENT: &str = r#"
-[run]
-name = "stop"
-replicates = 8
-resolution = [16, 16]
-spp = { pow2 = [0, 6] }
-[axes]
-scene = ["cornell-box"]
-accel = ["bvh"]
-sequence = ["pixel-hash", "sobol"]
-decorrelation = ["none"]
-integrator = ["path"]
-[reference]
-spp = 8192
-[timing]
-rounds = 3
-min_warmup_ms = 0
-max_warmup_ms = 1
-rays = 1024
-[gate]
-rays = 1024
-brute_force_tests = 1000
-oracle_rays = 16
-[discrepancy]
-points = 16
-"#;
+/// Two samplers to 64 samples, and what a test changes.
+fn experiment(changes: &[&str]) -> String {
+    let common = [
+        "run.replicates = 8",
+        "run.spp = { pow2 = [0, 6] }",
+        "axes.sequence = [\"pixel-hash\", \"sobol\"]",
+        "reference.spp = 8192",
+    ];
+    support::small_with(&[&common, changes].concat())
+}
 
 const METRIC: &str = "relmse-unbiased/eps=1e-2/v1";
 
@@ -63,12 +47,11 @@ fn mean_at(records: &[&ErrorRecord], spp: u32) -> f64 {
 
 #[test]
 fn a_sampler_ends_where_its_error_is_below_the_target_and_says_so() {
-    let all = lines(EXPERIMENT);
+    let all = lines(&experiment(&[]));
     let full = errors(&all, "pixel-hash");
     let target = mean_at(&full, 8);
-    let rule =
-        format!("spp = {{ pow2 = [0, 6] }}\nstop = {{ relmse = {target}, confidence = 0.95 }}");
-    let stopped = lines(&EXPERIMENT.replace("spp = { pow2 = [0, 6] }", &rule));
+    let rule = format!("run.stop = {{ relmse = {target}, confidence = 0.95 }}");
+    let stopped = lines(&experiment(&[&rule]));
     let ended = errors(&stopped, "pixel-hash");
     assert_eq!(ended.len(), 8);
     let last = ended[0].errors.last().expect("an error").spp;
@@ -79,6 +62,7 @@ fn a_sampler_ends_where_its_error_is_below_the_target_and_says_so() {
         let stop = StopRule {
             relmse: target,
             confidence: 0.95,
+            tile: None,
         };
         assert_eq!((ended.stop, full.stop), (Some(stop), None));
         assert_eq!(

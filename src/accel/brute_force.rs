@@ -152,6 +152,7 @@ impl<'a> EveryTriangle<'a> {
     pub fn intersect(&self, ray: &Ray, first: u32, hit: &mut Hit) {
         let ray = &self.soup.intersection.raised(ray);
         let inverse = self.soup.intersection.inverse(ray.direction);
+        let masks = self.soup.masks.as_deref();
         // With infinite reciprocals nothing can be said of a slab.
         let bounded = self.soup.intersection.box_test.finite;
         let line = match bounded {
@@ -167,7 +168,8 @@ impl<'a> EveryTriangle<'a> {
                     if let Some(&index) = self.groups.members(group).get(lane) {
                         let record = &self.soup.records[index as usize];
                         let id = record.id + first;
-                        intersect_triangle(&TriangleRecord { id, ..*record }, ray, inverse, hit);
+                        let record = TriangleRecord { id, ..*record };
+                        intersect_triangle((&record, masks), ray, inverse, hit);
                     }
                 }
             }

@@ -25,6 +25,7 @@ mod intersection;
 mod irregular_grid;
 mod kd_tree;
 mod leaf;
+pub mod mask;
 mod octree;
 mod polygon;
 pub mod ray;
@@ -49,6 +50,7 @@ pub use instancing::{InstanceJudge, MetaBvh, ObjectList, Placed, brute_force_ins
 pub use intersection::{BoxTest, Intersection};
 pub use irregular_grid::IrregularGrid;
 pub use kd_tree::KdTree;
+pub use mask::Masks;
 pub use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::{AccelRegistry, BoxRegistry, TriangleRegistry};
@@ -129,6 +131,8 @@ pub struct TriangleSoup {
     pub placed: Option<Placed>,
     /// How rays meet them: see [`TriangleSoup::intersecting`].
     pub intersection: Intersection,
+    /// What is cut out of them; the words of records lead there.
+    pub masks: Option<Arc<Masks>>,
 }
 
 impl From<Vec<TriangleRecord>> for TriangleSoup {
@@ -144,25 +148,34 @@ impl From<Vec<TriangleRecord>> for TriangleSoup {
 impl TriangleSoup {
     /// The records of a scene.
     pub fn new(scene: &SceneData) -> Self {
+        let (masks, words) = match Masks::of(scene, 3 * scene.triangles.len() as u32) {
+            Some((masks, words)) => (Some(Arc::new(masks)), Cow::Owned(words)),
+            None => (None, Cow::Borrowed(&scene.material_ids)),
+        };
         let records = scene
             .triangles
             .iter()
-            .zip(&scene.material_ids)
+            .zip(&*words)
             .enumerate()
             .map(|(id, (triangle, material))| TriangleRecord::new(triangle, id as u32, *material))
             .collect();
+        let mut placed = scene.assembly.as_ref().map(Placed::new);
+        if let Some(masks) = &masks {
+            placed = placed.and_then(|placed| placed.masked(masks, &words));
+        }
         Self {
             records,
-            placed: scene.assembly.as_ref().map(Placed::new),
+            placed,
             intersection: Intersection::default(),
+            masks,
         }
     }
 
     /// The same triangles, met by these tests. Structures take copies of records: choose before building.
     #[must_use]
     pub fn intersecting(mut self, intersection: Intersection) -> Self {
-        // Behind the records lie the words made of them, then those of the objects.
-        let mut place = 3 * self.records.len() as u32;
+        // Behind the records and masks lie the words made of them, then those of the objects.
+        let mut place = 3 * self.records.len() as u32 + self.mask_rows().len() as u32;
         let objects = self.placed.iter_mut().flat_map(|p| &mut p.objects);
         let objects = objects.map(|object| {
             object.intersection = intersection;
@@ -179,19 +192,22 @@ impl TriangleSoup {
         self
     }
 
-    /// The buffer `triangles` of kernels: the records, and what the triangle test made of them.
+    fn mask_rows(&self) -> &[[u32; 4]] {
+        self.masks.as_ref().map_or(&[], |masks| &masks.rows)
+    }
+
+    /// The buffer `triangles` of kernels: the records, their masks, and what the triangle test made of them.
     pub fn words(&self) -> Cow<'_, [[u32; 4]]> {
         let records = bytemuck::cast_slice(&self.records);
         let objects = self.placed.iter().flat_map(|p| &p.objects);
         let objects = objects.flat_map(|object| &object.records);
         let transformed = |record| self.intersection.triangle.transformed(record);
-        let mut made = self.records.iter().chain(objects).filter_map(transformed);
-        match made.next() {
+        let made = self.records.iter().chain(objects).filter_map(transformed);
+        let masks = self.mask_rows().iter().copied();
+        let mut behind = masks.chain(made.flatten()).peekable();
+        match behind.peek() {
             None => Cow::Borrowed(records),
-            Some(first) => {
-                let made = std::iter::once(first).chain(made).flatten();
-                Cow::Owned(records.iter().copied().chain(made).collect())
-            }
+            Some(_) => Cow::Owned(records.iter().copied().chain(behind).collect()),
         }
     }
 

@@ -5,7 +5,8 @@
 
 use super::TriangleSoup;
 use super::bounds::{Bounds, enter_box};
-use super::intersection::{Intersection, Reciprocal};
+use super::intersection::Reciprocal;
+use super::mask::Masks;
 use super::ray::{Hit, NO_HIT, Ray};
 use super::triangle::{TriangleRecord, intersect_triangle};
 use super::watch;
@@ -29,6 +30,8 @@ pub struct Walk<'a> {
     pub ray: Ray,
     /// What tests need of its direction.
     pub inverse: Reciprocal,
+    /// What is cut out of triangles.
+    pub masks: Option<&'a Masks>,
     /// Whether any hit is enough.
     pub any: bool,
     /// The nearest hit so far.
@@ -38,12 +41,14 @@ pub struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    /// The way of `ray`, met by these tests.
-    pub fn new(ray: &Ray, any: bool, tests: Intersection, counters: &'a mut Counters) -> Self {
+    /// The way of `ray` through triangles that are met by the tests of `soup`.
+    pub fn new(ray: &Ray, any: bool, soup: &'a TriangleSoup, counters: &'a mut Counters) -> Self {
+        let tests = soup.intersection;
         let ray = tests.raised(ray);
         Self {
             ray,
             inverse: tests.inverse(ray.direction),
+            masks: soup.masks.as_deref(),
             any,
             hit: Hit::miss(&ray),
             counters,
@@ -76,6 +81,7 @@ impl<'a> Walk<'a> {
     /// Tests a triangle.
     pub fn test(&mut self, triangle: &TriangleRecord) {
         self.counters.triangle_tests += 1;
+        let triangle = (triangle, self.masks);
         intersect_triangle(triangle, &self.ray, self.inverse, &mut self.hit);
     }
 
@@ -107,12 +113,12 @@ pub struct Twin<'a, T>(pub &'a T, pub &'a TriangleSoup);
 impl<T: Traverse> CpuTwin for Twin<'_, T> {
     fn closest_hit(&self, ray: &Ray, counters: &mut Counters) -> Hit {
         let Self(built, soup) = self;
-        built.trace(soup, Walk::new(ray, false, soup.intersection, counters))
+        built.trace(soup, Walk::new(ray, false, soup, counters))
     }
 
     fn any_hit(&self, ray: &Ray, counters: &mut Counters) -> bool {
         let Self(built, soup) = self;
-        let walk = Walk::new(ray, true, soup.intersection, counters);
+        let walk = Walk::new(ray, true, soup, counters);
         built.trace(soup, walk).triangle != NO_HIT
     }
 }

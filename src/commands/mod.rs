@@ -20,6 +20,7 @@ mod stress;
 mod system;
 mod trace;
 mod verify;
+mod verify_images;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

@@ -11,7 +11,7 @@ use raystone::config::{Cell, Experiment};
 use raystone::image::FileFormat;
 use raystone::measure::record::{Body, Line, read_records};
 use raystone::report::{failed_checks, terminal_tables, write_report};
-use raystone::run::{Existing, Kernels, Registries, RunError, RunSummary};
+use raystone::run::{Existing, Kernels, Registries, RunError, RunSummary, user_cache};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -39,6 +39,10 @@ pub struct Run {
     /// hdr, pfm, npy
     #[arg(long, value_name = "FORMAT", value_parser = linear_format)]
     images: Option<&'static FileFormat>,
+    /// Render references even if an earlier run kept them (in $RAYSTONE_CACHE, else ~/.cache/raystone; at most 1 GiB),
+    /// and keep none
+    #[arg(long)]
+    no_cache: bool,
     /// Print the cells and an estimate of the time; start nothing
     #[arg(long)]
     dry_run: bool,
@@ -75,6 +79,7 @@ impl Run {
             .options(out, &self.experiment.values, self.quiet);
         options.existing = existing;
         options.images = self.images;
+        options.cache = user_cache().filter(|_| !self.no_cache);
         signals::watch(options.interrupt.clone())?;
         match raystone::run::run(&experiment, &plan, &registries, &options) {
             Err(RunError::Interrupted) => signals::wait_for_end(),

@@ -3,6 +3,7 @@
 use super::arguments::{DeviceArguments, ExperimentArguments, list_override, plan};
 use super::failure::{BAD_INPUT, FAILED};
 use super::output::{print, tell};
+use super::verify_images;
 use anyhow::Result;
 use clap::Args;
 use raystone::config::{Axis, Catalogue, Cell, Experiment, Plan, Skipped};
@@ -28,7 +29,8 @@ const BRUTE_FORCE_TRIANGLES: usize = 5_000;
 /// Run the gate alone: does every structure answer every ray as the judge does?
 ///
 /// Without a file: every structure (brute force only where a scene has fewer than 5,000 triangles),
-/// on `cornell-box` and `displaced-sphere`.
+/// on `cornell-box` and `displaced-sphere`, and the integrators on small trial scenes of every material, light and
+/// estimator.
 #[derive(Args)]
 pub struct Verify {
     /// Experiment file whose scenes and structures to check
@@ -42,6 +44,9 @@ pub struct Verify {
     /// Rays of each class [default: gate.rays of the experiment]
     #[arg(long, value_name = "N")]
     rays: Option<u32>,
+    /// Render known images instead: scenes with answers in closed form, or by quadrature, each judged to 0.2 % or better
+    #[arg(long, conflicts_with_all = ["file", "scene", "accel", "rays", "set", "only"])]
+    images: bool,
     #[command(flatten)]
     experiment: ExperimentArguments,
     #[command(flatten)]
@@ -51,6 +56,9 @@ pub struct Verify {
 impl Verify {
     pub fn execute(self) -> Result<ExitCode> {
         let registries = Registries::default();
+        if self.images {
+            return verify_images::execute(&registries, &self.device, &self.experiment.values);
+        }
         let catalogue = registries.catalogue();
         let overrides = self.overrides();
         let experiment = match &self.file {
@@ -74,7 +82,9 @@ impl Verify {
             .device
             .options(PathBuf::new(), &self.experiment.values, false);
         let rays = experiment.gate.rays;
-        let verified = raystone::run::verify(&experiment, &plan, &registries, &options, rays)?;
+        let trials = self.file.is_none() && self.scene.is_empty();
+        let verified =
+            raystone::run::verify(&experiment, &plan, &registries, &options, rays, trials)?;
         print(&table(&verified))?;
         let paths: Vec<_> = verified.iter().flat_map(|v| &v.paths).collect();
         print(&paths_table(&paths))?;

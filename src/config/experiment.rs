@@ -57,6 +57,9 @@ pub struct StopRule {
     pub relmse: f64,
     /// Probability with which a sampler that is ended has it, in (0, 1).
     pub confidence: f64,
+    /// Edge of the tiles that end on their own, pixels, a multiple of 8; without it, the image ends as a whole.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tile: Option<u32>,
 }
 
 /// Numbers of samples per pixel: at least one, ascending.

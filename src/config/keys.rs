@@ -150,7 +150,7 @@ impl fmt::Display for ValueKind {
             }
             Self::StopRule => write!(
                 f,
-                "a table {{ relmse = x, confidence = p }} with x > 0 and 0.5 <= p < 1"
+                "a table {{ relmse = x, confidence = p }} with x > 0 and 0.5 <= p < 1, and perhaps tile = n, a multiple of 8 in [8, 512]"
             ),
             Self::DimensionPairs { max } => {
                 write!(f, "a list of pairs of different dimensions in [0, {max}]")
@@ -226,7 +226,7 @@ pub const KEYS: &[KeyRow] = &[
     key("run", "seed", SEED, Some("1"), "Seed of the first replicate."),
     key("run", "resolution", ValueKind::IntegerPair { min: 16, max: 8192 }, Some("[192, 144]"), "Width and height of every image, pixels."),
     key("run", "spp", ValueKind::Counts { max_exponent: 16 }, Some("{ pow2 = [0, 5] }"), "Samples per pixel at which the error is taken: 2^lo, …, 2^hi, or those listed, `[1, 3, 10]`."),
-    key("run", "stop", ValueKind::StopRule, None, "Ends a sampler at one of these numbers of samples where its relMSE is below x with probability p; without it, each takes them all."),
+    key("run", "stop", ValueKind::StopRule, None, "Ends a sampler at one of these numbers of samples where its relMSE is below x with probability p, or each tile of n × n pixels on its own; without it, each takes them all."),
     key("run", "runtime_checks", ValueKind::Flag, Some("true"), "Keep the bounds checks and loop bounds that the driver layer adds to kernels."),
     key("axes", "scene", ValueKind::Names(Axis::Scene), None, "Scenes: built-in names, or paths of .obj, .gltf, .glb, .ply or Nori .xml files, relative to the current directory. Not needed if all integrators are `integrand:*`."),
     key("axes", "accel", ValueKind::Names(Axis::Accel), None, "Acceleration structures. Not needed if all integrators are `integrand:*`."),

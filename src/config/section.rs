@@ -206,7 +206,7 @@ impl<'t> Section<'t> {
         let Value::Table(table) = &item.value else {
             return Err(self.wrong_type(name, item));
         };
-        let known = ["relmse", "confidence"];
+        let known = ["relmse", "confidence", "tile"];
         if let Some((other, item)) = table.iter().find(|(key, _)| !known.contains(&key.as_str())) {
             return Err(ConfigError::Unknown {
                 at: item.at.clone(),
@@ -215,7 +215,11 @@ impl<'t> Section<'t> {
                 known: known.map(str::to_owned).to_vec(),
             });
         }
-        let [relmse, confidence] = known.map(|key| {
+        let tile = table.get("tile").map(|inner| match inner.value {
+            Value::Integer(edge) if (8..=512).contains(&edge) && edge % 8 == 0 => Ok(edge as u32),
+            _ => Err(self.wrong_type(name, inner)),
+        });
+        let [relmse, confidence] = ["relmse", "confidence"].map(|key| {
             let inner = table.get(key).ok_or_else(|| self.wrong_type(name, item))?;
             let value = number(inner).ok_or_else(|| self.wrong_type(name, inner))?;
             let allowed = match key {
@@ -230,6 +234,7 @@ impl<'t> Section<'t> {
         Ok(StopRule {
             relmse: relmse?,
             confidence: confidence?,
+            tile: tile.transpose()?,
         })
     }
 

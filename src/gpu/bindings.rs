@@ -6,7 +6,7 @@ use super::buffers::check;
 use super::compose::Composition;
 use super::pipeline::{Binding, BindingKind, Pipeline, TEXEL_FORMAT, TEXELS_PER_ROW};
 use super::uniform::UniformValues;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 
 const TEXEL_BYTES: u64 = 16;
@@ -65,6 +65,8 @@ pub struct Bindings {
     pub(super) uniforms: BTreeMap<String, UniformValues>,
     /// Arrays in several parts: how many parts, and `vec4`s in all but the last.
     parts: BTreeMap<String, (usize, u32)>,
+    /// Features of kernels that what is bound is there for.
+    features: BTreeSet<&'static str>,
 }
 
 /// What a binding of a kernel is bound to.
@@ -129,10 +131,19 @@ impl Bindings {
         self
     }
 
-    /// `composition` with what arrays in several parts ask of kernels: the features `name_1`, … and
-    /// the constant `NAME_PART`.
+    /// Says that kernels which bind this have a feature.
+    pub fn feature(&mut self, name: &'static str) -> &mut Self {
+        self.features.insert(name);
+        self
+    }
+
+    /// `composition` with the features of what is bound, and with what arrays in several parts ask of kernels: the features
+    /// `name_1`, … and the constant `NAME_PART`.
     #[must_use]
     pub fn compose(&self, mut composition: Composition) -> Composition {
+        for name in &self.features {
+            composition = composition.feature(name, true);
+        }
         for (name, (count, vec4s)) in &self.parts {
             for index in 1..*count {
                 composition = composition.feature(&part_name(name, index), true);
@@ -149,6 +160,7 @@ impl Bindings {
         out.buffers.extend(other.buffers);
         out.uniforms.extend(other.uniforms);
         out.parts.extend(other.parts);
+        out.features.extend(other.features);
         out
     }
 

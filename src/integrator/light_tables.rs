@@ -2,7 +2,7 @@
 //! `kernels/shading/light/table.wesl` takes apart.
 
 use super::environment_tables::environment_rows;
-use super::light_tree::{LightBounds, tree_rows};
+use super::light_tree::{LightBounds, TreeNode, light_tree, tree_rows};
 use super::tables::emits_in_front;
 use crate::gpu::UniformValues;
 use crate::scene::{
@@ -101,6 +101,19 @@ impl LightTables {
         self.first = words.len() as u32 / 4;
         words.extend_from_slice(self.rows.as_flattened());
         self.rows = Vec::new();
+    }
+
+    /// Whether one of them is a map of the environment.
+    pub(super) fn has_map(&self) -> bool {
+        let mut kinds = LIGHT_KINDS.iter().zip(self.kinds);
+        kinds.any(|(kind, there)| there && kind.name == "environment")
+    }
+
+    /// Whether there is more than one light, or some triangle emits that is not of the one.
+    pub(super) fn are_chosen(&self, scene: &SceneData) -> bool {
+        let emits = |of: &&u32| scene.materials[**of as usize].emission != Vec3::ZERO;
+        let emissive = scene.material_ids.iter().filter(emits).count();
+        self.lights > 1 || emissive != self.emitters as usize
     }
 
     /// Features of the kinds that there are.
@@ -219,6 +232,13 @@ fn ies_rows(profile: &IesProfile) -> Vec<[u32; 4]> {
         row
     }));
     rows
+}
+
+/// The nodes of the tree over the lights of a scene that have a place: see [`light_tree`].
+pub(crate) fn light_branches(scene: &SceneData, list: &LightList) -> Vec<TreeNode> {
+    let lights = list.lights.iter();
+    let bounds: Vec<LightBounds> = lights.filter_map(|l| light_bounds(scene, l)).collect();
+    light_tree(&bounds).0
 }
 
 /// Where a light is and shines, if it has a place.

@@ -89,8 +89,8 @@ fn cone_union(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
 
 /// A node; its number is its place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct TreeNode {
-    pub bounds: LightBounds,
+pub(crate) struct TreeNode {
+    pub(super) bounds: LightBounds,
     /// First of its two children, which follow each other, or 0.
     pub child: u32,
     /// The node above; 0 above the root.

@@ -1,6 +1,7 @@
 //! Integrators: what is traced per sample, and the renderer that runs them.
 
 mod alias;
+mod blocks;
 mod builtin;
 mod environment_tables;
 pub mod integrand;
@@ -18,11 +19,14 @@ mod surface_tables;
 mod tables;
 
 pub use crate::accel::Traced;
+pub use blocks::BLOCK_EDGE;
+pub(crate) use environment_tables::environment_aliases;
 pub use kind::{
     ConfiguredIntegrator, CountedRays, Integrator, IntegratorError, IntegratorFacts,
     RAY_COUNT_CLASSES, TRACED_CLASSES,
 };
 pub use light_tables::LightTables;
+pub(crate) use light_tables::light_branches;
 pub use offset::{OffsetRegistry, RayOffset};
 pub use passes::ImageSteps;
 pub use registry::IntegratorRegistry;

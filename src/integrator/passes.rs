@@ -26,6 +26,8 @@ pub(super) struct Passes {
     triangles: TriangleBuffers,
     traced: Traced,
     runtime_checks: bool,
+    /// Features that some scenes need and this kernel is without; none where nothing is traced.
+    left_out: Vec<&'static str>,
     pipelines: RefCell<BTreeMap<String, Arc<Pipeline>>>,
     /// What answers buffers of rays, by the name of the query.
     tracers: RefCell<BTreeMap<String, Arc<Tracer>>>,
@@ -38,7 +40,7 @@ impl Passes {
         traced: &Traced,
         job: &RenderJob,
         status: &wgpu::Buffer,
-        ray_counts: bool,
+        [ray_counts, by_blocks]: [bool; 2],
     ) -> Result<Self, GpuError> {
         let table = gpu.storage("sampler_table", job.sampler.table.words())?;
         let mut bindings = scene.bindings.clone();
@@ -49,10 +51,18 @@ impl Passes {
             bindings = bindings.merged(&traced.bindings);
             chosen = traced.compose(chosen);
         }
-        let mut chosen = with_sampler(chosen, job.sampler).feature("ray_counts", ray_counts);
+        let mut chosen = with_sampler(chosen, job.sampler)
+            .feature("ray_counts", ray_counts)
+            .feature("block_list", by_blocks);
         let of_integrator = job.integrator.kind.features(&job.integrator.params);
-        for (name, on) in scene.features.flags().into_iter().chain(of_integrator) {
+        let mut left_out: Vec<&str> = Vec::new();
+        let of_scene = scene.features.flags();
+        for (name, on) in of_scene.iter().copied().chain(of_integrator) {
             chosen = chosen.feature(name, on);
+        }
+        if job.integrator.facts.traces() {
+            let names = of_scene.iter().map(|(name, _)| *name);
+            left_out.extend(names.filter(|name| !chosen.features.contains(*name)));
         }
         for (name, value) in job.integrator.kind.constants(&job.integrator.params) {
             chosen = chosen.constant(name, value);
@@ -71,6 +81,7 @@ impl Passes {
             triangles: scene.triangles.clone(),
             traced: traced.clone(),
             runtime_checks: job.runtime_checks,
+            left_out,
             pipelines: RefCell::default(),
             tracers: RefCell::default(),
         })
@@ -118,6 +129,14 @@ impl Passes {
         all.into_iter().collect()
     }
 
+    /// Features that other scenes need and these kernels are without.
+    pub fn left_out(&self) -> Vec<String> {
+        self.left_out
+            .iter()
+            .map(|name| (*name).to_owned())
+            .collect()
+    }
+
     /// Text of every composed kernel, by the name of its pass.
     pub fn texts(&self) -> Vec<(String, String)> {
         let pipelines = self.pipelines.borrow();
@@ -147,6 +166,8 @@ pub struct ImageSteps<'a> {
     pub rows: u32,
     /// Samples that each of their pixels takes.
     pub samples: u32,
+    /// Whether the slice is so many blocks of a list, and not rows.
+    by_blocks: bool,
 }
 
 impl<'a> ImageSteps<'a> {
@@ -158,11 +179,15 @@ impl<'a> ImageSteps<'a> {
         slice: &Slice,
         sums: &wgpu::Buffer,
         scratch: &[(&'static str, u64)],
+        blocks: Option<&wgpu::Buffer>,
     ) -> Self {
         let mut bindings = passes.bindings.clone();
         bindings
             .buffer("accumulation", sums)
             .uniform("frame", slice.uniform(of_job));
+        if let Some(blocks) = blocks {
+            bindings.buffer("block_list", blocks);
+        }
         let count = u64::from(width) * u64::from(slice.rows) * u64::from(slice.samples);
         for (name, bytes) in scratch {
             let storage = Storage::scratch(&format!("image {name}"), bytes * count.max(1));
@@ -175,6 +200,7 @@ impl<'a> ImageSteps<'a> {
             width,
             rows: slice.rows,
             samples: slice.samples,
+            by_blocks: blocks.is_some(),
         }
     }
 
@@ -185,7 +211,10 @@ impl<'a> ImageSteps<'a> {
 
     /// Workgroups of 8 × 8 invocations, one for each pixel of the slice.
     pub fn pixels(&self) -> [u32; 3] {
-        [self.width.div_ceil(8), self.rows.div_ceil(8), 1]
+        match self.by_blocks {
+            true => [self.rows, 1, 1],
+            false => [self.width.div_ceil(8), self.rows.div_ceil(8), 1],
+        }
     }
 
     /// The buffer of this name.

@@ -2,9 +2,10 @@
 //! `kernels/integrator/path.wesl`.
 
 use super::kind::CountedRays::{Bounce, Primary, Shadow};
+use super::tables::FEATURE_GROUPS;
 use super::{Integrator, IntegratorFacts};
 use crate::parameters;
-use crate::params::{ParameterSchema, Parameters as _, Params};
+use crate::params::{Choice as _, ParameterSchema, Parameters as _, Params};
 use crate::sampling::dimensions::{self, LIGHT_POINT, ROULETTE};
 
 parameters! {
@@ -48,6 +49,28 @@ parameters! {
         All = "all",
     }
 
+    /// What a kernel carries though the scene does not need it: groups of features.
+    pub enum Carry {
+        /// Nothing.
+        Nothing = "none",
+        /// Every kind of material.
+        Materials = "materials",
+        /// Textures of all uses.
+        Textures = "textures",
+        /// Normals of vertices and of textures.
+        Normals = "normals",
+        /// Every kind of light.
+        Lights = "lights",
+        /// The choice among lights, and the search for the one that was found.
+        Choice = "choice",
+        /// What rays that leave the scene find.
+        Background = "background",
+        /// The error that instances add to points.
+        Transforms = "transforms",
+        /// All of these: the full kernel.
+        All = "all",
+    }
+
     /// Parameters of `path`.
     pub struct PathParameters {
         /// most bounces of a path
@@ -66,13 +89,16 @@ parameters! {
         /// greatest component of a contribution after the first bounce, in units of radiance; 0 is no
         /// limit. A limit makes images darker than they should be, and is reported as such
         clamp: f64 = 0.0, in 0.0..=1e6;
+        /// what the kernel carries though the scene does not need it, to measure what leaving it out gains;
+        /// the image stays the same to the bit
+        carry: Carry = Carry::Nothing;
     }
 }
 
 impl PathParameters {
     /// Features of the kernel, with whether they are on.
     fn features(&self) -> Vec<(&'static str, bool)> {
-        vec![
+        let mut features = vec![
             ("next_event", self.strategy != Strategy::Bsdf),
             ("found_emission", self.strategy != Strategy::Light),
             ("uniform_lights", self.light_choice == LightChoice::Uniform),
@@ -82,7 +108,10 @@ impl PathParameters {
             ("roulette", self.roulette != Roulette::Never),
             ("roulette_by_albedo", self.roulette == Roulette::Albedo),
             ("clamped", self.clamp > 0.0),
-        ]
+            ("carried", self.carry != Carry::Nothing),
+        ];
+        features.extend(self.carry.features().map(|name| (name, true)));
+        features
     }
 
     /// Dimensions that no path draws.
@@ -101,6 +130,16 @@ impl PathParameters {
             undrawn.sort_unstable();
         }
         undrawn
+    }
+}
+
+impl Carry {
+    /// Features that are on whatever the scene.
+    fn features(self) -> impl Iterator<Item = &'static str> {
+        let is_carried = move |group: &str| self == Self::All || group == self.name();
+        let groups = FEATURE_GROUPS.iter();
+        let carried = groups.filter(move |(group, _)| is_carried(group));
+        carried.flat_map(|(_, features)| features.iter().copied())
     }
 }
 
@@ -155,6 +194,23 @@ impl Integrator for Path {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrator::SceneFeatures;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn a_kernel_can_carry_every_feature_of_scenes_and_each_in_one_group() {
+        let all: Vec<&str> = Carry::All.features().collect();
+        let single = Carry::ALL.iter().filter(|carry| **carry != Carry::All);
+        let mut parts: Vec<&str> = single.flat_map(|carry| carry.features()).collect();
+        assert_eq!(parts.len(), all.len());
+        parts.sort_unstable();
+        let flags = SceneFeatures::default().flags();
+        let known: BTreeSet<&str> = flags.iter().map(|(name, _)| *name).collect();
+        assert_eq!(parts, known.into_iter().collect::<Vec<_>>());
+        let alone = |carry: Carry| carry.features().count();
+        assert_eq!(alone(Carry::Nothing), 0);
+        assert!(Carry::ALL.iter().skip(1).all(|carry| alone(*carry) > 0));
+    }
 
     #[test]
     fn what_a_strategy_does_not_draw_is_not_asked_of_a_sampler() {

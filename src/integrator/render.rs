@@ -4,10 +4,11 @@
 //! Every image that it hands out was checked: no kernel raised its error word, and every pixel took
 //! exactly the samples asked for.
 
+use super::blocks::Blocks;
 use super::kind::{ConfiguredIntegrator, RAY_COUNT_CLASSES};
 use super::offset::RayOffset;
 use super::passes::{ImageSteps, Passes};
-use super::slice::{Slice, job_uniform};
+use super::slice::{Slice, job_uniform, lens};
 use super::tables::SceneBuffers;
 use crate::accel::Traced;
 use crate::geometry::Camera;
@@ -78,6 +79,8 @@ pub struct Renderer<'a> {
     uniform: UniformValues,
     passes: Passes,
     bands: Vec<Band>,
+    /// Where only some blocks take samples: which.
+    chosen: Option<Blocks>,
     status: wgpu::Buffer,
     /// Samples per pixel since the last reset.
     done: Cell<u32>,
@@ -144,6 +147,30 @@ impl<'a> Renderer<'a> {
         job: &RenderJob,
         ray_counts: bool,
     ) -> Result<Self, GpuError> {
+        Self::compiled(gpu, scene, traced, job, [ray_counts, false])
+    }
+
+    /// The same with a kernel that takes samples in some blocks of the image alone, see [`Renderer::only`]; in all at
+    /// first.
+    ///
+    /// # Errors
+    /// As for [`Renderer::new`], or the integrator has passes of its own, or the sums do not fit into one buffer.
+    pub fn by_blocks(
+        gpu: &'a Gpu,
+        scene: &SceneBuffers,
+        traced: &Traced,
+        job: &RenderJob,
+    ) -> Result<Self, GpuError> {
+        Self::compiled(gpu, scene, traced, job, [false, true])
+    }
+
+    fn compiled(
+        gpu: &'a Gpu,
+        scene: &SceneBuffers,
+        traced: &Traced,
+        job: &RenderJob,
+        [ray_counts, by_blocks]: [bool; 2],
+    ) -> Result<Self, GpuError> {
         if let Some(reason) = job.integrator.refusal(traced) {
             return Err(GpuError::Kernel(reason));
         }
@@ -154,8 +181,12 @@ impl<'a> Renderer<'a> {
             size: job.size,
             integrator: job.integrator.clone(),
             uniform: job_uniform(job, scene),
-            passes: Passes::new(gpu, scene, traced, job, &status, ray_counts)?,
+            passes: Passes::new(gpu, scene, traced, job, &status, [ray_counts, by_blocks])?,
             bands: bands(gpu, job.size)?,
+            chosen: match by_blocks {
+                true => Some(Blocks::all(gpu, job.size)?),
+                false => None,
+            },
             status,
             done: Cell::new(0),
             pending: Cell::new(0),
@@ -164,15 +195,37 @@ impl<'a> Renderer<'a> {
             most: most_samples(gpu, job.integrator.kind.scratch()),
             spent: Cell::default(),
         };
+        let own_passes = job.integrator.kind.kernel().is_empty();
+        if by_blocks && (own_passes || renderer.bands.len() > 1) {
+            return Err(GpuError::Kernel(format!(
+                "`{}` at {:?} pixels cannot take samples by blocks: that needs an integrator of one kernel and sums in one buffer",
+                job.integrator.kind.name(),
+                job.size
+            )));
+        }
         if let Some(band) = renderer.bands.first() {
             renderer.record(&mut Recording::new(), band, &Slice::default())?;
         }
         Ok(renderer)
     }
 
+    /// Looks from elsewhere: what is added from now on is seen by this camera.
+    ///
+    /// # Errors
+    /// As [`Renderer::reset`], which forgets what was seen so far.
+    pub fn look(&mut self, camera: Camera) -> Result<(), GpuError> {
+        self.uniform = lens(self.uniform.clone(), camera, self.size);
+        self.reset()
+    }
+
     /// Feature flags of the kernels.
     pub fn features(&self) -> Vec<String> {
         self.passes.features()
+    }
+
+    /// Features that other scenes need and these kernels are without; none of integrators that trace nothing.
+    pub fn left_out(&self) -> Vec<String> {
+        self.passes.left_out()
     }
 
     /// Texts of the composed kernels.
@@ -233,7 +286,10 @@ impl<'a> Renderer<'a> {
             let left_in_block = BLOCK_SAMPLES - sample % BLOCK_SAMPLES;
             let samples = self.samples_at_once().min(left_in_block).min(end - sample);
             for band in &self.bands {
-                self.add_to_band(band, sample, samples, seed)?;
+                match &self.chosen {
+                    Some(blocks) => self.add_to_blocks(band, blocks, (sample, samples), seed)?,
+                    None => self.add_to_band(band, sample, samples, seed)?,
+                }
             }
             sample += samples;
             self.done.set(self.done.get() + samples);
@@ -254,7 +310,44 @@ impl<'a> Renderer<'a> {
             return 1;
         }
         let [width, height] = self.size.map(u64::from);
-        (self.fitting() / (width * height).max(1)).clamp(1, u64::from(BLOCK_SAMPLES)) as u32
+        let blocks = self.chosen.as_ref().map(Blocks::pixels);
+        let pixels = blocks.unwrap_or(width * height);
+        (self.fitting() / pixels.max(1)).clamp(1, u64::from(BLOCK_SAMPLES)) as u32
+    }
+
+    /// Takes samples, from the next reset on, in these blocks of [`BLOCK_EDGE`](super::BLOCK_EDGE) pixels squared alone,
+    /// each by its column and row; all other pixels of images are black. Of a renderer that was not made
+    /// [by blocks](Renderer::by_blocks) nothing changes.
+    pub fn only(&self, blocks: &[[u32; 2]]) {
+        if let Some(known) = &self.chosen {
+            known.set(self.gpu, blocks);
+        }
+    }
+
+    fn add_to_blocks(
+        &self,
+        band: &Band,
+        blocks: &Blocks,
+        (first_sample, samples): (u32, u32),
+        seed: u32,
+    ) -> Result<(), GpuError> {
+        let fitting = self.fitting() / (u64::from(samples) * Blocks::PIXELS).max(1);
+        let mut first = 0;
+        while first < blocks.len() {
+            let count = (fitting.clamp(1, Blocks::MOST) as u32).min(blocks.len() - first);
+            let slice = Slice {
+                band_row: 0,
+                first_row: first,
+                rows: count,
+                first_sample,
+                samples,
+                seed,
+            };
+            let items = u64::from(count) * u64::from(samples) * Blocks::PIXELS;
+            self.run_slice(band, &slice, items)?;
+            first += count;
+        }
+        Ok(())
     }
 
     fn add_to_band(
@@ -277,7 +370,7 @@ impl<'a> Renderer<'a> {
                 samples,
                 seed,
             };
-            self.run_slice(band, &slice)?;
+            self.run_slice(band, &slice, row_samples * u64::from(slice.rows))?;
             row += slice.rows;
         }
         Ok(())
@@ -299,16 +392,15 @@ impl<'a> Renderer<'a> {
             slice,
             sums,
             scratch,
+            self.chosen.as_ref().map(Blocks::list),
         ))
     }
 
-    fn run_slice(&self, band: &Band, slice: &Slice) -> Result<(), GpuError> {
+    fn run_slice(&self, band: &Band, slice: &Slice, items: u64) -> Result<(), GpuError> {
         let mut recording = Recording::new();
         self.record(&mut recording, band, slice)?;
         let elapsed = self.player.play(&recording)?.elapsed();
-        let row_samples = u64::from(self.size[0]) * u64::from(slice.samples);
-        self.slices
-            .learn(row_samples * u64::from(slice.rows), elapsed);
+        self.slices.learn(items, elapsed);
         let mut spent = self.spent.get();
         spent += elapsed;
         self.spent.set(spent);
@@ -393,6 +485,9 @@ impl<'a> Renderer<'a> {
             let [start, end] = [band.rows.start, band.rows.end].map(|row| row as usize * width);
             let pixels = totals[start..end].iter_mut().zip(&sums);
             for (pixel, (total, [r, g, b, taken])) in (start..).zip(pixels) {
+                let blocks = self.chosen.as_ref();
+                let is_off = blocks.is_some_and(|blocks| !blocks.has(pixel, width));
+                let wanted = if is_off { 0 } else { wanted };
                 // Exact: a block has far fewer samples than 2²⁴.
                 if *taken != wanted as f32 {
                     wrong += 1;

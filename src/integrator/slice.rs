@@ -2,6 +2,7 @@
 
 use super::RenderJob;
 use super::tables::SceneBuffers;
+use crate::geometry::Camera;
 use crate::gpu::UniformValues;
 
 /// The rows and samples of one dispatch.
@@ -16,18 +17,23 @@ pub(super) struct Slice {
     pub seed: u32,
 }
 
-/// What all slices of a job have in common.
-pub(super) fn job_uniform(job: &RenderJob, scene: &SceneBuffers) -> UniformValues {
-    let [width, height] = job.size;
-    let [forward, right, up] = job.camera.basis(job.size).map(|v| v.to_array());
-    let ao_radius = job.integrator.facts.ao_radius.unwrap_or(0.0) * scene.diagonal;
-    let values = UniformValues::new();
-    let values = scene.lights.uniform(values);
+/// The camera of an image of this size among the values of a job.
+pub(super) fn lens(values: UniformValues, camera: Camera, size: [u32; 2]) -> UniformValues {
+    let [forward, right, up] = camera.basis(size).map(|v| v.to_array());
     values
-        .vec("eye", &job.camera.eye.to_array())
+        .vec("eye", &camera.eye.to_array())
         .vec("forward", &forward)
         .vec("right", &right)
         .vec("up", &up)
+}
+
+/// What all slices of a job have in common.
+pub(super) fn job_uniform(job: &RenderJob, scene: &SceneBuffers) -> UniformValues {
+    let [width, height] = job.size;
+    let ao_radius = job.integrator.facts.ao_radius.unwrap_or(0.0) * scene.diagonal;
+    let values = lens(UniformValues::new(), job.camera, job.size);
+    let values = scene.lights.uniform(values);
+    values
         .vec("environment", &scene.environment)
         .u32("width", width)
         .u32("height", height)
@@ -38,7 +44,14 @@ pub(super) fn job_uniform(job: &RenderJob, scene: &SceneBuffers) -> UniformValue
         .f32("transform_shift", scene.transform_error.shift)
         .vec("sky_up", &scene.daylight.up.to_array())
         .vec("sky_key", &scene.daylight.key.to_array())
-        .f32("sky_reach", scene.daylight.reach)
+        .f32(
+            "sky_reach",
+            if scene.features.daylight {
+                scene.daylight.reach
+            } else {
+                0.0
+            },
+        )
 }
 
 impl Slice {

@@ -58,7 +58,7 @@ impl SurfaceFeatures {
     }
 }
 
-/// Where things begin, in words.
+/// Where things begin, in words; 0 for what the scene does not have.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Places {
     pub first_uv: u32,
@@ -87,7 +87,9 @@ pub(super) fn append(
             }
         }
     }
-    let first_uv = words.len() as u32;
+    // Materials come first: 0 is where neither can begin.
+    let place_of = |there: bool, words: &[u32]| if there { words.len() as u32 } else { 0 };
+    let first_uv = place_of(features.textures, words);
     let texels = match features.textures {
         true => scene.textures.iter().map(|t| t.texels.len()).sum(),
         false => 0,
@@ -97,12 +99,14 @@ pub(super) fn append(
         let uvs = scene.uvs.iter().flatten();
         words.extend(uvs.flat_map(|uv| [uv.x.to_bits(), uv.y.to_bits()]));
     }
-    let first_normal = words.len() as u32;
+    let first_normal = place_of(features.normals, words);
     if features.normals {
         words.extend_from_slice(scene.normals.as_flattened());
     }
     if features.textures {
-        for (id, texture) in (0_u32..).zip(&scene.textures) {
+        // Those of masks alone are with the triangles.
+        let shown = (0_u32..).zip(&scene.textures);
+        for (id, texture) in shown.filter(|(id, _)| rows.iter().any(|(_, used)| used == id)) {
             let first = words.len() as u32;
             words.extend(texture.texels.iter().map(|t| u32::from_le_bytes(*t)));
             for (row, _) in rows.iter().filter(|(_, used)| *used == id) {

@@ -19,13 +19,62 @@ pub struct SceneFeatures {
     pub lights: bool,
     /// Which of [`LIGHT_KINDS`] they are of.
     pub light_kinds: [bool; LIGHT_KINDS.len()],
+    /// Lights are chosen among: there is more than one, or an emissive triangle that is not of the one.
+    pub many_lights: bool,
     /// Some surface emits from its front alone.
     pub one_sided_lights: bool,
+    /// Rays that leave the scene find light.
+    pub background: bool,
     /// The environment is the sky over a scene without a light.
     pub daylight: bool,
     /// Which of [`MATERIAL_KINDS`] some material is of.
     pub materials: [bool; MATERIAL_KINDS.len()],
+    /// Instances add to the error of points.
+    pub transforms: bool,
 }
+
+/// What a feature belongs to: the groups in which kernels can be made to carry what a scene does not need.
+pub(super) const FEATURE_GROUPS: [(&str, &[&str]); 7] = [
+    (
+        "materials",
+        &[
+            "phong",
+            "cook_torrance",
+            "principled",
+            "mirror",
+            "dielectric",
+            "several_materials",
+        ],
+    ),
+    (
+        "textures",
+        &[
+            "textures",
+            "metallic_roughness_textures",
+            "emission_textures",
+            "texture_transforms",
+        ],
+    ),
+    ("normals", &["normals", "normal_maps"]),
+    (
+        "lights",
+        &[
+            "lights",
+            "triangle_lights",
+            "rectangle_lights",
+            "sphere_lights",
+            "point_lights",
+            "spot_lights",
+            "ies_lights",
+            "directional_lights",
+            "one_sided_lights",
+            "several_light_kinds",
+        ],
+    ),
+    ("choice", &["many_lights"]),
+    ("background", &["background", "daylight", "environment_map"]),
+    ("transforms", &["transforms"]),
+];
 
 impl SceneFeatures {
     /// Feature names as kernels write them, with whether they are on. Diffuse, which every kernel has, is none.
@@ -34,9 +83,14 @@ impl SceneFeatures {
         let mut flags: Vec<_> = kinds.zip(self.materials).collect();
         flags.retain(|(name, _)| *name != DIFFUSE.feature);
         flags.extend([
+            ("several_materials", several(&self.materials)),
             ("lights", self.lights),
+            ("many_lights", self.many_lights),
+            ("several_light_kinds", several(&self.light_kinds)),
             ("one_sided_lights", self.one_sided_lights),
+            ("background", self.background),
             ("daylight", self.daylight),
+            ("transforms", self.transforms),
         ]);
         flags.extend(LightTables::flags(&self.light_kinds));
         flags.extend(self.surfaces.flags());
@@ -83,18 +137,23 @@ impl SceneBuffers {
             "shading_tables",
             &gpu.storage("shading_tables", &tables.words)?,
         );
+        let transform_error = TransformError::of(soup);
+        let has_map = lights.has_map();
         Ok(Self {
             bindings,
             triangles,
-            transform_error: TransformError::of(soup),
+            transform_error,
             features: SceneFeatures {
                 surfaces,
                 lights: lights.lights > 0,
                 light_kinds: lights.kinds,
+                many_lights: lights.are_chosen(scene),
                 one_sided_lights: lights.one_sided,
+                background: has_map || scene.daylight.is_some() || scene.environment != Vec3::ZERO,
                 daylight: scene.daylight.is_some(),
                 materials: MATERIAL_KINDS
                     .map(|kind| scene.materials.iter().any(|m| m.kind == kind)),
+                transforms: transform_error.scale != 0.0 || transform_error.shift != 0.0,
             },
             environment: scene.environment.to_array(),
             daylight: scene.daylight.unwrap_or_default(),
@@ -136,6 +195,10 @@ impl Tables {
         words.resize(words.len().next_multiple_of(4), 0);
         Self { words, places }
     }
+}
+
+fn several(kinds: &[bool]) -> bool {
+    kinds.iter().filter(|there| **there).count() > 1
 }
 
 /// Whether the material emits, and from its front alone.

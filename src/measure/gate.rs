@@ -8,6 +8,7 @@
 //! A scene of instances has a second judge, for structures that take rays to the objects' spaces:
 //! see [`super::instance_judge`].
 
+use super::holes::SceneHoles;
 use super::instance_judge;
 use super::kept_checks::{self, KeptChecks};
 use super::rays::{RaySet, record_rays};
@@ -20,7 +21,7 @@ use crate::accel::{
 use crate::config::Gate;
 use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu, GpuError, kernel_errors};
-use crate::oracle::{self, Verdict};
+use crate::oracle::{self, Holes, Surfaces, Verdict};
 use crate::scene::SceneData;
 
 /// The judge is compared with brute force on at least this many rays.
@@ -102,7 +103,7 @@ impl Judge {
         });
         self.check_oracle(scene, soup, settings.oracle_rays as usize);
         if let (Some(judge), Some(placed)) = (&mut self.instances, &soup.placed) {
-            instance_judge::check(judge, placed, soup.records.len(), settings);
+            instance_judge::check(judge, (scene, placed), settings);
         }
     }
 
@@ -184,7 +185,12 @@ impl Judge {
                 (soup.intersection.raised(ray), answer)
             })
             .collect();
-        let verdicts = oracle::judge_closest_hits(&scene.triangles, &questions);
+        let holes = SceneHoles::of(scene);
+        let surfaces = Surfaces {
+            triangles: &scene.triangles,
+            holes: holes.as_ref().map(|holes| holes as &dyn Holes),
+        };
+        let verdicts = oracle::judge_closest_hits(surfaces, &questions);
         self.note_oracle(&pairs, verdicts);
     }
 

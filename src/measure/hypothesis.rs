@@ -153,6 +153,17 @@ pub fn benjamini_hochberg(p_values: &[f64], alpha: f64) -> Vec<bool> {
     p_values.iter().map(|&p| p <= threshold).collect()
 }
 
+/// The least `alpha` at which [`benjamini_hochberg`] rejects any of these hypotheses; 1 of none.
+pub fn least_rate(p_values: &[f64]) -> f64 {
+    let mut sorted = p_values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let m = sorted.len() as f64;
+    let rates = (1u32..)
+        .zip(sorted)
+        .map(|(rank, p)| p * m / f64::from(rank));
+    rates.fold(1.0, f64::min)
+}
+
 /// The p-values corrected for their number, in their order: rejecting those of at most `alpha` rejects any true
 /// hypothesis with probability at most `alpha`, however the tests depend on each other (Holm 1979, step-down).
 /// NaN counts as 1.

@@ -4,6 +4,7 @@
 //! structures only.
 
 use super::gate::{Judge, Meeting};
+use super::holes::SceneHoles;
 use super::rays::RaySet;
 use super::record::RayClass;
 use crate::accel::{
@@ -11,8 +12,8 @@ use crate::accel::{
 };
 use crate::config::Gate;
 use crate::geometry::Triangle;
-use crate::oracle::{self, Verdict};
-use crate::scene::Instance;
+use crate::oracle::{self, Holes, Surfaces, Verdict};
+use crate::scene::{Instance, SceneData};
 use glam::DVec3;
 
 /// Answers of the oracle that are held at a time, one for each ray and instance.
@@ -41,22 +42,23 @@ pub(super) fn new(
     Ok(Some(Judge::of_sets(sets.iter().map(of_class).collect())))
 }
 
-/// Compares this judge of a scene of so many triangles with brute force and the oracle.
-pub(super) fn check(judge: &mut Judge, placed: &Placed, triangles: usize, settings: &Gate) {
+/// Compares this judge with brute force and the oracle.
+pub(super) fn check(judge: &mut Judge, (scene, placed): (&SceneData, &Placed), settings: &Gate) {
+    let triangles = scene.triangles.len();
     judge.check_brute_force(settings.brute_force_tests, triangles, |rays| {
         brute_force_instances(placed, rays)
     });
     let at_once = (ORACLE_QUESTIONS / placed.instances.len()).max(64);
     let mut pairs = judge.subset((settings.oracle_rays as usize).min(at_once));
     pairs.extend(judge.hard().take(at_once));
-    let verdicts = oracle_verdicts(placed, &pairs);
+    let verdicts = oracle_verdicts((scene, placed), &pairs);
     judge.note_oracle(&pairs, verdicts);
 }
 
 /// What the oracle thinks of each answer. Every instance is asked with the ray as it is in its
 /// object's space: the one that was hit whether the hit is right, the others whether they leave the
 /// way to it free.
-fn oracle_verdicts(placed: &Placed, pairs: &[(Ray, Hit)]) -> Vec<Verdict> {
+fn oracle_verdicts((scene, placed): (&SceneData, &Placed), pairs: &[(Ray, Hit)]) -> Vec<Verdict> {
     let mut verdicts = vec![Verdict::Agrees; pairs.len()];
     for (index, object) in placed.objects.iter().enumerate() {
         let of_object = |i: &&Instance| i.object as usize == index;
@@ -78,7 +80,14 @@ fn oracle_verdicts(placed: &Placed, pairs: &[(Ray, Hit)]) -> Vec<Verdict> {
         }
         let records = object.records.iter();
         let triangles: Vec<Triangle> = records.map(|record| record.triangle()).collect();
-        let answers = oracle::judge_closest_hits(&triangles, &questions);
+        // All copies of an object are cut alike.
+        let first = placed.instances.iter().find(of_object).map(|i| i.first);
+        let holes = SceneHoles::of(scene).map(|holes| holes.of_copy(first.unwrap_or(0)));
+        let surfaces = Surfaces {
+            triangles: &triangles,
+            holes: holes.as_ref().map(|holes| holes as &dyn Holes),
+        };
+        let answers = oracle::judge_closest_hits(surfaces, &questions);
         for (pair, answer) in asked.into_iter().zip(answers) {
             match (&verdicts[pair], &answer) {
                 (Verdict::Wrong(_), _) | (_, Verdict::Agrees) => {}

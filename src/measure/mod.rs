@@ -1,16 +1,20 @@
 //! Measuring: the gate, the timing protocol, image metrics, statistics, records.
 
+pub mod adaptive;
 pub mod bias;
 pub mod comparison;
 pub mod figure;
 pub mod flip;
 pub mod gate;
 pub mod hard_rays;
+mod holes;
 pub mod hypothesis;
 pub mod image_gate;
 mod instance_judge;
 mod kept_checks;
+pub mod known_images;
 pub mod memory;
+mod mesh;
 pub mod metrics;
 pub mod path_oracle;
 pub mod rays;
@@ -23,7 +27,9 @@ pub mod statistics;
 pub mod stopping;
 pub mod stream;
 pub mod timing;
+mod trial_lights;
 pub mod trial_scenes;
+mod trial_surfaces;
 pub mod words;
 
 pub use kept_checks::CACHE_VARIABLE;

@@ -1,15 +1,15 @@
 //! Small scenes with what single paths can go wrong with: unequal, small, grazing and hidden lamps, glass in glass, panes,
-//! mirrors, textures that repeat, and light from all sides. `raystone verify --images` and the tests of the gate judge paths on
+//! mirrors, textures that repeat, and light from all sides. The tests of the gate judge paths on
 //! them, so that a fault of a kernel shows although the scenes of a user do without what it breaks.
 
-use crate::geometry::{Camera, Triangle};
+use super::mesh::Mesh;
+use crate::geometry::Camera;
 use crate::params::ParamValue;
 use crate::scene::{
-    self, CookTorrance, Fresnel, Light, MIRROR, Masking, Material, SceneData, SceneError, Texture,
+    self, CookTorrance, Fresnel, Light, Masking, Material, SceneData, SceneError, Texture,
     TextureUse,
 };
 use glam::{Vec2, Vec3, vec2, vec3};
-use std::f32::consts::{PI, TAU};
 
 /// What is judged on a scene: integrator and the parameters that are not at their defaults.
 pub type Trial = (&'static str, Vec<(&'static str, ParamValue)>);
@@ -21,6 +21,8 @@ pub struct TrialScene {
     /// Integrators.
     pub trials: Vec<Trial>,
 }
+
+pub use super::trial_lights::trials_of;
 
 /// All of them.
 ///
@@ -52,7 +54,7 @@ pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
     ));
     let occlusion = |radius| ("ao", vec![("radius", ParamValue::Number(radius))]);
     let primary = || ("primary", vec![]);
-    Ok(vec![
+    let mut scenes = vec![
         TrialScene {
             scene: lamps()?,
             trials: lamps_trials,
@@ -96,121 +98,21 @@ pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
                 primary(),
             ],
         },
-    ])
+    ];
+    scenes.extend(super::trial_lights::scenes()?);
+    scenes.extend(super::trial_surfaces::scenes()?);
+    Ok(scenes)
 }
 
-fn depth(depth: i64) -> (&'static str, ParamValue) {
+pub(super) fn depth(depth: i64) -> (&'static str, ParamValue) {
     ("max_depth", ParamValue::Integer(depth))
 }
 
-fn word(key: &'static str, value: &str) -> (&'static str, ParamValue) {
+pub(super) fn word(key: &'static str, value: &str) -> (&'static str, ParamValue) {
     (key, ParamValue::Name(value.to_owned()))
 }
 
-/// A scene that grows.
-struct Mesh {
-    scene: SceneData,
-}
-
-impl Mesh {
-    /// Nothing but a camera under a sky of this radiance.
-    fn new(name: &str, camera: Camera, environment: Vec3) -> Result<Self, SceneError> {
-        let scene = SceneData {
-            name: name.to_owned(),
-            triangles: Vec::new(),
-            material_ids: Vec::new(),
-            materials: Vec::new(),
-            camera: Some(camera),
-            environment,
-            daylight: None,
-            ..scene::named("single-triangle")?
-        };
-        Ok(Self { scene })
-    }
-
-    fn material(&mut self, material: Material) -> u32 {
-        self.scene.materials.push(material);
-        self.scene.materials.len() as u32 - 1
-    }
-
-    fn triangle(&mut self, corners: [Vec3; 3], uv: [Vec2; 3], material: u32) {
-        self.scene.triangles.push(Triangle { vertices: corners });
-        self.scene.uvs.push(uv);
-        self.scene.material_ids.push(material);
-    }
-
-    /// A parallelogram whose texture coordinates run over `uv`.
-    fn quad(&mut self, [corner, along, across]: [Vec3; 3], uv: [Vec2; 2], material: u32) {
-        let p = |u: f32, v: f32| corner + u * along + v * across;
-        let t = |u: f32, v: f32| vec2(uv[0].x.lerp(uv[1].x, u), uv[0].y.lerp(uv[1].y, v));
-        let [a, b, c, d] = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
-        for [a, b, c] in [[a, b, c], [a, c, d]] {
-            let corners = [a, b, c].map(|(u, v)| p(u, v));
-            self.triangle(corners, [a, b, c].map(|(u, v)| t(u, v)), material);
-        }
-    }
-
-    fn plain(&mut self, quad: [Vec3; 3], material: u32) {
-        self.quad(quad, [Vec2::ZERO, Vec2::ONE], material);
-    }
-
-    /// A box; corners turn counter-clockwise seen from outside.
-    fn block(&mut self, low: Vec3, size: Vec3, material: u32) {
-        let high = low + size;
-        let [x, y, z] = [Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z];
-        for [along, across] in [[x, y], [y, z], [z, x]] {
-            self.plain([low, across, along], material);
-            self.plain([high, -along, -across], material);
-        }
-    }
-
-    /// A ball of facets; corners turn counter-clockwise seen from outside.
-    fn ball(&mut self, centre: Vec3, radius: f32, material: u32) {
-        const ROWS: u32 = 9;
-        let at = |row: u32, column: u32| {
-            let (theta, phi) = (
-                PI * row as f32 / ROWS as f32,
-                TAU * column as f32 / (2 * ROWS) as f32 + 0.1,
-            );
-            let ring = theta.sin();
-            centre + radius * vec3(ring * phi.cos(), theta.cos(), ring * phi.sin())
-        };
-        for row in 0..ROWS {
-            for column in 0..2 * ROWS {
-                let (next, below) = (column + 1, row + 1);
-                let [a, b, c, d] = [
-                    at(row, column),
-                    at(row, next),
-                    at(below, next),
-                    at(below, column),
-                ];
-                if row > 0 {
-                    self.triangle([a, b, c], [Vec2::ZERO; 3], material);
-                }
-                if below < ROWS {
-                    self.triangle([a, c, d], [Vec2::ZERO; 3], material);
-                }
-            }
-        }
-    }
-
-    fn done(mut self, textures: Vec<Texture>) -> SceneData {
-        if textures.is_empty() {
-            self.scene.uvs.clear();
-        }
-        self.scene.textures = textures;
-        self.scene
-    }
-}
-
-fn silver(tint: Vec3) -> Material {
-    Material {
-        kind: &MIRROR,
-        ..Material::diffuse("mirror", tint)
-    }
-}
-
-fn camera(eye: Vec3, target: Vec3, up: Vec3) -> Camera {
+pub(super) fn camera(eye: Vec3, target: Vec3, up: Vec3) -> Camera {
     Camera {
         eye,
         target,
@@ -340,7 +242,7 @@ fn glass() -> Result<SceneData, SceneError> {
     let mut mesh = Mesh::new("glass", camera, vec3(0.5, 0.6, 0.9))?;
     let [floor, mirror, clear, green, dense, pane, lamp] = [
         Material::diffuse("floor", vec3(0.6, 0.55, 0.5)),
-        silver(vec3(0.9, 0.85, 0.8)),
+        Material::mirror("mirror", vec3(0.9, 0.85, 0.8)),
         Material::dielectric("clear", Vec3::ONE, 1.5),
         Material::dielectric("green", vec3(0.7, 0.95, 0.8), 1.33),
         Material::dielectric("bubble", Vec3::ONE, 0.7),
@@ -432,7 +334,7 @@ fn textured() -> Result<SceneData, SceneError> {
     let [floor, wall, mirror, lamp, plain] = [
         painted(Material::diffuse("floor", vec3(0.9, 0.7, 0.8)), 0),
         painted(Material::diffuse("wall", Vec3::ONE), 1),
-        painted(silver(vec3(0.8, 0.9, 1.0)), 1),
+        painted(Material::mirror("mirror", vec3(0.8, 0.9, 1.0)), 1),
         painted(Material::diffuse("lamp", Vec3::splat(0.6)), 0).emitting(vec3(5.0, 4.0, 3.0)),
         Material::diffuse("plain", vec3(0.4, 0.6, 0.5)),
     ]
@@ -476,15 +378,4 @@ fn textured() -> Result<SceneData, SceneError> {
             .collect(),
     };
     Ok(mesh.done(vec![texture("wide", 7, 3, 12), texture("tall", 2, 5, 200)]))
-}
-
-/// Interpolation of numbers.
-trait Lerp {
-    fn lerp(self, to: Self, t: f32) -> Self;
-}
-
-impl Lerp for f32 {
-    fn lerp(self, to: Self, t: f32) -> Self {
-        self + t * (to - self)
-    }
 }

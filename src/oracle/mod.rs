@@ -11,13 +11,15 @@ mod brute_force;
 mod exact;
 mod exact_judge;
 mod groups;
+mod holes;
 mod triangle;
 
 pub use exact::{ExactCrossing, Side};
 pub use exact_judge::{Crossed, ExactTruth, ExactVerdict, exact_truths};
 pub use groups::{GROUP, Groups, Line};
+pub use holes::{Cut, Holes, Surfaces, Weight};
 
-use crate::geometry::{Ray, Triangle};
+use crate::geometry::Ray;
 use rayon::prelude::*;
 use std::fmt;
 use thiserror::Error;
@@ -119,51 +121,77 @@ impl fmt::Display for Distance {
 }
 
 /// Judges one closest-hit answer over all `triangles`.
-pub fn judge(triangles: &[Triangle], ray: Ray, answer: ClosestHit) -> Verdict {
-    let candidates = brute_force::candidates(triangles, &[ray]);
-    Scene::new(triangles, &ray, &candidates[0]).judge_closest(answer)
+pub fn judge<'a>(surfaces: impl Into<Surfaces<'a>>, ray: Ray, answer: ClosestHit) -> Verdict {
+    let surfaces = surfaces.into();
+    let candidates = brute_force::candidates(surfaces.triangles, &[ray]);
+    Scene::new(surfaces, &ray, &candidates[0]).judge_closest(answer)
 }
 
 /// Judges many closest-hit answers, in the order of `queries`, on all cores.
-pub fn judge_closest_hits(triangles: &[Triangle], queries: &[(Ray, ClosestHit)]) -> Vec<Verdict> {
-    judge_all(triangles, queries, |scene, answer| {
+pub fn judge_closest_hits<'a>(
+    surfaces: impl Into<Surfaces<'a>>,
+    queries: &[(Ray, ClosestHit)],
+) -> Vec<Verdict> {
+    judge_all(surfaces.into(), queries, |scene, answer| {
         scene.judge_closest(answer)
     })
 }
 
 /// Judges many any-hit answers (`true`: something lies in the ray's interval), on all cores.
-pub fn judge_any_hits(triangles: &[Triangle], queries: &[(Ray, bool)]) -> Vec<Verdict> {
-    judge_all(triangles, queries, |scene, answer| scene.judge_any(answer))
+pub fn judge_any_hits<'a>(
+    surfaces: impl Into<Surfaces<'a>>,
+    queries: &[(Ray, bool)],
+) -> Vec<Verdict> {
+    judge_all(surfaces.into(), queries, |scene, answer| {
+        scene.judge_any(answer)
+    })
 }
 
 fn judge_all<A: Copy + Sync>(
-    triangles: &[Triangle],
+    surfaces: Surfaces,
     queries: &[(Ray, A)],
     judge: impl Fn(&Scene, A) -> Verdict + Sync,
 ) -> Vec<Verdict> {
     let rays: Vec<Ray> = queries.iter().map(|q| q.0).collect();
-    let candidates = brute_force::candidates(triangles, &rays);
+    let candidates = brute_force::candidates(surfaces.triangles, &rays);
     (queries.par_iter().zip(&candidates))
-        .map(|((ray, answer), found)| judge(&Scene::new(triangles, ray, found), *answer))
+        .map(|((ray, answer), found)| judge(&Scene::new(surfaces, ray, found), *answer))
         .collect()
 }
 
 /// One ray with every triangle that it may hit.
 struct Scene<'a> {
-    triangles: &'a [Triangle],
+    triangles: usize,
     ray: &'a Ray,
-    possible: Vec<(u32, Crossing)>,
+    possible: Vec<Possible>,
+}
+
+/// A triangle that an f32 test may answer.
+struct Possible {
+    id: u32,
+    crossing: Crossing,
+    /// Whether every test must.
+    is_definite: bool,
 }
 
 impl<'a> Scene<'a> {
-    fn new(triangles: &'a [Triangle], ray: &'a Ray, candidates: &[u32]) -> Self {
-        let possible = candidates
-            .iter()
-            .map(|&id| (id, Crossing::new(&triangles[id as usize], ray)))
-            .filter(|(_, crossing)| crossing.is_possible(ray))
-            .collect();
+    fn new(surfaces: Surfaces, ray: &'a Ray, candidates: &[u32]) -> Self {
+        let possible = |&id: &u32| {
+            let crossing = Crossing::new(&surfaces.triangles[id as usize], ray);
+            if !crossing.is_possible(ray) {
+                return None;
+            }
+            let cut = surfaces.cut(id, &crossing);
+            let is_definite = cut == Cut::Surface && crossing.is_definite(ray);
+            (cut != Cut::Hole).then_some(Possible {
+                id,
+                crossing,
+                is_definite,
+            })
+        };
+        let possible = candidates.iter().filter_map(possible).collect();
         Self {
-            triangles,
+            triangles: surfaces.triangles.len(),
             ray,
             possible,
         }
@@ -192,7 +220,7 @@ impl<'a> Scene<'a> {
 
     fn find_fault(&self, id: u32, t: f32) -> Option<Fault> {
         let (t_min, t_max) = (self.ray.t_min, self.ray.t_max);
-        let triangles = self.triangles.len();
+        let triangles = self.triangles;
         if id as usize >= triangles {
             return Some(Fault::NoSuchTriangle { id, triangles });
         }
@@ -227,25 +255,23 @@ impl<'a> Scene<'a> {
         let behind = |crossing: &Crossing| {
             (crossing.distance()).is_some_and(|other| other.value - other.error > f64::from(t))
         };
-        self.possible
-            .iter()
-            .all(|(other, crossing)| match *other == id {
-                true => crossing.is_definite(self.ray),
-                false => behind(crossing),
-            })
+        self.possible.iter().all(|other| match other.id == id {
+            true => other.is_definite,
+            false => behind(&other.crossing),
+        })
     }
 
     fn possible(&self, id: u32) -> Option<&Crossing> {
-        let at = self.possible.binary_search_by_key(&id, |p| p.0).ok()?;
-        Some(&self.possible[at].1)
+        let at = self.possible.binary_search_by_key(&id, |p| p.id).ok()?;
+        Some(&self.possible[at].crossing)
     }
 
     /// The definite hit of which the upper bound of the distance is least.
     fn nearest_definite(&self) -> Option<(u32, Distance)> {
         let upper = |d: &Distance| d.t + d.bound;
         (self.possible.iter())
-            .filter(|(_, crossing)| crossing.is_definite(self.ray))
-            .map(|(id, crossing)| (*id, Distance::of(crossing)))
+            .filter(|p| p.is_definite)
+            .map(|p| (p.id, Distance::of(&p.crossing)))
             .min_by(|a, b| upper(&a.1).total_cmp(&upper(&b.1)))
     }
 }

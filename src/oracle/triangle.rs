@@ -34,6 +34,7 @@
 //! The bounds here are those of both kinds, whichever is wider. A test that moves vertices into a frame
 //! of the triangle's own (Baldwin and Weber) has wider ones still, and is wrong by these.
 
+use super::holes::Weight;
 use crate::geometry::{Ray, Triangle};
 
 /// Half an ulp of 1 in f32.
@@ -146,6 +147,19 @@ impl Crossing {
             value,
             error: error + ROUNDINGS * EPSILON * value.abs(),
         })
+    }
+
+    /// Weights of the second and third corner, with the error of those of an f32 test; `None` as for [`Crossing::distance`].
+    pub(super) fn weights(&self) -> Option<[Weight; 2]> {
+        let least_det = self.det.value.abs() - self.det_error();
+        let weight = |b: Bounded| {
+            let value = b.value / self.det.value;
+            let error = (b.error + value.abs() * self.det_error()) / least_det;
+            let error = error + ROUNDINGS * EPSILON * value.abs();
+            Weight { value, error }
+        };
+        let [u, v, _] = self.barycentrics;
+        (least_det > 0.0).then(|| [u, v].map(weight))
     }
 
     /// Whether an f32 test may answer the distance `t`.

@@ -2,6 +2,7 @@
 
 use super::names::Names;
 use super::samplers::MeasuredSampler;
+use crate::measure::bias::BiasVerdict;
 use crate::measure::figure::{FIGURES, Figure, figure};
 use crate::measure::gate::fault_text;
 use crate::measure::record::*;
@@ -77,6 +78,8 @@ pub struct Measured<'a, T> {
     pub structure: String,
     /// Name of the sampler that it was timed with.
     pub sampler: String,
+    /// What ran.
+    pub ran: &'a Ran,
     /// The record.
     pub body: &'a T,
 }
@@ -151,7 +154,7 @@ impl<'a> RunData<'a> {
                     put(&mut data.costs, line.of(record), |a, b| a.key == b.key)
                 }
                 Body::Spectrum(record) => data.sampler(&line.key).spectrum = Some(record),
-                Body::Bias(record) => data.sampler(&line.key).bias = Some(record),
+                Body::Bias(record) => data.sampler(&line.key).bias = Some(record.clone()),
                 Body::Scene(record) => {
                     data.scene(line.key.label(axis::SCENE)).record = Some(record)
                 }
@@ -160,6 +163,7 @@ impl<'a> RunData<'a> {
                     let measured = Measured {
                         structure: data.names.structure(&key),
                         sampler: String::new(),
+                        ran: &line.ran,
                         key,
                         body: record,
                     };
@@ -173,6 +177,7 @@ impl<'a> RunData<'a> {
                     let measured = Measured {
                         structure: key.label(axis::ACCEL).to_owned(),
                         sampler: data.sampler(&line.key).name.clone(),
+                        ran: &line.ran,
                         key,
                         body: record,
                     };
@@ -189,7 +194,33 @@ impl<'a> RunData<'a> {
             data.refer_to(reference);
         }
         data.name_competitors();
+        data.judge_biases_together();
         data
+    }
+
+    /// Every sampler was tested at its share of the run's level. Those found biased need theirs no more: the
+    /// others share the level anew, until no more are found (Holm 1979; the chance that any sampler without bias
+    /// is called biased stays below the level).
+    fn judge_biases_together(&mut self) {
+        let views = self.scenes.iter_mut().flat_map(|scene| &mut scene.views);
+        let samplers = views.flat_map(|view| &mut view.samplers);
+        let biases = samplers.filter_map(|sampler| sampler.bias.as_mut());
+        let mut tested: Vec<&mut BiasRecord> = biases.filter(|bias| !bias.by_design).collect();
+        loop {
+            let is_biased = |bias: &&mut BiasRecord| bias.verdict == BiasVerdict::Biased;
+            let found = tested.iter().filter(|bias| is_biased(bias)).count() as f64;
+            let is_next = |bias: &&mut BiasRecord| {
+                let (Some(p), Some(level)) = (bias.p_of_all, bias.alpha_of_run) else {
+                    return false;
+                };
+                let left = (level / bias.alpha).round() - found;
+                bias.verdict == BiasVerdict::NoBiasFound && p <= level / left.max(1.0)
+            };
+            let Some(next) = tested.iter_mut().find(|bias| is_next(bias)) else {
+                return;
+            };
+            next.verdict = BiasVerdict::Biased;
+        }
     }
 
     /// Gives a reference to every view that it is of. One whose value is known was not rendered, so that

@@ -27,7 +27,7 @@ pub struct MeasuredSampler<'a> {
     /// Its replicates.
     pub replicates: Vec<&'a ErrorRecord>,
     /// Verdict on its bias.
-    pub bias: Option<&'a BiasRecord>,
+    pub bias: Option<BiasRecord>,
     /// What its error looks like.
     pub spectrum: Option<&'a SpectrumRecord>,
 }
@@ -147,7 +147,7 @@ impl<'a> MeasuredSampler<'a> {
             return Some(format!("{bad} NaN or infinite pixels"));
         }
         let is_biased = |bias: &&BiasRecord| bias.verdict == BiasVerdict::Biased;
-        let bias = self.bias.filter(is_biased)?;
+        let bias = self.bias.as_ref().filter(is_biased)?;
         let design = if bias.by_design { " by design" } else { "" };
         let tiles = format!("{} of {} tiles rejected", bias.rejected, bias.tiles);
         let of_image = bias.p.map_or(String::new(), |p| {

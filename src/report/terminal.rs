@@ -3,7 +3,7 @@
 use super::data::RunData;
 use super::document::{Table, TableCell};
 use super::samplers::Metric;
-use super::sections::{belief, run, samplers, structures, verdict};
+use super::sections::{belief, kernels, rendering, run, samplers, structures, verdict};
 use super::values::{of_structures, of_view};
 use crate::measure::record::{Line, Verdict};
 
@@ -15,16 +15,22 @@ pub fn terminal_tables(records: &[Line]) -> String {
         let values = of_structures(&data, scene);
         tables.push(structures::speed_table(scene, &values));
         tables.push(structures::outside_table(&data, scene, &values));
+        let mut of_views = Vec::new();
         for view in &scene.views {
             let values = of_view(scene, view);
             tables.push(samplers::error_table(view, &values, Metric::RelMse));
             tables.push(samplers::efficiency_table(view, &values));
+            of_views.extend(values);
         }
+        tables.push(kernels::gains_table(scene, &of_views));
         tables.push(verdict::table(scene));
     }
     let mut out = String::new();
     for table in tables.iter().filter(|table| !table.rows.is_empty()) {
         out += &(aligned(table) + "\n");
+    }
+    for line in data.scenes.iter().flat_map(rendering::disagreements) {
+        out += &format!("warning: {line}\n");
     }
     if data.run.is_some_and(|run| run.environment.software) {
         out += "Software adapter: times compare structures on this adapter only.\n";

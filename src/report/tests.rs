@@ -3,6 +3,7 @@
 mod checks;
 mod fixture;
 mod names;
+mod rendering;
 
 use super::*;
 use crate::measure::bias::BiasVerdict;
@@ -49,7 +50,7 @@ fn path_view<'d, 'a>(data: &'d data::RunData<'a>) -> &'d data::View<'a> {
 }
 
 /// The full run with some records changed.
-fn changed(change: impl Fn(&Key, &mut Body)) -> Vec<Line> {
+fn changed(mut change: impl FnMut(&Key, &mut Body)) -> Vec<Line> {
     let mut lines = full_run();
     lines
         .iter_mut()
@@ -242,6 +243,36 @@ fn a_bias_by_design_never_wins_and_is_no_failure() {
     assert!(bias.detail.contains("2 biased by design"), "{bias:?}");
     let (html, _) = report("by-design", &lines);
     assert!(html.contains("biased by design: 57 of 432 tiles rejected, image z = "));
+}
+
+/// Of the first sampler of a view that is not biased, p = 0.3 % against a share of 1 % of `level`: how many are biased?
+fn biased_samplers(level: Option<f64>, found: usize) -> usize {
+    let mut seen = 0;
+    let lines = changed(|_, body| {
+        if let Body::Bias(b) = body {
+            seen += 1;
+            b.alpha = 0.0025;
+            b.alpha_of_run = level;
+            b.p_of_all = Some(if seen == 1 { 0.003 } else { 0.9 });
+            b.verdict = match (2..2 + found).contains(&seen) {
+                true => BiasVerdict::Biased,
+                false => BiasVerdict::NoBiasFound,
+            };
+        }
+    });
+    let data = RunData::new(&lines);
+    let samplers = data.views().flat_map(|(_, view)| &view.samplers);
+    samplers.filter(|s| s.fault().is_some()).count()
+}
+
+#[test]
+fn samplers_that_are_biased_leave_their_share_of_the_level_to_the_others() {
+    // Four share 1 %: 0.3 % is more than a quarter of it, and less than a third.
+    assert_eq!(biased_samplers(Some(0.01), 0), 0);
+    assert_eq!(biased_samplers(Some(0.01), 1), 2);
+    assert_eq!(biased_samplers(Some(0.01), 2), 3);
+    // Records that do not know the level of the run stay as they are.
+    assert_eq!(biased_samplers(None, 1), 1);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::data::{RunData, SceneGroup, View};
 use super::document::TableCell;
 use super::format;
 use super::samplers::Metric;
-use super::sections::{trade_off, verdict::Race};
+use super::sections::{kernels, trade_off, verdict::Race};
 use crate::measure::figure::{Figure, figure};
 use crate::measure::record::*;
 use std::borrow::Cow;
@@ -208,7 +208,7 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
             let key = key.clone().with(axis::SPP, spp);
             values.extend(Value::known(&key, sampler.further(spp)));
         }
-        values.extend(sampler.bias.into_iter().flat_map(|bias| of_bias(key, bias)));
+        values.extend(sampler.bias.iter().flat_map(|bias| of_bias(key, bias)));
         let spectrum = sampler.spectrum.into_iter();
         values.extend(spectrum.flat_map(|s| of_spectrum(key, s)));
         for time in view.valid_times().filter(|t| t.sampler == sampler.name) {
@@ -224,6 +224,7 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
     values.extend(mse);
     values.extend(Race::new(view).iter().flat_map(Race::values));
     values.extend(trade_off::times_to_image(scene, view));
+    values.extend(kernels::gains(scene, view));
     values
 }
 

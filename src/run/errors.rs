@@ -1,5 +1,6 @@
 //! Error: once per scene, integrator and sampler, through the fastest gated structure.
 
+use super::adaptive;
 use super::images::{self, Estimator, IMAGE_AXES, attributes, sampler_label, write_spread};
 use super::paths;
 use super::reference::{Yardstick, reference, reference_structure};
@@ -116,9 +117,9 @@ fn all_errors(
 }
 
 /// One render of a replicate, and the numbers of samples at which its image is kept.
-struct Pass<'a> {
-    renderer: Renderer<'a>,
-    spps: Vec<u32>,
+pub(super) struct Pass<'a> {
+    pub renderer: Renderer<'a>,
+    pub spps: Vec<u32>,
     /// Hash of the sampler's words.
     table: String,
 }
@@ -146,10 +147,20 @@ fn passes<'a>(
         vec![(spps, whole)]
     };
     let seeds = session.experiment.seeds().replicates;
+    let is_by_tile = session
+        .experiment
+        .stop
+        .is_some_and(|rule| rule.tile.is_some());
+    let by_blocks = is_by_tile && cell.randomised;
     let pass = |(spps, estimator): (Vec<u32>, Estimator)| {
         let words = bytemuck::cast_slice(estimator.sampler.table.words());
         Ok(Pass {
-            renderer: estimator.renderer(session, world, &fastest.traced, &seeds, [true, false])?,
+            renderer: match by_blocks {
+                true => estimator.by_blocks(session, world, &fastest.traced, &seeds)?,
+                false => {
+                    estimator.renderer(session, world, &fastest.traced, &seeds, [true, false])?
+                }
+            },
             spps,
             table: blake3::hash(words).to_hex().to_string(),
         })
@@ -194,9 +205,13 @@ fn sampler_error(
     ];
     let hash = content_hash(&blank, &world.scene.hash, &made_of);
     let line = |body| blank.clone().hashed(&hash).with_body(|()| body);
-    let replicates = match rule {
-        None => all_samples(session, cell, yardstick, &passes, &line)?,
-        Some(rule) => until_met(session, cell, yardstick, &passes, &line, rule)?,
+    let by_tile = rule.and_then(|rule| Some((rule, rule.tile?)));
+    let replicates = match (rule, by_tile.filter(|_| cell.randomised)) {
+        (_, Some(by_tile)) => {
+            adaptive::by_tile(session, cell, yardstick, single(&passes)?, &line, by_tile)?
+        }
+        (None, _) => all_samples(session, cell, yardstick, &passes, &line)?,
+        (Some(rule), _) => until_met(session, cell, yardstick, &passes, &line, rule)?,
     };
     session.finish(cell.to_string());
     let spp = replicates.spp;
@@ -209,14 +224,25 @@ fn sampler_error(
     Ok(())
 }
 
+/// The one pass of a sampler whose points do not depend on how many there are.
+fn single<'p, 'a>(passes: &'p [Pass<'a>]) -> Result<&'p Pass<'a>, Fault> {
+    match passes {
+        [only] => Ok(only),
+        _ => Err(Fault::Cell(
+            "its points are others for each number of samples: tiles cannot take different numbers"
+                .to_owned(),
+        )),
+    }
+}
+
 /// The images of all replicates at the most samples per pixel that they took.
-struct Replicates {
-    spp: u32,
-    images: Vec<Image>,
+pub(super) struct Replicates {
+    pub spp: u32,
+    pub images: Vec<Image>,
 }
 
 /// The seeds of a sampler's replicates, by their numbers.
-fn replicates(session: &Session, cell: &Cell) -> Vec<(u32, u32)> {
+pub(super) fn replicates(session: &Session, cell: &Cell) -> Vec<(u32, u32)> {
     let seeds = session.experiment.seeds().replicates;
     let count = session.plan.renders(cell) as usize;
     (0..).zip(seeds.into_iter().take(count)).collect()
@@ -238,7 +264,12 @@ fn all_samples(
             let rendered = session.clock.time("gpu", render);
             snapshots.extend(rendered.map_err(|e| e.to_string())?);
         }
-        let record = error_record(session, cell, yardstick, &snapshots, (replicate, seed))?;
+        let mut record = blank_record(session, cell, (replicate, seed));
+        for snapshot in &snapshots {
+            add_error(session, cell, yardstick, &mut record, snapshot)?;
+        }
+        let last = snapshots.last().ok_or("nothing was rendered".to_owned())?;
+        draw(session, cell, yardstick, &mut record, last)?;
         check_finite(&record)?;
         session.write(&line(Body::Error(record)))?;
         images.extend(snapshots.into_iter().last().map(|s| s.image));
@@ -265,33 +296,33 @@ fn until_met(
         .flat_map(|pass| pass.spps.iter().map(move |spp| (pass, *spp)))
         .collect();
     let seeds = replicates(session, cell);
-    let mut snapshots: Vec<Vec<Snapshot>> = vec![Vec::new(); seeds.len()];
-    let mut records: Vec<ErrorRecord> = Vec::new();
+    let blank = |of: &(u32, u32)| blank_record(session, cell, *of);
+    let mut records: Vec<ErrorRecord> = seeds.iter().map(blank).collect();
+    let mut last: Vec<Snapshot> = Vec::new();
     for &(pass, spp) in &steps {
-        records.clear();
-        for (taken, &(replicate, seed)) in snapshots.iter_mut().zip(&seeds) {
-            let before = taken.last().filter(|_| pass.spps.len() > 1);
-            let further = || further_samples(pass, before, spp, seed);
+        for (index, record) in records.iter_mut().enumerate() {
+            let before = last.get(index).filter(|_| pass.spps.len() > 1);
+            let further = || further_samples(pass, before, spp, record.seed);
             let snapshot = session.clock.time("gpu", further);
-            taken.push(snapshot.map_err(|e| e.to_string())?);
-            let record = error_record(session, cell, yardstick, taken, (replicate, seed))?;
-            check_finite(&record)?;
-            records.push(record);
+            let snapshot = snapshot.map_err(|e| e.to_string())?;
+            add_error(session, cell, yardstick, record, &snapshot)?;
+            check_finite(record)?;
+            match last.get_mut(index) {
+                Some(place) => *place = snapshot,
+                None => last.push(snapshot),
+            }
         }
         let all: Vec<&ErrorRecord> = records.iter().collect();
         if is_met_by(&rule, &all, spp, steps.len()) {
             break;
         }
     }
-    for record in &mut records {
+    for (mut record, snapshot) in records.into_iter().zip(&last) {
         record.stop = Some(rule);
-        session.write(&line(Body::Error(record.clone())))?;
+        draw(session, cell, yardstick, &mut record, snapshot)?;
+        session.write(&line(Body::Error(record)))?;
         session.progress.inc(1);
     }
-    let last = snapshots
-        .into_iter()
-        .filter_map(|taken| taken.into_iter().last());
-    let last: Vec<Snapshot> = last.collect();
     Ok(Replicates {
         spp: last.first().map_or(0, |snapshot| snapshot.spp),
         images: last.into_iter().map(|snapshot| snapshot.image).collect(),
@@ -320,7 +351,7 @@ fn further_samples(
     Ok(Snapshot { spp, image })
 }
 
-fn check_finite(record: &ErrorRecord) -> Result<(), String> {
+pub(super) fn check_finite(record: &ErrorRecord) -> Result<(), String> {
     match record.non_finite_pixels {
         0 => Ok(()),
         count => {
@@ -360,51 +391,68 @@ fn spectrum_record(
     })
 }
 
-fn error_record(
+/// The record of a replicate of which nothing was measured.
+pub(super) fn blank_record(
     session: &Session,
     cell: &Cell,
-    yardstick: &Yardstick,
-    snapshots: &[Snapshot],
     (replicate, seed): (u32, u32),
-) -> Result<ErrorRecord, Fault> {
-    let reference = &yardstick.reference;
-    let facts = session.registries.samplers.facts(&cell[Axis::Sequence]);
-    let base_2 = facts.is_ok_and(|facts| facts.base_2);
-    let mut errors = Vec::new();
-    let mut non_finite_pixels = 0;
-    for snapshot in snapshots {
-        let report = measure(&snapshot.image, reference).map_err(|e| e.to_string())?;
-        non_finite_pixels = non_finite_pixels.max(report.non_finite_pixels);
-        errors.push(ErrorAtSpp {
-            partial_net: base_2 && !snapshot.spp.is_power_of_two(),
-            spp: snapshot.spp,
-            metrics: report.metrics,
-            without_part: report.without_part,
-        });
-    }
-    let last = snapshots.last().ok_or("nothing was rendered".to_owned())?;
-    let mut record = ErrorRecord {
+) -> ErrorRecord {
+    ErrorRecord {
         randomised: cell.randomised,
         replicate,
         seed,
         resolution: session.experiment.resolution,
-        errors,
+        errors: Vec::new(),
         stop: None,
-        non_finite_pixels,
-        image_hash: image_hash(&last.image),
+        non_finite_pixels: 0,
+        image_hash: String::new(),
         image: None,
         error_map: None,
-    };
-    if replicate == 0 {
-        let labels = cell.labels(&IMAGE_AXES);
-        let draw = |kind, picture: &Picture| session.picture(kind, &labels, picture);
-        record.image = draw("image", &tone_map(&last.image, yardstick.exposure))?;
-        let about = attributes(cell, &sampler_label(cell), last.spp, seed);
-        session.linear("image", &labels, &last.image, &about)?;
-        let map = error_map(&last.image, reference, ERROR_MAP_FULL_SCALE, viridis);
-        record.error_map = draw("error", &map.map_err(|e| e.to_string())?)?;
     }
-    Ok(record)
+}
+
+/// Adds what is measured of the next image of a replicate.
+pub(super) fn add_error(
+    session: &Session,
+    cell: &Cell,
+    yardstick: &Yardstick,
+    record: &mut ErrorRecord,
+    snapshot: &Snapshot,
+) -> Result<(), String> {
+    let facts = session.registries.samplers.facts(&cell[Axis::Sequence]);
+    let base_2 = facts.is_ok_and(|facts| facts.base_2);
+    let report = measure(&snapshot.image, &yardstick.reference).map_err(|e| e.to_string())?;
+    record.non_finite_pixels = record.non_finite_pixels.max(report.non_finite_pixels);
+    record.image_hash = image_hash(&snapshot.image);
+    record.errors.push(ErrorAtSpp {
+        partial_net: base_2 && !snapshot.spp.is_power_of_two(),
+        spp: snapshot.spp,
+        metrics: report.metrics,
+        without_part: report.without_part,
+    });
+    Ok(())
+}
+
+/// Writes the pictures of the first replicate, and tells its record where.
+pub(super) fn draw(
+    session: &Session,
+    cell: &Cell,
+    yardstick: &Yardstick,
+    record: &mut ErrorRecord,
+    last: &Snapshot,
+) -> Result<(), Fault> {
+    if record.replicate > 0 {
+        return Ok(());
+    }
+    let labels = cell.labels(&IMAGE_AXES);
+    let draw = |kind, picture: &Picture| session.picture(kind, &labels, picture);
+    record.image = draw("image", &tone_map(&last.image, yardstick.exposure))?;
+    let about = attributes(cell, &sampler_label(cell), last.spp, record.seed);
+    session.linear("image", &labels, &last.image, &about)?;
+    let reference = &yardstick.reference;
+    let map = error_map(&last.image, reference, ERROR_MAP_FULL_SCALE, viridis);
+    record.error_map = draw("error", &map.map_err(|e| e.to_string())?)?;
+    Ok(())
 }
 
 /// The probability of a false alarm is shared out among all samplers of the run that claim to have no
@@ -435,6 +483,8 @@ fn bias_record(
         tiles: check.tiles,
         rejected: check.rejected.len(),
         alpha: check.alpha,
+        alpha_of_run: Some(defaults.alpha),
+        p_of_all: Some(check.p).filter(|_| cell.randomised),
         min_p: check.min_p,
         p_histogram: check.p_histogram.to_vec(),
         z: whole.map(|test| test.t).filter(|t| t.is_finite()),

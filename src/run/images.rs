@@ -123,6 +123,27 @@ impl Estimator {
         }
     }
 
+    /// The same, with samples in chosen blocks of pixels alone.
+    ///
+    /// # Errors
+    /// As [`Estimator::renderer`], or the integrator cannot do that.
+    pub fn by_blocks<'a>(
+        &self,
+        session: &mut Session,
+        world: &'a World,
+        traced: &Traced,
+        seeds: &[u32],
+    ) -> Result<Renderer<'a>, String> {
+        let device: &'a Device = world.device;
+        let gpu = device.of(&self.kernels).map_err(|e| e.to_string())?;
+        words::check(session, gpu, &self.sampler, seeds)?;
+        let job = self.job(session, world.camera, true);
+        let compiled = session.clock.time("gpu", || {
+            Renderer::by_blocks(gpu, &world.buffers, traced, &job)
+        });
+        compiled.map_err(|e| e.to_string())
+    }
+
     /// The compiled image of a world. The sampler's words were compared with those of its
     /// twin, in all that `seeds` make of them.
     ///

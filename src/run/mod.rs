@@ -3,12 +3,15 @@
 //! config → scene → accel → gpu → integrator → measure → records. Reports are made from the records alone,
 //! by others.
 
+mod adaptive;
 mod errors;
 mod folder;
 mod images;
 mod kernels;
+mod known_images;
 mod paths;
 mod reference;
+mod reference_cache;
 mod reference_file;
 mod registries;
 mod render;
@@ -23,6 +26,8 @@ mod world;
 
 pub use folder::{Existing, Interrupt, Interrupted, lock_folder};
 pub use kernels::{Kernels, kernel_library};
+pub use known_images::verify_images;
+pub use reference_cache::user_cache;
 pub use registries::Registries;
 pub use render::{Rendering, render};
 
@@ -53,6 +58,8 @@ pub struct RunOptions {
     pub adapter: AdapterChoice,
     /// Whether, and in which format, linear radiance is written beside the pictures of a run.
     pub images: Option<&'static FileFormat>,
+    /// Folder in which rendered references are kept for later runs; `None`: each run renders its own.
+    pub cache: Option<PathBuf>,
     /// Whether models may name files outside their folder: see [`crate::scene::LoadOptions`].
     pub allow_outside: bool,
     /// Whether to draw a progress bar on standard error.
@@ -287,7 +294,8 @@ fn run_world(
     Ok(())
 }
 
-/// Runs the gate alone on every structure of a plan, with `rays` rays of each class.
+/// Runs the gate alone on every structure of a plan, with `rays` rays of each class; integrators are judged on all `trials`, too
+/// ([`crate::measure::trial_scenes`]), or on those alone that are of the plan's scenes.
 ///
 /// # Errors
 /// No adapter.
@@ -297,12 +305,14 @@ pub fn verify(
     registries: &Registries,
     options: &RunOptions,
     rays: u32,
+    trials: bool,
 ) -> Result<Vec<Verified>, RunError> {
     let device = Device::open(options, &Kernels::load(&plan.kernels, registries)?)?;
     let mut experiment = experiment.clone();
     experiment.gate.rays = rays;
     experiment.timing.rays = rays;
     let mut session = Session::unrecorded(&experiment, plan, registries, options);
+    session.judges_trials = trials;
     let mut verified = Vec::new();
     for scene in &plan.scenes {
         let loaded = match Loaded::new(&mut session, scene) {

@@ -4,14 +4,21 @@ use super::session::{Session, content_hash};
 use super::world::World;
 use super::{Fault, RunError};
 use crate::config::{Axis, Cell};
-use crate::integrator::{ConfiguredIntegrator, RayOffset, RenderJob, Renderer, Traced};
-use crate::measure::image_gate::{Answer, Pixels, answers, judge};
+use crate::geometry::Camera;
+use crate::gpu::Gpu;
+use crate::integrator::{ConfiguredIntegrator, RayOffset, RenderJob, Renderer, Stage, Traced};
+use crate::measure::image_gate::{Answer, Pixels, answers, judge, sums};
 use crate::measure::path_oracle::{Estimator, PathOracle, View};
 use crate::measure::record::{Body, Key, Line, PathsRecord, Ran};
+use crate::measure::trial_scenes::{TrialScene, trial_scenes, trials_of};
+use crate::params::{Params, Variant};
 use crate::sampling::Sampler;
 
 /// Of the frame that is judged: no square, and no multiple of a workgroup.
 const SIZE: [u32; 2] = [26, 19];
+
+/// Through which trial scenes are traced.
+const STRUCTURE: &str = "bvh";
 
 /// What an outcome depends on beside the world: the first sampler of each does.
 const AXES: [Axis; 3] = [Axis::Integrator, Axis::Offset, Axis::Kernels];
@@ -107,7 +114,18 @@ fn judge_and_record(
     Ok(record)
 }
 
-/// The verdict and the kernels that it is on, or why there is none.
+/// What is judged: a scene on the device with the kernels of a cell.
+struct Subject<'a> {
+    stage: &'a Stage,
+    gpu: &'a Gpu,
+    traced: &'a Traced,
+    camera: Camera,
+    cell: &'a Cell,
+    offset: RayOffset,
+}
+
+/// The verdict and the kernels that it is on, or why there is none. Trial scenes join what a scene may show too little of; by
+/// `verify` all of them may do, once for each integrator and its kernels.
 fn made(
     session: &mut Session,
     world: &World,
@@ -118,7 +136,7 @@ fn made(
     let registries = session.registries;
     let integrator = registries.integrators.configured(&cell[Axis::Integrator]);
     let integrator = integrator.map_err(|e| e.to_string())?;
-    let estimator = Estimator::of(&integrator)?;
+    Estimator::of(&integrator)?;
     let offset = registries.offset(cell)?;
     if !offset.is_unbiased {
         return Err(format!("rays that start by offset `{}`", offset.name));
@@ -126,17 +144,100 @@ fn made(
     if let Some(reason) = integrator.refusal(traced) {
         return Err(reason);
     }
-    let oracle = (session.clock).time("judge", || PathOracle::new(&world.scene))?;
+    let gpu = world.device.of(&cell[Axis::Kernels]);
+    let subject = Subject {
+        stage: &world.stage,
+        gpu: gpu.map_err(|e| e.to_string())?,
+        traced,
+        camera: world.camera,
+        cell,
+        offset,
+    };
+    let (mut record, ran) = judged(session, &subject, &integrator, extent)?;
+    let of = [Axis::Offset, Axis::Kernels];
+    let all = format!("trial scenes, {}, {}", cell.on(&of), integrator.kind.name());
+    let trials = match session.judges_trials {
+        true if session.judged.insert(all, None).is_none() => trial_scenes(),
+        true => Ok(Vec::new()),
+        false => trials_of(&world.scene, &integrator),
+    };
+    for trial in trials.map_err(|e| e.to_string())? {
+        if record.fault.is_none() {
+            record = record.and(of_trial(session, &subject, &integrator, &trial)?);
+        }
+    }
+    Ok((record, ran))
+}
+
+/// Judges the trials of this integrator on a trial scene, or itself where the scene lists none.
+fn of_trial(
+    session: &mut Session,
+    subject: &Subject,
+    integrator: &ConfiguredIntegrator,
+    trial: &TrialScene,
+) -> Result<PathsRecord, String> {
+    let registries = session.registries;
+    let name = integrator.kind.name();
+    let listed = trial.trials.iter().filter(|(of, _)| *of == name);
+    let listed = listed.map(|(_, changes)| {
+        let changes = changes.iter().map(|(k, v)| ((*k).to_owned(), v.clone()));
+        let variant = Variant {
+            name: name.to_owned(),
+            params: Params(changes.collect()),
+            ..Variant::default()
+        };
+        registries.integrators.configured(&variant)
+    });
+    let listed: Result<Vec<_>, _> = listed.collect();
+    let listed = listed.map_err(|e| e.to_string())?;
+    let own = [integrator];
+    let integrators: Vec<&ConfiguredIntegrator> = match trial.trials.is_empty() {
+        true => own.to_vec(),
+        false => listed.iter().collect(),
+    };
+    let mut all = PathsRecord::default();
+    if integrators.is_empty() {
+        return Ok(all);
+    }
+    let tests = subject.stage.soup.intersection;
+    let stage = Stage::new(subject.gpu, trial.scene.clone(), tests).map_err(|e| e.to_string())?;
+    let traced = stage.structure(&registries.accel, STRUCTURE);
+    let on_trial = Subject {
+        stage: &stage,
+        traced: &traced.map_err(|e| e.to_string())?,
+        camera: trial.scene.view(1.0),
+        ..*subject
+    };
+    for integrator in integrators {
+        let (mut record, _) = judged(session, &on_trial, integrator, RUN)?;
+        let told = |fault: String| format!("on the trial scene `{}`: {fault}", trial.scene.name);
+        record.fault = record.fault.map(told);
+        all = all.and(record);
+        if all.fault.is_some() {
+            break;
+        }
+    }
+    Ok(all)
+}
+
+/// The verdict on an integrator.
+fn judged(
+    session: &mut Session,
+    subject: &Subject,
+    integrator: &ConfiguredIntegrator,
+    extent: Extent,
+) -> Result<(PathsRecord, Ran), String> {
+    let cell = subject.cell;
+    let oracle = (session.clock).time("judge", || PathOracle::new(&subject.stage.scene))?;
     let spp = session.experiment.spp.max();
     let demand = integrator.demand(spp, SIZE[0]);
     let (sequence, decorrelation) = (&cell[Axis::Sequence], &cell[Axis::Decorrelation]);
-    let sampler = registries
-        .samplers
-        .sampler(sequence, decorrelation, &demand);
+    let samplers = &session.registries.samplers;
+    let sampler = samplers.sampler(sequence, decorrelation, &demand);
     let sampler = sampler.map_err(|e| e.to_string())?;
     let view = View {
-        estimator,
-        camera: world.camera,
+        estimator: Estimator::of(integrator)?,
+        camera: subject.camera,
         size: SIZE,
         sampler: &sampler,
     };
@@ -147,18 +248,12 @@ fn made(
         samples: spread(spp, extent.samples),
         seed: seed.unwrap_or_default(),
     };
-    let (answers, ran) = session.clock.time("gate", || {
-        render(
-            world,
-            traced,
-            cell,
-            (&integrator, offset, &sampler),
-            &pixels,
-        )
-    })?;
-    let record = session
+    let (answers, sums, ran) =
+        (session.clock).time("gate", || render(subject, (integrator, &sampler), &pixels))?;
+    let mut record = session
         .clock
         .time("judge", || judge(&oracle, &view, &answers));
+    record.fault = record.fault.or(sums);
     Ok((record, ran))
 }
 
@@ -171,29 +266,25 @@ fn spread(spp: u32, count: u32) -> Vec<u32> {
     indices
 }
 
-/// What the kernels answer.
+/// What the kernels answer, and what is wrong with their sums.
 fn render(
-    world: &World,
-    traced: &Traced,
-    cell: &Cell,
-    (integrator, offset, sampler): (&ConfiguredIntegrator, RayOffset, &Sampler),
+    subject: &Subject,
+    (integrator, sampler): (&ConfiguredIntegrator, &Sampler),
     pixels: &Pixels,
-) -> Result<(Vec<Answer>, Ran), String> {
-    let gpu = world
-        .device
-        .of(&cell[Axis::Kernels])
-        .map_err(|e| e.to_string())?;
+) -> Result<(Vec<Answer>, Option<String>, Ran), String> {
     let job = RenderJob {
         size: pixels.size,
-        camera: world.camera,
+        camera: subject.camera,
         sampler,
         integrator,
-        offset,
+        offset: subject.offset,
         runtime_checks: true,
     };
-    let renderer = Renderer::new(gpu, &world.buffers, traced, &job, false);
+    let buffers = &subject.stage.buffers;
+    let renderer = Renderer::new(subject.gpu, buffers, subject.traced, &job, false);
     let renderer = renderer.map_err(|e| e.to_string())?;
     let ran = Ran::kernel(renderer.kernel_hash());
     let answers = answers(&renderer, pixels).map_err(|e| e.to_string())?;
-    Ok((answers, ran))
+    let sums = sums(&renderer, pixels).map_err(|e| e.to_string())?;
+    Ok((answers, sums, ran))
 }

@@ -1,13 +1,14 @@
 //! References: what images are compared with, and the exposure of their pictures.
 
 use super::images::{Estimator, attributes};
+use super::reference_cache::Kept;
 use super::session::{Session, content_hash};
 use super::structures::{self, Gated};
 use super::world::World;
 use super::{Fault, RunError};
 use crate::config::{Axis, Cell, REFERENCE_PARTS};
 use crate::image::{Image, automatic_exposure, tone_map};
-use crate::integrator::{Traced, rounding_bound};
+use crate::integrator::{Renderer, Traced, rounding_bound};
 use crate::measure::metrics::Reference;
 use crate::measure::record::{Body, Key, Line, Ran, ReferenceRecord};
 use crate::params::{Entry, Variant};
@@ -89,21 +90,39 @@ pub(super) fn reference(
     let estimator = Estimator::new(session, &cell, spp)?;
     let seeds = session.experiment.seeds().reference_parts;
     let renderer = estimator.renderer(session, world, traced, &seeds, [true, false])?;
-    let mut parts = Vec::new();
-    for &seed in &seeds {
-        let shots = session.clock.time("gpu", || renderer.render(&[spp], seed));
-        let shots = shots.map_err(|e| e.to_string())?;
-        parts.extend(shots.into_iter().map(|s| s.image));
-        session.progress.inc(1);
+    let sampler = estimator.sampler.label();
+    let ran = Ran::kernel(renderer.kernel_hash());
+    let blank = Line::new(key, ran, ());
+    let words = bytemuck::cast_slice(estimator.sampler.table.words());
+    let points = format!("{sampler}, {spp} spp, {}", blake3::hash(words).to_hex());
+    let hash = reference_hash(session, world, &blank, &points);
+    let size = session.experiment.resolution;
+    let place = session
+        .options
+        .cache
+        .as_ref()
+        .and_then(|folder| Kept::new(folder, world, &hash, size, REFERENCE_PARTS as usize));
+    let kept = place.as_ref().and_then(Kept::read);
+    let cached = kept.is_some();
+    let parts = match kept {
+        Some(parts) => {
+            session.progress.inc(parts.len() as u64);
+            parts
+        }
+        None => rendered_parts(session, &renderer, spp, &seeds)?,
+    };
+    if let Some(Err(error)) = place.filter(|_| !cached).map(|place| place.write(&parts)) {
+        session.warn("reference", format!("is not kept for later runs: {error}"))?;
     }
     let reference = Reference::from_parts(parts).map_err(|e| e.to_string())?;
     let record = ReferenceRecord {
         spp: spp * REFERENCE_PARTS,
-        sampler: estimator.sampler.label(),
+        cached,
+        sampler,
         seconds: start.elapsed().as_secs_f64(),
         ..reference_record(&reference)
     };
-    let line = Line::new(key, Ran::kernel(renderer.kernel_hash()), record);
+    let line = blank.with_body(|()| record);
     Ok(finish_reference(
         session,
         world,
@@ -112,6 +131,42 @@ pub(super) fn reference(
         reference,
         rounding_bound(spp),
     )?)
+}
+
+/// The independent parts of a reference.
+fn rendered_parts(
+    session: &mut Session,
+    renderer: &Renderer,
+    spp: u32,
+    seeds: &[u32],
+) -> Result<Vec<Image>, Fault> {
+    let mut parts = Vec::new();
+    for &seed in seeds {
+        let shots = session.clock.time("gpu", || renderer.render(&[spp], seed));
+        let shots = shots.map_err(|e| e.to_string())?;
+        parts.extend(shots.into_iter().map(|s| s.image));
+        session.progress.inc(1);
+    }
+    Ok(parts)
+}
+
+/// Content hash of a reference, made of these `points`.
+fn reference_hash<B>(session: &Session, world: &World, line: &Line<B>, points: &str) -> String {
+    let file = session.reference_file.as_ref();
+    let seeds = &session.experiment.seeds().reference_parts;
+    let [seeds, camera, size] = [
+        format!("{seeds:?}"),
+        format!("{:?}", world.camera),
+        format!("{:?}", session.experiment.resolution),
+    ];
+    let made_of = [
+        ("sampler", points),
+        ("file", file.map_or("", |file| &file.hash)),
+        ("seeds", &seeds),
+        ("camera", &camera),
+        ("resolution", &size),
+    ];
+    content_hash(line, &world.scene.hash, &made_of)
 }
 
 /// The image of a file: nothing is rendered, and nothing is known of its noise or rounding.
@@ -160,6 +215,7 @@ fn reference_record(reference: &Reference) -> ReferenceRecord {
     ReferenceRecord {
         spp: 0,
         exact: None,
+        cached: false,
         file: None,
         sampler: "exact".to_owned(),
         seconds: 0.0,
@@ -194,21 +250,7 @@ fn finish_reference(
     let done = format!("reference {}: done", labels.join(", "));
     if !session.is_done(&done) {
         let sampler = format!("{}, {} spp", line.body.sampler, line.body.spp);
-        let file = session.reference_file.as_ref();
-        let seeds = &session.experiment.seeds().reference_parts;
-        let [seeds, camera, size] = [
-            format!("{seeds:?}"),
-            format!("{:?}", world.camera),
-            format!("{:?}", session.experiment.resolution),
-        ];
-        let made_of = [
-            ("sampler", sampler.as_str()),
-            ("file", file.map_or("", |file| &file.hash)),
-            ("seeds", &seeds),
-            ("camera", &camera),
-            ("resolution", &size),
-        ];
-        let hash = content_hash(&line, &world.scene.hash, &made_of);
+        let hash = reference_hash(session, world, &line, &sampler);
         session.write(&line.hashed(hash).with_body(Body::Reference))?;
         session.finish(done);
     }

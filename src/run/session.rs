@@ -64,6 +64,8 @@ pub(super) struct Session<'a> {
     pub reference_file: Option<ReferenceFile>,
     /// What is wrong with the integrators that were judged.
     pub judged: BTreeMap<String, Option<String>>,
+    /// Whether they are judged on all trial scenes, and not on those alone that are of a scene.
+    pub judges_trials: bool,
     /// `None`: nothing is written (gate alone, single images).
     folder: Option<Arc<Folder>>,
 }
@@ -117,6 +119,7 @@ impl<'a> Session<'a> {
             compared: HashSet::new(),
             reference_file: None,
             judged: BTreeMap::new(),
+            judges_trials: false,
             folder: None,
         }
     }

@@ -237,6 +237,7 @@ fn finish(
     line.ran = Ran {
         kernel_hash: item.renderer.kernel_hash(),
         features: item.renderer.features(),
+        left_out: item.renderer.left_out(),
         unchecked: !item.runtime_checks,
     };
     Ok(line)

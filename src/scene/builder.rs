@@ -2,7 +2,7 @@
 
 use super::{
     Assembly, Daylight, Framing, GEOMETRIC, InstanceError, Light, LightList, LoadReport, Material,
-    SceneData, SceneError, Texture, Transform, normals,
+    SceneData, SceneError, Texture, Transform, mask, normals,
 };
 use crate::geometry::{Camera, Triangle};
 use glam::{Vec2, Vec3};
@@ -138,11 +138,23 @@ impl SceneBuilder {
     /// Adds an instance of an object of the assembly, all of one material. What cannot be placed
     /// makes [`SceneBuilder::finish`] fail.
     pub fn place(&mut self, object: u32, to_world: Transform, material: u32) {
+        self.place_textured(object, to_world, material, &[]);
+    }
+
+    /// The same with texture coordinates of the object's triangles.
+    pub fn place_textured(
+        &mut self,
+        object: u32,
+        to_world: Transform,
+        material: u32,
+        uvs: &[[Vec2; 3]],
+    ) {
         match self.assembly.place(object, to_world) {
             Ok(instance) => {
                 let copy: Vec<Triangle> = self.assembly.copy(&instance).collect();
-                for triangle in copy {
-                    self.push(triangle.vertices, material);
+                for (id, triangle) in copy.iter().enumerate() {
+                    let uvs = uvs.get(id).copied().unwrap_or_default();
+                    self.push_corners(triangle.vertices, uvs, None, material);
                 }
             }
             Err(error) => {
@@ -179,7 +191,7 @@ impl SceneBuilder {
     /// # Errors
     /// [`SceneError::NoTriangles`], [`SceneError::TooLarge`], [`SceneError::Instance`], and
     /// [`SceneError::Camera`] if the scene brings a camera that sees nothing.
-    pub fn finish(mut self, name: &str, look: Look) -> Result<SceneData, SceneError> {
+    pub fn finish(mut self, name: &str, mut look: Look) -> Result<SceneData, SceneError> {
         if let Some(source) = self.misplaced {
             return Err(SceneError::Instance {
                 name: name.to_owned(),
@@ -212,6 +224,7 @@ impl SceneBuilder {
         if let Some(camera) = &look.camera {
             camera.validate()?;
         }
+        mask::settle(&mut look.materials, &look.textures);
         let textured = !look.textures.is_empty();
         let assembly = self.take_assembly();
         let mut scene = SceneData {

@@ -139,6 +139,11 @@ impl SceneData {
                 }
             }
         }
+        for (id, material) in self.materials.iter().enumerate() {
+            if let Some(mask) = material.mask {
+                hash.bytes(format!("{id} {mask:?}").as_bytes());
+            }
+        }
         if !self.normals.is_empty() {
             hash.bytes(bytemuck::cast_slice::<[u32; 3], u8>(&self.normals));
         }

@@ -108,7 +108,7 @@ impl SceneError {
     }
 
     /// A [`SceneError::Malformed`].
-    pub(super) fn malformed(
+    pub(crate) fn malformed(
         path: &Path,
         place: impl Into<String>,
         problem: impl Into<String>,

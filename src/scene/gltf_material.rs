@@ -6,9 +6,11 @@ use super::gltf_texture::{Images, Placed};
 use super::material::{Description, Format, emitted};
 use super::texture::ImageSource;
 use super::{
-    DIELECTRIC, DIFFUSE, MIRROR, Material, MaterialSource, PRINCIPLED, approximation_warning,
+    AlphaChannel, AlphaMask, DIELECTRIC, DIFFUSE, MIRROR, Material, MaterialSource, PRINCIPLED,
+    approximation_warning,
 };
 use glam::{Vec3, Vec4, Vec4Swizzles};
+use gltf::material::AlphaMode;
 
 /// Roughness from which glass looks frosted.
 const FROSTED: f32 = 0.1;
@@ -50,6 +52,7 @@ pub(super) fn read<'a>(
     for material in document.materials() {
         let mut found = convert(&material, files, with_textures, &mut told);
         let mut set = None;
+        found.mask = mask(&material, &mut images, &mut set);
         if with_textures && textured(&material, &mut found, &mut images, &mut set) {
             elsewhere.push(found.name.clone());
         }
@@ -103,6 +106,29 @@ fn textured(
         found.emission_texture = shining.and_then(|info| take(images.place(&info)));
     }
     left_out
+}
+
+/// What `alphaMode` `MASK` cuts out: by the alpha of the base colour and of its texture, whose set of coordinates is the first.
+fn mask(
+    material: &gltf::Material<'_>,
+    images: &mut Images<'_>,
+    set: &mut Option<u32>,
+) -> Option<AlphaMask> {
+    if material.alpha_mode() != AlphaMode::Mask {
+        return None;
+    }
+    let (factor, texture) = base_color(material);
+    let texture = texture.map(|info| {
+        let placed = images.place(&info);
+        *set = Some(placed.set);
+        placed.place
+    });
+    Some(AlphaMask {
+        texture,
+        channel: AlphaChannel::Alpha,
+        factor: factor.w,
+        cutoff: material.alpha_cutoff().unwrap_or(AlphaMask::CUTOFF),
+    })
 }
 
 /// Linear base colour and texture: the diffuse ones where `KHR_materials_pbrSpecularGlossiness`
@@ -184,7 +210,7 @@ fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
         of(&|m, _| m.kind != &DIELECTRIC && m.source.transmission.is_some_and(|t| t > 0.0));
     let frosted =
         of(&|m, _| m.kind == &DIELECTRIC && m.source.roughness.is_some_and(|r| r > FROSTED));
-    let cut_out = of(&|m, _| m.source.alpha_mode.as_deref() != Some("OPAQUE"));
+    let blended = of(&|_, original| original.alpha_mode() == AlphaMode::Blend);
     // Where a texture scales the metalness, the factor alone says nothing.
     let metal = of(&|m, original| {
         let model = original.pbr_metallic_roughness();
@@ -203,7 +229,7 @@ fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
     [
         approximation_warning("transmissive", "diffuse", transmissive),
         approximation_warning("frosted glass", "clear glass", frosted),
-        approximation_warning("cut out or blended by alpha", "diffuse", cut_out),
+        approximation_warning("blended by alpha", "if it were opaque", blended),
         approximation_warning("rough metal", "diffuse", metal),
         approximation_warning(
             "of varying gloss",

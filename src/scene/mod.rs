@@ -23,6 +23,7 @@ mod gltf_texture;
 mod ies;
 mod instances;
 mod light;
+mod mask;
 mod material;
 mod mtl;
 mod mtl_texture;
@@ -45,6 +46,7 @@ pub use framing::Framing;
 pub use ies::{IesError, IesProfile, Photometry};
 pub use instances::{Assembly, Instance, InstanceError, Transform, row_sum_norm};
 pub use light::{LIGHT_KINDS, Light, LightKind, LightList, ListedLight, Parallelogram, Source};
+pub use mask::{AlphaChannel, AlphaMask};
 pub use material::{
     COOK_TORRANCE, CookTorrance, DEFAULT_IOR, DIELECTRIC, DIFFUSE, Fresnel, MATERIAL_KINDS, MIRROR,
     Masking, Material, MaterialKind, MaterialSource, PHONG, PRINCIPLED, reflectance_of_ior,
@@ -136,8 +138,8 @@ pub struct SceneData {
 /// How a scene is loaded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LoadOptions {
-    /// Whether textures are decoded. Without them textured surfaces show their
-    /// constant colour, and no texture coordinates are kept.
+    /// Whether textures are decoded. Without them textured surfaces show their constant colour, and no texture coordinates are kept.
+    /// Masks are there in any case: they say what rays hit.
     pub textures: bool,
     /// Largest width and height of a texture, texels; larger ones are reduced, with a warning.
     pub max_texture_size: u32,

@@ -6,7 +6,9 @@ use super::material::{Description, Format, emitted};
 use super::mtl_texture::{Statement, statement};
 use super::text::normalised;
 use super::texture::{Encoded, ImageSource};
-use super::{DIELECTRIC, LoadOptions, MIRROR, Material, MaterialSource, TextureUse};
+use super::{
+    AlphaChannel, AlphaMask, DIELECTRIC, LoadOptions, MIRROR, Material, MaterialSource, TextureUse,
+};
 use glam::Vec3;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -116,9 +118,10 @@ impl Contents {
         };
         let name = material.name.clone();
         let found = Material::described(name, &description, file, &mut self.warnings);
+        let mask = self.mask(material, folder, options);
         let mut texture = |statement: Option<&str>, is_used: bool| {
             let statement = statement.filter(|_| is_used && options.textures)?;
-            Some(self.texture(folder, statement, options))
+            Some(self.texture(folder, statement, options).place)
         };
         let other = |key: &str| material.unknown_param.get(key).map(String::as_str);
         let is_rough = found.kind != &MIRROR && found.kind != &DIELECTRIC;
@@ -129,13 +132,13 @@ impl Contents {
             normal_texture: texture(other("norm"), found.kind != &DIELECTRIC),
             emission_texture: texture(other("map_Ke"), is_lamp),
             emission,
+            mask,
             ..found
         };
         let unused = [
             ("map_Ks", material.specular_texture.is_some()),
             ("map_Ns", material.shininess_texture.is_some()),
             ("a bump map", material.normal_texture.is_some()),
-            ("map_d", material.dissolve_texture.is_some()),
         ];
         for (what, _) in unused.iter().filter(|(_, is_there)| *is_there) {
             self.unused
@@ -147,8 +150,12 @@ impl Contents {
     }
 
     /// The texture that a statement names, each file once.
-    fn texture(&mut self, folder: &Path, text: &str, options: &LoadOptions) -> TextureUse {
-        let Statement { file, place } = statement(text);
+    fn texture(&mut self, folder: &Path, text: &str, options: &LoadOptions) -> Statement {
+        let Statement {
+            file,
+            place,
+            channel,
+        } = statement(text);
         let next = self.textures.len() as u32;
         let path = folder.join(&file);
         let texture = *self.texture_ids.entry(path).or_insert_with_key(|path| {
@@ -161,7 +168,26 @@ impl Contents {
             });
             next
         });
-        TextureUse { texture, ..place }
+        Statement {
+            place: TextureUse { texture, ..place },
+            file,
+            channel,
+        }
+    }
+
+    /// The texture of the opacity as a mask: what MTL blends is there or not, by half.
+    fn mask(
+        &mut self,
+        material: &tobj::Material,
+        folder: &Path,
+        options: &LoadOptions,
+    ) -> Option<AlphaMask> {
+        let text = material.dissolve_texture.as_deref()?;
+        let found = self.texture(folder, text, options);
+        let channel = found.channel.unwrap_or(AlphaChannel::AlphaOrLuminance);
+        let mask = AlphaMask::of(found.place, channel, AlphaMask::CUTOFF);
+        let factor = material.dissolve.unwrap_or(1.0);
+        Some(AlphaMask { factor, ..mask })
     }
 }
 

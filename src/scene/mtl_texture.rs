@@ -1,6 +1,6 @@
 //! Texture statements of material libraries: options, then the file.
 
-use super::{TextureUse, Wrap};
+use super::{AlphaChannel, TextureUse, Wrap};
 use glam::{Mat2, Vec2};
 
 /// What a statement such as `-s 2 2 -clamp on wall.png` says.
@@ -9,12 +9,15 @@ pub(super) struct Statement {
     pub file: String,
     /// Of a texture still to be numbered, for coordinates whose v points down.
     pub place: TextureUse,
+    /// What of the image counts as one number (`-imfchan`), if the statement says so.
+    pub channel: Option<AlphaChannel>,
 }
 
-/// Reads the options `-s`, `-o`, `-clamp` and `-bm`, and skips the others.
+/// Reads the options `-s`, `-o`, `-clamp`, `-bm` and `-imfchan`, and skips the others.
 pub(super) fn statement(text: &str) -> Statement {
     let mut place = TextureUse::plain(0);
     let (mut scale, mut offset) = (Vec2::ONE, Vec2::ZERO);
+    let mut channel = None;
     let mut rest = text.trim();
     while rest.starts_with('-') {
         let (option, after) = first_word(rest);
@@ -29,6 +32,9 @@ pub(super) fn statement(text: &str) -> Statement {
         for taken in 0..most {
             let (word, after) = first_word(rest);
             let number = word.parse::<f32>();
+            if option == "-imfchan" {
+                channel = channel_of(word);
+            }
             if taken >= least && number.is_err() {
                 break;
             }
@@ -55,7 +61,19 @@ pub(super) fn statement(text: &str) -> Statement {
     Statement {
         file: rest.replace('\\', "/"),
         place,
+        channel,
     }
+}
+
+fn channel_of(letter: &str) -> Option<AlphaChannel> {
+    Some(match letter {
+        "r" => AlphaChannel::Red,
+        "g" => AlphaChannel::Green,
+        "b" => AlphaChannel::Blue,
+        "m" => AlphaChannel::Alpha,
+        "l" => AlphaChannel::Luminance,
+        _ => return None,
+    })
 }
 
 fn first_word(text: &str) -> (&str, &str) {
@@ -81,6 +99,9 @@ mod tests {
         }
         let found = statement("-s 2 4 -o 0.5 0.25 -clamp on -bm 0.5 a.png");
         assert_eq!(found.file, "a.png");
+        let masked = statement("-imfchan r -s 2 2 leaf.png");
+        assert_eq!(masked.channel, Some(AlphaChannel::Red));
+        assert_eq!((masked.file.as_str(), found.channel), ("leaf.png", None));
         let place = found.place;
         assert_eq!((place.wrap, place.scale), ([Wrap::Clamp; 2], 0.5));
         // The upper left corner of the surface, v = 0 downwards, is v = 1 upwards.

@@ -66,8 +66,14 @@ pub(super) fn decode_all(
                 Some(textures.len() as u32 - 1)
             }
             Err(problem) => {
+                let is_it = |used: TextureUse| used.texture as usize == new_index.len();
+                let mut masks = materials.iter().filter_map(|m| m.mask?.texture);
+                let uncut = match masks.any(is_it) {
+                    true => "; surfaces that it cuts out are whole",
+                    false => "",
+                };
                 report.warnings.push(format!(
-                    "texture {}: {problem}; drawn with the constant",
+                    "texture {}: {problem}; drawn with the constant{uncut}",
                     source.name
                 ));
                 None

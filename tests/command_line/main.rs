@@ -4,6 +4,8 @@ mod models;
 mod pictures;
 mod points;
 mod references;
+#[path = "../support/mod.rs"]
+mod support;
 
 use raystone::config::Axis;
 use raystone::discrepancy::Measure;
@@ -19,6 +21,7 @@ fn program(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_raystone"));
     command
         .args(arguments)
+        .env("RAYSTONE_CACHE", "")
         .current_dir(env!("CARGO_MANIFEST_DIR"));
     command
 }

@@ -1,5 +1,6 @@
 //! `raystone run --reference` and `--images`: foreign references, and linear images of a run.
 
+use crate::support::small_with;
 use crate::{error, output, program, text};
 use raystone::image::{Image, read_linear};
 use raystone::measure::record::{
@@ -7,36 +8,24 @@ use raystone::measure::record::{
 };
 use std::path::{Path, PathBuf};
 
-const EXPERIMENT: &str = r#"
-[run]
-replicates = 3
-resolution = [24, 16]
-spp = [1, 3, 4]
-[axes]
-scene = ["cornell-box"]
-accel = ["bvh"]
-sequence = ["sobol"]
-decorrelation = ["cranley-patterson"]
-integrator = ["primary"]
-[reference]
-spp = 64
-[timing]
-rounds = 3
-min_warmup_ms = 0
-max_warmup_ms = 1
-rays = 1024
-[gate]
-rays = 256
-brute_force_tests = 1000
-oracle_rays = 16
-[discrepancy]
-points = 16
-"#;
+/// Primary rays by a sampler with few samples.
+fn experiment() -> String {
+    small_with(&[
+        "run.replicates = 3",
+        "run.resolution = [24, 16]",
+        "run.spp = [1, 3, 4]",
+        "axes.sequence = [\"sobol\"]",
+        "axes.decorrelation = [\"cranley-patterson\"]",
+        "axes.integrator = [\"primary\"]",
+        "reference.spp = 64",
+        "gate.rays = 256",
+    ])
+}
 
 /// Runs the experiment in a folder; the records.
 fn run(folder: &Path, name: &str, more: &[&str]) -> (i32, String, Vec<Line>) {
     let file = folder.join("trial.toml");
-    std::fs::write(&file, EXPERIMENT).expect("a writable folder");
+    std::fs::write(&file, experiment()).expect("a writable folder");
     let out = folder.join(name);
     let arguments = ["run", text(&file), "-q", "--out", text(&out)];
     let ended = output(program(&arguments).args(more));
@@ -148,4 +137,56 @@ fn a_reference_that_does_not_fit_ends_with_2_before_anything_is_measured() {
     let two = ["run", text(&file), "--reference", text(&wrong), "--set"];
     let two = output(program(&two).arg("axes.scene=cornell-box,furnace-box"));
     assert!(error(&two, 2).contains("reference.file"));
+}
+
+/// The reference of a run that keeps references in `cache`: whether it was there, and the errors against it.
+fn with_cache(folder: &Path, cache: &Path, name: &str, more: &[&str]) -> (bool, Vec<ErrorRecord>) {
+    let file = folder.join("trial.toml");
+    std::fs::write(&file, experiment()).expect("a writable folder");
+    let out = folder.join(name);
+    let arguments = ["run", text(&file), "-q", "--out", text(&out)];
+    // So few samples are too noisy a reference, which is told by the code 1.
+    output(program(&arguments).args(more).env("RAYSTONE_CACHE", cache));
+    let lines = read_records(&out).expect("records").lines;
+    let references: Vec<Recorded<ReferenceRecord>> = all_of(&lines).collect();
+    let errors = all_of(&lines).map(|r: Recorded<ErrorRecord>| r.body.clone());
+    (references[0].cached, errors.collect())
+}
+
+#[test]
+fn a_reference_is_rendered_once_for_all_runs_that_it_serves() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let cache = folder.path().join("cache");
+    let run = |name: &str, more: &[&str]| with_cache(folder.path(), &cache, name, more);
+    let (cached, rendered) = run("first", &[]);
+    assert!(!cached);
+    assert_eq!(run("again", &[]), (true, rendered.clone()));
+    assert_eq!(run("without", &["--no-cache"]), (false, rendered.clone()));
+    // Edited kernels and other samplers are measured against the same; whatever it is made of makes another.
+    let kernels = folder.path().join("kernels");
+    std::fs::create_dir_all(kernels.join("accel")).expect("a writable folder");
+    let edited = std::fs::read_to_string("kernels/accel/leaf.wesl").expect("a kernel");
+    std::fs::write(kernels.join("accel/leaf.wesl"), edited + "// Edited.\n").expect("a file");
+    assert!(run("edited", &["--kernels", text(&kernels)]).0);
+    assert!(run("sampler", &["--set", r#"axes.sequence=["halton"]"#]).0);
+    for other in [
+        "reference.spp=72",
+        "reference.seed=9",
+        "run.resolution=[16, 24]",
+        r#"axes.scene=["lamp"]"#,
+    ] {
+        assert!(!run(other, &["--set", other]).0, "{other}");
+    }
+    for kept in std::fs::read_dir(cache.join("references")).expect("a folder") {
+        let path = kept.expect("an entry").path();
+        let mut bytes = std::fs::read(&path).expect("a readable file");
+        bytes[5] ^= 1;
+        std::fs::write(&path, bytes).expect("a writable file");
+    }
+    assert_eq!(run("damaged", &[]), (false, rendered.clone()));
+    assert_eq!(run("mended", &[]), (true, rendered));
+    // A cache that cannot be written is told, and the run goes on.
+    std::fs::write(folder.path().join("file"), "").expect("a writable folder");
+    let unusable = with_cache(folder.path(), &folder.path().join("file"), "unusable", &[]);
+    assert!(!unusable.0);
 }

@@ -2,11 +2,14 @@
 //! the ignored test runs.
 
 use crate::support::builtin;
+use glam::Vec3;
 use raystone::scene::{
-    DIELECTRIC, MITSUBA_FILE, Material, MitsubaSettings, SceneData, Texture, export_mitsuba,
+    DIELECTRIC, EnvironmentMap, Light, MITSUBA_FILE, Material, MitsubaSettings, SceneData, Texture,
+    export_mitsuba,
 };
 use std::fs;
 use std::process::Command;
+use std::sync::Arc;
 use tempfile::TempDir;
 
 /// The folder, the XML, and what was said.
@@ -135,7 +138,139 @@ fn textures_keep_their_factor_and_skies_are_written() {
 }
 
 /// What the script ends with where Mitsuba cannot be installed.
+/// A light over a floor, as XML; or why it is refused.
+fn light(light: Light) -> Result<String, String> {
+    let mut scene = builtin("lamp", &[]);
+    scene.lights = vec![light];
+    let folder = TempDir::new().unwrap();
+    let settings = MitsubaSettings {
+        camera: scene.view(1.0),
+        size: [8, 8],
+        spp: 1,
+        bounces: 1,
+        fronts_only: false,
+    };
+    export_mitsuba(&scene, &settings, folder.path()).map_err(|e| e.to_string())?;
+    let xml = fs::read_to_string(folder.path().join(MITSUBA_FILE)).unwrap();
+    roxmltree::Document::parse(&xml).unwrap();
+    Ok(xml)
+}
+
+fn spot(outer: f32, decay: bool) -> Light {
+    Light::Spot {
+        position: Vec3::Y,
+        direction: Vec3::NEG_Y,
+        intensity: Vec3::splat(3.0),
+        inner: 0.2,
+        outer,
+        decay,
+    }
+}
+
+fn ball(radius: f32) -> Light {
+    Light::Sphere {
+        center: Vec3::Y,
+        radius,
+        radiance: Vec3::splat(7.0),
+    }
+}
+
+#[test]
+fn lights_without_triangles_are_written_or_refused_by_name() {
+    let map = EnvironmentMap::new("map", [4, 2], vec![Vec3::ONE; 8], &mut Vec::new()).unwrap();
+    let point = Light::Point {
+        position: Vec3::Y,
+        intensity: Vec3::new(1.0, 2.5, 3.0),
+    };
+    let directional = Light::Directional {
+        direction: Vec3::NEG_Y,
+        irradiance: Vec3::ONE,
+    };
+    let environment = Light::Environment {
+        map: Arc::new(map),
+        scale: 2.0,
+        turn: 0.5,
+    };
+    for (written, kind, numbers) in [
+        (point, "point", "1 2.5 3"),
+        (directional, "directional", "0 -1 0"),
+        (spot(0.5, true), "spot", "28.64789"),
+        (environment, "envmap", "28.64789"),
+    ] {
+        let xml = light(written).unwrap();
+        assert!(xml.contains(&format!("<emitter type=\"{kind}\">")), "{xml}");
+        assert!(xml.contains(numbers), "{xml}");
+    }
+    assert!(
+        light(ball(0.5))
+            .unwrap()
+            .contains("<shape type=\"sphere\">")
+    );
+    for (refused, reason) in [
+        (
+            spot(0.5, false),
+            "spot, cannot be written for Mitsuba: all of Mitsuba's spots fall off",
+        ),
+        (spot(1.6, true), "86 degrees"),
+        (ball(4.0), "something is inside"),
+    ] {
+        let said = light(refused).unwrap_err();
+        assert!(said.contains(reason), "{said}");
+    }
+    let luminaire = builtin("luminaire", &[]).lights.remove(0);
+    assert!(light(luminaire).unwrap_err().contains("light 0, a ies"));
+}
+
+#[test]
+fn every_other_row_of_a_written_map_is_one_of_the_scene_and_columns_run_backwards() {
+    let texels: Vec<Vec3> = (0..6).map(|k| Vec3::splat(k as f32)).collect();
+    let map = EnvironmentMap::new("map", [3, 2], texels, &mut Vec::new()).unwrap();
+    let mut scene = builtin("lamp", &[]);
+    scene.lights = vec![Light::Environment {
+        map: Arc::new(map),
+        scale: 1.0,
+        turn: 0.0,
+    }];
+    let (folder, ..) = exported(&scene, false);
+    let file = folder.path().join("textures/environment.exr");
+    let written = raystone::image::read_linear(&file).unwrap();
+    let red: Vec<f32> = written.pixels.iter().map(|p| p[0]).collect();
+    let rows = [
+        [2.0, 1.0, 0.0],
+        [2.0, 1.0, 0.0],
+        [3.5, 2.5, 1.5],
+        [5.0, 4.0, 3.0],
+        [5.0, 4.0, 3.0],
+    ];
+    assert_eq!(red, rows.concat());
+}
+
 const SKIPPED: i32 = 77;
+
+#[test]
+#[ignore = "installs Mitsuba 3: `cargo test --release --test foreign -- --ignored`"]
+fn mitsuba_renders_the_same_floors_below_lights_and_not_one_that_is_brighter() {
+    let root = env!("CARGO_MANIFEST_DIR");
+    let validate = |kind: &str, more: &[&str]| {
+        let mut command = Command::new(format!("{root}/scripts/validate"));
+        command.env("RAYSTONE", env!("CARGO_BIN_EXE_raystone"));
+        let kind = format!("scene.lamp.kind={kind}");
+        let common = [
+            "scene", "lamp", "--size", "32x32", "--spp", "64", "--set", &kind,
+        ];
+        command.args(common).args(more);
+        command.status().unwrap().code()
+    };
+    // The sphere needs finer pixels and more samples: see docs/validation.md.
+    for kind in ["point", "spot", "directional"] {
+        match validate(kind, &[]) {
+            Some(SKIPPED) => return println!("skipped: Mitsuba 3 cannot be installed here"),
+            code => assert_eq!(code, Some(0), "{kind}"),
+        }
+        let brighter = ["--control", "value=\"10 10 10\"=>value=\"10.1 10.1 10.1\""];
+        assert_eq!(validate(kind, &brighter), Some(1), "{kind}");
+    }
+}
 
 #[test]
 #[ignore = "installs Mitsuba 3; `scripts/validate` makes the same comparison, `cargo test --release --test foreign -- --ignored` this one"]

@@ -144,7 +144,7 @@ fn kernel_and_twin_of_every_test_agree_to_the_bit_on_pairs() {
             let mut hit = Hit::miss(ray);
             let ray = &soup.intersection.raised(ray);
             let inverse = soup.intersection.inverse(ray.direction);
-            intersect_triangle(record, ray, inverse, &mut hit);
+            intersect_triangle((record, None), ray, inverse, &mut hit);
             hit
         };
         let expected: Vec<Hit> = rays.iter().zip(&soup.records).map(closest).collect();

@@ -119,14 +119,14 @@ const FAULTS: &[(&str, &str, &str, Seen)] = &[
     ),
     (
         "delta",
-        "        1.0,\n        true,\n        Ray(origin, 0.0, towards, 1.0)",
-        "        1.0,\n        false,\n        Ray(origin, 0.0, towards, 1.0)",
+        "        1.0,\n        true,\n        Ray(origin, 0.0, position - origin, 1.0)",
+        "        1.0,\n        false,\n        Ray(origin, 0.0, position - origin, 1.0)",
         Irradiance("point", "mis-balance"),
     ),
     (
         "delta",
-        "Ray(origin, 0.0, towards, 1.0)",
-        "Ray(origin, 0.0, -towards, 1.0e30)",
+        "Ray(origin, 0.0, position - origin, 1.0)",
+        "Ray(origin, 0.0, origin - position, 1.0e30)",
         Irradiance("point", "light"),
     ),
     (
@@ -253,8 +253,8 @@ const FAULTS: &[(&str, &str, &str, Seen)] = &[
     ),
     (
         "choice",
-        "@if(all_lights) return 1.0;",
-        "@if(all_lights) return 0.5;",
+        "@if(all_lights || !many_lights) return 1.0;",
+        "@if(all_lights || !many_lights) return 0.5;",
         Mean("uniform", "all"),
     ),
     (

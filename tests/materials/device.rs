@@ -61,7 +61,7 @@ fn to_local(world: Vec3) -> DVec3 {
 
 impl Device {
     pub fn new(gpu: Gpu) -> Self {
-        let mut kernel = Composition::new("test/bsdf");
+        let mut kernel = Composition::new("test/bsdf").feature("several_materials", true);
         for kind in MATERIAL_KINDS {
             kernel = kernel.feature(kind.feature, true);
         }

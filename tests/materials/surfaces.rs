@@ -3,7 +3,7 @@
 
 use crate::Path;
 use crate::support::{builtin, kernels_with, open};
-use glam::{DMat2, DVec2, DVec3, Mat2, Vec2, Vec3};
+use glam::{DVec2, DVec3, Mat2, Vec2, Vec3};
 use raystone::accel::TriangleSoup;
 use raystone::geometry::Triangle;
 use raystone::gpu::{Composition, Gpu, KernelLibrary, Player, Recording, Storage, UniformValues};
@@ -224,23 +224,26 @@ fn sampled(scene: &SceneData, used: &TextureUse, uv: DVec2, decode: fn(f64) -> f
     upper.lerp(lower, part.y)
 }
 
-/// Differences in the frame of the texture, by solving for ∂p/∂u and ∂p/∂v.
+/// Bent by a map. The triangle's lines of constant v are across the gradient of v, and x runs along them; y is what is left of
+/// those of constant u, against v, without x and the normal (Gram and Schmidt).
 fn bent(scene: &SceneData, used: &TextureUse, triangle: usize, uv: DVec2, normal: DVec3) -> DVec3 {
     let [a, b, c] = scene.triangles[triangle].vertices.map(|v| v.as_dvec3());
-    let [ta, tb, tc] = scene.uvs[triangle].map(|uv| uv.as_dvec2());
-    let of_texture = DMat2::from_cols(tb - ta, tc - ta);
-    if of_texture.determinant() == 0.0 {
+    let corners = scene.uvs[triangle].map(|uv| uv.as_dvec2());
+    let face = (b - a).cross(c - a).normalize();
+    // Of a function that is linear between these values at the corners, times twice the area.
+    let gradient = |at: [f64; 3]| face.cross(at[0] * (c - b) + at[1] * (a - c) + at[2] * (b - a));
+    let [of_u, of_v] = [corners.map(|t| t.x), corners.map(|t| t.y)].map(gradient);
+    let (mut along_u, mut along_v) = (of_v.cross(face), face.cross(of_u));
+    if along_u.dot(of_u) == 0.0 {
         return normal;
     }
-    let inverse = of_texture.inverse();
-    let along = |x: DVec2| (b - a) * x.x + (c - a) * x.y;
-    let (du, dv) = (along(inverse.x_axis), along(inverse.y_axis));
-    let tangent = (du - normal * du.dot(normal)).normalize();
-    let across = normal.cross(tangent);
-    let up = across * -across.dot(dv).signum();
+    along_u *= along_u.dot(of_u).signum();
+    along_v *= along_v.dot(of_v).signum();
+    let x = along_u.reject_from(normal).normalize();
+    let y = (-along_v).reject_from(normal).reject_from(x).normalize();
     let mapped = 2.0 * sampled(scene, used, uv, |c| c) - 1.0;
     let scale = f64::from(used.scale);
-    (tangent * (scale * mapped.x) + up * (scale * mapped.y) + normal * mapped.z).normalize()
+    (scale * (mapped.x * x + mapped.y * y) + mapped.z * normal).normalize()
 }
 
 /// What is wrong with an answer.

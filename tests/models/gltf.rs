@@ -217,3 +217,55 @@ fn all_textures_and_the_normals_of_a_gltf_material_arrive() {
     let all = scene.report.warnings.join("\n");
     assert!(all.contains("several sets of coordinates"), "{all}");
 }
+
+#[test]
+fn a_mask_takes_alpha_and_cutoff_of_the_base_colour_and_blending_is_told() {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let image = image::RgbaImage::from_raw(2, 1, vec![9, 9, 9, 60, 9, 9, 9, 255]).unwrap();
+    image.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    let image = bytes.into_inner();
+    let load = |mode: &str, textures: bool| {
+        let json = square_json(image.len())
+            .replace(
+                "\"baseColorFactor\":[0.5,0.6,0.7,1]",
+                "\"baseColorFactor\":[0.5,0.6,0.7,0.8]",
+            )
+            .replace(
+                "{\"name\":\"lamp\",",
+                &format!("{{\"name\":\"lamp\",{mode}"),
+            );
+        let folder = TempDir::new().unwrap();
+        let path = folder.path().join("a.glb");
+        fs::write(&path, glb(&json, &square_bin(&image))).unwrap();
+        let options = LoadOptions {
+            textures,
+            ..LoadOptions::default()
+        };
+        raystone::scene::load(&variant(path.to_str().unwrap()), &options).unwrap()
+    };
+    let scene = load("\"alphaMode\":\"MASK\",\"alphaCutoff\":0.3,", true);
+    let mask = scene.materials[0].mask.unwrap();
+    assert_eq!((mask.factor, mask.cutoff), (0.8, 0.3));
+    assert_eq!(mask.texture, scene.materials[0].base_color_texture);
+    assert!(
+        mask.texture.unwrap().linear != glam::Mat2::IDENTITY,
+        "its transform"
+    );
+    // Masks say what rays hit: they are there without textures, too.
+    let bare = load("\"alphaMode\":\"MASK\",\"alphaCutoff\":0.3,", false);
+    assert_eq!(bare.materials[0].mask, Some(mask));
+    assert_eq!(bare.materials[0].base_color_texture, None);
+    assert_eq!(bare.uvs.len(), bare.triangles.len());
+
+    let default = load("\"alphaMode\":\"MASK\",", true);
+    assert_eq!(default.materials[0].mask.unwrap().cutoff, 0.5);
+    assert_eq!(load("", true).materials[0].mask, None);
+    let low = load("\"alphaMode\":\"MASK\",\"alphaCutoff\":0.1,", true);
+    assert_eq!(low.materials[0].mask, None, "no texel is below the cutoff");
+    let blended = load("\"alphaMode\":\"BLEND\",", true);
+    assert_eq!(blended.materials[0].mask, None);
+    let told = |line: &&String| line.contains("blended by alpha") && line.contains("lamp");
+    assert_eq!(blended.report.warnings.iter().filter(told).count(), 1);
+    let hashes = [&scene.hash, &default.hash, &blended.hash];
+    assert!(hashes[0] != hashes[1] && hashes[1] != hashes[2]);
+}

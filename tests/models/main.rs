@@ -11,8 +11,8 @@ use glam::{DVec3, Vec2, Vec3};
 use raystone::params::{Params, Variant};
 use raystone::random::Pcg32;
 use raystone::scene::{
-    DEFAULT_ALBEDO, DIELECTRIC, DIFFUSE, GEOMETRIC, LoadOptions, MIRROR, Material, PHONG,
-    PRINCIPLED, SceneData, SceneError, TextureUse, Wrap, decode_normal, load,
+    AlphaChannel, AlphaMask, DEFAULT_ALBEDO, DIELECTRIC, DIFFUSE, GEOMETRIC, LoadOptions, MIRROR,
+    Material, PHONG, PRINCIPLED, SceneData, SceneError, TextureUse, Wrap, decode_normal, load,
 };
 use std::fs;
 use std::path::Path;

@@ -209,3 +209,58 @@ fn statements_place_textures_and_what_has_none_says_so() {
         assert!(all.contains(expected), "{all} lacks {expected}");
     }
 }
+
+/// A 2 x 1 image whose first texel is this alpha and whose second is opaque white.
+fn masked_png(alpha: u8, light: u8) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let texels = vec![light, light, light, alpha, 255, 255, 255, 255];
+    let image = image::RgbaImage::from_raw(2, 1, texels).unwrap();
+    image.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
+/// The mask of a square with these statements, and all warnings.
+fn mask_of(statements: &str, image: &[u8]) -> (Option<AlphaMask>, String) {
+    let mtl = format!("newmtl a\nKd 1 1 1\n{statements}\n");
+    let obj = format!("mtllib m.mtl\n{SQUARE}usemtl a\nf 1 2 3\n");
+    let files: [(&str, &[u8]); 3] = [
+        ("a.obj", obj.as_bytes()),
+        ("m.mtl", mtl.as_bytes()),
+        ("leaf.png", image),
+    ];
+    let scene = load_files("a.obj", &files).unwrap();
+    let mask = scene.materials[0].mask;
+    let uvs = if mask.is_some() { 1 } else { scene.uvs.len() };
+    assert_eq!(scene.uvs.len(), uvs);
+    (mask, scene.report.warnings.join("\n"))
+}
+
+#[test]
+fn the_texture_of_the_opacity_is_a_mask() {
+    let (mask, warnings) = mask_of("d 0.75\nmap_d -clamp on leaf.png", &masked_png(0, 255));
+    let mask = mask.unwrap();
+    assert!(!warnings.contains("map_d"), "{warnings}");
+    assert_eq!((mask.factor, mask.cutoff), (0.75, 0.5));
+    assert_eq!(mask.channel, AlphaChannel::Alpha);
+    assert_eq!(mask.texture.unwrap().wrap, [Wrap::Clamp; 2]);
+
+    let by_light = mask_of("map_d leaf.png", &masked_png(255, 20)).0.unwrap();
+    assert_eq!(by_light.channel, AlphaChannel::Luminance);
+    let named = mask_of("map_d -imfchan g leaf.png", &masked_png(0, 20));
+    assert_eq!(named.0.unwrap().channel, AlphaChannel::Green);
+
+    assert_eq!(mask_of("map_d leaf.png", &masked_png(200, 255)).0, None);
+    for (text, image) in [
+        ("map_d gone.png", masked_png(0, 0)),
+        ("map_d leaf.png", vec![1, 2, 3]),
+    ] {
+        let (mask, warnings) = mask_of(text, &image);
+        assert_eq!(mask, None);
+        let file = text.rsplit(' ').next().unwrap();
+        let told = warnings.lines().find(|line| line.contains(file));
+        assert!(
+            told.is_some_and(|line| line.contains("cuts out are whole")),
+            "{warnings}"
+        );
+    }
+}

@@ -73,6 +73,7 @@ fn without_bias_one_run_in_a_hundred_alarms_at_most_and_p_values_are_flat() {
     for _ in 0..trials {
         let check = check(0.0, &mut generator);
         alarms += usize::from(is_biased(&check));
+        assert_eq!(is_biased(&check), check.p <= check.alpha, "{}", check.p);
         let p_values = [check.whole, check.weighted].map(|test| test.unwrap().p);
         for (bins, p) in bins.iter_mut().zip(p_values) {
             bins[((p * 10.0) as usize).min(9)] += 1;

@@ -230,6 +230,7 @@ fn what_is_said_of_a_point_is_as_rarely_wrong_as_promised() {
 }
 
 const RULE: StopRule = StopRule {
+    tile: None,
     relmse: 1.0,
     confidence: 0.95,
 };

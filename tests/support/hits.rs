@@ -153,7 +153,7 @@ pub fn brute_force(soup: &TriangleSoup, rays: &[Ray]) -> Vec<Hit> {
             return hit;
         }
         for triangle in &soup.records {
-            intersect_triangle(triangle, ray, inverse, &mut hit);
+            intersect_triangle((triangle, soup.masks.as_deref()), ray, inverse, &mut hit);
         }
         hit
     };

@@ -78,6 +78,29 @@ oracle_rays = 16
 points = 16
 "#;
 
+/// [`SMALL`] with these keys set, each `section.key = value` as experiment files write it.
+pub fn small_with(changes: &[&str]) -> String {
+    fn lay(over: toml::Table, table: &mut toml::Table) {
+        for (key, value) in over {
+            match (value, table.get_mut(&key)) {
+                // Not those of one line: they are values.
+                (toml::Value::Table(inner), Some(toml::Value::Table(below))) if key != "spp" => {
+                    lay(inner, below);
+                }
+                (value, _) => drop(table.insert(key, value)),
+            }
+        }
+    }
+    let parsed = |text: &str| -> toml::Table {
+        toml::from_str(text).unwrap_or_else(|e| panic!("`{text}`: {e}"))
+    };
+    let mut table = parsed(SMALL);
+    for change in changes {
+        lay(parsed(change), &mut table);
+    }
+    toml::to_string(&table).expect("a table is text")
+}
+
 /// The embedded kernels with one text replaced in one of them. Panics unless `from` stands there
 /// exactly once, so that a fault is never planted beside the kernel.
 pub fn kernels_with(module: &str, changes: &[(&str, &str)]) -> KernelLibrary {

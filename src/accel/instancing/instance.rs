@@ -126,7 +126,8 @@ pub(super) fn leaf(
         walk.counters.triangle_tests += 1;
         let id = triangle.id + first_id;
         let triangle = TriangleRecord { id, ..*triangle };
-        intersect_triangle(&triangle, &level.ray, level.inverse, &mut walk.hit);
+        let triangle = (&triangle, walk.masks);
+        intersect_triangle(triangle, &level.ray, level.inverse, &mut walk.hit);
     }
 }
 

@@ -3,9 +3,12 @@
 use super::super::triangle::TriangleRecord;
 use super::super::{Ray, TriangleSoup};
 use super::instance::object_ray;
+use crate::accel::Masks;
+use crate::accel::mask::MASKED;
 use crate::geometry::Triangle;
 use crate::scene::{Assembly, Instance, Transform};
 use std::borrow::Cow;
+use std::sync::Arc;
 
 /// Canonical records of each object in its own space, and where the objects stand.
 #[derive(Debug, Clone, Default)]
@@ -28,6 +31,27 @@ impl Placed {
             objects: assembly.objects().iter().map(records).collect(),
             instances: assembly.instances().to_vec(),
         }
+    }
+
+    /// The same with the masks that `words`, one a triangle of the scene, lead to; `None` if copies of an object are cut out in
+    /// different ways, so that they are no copies.
+    #[must_use]
+    pub fn masked(mut self, masks: &Arc<Masks>, words: &[u32]) -> Option<Self> {
+        for instance in &self.instances {
+            let object = &mut self.objects[instance.object as usize];
+            let own = &words[instance.first as usize..];
+            let is_first = object.masks.is_none();
+            for (record, word) in object.records.iter_mut().zip(own) {
+                let word = if *word >= MASKED { *word } else { 0 };
+                if is_first {
+                    record.material = word;
+                } else if !masks.cut_alike(record.material, word) {
+                    return None;
+                }
+            }
+            object.masks = Some(Arc::clone(masks));
+        }
+        Some(self)
     }
 
     /// The ray in the space of an instance's object. Distances stay the same.

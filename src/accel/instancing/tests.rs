@@ -99,7 +99,12 @@ fn hits_and_culled(seeds: std::ops::Range<u64>, pad: Option<f64>) -> (usize, usi
                 let ray = tests.raised(&ray(&mut rng, &instance, &target));
                 let local = tests.raised(&object_ray(&instance, &ray));
                 let mut hit = Hit::miss(&ray);
-                intersect_triangle(&record, &local, tests.inverse(local.direction), &mut hit);
+                intersect_triangle(
+                    (&record, None),
+                    &local,
+                    tests.inverse(local.direction),
+                    &mut hit,
+                );
                 if hit.triangle == NO_HIT {
                     continue;
                 }

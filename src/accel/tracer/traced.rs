@@ -24,6 +24,9 @@ impl TriangleBuffers {
         let words = soup.words();
         let parts = gpu.storage_parts("triangles", words.as_flattened())?;
         bindings.parts("triangles", &parts);
+        if soup.masks.is_some() {
+            bindings.feature("alpha_masks");
+        }
         Ok(Self {
             bindings,
             intersection: soup.intersection,

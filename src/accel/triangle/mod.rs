@@ -30,6 +30,7 @@ pub use watertight::Watertight;
 
 use super::bounds::{Bounds, slabs};
 use super::intersection::Reciprocal;
+use super::mask::{Masks, is_cut_out};
 use super::ray::{Hit, Ray, SMALLEST_COMPONENT, SMALLEST_SLOPE};
 use super::watch::{self, Event};
 use crate::geometry::Triangle;
@@ -52,7 +53,7 @@ pub struct TriangleRecord {
     pub id: u32,
     /// Second vertex.
     pub v1: [f32; 3],
-    /// Material index.
+    /// Material index; of a triangle with a mask, where its words are: see [`MASKED`](super::mask::MASKED).
     pub material: u32,
     /// Third vertex.
     pub v2: [f32; 3],
@@ -152,9 +153,15 @@ pub trait TriangleTest: Send + Sync {
         found: &Meeting,
     ) -> [f32; 3];
 
-    /// Tests `ray` against `triangle`; a nearer hit, or an equally near one of a lower index, replaces
+    /// Tests `ray` against `triangle`, which lets it pass where a mask has cut it out; a nearer hit, or an equally near one of a lower index, replaces
     /// `hit`. What all tests share; it stands here so that each has a copy with its own `meet` in it.
-    fn intersect(&self, triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3], hit: &mut Hit) {
+    fn intersect(
+        &self,
+        (triangle, masks): (&TriangleRecord, Option<&Masks>),
+        ray: &Ray,
+        inverse: &[f32; 3],
+        hit: &mut Hit,
+    ) {
         watch::note(Event::Triangle(triangle.id));
         let found = self.meet(triangle, ray, inverse);
         if found.area <= 0.0 || found.area.is_nan() {
@@ -175,12 +182,16 @@ pub trait TriangleTest: Send + Sync {
         let nearer = t < hit.t || (t == hit.t && triangle.id < hit.triangle);
         let within = t >= ray.t_min && t <= ray.t_max;
         if repaired && within && nearer && !is_along(triangle, ray.direction) {
+            let [u, v] = [found.u, found.v].map(|weight| weight.abs() / found.area);
+            if is_cut_out(masks, triangle, u, v) {
+                return;
+            }
             // None of the three is negative, but any may be −0, whose sign compilers do not keep.
             *hit = Hit {
                 t: t.abs(),
                 triangle: triangle.id,
-                u: found.u.abs() / found.area,
-                v: found.v.abs() / found.area,
+                u,
+                v,
             };
             watch::note(Event::Nearest(*hit));
         }
@@ -240,9 +251,9 @@ fn is_along(triangle: &TriangleRecord, direction: [f32; 3]) -> bool {
     (nx * dx + ny * dy + nz * dz).abs() <= (nx.abs() + ny.abs() + nz.abs()) * tilt
 }
 
-/// Tests `ray` against `triangle` by the test of the reciprocal: see [`TriangleTest::intersect`].
+/// Tests `ray` against a triangle, given with the masks of its scene, by the test of the reciprocal: see [`TriangleTest::intersect`].
 pub fn intersect_triangle(
-    triangle: &TriangleRecord,
+    triangle: (&TriangleRecord, Option<&Masks>),
     ray: &Ray,
     inverse: Reciprocal,
     hit: &mut Hit,

@@ -20,7 +20,7 @@
 mod weights;
 
 use super::hypothesis::{
-    WelchTest, benjamini_hochberg, capped_t_test, t_test_effect, t_test_power,
+    WelchTest, benjamini_hochberg, capped_t_test, least_rate, t_test_effect, t_test_power,
 };
 use crate::image::{Image, ImageError, luminance};
 use serde::{Deserialize, Serialize};
@@ -93,6 +93,9 @@ pub struct BiasCheck {
     pub alpha: f64,
     /// Smallest p-value of a tile; 1 if not testable.
     pub min_p: f64,
+    /// p-value of the three tests together: the least level `alpha` at which one of them rejects. 1 if not
+    /// testable.
+    pub p: f64,
     /// p-values of tiles in ten equal bins of `[0, 1]`: flat if there is no bias.
     pub p_histogram: [usize; 10],
     /// Test of the mean luminance of the whole image, the difference shortened by the rounding; absent
@@ -134,6 +137,7 @@ pub fn check_bias(
         rejected: Vec::new(),
         alpha: options.alpha,
         min_p: 1.0,
+        p: 1.0,
         p_histogram: [0; 10],
         whole: None,
         weighted: None,
@@ -169,6 +173,8 @@ pub fn check_bias(
     count_tiles(&mut check, &p_values, width, options);
     let of_image = [check.whole, check.weighted].map(p_value);
     let biased = of_image.iter().any(|p| *p <= level) || !check.rejected.is_empty();
+    let least = of_image.into_iter().fold(least_rate(&p_values), f64::min);
+    check.p = (least / SHARE).min(1.0);
     let means = tile_means(replicates, width.max(height)).concat();
     let noisy = means.iter().any(|mean| *mean != means[0]);
     let needed = replicates_needed(options.alpha);

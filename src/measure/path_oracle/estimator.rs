@@ -2,7 +2,7 @@
 
 use super::bsdf::{self, Bounce, Bsdf, Reflected};
 use super::hits::{SHORT, Segment};
-use super::light::{Choice, moved};
+use super::light::{Choice, Chosen, moved};
 use super::surface::Surface;
 use super::{PathOracle, Vertex, Walk};
 use crate::integrator::ConfiguredIntegrator;
@@ -98,7 +98,11 @@ impl Reader<'_> {
     }
 
     fn light_choice(&mut self) -> Result<Choice, String> {
-        let by = [("power", Choice::Power), ("uniform", Choice::Uniform)];
+        let by = [
+            ("power", Choice::Power),
+            ("uniform", Choice::Uniform),
+            ("tree", Choice::Tree),
+        ];
         let by = self.choice("light_choice", &by)?;
         self.choice("lights", &[("one", by), ("all", Choice::All)])
     }
@@ -125,6 +129,10 @@ impl Estimator {
             params: &integrator.params,
             known: Vec::new(),
         };
+        // What a kernel carries besides changes no image.
+        if name == "path" {
+            read.get("carry");
+        }
         let estimator = match name {
             "primary" => Self::Primary,
             "ao" => Self::Occlusion {
@@ -172,7 +180,7 @@ impl Strategy {
 
 impl Strategy {
     /// What emission counts that a direction of this density has found; `other` is that of light samples.
-    fn found(self, density: Option<f64>, other: impl Fn() -> f64) -> f64 {
+    fn found(self, density: Option<f64>, other: impl FnOnce() -> f64) -> f64 {
         match (density, self) {
             (None, _) => 1.0,
             (Some(_), Self::Light) => 0.0,
@@ -217,14 +225,16 @@ impl PathOracle<'_> {
 
     /// The first thing on a ray, noted.
     fn meet(&self, walk: &mut Walk, ray: &Segment) -> Option<(Surface<'_>, f64)> {
-        let terms = ray.origin.abs();
+        let moved = walk.rounding.point(ray.origin, ray.origin.abs()) - ray.origin;
         let seen = Segment {
-            origin: walk.rounding.point(ray.origin, terms),
+            start: ray.start + moved,
+            origin: ray.origin + moved,
+            shift: walk.rounding.texel(),
             ..*ray
         };
         let hit = self.hits.nearest(&seen);
         walk.decide(hit.map_or(u64::MAX, |hit| hit.triangle.into()));
-        let hit = hit?;
+        let hit = self.hits.unmoved(hit?, &seen);
         let surface = self.surface(ray, &hit, &mut walk.rounding);
         walk.vertices.push(Vertex {
             position: surface.position,
@@ -274,7 +284,8 @@ impl PathOracle<'_> {
             let end = met
                 .as_ref()
                 .map_or(f64::INFINITY, |(_, distance)| *distance);
-            if let Some((radiance, density)) = self.sphere_met(&state.ray, end, rules.choice) {
+            let ball = self.sphere_met(&state.ray, end, rules.choice, &mut walk.rounding);
+            if let Some((radiance, density)) = ball {
                 walk.decide(4);
                 let found = radiance * rules.strategy.found(state.density, || density);
                 state.radiance += rules.clamped(depth, state.throughput * found);
@@ -282,13 +293,14 @@ impl PathOracle<'_> {
             }
             let leaves = |distance: f64| depth > 0 && self.escapes(distance);
             let met = met.filter(|(_, d)| !leaves(walk.rounding.number(*d)));
-            let Some((surface, distance)) = met else {
+            let Some((surface, _)) = met else {
                 walk.decide(2);
-                let light = state.throughput * self.escaped(state.ray.direction);
-                state.radiance += rules.clamped(depth, light);
+                let found = self.escaped_found(walk, &state, rules);
+                state.radiance += rules.clamped(depth, state.throughput * found);
                 break;
             };
-            let other = || self.light_density(&surface, distance, rules.choice);
+            let rounding = &mut walk.rounding;
+            let other = || self.light_density(&surface, &state.ray, rules.choice, rounding);
             let found = surface.emission * rules.strategy.found(state.density, other);
             state.radiance += rules.clamped(depth, state.throughput * found);
             if depth == rules.max_depth {
@@ -321,29 +333,44 @@ impl PathOracle<'_> {
     ) -> DVec3 {
         let point = walk.draw_2d(at_bounce(depth, LIGHT_POINT));
         let number = walk.draw(at_bounce(depth, LIGHT_CHOICE));
-        let chosen = (self.lights).chosen(rules.choice, number, &mut walk.rounding);
+        let at = (surface.position, surface.geometric);
+        let chosen = self.chosen(rules.choice, number, at, &mut walk.rounding);
         let mut sum = DVec3::ZERO;
-        for (light, share) in chosen {
+        for chosen in chosen {
             let point = match rules.choice {
-                Choice::All => moved(point, light),
+                Choice::All => moved(point, chosen.light),
                 _ => point,
             };
-            sum += self.of_light(walk, surface, bsdf, (light, share, point), rules.strategy);
+            sum += self.of_light(walk, surface, bsdf, (chosen, point), rules.strategy);
         }
         sum
     }
 
-    /// Light from a point of a light that was chosen with probability `share`.
+    /// What a ray brings that leaves the scene, weighted.
+    fn escaped_found(&self, walk: &mut Walk, state: &State, rules: &PathRules) -> DVec3 {
+        let light = self.escaped(state.ray.direction);
+        let rounding = &mut walk.rounding;
+        match self.escaped_density(&state.ray, rules.choice, rounding) {
+            Some((texel, other)) => {
+                walk.decide(texel as u64);
+                light * rules.strategy.found(state.density, || other)
+            }
+            None => light,
+        }
+    }
+
+    /// Light from a point of a light that was chosen.
     fn of_light(
         &self,
         walk: &mut Walk,
         surface: &Surface,
         bsdf: &dyn Bsdf,
-        (place, share, point): (usize, f64, [f64; 2]),
+        (chosen, point): (Chosen, [f64; 2]),
         strategy: Strategy,
     ) -> DVec3 {
-        walk.decide(place as u64);
-        let light = self.light_sample(surface, place, point, &mut walk.rounding);
+        walk.decide(chosen.light as u64);
+        let (part, light) = self.light_sample(surface, &chosen, point, &mut walk.rounding);
+        walk.decide(part as u64);
         let Some(light) = light.filter(|l| l.density.is_none_or(f64::is_finite)) else {
             return DVec3::ZERO;
         };
@@ -351,21 +378,26 @@ impl PathOracle<'_> {
         let Some(Reflected { value, density }) = reflected else {
             return DVec3::ZERO;
         };
+        // To the point of the light, from wherever it starts.
+        let left = surface.leave(light.direction, &mut walk.rounding);
+        let towards = left.start + light.direction * light.distance - left.origin;
+        let distance = towards.length();
         let shadow = Segment {
-            to: light.triangle,
-            length: light.distance * (1.0 - SHORT),
-            ..surface.leave(light.direction, &mut walk.rounding)
+            to: light.triangles,
+            length: distance * (1.0 - SHORT),
+            direction: towards / distance,
+            ..left
         };
-        let blocked = self.shadowed(&shadow, place);
+        let blocked = self.shadowed(&shadow, chosen.light);
         walk.decide(blocked.into());
         if blocked {
             return DVec3::ZERO;
         }
         let weight = match light.density {
-            Some(own) => strategy.weight(share * own, density) / own,
+            Some(own) => strategy.weight(chosen.share * own, density) / own,
             None => 1.0,
         };
-        value * light.radiance * (weight / share)
+        value * light.radiance * (weight / chosen.share)
     }
 
     /// Takes a path to its next ray; false if it ends.

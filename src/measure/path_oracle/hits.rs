@@ -1,8 +1,10 @@
 //! Nearest hits in f64, over all triangles whose group is near the ray.
 
 use crate::geometry::Triangle;
+use crate::measure::holes::SceneHoles;
 use crate::oracle::{Groups, Line};
-use glam::DVec3;
+use crate::scene::SceneData;
+use glam::{DVec2, DVec3};
 
 /// Where a shadow ray ends, as a part of the distance to its light that is left out.
 pub const SHORT: f64 = 1e-7;
@@ -22,6 +24,7 @@ const FAR: f64 = 1e30;
 /// The triangles of a scene.
 pub(super) struct Hits<'a> {
     triangles: &'a [Triangle],
+    holes: Option<SceneHoles<'a>>,
     groups: Groups,
     start: f64,
 }
@@ -37,34 +40,51 @@ pub(super) struct Hit {
 /// A ray with a unit direction; what it does not see again.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Segment {
+    /// The point of the surface or lens that it leaves: where light is measured.
+    pub start: DVec3,
+    /// Of the triangle there, on the viewer's side.
+    pub normal: DVec3,
+    /// Where it is traced from: `start`, unless an offset is played.
     pub origin: DVec3,
     pub direction: DVec3,
     /// The triangle that it leaves.
     pub from: Option<u32>,
-    /// The triangle that it goes to.
-    pub to: Option<u32>,
+    /// The triangles that it goes to.
+    pub to: Option<[u32; 2]>,
     pub length: f64,
+    /// How far masks are off their places on it, texels: see [`Rounding::texel`](super::Rounding::texel).
+    pub shift: DVec2,
 }
 
 impl Segment {
     pub fn endless(origin: DVec3, direction: DVec3, from: Option<u32>) -> Self {
         Self {
+            start: origin,
+            normal: DVec3::ZERO,
             origin,
             direction,
             from,
             to: None,
             length: FAR,
+            shift: DVec2::ZERO,
         }
+    }
+
+    /// Point and normal where it begins.
+    pub fn place(&self) -> (DVec3, DVec3) {
+        (self.start, self.normal)
     }
 }
 
 impl<'a> Hits<'a> {
-    pub fn new(triangles: &'a [Triangle]) -> Self {
+    pub fn new(scene: &'a SceneData) -> Self {
+        let triangles = &scene.triangles;
         let corners = |id: usize| triangles[id].vertices.map(|v| v.to_array());
         let coordinates = triangles.iter().flat_map(|t| t.vertices);
         let greatest = coordinates.fold(0.0_f32, |most, v| most.max(v.abs().max_element()));
         Self {
             triangles,
+            holes: SceneHoles::of(scene),
             groups: Groups::new(triangles.len(), true, corners),
             start: START * f64::from(greatest),
         }
@@ -92,6 +112,16 @@ impl<'a> Hits<'a> {
         best
     }
 
+    /// A hit as it is from the point that the ray leaves; as it is found, where the line from there passes the triangle.
+    pub fn unmoved(&self, hit: Hit, segment: &Segment) -> Hit {
+        let from_there = Segment {
+            origin: segment.start,
+            ..*segment
+        };
+        let triangle = &self.triangles[hit.triangle as usize];
+        meet(triangle, hit.triangle, &from_there).unwrap_or(hit)
+    }
+
     /// Whether anything lies on a segment.
     pub fn blocked(&self, segment: &Segment) -> bool {
         let mut found = false;
@@ -100,6 +130,12 @@ impl<'a> Hits<'a> {
             f32::NEG_INFINITY
         });
         found
+    }
+
+    /// Whether there is no surface at a point of a triangle.
+    pub fn is_cut_out(&self, triangle: u32, weights: [f64; 2], shift: DVec2) -> bool {
+        let holes = self.holes.as_ref();
+        holes.is_some_and(|holes| holes.is_cut_out(triangle, weights, shift))
     }
 
     /// Calls `found` with every hit; it returns the end of what is still of interest.
@@ -114,12 +150,13 @@ impl<'a> Hits<'a> {
         let line = Line::new(origin, direction.map(inverse), [0.0, end]);
         self.groups.visit(&line, |group| {
             for &id in self.groups.members(group) {
-                if Some(id) == segment.from || Some(id) == segment.to {
+                if Some(id) == segment.from || segment.to.is_some_and(|to| to.contains(&id)) {
                     continue;
                 }
                 let hit = meet(&self.triangles[id as usize], id, segment);
                 let within = |h: &Hit| h.distance > self.start && h.distance < segment.length;
-                if let Some(hit) = hit.filter(within) {
+                let hit = hit.filter(within);
+                if let Some(hit) = hit.filter(|h| !self.is_cut_out(id, h.weights, segment.shift)) {
                     end = end.min(found(hit));
                 }
             }

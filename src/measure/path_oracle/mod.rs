@@ -25,12 +25,13 @@ pub use rounding::Rounding;
 
 use crate::geometry::Camera;
 use crate::sampling::{Coordinate, Sampler, to_unit};
-use crate::scene::SceneData;
+use crate::scene::{Material, SceneData};
 use camera::Lens;
 use glam::DVec3;
 use hits::Hits;
 use light::Lights;
 use std::fmt;
+use surface::Surface;
 use texture::Textures;
 
 /// One sample of one pixel.
@@ -72,12 +73,14 @@ impl fmt::Display for Vertex {
         let show = |v: DVec3| format!("({:.7}, {:.7}, {:.7})", v.x, v.y, v.z);
         write!(
             f,
-            "{} on triangle {} ({}), throughput {}, direct light {}",
+            "{} on triangle {} ({}), throughput {}, direct light ({:.4e}, {:.4e}, {:.4e})",
             show(self.position),
             self.triangle,
             self.material,
             show(self.throughput),
-            show(self.direct)
+            self.direct.x,
+            self.direct.y,
+            self.direct.z
         )
     }
 }
@@ -125,17 +128,20 @@ impl<'a> PathOracle<'a> {
         bsdf::all_known(scene)?;
         Ok(Self {
             scene,
-            hits: Hits::new(&scene.triangles),
-            lights: Lights::new(scene)?,
+            hits: Hits::new(scene),
+            lights: Lights::new(scene),
             textures: Textures::new(scene),
             diagonal: diagonal(scene),
         })
     }
 
-    /// Whether colours come from textures.
-    pub fn is_textured(&self) -> bool {
+    /// 2 where colours of surfaces come from textures, 1 where light comes from a map, else 0.
+    pub fn texturing(&self) -> usize {
         let mut materials = self.scene.materials.iter();
-        materials.any(|m| m.texture_uses().iter().any(Option::is_some))
+        match materials.any(|m| m.texture_uses().iter().any(Option::is_some)) {
+            true => 2,
+            false => usize::from(self.lights.have_map()),
+        }
     }
 
     /// The path of one sample, computed in f64 throughout, or with the roundings of f32 played.
@@ -154,6 +160,14 @@ impl<'a> PathOracle<'a> {
             branch: walk.branch,
         }
     }
+}
+
+/// f · cos of a material on the plane z = 0 for light that arrives from `from` and leaves towards `out`, both above it; delta lobes
+/// are no part of it.
+pub fn scattered(material: &Material, out: DVec3, from: DVec3) -> DVec3 {
+    let surface = Surface::flat(material, out);
+    let reflected = bsdf::of(&surface).evaluate(from, &mut Rounding::none());
+    reflected.map_or(DVec3::ZERO, |reflected| reflected.value)
 }
 
 fn diagonal(scene: &SceneData) -> f64 {

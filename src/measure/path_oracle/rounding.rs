@@ -6,8 +6,9 @@
 //! "Monte Carlo arithmetic", 1997). What comes out is what a kernel may answer. A path that changes its decisions
 //! under so little is near a boundary, and its margin is the number of roundings that it took.
 
+use crate::measure::holes::PLACED;
 use crate::random::Pcg32;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// Half an ulp of 1 in f32.
 const EPSILON: f64 = 1.0 / (1u32 << 24) as f64;
@@ -16,9 +17,14 @@ const EPSILON: f64 = 1.0 / (1u32 << 24) as f64;
 /// devices may be off by this much in these functions.
 const DIRECTION: f64 = 4.0;
 
+/// Stream of the numbers that move points in masks.
+const MASKS: u64 = 2;
+
 /// Moves quantities by roundings of f32, or leaves them as they are.
 pub struct Rounding {
     random: Option<Pcg32>,
+    /// What moves points in masks: other numbers stay the same without masks.
+    texels: Option<Pcg32>,
     /// By how many roundings.
     scale: f64,
 }
@@ -28,6 +34,7 @@ impl Rounding {
     pub fn none() -> Self {
         Self {
             random: None,
+            texels: None,
             scale: 0.0,
         }
     }
@@ -36,6 +43,7 @@ impl Rounding {
     pub fn played(roundings: f64, trial: u64) -> Self {
         Self {
             random: Some(Pcg32::new(trial)),
+            texels: Some(Pcg32::with_stream(trial, MASKS)),
             scale: roundings * EPSILON,
         }
     }
@@ -74,6 +82,13 @@ impl Rounding {
     /// A point whose coordinates are sums of terms as large as `terms`.
     pub fn point(&mut self, p: DVec3, terms: DVec3) -> DVec3 {
         p + terms * self.vector()
+    }
+
+    /// How far a point may be off its place in a mask, texels, whatever the number of roundings: coordinates there are
+    /// multiples of 1/256 texel.
+    pub fn texel(&mut self) -> DVec2 {
+        let mut signed = || (self.texels.as_mut()).map_or(0.0, Pcg32::signed);
+        PLACED * DVec2::new(signed(), signed())
     }
 
     /// How far a ray may start off its surface, where rays start at most `offset` off by one rounding.

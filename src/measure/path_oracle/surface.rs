@@ -36,17 +36,36 @@ pub(super) struct Surface<'a> {
     offset: f64,
 }
 
-impl Surface<'_> {
-    /// From where a light is seen: kernels take the start of the shadow ray, off the surface.
-    pub fn seen_from(&self, rounding: &mut Rounding) -> DVec3 {
-        self.position + self.geometric * rounding.offset(self.offset)
+impl<'a> Surface<'a> {
+    /// A point of the plane z = 0 seen from its front, without textures.
+    pub fn flat(material: &'a Material, out: DVec3) -> Self {
+        Self {
+            triangle: 0,
+            position: DVec3::ZERO,
+            out,
+            geometric: DVec3::Z,
+            normal: DVec3::Z,
+            side: 1.0,
+            material,
+            base: material.base_color.as_dvec3(),
+            varied: [1.0; 2],
+            emission: DVec3::ZERO,
+            offset: 0.0,
+        }
     }
+}
 
+impl Surface<'_> {
     /// The ray that leaves in this direction.
     pub fn leave(&self, direction: DVec3, rounding: &mut Rounding) -> Segment {
         let side = direction.dot(self.geometric).signum();
-        let start = self.position + self.geometric * (side * rounding.offset(self.offset));
-        Segment::endless(start, direction, Some(self.triangle))
+        let off = self.geometric * (side * rounding.offset(self.offset));
+        Segment {
+            origin: self.position + off,
+            normal: self.geometric,
+            shift: rounding.texel(),
+            ..Segment::endless(self.position, direction, Some(self.triangle))
+        }
     }
 }
 

@@ -14,6 +14,9 @@ pub struct ReferenceRecord {
     /// The value of every pixel, if it is known: then this is the reference.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact: Option<f64>,
+    /// Whether an earlier run rendered it; then `seconds` are those of reading it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub cached: bool,
     /// The file it was read from, if it was not rendered.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
@@ -87,8 +90,14 @@ pub struct BiasRecord {
     /// image, a third for the weighted mean, a third is the false-discovery rate among tiles. (Half for the
     /// image and half for tiles in records without `weighted_p`.)
     pub alpha: f64,
+    /// The same bound for the whole run: `alpha` is its share. Absent in records that know of no sharing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub alpha_of_run: Option<f64>,
     /// Smallest p-value of a tile.
     pub min_p: f64,
+    /// p-value of all the tests of this sampler together, to be held against `alpha`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub p_of_all: Option<f64>,
     /// Histogram of the p-values in ten equal bins: flat when there is no bias.
     pub p_histogram: Vec<usize>,
     /// Difference of the mean luminance of all replicates from the reference's beyond what rounding
@@ -114,7 +123,8 @@ pub struct BiasRecord {
     /// Whether the sampler is one whose mean over seeds is not the integral, so that a bias is no fault.
     #[serde(default)]
     pub by_design: bool,
-    /// What the check says.
+    /// What the check of this sampler says alone. A report holds the samplers of a run together: what it finds
+    /// biased leaves a larger share of `alpha_of_run` to the others.
     pub verdict: BiasVerdict,
 }
 

@@ -209,6 +209,9 @@ pub struct Ran {
     /// Feature flags of the composed kernel.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub features: Vec<String>,
+    /// Feature flags that other scenes need and that were compiled out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
     /// Whether the driver's bounds checks and loop bounds were off: another competitor.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub unchecked: bool,

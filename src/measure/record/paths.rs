@@ -35,6 +35,20 @@ impl PathsRecord {
         }
     }
 
+    /// Both together; the median is the greater one.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            paths: self.paths + other.paths,
+            ill_conditioned: self.ill_conditioned + other.ill_conditioned,
+            flips: self.flips + other.flips,
+            wrong: self.wrong + other.wrong,
+            median: self.median.max(other.median),
+            worst: self.worst.max(other.worst),
+            fault: self.fault.or(other.fault),
+            not_judged: self.not_judged.or(other.not_judged),
+        }
+    }
+
     /// What the gate says.
     pub fn verdict(&self) -> Verdict {
         Verdict::new(self.paths > 0, self.fault.is_some())

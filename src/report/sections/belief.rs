@@ -188,7 +188,7 @@ fn bias(data: &RunData) -> Check {
     let records: Vec<_> = data
         .views()
         .flat_map(|(scene, view)| view.samplers.iter().map(move |s| (scene, view, s)))
-        .filter_map(|(scene, view, s)| Some((scene, view, s, s.bias?)))
+        .filter_map(|(scene, view, s)| Some((scene, view, s, s.bias.as_ref()?)))
         .collect();
     let with = |verdict: BiasVerdict| records.iter().filter(move |r| r.3.verdict == verdict);
     let clean = with(BiasVerdict::NoBiasFound).count();

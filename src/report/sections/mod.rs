@@ -1,7 +1,9 @@
 //! The content of the report, section by section.
 
 pub mod belief;
+pub mod kernels;
 pub mod point_sets;
+pub mod rendering;
 pub mod run;
 pub mod sampler_plots;
 pub mod samplers;
@@ -111,6 +113,12 @@ fn scene_section(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -
         let stem = format!("scene-{index}-{}-{number}", file_stem(&view.name));
         blocks.extend(samplers::blocks(dir, data, &stem, scene, view));
     }
+    let values: Vec<_> = scene
+        .views
+        .iter()
+        .flat_map(|view| kernels::gains(scene, view))
+        .collect();
+    blocks.extend(kernels::blocks(scene, &values));
     section
 }
 

@@ -159,7 +159,7 @@ pub fn pareto_figure(data: &RunData, stem: &str, view: &View) -> Option<Illustra
 /// The p-values of every sampler that was checked.
 pub fn histograms(stem: &str, view: &View) -> Option<Illustration> {
     let panel = |sampler: &MeasuredSampler| {
-        let bias = sampler.bias?;
+        let bias = sampler.bias.as_ref()?;
         let biased = bias.verdict == BiasVerdict::Biased;
         let counts = bias.p_histogram.clone();
         let title = match biased {

@@ -125,15 +125,16 @@ fn further_table(view: &View, values: &[Value]) -> Table {
 
 /// Verdict on the bias of every sampler.
 fn bias_table(view: &View, values: &[Value]) -> Table {
-    let levels = view.samplers.iter().filter_map(|s| s.bias);
+    let levels = view.samplers.iter().filter_map(|s| s.bias.as_ref());
     let level = levels.map(|bias| bias.alpha).reduce(f64::min);
     let caption = format!(
         "Bias check with {}: biased if the p of the image or of the weighted mean is at most a third of {}, or \
-         tiles are rejected at another third; of a bias of all pixels below the last column it says nothing",
+         tiles are rejected at another third (of more, once other samplers were found biased); of a bias of all \
+         pixels below the last column it says nothing",
         view.name,
         format::optional(level)
     );
-    let verdict = |sampler: &MeasuredSampler| match (sampler.fault(), sampler.bias) {
+    let verdict = |sampler: &MeasuredSampler| match (sampler.fault(), &sampler.bias) {
         (Some(fault), _) => TableCell::from(fault).toned(Tone::Bad),
         (None, None) => "not tested".into(),
         (None, Some(bias)) if bias.verdict == BiasVerdict::NoBiasFound => {
@@ -220,12 +221,17 @@ fn galleries(dir: &Path, view: &View) -> [Option<Block>; 2] {
         let caption = match (reference.exact, &reference.file) {
             (Some(value), _) => format!("reference: the exact value, {value}"),
             (None, Some(file)) => format!("reference: {file}"),
-            (None, None) => format!(
-                "reference: {} spp of {}, {} s",
-                format::count(u64::from(reference.spp)),
-                reference.sampler,
-                format::number(reference.seconds)
-            ),
+            (None, None) => {
+                let [spp, seconds] = [
+                    format::count(u64::from(reference.spp)),
+                    format::number(reference.seconds),
+                ];
+                let origin = match reference.cached {
+                    true => "kept from an earlier run".to_owned(),
+                    false => format!("{seconds} s"),
+                };
+                format!("reference: {spp} spp of {}, {origin}", reference.sampler)
+            }
         };
         renders.push(pictures::load(dir, &reference.image, caption));
     }

@@ -1,7 +1,7 @@
 //! What the errors of samplers look like: spectra, and what filters leave.
 
 use super::samplers::{SAMPLER, rows};
-use crate::measure::record::{FilteredError, Key, PowerAt, SpectrumRecord, axis};
+use crate::measure::record::{FilteredError, Interval, Key, PowerAt, SpectrumRecord, axis};
 use crate::report::data::{RunData, View};
 use crate::report::document::*;
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
@@ -16,6 +16,23 @@ pub fn blocks(data: &RunData, stem: &str, view: &View, values: &[Value]) -> Vec<
         curves: curves(data, view, |record| {
             let at = |at: &PowerAt| CurvePoint::new(at.frequency, &at.power);
             record.power.iter().map(at).collect()
+        }),
+        guides: vec![Guide::new("white noise", 1.0, 0.0)],
+    };
+    let of_images = CurvePlot {
+        x_title: "frequency, cycles per pixel".into(),
+        x_ticks: Ticks::PowersOfTen,
+        y_title: "power of single images, variance = 1".into(),
+        curves: curves(data, view, |record| {
+            let at = |at: &PowerAt| {
+                let [middle, .., worst] = at.quantiles?;
+                let (value, low, high) = (middle, middle, worst);
+                Some(CurvePoint::new(
+                    at.frequency,
+                    &Interval { value, low, high },
+                ))
+            };
+            record.power.iter().filter_map(at).collect()
         }),
         guides: vec![Guide::new("white noise", 1.0, 0.0)],
     };
@@ -43,6 +60,12 @@ pub fn blocks(data: &RunData, stem: &str, view: &View, values: &[Value]) -> Vec<
             "Spectrum of the error at the highest spp: signed luminance error, mean over a ring of frequencies, \
              white noise at 1. The eye and denoisers take out high frequencies: a curve that rises from the left is \
              good, one that falls shows as blotches.",
+        ),
+        of_images.figure(
+            format!("{stem}-outliers"),
+            "The same of single images, in units of the variance of all replicates: the line is the median image, the \
+             band reaches up to the worst. An image with fireflies has more power at all frequencies: a wide band says \
+             that the mean is carried by few images.",
         ),
         filtered.figure(
             format!("{stem}-filtered"),

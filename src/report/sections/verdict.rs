@@ -1,5 +1,6 @@
 //! Who wins, per scene.
 
+use super::rendering;
 use crate::measure::comparison::LogFigure;
 use crate::measure::figure::figure;
 use crate::measure::record::{ClassTiming, Interval, RayClass, StructureRecord, axis};
@@ -18,6 +19,9 @@ pub fn section(data: &RunData) -> Section {
         let verdicts = table(scene).into_block();
         let none = || Block::Paragraph(format!("On {} nothing could be compared.", scene.name));
         section.blocks.push(verdicts.unwrap_or_else(none));
+        let lines = rendering::disagreements(scene).into_iter();
+        let warned = lines.map(|line| Block::Paragraph(format!("Warning: {line}.")));
+        section.blocks.extend(warned);
         section.blocks.extend(apart(scene));
     }
     let rule = match section.blocks.is_empty() {
@@ -48,6 +52,14 @@ fn rulings(scene: &SceneGroup) -> Vec<(String, Ruling)> {
     for class in ray_classes(scene) {
         let question = format!("fastest, {} rays (Mrays/s)", format::ray_class(class));
         rulings.push((question, fastest(scene, class)));
+    }
+    for view in scene
+        .views
+        .iter()
+        .filter(|view| view.valid_times().next().is_some())
+    {
+        let question = format!("fastest for rendering: {} (ms per spp)", view.name);
+        rulings.push((question, rendering::fastest(scene, view)));
     }
     let metric = Metric::RelMse.name();
     for view in &scene.views {
@@ -147,16 +159,22 @@ pub fn ray_classes(scene: &SceneGroup) -> Vec<RayClass> {
     classes
 }
 
+/// Speed in a class, Mrays/s, of a structure that passed the gate and was timed often enough.
+pub fn class_speed(s: &Measured<StructureRecord>, class: RayClass) -> Option<LogFigure> {
+    let timing = s.timings.iter().find(|timing| timing.class == class)?;
+    let often = timing.ms.len() >= LEAST_FOR_MEDIAN && s.fault().is_none();
+    let ms = LogFigure::of_times(&timing.ms).filter(|_| often)?;
+    Some(ms.inverse().scaled(1e-3 * timing.rays as f64))
+}
+
 /// Compares the structures that passed the gate on one ray class.
 pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
     let contender = |s: &Measured<StructureRecord>| {
         let timing: &ClassTiming = s.timings.iter().find(|timing| timing.class == class)?;
-        let often = timing.ms.len() >= LEAST_FOR_MEDIAN;
-        let ms = LogFigure::of_times(&timing.ms).filter(|_| often);
         s.fault().is_none().then_some(Contender {
             name: s.structure.clone(),
             figure: timing.mrays_s,
-            log: ms.map(|ms| ms.inverse().scaled(1e-3 * timing.rays as f64)),
+            log: class_speed(s, class),
         })
     };
     judge(

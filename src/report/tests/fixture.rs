@@ -77,7 +77,7 @@ fn scene(name: &str, triangles: usize) -> Line {
 }
 
 /// Classes of rays, with their speed per speed of primary rays.
-const CLASSES: [(&str, f64); 4] = [
+pub(super) const CLASSES: [(&str, f64); 4] = [
     ("primary", 1.0),
     ("shadow", 0.8),
     ("ao", 0.7),
@@ -230,7 +230,11 @@ fn paths([scene, integrator]: [&str; 2]) -> Line {
 
 /// Spectra that rise, so that low frequencies are weak.
 fn spectrum(view: [&str; 2], sampler: &Sampler) -> Line {
-    let power = |k: i32| json!({ "frequency": 0.05 * f64::from(k), "power": around(0.2 * f64::from(k), 0.1) });
+    let power = |k: i32| {
+        let quantiles = [0.18, 0.2, 0.3, 0.5].map(|q| q * f64::from(k));
+        let power = around(0.2 * f64::from(k), 0.1);
+        json!({ "frequency": 0.05 * f64::from(k), "power": power, "quantiles": quantiles })
+    };
     let filtered =
         |sigma: f64| json!({ "sigma": sigma, "rmse": around(0.02 / (1.0 + sigma), 0.05) });
     let (power, filtered): (Vec<_>, _) =

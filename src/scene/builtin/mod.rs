@@ -5,6 +5,7 @@
 mod cornell_box;
 mod displaced_sphere;
 mod far_corners;
+mod foliage;
 mod furnace;
 mod instances;
 mod lamps;
@@ -50,7 +51,7 @@ impl Builtin {
 }
 
 /// The registry.
-const BUILTINS: [Builtin; 12] = [
+const BUILTINS: [Builtin; 13] = [
     Builtin::of::<cornell_box::CornellBox>(),
     Builtin::of::<displaced_sphere::DisplacedSphere>(),
     Builtin::of::<triangle_soup::TriangleSoup>(),
@@ -63,6 +64,7 @@ const BUILTINS: [Builtin; 12] = [
     Builtin::of::<lamps::LampScene>(),
     Builtin::of::<lamps::Luminaire>(),
     Builtin::of::<lamps::ManyLights>(),
+    Builtin::of::<foliage::Foliage>(),
 ];
 
 /// The built-in scenes with their parameters, for the parser, lists and docs.

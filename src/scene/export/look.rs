@@ -3,8 +3,8 @@
 use super::{Export, ExportError, vector};
 use crate::image::{Image, Picture};
 use crate::scene::{
-    COOK_TORRANCE, DIELECTRIC, DIFFUSE, Daylight, MIRROR, Material, PHONG, PRINCIPLED, SceneData,
-    Texture, Wrap,
+    AlphaMask, COOK_TORRANCE, DIELECTRIC, DIFFUSE, Daylight, MIRROR, Material, PHONG, PRINCIPLED,
+    SceneData, Texture, TextureUse, Wrap,
 };
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
@@ -13,6 +13,9 @@ use std::fmt::Write as _;
 /// Python that teaches Mitsuba the materials that it lacks, and the file that it is written to.
 const MATERIALS: &str = include_str!("materials.py");
 const MATERIALS_FILE: &str = "materials.py";
+
+/// Texels of a written mask for one of its image.
+const FINER: u32 = 4;
 
 /// Size of the map that stands for a sky with a gradient, texels.
 const SKY_SIZE: [u32; 2] = [1024, 512];
@@ -55,7 +58,13 @@ impl Export<'_> {
                 material.name
             ));
         }
-        let id = format!("id=\"material-{id}\"");
+        let name = format!("id=\"material-{id}\"");
+        let opening = self.mask(scene, id, &name)?;
+        // The mask has the name, and around it what it cuts.
+        let (id, closing) = match opening {
+            true => (String::new(), "    </bsdf>\n"),
+            false => (name, ""),
+        };
         let _ = match material.kind {
             kind if kind == &DIELECTRIC => write!(self.xml, "{}", dielectric(material, &id)),
             kind if kind == &MIRROR => write!(
@@ -81,7 +90,49 @@ impl Export<'_> {
                 color.named("reflectance")
             ),
         };
+        self.xml += closing;
         Ok(())
+    }
+
+    /// Opens the mask of a material and writes its image, if it has one.
+    fn mask(&mut self, scene: &SceneData, id: usize, name: &str) -> Result<bool, ExportError> {
+        let material = &scene.materials[id];
+        let Some(mask) = &material.mask else {
+            return Ok(false);
+        };
+        let moved = |of: TextureUse| (of.linear, of.offset);
+        let color = material.base_color_texture.map(moved);
+        if mask.texture.map(moved) != color && color.is_some() {
+            self.warnings.push(format!(
+                "material {}: its mask lies where its base colour does in Mitsuba",
+                material.name
+            ));
+        }
+        if material.emission != Vec3::ZERO {
+            self.warnings.push(format!(
+                "material {}: Mitsuba's emitters shine where masks cut them out, too",
+                material.name
+            ));
+        }
+        let file = format!("textures/{id}-mask.png");
+        self.write_picture(&file, &cut(mask, &scene.textures))?;
+        let wrap = match mask.texture.map(|of| of.wrap[0]) {
+            Some(Wrap::Mirrored) => "mirror",
+            Some(Wrap::Clamp) => "clamp",
+            _ => "repeat",
+        };
+        let _ = write!(
+            self.xml,
+            r#"    <bsdf type="mask" {name}>
+        <texture name="opacity" type="bitmap">
+            <string name="filename" value="{file}"/>
+            <string name="filter_type" value="nearest"/>
+            <string name="wrap_mode" value="{wrap}"/>
+            <boolean name="raw" value="true"/>
+        </texture>
+"#
+        );
+        Ok(true)
     }
 
     /// The base colour: constant, or a texture file. Mitsuba multiplies no colours, so that a texture with a factor is written as the
@@ -199,6 +250,43 @@ fn picture(texture: &Texture) -> Picture {
     }
 }
 
+/// Where the surface is there, white, in [`FINER`] texels for each of the image's in both directions: Mitsuba's masks know no cutoff.
+fn cut(mask: &AlphaMask, textures: &[Texture]) -> Picture {
+    let texture = mask
+        .texture
+        .and_then(|of| textures.get(of.texture as usize));
+    let size = texture.map_or([1, 1], |t| [t.width, t.height].map(|n| n * FINER));
+    let wraps = mask.texture.map_or([Wrap::Repeat; 2], |of| of.wrap);
+    let beside = |at: i64, axis: usize| {
+        let count = i64::from(size[axis] / FINER);
+        let inside = match wraps[axis] {
+            Wrap::Repeat => at.rem_euclid(count),
+            Wrap::Mirrored | Wrap::Clamp => at.clamp(0, count - 1),
+        };
+        inside as usize
+    };
+    let alpha = |x: i64, y: i64| {
+        let texel = texture.map(|t| t.texels[beside(y, 1) * t.width as usize + beside(x, 0)]);
+        texel.map_or(1.0, |texel| f64::from(mask.channel.value(texel)) / 255.0)
+    };
+    let pixel = |k: u32| {
+        let [x, y] =
+            [k % size[0], k / size[0]].map(|n| (f64::from(n) + 0.5) / f64::from(FINER) - 0.5);
+        let (column, row) = (x.floor(), y.floor());
+        let (fx, fy) = (x - column, y - row);
+        let (column, row) = (column as i64, row as i64);
+        let line = |row| alpha(column, row) * (1.0 - fx) + alpha(column + 1, row) * fx;
+        let found = line(row) * (1.0 - fy) + line(row + 1) * fy;
+        let there = found * f64::from(mask.factor) >= f64::from(mask.cutoff);
+        [if there { 255 } else { 0 }; 3]
+    };
+    Picture {
+        width: size[0],
+        height: size[1],
+        pixels: (0..size[0] * size[1]).map(pixel).collect(),
+    }
+}
+
 /// The linear texels times `factor`.
 fn product(texture: &Texture, factor: Vec3) -> Result<Image, ExportError> {
     let linear = |[r, g, b, _]: &[u8; 4]| {
@@ -209,14 +297,14 @@ fn product(texture: &Texture, factor: Vec3) -> Result<Image, ExportError> {
     Ok(Image::new(texture.width, texture.height, texels)?)
 }
 
-/// The sky as a map of directions in Mitsuba's convention: from +y in the first row to −y, the middle of the first column
-/// beside −z, from there to +x.
+/// The sky as a map of directions in Mitsuba's convention: from +y in the first row to −y in the last, the middle of the
+/// first column beside −z, from there to +x.
 fn sky_image(daylight: &Daylight, scale: Vec3) -> Result<Image, ExportError> {
     let [width, height] = SKY_SIZE;
     let texel = |at: u32| {
         let (column, row) = (at % width, at / width);
         let phi = TAU * (column as f32 + 0.5) / width as f32;
-        let theta = PI * (row as f32 + 0.5) / height as f32;
+        let theta = PI * row as f32 / (height - 1) as f32;
         let (sin, cos) = theta.sin_cos();
         let direction = Vec3::new(phi.sin() * sin, cos, -phi.cos() * sin);
         (scale * sky_radiance(daylight, direction)).to_array()

@@ -6,8 +6,8 @@ use crate::scene::decode_normal;
 use glam::{Vec2, Vec3};
 
 /// The triangles of material `id`, none of whose vertices are shared, so that each keeps its own normal and texture
-/// coordinates; nothing if there are none, and whether they have normals of their own. The base colour's texture is placed by the
-/// coordinates. With `back` they are turned over and moved behind themselves by so much.
+/// coordinates; nothing if there are none, and whether they have normals of their own. The base colour's texture, or else the mask, is
+/// placed by the coordinates. With `back` they are turned over and moved behind themselves by so much.
 pub(super) fn ply(scene: &SceneData, id: u32, back: Option<f32>) -> Option<(Vec<u8>, bool)> {
     let of_material = |(index, found): (usize, &u32)| (*found == id).then_some(index);
     let ids = scene.material_ids.iter().enumerate();
@@ -16,7 +16,9 @@ pub(super) fn ply(scene: &SceneData, id: u32, back: Option<f32>) -> Option<(Vec<
         return None;
     }
     let textured = !scene.uvs.is_empty();
-    let placed = scene.materials.get(id as usize)?.base_color_texture;
+    let material = scene.materials.get(id as usize)?;
+    let of_mask = material.mask.and_then(|mask| mask.texture);
+    let placed = material.base_color_texture.or(of_mask);
     let place = |uv: Vec2| placed.map_or(uv, |of| of.linear * uv + of.offset);
     let has_normal = |index: &usize| {
         let words = scene.normals.get(*index);

@@ -5,6 +5,7 @@
 //! space, the same camera, a box filter, no clipping. Mitsuba's `max_depth` counts vertices behind the camera, ours
 //! bounces: a path of `b` bounces there has depth `b + 1`. What has no counterpart is drawn as something near, and said.
 
+mod lights;
 mod look;
 mod mesh;
 
@@ -41,6 +42,16 @@ pub enum ExportError {
         path: PathBuf,
         /// Why not.
         source: std::io::Error,
+    },
+    /// A light has no counterpart: the image would be another one.
+    #[error("light {number}, a {kind}, cannot be written for Mitsuba: {reason}")]
+    Light {
+        /// Its index in [`SceneData::lights`].
+        number: usize,
+        /// Name of its kind.
+        kind: &'static str,
+        /// Why not, and what to do.
+        reason: &'static str,
     },
     /// A texture or the sky could not be written.
     #[error(transparent)]
@@ -80,6 +91,7 @@ pub fn export_mitsuba(
     for id in 0..scene.materials.len() {
         export.material(scene, id)?;
     }
+    export.lights(scene)?;
     export.shapes(scene, settings.fronts_only)?;
     export.xml += "</scene>\n";
     let path = folder.join(MITSUBA_FILE);

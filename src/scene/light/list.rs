@@ -157,8 +157,9 @@ impl LightList {
                 continue;
             }
             let [a, b] = [next - 1, next].map(|id| scene.triangles.get(id));
-            // A textured lamp is sampled by the triangle that has the texture coordinates.
-            let plain = scene.materials[of].emission_texture.is_none();
+            // A lamp with a texture or a mask is sampled by the triangle that has the texture coordinates.
+            let lamp = &scene.materials[of];
+            let plain = lamp.emission_texture.is_none() && lamp.mask.is_none();
             let pair = a.zip(b).filter(|_| plain && material(next) == Some(of));
             let formed = pair.and_then(|(a, b)| Parallelogram::of(id, a, b));
             let (source, area) = match formed {

@@ -16,7 +16,7 @@ pub use mirror::MIRROR;
 pub use phong::PHONG;
 pub use principled::{PRINCIPLED, reflectance_of_ior};
 
-use super::TextureUse;
+use super::{AlphaMask, TextureUse};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -79,6 +79,8 @@ pub struct Material {
     pub normal_texture: Option<TextureUse>,
     /// What the emission is multiplied by.
     pub emission_texture: Option<TextureUse>,
+    /// What is cut out of the surface.
+    pub mask: Option<AlphaMask>,
     /// Emitted radiance, linear RGB.
     pub emission: Vec3,
     /// Whether both sides of the triangle emit, or only that from which its corners turn counter-clockwise (glTF without
@@ -99,6 +101,7 @@ impl Material {
             metallic_roughness_texture: None,
             normal_texture: None,
             emission_texture: None,
+            mask: None,
             emission: Vec3::ZERO,
             emits_both_sides: true,
             source: MaterialSource::default(),
@@ -141,14 +144,16 @@ impl Material {
         ]
     }
 
-    /// The same, to be changed.
-    pub(super) fn texture_uses_mut(&mut self) -> [&mut Option<TextureUse>; 4] {
-        [
+    /// The same and that of the mask, to be changed.
+    pub(super) fn texture_uses_mut(&mut self) -> impl Iterator<Item = &mut Option<TextureUse>> {
+        let of_mask = self.mask.iter_mut().map(|mask| &mut mask.texture);
+        let shown = [
             &mut self.base_color_texture,
             &mut self.metallic_roughness_texture,
             &mut self.normal_texture,
             &mut self.emission_texture,
-        ]
+        ];
+        shown.into_iter().chain(of_mask)
     }
 
     /// The same material, emitting `radiance` (linear RGB) from both sides.

@@ -5,7 +5,7 @@ use crate::subject::{build, sampler};
 use crate::{CheckError, Plant};
 use raystone::accel::{Traced, TriangleSoup};
 use raystone::integrator::{IntegratorRegistry, RayOffset, RenderJob, Renderer, SceneBuffers};
-use raystone::measure::image_gate::{Pixels, answers, judge};
+use raystone::measure::image_gate::{Pixels, answers, judge, sums};
 use raystone::measure::path_oracle::{Estimator, PathOracle, View};
 use raystone::measure::trial_scenes::{Trial, TrialScene, trial_scenes};
 use raystone::params::{Params, Variant};
@@ -89,5 +89,6 @@ fn of_integrator(
         size: SIZE,
         sampler: &sampler,
     };
-    Ok(judge(oracle, &view, &answers(&renderer, &pixels)?).fault)
+    let found = judge(oracle, &view, &answers(&renderer, &pixels)?).fault;
+    Ok(found.or(sums(&renderer, &pixels)?))
 }

@@ -7,6 +7,7 @@ mod hard;
 mod image;
 mod instanced;
 mod late_samples;
+mod path_lights;
 mod paths;
 mod samplers;
 mod wide;
@@ -29,6 +30,7 @@ pub fn mutants() -> Vec<Mutant> {
         late_samples::MUTANTS,
         image::MUTANTS,
         paths::MUTANTS,
+        path_lights::MUTANTS,
     ]
     .concat()
 }

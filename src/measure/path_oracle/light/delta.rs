@@ -1,13 +1,15 @@
-//! Lights of one direction: points, cones, and light from infinitely far away.
+//! Lights of one direction: points, cones, measured luminaires, and light from infinitely far away.
 
 use super::LightSample;
+use super::ies::candela;
+use crate::measure::path_oracle::rounding::Rounding;
 use crate::scene::Light;
 use glam::DVec3;
 
 /// Distance of what has none.
 const FAR: f64 = 1e30;
 
-pub(super) fn sample(light: &Light, from: DVec3) -> Option<LightSample> {
+pub(super) fn sample(light: &Light, from: DVec3, rounding: &mut Rounding) -> Option<LightSample> {
     let towards = |place: glam::Vec3| {
         let to_light = place.as_dvec3() - from;
         (to_light.normalize(), to_light.length())
@@ -43,6 +45,17 @@ pub(super) fn sample(light: &Light, from: DVec3) -> Option<LightSample> {
                 intensity.as_dvec3() * (step * step / falloff),
             )
         }
+        Light::Ies {
+            position,
+            rotation,
+            color,
+            profile,
+        } => {
+            let (direction, distance) = towards(*position);
+            let candela = candela(profile, *rotation, -direction, rounding);
+            let falloff = distance * distance;
+            (direction, distance, color.as_dvec3() * (candela / falloff))
+        }
         Light::Directional {
             direction,
             irradiance,
@@ -58,6 +71,6 @@ pub(super) fn sample(light: &Light, from: DVec3) -> Option<LightSample> {
         distance,
         radiance,
         density: None,
-        triangle: None,
+        triangles: None,
     })
 }

@@ -1,31 +1,37 @@
 //! Triangles and parallelograms: points on them evenly.
 
 use super::LightSample;
+use crate::measure::path_oracle::hits::Hits;
 use crate::measure::path_oracle::rounding::Rounding;
 use crate::measure::path_oracle::texture::Textures;
 use crate::scene::{SceneData, Source};
 use glam::DVec3;
 
 pub(super) fn sample(
-    (scene, textures): (&SceneData, &Textures),
+    (scene, textures, hits): (&SceneData, &Textures, &Hits),
     source: Source,
     from: DVec3,
     [u, v]: [f64; 2],
     rounding: &mut Rounding,
 ) -> Option<LightSample> {
-    let (id, point, [x, y], area) = match source {
+    let (triangles, point, [x, y], area) = match source {
         Source::Triangle(id) => {
             let [a, b, c] = scene.triangles[id as usize].vertices.map(|v| v.as_dvec3());
             let root = u.sqrt();
             let point = a * (1.0 - root) + b * (root * (1.0 - v)) + c * (root * v);
             let edges = [b - a, c - a];
-            (id, point, edges, 0.5 * edges[0].cross(edges[1]).length())
+            (
+                [id; 2],
+                point,
+                edges,
+                0.5 * edges[0].cross(edges[1]).length(),
+            )
         }
         Source::Parallelogram(of) => {
             let edges = of.edges.map(|e| e.as_dvec3());
             let point = of.corner.as_dvec3() + u * edges[0] + v * edges[1];
             (
-                of.triangles[0],
+                of.triangles,
                 point,
                 edges,
                 edges[0].cross(edges[1]).length(),
@@ -33,6 +39,7 @@ pub(super) fn sample(
         }
         Source::Light(_) => return None,
     };
+    let id = triangles[0];
     let material = &scene.materials[scene.material_ids[id as usize] as usize];
     let to_light = rounding.point(point, point.abs() + x.abs() + y.abs()) - from;
     let distance = to_light.length();
@@ -41,14 +48,18 @@ pub(super) fn sample(
     if away >= 0.0 && !material.emits_both_sides {
         return None;
     }
-    // Parallelograms have no texture.
+    // Parallelograms have neither texture nor mask.
     let root = u.sqrt();
-    let at = textures.coordinates(id, [root * (1.0 - v), root * v]);
+    let weights = [root * (1.0 - v), root * v];
+    if hits.is_cut_out(id, weights, rounding.texel()) {
+        return None;
+    }
+    let at = textures.coordinates(id, weights);
     Some(LightSample {
         direction,
         distance,
         radiance: material.emission.as_dvec3() * textures.colour(material.emission_texture, at),
         density: Some(distance * distance / (area * away.abs())),
-        triangle: Some(id),
+        triangles: Some(triangles),
     })
 }

@@ -1,9 +1,12 @@
 //! Lights, one file for each way of shining, from `docs/shading.md`.
 
 mod delta;
+mod environment;
 mod flat;
+mod ies;
 mod sky;
 mod sphere;
+mod tree;
 
 use super::PathOracle;
 use super::hits::Segment;
@@ -12,6 +15,7 @@ use super::surface::Surface;
 use crate::scene::{Light, LightList, SceneData, Source};
 use glam::DVec3;
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 /// What lights are chosen by.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,6 +24,8 @@ pub(super) enum Choice {
     Power,
     /// Nothing.
     Uniform,
+    /// What they contribute at the point, about.
+    Tree,
     /// All are sampled.
     All,
 }
@@ -32,6 +38,21 @@ pub(super) struct Lights {
     owners: BTreeMap<u32, usize>,
     /// The lights that rays meet though they have no triangles.
     spheres: Vec<(usize, sphere::Ball)>,
+    /// The map around the scene, which is the last light.
+    map: Option<environment::Map>,
+    tree: OnceLock<tree::Tree>,
+}
+
+/// Where a light is chosen: a point of a surface, and the normal of the triangle there on the viewer's side.
+pub(super) type Place = (DVec3, DVec3);
+
+/// A light that was chosen.
+pub(super) struct Chosen {
+    pub light: usize,
+    /// With what probability.
+    pub share: f64,
+    /// What is left of the number.
+    pub remainder: f64,
 }
 
 /// A point of a light, as a surface sees it.
@@ -42,17 +63,15 @@ pub(super) struct LightSample {
     pub radiance: DVec3,
     /// Over solid angle, without the choice of the light in it; `None` for delta lights.
     pub density: Option<f64>,
-    /// The triangle that the point lies on.
-    pub triangle: Option<u32>,
+    /// The triangles that the point may lie on.
+    pub triangles: Option<[u32; 2]>,
 }
 
 impl Lights {
     /// The lights of a scene.
-    ///
-    /// # Errors
-    /// One of them is of a kind that the oracle has no formula for.
-    pub fn new(scene: &SceneData) -> Result<Self, String> {
+    pub fn new(scene: &SceneData) -> Self {
         let list = LightList::of(scene);
+        let mut map = None;
         let mut owners = BTreeMap::new();
         let mut spheres = Vec::new();
         for (place, light) in list.lights.iter().enumerate() {
@@ -63,18 +82,24 @@ impl Lights {
                     light @ Light::Sphere { .. } => {
                         spheres.extend(sphere::Ball::of(light).map(|ball| (place, ball)));
                     }
-                    Light::Point { .. } | Light::Spot { .. } | Light::Directional { .. } => {}
-                    other => return Err(format!("light `{}`", other.kind().name)),
+                    Light::Environment {
+                        map: texels,
+                        scale,
+                        turn,
+                    } => map = Some(environment::Map::new(texels, *scale, *turn)),
+                    _ => {}
                 },
             }
         }
         let power = list.lights.iter().map(|light| light.power).sum();
-        Ok(Self {
+        Self {
             list,
             power,
             owners,
             spheres,
-        })
+            map,
+            tree: OnceLock::new(),
+        }
     }
 
     /// Whether there is nothing to sample.
@@ -82,35 +107,18 @@ impl Lights {
         self.list.lights.is_empty()
     }
 
-    /// Probability with which a light is chosen.
-    fn share(&self, light: usize, choice: Choice) -> f64 {
-        match choice {
-            Choice::Power => self.list.lights[light].power / self.power,
-            Choice::Uniform => 1.0 / self.list.lights.len() as f64,
-            Choice::All => 1.0,
-        }
+    /// Whether a map shines.
+    pub fn have_map(&self) -> bool {
+        self.map.is_some()
     }
 
-    /// The lights that are sampled, with the probability of each.
-    pub fn chosen(
-        &self,
-        choice: Choice,
-        number: f64,
-        rounding: &mut Rounding,
-    ) -> Vec<(usize, f64)> {
-        let lights = 0..self.list.lights.len();
-        if choice == Choice::All {
-            return lights.map(|light| (light, 1.0)).collect();
-        }
-        let number = rounding.share(number);
-        let mut below = 0.0;
-        let last = lights.end.saturating_sub(1);
-        let found = lights.map(|light| (light, self.share(light, choice)));
-        let mut found = found.skip_while(|(light, share)| {
-            below += share;
-            number >= below && *light < last
-        });
-        found.next().into_iter().collect()
+    fn tree(&self, scene: &SceneData) -> &tree::Tree {
+        self.tree.get_or_init(|| tree::Tree::new(scene, &self.list))
+    }
+
+    /// Groups that a tree chooses evenly from: each light without a place, and all others.
+    fn groups(&self, tree: &tree::Tree) -> usize {
+        self.list.lights.len() - tree.len() + usize::from(tree.len() > 0)
     }
 }
 
@@ -124,31 +132,117 @@ pub(super) fn moved([u, v]: [f64; 2], k: usize) -> [f64; 2] {
 }
 
 impl PathOracle<'_> {
-    /// A point of a light.
-    pub(super) fn light_sample(
-        &self,
-        surface: &Surface,
-        light: usize,
-        point: [f64; 2],
-        rounding: &mut Rounding,
-    ) -> Option<LightSample> {
-        let from = surface.seen_from(rounding);
-        match self.lights.list.lights[light].source {
-            Source::Light(id) => match &self.scene.lights[id as usize] {
-                light @ Light::Sphere { .. } => sphere::Ball::of(light)?.sample(from, point),
-                light => delta::sample(light, from),
-            },
-            flat => flat::sample((self.scene, &self.textures), flat, from, point, rounding),
+    /// Probability with which a light is chosen.
+    fn share(&self, light: usize, choice: Choice, at: Place, rounding: &mut Rounding) -> f64 {
+        let lights = &self.lights;
+        match choice {
+            Choice::Power => lights.list.lights[light].power / lights.power,
+            Choice::Uniform => 1.0 / lights.list.lights.len() as f64,
+            Choice::All => 1.0,
+            Choice::Tree => {
+                let tree = lights.tree(self.scene);
+                let group = 1.0 / lights.groups(tree) as f64;
+                match light < tree.len() {
+                    true => group * tree.share(light, at, rounding),
+                    false => group,
+                }
+            }
         }
     }
 
+    /// The lights that are sampled.
+    pub(super) fn chosen(
+        &self,
+        choice: Choice,
+        number: f64,
+        at: Place,
+        rounding: &mut Rounding,
+    ) -> Vec<Chosen> {
+        let lights = self.lights.list.lights.len();
+        let chosen = |light, share, remainder| Chosen {
+            light,
+            share,
+            remainder,
+        };
+        if choice == Choice::All {
+            return (0..lights)
+                .map(|light| chosen(light, 1.0, number))
+                .collect();
+        }
+        let number = rounding.share(number).clamp(0.0, 1.0);
+        if choice == Choice::Tree {
+            let tree = self.lights.tree(self.scene);
+            let groups = self.lights.groups(tree);
+            let infinite = lights - tree.len();
+            let place = number * groups as f64;
+            let group = (place as usize).min(groups - 1);
+            let rest = place - group as f64;
+            let even = 1.0 / groups as f64;
+            if group < infinite {
+                return vec![chosen(tree.len() + group, even, rest)];
+            }
+            let found = tree.choose(rest, at, rounding);
+            let found = found.map(|(light, share, rest)| chosen(light, even * share, rest));
+            return found.into_iter().collect();
+        }
+        let mut below = 0.0;
+        for light in 0..lights {
+            let share = self.share(light, choice, at, rounding);
+            below += share;
+            if number < below || light + 1 == lights {
+                let remainder = (number - (below - share)) / share;
+                return vec![chosen(light, share, remainder)];
+            }
+        }
+        Vec::new()
+    }
+
+    /// A point of a light, and which part of it that is, where lights have parts that are chosen.
+    pub(super) fn light_sample(
+        &self,
+        surface: &Surface,
+        chosen: &Chosen,
+        point: [f64; 2],
+        rounding: &mut Rounding,
+    ) -> (usize, Option<LightSample>) {
+        let from = surface.position;
+        let light = match self.lights.list.lights[chosen.light].source {
+            Source::Light(id) => match &self.scene.lights[id as usize] {
+                light @ Light::Sphere { .. } => {
+                    sphere::Ball::of(light).and_then(|ball| ball.sample(from, point))
+                }
+                Light::Environment { .. } => {
+                    let map = self.lights.map.as_ref();
+                    let found = map.map(|map| map.sample(chosen.remainder, point, rounding));
+                    return found.unwrap_or((0, None));
+                }
+                light => delta::sample(light, from, rounding),
+            },
+            flat => flat::sample(
+                (self.scene, &self.textures, &self.hits),
+                flat,
+                from,
+                point,
+                rounding,
+            ),
+        };
+        (0, light)
+    }
+
     /// With what density light samples find the point of an emitter that a ray has met.
-    pub(super) fn light_density(&self, emitter: &Surface, distance: f64, choice: Choice) -> f64 {
+    pub(super) fn light_density(
+        &self,
+        emitter: &Surface,
+        ray: &Segment,
+        choice: Choice,
+        rounding: &mut Rounding,
+    ) -> f64 {
         let lights = &self.lights;
         lights.owners.get(&emitter.triangle).map_or(0.0, |light| {
             let cos = emitter.geometric.dot(emitter.out);
+            let distance = emitter.geometric.dot(ray.start - emitter.position) / cos;
             let area = lights.list.lights[*light].area;
-            lights.share(*light, choice) * distance * distance / (area * cos)
+            self.share(*light, choice, ray.place(), rounding) * distance * distance / (area * cos)
         })
     }
 
@@ -158,14 +252,16 @@ impl PathOracle<'_> {
         ray: &Segment,
         end: f64,
         choice: Choice,
+        rounding: &mut Rounding,
     ) -> Option<(DVec3, f64)> {
         let met = self.lights.spheres.iter().filter_map(|(light, ball)| {
             let distance = ball.meet(ray)?;
             (distance < end).then_some((light, ball, distance))
         });
         let (light, ball, _) = met.min_by(|a, b| a.2.total_cmp(&b.2))?;
-        let density = ball.density(ray.origin, ray.direction);
-        Some((ball.radiance, self.lights.share(*light, choice) * density))
+        let density = ball.density(ray.start, ray.direction);
+        let share = self.share(*light, choice, ray.place(), rounding);
+        Some((ball.radiance, share * density))
     }
 
     /// Whether anything lies on the way to a light.
@@ -176,9 +272,29 @@ impl PathOracle<'_> {
             || self.hits.blocked(shadow)
     }
 
-    /// What comes along a ray that leaves the scene.
+    /// What comes along a ray that leaves the scene. A map takes the place of the sky.
     pub(super) fn escaped(&self, direction: DVec3) -> DVec3 {
-        sky::radiance(self.scene, direction)
+        let map = self.lights.map.as_ref();
+        map.map_or_else(
+            || sky::radiance(self.scene, direction),
+            |map| map.radiance(direction),
+        )
+    }
+
+    /// The part of the map that a ray meets which leaves the scene, and the density with which light samples find its direction;
+    /// nothing where there is no map.
+    pub(super) fn escaped_density(
+        &self,
+        ray: &Segment,
+        choice: Choice,
+        rounding: &mut Rounding,
+    ) -> Option<(usize, f64)> {
+        let (texel, density) = self.lights.map.as_ref()?.density(ray.direction);
+        let last = self.lights.list.lights.len() - 1;
+        Some((
+            texel,
+            density * self.share(last, choice, ray.place(), rounding),
+        ))
     }
 
     /// Whether a bounced ray counts as one that leaves, though it hits something so far away.

@@ -78,7 +78,7 @@ impl Ball {
             distance,
             radiance: self.radiance,
             density: Some(self.density(from, direction)),
-            triangle: None,
+            triangles: None,
         })
     }
 

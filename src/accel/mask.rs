@@ -1,0 +1,200 @@
+//! Alpha masks: rays pass where a surface is cut out. Twin of `kernels/accel/mask.wesl`.
+//!
+//! A triangle test first says whether it accepts a hit, its weights u and v included; then the mask says whether there is a surface
+//! at these weights. It depends on ray and triangle alone, as the test does, so what is proved of boxes in
+//! `docs/design.md` holds, and a hit that is cut out never shortens the ray.
+//!
+//! u and v become integers (24 bits), and all that follows is integer arithmetic: coordinates in units of 1/256 texel, bilinear weights
+//! of 8 bits, the comparison with the threshold. Kernels and twins cannot differ where weights do not.
+
+use super::triangle::TriangleRecord;
+use crate::scene::{AlphaMask, SceneData, Texture, Wrap};
+use glam::DVec2;
+use std::collections::BTreeMap;
+
+/// Set in the word of the material where a record's triangle has a mask: the place of its words then.
+pub const MASKED: u32 = 0x8000_0000;
+const MIRRORED: u32 = 1;
+const CLAMPED: u32 = 2;
+/// The weight of a corner in its own point.
+const WHOLE: u32 = 1 << 24;
+/// Units of coordinates in a texel.
+const UNITS: f64 = 256.0;
+/// Greatest coordinate of a corner, in units: sums of three changes stay within 32 bits.
+const GREATEST: f64 = 268_435_456.0;
+
+/// Words of the masks of a scene's triangles: they lie behind the records in the buffer `triangles`.
+///
+/// First the images: a row with width, height, how it wraps (in v times 4, in u) and threshold, then alphas, sixteen a row. Then
+/// two rows a triangle: coordinates of the first corner, and what the second and the third add to them, in 1/256 texel from the
+/// centre of the first texel; place of the image; the material.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Masks {
+    /// Where they begin in the buffer, in `vec4`.
+    pub first: u32,
+    /// Four words a row.
+    pub rows: Vec<[u32; 4]>,
+}
+
+impl Masks {
+    /// The masks of a scene, to lie behind `first` rows, and the word that takes the place of the material's in each record; `None`
+    /// if nothing is cut out.
+    pub fn of(scene: &SceneData, first: u32) -> Option<(Self, Vec<u32>)> {
+        let mut masks = Self {
+            first,
+            rows: Vec::new(),
+        };
+        let mut images = BTreeMap::new();
+        for (id, material) in (0_u32..).zip(&scene.materials) {
+            if let Some(mask) = &material.mask {
+                images.insert(id, (masks.end(), *mask));
+                masks.append_image(mask, &scene.textures);
+            }
+        }
+        if images.is_empty() {
+            return None;
+        }
+        let mut words = scene.material_ids.clone();
+        for (id, word) in words.iter_mut().enumerate() {
+            if let Some((image, mask)) = images.get(word) {
+                let (material, place) = (*word, masks.end());
+                *word = MASKED | place;
+                let uvs = scene.uvs.get(id).copied().unwrap_or_default();
+                masks.append_triangle(uvs, mask, *image, material);
+            }
+        }
+        Some((masks, words))
+    }
+
+    /// The place behind the last row.
+    pub fn end(&self) -> u32 {
+        self.first + self.rows.len() as u32
+    }
+
+    fn append_image(&mut self, mask: &AlphaMask, textures: &[Texture]) {
+        let threshold = mask.threshold();
+        let Some(used) = mask.texture else {
+            let opaque = [u32::MAX, 0, 0, 0];
+            self.rows.extend([[1, 1, 0, threshold], opaque]);
+            return;
+        };
+        let texture = &textures[used.texture as usize];
+        let number = |wrap| match wrap {
+            Wrap::Repeat => 0,
+            Wrap::Mirrored => MIRRORED,
+            Wrap::Clamp => CLAMPED,
+        };
+        let [u, v] = used.wrap.map(number);
+        self.rows
+            .push([texture.width, texture.height, 4 * v + u, threshold]);
+        let alpha = |texel: &[u8; 4]| mask.channel.value(*texel);
+        let alphas: Vec<u8> = texture.texels.iter().map(alpha).collect();
+        let row = |bytes: &[u8]| {
+            let byte = |i: usize| bytes.get(i).copied().unwrap_or(0);
+            [0, 4, 8, 12].map(|i| u32::from_le_bytes([0, 1, 2, 3].map(|k| byte(i + k))))
+        };
+        self.rows.extend(alphas.chunks(16).map(row));
+    }
+
+    fn append_triangle(
+        &mut self,
+        uvs: [glam::Vec2; 3],
+        mask: &AlphaMask,
+        image: u32,
+        material: u32,
+    ) {
+        let [width, height, wraps, _] = self.rows[(image - self.first) as usize];
+        let size = DVec2::new(width.into(), height.into());
+        let corners = uvs.map(|uv| match mask.texture {
+            Some(used) => {
+                let at = used.linear.as_dmat2() * uv.as_dvec2() + used.offset.as_dvec2();
+                (at * size - 0.5) * UNITS
+            }
+            None => DVec2::ZERO,
+        });
+        let axis = |axis: usize, wrap: u32| {
+            let [a, b, c] = corners.map(|corner| corner[axis]);
+            // Whole periods change nothing: numbers stay small where coordinates are large.
+            let period = size[axis] * UNITS * if wrap == MIRRORED { 2.0 } else { 1.0 };
+            let moved = match wrap {
+                CLAMPED => 0.0,
+                _ => (a / period).floor() * period,
+            };
+            let within = |x: f64| (x - moved).round().clamp(-GREATEST, GREATEST) as i32;
+            let [a, b, c] = [a, b, c].map(within);
+            [a, b - a, c - a].map(|x| x as u32)
+        };
+        let ([x, x1, x2], [y, y1, y2]) = (axis(0, wraps & 3), axis(1, wraps >> 2));
+        self.rows
+            .extend([[x, y, x1, y1], [x2, y2, image, material]]);
+    }
+
+    /// Whether two triangles, given by the words of their materials, have the same parts cut out.
+    pub fn cut_alike(&self, one: u32, other: u32) -> bool {
+        let cut = |word: u32| {
+            let own = (word >= MASKED).then_some(word & !MASKED)?;
+            let [x2, y2, image, _] = self.row(own + 1);
+            Some((self.row(own), [x2, y2, image]))
+        };
+        cut(one) == cut(other)
+    }
+
+    fn row(&self, place: u32) -> [u32; 4] {
+        self.rows[(place - self.first) as usize]
+    }
+}
+
+/// The part of a change of coordinates that belongs to a weight, rounded.
+fn part_of(change: i32, weight: u32) -> i32 {
+    let (high, low) = (weight >> 8, (weight & 255) as i32);
+    let fraction = change as u32 & 0xffff;
+    let rest = ((fraction * high) >> 8) as i32 + (((change >> 8) * low) >> 8);
+    (change >> 16) * high as i32 + ((rest + 128) >> 8)
+}
+
+fn wrapped(at: i32, size: i32, wrap: u32) -> u32 {
+    if wrap == CLAMPED {
+        return at.clamp(0, size - 1) as u32;
+    }
+    let period = if wrap == MIRRORED { 2 * size } else { size };
+    let there = (at % period + period) % period;
+    there.min(2 * size - 1 - there) as u32
+}
+
+fn alpha_at(masks: &Masks, place: u32, image: [u32; 4], x: i32, y: i32) -> u32 {
+    let [width, height, wraps, _] = image;
+    let column = wrapped(x, width as i32, wraps & 3);
+    let row = wrapped(y, height as i32, wraps >> 2);
+    let at = row * width + column;
+    let word = masks.row(place + 1 + (at >> 4))[((at >> 2) & 3) as usize];
+    (word >> (8 * (at & 3))) & 255
+}
+
+/// Whether there is no surface at the point of a triangle with these weights of its second and third corner.
+pub fn is_cut_out(masks: Option<&Masks>, triangle: &TriangleRecord, u: f32, v: f32) -> bool {
+    let Some(masks) = masks.filter(|_| triangle.material >= MASKED) else {
+        return false;
+    };
+    let own = triangle.material & !MASKED;
+    let [x, y, x1, y1] = masks.row(own).map(|word| word as i32);
+    let [x2, y2, place, _] = masks.row(own + 1);
+    let second = ((u * WHOLE as f32) as u32).min(WHOLE);
+    let third = ((v * WHOLE as f32) as u32).min(WHOLE - second);
+    let x = x + part_of(x1, second) + part_of(x2 as i32, third);
+    let y = y + part_of(y1, second) + part_of(y2 as i32, third);
+    let image = masks.row(place);
+    let (column, row) = (x >> 8, y >> 8);
+    let (fx, fy) = ((x & 255) as u32, (y & 255) as u32);
+    let alpha = |dx, dy| alpha_at(masks, place, image, column + dx, row + dy);
+    let upper = alpha(0, 0) * (256 - fx) + alpha(1, 0) * fx;
+    let lower = alpha(0, 1) * (256 - fx) + alpha(1, 1) * fx;
+    upper * (256 - fy) + lower * fy < image[3]
+}
+
+/// The material of a triangle.
+pub fn material_of(masks: Option<&Masks>, triangle: &TriangleRecord) -> u32 {
+    match masks.filter(|_| triangle.material >= MASKED) {
+        Some(masks) => masks.row((triangle.material & !MASKED) + 1)[3],
+        None => triangle.material,
+    }
+}

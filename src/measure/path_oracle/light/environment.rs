@@ -1,0 +1,148 @@
+//! Radiance from all around by an equirectangular map.
+//!
+//! Which texel a number chooses depends on the order in which an alias table was made: the table is read as data. With
+//! what probability it chooses each texel is counted from it, so that a table that chooses by other weights than
+//! kernels divide by shows, as does a density that is none of the table.
+
+use super::LightSample;
+use crate::integrator::environment_aliases;
+use crate::measure::path_oracle::rounding::Rounding;
+use crate::scene::EnvironmentMap;
+use glam::DVec3;
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+/// Distance of what has none.
+const FAR: f64 = 1e30;
+
+/// A choice by one number: threshold and alias of each entry, and with what probability each is chosen.
+struct Aliases {
+    entries: Vec<(f64, usize)>,
+    shares: Vec<f64>,
+}
+
+impl Aliases {
+    fn new(entries: Vec<(f64, usize)>) -> Self {
+        let mut shares: Vec<f64> = entries.iter().map(|(own, _)| *own).collect();
+        for (own, alias) in &entries {
+            shares[*alias] += 1.0 - own;
+        }
+        let count = entries.len() as f64;
+        shares.iter_mut().for_each(|share| *share /= count);
+        Self { entries, shares }
+    }
+
+    /// The entry of a number in [0, 1), and what is left of the number.
+    fn choose(&self, u: f64) -> (usize, f64) {
+        let place = u.clamp(0.0, 1.0) * self.entries.len() as f64;
+        let index = (place as usize).min(self.entries.len() - 1);
+        let along = (place - index as f64).min(1.0);
+        let (threshold, alias) = self.entries[index];
+        match along < threshold {
+            true => (index, along / threshold),
+            false => (alias, (along - threshold) / (1.0 - threshold)),
+        }
+    }
+}
+
+/// A map with the tables that choose its texels.
+pub(super) struct Map {
+    map: Arc<EnvironmentMap>,
+    scale: f64,
+    turn: f64,
+    rows: Aliases,
+    /// One for each row.
+    columns: Vec<Aliases>,
+}
+
+impl Map {
+    pub fn new(map: &Arc<EnvironmentMap>, scale: f32, turn: f32) -> Self {
+        let entries: Vec<(f64, usize)> = (environment_aliases(map).into_iter())
+            .map(|(threshold, alias)| (threshold.into(), alias as usize))
+            .collect();
+        let (rows, columns) = entries.split_at(map.height as usize);
+        let of_row = |row: &[(f64, usize)]| Aliases::new(row.to_vec());
+        Self {
+            map: Arc::clone(map),
+            scale: scale.into(),
+            turn: turn.into(),
+            rows: of_row(rows),
+            columns: columns.chunks(map.width as usize).map(of_row).collect(),
+        }
+    }
+
+    fn size(&self) -> [f64; 2] {
+        [self.map.width.into(), self.map.height.into()]
+    }
+
+    /// Solid angle of a texel of a row.
+    fn solid_angle(&self, row: usize) -> f64 {
+        let [width, height] = self.size();
+        let cosine = |row: usize| (PI * row as f64 / height).cos();
+        TAU / width * (cosine(row) - cosine(row + 1))
+    }
+
+    /// Column and row of a direction, as they run over the map.
+    fn place(&self, d: DVec3) -> [f64; 2] {
+        let [width, height] = self.size();
+        let around = ((-d.x).atan2(-d.z) - self.turn).rem_euclid(TAU);
+        let down = d.x.hypot(d.z).atan2(d.y);
+        [around / TAU * width, down / PI * height]
+    }
+
+    /// Bilinear between the centres of texels.
+    pub fn radiance(&self, direction: DVec3) -> DVec3 {
+        let [x, y] = self.place(direction);
+        let (width, height) = (self.map.width as usize, self.map.height as usize);
+        let (x, y) = (x - 0.5, (y - 0.5).clamp(0.0, height as f64 - 1.0));
+        let left = x.floor().rem_euclid(width as f64) as usize;
+        let above = y as usize;
+        let (s, t) = (x - x.floor(), y - above as f64);
+        let texel = |column: usize, row: usize| {
+            let at = row.min(height - 1) * width + column % width;
+            self.map.texels[at].as_dvec3()
+        };
+        let along = |row: usize| texel(left, row) * (1.0 - s) + texel(left + 1, row) * s;
+        self.scale * (along(above) * (1.0 - t) + along(above + 1) * t)
+    }
+
+    /// The texel of a direction, and the density with which light samples find it.
+    pub fn density(&self, direction: DVec3) -> (usize, f64) {
+        let [x, y] = self.place(direction);
+        let (width, height) = (self.map.width as usize, self.map.height as usize);
+        let (column, row) = ((x as usize).min(width - 1), (y as usize).min(height - 1));
+        (row * width + column, self.density_of(column, row))
+    }
+
+    fn density_of(&self, column: usize, row: usize) -> f64 {
+        self.rows.shares[row] * self.columns[row].shares[column] / self.solid_angle(row)
+    }
+
+    /// A direction; `remainder` is what is left of the number that chose the light.
+    pub fn sample(
+        &self,
+        remainder: f64,
+        [u, v]: [f64; 2],
+        rounding: &mut Rounding,
+    ) -> (usize, Option<LightSample>) {
+        let [width, height] = self.size();
+        let (row, _) = self.rows.choose(remainder);
+        let (column, along) = self.columns[row].choose(rounding.share(u));
+        let edge = |row: usize| (PI * row as f64 / height).cos();
+        let cos = edge(row) + v * (edge(row + 1) - edge(row));
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        let around = TAU * (column as f64 + along) / width + self.turn;
+        let direction = DVec3::new(-around.sin() * sin, cos, -around.cos() * sin);
+        let direction = rounding.direction(direction);
+        let density = self.density_of(column, row);
+        let sample = LightSample {
+            direction,
+            distance: FAR,
+            radiance: self.radiance(direction),
+            density: Some(density),
+            triangles: None,
+        };
+        let texel = row * self.map.width as usize + column;
+        (texel, (density > 0.0).then_some(sample))
+    }
+}
