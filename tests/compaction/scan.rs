@@ -38,7 +38,9 @@ fn first_wrong(gpu: &Gpu, lanes: u32) -> Option<usize> {
         })
         .collect();
     let kernel = Composition::new("test/scan").constant("SCAN_LANES", lanes);
-    let pipeline = gpu.pipeline(&kernel, true).unwrap_or_else(|e| panic!("{e}"));
+    let pipeline = gpu
+        .pipeline(&kernel, true)
+        .unwrap_or_else(|e| panic!("{e}"));
     let scans = Storage::scratch("scans", 24 * words.len() as u64);
     let mut bindings = Bindings::new();
     bindings
