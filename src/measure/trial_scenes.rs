@@ -295,6 +295,9 @@ fn glossy() -> Result<SceneData, SceneError> {
         principled(1.0, 0.5, 0.04),
         principled(0.5, 0.9, 0.08),
         Material::dielectric("glass", vec3(0.9, 1.0, 0.9), 1.5).with_schlick(),
+        // Rough enough for half of the angles to be masked.
+        cook(Masking::Smith, Fresnel::Schlick, 0.6),
+        cook(Masking::VCavities, Fresnel::Exact, 0.7),
     ];
     for (place, material) in balls.into_iter().enumerate() {
         let material = mesh.material(material);

@@ -37,6 +37,11 @@ const RUN: Extent = Extent {
     samples: 4,
     every: 4,
 };
+/// On a trial scene by `verify`: 1976 paths, since a material may have a twentieth of the image.
+const TRIAL: Extent = Extent {
+    samples: 4,
+    every: 1,
+};
 /// By `verify`: 3952 paths.
 const VERIFY: Extent = Extent {
     samples: 8,
@@ -209,7 +214,8 @@ fn of_trial(
         ..*subject
     };
     for integrator in integrators {
-        let (mut record, _) = judged(session, &on_trial, integrator, RUN)?;
+        let extent = if session.judges_trials { TRIAL } else { RUN };
+        let (mut record, _) = judged(session, &on_trial, integrator, extent)?;
         let told = |fault: String| format!("on the trial scene `{}`: {fault}", trial.scene.name);
         record.fault = record.fault.map(told);
         all = all.and(record);
