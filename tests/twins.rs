@@ -56,6 +56,78 @@ const NO_TWIN: &[(&str, &str)] = &[
         "sums over a workgroup; tests/compaction compares them with the host's",
     ),
     ("common/scene", "a binding"),
+    (
+        "compaction/add_totals",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/atomic",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/blelloch",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/digest",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/gather",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/groups",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/hillis_steele",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/holes",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/none",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/reduce",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/roger_blocks",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/roger_move",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/scan_blocks",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/scatter",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/stream",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/subgroup",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/tile",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/workgroup",
+        "judged by tests/compaction, against what flags say",
+    ),
     ("integrator/ao", "judged by images, not by a twin"),
     ("integrator/frame", "judged by images, not by a twin"),
     ("integrator/path", "judged by images, not by a twin"),

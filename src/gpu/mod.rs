@@ -27,7 +27,7 @@ pub use kernel_errors::{KERNEL_ERRORS, kernel_errors};
 pub use pipeline::{Pipeline, TEXELS_PER_ROW, WORKGROUP_SIZE};
 pub use player::Player;
 pub use probe::{ArithmeticProbe, probe_arithmetic};
-pub use recording::{Groups, Played, Recording, groups_for};
+pub use recording::{Groups, Played, Recording, grid_of, groups_for};
 pub use slices::Slices;
 pub use uniform::UniformValues;
 

@@ -1,5 +1,7 @@
 //! Stream compaction, and the scans that it is made of.
 
+mod methods;
+mod runs;
 mod scan;
 #[path = "../support/mod.rs"]
 mod support;
