@@ -70,7 +70,7 @@ fn a_run_of_compactions_needs_no_scene_and_says_how_each_grows() {
     for text in [
         "Compaction of streams",
         "fits better",
-        "compaction:roger(bytes=8,block=16)",
+        "compaction:roger(block=16)",
     ] {
         assert!(page.contains(text), "{text} is not in\n{page}");
     }
