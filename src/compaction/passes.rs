@@ -25,12 +25,11 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// How kernels see the elements: `vec4`s where whole ones fit, else words, and how many an element has.
-    fn cells(&self) -> (bool, u32) {
-        match self.element_bytes % 16 {
-            0 => (true, self.element_bytes / 16),
-            _ => (false, self.element_bytes / 4),
-        }
+    /// A kernel that sees the elements as what they have fewest of: `vec4`s where whole ones fit, else words.
+    pub fn seen_by(&self, kernel: Composition) -> Composition {
+        let wide = self.element_bytes.is_multiple_of(16);
+        let cells = self.element_bytes / if wide { 16 } else { 4 };
+        kernel.constant("CELLS", cells).feature("wide_cells", wide)
     }
 
     fn bindings(&self) -> Bindings {
@@ -90,8 +89,7 @@ impl<'a> Passes<'a> {
         further: &Bindings,
         workgroups: u32,
     ) -> Result<(), GpuError> {
-        let (wide, cells) = self.stream.cells();
-        let kernel = kernel.constant("CELLS", cells).feature("wide_cells", wide);
+        let kernel = self.stream.seen_by(kernel);
         let pipeline = self.gpu.pipeline(&kernel, true)?;
         let bindings = self.stream.bindings().merged(further);
         let name = kernel.entry.rsplit('/').next().unwrap_or_default();

@@ -128,3 +128,20 @@ fn a_method_that_is_wrong_has_no_figure() {
         );
     }
 }
+
+#[test]
+fn a_lost_device_costs_one_cell() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let lost = "compaction:atomic(elements=1000)";
+    let text = "[run]\nname = \"lost\"\n[axes]\nintegrator = [\"compaction:none\", \"compaction:atomic\", \"compaction:roger\"]\n\
+                [integrator.\"compaction:none\"]\nelements = 1000\n[integrator.\"compaction:atomic\"]\nelements = 1000\n\
+                [integrator.\"compaction:roger\"]\nelements = 1000\n[timing]\nrounds = 3\nmin_warmup_ms = 0\nmax_warmup_ms = 1\n";
+    let (summary, lines) = run(text, &Registries::default(), folder.path(), Some(lost));
+    assert_eq!(summary.failed, 1);
+    let found = compactions(&lines);
+    assert_eq!(found.len(), 3);
+    for (line, record) in found {
+        let is_lost = line.key.label(axis::INTEGRATOR) == lost;
+        assert_eq!(record.failure.is_some(), is_lost, "{}", line.key);
+    }
+}

@@ -80,7 +80,7 @@ impl Inputs {
     /// # Errors
     /// They are larger than the adapter binds, or have no whole words.
     pub fn upload(gpu: &Gpu, flags: Vec<u32>, bytes: u32) -> Result<Self, GpuError> {
-        if bytes == 0 || bytes % 4 != 0 {
+        if bytes == 0 || !bytes.is_multiple_of(4) {
             let text = format!("an element of {bytes} bytes has no whole words of 4 bytes");
             return Err(GpuError::Kernel(text));
         }
@@ -207,12 +207,8 @@ impl Bench {
 /// Two sums over what stays, and the count.
 fn look(gpu: &Gpu, stream: &Stream) -> Result<Recording, GpuError> {
     let digest = Storage::scratch("digest", 16);
-    let wide = stream.element_bytes % 16 == 0;
-    let cells = stream.element_bytes / if wide { 16 } else { 4 };
-    let kernel = Composition::new("compaction/digest")
-        .constant("SCAN_LANES", DIGEST_LANES)
-        .constant("CELLS", cells)
-        .feature("wide_cells", wide);
+    let kernel = Composition::new("compaction/digest").constant("SCAN_LANES", DIGEST_LANES);
+    let kernel = stream.seen_by(kernel);
     let mut bindings = Bindings::new();
     bindings
         .buffer("kept", &stream.kept)

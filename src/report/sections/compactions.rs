@@ -76,7 +76,7 @@ fn others(key: &Key, parameter: &str) -> (String, String) {
 
 /// Cells that differ in one parameter alone, by growing values of it.
 fn over<'a, 'd>(data: &'d RunData<'a>, parameter: &str) -> Vec<Vec<(f64, &'d Measured<'a>)>> {
-    let mut groups: Vec<((String, String), Vec<(f64, &Measured)>)> = Vec::new();
+    let mut groups: Vec<(_, Vec<(f64, &Measured)>)> = Vec::new();
     for cell in data.compactions.iter().filter(|c| c.failure.is_none()) {
         let variant = cell.key.get(axis::INTEGRATOR);
         let x = match variant.and_then(|v| v.params.0.get(parameter)) {
