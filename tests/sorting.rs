@@ -34,7 +34,8 @@ fn sorted(gpu: &Gpu, keys: &[u32], bits: u32) -> (Vec<u32>, Vec<u32>) {
 /// The same on the host.
 fn expected(keys: &[u32], bits: u32) -> (Vec<u32>, Vec<u32>) {
     let mut values: Vec<u32> = (0..keys.len() as u32).collect();
-    let mask = u32::MAX >> (32 - bits);
+    // Whole digits.
+    let mask = u32::MAX >> (32 - bits.next_multiple_of(8));
     values.sort_by_key(|&place| keys[place as usize] & mask);
     let keys = values.iter().map(|&place| keys[place as usize]).collect();
     (keys, values)

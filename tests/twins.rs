@@ -182,11 +182,6 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
         "reads words; the twin has structs",
     ),
     ("accel/bounds", "MISSED", "the twin returns an Option"),
-    (
-        "accel/tree/parallel/boxes",
-        "NOTHING",
-        "a constant of the twin's type",
-    ),
     ("accel/leaf", "leaf_words", "parts of an array"),
     ("accel/cwbvh", "node_word", "parts of an array"),
     ("accel/cwbvh", "triangle_word", "parts of an array"),

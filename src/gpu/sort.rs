@@ -54,7 +54,7 @@ impl RadixSort {
         })
     }
 
-    /// Sorts by the lowest `bits` of the keys, ascending; what is equal stays in order. Tells where the sorted
+    /// Sorts by the lowest `bits` of the keys, in whole digits of eight, ascending; what is equal stays in order. Tells where the sorted
     /// pairs are then: in the buffers given, or in scratch. Times are told under `sort count`, `sort offsets` and
     /// `sort scatter`.
     pub fn record(&self, recording: &mut Recording, pairs: &Pairs, bits: u32) -> Pairs {

@@ -1,8 +1,8 @@
-//! Trees from sorted triangles, bottom-up, by methods that a device can follow: `device-lbvh` and `device-ploc` are
-//! built there, `host-lbvh` and `host-ploc` are their twins, equal to the bit.
+//! Trees from sorted triangles, bottom-up, by a method that a device can follow: `device-lbvh` is built there, `host-lbvh`
+//! is its twin, equal to the bit.
 //!
-//! Both sort triangles along a curve through the scene ([`morton`]). [`lbvh`] then reads the tree off the codes,
-//! [`clusters`] joins neighbours in rounds. [`device`] records the passes.
+//! Triangles are sorted along a curve through the scene ([`morton`]), and `lbvh` reads the tree off the codes. [`device`]
+//! records the passes.
 
 pub mod boxes;
 pub mod device;
@@ -93,7 +93,7 @@ impl LinkedTree {
     /// The first node that is not, of a tree that a device with a fault handed over.
     pub fn check(&self, triangles: usize) -> Result<(), AccelError> {
         let mut seen = vec![false; self.nodes.len()];
-        let mut open = vec![self.root];
+        let mut open = Vec::from_iter((!self.nodes.is_empty()).then_some(self.root));
         while let Some(index) = open.pop() {
             let node = self.nodes.get(index as usize);
             let is_new = seen
