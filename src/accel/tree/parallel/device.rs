@@ -44,8 +44,8 @@ pub fn build(
         Method::Lbvh => passes.lbvh(&mut recording).map_err(failed)?,
     };
     recording
-        .download("scene", &passes.words("tree scene", SCENE_WORDS))
-        .download("nodes", &passes.nodes());
+        .download("scene", passes.words("tree scene", SCENE_WORDS))
+        .download("nodes", passes.nodes());
     let start = Instant::now();
     let played = log.play(&recording)?;
     let scene: Vec<u32> = played.download("scene").map_err(failed)?;
