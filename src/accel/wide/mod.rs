@@ -8,8 +8,8 @@ pub use collapse::{WideChild, WideKind};
 pub use quantise::{Quantisation, enter_four, frame, leave_four};
 
 use super::structure::prelude::*;
-use super::tree::{Coverage, NodeKind, Tree, TreeParameters};
 use super::tracer::RefillParameters;
+use super::tree::{Coverage, NodeKind, Tree, TreeParameters};
 use super::triangle::TriangleRecord;
 use bytemuck::Pod;
 use collapse::WideTree;
