@@ -14,6 +14,7 @@
 
 pub mod accel;
 pub mod atomic;
+pub mod compaction;
 pub mod config;
 pub mod discrepancy;
 pub mod geometry;

@@ -4,6 +4,7 @@
 //! by others.
 
 mod adaptive;
+mod compactions;
 mod errors;
 mod folder;
 mod images;
@@ -226,6 +227,9 @@ fn measure(
     }
     loop {
         streams::run(session, &device)?;
+        if device.gpu.lost().is_none() {
+            compactions::run(session, &device)?;
+        }
         if device.gpu.lost().is_none() {
             break;
         }

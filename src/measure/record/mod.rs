@@ -2,6 +2,7 @@
 //! and a body. Every table, plot and export derives from these lines alone; an absent value is absent,
 //! never 0.
 
+mod compaction;
 mod error;
 mod key;
 mod old;
@@ -11,6 +12,7 @@ mod run;
 mod stream;
 mod structure;
 
+pub use compaction::CompactionRecord;
 pub use error::*;
 pub use key::{Key, axis};
 pub use paths::PathsRecord;
@@ -144,6 +146,8 @@ pub enum Body {
     Stream(StreamRecord),
     /// What drawing from a sampler costs.
     SamplerCost(SamplerCostRecord),
+    /// A compaction of a stream was judged and timed.
+    Compaction(CompactionRecord),
     /// A cell that was not run, with the reason.
     Skipped(SkippedRecord),
     /// A cell that failed before it had a record of its own kind, with the reason.
@@ -188,6 +192,7 @@ kinds! {
     Time: TimeRecord,
     Stream: StreamRecord,
     SamplerCost: SamplerCostRecord,
+    Compaction: CompactionRecord,
     Finished: FinishedRecord,
     Interrupted: InterruptedRecord,
 }

@@ -1,6 +1,7 @@
 //! The content of the report, section by section.
 
 pub mod belief;
+pub mod compactions;
 pub mod kernels;
 pub mod point_sets;
 pub mod rendering;
@@ -27,6 +28,7 @@ pub fn document(dir: &Path, data: &RunData, warnings: &[String]) -> Document {
     }
     sections.extend(streams::section(data));
     sections.extend(point_sets::section(data));
+    sections.extend(compactions::section(data));
     sections.extend(run::sections(data));
     Document {
         title: title(data),
