@@ -138,9 +138,8 @@ impl WideNode for Node {
         let mut next_nearest = 0;
         loop {
             let place = child(children, list & SLOT_MASK) as usize;
-            walk.visit(place);
+            let node = walk.visit(place, &built.nodes[place]);
             walk.counters.box_tests += WIDTH as u32;
-            let node = &built.nodes[place];
             let rest = list >> SLOT_BITS;
             if rest != EMPTY_LIST {
                 stack.push((children, next_nearest & STACKED_MASK | rest));

@@ -173,13 +173,12 @@ impl WideNode for Node {
             let places = group.1 >> PLACES_SHIFT;
             let slot = bit_number(places & places.wrapping_neg()) ^ octant;
             let index = group.0 + (group.1 & ((1 << slot) - 1)).count_ones();
-            walk.visit(index as usize);
+            let node = walk.visit(index as usize, &built.nodes[index as usize]);
             let left = places & (places - 1);
             if left != 0 {
                 stack.push((group.0, left << PLACES_SHIFT | group.1 & SLOTS_MASK));
                 walk.count_stack(stack.len());
             }
-            let node = &built.nodes[index as usize];
             let slots = slot_bits(node, &walk);
             let inner = node.inner_mask();
             group = (

@@ -4,6 +4,7 @@
 //! by others.
 
 mod adaptive;
+mod coherence;
 mod errors;
 mod folder;
 mod images;
@@ -291,6 +292,7 @@ fn run_world(
     if gpu.lost().is_none() {
         times::run(session, &world, &gated)?;
     }
+    coherence::run(session, &world, &gated)?;
     Ok(())
 }
 
