@@ -48,31 +48,17 @@ fn blocks_on_the_list_have_the_samples_of_a_whole_image_and_others_none() {
     assert!(lit > 64, "{lit}");
 }
 
-const EXPERIMENT: &str = r#"
-[run]
-replicates = 16
-resolution = [32, 32]
-spp = { pow2 = [3, 7] }
-[axes]
-scene = ["cornell-box"]
-accel = ["cwbvh"]
-sequence = ["pixel-hash"]
-decorrelation = ["none"]
-integrator = ["path"]
-[reference]
-spp = 8192
-[timing]
-rounds = 3
-min_warmup_ms = 0
-max_warmup_ms = 1
-rays = 1024
-[gate]
-rays = 1024
-brute_force_tests = 1000
-oracle_rays = 16
-[discrepancy]
-points = 16
-"#;
+/// 16 replicates to 128 samples, and what a test changes.
+fn experiment(changes: &[&str]) -> String {
+    let common = [
+        "run.replicates = 16",
+        "run.resolution = [32, 32]",
+        "run.spp = { pow2 = [3, 7] }",
+        "axes.accel = [\"cwbvh\"]",
+        "reference.spp = 8192",
+    ];
+    small_with(&[&common, changes].concat())
+}
 
 const METRIC: &str = "relmse-unbiased/eps=1e-2/v1";
 
@@ -105,14 +91,12 @@ fn curve(records: &[ErrorRecord]) -> Vec<(u32, f64)> {
 
 #[test]
 fn tiles_end_on_their_own_without_bias_and_the_target_is_met() {
-    let (uniform, _) = run(EXPERIMENT);
+    let (uniform, _) = run(&experiment(&[]));
     let uniform = curve(&uniform);
     // What an even image has at 32 samples, so that some tiles need fewer and some more.
     let target = uniform[2].1;
-    let rule = format!(
-        "spp = {{ pow2 = [3, 7] }}\nstop = {{ relmse = {target}, confidence = 0.95, tile = 8 }}"
-    );
-    let text = EXPERIMENT.replace("spp = { pow2 = [3, 7] }", &rule);
+    let rule = format!("run.stop = {{ relmse = {target}, confidence = 0.95, tile = 8 }}");
+    let text = experiment(&[&rule]);
     let (records, verdict) = run(&text);
     assert_eq!(verdict, BiasVerdict::NoBiasFound);
     let adaptive = curve(&records);

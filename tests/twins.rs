@@ -51,6 +51,10 @@ const NO_TWIN: &[(&str, &str)] = &[
         "common/ray_counts",
         "counts on the device, read by the renderer",
     ),
+    (
+        "common/scan",
+        "sums over a workgroup; tests/compaction compares them with the host's",
+    ),
     ("common/scene", "a binding"),
     ("integrator/ao", "judged by images, not by a twin"),
     ("integrator/frame", "judged by images, not by a twin"),

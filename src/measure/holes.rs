@@ -166,7 +166,8 @@ impl<'a> Image<'a> {
     }
 }
 
-fn wrapped(at: f64, size: f64, wrap: Wrap) -> usize {
+/// The texel that a place on an axis of `size` texels stands for.
+pub(super) fn wrapped(at: f64, size: f64, wrap: Wrap) -> usize {
     let inside = match wrap {
         Wrap::Repeat => at.rem_euclid(size),
         Wrap::Clamp => at.clamp(0.0, size - 1.0),

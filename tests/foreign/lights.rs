@@ -3,6 +3,7 @@
 use crate::{replicates, scene_of};
 use glam::{DVec3, Vec3};
 use raystone::geometry::Camera;
+use raystone::measure::known_images::closed::{disk, polygon};
 use raystone::scene::{Material, SceneData};
 use std::f64::consts::{PI, TAU};
 
@@ -13,29 +14,6 @@ const RADIANCE: f64 = 5.0;
 const HEIGHT: f64 = 1.5;
 /// The mean of an image may differ by so much beyond five standard errors.
 const TOLERANCE: f64 = 0.001;
-
-/// Irradiance over radiance at `point` with this normal from a polygon wholly above its horizon, which is seen from its front
-/// (J. H. Lambert, Photometria, 1760): half the sum over edges of the angle that an edge spans times the cosine of the normal to the
-/// plane through it.
-pub fn polygon(point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
-    let towards: Vec<DVec3> = corners.iter().map(|c| *c - point).collect();
-    let edges = towards.iter().zip(towards.iter().cycle().skip(1));
-    let sum: f64 = edges
-        .map(|(a, b)| {
-            let across = a.cross(*b);
-            across.length().atan2(a.dot(*b)) * normal.dot(across.normalize_or_zero())
-        })
-        .sum();
-    0.5 * sum.abs()
-}
-
-/// Irradiance over radiance from a disk parallel to the surface, whose axis passes the point at `offset` (J. R. Howell,
-/// A Catalog of Radiation Heat Transfer Configuration Factors, B-13, times π).
-fn disk(height: f64, radius: f64, offset: f64) -> f64 {
-    let (h, r) = (height / offset, radius / offset);
-    let z = 1.0 + h * h + r * r;
-    0.5 * PI * (1.0 - (z - 2.0 * r * r) / (z * z - 4.0 * r * r).sqrt())
-}
 
 /// A plane under a light, seen from aside, and the mean over the image of what its points reflect.
 fn compare(light: &[DVec3], irradiance: impl Fn(DVec3) -> f64, brighter: f32) -> f64 {

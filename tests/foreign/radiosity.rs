@@ -2,11 +2,11 @@
 //! exact (Lambert's formula), and a room without blocks hides nothing. One Jacobi step is one bounce, so that paths and
 //! radiosity end after the same number of them.
 
-use crate::lights::polygon;
 use crate::support::Estimate;
 use crate::{replicates, scene_of};
 use glam::{DVec3, Vec3};
 use raystone::geometry::Camera;
+use raystone::measure::known_images::closed::polygon;
 use raystone::scene::Material;
 use std::f64::consts::PI;
 

@@ -1,6 +1,7 @@
 //! Textures: bilinear between texel centres, decoded before they are interpolated.
 
-use crate::scene::{SceneData, TextureUse, Wrap};
+use crate::measure::holes::wrapped;
+use crate::scene::{SceneData, TextureUse};
 use glam::{DMat2, DVec2, DVec3};
 
 /// The textures of a scene.
@@ -90,16 +91,4 @@ impl<'a> Textures<'a> {
         let scale = f64::from(used.scale);
         (scale * map.x * tangent + scale * map.y * up + map.z * normal).normalize()
     }
-}
-
-fn wrapped(at: f64, size: f64, wrap: Wrap) -> usize {
-    let inside = match wrap {
-        Wrap::Repeat => at.rem_euclid(size),
-        Wrap::Clamp => at.clamp(0.0, size - 1.0),
-        Wrap::Mirrored => {
-            let there = at.rem_euclid(2.0 * size);
-            there.min(2.0 * size - 1.0 - there)
-        }
-    };
-    inside as usize
 }
