@@ -2,7 +2,6 @@
 
 use super::RunError;
 use super::images::Estimator;
-use super::paths::spread;
 use super::session::{Session, content_hash};
 use super::structures::Gated;
 use super::world::World;
@@ -158,6 +157,13 @@ fn rays(
     Ok(all)
 }
 
+/// So many of the indices below `spp`, evenly spread from the first on.
+fn spread(spp: u32, count: u32) -> Vec<u32> {
+    let count = count.min(spp).max(1);
+    let index = |i| (u64::from(i) * u64::from(spp) / u64::from(count)) as u32;
+    (0..count).map(index).collect()
+}
+
 /// What the model says of these rays.
 fn modelled(
     rays: &[(u32, Rays)],
@@ -184,4 +190,17 @@ fn modelled(
         }
     }
     Ok(at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_are_spread_over_all_and_none_stands_twice() {
+        assert_eq!(spread(64, 4), [0, 16, 32, 48]);
+        assert_eq!(spread(64, 1), [0]);
+        assert_eq!(spread(3, 8), [0, 1, 2]);
+        assert_eq!(spread(10, 4), [0, 2, 5, 7]);
+    }
 }

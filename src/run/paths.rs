@@ -258,7 +258,7 @@ fn judged(
 }
 
 /// So many of the indices below `spp`, the first and the last among them.
-pub(super) fn spread(spp: u32, count: u32) -> Vec<u32> {
+fn spread(spp: u32, count: u32) -> Vec<u32> {
     let last = u64::from(spp.max(1) - 1);
     let steps = u64::from(count.max(2) - 1);
     let mut indices: Vec<u32> = (0..=steps).map(|i| (i * last / steps) as u32).collect();

@@ -76,7 +76,7 @@ pub enum Ticks {
     /// 1, 2, 5, 10, …
     PowersOfTen,
     /// 0, 1, 2, …: the x axis is linear.
-    Linear,
+    Whole,
 }
 
 /// A plot whose y axis is logarithmic, and the x axis, too, unless its ticks say otherwise.
@@ -113,7 +113,7 @@ impl CurvePlot {
         let x = match self.x_ticks {
             Ticks::PowersOfTwo => Axis::log2(xs, &self.x_title)?,
             Ticks::PowersOfTen => Axis::log10(xs, &self.x_title)?,
-            Ticks::Linear => Axis::linear(xs.reduce(f64::max)?, &self.x_title),
+            Ticks::Whole => Axis::whole(xs.reduce(f64::max)?, &self.x_title),
         };
         let ends = [x.min() * 1.05, x.max() / 1.05];
         let guides = self.guides.iter();
@@ -194,7 +194,7 @@ fn shown_low(point: &CurvePoint) -> f64 {
 }
 
 fn drawable(point: &CurvePoint, ticks: Ticks) -> bool {
-    let has_place = point.x > 0.0 || (ticks == Ticks::Linear && point.x == 0.0);
+    let has_place = point.x > 0.0 || (ticks == Ticks::Whole && point.x == 0.0);
     has_place && point.y > 0.0 && point.x.is_finite() && point.y.is_finite()
 }
 

@@ -170,7 +170,7 @@ fn by_bounce(data: &RunData, stem: &str, view: &View) -> Option<Illustration> {
     });
     let plot = CurvePlot {
         x_title: "bounces before the ray".into(),
-        x_ticks: Ticks::Linear,
+        x_ticks: Ticks::Whole,
         y_title: "SIMT efficiency".into(),
         curves,
         guides: Vec::new(),

@@ -26,7 +26,7 @@ const SIDES: usize = 3;
 const ROOT: f64 = 0.15;
 const TIP: f64 = 1.0;
 /// Thickness at the root; it falls to a tenth at the tip.
-const THICKNESS: f64 = 0.006;
+const THICKNESS: f64 = 0.012;
 
 impl BuiltinScene for Hairball {
     const NAME: &'static str = "hairball";
