@@ -5,7 +5,7 @@ use crate::support::builtin;
 use glam::Vec3;
 use raystone::scene::{
     DIELECTRIC, EnvironmentMap, Light, MITSUBA_FILE, Material, MitsubaSettings, SceneData, Texture,
-    export_mitsuba,
+    encode_normal, export_mitsuba,
 };
 use std::fs;
 use std::process::Command;
@@ -69,6 +69,27 @@ fn every_triangle_is_written_once_and_an_emitter_with_its_back() {
             "{id}"
         );
     }
+}
+
+#[test]
+fn emitters_shine_by_their_facets_and_other_surfaces_keep_their_normals() {
+    let mut scene = builtin("cornell-box", &[]);
+    scene.normals = vec![[encode_normal(Vec3::Y); 3]; scene.triangles.len()];
+    let (_folder, xml, _) = exported(&scene, true);
+    let document = roxmltree::Document::parse(&xml).unwrap();
+    let shapes = document.descendants().filter(|n| n.has_tag_name("shape"));
+    let mut both = [0, 0];
+    for shape in shapes {
+        let emits = shape.children().any(|n| n.has_tag_name("emitter"));
+        let named = |n: &roxmltree::Node| n.attribute("name") == Some("face_normals");
+        let by_faces = shape.children().find(named).unwrap();
+        assert_eq!(
+            by_faces.attribute("value"),
+            Some(if emits { "true" } else { "false" })
+        );
+        both[usize::from(emits)] += 1;
+    }
+    assert!(both.iter().all(|count| *count > 0), "{both:?}");
 }
 
 #[test]

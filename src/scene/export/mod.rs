@@ -170,14 +170,16 @@ impl Export<'_> {
                 let side = ["", "-back"][usize::from(back.is_some())];
                 let name = format!("meshes/{id}{side}.ply");
                 self.write(&name, &bytes)?;
+                // Mitsuba takes the normals of vertices for those of the light, too, and then a faceted ball casts 0.3 % less
+                // around its shadows.
+                let by_faces = emits || !smooth;
                 let _ = write!(
                     self.xml,
                     r#"    <shape type="ply">
         <string name="filename" value="{name}"/>
-        <boolean name="face_normals" value="{}"/>
+        <boolean name="face_normals" value="{by_faces}"/>
         <ref id="material-{id}"/>
-"#,
-                    !smooth
+"#
                 );
                 if emits {
                     let radiance = vector(material.emission);
