@@ -143,6 +143,7 @@ struct Setting {
     sampler: Sampler,
     variant: raystone::params::Variant,
     size: [u32; 2],
+    groups: [u32; 2],
 }
 
 impl Setting {
@@ -170,12 +171,13 @@ impl Setting {
             integrator,
             variant: what,
             size: SIZE,
+            groups: [2, 6],
         }
     }
 
     /// Rays of the whole image.
     fn rays(&self, samples: &[u32]) -> Rays {
-        let groups = groups_of(self.size, [8, 4], [2, 6]);
+        let groups = groups_of(self.size, [8, 4], self.groups);
         let oracle = PathOracle::new(&self.scene).expect("an oracle");
         let image = path_oracle::View {
             estimator: path_oracle::Estimator::of(&self.integrator).expect("an estimator"),
@@ -311,7 +313,7 @@ fn a_path_lengthens_and_lanes_fall_asleep_unless_they_are_compacted() {
 fn a_smaller_jitter_makes_rays_more_coherent() {
     let efficiency = |decorrelation| {
         let mut setting = Setting::new("cornell-box", "ao", &[], decorrelation, 256);
-        setting.size = LARGE;
+        (setting.size, setting.groups) = (LARGE, [7, 6]);
         let tallies = setting.tallies(&[3, 100], "bvh", Organisation::SingleKernel);
         tallies["ao"].efficiency().expect("issues")
     };
