@@ -219,6 +219,7 @@ impl Setting {
 }
 
 const MACHINE: Coherence = Coherence {
+    resolution: SIZE,
     spp: Vec::new(),
     groups: 2,
     warps: 6,
@@ -313,7 +314,7 @@ fn a_path_lengthens_and_lanes_fall_asleep_unless_they_are_compacted() {
 fn a_smaller_jitter_makes_rays_more_coherent() {
     let efficiency = |decorrelation| {
         let mut setting = Setting::new("cornell-box", "ao", &[], decorrelation, 256);
-        (setting.size, setting.groups) = (LARGE, [7, 6]);
+        (setting.size, setting.groups) = (LARGE, [6, 4]);
         let tallies = setting.tallies(&[3, 100], "bvh", Organisation::SingleKernel);
         tallies["ao"].efficiency().expect("issues")
     };

@@ -16,6 +16,10 @@ use std::fmt;
 /// Edge of a workgroup of the image kernel, pixels.
 pub const WORKGROUP: u32 = 8;
 
+/// The golden ratio less 1, and a half, as fractions of 2³².
+const GOLDEN: u32 = 0x9e37_79b9;
+const HALF: u32 = 0x8000_0000;
+
 /// Rays start off their surface by this fraction of the scene's diagonal.
 const OFFSET: f64 = 1e-5;
 
@@ -68,14 +72,14 @@ impl fmt::Display for RayClass {
 /// The pixel of each lane of a warp; `None` beside the image.
 pub type Pixels = Vec<Option<[u32; 2]>>;
 
-/// The warps of some groups, spread evenly over an image: each group is so many of its warps, one after the other
-/// in the order of workgroups and of lanes within them. A warp is `[width, height]` lanes, which divide the edges of a
-/// workgroup.
+/// The warps of some groups. Each group is so many warps one after the other, in the order of workgroups and of lanes within
+/// them; the first of each are spread over the image, by rows evenly and along them by the golden ratio. Groups that hold all of an
+/// image hold each of its warps once. A warp is `[width, height]` lanes, which divide the edges of a workgroup.
 pub fn groups_of(size: [u32; 2], warp: [u32; 2], [groups, warps]: [u32; 2]) -> Vec<Vec<Pixels>> {
     let blocks = size.map(|edge| edge.div_ceil(WORKGROUP));
     let of_block = warp.map(|edge| WORKGROUP / edge);
     let per_block = of_block[0] * of_block[1];
-    let all = u64::from(blocks[0] * blocks[1] * per_block);
+    let all = blocks[0] * blocks[1] * per_block;
     let lane = |number: u32, lane: u32| {
         let (block, within) = (number / per_block, number % per_block);
         let corner = [
@@ -86,10 +90,18 @@ pub fn groups_of(size: [u32; 2], warp: [u32; 2], [groups, warps]: [u32; 2]) -> V
         (pixel[0] < size[0] && pixel[1] < size[1]).then_some(pixel)
     };
     let pixels = |number| (0..warp[0] * warp[1]).map(|l| lane(number, l)).collect();
-    let group = |index: u32| {
-        let first = (u64::from(index) * all / u64::from(groups)) as u32;
-        let end = (first + warps).min(all as u32);
-        (first..end).map(pixels).collect()
+    let first = |group: u32| match u64::from(groups) * u64::from(warps) >= u64::from(all) {
+        true => group.saturating_mul(warps).min(all),
+        false => {
+            let share = |fraction: u32, of: u32| (u64::from(fraction) * u64::from(of) >> 32) as u32;
+            let column = share(group.wrapping_mul(GOLDEN).wrapping_add(HALF), blocks[0]);
+            let row = (2 * u64::from(group) + 1) * u64::from(blocks[1]) / (2 * u64::from(groups));
+            (row as u32 * blocks[0] + column) * per_block
+        }
+    };
+    let group = |index| {
+        let first = first(index);
+        (first..(first + warps).min(all)).map(pixels).collect()
     };
     (0..groups).map(group).collect()
 }
@@ -249,12 +261,18 @@ mod tests {
     }
 
     #[test]
-    fn groups_are_spread_over_the_image() {
+    fn groups_are_spread_over_the_image_and_hold_each_warp_once_where_they_hold_all() {
         let groups = groups_of([64, 64], [8, 4], [4, 2]);
-        let first: Vec<_> = groups.iter().map(|group| group[0][0]).collect();
-        let corner = |y| Some([0, y]);
-        assert_eq!(first, [corner(0), corner(16), corner(32), corner(48)]);
         assert!(groups.iter().all(|group| group.len() == 2));
+        let first: Vec<_> = groups.iter().map(|group| group[0][0]).collect();
+        // Rows 1, 3, 5, 7 of workgroups; columns ½, ½ + φ, ½ + 2φ, … of eight.
+        let corners = [[32, 8], [8, 24], [48, 40], [16, 56]];
+        assert_eq!(first, corners.map(Some));
+        for count in [[4, 32], [3, 50], [200, 1]] {
+            let all: Vec<_> = groups_of([64, 64], [8, 4], count).concat();
+            let pixels: std::collections::BTreeSet<_> = all.iter().flatten().flatten().collect();
+            assert_eq!((all.len(), pixels.len()), (128, 64 * 64), "{count:?}");
+        }
     }
 
     #[test]

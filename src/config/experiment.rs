@@ -201,6 +201,8 @@ pub struct Discrepancy {
 /// What the model of coherence looks at, and the machine.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Coherence {
+    /// Width and height of the image, pixels.
+    pub resolution: [u32; 2],
     /// Samples per pixel that samplers are made for, ascending.
     pub spp: Vec<u32>,
     /// Groups of warps, spread over the image; each has a cache of its own.

@@ -271,6 +271,7 @@ pub const KEYS: &[KeyRow] = &[
     key("discrepancy", "points", ValueKind::PowerOfTwo { min: 2, max: 65_536 }, Some("4096"), "Star discrepancy is taken at N = 2, 4, 8, … up to this many points."),
     key("discrepancy", "pairs", ValueKind::DimensionPairs { max: 255 }, Some("[[0, 1], [2, 3], [4, 5], [0, 2], [1, 3], [2, 4]]"), "Pairs of dimensions of the path's table; the worst of all pairs that the integrators draw is measured as well."),
     key("discrepancy", "seeds", integer(1, 1024), Some("8"), "Seeds measured where the stream is randomised."),
+    key("coherence", "resolution", ValueKind::IntegerPair { min: 16, max: 8192 }, None, "Width and height of the image whose rays are looked at, pixels; without it, `run.resolution`."),
     key("coherence", "spp", ValueKind::Counts { max_exponent: 16 }, None, "Samples per pixel that samplers are made for; without it, those of `run.spp`."),
     key("coherence", "groups", integer(1, 4096), Some("4"), "Groups of warps that the model of coherence looks at, spread over the image; each has an L1 of its own. Without a section `[coherence]` nothing is modelled."),
     key("coherence", "warps", integer(1, 256), Some("8"), "Warps of a group: neighbours in the order of workgroups, with one L1."),

@@ -372,7 +372,12 @@ impl<'t> Reader<'t> {
             true => section.counts("spp")?,
             false => run.counts("spp")?,
         };
+        let resolution = match section.has("resolution") {
+            true => section.unsigned_pair("resolution")?,
+            false => run.unsigned_pair("resolution")?,
+        };
         Ok(Some(Coherence {
+            resolution,
             spp: spp.counts().collect(),
             groups: section.unsigned("groups")?,
             warps: section.unsigned("warps")?,

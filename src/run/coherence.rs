@@ -131,13 +131,13 @@ fn rays(
     cell: &Cell,
     (settings, oracle): (&Coherence, &PathOracle),
 ) -> Result<Vec<(u32, Rays)>, String> {
-    let size = session.experiment.resolution;
+    let size = settings.resolution;
     let groups = groups_of(size, settings.warp, [settings.groups, settings.warps]);
     let seed = session.experiment.seeds().replicates.first().copied();
     let bounds = world.scene.bounds();
     let mut all = Vec::new();
     for &spp in &settings.spp {
-        let estimator = Estimator::new(session, cell, spp)?;
+        let estimator = Estimator::for_width(session, cell, spp, size[0])?;
         let image = path_oracle::View {
             estimator: path_oracle::Estimator::of(&estimator.integrator)?,
             camera: world.camera,
