@@ -36,7 +36,8 @@ fn variants() -> Vec<(String, Params)> {
     let Some(ParamRange::Choice(names)) = builder.map(|p| &p.range) else {
         panic!("builder is no choice of names");
     };
-    let plain = names.iter().map(|n| ((*n).to_owned(), params(n, 0)));
+    let on_host = names.iter().filter(|n| !n.starts_with("device-"));
+    let plain = on_host.map(|n| ((*n).to_owned(), params(n, 0)));
     let combined = COMBINATIONS
         .iter()
         .map(|(name, builder, rounds)| ((*name).to_owned(), params(builder, *rounds)));

@@ -11,7 +11,7 @@ const LAYERS: [&[&str]; 11] = [
     &["atomic", "text", "geometry", "params", "random"],
     &["image"],
     &["gpu", "sampling", "discrepancy", "oracle"],
-    &["config"],
+    &["config", "compaction"],
     &["scene"],
     &["accel"],
     &["integrator"],

@@ -35,6 +35,42 @@ const NO_TWIN: &[(&str, &str)] = &[
         "a binding; the twin's layouts own their nodes",
     ),
     ("accel/stack", "the twins have vectors"),
+    (
+        "accel/tree/parallel/device/blocks",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
+        "accel/tree/parallel/device/boxes",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
+        "accel/tree/parallel/device/codes",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
+        "accel/tree/parallel/device/inner",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
+        "accel/tree/parallel/device/keys",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
+        "accel/tree/parallel/device/leaves",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
+        "accel/tree/parallel/device/links",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
+        "accel/tree/parallel/device/nodes",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
+        "accel/tree/parallel/device/size",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
     ("common/lane", "an invocation's place in its workgroup"),
     (
         "common/texels",
@@ -42,6 +78,19 @@ const NO_TWIN: &[(&str, &str)] = &[
     ),
     ("common/errors", "writes the error word on the device"),
     ("common/limits", "a uniform, filled by name"),
+    ("common/sort/digits", "what the passes of the sort share"),
+    (
+        "common/sort/count",
+        "a pass of the sort; tests/sorting.rs has the host's",
+    ),
+    (
+        "common/sort/offsets",
+        "a pass of the sort; tests/sorting.rs has the host's",
+    ),
+    (
+        "common/sort/scatter",
+        "a pass of the sort; tests/sorting.rs has the host's",
+    ),
     (
         "common/loops",
         "run by src/gpu/probe.rs, which knows the answer",
@@ -56,6 +105,78 @@ const NO_TWIN: &[(&str, &str)] = &[
         "sums over a workgroup; tests/compaction compares them with the host's",
     ),
     ("common/scene", "a binding"),
+    (
+        "compaction/add_totals",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/atomic",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/blelloch",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/digest",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/gather",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/groups",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/hillis_steele",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/holes",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/none",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/reduce",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/roger_blocks",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/roger_move",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/scan_blocks",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/scatter",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/stream",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/subgroup",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/tile",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/workgroup",
+        "judged by tests/compaction, against what flags say",
+    ),
     ("integrator/ao", "judged by images, not by a twin"),
     ("integrator/frame", "judged by images, not by a twin"),
     ("integrator/path", "judged by images, not by a twin"),
@@ -191,6 +312,7 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
         "two expressions of the kernel",
     ),
     ("accel/leaf", "leaf_reference", "build"),
+    ("accel/tree/parallel/lbvh", "build", "the passes, in turn"),
     ("accel/leaf", "leaf_range", "unpacks in one place"),
     ("accel/bvh/boxes", "split_axis", "build"),
     ("accel/bvh/roped", "rope", "build"),

@@ -76,13 +76,22 @@ impl BuildLog {
         }
     }
 
+    /// A log without phases for parts that are built side by side, on the same device.
+    #[must_use]
+    pub fn of_a_part(&self) -> Self {
+        Self {
+            phases: Vec::new(),
+            player: self.player.clone(),
+        }
+    }
+
     /// The device, if the build may use one.
     pub fn gpu(&self) -> Option<&Gpu> {
         self.player.as_deref().map(Player::gpu)
     }
 
-    /// Plays what builds on the device; each of its runs becomes a phase, by GPU timestamps where there are
-    /// any. Where not, all of it is one phase of wall time.
+    /// Plays what builds on the device; its runs become phases, those of one name together, by GPU timestamps where
+    /// there are any. Where not, all of it is one phase of wall time.
     ///
     /// # Errors
     /// There is no device, or what it met with.
@@ -95,20 +104,25 @@ impl BuildLog {
         })?;
         let played = player.play(recording);
         let played = played.map_err(|e| AccelError::Device(e.to_string()))?;
-        let timed = played.runs.iter();
-        let timed: Option<Vec<Phase>> = timed
-            .map(|(name, ms)| {
-                let name = name.clone();
-                ms.map(|ms| Phase { name, ms })
-            })
-            .collect();
-        let names = || played.runs.iter().map(|(name, _)| name.as_str());
-        self.phases.extend(timed.unwrap_or_else(|| {
-            vec![Phase {
-                name: names().collect::<Vec<_>>().join(" + "),
+        let first = self.phases.len();
+        let is_timed = played.runs.iter().all(|(_, ms)| ms.is_some());
+        for (name, ms) in played.runs.iter().filter(|_| is_timed) {
+            let mut phases = self.phases[first..].iter_mut();
+            match phases.find(|phase| phase.name == *name) {
+                Some(phase) => phase.ms += ms.unwrap_or(0.0),
+                None => self.phases.push(Phase {
+                    name: name.clone(),
+                    ms: ms.unwrap_or(0.0),
+                }),
+            }
+        }
+        if !is_timed {
+            let names = played.runs.iter().map(|(name, _)| name.as_str());
+            self.phases.push(Phase {
+                name: names.collect::<Vec<_>>().join(" + "),
                 ms: played.wall_ms,
-            }]
-        }));
+            });
+        }
         Ok(played)
     }
 

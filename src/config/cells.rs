@@ -15,6 +15,14 @@ pub struct Cell {
     pub randomised: bool,
 }
 
+/// How names begin on the axis of integrators that are compactions of streams, which render nothing.
+pub const COMPACTIONS: &str = "compaction:";
+
+/// Whether an integrator is a compaction of a stream.
+pub fn is_compaction(integrator: &Variant) -> bool {
+    integrator.name.starts_with(COMPACTIONS)
+}
+
 /// What stands on an axis that does not matter.
 static NOTHING: Variant = Variant {
     name: String::new(),
@@ -42,6 +50,8 @@ impl Cell {
         Axis::Offset,
         Axis::Kernels,
     ];
+    /// What the compaction of a stream depends on.
+    pub const COMPACTION: [Axis; 2] = [Axis::Integrator, Axis::Kernels];
     /// What the words that a sampler draws depend on.
     pub const STREAM: [Axis; 3] = [Axis::Sequence, Axis::Decorrelation, Axis::Kernels];
     /// What is loaded, uploaded and judged once for all cells on it.

@@ -1,5 +1,6 @@
 //! The walk from the merged tree to a checked [`Experiment`].
 
+use super::cells::COMPACTIONS;
 use super::check::{
     as_table, check_on_axis, check_sections, exclude_tables, parameter_tables, pattern_list,
 };
@@ -97,7 +98,7 @@ fn layers(text: &str, file: &str, overrides: &[String]) -> Result<Table, ConfigE
 }
 
 /// Integrands trace nothing: an experiment of nothing else needs neither a scene nor a structure, and
-/// gets the least there is where it names none.
+/// gets the least there is where it names none. Compactions draw nothing, too.
 fn add_least_scene(tree: &mut Table) {
     let Some(Item {
         value: Value::Table(axes),
@@ -106,19 +107,25 @@ fn add_least_scene(tree: &mut Table) {
     else {
         return;
     };
-    let is_integrand =
-        |item: &Item| matches!(&item.value, Value::Text(name) if name.starts_with("integrand:"));
-    let scene_free = match axes.get("integrator").map(|item| &item.value) {
-        Some(Value::List(items)) => !items.is_empty() && items.iter().all(is_integrand),
+    let begins = |item: &Item, with: &str| matches!(&item.value, Value::Text(name) if name.starts_with(with));
+    let all_begin = |with: &[&str]| match axes.get("integrator").map(|item| &item.value) {
+        Some(Value::List(items)) => {
+            let fits = |item: &Item| with.iter().any(|with| begins(item, with));
+            !items.is_empty() && items.iter().all(fits)
+        }
         _ => false,
     };
-    if !scene_free {
-        return;
+    let mut least = Vec::new();
+    if all_begin(&["integrand:", COMPACTIONS]) {
+        least = vec![
+            (Axis::Scene, "single-triangle"),
+            (Axis::Accel, "brute-force"),
+        ];
     }
-    for (axis, name) in [
-        (Axis::Scene, "single-triangle"),
-        (Axis::Accel, "brute-force"),
-    ] {
+    if all_begin(&[COMPACTIONS]) {
+        least.push((Axis::Sequence, "pixel-hash"));
+    }
+    for (axis, name) in least {
         let least = Item {
             at: Place::Default,
             value: tree::default_value(&format!("[\"{name}\"]")),

@@ -5,7 +5,7 @@
 //! for every full cell, at few samples per pixel. The plan counts what this saves.
 
 use super::ConfigError;
-use super::cells::Cell;
+use super::cells::{Cell, is_compaction};
 use super::experiment::Experiment;
 use super::keys::Axis;
 use super::product::{Filter, Point, check_size, excluded, product, refused};
@@ -38,6 +38,8 @@ pub struct Plan {
     pub times: Vec<Cell>,
     /// Streams whose discrepancy is measured: see [`Cell::STREAM`].
     pub streams: Vec<Cell>,
+    /// Compactions of streams that are judged and timed: see [`Cell::COMPACTION`].
+    pub compactions: Vec<Cell>,
     /// What is left out.
     pub skipped: Vec<Skipped>,
     /// Seeds that the error of a randomised sampler is measured with.
@@ -78,6 +80,7 @@ impl Plan {
         let mut wanted = full;
         wanted.retain(|point| is_wanted(experiment, &filter, point));
         let refused = refused(&wanted, &is_randomised);
+        let renders = !axes[Axis::Integrator].iter().all(is_compaction);
         let cells = |which: &[Axis]| -> Vec<Cell> {
             let mut points = product(axes, which);
             points.retain(|point| {
@@ -85,17 +88,26 @@ impl Plan {
             });
             points.iter().map(|p| p.cell(&is_randomised)).collect()
         };
-        let structures = cells(&Cell::STRUCTURE);
-        let (samplers, untraceable): (Vec<_>, Vec<_>) = (cells(&Cell::SAMPLER).into_iter())
+        // Cells that render, and those of the axes that all integrators share if some do.
+        let rendering = |which: &[Axis]| -> Vec<Cell> {
+            let mut cells = cells(which);
+            cells.retain(|cell| renders && !is_compaction(&cell[Axis::Integrator]));
+            cells
+        };
+        let mut compactions = cells(&Cell::COMPACTION);
+        compactions.retain(|cell| is_compaction(&cell[Axis::Integrator]));
+        let structures = rendering(&Cell::STRUCTURE);
+        let (samplers, untraceable): (Vec<_>, Vec<_>) = (rendering(&Cell::SAMPLER).into_iter())
             .partition(|cell| {
                 let place = |cell: &Cell| cell.on(&[&Cell::WORLD[..], &[Axis::Kernels]].concat());
                 structures.iter().any(|s| place(s) == place(cell))
             });
         skipped.extend(untraceable.iter().map(no_structure));
         let plan = Self {
-            scenes: needed(&axes[Axis::Scene], Axis::Scene, [&structures, &[]]),
-            times: cells(&Axis::ALL),
-            streams: cells(&Cell::STREAM),
+            scenes: needed(&axes[Axis::Scene], Axis::Scene, [&structures, &[], &[]]),
+            times: rendering(&Axis::ALL),
+            streams: rendering(&Cell::STREAM),
+            compactions,
             structures,
             samplers,
             kernels: Vec::new(),
@@ -112,17 +124,20 @@ impl Plan {
         refused: Vec<Skipped>,
         only: &[String],
     ) -> Result<Self, ConfigError> {
-        let users = [&self.structures[..], &self.streams];
+        let users = [&self.structures[..], &self.streams, &self.compactions];
         self.kernels = needed(&experiment.axes[Axis::Kernels], Axis::Kernels, users);
         let nothing_left = |reason: String| ConfigError::NothingLeft {
             file: experiment.source.clone(),
             reason,
         };
-        if let (true, Some(first)) = (self.times.is_empty(), refused.first()) {
+        if let (true, Some(first)) = (
+            self.times.is_empty() && self.compactions.is_empty(),
+            refused.first(),
+        ) {
             return Err(nothing_left(first.reason.clone()));
         }
         self.skipped.extend(refused);
-        if self.structures.is_empty() {
+        if self.structures.is_empty() && self.compactions.is_empty() {
             let filters = if only.is_empty() { "" } else { " and --only" };
             return Err(nothing_left(format!(
                 "the excludes{filters} leave no scene with a structure"
@@ -211,6 +226,16 @@ impl Plan {
         for cell in &self.streams {
             writeln!(text, "  {cell}")?;
         }
+        if !self.compactions.is_empty() {
+            writeln!(
+                text,
+                "{} compactions to judge and time:",
+                self.compactions.len()
+            )?;
+        }
+        for cell in &self.compactions {
+            writeln!(text, "  {cell}")?;
+        }
         for skipped in &self.skipped {
             let Skipped {
                 cell,
@@ -234,7 +259,7 @@ fn is_wanted(experiment: &Experiment, filter: &Filter, point: &Point) -> bool {
 }
 
 /// The variants of an axis that some of these cells need.
-fn needed(variants: &[Variant], axis: Axis, users: [&[Cell]; 2]) -> Vec<Variant> {
+fn needed(variants: &[Variant], axis: Axis, users: [&[Cell]; 3]) -> Vec<Variant> {
     let is_used = |v: &&Variant| users.iter().copied().flatten().any(|c| c[axis] == **v);
     variants.iter().filter(is_used).cloned().collect()
 }

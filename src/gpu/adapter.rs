@@ -172,7 +172,8 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
     let adapter = choose(enumerate(), choice)?;
     let info = adapter.get_info();
     let limits = limits_to_ask(&adapter.limits());
-    let features = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
+    let features =
+        adapter.features() & (wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::SUBGROUP);
     let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
         label: Some("raystone"),
         required_features: features,
@@ -229,6 +230,11 @@ impl Gpu {
     /// Whether the adapter is a software rasteriser.
     pub fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Whether kernels may vote and shuffle within subgroups. How large those are is not for kernels to assume.
+    pub fn has_subgroups(&self) -> bool {
+        self.device.features().contains(wgpu::Features::SUBGROUP)
     }
 
     /// The error that made the device unusable, if any.

@@ -129,7 +129,8 @@ pub(super) struct Composed<'a> {
     pub paths: &'a Paths,
 }
 
-/// Parses and validates composed WGSL with the capabilities of plain WebGPU.
+/// Parses and validates composed WGSL with the capabilities of plain WebGPU, and subgroups: a device without them
+/// refuses such a kernel.
 pub(super) fn parse_and_validate(
     kernel: &Composed,
 ) -> Result<(naga::Module, naga::valid::ModuleInfo), GpuError> {
@@ -139,7 +140,7 @@ pub(super) fn parse_and_validate(
     })?;
     let mut validator = naga::valid::Validator::new(
         naga::valid::ValidationFlags::all(),
-        naga::valid::Capabilities::default(),
+        naga::valid::Capabilities::default() | naga::valid::Capabilities::SUBGROUP,
     );
     let info = validator.validate(&module).map_err(|e| {
         // The outer spans are the function and the block around the fault.

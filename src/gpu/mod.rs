@@ -15,6 +15,7 @@ mod player;
 mod probe;
 mod recording;
 mod slices;
+mod sort;
 mod uniform;
 
 pub use adapter::{AdapterChoice, AdapterSummary, Gpu, adapters, open};
@@ -27,8 +28,9 @@ pub use kernel_errors::{KERNEL_ERRORS, kernel_errors};
 pub use pipeline::{Pipeline, TEXELS_PER_ROW, WORKGROUP_SIZE};
 pub use player::Player;
 pub use probe::{ArithmeticProbe, probe_arithmetic};
-pub use recording::{Groups, Played, Recording, groups_for};
+pub use recording::{Groups, Played, Recording, grid_of, groups_for};
 pub use slices::Slices;
+pub use sort::{Pairs, RadixSort};
 pub use uniform::UniformValues;
 
 use thiserror::Error;

@@ -30,7 +30,13 @@ impl From<[u32; 3]> for Groups {
 /// Workgroups for `items` invocations of a one-dimensional kernel; kernels compute their index as
 /// `x + y * WORKGROUP_SIZE * num_workgroups.x`.
 pub fn groups_for(items: u32) -> [u32; 3] {
-    let groups = items.div_ceil(WORKGROUP_SIZE).max(1);
+    grid_of(items.div_ceil(WORKGROUP_SIZE))
+}
+
+/// So many workgroups, at least one: in a row, or in rows where one would be too long, the last of which may have
+/// too many. A kernel computes the index of its own as `x + y * num_workgroups.x`.
+pub fn grid_of(workgroups: u32) -> [u32; 3] {
+    let groups = workgroups.max(1);
     if groups <= MAX_GROUPS {
         [groups, 1, 1]
     } else {

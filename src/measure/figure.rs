@@ -119,7 +119,7 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 103] = [
+pub static FIGURES: [Figure; 112] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
@@ -201,6 +201,16 @@ pub static FIGURES: [Figure; 103] = [
     Figure::new("coverage/v1", "coverage", "", Higher, Percent, Single),
     Figure::new("ns-per-sample/v1", "ns per sample", "", Lower, THREE, Median),
     Figure::new("loop-ns/v1", "empty loop", "ns", Neither, THREE, Median),
+    // Compactions of streams.
+    Figure::new("compaction-ns/v1", "time per element", "ns", Lower, THREE, Median),
+    Figure::new("compaction-melements-per-s/v1", "speed", "Melements/s", Higher, THREE, Median),
+    Figure::new("compaction-gb-per-s/v1", "least traffic over time", "GB/s", Higher, THREE, Median),
+    Figure::new("compaction-ratio/v1", "time over that of roger", "", Lower, THREE, Median),
+    Figure::new("compaction-passes/v1", "passes", "", Lower, Count, Exact),
+    Figure::new("compaction-scratch/v1", "memory between passes", "", Lower, Bytes, Exact),
+    Figure::new("growth-linear/v1", "residual of a + b·n", "", Lower, Percent, Median),
+    Figure::new("growth-linearithmic/v1", "residual of a + b·n·log n", "", Lower, Percent, Median),
+    Figure::new("growth-difference/v1", "criterion of n less that of n log n", "", Neither, THREE, Median),
     // Hard scenes and rays, judged exactly.
     Figure::new("false-misses/v1", "false misses", "", Lower, Count, Exact),
     Figure::new("unexplained-misses/v1", "unexplained misses", "", Lower, Count, Exact),

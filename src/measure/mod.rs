@@ -2,10 +2,12 @@
 
 pub mod adaptive;
 pub mod bias;
+pub mod compaction;
 pub mod comparison;
 pub mod figure;
 pub mod flip;
 pub mod gate;
+pub mod growth;
 pub mod hard_rays;
 mod holes;
 pub mod hypothesis;

@@ -28,6 +28,8 @@ pub struct RunData<'a> {
     pub paths: Vec<Recorded<'a, PathsRecord>>,
     /// What drawing costs.
     pub costs: Vec<Recorded<'a, SamplerCostRecord>>,
+    /// Compactions of streams.
+    pub compactions: Vec<Recorded<'a, CompactionRecord>>,
     /// Cells left out.
     pub skipped: Vec<&'a SkippedRecord>,
     /// Cells that failed without a record of their own kind.
@@ -155,6 +157,9 @@ impl<'a> RunData<'a> {
                 Body::SamplerCost(record) => {
                     put(&mut data.costs, line.of(record), |a, b| a.key == b.key)
                 }
+                Body::Compaction(record) => put(&mut data.compactions, line.of(record), |a, b| {
+                    a.key == b.key
+                }),
                 Body::Spectrum(record) => data.sampler(&line.key).spectrum = Some(record),
                 Body::Bias(record) => data.sampler(&line.key).bias = Some(record.clone()),
                 Body::Scene(record) => {

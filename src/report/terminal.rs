@@ -3,7 +3,9 @@
 use super::data::RunData;
 use super::document::{Table, TableCell};
 use super::samplers::Metric;
-use super::sections::{belief, kernels, rendering, run, samplers, structures, verdict};
+use super::sections::{
+    belief, compactions, kernels, rendering, run, samplers, structures, verdict,
+};
 use super::values::{of_structures, of_view};
 use crate::measure::record::{Line, Verdict};
 
@@ -25,6 +27,9 @@ pub fn terminal_tables(records: &[Line]) -> String {
         tables.push(kernels::gains_table(scene, &of_views));
         tables.push(verdict::table(scene));
     }
+    let values = compactions::values(&data);
+    tables.push(compactions::growth_table(&data, &values));
+    tables.push(compactions::table(&data, &values));
     let mut out = String::new();
     for table in tables.iter().filter(|table| !table.rows.is_empty()) {
         out += &(aligned(table) + "\n");

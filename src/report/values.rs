@@ -4,7 +4,7 @@ use super::data::{RunData, SceneGroup, View};
 use super::document::TableCell;
 use super::format;
 use super::samplers::Metric;
-use super::sections::{kernels, trade_off, verdict::Race};
+use super::sections::{compactions, kernels, trade_off, verdict::Race};
 use crate::measure::figure::{Figure, figure};
 use crate::measure::record::*;
 use std::borrow::Cow;
@@ -99,6 +99,7 @@ pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
     }
     values.extend(data.streams.iter().flat_map(|s| of_stream(s)));
     values.extend(data.costs.iter().flat_map(|c| of_cost(c)));
+    values.extend(compactions::values(data));
     values
 }
 

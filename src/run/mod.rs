@@ -5,6 +5,7 @@
 
 mod adaptive;
 mod coherence;
+mod compactions;
 mod errors;
 mod folder;
 mod images;
@@ -227,6 +228,9 @@ fn measure(
     }
     loop {
         streams::run(session, &device)?;
+        if device.gpu.lost().is_none() {
+            compactions::run(session, &device)?;
+        }
         if device.gpu.lost().is_none() {
             break;
         }

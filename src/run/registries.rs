@@ -1,9 +1,11 @@
 //! All registries together.
 
 use crate::accel::{AccelRegistry, BoxRegistry, Intersection, TriangleRegistry};
+use crate::compaction::CompactionRegistry;
 use crate::config::{Axis, Catalogue, Cell};
 use crate::gpu::KernelLibrary;
 use crate::integrator::{IntegratorRegistry, OffsetRegistry, RayOffset};
+use crate::measure::compaction::benches;
 use crate::measure::figure::FigureRegistry;
 use crate::params::Variant;
 use crate::sampling::SamplerRegistry;
@@ -23,6 +25,8 @@ pub struct Registries {
     pub boxes: BoxRegistry,
     /// Offsets of rays that leave a surface.
     pub offsets: OffsetRegistry,
+    /// Compactions of streams.
+    pub compactions: CompactionRegistry,
     /// Figures beside those of the crate.
     pub figures: FigureRegistry,
 }
@@ -35,7 +39,8 @@ impl Registries {
         catalogue[Axis::Accel] = self.accel.entries();
         catalogue[Axis::Sequence] = self.samplers.sequence_entries();
         catalogue[Axis::Decorrelation] = self.samplers.decorrelation_entries();
-        catalogue[Axis::Integrator] = self.integrators.entries();
+        let integrators = self.integrators.entries().into_iter();
+        catalogue[Axis::Integrator] = integrators.chain(benches(&self.compactions)).collect();
         catalogue[Axis::Triangle] = self.triangles.entries();
         catalogue[Axis::BoxTest] = self.boxes.entries();
         catalogue[Axis::Offset] = self.offsets.entries();

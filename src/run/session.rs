@@ -311,7 +311,7 @@ pub(super) const SCENE_STEPS: u64 = 20;
 fn steps(experiment: &Experiment, plan: &Plan) -> u64 {
     let rounds = u64::from(experiment.timing.rounds) + 1;
     let structures = plan.structures.len() as u64 * (2 + 5 * rounds);
-    let times = plan.times.len() as u64 * (1 + rounds);
+    let times = (plan.times.len() + plan.compactions.len()) as u64 * (1 + rounds);
     let worlds: usize = plan.scenes.iter().map(|s| plan.worlds(s).len()).sum();
     let scenes = worlds as u64 * SCENE_STEPS;
     let references = worlds * experiment.axes[Axis::Integrator].len() * REFERENCE_PARTS as usize;

@@ -4,7 +4,7 @@
 use super::RunError;
 use super::kernels::Device;
 use super::session::{Session, content_hash};
-use crate::config::{Axis, Cell};
+use crate::config::{Axis, Cell, is_compaction};
 use crate::discrepancy::{Budget, PointSet, radial_spectrum, star_2d};
 use crate::gpu::Gpu;
 use crate::measure::record::{
@@ -125,7 +125,8 @@ fn worst_pair(
     cell: &Cell,
 ) -> Result<Option<([u32; 2], usize)>, String> {
     let mut drawn = BTreeSet::new();
-    for variant in &session.experiment.axes[Axis::Integrator] {
+    let integrators = session.experiment.axes[Axis::Integrator].iter();
+    for variant in integrators.filter(|variant| !is_compaction(variant)) {
         let integrator = session.registries.integrators.configured(variant);
         let integrator = integrator.map_err(|e| e.to_string())?;
         drawn.extend(integrator.facts.dimension_pairs());

@@ -1,5 +1,8 @@
 //! Stream compaction, and the scans that it is made of.
 
+mod faults;
+mod methods;
+mod runs;
 mod scan;
 #[path = "../support/mod.rs"]
 mod support;

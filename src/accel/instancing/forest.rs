@@ -50,9 +50,10 @@ impl Forest {
         parameters: &TreeParameters,
         log: &mut BuildLog,
     ) -> Result<Self, AccelError> {
+        let part = log.of_a_part();
         let trees: Result<Vec<Tree>, AccelError> = log.phase("objects", || {
             let build = |object: &&TriangleSoup| {
-                let tree = Tree::build(object, parameters, &mut BuildLog::default())?;
+                let tree = Tree::build(object, parameters, &mut part.clone())?;
                 check_leaves(&tree).map(|()| tree)
             };
             objects.par_iter().map(build).collect()

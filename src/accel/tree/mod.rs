@@ -9,6 +9,7 @@ mod coverage;
 mod depth;
 pub(super) mod grow;
 mod leaves;
+pub mod parallel;
 mod parameters;
 mod ploc;
 mod quality;
@@ -24,7 +25,7 @@ pub use parameters::{Builder, Preset, TreeParameters};
 use super::bounds::Bounds;
 use super::{AccelError, BuildLog, TriangleSoup};
 use crate::params::Choice as _;
-use reference::Reference;
+use parallel::Method;
 use sweep::Axes;
 
 /// A node; children of an inner node lie at `left` and `right`.
@@ -83,9 +84,7 @@ impl Tree {
         if soup.records.is_empty() {
             return Ok(Tree::default());
         }
-        let references = log.phase("boxes", || reference::references(soup));
-        let builder = settings.builder.name();
-        let mut tree = log.phase(builder, || Tree::grow(references, settings))?;
+        let mut tree = Tree::grow(soup, settings, log)?;
         if settings.reinsertion > 0 {
             tree = log.phase("reinsertion", || reinsertion::optimise(tree, settings));
         }
@@ -102,14 +101,29 @@ impl Tree {
     }
 
     /// The tree of the builder alone.
-    fn grow(references: Vec<Reference>, settings: &TreeParameters) -> Result<Tree, AccelError> {
-        Ok(match settings.builder {
-            Builder::Binned => binned::build(references, settings),
-            Builder::Sweep => sweep::build(&references, Axes::All, settings),
-            Builder::LongestAxisSweep => sweep::build(&references, Axes::Longest, settings),
-            Builder::Sbvh => sbvh::build(references, settings),
-            Builder::Ploc => ploc::build(&references, settings, false)?,
-            Builder::PlocReinsertion => ploc::build(&references, settings, true)?,
+    fn grow(
+        soup: &TriangleSoup,
+        settings: &TreeParameters,
+        log: &mut BuildLog,
+    ) -> Result<Tree, AccelError> {
+        if let Some(parallel) = settings.on_device() {
+            let linked = parallel::device::build(soup, &parallel, log)?;
+            return Ok(log.phase("order", || linked.into()));
+        }
+        let references = log.phase("boxes", || reference::references(soup));
+        log.phase(settings.builder.name(), || {
+            Ok(match settings.builder {
+                Builder::Binned => binned::build(references, settings),
+                Builder::Sweep => sweep::build(&references, Axes::All, settings),
+                Builder::LongestAxisSweep => sweep::build(&references, Axes::Longest, settings),
+                Builder::Sbvh => sbvh::build(references, settings),
+                Builder::Ploc => ploc::build(&references, settings, false)?,
+                Builder::PlocReinsertion => ploc::build(&references, settings, true)?,
+                // Of the pair only the one on the host comes here.
+                Builder::HostLbvh | Builder::DeviceLbvh => {
+                    parallel::build(soup, &settings.parallel(Method::Lbvh))?.into()
+                }
+            })
         })
     }
 

@@ -1,5 +1,6 @@
 //! Parameters of all builders.
 
+use super::parallel::{self, Method};
 use super::reference::Box3;
 use crate::parameters;
 
@@ -14,7 +15,8 @@ parameters! {
     pub struct TreeParameters {
         /// binned SAH (Wald 2007); sweep: SAH at every triangle of three axes; longest-axis-sweep: of
         /// the longest axis (Dufay 2017); sbvh: spatial splits (Stich et al. 2009); ploc: bottom-up
-        /// (Meister & Bittner 2018, crate obvhs), also with obvhs' reinsertion
+        /// (Meister & Bittner 2018, crate obvhs), also with obvhs' reinsertion; lbvh: the radix tree over
+        /// Morton codes (Karras 2012), made on the device, or the same tree to the bit on the host
         builder: Builder = Builder::Binned;
         /// most triangles in a leaf
         leaf_size: usize = 4, in 1..=31;
@@ -36,6 +38,8 @@ parameters! {
         spatial_bins: usize = 32, in 2..=256;
         /// preset of obvhs (ploc, ploc-reinsertion)
         ploc_preset: Preset = Preset::Medium;
+        /// Morton codes of 60 bits instead of 30 (host-*, device-*)
+        long_codes: bool = false;
         /// rounds of reinsertion after any builder (Meister & Bittner 2018)
         reinsertion: u32 = 0, in 0..=64;
         /// share of the nodes, largest first, that a round tries to reinsert
@@ -56,6 +60,10 @@ parameters! {
         Ploc = "ploc",
         /// Bottom-up, then obvhs' reinsertion.
         PlocReinsertion = "ploc-reinsertion",
+        /// Radix tree over Morton codes, on the host.
+        HostLbvh = "host-lbvh",
+        /// Radix tree over Morton codes, on the device.
+        DeviceLbvh = "device-lbvh",
     }
 
     /// Presets of the crate obvhs.
@@ -82,6 +90,22 @@ impl TreeParameters {
         Self {
             leaf_size: 1,
             ..self.clone()
+        }
+    }
+
+    /// What the builders that a device can follow are told.
+    pub(super) fn parallel(&self, method: Method) -> parallel::Settings {
+        parallel::Settings {
+            method,
+            long_codes: self.long_codes,
+        }
+    }
+
+    /// What the device is told, if it is to build.
+    pub(super) fn on_device(&self) -> Option<parallel::Settings> {
+        match self.builder {
+            Builder::DeviceLbvh => Some(self.parallel(Method::Lbvh)),
+            _ => None,
         }
     }
 

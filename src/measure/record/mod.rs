@@ -3,6 +3,7 @@
 //! never 0.
 
 mod coherence;
+mod compaction;
 mod error;
 mod key;
 mod old;
@@ -13,6 +14,7 @@ mod stream;
 mod structure;
 
 pub use coherence::*;
+pub use compaction::CompactionRecord;
 pub use error::*;
 pub use key::{Key, axis};
 pub use paths::PathsRecord;
@@ -148,6 +150,8 @@ pub enum Body {
     Stream(StreamRecord),
     /// What drawing from a sampler costs.
     SamplerCost(SamplerCostRecord),
+    /// A compaction of a stream was judged and timed.
+    Compaction(CompactionRecord),
     /// A cell that was not run, with the reason.
     Skipped(SkippedRecord),
     /// A cell that failed before it had a record of its own kind, with the reason.
@@ -193,6 +197,7 @@ kinds! {
     Coherence: CoherenceRecord,
     Stream: StreamRecord,
     SamplerCost: SamplerCostRecord,
+    Compaction: CompactionRecord,
     Finished: FinishedRecord,
     Interrupted: InterruptedRecord,
 }

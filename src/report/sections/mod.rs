@@ -2,6 +2,7 @@
 
 pub mod belief;
 pub mod coherence;
+pub mod compactions;
 pub mod kernels;
 pub mod point_sets;
 pub mod rendering;
@@ -28,6 +29,7 @@ pub fn document(dir: &Path, data: &RunData, warnings: &[String]) -> Document {
     }
     sections.extend(streams::section(data));
     sections.extend(point_sets::section(data));
+    sections.extend(compactions::section(data));
     sections.extend(run::sections(data));
     Document {
         title: title(data),

@@ -1,0 +1,78 @@
+//! Boxes whose corners are integers in the order of the numbers they stand for: least and greatest are exact and
+//! the same in any order, signs of zero and denormal numbers included. Twin of
+//! `kernels/accel/tree/parallel/boxes.wesl`.
+
+use crate::accel::bounds::Bounds;
+use crate::accel::triangle::TriangleRecord;
+
+/// An axis-aligned box; see [`ordered`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OrderedBox {
+    /// Least corner.
+    pub low: [u32; 3],
+    /// Greatest corner.
+    pub high: [u32; 3],
+}
+
+const SIGN: u32 = 0x8000_0000;
+
+impl OrderedBox {
+    /// The neutral element of [`join`].
+    pub const NOTHING: Self = Self {
+        low: [u32::MAX; 3],
+        high: [0; 3],
+    };
+}
+
+impl From<&TriangleRecord> for OrderedBox {
+    fn from(record: &TriangleRecord) -> Self {
+        let corner = |vertex: [f32; 3]| {
+            let key = vertex.map(|x| ordered(x.to_bits()));
+            Self {
+                low: key,
+                high: key,
+            }
+        };
+        let [a, b, c] = record.vertices().map(corner);
+        join(join(a, b), c)
+    }
+}
+
+impl From<OrderedBox> for Bounds {
+    fn from(ordered: OrderedBox) -> Self {
+        Self {
+            min: ordered.low.map(number),
+            max: ordered.high.map(number),
+        }
+    }
+}
+
+/// The bits of a number as an integer in the order of the numbers.
+pub fn ordered(bits: u32) -> u32 {
+    if bits >= SIGN { !bits } else { bits ^ SIGN }
+}
+
+/// The number that such an integer stands for.
+pub fn number(key: u32) -> f32 {
+    f32::from_bits(if key >= SIGN { key ^ SIGN } else { !key })
+}
+
+/// The smallest box around both.
+pub fn join(a: OrderedBox, b: OrderedBox) -> OrderedBox {
+    OrderedBox {
+        low: std::array::from_fn(|axis| a.low[axis].min(b.low[axis])),
+        high: std::array::from_fn(|axis| a.high[axis].max(b.high[axis])),
+    }
+}
+
+/// Twice the centre.
+pub fn doubled_centre(around: OrderedBox) -> [f32; 3] {
+    std::array::from_fn(|axis| number(around.low[axis]) + number(around.high[axis]))
+}
+
+/// Half of the surface. Two products that share no factor: compilers of kernels put those together that do.
+pub fn half_area(around: OrderedBox) -> f32 {
+    let [x, y, z] =
+        std::array::from_fn(|axis| number(around.high[axis]) - number(around.low[axis]));
+    x * (y + z) + y * z
+}

@@ -1,0 +1,217 @@
+//! Trees from sorted triangles, bottom-up, by a method that a device can follow: `device-lbvh` is built there, `host-lbvh`
+//! is its twin, equal to the bit.
+//!
+//! Triangles are sorted along a curve through the scene ([`morton`]), and `lbvh` reads the tree off the codes. [`device`]
+//! records the passes.
+
+pub mod boxes;
+pub mod device;
+mod lbvh;
+pub mod morton;
+
+use super::Tree;
+use super::depth::limit_depth;
+use super::grow::lay_out;
+use crate::accel::triangle::TriangleRecord;
+use crate::accel::{AccelError, TriangleSoup};
+use boxes::{OrderedBox, doubled_centre, number, ordered};
+use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
+
+/// In the place of a leaf's second child.
+pub const LEAF: u32 = 0xffff_ffff;
+/// Larger coordinates have areas that are not finite.
+const LARGEST_COORDINATE: f32 = 1e18;
+
+/// How the tree comes about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// The radix tree over the codes.
+    Lbvh,
+}
+
+/// What both places of building are told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// How the tree comes about.
+    pub method: Method,
+    /// Whether codes have 60 bits instead of 30.
+    pub long_codes: bool,
+}
+
+/// A node: its box, with a child behind each corner. A leaf has its triangle as the first and [`LEAF`] as the second.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct LinkedNode {
+    /// Least corner: see [`boxes::ordered`].
+    pub low: [u32; 3],
+    /// First child.
+    pub left: u32,
+    /// Greatest corner.
+    pub high: [u32; 3],
+    /// Second child.
+    pub right: u32,
+}
+
+impl LinkedNode {
+    fn new(around: OrderedBox, [left, right]: [u32; 2]) -> Self {
+        Self {
+            low: around.low,
+            left,
+            high: around.high,
+            right,
+        }
+    }
+
+    /// Its box.
+    pub fn around(&self) -> OrderedBox {
+        OrderedBox {
+            low: self.low,
+            high: self.high,
+        }
+    }
+
+    /// Its children, unless it is a leaf.
+    pub fn children(&self) -> [u32; 2] {
+        [self.left, self.right]
+    }
+}
+
+/// A binary tree with a triangle in each leaf; leaves come first, in the order of their codes.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct LinkedTree {
+    /// Leaves, then inner nodes.
+    pub nodes: Vec<LinkedNode>,
+    /// Index of the root.
+    pub root: u32,
+}
+
+impl LinkedTree {
+    /// Whether every node but the root is the child of one other, and every leaf lists one of so many triangles.
+    ///
+    /// # Errors
+    /// The first node that is not, of a tree that a device with a fault handed over.
+    pub fn check(&self, triangles: usize) -> Result<(), AccelError> {
+        let mut seen = vec![false; self.nodes.len()];
+        let mut open = Vec::from_iter((!self.nodes.is_empty()).then_some(self.root));
+        while let Some(index) = open.pop() {
+            let node = self.nodes.get(index as usize);
+            let is_new = seen
+                .get_mut(index as usize)
+                .is_some_and(|s| !std::mem::replace(s, true));
+            let Some(node) = node.filter(|_| is_new) else {
+                return Err(AccelError::Invalid(format!(
+                    "node {index} of {} is met twice or does not exist: the links of the tree are wrong",
+                    self.nodes.len()
+                )));
+            };
+            if node.right != LEAF {
+                open.extend(node.children());
+            } else {
+                ensure!(
+                    (node.left as usize) < triangles,
+                    "leaf {index} lists triangle {} of {triangles}",
+                    node.left
+                );
+            }
+        }
+        let lost = seen.iter().position(|s| !s);
+        match lost {
+            Some(index) => Err(AccelError::Invalid(format!(
+                "node {index} is no node's child"
+            ))),
+            None => Ok(()),
+        }
+    }
+}
+
+impl From<LinkedTree> for Tree {
+    /// The nodes in depth-first order.
+    fn from(tree: LinkedTree) -> Self {
+        if tree.nodes.is_empty() {
+            return Self::default();
+        }
+        limit_depth(lay_out(tree.root, |index: u32, _, order| {
+            let node = &tree.nodes[index as usize];
+            if node.right == LEAF {
+                order.push(node.left);
+                return (node.around().into(), None);
+            }
+            (node.around().into(), Some(node.children()))
+        }))
+    }
+}
+
+/// Triangles in the order of their codes.
+struct Sorted {
+    leaves: Vec<LinkedNode>,
+    codes: Vec<[u32; 2]>,
+}
+
+/// The tree, built on the host: the twin of [`device::build`].
+///
+/// # Errors
+/// A coordinate is too large or not a number.
+pub fn build(soup: &TriangleSoup, settings: &Settings) -> Result<LinkedTree, AccelError> {
+    let records = soup.records.par_iter();
+    let boxes: Vec<OrderedBox> = records.map(OrderedBox::from).collect();
+    let limit = LARGEST_COORDINATE.to_bits();
+    let is_usable = |x: &f32| x.to_bits() & 0x7fff_ffff <= limit;
+    let usable = |r: &TriangleRecord| r.vertices().as_flattened().iter().all(is_usable);
+    if let Some(first) = soup.records.par_iter().position_first(|r| !usable(r)) {
+        return Err(too_large(soup, first));
+    }
+    if boxes.is_empty() {
+        return Ok(LinkedTree::default());
+    }
+    let sorted = sort(&boxes, settings);
+    Ok(match settings.method {
+        Method::Lbvh => lbvh::build(sorted),
+    })
+}
+
+/// What is said of a triangle that cannot be built over.
+fn too_large(soup: &TriangleSoup, triangle: usize) -> AccelError {
+    let vertices = soup.records.get(triangle).map(|r| r.vertices());
+    AccelError::Invalid(format!(
+        "triangle {triangle}: lbvh and ploc take coordinates up to {LARGEST_COORDINATE:e}; its vertices are {:?}",
+        vertices.unwrap_or_default()
+    ))
+}
+
+/// Leaves by their codes; those of one code by their triangles.
+fn sort(boxes: &[OrderedBox], settings: &Settings) -> Sorted {
+    let centre = |around: &OrderedBox| doubled_centre(*around).map(|x| ordered(x.to_bits()));
+    let mut all = OrderedBox::NOTHING;
+    for key in boxes.iter().map(centre) {
+        all = boxes::join(
+            all,
+            OrderedBox {
+                low: key,
+                high: key,
+            },
+        );
+    }
+    let extent = [0, 1, 2].map(|axis| number(all.high[axis]) - number(all.low[axis]));
+    let scale = morton::grid_scale(extent[0].max(extent[1]).max(extent[2]));
+    let code = |around: &OrderedBox| {
+        let centre = doubled_centre(*around);
+        let cell =
+            [0, 1, 2].map(|axis| morton::cell_of(centre[axis], number(all.low[axis]), scale));
+        let [upper, lower] = morton::morton_code(cell);
+        [upper, if settings.long_codes { lower } else { 0 }]
+    };
+    let mut order: Vec<([u32; 2], u32)> = boxes
+        .par_iter()
+        .map(code)
+        .zip(0..boxes.len() as u32)
+        .collect();
+    order.par_sort_unstable();
+    let leaf = |(_, triangle): &([u32; 2], u32)| {
+        LinkedNode::new(boxes[*triangle as usize], [*triangle, LEAF])
+    };
+    Sorted {
+        leaves: order.par_iter().map(leaf).collect(),
+        codes: order.iter().map(|(code, _)| *code).collect(),
+    }
+}

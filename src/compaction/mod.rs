@@ -1,0 +1,72 @@
+//! Stream compaction: of the elements of a stream those that are wanted, side by side, without the holes between.
+//!
+//! Methods are a registry ([`CompactionRegistry`]); each records its passes over a [`Stream`]. What belongs together
+//! is told by a word per element, its flag: 0 is a hole, `k` what belongs to the `k`-th bucket. Most methods know one
+//! bucket, so that a flag says whether an element stays; a [`BucketSort`] puts several buckets one behind the other.
+//! How many elements there are stands on the device, and so does how many stay: nothing comes to the host in between.
+//!
+//! Scans of the device are *reduce, scan, scatter* in passes of their own ([`scan`]). A single pass in which workgroups
+//! wait for those before them (decoupled look-back, Merrill and Garland 2016) would read the stream once less, but
+//! WebGPU does not promise that a workgroup which is waited for makes progress, or has even begun.
+
+mod atomic;
+mod blelloch;
+mod bucket_sort;
+mod horn;
+mod none;
+mod passes;
+mod reduce_scan_scatter;
+mod registry;
+mod roger;
+pub mod scan;
+mod subgroup;
+mod tile;
+mod workgroup;
+
+pub use atomic::Atomic;
+pub use blelloch::Blelloch;
+pub use bucket_sort::BucketSort;
+pub use horn::Horn;
+pub use none::NoCompaction;
+pub use passes::{Passes, Stream};
+pub use reduce_scan_scatter::ReduceScanScatter;
+pub use registry::CompactionRegistry;
+pub use roger::{Roger, Search};
+pub use subgroup::Subgroup;
+pub use workgroup::Workgroup;
+
+use crate::gpu::{Gpu, GpuError};
+
+/// How a method leaves the elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// As they came, bucket by bucket.
+    Stable,
+    /// In an order that another run may change.
+    Any,
+    /// As they came, with the holes between them.
+    WithHoles,
+}
+
+/// A way to compact streams: the struct of its parameters, a kernel or some, one line in the registry.
+pub trait Compaction: Send + Sync {
+    /// How it leaves the elements.
+    fn order(&self) -> Order;
+
+    /// Buckets that it puts one behind the other; flags are at most this.
+    fn buckets(&self) -> u32 {
+        1
+    }
+
+    /// Why it cannot run on this adapter, if so.
+    fn refusal(&self, _gpu: &Gpu) -> Option<String> {
+        None
+    }
+
+    /// Records the passes that leave what stays in [`Stream::kept`], and how many that are in the first word of
+    /// [`Stream::count`].
+    ///
+    /// # Errors
+    /// A kernel does not compose or compile.
+    fn record(&self, passes: &mut Passes) -> Result<(), GpuError>;
+}

@@ -1,0 +1,274 @@
+//! Compactions of streams: time per element, growth with the number of elements, what parameters do.
+
+use crate::measure::growth::{Growth, growth};
+use crate::measure::record::{CompactionRecord, Interval, Key, Recorded, axis};
+use crate::measure::statistics::median_interval;
+use crate::params::ParamValue;
+use crate::report::data::RunData;
+use crate::report::document::*;
+use crate::report::pivot::{FIGURES_ALONE, Rows};
+use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
+use crate::report::values::Value;
+use std::collections::BTreeSet;
+
+type Measured<'a> = Recorded<'a, CompactionRecord>;
+
+/// What tells compactions of a run apart.
+const ROW: [&str; 2] = [axis::INTEGRATOR, axis::KERNELS];
+/// Parameters of the stream.
+const STREAM: [&str; 3] = ["elements", "valid", "bytes"];
+/// What others are measured against: the method that the thesis proposes, with its own parameters.
+const YARDSTICK: &str = "compaction:roger";
+/// A curve has so many points at least.
+const LEAST_POINTS: usize = 3;
+
+const JUDGED: &str = "Each method first compacted its stream once and was judged word by word against what the flags \
+                      say: elements that stay, no hole, none twice, in their order where that is promised. Then all \
+                      were timed in the same rounds; before each turn the count was set to a wrong number and what \
+                      stayed wiped out, and after it two sums over what stayed were compared with the host's. What \
+                      differs has no figure. Times are those of all passes of a method together.";
+
+/// The section; `None` when no compaction was measured.
+pub fn section(data: &RunData) -> Option<Section> {
+    if data.compactions.is_empty() {
+        return None;
+    }
+    let mut section = Section::new("compaction", "Compaction of streams");
+    section.blocks.push(Block::Paragraph(JUDGED.into()));
+    section.blocks.extend(Block::figures(plots(data)));
+    let values = values(data);
+    let tables = [growth_table(data, &values), table(data, &values)];
+    let blocks = tables.into_iter().filter_map(Table::into_block);
+    section.blocks.extend(blocks);
+    Some(section)
+}
+
+/// The label of a cell without some parameters.
+fn label_without(key: &Key, left_out: &[&str]) -> String {
+    let label = key.label(axis::INTEGRATOR);
+    let (name, parameters) = label.split_once('(').unwrap_or((label, ""));
+    let is_left_out = |part: &&str| {
+        let name = part.split('=').next().unwrap_or_default();
+        left_out.contains(&name)
+    };
+    let parts = parameters.trim_end_matches(')').split(',');
+    let parts: Vec<&str> = parts.filter(|p| !p.is_empty() && !is_left_out(p)).collect();
+    let mut text = match parts.is_empty() {
+        true => name.to_owned(),
+        false => format!("{name}({})", parts.join(",")),
+    };
+    if let Some(kernels) = key.get(axis::KERNELS) {
+        text += &format!(", @{kernels}");
+    }
+    text
+}
+
+/// What is the same in all cells of a curve over a parameter.
+fn others(key: &Key, parameter: &str) -> (String, String) {
+    let Some(variant) = key.get(axis::INTEGRATOR) else {
+        return Default::default();
+    };
+    let mut params = variant.params.clone();
+    params.0.remove(parameter);
+    let text = format!("{} {:?}", variant.name, params.0);
+    (text, key.label(axis::KERNELS).to_owned())
+}
+
+/// Cells that differ in one parameter alone, by growing values of it.
+fn over<'a, 'd>(data: &'d RunData<'a>, parameter: &str) -> Vec<Vec<(f64, &'d Measured<'a>)>> {
+    let mut groups: Vec<(_, Vec<(f64, &Measured)>)> = Vec::new();
+    for cell in data.compactions.iter().filter(|c| c.failure.is_none()) {
+        let variant = cell.key.get(axis::INTEGRATOR);
+        let x = match variant.and_then(|v| v.params.0.get(parameter)) {
+            Some(ParamValue::Integer(x)) => *x as f64,
+            Some(ParamValue::Number(x)) => *x,
+            _ => continue,
+        };
+        let same = others(cell.key, parameter);
+        match groups.iter_mut().find(|(known, _)| *known == same) {
+            Some((_, cells)) => cells.push((x, cell)),
+            None => groups.push((same, vec![(x, cell)])),
+        }
+    }
+    let mut groups: Vec<_> = groups.into_iter().map(|(_, cells)| cells).collect();
+    groups
+        .iter_mut()
+        .for_each(|cells| cells.sort_by(|a, b| a.0.total_cmp(&b.0)));
+    groups.retain(|cells| cells.len() >= LEAST_POINTS);
+    groups
+}
+
+/// A plot for each parameter that was varied.
+fn plots(data: &RunData) -> Vec<Option<Illustration>> {
+    let variants = data.compactions.iter();
+    let variants = variants.filter_map(|c| c.key.get(axis::INTEGRATOR));
+    let own = variants.flat_map(|v| v.params.0.keys().map(String::as_str));
+    let own: BTreeSet<&str> = own.filter(|name| !STREAM.contains(name)).collect();
+    let all = STREAM.into_iter().chain(own);
+    all.map(|parameter| plot(data, parameter)).collect()
+}
+
+fn plot(data: &RunData, parameter: &str) -> Option<Illustration> {
+    let whole = parameter == "elements";
+    let curve = |cells: Vec<(f64, &Measured)>| {
+        let (_, first) = cells.first()?;
+        let point = |(x, cell): &(f64, &Measured)| {
+            let y = match whole {
+                true => median_interval(&cell.ms)?,
+                false => cell.ns_per_element?,
+            };
+            Some(CurvePoint::new(*x, &y))
+        };
+        Some(Curve {
+            label: label_without(first.key, &[parameter]),
+            look: look(data, first.key),
+            exact: false,
+            points: cells.iter().filter_map(point).collect(),
+        })
+    };
+    let curves = over(data, parameter).into_iter().filter_map(curve);
+    let (y_title, says) = match whole {
+        true => ("time, ms", "Time of a compaction"),
+        false => ("time per element, ns", "Time per element of the stream"),
+    };
+    let (x_title, x_ticks) = match parameter {
+        "elements" => ("elements", Ticks::PowersOfTwo),
+        "valid" => ("share of elements that stay", Ticks::PowersOfTen),
+        "bytes" => ("bytes of an element", Ticks::PowersOfTwo),
+        other => (other, Ticks::PowersOfTwo),
+    };
+    let plot = CurvePlot {
+        x_title: x_title.to_owned(),
+        x_ticks,
+        y_title: y_title.to_owned(),
+        curves: curves.collect(),
+        guides: Vec::new(),
+    };
+    let caption = format!("{says}, against {x_title}. Bands: 95 % interval of the median.");
+    plot.figure(format!("compaction-{parameter}"), caption)
+}
+
+/// The same look for all variants of a method.
+fn look(data: &RunData, key: &Key) -> usize {
+    let mut names: Vec<&str> = Vec::new();
+    for cell in &data.compactions {
+        let name = cell.key.name(axis::INTEGRATOR);
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let own = key.name(axis::INTEGRATOR);
+    names.iter().position(|name| *name == own).unwrap_or(0)
+}
+
+/// Every figure of compactions.
+pub fn values(data: &RunData) -> Vec<Value<'static>> {
+    let sound = data.compactions.iter().filter(|c| c.failure.is_none());
+    let mut values: Vec<Value> = sound.flat_map(|cell| of_cell(data, cell)).collect();
+    for (key, growth) in growths(data) {
+        values.push(Value::new(&key, "growth-linear/v1", growth.linear));
+        values.push(Value::new(
+            &key,
+            "growth-linearithmic/v1",
+            growth.linearithmic,
+        ));
+        values.push(Value::new(&key, "growth-difference/v1", growth.difference));
+    }
+    values
+}
+
+fn of_cell(data: &RunData, cell: &Measured) -> Vec<Value<'static>> {
+    let known = [
+        ("compaction-ns/v1", cell.ns_per_element),
+        ("compaction-melements-per-s/v1", cell.melements_s),
+        ("compaction-gb-per-s/v1", cell.gb_s),
+        ("compaction-ratio/v1", yardstick(data, cell)),
+    ];
+    let counted = [
+        ("compaction-passes/v1", Some(f64::from(cell.passes))),
+        ("compaction-scratch/v1", Some(cell.scratch_bytes as f64)),
+    ];
+    let mut values = Value::known(cell.key, known);
+    values.extend(Value::known(cell.key, counted));
+    values
+}
+
+/// Time over that of the yardstick on the same stream, round by round.
+fn yardstick(data: &RunData, cell: &Measured) -> Option<Interval> {
+    let same_stream = |other: &&Measured| {
+        label_without(other.key, &STREAM) == YARDSTICK
+            && (other.elements, other.bytes) == (cell.elements, cell.bytes)
+            && other.valid == cell.valid
+            && other.failure.is_none()
+    };
+    let other = data.compactions.iter().find(same_stream)?;
+    let ratios = cell.ms.iter().zip(&other.ms).map(|(a, b)| a / b);
+    median_interval(&ratios.collect::<Vec<_>>())
+}
+
+/// How each method grows, where there are sizes enough.
+fn growths(data: &RunData) -> Vec<(Key, Growth)> {
+    let of = |cells: Vec<(f64, &Measured)>| {
+        let rounds = cells.iter().map(|(_, cell)| cell.ms.len()).min()?;
+        let round = |r: usize| cells.iter().map(|(n, cell)| (*n, cell.ms[r])).collect();
+        let rounds: Vec<Vec<(f64, f64)>> = (0..rounds).map(round).collect();
+        let key = cells.first()?.1.key;
+        let label = label_without(key, &["elements"]);
+        Some((key.clone().with(axis::INTEGRATOR, label), growth(&rounds)?))
+    };
+    over(data, "elements").into_iter().filter_map(of).collect()
+}
+
+/// Which model of growth fits each method better.
+pub fn growth_table(data: &RunData, values: &[Value]) -> Table {
+    let row = |(key, growth): (Key, Growth)| {
+        let better = growth.better.map_or("neither", |model| model.name());
+        let cells = vec![key.label(axis::INTEGRATOR).into(), better.into()];
+        (key, cells)
+    };
+    let rows = growths(data).into_iter().map(row);
+    Rows::new(&ROW, &["method", ":fits better"], rows).table(
+        values,
+        "Growth with the number of elements n: relative residuals of both models, of two constants each, and the \
+         difference of Akaike's criteria, each fitted round by round: median [95 % interval]. A model is named where \
+         the whole interval is beyond ±2",
+        &[
+            "growth-linear/v1",
+            "growth-linearithmic/v1",
+            "growth-difference/v1",
+        ],
+        FIGURES_ALONE,
+    )
+}
+
+/// Every cell.
+pub fn table(data: &RunData, values: &[Value]) -> Table {
+    let row = |cell: &Measured| {
+        let judged = match &cell.failure {
+            None => TableCell::from("passed").toned(Tone::Good),
+            Some(fault) => TableCell::with_detail("FAILED", fault.clone()).toned(Tone::Bad),
+        };
+        let cells = vec![
+            label_without(cell.key, &STREAM).into(),
+            cell.elements.to_string().into(),
+            cell.valid.to_string().into(),
+            cell.bytes.to_string().into(),
+            judged,
+        ];
+        (cell.key.clone(), cells)
+    };
+    let heads = ["method", "elements", "valid", "bytes", ":judge"];
+    Rows::new(&ROW, &heads, data.compactions.iter().map(row)).table(
+        values,
+        "All compactions: median [95 % interval]. Least traffic: flags once, what stays once from and once to memory",
+        &[
+            "compaction-ns/v1",
+            "compaction-melements-per-s/v1",
+            "compaction-gb-per-s/v1",
+            "compaction-ratio/v1",
+            "compaction-passes/v1",
+            "compaction-scratch/v1",
+        ],
+        FIGURES_ALONE,
+    )
+}
