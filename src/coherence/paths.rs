@@ -93,7 +93,8 @@ pub fn groups_of(size: [u32; 2], warp: [u32; 2], [groups, warps]: [u32; 2]) -> V
     let first = |group: u32| match u64::from(groups) * u64::from(warps) >= u64::from(all) {
         true => group.saturating_mul(warps).min(all),
         false => {
-            let share = |fraction: u32, of: u32| (u64::from(fraction) * u64::from(of) >> 32) as u32;
+            let share =
+                |fraction: u32, of: u32| ((u64::from(fraction) * u64::from(of)) >> 32) as u32;
             let column = share(group.wrapping_mul(GOLDEN).wrapping_add(HALF), blocks[0]);
             let row = (2 * u64::from(group) + 1) * u64::from(blocks[1]) / (2 * u64::from(groups));
             (row as u32 * blocks[0] + column) * per_block
