@@ -14,6 +14,7 @@
 
 pub mod accel;
 pub mod atomic;
+pub mod coherence;
 pub mod compaction;
 pub mod config;
 pub mod discrepancy;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// Layers from the bottom: a module may use those above its own line here, and those of the same line
 /// that stand together in [`TOGETHER`].
-const LAYERS: [&[&str]; 10] = [
+const LAYERS: [&[&str]; 11] = [
     &["atomic", "text", "geometry", "params", "random"],
     &["image"],
     &["gpu", "sampling", "discrepancy", "oracle"],
@@ -16,6 +16,7 @@ const LAYERS: [&[&str]; 10] = [
     &["accel"],
     &["integrator"],
     &["measure"],
+    &["coherence"],
     &["run"],
     &["report"],
 ];

@@ -75,6 +75,7 @@ fn subject(line: &Line) -> (String, bool) {
         Body::Spectrum(_) => (format!("spectrum of {cell}"), false),
         Body::SamplerCost(_) => (format!("cost of {sampler}"), false),
         Body::Time(r) => (cell.to_string(), failed(&r.failure)),
+        Body::Coherence(_) => (format!("coherence of {cell}"), false),
         Body::Compaction(r) => (cell.to_string(), failed(&r.failure)),
         Body::Stream(r) => (format!("stream {sampler}, {:?}", r.dimensions), false),
         Body::Skipped(r) => (format!("skipped {}", r.cell), false),

@@ -161,9 +161,8 @@ fn begin(walk: Walk) -> Traversal {
 fn advance(built: &Wide<Node>, at: &mut Traversal) -> bool {
     let walk = &mut at.walk;
     let place = child(at.children, at.list & SLOT_MASK) as usize;
-    walk.visit(place);
+    let node = walk.visit(place, &built.nodes[place]);
     walk.counters.box_tests += WIDTH as u32;
-    let node = &built.nodes[place];
     let rest = at.list >> SLOT_BITS;
     if rest != EMPTY_LIST {
         let waiting = (at.children, at.next_nearest & STACKED_MASK | rest);

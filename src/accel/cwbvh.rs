@@ -195,14 +195,13 @@ fn advance(built: &Wide<Node>, at: &mut Traversal) -> bool {
     let places = group.1 >> PLACES_SHIFT;
     let slot = bit_number(places & places.wrapping_neg()) ^ at.octant;
     let index = group.0 + (group.1 & ((1 << slot) - 1)).count_ones();
-    walk.visit(index as usize);
+    let node = walk.visit(index as usize, &built.nodes[index as usize]);
     let left = places & (places - 1);
     if left != 0 {
         let waiting = (group.0, left << PLACES_SHIFT | group.1 & SLOTS_MASK);
         at.stack.push(waiting);
         walk.count_stack(at.stack.len());
     }
-    let node = &built.nodes[index as usize];
     let slots = slot_bits(node, walk);
     let inner = node.inner_mask();
     at.group = (

@@ -5,6 +5,7 @@ use super::bounds::Bounds;
 use super::tree::Coverage;
 use super::triangle::TriangleRecord;
 use super::twin::Walk;
+use super::watch;
 use super::{AccelError, NamedWords, TriangleSoup};
 
 /// Marks a reference to a leaf; bits 26–30 hold its count, bits 0–25 its first place.
@@ -116,7 +117,7 @@ impl LeafReader<'_> {
     pub fn load_leaf_triangle(&self, place: usize) -> &TriangleRecord {
         match self.leaves {
             Leaves::Gathered(records) => &records[place],
-            Leaves::Indexed(indices) => &self.soup.records[indices[place] as usize],
+            Leaves::Indexed(indices) => &self.soup.records[*watch::read(&indices[place]) as usize],
         }
     }
 

@@ -386,6 +386,16 @@ pub trait BuiltAccel: Sync {
     fn update(&mut self, _soup: &TriangleSoup) -> Option<Result<(), AccelError>> {
         None
     }
+    /// The arrays of [`BuiltAccel::buffers`] as its twin reads them, which is in place: an array made of several,
+    /// part by part.
+    fn twin_arrays(&self) -> Vec<(&'static str, Vec<&[u32]>)> {
+        let arrays = self.buffers().arrays.into_iter();
+        let in_place = arrays.filter_map(|array| match array.words {
+            Cow::Borrowed(words) => Some((array.name, vec![words])),
+            Cow::Owned(_) => None,
+        });
+        in_place.collect()
+    }
     /// The traversal on the host, if it has one.
     fn cpu_twin<'a>(&'a self, _soup: &'a TriangleSoup) -> Option<Box<dyn CpuTwin + 'a>> {
         None

@@ -60,10 +60,17 @@ impl<'a> Walk<'a> {
         self.any && self.hit.triangle != NO_HIT
     }
 
-    /// Counts the visit of a node or cell, given its place among the structure's own.
-    pub fn visit(&mut self, place: usize) {
+    /// Counts the visit of a node or cell, given its place among the structure's own, and reads it.
+    pub fn visit<'n, N: ?Sized>(&mut self, place: usize, node: &'n N) -> &'n N {
+        watch::read(node);
         self.counters.nodes += 1;
         watch::note(watch::Event::Node(place as u32));
+        node
+    }
+
+    /// Notes that something else is read of what a kernel reads, for the visit or the test that comes next.
+    pub fn read<'n, N: ?Sized>(&mut self, what: &'n N) -> &'n N {
+        watch::read(what)
     }
 
     /// Notes how many entries the stack has.
@@ -81,13 +88,13 @@ impl<'a> Walk<'a> {
     /// Tests a triangle.
     pub fn test(&mut self, triangle: &TriangleRecord) {
         self.counters.triangle_tests += 1;
-        let triangle = (triangle, self.masks);
+        let triangle = (watch::read(triangle), self.masks);
         intersect_triangle(triangle, &self.ray, self.inverse, &mut self.hit);
     }
 
     /// Tests the triangles of a list.
-    pub fn test_list(&mut self, soup: &TriangleSoup, ids: impl IntoIterator<Item = u32>) {
-        for id in ids {
+    pub fn test_list(&mut self, soup: &TriangleSoup, ids: &[u32]) {
+        for id in watch::each(ids) {
             self.test(&soup.records[id as usize]);
         }
     }

@@ -9,6 +9,7 @@
 use super::grid::lists::{Lists, PartLists, check_lists, check_starts, in_runs};
 use super::grid::{Cut, Grid, GridBox, areas, check_words, clamped, finest, first_axis, outside};
 use super::structure::prelude::*;
+use super::watch;
 use rayon::prelude::*;
 
 /// Most parts of a top cell along an axis: its resolution takes ten bits per axis.
@@ -153,9 +154,10 @@ impl Built {
     /// Place of the first part of a top cell, and its resolution: 0 if it is empty.
     fn top(&self, cell: [u32; 3]) -> (u32, [u32; 3]) {
         let index = 2 * self.grid.index(cell) as usize;
-        let packed = self.cells[index + 1];
+        let words = watch::read(&self.cells[index..index + 2]);
+        let packed = words[1];
         let resolution = [0, PART_BITS, 2 * PART_BITS].map(|shift| packed >> shift & PART_MASK);
-        (self.cells[index], resolution)
+        (words[0], resolution)
     }
 
     fn list(&self, place: usize) -> &[u32] {
@@ -257,10 +259,12 @@ impl Traverse for Built {
         let mut part = find_part(entry, top, parts);
         loop {
             // The place of the cell's first part.
-            walk.visit(first as usize);
-            if resolution[0] != 0 {
-                let place = first + (part[2] * parts[1] + part[1]) * parts[0] + part[0];
-                walk.test_list(soup, self.list(place as usize).iter().copied());
+            let place = (first + (part[2] * parts[1] + part[1]) * parts[0] + part[0]) as usize;
+            let is_occupied = resolution[0] != 0;
+            let ends = if is_occupied { place..place + 2 } else { 0..0 };
+            walk.visit(first as usize, &self.cells[ends]);
+            if is_occupied {
+                walk.test_list(soup, self.list(place));
             }
             if walk.is_answered() {
                 return walk.hit;

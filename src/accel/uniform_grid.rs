@@ -187,8 +187,10 @@ impl Traverse for Built {
         let mut cell: [u32; 3] = std::array::from_fn(|a| clamped(entry[a], grid.resolution[a]));
         loop {
             let index = grid.index(cell) as usize;
-            walk.visit(index);
-            walk.test_list(soup, self.list(index).iter().copied());
+            // A cell ends where the next one begins.
+            walk.read(&self.cells[index + 1]);
+            walk.visit(index, &self.cells[index]);
+            walk.test_list(soup, self.list(index));
             if walk.is_answered() {
                 return walk.hit;
             }

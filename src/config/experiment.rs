@@ -48,6 +48,8 @@ pub struct Experiment {
     pub gate: Gate,
     /// Star discrepancy of the streams.
     pub discrepancy: Discrepancy,
+    /// The model of coherence; `None` if nothing is to be modelled.
+    pub coherence: Option<Coherence>,
 }
 
 /// Ends a sampler at one of the numbers of samples where its relMSE is below a target.
@@ -194,6 +196,46 @@ pub struct Discrepancy {
     pub pairs: Vec<[u32; 2]>,
     /// Seeds measured where the stream is randomised.
     pub seeds: u32,
+}
+
+/// What the model of coherence looks at, and the machine.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Coherence {
+    /// Width and height of the image, pixels.
+    pub resolution: [u32; 2],
+    /// Samples per pixel that samplers are made for, ascending.
+    pub spp: Vec<u32>,
+    /// Groups of warps, spread over the image; each has a cache of its own.
+    pub groups: u32,
+    /// Warps of a group, neighbours in the image.
+    pub warps: u32,
+    /// Width and height of a warp, pixels: divisors of 8.
+    pub warp: [u32; 2],
+    /// Samples of each pixel that are looked at, spread over all.
+    pub samples: u32,
+    /// How the lanes of a warp go on.
+    pub rule: Rule,
+    /// Bytes of a cache line.
+    pub line_bytes: u32,
+    /// Size of the cache of a group, KiB.
+    pub l1_kib: u32,
+    /// Its associativity; 0: fully associative.
+    pub l1_ways: u32,
+    /// Size of the cache of all groups, KiB.
+    pub l2_kib: u32,
+    /// Its associativity; 0: fully associative.
+    pub l2_ways: u32,
+}
+
+/// How a turn of a warp goes on after its visits of nodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rule {
+    /// While any lane has a triangle to test, those that have one test it; then comes the next turn. This is how the
+    /// kernels are written: visit a node, test the triangles of its leaves.
+    Loop,
+    /// Lanes that had a triangle to test when the turn began test one; then comes the next turn ("if-if").
+    IfIf,
 }
 
 impl Experiment {

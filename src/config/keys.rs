@@ -94,6 +94,8 @@ pub enum ValueKind {
         /// Greatest value.
         max: i64,
     },
+    /// One of these words.
+    Word(&'static [&'static str]),
     /// Two integers.
     IntegerPair {
         /// Least value of each.
@@ -137,6 +139,7 @@ impl fmt::Display for ValueKind {
             Self::Flag => write!(f, "true or false"),
             Self::Integer { min, max } => write!(f, "an integer in [{min}, {max}]"),
             Self::PowerOfTwo { min, max } => write!(f, "a power of two in [{min}, {max}]"),
+            Self::Word(words) => write!(f, "one of \"{}\"", words.join("\", \"")),
             Self::IntegerPair { min, max } => {
                 write!(f, "a list of two integers in [{min}, {max}]")
             }
@@ -268,10 +271,22 @@ pub const KEYS: &[KeyRow] = &[
     key("discrepancy", "points", ValueKind::PowerOfTwo { min: 2, max: 65_536 }, Some("4096"), "Star discrepancy is taken at N = 2, 4, 8, … up to this many points."),
     key("discrepancy", "pairs", ValueKind::DimensionPairs { max: 255 }, Some("[[0, 1], [2, 3], [4, 5], [0, 2], [1, 3], [2, 4]]"), "Pairs of dimensions of the path's table; the worst of all pairs that the integrators draw is measured as well."),
     key("discrepancy", "seeds", integer(1, 1024), Some("8"), "Seeds measured where the stream is randomised."),
+    key("coherence", "resolution", ValueKind::IntegerPair { min: 16, max: 8192 }, None, "Width and height of the image whose rays are looked at, pixels; without it, `run.resolution`."),
+    key("coherence", "spp", ValueKind::Counts { max_exponent: 16 }, None, "Samples per pixel that samplers are made for; without it, those of `run.spp`."),
+    key("coherence", "groups", integer(1, 4096), Some("4"), "Groups of warps that the model of coherence looks at, spread over the image; each has an L1 of its own. Without a section `[coherence]` nothing is modelled."),
+    key("coherence", "warps", integer(1, 256), Some("8"), "Warps of a group: neighbours in the order of workgroups, with one L1."),
+    key("coherence", "warp", ValueKind::IntegerPair { min: 1, max: 8 }, Some("[8, 4]"), "Width and height of the pixels of a warp, divisors of 8: workgroups of the image kernel are 8 × 8 pixels, and their lanes are numbered by rows."),
+    key("coherence", "samples", integer(1, 1024), Some("2"), "Samples of each pixel, spread over all of them."),
+    key("coherence", "rule", ValueKind::Word(&["loop", "if-if"]), Some("\"loop\""), "How a turn of a warp goes on after a visit: until no lane has a triangle to test, as kernels are written, or with one test."),
+    key("coherence", "line_bytes", ValueKind::PowerOfTwo { min: 16, max: 4096 }, Some("128"), "Bytes of a cache line."),
+    key("coherence", "l1_kib", integer(1, 1 << 20), Some("128"), "Size of each group's L1, KiB."),
+    key("coherence", "l1_ways", integer(0, 1024), Some("0"), "Its associativity; 0: fully associative. The line that was used longest ago goes (LRU)."),
+    key("coherence", "l2_kib", integer(1, 1 << 20), Some("51200"), "Size of the L2 of all groups, KiB."),
+    key("coherence", "l2_ways", integer(0, 1024), Some("16"), "Its associativity."),
 ];
 
 /// Sections that may be absent altogether; their defaults apply only when they are used.
-pub const OPTIONAL_SECTIONS: &[&str] = &["camera", "exclude"];
+pub const OPTIONAL_SECTIONS: &[&str] = &["camera", "exclude", "coherence"];
 
 /// The row of a key, if there is one.
 pub fn find(section: &str, name: &str) -> Option<&'static KeyRow> {

@@ -5,7 +5,9 @@ use super::check::{
     as_table, check_on_axis, check_sections, exclude_tables, parameter_tables, pattern_list,
 };
 use super::error::{ConfigError, Place};
-use super::experiment::{Axes, Discrepancy, Exclude, Experiment, Gate, Reference, Timing};
+use super::experiment::{
+    Axes, Coherence, Discrepancy, Exclude, Experiment, Gate, Reference, Rule, Timing,
+};
 use super::keys::{Axis, KEYS, OPTIONAL_SECTIONS};
 use super::section::{Section, texts};
 use super::tree::{self, Item, Table, Value};
@@ -61,6 +63,7 @@ pub(super) fn parse(
         timing: reader.timing()?,
         gate: reader.gate()?,
         discrepancy: reader.discrepancy()?,
+        coherence: reader.coherence(&run)?,
     };
     check_reference_seed(&experiment, &reader)?;
     check_reference_file(&experiment, &reader)?;
@@ -361,6 +364,42 @@ impl<'t> Reader<'t> {
             ao_length: section.number("ao_length")? as f32,
             offset: section.number("offset")? as f32,
         })
+    }
+
+    fn coherence(&self, run: &Section) -> Result<Option<Coherence>, ConfigError> {
+        if !self.tree.contains_key("coherence") {
+            return Ok(None);
+        }
+        let section = self.section("coherence")?;
+        let warp = section.unsigned_pair("warp")?;
+        if warp.iter().any(|edge| 8 % edge != 0) {
+            return Err(section.not_allowed("warp", "divisors of 8, the edge of a workgroup"));
+        }
+        let spp = match section.has("spp") {
+            true => section.counts("spp")?,
+            false => run.counts("spp")?,
+        };
+        let resolution = match section.has("resolution") {
+            true => section.unsigned_pair("resolution")?,
+            false => run.unsigned_pair("resolution")?,
+        };
+        Ok(Some(Coherence {
+            resolution,
+            spp: spp.counts().collect(),
+            groups: section.unsigned("groups")?,
+            warps: section.unsigned("warps")?,
+            warp,
+            samples: section.unsigned("samples")?,
+            rule: match section.word("rule")? {
+                0 => Rule::Loop,
+                _ => Rule::IfIf,
+            },
+            line_bytes: section.unsigned("line_bytes")?,
+            l1_kib: section.unsigned("l1_kib")?,
+            l1_ways: section.unsigned("l1_ways")?,
+            l2_kib: section.unsigned("l2_kib")?,
+            l2_ways: section.unsigned("l2_ways")?,
+        }))
     }
 
     fn discrepancy(&self) -> Result<Discrepancy, ConfigError> {

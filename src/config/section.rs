@@ -129,6 +129,16 @@ impl<'t> Section<'t> {
         u32::try_from(x).map_err(|_| self.out_of_range(name, &self.place(name), x))
     }
 
+    /// Place of a word among those of its key.
+    pub fn word(&self, name: &str) -> Result<usize, ConfigError> {
+        let word = self.text(name)?;
+        let place = match self.key(name).kind {
+            ValueKind::Word(words) => words.iter().position(|known| *known == word),
+            _ => None,
+        };
+        place.ok_or_else(|| self.out_of_range(name, &self.place(name), format!("\"{word}\"")))
+    }
+
     pub fn unsigned_pair(&self, name: &str) -> Result<[u32; 2], ConfigError> {
         let item = self.item(name)?;
         let ValueKind::IntegerPair { min, max } = self.key(name).kind else {

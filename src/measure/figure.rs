@@ -119,7 +119,7 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 102] = [
+pub static FIGURES: [Figure; 112] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
@@ -152,6 +152,17 @@ pub static FIGURES: [Figure; 102] = [
     Figure::new("error-at-time/v1", "unbiased relMSE at equal time", "", Lower, THREE, Jackknife),
     Figure::new("spp-to-error/v1", "samples per pixel to an error", "", Lower, THREE, Jackknife),
     Figure::new("seconds-to-error/v1", "time to an error", "s", Lower, THREE, Jackknife),
+    // Coherence, by a model.
+    Figure::new("simt-efficiency/v1", "SIMT efficiency", "", Higher, Percent, Exact),
+    Figure::new("lines-per-issue/v1", "cache lines/issue", "", Lower, THREE, Exact),
+    Figure::new("l1-hits/v1", "found in L1", "", Higher, Percent, Exact),
+    Figure::new("l2-hits/v1", "of the rest in L2", "", Higher, Percent, Exact),
+    Figure::new("issues-per-ray/v1", "issues/ray", "", Lower, THREE, Exact),
+    Figure::new("asked-bytes-per-ray/v1", "bytes asked for/ray", "", Lower, THREE, Exact),
+    Figure::new("l2-bytes-per-ray/v1", "bytes from L2/ray", "", Lower, THREE, Exact),
+    Figure::new("memory-bytes-per-ray/v1", "bytes from memory/ray", "", Lower, THREE, Exact),
+    Figure::new("cycles-per-ray/v1", "predicted cycles/ray", "", Lower, THREE, Exact),
+    Figure::new("cycles-per-path/v1", "predicted cycles/path", "", Lower, THREE, Exact),
     // Errors of samplers.
     Figure::new("relmse-unbiased/v1", "unbiased relMSE", "", Lower, THREE, Jackknife),
     Figure::new("rmse-unbiased/v1", "unbiased RMSE", "", Lower, THREE, Jackknife),

@@ -217,6 +217,24 @@ pub fn log_log_slope(curves: &[Vec<(f64, f64)>]) -> Option<Interval> {
     jackknife_interval(slope, &[estimates?])
 }
 
+/// Rank correlation τ-b of pairs (Kendall 1945), which knows ties: 1 where both order alike, -1 where one reverses the
+/// other. `None` below two pairs, and where one of both is the same in all.
+pub fn kendall_tau(pairs: &[[f64; 2]]) -> Option<f64> {
+    if !finite(&pairs.concat()) {
+        return None;
+    }
+    let (mut sum, mut distinct) = (0, [0_i64; 2]);
+    for (i, a) in pairs.iter().enumerate() {
+        for b in &pairs[..i] {
+            let signs = [0, 1].map(|k| a[k].total_cmp(&b[k]) as i64);
+            sum += signs[0] * signs[1];
+            distinct = [0, 1].map(|k| distinct[k] + signs[k].abs());
+        }
+    }
+    let [x, y] = distinct.map(|n| n as f64);
+    (x > 0.0 && y > 0.0).then(|| sum as f64 / (x * y).sqrt())
+}
+
 /// Indices of the points that no other point beats, smaller being better in both coordinates, by
 /// increasing first coordinate. Equal points on the front are all kept; points with a NaN never are.
 pub fn pareto_front(points: &[(f64, f64)]) -> Vec<usize> {

@@ -68,6 +68,8 @@ pub struct View<'a> {
     pub samplers: Vec<MeasuredSampler<'a>>,
     /// Times of full cells.
     pub times: Vec<Measured<'a, TimeRecord>>,
+    /// Coherence of full cells.
+    pub coherence: Vec<Measured<'a, CoherenceRecord>>,
 }
 
 /// What was measured of a structure, alone or with a sampler; reads like the record.
@@ -178,16 +180,14 @@ impl<'a> RunData<'a> {
                 Body::Reference(_) => {}
                 Body::Paths(record) => put(&mut data.paths, line.of(record), |a, b| a.key == b.key),
                 Body::Time(record) => {
-                    let key = competitor(line);
-                    let measured = Measured {
-                        structure: key.label(axis::ACCEL).to_owned(),
-                        sampler: data.sampler(&line.key).name.clone(),
-                        ran: &line.ran,
-                        key,
-                        body: record,
-                    };
+                    let measured = data.of_cell(line, record);
                     let view = data.view(&line.key);
                     put(&mut view.times, measured, |a, b| a.key == b.key);
+                }
+                Body::Coherence(record) => {
+                    let measured = data.of_cell(line, record);
+                    let view = data.view(&line.key);
+                    put(&mut view.coherence, measured, |a, b| a.key == b.key);
                 }
                 Body::Error(record) => {
                     let replicates = &mut data.sampler(&line.key).replicates;
@@ -201,6 +201,18 @@ impl<'a> RunData<'a> {
         data.name_competitors();
         data.judge_biases_together();
         data
+    }
+
+    /// What was measured of a full cell.
+    fn of_cell<T>(&mut self, line: &'a Line, body: &'a T) -> Measured<'a, T> {
+        let key = competitor(line);
+        Measured {
+            structure: key.label(axis::ACCEL).to_owned(),
+            sampler: self.sampler(&line.key).name.clone(),
+            ran: &line.ran,
+            key,
+            body,
+        }
     }
 
     /// Every sampler was tested at its share of the run's level. Those found biased need theirs no more: the
@@ -303,6 +315,7 @@ impl<'a> RunData<'a> {
             reference: None,
             samplers: Vec::new(),
             times: Vec::new(),
+            coherence: Vec::new(),
         };
         let views = &mut self.scene(key.label(axis::SCENE)).views;
         find_or_push(views, |view| view.key.agrees(key, &VIEW_AXES), new)

@@ -220,12 +220,35 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
             values.extend(Value::known(&time.key, figures));
         }
     }
+    values.extend(view.coherence.iter().flat_map(|c| of_coherence(&c.key, c)));
     let reference = view.reference.iter();
     let mse = reference.filter_map(|r| Some(Value::new(r.key, "reference-mse/v1", r.mse?)));
     values.extend(mse);
     values.extend(Race::new(view).iter().flat_map(Race::values));
     values.extend(trade_off::times_to_image(scene, view));
     values.extend(kernels::gains(scene, view));
+    values
+}
+
+/// What stands on the axis of rays for all of them.
+pub const ALL_RAYS: &str = "all";
+
+/// Coherence by class of rays, and of all.
+fn of_coherence(key: &Key, record: &CoherenceRecord) -> Vec<Value<'static>> {
+    let mut values = Vec::new();
+    for at in &record.at {
+        let key = key.clone().with(axis::SPP, at.spp);
+        let key = key.with(axis::SUBJECT, &at.organisation);
+        let all = (ALL_RAYS.to_owned(), at.all());
+        for (class, tally) in at.classes.iter().chain([&all]) {
+            let key = key.clone().with(axis::RAYS, class);
+            let figures = tally.figures(record.settings.line_bytes);
+            values.extend(Value::known(&key, figures));
+        }
+        let key = key.with(axis::RAYS, ALL_RAYS);
+        let path = [("cycles-per-path/v1", at.cost_of_path())];
+        values.extend(Value::known(&key, path));
+    }
     values
 }
 

@@ -97,11 +97,24 @@ impl Estimator {
     /// # Errors
     /// A name is not registered, or the sampler has too few dimensions or samples.
     pub fn new(session: &Session, cell: &Cell, samples: u32) -> Result<Self, String> {
+        Self::for_width(session, cell, samples, session.experiment.resolution[0])
+    }
+
+    /// The same for images of another width than the experiment's.
+    ///
+    /// # Errors
+    /// As [`Estimator::new`].
+    pub fn for_width(
+        session: &Session,
+        cell: &Cell,
+        samples: u32,
+        width: u32,
+    ) -> Result<Self, String> {
         let registries = session.registries;
         let integrator = registries.integrators.configured(&cell[Axis::Integrator]);
         let integrator = integrator.map_err(|e| e.to_string())?;
         let (sequence, decorrelation) = (&cell[Axis::Sequence], &cell[Axis::Decorrelation]);
-        let demand = integrator.demand(samples, session.experiment.resolution[0]);
+        let demand = integrator.demand(samples, width);
         let sampler = (registries.samplers).sampler(sequence, decorrelation, &demand);
         Ok(Self {
             sampler: sampler.map_err(|e| e.to_string())?,

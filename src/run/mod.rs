@@ -4,6 +4,7 @@
 //! by others.
 
 mod adaptive;
+mod coherence;
 mod compactions;
 mod errors;
 mod folder;
@@ -295,6 +296,7 @@ fn run_world(
     if gpu.lost().is_none() {
         times::run(session, &world, &gated)?;
     }
+    coherence::run(session, &world, &gated)?;
     Ok(())
 }
 

@@ -145,7 +145,12 @@ fn refusal(session: &Session, cell: &Cell) -> Option<String> {
 }
 
 /// Timed are the first samples of the set whose error is measured last: how near the rays of
-/// neighbouring pixels lie may depend on how many there are.
+/// neighbouring pixels lie may depend on how many there are. So many are in that set.
+pub(super) fn samples(session: &Session) -> u32 {
+    let experiment = &session.experiment;
+    experiment.spp.max().max(experiment.timing.spp)
+}
+
 fn renderer<'a>(
     session: &mut Session,
     world: &'a World,
@@ -153,9 +158,8 @@ fn renderer<'a>(
     cell: &Cell,
     checks_and_counts: [bool; 2],
 ) -> Result<Renderer<'a>, String> {
-    let experiment = &session.experiment;
-    let samples = experiment.spp.max().max(experiment.timing.spp);
-    let seeds = experiment.seeds().replicates;
+    let samples = samples(session);
+    let seeds = session.experiment.seeds().replicates;
     let estimator = Estimator::new(session, cell, samples)?;
     estimator.renderer(session, world, &structure.traced, &seeds, checks_and_counts)
 }

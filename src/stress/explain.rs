@@ -69,6 +69,7 @@ fn steps(events: &[Event]) -> String {
     let mut text = String::new();
     for event in events {
         let _ = match event {
+            Event::Read(_) => Ok(()),
             Event::Node(place) => write!(text, "\nnode {place}"),
             Event::Triangle(id) => write!(text, "\n  triangle {id}"),
             Event::Nearest(hit) => write!(

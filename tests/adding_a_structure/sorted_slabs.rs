@@ -136,7 +136,7 @@ impl BuiltAccel for Built {
 impl Traverse for Built {
     fn trace(&self, soup: &TriangleSoup, mut walk: Walk) -> Hit {
         for (index, run) in self.runs.iter().enumerate() {
-            walk.visit(index);
+            walk.visit(index, run);
             if walk.enter(&run.bounds).is_none() {
                 continue;
             }

@@ -69,6 +69,10 @@ fn unknown_names_are_answered_with_the_nearest_known_one() {
             [":6", "`pgc`", "Known: `pcg`, `wang`"],
         ),
         (
+            "[coherence]\nwarp_size = 32\n",
+            [":6", "key in [coherence] `warp_size`", "`warp`"],
+        ),
+        (
             "[reference]\nsequence = \"soboll\"\n",
             [":6", "`soboll`", "`sobol`"],
         ),
@@ -343,4 +347,28 @@ fn parameters_of_an_entry_that_is_not_used_are_a_mistake() {
         parse_with(AXES, &["axes.accel=bvh", "accel.uniform-grid.lambda=4"]),
         &["--set accel.uniform-grid.lambda=4", "not in axes.accel"],
     );
+}
+
+#[test]
+fn a_warp_that_is_no_part_of_a_workgroup_and_a_rule_that_nobody_knows_are_refused() {
+    for (more, pieces) in [
+        (
+            "[coherence]\nwarp = [8, 3]\n",
+            [":6", "`coherence.warp`", "divisors of 8"],
+        ),
+        (
+            "[coherence]\nrule = \"while\"\n",
+            [":6", "`coherence.rule`", "one of \"loop\", \"if-if\""],
+        ),
+        (
+            "[coherence]\nline_bytes = 96\n",
+            [
+                ":6",
+                "`coherence.line_bytes`",
+                "a power of two in [16, 4096]",
+            ],
+        ),
+    ] {
+        assert_says(parse(more), &pieces);
+    }
 }

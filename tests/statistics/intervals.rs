@@ -302,3 +302,19 @@ fn the_pareto_front_has_only_points_that_nothing_beats() {
     assert_eq!(pareto_front(&points), [1, 2, 0, 4]);
     assert!(pareto_front(&[]).is_empty());
 }
+
+#[test]
+fn the_rank_correlation_sees_order_alone_and_knows_ties() {
+    let tau = |pairs: &[[f64; 2]]| kendall_tau(pairs);
+    assert_eq!(tau(&[[1.0, 1.0], [2.0, 10.0], [3.0, 1e9]]), Some(1.0));
+    assert_eq!(tau(&[[1.0, 3.0], [2.0, 2.0], [3.0, 1.0]]), Some(-1.0));
+    // Of six pairs five agree and one does not: (5 − 1) / 6.
+    let one_wrong = tau(&[[1.0, 1.0], [2.0, 2.0], [3.0, 4.0], [4.0, 3.0]]);
+    assert_eq!(one_wrong, Some(4.0 / 6.0));
+    // Three pairs, of which one is a tie in x and none in y: 2 / √(2 · 3).
+    let tied = tau(&[[1.0, 1.0], [1.0, 2.0], [2.0, 3.0]]);
+    assert!((tied.unwrap() - 2.0 / 6.0_f64.sqrt()).abs() < 1e-15);
+    assert_eq!(tau(&[[1.0, 1.0], [1.0, 2.0]]), None);
+    assert_eq!(tau(&[[1.0, 1.0]]), None);
+    assert_eq!(tau(&[[1.0, f64::NAN], [2.0, 1.0]]), None);
+}

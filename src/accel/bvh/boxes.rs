@@ -9,6 +9,7 @@ use super::super::bounds::Bounds;
 use super::super::leaf::{LEAF, LeafReader, Leaves, leaf_reference};
 use super::super::tree::{Coverage, NodeKind, Tree};
 use super::super::twin::Walk;
+use super::super::watch;
 use super::super::{AccelError, Ray, TriangleSoup};
 use super::layout::{Inner, Nodes};
 use super::options::NodeOrder;
@@ -150,8 +151,7 @@ impl Boxes {
 
 impl Nodes for Boxes {
     fn visit(&self, node: u32, leaves: LeafReader, walk: &mut Walk) -> Inner {
-        walk.visit(node as usize);
-        let node = &self.0[node as usize];
+        let node = walk.visit(node as usize, &self.0[node as usize]);
         let mut inner = Inner {
             first: NONE,
             second: NONE,
@@ -170,8 +170,7 @@ impl Nodes for Boxes {
     }
 
     fn second_child(&self, node: u32, from: u32, walk: &mut Walk) -> u32 {
-        walk.visit(node as usize);
-        let content = self.0[node as usize].content;
+        let content = walk.visit(node as usize, &self.0[node as usize]).content;
         if from & 1 == near_side(content, &walk.ray) {
             from ^ 1
         } else {
@@ -180,11 +179,10 @@ impl Nodes for Boxes {
     }
 
     fn parent(&self, node: u32) -> u32 {
-        self.0[node as usize].link
+        *watch::read(&self.0[node as usize].link)
     }
 
     fn child(&self, node: u32, side: u32, walk: &mut Walk) -> u32 {
-        walk.visit(node as usize);
-        (self.0[node as usize].content & CHILD_MASK) + side
+        (walk.visit(node as usize, &self.0[node as usize]).content & CHILD_MASK) + side
     }
 }

@@ -94,8 +94,7 @@ pub(super) fn trace(octants: &Octants, leaves: LeafReader, mut walk: Walk) -> Hi
         if current == NONE || walk.is_answered() {
             return walk.hit;
         }
-        walk.visit(current as usize);
-        let OctantNode { node, ropes } = &octants.0[current as usize];
+        let OctantNode { node, ropes } = walk.visit(current as usize, &octants.0[current as usize]);
         let entered = walk.enter(&node.bounds()).is_some();
         if entered && node.content < LEAF {
             current = (node.content & CHILD_MASK) + near_side(node.content, octant);

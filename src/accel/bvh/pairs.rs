@@ -7,6 +7,7 @@ use super::super::bounds::{Bounds, enter_box};
 use super::super::leaf::{LEAF, LeafReader, leaf_reference};
 use super::super::tree::{Coverage, NodeKind, Tree};
 use super::super::twin::Walk;
+use super::super::watch;
 use super::NONE;
 use super::layout::{Inner, Nodes};
 use super::options::NodeOrder;
@@ -155,8 +156,8 @@ pub(in crate::accel) fn validate<'a>(
 
 impl Nodes for Pairs {
     fn visit(&self, node: u32, leaves: LeafReader, walk: &mut Walk) -> Inner {
-        walk.visit(node as usize);
-        let [(left, left_box), (right, right_box)] = self.0[node as usize].children();
+        let node = walk.visit(node as usize, &self.0[node as usize]);
+        let [(left, left_box), (right, right_box)] = node.children();
         let left = (walk.enter(&left_box), left);
         let right = (walk.enter(&right_box), right);
         let swap = right.0.is_some_and(|r| left.0.is_none_or(|l| r < l));
@@ -192,11 +193,11 @@ impl Nodes for Pairs {
     }
 
     fn second_child(&self, node: u32, from: u32, walk: &mut Walk) -> u32 {
-        walk.visit(node as usize);
+        let node = walk.visit(node as usize, &self.0[node as usize]);
         walk.counters.box_tests += 2;
         let (ray, inverse) = (&walk.ray, walk.inverse);
         let enter = |bounds| enter_box(bounds, ray, inverse, ray.t_max);
-        let [(left, left_box), (right, right_box)] = self.0[node as usize].children();
+        let [(left, left_box), (right, right_box)] = node.children();
         let (enter_left, enter_right) = (enter(&left_box), enter(&right_box));
         let swap = enter_right.is_some_and(|r| enter_left.is_none_or(|l| r < l));
         let (near, far, enter) = if swap {
@@ -213,12 +214,11 @@ impl Nodes for Pairs {
     }
 
     fn parent(&self, node: u32) -> u32 {
-        self.0[node as usize].parent
+        *watch::read(&self.0[node as usize].parent)
     }
 
     fn child(&self, node: u32, side: u32, walk: &mut Walk) -> u32 {
-        walk.visit(node as usize);
-        let pair = &self.0[node as usize];
+        let pair = walk.visit(node as usize, &self.0[node as usize]);
         if side == 0 { pair.left } else { pair.right }
     }
 }

@@ -38,8 +38,7 @@ pub(super) fn trace(boxes: &Boxes, leaves: LeafReader, mut walk: Walk) -> Hit {
         if current == NONE || walk.is_answered() {
             return walk.hit;
         }
-        walk.visit(current as usize);
-        let node = &boxes.0[current as usize];
+        let node = walk.visit(current as usize, &boxes.0[current as usize]);
         if walk.enter(&node.bounds()).is_none() {
             current = node.link;
         } else if node.content >= LEAF {

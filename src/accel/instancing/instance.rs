@@ -123,6 +123,7 @@ pub(super) fn leaf(
 ) {
     let (first, count) = leaf_range(reference);
     for triangle in &triangles[first..first + count] {
+        walk.read(triangle);
         walk.counters.triangle_tests += 1;
         let id = triangle.id + first_id;
         let triangle = TriangleRecord { id, ..*triangle };
@@ -137,7 +138,7 @@ pub(super) fn near_and_far(
     level: &Level,
     walk: &mut Walk,
 ) -> [(Option<f32>, u32); 2] {
-    walk.visit(place as usize);
+    walk.visit(place as usize, node);
     walk.counters.box_tests += 2;
     let [(left, left_box), (right, right_box)] = node.children();
     let enter_left = enter_grown(level, &left_box, walk.hit.t);
@@ -157,7 +158,7 @@ pub(super) fn is_open(enter: Option<f32>, level: &Level, hit: &Hit) -> bool {
 
 /// Traces the object below `entry.node`, near child first.
 pub(super) fn trace_object(forest: &Forest, entry: &Entry, walk: &mut Walk) {
-    let level = object_level(entry, &walk.ray, forest.intersection);
+    let level = object_level(walk.read(entry), &walk.ray, forest.intersection);
     let node = |index: u32| &forest.nodes[index as usize];
     descend(node, entry.node, &level, walk, |reference, walk| {
         leaf(&forest.triangles, reference, entry.first_id, &level, walk);

@@ -275,7 +275,7 @@ fn trace(levels: Levels, mut walk: Walk) -> Hit {
             }
         }
         if floor == OUTSIDE && next >= LEAF {
-            let entry = levels.load_entry(next);
+            let entry = walk.read(levels.load_entry(next));
             here = object_level(entry, &walk.ray, tests);
             (floor, first_id, next) = (stack.len() as u32, entry.first_id, entry.node);
         }

@@ -92,6 +92,14 @@ impl<U: Upper> BuiltAccel for TwoLevel<U> {
         self.base.buffers(&self.upper.layout(&self.base))
     }
 
+    fn twin_arrays(&self) -> Vec<(&'static str, Vec<&[u32]>)> {
+        let forest = &self.base.forest;
+        let [first, second] = self.upper.layout(&self.base).parts;
+        let nodes = vec![bytemuck::cast_slice(&forest.nodes), first, second];
+        let triangles = vec![bytemuck::cast_slice(&forest.triangles)];
+        vec![("nodes", nodes), ("leaf_triangles", triangles)]
+    }
+
     fn divisible(&self) -> &'static [&'static str] {
         &["nodes", "leaf_triangles"]
     }

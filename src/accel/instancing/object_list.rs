@@ -122,6 +122,7 @@ impl Upper for List {
         let world = level(&walk.ray, self.growth, base.forest.intersection);
         for (entry, world_box) in self.entries.iter().zip(&self.boxes) {
             walk.counters.box_tests += 1;
+            walk.read(world_box);
             if enter_grown(&world, &world_box.bounds(), walk.hit.t).is_none() {
                 continue;
             }

@@ -20,6 +20,7 @@ use self::voxels::{GridCell, Map};
 use super::grid::lists::check_lists;
 use super::grid::{Grid, check_words, clamped, first_axis, outside};
 use super::structure::prelude::*;
+use super::watch;
 use crate::gpu::UniformValues;
 
 /// Bits of an entry that hold the logarithm of its block's side; 0: the rest is a cell.
@@ -123,7 +124,7 @@ impl Built {
         let mut shift = self.shift;
         let [nx, ny, _] = self.top();
         let [x, y, z] = voxel.map(|v| v >> shift);
-        let mut entry = self.words[((z * ny + y) * nx + x) as usize];
+        let mut entry = *watch::read(&self.words[((z * ny + y) * nx + x) as usize]);
         loop {
             let log = entry & LOG_MASK;
             if log == 0 {
@@ -132,12 +133,16 @@ impl Built {
             shift -= log;
             let [x, y, z] = voxel.map(|v| (v >> shift) & ((1 << log) - 1));
             let place = (entry >> LOG_BITS) + (((z << log) + y) << log) + x;
-            entry = self.words[place as usize];
+            entry = *watch::read(&self.words[place as usize]);
         }
     }
 
+    fn cell_words(&self, cell: u32) -> &[u32] {
+        &self.cells[4 * cell as usize..4 * cell as usize + 4]
+    }
+
     fn load_cell(&self, cell: u32) -> Found {
-        let words = &self.cells[4 * cell as usize..4 * cell as usize + 4];
+        let words = self.cell_words(cell);
         let low = |word: u32| (word & 0xffff) as i32;
         let high = |word: u32| (word >> 16) as i32;
         Found {
@@ -156,7 +161,7 @@ impl Built {
         };
         let mut ended = false;
         self.words[begin..].iter().map_while(move |word| {
-            let id = (!ended).then_some(word & !LAST);
+            let id = (!ended).then(|| watch::read(word) & !LAST);
             ended = word & LAST != 0;
             id
         })
@@ -264,9 +269,11 @@ impl Traverse for Built {
         let mut voxel: [u32; 3] = std::array::from_fn(|a| clamped(entry[a], grid.resolution[a]));
         loop {
             let place = self.find_cell(voxel);
-            walk.visit(place as usize);
+            walk.visit(place as usize, self.cell_words(place));
             let cell = self.load_cell(place);
-            walk.test_list(soup, self.list(cell.list));
+            for id in self.list(cell.list) {
+                walk.test(&soup.records[id as usize]);
+            }
             if walk.is_answered() {
                 return walk.hit;
             }

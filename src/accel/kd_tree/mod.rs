@@ -238,8 +238,7 @@ impl Traverse for Built {
         let mut stack: Vec<(usize, f32)> = Vec::new();
         let mut current = 0;
         loop {
-            walk.visit(current);
-            match self.nodes[current].content() {
+            match walk.visit(current, &self.nodes[current]).content() {
                 Content::Inner {
                     axis,
                     position,
@@ -260,8 +259,7 @@ impl Traverse for Built {
                     }
                 }
                 Content::Leaf { first, count } => {
-                    let ids = &self.references[first..first + count];
-                    walk.test_list(soup, ids.iter().copied());
+                    walk.test_list(soup, &self.references[first..first + count]);
                     if walk.is_answered() {
                         return walk.hit;
                     }

@@ -264,6 +264,7 @@ impl Built {
     /// Tests the triangles of the leaf that begins at `first`.
     fn leaf(&self, first: u32, soup: &TriangleSoup, walk: &mut Walk) {
         for reference in &self.references[first as usize..] {
+            walk.read(reference);
             walk.test(&soup.records[(reference & !LAST) as usize]);
             if reference & LAST != 0 {
                 return;
@@ -310,8 +311,7 @@ impl Traverse for Built {
                 return walk.hit;
             }
             let place = ((open >> INNER_SHIFT) * 8 + octant) as usize;
-            walk.visit(place);
-            let word = self.nodes[place];
+            let word = *walk.visit(place, &self.nodes[place]);
             if word & LEAF != 0 {
                 self.leaf(word & !LEAF, soup, &mut walk);
                 if walk.is_answered() {

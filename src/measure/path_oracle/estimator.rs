@@ -5,7 +5,7 @@ use super::hits::{SHORT, Segment};
 use super::light::{Choice, Chosen, moved};
 use super::surface::Surface;
 use super::{PathOracle, Vertex, Walk};
-use crate::integrator::ConfiguredIntegrator;
+use crate::integrator::{ConfiguredIntegrator, CountedRays};
 use crate::params::{ParamValue, Params};
 use crate::sampling::dimensions::{
     DIRECTION, LIGHT_CHOICE, LIGHT_POINT, PIXEL, ROULETTE, at_bounce,
@@ -36,7 +36,7 @@ pub struct PathRules {
     roulette: Roulette,
     /// First bounce with roulette.
     roulette_depth: u32,
-    choice: Choice,
+    pub(super) choice: Choice,
     /// Greatest component of a contribution of bounce 1 and later; 0 is none.
     clamp: f64,
 }
@@ -232,6 +232,11 @@ impl PathOracle<'_> {
             shift: walk.rounding.texel(),
             ..*ray
         };
+        let class = match walk.vertices.is_empty() {
+            true => CountedRays::Primary,
+            false => CountedRays::Bounce,
+        };
+        walk.note_ray(class, 0, &seen);
         let hit = self.hits.nearest(&seen);
         walk.decide(hit.map_or(u64::MAX, |hit| hit.triangle.into()));
         let hit = self.hits.unmoved(hit?, &seen);
@@ -266,6 +271,7 @@ impl PathOracle<'_> {
             length: walk.rounding.number(radius * self.diagonal),
             ..surface.leave(direction, &mut walk.rounding)
         };
+        walk.note_ray(CountedRays::Ao, 0, &free);
         let blocked = self.hits.blocked(&free);
         walk.decide(blocked.into());
         DVec3::splat(if blocked { 0.0 } else { 1.0 })
@@ -388,7 +394,7 @@ impl PathOracle<'_> {
             direction: towards / distance,
             ..left
         };
-        let blocked = self.shadowed(&shadow, chosen.light);
+        let blocked = self.shadowed(walk, &shadow, chosen.light);
         walk.decide(blocked.into());
         if blocked {
             return DVec3::ZERO;

@@ -24,12 +24,13 @@ pub use hits::SHORT;
 pub use rounding::Rounding;
 
 use crate::geometry::Camera;
+use crate::integrator::CountedRays;
 use crate::sampling::{Coordinate, Sampler, to_unit};
 use crate::scene::{Material, SceneData};
 use camera::Lens;
 use glam::DVec3;
-use hits::Hits;
-use light::Lights;
+use hits::{Hits, Segment};
+use light::{Choice, Lights};
 use std::fmt;
 use surface::Surface;
 use texture::Textures;
@@ -85,6 +86,25 @@ impl fmt::Display for Vertex {
     }
 }
 
+/// A ray of a path, in the order in which they are traced.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathRay {
+    /// What it is for.
+    pub class: CountedRays,
+    /// Bounces before it; of a shadow ray those before the point that it leaves.
+    pub depth: u32,
+    /// Which of all lights it goes to, where each is sampled; else 0.
+    pub light: u32,
+    /// Where it begins: on a surface, or in the camera.
+    pub origin: DVec3,
+    /// Unit normal there; 0 in the camera.
+    pub normal: DVec3,
+    /// Unit direction.
+    pub direction: DVec3,
+    /// Its length, scene units.
+    pub length: f64,
+}
+
 /// A path and what it found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
@@ -92,6 +112,8 @@ pub struct Path {
     pub radiance: DVec3,
     /// Its vertices from the camera on.
     pub vertices: Vec<Vertex>,
+    /// All that is traced for it.
+    pub rays: Vec<PathRay>,
     /// A hash of all decisions: triangles, lobes, lights, what was occluded, where it ended. Paths of one
     /// branch differ by rounding only.
     pub branch: u64,
@@ -151,12 +173,14 @@ impl<'a> PathOracle<'a> {
             view,
             rounding,
             vertices: Vec::new(),
+            rays: Vec::new(),
             branch: 0xcbf2_9ce4_8422_2325,
         };
         let radiance = self.estimate(&mut walk);
         Path {
             radiance,
             vertices: walk.vertices,
+            rays: walk.rays,
             branch: walk.branch,
         }
     }
@@ -181,10 +205,32 @@ struct Walk<'a> {
     view: &'a View<'a>,
     rounding: Rounding,
     vertices: Vec<Vertex>,
+    rays: Vec<PathRay>,
     branch: u64,
 }
 
 impl Walk<'_> {
+    /// Notes a ray that is traced after as many bounces as there are vertices but one.
+    fn note_ray(&mut self, class: CountedRays, light: usize, ray: &Segment) {
+        let closest = [CountedRays::Primary, CountedRays::Bounce].contains(&class);
+        let vertices = self.vertices.len() as u32;
+        let all_lights =
+            matches!(self.view.estimator, Estimator::Path(rules) if rules.choice == Choice::All);
+        self.rays.push(PathRay {
+            class,
+            depth: if closest {
+                vertices
+            } else {
+                vertices.saturating_sub(1)
+            },
+            light: if all_lights { light as u32 } else { 0 },
+            origin: ray.origin,
+            normal: ray.normal,
+            direction: ray.direction,
+            length: ray.length,
+        });
+    }
+
     /// The number of a dimension, in [0, 1).
     fn draw(&self, dimension: u32) -> f64 {
         let [x, y] = self.id.pixel;

@@ -2,6 +2,7 @@
 //! and a body. Every table, plot and export derives from these lines alone; an absent value is absent,
 //! never 0.
 
+mod coherence;
 mod compaction;
 mod error;
 mod key;
@@ -12,6 +13,7 @@ mod run;
 mod stream;
 mod structure;
 
+pub use coherence::*;
 pub use compaction::CompactionRecord;
 pub use error::*;
 pub use key::{Key, axis};
@@ -141,6 +143,8 @@ pub enum Body {
     Spectrum(SpectrumRecord),
     /// Time of a full cell (structure × sampler × integrator).
     Time(TimeRecord),
+    /// How alike the rays of neighbouring lanes are in a full cell, by a model.
+    Coherence(CoherenceRecord),
     /// Star discrepancy of the words of a pair of dimensions, read back from a dump kernel that imports the
     /// renderer's modules.
     Stream(StreamRecord),
@@ -190,6 +194,7 @@ kinds! {
     Bias: BiasRecord,
     Spectrum: SpectrumRecord,
     Time: TimeRecord,
+    Coherence: CoherenceRecord,
     Stream: StreamRecord,
     SamplerCost: SamplerCostRecord,
     Compaction: CompactionRecord,

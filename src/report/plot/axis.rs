@@ -45,6 +45,19 @@ impl Axis {
         }
     }
 
+    /// From 0 to `max`, ticks at whole numbers.
+    pub fn whole(max: f64, title: &str) -> Self {
+        let step = (max / 10.0).ceil().max(1.0) as usize;
+        let tick = |value: usize| Tick {
+            value: value as f64,
+            label: value.to_string(),
+        };
+        Self {
+            ticks: (0..=max as usize).step_by(step).map(tick).collect(),
+            ..Self::linear(max, title)
+        }
+    }
+
     fn logarithmic([min, max]: [f64; 2], ticks: Vec<Tick>, title: &str) -> Self {
         Self {
             is_log: true,
@@ -286,6 +299,8 @@ mod tests {
         let axis = Axis::linear(7.0, "rate");
         assert_eq!([axis.share(0.0), axis.share(7.0)], [0.0, 1.0]);
         assert_eq!(labels(Some(axis)), ["0", "2", "4", "6"]);
+        assert_eq!(labels(Some(Axis::whole(3.0, ""))), ["0", "1", "2", "3"]);
+        assert_eq!(labels(Some(Axis::whole(20.0, ""))).len(), 11);
         let log = Axis::log10([1.0, 100.0].into_iter(), "").unwrap();
         assert!((log.share(10.0) - 0.5).abs() < 1e-12);
     }

@@ -1,4 +1,5 @@
-//! Log–log curves with bands: error against samples or seconds, discrepancy against points.
+//! Curves with bands over a logarithmic y axis: error against samples or seconds, discrepancy against points,
+//! efficiency against bounces.
 
 use super::axis::{Axes, Axis};
 use super::drawing::{DIM, Drawing, INK, Ink};
@@ -74,9 +75,11 @@ pub enum Ticks {
     PowersOfTwo,
     /// 1, 2, 5, 10, …
     PowersOfTen,
+    /// 0, 1, 2, …: the x axis is linear.
+    Whole,
 }
 
-/// A log–log plot.
+/// A plot whose y axis is logarithmic, and the x axis, too, unless its ticks say otherwise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CurvePlot {
     /// Title of the x axis, with unit.
@@ -104,12 +107,13 @@ impl CurvePlot {
     pub fn draw(&self) -> Option<Drawing> {
         let points = || {
             let points = self.curves.iter().flat_map(|curve| &curve.points);
-            points.filter(|p| drawable(p))
+            points.filter(|p| drawable(p, self.x_ticks))
         };
         let xs = points().map(|p| p.x);
         let x = match self.x_ticks {
             Ticks::PowersOfTwo => Axis::log2(xs, &self.x_title)?,
             Ticks::PowersOfTen => Axis::log10(xs, &self.x_title)?,
+            Ticks::Whole => Axis::whole(xs.reduce(f64::max)?, &self.x_title),
         };
         let ends = [x.min() * 1.05, x.max() / 1.05];
         let guides = self.guides.iter();
@@ -122,7 +126,7 @@ impl CurvePlot {
         axes.draw(&mut drawing);
         let mut rows = legend::Rows::new(PLOT_HEIGHT, (16.0, WIDTH));
         for curve in &self.curves {
-            curve.draw(&axes, &mut drawing);
+            curve.draw(&axes, self.x_ticks, &mut drawing);
             let (ink, exact) = (marker::ink(curve.look), curve.exact);
             rows.add(&mut drawing, &curve.label, INK, |drawing, y| {
                 curve_line(drawing, &[(16.0, y), (50.0, y)], ink, exact);
@@ -147,9 +151,10 @@ impl Guide {
 }
 
 impl Curve {
-    fn draw(&self, axes: &Axes, drawing: &mut Drawing) {
+    fn draw(&self, axes: &Axes, ticks: Ticks, drawing: &mut Drawing) {
         let ink = marker::ink(self.look);
-        let points: Vec<&CurvePoint> = self.points.iter().filter(|p| drawable(p)).collect();
+        let points = self.points.iter().filter(|p| drawable(p, ticks));
+        let points: Vec<&CurvePoint> = points.collect();
         // An interval that reaches 0 ends at the bottom of the axis.
         let upper = points.iter().map(|p| axes.at(p.x, p.high));
         let lower = points
@@ -188,8 +193,9 @@ fn shown_low(point: &CurvePoint) -> f64 {
     point.low.max(point.y / 30.0)
 }
 
-fn drawable(point: &CurvePoint) -> bool {
-    point.x > 0.0 && point.y > 0.0 && point.x.is_finite() && point.y.is_finite()
+fn drawable(point: &CurvePoint, ticks: Ticks) -> bool {
+    let has_place = point.x > 0.0 || (ticks == Ticks::Whole && point.x == 0.0);
+    has_place && point.y > 0.0 && point.x.is_finite() && point.y.is_finite()
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The content of the report, section by section.
 
 pub mod belief;
+pub mod coherence;
 pub mod compactions;
 pub mod kernels;
 pub mod point_sets;

@@ -7,6 +7,7 @@ mod displaced_sphere;
 mod far_corners;
 mod foliage;
 mod furnace;
+mod hairball;
 mod instances;
 mod lamps;
 pub(super) mod numeric;
@@ -51,7 +52,7 @@ impl Builtin {
 }
 
 /// The registry.
-const BUILTINS: [Builtin; 13] = [
+const BUILTINS: [Builtin; 14] = [
     Builtin::of::<cornell_box::CornellBox>(),
     Builtin::of::<displaced_sphere::DisplacedSphere>(),
     Builtin::of::<triangle_soup::TriangleSoup>(),
@@ -65,6 +66,7 @@ const BUILTINS: [Builtin; 13] = [
     Builtin::of::<lamps::Luminaire>(),
     Builtin::of::<lamps::ManyLights>(),
     Builtin::of::<foliage::Foliage>(),
+    Builtin::of::<hairball::Hairball>(),
 ];
 
 /// The built-in scenes with their parameters, for the parser, lists and docs.

@@ -8,10 +8,11 @@ mod sky;
 mod sphere;
 mod tree;
 
-use super::PathOracle;
 use super::hits::Segment;
 use super::rounding::Rounding;
 use super::surface::Surface;
+use super::{PathOracle, Walk};
+use crate::integrator::CountedRays;
 use crate::scene::{Light, LightList, SceneData, Source};
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -265,11 +266,14 @@ impl PathOracle<'_> {
     }
 
     /// Whether anything lies on the way to a light.
-    pub(super) fn shadowed(&self, shadow: &Segment, light: usize) -> bool {
+    pub(super) fn shadowed(&self, walk: &mut Walk, shadow: &Segment, light: usize) -> bool {
         let balls = self.lights.spheres.iter();
         let mut others = balls.filter(|(place, _)| *place != light);
-        others.any(|(_, ball)| ball.meet(shadow).is_some_and(|d| d < shadow.length))
-            || self.hits.blocked(shadow)
+        if others.any(|(_, ball)| ball.meet(shadow).is_some_and(|d| d < shadow.length)) {
+            return true;
+        }
+        walk.note_ray(CountedRays::Shadow, light, shadow);
+        self.hits.blocked(shadow)
     }
 
     /// What comes along a ray that leaves the scene. A map takes the place of the sky.
