@@ -5,17 +5,21 @@ mod support;
 
 use raystone::accel::bounds::Bounds;
 use raystone::accel::tree::parallel::{LEAF, LinkedTree, Method, Settings, build, device};
+use raystone::accel::tree::{NodeKind, Tree, TreeParameters};
 use raystone::accel::{AccelKind, BuildLog, BuiltAccel, Cwbvh, Traced, TriangleSoup};
 use raystone::gpu::Gpu;
 use raystone::measure::gate::Checks;
-use raystone::params::{ParamValue, Params};
+use raystone::params::{ParamValue, Parameters as _, Params};
 use raystone::scene::builtin_scenes;
 use std::path::Path;
 use support::scenes::{self, lattice_soup};
 use support::{Pcg, Stage, default_params, gpu, is_exact, kernels_with, open, structures};
 
 const SPONZA: &str = "../shared/scenes/sponza-crytek/sponza.obj";
-const METHODS: [(&str, Method); 1] = [("lbvh", Method::Lbvh)];
+const METHODS: [(&str, Method); 2] = [
+    ("lbvh", Method::Lbvh),
+    ("ploc", Method::Ploc { radius: 14 }),
+];
 
 /// Every method with codes of both lengths.
 fn settings() -> Vec<Settings> {
@@ -115,6 +119,49 @@ fn trees_equal_the_host_twin_to_the_bit() {
         check("equal positions", &equal_positions(count));
     }
     check("lattice", &lattice_soup(&mut random, 70_001, 200));
+    check("shrinking", &shrinking(1200));
+}
+
+#[test]
+fn clustering_equals_the_host_twin_whatever_its_radius() {
+    if !is_exact(gpu()) {
+        return;
+    }
+    let soup = clusters(&mut Pcg::new(13), 1500);
+    for radius in [1, 2, 31, 32] {
+        let method = Method::Ploc { radius };
+        let long_codes = false;
+        let settings = Settings { method, long_codes };
+        let host = build(&soup, &settings).expect("a tree");
+        let device = on_device(gpu(), &soup, &settings).expect("a tree");
+        assert_eq!(difference(&host, &device), None, "radius {radius}");
+    }
+}
+
+/// Boxes that halve in size towards the origin: of all neighbours only the last two choose each other, so that most
+/// rounds of clustering are joined without a look.
+fn shrinking(count: i32) -> TriangleSoup {
+    let triangle = |i: i32| {
+        let size = 2.0_f32.powf(50.0 - 0.08 * i as f32);
+        let corner = glam::Vec3::splat(size);
+        [
+            corner,
+            corner + glam::Vec3::X * size,
+            corner + glam::Vec3::Y * size,
+        ]
+    };
+    scenes::soup((0..count).map(triangle))
+}
+
+#[test]
+fn clusters_of_equal_boxes_are_joined_in_few_rounds() {
+    // Where ties went to the first neighbour, a round would join one pair.
+    let settings = Settings {
+        method: Method::Ploc { radius: 14 },
+        long_codes: false,
+    };
+    let tree = build(&equal_positions(1 << 12), &settings).expect("a tree");
+    assert_eq!(Tree::from(tree).depth(), 12);
 }
 
 #[test]
@@ -298,6 +345,42 @@ fn faults_in_the_passes_are_seen() {
             "(x.y << 1u)",
         ),
         (
+            "clusters",
+            "the search one short on one side",
+            "min(place + radius + 1u, count)",
+            "min(place + radius, count)",
+        ),
+        (
+            "clusters",
+            "ties of clusters settled the other way",
+            "a.apart < b.apart",
+            "a.apart > b.apart",
+        ),
+        (
+            "device/advance",
+            "the last tile of clusters left out",
+            "first < tile_count;",
+            "first + 1u < tile_count;",
+        ),
+        (
+            "device/merge",
+            "the last cluster lost",
+            "min(first + PER_LANE, count)",
+            "min(first + PER_LANE, count - 1u)",
+        ),
+        (
+            "device/joins",
+            "clusters joined that do not choose each other",
+            "if (nearest[other] != place || other == place) {",
+            "if (other == place) {",
+        ),
+        (
+            "device/sorted",
+            "codes not in the order of the sort",
+            "codes[sorted_triangles[place]]",
+            "codes[place]",
+        ),
+        (
             "boxes",
             "numbers below zero in the wrong order",
             "return select(bits ^ vec3<u32>(SIGN), ~bits,",
@@ -308,18 +391,118 @@ fn faults_in_the_passes_are_seen() {
         clusters(&mut Pcg::new(11), 3000),
         lattice_soup(&mut Pcg::new(12), 3000, 4),
     ];
-    for settings in settings() {
-        for (module, what, from, to) in faults {
-            let module = format!("accel/tree/parallel/{module}");
-            let gpu = open(kernels_with(&module, &[(from, to)]));
-            let seen = soups.iter().any(|soup| {
-                let host = build(soup, &settings).expect("a tree");
-                match on_device(&gpu, soup, &settings) {
-                    Ok(device) => difference(&host, &device).is_some(),
-                    Err(_) => true,
-                }
-            });
-            assert!(seen, "{what}, {settings:?}");
+    for (module, what, from, to) in faults {
+        let module = format!("accel/tree/parallel/{module}");
+        let gpu = open(kernels_with(&module, &[(from, to)]));
+        let differs = |soup: &TriangleSoup, settings: &Settings| {
+            let host = build(soup, settings).expect("a tree");
+            match on_device(&gpu, soup, settings) {
+                Ok(device) => difference(&host, &device).is_some(),
+                Err(_) => true,
+            }
+        };
+        let seen = |s: &Settings| soups.iter().any(|soup| differs(soup, s));
+        let [lbvh, ploc] = METHODS.map(|(_, method)| {
+            let settings = settings().into_iter().filter(|s| s.method == method);
+            settings.map(|s| seen(&s)).collect::<Vec<_>>()
+        });
+        // What only one of the methods runs is not seen by the other.
+        let all = |seen: &[bool]| seen.iter().all(|s| *s);
+        assert!(all(&lbvh) || all(&ploc), "{what}: {lbvh:?} {ploc:?}");
+    }
+}
+
+/// The triangles, each vertex moved by up to so much.
+fn moved(soup: &TriangleSoup, random: &mut Pcg, by: f32) -> TriangleSoup {
+    let mut out = soup.clone();
+    for record in &mut out.records {
+        for x in record
+            .v0
+            .iter_mut()
+            .chain(&mut record.v1)
+            .chain(&mut record.v2)
+        {
+            *x += by * random.signed();
         }
     }
+    out
+}
+
+fn tree_of(gpu: &Gpu, soup: &TriangleSoup, builder: &str) -> Tree {
+    let params = default_params(&TreeParameters::schema());
+    let mut params = Params(params.0);
+    params
+        .0
+        .insert("builder".into(), ParamValue::Name(builder.to_owned()));
+    let parameters = TreeParameters::from_params(&params).expect("parameters");
+    Tree::build(soup, &parameters, &mut BuildLog::with_gpu(gpu)).expect("a tree")
+}
+
+/// Bits of all boxes.
+fn boxes(tree: &Tree) -> Vec<[u32; 6]> {
+    let bits = |b: &Bounds| {
+        let [x, y, z] = b.min.map(f32::to_bits);
+        let [u, v, w] = b.max.map(f32::to_bits);
+        [x, y, z, u, v, w]
+    };
+    tree.nodes.iter().map(|node| bits(&node.bounds)).collect()
+}
+
+#[test]
+fn boxes_are_fitted_to_moved_triangles_the_same_on_host_and_device() {
+    let mut random = Pcg::new(14);
+    for count in [1, 2, 9, 700, 5000] {
+        let soup = clusters(&mut random, count);
+        let later = moved(&soup, &mut random, 3.0);
+        for builder in ["binned", "sbvh", "ploc", "device-lbvh", "device-ploc"] {
+            let built = tree_of(gpu(), &soup, builder);
+            let [mut host, mut device] = [built.clone(), built.clone()];
+            host.refit(&later).expect("the same triangles");
+            let fitted = device.refit_on_device(&later, &mut BuildLog::with_gpu(gpu()));
+            fitted.expect("the same triangles");
+            assert!(
+                boxes(&host) == boxes(&device),
+                "{builder}, {count} triangles"
+            );
+            for (node, was) in host.nodes.iter().zip(&built.nodes) {
+                assert_eq!(node.kind, was.kind, "{builder}");
+                let expected = match node.kind {
+                    NodeKind::Inner { left, right } => {
+                        let [a, b] = [left, right].map(|c| host.nodes[c as usize].bounds);
+                        a.union(&b)
+                    }
+                    NodeKind::Leaf { first, count } => {
+                        let listed = &host.order[first as usize..(first + count) as usize];
+                        let boxes = listed.iter().map(|id| later.records[*id as usize].bounds());
+                        boxes.fold(Bounds::EMPTY, |all, b| all.union(&b))
+                    }
+                };
+                assert_eq!(node.bounds, expected, "{builder}");
+            }
+            if builder != "sbvh" {
+                device
+                    .refit_on_device(&soup, &mut BuildLog::with_gpu(gpu()))
+                    .expect("a tree");
+                assert_eq!(device.nodes, built.nodes, "{builder}: moved back");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_fitted_says_why() {
+    let soup = clusters(&mut Pcg::new(15), 100);
+    let mut tree = tree_of(gpu(), &soup, "device-lbvh");
+    let mut fewer = soup.clone();
+    fewer.records.pop();
+    let mut bad = soup.clone();
+    bad.records[31].v2[0] = f32::NAN;
+    for (soup, text) in [(&fewer, "there are 99"), (&bad, "triangle 31")] {
+        let host = tree.refit(soup).expect_err("other triangles").to_string();
+        assert!(host.contains(text), "{host}");
+        let device = tree.refit_on_device(soup, &mut BuildLog::with_gpu(gpu()));
+        assert_eq!(device.expect_err("other triangles").to_string(), host);
+    }
+    let alone = tree.refit_on_device(&soup, &mut BuildLog::default());
+    assert!(alone.is_err_and(|e| e.to_string().contains("there is none")));
 }

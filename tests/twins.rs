@@ -68,6 +68,34 @@ const NO_TWIN: &[(&str, &str)] = &[
         "a pass; tests/device_builders.rs compares trees",
     ),
     (
+        "accel/tree/parallel/device/advance",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
+        "accel/tree/parallel/device/joins",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
+        "accel/tree/parallel/device/merge",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
+        "accel/tree/parallel/device/nearest",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
+        "accel/tree/parallel/device/pairs",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
+        "accel/tree/parallel/device/state",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
+        "accel/tree/parallel/device/sorted",
+        "a pass; tests/device_builders.rs compares trees",
+    ),
+    (
         "accel/tree/parallel/device/size",
         "a pass; tests/device_builders.rs compares trees",
     ),
@@ -313,6 +341,16 @@ const RUST_ONLY: &[(&str, &str, &str)] = &[
     ),
     ("accel/leaf", "leaf_reference", "build"),
     ("accel/tree/parallel/lbvh", "build", "the passes, in turn"),
+    (
+        "accel/tree/parallel/clusters",
+        "build",
+        "the passes, in turn",
+    ),
+    (
+        "accel/tree/parallel/clusters",
+        "nearest",
+        "a pass, device/nearest.wesl",
+    ),
     ("accel/leaf", "leaf_range", "unpacks in one place"),
     ("accel/bvh/boxes", "split_axis", "build"),
     ("accel/bvh/roped", "rope", "build"),

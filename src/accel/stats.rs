@@ -104,26 +104,26 @@ impl BuildLog {
         })?;
         let played = player.play(recording);
         let played = played.map_err(|e| AccelError::Device(e.to_string()))?;
-        let first = self.phases.len();
         let is_timed = played.runs.iter().all(|(_, ms)| ms.is_some());
         for (name, ms) in played.runs.iter().filter(|_| is_timed) {
-            let mut phases = self.phases[first..].iter_mut();
-            match phases.find(|phase| phase.name == *name) {
-                Some(phase) => phase.ms += ms.unwrap_or(0.0),
-                None => self.phases.push(Phase {
-                    name: name.clone(),
-                    ms: ms.unwrap_or(0.0),
-                }),
-            }
+            self.note(name, ms.unwrap_or(0.0));
         }
         if !is_timed {
             let names = played.runs.iter().map(|(name, _)| name.as_str());
-            self.phases.push(Phase {
-                name: names.collect::<Vec<_>>().join(" + "),
-                ms: played.wall_ms,
-            });
+            self.note(&names.collect::<Vec<_>>().join(" + "), played.wall_ms);
         }
         Ok(played)
+    }
+
+    /// Adds milliseconds to the phase of this name, which may be a new one.
+    pub fn note(&mut self, name: &str, ms: f64) {
+        match self.phases.iter_mut().find(|phase| phase.name == name) {
+            Some(phase) => phase.ms += ms,
+            None => self.phases.push(Phase {
+                name: name.to_owned(),
+                ms,
+            }),
+        }
     }
 
     /// Runs `work` and notes how long it took.

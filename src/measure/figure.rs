@@ -119,7 +119,7 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 112] = [
+pub static FIGURES: [Figure; 113] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
@@ -130,6 +130,7 @@ pub static FIGURES: [Figure; 112] = [
     Figure::new("deepest-stack/v1", "deepest stack", "", Lower, Count, Exact),
     // A structure.
     Figure::new("build-ms/v1", "build", "ms", Lower, THREE, Single),
+    Figure::new("build-rate/v1", "build", "Mtris/s", Higher, THREE, Single),
     Figure::new("build-peak-bytes/v1", "peak memory", "", Lower, Bytes, Single),
     Figure::new("update-ms/v1", "update", "ms", Lower, THREE, Single),
     Figure::new("bytes/v1", "size", "", Lower, Bytes, Exact),

@@ -139,8 +139,10 @@ const LEAF_CLASSES: [(&str, usize, usize); 8] = [
 fn of_build(key: &Key, s: &StructureRecord, triangles: usize) -> Vec<Value<'static>> {
     let per_triangle = |x: u64| (triangles > 0).then(|| x as f64 / triangles as f64);
     let stats = &s.stats;
+    let rate = (s.build_ms > 0.0).then(|| triangles as f64 / s.build_ms * 1e-3);
     let figures = [
         ("build-ms/v1", Some(s.build_ms)),
+        ("build-rate/v1", rate),
         ("build-peak-bytes/v1", s.build_peak_bytes.map(|n| n as f64)),
         ("update-ms/v1", s.update_ms),
         ("bytes/v1", Some(stats.bytes as f64)),

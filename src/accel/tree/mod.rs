@@ -123,6 +123,9 @@ impl Tree {
                 Builder::HostLbvh | Builder::DeviceLbvh => {
                     parallel::build(soup, &settings.parallel(Method::Lbvh))?.into()
                 }
+                Builder::HostPloc | Builder::DevicePloc => {
+                    parallel::build(soup, &settings.parallel(settings.clustering()))?.into()
+                }
             })
         })
     }

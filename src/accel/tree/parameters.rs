@@ -7,6 +7,8 @@ use crate::parameters;
 /// Below this depth splits are by SAH, beyond it by the median, so that depth stays below
 /// `SAH_DEPTH + log2(references) + 1` whatever the input.
 pub(super) const SAH_DEPTH: u32 = 48;
+/// Most neighbours on either side that clustering looks at, as in the kernel `nearest`.
+pub(super) const LARGEST_RADIUS: u32 = 32;
 /// Most bins on an axis.
 pub(super) const MAX_BINS: usize = 32;
 
@@ -16,7 +18,8 @@ parameters! {
         /// binned SAH (Wald 2007); sweep: SAH at every triangle of three axes; longest-axis-sweep: of
         /// the longest axis (Dufay 2017); sbvh: spatial splits (Stich et al. 2009); ploc: bottom-up
         /// (Meister & Bittner 2018, crate obvhs), also with obvhs' reinsertion; lbvh: the radix tree over
-        /// Morton codes (Karras 2012), made on the device, or the same tree to the bit on the host
+        /// Morton codes (Karras 2012); host-*, device-*: a tree that is made on the device, or the same to the
+        /// bit on the host
         builder: Builder = Builder::Binned;
         /// most triangles in a leaf
         leaf_size: usize = 4, in 1..=31;
@@ -40,6 +43,8 @@ parameters! {
         ploc_preset: Preset = Preset::Medium;
         /// Morton codes of 60 bits instead of 30 (host-*, device-*)
         long_codes: bool = false;
+        /// neighbours on either side that a cluster looks at (host-ploc, device-ploc)
+        search_radius: u32 = 14, in 1..=LARGEST_RADIUS;
         /// rounds of reinsertion after any builder (Meister & Bittner 2018)
         reinsertion: u32 = 0, in 0..=64;
         /// share of the nodes, largest first, that a round tries to reinsert
@@ -64,6 +69,10 @@ parameters! {
         HostLbvh = "host-lbvh",
         /// Radix tree over Morton codes, on the device.
         DeviceLbvh = "device-lbvh",
+        /// Clustering along the curve of Morton codes, on the host.
+        HostPloc = "host-ploc",
+        /// Clustering along the curve of Morton codes, on the device.
+        DevicePloc = "device-ploc",
     }
 
     /// Presets of the crate obvhs.
@@ -101,10 +110,18 @@ impl TreeParameters {
         }
     }
 
+    /// Clustering with the radius that is set.
+    pub(super) fn clustering(&self) -> Method {
+        Method::Ploc {
+            radius: self.search_radius,
+        }
+    }
+
     /// What the device is told, if it is to build.
     pub(super) fn on_device(&self) -> Option<parallel::Settings> {
         match self.builder {
             Builder::DeviceLbvh => Some(self.parallel(Method::Lbvh)),
+            Builder::DevicePloc => Some(self.parallel(self.clustering())),
             _ => None,
         }
     }

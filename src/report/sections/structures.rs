@@ -138,7 +138,12 @@ fn build_table(scene: &SceneGroup, values: &[Value]) -> Table {
     rows(all_built(scene), &heads, phases).table(
         values,
         format!("Build (one each){update}"),
-        &["build-ms/v1", "build-peak-bytes/v1", "update-ms/v1"],
+        &[
+            "build-ms/v1",
+            "build-rate/v1",
+            "build-peak-bytes/v1",
+            "update-ms/v1",
+        ],
         FIGURES_ALONE,
     )
 }

@@ -70,9 +70,8 @@ pub fn doubled_centre(around: OrderedBox) -> [f32; 3] {
     std::array::from_fn(|axis| number(around.low[axis]) + number(around.high[axis]))
 }
 
-/// Half of the surface. Two products that share no factor: compilers of kernels put those together that do.
-pub fn half_area(around: OrderedBox) -> f32 {
-    let [x, y, z] =
-        std::array::from_fn(|axis| number(around.high[axis]) - number(around.low[axis]));
+/// Half of the surface of a box. Two products that share no factor: compilers of kernels put those together that do.
+pub fn half_area(low: [f32; 3], high: [f32; 3]) -> f32 {
+    let [x, y, z] = std::array::from_fn(|axis| high[axis] - low[axis]);
     x * (y + z) + y * z
 }

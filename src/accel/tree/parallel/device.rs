@@ -1,12 +1,13 @@
-//! The passes that build a tree on the device; their kernels are in `kernels/accel/tree/parallel/device/`.
+//! The passes that build a tree or fit its boxes on the device; their kernels are in `kernels/accel/tree/parallel/device/`.
 //!
 //! Nodes are read back, and the host lays them out and collapses them. What that takes is a phase of its own.
 
+use super::rounds::Rounds;
 use super::{LinkedNode, LinkedTree, Method, Settings, too_large};
-use crate::accel::{AccelError, BuildLog, Phase, TriangleBuffers, TriangleSoup};
+use crate::accel::{AccelError, BuildLog, TriangleBuffers, TriangleSoup};
 use crate::gpu::{
-    Bindings, Composition, Gpu, GpuError, Pairs, Pipeline, RadixSort, Recording, Storage,
-    UniformValues, groups_for,
+    Bindings, Composition, Gpu, GpuError, Groups, Pairs, Pipeline, Played, RadixSort, Recording,
+    Storage, UniformValues, WORKGROUP_SIZE, groups_for,
 };
 use std::sync::Arc;
 use std::time::Instant;
@@ -15,8 +16,10 @@ use std::time::Instant;
 const WORD_BITS: u32 = 30;
 /// Children of a block, as in `blocks.wesl`.
 const BLOCK: u32 = 8;
+/// Words that `boxes.wesl` leaves of the whole scene, the last of which names a triangle that is too large.
+const SCENE_WORDS: u32 = 7;
 
-fn failed(error: GpuError) -> AccelError {
+pub(super) fn failed(error: GpuError) -> AccelError {
     AccelError::Device(error.to_string())
 }
 
@@ -36,178 +39,204 @@ pub fn build(
     if soup.records.is_empty() {
         return Ok(LinkedTree::default());
     }
-    let triangles = log.phase("upload", || TriangleBuffers::upload(&gpu, soup));
-    let mut passes = Passes::new(&gpu, triangles.map_err(failed)?, soup.records.len() as u32);
+    let count = soup.records.len() as u32;
+    let passes = log.phase("upload", || Passes::new(&gpu, soup, [count, count - 1]));
+    let passes = passes.map_err(failed)?;
     let mut recording = Recording::new();
-    passes.sort(&mut recording, settings).map_err(failed)?;
+    let long_codes = settings.long_codes;
+    let sorted = passes.sort(&mut recording, long_codes).map_err(failed)?;
     let root = match settings.method {
-        Method::Lbvh => passes.lbvh(&mut recording).map_err(failed)?,
+        _ if passes.count == 1 => passes.play(&recording, log).map(|_| 0),
+        Method::Lbvh => {
+            let recorded = passes.radix_tree(&mut recording, &sorted);
+            recorded.map_err(failed)?;
+            passes.play(&recording, log).map(|_| passes.count)
+        }
+        Method::Ploc { radius } => {
+            let rounds = Rounds::new(&passes, radius).map_err(failed)?;
+            rounds.play(recording, log)
+        }
     };
-    recording
-        .download("scene", passes.words("tree scene", SCENE_WORDS))
-        .download("nodes", passes.nodes());
-    let start = Instant::now();
-    let played = log.play(&recording)?;
-    let scene: Vec<u32> = played.download("scene").map_err(failed)?;
-    let mut nodes: Vec<LinkedNode> = played.download("nodes").map_err(failed)?;
-    // What is not told by the clock of the device: submission, copies of nodes to the host, waiting.
-    if let Some(ms) = played.elapsed().gpu_ms {
-        log.phases.push(Phase {
-            name: "transfer".to_owned(),
-            ms: (start.elapsed().as_secs_f64() * 1e3 - ms).max(0.0),
-        });
-    }
-    if scene[6] != 0 {
-        return Err(too_large(soup, !scene[6] as usize));
-    }
-    nodes.truncate(2 * soup.records.len() - 1);
-    let tree = LinkedTree { nodes, root };
+    let nodes = passes.nodes(soup, log)?;
+    let tree = LinkedTree { nodes, root: root? };
     log.phase("check", || tree.check(soup.records.len()))?;
     Ok(tree)
 }
 
-/// Words that `boxes.wesl` leaves of the whole scene.
-const SCENE_WORDS: u32 = 7;
-
 /// The passes over one scene.
-struct Passes<'a> {
-    gpu: &'a Gpu,
+pub(super) struct Passes<'a> {
+    pub gpu: &'a Gpu,
+    /// Leaves.
+    pub count: u32,
+    /// Nodes behind them.
+    inner: u32,
     triangles: TriangleBuffers,
-    count: u32,
+    /// Leaves, inner nodes and blocks: what is kept from one submission to the next.
+    nodes: wgpu::Buffer,
+    scene: wgpu::Buffer,
 }
 
 impl<'a> Passes<'a> {
-    fn new(gpu: &'a Gpu, triangles: TriangleBuffers, count: u32) -> Self {
-        Self {
+    /// Over these triangles, for so many leaves and nodes behind them.
+    pub fn new(
+        gpu: &'a Gpu,
+        soup: &TriangleSoup,
+        [count, inner]: [u32; 2],
+    ) -> Result<Self, GpuError> {
+        let blocks: u32 = levels([count, inner]).iter().map(|level| level.count).sum();
+        let elements = u64::from(count) + u64::from(inner) + u64::from(blocks);
+        Ok(Self {
             gpu,
-            triangles,
             count,
-        }
+            inner,
+            triangles: TriangleBuffers::upload(gpu, soup)?,
+            nodes: gpu.zeroed("tree nodes", 32 * elements)?,
+            scene: gpu.zeroed("tree scene", 4 * u64::from(SCENE_WORDS))?,
+        })
     }
 
-    /// So many words of scratch.
-    fn words(&self, name: &str, words: u32) -> Storage {
-        Storage::scratch(name, 4 * u64::from(words))
-    }
-
-    /// Nodes, and behind them the blocks.
-    fn nodes(&self) -> Storage {
-        let elements = 2 * self.count - 1 + self.levels().iter().map(|l| l.count).sum::<u32>();
-        Storage::scratch("tree nodes", 32 * u64::from(elements))
+    /// So many words of scratch for each triangle.
+    fn words(&self, name: &str, each: u32) -> Storage {
+        Storage::scratch(name, 4 * u64::from(each) * u64::from(self.count))
     }
 
     /// What all passes bind.
-    fn bindings(&self, settings: Option<&Settings>) -> Bindings {
-        let long_codes = settings.is_some_and(|s| s.long_codes);
-        let size = UniformValues::new()
-            .u32("count", self.count)
-            .u32("long_codes", u32::from(long_codes));
+    pub fn bindings(&self) -> Bindings {
         let mut bindings = self.triangles.bindings.clone();
         bindings
-            .uniform("size", size)
-            .buffer("boxes", self.words("tree boxes", 8 * self.count))
-            .buffer("scene", self.words("tree scene", SCENE_WORDS))
-            .buffer("codes", self.words("tree codes", 2 * self.count))
-            .buffer("keys", self.words("tree keys", self.count))
-            .buffer("nodes", self.nodes())
-            .buffer(
-                "sorted_codes",
-                self.words("tree sorted codes", 2 * self.count),
-            )
-            .buffer("ranges", self.words("tree ranges", 2 * self.count));
+            .uniform("size", UniformValues::new().u32("count", self.count))
+            .uniform("fit", UniformValues::new().u32("nodes", self.inner))
+            .buffer("nodes", &self.nodes)
+            .buffer("scene", &self.scene)
+            .buffer("boxes", self.words("tree boxes", 8))
+            .buffer("codes", self.words("tree codes", 2))
+            .buffer("sorted_codes", self.words("tree sorted codes", 2));
         bindings
     }
 
     fn pipeline(&self, pass: &str) -> Result<Arc<Pipeline>, GpuError> {
         let kernel = Composition::new(&format!("accel/tree/parallel/device/{pass}"));
+        let kernel = kernel.constant("SCAN_LANES", WORKGROUP_SIZE);
         let kernel = self.triangles.intersection.activate(kernel);
-        self.gpu
-            .pipeline(&self.triangles.bindings.compose(kernel), true)
+        let kernel = self.triangles.bindings.compose(kernel);
+        self.gpu.pipeline(&kernel, true)
     }
 
-    /// Runs a pass with an invocation an item.
-    fn run(
+    /// Runs a pass.
+    pub fn run(
         &self,
         recording: &mut Recording,
         pass: &str,
         bindings: &Bindings,
-        items: u32,
+        groups: impl Into<Groups>,
     ) -> Result<(), GpuError> {
-        recording.run(pass, &self.pipeline(pass)?, bindings, groups_for(items));
+        recording.run(pass, &self.pipeline(pass)?, bindings, groups);
         Ok(())
     }
 
-    /// Boxes and codes of the triangles, and the leaves in the order of the codes.
-    fn sort(&mut self, recording: &mut Recording, settings: &Settings) -> Result<(), GpuError> {
-        let mut bindings = self.bindings(Some(settings));
+    /// Plays a recording. What the clock of the device does not tell is the phase `transfer`: submission, copies to the
+    /// host, waiting.
+    pub fn play(&self, recording: &Recording, log: &mut BuildLog) -> Result<Played, AccelError> {
+        let played = log.play(recording)?;
+        if let Some(ms) = played.elapsed().gpu_ms {
+            log.note("transfer", (played.wall_ms - ms).max(0.0));
+        }
+        Ok(played)
+    }
+
+    /// The nodes, brought to the host.
+    pub fn nodes(
+        &self,
+        soup: &TriangleSoup,
+        log: &mut BuildLog,
+    ) -> Result<Vec<LinkedNode>, AccelError> {
+        let mut recording = Recording::new();
+        recording.download("scene", &self.scene);
+        recording.download("nodes", &self.nodes);
+        let played = self.play(&recording, log)?;
+        let start = Instant::now();
+        let scene: Vec<u32> = played.download("scene").map_err(failed)?;
+        let mut nodes: Vec<LinkedNode> = played.download("nodes").map_err(failed)?;
+        log.note("transfer", start.elapsed().as_secs_f64() * 1e3);
+        match scene[SCENE_WORDS as usize - 1] {
+            0 => nodes.truncate((self.count + self.inner) as usize),
+            too_far => return Err(too_large(soup, !too_far as usize)),
+        }
+        Ok(nodes)
+    }
+
+    /// The boxes of so many triangles, and the box around their centres.
+    pub fn boxes(&self, recording: &mut Recording, triangles: u32) -> Result<(), GpuError> {
+        let mut bindings = self.bindings();
+        bindings.uniform("size", UniformValues::new().u32("count", triangles));
+        self.run(recording, "boxes", &bindings, groups_for(triangles))
+    }
+
+    /// Boxes and codes of the triangles, and the leaves in the order of the codes; tells where the triangles are in that
+    /// order.
+    fn sort(&self, recording: &mut Recording, long_codes: bool) -> Result<Storage, GpuError> {
+        let items = groups_for(self.count);
         let mut pairs = Pairs {
-            keys: self.words("tree keys", self.count),
-            values: self.words("tree triangles", self.count),
+            keys: self.words("tree keys", 1),
+            values: self.words("tree triangles", 1),
             count: self.count,
         };
-        bindings.buffer("sorted_triangles", &pairs.values);
-        recording.clear(self.words("tree scene", SCENE_WORDS));
-        self.run(recording, "boxes", &bindings, self.count)?;
-        self.run(recording, "codes", &bindings, self.count)?;
+        let mut bindings = self.bindings();
+        let length = UniformValues::new().u32("long_codes", u32::from(long_codes));
+        bindings
+            .uniform("code", length)
+            .buffer("sorted_triangles", &pairs.values);
+        self.boxes(recording, self.count)?;
+        self.run(recording, "codes", &bindings, items)?;
         let sort = RadixSort::new(self.gpu)?;
         // The lower word first: the sort is stable.
-        let words: &[u32] = if settings.long_codes { &[1, 0] } else { &[0] };
+        let words: &[u32] = if long_codes { &[1, 0] } else { &[0] };
         for word in words {
             bindings
                 .uniform("part", UniformValues::new().u32("word", *word))
                 .buffer("keys", &pairs.keys)
                 .buffer("sorted_triangles", &pairs.values);
-            self.run(recording, "keys", &bindings, self.count)?;
+            self.run(recording, "keys", &bindings, items)?;
             pairs = sort.record(recording, &pairs, WORD_BITS);
         }
-        bindings.buffer("sorted_triangles", &pairs.values);
-        self.run(recording, "leaves", &bindings, self.count)
+        self.leaves(recording, &pairs.values)?;
+        Ok(pairs.values)
     }
 
-    /// The radix tree over the sorted codes; tells its root.
-    fn lbvh(&self, recording: &mut Recording) -> Result<u32, GpuError> {
-        if self.count == 1 {
-            return Ok(0);
-        }
-        let bindings = self.bindings(None);
-        self.run(recording, "links", &bindings, self.count - 1)?;
-        self.blocks(recording, &bindings)?;
-        self.run(recording, "inner", &bindings, self.count - 1)?;
-        Ok(self.count)
+    /// The leaves in the order of their triangles.
+    pub fn leaves(&self, recording: &mut Recording, triangles: &Storage) -> Result<(), GpuError> {
+        let mut bindings = self.bindings();
+        bindings.buffer("sorted_triangles", triangles);
+        self.run(recording, "leaves", &bindings, groups_for(self.count))
     }
 
-    /// Boxes around blocks of leaves, level by level: a dispatch sees what those before it wrote.
-    fn blocks(&self, recording: &mut Recording, bindings: &Bindings) -> Result<(), GpuError> {
-        let mut bindings = bindings.clone();
-        for level in self.levels() {
+    /// The radix tree over the sorted codes, of two leaves or more.
+    fn radix_tree(&self, recording: &mut Recording, sorted: &Storage) -> Result<(), GpuError> {
+        let mut bindings = self.bindings();
+        let ranges = self.words("tree ranges", 2);
+        bindings
+            .buffer("sorted_triangles", sorted)
+            .buffer("ranges", &ranges);
+        self.run(recording, "sorted", &bindings, groups_for(self.count))?;
+        self.run(recording, "links", &bindings, groups_for(self.inner))?;
+        self.fit(recording, &ranges)
+    }
+
+    /// The boxes of the nodes behind the leaves, whose first and last leaves are these.
+    pub fn fit(&self, recording: &mut Recording, ranges: &Storage) -> Result<(), GpuError> {
+        let mut bindings = self.bindings();
+        // Level by level: a dispatch sees what those before it wrote.
+        for level in levels([self.count, self.inner]) {
             let values = UniformValues::new()
                 .u32("below", level.below)
                 .u32("below_count", level.below_count)
                 .u32("here", level.here)
                 .u32("count", level.count);
             bindings.uniform("level", values);
-            self.run(recording, "blocks", &bindings, level.count)?;
+            self.run(recording, "blocks", &bindings, groups_for(level.count))?;
         }
-        Ok(())
-    }
-
-    /// Levels of blocks, up to the first of a single one.
-    fn levels(&self) -> Vec<Level> {
-        let mut out = Vec::new();
-        let (mut below, mut below_count) = (0, self.count);
-        let mut here = 2 * self.count - 1;
-        while below_count > 1 {
-            let count = below_count.div_ceil(BLOCK);
-            out.push(Level {
-                below,
-                below_count,
-                here,
-                count,
-            });
-            (below, below_count) = (here, count);
-            here += count;
-        }
-        out
+        bindings.buffer("ranges", ranges);
+        self.run(recording, "inner", &bindings, groups_for(self.inner))
     }
 }
 
@@ -217,4 +246,23 @@ struct Level {
     below_count: u32,
     here: u32,
     count: u32,
+}
+
+/// Levels of blocks over so many leaves, up to the first of a single one; they lie behind leaves and nodes.
+fn levels([leaves, inner]: [u32; 2]) -> Vec<Level> {
+    let mut out = Vec::new();
+    let (mut below, mut below_count) = (0, leaves);
+    let mut here = leaves + inner;
+    while below_count > 1 {
+        let count = below_count.div_ceil(BLOCK);
+        out.push(Level {
+            below,
+            below_count,
+            here,
+            count,
+        });
+        (below, below_count) = (here, count);
+        here += count;
+    }
+    out
 }

@@ -1,13 +1,16 @@
-//! Trees from sorted triangles, bottom-up, by a method that a device can follow: `device-lbvh` is built there, `host-lbvh`
-//! is its twin, equal to the bit.
+//! Trees from sorted triangles, bottom-up, by methods that a device can follow: `device-lbvh` and `device-ploc` are built
+//! there, `host-lbvh` and `host-ploc` are their twins, equal to the bit.
 //!
-//! Triangles are sorted along a curve through the scene ([`morton`]), and `lbvh` reads the tree off the codes. [`device`]
-//! records the passes.
+//! Both sort triangles along a curve through the scene ([`morton`]). `lbvh` then reads the tree off the codes, `clusters`
+//! joins neighbours in rounds. [`device`] records the passes, `refit` fits boxes to triangles that moved.
 
 pub mod boxes;
+mod clusters;
 pub mod device;
 mod lbvh;
 pub mod morton;
+mod refit;
+mod rounds;
 
 use super::Tree;
 use super::depth::limit_depth;
@@ -28,6 +31,11 @@ const LARGEST_COORDINATE: f32 = 1e18;
 pub enum Method {
     /// The radix tree over the codes.
     Lbvh,
+    /// Parallel locally-ordered clustering.
+    Ploc {
+        /// Neighbours on either side that a cluster looks at, 1 to 32.
+        radius: u32,
+    },
 }
 
 /// What both places of building are told.
@@ -153,21 +161,28 @@ struct Sorted {
 /// # Errors
 /// A coordinate is too large or not a number.
 pub fn build(soup: &TriangleSoup, settings: &Settings) -> Result<LinkedTree, AccelError> {
+    check_coordinates(soup)?;
     let records = soup.records.par_iter();
     let boxes: Vec<OrderedBox> = records.map(OrderedBox::from).collect();
-    let limit = LARGEST_COORDINATE.to_bits();
-    let is_usable = |x: &f32| x.to_bits() & 0x7fff_ffff <= limit;
-    let usable = |r: &TriangleRecord| r.vertices().as_flattened().iter().all(is_usable);
-    if let Some(first) = soup.records.par_iter().position_first(|r| !usable(r)) {
-        return Err(too_large(soup, first));
-    }
     if boxes.is_empty() {
         return Ok(LinkedTree::default());
     }
     let sorted = sort(&boxes, settings);
     Ok(match settings.method {
         Method::Lbvh => lbvh::build(sorted),
+        Method::Ploc { radius } => clusters::build(sorted, radius),
     })
+}
+
+/// Whether all coordinates are numbers that are small enough.
+fn check_coordinates(soup: &TriangleSoup) -> Result<(), AccelError> {
+    let limit = LARGEST_COORDINATE.to_bits();
+    let is_usable = |x: &f32| x.to_bits() & 0x7fff_ffff <= limit;
+    let is_bad = |r: &TriangleRecord| !r.vertices().as_flattened().iter().all(is_usable);
+    match soup.records.par_iter().position_first(is_bad) {
+        Some(first) => Err(too_large(soup, first)),
+        None => Ok(()),
+    }
 }
 
 /// What is said of a triangle that cannot be built over.
