@@ -103,7 +103,13 @@ fn renderers() -> Vec<Composition> {
     out
 }
 
-/// The batch kernels of every structure: closest and any hit, counting or not.
+/// `kernel` refilled, if its structure exports what that takes.
+fn refilled(kernel: &Composition) -> Option<Composition> {
+    let takes_it = ["accel/bvh4", "accel/cwbvh"].contains(&&*kernel.active["accel"]);
+    takes_it.then(|| kernel.clone().feature("refill", true))
+}
+
+/// The batch kernels of every structure: closest and any hit, counting or not, refilled or not.
 fn batches() -> Vec<Composition> {
     let feature_sets: [&[&str]; 4] = [&[], &["any"], &["counters"], &["any", "counters"]];
     let batch = |features: &[&str]| {
@@ -116,6 +122,9 @@ fn batches() -> Vec<Composition> {
         .iter()
         .flat_map(|features| with_structures(&batch(features)))
         .collect();
+    let more: Vec<_> = out.iter().filter_map(refilled).collect();
+    assert!(more.len() >= 8, "only {} refilled kernels", more.len());
+    out.extend(more);
     let mut seen = std::collections::BTreeSet::new();
     out.retain(|kernel| seen.insert(format!("{kernel:?}")));
     out
