@@ -131,48 +131,71 @@ impl WideNode for Node {
         )
     }
 
-    fn trace(built: &Wide<Self>, mut walk: Walk) -> Hit {
-        let inverse = walk.inverse;
-        let mut stack: Vec<(u32, u32)> = Vec::new();
-        let (mut children, mut list) = (0, ROOT_LIST);
-        let mut next_nearest = 0;
-        loop {
-            let place = child(children, list & SLOT_MASK) as usize;
-            walk.visit(place);
-            walk.counters.box_tests += WIDTH as u32;
-            let node = &built.nodes[place];
-            let rest = list >> SLOT_BITS;
-            if rest != EMPTY_LIST {
-                stack.push((children, next_nearest & STACKED_MASK | rest));
-                walk.count_stack(stack.len());
-            }
-            let keys = sorted_keys(node, &walk);
-            let slots = list_of(keys);
-            let node_bits = list_bits(keys, LEAF);
-            let all_bits = list_bits(keys, MISSED);
-            children = node.children();
-            list = slots & ((1 << node_bits) - 1) | 1 << node_bits;
-            let mut nearest = keys[0] & DISTANCE_MASK;
-            next_nearest = keys[1] & DISTANCE_MASK;
-            for place in (node_bits..all_bits).step_by(SLOT_BITS as usize) {
-                for triangle in &built.leaf_triangles[node.leaf(slots >> place & SLOT_MASK)] {
-                    walk.test(triangle);
-                    if walk.is_answered() {
-                        return walk.hit;
-                    }
-                }
-            }
-            while list == EMPTY_LIST || f32::from_bits(nearest) > walk.hit.t * inverse.pad {
-                let Some(below) = stack.pop() else {
-                    return walk.hit;
-                };
-                children = below.0;
-                list = below.1 & !STACKED_MASK;
-                nearest = below.1 & STACKED_MASK;
-                next_nearest = nearest;
+    fn trace(built: &Wide<Self>, walk: Walk) -> Hit {
+        let mut at = begin(walk);
+        while advance(built, &mut at) {}
+        at.walk.hit
+    }
+}
+
+/// A ray on its way, between two nodes.
+struct Traversal<'a> {
+    walk: Walk<'a>,
+    children: u32,
+    list: u32,
+    next_nearest: u32,
+    stack: Vec<(u32, u32)>,
+}
+
+fn begin(walk: Walk) -> Traversal {
+    Traversal {
+        walk,
+        children: 0,
+        list: ROOT_LIST,
+        next_nearest: 0,
+        stack: Vec::new(),
+    }
+}
+
+/// Visits a node and tests the triangles of its leaves; whether the ray goes on.
+fn advance(built: &Wide<Node>, at: &mut Traversal) -> bool {
+    let walk = &mut at.walk;
+    let place = child(at.children, at.list & SLOT_MASK) as usize;
+    walk.visit(place);
+    walk.counters.box_tests += WIDTH as u32;
+    let node = &built.nodes[place];
+    let rest = at.list >> SLOT_BITS;
+    if rest != EMPTY_LIST {
+        let waiting = (at.children, at.next_nearest & STACKED_MASK | rest);
+        at.stack.push(waiting);
+        walk.count_stack(at.stack.len());
+    }
+    let keys = sorted_keys(node, walk);
+    let slots = list_of(keys);
+    let node_bits = list_bits(keys, LEAF);
+    let all_bits = list_bits(keys, MISSED);
+    at.children = node.children();
+    at.list = slots & ((1 << node_bits) - 1) | 1 << node_bits;
+    let mut nearest = keys[0] & DISTANCE_MASK;
+    at.next_nearest = keys[1] & DISTANCE_MASK;
+    for place in (node_bits..all_bits).step_by(SLOT_BITS as usize) {
+        for triangle in &built.leaf_triangles[node.leaf(slots >> place & SLOT_MASK)] {
+            walk.test(triangle);
+            if walk.is_answered() {
+                return false;
             }
         }
     }
+    while at.list == EMPTY_LIST || f32::from_bits(nearest) > walk.hit.t * walk.inverse.pad {
+        let Some(below) = at.stack.pop() else {
+            return false;
+        };
+        at.children = below.0;
+        at.list = below.1 & !STACKED_MASK;
+        nearest = below.1 & STACKED_MASK;
+        at.next_nearest = nearest;
+    }
+    true
 }
 
 /// Keys of the children that are entered, in ascending order, then `MISSED`.

@@ -162,49 +162,71 @@ impl WideNode for Node {
         )
     }
 
-    fn trace(built: &Wide<Self>, mut walk: Walk) -> Hit {
-        let inverse = walk.inverse;
-        let backward = inverse.map(|x| x < 0.0);
-        let octant = (0..3).fold(0, |bits, axis| bits | u32::from(backward[axis]) << axis);
-        let mut stack = Vec::new();
-        let mut group = (0, ROOT);
-        loop {
-            walk.counters.box_tests += WIDTH as u32;
-            let places = group.1 >> PLACES_SHIFT;
-            let slot = bit_number(places & places.wrapping_neg()) ^ octant;
-            let index = group.0 + (group.1 & ((1 << slot) - 1)).count_ones();
-            walk.visit(index as usize);
-            let left = places & (places - 1);
-            if left != 0 {
-                stack.push((group.0, left << PLACES_SHIFT | group.1 & SLOTS_MASK));
-                walk.count_stack(stack.len());
-            }
-            let node = &built.nodes[index as usize];
-            let slots = slot_bits(node, &walk);
-            let inner = node.inner_mask();
-            group = (
-                node.first_child & INDEX_MASK,
-                permute(slots & inner, octant) << PLACES_SHIFT | inner,
-            );
-            let mut leaves = slots & node.leaf_mask();
-            while leaves != 0 {
-                let leaf = bit_number(leaves & leaves.wrapping_neg());
-                leaves &= leaves - 1;
-                for triangle in &built.leaf_triangles[node.leaf(leaf as usize)] {
-                    walk.test(triangle);
-                    if walk.is_answered() {
-                        return walk.hit;
-                    }
-                }
-            }
-            if group.1 < ROOT {
-                match stack.pop() {
-                    Some(below) => group = below,
-                    None => return walk.hit,
-                }
+    fn trace(built: &Wide<Self>, walk: Walk) -> Hit {
+        let mut at = begin(walk);
+        while advance(built, &mut at) {}
+        at.walk.hit
+    }
+}
+
+/// A ray on its way, between two nodes.
+struct Traversal<'a> {
+    walk: Walk<'a>,
+    octant: u32,
+    /// Index of the first inner child, and the group.
+    group: (u32, u32),
+    stack: Vec<(u32, u32)>,
+}
+
+fn begin(walk: Walk) -> Traversal {
+    let backward = walk.inverse.map(|x| x < 0.0);
+    Traversal {
+        octant: (0..3).fold(0, |bits, axis| bits | u32::from(backward[axis]) << axis),
+        walk,
+        group: (0, ROOT),
+        stack: Vec::new(),
+    }
+}
+
+/// Visits a node and tests the triangles of its leaves; whether the ray goes on.
+fn advance(built: &Wide<Node>, at: &mut Traversal) -> bool {
+    let (walk, group) = (&mut at.walk, at.group);
+    walk.counters.box_tests += WIDTH as u32;
+    let places = group.1 >> PLACES_SHIFT;
+    let slot = bit_number(places & places.wrapping_neg()) ^ at.octant;
+    let index = group.0 + (group.1 & ((1 << slot) - 1)).count_ones();
+    walk.visit(index as usize);
+    let left = places & (places - 1);
+    if left != 0 {
+        let waiting = (group.0, left << PLACES_SHIFT | group.1 & SLOTS_MASK);
+        at.stack.push(waiting);
+        walk.count_stack(at.stack.len());
+    }
+    let node = &built.nodes[index as usize];
+    let slots = slot_bits(node, walk);
+    let inner = node.inner_mask();
+    at.group = (
+        node.first_child & INDEX_MASK,
+        permute(slots & inner, at.octant) << PLACES_SHIFT | inner,
+    );
+    let mut leaves = slots & node.leaf_mask();
+    while leaves != 0 {
+        let leaf = bit_number(leaves & leaves.wrapping_neg());
+        leaves &= leaves - 1;
+        for triangle in &built.leaf_triangles[node.leaf(leaf as usize)] {
+            walk.test(triangle);
+            if walk.is_answered() {
+                return false;
             }
         }
     }
+    if at.group.1 < ROOT {
+        match at.stack.pop() {
+            Some(below) => at.group = below,
+            None => return false,
+        }
+    }
+    true
 }
 
 /// The number of a bit that stands alone.

@@ -57,7 +57,8 @@ pub use registry::{AccelRegistry, BoxRegistry, TriangleRegistry};
 pub use stats::{BuildLog, LEAF_HISTOGRAM_END, Phase, StructureStats};
 pub use structure::Structure;
 pub use tracer::{
-    Answers, Ask, Query, RayBatch, TracePasses, TraceSteps, Traced, Tracer, TriangleBuffers,
+    Answers, Ask, Query, RayBatch, RefillParameters, TracePasses, TraceSteps, Traced, Tracer,
+    TriangleBuffers,
 };
 pub use twin::{Counters, CpuTwin};
 pub use two_level_grid::TwoLevelGrid;
@@ -360,6 +361,11 @@ pub trait BuiltAccel: Sync {
     /// How it is traced.
     fn access(&self) -> Access {
         Access::Inline
+    }
+    /// When the batch kernel refills its invocations: for inline structures whose kernel exports
+    /// `Traversal`, `begin` and `advance`.
+    fn refill(&self) -> RefillParameters {
+        RefillParameters::NONE
     }
     /// Arrays that the kernel can read in several parts, where the adapter binds less than they need:
     /// see [`crate::gpu::Bindings::parts`].

@@ -240,6 +240,7 @@ pub fn gate(
     for set in &judge.sets {
         let batch = |query: Query| {
             let ask = Ask {
+                coherent: set.is_coherent(),
                 runtime_checks,
                 ..query.into()
             };

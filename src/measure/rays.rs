@@ -55,6 +55,11 @@ impl RaySet {
         self.class != RayClass::Hard
     }
 
+    /// Whether neighbouring rays take nearly the same way.
+    pub fn is_coherent(&self) -> bool {
+        self.class == RayClass::Primary
+    }
+
     /// What the class asks.
     pub fn query(&self) -> Query {
         match self.class {

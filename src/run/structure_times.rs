@@ -121,6 +121,7 @@ pub(super) fn time_all(
 /// The rays of a class, ready to be traced through a structure.
 fn prepare(gpu: &Gpu, world: &World, one: &Gated, set: &RaySet) -> Result<RayBatch, GpuError> {
     let ask = Ask {
+        coherent: set.is_coherent(),
         runtime_checks: one.runtime_checks,
         ..set.query().into()
     };

@@ -127,6 +127,7 @@ pub fn trace(
             false => Query::Closest,
         },
         counters: features.contains(&"counters"),
+        coherent: false,
         runtime_checks: true,
     };
     let run = || {

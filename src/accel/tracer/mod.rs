@@ -6,10 +6,12 @@
 
 mod batch;
 mod passes;
+mod refill;
 mod traced;
 
 pub use batch::{Answers, RayBatch, count_work};
 pub use passes::{TracePasses, TraceSteps, rays_of_batch};
+pub use refill::{Refill, RefillParameters};
 pub use traced::{Traced, TriangleBuffers};
 
 use crate::gpu::{Bindings, Composition, Gpu, GpuError, Pipeline, Recording, Storage};
@@ -34,16 +36,19 @@ pub struct Ask {
     pub query: Query,
     /// Whether work is counted instead of answers kept.
     pub counters: bool,
+    /// Whether neighbouring rays are alike: see [`Refill::Auto`].
+    pub coherent: bool,
     /// Whether the driver's checks are on.
     pub runtime_checks: bool,
 }
 
 impl From<Query> for Ask {
-    /// Answers, with the driver's checks.
+    /// Answers, with the driver's checks, of rays of which nothing is known.
     fn from(query: Query) -> Self {
         Self {
             query,
             counters: false,
+            coherent: false,
             runtime_checks: true,
         }
     }

@@ -1,6 +1,6 @@
 //! The passes in which a structure answers a buffer of rays.
 
-use super::{Query, RayBuffers, Tracer};
+use super::{Query, RayBuffers, RefillParameters, Tracer};
 use crate::gpu::{
     Bindings, Composition, GpuError, Groups, Recording, Storage, UniformValues, groups_for,
 };
@@ -26,8 +26,8 @@ pub trait TracePasses: Send + Sync {
     fn record(&self, steps: &mut TraceSteps) -> Result<(), GpuError>;
 }
 
-/// An inline structure: each ray by an invocation of its own.
-pub(super) struct OnePass;
+/// An inline structure: each ray by an invocation of its own, or by one that is refilled.
+pub(super) struct OnePass(pub RefillParameters);
 
 impl TracePasses for OnePass {
     fn counts_work(&self) -> bool {
@@ -35,8 +35,14 @@ impl TracePasses for OnePass {
     }
 
     fn record(&self, steps: &mut TraceSteps) -> Result<(), GpuError> {
-        let groups = steps.groups(steps.count);
-        let kernel = Composition::new("integrator/trace_rays");
+        let (ask, gpu) = (steps.tracer.ask, &steps.tracer.gpu);
+        let refilled = self.0.applies(ask.coherent, gpu.is_software());
+        let lanes = match refilled {
+            true => self.0.lanes(steps.count),
+            false => steps.count,
+        };
+        let groups = steps.groups(lanes);
+        let kernel = Composition::new("integrator/trace_rays").feature("refill", refilled);
         steps.run("trace", kernel, groups, &Bindings::new())
     }
 }

@@ -78,7 +78,7 @@ impl Traced {
             ..Default::default()
         };
         let (inline, passes): (bool, Arc<dyn TracePasses>) = match built.access() {
-            Access::Inline => (true, Arc::new(OnePass)),
+            Access::Inline => (true, Arc::new(OnePass(built.refill()))),
             Access::Pipeline(passes) => (false, passes),
         };
         Ok(Self {

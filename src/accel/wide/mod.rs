@@ -8,6 +8,7 @@ pub use collapse::{WideChild, WideKind};
 pub use quantise::{Quantisation, enter_four, frame, leave_four};
 
 use super::structure::prelude::*;
+use super::tracer::RefillParameters;
 use super::tree::{Coverage, NodeKind, Tree, TreeParameters};
 use super::triangle::TriangleRecord;
 use bytemuck::Pod;
@@ -24,6 +25,8 @@ parameters! {
         tree: TreeParameters { leaf_size = MAX_LEAF, in 1..=MAX_LEAF; };
         /// read nodes and triangles as texels of textures instead of from buffers
         texels: bool = true;
+        /// How the batch kernel hands out rays.
+        refill: RefillParameters;
     }
 }
 
@@ -74,6 +77,7 @@ pub struct Wide<N> {
     pub leaf_triangles: Vec<TriangleRecord>,
     stats: StructureStats,
     texels: bool,
+    refill: RefillParameters,
 }
 
 impl<N: WideNode> Wide<N> {
@@ -107,6 +111,7 @@ impl<N: WideNode> Wide<N> {
                 nodes,
                 leaf_triangles,
                 texels: parameters.texels,
+                refill: parameters.refill.clone(),
             }
         })))
     }
@@ -153,6 +158,10 @@ impl<N: WideNode> BuiltAccel for Wide<N> {
             // A multiple of 8, so that scenes of like depth share a kernel, and one to spare.
             constants: vec![("STACK_ENTRIES", (self.depth() + 1).next_multiple_of(8))],
         }
+    }
+
+    fn refill(&self) -> RefillParameters {
+        self.refill.clone()
     }
 
     fn stats(&self) -> StructureStats {

@@ -96,8 +96,8 @@ pub const MUTANTS: &[Mutant] = &[
         "children are visited in the order of the opposite octant: slower, and no other answer",
         text(
             "accel/cwbvh",
-            "let octant = select(0u, 1u, backward.x) | select(0u, 2u, backward.y) | select(0u, 4u, backward.z);",
-            "let octant = 7u ^ (select(0u, 1u, backward.x) | select(0u, 2u, backward.y) | select(0u, 4u, backward.z));",
+            "(*at).octant = select(0u, 1u, backward.x) | select(0u, 2u, backward.y) | select(0u, 4u, backward.z);",
+            "(*at).octant = 7u ^ (select(0u, 1u, backward.x) | select(0u, 2u, backward.y) | select(0u, 4u, backward.z));",
         ),
         CWBVH,
         Check::Work,

@@ -1,0 +1,97 @@
+//! Lane refill: an invocation of the batch kernel that is done with a ray begins its next one, instead of
+//! waiting for the longest ray of its vector.
+//!
+//! T. Aila, S. Laine, "Understanding the efficiency of ray traversal on GPUs", HPG 2009, §4 ("persistent
+//! threads", "replacing terminated rays"), here without atomics: each workgroup has a run of rays of its
+//! own, and each invocation its share of them. Kernel: `kernels/integrator/trace_rays.wesl`; a structure
+//! that can be refilled exports `Traversal`, `begin` and `advance` beside `trace`.
+
+use crate::gpu::WORKGROUP_SIZE;
+use crate::parameters;
+
+parameters! {
+    /// How the batch kernel hands rays to its invocations.
+    pub struct RefillParameters {
+        /// whether an invocation begins its next ray as soon as it is done with one; auto: on software
+        /// adapters, unless neighbouring rays are alike (primary rays)
+        refill: Refill = Refill::Auto;
+        /// most rays that an invocation answers, one after the other, where it is refilled
+        rays_per_lane: u32 = 64, in 1..=4096;
+    }
+
+    /// When invocations are refilled.
+    pub enum Refill {
+        /// Never.
+        None = "none",
+        /// Where it was measured to pay.
+        Auto = "auto",
+        /// For all rays, on all adapters.
+        Always = "always",
+    }
+}
+
+/// Workgroups that a dispatch has at least, if it has as many rays: with fewer, rays per invocation are
+/// fewer. It is enough for the cores of a software adapter.
+const LEAST_GROUPS: u32 = 16;
+
+impl RefillParameters {
+    /// For structures that cannot be refilled.
+    pub const NONE: Self = Self {
+        refill: Refill::None,
+        rays_per_lane: 1,
+    };
+
+    /// Whether invocations are refilled, for rays whose neighbours are alike or not.
+    pub(super) fn applies(&self, coherent: bool, software: bool) -> bool {
+        match self.refill {
+            Refill::None => false,
+            Refill::Auto => software && !coherent,
+            Refill::Always => true,
+        }
+    }
+
+    /// Invocations for so many rays.
+    pub(super) fn lanes(&self, rays: u32) -> u32 {
+        let few = rays / (LEAST_GROUPS * WORKGROUP_SIZE);
+        rays.div_ceil(few.clamp(1, self.rays_per_lane))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refill(rays_per_lane: u32) -> RefillParameters {
+        RefillParameters {
+            refill: Refill::Auto,
+            rays_per_lane,
+        }
+    }
+
+    #[test]
+    fn rays_that_are_alike_and_other_adapters_are_left_alone() {
+        let all = [(false, false), (false, true), (true, false), (true, true)];
+        let of = |refill: Refill| {
+            let parameters = RefillParameters {
+                refill,
+                rays_per_lane: 64,
+            };
+            all.map(|(coherent, software)| parameters.applies(coherent, software))
+        };
+        assert_eq!(of(Refill::None), [false; 4]);
+        assert_eq!(of(Refill::Auto), [false, true, false, false]);
+        assert_eq!(of(Refill::Always), [true; 4]);
+    }
+
+    #[test]
+    fn a_dispatch_of_few_rays_keeps_its_workgroups() {
+        assert_eq!(refill(64).lanes(0), 0);
+        assert_eq!(refill(64).lanes(63), 63);
+        assert_eq!(refill(64).lanes(2047), 2047);
+        assert_eq!(refill(64).lanes(2048), 1024);
+        assert_eq!(refill(64).lanes(1 << 16), 1024);
+        assert_eq!(refill(64).lanes(1 << 20), 1 << 14);
+        assert_eq!(refill(1).lanes(1 << 20), 1 << 20);
+        assert_eq!(refill(4096).lanes(u32::MAX), 1 << 20);
+    }
+}
