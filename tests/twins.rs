@@ -150,6 +150,10 @@ const NO_TWIN: &[(&str, &str)] = &[
         "judged by tests/compaction, against what flags say",
     ),
     (
+        "compaction/dispatch",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
         "compaction/gather",
         "judged by tests/compaction, against what flags say",
     ),

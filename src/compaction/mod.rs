@@ -3,7 +3,8 @@
 //! Methods are a registry ([`CompactionRegistry`]); each records its passes over a [`Stream`]. What belongs together
 //! is told by a word per element, its flag: 0 is a hole, `k` what belongs to the `k`-th bucket. Most methods know one
 //! bucket, so that a flag says whether an element stays; a [`BucketSort`] puts several buckets one behind the other.
-//! How many elements there are stands on the device, and so does how many stay: nothing comes to the host in between.
+//! How many elements there are stands on the device, and so does how many stay: nothing comes to the host in between,
+//! and [`Passes::groups_of_kept`] is what a pass over them is dispatched with.
 //!
 //! Scans of the device are *reduce, scan, scatter* in passes of their own ([`scan`]). A single pass in which workgroups
 //! wait for those before them (decoupled look-back, Merrill and Garland 2016) would read the stream once less, but

@@ -1,8 +1,8 @@
 //! What a compaction reads and writes, and the passes that it is made of.
 
 use crate::gpu::{
-    Bindings, Composition, Gpu, GpuError, Recording, Storage, UniformValues, WORKGROUP_SIZE,
-    grid_of,
+    Bindings, Composition, Gpu, GpuError, Groups, Recording, Storage, UniformValues,
+    WORKGROUP_SIZE, grid_of,
 };
 
 /// A stream on the device, and where it is compacted to.
@@ -110,6 +110,21 @@ impl<'a> Passes<'a> {
         items: u32,
     ) -> Result<(), GpuError> {
         self.run(kernel, further, items.div_ceil(WORKGROUP_SIZE))
+    }
+}
+
+impl Passes<'_> {
+    /// Records what turns the count into workgroups of [`WORKGROUP_SIZE`] invocations, for a kernel of an invocation per
+    /// element that stays: nothing is run where none does.
+    ///
+    /// # Errors
+    /// The kernel does not compose or compile.
+    pub fn groups_of_kept(&mut self) -> Result<Groups, GpuError> {
+        let groups = self.scratch("groups", 4);
+        let mut bindings = Bindings::new();
+        bindings.buffer("groups", &groups);
+        self.run(kernel("dispatch"), &bindings, 1)?;
+        Ok(Groups::Indirect(groups, 0))
     }
 }
 

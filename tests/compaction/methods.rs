@@ -1,8 +1,8 @@
 //! Every registered method against the host, at all sizes where something ends.
 
 use super::support::gpu;
-use raystone::compaction::{Compaction, CompactionRegistry};
-use raystone::gpu::{Gpu, Player};
+use raystone::compaction::{Compaction, CompactionRegistry, Passes, Stream};
+use raystone::gpu::{Gpu, Groups, Player, Recording, Storage};
 use raystone::measure::compaction::{Bench, Inputs, stream};
 use raystone::params::{ParamValue, Params, Variant};
 use std::sync::Arc;
@@ -158,4 +158,38 @@ fn the_worked_example_of_the_thesis_comes_out() {
         .map(|block| block.iter().filter(|f| **f == 0).count()))
     .collect();
     assert_eq!(holes, [6, 7, 9, 7]);
+}
+
+/// Workgroups of 64 for what stays, in rows of 65535; none where none stays.
+#[test]
+fn an_indirect_dispatch_covers_what_stays() {
+    let gpu = gpu();
+    for (kept, wanted) in [
+        (0, [0, 0, 1]),
+        (1, [1, 1, 1]),
+        (64, [1, 1, 1]),
+        (65, [2, 1, 1]),
+        (64 * 65_535, [65_535, 1, 1]),
+        (64 * 65_535 + 1, [65_535, 2, 1]),
+    ] {
+        let word = |word: u32| Storage::from(&gpu.storage("word", &[word]).expect("a buffer"));
+        let stream = Stream {
+            capacity: 1,
+            element_bytes: 4,
+            length: word(1),
+            flags: word(1),
+            elements: word(1),
+            kept: word(0),
+            count: word(kept),
+        };
+        let mut recording = Recording::new();
+        let groups = Passes::new(gpu, &mut recording, &stream).groups_of_kept();
+        let Groups::Indirect(groups, 0) = groups.expect("a kernel") else {
+            panic!("not from the beginning of a buffer");
+        };
+        recording.download("groups", &groups);
+        let played = gpu.play(&recording).expect("it plays");
+        let found: Vec<u32> = played.download("groups").expect("words");
+        assert_eq!(found[..3], wanted, "{kept} elements");
+    }
 }
