@@ -14,12 +14,9 @@
 //! stay below those plus the logarithm of the number of triangles.
 
 use super::boxes::{OrderedBox, half_area, join, number};
+use super::rounds::FREE_ROUNDS;
 use super::{LinkedNode, LinkedTree, Sorted};
-use crate::accel::tree::parameters::SAH_DEPTH;
 use rayon::prelude::*;
-
-/// Rounds in which clusters choose.
-pub(super) const FREE_ROUNDS: u32 = SAH_DEPTH;
 
 /// A neighbour as it is compared with others.
 #[derive(Clone, Copy)]

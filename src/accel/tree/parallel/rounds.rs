@@ -1,10 +1,12 @@
 //! The rounds of clustering on the device: some to a submission, until one cluster is left.
 
-use super::clusters::FREE_ROUNDS;
 use super::device::{Passes, failed};
+use crate::accel::tree::parameters::SAH_DEPTH;
 use crate::accel::{AccelError, BuildLog};
 use crate::gpu::{Bindings, GpuError, Groups, Recording, Storage, UniformValues, groups_for};
 
+/// Rounds in which clusters choose; behind these they are joined as they lie.
+pub(super) const FREE_ROUNDS: u32 = SAH_DEPTH;
 /// Rounds in one submission; an even number, as two arrays of clusters take turns.
 const ROUNDS_PER_PLAY: u32 = 16;
 /// Clusters of a tile, as in `state.wesl`.
