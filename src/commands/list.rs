@@ -43,6 +43,8 @@ enum Topic {
     BoxTest,
     #[value(alias = "offsets")]
     Offset,
+    #[value(alias = "organisations")]
+    Organisation,
     #[value(alias = "metrics")]
     Metric,
     #[value(alias = "measures", alias = "discrepancy")]
@@ -70,6 +72,7 @@ impl List {
                 Topic::Triangle => axis(Axis::Triangle),
                 Topic::BoxTest => axis(Axis::BoxTest),
                 Topic::Offset => axis(Axis::Offset),
+                Topic::Organisation => axis(Axis::Organisation),
                 Topic::Material => materials(),
                 Topic::Light => lights(),
                 Topic::Metric => metrics(),
@@ -95,6 +98,7 @@ fn entries(axis: Axis, entries: &[Entry]) -> String {
         Axis::Triangle => "triangle: ray-triangle test of all structures\n".into(),
         Axis::BoxTest => "box_test: of all structures\n".into(),
         Axis::Offset => "offset: how rays leave a surface\n".into(),
+        Axis::Organisation => "organisation: of the path tracer on the device\n".into(),
         axis => format!("{axis}\n"),
     };
     // Writing to a string cannot fail.

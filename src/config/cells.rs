@@ -86,7 +86,7 @@ impl Cell {
         axes.all(|(axis, variant)| variant.is_none() || *variant == self.variants[axis])
     }
 
-    /// Labels on these axes, and behind them tests, offset and kernels (`offset none`, `@idea`) where they
+    /// Labels on these axes, and behind them tests, offset, organisation and kernels (`offset none`, `@idea`) where they
     /// are not the default ones: what tells cells of a run apart.
     pub fn labels(&self, axes: &[Axis]) -> Vec<String> {
         let named = axes.iter().map(|&axis| self[axis].label.clone());
@@ -94,7 +94,13 @@ impl Cell {
     }
 
     fn unusual(&self) -> impl Iterator<Item = String> {
-        let further = [Axis::Triangle, Axis::BoxTest, Axis::Offset, Axis::Kernels];
+        let further = [
+            Axis::Triangle,
+            Axis::BoxTest,
+            Axis::Offset,
+            Axis::Organisation,
+            Axis::Kernels,
+        ];
         further.into_iter().filter_map(|axis| {
             let variant = self.get(axis)?;
             if variant.name.is_empty() || Some(variant.label.as_str()) == axis.default_name() {

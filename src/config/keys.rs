@@ -22,13 +22,15 @@ pub enum Axis {
     BoxTest,
     /// How rays are moved off the surface that they leave.
     Offset,
+    /// How the path tracer is organised on the device.
+    Organisation,
     /// The kernels that all this runs with.
     Kernels,
 }
 
 impl Axis {
     /// All axes, in the order of tables and plans.
-    pub const ALL: [Axis; 9] = [
+    pub const ALL: [Axis; 10] = [
         Axis::Scene,
         Axis::Accel,
         Axis::Sequence,
@@ -37,6 +39,7 @@ impl Axis {
         Axis::Triangle,
         Axis::BoxTest,
         Axis::Offset,
+        Axis::Organisation,
         Axis::Kernels,
     ];
 
@@ -51,6 +54,7 @@ impl Axis {
             Axis::Triangle => "triangle",
             Axis::BoxTest => "box_test",
             Axis::Offset => "offset",
+            Axis::Organisation => "organisation",
             Axis::Kernels => "kernels",
         }
     }
@@ -239,6 +243,7 @@ pub const KEYS: &[KeyRow] = &[
     key("axes", "triangle", ValueKind::Names(Axis::Triangle), Some("[\"watertight\"]"), "Ray-triangle tests, of all structures and of the judge."),
     key("axes", "box_test", ValueKind::Names(Axis::BoxTest), Some("[\"padded-16\"]"), "Ray-box tests: reciprocal and pad. Hits are proven for `padded-16` alone; the others are there to be measured."),
     key("axes", "offset", ValueKind::Names(Axis::Offset), Some("[\"error-bound\"]"), "How rays that leave a surface are moved off it by integrators. References are always rendered with `error-bound`."),
+    key("axes", "organisation", ValueKind::Names(Axis::Organisation), Some("[\"single-kernel\"]"), "How the path tracer is organised on the device. All make the same image to the bit; errors are measured with `single-kernel`."),
     key("axes", "kernels", ValueKind::Names(Axis::Kernels), Some("[\"\"]"), "Folders whose kernels (`*.wesl`) replace the embedded ones of the same path, or join them, relative to the current directory; `\"\"` are the embedded ones."),
     key("camera", "eye", ValueKind::Vector, None, "Position of the pinhole, scene units."),
     key("camera", "target", ValueKind::Vector, None, "Point that projects to the centre of the image, scene units."),
@@ -252,6 +257,7 @@ pub const KEYS: &[KeyRow] = &[
     key("exclude", "triangle", ValueKind::Patterns(Axis::Triangle), None, "… these triangle tests …"),
     key("exclude", "box_test", ValueKind::Patterns(Axis::BoxTest), None, "… these box tests …"),
     key("exclude", "offset", ValueKind::Patterns(Axis::Offset), None, "… these offsets …"),
+    key("exclude", "organisation", ValueKind::Patterns(Axis::Organisation), None, "… these organisations …"),
     key("exclude", "kernels", ValueKind::Patterns(Axis::Kernels), None, "… and these kernels are left out."),
     key("reference", "spp", integer(2, 1 << 24), Some("16384"), "Samples per pixel of the reference image, both halves together."),
     key("reference", "sequence", ValueKind::Name(Axis::Sequence), Some("\"pixel-hash\""), "Sequence of the reference, with its default parameters."),

@@ -1,9 +1,11 @@
 //! What an integrator is, and what the others have to know of it.
 
-use super::{ImageSteps, Traced};
+use super::organisation::SingleKernel;
+use super::{ImageSteps, Organisation, Traced};
 use crate::gpu::{Bindings, Composition, GpuError};
 use crate::params::{ParamError, ParameterSchema, Params, Variant};
 use crate::sampling::Demand;
+use std::sync::Arc;
 use thiserror::Error;
 
 /// Classes of rays that kernels count, in the order of `kernels/common/ray_counts.wesl`.
@@ -39,6 +41,11 @@ pub struct IntegratorFacts {
     pub exact: Option<f64>,
     /// Length of AO rays as a fraction of the scene's diagonal, if it traces any.
     pub ao_radius: Option<f64>,
+    /// Whether its kernel takes paths apart (`begin_path`, `visit` of `kernels/integrator/path.wesl`), so that it can be organised
+    /// in several ways.
+    pub has_stages: bool,
+    /// Whether light is sampled by several shadow rays from one point.
+    pub has_many_shadow_rays: bool,
     /// Whether the mean of its images is not the integral, by its parameters: a bias is no fault then.
     pub is_biased: bool,
     /// Whether its kernels call `closest_hit` or `any_hit` themselves, and so need a structure whose
@@ -140,6 +147,8 @@ pub struct ConfiguredIntegrator {
     pub params: Params,
     /// What is to be known of it with these.
     pub facts: IntegratorFacts,
+    /// How it is organised on the device.
+    pub organisation: Arc<dyn Organisation>,
 }
 
 impl ConfiguredIntegrator {
@@ -156,15 +165,45 @@ impl ConfiguredIntegrator {
         Ok(Self {
             kind,
             facts: kind.facts(&params),
+            organisation: Arc::new(SingleKernel::default()),
             params,
         })
+    }
+
+    /// The same, organised in another way.
+    ///
+    /// # Errors
+    /// The integrator cannot be; why, in words.
+    pub fn organised(mut self, by: Arc<dyn Organisation>) -> Result<Self, String> {
+        let name = self.kind.name();
+        if !by.takes_any() && !self.facts.has_stages {
+            return Err(format!(
+                "{name} is one kernel that cannot be taken apart: only `single-kernel` organises it"
+            ));
+        }
+        if !by.is_inline() && self.facts.has_many_shadow_rays {
+            return Err(format!(
+                "{name} with lights = all sends several shadow rays from one point, and there is one place in the queues for each path: take lights = one, or an organisation of one kernel"
+            ));
+        }
+        self.facts.needs_inline &= by.is_inline();
+        self.organisation = by;
+        Ok(self)
+    }
+
+    /// Records the passes of a slice: [`Organisation::record`].
+    ///
+    /// # Errors
+    /// A kernel does not compose or compile.
+    pub fn record(&self, steps: &mut ImageSteps) -> Result<(), GpuError> {
+        (self.organisation).record(steps, self.kind, &self.params)
     }
 
     /// Why it cannot render through this structure, if so.
     pub fn refusal(&self, traced: &Traced) -> Option<String> {
         (self.facts.needs_inline && !traced.is_inline()).then(|| {
             format!(
-                "{} calls the structure from its own kernel, and this structure answers buffers of rays alone",
+                "{} calls the structure from its own kernel, and this structure answers buffers of rays alone; the organisations `multi-kernel` and `wavefront` trace buffers",
                 self.kind.name()
             )
         })

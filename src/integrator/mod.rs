@@ -9,6 +9,7 @@ mod kind;
 mod light_tables;
 mod light_tree;
 pub mod offset;
+pub mod organisation;
 mod passes;
 pub mod path;
 mod registry;
@@ -28,6 +29,7 @@ pub use kind::{
 pub use light_tables::LightTables;
 pub(crate) use light_tables::light_branches;
 pub use offset::{OffsetRegistry, RayOffset};
+pub use organisation::{Organisation, OrganisationRegistry};
 pub use passes::ImageSteps;
 pub use registry::IntegratorRegistry;
 pub use render::{BLOCK_SAMPLES, RenderJob, Renderer, Snapshot, rounding_bound, with_sampler};

@@ -5,12 +5,13 @@ use super::slice::Slice;
 use super::tables::SceneBuffers;
 use super::{RenderJob, Traced};
 use crate::accel::tracer::RayBuffers;
-use crate::accel::{Ask, Query, Tracer, TriangleBuffers};
+use crate::accel::{Ask, LiveRays, Query, Tracer, TriangleBuffers};
 use crate::gpu::{
     Bindings, Composition, Gpu, GpuError, Groups, Pipeline, Recording, Storage, UniformValues,
 };
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Arrays that a kernel of images reads as textures, which software drivers load from in half the time:
@@ -26,6 +27,8 @@ pub(super) struct Passes {
     triangles: TriangleBuffers,
     traced: Traced,
     runtime_checks: bool,
+    /// Corners of the scene's box.
+    bounds: [[f32; 3]; 2],
     /// Features that some scenes need and this kernel is without; none where nothing is traced.
     left_out: Vec<&'static str>,
     pipelines: RefCell<BTreeMap<String, Arc<Pipeline>>>,
@@ -81,6 +84,7 @@ impl Passes {
             triangles: scene.triangles.clone(),
             traced: traced.clone(),
             runtime_checks: job.runtime_checks,
+            bounds: scene.bounds,
             left_out,
             pipelines: RefCell::default(),
             tracers: RefCell::default(),
@@ -248,6 +252,41 @@ impl<'a> ImageSteps<'a> {
         };
         let tracer = self.passes.tracer(query)?;
         tracer.record(self.recording, &buffers, 0..count)
+    }
+
+    /// The same for these rays of a buffer, of which the device may know how many there are.
+    ///
+    /// # Errors
+    /// As [`ImageSteps::trace`].
+    pub fn trace_live(
+        &mut self,
+        query: Query,
+        [rays, answers]: [Storage; 2],
+        range: Range<u32>,
+        live: Option<LiveRays>,
+    ) -> Result<(), GpuError> {
+        let buffers = RayBuffers {
+            rays,
+            answers,
+            status: self.storage("status")?,
+        };
+        let tracer = self.passes.tracer(query)?;
+        tracer.record_live(self.recording, &buffers, range, live)
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &'a Gpu {
+        &self.passes.gpu
+    }
+
+    /// Where passes of other makers are written down.
+    pub fn recording(&mut self) -> &mut Recording {
+        self.recording
+    }
+
+    /// Corners of the scene's box.
+    pub fn bounds(&self) -> [[f32; 3]; 2] {
+        self.passes.bounds
     }
 
     /// Runs a kernel, composed with the job's sampler, scene, constants and, where the integrator needs it

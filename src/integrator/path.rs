@@ -185,6 +185,8 @@ impl Integrator for Path {
                 _ => vec![Primary, Shadow, Bounce],
             },
             needs_inline: true,
+            has_stages: true,
+            has_many_shadow_rays: params.lights == Lights::All && params.strategy != Strategy::Bsdf,
             is_biased: params.clamp > 0.0,
             ..Default::default()
         }

@@ -21,6 +21,8 @@ use std::ops::Range;
 
 /// Samples of the first slice: few, it may be slow.
 const FIRST_SLICE: u64 = 25_000;
+/// Bytes of the error word and of what is counted behind it, see `kernels/common/ray_counts.wesl`.
+const STATUS_BYTES: u64 = 256;
 /// Bytes that a buffer between passes may take at most, below the adapter's limit.
 const SCRATCH_BYTES: u64 = 1 << 28;
 
@@ -125,12 +127,14 @@ pub fn with_sampler(mut composition: Composition, sampler: &Sampler) -> Composit
 }
 
 /// Samples for which an integrator's buffers between passes have room.
-fn most_samples(gpu: &Gpu, scratch: &[(&str, u64)]) -> u64 {
+fn most_samples(gpu: &Gpu, integrator: &ConfiguredIntegrator) -> u64 {
+    let scratch = integrator.kind.scratch().iter().map(|(_, bytes)| *bytes);
+    let scratch = scratch.chain([integrator.organisation.bytes_per_sample()]);
     let limit = gpu
         .limits
         .max_storage_buffer_binding_size
         .min(SCRATCH_BYTES);
-    let fitting = scratch.iter().map(|(_, bytes)| limit / (*bytes).max(1));
+    let fitting = scratch.map(|bytes| limit / bytes.max(1));
     fitting.min().unwrap_or(u64::MAX)
 }
 
@@ -174,7 +178,7 @@ impl<'a> Renderer<'a> {
         if let Some(reason) = job.integrator.refusal(traced) {
             return Err(GpuError::Kernel(reason));
         }
-        let status = gpu.zeroed("status", 64)?;
+        let status = gpu.zeroed("status", STATUS_BYTES)?;
         let renderer = Self {
             gpu,
             player: Player::new(gpu),
@@ -192,10 +196,11 @@ impl<'a> Renderer<'a> {
             pending: Cell::new(0),
             blocks: RefCell::default(),
             slices: Slices::starting_with(FIRST_SLICE),
-            most: most_samples(gpu, job.integrator.kind.scratch()),
+            most: most_samples(gpu, job.integrator),
             spent: Cell::default(),
         };
-        let own_passes = job.integrator.kind.kernel().is_empty();
+        let own_passes =
+            job.integrator.kind.kernel().is_empty() || !job.integrator.organisation.takes_any();
         if by_blocks && (own_passes || renderer.bands.len() > 1) {
             return Err(GpuError::Kernel(format!(
                 "`{}` at {:?} pixels cannot take samples by blocks: that needs an integrator of one kernel and sums in one buffer",
@@ -382,10 +387,9 @@ impl<'a> Renderer<'a> {
         band: &Band,
         slice: &Slice,
     ) -> Result<(), GpuError> {
-        let kind = self.integrator.kind;
         let of_job = (self.size[0], &self.uniform);
-        let (sums, scratch) = (&band.sums, kind.scratch());
-        kind.record(&mut ImageSteps::new(
+        let (sums, scratch) = (&band.sums, self.integrator.kind.scratch());
+        self.integrator.record(&mut ImageSteps::new(
             &self.passes,
             recording,
             of_job,

@@ -120,6 +120,8 @@ pub struct SceneBuffers {
     pub first_normal: u32,
     /// Length of the diagonal of the scene's box, scene units.
     pub diagonal: f64,
+    /// Corners of that box.
+    pub bounds: [[f32; 3]; 2],
 }
 
 impl SceneBuffers {
@@ -161,6 +163,7 @@ impl SceneBuffers {
             first_uv: tables.places.first_uv,
             first_normal: tables.places.first_normal,
             diagonal: f64::from(2.0 * scene.bounds().radius()),
+            bounds: [scene.bounds().min, scene.bounds().max].map(|corner| corner.to_array()),
         })
     }
 }

@@ -3,7 +3,12 @@
 use crate::measure::record::{Body, Key, Line, axis};
 
 /// Axes that are named only where a run has more than one value of them.
-const NAMED_IF_VARIED: [&str; 3] = [axis::TRIANGLE, axis::BOX_TEST, axis::OFFSET];
+const NAMED_IF_VARIED: [&str; 4] = [
+    axis::TRIANGLE,
+    axis::BOX_TEST,
+    axis::OFFSET,
+    axis::ORGANISATION,
+];
 
 /// The names of one run.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

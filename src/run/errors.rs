@@ -36,7 +36,7 @@ fn fastest<'a>(
     let same = gated
         .iter()
         .filter(|g| g.cell[Axis::Kernels] == cell[Axis::Kernels]);
-    let unfit = |g: &Gated| images::unfit(session, &cell[Axis::Integrator], &g.traced);
+    let unfit = |g: &Gated| images::unfit(session, cell, &g.traced);
     let fitting = same.clone().filter(|g| unfit(g).is_none());
     let fastest = fitting.max_by(|a, b| a.speed.total_cmp(&b.speed));
     fastest.ok_or_else(|| same.clone().find_map(unfit))

@@ -13,9 +13,11 @@ use crate::params::Variant;
 use crate::sampling::Sampler;
 
 /// Why an integrator cannot render through a structure, if so: such a cell is left out.
-pub(super) fn unfit(session: &Session, integrator: &Variant, traced: &Traced) -> Option<String> {
-    let integrator = session.registries.integrators.configured(integrator);
-    integrator.ok()?.refusal(traced)
+pub(super) fn unfit(session: &Session, cell: &Cell, traced: &Traced) -> Option<String> {
+    match session.registries.integrator(cell) {
+        Ok(integrator) => integrator.refusal(traced),
+        Err(reason) => Some(reason),
+    }
 }
 
 /// What an image file says of its making: name and value, of those that are known.
@@ -111,8 +113,7 @@ impl Estimator {
         width: u32,
     ) -> Result<Self, String> {
         let registries = session.registries;
-        let integrator = registries.integrators.configured(&cell[Axis::Integrator]);
-        let integrator = integrator.map_err(|e| e.to_string())?;
+        let integrator = registries.integrator(cell)?;
         let (sequence, decorrelation) = (&cell[Axis::Sequence], &cell[Axis::Decorrelation]);
         let demand = integrator.demand(samples, width);
         let sampler = (registries.samplers).sampler(sequence, decorrelation, &demand);

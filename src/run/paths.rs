@@ -21,7 +21,12 @@ const SIZE: [u32; 2] = [26, 19];
 const STRUCTURE: &str = "bvh";
 
 /// What an outcome depends on beside the world: the first sampler of each does.
-const AXES: [Axis; 3] = [Axis::Integrator, Axis::Offset, Axis::Kernels];
+const AXES: [Axis; 4] = [
+    Axis::Integrator,
+    Axis::Offset,
+    Axis::Organisation,
+    Axis::Kernels,
+];
 
 /// How many paths are judged.
 #[derive(Debug, Clone, Copy)]
@@ -139,8 +144,7 @@ fn made(
     extent: Extent,
 ) -> Result<(PathsRecord, Ran), String> {
     let registries = session.registries;
-    let integrator = registries.integrators.configured(&cell[Axis::Integrator]);
-    let integrator = integrator.map_err(|e| e.to_string())?;
+    let integrator = registries.integrator(cell)?;
     Estimator::of(&integrator)?;
     let offset = registries.offset(cell)?;
     if !offset.is_unbiased {
@@ -159,7 +163,7 @@ fn made(
         offset,
     };
     let (mut record, ran) = judged(session, &subject, &integrator, extent)?;
-    let of = [Axis::Offset, Axis::Kernels];
+    let of = [Axis::Offset, Axis::Organisation, Axis::Kernels];
     let all = format!("trial scenes, {}, {}", cell.on(&of), integrator.kind.name());
     let trials = match session.judges_trials {
         true if session.judged.insert(all, None).is_none() => trial_scenes(),
@@ -191,7 +195,7 @@ fn of_trial(
             params: Params(changes.collect()),
             ..Variant::default()
         };
-        registries.integrators.configured(&variant)
+        registries.integrator(&subject.cell.clone().with(Axis::Integrator, &variant))
     });
     let listed: Result<Vec<_>, _> = listed.collect();
     let listed = listed.map_err(|e| e.to_string())?;

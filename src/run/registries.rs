@@ -4,7 +4,9 @@ use crate::accel::{AccelRegistry, BoxRegistry, Intersection, TriangleRegistry};
 use crate::compaction::CompactionRegistry;
 use crate::config::{Axis, Catalogue, Cell};
 use crate::gpu::KernelLibrary;
-use crate::integrator::{IntegratorRegistry, OffsetRegistry, RayOffset};
+use crate::integrator::{
+    ConfiguredIntegrator, IntegratorRegistry, OffsetRegistry, OrganisationRegistry, RayOffset,
+};
 use crate::measure::compaction::benches;
 use crate::measure::figure::FigureRegistry;
 use crate::params::Variant;
@@ -25,6 +27,8 @@ pub struct Registries {
     pub boxes: BoxRegistry,
     /// Offsets of rays that leave a surface.
     pub offsets: OffsetRegistry,
+    /// Organisations of the path tracer.
+    pub organisations: OrganisationRegistry,
     /// Compactions of streams.
     pub compactions: CompactionRegistry,
     /// Figures beside those of the crate.
@@ -44,6 +48,7 @@ impl Registries {
         catalogue[Axis::Triangle] = self.triangles.entries();
         catalogue[Axis::BoxTest] = self.boxes.entries();
         catalogue[Axis::Offset] = self.offsets.entries();
+        catalogue[Axis::Organisation] = self.organisations.0.entries();
         catalogue
     }
 
@@ -65,6 +70,19 @@ impl Registries {
     /// The offset is not registered.
     pub fn offset(&self, cell: &Cell) -> Result<RayOffset, String> {
         (self.offsets.named("offset", &cell[Axis::Offset].name)).copied()
+    }
+
+    /// What a cell computes per sample, as the cell organises it; by a single kernel where it does not matter.
+    ///
+    /// # Errors
+    /// A name or a parameter is unknown, or the integrator cannot be organised so.
+    pub fn integrator(&self, cell: &Cell) -> Result<ConfiguredIntegrator, String> {
+        let integrator = self.integrators.configured(&cell[Axis::Integrator]);
+        let integrator = integrator.map_err(|e| e.to_string())?;
+        match cell.get(Axis::Organisation) {
+            Some(by) => integrator.organised(self.organisations.configured(by)?),
+            None => Ok(integrator),
+        }
     }
 
     /// Modules that a folder of kernels may bring for what is registered, beside those of the program.

@@ -8,7 +8,7 @@ use super::session::{Session, content_hash};
 use super::structures::Gated;
 use super::world::World;
 use crate::accel::Space;
-use crate::config::{Axis, Cell};
+use crate::config::Cell;
 use crate::gpu::{Elapsed, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer, TRACED_CLASSES};
 use crate::measure::record::{Body, Key, Line, Ran, TimeRecord};
@@ -111,7 +111,7 @@ fn prepare<'a>(
     };
     session.say(format!("{cell}: compiling"));
     session.lose_device_on_request(world.gpu, &text);
-    let unfit = images::unfit(session, &cell[Axis::Integrator], &structure.traced);
+    let unfit = images::unfit(session, &cell, &structure.traced);
     if let Some(reason) = unfit {
         session.write_refused(text, reason)?;
         return Ok(None);

@@ -10,7 +10,7 @@ mod refill;
 mod traced;
 
 pub use batch::{Answers, RayBatch, count_work};
-pub use passes::{TracePasses, TraceSteps, rays_of_batch};
+pub use passes::{LiveRays, TracePasses, TraceSteps, rays_of_batch};
 pub use refill::{Refill, RefillParameters};
 pub use traced::{Traced, TriangleBuffers};
 
@@ -125,7 +125,23 @@ impl Tracer {
         buffers: &RayBuffers,
         range: Range<u32>,
     ) -> Result<(), GpuError> {
-        self.record_in_rows(recording, buffers, range, u32::MAX)
+        self.record_live(recording, buffers, range, None)
+    }
+
+    /// The same, where the device knows how many of the rays there are.
+    ///
+    /// # Errors
+    /// As [`Tracer::record`].
+    pub fn record_live(
+        &self,
+        recording: &mut Recording,
+        buffers: &RayBuffers,
+        range: Range<u32>,
+        live: Option<LiveRays>,
+    ) -> Result<(), GpuError> {
+        let mut steps = TraceSteps::new(self, recording, buffers, range, u32::MAX);
+        steps.live = live;
+        self.record_steps(steps)
     }
 
     /// [`Tracer::record`] with at most so many workgroups in a row.
@@ -136,8 +152,11 @@ impl Tracer {
         range: Range<u32>,
         row: u32,
     ) -> Result<(), GpuError> {
+        self.record_steps(TraceSteps::new(self, recording, buffers, range, row))
+    }
+
+    fn record_steps(&self, mut steps: TraceSteps) -> Result<(), GpuError> {
         let passes = Arc::clone(&self.traced.passes);
-        let mut steps = TraceSteps::new(self, recording, buffers, range, row);
         for (name, bytes) in passes.scratch(steps.count) {
             steps.add_scratch(name, bytes);
         }

@@ -41,9 +41,26 @@ impl TracePasses for OnePass {
             true => self.0.lanes(steps.count),
             false => steps.count,
         };
-        let groups = steps.groups(lanes);
-        let kernel = Composition::new("integrator/trace_rays").feature("refill", refilled);
-        steps.run("trace", kernel, groups, &Bindings::new())
+        let mut groups: Groups = steps.groups(lanes).into();
+        let mut special = Bindings::new();
+        if let Some(live) = &steps.live {
+            let batch = rays_of_batch(steps.first, steps.count);
+            special
+                .buffer("live", &live.counts)
+                .uniform("batch", batch.u32("word", live.word));
+            if !refilled {
+                groups = live.groups.clone();
+            }
+        }
+        let kernel = Composition::new("integrator/trace_rays")
+            .feature("refill", refilled)
+            .feature("counted", steps.live.is_some());
+        let name = if steps.live.is_some() {
+            "trace live"
+        } else {
+            "trace"
+        };
+        steps.run(name, kernel, groups, &special)
     }
 }
 
@@ -58,8 +75,21 @@ pub struct TraceSteps<'a> {
     row: u32,
     /// The first ray to be answered.
     pub first: u32,
-    /// How many are.
+    /// How many are; where the device knows better, at most.
     pub count: u32,
+    /// How many of them there are, if that stands on the device. A structure may answer the others, too.
+    pub live: Option<LiveRays>,
+}
+
+/// How many rays of a buffer there are, where the device decides.
+#[derive(Debug, Clone)]
+pub struct LiveRays {
+    /// Words on the device.
+    pub counts: Storage,
+    /// Which of them is the number.
+    pub word: u32,
+    /// Workgroups of 64 invocations for as many rays or more.
+    pub groups: Groups,
 }
 
 impl<'a> TraceSteps<'a> {
@@ -85,6 +115,7 @@ impl<'a> TraceSteps<'a> {
             row,
             first,
             count,
+            live: None,
         }
     }
 

@@ -26,6 +26,8 @@ pub mod axis {
     pub const BOX_TEST: &str = "box_test";
     /// How rays are moved off the surface that they leave; absent where none is.
     pub const OFFSET: &str = "offset";
+    /// How the path tracer is organised; absent where none runs.
+    pub const ORGANISATION: &str = "organisation";
     /// Family of hard scenes and rays.
     pub const FAMILY: &str = "family";
     /// Mesh that is shot at.
@@ -45,7 +47,7 @@ pub mod axis {
     /// Any other thing that figures are of.
     pub const SUBJECT: &str = "subject";
     /// All of them.
-    pub const ALL: [&str; 18] = [
+    pub const ALL: [&str; 19] = [
         SCENE,
         ACCEL,
         INTEGRATOR,
@@ -55,6 +57,7 @@ pub mod axis {
         TRIANGLE,
         BOX_TEST,
         OFFSET,
+        ORGANISATION,
         FAMILY,
         MESH,
         PLACE,

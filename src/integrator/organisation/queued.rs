@@ -1,0 +1,294 @@
+//! Organisations of several kernels: camera, trace, shade, trace shadow rays, finish, and again; at last the results are added
+//! to the sums.
+
+use super::{Organisation, sorting};
+use crate::accel::{LiveRays, Query};
+use crate::compaction::{CompactionRegistry, Passes, Stream};
+use crate::gpu::{Bindings, Composition, GpuError, Groups, Storage, UniformValues, groups_for};
+use crate::integrator::{ImageSteps, Integrator};
+use crate::parameters;
+use crate::params::{Choice as _, Params, Variant};
+
+/// Rows of 16 bytes of a path: `PATH_ROWS` of `kernels/organisation/paths.wesl`.
+const PATH_BYTES: u64 = 7 * 16;
+/// Words of `counts`, as in `kernels/organisation/queue.wesl`.
+const LIVE: u32 = 0;
+const SHADOWS: u32 = 1;
+
+parameters! {
+    /// How the queue of live paths is kept without holes.
+    pub enum CompactionMethod {
+        /// An atomic for each path.
+        Atomic = "atomic",
+        /// A scan and one atomic for each workgroup.
+        Workgroup = "workgroup",
+        /// A ballot and one atomic for each subgroup.
+        Subgroup = "subgroup",
+        /// Counts, a scan of them, and each path to its place: stable.
+        ReduceScanScatter = "reduce-scan-scatter",
+        /// Horn 2005: stable.
+        Horn = "horn",
+        /// Blelloch 1990: stable.
+        Blelloch = "blelloch",
+        /// Roger 2008: stable.
+        Roger = "roger",
+    }
+
+    /// What is brought side by side.
+    pub enum Sorting {
+        /// Nothing.
+        Never = "none",
+        /// Paths that have met the same material, before they are shaded.
+        Material = "material",
+        /// Rays of one octant of directions, along the Morton code of their origins, before they are traced.
+        RayKey = "ray-key",
+    }
+
+    /// a kernel each for sampling, tracing and adding, run for all paths at every bounce, also for those that have
+    /// ended (Dufay 2017, algorithm 3)
+    pub struct MultiKernel {}
+
+    /// queues of live paths and of shadow rays between kernels, kept dense by a compaction (Laine, Karras & Aila 2013)
+    pub struct Wavefront {
+        /// paths in flight at most; more wait for their turn
+        capacity: u32 = 262_144, in 1024..=4_194_304;
+        /// how the queue of live paths is kept without holes
+        compaction: CompactionMethod = CompactionMethod::Workgroup;
+        /// what is brought side by side: paths of one material, or rays of one direction and place
+        sorting: Sorting = Sorting::Never;
+        /// whether the slot of a path that has ended is taken by the next at once; else all in flight end first
+        regeneration: bool = true;
+    }
+}
+
+/// What the passes of a batch share.
+pub(super) struct Queues<'a> {
+    /// Slots for paths.
+    pub capacity: u32,
+    /// None where all slots are looked at at every bounce.
+    wavefront: Option<&'a Wavefront>,
+    integrator: &'static str,
+    pub bindings: Bindings,
+}
+
+impl<'a> Queues<'a> {
+    fn new(
+        total: u32,
+        first: u32,
+        wavefront: Option<&'a Wavefront>,
+        integrator: &'static str,
+    ) -> Self {
+        let capacity = wavefront.map_or(total, |w| w.capacity.min(total)).max(1);
+        let mut queues = Self {
+            capacity,
+            wavefront,
+            integrator,
+            bindings: Bindings::new(),
+        };
+        for (name, bytes) in [
+            ("paths", PATH_BYTES),
+            ("rays", 64),
+            ("answers", 32),
+            ("queue", 4),
+            ("flags", 4),
+        ] {
+            let scratch = queues.scratch(name, bytes * u64::from(capacity));
+            queues.bindings.buffer(name, scratch);
+        }
+        for name in ["counts", "live_groups", "kept_count"] {
+            let scratch = queues.scratch(name, 16);
+            queues.bindings.buffer(name, scratch);
+        }
+        let results = queues.scratch("results", 16 * u64::from(total.max(1)));
+        queues.bindings.buffer("results", results);
+        let batch = UniformValues::new()
+            .u32("capacity", capacity)
+            .u32("total", total)
+            .u32("first", first);
+        queues.bindings.uniform("batch", batch);
+        queues
+    }
+
+    fn scratch(&self, name: &str, bytes: u64) -> Storage {
+        Storage::scratch(&format!("image {name}"), bytes)
+    }
+
+    /// A kernel that sees paths, queues and the integrator.
+    pub fn kernel(&self, entry: &str) -> Composition {
+        let regenerated = self.wavefront.is_some_and(|w| w.regeneration);
+        Composition::new(entry)
+            .with("integrator", self.integrator)
+            .feature("queued", true)
+            .feature("compacted", self.wavefront.is_some())
+            .feature("regenerated", regenerated)
+    }
+
+    /// An invocation for each slot.
+    pub fn all(&self) -> Groups {
+        groups_for(self.capacity).into()
+    }
+
+    /// An invocation for each live path.
+    pub fn live_groups(&self) -> Groups {
+        match self.wavefront {
+            Some(_) => Groups::Indirect(self.scratch("live_groups", 16), 0),
+            None => self.all(),
+        }
+    }
+
+    /// How many rays of a half of `rays` there are.
+    fn live(&self, word: u32) -> Option<LiveRays> {
+        self.wavefront.map(|_| LiveRays {
+            counts: self.scratch("counts", 16),
+            word,
+            groups: self.live_groups(),
+        })
+    }
+
+    fn run(&self, steps: &mut ImageSteps, name: &str, groups: Groups) -> Result<(), GpuError> {
+        let kernel = self.kernel(&format!("organisation/{name}"));
+        steps.run(name, kernel, groups, &self.bindings)
+    }
+
+    fn trace(
+        &self,
+        steps: &mut ImageSteps,
+        query: Query,
+        half: u32,
+        word: u32,
+    ) -> Result<(), GpuError> {
+        let buffers = ["rays", "answers"].map(|name| {
+            let bytes = if name == "rays" { 64 } else { 32 };
+            self.scratch(name, bytes * u64::from(self.capacity))
+        });
+        let range = half * self.capacity..(half + 1) * self.capacity;
+        steps.trace_live(query, buffers, range, self.live(word))
+    }
+
+    /// Keeps the slots of live paths side by side.
+    fn compact(&self, steps: &mut ImageSteps, wavefront: &Wavefront) -> Result<(), GpuError> {
+        let method = Variant {
+            label: String::new(),
+            name: wavefront.compaction.name().to_owned(),
+            params: Params::default(),
+        };
+        let method = CompactionRegistry::default().configured(&method);
+        let method = method.map_err(GpuError::Kernel)?;
+        let gpu = steps.gpu().clone();
+        if let Some(reason) = method.refusal(&gpu) {
+            return Err(GpuError::Kernel(reason));
+        }
+        let words = 4 * u64::from(self.capacity);
+        let stream = Stream {
+            capacity: self.capacity,
+            element_bytes: 4,
+            length: self.scratch("counts", 16),
+            flags: self.scratch("flags", words),
+            elements: self.scratch("queue", words),
+            kept: self.scratch("kept queue", words),
+            count: self.scratch("kept_count", 16),
+        };
+        method.record(&mut Passes::new(&gpu, steps.recording(), &stream))?;
+        steps.recording().copy(&stream.kept, &stream.elements);
+        self.run(steps, "plan", Groups::Direct([1, 1, 1]))
+    }
+
+    /// One ray of each live path.
+    fn bounce(&self, steps: &mut ImageSteps) -> Result<(), GpuError> {
+        let sorting = self.wavefront.map_or(Sorting::Never, |w| w.sorting);
+        if sorting == Sorting::RayKey {
+            sorting::by_ray(steps, self)?;
+        }
+        self.run(steps, "extend", self.live_groups())?;
+        self.trace(steps, Query::Closest, 0, LIVE)?;
+        let mut bindings = self.bindings.clone();
+        let mut shade = self.kernel("organisation/shade");
+        if sorting == Sorting::Material {
+            let order = sorting::by_material(steps, self)?;
+            bindings.buffer("order", &order);
+            shade = shade.feature("sorted_hits", true);
+        }
+        steps.run("shade", shade, self.live_groups(), &bindings)?;
+        self.trace(steps, Query::Any, 1, SHADOWS)?;
+        self.run(steps, "finish", self.live_groups())?;
+        match self.wavefront {
+            Some(wavefront) => self.compact(steps, wavefront),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Rays of a path at most.
+fn rays_of_path(integrator: &dyn Integrator, params: &Params) -> u32 {
+    let constants = integrator.constants(params);
+    let depth = constants.iter().find(|(name, _)| *name == "MAX_DEPTH");
+    depth.map_or(1, |(_, depth)| depth + 1)
+}
+
+/// All batches of a slice, and its results into the sums.
+fn record(
+    steps: &mut ImageSteps,
+    wavefront: Option<&Wavefront>,
+    integrator: &dyn Integrator,
+    params: &Params,
+) -> Result<(), GpuError> {
+    let total = steps.count();
+    let rays = rays_of_path(integrator, params);
+    let mut first = 0;
+    let results = loop {
+        let queues = Queues::new(total, first, wavefront, integrator.kernel());
+        let batches = total.div_ceil(queues.capacity);
+        if first == 0 {
+            steps
+                .recording()
+                .clear(queues.scratch("results", 16 * u64::from(total.max(1))));
+        }
+        queues.run(steps, "generate", queues.all())?;
+        // With regeneration no path waits while a slot is free, and none takes longer than its rays: all have ended by then.
+        let is_refilled = wavefront.is_some_and(|w| w.regeneration);
+        let bounces = if is_refilled {
+            batches.max(1) * rays
+        } else {
+            rays
+        };
+        for _ in 0..bounces {
+            queues.bounce(steps)?;
+        }
+        first += queues.capacity;
+        if is_refilled || first >= total {
+            break queues;
+        }
+    };
+    let kernel = results.kernel("organisation/accumulate");
+    steps.run("accumulate", kernel, steps.pixels(), &results.bindings)
+}
+
+impl Organisation for MultiKernel {
+    fn bytes_per_sample(&self) -> u64 {
+        PATH_BYTES
+    }
+
+    fn record(
+        &self,
+        steps: &mut ImageSteps,
+        integrator: &dyn Integrator,
+        params: &Params,
+    ) -> Result<(), GpuError> {
+        record(steps, None, integrator, params)
+    }
+}
+
+impl Organisation for Wavefront {
+    fn bytes_per_sample(&self) -> u64 {
+        16
+    }
+
+    fn record(
+        &self,
+        steps: &mut ImageSteps,
+        integrator: &dyn Integrator,
+        params: &Params,
+    ) -> Result<(), GpuError> {
+        record(steps, Some(self), integrator, params)
+    }
+}
