@@ -51,7 +51,9 @@ fn rendered(
     what: &Variant,
     by: &Variant,
 ) -> Result<(Vec<Vec<[u32; 3]>>, Vec<u64>), GpuError> {
-    let integrator = IntegratorRegistry::default().configured(what).expect("an integrator");
+    let integrator = IntegratorRegistry::default()
+        .configured(what)
+        .expect("an integrator");
     let by = OrganisationRegistry::default().configured(by);
     let integrator = integrator.organised(by.expect("an organisation"));
     let job = RenderJob {
@@ -104,7 +106,11 @@ fn all_organisations_make_the_image_of_the_single_kernel_to_the_bit() {
         for by in all() {
             let found = rendered(gpu(), &stage, &traced, &path(5), &by);
             let found = found.unwrap_or_else(|e| panic!("{by:?}: {e}"));
-            assert!(found.0 == expected.0, "{}: {by:?}: other pixels", stage.scene.name);
+            assert!(
+                found.0 == expected.0,
+                "{}: {by:?}: other pixels",
+                stage.scene.name
+            );
             assert_eq!(found.1, expected.1, "{}: {by:?}: rays", stage.scene.name);
         }
     }

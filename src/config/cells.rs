@@ -93,6 +93,13 @@ impl Cell {
         named.chain(self.unusual()).collect()
     }
 
+    /// Whether something else than the default stands on an axis.
+    pub fn is_unusual(&self, axis: Axis) -> bool {
+        self.get(axis).is_some_and(|variant| {
+            !variant.name.is_empty() && Some(variant.label.as_str()) != axis.default_name()
+        })
+    }
+
     fn unusual(&self) -> impl Iterator<Item = String> {
         let further = [
             Axis::Triangle,
@@ -102,10 +109,7 @@ impl Cell {
             Axis::Kernels,
         ];
         further.into_iter().filter_map(|axis| {
-            let variant = self.get(axis)?;
-            if variant.name.is_empty() || Some(variant.label.as_str()) == axis.default_name() {
-                return None;
-            }
+            let variant = self.get(axis).filter(|_| self.is_unusual(axis))?;
             Some(match axis {
                 Axis::Kernels => format!("@{variant}"),
                 axis => format!("{axis} {variant}"),

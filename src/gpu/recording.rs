@@ -78,6 +78,21 @@ impl Recording {
         self.steps.is_empty()
     }
 
+    /// Steps so far: a place for [`Recording::name_since`].
+    pub fn len(&self) -> usize {
+        self.steps.len()
+    }
+
+    /// Tells the times of all runs from this place on under one name.
+    pub fn name_since(&mut self, place: usize, name: &str) -> &mut Self {
+        for step in self.steps.iter_mut().skip(place) {
+            if let Step::Run(run) = step {
+                name.clone_into(&mut run.name);
+            }
+        }
+        self
+    }
+
     /// Fills a buffer with zeros.
     pub fn clear(&mut self, buffer: impl Into<Storage>) -> &mut Self {
         self.steps.push(Step::Clear(buffer.into()));

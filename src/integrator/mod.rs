@@ -30,7 +30,7 @@ pub use light_tables::LightTables;
 pub(crate) use light_tables::light_branches;
 pub use offset::{OffsetRegistry, RayOffset};
 pub use organisation::{Organisation, OrganisationRegistry};
-pub use passes::ImageSteps;
+pub use passes::{ImageSteps, RAY_QUERIES};
 pub use registry::IntegratorRegistry;
 pub use render::{BLOCK_SAMPLES, RenderJob, Renderer, Snapshot, rounding_bound, with_sampler};
 pub use stage::{Stage, StageError};

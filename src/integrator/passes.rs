@@ -18,6 +18,9 @@ use std::sync::Arc;
 /// nodes and triangles of a structure, sampler words, triangles and shading tables of the scene.
 const STORAGE_TEXTURES: u32 = 5;
 
+/// Under which the times of passes that answer rays are told: nearest hits, any hits.
+pub const RAY_QUERIES: [&str; 2] = ["closest hits", "any hits"];
+
 /// What the passes of a job are composed with and bind, and those that were compiled.
 pub(super) struct Passes {
     gpu: Gpu,
@@ -250,8 +253,7 @@ impl<'a> ImageSteps<'a> {
             answers: self.storage(answers)?,
             status: self.storage("status")?,
         };
-        let tracer = self.passes.tracer(query)?;
-        tracer.record(self.recording, &buffers, 0..count)
+        self.trace_buffers(query, &buffers, 0..count, None)
     }
 
     /// The same for these rays of a buffer, of which the device may know how many there are.
@@ -270,8 +272,26 @@ impl<'a> ImageSteps<'a> {
             answers,
             status: self.storage("status")?,
         };
+        self.trace_buffers(query, &buffers, range, live)
+    }
+
+    /// Times of whatever passes these are told under [`RAY_QUERIES`].
+    fn trace_buffers(
+        &mut self,
+        query: Query,
+        buffers: &RayBuffers,
+        range: Range<u32>,
+        live: Option<LiveRays>,
+    ) -> Result<(), GpuError> {
+        let place = self.recording.len();
         let tracer = self.passes.tracer(query)?;
-        tracer.record_live(self.recording, &buffers, range, live)
+        tracer.record_live(self.recording, buffers, range, live)?;
+        let name = match query {
+            Query::Closest => RAY_QUERIES[0],
+            Query::Any => RAY_QUERIES[1],
+        };
+        self.recording.name_since(place, name);
+        Ok(())
     }
 
     /// The device.

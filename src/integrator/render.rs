@@ -17,6 +17,7 @@ use crate::image::Image;
 use crate::sampling::Sampler;
 use crate::text::cell_hash;
 use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Samples of the first slice: few, it may be slow.
@@ -93,6 +94,8 @@ pub struct Renderer<'a> {
     slices: Slices,
     /// Samples for which the buffers between passes have room.
     most: u64,
+    /// GPU milliseconds of each stage since the last reset.
+    stages: RefCell<BTreeMap<String, f64>>,
     /// GPU milliseconds and wall milliseconds of all slices since the last reset.
     spent: Cell<Elapsed>,
 }
@@ -128,14 +131,14 @@ pub fn with_sampler(mut composition: Composition, sampler: &Sampler) -> Composit
 
 /// Samples for which an integrator's buffers between passes have room.
 fn most_samples(gpu: &Gpu, integrator: &ConfiguredIntegrator) -> u64 {
-    let scratch = integrator.kind.scratch().iter().map(|(_, bytes)| *bytes);
-    let scratch = scratch.chain([integrator.organisation.bytes_per_sample()]);
+    let scratch = integrator.kind.scratch().iter();
     let limit = gpu
         .limits
         .max_storage_buffer_binding_size
         .min(SCRATCH_BYTES);
-    let fitting = scratch.map(|bytes| limit / bytes.max(1));
-    fitting.min().unwrap_or(u64::MAX)
+    let fitting = scratch.map(|(_, bytes)| limit / (*bytes).max(1));
+    let organised = integrator.organisation.samples_at_once(limit);
+    fitting.chain([organised]).min().unwrap_or(u64::MAX)
 }
 
 impl<'a> Renderer<'a> {
@@ -197,6 +200,7 @@ impl<'a> Renderer<'a> {
             blocks: RefCell::default(),
             slices: Slices::starting_with(FIRST_SLICE),
             most: most_samples(gpu, job.integrator),
+            stages: RefCell::default(),
             spent: Cell::default(),
         };
         let own_passes =
@@ -264,6 +268,7 @@ impl<'a> Renderer<'a> {
         self.pending.set(0);
         self.done.set(0);
         self.blocks.borrow_mut().clear();
+        self.stages.borrow_mut().clear();
         self.spent.set(Elapsed {
             gpu_ms: self.gpu.timestamp_period.map(|_| 0.0),
             wall_ms: 0.0,
@@ -403,7 +408,12 @@ impl<'a> Renderer<'a> {
     fn run_slice(&self, band: &Band, slice: &Slice, items: u64) -> Result<(), GpuError> {
         let mut recording = Recording::new();
         self.record(&mut recording, band, slice)?;
-        let elapsed = self.player.play(&recording)?.elapsed();
+        let played = self.player.play(&recording)?;
+        let elapsed = played.elapsed();
+        let mut stages = self.stages.borrow_mut();
+        for (stage, ms) in played.runs {
+            *stages.entry(stage).or_default() += ms.unwrap_or_default();
+        }
         self.slices.learn(items, elapsed);
         let mut spent = self.spent.get();
         spent += elapsed;
@@ -414,6 +424,12 @@ impl<'a> Renderer<'a> {
     /// Time of all slices since the last reset.
     pub fn spent(&self) -> Elapsed {
         self.spent.get()
+    }
+
+    /// GPU milliseconds of each stage since the last reset, summed over its runs: [`RAY_QUERIES`](super::RAY_QUERIES) and those of the
+    /// organisation. Zeros without timestamps.
+    pub fn stages(&self) -> BTreeMap<String, f64> {
+        self.stages.borrow().clone()
     }
 
     /// Renders from nothing and returns the images after each of `spps` (ascending) samples.
@@ -528,10 +544,28 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// As for [`Renderer::image`].
     pub fn ray_counts(&self) -> Result<[u64; RAY_COUNT_CLASSES.len()], GpuError> {
+        let totals = self.totals()?;
+        Ok(std::array::from_fn(|class| totals[class]))
+    }
+
+    /// Paths that sent a ray from the camera, after one bounce, after two, …, since the last reset; nothing unless the kernel
+    /// was compiled to count.
+    ///
+    /// # Errors
+    /// As for [`Renderer::image`].
+    pub fn live_paths(&self) -> Result<Vec<u64>, GpuError> {
+        let mut live = self.totals()?.split_off(RAY_COUNT_CLASSES.len());
+        let last = live.iter().rposition(|paths| *paths > 0);
+        live.truncate(last.map_or(0, |last| last + 1));
+        Ok(live)
+    }
+
+    /// What kernels have counted behind the error word.
+    fn totals(&self) -> Result<Vec<u64>, GpuError> {
         self.check()?;
         let words: Vec<u32> = self.gpu.read(&self.status)?;
-        Ok(std::array::from_fn(|c| {
-            u64::from(words[1 + 2 * c]) | u64::from(words[2 + 2 * c]) << 32
-        }))
+        let pairs = words[1..].as_chunks::<2>().0.iter();
+        let total = |[low, high]: &[u32; 2]| u64::from(*low) | u64::from(*high) << 32;
+        Ok(pairs.map(total).collect())
     }
 }

@@ -119,7 +119,7 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 113] = [
+pub static FIGURES: [Figure; 115] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
@@ -146,6 +146,8 @@ pub static FIGURES: [Figure; 113] = [
     Figure::new("break-even/v1", "break-even", "thousand rays", Lower, THREE, Single),
     // Full cells.
     Figure::new("ms-per-spp/v1", "time per sample per pixel", "ms", Lower, THREE, Median),
+    Figure::new("ray-query-share/v1", "time in ray queries", "", Neither, Percent, Exact),
+    Figure::new("against-single-kernel/v1", "time over that of single-kernel", "", Lower, THREE, Median),
     Figure::new("cell-mrays-per-s/v1", "speed of the whole cell", "Mrays/s", Higher, THREE, Median),
     Figure::new("specialisation/v1", "time over that of the specialised kernel", "", Neither, THREE, Mean),
     Figure::new("time-to-image/v1", "build and rendering", "ms", Lower, THREE, Single),

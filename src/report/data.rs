@@ -311,14 +311,15 @@ impl<'a> RunData<'a> {
         let name = self.names.view(key);
         let new = || View {
             key: key.only(&VIEW_AXES),
-            name,
+            name: name.clone(),
             reference: None,
             samplers: Vec::new(),
             times: Vec::new(),
             coherence: Vec::new(),
         };
         let views = &mut self.scene(key.label(axis::SCENE)).views;
-        find_or_push(views, |view| view.key.agrees(key, &VIEW_AXES), new)
+        let is_it = |view: &View| view.name == name && view.key.agrees(key, &VIEW_AXES);
+        find_or_push(views, is_it, new)
     }
 
     fn sampler(&mut self, key: &'a Key) -> &mut MeasuredSampler<'a> {

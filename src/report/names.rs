@@ -48,11 +48,16 @@ impl Names {
         self.with_further(main, key, &[axis::OFFSET])
     }
 
-    /// What the images of a view are of: the integrator, and the tests that its rays meet triangles and
-    /// boxes with.
+    /// What the images of a view are of: the integrator, the tests that its rays meet triangles and
+    /// boxes with, and how it is organised.
     pub fn view(&self, key: &Key) -> String {
         let main = key.label(axis::INTEGRATOR).to_owned();
-        self.with_further(main, key, &[axis::TRIANGLE, axis::BOX_TEST])
+        let name = self.with_further(main, key, &[axis::TRIANGLE, axis::BOX_TEST]);
+        // Errors are those of any organisation, and told with the default one.
+        match key.label(axis::ORGANISATION) {
+            "" | "single-kernel" => name,
+            _ => self.with_further(name, key, &[axis::ORGANISATION]),
+        }
     }
 
     fn with_further(&self, main: String, key: &Key, axes: &[&str]) -> String {

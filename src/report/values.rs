@@ -4,7 +4,7 @@ use super::data::{RunData, SceneGroup, View};
 use super::document::TableCell;
 use super::format;
 use super::samplers::Metric;
-use super::sections::{compactions, kernels, trade_off, verdict::Race};
+use super::sections::{compactions, kernels, organisations, trade_off, verdict::Race};
 use crate::measure::figure::{Figure, figure};
 use crate::measure::record::*;
 use std::borrow::Cow;
@@ -214,13 +214,17 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
         values.extend(sampler.bias.iter().flat_map(|bias| of_bias(key, bias)));
         let spectrum = sampler.spectrum.into_iter();
         values.extend(spectrum.flat_map(|s| of_spectrum(key, s)));
-        for time in view.valid_times().filter(|t| t.sampler == sampler.name) {
-            let figures = [
-                ("ms-per-spp/v1", time.ms_per_spp),
-                ("cell-mrays-per-s/v1", time.mrays_s),
-            ];
-            values.extend(Value::known(&time.key, figures));
-        }
+    }
+    for time in view.valid_times() {
+        let figures = [
+            ("ms-per-spp/v1", time.ms_per_spp),
+            ("cell-mrays-per-s/v1", time.mrays_s),
+            (
+                "ray-query-share/v1",
+                organisations::query_share(time).map(Interval::exact),
+            ),
+        ];
+        values.extend(Value::known(&time.key, figures));
     }
     values.extend(view.coherence.iter().flat_map(|c| of_coherence(&c.key, c)));
     let reference = view.reference.iter();
@@ -229,6 +233,7 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
     values.extend(Race::new(view).iter().flat_map(Race::values));
     values.extend(trade_off::times_to_image(scene, view));
     values.extend(kernels::gains(scene, view));
+    values.extend(organisations::against_single(scene, view));
     values
 }
 

@@ -27,7 +27,10 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         return Ok(());
     };
     let cells = session.plan.times.iter();
-    let cells: Vec<Cell> = cells.filter(|c| c.is_on(&world.cell)).cloned().collect();
+    // The model has organisations of its own.
+    let first = session.experiment.axes[Axis::Organisation].first();
+    let cells = cells.filter(|c| c.is_on(&world.cell) && c.get(Axis::Organisation) == first);
+    let cells: Vec<Cell> = cells.cloned().collect();
     if cells.is_empty() {
         return Ok(());
     }

@@ -81,7 +81,9 @@ pub(super) fn verify(
     structure: &Cell,
 ) -> Result<Vec<(Cell, PathsRecord)>, RunError> {
     let mut judged = Vec::new();
-    for cell in &session.plan.samplers {
+    let reorganised = session.plan.times.iter();
+    let reorganised = reorganised.filter(|cell| cell.is_unusual(Axis::Organisation));
+    for cell in session.plan.samplers.iter().chain(reorganised) {
         let is_its = cell.is_on(&world.cell) && cell[Axis::Kernels] == structure[Axis::Kernels];
         if is_its && !session.judged.contains_key(&key(world, cell)) {
             let record = judge_and_record(session, world, traced, cell, VERIFY)?;

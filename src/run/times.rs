@@ -1,19 +1,21 @@
 //! Time of full cells, at few samples per pixel, in interleaved rounds; and the proof by hash that
 //! every structure gives the same image.
 
-use super::RunError;
 use super::errors::image_hash;
 use super::images::{self, Estimator};
+use super::paths;
 use super::session::{Session, content_hash};
 use super::structures::Gated;
 use super::world::World;
+use super::{Fault, RunError};
 use crate::accel::Space;
-use crate::config::Cell;
+use crate::config::{Axis, Cell};
 use crate::gpu::{Elapsed, GpuError};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer, TRACED_CLASSES};
 use crate::measure::record::{Body, Key, Line, Ran, TimeRecord};
-use crate::measure::statistics::median_interval;
+use crate::measure::statistics::{median, median_interval};
 use crate::measure::timing::{Measured, Samples, Watch, interleave};
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 /// A full cell, compiled.
@@ -25,6 +27,8 @@ struct Timed<'a> {
     runtime_checks: bool,
     space: Space,
     watch: Watch,
+    /// Milliseconds of its stages, measurement by measurement.
+    stages: RefCell<Vec<BTreeMap<String, f64>>>,
 }
 
 impl Measured for Timed<'_> {
@@ -33,6 +37,7 @@ impl Measured for Timed<'_> {
         self.renderer.add_samples(0, self.spp, self.seed)?;
         self.renderer.check()?;
         let elapsed = self.renderer.spent();
+        self.stages.borrow_mut().push(self.renderer.stages());
         let pixels = self.renderer.image()?.pixels;
         self.watch.note(blake3::hash(bytemuck::cast_slice(&pixels)));
         Ok(elapsed)
@@ -42,7 +47,14 @@ impl Measured for Timed<'_> {
 /// What does not depend on the structure, per sampler, integrator and space in which structures meet
 /// triangles: the counted rays, and the hash of the image of the run that counted them, which was
 /// rendered once into fresh buffers.
-type Shared = BTreeMap<String, ([u64; RAY_COUNT_CLASSES.len()], String)>;
+type Shared = BTreeMap<String, (Counted, String)>;
+
+/// Rays by class, and paths by bounce.
+#[derive(Clone)]
+struct Counted {
+    rays: [u64; RAY_COUNT_CLASSES.len()],
+    live_paths: Vec<u64>,
+}
 
 fn key(cell: &Cell, space: Space) -> String {
     format!("{} in {space:?}", cell.on(&Cell::SAMPLER))
@@ -116,6 +128,14 @@ fn prepare<'a>(
         session.write_refused(text, reason)?;
         return Ok(None);
     }
+    // Errors, whose cells judge integrators, are those of the single kernel.
+    if cell.is_unusual(Axis::Organisation) {
+        match paths::check(session, world, &structure.traced, &cell) {
+            Ok(()) => {}
+            Err(Fault::Cell(reason)) => return fail(session, &cell, reason).map(|()| None),
+            Err(Fault::Run(error)) => return Err(error),
+        }
+    }
     let compiled = compile(session, world, structure, cell.clone());
     session.progress.inc(1);
     match compiled {
@@ -179,6 +199,7 @@ fn compile<'a>(
         runtime_checks: checks,
         space: structure.traced.space,
         watch: Watch::default(),
+        stages: RefCell::default(),
     })
 }
 
@@ -193,19 +214,20 @@ fn finish(
 ) -> Result<Line<TimeRecord>, String> {
     let hash = image_hash(&item.renderer.image().map_err(|e| e.to_string())?);
     let key = key(&item.cell, item.space);
-    let (rays, first) = match shared.get(&key) {
+    let (counted, first) = match shared.get(&key) {
         Some(known) => known.clone(),
         None => {
             let structure = structure.ok_or("its structure is gone")?;
-            let (rays, mut image) = count_rays(session, world, structure, item)?;
+            let (counted, mut image) = count_rays(session, world, structure, item)?;
             if !world.probe.is_exact() {
                 // Another kernel, and so rounded otherwise.
                 image.clone_from(&hash);
             }
-            shared.insert(key, (rays, image.clone()));
-            (rays, image)
+            shared.insert(key, (counted.clone(), image.clone()));
+            (counted, image)
         }
     };
+    let rays = counted.rays;
     let total: u64 = rays[..TRACED_CLASSES].iter().sum();
     let spp = f64::from(item.spp);
     let per_spp: Vec<f64> = samples.ms.iter().map(|ms| ms / spp).collect();
@@ -229,7 +251,9 @@ fn finish(
         record.mrays_s = median_interval(&rates);
         record.ms = samples.ms;
         record.wall_ms = samples.wall_ms;
+        record.stages = median_stages(&item.stages.borrow());
     }
+    record.live_paths = counted.live_paths;
     record.rays = RAY_COUNT_CLASSES
         .iter()
         .zip(rays)
@@ -247,18 +271,39 @@ fn finish(
     Ok(line)
 }
 
+/// The median of each stage over all measurements, the first ones among them; nothing where there is one stage alone.
+fn median_stages(measured: &[BTreeMap<String, f64>]) -> BTreeMap<String, f64> {
+    let names = measured.first().into_iter().flat_map(BTreeMap::keys);
+    let of = |name: &String| {
+        let ms: Vec<f64> = measured
+            .iter()
+            .filter_map(|m| m.get(name).copied())
+            .collect();
+        Some((name.clone(), median(&ms)?))
+    };
+    let stages: BTreeMap<String, f64> = names.filter_map(of).collect();
+    match stages.len() {
+        0 | 1 => BTreeMap::new(),
+        _ => stages,
+    }
+}
+
 /// Rays per class, from a separate counting run of the same seed, and the hash of its image.
 fn count_rays(
     session: &mut Session,
     world: &World,
     structure: &Gated,
     item: &Timed,
-) -> Result<([u64; RAY_COUNT_CLASSES.len()], String), String> {
+) -> Result<(Counted, String), String> {
     let renderer = renderer(session, world, structure, &item.cell, [true, true])?;
     let counted = session.clock.time("gpu", || {
         renderer.reset()?;
         renderer.add_samples(0, item.spp, item.seed)?;
-        Ok((renderer.ray_counts()?, image_hash(&renderer.image()?)))
+        let counted = Counted {
+            rays: renderer.ray_counts()?,
+            live_paths: renderer.live_paths()?,
+        };
+        Ok((counted, image_hash(&renderer.image()?)))
     });
     counted.map_err(|e: GpuError| e.to_string())
 }
@@ -275,6 +320,8 @@ fn empty_record(session: &Session, cell: &Cell, failure: String) -> Line<TimeRec
         wall_ms: Vec::new(),
         ms_per_spp: None,
         rays: BTreeMap::new(),
+        live_paths: Vec::new(),
+        stages: BTreeMap::new(),
         mrays_s: None,
         image_hash: String::new(),
         image_equal: false,

@@ -27,9 +27,9 @@ pub trait Organisation: Send + Sync {
         false
     }
 
-    /// Bytes, for each sample of a slice of the image, of the largest buffer between its passes.
-    fn bytes_per_sample(&self) -> u64 {
-        0
+    /// Samples that a slice of the image may have, where no buffer between passes may have more than so many bytes.
+    fn samples_at_once(&self, _bytes: u64) -> u64 {
+        u64::MAX
     }
 
     /// Records the passes that add the samples of a slice to the sums, sample after sample within a pixel.

@@ -11,6 +11,8 @@ use crate::params::{Choice as _, Params, Variant};
 
 /// Rows of 16 bytes of a path: `PATH_ROWS` of `kernels/organisation/paths.wesl`.
 const PATH_BYTES: u64 = 7 * 16;
+/// Batches of a slice at most: what is submitted at once has a limit, and an end within a second.
+const BATCHES: u64 = 4;
 /// Words of `counts`, as in `kernels/organisation/queue.wesl`.
 const LIVE: u32 = 0;
 const SHADOWS: u32 = 1;
@@ -188,9 +190,12 @@ impl<'a> Queues<'a> {
             kept: self.scratch("kept queue", words),
             count: self.scratch("kept_count", 16),
         };
+        let place = steps.recording().len();
         method.record(&mut Passes::new(&gpu, steps.recording(), &stream))?;
         steps.recording().copy(&stream.kept, &stream.elements);
-        self.run(steps, "plan", Groups::Direct([1, 1, 1]))
+        self.run(steps, "plan", Groups::Direct([1, 1, 1]))?;
+        steps.recording().name_since(place, "compaction");
+        Ok(())
     }
 
     /// One ray of each live path.
@@ -264,8 +269,8 @@ fn record(
 }
 
 impl Organisation for MultiKernel {
-    fn bytes_per_sample(&self) -> u64 {
-        PATH_BYTES
+    fn samples_at_once(&self, bytes: u64) -> u64 {
+        bytes / PATH_BYTES
     }
 
     fn record(
@@ -279,8 +284,8 @@ impl Organisation for MultiKernel {
 }
 
 impl Organisation for Wavefront {
-    fn bytes_per_sample(&self) -> u64 {
-        16
+    fn samples_at_once(&self, bytes: u64) -> u64 {
+        (bytes / 16).min(u64::from(self.capacity) * BATCHES)
     }
 
     fn record(
@@ -289,6 +294,17 @@ impl Organisation for Wavefront {
         integrator: &dyn Integrator,
         params: &Params,
     ) -> Result<(), GpuError> {
+        let (bytes, limit) = (
+            u64::from(self.capacity) * PATH_BYTES,
+            steps.gpu().limits.max_storage_buffer_binding_size,
+        );
+        if bytes > limit {
+            return Err(GpuError::Kernel(format!(
+                "wavefront with capacity = {}: {bytes} bytes of paths, and a buffer of this adapter has at most {limit}; at most {} fit",
+                self.capacity,
+                limit / PATH_BYTES
+            )));
+        }
         record(steps, Some(self), integrator, params)
     }
 }

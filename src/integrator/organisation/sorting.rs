@@ -35,9 +35,12 @@ fn sorted(
         .buffer("keys", &unsorted.keys)
         .buffer("values", &unsorted.values);
     let keys = queues.kernel(&format!("organisation/{kernel}"));
+    let place = steps.recording().len();
     steps.run(kernel, keys, queues.all(), &bindings)?;
     let sort = RadixSort::new(steps.gpu())?;
-    Ok(sort.record(steps.recording(), &unsorted, bits).values)
+    let order = sort.record(steps.recording(), &unsorted, bits).values;
+    steps.recording().name_since(place, "sorting");
+    Ok(order)
 }
 
 /// Puts the queue into the order of the octants and origins of its rays.

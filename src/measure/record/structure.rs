@@ -167,6 +167,12 @@ pub struct TimeRecord {
     /// All rays over time, million per second; absent if the cell failed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mrays_s: Option<Interval>,
+    /// Paths of one render that sent a ray from the camera, after one bounce, …; empty for integrators without paths.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub live_paths: Vec<u64>,
+    /// GPU milliseconds of each stage of a render, medians; only where the passes are several.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub stages: BTreeMap<String, f64>,
     /// BLAKE3 of the image.
     pub image_hash: String,
     /// Whether the image equals to the bit that of the scene's first gated structure.

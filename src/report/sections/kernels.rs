@@ -1,7 +1,7 @@
 //! What kernels were made of: features compiled in and out, and what leaving them out gained.
 
 use crate::measure::comparison::LogFigure;
-use crate::measure::record::{Key, Ran, axis};
+use crate::measure::record::{Interval, Key, Ran, TimeRecord, axis};
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
 use crate::report::data::{SceneGroup, View};
 use crate::report::document::*;
@@ -98,18 +98,21 @@ pub fn gains(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
         let Some(specialised) = { times }.find(|other| other.key == wanted) else {
             continue;
         };
-        let [carried, specialised] = [time, specialised].map(|time| {
-            let often = time.ms.len() >= LEAST_FOR_MEDIAN;
-            LogFigure::of_times(&time.ms).filter(|_| often)
-        });
-        let ratio = carried.zip(specialised).map(|(carried, base)| {
-            let noise = base.own.first().copied();
-            carried.scaled((-base.log).exp()).with_noise(noise)
-        });
-        let figure = (GAIN, ratio.map(|ratio| ratio.interval()));
+        let figure = (GAIN, time_over(time, specialised));
         gains.extend(Value::known(&time.key, [figure]));
     }
     gains
+}
+
+/// What a full cell takes over another, if both were timed often enough for an interval.
+pub fn time_over(time: &TimeRecord, base: &TimeRecord) -> Option<Interval> {
+    let [own, base] = [time, base].map(|time| {
+        let often = time.ms.len() >= LEAST_FOR_MEDIAN;
+        LogFigure::of_times(&time.ms).filter(|_| often)
+    });
+    let (own, base) = own.zip(base)?;
+    let noise = base.own.first().copied();
+    Some(own.scaled((-base.log).exp()).with_noise(noise).interval())
 }
 
 /// The label of an integrator without the parameter; `None` for one that does not have it.

@@ -4,6 +4,7 @@ pub mod belief;
 pub mod coherence;
 pub mod compactions;
 pub mod kernels;
+pub mod organisations;
 pub mod point_sets;
 pub mod rendering;
 pub mod run;
@@ -122,6 +123,7 @@ fn scene_section(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -
         .flat_map(|view| kernels::gains(scene, view))
         .collect();
     blocks.extend(kernels::blocks(scene, &values));
+    blocks.extend(organisations::blocks(scene));
     section
 }
 

@@ -1,0 +1,133 @@
+//! How the path tracer was organised: what each organisation takes, for what, and how many paths are alive after each bounce.
+
+use super::file_stem;
+use super::kernels::time_over;
+use crate::integrator::RAY_QUERIES;
+use crate::measure::record::{Interval, TimeRecord, axis};
+use crate::report::data::{Measured, SceneGroup, View};
+use crate::report::document::*;
+use crate::report::format;
+use crate::report::pivot::{FIGURES_ALONE, Rows};
+use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
+use crate::report::values::Value;
+
+/// What tells the rows apart.
+const ROWS: [&str; 7] = [
+    axis::INTEGRATOR,
+    axis::ACCEL,
+    axis::KERNELS,
+    axis::SEQUENCE,
+    axis::DECORRELATION,
+    axis::OFFSET,
+    axis::ORGANISATION,
+];
+
+/// The organisation that others are compared with.
+const SINGLE: &str = "single-kernel";
+const AGAINST: &str = "against-single-kernel/v1";
+/// Figures of a row.
+const FIGURES: [&str; 3] = ["ms-per-spp/v1", AGAINST, "ray-query-share/v1"];
+
+/// The share of ray queries in the time of all stages, if stages were timed.
+pub fn query_share(time: &TimeRecord) -> Option<f64> {
+    let all: f64 = time.stages.values().sum();
+    let queries = RAY_QUERIES
+        .iter()
+        .filter_map(|stage| time.stages.get(*stage));
+    (all > 0.0).then(|| queries.sum::<f64>() / all)
+}
+
+fn is_single(time: &Measured<TimeRecord>) -> bool {
+    matches!(time.key.label(axis::ORGANISATION), "" | SINGLE)
+}
+
+/// Time of each organisation of a view over that of the single kernel with everything else the same.
+pub fn against_single(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
+    let others = view.valid_times().filter(|time| !is_single(time));
+    let value = |time: &Measured<TimeRecord>| {
+        let wanted = time.key.clone().with(axis::ORGANISATION, SINGLE);
+        let mut times = scene.views.iter().flat_map(View::valid_times);
+        let single = times.find(|other| other.key == wanted)?;
+        let figure = (AGAINST, time_over(time, single));
+        Value::known(&time.key, [figure]).pop()
+    };
+    others.filter_map(value).collect()
+}
+
+/// The stages by their share of the time, the longest first.
+fn stages(time: &TimeRecord) -> String {
+    let all: f64 = time.stages.values().sum();
+    let mut parts: Vec<(&String, f64)> = (time.stages.iter())
+        .map(|(stage, ms)| (stage, ms / all.max(f64::MIN_POSITIVE)))
+        .collect();
+    parts.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let told = parts.iter().filter(|(_, share)| *share >= 0.005);
+    let told: Vec<String> = told
+        .map(|(stage, share)| format!("{stage} {}", format::percent(*share)))
+        .collect();
+    told.join(", ")
+}
+
+/// Table and plot; nothing where there is one kernel alone.
+pub fn blocks(scene: &SceneGroup) -> Vec<Block> {
+    let times: Vec<&Measured<TimeRecord>> =
+        scene.views.iter().flat_map(View::valid_times).collect();
+    if times.iter().all(|time| is_single(time)) {
+        return Vec::new();
+    }
+    let row = |time: &&Measured<TimeRecord>| {
+        let cells: Vec<TableCell> = vec![
+            time.structure.clone().into(),
+            time.sampler.clone().into(),
+            time.key.label(axis::ORGANISATION).to_owned().into(),
+            stages(time).into(),
+        ];
+        (time.key.clone(), cells)
+    };
+    let rows: Vec<_> = times.iter().map(row).collect();
+    let heads = ["structure", ":sampler", ":organisation", ":stages"];
+    let views = scene.views.iter();
+    let mut values: Vec<Value> = views.flat_map(|view| against_single(scene, view)).collect();
+    for time in &times {
+        let share = query_share(time).map(Interval::exact);
+        let figures = [(FIGURES[0], time.ms_per_spp), (FIGURES[2], share)];
+        values.extend(Value::known(&time.key, figures));
+    }
+    let caption = "Organisations of the path tracer: the same image to the bit, in other passes";
+    let table = Rows::new(&ROWS, &heads, rows).table(&values, caption, &FIGURES, FIGURES_ALONE);
+    let mut blocks: Vec<Block> = table.into_block().into_iter().collect();
+    let stem = format!("organisations-{}", file_stem(scene.name));
+    blocks.extend(Block::figures(vec![live(stem, scene)]));
+    blocks
+}
+
+/// Paths that are alive after each bounce, by integrator: those of every organisation.
+fn live(stem: String, scene: &SceneGroup) -> Option<Illustration> {
+    let mut curves: Vec<Curve> = Vec::new();
+    for time in scene.views.iter().flat_map(View::valid_times) {
+        let label = time.key.label(axis::INTEGRATOR).to_owned();
+        let is_new = curves.iter().all(|curve| curve.label != label);
+        let Some(first) = time.live_paths.first().filter(|_| is_new) else {
+            continue;
+        };
+        let share = |paths: &u64| Interval::exact(*paths as f64 / *first as f64);
+        let points = (0u32..).zip(&time.live_paths);
+        curves.push(Curve {
+            label,
+            look: curves.len(),
+            exact: true,
+            points: points
+                .map(|(n, paths)| CurvePoint::new(n.into(), &share(paths)))
+                .collect(),
+        });
+    }
+    let plot = CurvePlot {
+        x_title: "bounces before the ray".into(),
+        x_ticks: Ticks::Whole,
+        y_title: "paths that are alive".into(),
+        curves,
+        guides: Vec::new(),
+    };
+    let caption = "Share of the paths that send a ray after so many bounces, of the first sampler.";
+    plot.figure(stem, caption.to_owned())
+}
