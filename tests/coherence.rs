@@ -11,7 +11,7 @@ use raystone::coherence::{
 use raystone::config::{Coherence, Rule};
 use raystone::integrator::{ConfiguredIntegrator, IntegratorRegistry};
 use raystone::measure::path_oracle::{self, PathOracle};
-use raystone::measure::record::{Body, CoherenceRecord, Tally, all_of, axis};
+use raystone::measure::record::{Body, CoherenceRecord, StructureRecord, Tally, all_of, axis};
 use raystone::params::ParamValue;
 use raystone::run::Registries;
 use raystone::sampling::{Sampler, SamplerRegistry};
@@ -177,7 +177,8 @@ impl Setting {
 
     /// Rays of the whole image.
     fn rays(&self, samples: &[u32]) -> Rays {
-        let groups = groups_of(self.size, [8, 4], self.groups);
+        let stride = self.sampler.stride();
+        let groups = groups_of(self.size, [8, 4], self.groups, stride);
         let oracle = PathOracle::new(&self.scene).expect("an oracle");
         let image = path_oracle::View {
             estimator: path_oracle::Estimator::of(&self.integrator).expect("an estimator"),
@@ -342,9 +343,10 @@ fn figures_do_not_depend_on_threads() {
     assert_eq!(on(1), on(7));
 }
 
-const WITH_MODEL: [&str; 3] = [
+const WITH_MODEL: [&str; 4] = [
     "axes.decorrelation = [\"none\", \"cranley-patterson\"]\naxes.sequence = [\"halton\"]\naxes.accel = [\"bvh\", \"cwbvh\", \"uniform-grid\"]",
     "integrator.path.max_depth = 2",
+    "gate.shadow_orders = true",
     "[coherence]\ngroups = 2\nwarps = 2\nsamples = 1",
 ];
 
@@ -400,6 +402,7 @@ fn a_run_records_coherence_twice_the_same_and_the_report_shows_it() {
             "{plot} of {plots:?}"
         );
     }
+    check_recorded_rays(&lines);
     let (again, ..) = once();
     let bodies = |lines: &[raystone::measure::record::Line]| -> Vec<String> {
         let found = lines
@@ -410,6 +413,23 @@ fn a_run_records_coherence_twice_the_same_and_the_report_shows_it() {
             .collect()
     };
     assert_eq!(bodies(&lines), bodies(&again));
+}
+
+/// Two groups of two warps of each class of recorded rays went through the model.
+fn check_recorded_rays(lines: &[raystone::measure::record::Line]) {
+    let structures: Vec<_> = all_of::<StructureRecord>(lines).collect();
+    assert_eq!(structures.len(), 3);
+    for structure in structures {
+        let classes = &structure.coherence.as_ref().expect("a model").classes;
+        assert_eq!(classes.len(), structure.timings.len());
+        assert_eq!(classes.len(), 8);
+        for ((class, tally), timing) in classes.iter().zip(&structure.timings) {
+            assert_eq!((*class, tally.rays), (timing.class, 128));
+            let is_shadow = format!("{class:?}").starts_with("Shadow");
+            let is_made = is_shadow && format!("{class:?}") != "Shadow";
+            assert_eq!(timing.unlike_shadow.is_some(), is_made, "{class:?}");
+        }
+    }
 }
 
 #[test]

@@ -150,6 +150,14 @@ const NO_TWIN: &[(&str, &str)] = &[
         "judged by tests/compaction, against what flags say",
     ),
     (
+        "compaction/keys",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/follow",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
         "compaction/dispatch",
         "judged by tests/compaction, against what flags say",
     ),

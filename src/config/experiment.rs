@@ -185,6 +185,8 @@ pub struct Gate {
     /// Distance from their surface at which recorded rays start, scene units; 0 is 1e-5 of the
     /// scene's diagonal.
     pub offset: f32,
+    /// Whether shadow rays are recorded from their lights and light by light, too.
+    pub shadow_orders: bool,
 }
 
 /// Which star discrepancies are taken.

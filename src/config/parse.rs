@@ -363,6 +363,7 @@ impl<'t> Reader<'t> {
             oracle_rays: section.unsigned("oracle_rays")?,
             ao_length: section.number("ao_length")? as f32,
             offset: section.number("offset")? as f32,
+            shadow_orders: section.flag("shadow_orders")?,
         })
     }
 

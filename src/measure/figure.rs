@@ -119,11 +119,12 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 113] = [
+pub static FIGURES: [Figure; 115] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
     Figure::new("hit-share/v1", "hit", "", Neither, Percent, Exact),
+    Figure::new("unlike-shadow/v1", "unlike the shadow ray", "per million", Neither, THREE, Exact),
     Figure::new("nodes-per-ray/v1", "nodes/ray", "", Lower, THREE, Exact),
     Figure::new("box-tests-per-ray/v1", "box tests/ray", "", Lower, THREE, Exact),
     Figure::new("triangle-tests-per-ray/v1", "triangle tests/ray", "", Lower, THREE, Exact),
@@ -186,6 +187,7 @@ pub static FIGURES: [Figure; 113] = [
     Figure::new("bias-weighted-freedom/v1", "its degrees of freedom", "", Neither, THREE, Exact),
     Figure::new("bias-detectable/v1", "bias found in 90 % of cases", "%", Lower, Digits(2), Exact),
     Figure::new("low-frequency-power/v1", "low-frequency power", "", Lower, THREE, Mean),
+    Figure::new("loudest-wave/v1", "loudest wave", "", Lower, THREE, Mean),
     Figure::new("neighbour-correlation/v1", "correlation", "", Lower, THREE, Mean),
     Figure::new("luminance-rmse/v1", "RMSE", "", Lower, THREE, Single),
     Figure::new("filtered-share/v1", "share of the RMSE after a filter", "", Lower, Percent, Single),

@@ -33,6 +33,7 @@ fn methods(gpu: &Gpu) -> Vec<(String, Arc<dyn Compaction>)> {
         ("reduce-scan-scatter", &[("lanes", 8), ("per_lane", 3)]),
         ("bucket-sort", &[("buckets", 9), ("per_lane", 4)]),
         ("bucket-sort", &[("buckets", 1), ("lanes", 33)]),
+        ("radix-sort", &[("buckets", 255)]),
         ("roger", &[("block", 2)]),
         ("roger", &[("block", 16)]),
         ("roger", &[("block", 100)]),
