@@ -169,6 +169,8 @@ pub struct Timing {
     pub max_warmup_ms: u32,
     /// Rays per class and dispatch.
     pub rays: u32,
+    /// Whether full cells are also rendered in orders of passes.
+    pub orders: bool,
 }
 
 /// How much the gate checks.

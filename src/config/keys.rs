@@ -263,6 +263,7 @@ pub const KEYS: &[KeyRow] = &[
     key("timing", "min_warmup_ms", integer(0, 60_000), Some("100"), "Least warm-up of a kernel before it is timed, milliseconds."),
     key("timing", "max_warmup_ms", integer(0, 600_000), Some("2000"), "Warm-up ends here even if the rate is not stable yet, milliseconds."),
     key("timing", "rays", integer(1024, 1 << 24), Some("65536"), "Rays per class and dispatch."),
+    key("timing", "orders", ValueKind::Flag, Some("false"), "Whether full cells are also rendered in one pass, in 16 blocks and in the 256 passes of a quad-tree, and the time to the first picture without a gap is taken; at most 256 samples."),
     key("gate", "rays", integer(256, 1 << 24), Some("32768"), "Rays per class that every structure must answer as the judge does."),
     key("gate", "brute_force_tests", integer(0, 1_000_000_000_000), Some("2_000_000_000"), "Ray-triangle tests spent on checking the judge itself against brute force (at least 2,000 rays are)."),
     key("gate", "oracle_rays", integer(0, 1 << 20), Some("2048"), "Rays of the judge that the double-precision oracle decides again."),

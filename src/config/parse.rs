@@ -347,6 +347,7 @@ impl<'t> Reader<'t> {
             min_warmup_ms: section.unsigned("min_warmup_ms")?,
             max_warmup_ms: section.unsigned("max_warmup_ms")?,
             rays: section.unsigned("rays")?,
+            orders: section.flag("orders")?,
         };
         if timing.max_warmup_ms < timing.min_warmup_ms {
             let expected = "at least `timing.min_warmup_ms`";

@@ -9,6 +9,8 @@ mod kind;
 mod light_tables;
 mod light_tree;
 pub mod offset;
+pub mod order;
+mod parts;
 mod passes;
 pub mod path;
 mod registry;
@@ -28,6 +30,8 @@ pub use kind::{
 pub use light_tables::LightTables;
 pub(crate) use light_tables::light_branches;
 pub use offset::{OffsetRegistry, RayOffset};
+pub use order::Order;
+pub use parts::{InOrder, PartRenderer};
 pub use passes::ImageSteps;
 pub use registry::IntegratorRegistry;
 pub use render::{BLOCK_SAMPLES, RenderJob, Renderer, Snapshot, rounding_bound, with_sampler};

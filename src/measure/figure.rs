@@ -119,7 +119,7 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 115] = [
+pub static FIGURES: [Figure; 119] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
@@ -148,6 +148,10 @@ pub static FIGURES: [Figure; 115] = [
     // Full cells.
     Figure::new("ms-per-spp/v1", "time per sample per pixel", "ms", Lower, THREE, Median),
     Figure::new("cell-mrays-per-s/v1", "speed of the whole cell", "Mrays/s", Higher, THREE, Median),
+    Figure::new("order-passes/v1", "passes per sample", "", Neither, Count, Exact),
+    Figure::new("order-ms/v1", "time per sample per pixel", "ms", Lower, THREE, Median),
+    Figure::new("order-ratio/v1", "over one pass", "", Lower, THREE, Single),
+    Figure::new("first-picture-ms/v1", "time to the first picture", "ms", Lower, THREE, Median),
     Figure::new("specialisation/v1", "time over that of the specialised kernel", "", Neither, THREE, Mean),
     Figure::new("time-to-image/v1", "build and rendering", "ms", Lower, THREE, Single),
     Figure::new("error-seconds/v1", "unbiased relMSE × seconds", "", Lower, THREE, Jackknife),

@@ -234,6 +234,7 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
                 ("cell-mrays-per-s/v1", time.mrays_s),
             ];
             values.extend(Value::known(&time.key, figures));
+            values.extend(of_orders(&time.key, time));
         }
     }
     values.extend(view.coherence.iter().flat_map(|c| of_coherence(&c.key, c)));
@@ -244,6 +245,27 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
     values.extend(trade_off::times_to_image(scene, view));
     values.extend(kernels::gains(scene, view));
     values
+}
+
+/// Times of a cell in orders of passes.
+fn of_orders(key: &Key, time: &TimeRecord) -> Vec<Value<'static>> {
+    let one_pass = time.orders.first().and_then(|at| at.ms_per_spp);
+    let of_order = |at: &OrderTime| {
+        let key = key.clone().with(axis::SUBJECT, &at.order);
+        let ratio = at
+            .ms_per_spp
+            .zip(one_pass)
+            .map(|(ms, one)| ms.value / one.value);
+        let passes = at.passes as f64;
+        let figures = [
+            ("order-passes/v1", Some(Interval::exact(passes))),
+            ("order-ms/v1", at.ms_per_spp),
+            ("order-ratio/v1", ratio.map(Interval::exact)),
+            ("first-picture-ms/v1", at.first_picture_ms),
+        ];
+        Value::known(&key, figures)
+    };
+    time.orders.iter().flat_map(of_order).collect()
 }
 
 /// What stands on the axis of rays for all of them.

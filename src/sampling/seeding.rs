@@ -27,19 +27,25 @@ parameters! {
     }
 }
 
+/// As kernels know [`Seeding`]: `SEQUENCE_SEEDING` and `DECORRELATION_SEEDING`.
+const PIXEL_SAMPLE: u32 = 0;
+const SAMPLE: u32 = 1;
+const WORKGROUP: u32 = 2;
+const SPARSE: u32 = 3;
+
 /// Pixels of a group in each direction, as lanes of a workgroup.
 const EDGE: u32 = 8;
 /// How far the pixels of a sparse group lie apart, in each direction.
 pub const STRIDE: u32 = 8;
 
 impl Seeding {
-    /// As kernels know it: `SEQUENCE_SEEDING` and `DECORRELATION_SEEDING`.
+    /// As kernels know it.
     pub(super) const fn number(self) -> u32 {
         match self {
-            Self::PixelSample => 0,
-            Self::Sample => 1,
-            Self::Workgroup => 2,
-            Self::Sparse => 3,
+            Self::PixelSample => PIXEL_SAMPLE,
+            Self::Sample => SAMPLE,
+            Self::Workgroup => WORKGROUP,
+            Self::Sparse => SPARSE,
         }
     }
 

@@ -15,7 +15,7 @@ type Fault = (
 );
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 19] = [
+const FAULTS: [Fault; 24] = [
     // The count is one short.
     ("scatter", ["= sums[BUCKETS * tiling.tiles]", "= sums[BUCKETS * tiling.tiles] - 1u"], "reduce-scan-scatter", &[]),
     ("gather", ["kept_count[0] = count", "kept_count[0] = count - 1u"], "horn", &[]),

@@ -28,7 +28,7 @@ fn methods(gpu: &Gpu) -> Vec<(String, Arc<dyn Compaction>)> {
     let mut variants: Vec<Variant> =
         (registry.0.iter().map(|kind| variant(kind.name(), &[]))).collect();
     assert!(variants.len() >= 9, "{} methods", variants.len());
-    let further: [(&str, &[(&str, i64)]); 9] = [
+    let further: [(&str, &[(&str, i64)]); 10] = [
         ("workgroup", &[("lanes", 32), ("per_lane", 4)]),
         ("reduce-scan-scatter", &[("lanes", 8), ("per_lane", 3)]),
         ("bucket-sort", &[("buckets", 9), ("per_lane", 4)]),

@@ -170,6 +170,19 @@ pub struct StructureRecord {
     pub failure: Option<String>,
 }
 
+/// Time of a full cell whose pixels are taken in an order of passes: see [`crate::integrator::Order`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OrderTime {
+    /// Which.
+    pub order: String,
+    /// Passes of a sample, each a submission of its own.
+    pub passes: usize,
+    /// Wall milliseconds per sample per pixel for the whole image, median with interval.
+    pub ms_per_spp: Option<Interval>,
+    /// Wall milliseconds until the first picture without a gap, median with interval.
+    pub first_picture_ms: Option<Interval>,
+}
+
 /// Time of a full cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TimeRecord {
@@ -190,6 +203,9 @@ pub struct TimeRecord {
     /// All rays over time, million per second; absent if the cell failed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mrays_s: Option<Interval>,
+    /// The same cell in orders of passes; empty where these were not asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub orders: Vec<OrderTime>,
     /// BLAKE3 of the image.
     pub image_hash: String,
     /// Whether the image equals to the bit that of the scene's first gated structure.
