@@ -4,7 +4,8 @@ use super::mesh::Mesh;
 use super::trial_scenes::{Trial, TrialScene, camera, depth, word};
 use crate::integrator::ConfiguredIntegrator;
 use crate::scene::{
-    EnvironmentMap, IesProfile, Light, Material, Photometry, SceneData, SceneError,
+    EnvironmentMap, GEOMETRIC, IesProfile, Light, Material, Photometry, SceneData, SceneError,
+    encode_normal,
 };
 use glam::{Quat, Vec3, vec3};
 use std::sync::Arc;
@@ -24,6 +25,7 @@ pub(super) fn scenes() -> Result<Vec<TrialScene>, SceneError> {
                     word("strategy", "mis-power"),
                 ]),
                 path(&[depth(2), word("strategy", "light"), tree()]),
+                path(&[depth(2), word("light_choice", "uniform")]),
             ],
         },
         TrialScene {
@@ -233,7 +235,8 @@ fn room(mesh: &mut Mesh) {
     mesh.block(vec3(-0.4, 0.0, -0.3), vec3(0.6, 0.8, 0.5), block);
 }
 
-/// Lamps of all kinds, sizes and directions: flat ones of one side and of two, balls, points, cones, luminaires, and from far away.
+/// Lamps of all kinds, sizes and directions: flat ones of one side and of two, balls, points, cones, luminaires, and from far away. The floor
+/// has vertex normals, so that it matters which normal a light is chosen by.
 fn many_lamps() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(1.2, 1.8, 3.4), vec3(-0.1, 0.6, -0.2), Vec3::Y);
     let mut mesh = Mesh::new("many-lamps", camera, Vec3::ZERO)?;
@@ -259,6 +262,10 @@ fn many_lamps() -> Result<SceneData, SceneError> {
         }
     }
     let mut scene = mesh.done(Vec::new());
+    scene.normals = vec![[GEOMETRIC; 3]; scene.triangles.len()];
+    let bent = |x: f32, z: f32| encode_normal(vec3(x, 1.0, z).normalize());
+    scene.normals[0] = [bent(-0.4, -0.1), bent(0.5, -0.2), bent(0.4, 0.3)];
+    scene.normals[1] = [bent(-0.4, -0.1), bent(0.4, 0.3), bent(-0.3, 0.4)];
     for k in (600..700).step_by(20) {
         scene.lights.extend([
             Light::Sphere {

@@ -15,7 +15,10 @@ pub(super) fn scenes() -> Result<Vec<TrialScene>, SceneError> {
         trials: vec![("path", changes.to_vec())],
     };
     Ok(vec![
-        trial(mapped()?, &[depth(4)]),
+        TrialScene {
+            scene: mapped()?,
+            trials: vec![("path", vec![depth(4)]), ("primary", vec![])],
+        },
         trial(under_the_sky()?, &[depth(5)]),
         trial(close_pane()?, &[depth(3)]),
     ])

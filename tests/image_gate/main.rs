@@ -3,7 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
-use raystone::gpu::Gpu;
+use raystone::gpu::{Gpu, GpuError};
 use raystone::integrator::RayOffset;
 use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer};
 use raystone::measure::image_gate::{Pixels, answers, judge, sums};
@@ -26,6 +26,17 @@ fn verdict(
     sampler: &Sampler,
     samples: &[u32],
 ) -> PathsRecord {
+    tried(gpu, scene, what, sampler, samples).expect("images")
+}
+
+/// The same, where kernels may raise an error or not compile.
+fn tried(
+    gpu: &Gpu,
+    scene: &SceneData,
+    what: &Variant,
+    sampler: &Sampler,
+    samples: &[u32],
+) -> Result<PathsRecord, GpuError> {
     let stage = Stage::new(gpu, scene.clone());
     let traced = stage.traced(gpu, structure("bvh"));
     let integrator = IntegratorRegistry::default().configured(what);
@@ -38,14 +49,14 @@ fn verdict(
         offset: RayOffset::default(),
         runtime_checks: true,
     };
-    let renderer = Renderer::new(gpu, &stage.buffers, &traced, &job, false).expect("a kernel");
+    let renderer = Renderer::new(gpu, &stage.buffers, &traced, &job, false)?;
     let pixels = Pixels {
         size: SIZE,
         every: 1,
         samples: samples.to_vec(),
         seed: 70_003,
     };
-    let answers = answers(&renderer, &pixels).expect("an image");
+    let answers = answers(&renderer, &pixels)?;
     let oracle = PathOracle::new(&stage.scene).expect("known materials");
     let view = View {
         estimator: Estimator::of(&integrator).expect("a known integrator"),
@@ -55,15 +66,14 @@ fn verdict(
     };
     let start = std::time::Instant::now();
     let mut record = judge(&oracle, &view, &answers);
-    let sums = sums(&renderer, &pixels).expect("an image");
-    record.fault = record.fault.or(sums);
+    record.fault = record.fault.or(sums(&renderer, &pixels)?);
     println!(
         "{} {}: {:?} {record:?}",
         scene.name,
         what.name,
         start.elapsed()
     );
-    record
+    Ok(record)
 }
 
 /// A sampler of independent numbers with as many dimensions as asked for.
@@ -234,8 +244,10 @@ fn hunt_faults() {
         let found = scenes.iter().find_map(|trial| {
             trial.trials.iter().find_map(|(name, changes)| {
                 let what = integrator_variant(name, changes);
-                let record = verdict(&gpu, &trial.scene, &what, &independent(), &[0, 70_000]);
-                let fault = record.fault?;
+                let fault = match tried(&gpu, &trial.scene, &what, &independent(), &[0, 70_000]) {
+                    Ok(record) => record.fault?,
+                    Err(error) => error.to_string(),
+                };
                 Some(format!(
                     "{} {what}: {}",
                     trial.scene.name,
