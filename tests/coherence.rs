@@ -5,8 +5,8 @@ mod support;
 
 use raystone::accel::{Query, Ray, TriangleSoup};
 use raystone::coherence::{
-    Kind, Machine, Memory, Organisation, RayClass, Rays, Trace, View, groups_of, run as run_model,
-    trace_of,
+    Kind, Machine, Memory, Organisation, RayClass, Rays, Trace, View, groups_of, of_rays,
+    run as run_model, trace_of,
 };
 use raystone::config::{Coherence, Rule};
 use raystone::integrator::{ConfiguredIntegrator, IntegratorRegistry};
@@ -341,6 +341,52 @@ fn figures_do_not_depend_on_threads() {
         pool.install(|| setting.tallies(&[0, 9], "cwbvh", Organisation::Compacted))
     };
     assert_eq!(on(1), on(7));
+}
+
+#[test]
+fn rays_of_a_buffer_go_in_warps_as_they_follow_each_other() {
+    let (soup, rays) = soup_and_rays(6);
+    let kind = support::structures()
+        .into_iter()
+        .find(|k| k.name() == "bvh");
+    let kind = kind.expect("bvh");
+    let built = build(kind, &soup, &support::default_params(&kind.parameters()));
+    let memory = Memory::new(&*built, &soup).expect("memory");
+    let twin = built.cpu_twin(&soup).expect("a twin");
+    let settings = |groups, warps| Coherence {
+        groups,
+        warps,
+        l1_kib: 128,
+        l1_ways: 0,
+        ..MACHINE
+    };
+    let tally = |rays: &[Ray], groups, warps| {
+        let found = of_rays(
+            rays,
+            Query::Closest,
+            (&*twin, &memory),
+            &settings(groups, warps),
+        );
+        found.expect("a tally")
+    };
+    // Every ray once, whatever the groups; the last of three warps is not full.
+    let all = tally(&rays[..80], 9, 1);
+    assert_eq!((all.rays, all.lanes % 32), (80, 0));
+    assert_eq!(tally(&rays[..80], 1, 3).active, all.active);
+    // Two groups of one warp: the first of all, and the last but one.
+    let some = tally(&rays[..80], 2, 1);
+    assert_eq!(some.rays, 64);
+    let alone = |from: usize| tally(&rays[from..from + 32], 1, 1);
+    let sum = |of: fn(&Tally) -> u64| of(&alone(0)) + of(&alone(32));
+    assert_eq!(some.issues, sum(|t| t.issues));
+    assert_eq!(some.active, sum(|t| t.active));
+    assert_eq!(some.lines, sum(|t| t.lines));
+    // Each group has an L1 of its own, so that equal groups need every line twice.
+    let twice = [&rays[..32], &rays[..32]].concat();
+    let (apart, together) = (tally(&twice, 2, 1), tally(&twice, 1, 2));
+    assert_eq!(apart.lines, 2 * alone(0).lines);
+    assert_eq!(apart.l2_accesses(), 2 * alone(0).l2_accesses());
+    assert_eq!(together.l2_accesses(), alone(0).l2_accesses());
 }
 
 const WITH_MODEL: [&str; 4] = [

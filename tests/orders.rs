@@ -41,8 +41,8 @@ fn in_order(
     let mut first = Vec::new();
     let spent = renderer.render(order, (SPP, 7), |renderer| {
         first = renderer.sums()?;
-        assert!(renderer.preview()?.is_some(), "the first picture has a gap");
-        Ok::<_, GpuError>(())
+        let gap = || GpuError::Kernels("the first picture has a gap".to_owned());
+        renderer.preview()?.map(|_| ()).ok_or_else(gap)
     })?;
     assert!(spent.first_picture.wall_ms <= spent.total.wall_ms);
     Ok((renderer.image(SPP)?, first, spent.passes))
@@ -74,7 +74,12 @@ fn images_of_all_orders_equal_that_of_whole_samples_to_the_bit() {
             Order::Blocks => (all, 16),
             Order::QuadTree => (4 * 3, 256),
         };
-        assert_eq!((taken, passes), (first_picture, of_sample), "{}", order.name());
+        assert_eq!(
+            (taken, passes),
+            (first_picture, of_sample),
+            "{}",
+            order.name()
+        );
         // One bit of one sum is seen.
         let mut sums = vec![[1.0; 4]; all];
         let same = splat(&sums, SIZE);
@@ -92,7 +97,10 @@ fn faults_of_the_kernel_are_seen() {
         // The last column of each part is left out.
         ("id.x >= part.columns", "id.x + 1u >= part.columns"),
         // The seed is that of the place within the part.
-        ("SamplerState(pixel,", "SamplerState(id.y * part.columns + id.x,"),
+        (
+            "SamplerState(pixel,",
+            "SamplerState(id.y * part.columns + id.x,",
+        ),
         // All samples are the first.
         ("frame.first_sample + i", "i"),
         // Sums begin anew.

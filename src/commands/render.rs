@@ -144,21 +144,21 @@ fn summary(rendering: &Rendering, [width, height]: [u32; 2]) -> String {
             rendering.non_finite_pixels
         );
     }
-    if let Some(in_order) = rendering.in_order {
-        text += &format!(
-            "{} passes a sample: {:.1} ms in all, first picture without a gap after {:.1} ms (submissions alone)\n",
+    let work = match rendering.in_order {
+        // Rays are not counted then.
+        Some(in_order) => format!(
+            "{} passes a sample took {:.1} ms in all, {:.1} ms to the first picture without a gap",
             in_order.passes, in_order.total.wall_ms, in_order.first_picture.wall_ms,
-        );
-    }
+        ),
+        None => format!(
+            "{:.1} million rays, {:.2} Mrays/s",
+            rendering.rays as f64 / 1e6,
+            rendering.rays as f64 / 1e6 / rendering.samples_s.max(1e-9),
+        ),
+    };
     text + &format!(
-        "{} triangles, {width}×{height} pixels, {} spp: {:.1} s, first picture after {:.1} s; \
-        {:.1} million rays, {:.2} Mrays/s\n",
-        rendering.triangles,
-        rendering.spp,
-        rendering.total_s,
-        rendering.first_picture_s,
-        rendering.rays as f64 / 1e6,
-        rendering.rays as f64 / 1e6 / rendering.samples_s.max(1e-9),
+        "{} triangles, {width}×{height} pixels, {} spp: {:.1} s, first picture after {:.1} s; {work}\n",
+        rendering.triangles, rendering.spp, rendering.total_s, rendering.first_picture_s,
     )
 }
 
