@@ -5,13 +5,13 @@ mod support;
 
 use raystone::accel::{Query, Ray, TriangleSoup};
 use raystone::coherence::{
-    Kind, Machine, Memory, Organisation, RayClass, Rays, Trace, View, groups_of, run as run_model,
-    trace_of,
+    Kind, Machine, Memory, Organisation, RayClass, Rays, Trace, View, groups_of, of_rays,
+    run as run_model, trace_of,
 };
 use raystone::config::{Coherence, Rule};
 use raystone::integrator::{ConfiguredIntegrator, IntegratorRegistry};
 use raystone::measure::path_oracle::{self, PathOracle};
-use raystone::measure::record::{Body, CoherenceRecord, Tally, all_of, axis};
+use raystone::measure::record::{Body, CoherenceRecord, StructureRecord, Tally, all_of, axis};
 use raystone::params::ParamValue;
 use raystone::run::Registries;
 use raystone::sampling::{Sampler, SamplerRegistry};
@@ -177,7 +177,8 @@ impl Setting {
 
     /// Rays of the whole image.
     fn rays(&self, samples: &[u32]) -> Rays {
-        let groups = groups_of(self.size, [8, 4], self.groups);
+        let stride = self.sampler.stride();
+        let groups = groups_of(self.size, [8, 4], self.groups, stride);
         let oracle = PathOracle::new(&self.scene).expect("an oracle");
         let image = path_oracle::View {
             estimator: path_oracle::Estimator::of(&self.integrator).expect("an estimator"),
@@ -342,9 +343,56 @@ fn figures_do_not_depend_on_threads() {
     assert_eq!(on(1), on(7));
 }
 
-const WITH_MODEL: [&str; 3] = [
+#[test]
+fn rays_of_a_buffer_go_in_warps_as_they_follow_each_other() {
+    let (soup, rays) = soup_and_rays(6);
+    let kind = support::structures()
+        .into_iter()
+        .find(|k| k.name() == "bvh");
+    let kind = kind.expect("bvh");
+    let built = build(kind, &soup, &support::default_params(&kind.parameters()));
+    let memory = Memory::new(&*built, &soup).expect("memory");
+    let twin = built.cpu_twin(&soup).expect("a twin");
+    let settings = |groups, warps| Coherence {
+        groups,
+        warps,
+        l1_kib: 128,
+        l1_ways: 0,
+        ..MACHINE
+    };
+    let tally = |rays: &[Ray], groups, warps| {
+        let found = of_rays(
+            rays,
+            Query::Closest,
+            (&*twin, &memory),
+            &settings(groups, warps),
+        );
+        found.expect("a tally")
+    };
+    // Every ray once, whatever the groups; the last of three warps is not full.
+    let all = tally(&rays[..80], 9, 1);
+    assert_eq!((all.rays, all.lanes % 32), (80, 0));
+    assert_eq!(tally(&rays[..80], 1, 3).active, all.active);
+    // Two groups of one warp: the first of all, and the last but one.
+    let some = tally(&rays[..80], 2, 1);
+    assert_eq!(some.rays, 64);
+    let alone = |from: usize| tally(&rays[from..from + 32], 1, 1);
+    let sum = |of: fn(&Tally) -> u64| of(&alone(0)) + of(&alone(32));
+    assert_eq!(some.issues, sum(|t| t.issues));
+    assert_eq!(some.active, sum(|t| t.active));
+    assert_eq!(some.lines, sum(|t| t.lines));
+    // Each group has an L1 of its own, so that equal groups need every line twice.
+    let twice = [&rays[..32], &rays[..32]].concat();
+    let (apart, together) = (tally(&twice, 2, 1), tally(&twice, 1, 2));
+    assert_eq!(apart.lines, 2 * alone(0).lines);
+    assert_eq!(apart.l2_accesses(), 2 * alone(0).l2_accesses());
+    assert_eq!(together.l2_accesses(), alone(0).l2_accesses());
+}
+
+const WITH_MODEL: [&str; 4] = [
     "axes.decorrelation = [\"none\", \"cranley-patterson\"]\naxes.sequence = [\"halton\"]\naxes.accel = [\"bvh\", \"cwbvh\", \"uniform-grid\"]",
     "integrator.path.max_depth = 2",
+    "gate.shadow_orders = true",
     "[coherence]\ngroups = 2\nwarps = 2\nsamples = 1",
 ];
 
@@ -400,6 +448,7 @@ fn a_run_records_coherence_twice_the_same_and_the_report_shows_it() {
             "{plot} of {plots:?}"
         );
     }
+    check_recorded_rays(&lines);
     let (again, ..) = once();
     let bodies = |lines: &[raystone::measure::record::Line]| -> Vec<String> {
         let found = lines
@@ -410,6 +459,23 @@ fn a_run_records_coherence_twice_the_same_and_the_report_shows_it() {
             .collect()
     };
     assert_eq!(bodies(&lines), bodies(&again));
+}
+
+/// Two groups of two warps of each class of recorded rays went through the model.
+fn check_recorded_rays(lines: &[raystone::measure::record::Line]) {
+    let structures: Vec<_> = all_of::<StructureRecord>(lines).collect();
+    assert_eq!(structures.len(), 3);
+    for structure in structures {
+        let classes = &structure.coherence.as_ref().expect("a model").classes;
+        assert_eq!(classes.len(), structure.timings.len());
+        assert_eq!(classes.len(), 8);
+        for ((class, tally), timing) in classes.iter().zip(&structure.timings) {
+            assert_eq!((*class, tally.rays), (timing.class, 128));
+            let is_shadow = format!("{class:?}").starts_with("Shadow");
+            let is_made = is_shadow && format!("{class:?}") != "Shadow";
+            assert_eq!(timing.unlike_shadow.is_some(), is_made, "{class:?}");
+        }
+    }
 }
 
 #[test]

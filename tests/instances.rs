@@ -357,6 +357,7 @@ fn a_tie_over_instances_allows_what_rounding_the_transform_can_do_and_no_more() 
         class: raystone::measure::record::RayClass::Chord,
         rays: vec![rays[index]],
         truth: vec![hits[index]],
+        shadow: Vec::new(),
     };
     let verdict = |t: f32| {
         let hit = Hit { t, ..hits[index] };

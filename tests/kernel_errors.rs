@@ -10,8 +10,8 @@ fn composition(structure: &str) -> Composition {
         .with("decorrelation", "sampling/cranley_patterson")
         .with("integrator", "integrator/path")
         .constant("STACK_ENTRIES", 32)
-        .constant("SHARED_SEQUENCE", 0)
-        .constant("SHARED_DECORRELATION", 0)
+        .constant("SEQUENCE_SEEDING", 0)
+        .constant("DECORRELATION_SEEDING", 0)
         .constant("MAX_DEPTH", 4)
         .constant("ROULETTE_DEPTH", 3)
         .constant("CLAMP", 0);

@@ -150,6 +150,14 @@ const NO_TWIN: &[(&str, &str)] = &[
         "judged by tests/compaction, against what flags say",
     ),
     (
+        "compaction/keys",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
+        "compaction/follow",
+        "judged by tests/compaction, against what flags say",
+    ),
+    (
         "compaction/dispatch",
         "judged by tests/compaction, against what flags say",
     ),
@@ -214,6 +222,7 @@ const NO_TWIN: &[(&str, &str)] = &[
     ("integrator/path", "judged by images, not by a twin"),
     ("integrator/primary", "judged by images, not by a twin"),
     ("integrator/render", "the loop over samples"),
+    ("integrator/render_part", "the loop over samples"),
     ("integrator/trace_rays", "the loop over rays"),
     ("sampling/dump_stream", "the loop over coordinates"),
     (
@@ -331,6 +340,11 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
 
 /// Free functions of a twin that no kernel needs, with the reason.
 const RUST_ONLY: &[(&str, &str, &str)] = &[
+    (
+        "sampling/seeding",
+        "paired",
+        "which pixels a workgroup should have, for the model of coherence",
+    ),
     (
         "accel/brute_force",
         "brute_force_hits",

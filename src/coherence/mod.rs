@@ -15,6 +15,7 @@ pub mod memory;
 pub mod model;
 pub mod organisation;
 pub mod paths;
+pub mod sets;
 pub mod simt;
 pub mod trace;
 
@@ -23,5 +24,6 @@ pub use memory::{Fetch, Memory};
 pub use model::{Machine, Pass, Warp, run};
 pub use organisation::Organisation;
 pub use paths::{RayClass, Rays, View, groups_of};
+pub use sets::of_rays;
 pub use simt::{Issue, issues};
 pub use trace::{Kind, Step, Trace, trace_of};

@@ -9,6 +9,7 @@ use super::{Memory, Pass, Warp};
 use crate::accel::{CpuTwin, Query, Ray};
 use crate::integrator::{CountedRays, RAY_COUNT_CLASSES};
 use crate::measure::path_oracle::{self, PathId, PathOracle, PathRay, Rounding};
+use crate::sampling::paired;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -74,9 +75,15 @@ pub type Pixels = Vec<Option<[u32; 2]>>;
 
 /// The warps of some groups. Each group is so many warps one after the other, in the order of workgroups and of lanes within
 /// them; the first of each are spread over the image, by rows evenly and along them by the golden ratio. Groups that hold all of an
-/// image hold each of its warps once. A warp is `[width, height]` lanes, which divide the edges of a workgroup.
-pub fn groups_of(size: [u32; 2], warp: [u32; 2], [groups, warps]: [u32; 2]) -> Vec<Vec<Pixels>> {
-    let blocks = size.map(|edge| edge.div_ceil(WORKGROUP));
+/// image hold each of its warps once. A warp is `[width, height]` lanes, which divide the edges of a workgroup. The pixels of
+/// neighbouring lanes lie `stride` apart: see [`paired`].
+pub fn groups_of(
+    size: [u32; 2],
+    warp: [u32; 2],
+    [groups, warps]: [u32; 2],
+    stride: u32,
+) -> Vec<Vec<Pixels>> {
+    let blocks = size.map(|edge| edge.div_ceil(WORKGROUP * stride) * stride);
     let of_block = warp.map(|edge| WORKGROUP / edge);
     let per_block = of_block[0] * of_block[1];
     let all = blocks[0] * blocks[1] * per_block;
@@ -86,7 +93,8 @@ pub fn groups_of(size: [u32; 2], warp: [u32; 2], [groups, warps]: [u32; 2]) -> V
             block % blocks[0] * WORKGROUP + within % of_block[0] * warp[0],
             block / blocks[0] * WORKGROUP + within / of_block[0] * warp[1],
         ];
-        let pixel = [corner[0] + lane % warp[0], corner[1] + lane / warp[0]];
+        let place = [corner[0] + lane % warp[0], corner[1] + lane / warp[0]];
+        let pixel = paired(place, stride);
         (pixel[0] < size[0] && pixel[1] < size[1]).then_some(pixel)
     };
     let pixels = |number| (0..warp[0] * warp[1]).map(|l| lane(number, l)).collect();
@@ -248,7 +256,7 @@ mod tests {
     #[test]
     fn lanes_have_the_pixels_that_the_image_kernel_gives_them() {
         // Workgroups of 8 × 8: a warp of 32 is the upper or the lower half of one.
-        let all = groups_of([20, 8], [8, 4], [1, 6]);
+        let all = groups_of([20, 8], [8, 4], [1, 6], 1);
         assert_eq!((all.len(), all[0].len()), (1, 6));
         assert_eq!(all[0][0][0], Some([0, 0]));
         assert_eq!(all[0][0][31], Some([7, 3]));
@@ -258,22 +266,27 @@ mod tests {
         assert_eq!(all[0][4].iter().flatten().count(), 16);
         assert_eq!(all[0][4][3..5], [Some([19, 0]), None]);
         // Another shape of the same size gives other neighbours.
-        assert_eq!(groups_of([20, 8], [4, 8], [1, 6])[0][0][4], Some([0, 1]));
+        assert_eq!(groups_of([20, 8], [4, 8], [1, 6], 1)[0][0][4], Some([0, 1]));
     }
 
     #[test]
     fn groups_are_spread_over_the_image_and_hold_each_warp_once_where_they_hold_all() {
-        let groups = groups_of([64, 64], [8, 4], [4, 2]);
+        let groups = groups_of([64, 64], [8, 4], [4, 2], 1);
         assert!(groups.iter().all(|group| group.len() == 2));
         let first: Vec<_> = groups.iter().map(|group| group[0][0]).collect();
         // Rows 1, 3, 5, 7 of workgroups; columns ½, ½ + φ, … of eight, without the whole part.
         let corners = [[32, 8], [0, 24], [40, 40], [16, 56]];
         assert_eq!(first, corners.map(Some));
-        for count in [[4, 32], [3, 50], [200, 1]] {
-            let all: Vec<_> = groups_of([64, 64], [8, 4], count).concat();
+        for (count, stride) in [([4, 32], 1), ([3, 50], 1), ([200, 1], 1), ([4, 32], 8)] {
+            let all: Vec<_> = groups_of([64, 64], [8, 4], count, stride).concat();
             let pixels: std::collections::BTreeSet<_> = all.iter().flatten().flatten().collect();
             assert_eq!((all.len(), pixels.len()), (128, 64 * 64), "{count:?}");
         }
+        // Sparse: lanes lie eight pixels apart, and an image that ends within a tile is held as a whole.
+        let sparse = groups_of([80, 8], [8, 4], [1, 256], 8).concat();
+        assert_eq!(sparse[0][..3], [Some([0, 0]), Some([8, 0]), Some([16, 0])]);
+        let pixels: std::collections::BTreeSet<_> = sparse.iter().flatten().flatten().collect();
+        assert_eq!(pixels.len(), 80 * 8);
     }
 
     #[test]

@@ -10,8 +10,8 @@ use std::fmt;
 const RAYS_PER_SECOND: f64 = 2e6;
 /// Seconds to compose, compile and warm up a kernel.
 const SECONDS_PER_KERNEL: f64 = 0.3;
-/// Classes of recorded rays.
-const RAY_CLASSES: u64 = 5;
+/// Classes of recorded rays that are timed, and those with shadow rays in other orders.
+const RAY_CLASSES: [u64; 2] = [5, 8];
 /// Bounces of a usual path: in a closed room paths take four to six rays, most under a sky two.
 const USUAL_BOUNCES: u32 = 2;
 
@@ -56,12 +56,13 @@ impl Estimate {
         let structures = plan.structures.len() as u64;
         let full_cells = plan.times.len() as u64;
         let kernels = 2 * structures + full_cells;
-        let warmups = RAY_CLASSES * structures + full_cells;
+        let classes = RAY_CLASSES[usize::from(experiment.gate.shadow_orders)];
+        let warmups = classes * structures + full_cells;
         Self {
             rays: errors.sum::<u64>()
                 + references.sum::<u64>()
                 + times.sum::<u64>()
-                + structures * RAY_CLASSES * recorded,
+                + structures * classes * recorded,
             kernels,
             warmup_s: warmups as f64 * f64::from(timing.min_warmup_ms) / 1e3,
         }

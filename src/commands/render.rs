@@ -6,6 +6,8 @@ use anyhow::{Result, bail};
 use clap::Args;
 use raystone::config::{Axis, Experiment};
 use raystone::image::FileFormat;
+use raystone::integrator::Order;
+use raystone::params::Choice as _;
 use raystone::run::{Registries, Rendering};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -55,6 +57,11 @@ pub struct Render {
     /// Seed [default: 1]
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
+    /// Order of the pixels: each sample in one-pass, in 16 blocks, or one pixel of each tile of 16 x 16 at a time, which
+    /// shows a coarse picture after the first of 256 passes (quad-tree); at most 256 spp, and no other picture than the first and
+    /// the last is written
+    #[arg(long, value_name = "ORDER", value_parser = parse_order)]
+    order: Option<Order>,
     #[command(flatten)]
     values: ValueArguments,
     /// Picture to write; the ending chooses the format: tone-mapped .png, or linear radiance in .exr,
@@ -76,8 +83,13 @@ impl Render {
         let plan = plan(&experiment, &[], &registries)?;
         // Only the picture is written: no folder is needed.
         let options = self.device.options(PathBuf::new(), &self.values, false);
-        let rendering =
-            raystone::run::render(&experiment, &plan, &registries, &options, &self.output)?;
+        let rendering = raystone::run::render(
+            &experiment,
+            &plan,
+            &registries,
+            &options,
+            (&self.output, self.order),
+        )?;
         super::output::tell(summary(&rendering, experiment.resolution).trim_end());
         print(&format!("{}\n", self.output.display()))?;
         Ok(ExitCode::SUCCESS)
@@ -132,15 +144,21 @@ fn summary(rendering: &Rendering, [width, height]: [u32; 2]) -> String {
             rendering.non_finite_pixels
         );
     }
+    let work = match rendering.in_order {
+        // Rays are not counted then.
+        Some(in_order) => format!(
+            "{} passes a sample took {:.1} ms in all, {:.1} ms to the first picture without a gap",
+            in_order.passes, in_order.total.wall_ms, in_order.first_picture.wall_ms,
+        ),
+        None => format!(
+            "{:.1} million rays, {:.2} Mrays/s",
+            rendering.rays as f64 / 1e6,
+            rendering.rays as f64 / 1e6 / rendering.samples_s.max(1e-9),
+        ),
+    };
     text + &format!(
-        "{} triangles, {width}×{height} pixels, {} spp: {:.1} s, first picture after {:.1} s; \
-        {:.1} million rays, {:.2} Mrays/s\n",
-        rendering.triangles,
-        rendering.spp,
-        rendering.total_s,
-        rendering.first_picture_s,
-        rendering.rays as f64 / 1e6,
-        rendering.rays as f64 / 1e6 / rendering.samples_s.max(1e-9),
+        "{} triangles, {width}×{height} pixels, {} spp: {:.1} s, first picture after {:.1} s; {work}\n",
+        rendering.triangles, rendering.spp, rendering.total_s, rendering.first_picture_s,
     )
 }
 
@@ -158,6 +176,10 @@ fn check_is_one(experiment: &Experiment) -> Result<()> {
         }
     }
     Ok(())
+}
+
+fn parse_order(text: &str) -> Result<Order, String> {
+    Order::from_name(text).ok_or_else(|| format!("must be one of {}", Order::NAMES.join(", ")))
 }
 
 pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {

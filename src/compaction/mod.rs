@@ -2,7 +2,7 @@
 //!
 //! Methods are a registry ([`CompactionRegistry`]); each records its passes over a [`Stream`]. What belongs together
 //! is told by a word per element, its flag: 0 is a hole, `k` what belongs to the `k`-th bucket. Most methods know one
-//! bucket, so that a flag says whether an element stays; a [`BucketSort`] puts several buckets one behind the other.
+//! bucket, so that a flag says whether an element stays; a [`BucketSort`] or [`RadixSorted`] puts several buckets one behind the other.
 //! How many elements there are stands on the device, and so does how many stay: nothing comes to the host in between,
 //! and [`Passes::groups_of_kept`] is what a pass over them is dispatched with.
 //!
@@ -16,6 +16,7 @@ mod bucket_sort;
 mod horn;
 mod none;
 mod passes;
+mod radix_sort;
 mod reduce_scan_scatter;
 mod registry;
 mod roger;
@@ -30,6 +31,7 @@ pub use bucket_sort::BucketSort;
 pub use horn::Horn;
 pub use none::NoCompaction;
 pub use passes::{Passes, Stream};
+pub use radix_sort::RadixSorted;
 pub use reduce_scan_scatter::ReduceScanScatter;
 pub use registry::CompactionRegistry;
 pub use roger::{Roger, Search};

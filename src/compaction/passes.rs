@@ -1,8 +1,8 @@
 //! What a compaction reads and writes, and the passes that it is made of.
 
 use crate::gpu::{
-    Bindings, Composition, Gpu, GpuError, Groups, Recording, Storage, UniformValues,
-    WORKGROUP_SIZE, grid_of,
+    Bindings, Composition, Gpu, GpuError, Groups, Pairs, RadixSort, Recording, Storage,
+    UniformValues, WORKGROUP_SIZE, grid_of,
 };
 
 /// A stream on the device, and where it is compacted to.
@@ -110,6 +110,17 @@ impl<'a> Passes<'a> {
         items: u32,
     ) -> Result<(), GpuError> {
         self.run(kernel, further, items.div_ceil(WORKGROUP_SIZE))
+    }
+
+    /// Sorts pairs of words by the lowest `bits` of the keys, and tells where they are then: see [`RadixSort::record`].
+    ///
+    /// # Errors
+    /// A kernel does not compose or compile.
+    pub fn sort(&mut self, pairs: &Pairs, bits: u32) -> Result<Pairs, GpuError> {
+        let sort = RadixSort::new(self.gpu)?;
+        self.runs += RadixSort::passes(bits);
+        self.scratch_bytes += RadixSort::scratch_bytes(pairs.count);
+        Ok(sort.record(self.recording, pairs, bits))
     }
 }
 

@@ -1,8 +1,8 @@
 //! The registry of compactions: one line each.
 
 use super::{
-    Atomic, Blelloch, BucketSort, Compaction, Horn, NoCompaction, ReduceScanScatter, Roger,
-    Subgroup, Workgroup,
+    Atomic, Blelloch, BucketSort, Compaction, Horn, NoCompaction, RadixSorted, ReduceScanScatter,
+    Roger, Subgroup, Workgroup,
 };
 use crate::params::{Parameters, Registered, Registry, Variant};
 use crate::text::nearest;
@@ -24,6 +24,7 @@ impl Default for CompactionRegistry {
             Registered::compaction::<Blelloch>("blelloch"),
             Registered::compaction::<Roger>("roger"),
             Registered::compaction::<BucketSort>("bucket-sort"),
+            Registered::compaction::<RadixSorted>("radix-sort"),
         ]))
     }
 }

@@ -169,6 +169,8 @@ pub struct Timing {
     pub max_warmup_ms: u32,
     /// Rays per class and dispatch.
     pub rays: u32,
+    /// Whether full cells are also rendered in orders of passes.
+    pub orders: bool,
 }
 
 /// How much the gate checks.
@@ -185,6 +187,8 @@ pub struct Gate {
     /// Distance from their surface at which recorded rays start, scene units; 0 is 1e-5 of the
     /// scene's diagonal.
     pub offset: f32,
+    /// Whether shadow rays are recorded from their lights and light by light, too.
+    pub shadow_orders: bool,
 }
 
 /// Which star discrepancies are taken.

@@ -347,6 +347,7 @@ impl<'t> Reader<'t> {
             min_warmup_ms: section.unsigned("min_warmup_ms")?,
             max_warmup_ms: section.unsigned("max_warmup_ms")?,
             rays: section.unsigned("rays")?,
+            orders: section.flag("orders")?,
         };
         if timing.max_warmup_ms < timing.min_warmup_ms {
             let expected = "at least `timing.min_warmup_ms`";
@@ -363,6 +364,7 @@ impl<'t> Reader<'t> {
             oracle_rays: section.unsigned("oracle_rays")?,
             ao_length: section.number("ao_length")? as f32,
             offset: section.number("offset")? as f32,
+            shadow_orders: section.flag("shadow_orders")?,
         })
     }
 

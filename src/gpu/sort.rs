@@ -54,6 +54,17 @@ impl RadixSort {
         })
     }
 
+    /// Kernels that [`RadixSort::record`] runs.
+    pub fn passes(bits: u32) -> u32 {
+        3 * bits.div_ceil(DIGIT_BITS)
+    }
+
+    /// Bytes of scratch that it takes for so many pairs.
+    pub fn scratch_bytes(count: u32) -> u64 {
+        let counts = BINS * count.div_ceil(TILE);
+        4 * (2 * u64::from(count) + u64::from(counts) + u64::from(BINS))
+    }
+
     /// Sorts by the lowest `bits` of the keys, in whole digits of eight, ascending; what is equal stays in order. Tells where the sorted
     /// pairs are then: in the buffers given, or in scratch. Times are told under `sort count`, `sort offsets` and
     /// `sort scatter`.

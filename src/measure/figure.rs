@@ -119,11 +119,12 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 115] = [
+pub static FIGURES: [Figure; 121] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
     Figure::new("hit-share/v1", "hit", "", Neither, Percent, Exact),
+    Figure::new("unlike-shadow/v1", "unlike the shadow ray", "per million", Neither, THREE, Exact),
     Figure::new("nodes-per-ray/v1", "nodes/ray", "", Lower, THREE, Exact),
     Figure::new("box-tests-per-ray/v1", "box tests/ray", "", Lower, THREE, Exact),
     Figure::new("triangle-tests-per-ray/v1", "triangle tests/ray", "", Lower, THREE, Exact),
@@ -149,6 +150,10 @@ pub static FIGURES: [Figure; 115] = [
     Figure::new("ray-query-share/v1", "time in ray queries", "", Neither, Percent, Exact),
     Figure::new("against-single-kernel/v1", "time over that of single-kernel", "", Lower, THREE, Median),
     Figure::new("cell-mrays-per-s/v1", "speed of the whole cell", "Mrays/s", Higher, THREE, Median),
+    Figure::new("order-passes/v1", "passes per sample", "", Neither, Count, Exact),
+    Figure::new("order-ms/v1", "time per sample per pixel", "ms", Lower, THREE, Median),
+    Figure::new("order-ratio/v1", "over one pass", "", Lower, THREE, Single),
+    Figure::new("first-picture-ms/v1", "time to the first picture", "ms", Lower, THREE, Median),
     Figure::new("specialisation/v1", "time over that of the specialised kernel", "", Neither, THREE, Mean),
     Figure::new("time-to-image/v1", "build and rendering", "ms", Lower, THREE, Single),
     Figure::new("error-seconds/v1", "unbiased relMSE × seconds", "", Lower, THREE, Jackknife),
@@ -188,6 +193,7 @@ pub static FIGURES: [Figure; 115] = [
     Figure::new("bias-weighted-freedom/v1", "its degrees of freedom", "", Neither, THREE, Exact),
     Figure::new("bias-detectable/v1", "bias found in 90 % of cases", "%", Lower, Digits(2), Exact),
     Figure::new("low-frequency-power/v1", "low-frequency power", "", Lower, THREE, Mean),
+    Figure::new("loudest-wave/v1", "loudest wave", "", Lower, THREE, Mean),
     Figure::new("neighbour-correlation/v1", "correlation", "", Lower, THREE, Mean),
     Figure::new("luminance-rmse/v1", "RMSE", "", Lower, THREE, Single),
     Figure::new("filtered-share/v1", "share of the RMSE after a filter", "", Lower, Percent, Single),

@@ -113,6 +113,7 @@ impl Judge {
             class: set.class,
             rays: set.rays.iter().step_by(every).copied().collect(),
             truth: set.truth.iter().step_by(every).copied().collect(),
+            shadow: Vec::new(),
         };
         Self {
             sets: self.sets.iter().map(thin).collect(),

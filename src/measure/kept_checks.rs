@@ -157,6 +157,7 @@ mod tests {
             class: RayClass::Chord,
             truth: vec![Hit::miss(&ray)],
             rays: vec![ray],
+            shadow: Vec::new(),
         };
         Judge {
             brute_force: checked.clone(),
@@ -171,6 +172,7 @@ mod tests {
         oracle_rays: 1,
         ao_length: 0.0,
         offset: 0.0,
+        shadow_orders: false,
     };
 
     fn place(folder: &Path, judge: &Judge, gate: &Gate) -> KeptChecks {

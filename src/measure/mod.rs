@@ -23,6 +23,7 @@ pub mod rays;
 pub mod record;
 pub mod replicates;
 pub mod sampler_cost;
+pub mod shadow_rays;
 mod shown;
 pub mod spectrum;
 pub mod statistics;

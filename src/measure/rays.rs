@@ -6,6 +6,7 @@
 
 use super::hard_rays::hard_rays;
 use super::record::RayClass;
+use super::shadow_rays::{Segment, lights_of, other_orders};
 use crate::accel::{Counters, CpuTwin, Hit, NO_HIT, Query, Ray, TriangleSoup};
 use crate::config::Gate;
 use crate::geometry::Camera;
@@ -29,6 +30,9 @@ pub struct RaySet {
     pub rays: Vec<Ray>,
     /// The judge's nearest hits.
     pub truth: Vec<Hit>,
+    /// For each the place of the ray of [`RayClass::Shadow`] between the same ends; empty for classes that are not made
+    /// from these.
+    pub shadow: Vec<u32>,
 }
 
 impl RaySet {
@@ -37,7 +41,12 @@ impl RaySet {
             .par_iter()
             .map(|ray| judge.closest_hit(ray, &mut Counters::default()))
             .collect();
-        Self { class, rays, truth }
+        Self {
+            class,
+            rays,
+            truth,
+            shadow: Vec::new(),
+        }
     }
 
     /// The hard rays of the scene.
@@ -47,7 +56,10 @@ impl RaySet {
 
     /// The same rays with the answers of another judge.
     pub fn judged_by(&self, judge: &dyn CpuTwin) -> Self {
-        Self::new(self.class, self.rays.clone(), judge)
+        Self {
+            shadow: self.shadow.clone(),
+            ..Self::new(self.class, self.rays.clone(), judge)
+        }
     }
 
     /// Whether the class is timed.
@@ -63,8 +75,14 @@ impl RaySet {
     /// What the class asks.
     pub fn query(&self) -> Query {
         match self.class {
-            RayClass::Shadow | RayClass::Ao => Query::Any,
-            _ => Query::Closest,
+            RayClass::Shadow
+            | RayClass::ShadowReversed
+            | RayClass::ShadowClustered
+            | RayClass::ShadowReversedClustered
+            | RayClass::Ao => Query::Any,
+            RayClass::Primary | RayClass::Bounce | RayClass::Chord | RayClass::Hard => {
+                Query::Closest
+            }
         }
     }
 
@@ -151,12 +169,17 @@ pub fn record_rays(
                 .take(primary.rays.len())
                 .map(|&(p, n)| (p + n * offset, n))
         };
-        let shadow = starts().map(|(p, _)| {
-            let target = light_point(scene, &emitters, &bounds, &mut random);
-            // A little short of the emitter, which must not shadow itself.
-            Ray::new(p, target - p).between(0.0, 0.9999)
+        let lights = lights_of(scene, &emitters);
+        let segments = starts().map(|(surface, _)| {
+            let (light, emitter) = light_point(scene, &emitters, &bounds, &mut random);
+            Segment {
+                surface,
+                light,
+                number: emitter.map_or(0, |place| lights[place]),
+            }
         });
-        let shadow = shadow.collect();
+        let segments: Vec<Segment> = segments.collect();
+        let shadow = segments.iter().map(Segment::forward).collect();
         let ao = starts()
             .map(|(p, n)| Ray::new(p, cosine_direction(n, &mut random)).between(0.0, ao_length))
             .collect();
@@ -164,6 +187,9 @@ pub fn record_rays(
             .map(|(p, n)| Ray::new(p, cosine_direction(n, &mut random)))
             .collect();
         sets.push(RaySet::new(RayClass::Shadow, shadow, judge));
+        if settings.shadow_orders {
+            sets.extend(other_orders(&segments, judge));
+        }
         sets.push(RaySet::new(RayClass::Ao, ao, judge));
         sets.push(RaySet::new(RayClass::Bounce, bounce, judge));
     }
@@ -190,20 +216,26 @@ pub fn record_rays(
     sets
 }
 
-/// A point on a random emissive triangle, or on the bounding sphere of a scene without any.
-fn light_point(scene: &SceneData, emitters: &[u32], bounds: &Bounds, random: &mut Pcg32) -> Vec3 {
+/// A point on a random emissive triangle with its place among them, or on the bounding sphere of a scene without any.
+fn light_point(
+    scene: &SceneData,
+    emitters: &[u32],
+    bounds: &Bounds,
+    random: &mut Pcg32,
+) -> (Vec3, Option<usize>) {
     let (u, v) = (random.uniform() as f32, random.uniform() as f32);
     if emitters.is_empty() {
         let z = 1.0 - 2.0 * u;
         let radius = (1.0 - z * z).max(0.0).sqrt();
         let angle = std::f32::consts::TAU * v;
-        return bounds.center()
-            + bounds.radius() * Vec3::new(radius * angle.cos(), radius * angle.sin(), z);
+        let direction = Vec3::new(radius * angle.cos(), radius * angle.sin(), z);
+        return (bounds.center() + bounds.radius() * direction, None);
     }
-    let chosen = emitters[random.below(emitters.len())];
-    let [a, b, c] = scene.triangles[chosen as usize].vertices;
+    let chosen = random.below(emitters.len());
+    let [a, b, c] = scene.triangles[emitters[chosen] as usize].vertices;
     let root = u.sqrt();
-    a + (b - a) * (root * (1.0 - v)) + (c - a) * (root * v)
+    let point = a + (b - a) * (root * (1.0 - v)) + (c - a) * (root * v);
+    (point, Some(chosen))
 }
 
 fn cosine_direction(n: Vec3, random: &mut Pcg32) -> Vec3 {

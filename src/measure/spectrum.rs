@@ -31,6 +31,9 @@ pub struct ErrorSpectrum {
     pub variance: f64,
     /// Mean power up to [`LOW_FREQUENCY`]; white noise has 1.
     pub low_frequency: Option<f64>,
+    /// Power of the loudest wave, any frequency but 0; n pixels of white noise have about ln(n/2) + 0.58. What repeats
+    /// itself, or is the same everywhere, is loud.
+    pub loudest: Option<f64>,
     /// Correlation of the error with that of the pixel to the right or below, −1 to 1; white noise has 0.
     pub autocorrelation: Option<f64>,
     /// Root mean square of the error after a Gaussian filter of each of [`SIGMAS`], mean error included.
@@ -62,6 +65,7 @@ pub fn error_spectrum(error: &[f64], [width, height]: [usize; 2]) -> ErrorSpectr
         power: Vec::new(),
         variance: squares / n,
         low_frequency: None,
+        loudest: None,
         autocorrelation: None,
         filtered: filtered.to_vec(),
     };
@@ -71,12 +75,16 @@ pub fn error_spectrum(error: &[f64], [width, height]: [usize; 2]) -> ErrorSpectr
     // Parseval: the powers of all frequencies but 0 have the mean 1.
     let scale = (n - 1.0) / (n * squares);
     let mut rings = Rings::new(width.min(height));
+    let mut loudest = 0.0_f64;
     for (index, value) in fourier(&rest, width).iter().enumerate().skip(1) {
         let cycles = |k: usize, size: usize| k.min(size - k) as f64 / size as f64;
         let frequency = cycles(index % width, width).hypot(cycles(index / width, height));
         let [re, im] = value;
-        rings.add(frequency, (re * re + im * im) * scale);
+        let power = (re * re + im * im) * scale;
+        rings.add(frequency, power);
+        loudest = loudest.max(power);
     }
+    found.loudest = Some(loudest);
     found.power = rings.means();
     found.low_frequency = (rings.low[1] > 0.0).then(|| rings.low[0] / rings.low[1]);
     found.autocorrelation = autocorrelation(&rest, width, squares / n);
@@ -305,6 +313,10 @@ mod tests {
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
         assert!((mean(&low) - 1.0).abs() < 0.06, "{low:?}");
         assert!(mean(&lag).abs() < 0.01, "{lag:?}");
+        // The greatest of n/2 exponential variates.
+        let loudest: Vec<f64> = spectra.iter().filter_map(|s| s.loudest).collect();
+        let expected = (0.5 * (SIZE[0] * SIZE[1]) as f64).ln() + 0.5772;
+        assert!((mean(&loudest) - expected).abs() < 1.0, "{loudest:?}");
         // A Gaussian leaves 1 / (2 σ √π) of white noise, but for borders.
         let filtered = mean_filtered(&spectra);
         let share = filtered[3].rmse.value / filtered[0].rmse.value;
@@ -357,6 +369,20 @@ mod tests {
             loud.len() == 1 && (loud[0].0 - 0.125).abs() < 1.0 / 64.0,
             "{loud:?}"
         );
+        // A wave and its mirror image share all power.
+        let all = (96.0 * 64.0 - 1.0) / 2.0;
+        assert!(
+            found
+                .loudest
+                .is_some_and(|loudest| (loudest / all - 1.0).abs() < 1e-9)
+        );
+        // Noise that repeats itself every eight pixels: 63 waves share it.
+        let noise = white(&mut Pcg32::new(9));
+        let tiled: Vec<f64> = (0..96 * 64)
+            .map(|i| noise[i / 96 % 8 * 8 + i % 8])
+            .collect();
+        let tiled = error_spectrum(&tiled, SIZE).loudest;
+        assert!(tiled.is_some_and(|loudest| loudest > 96.0), "{tiled:?}");
         let blurred = gaussian(&white(&mut Pcg32::new(8)), 96, 2.0);
         let found = error_spectrum(&blurred, SIZE);
         assert!(found.low_frequency.is_some_and(|low| low > 4.0));

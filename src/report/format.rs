@@ -141,6 +141,9 @@ pub fn ray_class(class: RayClass) -> &'static str {
     match class {
         RayClass::Primary => "primary",
         RayClass::Shadow => "shadow",
+        RayClass::ShadowReversed => "shadow, reversed",
+        RayClass::ShadowClustered => "shadow, clustered",
+        RayClass::ShadowReversedClustered => "shadow, reversed and clustered",
         RayClass::Ao => "ambient occlusion",
         RayClass::Bounce => "bounce",
         RayClass::Chord => "chord",

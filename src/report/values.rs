@@ -103,6 +103,15 @@ pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
     values
 }
 
+/// Coherence of recorded rays, class by class.
+fn of_classes(key: &Key, coherence: &ClassCoherence) -> Vec<Value<'static>> {
+    let of_class = |(class, tally): &(RayClass, Tally)| {
+        let key = key.clone().with(axis::RAYS, format::ray_class(*class));
+        Value::known(&key, tally.figures(coherence.settings.line_bytes))
+    };
+    coherence.classes.iter().flat_map(of_class).collect()
+}
+
 /// Figures of all structures of a scene; those without a fault also have speeds.
 pub fn of_structures<'a>(data: &RunData<'a>, scene: &SceneGroup<'a>) -> Vec<Value<'a>> {
     let triangles = scene.record.map_or(0, |record| record.triangles);
@@ -113,6 +122,7 @@ pub fn of_structures<'a>(data: &RunData<'a>, scene: &SceneGroup<'a>) -> Vec<Valu
         }
         if s.fault().is_none() {
             values.extend(s.timings.iter().flat_map(|timing| of_rays(&s.key, timing)));
+            values.extend(s.coherence.iter().flat_map(|c| of_classes(&s.key, c)));
         }
         values.extend(s.body.figures.iter().map(|(id, value)| Value {
             key: s.key.clone(),
@@ -172,12 +182,16 @@ fn of_build(key: &Key, s: &StructureRecord, triangles: usize) -> Vec<Value<'stat
 fn of_rays(key: &Key, timing: &ClassTiming) -> Vec<Value<'static>> {
     let key = (key.clone()).with(axis::RAYS, format::ray_class(timing.class));
     let work = timing.counters;
+    let unlike = timing
+        .unlike_shadow
+        .map(|rays| 1e6 * rays as f64 / timing.rays.max(1) as f64);
     let mut values = vec![Value::new(&key, "mrays-per-s/v1", timing.mrays_s)];
     values.extend(Value::known(
         &key,
         [
             ("rays/v1", Some(timing.rays as f64)),
             ("hit-share/v1", Some(timing.hit_fraction)),
+            ("unlike-shadow/v1", unlike),
             ("nodes-per-ray/v1", work.map(|w| w.nodes)),
             ("box-tests-per-ray/v1", work.map(|w| w.box_tests)),
             ("triangle-tests-per-ray/v1", work.map(|w| w.triangle_tests)),
@@ -225,6 +239,7 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
             ),
         ];
         values.extend(Value::known(&time.key, figures));
+        values.extend(of_orders(&time.key, time));
     }
     values.extend(view.coherence.iter().flat_map(|c| of_coherence(&c.key, c)));
     let reference = view.reference.iter();
@@ -235,6 +250,27 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
     values.extend(kernels::gains(scene, view));
     values.extend(organisations::against_single(scene, view));
     values
+}
+
+/// Times of a cell in orders of passes.
+fn of_orders(key: &Key, time: &TimeRecord) -> Vec<Value<'static>> {
+    let one_pass = time.orders.first().and_then(|at| at.ms_per_spp);
+    let of_order = |at: &OrderTime| {
+        let key = key.clone().with(axis::SUBJECT, &at.order);
+        let ratio = at
+            .ms_per_spp
+            .zip(one_pass)
+            .map(|(ms, one)| ms.value / one.value);
+        let passes = at.passes as f64;
+        let figures = [
+            ("order-passes/v1", Some(Interval::exact(passes))),
+            ("order-ms/v1", at.ms_per_spp),
+            ("order-ratio/v1", ratio.map(Interval::exact)),
+            ("first-picture-ms/v1", at.first_picture_ms),
+        ];
+        Value::known(&key, figures)
+    };
+    time.orders.iter().flat_map(of_order).collect()
 }
 
 /// What stands on the axis of rays for all of them.
@@ -292,6 +328,7 @@ fn of_spectrum(key: &Key, spectrum: &SpectrumRecord) -> Vec<Value<'static>> {
         key,
         [
             ("low-frequency-power/v1", spectrum.low_frequency),
+            ("loudest-wave/v1", spectrum.loudest),
             ("neighbour-correlation/v1", spectrum.autocorrelation),
             ("luminance-rmse/v1", before.map(Interval::exact)),
         ],

@@ -7,11 +7,12 @@ use super::structures::Gated;
 use super::world::World;
 use crate::accel::{BuildLog, CpuTwin};
 use crate::coherence::{
-    Machine, Memory, Organisation, RayClass, Rays, View, groups_of, run as run_model,
+    Machine, Memory, Organisation, RayClass, Rays, View, groups_of, of_rays, run as run_model,
 };
 use crate::config::{Axis, Cell, Coherence, Skipped};
 use crate::measure::path_oracle::{self, PathOracle};
-use crate::measure::record::{Body, CoherenceAt, CoherenceRecord, Key, Line, Ran};
+use crate::measure::rays::RaySet;
+use crate::measure::record::{Body, ClassCoherence, CoherenceAt, CoherenceRecord, Key, Line, Ran};
 use std::collections::BTreeMap;
 
 /// What does not depend on the structure.
@@ -84,47 +85,84 @@ fn of_structure(
     cells: &[&Cell],
     (settings, known): (&Coherence, &mut Known),
 ) -> Vec<Result<CoherenceRecord, String>> {
-    let none = |reason: String| vec![Err(reason); cells.len()];
+    let records = with_twin(session, world, structure, |session, twin, memory| {
+        let of_cell =
+            |cell: &&Cell| of_cell(session, world, cell, (twin, memory), (settings, known));
+        Ok(cells.iter().map(of_cell).collect())
+    });
+    records.unwrap_or_else(|reason| vec![Err(reason); cells.len()])
+}
+
+/// Something about the twin of a structure, which is built anew, and the memory that it reads.
+fn with_twin<T>(
+    session: &mut Session,
+    world: &World,
+    structure: &Gated,
+    then: impl FnOnce(&mut Session, &dyn CpuTwin, &Memory) -> Result<T, String>,
+) -> Result<T, String> {
     if !structure.cell[Axis::Kernels].name.is_empty() {
-        return none("its twin is that of the embedded kernels".to_owned());
+        return Err("its twin is that of the embedded kernels".to_owned());
     }
     let accel = &structure.cell[Axis::Accel];
-    let built = session.registries.accel.named("structure", &accel.name);
-    let built = built.and_then(|kind| {
-        let mut log = BuildLog::with_gpu(world.gpu);
-        let built =
-            (session.clock).time("build", || kind.build(&world.soup, &accel.params, &mut log));
-        built.map_err(|e| e.to_string())
-    });
-    let built = match built {
-        Ok(built) => built,
-        Err(reason) => return none(reason),
-    };
-    let Some(twin) = built.cpu_twin(&world.soup) else {
-        return none("it has no twin on the host".to_owned());
-    };
-    let memory = match Memory::new(&*built, &world.soup) {
-        Ok(memory) => memory,
-        Err(reason) => return none(reason),
-    };
-    let records = cells.iter().map(|cell| {
-        session.say(name(cell));
-        let sampler = cell.on(&Cell::SAMPLER).to_string();
-        if !known.rays.contains_key(&sampler) {
-            let rays = rays(session, world, cell, (settings, known.oracle.as_ref()?))?;
-            known.rays.insert(sampler.clone(), rays);
-        }
-        let rays = &known.rays[&sampler];
-        let timed_spp = super::times::samples(session);
-        let modelled = || modelled(rays, &*twin, &memory, settings);
-        let at = session.clock.time("coherence", modelled)?;
-        Ok(CoherenceRecord {
+    let kind = session.registries.accel.named("structure", &accel.name)?;
+    let mut log = BuildLog::with_gpu(world.gpu);
+    let built = (session.clock).time("build", || kind.build(&world.soup, &accel.params, &mut log));
+    let built = built.map_err(|e| e.to_string())?;
+    let twin = built.cpu_twin(&world.soup);
+    let twin = twin.ok_or("it has no twin on the host")?;
+    let memory = Memory::new(&*built, &world.soup)?;
+    then(session, &*twin, &memory)
+}
+
+/// Coherence of the recorded rays, in the order in which they are traced.
+///
+/// # Errors
+/// The structure has no twin that tells what it reads, in words.
+pub(super) fn of_recorded_rays(
+    session: &mut Session,
+    world: &World,
+    structure: &Gated,
+    settings: &Coherence,
+) -> Result<ClassCoherence, String> {
+    let sets = &world.judge.of(structure.traced.space).sets;
+    with_twin(session, world, structure, |session, twin, memory| {
+        let timed = sets.iter().filter(|set| set.is_timed());
+        let of_set = |set: &RaySet| {
+            let tally = of_rays(&set.rays, set.query(), (twin, memory), settings)?;
+            Ok::<_, String>((set.class, tally))
+        };
+        let classes = session
+            .clock
+            .time("coherence", || timed.map(of_set).collect::<Result<_, _>>())?;
+        Ok(ClassCoherence {
             settings: settings.clone(),
-            timed_spp,
-            at,
+            classes,
         })
-    });
-    records.collect()
+    })
+}
+
+fn of_cell(
+    session: &mut Session,
+    world: &World,
+    cell: &Cell,
+    (twin, memory): (&dyn CpuTwin, &Memory),
+    (settings, known): (&Coherence, &mut Known),
+) -> Result<CoherenceRecord, String> {
+    session.say(name(cell));
+    let sampler = cell.on(&Cell::SAMPLER).to_string();
+    if !known.rays.contains_key(&sampler) {
+        let rays = rays(session, world, cell, (settings, known.oracle.as_ref()?))?;
+        known.rays.insert(sampler.clone(), rays);
+    }
+    let rays = &known.rays[&sampler];
+    let timed_spp = super::times::samples(session);
+    let modelled = || modelled(rays, twin, memory, settings);
+    let at = session.clock.time("coherence", modelled)?;
+    Ok(CoherenceRecord {
+        settings: settings.clone(),
+        timed_spp,
+        at,
+    })
 }
 
 /// The rays of a cell, for each number of samples per pixel.
@@ -135,12 +173,13 @@ fn rays(
     (settings, oracle): (&Coherence, &PathOracle),
 ) -> Result<Vec<(u32, Rays)>, String> {
     let size = settings.resolution;
-    let groups = groups_of(size, settings.warp, [settings.groups, settings.warps]);
     let seed = session.experiment.seeds().replicates.first().copied();
     let bounds = world.scene.bounds();
     let mut all = Vec::new();
     for &spp in &settings.spp {
         let estimator = Estimator::for_width(session, cell, spp, size[0])?;
+        let count = [settings.groups, settings.warps];
+        let groups = groups_of(size, settings.warp, count, estimator.sampler.stride());
         let image = path_oracle::View {
             estimator: path_oracle::Estimator::of(&estimator.integrator)?,
             camera: world.camera,

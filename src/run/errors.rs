@@ -386,6 +386,7 @@ fn spectrum_record(
         replicates: spectra.len(),
         power: mean_power(&spectra),
         low_frequency: mean(|s| s.low_frequency),
+        loudest: mean(|s| s.loudest),
         autocorrelation: mean(|s| s.autocorrelation),
         filtered: mean_filtered(&spectra),
     })

@@ -11,6 +11,7 @@ mod folder;
 mod images;
 mod kernels;
 mod known_images;
+mod orders;
 mod paths;
 mod reference;
 mod reference_cache;

@@ -9,7 +9,9 @@ use crate::accel::{AccelError, TriangleSoup};
 use crate::config::{Axis, Experiment, Plan};
 use crate::gpu::probe_arithmetic;
 use crate::image::{FileFormat, Image};
-use crate::integrator::{Renderer, Stage, StageError, TRACED_CLASSES, Traced};
+use crate::integrator::{
+    InOrder, Order, PartRenderer, Renderer, Stage, StageError, TRACED_CLASSES, Traced,
+};
 use crate::params::Variant;
 use crate::scene::{self, LoadOptions, LoadReport};
 use indicatif::ProgressStyle;
@@ -40,11 +42,13 @@ pub struct Rendering {
     pub report: LoadReport,
     /// Pixels that are NaN or infinite: a fault of the renderer.
     pub non_finite_pixels: usize,
+    /// Where pixels were taken in an order of passes: how long that took.
+    pub in_order: Option<InOrder>,
 }
 
 /// Renders the first scene, structure, sampler and integrator of the axes at `experiment.spp.max()`
 /// samples into `file`, whose ending chooses the format. The file is there after the first sample
-/// and is written again while more are added.
+/// and is written again while more are added; in an order of passes it is there as soon as no pixel is without a colour.
 ///
 /// # Errors
 /// An unknown ending, no adapter, a scene that does not load, a structure that cannot be built or is
@@ -54,7 +58,7 @@ pub fn render(
     plan: &Plan,
     registries: &Registries,
     options: &RunOptions,
-    file: &Path,
+    (file, order): (&Path, Option<Order>),
 ) -> Result<Rendering, RunError> {
     let start = Instant::now();
     let format = FileFormat::of(file).map_err(input)?;
@@ -93,7 +97,6 @@ pub fn render(
         return Err(RunError::Input(format!("{accel}: {reason}")));
     }
     let job = estimator.job(&session, camera, true);
-    let renderer = Renderer::new(gpu, &stage.buffers, &traced, &job, true)?;
     let mut rendering = Rendering {
         triangles: scene.triangles.len(),
         spp,
@@ -103,18 +106,31 @@ pub fn render(
         rays: 0,
         report: scene.report.clone(),
         non_finite_pixels: 0,
+        in_order: None,
     };
-    let compiled = Instant::now();
-    let image = add_all_samples(&session, &renderer, spp, |image, done| {
+    let mut show = |image: &Image, done: u32| {
         if rendering.first_picture_s == 0.0 {
             rendering.first_picture_s = start.elapsed().as_secs_f64();
         }
         let sampler = estimator.sampler.label();
         let about = attributes(cell, &sampler, done, experiment.seed);
         format.write(file, image, &about).map_err(input)
-    })?;
+    };
+    let compiled;
+    let image = if let Some(order) = order {
+        let renderer = PartRenderer::new(gpu, &stage.buffers, &traced, &job)?;
+        compiled = Instant::now();
+        let (image, spent) = add_in_order(&renderer, order, (spp, experiment.seed), &mut show)?;
+        rendering.in_order = Some(spent);
+        image
+    } else {
+        let renderer = Renderer::new(gpu, &stage.buffers, &traced, &job, true)?;
+        compiled = Instant::now();
+        let image = add_all_samples(&session, &renderer, spp, &mut show)?;
+        rendering.rays = renderer.ray_counts()?[..TRACED_CLASSES].iter().sum();
+        image
+    };
     rendering.samples_s = compiled.elapsed().as_secs_f64();
-    rendering.rays = renderer.ray_counts()?[..TRACED_CLASSES].iter().sum();
     rendering.non_finite_pixels = image.non_finite_pixels();
     rendering.total_s = start.elapsed().as_secs_f64();
     session.progress.finish_and_clear();
@@ -136,6 +152,22 @@ fn build(session: &Session, stage: &Stage, accel: &Variant) -> Result<Traced, Ru
         }
         error => input(error),
     })
+}
+
+/// Adds `spp` samples pass by pass. `show` gets the first picture without a gap, and the last.
+fn add_in_order(
+    renderer: &PartRenderer,
+    order: Order,
+    (spp, seed): (u32, u32),
+    mut show: impl FnMut(&Image, u32) -> Result<(), RunError>,
+) -> Result<(Image, InOrder), RunError> {
+    let spent = renderer.render(order, (spp, seed), |renderer| match renderer.preview()? {
+        Some(preview) => show(&preview, 1),
+        None => Ok(()),
+    })?;
+    let image = renderer.image(spp)?;
+    show(&image, spp)?;
+    Ok((image, spent))
 }
 
 /// Adds `spp` samples in steps of about [`STEP`]. `show` gets the image and its samples after the first, whenever the

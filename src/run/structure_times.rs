@@ -12,6 +12,7 @@ use crate::image::{Picture, viridis};
 use crate::measure::gate::timed_fault;
 use crate::measure::rays::{RaySet, primary_pixels, primary_rays};
 use crate::measure::record::{ClassTiming, CountersPerRay};
+use crate::measure::shadow_rays::unlike_shadow;
 use crate::measure::timing::{
     Measured, Samples, Watch, empty_ms, interleave, millions_per_second, without_overhead,
 };
@@ -160,6 +161,7 @@ fn class_timing(
         class: set.class,
         rays: set.rays.len(),
         hit_fraction: set.hit_fraction(),
+        unlike_shadow: unlike_shadow(set, &world.judge.of(one.traced.space).sets),
         ms,
         wall_ms: samples.wall_ms,
         mrays_s,

@@ -203,6 +203,7 @@ fn empty_record(cell: &Cell, runtime_checks: bool) -> Line<StructureRecord> {
         figures: Default::default(),
         gate: None,
         timings: Vec::new(),
+        coherence: None,
         heat_map: None,
         heat_map_max: None,
         failure: None,
@@ -246,7 +247,14 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
     }
     drop(last);
     let gated = time_all(session, world, gated)?;
-    let gated = draw_heat_maps(session, world, gated)?;
+    let mut gated = draw_heat_maps(session, world, gated)?;
+    if let Some(settings) = session.experiment.coherence.clone() {
+        for structure in &mut gated {
+            let modelled = super::coherence::of_recorded_rays(session, world, structure, &settings);
+            // Why there is none is told of its cells.
+            structure.record.body.coherence = modelled.ok();
+        }
+    }
     for structure in &gated {
         let cell = structure.cell.to_string();
         if !session.is_done(&cell) {

@@ -95,6 +95,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             Err(error) => Err(error.to_string()),
             Ok(samples) => finish(session, world, structure, item, samples, &mut shared),
         };
+        let record = record.and_then(|line| with_orders(session, world, structure, item, line));
         match record {
             Ok(record) => write(session, world, item, record)?,
             Err(reason) => fail(session, &item.cell, reason)?,
@@ -288,6 +289,22 @@ fn median_stages(measured: &[BTreeMap<String, f64>]) -> BTreeMap<String, f64> {
     }
 }
 
+/// The record with the times of orders, where the experiment asks for them: they are dispatches of the single kernel.
+fn with_orders(
+    session: &mut Session,
+    world: &World,
+    structure: Option<&Gated>,
+    item: &Timed,
+    mut line: Line<TimeRecord>,
+) -> Result<Line<TimeRecord>, String> {
+    let is_single = !item.cell.is_unusual(Axis::Organisation);
+    if let Some(structure) = structure.filter(|_| is_single && line.body.failure.is_none()) {
+        let of_image = (&item.cell, &*line.body.image_hash);
+        line.body.orders = super::orders::of_cell(session, world, structure, of_image)?;
+    }
+    Ok(line)
+}
+
 /// Rays per class, from a separate counting run of the same seed, and the hash of its image.
 fn count_rays(
     session: &mut Session,
@@ -323,6 +340,7 @@ fn empty_record(session: &Session, cell: &Cell, failure: String) -> Line<TimeRec
         live_paths: Vec::new(),
         stages: BTreeMap::new(),
         mrays_s: None,
+        orders: Vec::new(),
         image_hash: String::new(),
         image_equal: false,
         failure: Some(failure),

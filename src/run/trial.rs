@@ -23,6 +23,7 @@ const GATE: Gate = Gate {
     oracle_rays: 512,
     ao_length: 0.0,
     offset: 0.0,
+    shadow_orders: false,
 };
 /// Brute force takes each of so many rays.
 const EVERY: usize = 8;

@@ -33,6 +33,7 @@ mod r2;
 mod radical_inverse;
 mod rank1_lattice;
 mod registry;
+mod seeding;
 mod sequence;
 mod sobol;
 mod state;
@@ -61,7 +62,8 @@ pub use pmj02::Pmj02;
 pub use r2::R2;
 pub use rank1_lattice::Rank1Lattice;
 pub use registry::SamplerRegistry;
-pub use sequence::{Facts, Seeded, Seeding, Sequence};
+pub use seeding::{STRIDE, Seeded, Seeding, paired};
+pub use sequence::{Facts, Sequence};
 pub use sobol::Sobol;
 pub use state::{Coordinate, SamplerTable};
 pub use van_der_corput::VanDerCorput;
@@ -95,8 +97,8 @@ pub struct Sampler {
     pub demand: Demand,
     /// The words of both.
     pub table: SamplerTable,
-    /// Whether all pixels draw the same from the sequence and from the decorrelation.
-    shared_by_pixels: [bool; 2],
+    /// Which pixels draw the same from the sequence and from the decorrelation.
+    seeding: [Seeding; 2],
 }
 
 impl Sampler {
@@ -133,12 +135,18 @@ impl Sampler {
 
     /// Constants of `package::active::constants`.
     pub fn constants(&self) -> Vec<(&'static str, u32)> {
-        let [sequence, decorrelation] = self.shared_by_pixels.map(u32::from);
+        let [sequence, decorrelation] = self.seeding.map(Seeding::number);
         let mut out = self.sequence.constants();
         out.extend(self.decorrelation.constants());
-        out.push(("SHARED_SEQUENCE", sequence));
-        out.push(("SHARED_DECORRELATION", decorrelation));
+        out.push(("SEQUENCE_SEEDING", sequence));
+        out.push(("DECORRELATION_SEEDING", decorrelation));
         out
+    }
+
+    /// How far the pixels of a workgroup should lie apart, in each direction, so that they draw the same: see [`paired`].
+    pub fn stride(&self) -> u32 {
+        let [sequence, decorrelation] = self.seeding.map(Seeding::stride);
+        sequence.max(decorrelation)
     }
 
     /// The u32 that the kernel computes for this coordinate.
@@ -146,14 +154,11 @@ impl Sampler {
     /// # Panics
     /// A dimension beyond the demand, where there is a table.
     pub fn sample_u32(&self, at: Coordinate) -> u32 {
-        let [sequence, decorrelation] = self.shared_by_pixels;
-        let (mut point, mut own) = (at, at);
-        if sequence {
-            point.pixel = 0;
-        }
-        if decorrelation {
-            own.pixel = 0;
-        }
+        let width = self.table.image_width();
+        let [mut point, own] = self.seeding.map(|seeding| Coordinate {
+            pixel: seeding.seed_pixel(at.pixel, width),
+            ..at
+        });
         point.sample = self.decorrelation.index(&self.table, own);
         let x = self.sequence.sequence(&self.table, point);
         self.decorrelation.decorrelate(x, &self.table, own)

@@ -172,9 +172,11 @@ impl SamplerRegistry {
             }
         }
         let by_count = facts.by_count || second.by_count();
+        let seeding = [first.seeding(), second.seeding()];
+        let by_width = second.by_width() || seeding.into_iter().any(Seeding::by_width);
         let unknown = [
             (by_count && demand.samples.is_none()).then_some("the number of samples"),
-            (second.by_width() && demand.width.is_none()).then_some("the width of the image"),
+            (by_width && demand.width.is_none()).then_some("the width of the image"),
         ];
         if let Some(what) = unknown.into_iter().flatten().next() {
             return Err(SamplerError::NotKnown { pair: pair(), what });
@@ -185,8 +187,8 @@ impl SamplerRegistry {
             reason,
         })?;
         Ok(Sampler {
-            table: SamplerTable::new(&first.table(demand), &words),
-            shared_by_pixels: [first.seeding(), second.seeding()].map(|s| s == Seeding::Sample),
+            table: SamplerTable::new(&first.table(demand), demand.width.unwrap_or(0), &words),
+            seeding,
             sequence: first,
             sequence_variant: sequence,
             decorrelation: second,

@@ -1,7 +1,6 @@
 //! What a sequence is.
 
-use super::{Coordinate, Demand, SamplerTable};
-use crate::parameters;
+use super::{Coordinate, Demand, SamplerTable, Seeding};
 use crate::params::{Parameters, Registered};
 use std::sync::Arc;
 
@@ -58,21 +57,5 @@ impl Registered<dyn Sequence> {
     /// The sequence that `S` declares, under this name; the doc comment of `S` describes it.
     pub fn sequence<S: Sequence + Parameters + 'static>(name: &str) -> Self {
         Self::new::<S>(name, |params| Ok(Arc::new(S::from_params(params)?)))
-    }
-}
-
-parameters! {
-    /// The parameter of everything that hashes the pixel.
-    pub struct Seeded {
-        /// random numbers differ by pixel and sample, or by sample only (Nilsson & Otte dag 2018)
-        seeding: Seeding = Seeding::PixelSample;
-    }
-
-    /// Whether pixels draw different random numbers.
-    pub enum Seeding {
-        /// Each pixel draws its own.
-        PixelSample = "pixel-sample",
-        /// All pixels draw the same: coherence by force (Nilsson & Otte dag 2018, Table 5.3).
-        Sample = "sample",
     }
 }

@@ -17,7 +17,7 @@ pub struct Coordinate {
 /// Words before those of the sequence: where the words of the decorrelation begin.
 const HEADER: u32 = 1;
 
-/// The words that kernels read as the texture `sampler_table`: the header, the sequence's, the
+/// The words that kernels read as the texture `sampler_table`: the header, the sequence's, the width of the image, the
 /// decorrelation's, and zeros up to a whole texel of four.
 /// Lengths are data, not constants, so that neither the number of samples nor that of dimensions
 /// makes another kernel.
@@ -25,10 +25,10 @@ const HEADER: u32 = 1;
 pub struct SamplerTable(Vec<u32>);
 
 impl SamplerTable {
-    /// A table of the words of a sequence and those of a decorrelation.
-    pub fn new(sequence: &[u32], decorrelation: &[u32]) -> Self {
-        let header = [HEADER + sequence.len() as u32];
-        let mut words = [&header, sequence, decorrelation].concat();
+    /// A table of the words of a sequence and those of a decorrelation, for images of this width (0 if that is not known).
+    pub fn new(sequence: &[u32], width: u32, decorrelation: &[u32]) -> Self {
+        let header = [HEADER + sequence.len() as u32 + 1];
+        let mut words = [&header, sequence, &[width], decorrelation].concat();
         words.resize(words.len().next_multiple_of(4), 0);
         Self(words)
     }
@@ -48,6 +48,11 @@ impl SamplerTable {
     /// Beyond the table: a dimension that the sampler was not made for.
     pub fn sequence_word(&self, i: u32) -> u32 {
         self.word(HEADER + i)
+    }
+
+    /// Width of the image, pixels.
+    pub fn image_width(&self) -> u32 {
+        self.word(self.word(0) - 1)
     }
 
     /// Word `i` of the decorrelation.

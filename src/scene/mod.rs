@@ -20,6 +20,7 @@ mod gltf_files;
 mod gltf_lights;
 mod gltf_material;
 mod gltf_texture;
+mod hung_lamps;
 mod ies;
 mod instances;
 mod light;
@@ -181,9 +182,14 @@ pub fn named(name: &str) -> Result<SceneData, SceneError> {
 pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, SceneError> {
     let mut variant = variant.clone();
     let mut common = Params::default();
-    common.0.extend(variant.params.0.remove_entry(ENVIRONMENT));
+    for name in [ENVIRONMENT, HUNG_LAMPS] {
+        common.0.extend(variant.params.0.remove_entry(name));
+    }
     let common = common.completed(&common_parameters())?;
-    let scene = load_alone(&variant, options)?;
+    let mut scene = load_alone(&variant, options)?;
+    if let Some(ParamValue::Integer(lamps @ 1..)) = common.0.get(HUNG_LAMPS) {
+        scene = hung_lamps::hang(scene, *lamps as u32);
+    }
     match common.0.get(ENVIRONMENT) {
         Some(ParamValue::Name(file)) if !file.is_empty() => scene.under(Path::new(file)),
         _ => Ok(scene),
@@ -193,14 +199,25 @@ pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Scene
 /// The parameter of every scene that names an environment map.
 const ENVIRONMENT: &str = "environment";
 
+/// The parameter of every scene that says how many lamps are hung into it.
+const HUNG_LAMPS: &str = "hung_lamps";
+
 /// What every scene has as parameters, built in or not.
 pub fn common_parameters() -> ParameterSchema {
-    vec![Parameter {
-        name: ENVIRONMENT,
-        description: "equirectangular map (HDR, EXR, PFM or NPY) that lights the scene from all around; none if empty",
-        default: ParamValue::Name(String::new()),
-        range: ParamRange::Text,
-    }]
+    vec![
+        Parameter {
+            name: ENVIRONMENT,
+            description: "equirectangular map (HDR, EXR, PFM or NPY) that lights the scene from all around; none if empty",
+            default: ParamValue::Name(String::new()),
+            range: ParamRange::Text,
+        },
+        Parameter {
+            name: HUNG_LAMPS,
+            description: "small square lamps that are hung into the scene, at places of their own, and shine down",
+            default: ParamValue::Integer(0),
+            range: ParamRange::Integer { min: 0, max: 4096 },
+        },
+    ]
 }
 
 /// The scene of a variant without its environment map.

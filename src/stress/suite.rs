@@ -324,6 +324,7 @@ impl Trace<'_> {
             class: RayClass::Chord,
             rays: self.case.rays.clone(),
             truth,
+            shadow: Vec::new(),
         };
         let exact = self.suite.exact;
         let verdict = gate::compare(&set, hits, &found, &self.stage.soup, built.space(), exact);

@@ -15,7 +15,7 @@ type Fault = (
 );
 
 #[rustfmt::skip]
-const FAULTS: [Fault; 19] = [
+const FAULTS: [Fault; 24] = [
     // The count is one short.
     ("scatter", ["= sums[BUCKETS * tiling.tiles]", "= sums[BUCKETS * tiling.tiles] - 1u"], "reduce-scan-scatter", &[]),
     ("gather", ["kept_count[0] = count", "kept_count[0] = count - 1u"], "horn", &[]),
@@ -40,6 +40,12 @@ const FAULTS: [Fault; 19] = [
     // A bucket is left out, or two are one.
     ("scatter", ["bucket < BUCKETS", "bucket + 1u < BUCKETS"], "bucket-sort", &[]),
     ("reduce", ["sums[bucket * tiling.tiles + tile]", "sums[tile]"], "bucket-sort", &[]),
+    // Holes are sorted first, places are those of other elements, the count is one short or one for all.
+    ("keys", ["select(flag - 1u, HOLE, flag == 0u)", "flag"], "radix-sort", &[]),
+    ("keys", ["places[element] = element", "places[element] = element ^ 1u"], "radix-sort", &[]),
+    ("follow", ["kept_count[0] = slot + 1u", "kept_count[0] = slot"], "radix-sort", &[]),
+    ("follow", ["slot >= sorting.count || keys[slot] == HOLE", "slot >= sorting.count"], "radix-sort", &[]),
+    ("follow", ["copy_element(places[slot], slot)", "copy_element(slot, slot)"], "radix-sort", &[]),
     // Scans: the root of the tree keeps its sum, a step misses a word.
     ("blelloch", ["before = 0u", "before += 0u"], "blelloch", &[]),
     ("hillis_steele", ["word >= scan_step.reach", "word > scan_step.reach"], "horn", &[]),

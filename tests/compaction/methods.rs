@@ -28,11 +28,12 @@ fn methods(gpu: &Gpu) -> Vec<(String, Arc<dyn Compaction>)> {
     let mut variants: Vec<Variant> =
         (registry.0.iter().map(|kind| variant(kind.name(), &[]))).collect();
     assert!(variants.len() >= 9, "{} methods", variants.len());
-    let further: [(&str, &[(&str, i64)]); 9] = [
+    let further: [(&str, &[(&str, i64)]); 10] = [
         ("workgroup", &[("lanes", 32), ("per_lane", 4)]),
         ("reduce-scan-scatter", &[("lanes", 8), ("per_lane", 3)]),
         ("bucket-sort", &[("buckets", 9), ("per_lane", 4)]),
         ("bucket-sort", &[("buckets", 1), ("lanes", 33)]),
+        ("radix-sort", &[("buckets", 255)]),
         ("roger", &[("block", 2)]),
         ("roger", &[("block", 16)]),
         ("roger", &[("block", 100)]),

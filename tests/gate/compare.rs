@@ -48,6 +48,7 @@ fn set() -> RaySet {
         class: RayClass::Primary,
         rays,
         truth,
+        shadow: Vec::new(),
     }
 }
 

@@ -128,7 +128,7 @@ fn a_kernel_that_ignores_ties_is_wrong_on_every_hit_of_a_scene_made_of_ties() {
 
 #[test]
 fn a_blown_step_fuse_and_a_stack_overflow_are_named() {
-    let [(_, fuse), (_, overflow), _] = KERNEL_ERRORS;
+    let [(_, fuse), (_, overflow), ..] = KERNEL_ERRORS;
     let impatient = open(kernels_with(
         "accel/bvh/roped",
         &[(

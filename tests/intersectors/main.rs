@@ -342,6 +342,7 @@ fn what_tests_cost_in_a_whole_traversal() {
             oracle_rays: 0,
             ao_length: 0.0,
             offset: 0.0,
+            shadow_orders: false,
         };
         let params = BvhParameters::default();
         let soup = TriangleSoup::new(&scene);

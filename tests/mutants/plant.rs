@@ -119,7 +119,8 @@ impl Plant {
                 return Err(CheckError::Stale(format!("no {part} is left to change")));
             }
             let (sequence, decorrelation) = words.split_at(words[0] as usize);
-            sampler.table = SamplerTable::new(&sequence[1..], decorrelation);
+            let (width, sequence) = sequence[1..].split_last().unwrap_or((&0, &[]));
+            sampler.table = SamplerTable::new(sequence, *width, decorrelation);
         }
         Ok(sampler)
     }

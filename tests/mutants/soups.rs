@@ -49,6 +49,7 @@ pub fn lattice_judge(soup: &TriangleSoup, seed: u64) -> Judge {
             class: RayClass::Chord,
             rays,
             truth,
+            shadow: Vec::new(),
         }],
         brute_force: JudgeCheck::default(),
         oracle: JudgeCheck::default(),

@@ -31,6 +31,7 @@ const GATE: Gate = Gate {
     oracle_rays: 64,
     ao_length: 0.0,
     offset: 0.0,
+    shadow_orders: false,
 };
 
 /// A scene with rays and answers.

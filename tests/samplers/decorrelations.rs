@@ -228,6 +228,61 @@ fn sample_seeding_makes_all_pixels_draw_the_same_and_seeds_still_count() {
 }
 
 #[test]
+fn pixels_of_a_group_draw_the_same_and_neighbours_of_a_sparse_one_do_not() {
+    let registry = SamplerRegistry::default();
+    let names: Vec<&str> = (registry.decorrelations.iter())
+        .filter(|d| d.entry.schema.iter().any(|p| p.name == "seeding"))
+        .map(|d| d.name())
+        .collect();
+    assert!(names.len() >= 5, "{names:?}");
+    let same_as_first = |seeding: &'static str, decorrelation: &str| -> Vec<[u32; 2]> {
+        let seeded = [("seeding", name(seeding))];
+        let made = try_sampler(("sobol", &[]), (decorrelation, &seeded), &demand(16, 4));
+        let sampler = made.unwrap_or_else(|e| panic!("{e}"));
+        let draw = |[x, y]: [u32; 2]| {
+            let pixel = y * WIDTH + x;
+            let one = |i| {
+                sampler.sample_u32(Coordinate {
+                    pixel,
+                    ..at(i / 4, i % 4)
+                })
+            };
+            (0..64_u32).map(one).collect::<Vec<u32>>()
+        };
+        // From a pixel within the second tile on.
+        let first = draw([67, 66]);
+        let places = (0..64).flat_map(|y| (0..64).map(move |x| [64 + x, 64 + y]));
+        places.filter(|place| draw(*place) == first).collect()
+    };
+    let grid = |from: [u32; 2], step: usize| -> Vec<[u32; 2]> {
+        let along = move |from: u32| (from..).step_by(step).take(8);
+        along(from[1])
+            .flat_map(|y| along(from[0]).map(move |x| [x, y]))
+            .collect()
+    };
+    for decorrelation in names {
+        assert_eq!(
+            same_as_first("workgroup", decorrelation),
+            grid([64, 64], 1),
+            "{decorrelation}"
+        );
+        assert_eq!(
+            same_as_first("sparse", decorrelation),
+            grid([67, 66], 8),
+            "{decorrelation}"
+        );
+    }
+    let unknown = Demand {
+        width: None,
+        ..demand(16, 4)
+    };
+    let seeded = [("seeding", name("sparse"))];
+    let made = try_sampler(("sobol", &[]), ("owen-hash", &seeded), &unknown);
+    let reason = made.err().expect("a refusal").to_string();
+    assert!(reason.contains("width"), "{reason}");
+}
+
+#[test]
 fn the_dither_mask_has_every_step_once_and_little_power_at_low_frequencies() {
     let plain = sampler("sobol", "none", &demand(1, 1));
     let dithered = sampler("sobol", "blue-noise", &demand(1, 1));

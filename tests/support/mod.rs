@@ -198,6 +198,7 @@ impl Stage {
             oracle_rays,
             ao_length: 0.0,
             offset: 0.0,
+            shadow_orders: false,
         };
         Judge::new(&self.scene, &self.soup, self.camera, &settings, 1, checks).expect("a judge")
     }

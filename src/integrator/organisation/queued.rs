@@ -20,6 +20,8 @@ const SHADOWS: u32 = 1;
 parameters! {
     /// How the queue of live paths is kept without holes.
     pub enum CompactionMethod {
+        /// What measured best: `atomic` on software adapters, where a workgroup's barriers are dear, else `workgroup`.
+        Auto = "auto",
         /// An atomic for each path.
         Atomic = "atomic",
         /// A scan and one atomic for each workgroup.
@@ -55,7 +57,7 @@ parameters! {
         /// paths in flight at most; more wait for their turn
         capacity: u32 = 262_144, in 1024..=4_194_304;
         /// how the queue of live paths is kept without holes
-        compaction: CompactionMethod = CompactionMethod::Workgroup;
+        compaction: CompactionMethod = CompactionMethod::Auto;
         /// what is brought side by side: paths of one material, or rays of one direction and place
         sorting: Sorting = Sorting::Never;
         /// whether the slot of a path that has ended is taken by the next at once; else all in flight end first
@@ -169,14 +171,19 @@ impl<'a> Queues<'a> {
 
     /// Keeps the slots of live paths side by side.
     fn compact(&self, steps: &mut ImageSteps, wavefront: &Wavefront) -> Result<(), GpuError> {
+        let gpu = steps.gpu().clone();
+        let method = match wavefront.compaction {
+            CompactionMethod::Auto if gpu.is_software() => CompactionMethod::Atomic,
+            CompactionMethod::Auto => CompactionMethod::Workgroup,
+            chosen => chosen,
+        };
         let method = Variant {
             label: String::new(),
-            name: wavefront.compaction.name().to_owned(),
+            name: method.name().to_owned(),
             params: Params::default(),
         };
         let method = CompactionRegistry::default().configured(&method);
         let method = method.map_err(GpuError::Kernel)?;
-        let gpu = steps.gpu().clone();
         if let Some(reason) = method.refusal(&gpu) {
             return Err(GpuError::Kernel(reason));
         }

@@ -140,6 +140,9 @@ pub struct SpectrumRecord {
     pub power: Vec<PowerAt>,
     /// Mean power up to 1/8 cycle per pixel, white noise being 1.
     pub low_frequency: Option<Interval>,
+    /// Power of the loudest wave, white noise having about ln(n/2) + 0.58 for n pixels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub loudest: Option<Interval>,
     /// Correlation of the errors of neighbouring pixels.
     pub autocorrelation: Option<Interval>,
     /// What Gaussian filters leave of the error.

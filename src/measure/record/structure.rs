@@ -1,7 +1,8 @@
 //! What is recorded of a structure on a scene, and of full cells.
 
-use super::Interval;
+use super::{Interval, Tally};
 use crate::accel::{Phase, Space, StructureStats};
+use crate::config::Coherence;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -13,6 +14,12 @@ pub enum RayClass {
     Primary,
     /// Rays from first hits towards emitters (or towards points of the bounding sphere); any hit.
     Shadow,
+    /// The same from the other end: from the emitter to the first hit.
+    ShadowReversed,
+    /// Those of [`RayClass::Shadow`], light by light.
+    ShadowClustered,
+    /// Those of [`RayClass::ShadowReversed`], light by light.
+    ShadowReversedClustered,
     /// Cosine-distributed rays of limited length from first hits; any hit.
     Ao,
     /// Cosine-distributed rays from first hits; closest hit.
@@ -97,6 +104,10 @@ pub struct ClassTiming {
     pub rays: usize,
     /// Fraction of the rays that hit something.
     pub hit_fraction: f64,
+    /// Answers that differ from those of the shadow rays between the same ends; absent for classes that are not
+    /// shadow rays in another order or direction.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unlike_shadow: Option<usize>,
     /// Every kept sample, milliseconds, an empty dispatch already subtracted.
     pub ms: Vec<f64>,
     /// The same dispatches by the wall clock, milliseconds.
@@ -106,6 +117,15 @@ pub struct ClassTiming {
     /// Counted work, from a separate run; absent for a structure that counts none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub counters: Option<CountersPerRay>,
+}
+
+/// Coherence of recorded rays, as they follow each other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ClassCoherence {
+    /// The machine, and how many rays were looked at.
+    pub settings: Coherence,
+    /// Counts by class.
+    pub classes: Vec<(RayClass, Tally)>,
 }
 
 /// A structure on a scene.
@@ -139,12 +159,28 @@ pub struct StructureRecord {
     pub gate: Option<GateVerdict>,
     /// Speeds; empty unless the gate passed.
     pub timings: Vec<ClassTiming>,
+    /// Coherence of the recorded rays; absent where it is not modelled.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coherence: Option<ClassCoherence>,
     /// Heat map of traversal cost of primary rays, a PNG relative to the run's folder.
     pub heat_map: Option<String>,
     /// Cost (nodes + triangle tests) at the top of the heat map's colour scale.
     pub heat_map_max: Option<f64>,
     /// Why there are no figures.
     pub failure: Option<String>,
+}
+
+/// Time of a full cell whose pixels are taken in an order of passes: see [`crate::integrator::Order`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OrderTime {
+    /// Which.
+    pub order: String,
+    /// Passes of a sample, each a submission of its own.
+    pub passes: usize,
+    /// Wall milliseconds per sample per pixel for the whole image, median with interval.
+    pub ms_per_spp: Option<Interval>,
+    /// Wall milliseconds until the first picture without a gap, median with interval.
+    pub first_picture_ms: Option<Interval>,
 }
 
 /// Time of a full cell.
@@ -173,6 +209,9 @@ pub struct TimeRecord {
     /// GPU milliseconds of each stage of a render, medians; only where the passes are several.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub stages: BTreeMap<String, f64>,
+    /// The same cell in orders of passes; empty where these were not asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub orders: Vec<OrderTime>,
     /// BLAKE3 of the image.
     pub image_hash: String,
     /// Whether the image equals to the bit that of the scene's first gated structure.

@@ -4,6 +4,7 @@ pub mod belief;
 pub mod coherence;
 pub mod compactions;
 pub mod kernels;
+mod orders;
 pub mod organisations;
 pub mod point_sets;
 pub mod rendering;

@@ -1,6 +1,7 @@
 //! Samplers under one scene and integrator: errors, times, bias, pictures.
 
 use super::coherence;
+use super::orders;
 use super::sampler_plots::{error_figures, histograms, pareto_figure};
 use super::spectrum;
 use super::verdict::Race;
@@ -34,6 +35,7 @@ pub fn blocks(
     blocks.extend(efficiency_table(view, &values).into_block());
     blocks.extend(Block::figures([pareto_figure(data, stem, view)]));
     blocks.extend(time_table(data, view, &values).into_block());
+    blocks.extend(orders::table(view, &values).into_block());
     blocks.extend(coherence::blocks(data, stem, view, &values));
     blocks.extend(bias_table(view, &values).into_block());
     blocks.extend(Block::figures([histograms(stem, view)]));

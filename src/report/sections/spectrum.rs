@@ -102,12 +102,13 @@ fn table(view: &View, values: &[Value]) -> Table {
         return Table::default();
     }
     let caption = format!(
-        "Error in space with {} at {spp} spp, luminance: power up to 1/8 cycle per pixel (white noise 1), correlation \
-         of neighbours (white noise 0), RMSE, and share of it after Gaussian filters of standard deviation σ",
+        "Error in space with {} at {spp} spp, luminance: power up to 1/8 cycle per pixel (white noise 1), power of the \
+         loudest wave (n pixels of white noise: about ln n), correlation of neighbours (white noise 0), RMSE, and share of it after Gaussian filters of standard deviation σ",
         view.name
     );
     let figures = [
         "low-frequency-power/v1",
+        "loudest-wave/v1",
         "neighbour-correlation/v1",
         "luminance-rmse/v1",
         "filtered-share/v1",

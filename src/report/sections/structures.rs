@@ -41,6 +41,7 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
         outside_table(data, scene, &values),
         leaf_table(scene, &values),
         work_table(scene, &values),
+        coherence_table(scene, &values),
     ]);
     blocks.extend(tables.into_iter().filter_map(Table::into_block));
     blocks.extend(heat_maps(dir, scene));
@@ -182,9 +183,8 @@ fn leaf_table(scene: &SceneGroup, values: &[Value]) -> Table {
     )
 }
 
-/// Counted work per ray.
-fn work_table(scene: &SceneGroup, values: &[Value]) -> Table {
-    let by = [&[axis::RAYS], &STRUCTURE_AXES[..]].concat();
+/// A row for each class of rays and each of the structures that were timed with it.
+fn class_rows<'a>(scene: &'a SceneGroup, by: &'a [&'a str]) -> Rows<'a> {
     let passed = || scene.structures.iter().filter(|s| s.fault().is_none());
     let rows = ray_classes(scene).into_iter().flat_map(|class| {
         let timed = passed().filter(move |s| s.timings.iter().any(|t| t.class == class));
@@ -194,12 +194,43 @@ fn work_table(scene: &SceneGroup, values: &[Value]) -> Table {
             (key, vec![class.into(), s.structure.clone().into()])
         })
     });
-    Rows::new(&by, &["class", ":structure"], rows).table(
+    Rows::new(by, &["class", ":structure"], rows)
+}
+
+/// Coherence of the recorded rays, by the model.
+fn coherence_table(scene: &SceneGroup, values: &[Value]) -> Table {
+    let by = [&[axis::RAYS], &STRUCTURE_AXES[..]].concat();
+    let Some(modelled) = scene.structures.iter().find_map(|s| s.coherence.as_ref()) else {
+        return Table::default();
+    };
+    let s = &modelled.settings;
+    let caption = format!(
+        "Coherence of the recorded rays, by a model on the host: warps of {} rays that follow each other, {} in each of {} groups",
+        s.warp[0] * s.warp[1],
+        s.warps,
+        s.groups,
+    );
+    let figures = [
+        "simt-efficiency/v1",
+        "lines-per-issue/v1",
+        "l1-hits/v1",
+        "issues-per-ray/v1",
+        "l2-bytes-per-ray/v1",
+        "cycles-per-ray/v1",
+    ];
+    class_rows(scene, &by).table(values, caption, &figures, FIGURES_ALONE)
+}
+
+/// Counted work per ray.
+fn work_table(scene: &SceneGroup, values: &[Value]) -> Table {
+    let by = [&[axis::RAYS], &STRUCTURE_AXES[..]].concat();
+    class_rows(scene, &by).table(
         values,
         "Counted work per ray (means over a class, from a separate run)",
         &[
             "rays/v1",
             "hit-share/v1",
+            "unlike-shadow/v1",
             "nodes-per-ray/v1",
             "box-tests-per-ray/v1",
             "triangle-tests-per-ray/v1",

@@ -22,6 +22,8 @@ const SOBOL: Subject = sampler("sobol", &[], "none");
 const HALTON: Subject = sampler("halton", &[], "cranley-patterson");
 const FAURE: Subject = sampler("halton", &[("digits", "faure")], "none");
 const OWEN: Subject = sampler("sobol", &[], "owen-hash");
+const SHARED: Subject = sampler("pixel-hash", &[("seeding", "sample")], "none");
+const SPARSE: Subject = sampler("pixel-hash", &[("seeding", "sparse")], "none");
 
 pub const MUTANTS: &[Mutant] = &[
     row(
@@ -40,6 +42,27 @@ pub const MUTANTS: &[Mutant] = &[
         "all seeds draw the same",
         text("sampling/hash", "s.pixel + pcg_hash(s.seed)", "s.pixel"),
         OWEN,
+        Check::Stream,
+    ),
+    row(
+        "shared-seed-by-column",
+        "the seed of all pixels still depends on the pixel",
+        text("sampling/seeding", "return 0u;", "return pixel & 1u;"),
+        SHARED,
+        Check::Stream,
+    ),
+    row(
+        "sparse-seed-of-a-whole-tile",
+        "all pixels of a tile share a seed, and not one of eight in each direction",
+        text("sampling/seeding", " + at % stride", ""),
+        SPARSE,
+        Check::Stream,
+    ),
+    row(
+        "sparse-seed-of-neighbours",
+        "the pixels that share a seed lie side by side",
+        text("sampling/seeding", "seeding == SPARSE", "seeding > 9u"),
+        SPARSE,
         Check::Stream,
     ),
     row(

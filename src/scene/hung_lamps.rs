@@ -1,0 +1,82 @@
+//! Lamps that are hung into any scene, so that the number of its lights can be varied.
+
+use super::{GEOMETRIC, Material, SceneData};
+use crate::geometry::Triangle;
+use crate::random::Pcg32;
+use glam::{Vec2, Vec3};
+
+/// Edge of a lamp as a fraction of the scene's diagonal.
+const EDGE: f32 = 0.003;
+/// Lamps hang within so much of the box, from its centre along each axis.
+const INNER: f32 = 0.2;
+/// Radiance of all lamps together, if one alone had all.
+const RADIANCE: f32 = 2000.0;
+
+/// The scene with so many square lamps of equal power, at random places of the inner box. A scene that brings no light
+/// loses the sky that is put over such; one of instances becomes a flat one. The first lamps are the same however many follow.
+pub(super) fn hang(mut scene: SceneData, lamps: u32) -> SceneData {
+    let bounds = scene.bounds();
+    let (center, half) = (bounds.center(), 0.5 * (bounds.max - bounds.min));
+    let edge = EDGE * 2.0 * bounds.radius();
+    let material = scene.materials.len() as u32;
+    let emission = Vec3::splat(RADIANCE / lamps as f32);
+    scene.materials.push(Material {
+        emits_both_sides: false,
+        ..Material::diffuse("hung lamp", Vec3::ZERO).emitting(emission)
+    });
+    let mut random = Pcg32::new(36);
+    for _ in 0..lamps {
+        let corner = center + 2.0 * INNER * half * random.in_cube().as_vec3();
+        let at = |x: f32, z: f32| corner + edge * Vec3::new(x, 0.0, z);
+        let [a, b, c, d] = [at(0.0, 0.0), at(1.0, 0.0), at(1.0, 1.0), at(0.0, 1.0)];
+        for vertices in [[a, b, c], [a, c, d]] {
+            scene.triangles.push(Triangle { vertices });
+            scene.material_ids.push(material);
+        }
+    }
+    let count = scene.triangles.len();
+    if !scene.uvs.is_empty() {
+        scene.uvs.resize(count, [Vec2::ZERO; 3]);
+    }
+    if !scene.normals.is_empty() {
+        scene.normals.resize(count, [GEOMETRIC; 3]);
+    }
+    scene.assembly = None;
+    if let Some(sky) = scene.daylight.take() {
+        let note = sky.note();
+        scene.report.warnings.retain(|line| *line != note);
+        scene.environment = Vec3::ZERO;
+    }
+    scene.hash = scene.content_hash();
+    scene
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::ParamValue;
+    use crate::scene::LightList;
+    use crate::scene::builtin::tests::{load_default, load_with};
+
+    #[test]
+    fn so_many_lamps_hang_within_the_box_and_shine_down() {
+        let plain = load_default("foliage");
+        let lamps = |count| load_with("foliage", &[("hung_lamps", ParamValue::Integer(count))]);
+        let scene = lamps(5);
+        assert_eq!(LightList::of(&scene).lights.len(), 5);
+        assert_eq!(scene.bounds(), plain.bounds());
+        assert_ne!(scene.hash, plain.hash);
+        for triangle in &scene.triangles[plain.triangles.len()..] {
+            let [a, b, c] = triangle.vertices;
+            assert!((b - a).cross(c - a).y < 0.0);
+        }
+        let corners = |scene: &SceneData| scene.triangles[plain.triangles.len()..][..10].to_vec();
+        assert_eq!(corners(&lamps(9)), corners(&scene));
+    }
+
+    #[test]
+    fn a_scene_under_the_sky_of_those_without_a_light_loses_it() {
+        let scene = load_with("single-triangle", &[("hung_lamps", ParamValue::Integer(1))]);
+        assert_eq!((scene.daylight, scene.environment), (None, Vec3::ZERO));
+    }
+}
