@@ -234,6 +234,15 @@ const MACHINE: Coherence = Coherence {
     l2_ways: 16,
 };
 
+#[test]
+fn each_cache_of_the_machine_has_its_own_size_and_ways() {
+    let machine = Machine::new(&MACHINE);
+    // 16 KiB and 64 KiB, of lines of 128 bytes.
+    assert_eq!([machine.l1.lines, machine.l1.ways], [128, 4]);
+    assert_eq!([machine.l2.lines, machine.l2.ways], [512, 16]);
+    assert_eq!((machine.line_bytes, machine.rule), (128, Rule::Loop));
+}
+
 fn depth(max: i64) -> [(&'static str, ParamValue); 1] {
     [("max_depth", ParamValue::Integer(max))]
 }

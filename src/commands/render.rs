@@ -8,7 +8,7 @@ use raystone::config::{Axis, Experiment};
 use raystone::image::FileFormat;
 use raystone::integrator::Order;
 use raystone::params::Choice as _;
-use raystone::run::{Registries, Rendering};
+use raystone::run::{Pictures, Registries, Rendering};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -62,6 +62,9 @@ pub struct Render {
     /// the last is written
     #[arg(long, value_name = "ORDER", value_parser = parse_order)]
     order: Option<Order>,
+    /// Picture to write with the first that has no gap, in an order of passes; without it, that is written to the output first
+    #[arg(long, value_name = "FILE", requires = "order")]
+    preview: Option<PathBuf>,
     #[command(flatten)]
     values: ValueArguments,
     /// Picture to write; the ending chooses the format: tone-mapped .png, or linear radiance in .exr,
@@ -75,6 +78,9 @@ pub struct Render {
 impl Render {
     pub fn execute(self) -> Result<ExitCode> {
         check_output(&self.output)?;
+        if let Some(preview) = &self.preview {
+            check_output(preview)?;
+        }
         let registries = Registries::default();
         let catalogue = registries.catalogue();
         let experiment =
@@ -88,7 +94,11 @@ impl Render {
             &plan,
             &registries,
             &options,
-            (&self.output, self.order),
+            &Pictures {
+                file: &self.output,
+                order: self.order,
+                preview: self.preview.as_deref(),
+            },
         )?;
         super::output::tell(summary(&rendering, experiment.resolution).trim_end());
         print(&format!("{}\n", self.output.display()))?;

@@ -32,7 +32,7 @@ pub use kernels::{Kernels, kernel_library};
 pub use known_images::verify_images;
 pub use reference_cache::user_cache;
 pub use registries::Registries;
-pub use render::{Rendering, render};
+pub use render::{Pictures, Rendering, render};
 
 use crate::config::{Cell, Experiment, Plan};
 use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};

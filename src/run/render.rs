@@ -46,8 +46,19 @@ pub struct Rendering {
     pub in_order: Option<InOrder>,
 }
 
+/// Where pictures go, and in which order pixels are taken.
+#[derive(Debug, Clone, Copy)]
+pub struct Pictures<'a> {
+    /// The picture, in the format of its ending.
+    pub file: &'a Path,
+    /// Passes, each a part of the pixels; `None` takes whole samples.
+    pub order: Option<Order>,
+    /// Where the first picture without a gap goes, if there is an order; `None`: it is the first of the file.
+    pub preview: Option<&'a Path>,
+}
+
 /// Renders the first scene, structure, sampler and integrator of the axes at `experiment.spp.max()`
-/// samples into `file`, whose ending chooses the format. The file is there after the first sample
+/// samples into a file, whose ending chooses the format. The file is there after the first sample
 /// and is written again while more are added; in an order of passes it is there as soon as no pixel is without a colour.
 ///
 /// # Errors
@@ -58,10 +69,15 @@ pub fn render(
     plan: &Plan,
     registries: &Registries,
     options: &RunOptions,
-    (file, order): (&Path, Option<Order>),
+    pictures: &Pictures,
 ) -> Result<Rendering, RunError> {
     let start = Instant::now();
-    let format = FileFormat::of(file).map_err(input)?;
+    for file in [Some(pictures.file), pictures.preview]
+        .into_iter()
+        .flatten()
+    {
+        FileFormat::of(file).map_err(input)?;
+    }
     let cell = plan
         .times
         .first()
@@ -108,25 +124,35 @@ pub fn render(
         non_finite_pixels: 0,
         in_order: None,
     };
-    let mut show = |image: &Image, done: u32| {
+    let mut show = |image: &Image, done: u32, file: &Path| {
         if rendering.first_picture_s == 0.0 {
             rendering.first_picture_s = start.elapsed().as_secs_f64();
         }
         let sampler = estimator.sampler.label();
         let about = attributes(cell, &sampler, done, experiment.seed);
+        let format = FileFormat::of(file).map_err(input)?;
         format.write(file, image, &about).map_err(input)
     };
     let compiled;
-    let image = if let Some(order) = order {
+    let image = if let Some(order) = pictures.order {
         let renderer = PartRenderer::new(gpu, &stage.buffers, &traced, &job)?;
         compiled = Instant::now();
-        let (image, spent) = add_in_order(&renderer, order, (spp, experiment.seed), &mut show)?;
+        let first = pictures.preview.unwrap_or(pictures.file);
+        let samples = (spp, experiment.seed);
+        let spent = renderer.render(order, samples, |renderer| match renderer.preview()? {
+            Some(preview) => show(&preview, 1, first),
+            None => Ok(()),
+        })?;
+        let image = renderer.image(spp)?;
+        show(&image, spp, pictures.file)?;
         rendering.in_order = Some(spent);
         image
     } else {
         let renderer = Renderer::new(gpu, &stage.buffers, &traced, &job, true)?;
         compiled = Instant::now();
-        let image = add_all_samples(&session, &renderer, spp, &mut show)?;
+        let image = add_all_samples(&session, &renderer, spp, |image, done| {
+            show(image, done, pictures.file)
+        })?;
         rendering.rays = renderer.ray_counts()?[..TRACED_CLASSES].iter().sum();
         image
     };
@@ -152,22 +178,6 @@ fn build(session: &Session, stage: &Stage, accel: &Variant) -> Result<Traced, Ru
         }
         error => input(error),
     })
-}
-
-/// Adds `spp` samples pass by pass. `show` gets the first picture without a gap, and the last.
-fn add_in_order(
-    renderer: &PartRenderer,
-    order: Order,
-    (spp, seed): (u32, u32),
-    mut show: impl FnMut(&Image, u32) -> Result<(), RunError>,
-) -> Result<(Image, InOrder), RunError> {
-    let spent = renderer.render(order, (spp, seed), |renderer| match renderer.preview()? {
-        Some(preview) => show(&preview, 1),
-        None => Ok(()),
-    })?;
-    let image = renderer.image(spp)?;
-    show(&image, spp)?;
-    Ok((image, spent))
 }
 
 /// Adds `spp` samples in steps of about [`STEP`]. `show` gets the image and its samples after the first, whenever the

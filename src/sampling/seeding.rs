@@ -129,7 +129,7 @@ mod tests {
         let sparse = |with: fn([u32; 2], u32) -> [u32; 2]| fault(Seeding::Sparse, with);
         let says = |fault: Option<String>, what: &str| assert_eq!(fault.as_deref(), Some(what));
         says(
-            sparse(|at, stride| paired(at, stride - 1)),
+            sparse(|at, stride| paired(at, stride / 2)),
             "a workgroup has several seeds",
         );
         says(

@@ -60,8 +60,13 @@ mod tests {
 
     #[test]
     fn so_many_lamps_hang_within_the_box_and_shine_down() {
-        let plain = load_default("foliage");
-        let lamps = |count| load_with("foliage", &[("hung_lamps", ParamValue::Integer(count))]);
+        let plain = load_default("triangle-soup");
+        let lamps = |count| {
+            load_with(
+                "triangle-soup",
+                &[("hung_lamps", ParamValue::Integer(count))],
+            )
+        };
         let scene = lamps(5);
         assert_eq!(LightList::of(&scene).lights.len(), 5);
         assert_eq!(scene.bounds(), plain.bounds());
@@ -76,7 +81,17 @@ mod tests {
 
     #[test]
     fn a_scene_under_the_sky_of_those_without_a_light_loses_it() {
-        let scene = load_with("single-triangle", &[("hung_lamps", ParamValue::Integer(1))]);
+        let missing = ("file", ParamValue::Name("none.ies".to_owned()));
+        assert!(
+            load_with("luminaire", std::slice::from_ref(&missing))
+                .daylight
+                .is_some()
+        );
+        let scene = load_with(
+            "luminaire",
+            &[missing, ("hung_lamps", ParamValue::Integer(1))],
+        );
         assert_eq!((scene.daylight, scene.environment), (None, Vec3::ZERO));
+        assert_eq!(scene.report.warnings.len(), 1, "{:?}", scene.report);
     }
 }
