@@ -25,6 +25,7 @@ pub mod integrator;
 pub mod measure;
 pub mod oracle;
 pub mod params;
+pub mod peers;
 pub mod random;
 pub mod report;
 pub mod run;

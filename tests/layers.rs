@@ -14,7 +14,7 @@ const LAYERS: [&[&str]; 11] = [
     &["config", "compaction"],
     &["scene"],
     &["accel"],
-    &["integrator"],
+    &["integrator", "peers"],
     &["measure"],
     &["coherence"],
     &["run"],

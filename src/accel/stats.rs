@@ -110,7 +110,7 @@ impl BuildLog {
         }
         if !is_timed {
             let names = played.runs.iter().map(|(name, _)| name.as_str());
-            self.note(&names.collect::<Vec<_>>().join(" + "), played.wall_ms);
+            self.note(&names.collect::<Vec<_>>().join(" + "), played.wall_ms());
         }
         Ok(played)
     }

@@ -18,6 +18,9 @@ pub struct Cell {
 /// How names begin on the axis of integrators that are compactions of streams, which render nothing.
 pub const COMPACTIONS: &str = "compaction:";
 
+/// The name on the axis of peers that stands for none.
+pub const NO_PEER: &str = "none";
+
 /// Whether an integrator is a compaction of a stream.
 pub fn is_compaction(integrator: &Variant) -> bool {
     integrator.name.starts_with(COMPACTIONS)
@@ -48,6 +51,21 @@ impl Cell {
         Axis::Sequence,
         Axis::Decorrelation,
         Axis::Offset,
+        Axis::Kernels,
+    ];
+    /// What the times of a ray caster of others depend on.
+    pub const PEER: [Axis; 4] = [Axis::Scene, Axis::Triangle, Axis::BoxTest, Axis::Peer];
+    /// What an image and its time depend on.
+    pub const FULL: [Axis; 10] = [
+        Axis::Scene,
+        Axis::Accel,
+        Axis::Sequence,
+        Axis::Decorrelation,
+        Axis::Integrator,
+        Axis::Triangle,
+        Axis::BoxTest,
+        Axis::Offset,
+        Axis::Organisation,
         Axis::Kernels,
     ];
     /// What the compaction of a stream depends on.
@@ -129,7 +147,7 @@ impl Index<Axis> for Cell {
 
 impl fmt::Display for Cell {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let main = [Axis::Scene, Axis::Accel, Axis::Integrator];
+        let main = [Axis::Scene, Axis::Accel, Axis::Peer, Axis::Integrator];
         let main = main.into_iter().filter_map(|axis| self.get(axis));
         let mut parts: Vec<String> = main.map(Variant::to_string).collect();
         if let Some(sequence) = self.get(Axis::Sequence) {

@@ -20,7 +20,7 @@ mod tree;
 mod variants;
 
 pub use axis_map::AxisMap;
-pub use cells::{COMPACTIONS, Cell, is_compaction};
+pub use cells::{COMPACTIONS, Cell, NO_PEER, is_compaction};
 pub use error::{ConfigError, Place};
 pub use experiment::{
     Axes, Coherence, Discrepancy, Exclude, Experiment, Gate, REFERENCE_PARTS, Reference, Rule,

@@ -5,7 +5,7 @@
 //! for every full cell, at few samples per pixel. The plan counts what this saves.
 
 use super::ConfigError;
-use super::cells::{Cell, is_compaction};
+use super::cells::{Cell, NO_PEER, is_compaction};
 use super::experiment::Experiment;
 use super::keys::Axis;
 use super::product::{Filter, Point, check_size, excluded, product, refused};
@@ -34,8 +34,10 @@ pub struct Plan {
     pub structures: Vec<Cell>,
     /// Samplers whose error is measured: see [`Cell::SAMPLER`].
     pub samplers: Vec<Cell>,
-    /// Full cells whose time is measured.
+    /// Full cells whose time is measured: see [`Cell::FULL`].
     pub times: Vec<Cell>,
+    /// Ray casters of others that are timed: see [`Cell::PEER`].
+    pub peers: Vec<Cell>,
     /// Streams whose discrepancy is measured: see [`Cell::STREAM`].
     pub streams: Vec<Cell>,
     /// Compactions of streams that are judged and timed: see [`Cell::COMPACTION`].
@@ -72,7 +74,7 @@ impl Plan {
         let axes = &experiment.axes;
         check_size(experiment)?;
         let filter = Filter::parse(only, axes)?;
-        let full = product(axes, &Axis::ALL);
+        let full = product(axes, &Cell::FULL);
         let mut skipped = Vec::new();
         for exclude in &experiment.excludes {
             skipped.extend(excluded(exclude, &full, &filter)?);
@@ -96,6 +98,8 @@ impl Plan {
         };
         let mut compactions = cells(&Cell::COMPACTION);
         compactions.retain(|cell| is_compaction(&cell[Axis::Integrator]));
+        let mut peers = rendering(&Cell::PEER);
+        peers.retain(|cell| cell[Axis::Peer].name != NO_PEER);
         let structures = rendering(&Cell::STRUCTURE);
         let (samplers, untraceable): (Vec<_>, Vec<_>) = (rendering(&Cell::SAMPLER).into_iter())
             .partition(|cell| {
@@ -105,7 +109,8 @@ impl Plan {
         skipped.extend(untraceable.iter().map(no_structure));
         let plan = Self {
             scenes: needed(&axes[Axis::Scene], Axis::Scene, [&structures, &[], &[]]),
-            times: rendering(&Axis::ALL),
+            times: rendering(&Cell::FULL),
+            peers,
             streams: rendering(&Cell::STREAM),
             compactions,
             structures,

@@ -15,7 +15,7 @@ use crate::text::nearest;
 const MAX_CELLS: usize = 1 << 20;
 
 pub(super) fn check_size(experiment: &Experiment) -> Result<(), ConfigError> {
-    let lengths = Axis::ALL.map(|axis| experiment.axes[axis].len());
+    let lengths = Cell::FULL.map(|axis| experiment.axes[axis].len());
     let cells = lengths.into_iter().fold(1, usize::saturating_mul);
     if cells <= MAX_CELLS {
         return Ok(());

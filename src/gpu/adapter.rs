@@ -164,6 +164,36 @@ fn limits_to_ask(offer: &wgpu::Limits) -> wgpu::Limits {
     }
 }
 
+/// A device of its own, for what kernels of this crate cannot do: without players, pipelines and checks.
+pub struct RawDevice {
+    /// The device.
+    pub device: wgpu::Device,
+    /// Its queue.
+    pub queue: wgpu::Queue,
+    /// Name of the adapter.
+    pub adapter: String,
+    fault: Arc<Mutex<Option<String>>>,
+}
+
+impl RawDevice {
+    /// Waits for all that was submitted.
+    ///
+    /// # Errors
+    /// The driver has complained, or does not finish.
+    pub fn wait(&self) -> Result<(), GpuError> {
+        let waited = self.device.poll(wgpu::PollType::Wait {
+            submission_index: None,
+            timeout: Some(super::buffers::PATIENCE),
+        });
+        if let Some(cause) = self.fault.lock().ok().and_then(|slot| slot.clone()) {
+            return Err(GpuError::Driver(cause));
+        }
+        waited.map(|_| ()).map_err(|_| GpuError::Timeout {
+            seconds: super::buffers::PATIENCE.as_secs(),
+        })
+    }
+}
+
 /// Opens the chosen adapter.
 ///
 /// # Errors
@@ -225,6 +255,55 @@ impl Gpu {
             kernels,
             ..self.clone()
         }
+    }
+
+    /// Another device on the same adapter with these features of wgpu, which may be experimental.
+    ///
+    /// # Errors
+    /// The adapter lacks them, or gives no second device.
+    pub fn open_beside(&self, features: wgpu::Features) -> Result<RawDevice, GpuError> {
+        let refused = |cause: String| GpuError::NoDevice {
+            adapter: self.info.name.clone(),
+            cause,
+        };
+        let mut found = enumerate_among(self.info.backend.into()).into_iter();
+        let adapter = found
+            .find(|adapter| adapter.get_info() == self.info)
+            .ok_or_else(|| refused("it does not answer a second time".into()))?;
+        if !adapter.features().contains(features) {
+            return Err(refused(format!("it lacks {features:?}")));
+        }
+        let limits = adapter.limits();
+        // SAFETY: what is experimental is asked for by name, and used as wgpu says.
+        let experimental_features = unsafe { wgpu::ExperimentalFeatures::enabled() };
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("raystone, beside"),
+            required_features: features,
+            required_limits: limits,
+            experimental_features,
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|e| refused(e.to_string()))?;
+        let fault = Arc::new(Mutex::new(None));
+        let slot = Arc::clone(&fault);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            if let Ok(mut slot) = slot.lock() {
+                slot.get_or_insert_with(|| error.to_string());
+            }
+        }));
+        let adapter = self.info.name.clone();
+        Ok(RawDevice {
+            device,
+            queue,
+            adapter,
+            fault,
+        })
+    }
+
+    /// Whether there are GPU timestamps.
+    pub fn has_clock(&self) -> bool {
+        self.timestamp_period.is_some()
     }
 
     /// Whether the adapter is a software rasteriser.

@@ -7,35 +7,12 @@ use bytemuck::Pod;
 use std::time::Duration;
 
 /// Work that takes longer than this is given up: the driver hangs.
-const PATIENCE: Duration = Duration::from_secs(120);
+pub(super) const PATIENCE: Duration = Duration::from_secs(120);
 /// How every storage buffer may be used.
 pub(super) const STORAGE: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE
     .union(wgpu::BufferUsages::INDIRECT)
     .union(wgpu::BufferUsages::COPY_SRC)
     .union(wgpu::BufferUsages::COPY_DST);
-
-/// How long something took.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Elapsed {
-    /// Milliseconds between the GPU timestamps around it; `None` where there are none.
-    pub gpu_ms: Option<f64>,
-    /// Milliseconds by the wall clock from submission to completion.
-    pub wall_ms: f64,
-}
-
-impl Elapsed {
-    /// GPU time where there is one, wall time elsewhere.
-    pub fn ms(&self) -> f64 {
-        self.gpu_ms.unwrap_or(self.wall_ms)
-    }
-}
-
-impl std::ops::AddAssign for Elapsed {
-    fn add_assign(&mut self, other: Self) {
-        self.gpu_ms = self.gpu_ms.zip(other.gpu_ms).map(|(a, b)| a + b);
-        self.wall_ms += other.wall_ms;
-    }
-}
 
 /// Refuses what needs more bytes than `limit`.
 pub(super) fn check(name: &str, needed: u64, limit: u64) -> Result<(), GpuError> {

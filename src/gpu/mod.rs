@@ -6,6 +6,7 @@
 mod adapter;
 mod bindings;
 mod buffers;
+mod clock;
 mod compose;
 mod diagnose;
 mod environment;
@@ -18,9 +19,9 @@ mod slices;
 mod sort;
 mod uniform;
 
-pub use adapter::{AdapterChoice, AdapterSummary, Gpu, adapters, open};
+pub use adapter::{AdapterChoice, AdapterSummary, Gpu, RawDevice, adapters, open};
 pub use bindings::{Bindings, MAX_PARTS, Storage};
-pub use buffers::Elapsed;
+pub use clock::{Elapsed, Stopwatch};
 pub use compose::{ComposedKernel, Composition, KernelLibrary};
 pub use environment::{Environment, capture, cpu_model, device_type};
 pub(crate) use kernel_errors::LOOPS_CUT;

@@ -3,6 +3,7 @@
 use super::GpuError;
 use super::adapter::Gpu;
 use super::bindings::{Resource, Storage};
+use super::clock::Stopwatch;
 use super::pipeline::{BindingKind, Pipeline};
 use super::recording::{Groups, Played, Recording, Run, Step};
 use std::collections::{BTreeMap, HashMap};
@@ -121,7 +122,7 @@ impl Kept {
             self.wind_clock(gpu, runs.len());
         }
         let (commands, staged) = self.encode(gpu, recording, &bound);
-        let start = Instant::now();
+        let watch = Stopwatch::start();
         gpu.queue.submit([commands]);
         let clock_buffer = clock.and(self.clock.as_ref().map(|clock| clock.mapped.clone()));
         let to_map = staged.iter().map(|(_, buffer)| buffer);
@@ -129,7 +130,7 @@ impl Kept {
             buffer.map_async(wgpu::MapMode::Read, .., |_| {});
         }
         gpu.wait()?;
-        let wall_ms = start.elapsed().as_secs_f64() * 1e3;
+        let host = watch.elapsed();
         let mut downloads = BTreeMap::new();
         for (name, buffer) in staged {
             downloads.insert(name, take(&buffer)?);
@@ -153,7 +154,7 @@ impl Kept {
         let runs = runs.iter().enumerate();
         let runs = runs.map(|(place, run)| (run.name.clone(), ms(place)));
         Ok(Played {
-            wall_ms,
+            host,
             runs: runs.collect(),
             downloads,
         })

@@ -2,7 +2,7 @@
 
 use super::adapter::Gpu;
 use super::bindings::{Bindings, Storage};
-use super::buffers::Elapsed;
+use super::clock::Elapsed;
 use super::pipeline::{Pipeline, WORKGROUP_SIZE};
 use super::{Composition, GpuError, Player, UniformValues};
 use bytemuck::Pod;
@@ -173,8 +173,8 @@ impl Recording {
 /// What a recording took and brought back.
 #[derive(Debug, Clone, Default)]
 pub struct Played {
-    /// Milliseconds by the wall clock from submission to completion.
-    pub wall_ms: f64,
+    /// From submission to completion by the clocks of the host.
+    pub(super) host: Elapsed,
     /// Names of the runs, each with the milliseconds between the GPU timestamps around it; `None` where
     /// there are none.
     pub runs: Vec<(String, Option<f64>)>,
@@ -182,12 +182,17 @@ pub struct Played {
 }
 
 impl Played {
-    /// The sum over all runs, and the wall clock.
+    /// Milliseconds by the wall clock from submission to completion.
+    pub fn wall_ms(&self) -> f64 {
+        self.host.wall_ms
+    }
+
+    /// The sum over all runs, and the clocks of the host.
     pub fn elapsed(&self) -> Elapsed {
         let add = |sum: Option<f64>, (_, ms): &(String, Option<f64>)| Some(sum? + (*ms)?);
         Elapsed {
             gpu_ms: self.runs.iter().fold(Some(0.0), add),
-            wall_ms: self.wall_ms,
+            ..self.host
         }
     }
 

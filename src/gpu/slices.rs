@@ -65,8 +65,8 @@ mod tests {
             slices.learn(
                 u64::from(count),
                 Elapsed {
-                    gpu_ms: None,
                     wall_ms: f64::from(count) * ms_per_item,
+                    ..Elapsed::default()
                 },
             );
             out.push(count);

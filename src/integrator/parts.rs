@@ -162,10 +162,7 @@ impl PartRenderer {
         }
         let parts = order.parts(self.size);
         let first = order.passes_to_first_picture(self.size);
-        let nothing = || Elapsed {
-            gpu_ms: self.gpu.timestamp_period.map(|_| 0.0),
-            wall_ms: 0.0,
-        };
+        let nothing = || Elapsed::nothing(self.gpu.has_clock());
         let mut spent = InOrder {
             passes: parts.len(),
             total: nothing(),

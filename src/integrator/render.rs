@@ -269,10 +269,7 @@ impl<'a> Renderer<'a> {
         self.done.set(0);
         self.blocks.borrow_mut().clear();
         self.stages.borrow_mut().clear();
-        self.spent.set(Elapsed {
-            gpu_ms: self.gpu.timestamp_period.map(|_| 0.0),
-            wall_ms: 0.0,
-        });
+        self.spent.set(Elapsed::nothing(self.gpu.has_clock()));
         Ok(())
     }
 

@@ -119,7 +119,7 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 121] = [
+pub static FIGURES: [Figure; 126] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
@@ -129,6 +129,12 @@ pub static FIGURES: [Figure; 121] = [
     Figure::new("box-tests-per-ray/v1", "box tests/ray", "", Lower, THREE, Exact),
     Figure::new("triangle-tests-per-ray/v1", "triangle tests/ray", "", Lower, THREE, Exact),
     Figure::new("deepest-stack/v1", "deepest stack", "", Lower, Count, Exact),
+    // Ray casters of others, and structures beside them.
+    Figure::new("cpu-ns-per-ray/v1", "time of the processors", "ns per ray", Lower, THREE, Median),
+    Figure::new("cpu-over-peer/v1", "time of the processors over a peer's", "", Lower, THREE, Median),
+    Figure::new("peer-mrays-per-s/v1", "speed of a peer", "Mrays/s", Higher, THREE, Median),
+    Figure::new("unlike-judge/v1", "unlike the judge", "per million", Neither, THREE, Exact),
+    Figure::new("farthest-distance/v1", "farthest distance", "", Neither, THREE, Exact),
     // A structure.
     Figure::new("build-ms/v1", "build", "ms", Lower, THREE, Single),
     Figure::new("build-rate/v1", "build", "Mtris/s", Higher, THREE, Single),

@@ -19,6 +19,7 @@ pub mod memory;
 mod mesh;
 pub mod metrics;
 pub mod path_oracle;
+pub mod peer_judge;
 pub mod rays;
 pub mod record;
 pub mod replicates;

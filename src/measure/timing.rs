@@ -21,6 +21,12 @@ pub trait Measured {
     fn measure(&self) -> Result<Elapsed, GpuError>;
 }
 
+impl<M: Measured + ?Sized> Measured for &M {
+    fn measure(&self) -> Result<Elapsed, GpuError> {
+        (**self).measure()
+    }
+}
+
 /// What a measured thing answered, turn by turn: it must be the same each time, or the time is that of
 /// something else.
 #[derive(Debug, Default)]
@@ -56,6 +62,8 @@ pub struct Samples {
     pub ms: Vec<f64>,
     /// Milliseconds on the wall clock.
     pub wall_ms: Vec<f64>,
+    /// Milliseconds of all processors, where they are counted.
+    pub cpu_ms: Vec<f64>,
 }
 
 /// Measures everything `rounds` times in rounds of random order; what fails keeps its error.
@@ -91,6 +99,7 @@ pub fn interleave<M: Measured>(
                 Ok(elapsed) => {
                     samples.ms.push(elapsed.ms());
                     samples.wall_ms.push(elapsed.wall_ms);
+                    samples.cpu_ms.extend(elapsed.cpu_ms);
                 }
                 Err(error @ GpuError::Lost(_)) => return Err((index, error)),
                 Err(error) => results[index] = Err(error),

@@ -51,6 +51,8 @@ pub struct SceneGroup<'a> {
     pub record: Option<&'a SceneRecord>,
     /// Structures in the order measured.
     pub structures: Vec<Measured<'a, StructureRecord>>,
+    /// Ray casters of others in the order measured.
+    pub peers: Vec<Recorded<'a, PeerRecord>>,
     /// One per integrator, triangle test and box test.
     pub views: Vec<View<'a>>,
 }
@@ -177,6 +179,10 @@ impl<'a> RunData<'a> {
                     let scene = data.scene(line.key.label(axis::SCENE));
                     put(&mut scene.structures, measured, |a, b| a.key == b.key)
                 }
+                Body::Peer(record) => {
+                    let scene = data.scene(line.key.label(axis::SCENE));
+                    put(&mut scene.peers, line.of(record), |a, b| a.key == b.key)
+                }
                 Body::Reference(_) => {}
                 Body::Paths(record) => put(&mut data.paths, line.of(record), |a, b| a.key == b.key),
                 Body::Time(record) => {
@@ -302,6 +308,7 @@ impl<'a> RunData<'a> {
             name,
             record: None,
             structures: Vec::new(),
+            peers: Vec::new(),
             views: Vec::new(),
         };
         find_or_push(&mut self.scenes, |scene| scene.name == name, new)

@@ -10,6 +10,7 @@ use crate::integrator::{
 use crate::measure::compaction::benches;
 use crate::measure::figure::FigureRegistry;
 use crate::params::Variant;
+use crate::peers::PeerRegistry;
 use crate::sampling::SamplerRegistry;
 
 /// Everything that can be named.
@@ -29,6 +30,8 @@ pub struct Registries {
     pub offsets: OffsetRegistry,
     /// Organisations of the path tracer.
     pub organisations: OrganisationRegistry,
+    /// Ray casters of others.
+    pub peers: PeerRegistry,
     /// Compactions of streams.
     pub compactions: CompactionRegistry,
     /// Figures beside those of the crate.
@@ -49,6 +52,7 @@ impl Registries {
         catalogue[Axis::BoxTest] = self.boxes.entries();
         catalogue[Axis::Offset] = self.offsets.entries();
         catalogue[Axis::Organisation] = self.organisations.0.entries();
+        catalogue[Axis::Peer] = self.peers.entries();
         catalogue
     }
 

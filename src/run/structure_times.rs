@@ -3,7 +3,7 @@
 use super::session::Session;
 use super::structures::{Gated, write_failed};
 use super::world::World;
-use super::{Fault, RunError};
+use super::{Fault, RunError, peers};
 use crate::accel::tracer::count_work;
 use crate::accel::{Ask, Counters, Query, RayBatch, Space, Tracer};
 use crate::config::Axis;
@@ -84,11 +84,15 @@ pub(super) fn time_all(
             }
         }
     }
+    let rivals = peers::build(session, world);
+    let (cast, refused) = peers::batches(&rivals, world);
     let timing = session.experiment.timing;
     let seed = u64::from(session.experiment.seed);
     let progress = session.progress.clone();
-    let samples = match session.clock.time("gpu", || {
-        interleave(&timed, &timing, seed, || progress.inc(1))
+    let ours = timed.iter().map(|item| item as &dyn Measured);
+    let all: Vec<&dyn Measured> = ours.chain(cast.iter().map(|item| item as _)).collect();
+    let mut samples = match session.clock.time("gpu", || {
+        interleave(&all, &timing, seed, || progress.inc(1))
     }) {
         Ok(samples) => samples,
         Err((index, error)) => {
@@ -96,6 +100,11 @@ pub(super) fn time_all(
             return fail_lost(session, world, lost, error);
         }
     };
+    let theirs = samples.split_off(timed.len());
+    let theirs = session
+        .clock
+        .time("gate", || peers::judged(world, cast, theirs));
+    peers::write(session, world, rivals, refused, theirs)?;
     for (item, samples) in timed.iter().zip(samples) {
         let one = &mut gated[item.structure];
         match class_timing(session, world, one, item, samples) {
@@ -164,6 +173,10 @@ fn class_timing(
         unlike_shadow: unlike_shadow(set, &world.judge.of(one.traced.space).sets),
         ms,
         wall_ms: samples.wall_ms,
+        cpu_ms: match gpu.is_software() {
+            true => samples.cpu_ms,
+            false => Vec::new(),
+        },
         mrays_s,
         counters: work.as_deref().map(per_ray),
     }))

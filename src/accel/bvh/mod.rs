@@ -17,6 +17,7 @@ mod stack;
 
 use super::leaf::{COUNT_MASK, LeafReader, Leaves};
 use super::structure::prelude::*;
+use super::tracer::RefillParameters;
 use super::tree::{Coverage, NodeKind, Tree};
 use boxes::Boxes;
 use octant_roped::Octants;
@@ -179,6 +180,10 @@ impl BuiltAccel for BuiltBvh {
 
     fn divisible(&self) -> &'static [&'static str] {
         &["nodes", "leaf_triangles"]
+    }
+
+    fn refill(&self) -> RefillParameters {
+        self.params.refill()
     }
 
     fn stats(&self) -> StructureStats {

@@ -1,6 +1,7 @@
 //! Parameters of `bvh` and `roped-bvh` beyond those of the tree: which traversal reads which layout.
 
-use super::super::AccelError;
+use crate::accel::AccelError;
+use crate::accel::tracer::{Refill, RefillParameters};
 use crate::accel::tree::TreeParameters;
 use crate::parameters;
 
@@ -28,6 +29,8 @@ parameters! {
         short_stack_entries: u32 = 4, in 1..=32;
         /// Where nodes and triangles lie.
         layout: Layout;
+        /// How the batch kernel hands out rays (stack).
+        refill: RefillParameters;
     }
 
     /// Parameters of `roped-bvh`.
@@ -136,6 +139,11 @@ impl BvhParameters {
                 "stack_memory: this traversal has no stack; leave it at `function`, or take \
                  traversal = stack or short-stack",
             ),
+            (Traversal::Stack, _) => Ok(()),
+            _ if self.refill.refill == Refill::Always => contradiction(
+                "refill = always: among the traversals of `bvh` the stack alone can be refilled; \
+                 take traversal = stack or refill = auto",
+            ),
             (Traversal::Roped, NodeBytes::Both) => contradiction(
                 "node_bytes = 64: a rope leads to one box, not to a pair; traversal = roped takes 32",
             ),
@@ -144,6 +152,14 @@ impl BvhParameters {
                  node_bytes = 32 walks in the same order",
             ),
             _ => Ok(()),
+        }
+    }
+
+    /// When the batch kernel refills its invocations: never for traversals without a state to stop at.
+    pub(super) fn refill(&self) -> RefillParameters {
+        match self.traversal {
+            Traversal::Stack => self.refill.clone(),
+            _ => RefillParameters::NONE,
         }
     }
 

@@ -80,10 +80,7 @@ impl RayBatch {
         let mut wipe = Recording::new();
         wipe.copy(&self.poison, &self.buffers.answers);
         self.player.play(&wipe)?;
-        let mut total = Elapsed {
-            gpu_ms: self.tracer.gpu.timestamp_period.map(|_| 0.0),
-            wall_ms: 0.0,
-        };
+        let mut total = Elapsed::nothing(self.tracer.gpu.has_clock());
         let mut first = 0;
         while first < self.rays {
             let count = self.slices.next(first, self.rays);

@@ -8,6 +8,7 @@ mod error;
 mod key;
 mod old;
 mod paths;
+mod peer;
 mod read;
 mod run;
 mod stream;
@@ -18,6 +19,7 @@ pub use compaction::CompactionRecord;
 pub use error::*;
 pub use key::{Key, axis};
 pub use paths::PathsRecord;
+pub use peer::{PeerRecord, PeerTiming};
 pub use read::{
     PARTIAL, RECORDS_FILE, RecordError, Records, STRESS_FILE, read_lines, read_records, text_of,
 };
@@ -131,6 +133,8 @@ pub enum Body {
     Scene(SceneRecord),
     /// A structure was built, gated and traced with the recorded rays.
     Structure(StructureRecord),
+    /// A ray caster of others was traced with the recorded rays.
+    Peer(PeerRecord),
     /// Single paths of an integrator were judged.
     Paths(PathsRecord),
     /// A reference image was rendered.
@@ -188,6 +192,7 @@ kinds! {
     Run: RunRecord,
     Scene: SceneRecord,
     Structure: StructureRecord,
+    Peer: PeerRecord,
     Paths: PathsRecord,
     Reference: ReferenceRecord,
     Error: ErrorRecord,

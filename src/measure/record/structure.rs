@@ -112,6 +112,9 @@ pub struct ClassTiming {
     pub ms: Vec<f64>,
     /// The same dispatches by the wall clock, milliseconds.
     pub wall_ms: Vec<f64>,
+    /// The same in time of the processors, all threads of the process together; empty on adapters that work elsewhere.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cpu_ms: Vec<f64>,
     /// Million rays per second, median with interval.
     pub mrays_s: Interval,
     /// Counted work, from a separate run; absent for a structure that counts none.

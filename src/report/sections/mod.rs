@@ -6,6 +6,7 @@ pub mod compactions;
 pub mod kernels;
 mod orders;
 pub mod organisations;
+pub mod peers;
 pub mod point_sets;
 pub mod rendering;
 pub mod run;
@@ -114,6 +115,7 @@ fn scene_section(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -
     let blocks = &mut section.blocks;
     blocks.extend(facts(scene));
     blocks.extend(structures::blocks(dir, data, index, scene));
+    blocks.extend(peers::blocks(scene));
     for (number, view) in scene.views.iter().enumerate() {
         let stem = format!("scene-{index}-{}-{number}", file_stem(&view.name));
         blocks.extend(samplers::blocks(dir, data, &stem, scene, view));

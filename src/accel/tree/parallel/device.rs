@@ -139,7 +139,7 @@ impl<'a> Passes<'a> {
     pub fn play(&self, recording: &Recording, log: &mut BuildLog) -> Result<Played, AccelError> {
         let played = log.play(recording)?;
         if let Some(ms) = played.elapsed().gpu_ms {
-            log.note("transfer", (played.wall_ms - ms).max(0.0));
+            log.note("transfer", (played.wall_ms() - ms).max(0.0));
         }
         Ok(played)
     }

@@ -1,0 +1,98 @@
+//! What a piece of work took, by three clocks.
+
+use std::time::Instant;
+
+/// How long something took.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Elapsed {
+    /// Milliseconds between the GPU timestamps around it; `None` where there are none.
+    pub gpu_ms: Option<f64>,
+    /// Milliseconds by the wall clock from submission to completion.
+    pub wall_ms: f64,
+    /// Milliseconds that the processors spent on this process meanwhile, all threads together: on a software adapter what the
+    /// work costs, whatever else the machine does. `None` where there is no such clock.
+    pub cpu_ms: Option<f64>,
+}
+
+impl Elapsed {
+    /// What a sum begins with; `gpu`: there are timestamps.
+    pub fn nothing(gpu: bool) -> Self {
+        Self {
+            gpu_ms: gpu.then_some(0.0),
+            wall_ms: 0.0,
+            cpu_ms: cpu_ms().map(|_| 0.0),
+        }
+    }
+
+    /// GPU time where there is one, wall time elsewhere.
+    pub fn ms(&self) -> f64 {
+        self.gpu_ms.unwrap_or(self.wall_ms)
+    }
+}
+
+impl std::ops::AddAssign for Elapsed {
+    fn add_assign(&mut self, other: Self) {
+        let add = |a: Option<f64>, b: Option<f64>| a.zip(b).map(|(a, b)| a + b);
+        self.gpu_ms = add(self.gpu_ms, other.gpu_ms);
+        self.cpu_ms = add(self.cpu_ms, other.cpu_ms);
+        self.wall_ms += other.wall_ms;
+    }
+}
+
+/// The clocks of the host, from when it is made on.
+pub struct Stopwatch {
+    start: Instant,
+    cpu_ms: Option<f64>,
+}
+
+impl Stopwatch {
+    /// Begins now.
+    pub fn start() -> Self {
+        let cpu_ms = cpu_ms();
+        let start = Instant::now();
+        Self { start, cpu_ms }
+    }
+
+    /// What has passed since.
+    pub fn elapsed(&self) -> Elapsed {
+        Elapsed {
+            gpu_ms: None,
+            wall_ms: self.start.elapsed().as_secs_f64() * 1e3,
+            cpu_ms: cpu_ms().zip(self.cpu_ms).map(|(now, then)| now - then),
+        }
+    }
+}
+
+/// Milliseconds of all processors that this process has used.
+#[cfg(unix)]
+fn cpu_ms() -> Option<f64> {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    Some(time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 * 1e-6)
+}
+
+/// There is none.
+#[cfg(not(unix))]
+fn cpu_ms() -> Option<f64> {
+    None
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sleep_costs_time_on_the_wall_and_work_costs_both() {
+        let watch = Stopwatch::start();
+        std::thread::sleep(std::time::Duration::from_millis(30));
+        let slept = watch.elapsed();
+        assert!(slept.wall_ms >= 30.0);
+        let watch = Stopwatch::start();
+        while watch.start.elapsed().as_millis() < 200 {}
+        let worked = watch.elapsed();
+        // Other tests of this process run meanwhile: only a lower bound holds, and a busy machine lends its time elsewhere.
+        assert!(worked.cpu_ms.is_some_and(|ms| ms > 20.0), "{worked:?}");
+        let mut sum = Elapsed::nothing(false);
+        sum += worked;
+        assert_eq!(sum, worked);
+    }
+}

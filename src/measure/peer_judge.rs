@@ -1,0 +1,121 @@
+//! Whether the answers of a ray caster of others are right. Its hits differ from ours by rounding, so they are not compared to the bit:
+//! where its triangle is not the judge's, the oracle decides in double precision whether rounding explains that.
+
+use super::holes::SceneHoles;
+use super::rays::RaySet;
+use crate::accel::{Hit, NO_HIT, Query, Ray, TriangleSoup};
+use crate::oracle::{self, Holes, Surfaces, Verdict};
+use crate::scene::SceneData;
+use glam::Vec3;
+
+/// Most rays of a class that the oracle looks at, spread evenly over those that differ: it tests every triangle of the scene.
+const MOST_JUDGED: usize = 256;
+/// Relative difference of a distance that single precision explains: plain Möller–Trumbore tests of far and thin triangles lose
+/// three digits.
+const EXPLAINED: f64 = 1e-3;
+
+/// How the answers to the rays of a class differ from the judge's.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Differences {
+    /// Rays with another triangle.
+    pub unlike: usize,
+    /// How many of them were put to the oracle.
+    pub judged: usize,
+    /// Greatest relative difference of a distance at the same triangle.
+    pub farthest: f64,
+}
+
+/// Compares answers with the judge's.
+///
+/// # Errors
+/// The first answer that rounding does not explain, in words.
+pub fn differences(
+    scene: &SceneData,
+    soup: &TriangleSoup,
+    set: &RaySet,
+    hits: &[Hit],
+) -> Result<Differences, String> {
+    if hits.len() != set.rays.len() {
+        return Err(format!("{} answers to {} rays", hits.len(), set.rays.len()));
+    }
+    let mut found = Differences::default();
+    let mut unlike = Vec::new();
+    for ((ray, truth), hit) in set.rays.iter().zip(&set.truth).zip(hits) {
+        let [is, was] = [hit, truth].map(|hit| hit.triangle != NO_HIT);
+        let same = match set.query() {
+            Query::Any => is == was,
+            Query::Closest => hit.triangle == truth.triangle,
+        };
+        if !same {
+            unlike.push((ray, hit));
+        } else if is && set.query() == Query::Closest {
+            let off = f64::from((hit.t - truth.t).abs()) / f64::from(truth.t.abs());
+            if !off.is_finite() || off > EXPLAINED {
+                return Err(format!(
+                    "ray {ray} | it {hit} | judge {truth}: the distance is wrong"
+                ));
+            }
+            found.farthest = found.farthest.max(off);
+        }
+    }
+    found.unlike = unlike.len();
+    found.judged = unlike.len().min(MOST_JUDGED);
+    let chosen: Vec<(&Ray, &Hit)> = (0..found.judged)
+        .map(|i| unlike[i * unlike.len() / found.judged])
+        .collect();
+    judge(scene, soup, set.query(), &chosen)?;
+    Ok(found)
+}
+
+fn judge(
+    scene: &SceneData,
+    soup: &TriangleSoup,
+    query: Query,
+    answers: &[(&Ray, &Hit)],
+) -> Result<(), String> {
+    let holes = SceneHoles::of(scene);
+    let surfaces = Surfaces {
+        triangles: &scene.triangles,
+        holes: holes.as_ref().map(|holes| holes as &dyn Holes),
+    };
+    let raised = |ray: &Ray| soup.intersection.raised(ray);
+    let verdicts = match query {
+        Query::Any => {
+            let asked = answers
+                .iter()
+                .map(|(ray, hit)| (raised(ray), hit.triangle != NO_HIT));
+            oracle::judge_any_hits(surfaces, &asked.collect::<Vec<_>>())
+        }
+        Query::Closest => {
+            let asked = answers.iter().map(|(ray, hit)| {
+                let answer =
+                    (hit.triangle != NO_HIT).then(|| (hit.triangle, distance(soup, ray, hit)));
+                (raised(ray), answer)
+            });
+            oracle::judge_closest_hits(surfaces, &asked.collect::<Vec<_>>())
+        }
+    };
+    for ((ray, hit), verdict) in answers.iter().zip(verdicts) {
+        if let Verdict::Wrong(fault) = verdict {
+            return Err(format!("ray {ray} | it {hit} | f64: {fault}"));
+        }
+    }
+    Ok(())
+}
+
+/// Where the ray meets the plane of the triangle that it is said to hit, if that is what was said to single precision: the oracle
+/// allows our own tests' rounding and no more.
+fn distance(soup: &TriangleSoup, ray: &Ray, hit: &Hit) -> f32 {
+    let Some(record) = soup.records.get(hit.triangle as usize) else {
+        return hit.t;
+    };
+    let vector = |v: [f32; 3]| Vec3::from(v).as_dvec3();
+    let [a, b, c] = record.vertices().map(vector);
+    let normal = (b - a).cross(c - a);
+    let t = normal.dot(a - vector(ray.origin)) / normal.dot(vector(ray.direction));
+    let off = (f64::from(hit.t) - t).abs() / t.abs();
+    match off <= EXPLAINED {
+        true => t as f32,
+        false => hit.t,
+    }
+}

@@ -1,0 +1,64 @@
+//! What casters on the host have in common: answers in memory, found by all threads of the machine.
+
+use super::PeerBatch;
+use crate::accel::{Hit, Query, Ray};
+use crate::gpu::{Elapsed, GpuError, Stopwatch};
+use rayon::prelude::*;
+use std::cell::RefCell;
+
+/// Rays that a thread takes at a time.
+const CHUNK: usize = 1024;
+
+/// One ray after the other.
+pub trait Caster: Sync {
+    /// The nearest hit, or [`Hit::miss`]; any hit if only that is asked for.
+    fn cast(&self, query: Query, ray: &Ray) -> Hit;
+}
+
+/// Rays that a caster answers.
+pub struct NativeBatch<'a, C> {
+    caster: &'a C,
+    query: Query,
+    rays: &'a [Ray],
+    hits: RefCell<Vec<Hit>>,
+}
+
+impl<'a, C: Caster> NativeBatch<'a, C> {
+    pub fn new(caster: &'a C, query: Query, rays: &'a [Ray]) -> Self {
+        Self {
+            caster,
+            query,
+            rays,
+            hits: RefCell::default(),
+        }
+    }
+}
+
+impl<C: Caster> PeerBatch for NativeBatch<'_, C> {
+    fn trace(&self) -> Result<Elapsed, GpuError> {
+        let (caster, query) = (self.caster, self.query);
+        let mut hits = self.hits.borrow_mut();
+        hits.clear();
+        let watch = Stopwatch::start();
+        let chunks = self.rays.par_iter().with_min_len(CHUNK);
+        chunks
+            .map(|ray| match ray.is_ray() {
+                true => caster.cast(query, ray),
+                false => Hit::miss(ray),
+            })
+            .collect_into_vec(&mut hits);
+        Ok(watch.elapsed())
+    }
+
+    fn hits(&self) -> Result<Vec<Hit>, GpuError> {
+        Ok(self.hits.borrow().clone())
+    }
+}
+
+/// How many threads answer, in words.
+pub fn threads() -> String {
+    match rayon::current_num_threads() {
+        1 => "1 thread".into(),
+        n => format!("{n} threads"),
+    }
+}

@@ -1,0 +1,49 @@
+//! The peers that experiments can name: one line each.
+
+use super::{BuiltPeer, Peer, embree::Embree, obvhs::Obvhs, ray_query::RayQuery};
+use crate::accel::TriangleSoup;
+use crate::config::NO_PEER;
+use crate::gpu::Gpu;
+use crate::params::{Kinds, Named};
+
+/// Everything that can be named on the `peer` axis.
+pub type PeerRegistry = Kinds<dyn Peer>;
+
+/// The registry entry `none`.
+struct NoPeer;
+
+impl Peer for NoPeer {
+    fn name(&self) -> &'static str {
+        NO_PEER
+    }
+
+    fn description(&self) -> &'static str {
+        "nobody to compare with"
+    }
+
+    fn build<'a>(&self, _: &Gpu, _: &'a TriangleSoup) -> Result<Box<dyn BuiltPeer + 'a>, String> {
+        Err("nobody was asked for".into())
+    }
+}
+
+impl Default for PeerRegistry {
+    fn default() -> Self {
+        Self::new([
+            &NoPeer as &dyn Peer,
+            &Obvhs::Binary,
+            &Obvhs::Wide,
+            &Embree,
+            &RayQuery,
+        ])
+    }
+}
+
+impl Named for dyn Peer {
+    fn name(&self) -> &'static str {
+        Peer::name(self)
+    }
+
+    fn description(&self) -> &'static str {
+        Peer::description(self)
+    }
+}

@@ -1,0 +1,156 @@
+//! Ray casters of others beside the structures: times of the processors, ratios, and how their answers differ. No verdict is drawn from it.
+
+use super::structures::BY_RAYS;
+use crate::measure::comparison::LogFigure;
+use crate::measure::record::{ClassTiming, Interval, PeerRecord, PeerTiming, Recorded, axis};
+use crate::measure::statistics::median_interval;
+use crate::report::data::SceneGroup;
+use crate::report::document::*;
+use crate::report::format;
+use crate::report::pivot::Rows;
+use crate::report::values::Value;
+
+const SPEED: &str = "peer-mrays-per-s/v1";
+const COST: &str = "cpu-ns-per-ray/v1";
+const RATIO: &str = "cpu-over-peer/v1";
+const UNLIKE: &str = "unlike-judge/v1";
+const FARTHEST: &str = "farthest-distance/v1";
+
+/// Who casts: a structure or a peer, and against whom.
+const ROWS: [&str; 5] = [
+    axis::ACCEL,
+    axis::KERNELS,
+    axis::TRIANGLE,
+    axis::BOX_TEST,
+    axis::PEER,
+];
+
+fn ns_per_ray(cpu_ms: &[f64], rays: usize) -> Option<Interval> {
+    let ns: Vec<f64> = cpu_ms.iter().map(|ms| ms * 1e6 / rays as f64).collect();
+    median_interval(&ns)
+}
+
+fn of_peer(peer: &Recorded<PeerRecord>, timing: &PeerTiming) -> Vec<Value<'static>> {
+    let key = (peer.key.clone()).with(axis::RAYS, format::ray_class(timing.class));
+    let figures = [
+        (SPEED, Some(timing.mrays_s)),
+        (COST, ns_per_ray(&timing.cpu_ms, timing.rays)),
+        (
+            UNLIKE,
+            Some(Interval::exact(
+                timing.unlike as f64 * 1e6 / timing.rays as f64,
+            )),
+        ),
+        (FARTHEST, Some(Interval::exact(timing.farthest))),
+    ];
+    Value::known(&key, figures)
+}
+
+/// Time of the processors for the same rays, over that of the peer.
+fn over(ours: &ClassTiming, theirs: &PeerTiming) -> Option<Interval> {
+    let [own, base] = [&ours.cpu_ms, &theirs.cpu_ms].map(|ms| LogFigure::of_times(ms));
+    let (own, base) = own.zip(base)?;
+    let noise = base.own.first().copied();
+    Some(own.scaled((-base.log).exp()).with_noise(noise).interval())
+}
+
+/// All figures of a scene's peers, and of its structures against them.
+pub fn values(scene: &SceneGroup) -> Vec<Value<'static>> {
+    let mut values = Vec::new();
+    for peer in &scene.peers {
+        values.extend(peer.timings.iter().flat_map(|timing| of_peer(peer, timing)));
+    }
+    if scene.peers.is_empty() {
+        return values;
+    }
+    for structure in scene.structures.iter().filter(|s| s.fault().is_none()) {
+        for ours in &structure.timings {
+            let key = (structure.key.clone()).with(axis::RAYS, format::ray_class(ours.class));
+            let cost = ns_per_ray(&ours.cpu_ms, ours.rays);
+            values.extend(Value::known(&key, [(COST, cost)]));
+            for peer in &scene.peers {
+                let mut timings = peer.timings.iter();
+                let theirs = timings.find(|t| t.class == ours.class && t.rays == ours.rays);
+                let same = peer
+                    .key
+                    .agrees(&structure.key, &[axis::TRIANGLE, axis::BOX_TEST]);
+                let ratio = theirs
+                    .filter(|_| same)
+                    .and_then(|theirs| over(ours, theirs));
+                let key = key.clone().with(axis::PEER, peer.key.label(axis::PEER));
+                values.extend(Value::known(&key, [(RATIO, ratio)]));
+            }
+        }
+    }
+    values
+}
+
+/// What each is, and why one is missing.
+fn told(peer: &Recorded<PeerRecord>) -> String {
+    let name = peer.key.label(axis::PEER);
+    match (&peer.absent, &peer.failure) {
+        (Some(reason), _) => format!("{name} did not run: {reason}."),
+        (_, Some(fault)) => format!("{name} has no figures, since its answers are wrong: {fault}."),
+        _ => format!(
+            "{name}: {}, built in {} ms.",
+            peer.about,
+            format::number(peer.build_ms)
+        ),
+    }
+}
+
+/// Tables of a scene; nothing without peers.
+pub fn blocks(scene: &SceneGroup) -> Vec<Block> {
+    if scene.peers.is_empty() {
+        return Vec::new();
+    }
+    let about = "Ray casters of others answered the same rays in the same rounds. They are no competitors: their hits may differ from ours by \
+                 rounding, where the triangle is another the double-precision oracle has to agree (at most 256 rays a class, spread over all that \
+                 differ), and one that is wrong gets no figures. Time of the processors is that of all threads together, for which it does not \
+                 matter what else the machine does.";
+    let mut blocks = vec![Block::Paragraph(about.into())];
+    blocks.extend(scene.peers.iter().map(|peer| Block::Paragraph(told(peer))));
+    let values = values(scene);
+    let table = |figure: &str, rows: &[&'static str], heads: &[&str], caption: &str| {
+        let own: Vec<Value> = values
+            .iter()
+            .filter(|v| v.figure.id == figure)
+            .cloned()
+            .collect();
+        Rows::of_labels(rows, heads, &own)
+            .table(&own, caption, &[figure], BY_RAYS)
+            .into_block()
+    };
+    let who = [axis::PEER, axis::ACCEL, axis::KERNELS];
+    blocks.extend(table(
+        COST,
+        &who,
+        &[":peer", ":structure", ":kernels"],
+        "Time of all processors, ns per ray: median [95 % interval]",
+    ));
+    blocks.extend(table(
+        RATIO,
+        &ROWS[..],
+        &[":structure", ":kernels", ":triangle", ":box test", ":over"],
+        "Time of the processors over that of a peer: above 1 the peer needs less",
+    ));
+    blocks.extend(table(
+        SPEED,
+        &[axis::PEER],
+        &[":peer"],
+        "Speed by the wall clock, Mrays/s: median [95 % interval]",
+    ));
+    blocks.extend(table(
+        UNLIKE,
+        &[axis::PEER],
+        &[":peer"],
+        "Rays with another triangle than the judge's, or another answer, per million",
+    ));
+    blocks.extend(table(
+        FARTHEST,
+        &[axis::PEER],
+        &[":peer"],
+        "Greatest relative difference of a distance at the same triangle",
+    ));
+    blocks
+}
