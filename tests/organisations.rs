@@ -5,6 +5,7 @@
 mod piped;
 mod support;
 
+use glam::Vec3;
 use piped::PipedBvh;
 use raystone::accel::{AccelKind, Traced};
 use raystone::gpu::{Gpu, GpuError, KernelLibrary};
@@ -231,7 +232,12 @@ fn fault_on(
 
 #[test]
 fn a_tree_of_lights_knows_the_surface_that_a_ray_has_left() {
-    let lamps = || builtin("many-lights", &[("lamps", ParamValue::Integer(12))]);
+    // A wall that shines beside the lamp: rays find lights that a tree would have chosen by the surface they come from.
+    let lamps = || {
+        let mut scene = builtin("cornell-box", &[]);
+        scene.materials[0].emission = Vec3::splat(0.5);
+        scene
+    };
     let tree = integrator_variant("path", &[("light_choice", word("tree"))]);
     let several = organisation("multi-kernel", &[]);
     let paths = |from, to| fault_on(lamps(), &tree, &several, ("organisation/paths", from, to));

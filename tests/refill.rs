@@ -116,13 +116,13 @@ fn what_goes_wrong_between_two_rays_is_seen() {
         (KERNEL, "index += 64u;", "index += 65u;"),
         (
             KERNEL,
-            "let run = (batch.count + lanes - 1u) / lanes",
-            "let run = batch.count / lanes",
+            "let run = (total + lanes - 1u) / lanes",
+            "let run = total / lanes",
         ),
         (
             KERNEL,
-            "min(first + run, batch.count)",
-            "min(first + run, batch.count - 1u)",
+            "min(first + run, total)",
+            "min(first + run, total - 1u)",
         ),
         (
             KERNEL,
