@@ -156,19 +156,8 @@ fn broken_limit(wgsl: &str) -> Option<String> {
     {
         return Some(format!("bind group {high}"));
     }
-    let size = wgsl
-        .split("@workgroup_size(")
-        .nth(1)
-        .and_then(|r| r.split(')').next());
-    let numbers = size.expect("an entry point").split(',');
-    let invocations: u32 = numbers
-        .map(|n| {
-            n.trim()
-                .trim_end_matches('u')
-                .parse::<u32>()
-                .expect("a size")
-        })
-        .product();
+    let module = naga::front::wgsl::parse_str(wgsl).expect("a kernel");
+    let invocations: u32 = module.entry_points[0].workgroup_size.iter().product();
     (invocations > 256).then(|| format!("{invocations} invocations"))
 }
 

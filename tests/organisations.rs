@@ -258,8 +258,8 @@ fn planted_faults_are_seen() {
         (
             &queues,
             "groups",
-            "(live + 63u) / 64u",
-            "max(live, 64u) / 64u",
+            "(live + LANES - 1u) / LANES",
+            "max(live, LANES) / LANES",
         ),
         (&queues, "finish", "new_slot(next)", "new_slot(next + 1u)"),
         (

@@ -111,18 +111,18 @@ fn what_goes_wrong_between_two_rays_is_seen() {
         (
             KERNEL,
             "if (index >= end) {\n                break;",
-            "if (index + 64u >= end) {\n                break;",
+            "if (index + LANES >= end) {\n                break;",
         ),
-        (KERNEL, "index += 64u;", "index += 65u;"),
+        (KERNEL, "index += LANES;", "index += LANES + 1u;"),
         (
             KERNEL,
-            "let run = (batch.count + lanes - 1u) / lanes",
-            "let run = batch.count / lanes",
+            "let run = (total + lanes - 1u) / lanes",
+            "let run = total / lanes",
         ),
         (
             KERNEL,
-            "min(first + run, batch.count)",
-            "min(first + run, batch.count - 1u)",
+            "min(first + run, total)",
+            "min(first + run, total - 1u)",
         ),
         (
             KERNEL,

@@ -29,7 +29,7 @@ pub use pipeline::{Pipeline, TEXELS_PER_ROW, WORKGROUP_EDGE, WORKGROUP_SIZE};
 pub use player::Player;
 pub use probe::{ArithmeticProbe, probe_arithmetic};
 pub use recording::{Groups, Played, Recording, grid_of, groups_for};
-pub use slices::Slices;
+pub use slices::{MOST_SLICE_MS, Slices, slow_slice};
 pub use sort::{Pairs, RadixSort};
 pub use uniform::UniformValues;
 

@@ -311,8 +311,8 @@ pub const MUTANTS: &[Mutant] = &[
         "rays of the last workgroup are not traced if it is not full",
         text(
             "integrator/trace_rays",
-            "if (item >= batch.count) {",
-            "if (item >= batch.count || (batch.count > 64u && (item | 63u) >= batch.count)) {",
+            "if (item >= ray_total()) {",
+            "if (item >= ray_total() || (ray_total() > 64u && (item | 63u) >= ray_total())) {",
         ),
         BVH,
         Check::Lattice,
@@ -322,7 +322,7 @@ pub const MUTANTS: &[Mutant] = &[
         "workgroups beyond the first row trace the rays of the first",
         text(
             "integrator/trace_rays",
-            "let item = id.x + id.y * groups.x * 64u;",
+            "let item = id.x + id.y * groups.x * LANES;",
             "let item = id.x;",
         ),
         BVH,
