@@ -69,6 +69,8 @@ fn catalogue() -> Catalogue {
     catalogue[Axis::Triangle] = plain(&["watertight", "pluecker"]);
     catalogue[Axis::BoxTest] = plain(&["padded-16", "plain"]);
     catalogue[Axis::Offset] = plain(&["error-bound", "none"]);
+    catalogue[Axis::Organisation] = plain(&["single-kernel"]);
+    catalogue[Axis::Workgroup] = plain(&["auto", "32", "16x16"]);
     catalogue
 }
 
@@ -324,6 +326,27 @@ fn a_plan_measures_errors_once_and_times_every_cell() {
     ] {
         assert!(text.contains(piece), "no `{piece}` in:\n{text}");
     }
+}
+
+#[test]
+fn workgroups_are_swept_for_times_and_not_for_errors() {
+    let text = AXES.replace(
+        "[axes]\n",
+        "[axes]\nworkgroup = [\"auto\", \"32\", \"16x16\"]\n",
+    );
+    let whole = plan(&parse_with(&text, &[]).expect("a good sweep"), &[]).expect("a plan");
+    assert_eq!(whole.structures.len(), 2 * 3);
+    assert_eq!(whole.samplers.len(), 2);
+    assert_eq!(whole.times.len(), 2 * 2 * 3);
+    assert_eq!(whole.streams.len(), 2);
+    let names: BTreeSet<String> = whole.times.iter().map(ToString::to_string).collect();
+    assert_eq!(names.len(), whole.times.len());
+    assert!(
+        names.iter().any(|name| name.ends_with("workgroup 16x16")),
+        "{names:?}"
+    );
+    let wrong = parse_with(&text.replace("16x16", "16x61"), &[]).expect_err("no such workgroup");
+    assert!(wrong.to_string().contains("16x16"), "{wrong}");
 }
 
 #[test]
