@@ -211,7 +211,8 @@ fn every_combination_composes_validates_and_stays_within_the_limits() {
 
 #[test]
 fn a_kernel_over_a_limit_is_seen() {
-    let buffers = |n: usize| "@group(0) @binding(0) var<storage, read> a: array<u32>;\n".repeat(n);
+    let buffer = |n| format!("@group(0) @binding({n}) var<storage, read> a{n}: array<u32>;\n");
+    let buffers = |n: usize| (0..n).map(buffer).collect::<String>();
     let entry = |size: &str| format!("@compute @workgroup_size({size}) fn main() {{}}");
     assert_eq!(broken_limit(&(buffers(8) + &entry("16, 16"))), None);
     assert!(broken_limit(&(buffers(9) + &entry("64"))).is_some());
