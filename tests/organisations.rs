@@ -49,6 +49,9 @@ fn organised(what: &Variant, by: &Variant) -> Result<ConfiguredIntegrator, Strin
     integrator.organised(OrganisationRegistry::default().configured(by)?)
 }
 
+/// Images, each pixel by the bits of its channels.
+type Bits = Vec<Vec<[u32; 3]>>;
+
 /// Bits of the images after [`SPPS`] samples, and rays by class.
 fn rendered(
     gpu: &Gpu,
@@ -56,7 +59,7 @@ fn rendered(
     traced: &Traced,
     what: &Variant,
     by: &Variant,
-) -> Result<(Vec<Vec<[u32; 3]>>, Vec<u64>), GpuError> {
+) -> Result<(Bits, Vec<u64>), GpuError> {
     let integrator = IntegratorRegistry::default()
         .configured(what)
         .expect("an integrator");
@@ -97,7 +100,7 @@ fn all() -> Vec<Variant> {
         organisation("multi-kernel", &[]),
         wavefront(&[]),
         small(&[]),
-        small(&[never.clone()]),
+        small(std::slice::from_ref(&never)),
         small(&[("sorting", word("material"))]),
         small(&[("sorting", word("ray-key")), never]),
     ];

@@ -327,15 +327,15 @@ fn what_goes_wrong_with_the_size_of_workgroups_is_seen() {
             ),
             "none",
         ),
-        ("128", (RAYS, "index += LANES;", "index += 64u;"), "always"),
+        ("128", (RAYS, "index += LANES;", "index += 256u;"), "always"),
         ("32", (RAYS, "index += LANES;", "index += 64u;"), "always"),
         ("32", (RAYS, "/ lanes * LANES;", "/ lanes * 31u;"), "always"),
         (
-            "256",
+            "32",
             (
                 RAYS,
                 "groups.x * groups.y * LANES;",
-                "groups.x * groups.y * 64u * 64u;",
+                "groups.x * groups.y * 64u;",
             ),
             "always",
         ),
