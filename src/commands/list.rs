@@ -47,6 +47,8 @@ enum Topic {
     Organisation,
     #[value(alias = "peers")]
     Peer,
+    #[value(alias = "workgroups")]
+    Workgroup,
     #[value(alias = "metrics")]
     Metric,
     #[value(alias = "measures", alias = "discrepancy")]
@@ -76,6 +78,7 @@ impl List {
                 Topic::Offset => axis(Axis::Offset),
                 Topic::Organisation => axis(Axis::Organisation),
                 Topic::Peer => axis(Axis::Peer),
+                Topic::Workgroup => axis(Axis::Workgroup),
                 Topic::Material => materials(),
                 Topic::Light => lights(),
                 Topic::Metric => metrics(),
@@ -103,6 +106,7 @@ fn entries(axis: Axis, entries: &[Entry]) -> String {
         Axis::Offset => "offset: how rays leave a surface\n".into(),
         Axis::Organisation => "organisation: of the path tracer on the device\n".into(),
         Axis::Peer => "peer: ray casters of others, to measure against\n".into(),
+        Axis::Workgroup => "workgroup: of kernels that trace\n".into(),
         axis => format!("{axis}\n"),
     };
     // Writing to a string cannot fail.

@@ -26,13 +26,15 @@ pub enum Axis {
     Organisation,
     /// Ray casters of others that are measured beside the structures.
     Peer,
+    /// The workgroups in which kernels trace.
+    Workgroup,
     /// The kernels that all this runs with.
     Kernels,
 }
 
 impl Axis {
     /// All axes, in the order of tables and plans.
-    pub const ALL: [Axis; 11] = [
+    pub const ALL: [Axis; 12] = [
         Axis::Scene,
         Axis::Accel,
         Axis::Sequence,
@@ -43,6 +45,7 @@ impl Axis {
         Axis::Offset,
         Axis::Organisation,
         Axis::Peer,
+        Axis::Workgroup,
         Axis::Kernels,
     ];
 
@@ -59,6 +62,7 @@ impl Axis {
             Axis::Offset => "offset",
             Axis::Organisation => "organisation",
             Axis::Peer => "peer",
+            Axis::Workgroup => "workgroup",
             Axis::Kernels => "kernels",
         }
     }
@@ -249,6 +253,7 @@ pub const KEYS: &[KeyRow] = &[
     key("axes", "offset", ValueKind::Names(Axis::Offset), Some("[\"error-bound\"]"), "How rays that leave a surface are moved off it by integrators. References are always rendered with `error-bound`."),
     key("axes", "organisation", ValueKind::Names(Axis::Organisation), Some("[\"single-kernel\"]"), "How the path tracer is organised on the device. All make the same image to the bit; errors are measured with `single-kernel`."),
     key("axes", "peer", ValueKind::Names(Axis::Peer), Some("[\"none\"]"), "Ray casters of others, timed with the same rays in the rounds of the structures, and told apart from them."),
+    key("axes", "workgroup", ValueKind::Names(Axis::Workgroup), Some("[\"auto\"]"), "Workgroups of the kernels that trace: so many rays, and pixels of this shape. All give the same hits and images to the bit."),
     key("axes", "kernels", ValueKind::Names(Axis::Kernels), Some("[\"\"]"), "Folders whose kernels (`*.wesl`) replace the embedded ones of the same path, or join them, relative to the current directory; `\"\"` are the embedded ones."),
     key("camera", "eye", ValueKind::Vector, None, "Position of the pinhole, scene units."),
     key("camera", "target", ValueKind::Vector, None, "Point that projects to the centre of the image, scene units."),
@@ -264,6 +269,7 @@ pub const KEYS: &[KeyRow] = &[
     key("exclude", "offset", ValueKind::Patterns(Axis::Offset), None, "… these offsets …"),
     key("exclude", "organisation", ValueKind::Patterns(Axis::Organisation), None, "… these organisations …"),
     key("exclude", "peer", ValueKind::Patterns(Axis::Peer), None, "… these peers …"),
+    key("exclude", "workgroup", ValueKind::Patterns(Axis::Workgroup), None, "… these workgroups …"),
     key("exclude", "kernels", ValueKind::Patterns(Axis::Kernels), None, "… and these kernels are left out."),
     key("reference", "spp", integer(2, 1 << 24), Some("16384"), "Samples per pixel of the reference image, both halves together."),
     key("reference", "sequence", ValueKind::Name(Axis::Sequence), Some("\"pixel-hash\""), "Sequence of the reference, with its default parameters."),

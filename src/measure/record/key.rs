@@ -30,6 +30,8 @@ pub mod axis {
     pub const ORGANISATION: &str = "organisation";
     /// Ray caster of others; absent for what is this crate's.
     pub const PEER: &str = "peer";
+    /// In which workgroups kernels trace; absent where none does.
+    pub const WORKGROUP: &str = "workgroup";
     /// Family of hard scenes and rays.
     pub const FAMILY: &str = "family";
     /// Mesh that is shot at.
@@ -49,7 +51,7 @@ pub mod axis {
     /// Any other thing that figures are of.
     pub const SUBJECT: &str = "subject";
     /// All of them.
-    pub const ALL: [&str; 20] = [
+    pub const ALL: [&str; 21] = [
         SCENE,
         ACCEL,
         INTEGRATOR,
@@ -61,6 +63,7 @@ pub mod axis {
         OFFSET,
         ORGANISATION,
         PEER,
+        WORKGROUP,
         FAMILY,
         MESH,
         PLACE,
