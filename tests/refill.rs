@@ -9,7 +9,7 @@ use raystone::params::{ParamValue, Params};
 use support::{Pcg, assert_same_hits, build, default_params, is_exact, kernels_with, open, scenes};
 
 /// Structures whose invocations can be refilled.
-const REFILLED: [&str; 2] = ["bvh4", "cwbvh"];
+const REFILLED: [&str; 3] = ["bvh", "bvh4", "cwbvh"];
 const KERNEL: &str = "integrator/trace_rays";
 
 /// A soup, and rays that are no multiple of anything; one of them is none.
@@ -85,7 +85,11 @@ fn is_seen(subject: &(TriangleSoup, Vec<Ray>), fault: (&str, &str, &str)) -> boo
     let (module, from, to) = fault;
     let gpu = open(kernels_with(module, &[(from, to)]));
     REFILLED.iter().all(|name| {
-        if module.starts_with("accel/") && module != format!("accel/{name}") {
+        let kernel = match *name {
+            "bvh" => "accel/bvh/stack".to_owned(),
+            name => format!("accel/{name}"),
+        };
+        if module.starts_with("accel/") && module != kernel {
             return true;
         }
         let plain = answers(support::gpu(), name, subject, ("none", 64));
@@ -158,6 +162,17 @@ fn what_goes_wrong_between_two_rays_is_seen() {
         "\n",
     ));
     faults.push(("accel/bvh4", "    (*at).list = ROOT_LIST;\n", "\n"));
+    for left_over in [
+        "    (*at).inverse = 1.0 / ray.direction;\n",
+        "    (*at).hit = miss(ray);\n",
+        "    (*at).current = ROOT;\n",
+        "    (*at).steps = 0u;\n",
+        "    (*at).stack.held = 0u;\n",
+        "    (*at).current = current;\n",
+        "    (*at).stack = stack;\n",
+    ] {
+        faults.push(("accel/bvh/stack", left_over, "\n"));
+    }
     let unseen: Vec<_> = faults
         .iter()
         .filter(|fault| !is_seen(&subject, **fault))
