@@ -8,6 +8,7 @@ use crate::accel::{Hit, NO_HIT, Query, Ray, TriangleSoup};
 use crate::gpu::Gpu;
 use libloading::{Library, Symbol};
 use std::ffi::{c_int, c_void};
+use std::mem::ManuallyDrop;
 use std::ptr::{null, null_mut};
 use std::time::Instant;
 
@@ -112,7 +113,8 @@ enum Cast {
 pub struct Embree;
 
 struct Built<'a> {
-    library: Library,
+    /// Never unloaded: its threads wait for work for as long as the program runs.
+    library: ManuallyDrop<Library>,
     cast: Cast,
     device: *mut c_void,
     scene: *mut c_void,
@@ -231,7 +233,7 @@ unsafe fn build(
             version,
             build_ms,
             _soup: soup,
-            library,
+            library: ManuallyDrop::new(library),
         })
     }
 }

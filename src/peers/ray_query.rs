@@ -4,11 +4,14 @@ use super::{BuiltPeer, Peer, PeerBatch};
 use crate::accel::{Hit, NO_HIT, Query, Ray, TriangleSoup};
 use crate::gpu::{Elapsed, Gpu, GpuError, RawDevice, Stopwatch};
 use std::cell::RefCell;
+use std::num::NonZeroU64;
 use std::time::Instant;
 use wgpu::util::DeviceExt as _;
 
 /// A workgroup of the kernel.
 const LANES: u32 = 64;
+/// Rays of a dispatch: software adapters take some microseconds for one, and a dispatch of seconds looks like a hang.
+const SLICE: usize = 1 << 16;
 const KERNEL: &str = include_str!("ray_query.wgsl");
 
 /// The registry entry `ray-query`.
@@ -27,7 +30,8 @@ struct Batch<'a> {
     built: &'a Built,
     rays: &'a [Ray],
     pipeline: &'a wgpu::ComputePipeline,
-    bound: wgpu::BindGroup,
+    /// Of each slice, with its number of rays.
+    slices: Vec<(wgpu::BindGroup, u32)>,
     answers: wgpu::Buffer,
     staging: wgpu::Buffer,
     hits: RefCell<Vec<Hit>>,
@@ -74,7 +78,7 @@ impl Peer for RayQuery {
                     cache: None,
                 })
         };
-        let pipelines = [pipeline("nearest"), pipeline("any")];
+        let pipelines = [pipeline("nearest_hit"), pipeline("any_hit")];
         raw.wait().map_err(|e| e.to_string())?;
         Ok(Box::new(Built {
             raw,
@@ -199,29 +203,33 @@ impl BuiltPeer for Built {
             wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
         );
         let pipeline = &self.pipelines[usize::from(query == Query::Any)];
-        let bound = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: self.tlas.as_binding(),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: asked.as_entire_binding(),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 2,
-                    resource: answers.as_entire_binding(),
-                },
-            ],
-        });
+        let bind = |first: usize| {
+            let count = SLICE.min(rays.len() - first);
+            let part = |buffer, bytes: usize| {
+                wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                    buffer,
+                    offset: (first * bytes) as u64,
+                    size: NonZeroU64::new((count * bytes) as u64),
+                })
+            };
+            let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+            let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &pipeline.get_bind_group_layout(0),
+                entries: &[
+                    entry(0, self.tlas.as_binding()),
+                    entry(1, part(&asked, 32)),
+                    entry(2, part(&answers, 16)),
+                ],
+            });
+            (group, count as u32)
+        };
+        let slices = (0..rays.len()).step_by(SLICE).map(bind).collect();
         Ok(Box::new(Batch {
             built: self,
             rays,
             pipeline,
-            bound,
+            slices,
             answers,
             staging,
             hits: RefCell::default(),
@@ -240,18 +248,18 @@ impl PeerBatch for Batch<'_> {
         wipe.clear_buffer(&self.answers, 0, None);
         raw.queue.submit([wipe.finish()]);
         raw.wait()?;
-        let mut commands = encoder();
-        {
-            let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            pass.set_pipeline(self.pipeline);
-            pass.set_bind_group(0, &self.bound, &[]);
-            let groups = (self.rays.len() as u32).div_ceil(LANES);
-            let row = groups.clamp(1, 1 << 15);
-            pass.dispatch_workgroups(row, groups.div_ceil(row), 1);
-        }
         let watch = Stopwatch::start();
-        raw.queue.submit([commands.finish()]);
-        raw.wait()?;
+        for (group, rays) in &self.slices {
+            let mut commands = encoder();
+            {
+                let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+                pass.set_pipeline(self.pipeline);
+                pass.set_bind_group(0, group, &[]);
+                pass.dispatch_workgroups(rays.div_ceil(LANES), 1, 1);
+            }
+            raw.queue.submit([commands.finish()]);
+            raw.wait()?;
+        }
         let elapsed = watch.elapsed();
         let words = self.answers()?;
         let hit = |(ray, [kind, t, id, _]): (&Ray, &[u32; 4])| match kind {

@@ -8,7 +8,7 @@ enable wgpu_ray_query;
 const MISS = vec4<u32>(1u, 0u, 0u, 0u);
 const TERMINATE_ON_FIRST_HIT = 4u;
 
-fn cast(flags: u32, item: u32) {
+fn answer(flags: u32, item: u32) {
     if (item >= arrayLength(&answers)) {
         return;
     }
@@ -30,11 +30,11 @@ fn cast(flags: u32, item: u32) {
 }
 
 @compute @workgroup_size(64)
-fn nearest(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    cast(0u, id.x + id.y * groups.x * 64u);
+fn nearest_hit(@builtin(global_invocation_id) id: vec3<u32>) {
+    answer(0u, id.x);
 }
 
 @compute @workgroup_size(64)
-fn any(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    cast(TERMINATE_ON_FIRST_HIT, id.x + id.y * groups.x * 64u);
+fn any_hit(@builtin(global_invocation_id) id: vec3<u32>) {
+    answer(TERMINATE_ON_FIRST_HIT, id.x);
 }
