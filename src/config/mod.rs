@@ -23,7 +23,7 @@ pub use axis_map::AxisMap;
 pub use cells::{COMPACTIONS, Cell, is_compaction};
 pub use error::{ConfigError, Place};
 pub use experiment::{
-    Animation, Axes, Coherence, Discrepancy, Exclude, Experiment, Gate, REFERENCE_PARTS, Reference,
+    Animation, Axes, Coherence, Discrepancy, Exclude, Experiment, Gate, Motion, REFERENCE_PARTS, Reference,
     Rule, Seeds, SppCounts, StopRule, Timing,
 };
 pub use keys::Axis;
