@@ -28,7 +28,10 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         return skip(session, format!("animation of {}", world.cell), reason);
     }
     let mut parts = Vec::new();
-    for structure in gated.iter().filter(|s| !session.is_done(&name(s))) {
+    for structure in gated {
+        if session.is_done(&name(structure)) {
+            continue;
+        }
         match part(session, world, structure, animation) {
             Ok(part) => parts.push(part),
             Err(reason) => skip(session, name(structure), reason)?,
@@ -113,7 +116,14 @@ fn frame(
     let judge = session.clock.time("judge", || {
         let settings = &experiment.gate;
         let past = Checks::Repeated;
-        Judge::new(&stage.scene, &stage.soup, world.camera, settings, seed, past)
+        Judge::new(
+            &stage.scene,
+            &stage.soup,
+            world.camera,
+            settings,
+            seed,
+            past,
+        )
     });
     let frame = Frame {
         number,
@@ -125,7 +135,9 @@ fn frame(
         timing: &experiment.timing,
         seed,
     };
-    let open = parts.iter_mut().filter(|part| part.record.failure.is_none());
+    let open = parts
+        .iter_mut()
+        .filter(|part| part.record.failure.is_none());
     let mut open: Vec<&mut Part> = open.collect();
     let actors: Vec<(&Actor, &Gpu)> = open.iter().map(|p| (&p.actor, p.gpu)).collect();
     let outcomes = (session.clock).time("animation", || take_over(&frame, &actors));

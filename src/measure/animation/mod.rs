@@ -60,7 +60,8 @@ pub fn take_over(frame: &Frame, actors: &[(&Actor, &Gpu)]) -> Vec<Result<FrameRe
             Err(error) => pairs[place] = Err(error.to_string()),
         }
     }
-    let failures: Vec<Option<GpuError>> = match interleave(&timed, frame.timing, frame.seed, || {}) {
+    let failures: Vec<Option<GpuError>> = match interleave(&timed, frame.timing, frame.seed, || {})
+    {
         Ok(samples) => samples.into_iter().map(Result::err).collect(),
         Err((_, error)) => {
             let lost = |_: &Timed| Some(GpuError::Lost(error.to_string()));
@@ -301,6 +302,12 @@ impl Timed<'_> {
         let Work::Trace(batch, set, space) = &self.work else {
             return Ok(None);
         };
-        timed_fault(batch, set, &frame.stage.soup, *space, frame.probe.is_exact())
+        timed_fault(
+            batch,
+            set,
+            &frame.stage.soup,
+            *space,
+            frame.probe.is_exact(),
+        )
     }
 }
