@@ -88,42 +88,40 @@ pub fn take_over(frame: &Frame, actors: &[(&Actor, &Gpu)]) -> Vec<Result<FrameRe
 }
 
 impl Frame<'_> {
-    /// Takes a structure over and builds it anew, and judges both; a refit of the host must equal that of the device.
+    /// Takes a structure over and builds it anew, and judges both. A tree refitted on the host must equal that of the
+    /// device to the bit, and is then judged with it.
     fn pair(&self, actor: &Actor, gpu: &Gpu) -> Result<Pair, String> {
         let ways = actor.ways();
-        let mut trees = Vec::new();
-        let mut judged = 0;
-        let mut of = |way: Way| {
-            let at = |fault: String| format!("{way:?}: {fault}");
-            let soup = &self.stage.soup;
+        let soup = &self.stage.soup;
+        let taken = |way: Way| {
             let mut log = BuildLog::with_gpu(gpu);
-            let taken = actor
-                .start(way, self.first)
-                .and_then(|from| actor.take(way, from, soup, &mut log))
-                .map_err(|e| at(e.to_string()))?;
-            if let (Taken::Tree(tree), Way::Device | Way::Host) = (&taken, way) {
-                trees.push(tree.nodes.clone());
+            let from = actor.start(way, self.first);
+            let taken = from.and_then(|from| actor.take(way, from, soup, &mut log));
+            taken.map_err(|e| format!("{way:?}: {e}"))
+        };
+        let refitted = taken(ways[0])?;
+        if ways.contains(&Way::Host) {
+            match (&refitted, taken(Way::Host)?) {
+                (Taken::Tree(device), Taken::Tree(host)) if device.nodes == host.nodes => {}
+                _ => return Err("trees refitted on host and device differ".to_owned()),
             }
+        }
+        let mut judged = 0;
+        let mut of = |taken: Taken, name: &str| {
+            let at = |fault: String| format!("{name}: {fault}");
             let built = actor.built(taken, soup).map_err(|e| at(e.to_string()))?;
             built.validate(soup).map_err(|e| at(e.to_string()))?;
             let traced = Traced::upload(gpu, &*built).map_err(|e| at(e.to_string()))?;
             judged = self.gate(gpu, &traced).map_err(at)?;
             Ok::<_, String>((traced, built.stats().sah_cost))
         };
-        let (refitted, rebuilt) = (of(ways[0])?, of(Way::Rebuild)?);
-        if ways.contains(&Way::Host) {
-            of(Way::Host)?;
-        }
-        match trees.as_slice() {
-            [device, host] if device != host => {
-                Err("trees refitted on host and device differ".to_owned())
-            }
-            _ => Ok(Pair {
-                traced: [refitted.0, rebuilt.0],
-                sah: [refitted.1, rebuilt.1],
-                judged,
-            }),
-        }
+        let refitted = of(refitted, "refitted")?;
+        let rebuilt = of(taken(Way::Rebuild)?, "rebuilt")?;
+        Ok(Pair {
+            traced: [refitted.0, rebuilt.0],
+            sah: [refitted.1, rebuilt.1],
+            judged,
+        })
     }
 
     /// Rays that were judged.

@@ -146,7 +146,8 @@ fn time_ratio(rays: &FrameRays, software: bool) -> Option<Interval> {
 }
 
 /// From how many million rays of the class in the frame on building anew pays: what it costs more, over what a ray costs
-/// less. No number where rays are no faster in half of the rounds.
+/// less. No number where the interval
+/// of the difference holds 0.
 fn break_even(frame: &FrameRecord, rays: &FrameRays, software: bool) -> Option<Reading> {
     let of = |ms: &[f64]| median_interval(ms).map(|i| i.value);
     let more = of(frame.rebuild.ms(software))? - of(frame.refit.ms(software))?;
@@ -156,8 +157,11 @@ fn break_even(frame: &FrameRecord, rays: &FrameRays, software: bool) -> Option<R
     if more <= 0.0 {
         return Some(Reading::Word("any"));
     }
-    if saved.value <= 0.0 {
+    if saved.high <= 0.0 {
         return Some(Reading::Word("none"));
+    }
+    if saved.low <= 0.0 {
+        return Some(Reading::Word("unresolved"));
     }
     let million_rays = rays.rays as f64 * 1e-6;
     Some(Reading::from(million_rays * more / saved.value))
@@ -250,8 +254,8 @@ fn rays_table(scene: &SceneGroup, values: &[Value]) -> Table {
     rows(scene).table(
         values,
         "Rays frame by frame: nodes visited and time in the refitted tree over those in the tree built anew, and from how \
-         many million rays of a class on building anew pays in that frame (none: its rays are no faster; any: it costs no \
-         more)",
+         many million rays of a class on building anew pays in that frame (none: its rays are slower; unresolved: \
+         the interval of the difference holds 0; any: it costs no more)",
         &[
             "frame-nodes-ratio/v1",
             "frame-time-ratio/v1",
