@@ -188,7 +188,7 @@ fn an_image_in_passes_does_not_depend_on_slices_and_a_fault_in_a_pass_is_seen() 
     }
     let stage = Stage::builtin(&gpu, "cornell-box", &[]);
     let traced = stage.traced(&gpu, support::structure("bvh"));
-    // The first slice of an unknown kernel is 25,000 samples: this image needs more.
+    // The first slice of an unknown kernel is 512 samples: this image needs more.
     let size = [200, 144];
     let expected = last(&renderer(&gpu, &stage, &traced, primary(), size), &[3]);
     let passes = renderer(&gpu, &stage, &traced, &Deferred, size);

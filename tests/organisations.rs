@@ -49,6 +49,9 @@ fn organised(what: &Variant, by: &Variant) -> Result<ConfiguredIntegrator, Strin
     integrator.organised(OrganisationRegistry::default().configured(by)?)
 }
 
+/// Images, each pixel by the bits of its channels.
+type Bits = Vec<Vec<[u32; 3]>>;
+
 /// Bits of the images after [`SPPS`] samples, and rays by class.
 fn rendered(
     gpu: &Gpu,
@@ -56,7 +59,7 @@ fn rendered(
     traced: &Traced,
     what: &Variant,
     by: &Variant,
-) -> Result<(Vec<Vec<[u32; 3]>>, Vec<u64>), GpuError> {
+) -> Result<(Bits, Vec<u64>), GpuError> {
     let integrator = IntegratorRegistry::default()
         .configured(what)
         .expect("an integrator");
@@ -97,7 +100,7 @@ fn all() -> Vec<Variant> {
         organisation("multi-kernel", &[]),
         wavefront(&[]),
         small(&[]),
-        small(&[never.clone()]),
+        small(std::slice::from_ref(&never)),
         small(&[("sorting", word("material"))]),
         small(&[("sorting", word("ray-key")), never]),
     ];
@@ -258,8 +261,8 @@ fn planted_faults_are_seen() {
         (
             &queues,
             "groups",
-            "(live + 63u) / 64u",
-            "max(live, 64u) / 64u",
+            "(live + LANES - 1u) / LANES",
+            "max(live, LANES) / LANES",
         ),
         (&queues, "finish", "new_slot(next)", "new_slot(next + 1u)"),
         (

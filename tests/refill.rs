@@ -111,9 +111,9 @@ fn what_goes_wrong_between_two_rays_is_seen() {
         (
             KERNEL,
             "if (index >= end) {\n                break;",
-            "if (index + 64u >= end) {\n                break;",
+            "if (index + LANES >= end) {\n                break;",
         ),
-        (KERNEL, "index += 64u;", "index += 65u;"),
+        (KERNEL, "index += LANES;", "index += LANES + 1u;"),
         (
             KERNEL,
             "let run = (total + lanes - 1u) / lanes",

@@ -57,8 +57,8 @@ pub use registry::{AccelRegistry, BoxRegistry, TriangleRegistry};
 pub use stats::{BuildLog, LEAF_HISTOGRAM_END, Phase, StructureStats};
 pub use structure::{OverTree, Structure};
 pub use tracer::{
-    Answers, Ask, LiveRays, Query, RayBatch, RefillParameters, TracePasses, TraceSteps, Traced,
-    Tracer, TriangleBuffers,
+    Answers, Ask, GroupShape, LiveRays, Query, RayBatch, RefillParameters, TracePasses, TraceSteps,
+    Traced, Tracer, TriangleBuffers, Workgroup, WorkgroupRegistry,
 };
 pub use twin::{Counters, CpuTwin};
 pub use two_level_grid::TwoLevelGrid;

@@ -45,6 +45,8 @@ enum Topic {
     Offset,
     #[value(alias = "organisations")]
     Organisation,
+    #[value(alias = "workgroups")]
+    Workgroup,
     #[value(alias = "metrics")]
     Metric,
     #[value(alias = "measures", alias = "discrepancy")]
@@ -73,6 +75,7 @@ impl List {
                 Topic::BoxTest => axis(Axis::BoxTest),
                 Topic::Offset => axis(Axis::Offset),
                 Topic::Organisation => axis(Axis::Organisation),
+                Topic::Workgroup => axis(Axis::Workgroup),
                 Topic::Material => materials(),
                 Topic::Light => lights(),
                 Topic::Metric => metrics(),
@@ -99,6 +102,7 @@ fn entries(axis: Axis, entries: &[Entry]) -> String {
         Axis::BoxTest => "box_test: of all structures\n".into(),
         Axis::Offset => "offset: how rays leave a surface\n".into(),
         Axis::Organisation => "organisation: of the path tracer on the device\n".into(),
+        Axis::Workgroup => "workgroup: of kernels that trace\n".into(),
         axis => format!("{axis}\n"),
     };
     // Writing to a string cannot fail.

@@ -32,11 +32,12 @@ static NOTHING: Variant = Variant {
 
 impl Cell {
     /// What builds, gate and timings of a structure depend on.
-    pub const STRUCTURE: [Axis; 5] = [
+    pub const STRUCTURE: [Axis; 6] = [
         Axis::Scene,
         Axis::Triangle,
         Axis::BoxTest,
         Axis::Accel,
+        Axis::Workgroup,
         Axis::Kernels,
     ];
     /// What the error of a sampler depends on: not the structure, as hits are equal to the bit.
@@ -86,7 +87,7 @@ impl Cell {
         axes.all(|(axis, variant)| variant.is_none() || *variant == self.variants[axis])
     }
 
-    /// Labels on these axes, and behind them tests, offset, organisation and kernels (`offset none`, `@idea`) where they
+    /// Labels on these axes, and behind them tests, offset, organisation, workgroup and kernels (`offset none`, `@idea`) where they
     /// are not the default ones: what tells cells of a run apart.
     pub fn labels(&self, axes: &[Axis]) -> Vec<String> {
         let named = axes.iter().map(|&axis| self[axis].label.clone());
@@ -106,6 +107,7 @@ impl Cell {
             Axis::BoxTest,
             Axis::Offset,
             Axis::Organisation,
+            Axis::Workgroup,
             Axis::Kernels,
         ];
         further.into_iter().filter_map(|axis| {

@@ -24,13 +24,15 @@ pub enum Axis {
     Offset,
     /// How the path tracer is organised on the device.
     Organisation,
+    /// The workgroups in which kernels trace.
+    Workgroup,
     /// The kernels that all this runs with.
     Kernels,
 }
 
 impl Axis {
     /// All axes, in the order of tables and plans.
-    pub const ALL: [Axis; 10] = [
+    pub const ALL: [Axis; 11] = [
         Axis::Scene,
         Axis::Accel,
         Axis::Sequence,
@@ -40,6 +42,7 @@ impl Axis {
         Axis::BoxTest,
         Axis::Offset,
         Axis::Organisation,
+        Axis::Workgroup,
         Axis::Kernels,
     ];
 
@@ -55,6 +58,7 @@ impl Axis {
             Axis::BoxTest => "box_test",
             Axis::Offset => "offset",
             Axis::Organisation => "organisation",
+            Axis::Workgroup => "workgroup",
             Axis::Kernels => "kernels",
         }
     }
@@ -244,6 +248,7 @@ pub const KEYS: &[KeyRow] = &[
     key("axes", "box_test", ValueKind::Names(Axis::BoxTest), Some("[\"padded-16\"]"), "Ray-box tests: reciprocal and pad. Hits are proven for `padded-16` alone; the others are there to be measured."),
     key("axes", "offset", ValueKind::Names(Axis::Offset), Some("[\"error-bound\"]"), "How rays that leave a surface are moved off it by integrators. References are always rendered with `error-bound`."),
     key("axes", "organisation", ValueKind::Names(Axis::Organisation), Some("[\"single-kernel\"]"), "How the path tracer is organised on the device. All make the same image to the bit; errors are measured with `single-kernel`."),
+    key("axes", "workgroup", ValueKind::Names(Axis::Workgroup), Some("[\"auto\"]"), "Workgroups of the kernels that trace: so many rays, and pixels of this shape. All give the same hits and images to the bit."),
     key("axes", "kernels", ValueKind::Names(Axis::Kernels), Some("[\"\"]"), "Folders whose kernels (`*.wesl`) replace the embedded ones of the same path, or join them, relative to the current directory; `\"\"` are the embedded ones."),
     key("camera", "eye", ValueKind::Vector, None, "Position of the pinhole, scene units."),
     key("camera", "target", ValueKind::Vector, None, "Point that projects to the centre of the image, scene units."),
@@ -258,6 +263,7 @@ pub const KEYS: &[KeyRow] = &[
     key("exclude", "box_test", ValueKind::Patterns(Axis::BoxTest), None, "… these box tests …"),
     key("exclude", "offset", ValueKind::Patterns(Axis::Offset), None, "… these offsets …"),
     key("exclude", "organisation", ValueKind::Patterns(Axis::Organisation), None, "… these organisations …"),
+    key("exclude", "workgroup", ValueKind::Patterns(Axis::Workgroup), None, "… these workgroups …"),
     key("exclude", "kernels", ValueKind::Patterns(Axis::Kernels), None, "… and these kernels are left out."),
     key("reference", "spp", integer(2, 1 << 24), Some("16384"), "Samples per pixel of the reference image, both halves together."),
     key("reference", "sequence", ValueKind::Name(Axis::Sequence), Some("\"pixel-hash\""), "Sequence of the reference, with its default parameters."),

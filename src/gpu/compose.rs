@@ -6,6 +6,7 @@
 
 use super::GpuError;
 use super::diagnose;
+use super::pipeline::WORKGROUP_EDGE;
 use crate::text::{cell_hash, nearest};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
@@ -281,7 +282,11 @@ const DEFAULT_MODULES: [(&str, &str); 2] = [
     ("triangle", "accel/triangle/watertight"),
     ("offset", "integrator/offset/error_bound"),
 ];
-const DEFAULT_CONSTANTS: [(&str, u32); 1] = [("BOX_PAD_ULPS", 16)];
+const DEFAULT_CONSTANTS: [(&str, u32); 3] = [
+    ("BOX_PAD_ULPS", 16),
+    ("GROUP_WIDTH", WORKGROUP_EDGE),
+    ("GROUP_HEIGHT", WORKGROUP_EDGE),
+];
 
 /// What goes into one kernel.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]

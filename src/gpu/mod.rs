@@ -25,11 +25,11 @@ pub use compose::{ComposedKernel, Composition, KernelLibrary};
 pub use environment::{Environment, capture, cpu_model, device_type};
 pub(crate) use kernel_errors::LOOPS_CUT;
 pub use kernel_errors::{KERNEL_ERRORS, kernel_errors};
-pub use pipeline::{Pipeline, TEXELS_PER_ROW, WORKGROUP_SIZE};
+pub use pipeline::{Pipeline, TEXELS_PER_ROW, WORKGROUP_EDGE, WORKGROUP_SIZE};
 pub use player::Player;
 pub use probe::{ArithmeticProbe, probe_arithmetic};
 pub use recording::{Groups, Played, Recording, grid_of, groups_for};
-pub use slices::Slices;
+pub use slices::{MOST_SLICE_MS, Slices, slow_slice};
 pub use sort::{Pairs, RadixSort};
 pub use uniform::UniformValues;
 
@@ -108,6 +108,20 @@ pub enum GpuError {
         /// The adapter's limit.
         limit: u32,
     },
+    /// A workgroup of a kernel is larger than the adapter runs.
+    #[error(
+        "kernel `{kernel}` has workgroups with {needed} {what}, but this adapter runs at most {limit}: choose a smaller one on the axis `workgroup`"
+    )]
+    WorkgroupTooLarge {
+        /// Entry module.
+        kernel: String,
+        /// Of what there are too many.
+        what: &'static str,
+        /// How many.
+        needed: u64,
+        /// The adapter's limit.
+        limit: u64,
+    },
     /// The driver ended loops early, and what was computed is wrong.
     #[error(
         "this driver ends loops in silence once an invocation's loops together took {limit} turns, and here they need more: fewer triangles, another structure or a newer driver help (`raystone doctor`)"
@@ -162,9 +176,9 @@ pub enum GpuError {
 }
 
 impl GpuError {
-    /// Whether the driver cannot run what was asked for, through no fault of it: such a cell is left
+    /// Whether driver or adapter cannot run what was asked for, through no fault of it: such a cell is left
     /// out.
     pub fn is_refusal(&self) -> bool {
-        matches!(self, Self::LoopsCut { .. })
+        matches!(self, Self::LoopsCut { .. } | Self::WorkgroupTooLarge { .. })
     }
 }

@@ -7,8 +7,10 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
-/// Invocations per workgroup of every one-dimensional kernel.
-pub const WORKGROUP_SIZE: u32 = 64;
+/// Edge of a workgroup of pixels where no other shape was chosen, invocations.
+pub const WORKGROUP_EDGE: u32 = 8;
+/// Invocations per workgroup of every one-dimensional kernel for which no other number was chosen.
+pub const WORKGROUP_SIZE: u32 = WORKGROUP_EDGE * WORKGROUP_EDGE;
 
 /// Texels in a row of an array that is read as a texture; twin of `kernels/common/texels.wesl`.
 pub const TEXELS_PER_ROW: u32 = 8192;
@@ -146,6 +148,7 @@ impl Gpu {
                 limit,
             });
         }
+        self.check_workgroup(&kernel)?;
         let label = kernel.composition.entry.clone();
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let module = self.shader_module(&label, &kernel.wgsl, runtime_checks);
@@ -176,6 +179,49 @@ impl Gpu {
             made_ms: start.elapsed().as_secs_f64() * 1e3,
             first_ms: OnceLock::new(),
         })
+    }
+
+    /// Whether the adapter runs workgroups as large as a kernel's.
+    fn check_workgroup(&self, kernel: &ComposedKernel) -> Result<(), GpuError> {
+        let module = &kernel.module;
+        let [x, y, z] = module.entry_points[0].workgroup_size;
+        let used = kernel.info.get_entry_point(0);
+        let shared = module.global_variables.iter().filter(|(handle, variable)| {
+            variable.space == naga::AddressSpace::WorkGroup && !used[*handle].is_empty()
+        });
+        let bytes = |ty: naga::Handle<naga::Type>| module.types[ty].inner.size(module.to_ctx());
+        let shared: u64 = shared.map(|(_, v)| u64::from(bytes(v.ty))).sum();
+        let limits = &self.limits;
+        let all = u64::from(x) * u64::from(y) * u64::from(z);
+        let most = limits.max_compute_invocations_per_workgroup;
+        for (what, needed, limit) in [
+            (
+                "invocations across",
+                x.into(),
+                limits.max_compute_workgroup_size_x,
+            ),
+            (
+                "invocations down",
+                y.into(),
+                limits.max_compute_workgroup_size_y,
+            ),
+            ("invocations", all, most),
+            (
+                "bytes of memory",
+                shared,
+                limits.max_compute_workgroup_storage_size,
+            ),
+        ] {
+            if needed > u64::from(limit) {
+                return Err(GpuError::WorkgroupTooLarge {
+                    kernel: kernel.composition.entry.clone(),
+                    what,
+                    needed,
+                    limit: limit.into(),
+                });
+            }
+        }
+        Ok(())
     }
 
     fn shader_module(&self, label: &str, wgsl: &str, runtime_checks: bool) -> wgpu::ShaderModule {

@@ -27,7 +27,7 @@ impl From<[u32; 3]> for Groups {
     }
 }
 
-/// Workgroups for `items` invocations of a one-dimensional kernel; kernels compute their index as
+/// Workgroups of [`WORKGROUP_SIZE`] for `items` invocations of a one-dimensional kernel; kernels compute their index as
 /// `x + y * WORKGROUP_SIZE * num_workgroups.x`.
 pub fn groups_for(items: u32) -> [u32; 3] {
     grid_of(items.div_ceil(WORKGROUP_SIZE))

@@ -6,6 +6,8 @@ use std::cell::Cell;
 
 /// A slice should take about so long, milliseconds.
 const SLICE_MS: f64 = 250.0;
+/// A slice must not take longer, milliseconds: some drivers take the device away from who does not answer for two seconds.
+pub const MOST_SLICE_MS: f64 = 1000.0;
 /// A slice is at most so many times as large as the one before.
 const GROWTH: u64 = 8;
 
@@ -14,6 +16,7 @@ const GROWTH: u64 = 8;
 pub struct Slices {
     fitting: Cell<u64>,
     least: u64,
+    longest_ms: Cell<f64>,
 }
 
 impl Slices {
@@ -22,6 +25,7 @@ impl Slices {
         Self {
             fitting: Cell::new(first.max(1)),
             least: 1,
+            longest_ms: Cell::new(0.0),
         }
     }
 
@@ -42,15 +46,30 @@ impl Slices {
         self.fitting().min(u64::from(end.saturating_sub(first))) as u32
     }
 
+    /// Milliseconds of the longest slice so far.
+    pub fn longest_ms(&self) -> f64 {
+        self.longest_ms.get()
+    }
+
     /// Learns from a slice of `items`. A short remainder says little and makes no slice smaller.
     pub fn learn(&self, items: u64, elapsed: Elapsed) {
         let was = self.fitting();
         let ms = elapsed.ms().max(0.1);
+        self.longest_ms.set(self.longest_ms.get().max(ms));
         if 2 * items >= was || ms > SLICE_MS {
             let now = (items as f64 * SLICE_MS / ms) as u64;
             self.fitting.set(now.min(was.saturating_mul(GROWTH)).max(1));
         }
     }
+}
+
+/// What to say of a slice of so many milliseconds, if it was too long.
+pub fn slow_slice(longest_ms: f64) -> Option<String> {
+    (longest_ms > MOST_SLICE_MS).then(|| {
+        format!(
+            "a dispatch took {longest_ms:.0} ms, which should stay below {MOST_SLICE_MS:.0} ms: its rays cost far more than those before it"
+        )
+    })
 }
 
 #[cfg(test)]
@@ -91,5 +110,10 @@ mod tests {
     fn a_slice_that_took_too_long_is_followed_by_a_small_one() {
         let slow = Slices::starting_with(64).at_least(8);
         assert_eq!(slices(&slow, 80, 1000.0), [64, 8, 8]);
+        assert_eq!(slow.longest_ms(), 64_000.0);
+        assert!(slow.longest_ms() > MOST_SLICE_MS);
+        let text = slow_slice(slow.longest_ms()).unwrap();
+        assert!(text.contains("64000 ms") && text.contains("1000 ms"));
+        assert_eq!(slow_slice(MOST_SLICE_MS), None);
     }
 }

@@ -113,7 +113,7 @@ pub trait Integrator: Send + Sync {
     /// A kernel does not compose or compile.
     fn record(&self, steps: &mut ImageSteps) -> Result<(), GpuError> {
         let kernel = Composition::new("integrator/render").with("integrator", self.kernel());
-        steps.run("render", kernel, steps.pixels(), &Bindings::new())
+        steps.run("render", kernel, steps.pixel_groups(), &Bindings::new())
     }
 }
 

@@ -90,7 +90,7 @@ impl PartRenderer {
         special.uniform("part", uniform);
         let kernel = Composition::new("integrator/render_part");
         let kernel = kernel.with("integrator", self.integrator.kind.kernel());
-        let groups = [columns.div_ceil(8), rows.div_ceil(8), 1];
+        let groups = steps.shape().over(columns, rows);
         steps.run("render part", kernel, groups, &special)?;
         Ok(recording)
     }

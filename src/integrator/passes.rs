@@ -5,7 +5,7 @@ use super::slice::Slice;
 use super::tables::SceneBuffers;
 use super::{RenderJob, Traced};
 use crate::accel::tracer::RayBuffers;
-use crate::accel::{Ask, LiveRays, Query, Tracer, TriangleBuffers};
+use crate::accel::{Ask, GroupShape, LiveRays, Query, Tracer, TriangleBuffers};
 use crate::gpu::{
     Bindings, Composition, Gpu, GpuError, Groups, Pipeline, Recording, Storage, UniformValues,
 };
@@ -57,7 +57,12 @@ impl Passes {
             bindings = bindings.merged(&traced.bindings);
             chosen = traced.compose(chosen);
         }
-        let mut chosen = with_sampler(chosen, job.sampler)
+        // A block of a list is a workgroup of its own.
+        let shape = match by_blocks {
+            true => GroupShape::default(),
+            false => traced.workgroup,
+        };
+        let mut chosen = with_sampler(shape.activate(chosen), job.sampler)
             .feature("ray_counts", ray_counts)
             .feature("block_list", by_blocks);
         let of_integrator = job.integrator.kind.features(&job.integrator.params);
@@ -220,8 +225,21 @@ impl<'a> ImageSteps<'a> {
     pub fn pixels(&self) -> [u32; 3] {
         match self.by_blocks {
             true => [self.rows, 1, 1],
-            false => [self.width.div_ceil(8), self.rows.div_ceil(8), 1],
+            false => GroupShape::default().over(self.width, self.rows),
         }
+    }
+
+    /// The same for kernels with workgroups of `GROUP_WIDTH` × `GROUP_HEIGHT` invocations, which an experiment chooses.
+    pub fn pixel_groups(&self) -> [u32; 3] {
+        match self.by_blocks {
+            true => self.pixels(),
+            false => self.shape().over(self.width, self.rows),
+        }
+    }
+
+    /// The shape of these workgroups.
+    pub fn shape(&self) -> GroupShape {
+        self.passes.traced.workgroup
     }
 
     /// The buffer of this name.

@@ -20,8 +20,8 @@ use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Samples of the first slice: few, it may be slow.
-const FIRST_SLICE: u64 = 25_000;
+/// Samples of the first slice: few, each may be a path through brute force over thousands of triangles.
+const FIRST_SLICE: u64 = 512;
 /// Bytes of the error word and of what is counted behind it, see `kernels/common/ray_counts.wesl`.
 const STATUS_BYTES: u64 = 256;
 /// Bytes that a buffer between passes may take at most, below the adapter's limit.
@@ -424,6 +424,11 @@ impl<'a> Renderer<'a> {
     /// Time of all slices since the last reset.
     pub fn spent(&self) -> Elapsed {
         self.spent.get()
+    }
+
+    /// Milliseconds of the longest slice of its life: no dispatch took longer.
+    pub fn longest_slice_ms(&self) -> f64 {
+        self.slices.longest_ms()
     }
 
     /// GPU milliseconds of each stage since the last reset, summed over its runs: [`RAY_QUERIES`](super::RAY_QUERIES) and those of the

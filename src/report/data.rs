@@ -107,7 +107,13 @@ const VIEW_AXES: [&str; 4] = [
 ];
 
 /// What tells the structures of a scene apart.
-pub const STRUCTURE_AXES: [&str; 4] = [axis::ACCEL, axis::KERNELS, axis::TRIANGLE, axis::BOX_TEST];
+pub const STRUCTURE_AXES: [&str; 5] = [
+    axis::ACCEL,
+    axis::KERNELS,
+    axis::TRIANGLE,
+    axis::BOX_TEST,
+    axis::WORKGROUP,
+];
 
 /// What tells the samplers of a view apart.
 pub const SAMPLER_ROW: [&str; 4] = [

@@ -3,11 +3,12 @@
 use crate::measure::record::{Body, Key, Line, axis};
 
 /// Axes that are named only where a run has more than one value of them.
-const NAMED_IF_VARIED: [&str; 4] = [
+const NAMED_IF_VARIED: [&str; 5] = [
     axis::TRIANGLE,
     axis::BOX_TEST,
     axis::OFFSET,
     axis::ORGANISATION,
+    axis::WORKGROUP,
 ];
 
 /// The names of one run.
@@ -37,7 +38,8 @@ impl Names {
     /// A structure among all of its scene.
     pub fn structure(&self, key: &Key) -> String {
         let main = key.label(axis::ACCEL).to_owned();
-        self.with_further(main + &kernels(key), key, &[axis::TRIANGLE, axis::BOX_TEST])
+        let further = [axis::TRIANGLE, axis::BOX_TEST, axis::WORKGROUP];
+        self.with_further(main + &kernels(key), key, &further)
     }
 
     /// A sampler among those of one view, or one whose words were read back.

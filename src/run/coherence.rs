@@ -29,8 +29,11 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     };
     let cells = session.plan.times.iter();
     // The model has organisations of its own.
-    let first = session.experiment.axes[Axis::Organisation].first();
-    let cells = cells.filter(|c| c.is_on(&world.cell) && c.get(Axis::Organisation) == first);
+    let axes = &session.experiment.axes;
+    let is_first = |c: &&Cell, axis| c.get(axis) == axes[axis].first();
+    let cells = cells.filter(|c| {
+        c.is_on(&world.cell) && is_first(c, Axis::Organisation) && is_first(c, Axis::Workgroup)
+    });
     let cells: Vec<Cell> = cells.cloned().collect();
     if cells.is_empty() {
         return Ok(());

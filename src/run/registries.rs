@@ -1,6 +1,8 @@
 //! All registries together.
 
-use crate::accel::{AccelRegistry, BoxRegistry, Intersection, TriangleRegistry};
+use crate::accel::{
+    AccelRegistry, BoxRegistry, Intersection, TriangleRegistry, Workgroup, WorkgroupRegistry,
+};
 use crate::compaction::CompactionRegistry;
 use crate::config::{Axis, Catalogue, Cell};
 use crate::gpu::KernelLibrary;
@@ -29,6 +31,8 @@ pub struct Registries {
     pub offsets: OffsetRegistry,
     /// Organisations of the path tracer.
     pub organisations: OrganisationRegistry,
+    /// Workgroups of kernels that trace.
+    pub workgroups: WorkgroupRegistry,
     /// Compactions of streams.
     pub compactions: CompactionRegistry,
     /// Figures beside those of the crate.
@@ -49,6 +53,7 @@ impl Registries {
         catalogue[Axis::BoxTest] = self.boxes.entries();
         catalogue[Axis::Offset] = self.offsets.entries();
         catalogue[Axis::Organisation] = self.organisations.0.entries();
+        catalogue[Axis::Workgroup] = self.workgroups.entries();
         catalogue
     }
 
@@ -70,6 +75,17 @@ impl Registries {
     /// The offset is not registered.
     pub fn offset(&self, cell: &Cell) -> Result<RayOffset, String> {
         (self.offsets.named("offset", &cell[Axis::Offset].name)).copied()
+    }
+
+    /// In which workgroups the rays of a cell are traced; the default where it does not say.
+    ///
+    /// # Errors
+    /// The workgroup is not registered.
+    pub fn workgroup(&self, cell: &Cell) -> Result<Workgroup, String> {
+        match cell.get(Axis::Workgroup) {
+            Some(variant) => self.workgroups.named("workgroup", &variant.name).copied(),
+            None => Ok(Workgroup::default()),
+        }
     }
 
     /// What a cell computes per sample, as the cell organises it; by a single kernel where it does not matter.

@@ -7,7 +7,7 @@ use super::{Fault, RunError};
 use crate::accel::tracer::count_work;
 use crate::accel::{Ask, Query, RayBatch, Space, Tracer};
 use crate::config::Axis;
-use crate::gpu::{Elapsed, Gpu, GpuError};
+use crate::gpu::{Elapsed, Gpu, GpuError, slow_slice};
 use crate::image::{Picture, viridis};
 use crate::measure::gate::timed_fault;
 use crate::measure::rays::{RaySet, primary_pixels, primary_rays};
@@ -144,6 +144,9 @@ fn class_timing(
         return Err(format!("{:?} rays: {fault}", set.class).into());
     }
     let samples = samples.map_err(text)?;
+    if let Some(slow) = slow_slice(item.batch.longest_slice_ms()) {
+        session.tell_warning(&format!("{}, {:?} rays: {slow}", one.cell, set.class));
+    }
     let empty = session
         .clock
         .time("gpu", || empty_ms(|| item.batch.trace_nothing()))

@@ -109,6 +109,14 @@ fn gate_with(
         return Ok(candidate);
     };
     let gpu = world.device.of(&cell[Axis::Kernels])?;
+    let workgroup = session.registries.workgroup(cell);
+    let traced = workgroup.map(|workgroup| traced.in_workgroups(gpu, &workgroup));
+    let traced = match traced {
+        Ok(Ok(traced)) => traced,
+        Ok(Err(error)) => return Ok(candidate.failed(error)),
+        Err(reason) => return Ok(candidate.failed(reason)),
+    };
+    candidate.traced = Some(traced.clone());
     let checks = session.experiment.runtime_checks;
     let gated = session.clock.time("gate", || {
         let verdict = gate_twice(checks, world, gpu, &traced)?;
@@ -216,7 +224,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
     let cells = session.plan.structures.iter();
     let cells: Vec<Cell> = cells.filter(|c| c.is_on(&world.cell)).cloned().collect();
     let mut gated = Vec::new();
-    // The last structure that was built: it serves all kernels.
+    // The last structure that was built: it serves all workgroups and kernels.
     let mut last: Option<Candidate> = None;
     for cell in cells {
         if session.is_done(&cell.to_string()) && !session.is_done(&passed(&cell)) {

@@ -10,7 +10,7 @@ use super::world::World;
 use super::{Fault, RunError};
 use crate::accel::Space;
 use crate::config::{Axis, Cell};
-use crate::gpu::{Elapsed, GpuError};
+use crate::gpu::{Elapsed, GpuError, slow_slice};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer, TRACED_CLASSES};
 use crate::measure::record::{Body, Key, Line, Ran, TimeRecord};
 use crate::measure::statistics::{median, median_interval};
@@ -213,6 +213,9 @@ fn finish(
     samples: Samples,
     shared: &mut Shared,
 ) -> Result<Line<TimeRecord>, String> {
+    if let Some(slow) = slow_slice(item.renderer.longest_slice_ms()) {
+        session.tell_warning(&format!("{}: {slow}", item.cell));
+    }
     let hash = image_hash(&item.renderer.image().map_err(|e| e.to_string())?);
     let key = key(&item.cell, item.space);
     let (counted, first) = match shared.get(&key) {

@@ -8,7 +8,6 @@ use crate::config::{Axis, Cell, Gate};
 use crate::gpu::{Gpu, GpuError};
 use crate::integrator::{Stage, StageError};
 use crate::measure::gate::{Checks, Judge, fault_text, gate};
-use crate::params::Variant;
 use crate::scene::{LoadOptions, SceneData, builtin_scenes, load};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -70,8 +69,14 @@ pub(super) fn fault(
     if world.cell[Axis::Scene].name == SCENE || !tests.bears_hard_rays() {
         return Ok(None);
     }
-    // Structures with the same parameters, tests and kernels are the same.
-    let parts = [Axis::Accel, Axis::Triangle, Axis::BoxTest, Axis::Kernels];
+    // Structures with the same parameters, tests, workgroups and kernels are the same.
+    let parts = [
+        Axis::Accel,
+        Axis::Triangle,
+        Axis::BoxTest,
+        Axis::Workgroup,
+        Axis::Kernels,
+    ];
     let key = format!("{:?}", cell.on(&parts));
     if let Some(known) = session.trial.outcomes.get(&key) {
         return Ok(known.clone());
@@ -89,7 +94,7 @@ pub(super) fn fault(
     };
     (session.trial.scenes).insert(of_tests, Arc::clone(&judged));
     let found = session.clock.time("gate", || {
-        judged.fault_of(session.registries, world, gpu, &cell[Axis::Accel])
+        judged.fault_of(session.registries, world, gpu, cell)
     })?;
     let found = found.map(|fault| format!("{SCENE}: {fault}"));
     session.trial.outcomes.insert(key, found.clone());
@@ -102,8 +107,9 @@ impl JudgedScene {
         registries: &super::Registries,
         world: &World,
         gpu: &Gpu,
-        accel: &Variant,
+        cell: &Cell,
     ) -> Result<Option<String>, GpuError> {
+        let accel = &cell[Axis::Accel];
         let Some(kind) = registries.accel.get(&accel.name) else {
             return Ok(None);
         };
@@ -116,6 +122,8 @@ impl JudgedScene {
             Err(StageError::Accel(AccelError::Invalid(fault))) => return Ok(Some(fault)),
             Err(_) => return Ok(None),
         };
+        let workgroup = registries.workgroup(cell).map_err(GpuError::Kernel)?;
+        let traced = traced.in_workgroups(gpu, &workgroup)?;
         let thinned = (accel.name == "brute-force").then(|| self.judge.thinned(EVERY));
         let judge = thinned.as_ref().unwrap_or(&self.judge);
         let (triangles, probe) = (&stage.buffers.triangles, &world.probe);

@@ -70,6 +70,7 @@ fn catalogue() -> Catalogue {
     catalogue[Axis::BoxTest] = plain(&["padded-16", "plain"]);
     catalogue[Axis::Offset] = plain(&["error-bound", "none"]);
     catalogue[Axis::Organisation] = plain(&["single-kernel", "wavefront"]);
+    catalogue[Axis::Workgroup] = plain(&["auto", "32", "16x16"]);
     catalogue
 }
 
@@ -328,6 +329,27 @@ fn a_plan_measures_errors_once_and_times_every_cell() {
 }
 
 #[test]
+fn workgroups_are_swept_for_times_and_not_for_errors() {
+    let text = AXES.replace(
+        "[axes]\n",
+        "[axes]\nworkgroup = [\"auto\", \"32\", \"16x16\"]\n",
+    );
+    let whole = plan(&parse_with(&text, &[]).expect("a good sweep"), &[]).expect("a plan");
+    assert_eq!(whole.structures.len(), 2 * 3);
+    assert_eq!(whole.samplers.len(), 2);
+    assert_eq!(whole.times.len(), 2 * 2 * 3);
+    assert_eq!(whole.streams.len(), 2);
+    let names: BTreeSet<String> = whole.times.iter().map(ToString::to_string).collect();
+    assert_eq!(names.len(), whole.times.len());
+    assert!(
+        names.iter().any(|name| name.ends_with("workgroup 16x16")),
+        "{names:?}"
+    );
+    let wrong = parse_with(&text.replace("16x16", "16x61"), &[]).expect_err("no such workgroup");
+    assert!(wrong.to_string().contains("16x16"), "{wrong}");
+}
+
+#[test]
 fn tests_and_offsets_are_swept_where_they_matter() {
     let text = AXES.replace(
         "[axes]\n",
@@ -492,10 +514,10 @@ fn committed_experiments_parse_and_plan() {
                 .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
             let renders = !plan.times.is_empty() && !plan.streams.is_empty();
             assert!(renders || !plan.compactions.is_empty());
-            // The saving is in the axes that change no image.
-            let alike = [Axis::Accel, Axis::Organisation].map(|axis| experiment.axes[axis].len());
-            match alike {
-                [1, 1] => assert_eq!(plan.renders_planned(), plan.renders_full_product()),
+            // The saving is in what no image depends on.
+            let unseen = [Axis::Accel, Axis::Organisation, Axis::Workgroup];
+            match unseen.map(|axis| experiment.axes[axis].len()) {
+                [1, 1, 1] => assert_eq!(plan.renders_planned(), plan.renders_full_product()),
                 _ => assert!(plan.renders_planned() < plan.renders_full_product()),
             }
             seen += 1;

@@ -36,7 +36,7 @@ fn an_image_does_not_depend_on_how_its_samples_and_rows_are_cut() {
     let stage = Stage::builtin(gpu(), "furnace-box", &[]);
     let traced = stage.traced(gpu(), structure("bvh"));
     let sampler = sampler("sobol", "cranley-patterson");
-    // The first slice of an unknown kernel is 25,000 samples: this image needs two.
+    // The first slice of an unknown kernel is 512 samples: this image needs two.
     let renderer = stage.renderer(
         gpu(),
         &traced,

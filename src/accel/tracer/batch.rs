@@ -95,6 +95,11 @@ impl RayBatch {
         Ok(total)
     }
 
+    /// Milliseconds of the longest slice of its life: no dispatch took longer.
+    pub fn longest_slice_ms(&self) -> f64 {
+        self.slices.longest_ms()
+    }
+
     /// Traces all rays again in dispatches of narrow rows of workgroups, as dispatches of millions of rays
     /// are cut by the limit on a row.
     ///

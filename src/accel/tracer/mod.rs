@@ -8,11 +8,13 @@ mod batch;
 mod passes;
 mod refill;
 mod traced;
+mod workgroup;
 
 pub use batch::{Answers, RayBatch, count_work};
 pub use passes::{LiveRays, TracePasses, TraceSteps, rays_of_batch};
 pub use refill::{Refill, RefillParameters};
 pub use traced::{Traced, TriangleBuffers};
+pub use workgroup::{GroupShape, Workgroup, WorkgroupRegistry};
 
 use crate::gpu::{Bindings, Composition, Gpu, GpuError, Pipeline, Recording, Storage};
 use crate::text::cell_hash;

@@ -2,7 +2,7 @@
 
 use super::{Query, RayBuffers, RefillParameters, Tracer};
 use crate::gpu::{
-    Bindings, Composition, GpuError, Groups, Recording, Storage, UniformValues, groups_for,
+    Bindings, Composition, GpuError, Groups, Recording, Storage, UniformValues, grid_of,
 };
 use std::ops::Range;
 
@@ -38,7 +38,7 @@ impl TracePasses for OnePass {
         let (ask, gpu) = (steps.tracer.ask, &steps.tracer.gpu);
         let refilled = self.0.applies(ask.coherent, gpu.is_software());
         let lanes = match refilled {
-            true => self.0.lanes(steps.count),
+            true => self.0.lanes(steps.count, steps.lanes()),
             false => steps.count,
         };
         let mut groups: Groups = steps.groups(lanes).into();
@@ -88,7 +88,8 @@ pub struct LiveRays {
     pub counts: Storage,
     /// Which of them is the number.
     pub word: u32,
-    /// Workgroups of 64 invocations for as many rays or more.
+    /// Workgroups for as many rays or more: with as many invocations as the structure's kernels have, see
+    /// [`TraceSteps::lanes`].
     pub groups: Groups,
 }
 
@@ -138,9 +139,14 @@ impl<'a> TraceSteps<'a> {
         found.ok_or_else(|| GpuError::Kernel(format!("a pass names the buffer `{name}`, which is neither scratch nor an array of the structure")))
     }
 
+    /// Invocations of a workgroup: 64 in the passes of structures that have their own.
+    pub fn lanes(&self) -> u32 {
+        self.tracer.traced.workgroup.lanes()
+    }
+
     /// Workgroups for a kernel of one dimension with so many invocations.
     pub fn groups(&self, items: u32) -> [u32; 3] {
-        let [x, y, z] = groups_for(items);
+        let [x, y, z] = grid_of(items.div_ceil(self.lanes()));
         match x > self.row {
             true => [self.row, y * x.div_ceil(self.row), z],
             false => [x, y, z],

@@ -6,7 +6,6 @@
 //! own, and each invocation its share of them. Kernel: `kernels/integrator/trace_rays.wesl`; a structure
 //! that can be refilled exports `Traversal`, `begin` and `advance` beside `trace`.
 
-use crate::gpu::WORKGROUP_SIZE;
 use crate::parameters;
 
 parameters! {
@@ -50,9 +49,9 @@ impl RefillParameters {
         }
     }
 
-    /// Invocations for so many rays.
-    pub(super) fn lanes(&self, rays: u32) -> u32 {
-        let few = rays / (LEAST_GROUPS * WORKGROUP_SIZE);
+    /// Invocations for so many rays, in workgroups of so many.
+    pub(super) fn lanes(&self, rays: u32, of_group: u32) -> u32 {
+        let few = rays / (LEAST_GROUPS * of_group);
         rays.div_ceil(few.clamp(1, self.rays_per_lane))
     }
 }
@@ -85,13 +84,15 @@ mod tests {
 
     #[test]
     fn a_dispatch_of_few_rays_keeps_its_workgroups() {
-        assert_eq!(refill(64).lanes(0), 0);
-        assert_eq!(refill(64).lanes(63), 63);
-        assert_eq!(refill(64).lanes(2047), 2047);
-        assert_eq!(refill(64).lanes(2048), 1024);
-        assert_eq!(refill(64).lanes(1 << 16), 1024);
-        assert_eq!(refill(64).lanes(1 << 20), 1 << 14);
-        assert_eq!(refill(1).lanes(1 << 20), 1 << 20);
-        assert_eq!(refill(4096).lanes(u32::MAX), 1 << 20);
+        assert_eq!(refill(64).lanes(0, 64), 0);
+        assert_eq!(refill(64).lanes(63, 64), 63);
+        assert_eq!(refill(64).lanes(2047, 64), 2047);
+        assert_eq!(refill(64).lanes(2048, 64), 1024);
+        assert_eq!(refill(64).lanes(1 << 16, 64), 1024);
+        assert_eq!(refill(64).lanes(1 << 20, 64), 1 << 14);
+        assert_eq!(refill(1).lanes(1 << 20, 64), 1 << 20);
+        assert_eq!(refill(4096).lanes(u32::MAX, 64), 1 << 20);
+        assert_eq!(refill(64).lanes(2048, 32), 512);
+        assert_eq!(refill(64).lanes(2048, 256), 2048);
     }
 }

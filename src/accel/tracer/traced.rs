@@ -1,6 +1,7 @@
 //! Triangles and a built structure on the device.
 
 use super::passes::{OnePass, TracePasses};
+use super::workgroup::{GroupShape, Workgroup};
 use crate::accel::{Access, BuiltAccel, GpuBuffers, Intersection, Space, TriangleSoup};
 use crate::gpu::{Bindings, Composition, Gpu, GpuError};
 use std::sync::Arc;
@@ -45,6 +46,8 @@ pub struct Traced {
     inline: bool,
     /// Arrays and uniforms of the structure.
     pub bindings: Bindings,
+    /// Workgroups of the kernels that trace with it.
+    pub workgroup: GroupShape,
     /// Where triangles are met: decides which judge and which images it is compared with.
     pub space: Space,
 }
@@ -81,11 +84,16 @@ impl Traced {
             Access::Inline => (true, Arc::new(OnePass(built.refill()))),
             Access::Pipeline(passes) => (false, passes),
         };
+        let workgroup = match inline {
+            true => Workgroup::default().shape(gpu),
+            false => GroupShape::default(),
+        };
         Ok(Self {
             active,
             passes,
             inline,
             bindings,
+            workgroup,
             space: built.space(),
         })
     }
@@ -95,9 +103,26 @@ impl Traced {
         self.inline
     }
 
-    /// `composition` with this structure as the active one.
+    /// The same, traced in other workgroups.
+    ///
+    /// # Errors
+    /// A structure with passes of its own, unless `workgroup` is the default: it has workgroups of its own, too.
+    pub fn in_workgroups(mut self, gpu: &Gpu, workgroup: &Workgroup) -> Result<Self, GpuError> {
+        if self.inline {
+            self.workgroup = workgroup.shape(gpu);
+        } else if *workgroup != Workgroup::default() {
+            return Err(GpuError::Kernel(format!(
+                "workgroup = {}: this structure answers buffers of rays in passes of its own, whose workgroups are its own; take `{}`",
+                workgroup.name,
+                Workgroup::default().name
+            )));
+        }
+        Ok(self)
+    }
+
+    /// `composition` with this structure as the active one, in its workgroups.
     #[must_use]
     pub fn compose(&self, composition: Composition) -> Composition {
-        self.active.activate(composition)
+        self.workgroup.activate(self.active.activate(composition))
     }
 }

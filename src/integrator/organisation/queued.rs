@@ -4,7 +4,7 @@
 use super::{Organisation, sorting};
 use crate::accel::{LiveRays, Query};
 use crate::compaction::{CompactionRegistry, Passes, Stream};
-use crate::gpu::{Bindings, Composition, GpuError, Groups, Storage, UniformValues, groups_for};
+use crate::gpu::{Bindings, Composition, GpuError, Groups, Storage, UniformValues, grid_of};
 use crate::integrator::{ImageSteps, Integrator};
 use crate::parameters;
 use crate::params::{Choice as _, Params, Variant};
@@ -69,6 +69,8 @@ parameters! {
 pub(super) struct Queues<'a> {
     /// Slots for paths.
     pub capacity: u32,
+    /// Invocations of a workgroup.
+    lanes: u32,
     /// None where all slots are looked at at every bounce.
     wavefront: Option<&'a Wavefront>,
     integrator: &'static str,
@@ -77,14 +79,16 @@ pub(super) struct Queues<'a> {
 
 impl<'a> Queues<'a> {
     fn new(
-        total: u32,
+        steps: &ImageSteps,
         first: u32,
         wavefront: Option<&'a Wavefront>,
         integrator: &'static str,
     ) -> Self {
+        let total = steps.count();
         let capacity = wavefront.map_or(total, |w| w.capacity.min(total)).max(1);
         let mut queues = Self {
             capacity,
+            lanes: steps.shape().lanes(),
             wavefront,
             integrator,
             bindings: Bindings::new(),
@@ -129,7 +133,7 @@ impl<'a> Queues<'a> {
 
     /// An invocation for each slot.
     pub fn all(&self) -> Groups {
-        groups_for(self.capacity).into()
+        grid_of(self.capacity.div_ceil(self.lanes)).into()
     }
 
     /// An invocation for each live path.
@@ -248,7 +252,7 @@ fn record(
     let rays = rays_of_path(integrator, params);
     let mut first = 0;
     let results = loop {
-        let queues = Queues::new(total, first, wavefront, integrator.kernel());
+        let queues = Queues::new(steps, first, wavefront, integrator.kernel());
         let batches = total.div_ceil(queues.capacity);
         if first == 0 {
             steps

@@ -48,6 +48,6 @@ impl Organisation for Regeneration {
     ) -> Result<(), GpuError> {
         let kernel =
             Composition::new("organisation/regeneration").with("integrator", integrator.kernel());
-        steps.run("render", kernel, steps.pixels(), &Bindings::new())
+        steps.run("render", kernel, steps.pixel_groups(), &Bindings::new())
     }
 }

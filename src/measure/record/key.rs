@@ -28,6 +28,8 @@ pub mod axis {
     pub const OFFSET: &str = "offset";
     /// How the path tracer is organised; absent where none runs.
     pub const ORGANISATION: &str = "organisation";
+    /// In which workgroups kernels trace; absent where none does.
+    pub const WORKGROUP: &str = "workgroup";
     /// Family of hard scenes and rays.
     pub const FAMILY: &str = "family";
     /// Mesh that is shot at.
@@ -47,7 +49,7 @@ pub mod axis {
     /// Any other thing that figures are of.
     pub const SUBJECT: &str = "subject";
     /// All of them.
-    pub const ALL: [&str; 19] = [
+    pub const ALL: [&str; 20] = [
         SCENE,
         ACCEL,
         INTEGRATOR,
@@ -58,6 +60,7 @@ pub mod axis {
         BOX_TEST,
         OFFSET,
         ORGANISATION,
+        WORKGROUP,
         FAMILY,
         MESH,
         PLACE,

@@ -12,7 +12,7 @@ use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::report::values::Value;
 
 /// What tells the rows apart.
-const ROWS: [&str; 7] = [
+const ROWS: [&str; 8] = [
     axis::INTEGRATOR,
     axis::ACCEL,
     axis::KERNELS,
@@ -20,6 +20,7 @@ const ROWS: [&str; 7] = [
     axis::DECORRELATION,
     axis::OFFSET,
     axis::ORGANISATION,
+    axis::WORKGROUP,
 ];
 
 /// The organisation that others are compared with.

@@ -322,7 +322,7 @@ pub const MUTANTS: &[Mutant] = &[
         "workgroups beyond the first row trace the rays of the first",
         text(
             "integrator/trace_rays",
-            "let item = id.x + id.y * groups.x * 64u;",
+            "let item = id.x + id.y * groups.x * LANES;",
             "let item = id.x;",
         ),
         BVH,
