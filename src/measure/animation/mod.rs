@@ -168,7 +168,7 @@ impl Frame<'_> {
                 };
                 let triangles = &self.stage.buffers.triangles;
                 let batch = Tracer::new(gpu, triangles, traced, ask)?.batch(&set.rays)?;
-                items.push(new(Work::Trace(batch, set, traced.space)));
+                items.push(new(Work::Trace(Box::new(batch), set, traced.space)));
             }
         }
         Ok(items)
@@ -225,7 +225,7 @@ enum Work<'a> {
     /// A structure takes a frame over.
     Take(&'a Actor<'a>, Way, &'a Frame<'a>, &'a Gpu),
     /// Rays of a class are traced.
-    Trace(RayBatch, &'a RaySet, Space),
+    Trace(Box<RayBatch>, &'a RaySet, Space),
 }
 
 /// What was timed of an actor, and what it took each time.
