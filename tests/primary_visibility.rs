@@ -122,6 +122,8 @@ fn stages(gpu: &Gpu) -> Vec<(&'static str, Stage)> {
             Stage::builtin(gpu, "instances", &[("count", ParamValue::Integer(9))]),
         ),
     ];
+    let plants = [("plants", ParamValue::Integer(6))];
+    all.push(("foliage", Stage::builtin(gpu, "foliage", &plants)));
     let mut near = Stage::builtin(gpu, "triangle-soup", &[]);
     let vertices = near.scene.triangles[7].vertices;
     let middle = vertices.iter().copied().sum::<Vec3>() / 3.0;
@@ -176,8 +178,6 @@ fn what_cannot_be_rasterised_is_refused_with_the_reason() {
         let refused = rendered(stage, structure, "raster").expect_err("a refusal");
         refused.to_string()
     };
-    let foliage = Stage::builtin(gpu(), "foliage", &[("plants", ParamValue::Integer(6))]);
-    assert!(said(&foliage, "bvh").contains("masks"));
     let copies = Stage::builtin(gpu(), "instances", &[("count", ParamValue::Integer(9))]);
     assert!(said(&copies, "meta-bvh").contains("objects"));
     for (name, is_refused) in [
@@ -228,27 +228,26 @@ fn planted_faults_are_seen() {
     let faults = [
         // Another triangle.
         (DRAWN, "index / 3u)", "index / 3u + 1u)"),
-        (DRAWN, "index / 3u)", "(index + 1u) / 3u)"),
         // Upside down, from the other side, half a pixel away.
-        (DRAWN, "dot(view.upwards, p),", "-dot(view.upwards, p),"),
+        (DRAWN, "(x, y, view.near,", "(x, -y, view.near,"),
+        (DRAWN, "(x, y, view.near,", "(-x, y, view.near,"),
         (
             DRAWN,
-            "vec4<f32>(dot(view.across, p),",
-            "vec4<f32>(-dot(view.across, p),",
-        ),
-        (
-            DRAWN,
-            "vec4<f32>(dot(view.across, p),",
-            "vec4<f32>(dot(view.across, p) + 0.01 * dot(view.forward, p),",
+            "(x, y, view.near,",
+            "(x + 0.01 * distance, y, view.near,",
         ),
         // A near plane that cuts the scene, depth that grows with the distance, none at all.
-        (DRAWN, "view.near, dot", "view.near * 3e5, dot"),
+        (DRAWN, "(x, y, view.near,", "(x, y, view.near * 3e5,"),
+        (DRAWN, "(x, y, view.near,", "(x, y, distance - view.near,"),
+        (DRAWN, "(x, y, view.near,", "(x, y, 0.5 * distance,"),
+        // Holes that are none, and the other way round; of another point.
         (
             DRAWN,
-            "view.near, dot",
-            "dot(view.forward, p) - view.near, dot",
+            "if (is_hole(at.triangle, at.place.xy)) {",
+            "if (at.triangle == 0xfffffffeu) {",
         ),
-        (DRAWN, "view.near, dot", "0.5 * dot(view.forward, p), dot"),
+        (DRAWN, "if (is_hole(", "if (!is_hole("),
+        (DRAWN, "weights.x, weights.y)", "weights.y, weights.x)"),
         // Only what faces the camera; only what faces away.
         (
             DRAWN,
@@ -271,16 +270,11 @@ fn planted_faults_are_seen() {
             "visible[pixel.y * stride",
             "visible[max(pixel.y, 1u) * stride - stride",
         ),
-        // Weights of another corner; a point beside the triangle for all.
+        // Weights of another corner.
         (
             READ,
             "    return hit;\n",
             "    return Hit(hit.t, hit.triangle, hit.v, hit.u);\n",
-        ),
-        (
-            READ,
-            "if (hit.triangle == NO_HIT) {",
-            "if (hit.triangle != NO_HIT) {",
         ),
     ];
     let unseen: Vec<_> = faults.iter().filter(|fault| !is_seen(**fault)).collect();

@@ -210,7 +210,7 @@ impl ConfiguredIntegrator {
     /// Why it cannot render through this structure, if so.
     pub fn refusal(&self, traced: &Traced) -> Option<String> {
         if self.facts.is_rasterised {
-            let reason = visibility::refusal(false, traced.space);
+            let reason = visibility::refusal(traced.space);
             if reason.is_some() {
                 return reason.map(str::to_owned);
             }

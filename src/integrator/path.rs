@@ -100,7 +100,7 @@ parameters! {
         /// limit. A limit makes images darker than they should be, and is reported as such
         clamp: f64 = 0.0, in 0.0..=1e6;
         /// where the first hit comes from: a ray through a point of the pixel, or through its centre, or what a rasteriser finds at the
-        /// centre (scenes without masks, structures without instances, a single kernel). From the centre, edges are not smoothed
+        /// centre (structures without instances, a single kernel). From the centre, edges are not smoothed
         primary: Primary = Primary::Traced;
         /// what the kernel carries though the scene does not need it, to measure what leaving it out gains;
         /// the image stays the same to the bit

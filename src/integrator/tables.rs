@@ -106,8 +106,6 @@ pub struct SceneBuffers {
     pub triangles: TriangleBuffers,
     /// How many there are.
     pub triangle_count: u32,
-    /// Whether some are cut out by masks.
-    pub masked: bool,
     /// What instances add to the error of points.
     pub transform_error: TransformError,
     /// What kernels must carry.
@@ -149,7 +147,6 @@ impl SceneBuffers {
             bindings,
             triangles,
             triangle_count: soup.records.len() as u32,
-            masked: soup.masks.is_some(),
             transform_error,
             features: SceneFeatures {
                 surfaces,

@@ -9,7 +9,6 @@ use super::tables::SceneBuffers;
 use crate::accel::Space;
 use crate::geometry::Camera;
 use crate::gpu::{Composition, Elapsed, Gpu, GpuError, Raster, UniformValues};
-use glam::Vec3;
 
 /// Distance of the near plane, as a part of the scene's diagonal. Depth is near / distance in f32, whose relative precision is the same at all
 /// distances, so that the plane may be this near; what is nearer still is not seen.
@@ -27,7 +26,7 @@ impl Visibility {
     /// Compiles the rasterisation of a scene to images of this size.
     ///
     /// # Errors
-    /// The scene has what a rasteriser does not see, the rays of a structure are of another space, the image exceeds a limit of the adapter, or
+    /// The rays of a structure are of another space, the image exceeds a limit of the adapter, or
     /// the kernel does not compile.
     pub(super) fn new(
         gpu: &Gpu,
@@ -35,10 +34,11 @@ impl Visibility {
         space: Space,
         size: [u32; 2],
     ) -> Result<Self, GpuError> {
-        if let Some(reason) = refusal(scene.masked, space) {
+        if let Some(reason) = refusal(space) {
             return Err(GpuError::Kernel(reason.to_owned()));
         }
         let kernel = Composition::new("integrator/visibility");
+        let kernel = scene.triangles.intersection.activate(kernel);
         Ok(Self {
             raster: gpu.raster(&kernel, &scene.triangles.bindings, size)?,
             size,
@@ -53,13 +53,13 @@ impl Visibility {
     /// The driver complains, or the device is lost or hangs.
     pub fn draw(&self, camera: Camera) -> Result<Elapsed, GpuError> {
         let [forward, right, up] = camera.basis(self.size);
-        let over = |v: Vec3| (v / v.length_squared()).to_array();
         let view = UniformValues::new()
             .vec("eye", &camera.eye.to_array())
             .f32("near", self.near)
+            .vec("right", &right.to_array())
+            .vec("up", &up.to_array())
             .vec("forward", &forward.to_array())
-            .vec("across", &over(right))
-            .vec("upwards", &over(up));
+            .vec("size", &self.size.map(|pixels| pixels as f32));
         self.raster.draw(self.triangles, ("view", view))
     }
 
@@ -77,26 +77,9 @@ impl Visibility {
     }
 }
 
-/// Why a scene, met in this space, is not rasterised.
-pub(super) fn refusal(masked: bool, space: Space) -> Option<&'static str> {
-    if masked {
-        return Some(
-            "primary = raster: surfaces of this scene are cut out by masks, which the rasteriser does not look at; take `traced` or `centre`",
-        );
-    }
+/// Why what is met in this space is not rasterised.
+pub(super) fn refusal(space: Space) -> Option<&'static str> {
     (space == Space::Instances).then_some(
         "primary = raster: this structure meets triangles in the space of their objects, and the rasteriser in that of the world; take another structure, or `traced` or `centre`",
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_a_rasteriser_does_not_see_is_refused_with_the_reason() {
-        assert_eq!(refusal(false, Space::World), None);
-        assert!(refusal(true, Space::World).is_some_and(|text| text.contains("masks")));
-        assert!(refusal(false, Space::Instances).is_some_and(|text| text.contains("objects")));
-    }
 }
