@@ -119,7 +119,7 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 127] = [
+pub static FIGURES: [Figure; 137] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
@@ -226,6 +226,17 @@ pub static FIGURES: [Figure; 127] = [
     Figure::new("growth-linear/v1", "residual of a + b·n", "", Lower, Percent, Median),
     Figure::new("growth-linearithmic/v1", "residual of a + b·n·log n", "", Lower, Percent, Median),
     Figure::new("growth-difference/v1", "criterion of n less that of n log n", "", Neither, THREE, Median),
+    // A structure in a frame of a moving scene.
+    Figure::new("frame-sah-refitted/v1", "SAH, refitted", "", Lower, THREE, Exact),
+    Figure::new("frame-sah-rebuilt/v1", "SAH, rebuilt", "", Lower, THREE, Exact),
+    Figure::new("frame-sah-ratio/v1", "SAH, refitted over rebuilt", "", Lower, THREE, Exact),
+    Figure::new("frame-refit-ms/v1", "refit", "ms", Lower, THREE, Median),
+    Figure::new("frame-refit-host-ms/v1", "refit on the host", "ms", Lower, THREE, Median),
+    Figure::new("frame-rebuild-ms/v1", "rebuild", "ms", Lower, THREE, Median),
+    Figure::new("frame-judged/v1", "judged rays", "", Neither, Count, Exact),
+    Figure::new("frame-nodes-ratio/v1", "nodes/ray, refitted over rebuilt", "", Lower, THREE, Exact),
+    Figure::new("frame-time-ratio/v1", "time of rays, refitted over rebuilt", "", Lower, THREE, Median),
+    Figure::new("frame-break-even/v1", "rebuilding pays from", "million rays", Neither, THREE, Single),
     // Hard scenes and rays, judged exactly.
     Figure::new("false-misses/v1", "false misses", "", Lower, Count, Exact),
     Figure::new("unexplained-misses/v1", "unexplained misses", "", Lower, Count, Exact),

@@ -1,6 +1,7 @@
 //! Measuring: the gate, the timing protocol, image metrics, statistics, records.
 
 pub mod adaptive;
+pub mod animation;
 pub mod bias;
 pub mod compaction;
 pub mod comparison;
@@ -19,6 +20,7 @@ pub mod memory;
 mod mesh;
 pub mod metrics;
 pub mod path_oracle;
+pub mod processor;
 pub mod rays;
 pub mod record;
 pub mod replicates;

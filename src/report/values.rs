@@ -4,7 +4,7 @@ use super::data::{RunData, SceneGroup, View};
 use super::document::TableCell;
 use super::format;
 use super::samplers::Metric;
-use super::sections::{compactions, kernels, organisations, trade_off, verdict::Race};
+use super::sections::{animation, compactions, kernels, organisations, trade_off, verdict::Race};
 use crate::measure::figure::{Figure, figure};
 use crate::measure::record::*;
 use std::borrow::Cow;
@@ -95,6 +95,7 @@ pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
     let mut values = Vec::new();
     for scene in &data.scenes {
         values.extend(of_structures(data, scene));
+        values.extend(animation::values(data, scene));
         values.extend(scene.views.iter().flat_map(|view| of_view(scene, view)));
     }
     values.extend(data.streams.iter().flat_map(|s| of_stream(s)));

@@ -4,6 +4,7 @@
 //! by others.
 
 mod adaptive;
+mod animation;
 mod coherence;
 mod compactions;
 mod errors;
@@ -299,6 +300,9 @@ fn run_world(
         times::run(session, &world, &gated)?;
     }
     coherence::run(session, &world, &gated)?;
+    if gpu.lost().is_none() {
+        animation::run(session, &world, &gated)?;
+    }
     Ok(())
 }
 

@@ -7,6 +7,7 @@ mod lights;
 mod mitsuba;
 mod nori;
 mod radiosity;
+mod references;
 #[path = "../support/mod.rs"]
 mod support;
 

@@ -1,7 +1,7 @@
 //! What is recorded of a structure on a scene, and of full cells.
 
 use super::{Interval, Tally};
-use crate::accel::{Phase, Space, StructureStats};
+use crate::accel::{Counters, Phase, Space, StructureStats};
 use crate::config::Coherence;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -93,6 +93,21 @@ pub struct CountersPerRay {
     pub triangle_tests: f64,
     /// Deepest stack seen in the class (entries).
     pub stack_high_water: u32,
+}
+
+impl CountersPerRay {
+    /// Of the work of these rays.
+    pub fn mean_of(work: &[Counters]) -> Self {
+        let mean = |get: fn(&Counters) -> u32| {
+            work.iter().map(|c| f64::from(get(c))).sum::<f64>() / work.len().max(1) as f64
+        };
+        Self {
+            nodes: mean(|c| c.nodes),
+            box_tests: mean(|c| c.box_tests),
+            triangle_tests: mean(|c| c.triangle_tests),
+            stack_high_water: work.iter().map(|c| c.stack_high_water).max().unwrap_or(0),
+        }
+    }
 }
 
 /// Speed of one ray class through one structure.
