@@ -119,7 +119,7 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 131] = [
+pub static FIGURES: [Figure; 137] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
@@ -154,6 +154,12 @@ pub static FIGURES: [Figure; 131] = [
     Figure::new("order-ms/v1", "time per sample per pixel", "ms", Lower, THREE, Median),
     Figure::new("order-ratio/v1", "over one pass", "", Lower, THREE, Single),
     Figure::new("first-picture-ms/v1", "time to the first picture", "ms", Lower, THREE, Median),
+    Figure::new("primary-other-triangle/v1", "see another triangle", "", Neither, Percent, Exact),
+    Figure::new("primary-other-value/v1", "have another value", "", Neither, Percent, Exact),
+    Figure::new("primary-mean-difference/v1", "difference of the mean, over the mean", "", Neither, THREE, Exact),
+    Figure::new("primary-rms-difference/v1", "RMS difference, over the mean", "", Neither, THREE, Exact),
+    Figure::new("raster-ms/v1", "rasterised", "ms", Lower, THREE, Median),
+    Figure::new("traced-primary-ms/v1", "traced", "ms", Lower, THREE, Median),
     Figure::new("specialisation/v1", "time over that of the specialised kernel", "", Neither, THREE, Mean),
     Figure::new("time-to-image/v1", "build and rendering", "ms", Lower, THREE, Single),
     Figure::new("error-seconds/v1", "unbiased relMSE × seconds", "", Lower, THREE, Jackknife),

@@ -14,6 +14,7 @@ mod kernels;
 mod known_images;
 mod orders;
 mod paths;
+mod primary;
 mod reference;
 mod reference_cache;
 mod reference_file;

@@ -198,6 +198,27 @@ pub struct OrderTime {
     pub first_picture_ms: Option<Interval>,
 }
 
+/// Paths that begin at rasterised triangles, against rays through the same points with the same samples behind them.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct PrimaryRecord {
+    /// Pixels that were compared.
+    pub pixels: u64,
+    /// Those that see another triangle.
+    pub other_triangle: u64,
+    /// Those whose value is another.
+    pub other_value: u64,
+    /// Of these, those that see the same triangle.
+    pub unexplained: u64,
+    /// Mean of the differences of all channels, over the mean by rays.
+    pub mean_difference: f64,
+    /// Root of the mean of their squares, over the mean by rays.
+    pub rms_difference: f64,
+    /// Wall milliseconds to rasterise all pixels, median with interval.
+    pub raster_ms: Option<Interval>,
+    /// Wall milliseconds to trace a ray through each, median with interval.
+    pub traced_ms: Option<Interval>,
+}
+
 /// Time of a full cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TimeRecord {
@@ -227,6 +248,9 @@ pub struct TimeRecord {
     /// The same cell in orders of passes; empty where these were not asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub orders: Vec<OrderTime>,
+    /// Of paths that begin at rasterised triangles: what that changes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub primary: Option<PrimaryRecord>,
     /// BLAKE3 of the image.
     pub image_hash: String,
     /// Whether the image equals to the bit that of the scene's first gated structure.

@@ -8,6 +8,7 @@ pub mod kernels;
 mod orders;
 pub mod organisations;
 pub mod point_sets;
+mod primary;
 pub mod rendering;
 pub mod run;
 pub mod sampler_plots;
