@@ -228,6 +228,14 @@ const NO_TWIN: &[(&str, &str)] = &[
     ("integrator/render", "the loop over samples"),
     ("integrator/render_part", "the loop over samples"),
     ("integrator/trace_rays", "the loop over rays"),
+    (
+        "integrator/visibility",
+        "drawn by the rasteriser; tests/primary_visibility.rs compares it with rays",
+    ),
+    (
+        "integrator/visible",
+        "reads what was drawn; tests/primary_visibility.rs compares it with rays",
+    ),
     ("sampling/dump_stream", "the loop over coordinates"),
     (
         "sampling/sampler_cost",

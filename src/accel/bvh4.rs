@@ -6,10 +6,11 @@
 
 use super::structure::prelude::*;
 use super::wide::{
-    Quantisation, Wide, WideChild, WideKind, WideNode, WideParameters, enter_four, frame,
+    OfNodes, Quantisation, Wide, WideChild, WideKind, WideNode, WideParameters, enter_four, frame,
     leave_four,
 };
 use bytemuck::{Pod, Zeroable};
+use std::marker::PhantomData;
 use std::ops::Range;
 
 const WIDTH: usize = 4;
@@ -34,6 +35,10 @@ impl Structure for Bvh4 {
 
     fn build(soup: &TriangleSoup, options: &WideParameters, log: &mut BuildLog) -> BuildResult {
         Wide::<Node>::build(soup, options, log)
+    }
+
+    fn over_tree() -> Option<&'static dyn OverTree> {
+        Some(&OfNodes::<Node>(PhantomData))
     }
 }
 

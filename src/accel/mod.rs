@@ -55,7 +55,7 @@ pub use octree::Octree;
 pub use ray::{Hit, NO_HIT, Ray};
 pub use registry::{AccelRegistry, BoxRegistry, TriangleRegistry};
 pub use stats::{BuildLog, LEAF_HISTOGRAM_END, Phase, StructureStats};
-pub use structure::Structure;
+pub use structure::{OverTree, Structure};
 pub use tracer::{
     Answers, Ask, GroupShape, LiveRays, Query, RayBatch, RefillParameters, TracePasses, TraceSteps,
     Traced, Tracer, TriangleBuffers, Workgroup, WorkgroupRegistry,
@@ -315,6 +315,10 @@ pub trait AccelKind: Sync {
     /// # Errors
     /// A limit of the structure is exceeded.
     fn build(&self, soup: &TriangleSoup, params: &Params, log: &mut BuildLog) -> BuildResult;
+    /// The two halves of a build, if the structure is a layout of one binary tree.
+    fn over_tree(&self) -> Option<&dyn OverTree> {
+        None
+    }
 }
 
 /// A built structure, or why there is none.

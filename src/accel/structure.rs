@@ -1,6 +1,7 @@
 //! What the file of a structure begins with: the declaration of its registry entry, and the vocabulary.
 
-use super::{AccelKind, BuildLog, BuildResult, TriangleSoup};
+use super::tree::Tree;
+use super::{AccelError, AccelKind, BuildLog, BuildResult, TriangleSoup};
 use crate::params::{ParameterSchema, Parameters, Params, Sources};
 
 /// A registry entry whose name and parameters are known at compile time. Every one is an [`AccelKind`].
@@ -19,6 +20,38 @@ pub trait Structure: Sync {
     /// # Errors
     /// A limit of the structure is exceeded.
     fn build(soup: &TriangleSoup, options: &Self::Parameters, log: &mut BuildLog) -> BuildResult;
+
+    /// See [`AccelKind::over_tree`].
+    fn over_tree() -> Option<&'static dyn OverTree> {
+        None
+    }
+}
+
+/// A structure that is a layout of one binary tree, so that a tree whose boxes were fitted to triangles that moved makes
+/// one, too.
+pub trait OverTree: Sync {
+    /// The tree that is laid out.
+    ///
+    /// # Errors
+    /// Parameters that the structure does not have, or a limit of the builder is exceeded.
+    fn tree(
+        &self,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Tree, AccelError>;
+
+    /// Lays out a tree of [`OverTree::tree`], whatever its boxes have become.
+    ///
+    /// # Errors
+    /// The tree exceeds a limit of the layout.
+    fn lay_out(
+        &self,
+        tree: &Tree,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> BuildResult;
 }
 
 impl<S: Structure> AccelKind for S {
@@ -41,6 +74,10 @@ impl<S: Structure> AccelKind for S {
     fn build(&self, soup: &TriangleSoup, params: &Params, log: &mut BuildLog) -> BuildResult {
         S::build(soup, &S::Parameters::from_params(params)?, log)
     }
+
+    fn over_tree(&self) -> Option<&dyn OverTree> {
+        S::over_tree()
+    }
 }
 
 /// What the files of structures name, whatever they build.
@@ -52,6 +89,7 @@ pub(super) mod prelude {
         AccelError, BuildLog, BuildResult, BuiltAccel, GpuBuffers, NamedWords, StructureStats,
         TriangleSoup, limits,
     };
-    pub use super::Structure;
+    pub use super::{OverTree, Structure};
     pub use crate::parameters;
+    pub use crate::params::{Parameters as _, Params};
 }

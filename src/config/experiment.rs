@@ -50,6 +50,8 @@ pub struct Experiment {
     pub discrepancy: Discrepancy,
     /// The model of coherence; `None` if nothing is to be modelled.
     pub coherence: Option<Coherence>,
+    /// What moves; `None` if nothing does.
+    pub animation: Option<Animation>,
 }
 
 /// Ends a sampler at one of the numbers of samples where its relMSE is below a target.
@@ -200,6 +202,36 @@ pub struct Discrepancy {
     pub pairs: Vec<[u32; 2]>,
     /// Seeds measured where the stream is randomised.
     pub seeds: u32,
+}
+
+/// How a scene moves from frame to frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Animation {
+    /// What moves.
+    pub motion: Motion,
+    /// Frames; the first is the scene as it was loaded.
+    pub frames: u32,
+    /// Amplitude of the wave, or the way of each instance until the last frame, radii of the scene.
+    pub amplitude: f64,
+    /// Wavelength of the wave, radii of the scene.
+    pub wavelength: f64,
+}
+
+/// What moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Motion {
+    /// Every vertex, in a wave that travels through the scene.
+    Deform,
+    /// Every instance, straight on in a direction of its own.
+    Instances,
+}
+
+impl Animation {
+    /// Time of a frame: 0 of the first, 1 of the last.
+    pub fn time(&self, frame: u32) -> f64 {
+        f64::from(frame) / f64::from(self.frames - 1)
+    }
 }
 
 /// What the model of coherence looks at, and the machine.

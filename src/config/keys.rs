@@ -303,10 +303,14 @@ pub const KEYS: &[KeyRow] = &[
     key("coherence", "l1_ways", integer(0, 1024), Some("0"), "Its associativity; 0: fully associative. The line that was used longest ago goes (LRU)."),
     key("coherence", "l2_kib", integer(1, 1 << 20), Some("51200"), "Size of the L2 of all groups, KiB."),
     key("coherence", "l2_ways", integer(0, 1024), Some("16"), "Its associativity."),
+    key("animation", "motion", ValueKind::Word(&["deform", "instances"]), Some("\"deform\""), "What moves from frame to frame: vertices in a wave, or instances, each straight on. Without a section `[animation]` nothing does."),
+    key("animation", "frames", integer(2, 1024), Some("9"), "Frames, the scene as it was loaded being the first. In each, the tree of the first is refitted, and built anew by its own builder."),
+    key("animation", "amplitude", ValueKind::Number { min: 0.0, max: 10.0 }, Some("0.05"), "Amplitude of the wave, or the way of each instance until the last frame, in radii of the scene."),
+    key("animation", "wavelength", ValueKind::Number { min: 0.01, max: 100.0 }, Some("1"), "Wavelength of the wave, in radii of the scene."),
 ];
 
 /// Sections that may be absent altogether; their defaults apply only when they are used.
-pub const OPTIONAL_SECTIONS: &[&str] = &["camera", "exclude", "coherence"];
+pub const OPTIONAL_SECTIONS: &[&str] = &["camera", "exclude", "coherence", "animation"];
 
 /// The row of a key, if there is one.
 pub fn find(section: &str, name: &str) -> Option<&'static KeyRow> {

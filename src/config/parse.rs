@@ -6,7 +6,8 @@ use super::check::{
 };
 use super::error::{ConfigError, Place};
 use super::experiment::{
-    Axes, Coherence, Discrepancy, Exclude, Experiment, Gate, Reference, Rule, Timing,
+    Animation, Axes, Coherence, Discrepancy, Exclude, Experiment, Gate, Motion, Reference, Rule,
+    Timing,
 };
 use super::keys::{Axis, KEYS, OPTIONAL_SECTIONS};
 use super::section::{Section, texts};
@@ -64,6 +65,7 @@ pub(super) fn parse(
         gate: reader.gate()?,
         discrepancy: reader.discrepancy()?,
         coherence: reader.coherence(&run)?,
+        animation: reader.animation()?,
     };
     check_reference_seed(&experiment, &reader)?;
     check_reference_file(&experiment, &reader)?;
@@ -401,6 +403,22 @@ impl<'t> Reader<'t> {
             l1_ways: section.unsigned("l1_ways")?,
             l2_kib: section.unsigned("l2_kib")?,
             l2_ways: section.unsigned("l2_ways")?,
+        }))
+    }
+
+    fn animation(&self) -> Result<Option<Animation>, ConfigError> {
+        if !self.tree.contains_key("animation") {
+            return Ok(None);
+        }
+        let section = self.section("animation")?;
+        Ok(Some(Animation {
+            motion: match section.word("motion")? {
+                0 => Motion::Deform,
+                _ => Motion::Instances,
+            },
+            frames: section.unsigned("frames")?,
+            amplitude: section.number("amplitude")?,
+            wavelength: section.number("wavelength")?,
         }))
     }
 

@@ -51,15 +51,17 @@ pub struct Pipeline {
     pub(super) first_ms: OnceLock<f64>,
 }
 
-fn reflect(kernel: &ComposedKernel) -> Vec<Binding> {
+/// What the entries of a kernel bind.
+pub(super) fn reflect(kernel: &ComposedKernel) -> Vec<Binding> {
     let module = &kernel.module;
-    let entry = kernel.info.get_entry_point(0);
+    let entries = 0..module.entry_points.len();
+    let entries: Vec<_> = entries.map(|e| kernel.info.get_entry_point(e)).collect();
     let mut bindings = Vec::new();
     for (handle, variable) in module.global_variables.iter() {
         let Some(at) = &variable.binding else {
             continue;
         };
-        if entry[handle].is_empty() {
+        if entries.iter().all(|entry| entry[handle].is_empty()) {
             continue;
         }
         let name = kernel

@@ -1,6 +1,7 @@
 //! What an integrator is, and what the others have to know of it.
 
 use super::organisation::SingleKernel;
+use super::visibility;
 use super::{ImageSteps, Organisation, Traced};
 use crate::gpu::{Bindings, Composition, GpuError};
 use crate::params::{ParamError, ParameterSchema, Params, Variant};
@@ -48,6 +49,8 @@ pub struct IntegratorFacts {
     pub has_many_shadow_rays: bool,
     /// Whether the mean of its images is not the integral, by its parameters: a bias is no fault then.
     pub is_biased: bool,
+    /// Whether paths begin at triangles that were rasterised, and not with a ray.
+    pub is_rasterised: bool,
     /// Whether its kernels call `closest_hit` or `any_hit` themselves, and so need a structure whose
     /// traversal is a function.
     pub needs_inline: bool,
@@ -181,6 +184,11 @@ impl ConfiguredIntegrator {
                 "{name} is one kernel that cannot be taken apart: only `single-kernel` organises it"
             ));
         }
+        if !by.takes_any() && self.facts.is_rasterised {
+            return Err(format!(
+                "{name} with primary = raster begins its paths in its own kernel: only `single-kernel` organises it"
+            ));
+        }
         if !by.is_inline() && self.facts.has_many_shadow_rays {
             return Err(format!(
                 "{name} with lights = all sends several shadow rays from one point, and there is one place in the queues for each path: take lights = one, or an organisation of one kernel"
@@ -201,6 +209,12 @@ impl ConfiguredIntegrator {
 
     /// Why it cannot render through this structure, if so.
     pub fn refusal(&self, traced: &Traced) -> Option<String> {
+        if self.facts.is_rasterised {
+            let reason = visibility::refusal(traced.space);
+            if reason.is_some() {
+                return reason.map(str::to_owned);
+            }
+        }
         (self.facts.needs_inline && !traced.is_inline()).then(|| {
             format!(
                 "{} calls the structure from its own kernel, and this structure answers buffers of rays alone; the organisations `multi-kernel` and `wavefront` trace buffers",

@@ -20,6 +20,7 @@ mod slice;
 mod stage;
 mod surface_tables;
 mod tables;
+mod visibility;
 
 pub use crate::accel::Traced;
 pub use blocks::BLOCK_EDGE;
@@ -40,3 +41,4 @@ pub use render::{BLOCK_SAMPLES, RenderJob, Renderer, Snapshot, rounding_bound, w
 pub use stage::{Stage, StageError};
 pub use surface_tables::SurfaceFeatures;
 pub use tables::{SceneBuffers, SceneFeatures};
+pub use visibility::Visibility;

@@ -3,6 +3,7 @@
 use super::render::with_sampler;
 use super::slice::Slice;
 use super::tables::SceneBuffers;
+use super::visibility::Visibility;
 use super::{RenderJob, Traced};
 use crate::accel::tracer::RayBuffers;
 use crate::accel::{Ask, GroupShape, LiveRays, Query, Tracer, TriangleBuffers};
@@ -30,6 +31,8 @@ pub(super) struct Passes {
     triangles: TriangleBuffers,
     traced: Traced,
     runtime_checks: bool,
+    /// What paths begin at that trace no first ray.
+    pub visibility: Option<Visibility>,
     /// Corners of the scene's box.
     bounds: [[f32; 3]; 2],
     /// Features that some scenes need and this kernel is without; none where nothing is traced.
@@ -85,6 +88,14 @@ impl Passes {
         bindings
             .buffer("status", status)
             .buffer("sampler_table", &table);
+        let visibility = match job.integrator.facts.is_rasterised {
+            true => Some(Visibility::new(gpu, scene, traced.space, job.size)?),
+            false => None,
+        };
+        if let Some(visibility) = &visibility {
+            visibility.draw(job.camera)?;
+            bindings.buffer("visible", visibility.words());
+        }
         Ok(Self {
             gpu: gpu.clone(),
             chosen,
@@ -92,6 +103,7 @@ impl Passes {
             triangles: scene.triangles.clone(),
             traced: traced.clone(),
             runtime_checks: job.runtime_checks,
+            visibility,
             bounds: scene.bounds,
             left_out,
             pipelines: RefCell::default(),

@@ -1,12 +1,12 @@
 //! The path tracer, and how it joins what finds light: its estimator. Formulas: `docs/shading.md`; kernel:
 //! `kernels/integrator/path.wesl`.
 
-use super::kind::CountedRays::{Bounce, Primary, Shadow};
+use super::kind::CountedRays;
 use super::tables::FEATURE_GROUPS;
 use super::{Integrator, IntegratorFacts};
 use crate::parameters;
 use crate::params::{Choice as _, ParameterSchema, Parameters as _, Params};
-use crate::sampling::dimensions::{self, LIGHT_POINT, ROULETTE};
+use crate::sampling::dimensions::{self, LIGHT_POINT, PIXEL, ROULETTE};
 
 parameters! {
     /// How directions of the material and samples of lights are joined.
@@ -39,6 +39,16 @@ parameters! {
         Uniform = "uniform",
         /// What it contributes at the point, about, by a hierarchy of lights (Conty Estevez & Kulla 2018).
         Tree = "tree",
+    }
+
+    /// Where the first hit of a path comes from.
+    pub enum Primary {
+        /// A ray through the point of the pixel that the sample draws.
+        Traced = "traced",
+        /// A ray through the centre of the pixel.
+        Centre = "centre",
+        /// The triangle that the centre of the pixel sees, by rasterisation.
+        Raster = "raster",
     }
 
     /// How many lights are sampled at each vertex.
@@ -89,6 +99,9 @@ parameters! {
         /// greatest component of a contribution after the first bounce, in units of radiance; 0 is no
         /// limit. A limit makes images darker than they should be, and is reported as such
         clamp: f64 = 0.0, in 0.0..=1e6;
+        /// where the first hit comes from: a ray through a point of the pixel, or through its centre, or what a rasteriser finds at the
+        /// centre (structures without instances, a single kernel). From the centre, edges are not smoothed
+        primary: Primary = Primary::Traced;
         /// what the kernel carries though the scene does not need it, to measure what leaving it out gains;
         /// the image stays the same to the bit
         carry: Carry = Carry::Nothing;
@@ -108,6 +121,8 @@ impl PathParameters {
             ("roulette", self.roulette != Roulette::Never),
             ("roulette_by_albedo", self.roulette == Roulette::Albedo),
             ("clamped", self.clamp > 0.0),
+            ("pixel_centres", self.primary != Primary::Traced),
+            ("rasterised", self.primary == Primary::Raster),
             ("carried", self.carry != Carry::Nothing),
         ];
         features.extend(self.carry.features().map(|name| (name, true)));
@@ -127,8 +142,11 @@ impl PathParameters {
         let mut undrawn: Vec<u32> = (0..self.max_depth).filter_map(roulette).collect();
         if self.strategy == Strategy::Bsdf {
             undrawn.extend((0..self.max_depth).flat_map(light));
-            undrawn.sort_unstable();
         }
+        if self.primary != Primary::Traced {
+            undrawn.extend([PIXEL, PIXEL + 1]);
+        }
+        undrawn.sort_unstable();
         undrawn
     }
 }
@@ -177,17 +195,24 @@ impl Integrator for Path {
 
     fn facts(&self, params: &Params) -> IntegratorFacts {
         let params = PathParameters::from_checked(params);
+        let mut rays = match params.strategy {
+            Strategy::Bsdf => vec![CountedRays::Primary, CountedRays::Bounce],
+            _ => vec![
+                CountedRays::Primary,
+                CountedRays::Shadow,
+                CountedRays::Bounce,
+            ],
+        };
+        rays.retain(|class| *class != CountedRays::Primary || params.primary != Primary::Raster);
         IntegratorFacts {
             dimensions: dimensions::needed(params.max_depth),
             undrawn: params.undrawn(),
-            rays: match params.strategy {
-                Strategy::Bsdf => vec![Primary, Bounce],
-                _ => vec![Primary, Shadow, Bounce],
-            },
+            rays,
             needs_inline: true,
             has_stages: true,
             has_many_shadow_rays: params.lights == Lights::All && params.strategy != Strategy::Bsdf,
-            is_biased: params.clamp > 0.0,
+            is_biased: params.clamp > 0.0 || params.primary != Primary::Traced,
+            is_rasterised: params.primary == Primary::Raster,
             ..Default::default()
         }
     }

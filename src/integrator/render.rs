@@ -10,6 +10,7 @@ use super::offset::RayOffset;
 use super::passes::{ImageSteps, Passes};
 use super::slice::{Slice, job_uniform, lens};
 use super::tables::SceneBuffers;
+use super::visibility::Visibility;
 use crate::accel::Traced;
 use crate::geometry::Camera;
 use crate::gpu::{Composition, Elapsed, Gpu, GpuError, Player, Recording, Slices, UniformValues};
@@ -224,7 +225,15 @@ impl<'a> Renderer<'a> {
     /// As [`Renderer::reset`], which forgets what was seen so far.
     pub fn look(&mut self, camera: Camera) -> Result<(), GpuError> {
         self.uniform = lens(self.uniform.clone(), camera, self.size);
+        if let Some(visibility) = self.visibility() {
+            visibility.draw(camera)?;
+        }
         self.reset()
+    }
+
+    /// What was rasterised, if paths begin there.
+    pub fn visibility(&self) -> Option<&Visibility> {
+        self.passes.visibility.as_ref()
     }
 
     /// Feature flags of the kernels.

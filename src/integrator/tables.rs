@@ -104,6 +104,8 @@ pub struct SceneBuffers {
     pub bindings: Bindings,
     /// The triangles alone, and how rays meet them.
     pub triangles: TriangleBuffers,
+    /// How many there are.
+    pub triangle_count: u32,
     /// What instances add to the error of points.
     pub transform_error: TransformError,
     /// What kernels must carry.
@@ -144,6 +146,7 @@ impl SceneBuffers {
         Ok(Self {
             bindings,
             triangles,
+            triangle_count: soup.records.len() as u32,
             transform_error,
             features: SceneFeatures {
                 surfaces,

@@ -119,7 +119,7 @@ const THREE: Shown = Digits(3);
 
 /// All figures that this crate measures.
 #[rustfmt::skip]
-pub static FIGURES: [Figure; 126] = [
+pub static FIGURES: [Figure; 142] = [
     // A structure and a class of rays.
     Figure::new("mrays-per-s/v1", "speed", "Mrays/s", Higher, THREE, Median),
     Figure::new("rays/v1", "rays", "", Neither, Count, Exact),
@@ -160,6 +160,12 @@ pub static FIGURES: [Figure; 126] = [
     Figure::new("order-ms/v1", "time per sample per pixel", "ms", Lower, THREE, Median),
     Figure::new("order-ratio/v1", "over one pass", "", Lower, THREE, Single),
     Figure::new("first-picture-ms/v1", "time to the first picture", "ms", Lower, THREE, Median),
+    Figure::new("primary-other-triangle/v1", "see another triangle", "", Neither, Percent, Exact),
+    Figure::new("primary-other-value/v1", "have another value", "", Neither, Percent, Exact),
+    Figure::new("primary-mean-difference/v1", "difference of the mean, over the mean", "", Neither, THREE, Exact),
+    Figure::new("primary-rms-difference/v1", "RMS difference, over the mean", "", Neither, THREE, Exact),
+    Figure::new("raster-ms/v1", "rasterised", "ms", Lower, THREE, Median),
+    Figure::new("traced-primary-ms/v1", "traced", "ms", Lower, THREE, Median),
     Figure::new("specialisation/v1", "time over that of the specialised kernel", "", Neither, THREE, Mean),
     Figure::new("time-to-image/v1", "build and rendering", "ms", Lower, THREE, Single),
     Figure::new("error-seconds/v1", "unbiased relMSE × seconds", "", Lower, THREE, Jackknife),
@@ -226,6 +232,17 @@ pub static FIGURES: [Figure; 126] = [
     Figure::new("growth-linear/v1", "residual of a + b·n", "", Lower, Percent, Median),
     Figure::new("growth-linearithmic/v1", "residual of a + b·n·log n", "", Lower, Percent, Median),
     Figure::new("growth-difference/v1", "criterion of n less that of n log n", "", Neither, THREE, Median),
+    // A structure in a frame of a moving scene.
+    Figure::new("frame-sah-refitted/v1", "SAH, refitted", "", Lower, THREE, Exact),
+    Figure::new("frame-sah-rebuilt/v1", "SAH, rebuilt", "", Lower, THREE, Exact),
+    Figure::new("frame-sah-ratio/v1", "SAH, refitted over rebuilt", "", Lower, THREE, Exact),
+    Figure::new("frame-refit-ms/v1", "refit", "ms", Lower, THREE, Median),
+    Figure::new("frame-refit-host-ms/v1", "refit on the host", "ms", Lower, THREE, Median),
+    Figure::new("frame-rebuild-ms/v1", "rebuild", "ms", Lower, THREE, Median),
+    Figure::new("frame-judged/v1", "judged rays", "", Neither, Count, Exact),
+    Figure::new("frame-nodes-ratio/v1", "nodes/ray, refitted over rebuilt", "", Lower, THREE, Exact),
+    Figure::new("frame-time-ratio/v1", "time of rays, refitted over rebuilt", "", Lower, THREE, Median),
+    Figure::new("frame-break-even/v1", "rebuilding pays from", "million rays", Neither, THREE, Single),
     // Hard scenes and rays, judged exactly.
     Figure::new("false-misses/v1", "false misses", "", Lower, Count, Exact),
     Figure::new("unexplained-misses/v1", "unexplained misses", "", Lower, Count, Exact),

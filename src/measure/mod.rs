@@ -1,6 +1,7 @@
 //! Measuring: the gate, the timing protocol, image metrics, statistics, records.
 
 pub mod adaptive;
+pub mod animation;
 pub mod bias;
 pub mod compaction;
 pub mod comparison;

@@ -53,6 +53,8 @@ pub struct SceneGroup<'a> {
     pub structures: Vec<Measured<'a, StructureRecord>>,
     /// Ray casters of others in the order measured.
     pub peers: Vec<Recorded<'a, PeerRecord>>,
+    /// Structures that were taken from frame to frame.
+    pub animations: Vec<Measured<'a, AnimationRecord>>,
     /// One per integrator, triangle test and box test.
     pub views: Vec<View<'a>>,
 }
@@ -173,15 +175,13 @@ impl<'a> RunData<'a> {
                 Body::Scene(record) => {
                     data.scene(line.key.label(axis::SCENE)).record = Some(record)
                 }
+                Body::Animation(record) => {
+                    let measured = data.of_structure(line, record);
+                    let scene = data.scene(line.key.label(axis::SCENE));
+                    put(&mut scene.animations, measured, |a, b| a.key == b.key)
+                }
                 Body::Structure(record) => {
-                    let key = competitor(line);
-                    let measured = Measured {
-                        structure: data.names.structure(&key),
-                        sampler: String::new(),
-                        ran: &line.ran,
-                        key,
-                        body: record,
-                    };
+                    let measured = data.of_structure(line, record);
                     let scene = data.scene(line.key.label(axis::SCENE));
                     put(&mut scene.structures, measured, |a, b| a.key == b.key)
                 }
@@ -213,6 +213,18 @@ impl<'a> RunData<'a> {
         data.name_competitors();
         data.judge_biases_together();
         data
+    }
+
+    /// What was measured of a structure alone.
+    fn of_structure<T>(&self, line: &'a Line, body: &'a T) -> Measured<'a, T> {
+        let key = competitor(line);
+        Measured {
+            structure: self.names.structure(&key),
+            sampler: String::new(),
+            ran: &line.ran,
+            key,
+            body,
+        }
     }
 
     /// What was measured of a full cell.
@@ -315,6 +327,7 @@ impl<'a> RunData<'a> {
             record: None,
             structures: Vec::new(),
             peers: Vec::new(),
+            animations: Vec::new(),
             views: Vec::new(),
         };
         find_or_push(&mut self.scenes, |scene| scene.name == name, new)

@@ -4,7 +4,7 @@ use super::data::RunData;
 use super::document::{Table, TableCell};
 use super::samplers::Metric;
 use super::sections::{
-    belief, compactions, kernels, rendering, run, samplers, structures, verdict,
+    animation, belief, compactions, kernels, rendering, run, samplers, structures, verdict,
 };
 use super::values::{of_structures, of_view};
 use crate::measure::record::{Line, Verdict};
@@ -17,6 +17,8 @@ pub fn terminal_tables(records: &[Line]) -> String {
         let values = of_structures(&data, scene);
         tables.push(structures::speed_table(scene, &values));
         tables.push(structures::outside_table(&data, scene, &values));
+        let of_frames = animation::values(&data, scene);
+        tables.push(animation::costs_table(scene, &of_frames));
         let mut of_views = Vec::new();
         for view in &scene.views {
             let values = of_view(scene, view);

@@ -4,7 +4,9 @@ use super::data::{RunData, SceneGroup, View};
 use super::document::TableCell;
 use super::format;
 use super::samplers::Metric;
-use super::sections::{compactions, kernels, organisations, peers, trade_off, verdict::Race};
+use super::sections::{
+    animation, compactions, kernels, organisations, peers, trade_off, verdict::Race,
+};
 use crate::measure::figure::{Figure, figure};
 use crate::measure::record::*;
 use std::borrow::Cow;
@@ -95,6 +97,7 @@ pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
     let mut values = Vec::new();
     for scene in &data.scenes {
         values.extend(of_structures(data, scene));
+        values.extend(animation::values(data, scene));
         values.extend(peers::values(scene));
         values.extend(scene.views.iter().flat_map(|view| of_view(scene, view)));
     }
@@ -241,6 +244,7 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
         ];
         values.extend(Value::known(&time.key, figures));
         values.extend(of_orders(&time.key, time));
+        values.extend(time.primary.iter().flat_map(|p| of_primary(&time.key, p)));
     }
     values.extend(view.coherence.iter().flat_map(|c| of_coherence(&c.key, c)));
     let reference = view.reference.iter();
@@ -272,6 +276,25 @@ fn of_orders(key: &Key, time: &TimeRecord) -> Vec<Value<'static>> {
         Value::known(&key, figures)
     };
     time.orders.iter().flat_map(of_order).collect()
+}
+
+/// Rasterised primary visibility against rays.
+fn of_primary(key: &Key, primary: &PrimaryRecord) -> Vec<Value<'static>> {
+    let share = |pixels: u64| {
+        Some(Interval::exact(
+            pixels as f64 / primary.pixels.max(1) as f64,
+        ))
+    };
+    let exact = |x: f64| Some(Interval::exact(x));
+    let figures = [
+        ("primary-other-triangle/v1", share(primary.other_triangle)),
+        ("primary-other-value/v1", share(primary.other_value)),
+        ("primary-mean-difference/v1", exact(primary.mean_difference)),
+        ("primary-rms-difference/v1", exact(primary.rms_difference)),
+        ("raster-ms/v1", primary.raster_ms),
+        ("traced-primary-ms/v1", primary.traced_ms),
+    ];
+    Value::known(key, figures)
 }
 
 /// What stands on the axis of rays for all of them.

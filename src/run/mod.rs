@@ -4,6 +4,7 @@
 //! by others.
 
 mod adaptive;
+mod animation;
 mod coherence;
 mod compactions;
 mod errors;
@@ -14,6 +15,7 @@ mod known_images;
 mod orders;
 mod paths;
 mod peers;
+mod primary;
 mod reference;
 mod reference_cache;
 mod reference_file;
@@ -299,6 +301,9 @@ fn run_world(
         times::run(session, &world, &gated)?;
     }
     coherence::run(session, &world, &gated)?;
+    if gpu.lost().is_none() {
+        animation::run(session, &world, &gated)?;
+    }
     Ok(())
 }
 

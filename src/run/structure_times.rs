@@ -5,7 +5,7 @@ use super::structures::{Gated, write_failed};
 use super::world::World;
 use super::{Fault, RunError, peers};
 use crate::accel::tracer::count_work;
-use crate::accel::{Ask, Counters, Query, RayBatch, Space, Tracer};
+use crate::accel::{Ask, Query, RayBatch, Space, Tracer};
 use crate::config::Axis;
 use crate::gpu::{Elapsed, Gpu, GpuError, slow_slice};
 use crate::image::{Picture, viridis};
@@ -181,20 +181,8 @@ fn class_timing(
             false => Vec::new(),
         },
         mrays_s,
-        counters: work.as_deref().map(per_ray),
+        counters: work.as_deref().map(CountersPerRay::mean_of),
     }))
-}
-
-fn per_ray(work: &[Counters]) -> CountersPerRay {
-    let mean = |get: fn(&Counters) -> u32| {
-        work.iter().map(|c| f64::from(get(c))).sum::<f64>() / work.len().max(1) as f64
-    };
-    CountersPerRay {
-        nodes: mean(|c| c.nodes),
-        box_tests: mean(|c| c.box_tests),
-        triangle_tests: mean(|c| c.triangle_tests),
-        stack_high_water: work.iter().map(|c| c.stack_high_water).max().unwrap_or(0),
-    }
 }
 
 /// Cost of every pixel's primary ray as a picture, one scale for all structures of a scene. The

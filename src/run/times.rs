@@ -292,7 +292,8 @@ fn median_stages(measured: &[BTreeMap<String, f64>]) -> BTreeMap<String, f64> {
     }
 }
 
-/// The record with the times of orders, where the experiment asks for them: they are dispatches of the single kernel.
+/// The record with the times of orders, where the experiment asks for them, and with what rasterisation changes, where paths begin so: both are
+/// of the single kernel.
 fn with_orders(
     session: &mut Session,
     world: &World,
@@ -304,6 +305,8 @@ fn with_orders(
     if let Some(structure) = structure.filter(|_| is_single && line.body.failure.is_none()) {
         let of_image = (&item.cell, &*line.body.image_hash);
         line.body.orders = super::orders::of_cell(session, world, structure, of_image)?;
+        let seen = (&item.cell, &item.renderer);
+        line.body.primary = super::primary::of_cell(session, world, structure, seen)?;
     }
     Ok(line)
 }
@@ -344,6 +347,7 @@ fn empty_record(session: &Session, cell: &Cell, failure: String) -> Line<TimeRec
         stages: BTreeMap::new(),
         mrays_s: None,
         orders: Vec::new(),
+        primary: None,
         image_hash: String::new(),
         image_equal: false,
         failure: Some(failure),

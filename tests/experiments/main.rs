@@ -69,7 +69,7 @@ fn catalogue() -> Catalogue {
     catalogue[Axis::Triangle] = plain(&["watertight", "pluecker"]);
     catalogue[Axis::BoxTest] = plain(&["padded-16", "plain"]);
     catalogue[Axis::Offset] = plain(&["error-bound", "none"]);
-    catalogue[Axis::Organisation] = plain(&["single-kernel"]);
+    catalogue[Axis::Organisation] = plain(&["single-kernel", "wavefront"]);
     catalogue[Axis::Peer] = plain(&["none", "obvhs-bvh2"]);
     catalogue[Axis::Workgroup] = plain(&["auto", "32", "16x16"]);
     catalogue

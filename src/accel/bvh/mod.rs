@@ -19,11 +19,13 @@ use super::leaf::{COUNT_MASK, LeafReader, Leaves};
 use super::structure::prelude::*;
 use super::tracer::RefillParameters;
 use super::tree::{Coverage, NodeKind, Tree};
+use crate::params::Parameters;
 use boxes::Boxes;
 use octant_roped::Octants;
 pub use options::BvhParameters;
 use options::{LeafTriangles, RopedParameters, Traversal};
 use pairs::Pairs;
+use std::marker::PhantomData;
 
 /// The root.
 const ROOT: u32 = 0;
@@ -41,6 +43,10 @@ impl Structure for Bvh {
     fn build(soup: &TriangleSoup, params: &BvhParameters, log: &mut BuildLog) -> BuildResult {
         Ok(Box::new(BuiltBvh::build(soup, params, log)?))
     }
+
+    fn over_tree() -> Option<&'static dyn OverTree> {
+        Some(&Laid::<BvhParameters>(PhantomData))
+    }
 }
 
 /// The registry entry `roped-bvh`.
@@ -54,6 +60,37 @@ impl Structure for RopedBvh {
     fn build(soup: &TriangleSoup, params: &RopedParameters, log: &mut BuildLog) -> BuildResult {
         let params = params.clone().into();
         Ok(Box::new(BuiltBvh::build(soup, &params, log)?))
+    }
+
+    fn over_tree() -> Option<&'static dyn OverTree> {
+        Some(&Laid::<RopedParameters>(PhantomData))
+    }
+}
+
+/// The layout of a tree with parameters of this type.
+struct Laid<P>(PhantomData<fn() -> P>);
+
+impl<P: Parameters + Into<BvhParameters>> OverTree for Laid<P> {
+    fn tree(
+        &self,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Tree, AccelError> {
+        let params: BvhParameters = P::from_params(params)?.into();
+        Tree::build(soup, &params.tree, log)
+    }
+
+    fn lay_out(
+        &self,
+        tree: &Tree,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> BuildResult {
+        let params: BvhParameters = P::from_params(params)?.into();
+        params.check()?;
+        Ok(Box::new(BuiltBvh::of_tree(tree, soup, &params, log)?))
     }
 }
 
@@ -86,17 +123,27 @@ impl BuiltBvh {
         params.check()?;
         let mut tree = Tree::build(soup, &params.tree, log)?;
         tree.note_epo(soup);
+        Self::of_tree(&tree, soup, params, log)
+    }
+
+    /// Lays out a tree.
+    fn of_tree(
+        tree: &Tree,
+        soup: &TriangleSoup,
+        params: &BvhParameters,
+        log: &mut BuildLog,
+    ) -> Result<Self, AccelError> {
         let depth = tree.depth();
         params.check_depth(depth)?;
-        check_leaves(&tree)?;
+        check_leaves(tree)?;
         let (nodes, leaves) = log.phase("layout", || {
             let order = params.layout.node_order;
-            let boxes = || Boxes::new(&tree, order);
+            let boxes = || Boxes::new(tree, order);
             let nodes = match params.traversal {
                 Traversal::Roped => NodeArray::Boxes(roped::rope(boxes())),
                 Traversal::OctantRoped => NodeArray::Octants(Octants::new(&boxes())),
                 _ if params.has_boxes() => NodeArray::Boxes(boxes()),
-                _ => NodeArray::Pairs(Pairs::new(&tree, order)),
+                _ => NodeArray::Pairs(Pairs::new(tree, order)),
             };
             let indexed = params.layout.triangles == LeafTriangles::Indexed;
             (nodes, Leaves::new(soup, &tree.order, indexed))

@@ -13,6 +13,7 @@ use super::tree::{Coverage, NodeKind, Tree, TreeParameters};
 use super::triangle::TriangleRecord;
 use bytemuck::Pod;
 use collapse::WideTree;
+use std::marker::PhantomData;
 use std::ops::Range;
 
 /// Most triangles that a slot of either structure can count, in bits or in unary.
@@ -94,12 +95,22 @@ impl<N: WideNode> Wide<N> {
         N: 'static,
     {
         let tree = wide_tree(soup, &parameters.tree, log)?;
+        Ok(Box::new(Self::of_tree(&tree, soup, parameters, log)?))
+    }
+
+    /// Collapses a tree with one triangle a leaf.
+    fn of_tree(
+        tree: &Tree,
+        soup: &TriangleSoup,
+        parameters: &WideParameters,
+        log: &mut BuildLog,
+    ) -> Result<Self, AccelError> {
         let wide = log.phase("collapse", || {
-            WideTree::collapse(&tree, N::WIDTH, &parameters.tree, N::arrange)
+            WideTree::collapse(tree, N::WIDTH, &parameters.tree, N::arrange)
         });
         let what = format!("nodes of a {}", N::STRUCTURE);
         AccelError::check_limit(what, wide.nodes.len() as u64, N::MOST_NODES)?;
-        Ok(Box::new(log.phase("layout", || {
+        Ok(log.phase("layout", || {
             let nodes: Vec<N> = wide.nodes.iter().map(|slots| N::pack(slots)).collect();
             let leaf_triangles = wide.records(soup);
             let bytes = size_of_val(&nodes[..]) + size_of_val(&leaf_triangles[..]);
@@ -113,12 +124,37 @@ impl<N: WideNode> Wide<N> {
                 texels: parameters.texels,
                 refill: parameters.refill.clone(),
             }
-        })))
+        }))
     }
 
     /// Groups on the stack at most: a level leaves one behind.
     fn depth(&self) -> u32 {
         self.stats.depth.unwrap_or(0)
+    }
+}
+
+/// The layout of a tree as a structure of these nodes.
+pub struct OfNodes<N>(pub PhantomData<fn() -> N>);
+
+impl<N: WideNode + 'static> OverTree for OfNodes<N> {
+    fn tree(
+        &self,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> Result<Tree, AccelError> {
+        wide_tree(soup, &WideParameters::from_params(params)?.tree, log)
+    }
+
+    fn lay_out(
+        &self,
+        tree: &Tree,
+        soup: &TriangleSoup,
+        params: &Params,
+        log: &mut BuildLog,
+    ) -> BuildResult {
+        let params = WideParameters::from_params(params)?;
+        Ok(Box::new(Wide::<N>::of_tree(tree, soup, &params, log)?))
     }
 }
 

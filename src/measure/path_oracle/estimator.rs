@@ -39,6 +39,8 @@ pub struct PathRules {
     pub(super) choice: Choice,
     /// Greatest component of a contribution of bounce 1 and later; 0 is none.
     clamp: f64,
+    /// Whether it begins with a ray through the centre of the pixel.
+    centred: bool,
 }
 
 /// How light is found.
@@ -160,6 +162,7 @@ impl Estimator {
                 roulette_depth: read.number("roulette_depth", 3.0) as u32,
                 choice: read.light_choice()?,
                 clamp: read.number("clamp", 0.0),
+                centred: read.choice("primary", &[("traced", false), ("centre", true)])?,
             }),
             _ => return Err(format!("integrator `{name}`")),
         };
@@ -213,7 +216,11 @@ impl PathOracle<'_> {
     /// The radiance of a sample.
     pub(super) fn estimate(&self, walk: &mut Walk) -> DVec3 {
         let lens = walk.lens();
-        let direction = lens.direction(walk.id.pixel, walk.draw_2d(PIXEL));
+        let point = match walk.view.estimator {
+            Estimator::Path(PathRules { centred: true, .. }) => [0.5; 2],
+            _ => walk.draw_2d(PIXEL),
+        };
+        let direction = lens.direction(walk.id.pixel, point);
         let direction = walk.rounding.direction(direction);
         let ray = Segment::endless(lens.eye, direction, None);
         match walk.view.estimator {

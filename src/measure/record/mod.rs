@@ -2,6 +2,7 @@
 //! and a body. Every table, plot and export derives from these lines alone; an absent value is absent,
 //! never 0.
 
+mod animation;
 mod coherence;
 mod compaction;
 mod error;
@@ -14,6 +15,7 @@ mod run;
 mod stream;
 mod structure;
 
+pub use animation::*;
 pub use coherence::*;
 pub use compaction::CompactionRecord;
 pub use error::*;
@@ -149,6 +151,8 @@ pub enum Body {
     Time(TimeRecord),
     /// How alike the rays of neighbouring lanes are in a full cell, by a model.
     Coherence(CoherenceRecord),
+    /// A structure was taken from frame to frame of a moving scene.
+    Animation(AnimationRecord),
     /// Star discrepancy of the words of a pair of dimensions, read back from a dump kernel that imports the
     /// renderer's modules.
     Stream(StreamRecord),
@@ -200,6 +204,7 @@ kinds! {
     Spectrum: SpectrumRecord,
     Time: TimeRecord,
     Coherence: CoherenceRecord,
+    Animation: AnimationRecord,
     Stream: StreamRecord,
     SamplerCost: SamplerCostRecord,
     Compaction: CompactionRecord,

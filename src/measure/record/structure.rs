@@ -1,7 +1,7 @@
 //! What is recorded of a structure on a scene, and of full cells.
 
 use super::{Interval, Tally};
-use crate::accel::{Phase, Space, StructureStats};
+use crate::accel::{Counters, Phase, Space, StructureStats};
 use crate::config::Coherence;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -95,6 +95,21 @@ pub struct CountersPerRay {
     pub stack_high_water: u32,
 }
 
+impl CountersPerRay {
+    /// Of the work of these rays.
+    pub fn mean_of(work: &[Counters]) -> Self {
+        let mean = |get: fn(&Counters) -> u32| {
+            work.iter().map(|c| f64::from(get(c))).sum::<f64>() / work.len().max(1) as f64
+        };
+        Self {
+            nodes: mean(|c| c.nodes),
+            box_tests: mean(|c| c.box_tests),
+            triangle_tests: mean(|c| c.triangle_tests),
+            stack_high_water: work.iter().map(|c| c.stack_high_water).max().unwrap_or(0),
+        }
+    }
+}
+
 /// Speed of one ray class through one structure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ClassTiming {
@@ -186,6 +201,27 @@ pub struct OrderTime {
     pub first_picture_ms: Option<Interval>,
 }
 
+/// Paths that begin at rasterised triangles, against rays through the same points with the same samples behind them.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct PrimaryRecord {
+    /// Pixels that were compared.
+    pub pixels: u64,
+    /// Those that see another triangle.
+    pub other_triangle: u64,
+    /// Those whose value is another.
+    pub other_value: u64,
+    /// Of these, those that see the same triangle.
+    pub unexplained: u64,
+    /// Mean of the differences of all channels, over the mean by rays.
+    pub mean_difference: f64,
+    /// Root of the mean of their squares, over the mean by rays.
+    pub rms_difference: f64,
+    /// Wall milliseconds to rasterise all pixels, median with interval.
+    pub raster_ms: Option<Interval>,
+    /// Wall milliseconds to trace a ray through each, median with interval.
+    pub traced_ms: Option<Interval>,
+}
+
 /// Time of a full cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TimeRecord {
@@ -215,6 +251,9 @@ pub struct TimeRecord {
     /// The same cell in orders of passes; empty where these were not asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub orders: Vec<OrderTime>,
+    /// Of paths that begin at rasterised triangles: what that changes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub primary: Option<PrimaryRecord>,
     /// BLAKE3 of the image.
     pub image_hash: String,
     /// Whether the image equals to the bit that of the scene's first gated structure.

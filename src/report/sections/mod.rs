@@ -1,5 +1,6 @@
 //! The content of the report, section by section.
 
+pub mod animation;
 pub mod belief;
 pub mod coherence;
 pub mod compactions;
@@ -8,6 +9,7 @@ mod orders;
 pub mod organisations;
 pub mod peers;
 pub mod point_sets;
+mod primary;
 pub mod rendering;
 pub mod run;
 pub mod sampler_plots;
@@ -116,6 +118,7 @@ fn scene_section(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -
     blocks.extend(facts(scene));
     blocks.extend(structures::blocks(dir, data, index, scene));
     blocks.extend(peers::blocks(scene));
+    blocks.extend(animation::blocks(data, &format!("scene-{index}"), scene));
     for (number, view) in scene.views.iter().enumerate() {
         let stem = format!("scene-{index}-{}-{number}", file_stem(&view.name));
         blocks.extend(samplers::blocks(dir, data, &stem, scene, view));

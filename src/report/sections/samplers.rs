@@ -2,6 +2,7 @@
 
 use super::coherence;
 use super::orders;
+use super::primary;
 use super::sampler_plots::{error_figures, histograms, pareto_figure};
 use super::spectrum;
 use super::verdict::Race;
@@ -36,6 +37,7 @@ pub fn blocks(
     blocks.extend(Block::figures([pareto_figure(data, stem, view)]));
     blocks.extend(time_table(data, view, &values).into_block());
     blocks.extend(orders::table(view, &values).into_block());
+    blocks.extend(primary::table(view, &values).into_block());
     blocks.extend(coherence::blocks(data, stem, view, &values));
     blocks.extend(bias_table(view, &values).into_block());
     blocks.extend(Block::figures([histograms(stem, view)]));

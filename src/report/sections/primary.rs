@@ -1,0 +1,44 @@
+//! Paths that begin at rasterised triangles, against rays through the same points.
+
+use crate::measure::record::axis;
+use crate::report::data::View;
+use crate::report::document::*;
+use crate::report::format;
+use crate::report::pivot::{FIGURES_ALONE, Rows};
+use crate::report::values::Value;
+
+/// What tells cells of a view apart.
+const ROWS: [&str; 5] = [
+    axis::ACCEL,
+    axis::SEQUENCE,
+    axis::DECORRELATION,
+    axis::OFFSET,
+    axis::WORKGROUP,
+];
+
+/// A row for each cell that was compared; no table where none was.
+pub fn table(view: &View, values: &[Value]) -> Table {
+    let compared = view.valid_times().filter(|time| time.primary.is_some());
+    let rows = compared.map(|time| {
+        let cells = [&time.structure, &time.sampler];
+        let cells = cells.map(|text| text.clone().into()).to_vec();
+        (time.key.clone(), cells)
+    });
+    let counts = view.times.iter().map(|time| time.ms.len());
+    let caption = format!(
+        "Primary visibility with {}: rasterised against rays through the same points, centres of pixels, with the same samples behind them; wall times of one picture of \
+         all first hits, median [{}]. A pixel that sees the same triangle has the same value",
+        view.name,
+        format::median_bounds(counts),
+    );
+    let figures = [
+        "primary-other-triangle/v1",
+        "primary-other-value/v1",
+        "primary-mean-difference/v1",
+        "primary-rms-difference/v1",
+        "raster-ms/v1",
+        "traced-primary-ms/v1",
+    ];
+    let heads = ["structure", ":sampler"];
+    Rows::new(&ROWS, &heads, rows).table(values, caption, &figures, FIGURES_ALONE)
+}
