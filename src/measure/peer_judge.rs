@@ -10,8 +10,8 @@ use glam::Vec3;
 
 /// Most rays of a class that the oracle looks at, spread evenly over those that differ: it tests every triangle of the scene.
 const MOST_JUDGED: usize = 256;
-/// Relative difference of a distance that single precision explains: plain Möller–Trumbore tests of far and thin triangles lose
-/// three digits.
+/// Share of the distance (and of a hundredth of the origin's greatest coordinate, whose rounding a short one shows) that single
+/// precision explains: plain Möller–Trumbore tests of far and thin triangles lose three digits.
 const EXPLAINED: f64 = 1e-3;
 
 /// How the answers to the rays of a class differ from the judge's.
@@ -21,7 +21,7 @@ pub struct Differences {
     pub unlike: usize,
     /// How many of them were put to the oracle.
     pub judged: usize,
-    /// Greatest relative difference of a distance at the same triangle.
+    /// Greatest difference of a distance at the same triangle: see [`EXPLAINED`].
     pub farthest: f64,
 }
 
@@ -49,7 +49,7 @@ pub fn differences(
         if !same {
             unlike.push((ray, hit));
         } else if is && set.query() == Query::Closest {
-            let off = f64::from((hit.t - truth.t).abs()) / f64::from(truth.t.abs());
+            let off = off_by(ray, hit.t, f64::from(truth.t));
             if !off.is_finite() || off > EXPLAINED {
                 return Err(format!(
                     "ray {ray} | it {hit} | judge {truth}: the distance is wrong"
@@ -65,6 +65,13 @@ pub fn differences(
         .collect();
     judge(scene, soup, set.query(), &chosen)?;
     Ok(found)
+}
+
+/// How far a distance is from another, over that or a hundredth of the greatest coordinate of the ray's origin.
+fn off_by(ray: &Ray, found: f32, t: f64) -> f64 {
+    let vector = |v: [f32; 3]| Vec3::from(v).as_dvec3();
+    let reach = 0.01 * vector(ray.origin).abs().max_element() / vector(ray.direction).length();
+    (f64::from(found) - t).abs() / t.abs().max(reach)
 }
 
 fn judge(
@@ -113,8 +120,7 @@ fn distance(soup: &TriangleSoup, ray: &Ray, hit: &Hit) -> f32 {
     let [a, b, c] = record.vertices().map(vector);
     let normal = (b - a).cross(c - a);
     let t = normal.dot(a - vector(ray.origin)) / normal.dot(vector(ray.direction));
-    let off = (f64::from(hit.t) - t).abs() / t.abs();
-    match off <= EXPLAINED {
+    match off_by(ray, hit.t, t) <= EXPLAINED {
         true => t as f32,
         false => hit.t,
     }

@@ -21,7 +21,8 @@ pub struct PeerTiming {
     pub unlike: usize,
     /// Of these, how many were put to the oracle; none of them was beyond rounding.
     pub judged: usize,
-    /// Greatest difference of a distance to the judge's where the triangle is the same, over the distance.
+    /// Greatest difference of a distance to the judge's where the triangle is the same, over the distance or a hundredth of
+    /// the greatest coordinate of the ray's origin.
     pub farthest: f64,
 }
 
