@@ -308,7 +308,7 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
     ),
     ("accel/bounds", "MISSED", "the twin returns an Option"),
     ("accel/leaf", "leaf_words", "parts of an array"),
-    ("accel/bvh/stack", "step", "the body of the twin's loop"),
+    ("accel/bvh/stack", "follow", "the body of the twin's loop"),
     ("accel/bvh/stack", "begin", "of lanes that are refilled"),
     ("accel/bvh/stack", "advance", "of lanes that are refilled"),
     ("accel/cwbvh", "node_word", "parts of an array"),

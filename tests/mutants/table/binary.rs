@@ -83,8 +83,8 @@ pub const MUTANTS: &[Mutant] = &[
         "directions are raised for slabs, not for edges",
         text(
             "accel/bvh/stack",
-            "visit(current, ray, inverse",
-            "visit(current, Ray(ray.origin, ray.t_min, select(ray.direction, vec3<f32>(0.0), abs(ray.direction) < vec3<f32>(1e-15)), ray.t_max), inverse",
+            "visit(*current, ray, inverse",
+            "visit(*current, Ray(ray.origin, ray.t_min, select(ray.direction, vec3<f32>(0.0), abs(ray.direction) < vec3<f32>(1e-15)), ray.t_max), inverse",
         ),
         BVH,
         Check::Lattice,
@@ -129,7 +129,7 @@ pub const MUTANTS: &[Mutant] = &[
     row(
         "far-child-dropped",
         "the far child is not pushed",
-        text("accel/bvh/stack", "push(&stack, inner.second);", ""),
+        text("accel/bvh/stack", "push(stack, inner.second);", ""),
         BVH,
         Check::Lattice,
     ),
@@ -186,8 +186,8 @@ pub const MUTANTS: &[Mutant] = &[
         "the stack hands out what was pushed first",
         text(
             "accel/stack",
-            "@if(!stack_private && !stack_workgroup) return (*stack).entries[place];",
-            "@if(!stack_private && !stack_workgroup) return (*stack).entries[0];",
+            "@if(!stack_private && !stack_workgroup && !refill) return (*stack).entries[place];",
+            "@if(!stack_private && !stack_workgroup && !refill) return (*stack).entries[0];",
         ),
         BVH,
         Check::Lattice,
