@@ -315,7 +315,10 @@ fn a_run_shows_peers_apart_and_goes_on_without_one() {
     let text = String::from_utf8_lossy(&ran.stderr);
     // The reference of two samples is too noisy for such an image, which is a failed check; a missing or a wrong peer is none.
     let checks: Vec<&str> = text.lines().filter(|l| l.starts_with("failed:")).collect();
-    assert!(checks.iter().all(|l| l.contains("Reference noise")), "{text}");
+    assert!(
+        checks.iter().all(|l| l.contains("Reference noise")),
+        "{text}"
+    );
     let read =
         |name: &str| std::fs::read_to_string(out.path().join("results").join(name)).expect(name);
     let records = read("records.jsonl");

@@ -158,6 +158,7 @@ impl Stage {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::tracer::GroupShape;
     use crate::gpu::Composition;
     use crate::integrator::RayOffset;
 
@@ -165,6 +166,7 @@ mod tests {
     fn what_kernels_get_where_nobody_chose_is_what_the_registries_call_default() {
         let chosen = Intersection::default().activate(Composition::new("x"));
         let chosen = RayOffset::default().activate(chosen);
+        let chosen = GroupShape::default().activate(chosen);
         assert_eq!(Composition::new("x").completed(), chosen);
         assert_ne!(Composition::new("x"), chosen);
     }

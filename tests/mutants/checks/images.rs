@@ -59,7 +59,7 @@ const ONE: Replicates = Replicates {
 
 /// Kernels without next-event estimation: the simplest estimator of the same image.
 pub fn plain_path_tracing(folder: &Path) -> Result<KernelLibrary, CheckError> {
-    let text = "result += limited(throughput * direct_light(surface, depth, sampler), depth);";
+    let text = "@if(!queued) *result += limited(throughput * direct_light(surface, depth, sampler), depth);";
     let weight = "weight = found_weight(density, light_pdf(leaving, surface, hit));";
     let file = "integrator/path";
     let no_direct_light = Plant::Kernel {
