@@ -364,11 +364,17 @@ fn an_overflowing_stack_and_a_blown_step_fuse_raise_the_error_word() {
     ] {
         assert!(names_of("traversal").contains(&traversal));
         let (module, fuse) = (format!("accel/bvh/{module}"), "step < limits.step_fuse");
-        let changes = [("traversal", traversal)];
+        let changes = [("traversal", traversal), ("refill", "none")];
         assert_eq!(error_word(&module, fuse, fuse, &changes), None);
         let told = error_word(&module, fuse, "step < 4u", &changes).expect("a blown fuse");
         assert!(told.contains("step fuse"), "{traversal}: {told}");
     }
+    // Lanes that are refilled count the steps of each ray.
+    let (module, fuse) = ("accel/bvh/stack", "(*at).steps == limits.step_fuse");
+    let changes = [("refill", "always")];
+    assert_eq!(error_word(module, fuse, fuse, &changes), None);
+    let told = error_word(module, fuse, "(*at).steps == 4u", &changes).expect("a blown fuse");
+    assert!(told.contains("step fuse"), "refilled: {told}");
 }
 
 #[test]
