@@ -305,18 +305,29 @@ fn a_path_lengthens_and_lanes_fall_asleep_unless_they_are_compacted() {
         4,
     );
     let single = setting.tallies(&[0, 2], "bvh", Organisation::SingleKernel);
-    let compacted = setting.tallies(&[0, 2], "bvh", Organisation::Compacted);
+    let [compacted, by_warps, by_rays] = [
+        Organisation::Compacted,
+        Organisation::CompactedByWarps,
+        Organisation::CompactedByRays,
+    ]
+    .map(|organisation| setting.tallies(&[0, 2], "bvh", organisation));
     let efficiency =
         |t: &BTreeMap<String, Tally>, class: &str| t[class].efficiency().expect("issues");
     assert!(efficiency(&single, "bounce 1") < efficiency(&single, "primary"));
     assert!(efficiency(&single, "bounce 5") < efficiency(&single, "bounce 1"));
     for class in single.keys() {
-        let [s, c] = [&single, &compacted].map(|t| t[class]);
-        assert_eq!(
-            [s.rays, s.nodes, s.triangles, s.active, s.bytes],
-            [c.rays, c.nodes, c.triangles, c.active, c.bytes]
-        );
+        let s = single[class];
+        for c in [&compacted, &by_warps, &by_rays].map(|t| t[class]) {
+            assert_eq!(
+                [s.rays, s.nodes, s.triangles, s.active, s.bytes],
+                [c.rays, c.nodes, c.triangles, c.active, c.bytes]
+            );
+        }
     }
+    // An order that is lost costs coherence, and that of all rays more than that of warps.
+    let bounce = |t| efficiency(t, "bounce 1");
+    assert!(bounce(&by_rays) < 0.97 * bounce(&compacted));
+    assert!(bounce(&by_rays) < bounce(&by_warps));
     assert!(efficiency(&compacted, "bounce 5") > 1.3 * efficiency(&single, "bounce 5"));
 }
 
