@@ -1,6 +1,8 @@
 //! Organisations of the path tracer: all make the image of the single kernel to the bit, whatever the structure, the queues' length,
 //! compaction and sorting; and planted faults do not.
 
+#[path = "organisations/kinds.rs"]
+mod kinds;
 #[path = "adding_an_integrator/piped.rs"]
 mod piped;
 mod support;

@@ -1,14 +1,18 @@
 //! A structure that answers rays in passes of its own goes through gate, timing, counters, a run and its
 //! report like any other, and nothing in the program knows of it.
 
+#[path = "adding_an_integrator/piped.rs"]
+mod piped;
 #[path = "pipelines/sorted_rays.rs"]
 mod sorted_rays;
 mod support;
 
-use raystone::accel::{AccelKind, Bvh};
+use piped::PipedBvh;
+use raystone::accel::tracer::RayBuffers;
+use raystone::accel::{AccelKind, Bvh, LiveRays, Query};
 use raystone::config::Axis;
 use raystone::config::{Experiment, Plan};
-use raystone::gpu::KernelLibrary;
+use raystone::gpu::{Gpu, Groups, KernelLibrary, Recording, Storage};
 use raystone::measure::record::GateVerdict;
 use raystone::run::{Registries, RunOptions, RunSummary, run, verify};
 use sorted_rays::SortedRays;
@@ -186,4 +190,81 @@ fn a_run_times_counts_and_reports_it_and_leaves_out_single_kernel_integrators() 
     let report = raystone::report::write_report(&options.out).expect("a report");
     let page = std::fs::read_to_string(report.html).expect("the page");
     assert!(page.contains("sorted-rays") && page.contains("uncounted-rays"));
+}
+
+/// What stands in answers that nobody gave.
+const NO_ANSWER: [u32; 4] = [0xffff_dead; 4];
+/// Rays of a buffer, those that are to be answered, and how many of them there are.
+const RAYS: u32 = 900;
+const RANGE: std::ops::Range<u32> = 100..800;
+const LIVE: u32 = 300;
+
+/// Answers of a buffer through a structure, where the device says how many of the rays there are.
+fn live_answers(gpu: &Gpu, kind: &dyn AccelKind, query: Query) -> Vec<[u32; 4]> {
+    let stage = support::Stage::builtin(gpu, "cornell-box", &[]);
+    let tracer = stage.tracer(&stage.traced(gpu, kind), query);
+    let mut random = Pcg::new(3);
+    let rays = scenes::aimed_rays(&mut random, &stage.soup, RAYS as usize);
+    let stored = |words: &[u32]| Storage::Own(gpu.storage("words", words).expect("a buffer"));
+    let answers = stored([NO_ANSWER; RAYS as usize].as_flattened());
+    let buffers = RayBuffers {
+        rays: Storage::Own(gpu.storage("rays", &rays).expect("a buffer")),
+        answers: answers.clone(),
+        status: stored(&[0; 16]),
+    };
+    // Another number stands beside it.
+    let live = LiveRays {
+        counts: stored(&[7, LIVE]),
+        word: 1,
+        groups: Groups::Indirect(stored(&[LIVE.div_ceil(64), 1, 1]), 0),
+    };
+    let mut recording = Recording::new();
+    let tracer = tracer.expect("kernels");
+    let recorded = tracer.record_live(&mut recording, &buffers, RANGE, Some(live));
+    recorded.expect("it records");
+    recording.download("answers", &answers);
+    let played = gpu.play(&recording).expect("it plays");
+    let words: Vec<u32> = played.download("answers").expect("answers");
+    words.as_chunks::<4>().0.to_vec()
+}
+
+/// Whether live rays have the answers of the plain BVH, and the others none.
+fn only_live_rays_are_answered(gpu: &Gpu, kind: &dyn AccelKind) -> bool {
+    [Query::Closest, Query::Any].into_iter().all(|query| {
+        let expected = live_answers(support::gpu(), &Bvh, query);
+        let found = live_answers(gpu, kind, query);
+        let (first, last) = (RANGE.start as usize, (RANGE.start + LIVE) as usize);
+        let (live, others) = (
+            &found[first..last],
+            [&found[..first], &found[last..]].concat(),
+        );
+        assert!(!expected[first..last].contains(&NO_ANSWER));
+        live == &expected[first..last] && others.iter().all(|answer| *answer == NO_ANSWER)
+    })
+}
+
+#[test]
+fn of_rays_that_the_device_counts_the_live_ones_alone_are_answered_by_structures_of_both_kinds() {
+    let library = KernelLibrary::default().with_folder(&kernel_folder());
+    let gpu = support::open(library.expect("the kernels of this test"));
+    let kinds: [&dyn AccelKind; 3] = [&Bvh, &PipedBvh, &SORTED];
+    for kind in kinds {
+        assert!(only_live_rays_are_answered(&gpu, kind), "{}", kind.name());
+    }
+    for (from, to) in [
+        // All that there is room for, one too few, the number of others, behind the end of the range.
+        ("min(batch.count, live[batch.word])", "batch.count"),
+        (
+            "min(batch.count, live[batch.word])",
+            "live[batch.word] - 1u",
+        ),
+        ("live[batch.word]", "live[0u]"),
+        ("let index = batch.first + item;", "let index = item;"),
+    ] {
+        let gpu = support::open(support::kernels_with(
+            "integrator/trace_rays",
+            &[(from, to)],
+        ));
+        assert!(!only_live_rays_are_answered(&gpu, &PipedBvh), "{to}");
+    }
 }

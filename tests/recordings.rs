@@ -194,3 +194,29 @@ fn the_first_use_of_a_kernel_is_told_on_its_own() {
         [("common/loops".to_owned(), Some(cold))]
     );
 }
+
+#[test]
+fn more_runs_than_timestamps_are_played_in_parts_and_all_of_them() {
+    let words = Storage::scratch("many", BYTES);
+    let mut recording = Recording::new();
+    recording.clear(&words).download("before", &words);
+    let add = kernel("test/add");
+    for number in 0..2100 {
+        recording.run("add", &add, &adding(number % 3, &words), [4, 1, 1]);
+    }
+    recording.download("after", &words);
+    let player = Player::new(gpu());
+    for _ in 0..2 {
+        let played = player.play(&recording).expect("it plays");
+        assert_eq!(played.runs.len(), 2100);
+        assert!(played.elapsed().gpu_ms.is_none_or(|ms| ms > 0.0));
+        assert_eq!(
+            played.download::<u32>("before").expect("words"),
+            [0; WORDS as usize]
+        );
+        assert_eq!(
+            played.download::<u32>("after").expect("words"),
+            [2100; WORDS as usize]
+        );
+    }
+}

@@ -16,6 +16,8 @@ pub struct Stream {
     pub length: Storage,
     /// A word per element: 0 for a hole, else its bucket, from 1 on.
     pub flags: Storage,
+    /// The only bucket that stays, of all that flags tell apart; its elements are in the first one then.
+    pub bucket: Option<u32>,
     /// The elements.
     pub elements: Storage,
     /// What stays; as large as [`Stream::elements`], and another buffer.
@@ -25,11 +27,18 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// A kernel that sees the elements as what they have fewest of: `vec4`s where whole ones fit, else words.
+    /// A kernel that sees the elements as what they have fewest of, `vec4`s where whole ones fit, else words, and the flags as
+    /// those of the bucket that stays.
     pub fn seen_by(&self, kernel: Composition) -> Composition {
         let wide = self.element_bytes.is_multiple_of(16);
         let cells = self.element_bytes / if wide { 16 } else { 4 };
-        kernel.constant("CELLS", cells).feature("wide_cells", wide)
+        let kernel = kernel.constant("CELLS", cells).feature("wide_cells", wide);
+        match self.bucket {
+            Some(bucket) => kernel
+                .constant("BUCKET", bucket)
+                .feature("one_bucket", true),
+            None => kernel,
+        }
     }
 
     fn bindings(&self) -> Bindings {

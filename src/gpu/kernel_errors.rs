@@ -6,7 +6,7 @@ use super::{Gpu, GpuError};
 pub(crate) const LOOPS_CUT: u32 = 4;
 
 /// Meaning of the bits of the kernels' error word, as in `kernels/common/errors.wesl`.
-pub const KERNEL_ERRORS: [(u32, &str); 4] = [
+pub const KERNEL_ERRORS: [(u32, &str); 5] = [
     (
         1,
         "a traversal took more steps than the structure allows (step fuse)",
@@ -14,6 +14,7 @@ pub const KERNEL_ERRORS: [(u32, &str); 4] = [
     (2, "a traversal stack overflowed"),
     (LOOPS_CUT, "the driver ended loops before their end"),
     (8, "a queue of rays or paths was too short"),
+    (16, "a path was in no queue for shading, or in two"),
 ];
 
 /// What the bits of an error word mean; nothing for 0.

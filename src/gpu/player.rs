@@ -3,14 +3,14 @@
 use super::GpuError;
 use super::adapter::Gpu;
 use super::bindings::{Resource, Storage};
-use super::clock::Stopwatch;
+use super::clock::{Elapsed, Stopwatch};
 use super::pipeline::{BindingKind, Pipeline};
 use super::recording::{Groups, Played, Recording, Run, Step};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-/// Runs that one recording may have: as many as a set of timestamps has pairs.
+/// Runs of one submission at most: as many as a set of timestamps has pairs.
 const MAX_RUNS: usize = wgpu::QUERY_SET_MAX_QUERIES as usize / 2;
 /// Bind groups that are kept at most; they keep their buffers alive.
 const KEPT_GROUPS: usize = 256;
@@ -67,7 +67,7 @@ impl Player {
         kept.made
     }
 
-    /// Plays a recording to its end, in one submission, and measures it. Kernels that never ran on this
+    /// Plays a recording to its end, in one submission (in several, one after the other, if it has thousands of runs), and measures it. Kernels that never ran on this
     /// device are compiled first, outside what is measured: [`Pipeline::cold_ms`].
     ///
     /// # Errors
@@ -96,11 +96,26 @@ impl Player {
 
 impl Kept {
     fn play(&mut self, gpu: &Gpu, recording: &Recording) -> Result<Played, GpuError> {
-        let runs: Vec<&Run> = recording.runs().collect();
-        if runs.len() > MAX_RUNS {
-            let text = format!("{} runs in one recording, at most {MAX_RUNS}", runs.len());
-            return Err(GpuError::Driver(text));
+        if recording.runs().count() <= MAX_RUNS {
+            return self.play_part(gpu, recording);
         }
+        // As large as any part asks for: one that grew later would lose what it holds.
+        self.lend_scratch(gpu, recording)?;
+        let mut whole = Played {
+            host: Elapsed::nothing(false),
+            ..Played::default()
+        };
+        for part in recording.parts(MAX_RUNS) {
+            let played = self.play_part(gpu, &part)?;
+            whole.host += played.host;
+            whole.runs.extend(played.runs);
+            whole.downloads.extend(played.downloads);
+        }
+        Ok(whole)
+    }
+
+    fn play_part(&mut self, gpu: &Gpu, recording: &Recording) -> Result<Played, GpuError> {
+        let runs: Vec<&Run> = recording.runs().collect();
         for run in &runs {
             if let Groups::Direct(groups) = run.groups {
                 check_groups(gpu, &run.name, groups)?;

@@ -138,6 +138,23 @@ impl Recording {
         })
     }
 
+    /// The same steps in recordings of at most so many runs.
+    pub(super) fn parts(&self, most: usize) -> Vec<Self> {
+        let (mut parts, mut part, mut runs) = (Vec::new(), Self::new(), 0);
+        for step in &self.steps {
+            if matches!(step, Step::Run(_)) {
+                if runs == most {
+                    parts.push(std::mem::take(&mut part));
+                    runs = 0;
+                }
+                runs += 1;
+            }
+            part.steps.push(step.clone());
+        }
+        parts.push(part);
+        parts
+    }
+
     /// Every buffer that a step names.
     pub(super) fn storages(&self) -> impl Iterator<Item = &Storage> {
         self.steps.iter().flat_map(|step| {

@@ -2,7 +2,7 @@
 
 use super::render::with_sampler;
 use super::slice::Slice;
-use super::tables::SceneBuffers;
+use super::tables::{SceneBuffers, SceneFeatures};
 use super::visibility::Visibility;
 use super::{RenderJob, Traced};
 use crate::accel::tracer::RayBuffers;
@@ -35,6 +35,8 @@ pub(super) struct Passes {
     pub visibility: Option<Visibility>,
     /// Corners of the scene's box.
     bounds: [[f32; 3]; 2],
+    /// What the scene makes kernels carry.
+    scene: SceneFeatures,
     /// Features that some scenes need and this kernel is without; none where nothing is traced.
     left_out: Vec<&'static str>,
     pipelines: RefCell<BTreeMap<String, Arc<Pipeline>>>,
@@ -105,17 +107,25 @@ impl Passes {
             runtime_checks: job.runtime_checks,
             visibility,
             bounds: scene.bounds,
+            scene: scene.features,
             left_out,
             pipelines: RefCell::default(),
             tracers: RefCell::default(),
         })
     }
 
-    fn pipeline(&self, pass: &str, kernel: Composition) -> Result<Arc<Pipeline>, GpuError> {
+    /// The kernel of a pass, composed with what is chosen but for these features.
+    fn pipeline(
+        &self,
+        pass: &str,
+        kernel: Composition,
+        unneeded: &[&str],
+    ) -> Result<Arc<Pipeline>, GpuError> {
         if let Some(pipeline) = self.pipelines.borrow().get(pass) {
             return Ok(Arc::clone(pipeline));
         }
         let mut all = self.chosen.clone();
+        all.features.retain(|name| !unneeded.contains(&&**name));
         all.entry = kernel.entry;
         all.active.extend(kernel.active);
         all.features.extend(kernel.features);
@@ -339,6 +349,11 @@ impl<'a> ImageSteps<'a> {
         self.passes.bounds
     }
 
+    /// Numbers of the kinds of materials of the scene, as in `kernels/shading/bsdf.wesl`.
+    pub fn material_kinds(&self) -> Vec<usize> {
+        self.passes.scene.material_kinds().collect()
+    }
+
     /// Runs a kernel, composed with the job's sampler, scene, constants and, where the integrator needs it
     /// inline, structure. What `special` binds goes before the buffers and values of those names. A pass has
     /// one kernel: `name` decides.
@@ -352,7 +367,35 @@ impl<'a> ImageSteps<'a> {
         groups: impl Into<Groups>,
         special: &Bindings,
     ) -> Result<(), GpuError> {
-        let pipeline = self.passes.pipeline(name, kernel)?;
+        self.run_without(&[], name, kernel, groups.into(), special)
+    }
+
+    /// The same with a kernel that meets surfaces of one kind of materials alone, by its number, or none at all: it is composed without
+    /// what others need.
+    ///
+    /// # Errors
+    /// As [`ImageSteps::run`].
+    pub fn run_on(
+        &mut self,
+        kind: Option<usize>,
+        name: &str,
+        kernel: Composition,
+        groups: impl Into<Groups>,
+        special: &Bindings,
+    ) -> Result<(), GpuError> {
+        let unneeded = self.passes.scene.unneeded(kind);
+        self.run_without(&unneeded, name, kernel, groups.into(), special)
+    }
+
+    fn run_without(
+        &mut self,
+        unneeded: &[&str],
+        name: &str,
+        kernel: Composition,
+        groups: Groups,
+        special: &Bindings,
+    ) -> Result<(), GpuError> {
+        let pipeline = self.passes.pipeline(name, kernel, unneeded)?;
         let bindings = self.bindings.merged(special);
         self.recording.run(name, &pipeline, &bindings, groups);
         Ok(())

@@ -1,6 +1,6 @@
 //! What `shading_tables` holds of surfaces besides the numbers of materials: places of textures, texture coordinates, normals, texels.
 
-use crate::scene::{SceneData, TextureUse, Wrap};
+use crate::scene::{Material, SceneData, TextureUse, Wrap};
 
 /// Words of a material without its parameters; the last four are the places of its textures.
 pub(super) const MATERIAL_WORDS: usize = 12;
@@ -25,11 +25,13 @@ pub struct SurfaceFeatures {
 }
 
 impl SurfaceFeatures {
-    pub(super) fn of(scene: &SceneData) -> Self {
+    /// Of these materials among those of the scene.
+    pub(super) fn of(scene: &SceneData, is_among: impl Fn(&Material) -> bool) -> Self {
         // Without coordinates, materials show their constants.
         let is_mapped = scene.uvs.len() == scene.triangles.len();
-        let uses = scene.materials.iter().map(|m| m.texture_uses());
-        let uses: Vec<[Option<TextureUse>; 4]> = uses.filter(|_| is_mapped).collect();
+        let materials = scene.materials.iter();
+        let materials = materials.filter(|material| is_mapped && is_among(material));
+        let uses: Vec<[Option<TextureUse>; 4]> = materials.map(Material::texture_uses).collect();
         let some = |slot: usize| uses.iter().any(|of_one| of_one[slot].is_some());
         let mut all = uses.iter().flatten().flatten();
         Self {
@@ -55,6 +57,20 @@ impl SurfaceFeatures {
             ("texture_transforms", self.texture_transforms),
             ("normals", self.normals),
         ]
+    }
+
+    /// Features that a kernel for surfaces with these does without, whatever else there is in the scene. Emission and its textures
+    /// are those of lights, too.
+    pub(super) fn unneeded(&self) -> impl Iterator<Item = &'static str> {
+        let of_one_surface = [
+            "textures",
+            "metallic_roughness_textures",
+            "normal_maps",
+            "normals",
+        ];
+        let unneeded = move |(name, on): &(&str, bool)| !on && of_one_surface.contains(name);
+        let flags = self.flags().into_iter();
+        flags.filter(unneeded).map(|(name, _)| name)
     }
 }
 

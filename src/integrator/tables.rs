@@ -29,6 +29,8 @@ pub struct SceneFeatures {
     pub daylight: bool,
     /// Which of [`MATERIAL_KINDS`] some material is of.
     pub materials: [bool; MATERIAL_KINDS.len()],
+    /// Textures of the materials of each kind, and normals.
+    pub kinds: [SurfaceFeatures; MATERIAL_KINDS.len()],
     /// Instances add to the error of points.
     pub transforms: bool,
 }
@@ -96,6 +98,21 @@ impl SceneFeatures {
         flags.extend(self.surfaces.flags());
         flags
     }
+
+    /// Numbers of the kinds of materials that there are, as in `kernels/shading/bsdf.wesl`.
+    pub fn material_kinds(&self) -> impl Iterator<Item = usize> {
+        (0..MATERIAL_KINDS.len()).filter(|kind| self.materials[*kind])
+    }
+
+    /// Features that a kernel does without which meets surfaces of this kind alone, by its number, or none at all.
+    pub fn unneeded(&self, kind: Option<usize>) -> Vec<&'static str> {
+        let feature = kind.map(|kind| MATERIAL_KINDS[kind].feature);
+        let (_, of_materials) = FEATURE_GROUPS[0];
+        let others = of_materials.iter().copied();
+        let own = kind.map_or(SurfaceFeatures::default(), |kind| self.kinds[kind]);
+        let others = others.filter(|name| Some(*name) != feature);
+        others.chain(own.unneeded()).collect()
+    }
 }
 
 /// A scene on the GPU.
@@ -132,7 +149,7 @@ impl SceneBuffers {
     /// # Errors
     /// A buffer exceeds the adapter's limit.
     pub fn upload(gpu: &Gpu, scene: &SceneData, soup: &TriangleSoup) -> Result<Self, GpuError> {
-        let surfaces = SurfaceFeatures::of(scene);
+        let surfaces = SurfaceFeatures::of(scene, |_| true);
         let mut lights = LightTables::of(scene, &LightList::of(scene));
         let tables = Tables::of(scene, &mut lights, &surfaces);
         let triangles = TriangleBuffers::upload(gpu, soup)?;
@@ -158,6 +175,7 @@ impl SceneBuffers {
                 daylight: scene.daylight.is_some(),
                 materials: MATERIAL_KINDS
                     .map(|kind| scene.materials.iter().any(|m| m.kind == kind)),
+                kinds: MATERIAL_KINDS.map(|kind| SurfaceFeatures::of(scene, |m| m.kind == kind)),
                 transforms: transform_error.scale != 0.0 || transform_error.shift != 0.0,
             },
             environment: scene.environment.to_array(),

@@ -21,9 +21,8 @@ impl TracePasses for OnePass {
     }
 
     fn record(&self, steps: &mut TraceSteps) -> Result<(), GpuError> {
-        let groups = steps.groups(steps.count);
         let kernel = Composition::new("integrator/trace_rays");
-        steps.run("trace", kernel, groups, &Bindings::new())
+        steps.run_rays("trace", kernel, &Bindings::new())
     }
 }
 

@@ -179,6 +179,7 @@ fn an_indirect_dispatch_covers_what_stays() {
             element_bytes: 4,
             length: word(1),
             flags: word(1),
+            bucket: None,
             elements: word(1),
             kept: word(0),
             count: word(kept),

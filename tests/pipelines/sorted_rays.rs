@@ -1,6 +1,5 @@
 //! A plain BVH whose rays are sorted before they are traced: five passes and one of clearing.
 
-use raystone::accel::tracer::rays_of_batch;
 use raystone::accel::{
     AccelError, AccelKind, Access, BuildLog, BuiltAccel, BuiltBvh, Bvh, BvhParameters, CpuTwin,
     GpuBuffers, StructureStats, TracePasses, TraceSteps, TriangleSoup,
@@ -115,25 +114,20 @@ impl TracePasses for Passes {
     }
 
     fn record(&self, steps: &mut TraceSteps) -> Result<(), GpuError> {
-        let (groups, nothing) = (steps.groups(steps.count), Bindings::new());
+        let nothing = Bindings::new();
         let kernel = |pass: &str| Composition::new(&format!("accel/sorted_rays/{pass}"));
         steps.clear("places")?;
-        steps.run("keys", kernel("keys"), groups, &nothing)?;
+        steps.run_rays("keys", kernel("keys"), &nothing)?;
         steps.run("starts", kernel("starts"), [1, 1, 1], &nothing)?;
-        steps.run("sort", kernel("sort"), groups, &nothing)?;
+        steps.run_rays("sort", kernel("sort"), &nothing)?;
         let answers = steps.storage("sorted_answers")?;
         let mut sorted = Bindings::new();
         sorted
             .buffer("rays", steps.storage("sorted_rays")?)
             .buffer("hits", &answers)
             .buffer("work", &answers)
-            .uniform("batch", rays_of_batch(0, steps.count));
-        steps.run(
-            "trace",
-            Composition::new("integrator/trace_rays"),
-            groups,
-            &sorted,
-        )?;
-        steps.run("restore", kernel("restore"), groups, &nothing)
+            .uniform("batch", steps.rays_from(0));
+        steps.run_rays("trace", Composition::new("integrator/trace_rays"), &sorted)?;
+        steps.run_rays("restore", kernel("restore"), &nothing)
     }
 }

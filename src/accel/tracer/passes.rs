@@ -41,26 +41,11 @@ impl TracePasses for OnePass {
             true => self.0.lanes(steps.count, steps.lanes()),
             false => steps.count,
         };
-        let mut groups: Groups = steps.groups(lanes).into();
-        let mut special = Bindings::new();
-        if let Some(live) = &steps.live {
-            let batch = rays_of_batch(steps.first, steps.count);
-            special
-                .buffer("live", &live.counts)
-                .uniform("batch", batch.u32("word", live.word));
-            if !refilled {
-                groups = live.groups.clone();
-            }
+        let kernel = Composition::new("integrator/trace_rays").feature("refill", refilled);
+        match refilled {
+            true => steps.run_counted("trace", kernel, steps.groups(lanes), &Bindings::new()),
+            false => steps.run_rays("trace", kernel, &Bindings::new()),
         }
-        let kernel = Composition::new("integrator/trace_rays")
-            .feature("refill", refilled)
-            .feature("counted", steps.live.is_some());
-        let name = if steps.live.is_some() {
-            "trace live"
-        } else {
-            "trace"
-        };
-        steps.run(name, kernel, groups, &special)
     }
 }
 
@@ -77,7 +62,8 @@ pub struct TraceSteps<'a> {
     pub first: u32,
     /// How many are; where the device knows better, at most.
     pub count: u32,
-    /// How many of them there are, if that stands on the device. A structure may answer the others, too.
+    /// How many of them there are, if that stands on the device. A structure may answer the others, too; kernels that are run by
+    /// [`TraceSteps::run_rays`] leave them out.
     pub live: Option<LiveRays>,
 }
 
@@ -161,6 +147,57 @@ impl<'a> TraceSteps<'a> {
         let storage = self.storage(name)?;
         self.recording.clear(storage);
         Ok(())
+    }
+
+    /// Runs a kernel of one dimension with an invocation per ray: for all of them, or, where the device knows how many there are, for
+    /// about as many. It is composed with the feature `counted` then, and finds that number in `live[batch.word]`;
+    /// `batch` is what [`TraceSteps::rays_from`] says, which `special` can say otherwise.
+    ///
+    /// # Errors
+    /// As [`TraceSteps::run`].
+    pub fn run_rays(
+        &mut self,
+        name: &str,
+        kernel: Composition,
+        special: &Bindings,
+    ) -> Result<(), GpuError> {
+        let groups = match &self.live {
+            Some(live) => live.groups.clone(),
+            None => self.groups(self.count).into(),
+        };
+        self.run_counted(name, kernel, groups, special)
+    }
+
+    /// The same in so many workgroups, for kernels that share the rays out among their invocations.
+    ///
+    /// # Errors
+    /// As [`TraceSteps::run`].
+    pub fn run_counted(
+        &mut self,
+        name: &str,
+        kernel: Composition,
+        groups: impl Into<Groups>,
+        special: &Bindings,
+    ) -> Result<(), GpuError> {
+        let Some(live) = &self.live else {
+            return self.run(name, kernel, groups, special);
+        };
+        let mut bindings = Bindings::new();
+        bindings
+            .buffer("live", &live.counts)
+            .uniform("batch", self.rays_from(self.first));
+        let kernel = kernel.feature("counted", true);
+        let name = format!("{name} live");
+        self.run(&name, kernel, groups, &bindings.merged(special))
+    }
+
+    /// The uniform `batch` for as many rays, the first of which stands there.
+    pub fn rays_from(&self, first: u32) -> UniformValues {
+        let batch = rays_of_batch(first, self.count);
+        match &self.live {
+            Some(live) => batch.u32("word", live.word),
+            None => batch,
+        }
     }
 
     /// Runs a kernel with the structure, the tests and the query in it. What `special` binds goes before

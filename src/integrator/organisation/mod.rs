@@ -4,10 +4,11 @@
 
 mod queued;
 mod registry;
+mod shading;
 mod single;
 mod sorting;
 
-pub use queued::{CompactionMethod, MultiKernel, Sorting, Wavefront};
+pub use queued::{CompactionMethod, MultiKernel, Shading, Sorting, Wavefront};
 pub use registry::OrganisationRegistry;
 pub use single::{Regeneration, SingleKernel};
 

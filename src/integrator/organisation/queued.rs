@@ -1,7 +1,7 @@
 //! Organisations of several kernels: camera, trace, shade, trace shadow rays, finish, and again; at last the results are added
 //! to the sums.
 
-use super::{Organisation, sorting};
+use super::{Organisation, shading, sorting};
 use crate::accel::{LiveRays, Query};
 use crate::compaction::{CompactionRegistry, Passes, Stream};
 use crate::gpu::{Bindings, Composition, GpuError, Groups, Storage, UniformValues, grid_of};
@@ -16,6 +16,8 @@ const BATCHES: u64 = 4;
 /// Words of `counts`, as in `kernels/organisation/queue.wesl`.
 const LIVE: u32 = 0;
 const SHADOWS: u32 = 1;
+/// Bytes of them, with words to spare.
+const COUNTS_BYTES: u64 = 32;
 
 parameters! {
     /// How the queue of live paths is kept without holes.
@@ -48,6 +50,14 @@ parameters! {
         RayKey = "ray-key",
     }
 
+    /// How many kernels shade.
+    pub enum Shading {
+        /// One, with every kind of material of the scene in it.
+        One = "one",
+        /// One for each kind of material, with that alone in it and a queue of its own, and one for what has met nothing.
+        PerMaterial = "per-material",
+    }
+
     /// a kernel each for sampling, tracing and adding, run for all paths at every bounce, also for those that have
     /// ended (Dufay 2017, algorithm 3)
     pub struct MultiKernel {}
@@ -60,6 +70,8 @@ parameters! {
         compaction: CompactionMethod = CompactionMethod::Auto;
         /// what is brought side by side: paths of one material, or rays of one direction and place
         sorting: Sorting = Sorting::Never;
+        /// whether one kernel shades everything, or one each kind of material (BSDF), from a queue of its own
+        shading: Shading = Shading::One;
         /// whether the slot of a path that has ended is taken by the next at once; else all in flight end first
         regeneration: bool = true;
     }
@@ -104,7 +116,7 @@ impl<'a> Queues<'a> {
             queues.bindings.buffer(name, scratch);
         }
         for name in ["counts", "live_groups", "kept_count"] {
-            let scratch = queues.scratch(name, 16);
+            let scratch = queues.scratch(name, COUNTS_BYTES);
             queues.bindings.buffer(name, scratch);
         }
         let results = queues.scratch("results", 16 * u64::from(total.max(1)));
@@ -117,18 +129,20 @@ impl<'a> Queues<'a> {
         queues
     }
 
-    fn scratch(&self, name: &str, bytes: u64) -> Storage {
+    pub fn scratch(&self, name: &str, bytes: u64) -> Storage {
         Storage::scratch(&format!("image {name}"), bytes)
     }
 
     /// A kernel that sees paths, queues and the integrator.
     pub fn kernel(&self, entry: &str) -> Composition {
-        let regenerated = self.wavefront.is_some_and(|w| w.regeneration);
+        let is = |of: fn(&Wavefront) -> bool| self.wavefront.is_some_and(of);
         Composition::new(entry)
             .with("integrator", self.integrator)
             .feature("queued", true)
             .feature("compacted", self.wavefront.is_some())
-            .feature("regenerated", regenerated)
+            .feature("regenerated", is(|w| w.regeneration))
+            .feature("by_kind", is(|w| w.shading == Shading::PerMaterial))
+            .feature("sorted_hits", is(|w| w.sorting == Sorting::Material))
     }
 
     /// An invocation for each slot.
@@ -139,7 +153,7 @@ impl<'a> Queues<'a> {
     /// An invocation for each live path.
     pub fn live_groups(&self) -> Groups {
         match self.wavefront {
-            Some(_) => Groups::Indirect(self.scratch("live_groups", 16), 0),
+            Some(_) => Groups::Indirect(self.scratch("live_groups", COUNTS_BYTES), 0),
             None => self.all(),
         }
     }
@@ -147,7 +161,7 @@ impl<'a> Queues<'a> {
     /// How many rays of a half of `rays` there are.
     fn live(&self, word: u32) -> Option<LiveRays> {
         self.wavefront.map(|_| LiveRays {
-            counts: self.scratch("counts", 16),
+            counts: self.scratch("counts", COUNTS_BYTES),
             word,
             groups: self.live_groups(),
         })
@@ -173,8 +187,15 @@ impl<'a> Queues<'a> {
         steps.trace_live(query, buffers, range, self.live(word))
     }
 
-    /// Keeps the slots of live paths side by side.
-    fn compact(&self, steps: &mut ImageSteps, wavefront: &Wavefront) -> Result<(), GpuError> {
+    /// Brings what is flagged side by side, the slots of `elements` whose flags are of this bucket, or of any; tells where they are then.
+    /// How many stands in `kept_count`.
+    pub fn keep(
+        &self,
+        steps: &mut ImageSteps,
+        wavefront: &Wavefront,
+        elements: &Storage,
+        bucket: Option<u32>,
+    ) -> Result<Storage, GpuError> {
         let gpu = steps.gpu().clone();
         let method = match wavefront.compaction {
             CompactionMethod::Auto if gpu.is_software() => CompactionMethod::Atomic,
@@ -195,18 +216,41 @@ impl<'a> Queues<'a> {
         let stream = Stream {
             capacity: self.capacity,
             element_bytes: 4,
-            length: self.scratch("counts", 16),
+            length: self.scratch("counts", COUNTS_BYTES),
             flags: self.scratch("flags", words),
-            elements: self.scratch("queue", words),
+            bucket,
+            elements: elements.clone(),
             kept: self.scratch("kept queue", words),
-            count: self.scratch("kept_count", 16),
+            count: self.scratch("kept_count", COUNTS_BYTES),
         };
-        let place = steps.recording().len();
         method.record(&mut Passes::new(&gpu, steps.recording(), &stream))?;
-        steps.recording().copy(&stream.kept, &stream.elements);
+        Ok(stream.kept)
+    }
+
+    /// Keeps the slots of live paths side by side.
+    fn compact(&self, steps: &mut ImageSteps, wavefront: &Wavefront) -> Result<(), GpuError> {
+        let place = steps.recording().len();
+        let queue = self.scratch("queue", 4 * u64::from(self.capacity));
+        let kept = self.keep(steps, wavefront, &queue, None)?;
+        steps.recording().copy(&kept, &queue);
         self.run(steps, "plan", Groups::Direct([1, 1, 1]))?;
         steps.recording().name_since(place, "compaction");
         Ok(())
+    }
+
+    /// Shades what was met, in this order if there is one.
+    fn shade(&self, steps: &mut ImageSteps, order: Option<Storage>) -> Result<(), GpuError> {
+        if let Some(wavefront) = self.wavefront
+            && wavefront.shading == Shading::PerMaterial
+        {
+            return shading::by_kind(steps, self, wavefront, order);
+        }
+        let mut bindings = self.bindings.clone();
+        if let Some(order) = order {
+            bindings.buffer("order", order);
+        }
+        let kernel = self.kernel("organisation/shade");
+        steps.run("shade", kernel, self.live_groups(), &bindings)
     }
 
     /// One ray of each live path.
@@ -217,14 +261,11 @@ impl<'a> Queues<'a> {
         }
         self.run(steps, "extend", self.live_groups())?;
         self.trace(steps, Query::Closest, 0, LIVE)?;
-        let mut bindings = self.bindings.clone();
-        let mut shade = self.kernel("organisation/shade");
-        if sorting == Sorting::Material {
-            let order = sorting::by_material(steps, self)?;
-            bindings.buffer("order", &order);
-            shade = shade.feature("sorted_hits", true);
-        }
-        steps.run("shade", shade, self.live_groups(), &bindings)?;
+        let order = match sorting {
+            Sorting::Material => Some(sorting::by_material(steps, self)?),
+            _ => None,
+        };
+        self.shade(steps, order)?;
         self.trace(steps, Query::Any, 1, SHADOWS)?;
         self.run(steps, "finish", self.live_groups())?;
         match self.wavefront {

@@ -134,6 +134,7 @@ impl Bench {
             element_bytes: bytes,
             length: (&gpu.storage("stream_length", &[length])?).into(),
             flags: inputs.flags_there.clone(),
+            bucket: None,
             elements: inputs.elements.clone(),
             kept: Storage::scratch(&format!("kept {kept_bytes}"), kept_bytes),
             count: Storage::scratch("kept count", 4),
