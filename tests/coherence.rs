@@ -324,10 +324,10 @@ fn a_path_lengthens_and_lanes_fall_asleep_unless_they_are_compacted() {
             );
         }
     }
-    // An order that is lost costs coherence, and that of all rays more than that of warps.
+    // An order of rays that is lost costs coherence; that of warps next to nothing.
     let bounces = [&compacted, &by_warps, &by_rays].map(|t| efficiency(t, "bounce 1"));
-    assert!(bounces.is_sorted_by(|a, b| a > b), "{bounces:?}");
-    assert!(bounces[2] < 0.97 * bounces[0], "{bounces:?}");
+    assert!(bounces[2] < 0.98 * bounces[0], "{bounces:?}");
+    assert!((bounces[1] / bounces[0] - 1.0).abs() < 0.02, "{bounces:?}");
     assert!(efficiency(&compacted, "bounce 5") > 1.3 * efficiency(&single, "bounce 5"));
 }
 
