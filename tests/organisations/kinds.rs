@@ -211,7 +211,7 @@ fn planted_faults_are_seen() {
         (&by, "organisation/kinds", "var flag = MISSED;", "var flag = 0u;"),
         (&by, "organisation/kinds", "triangle != NO_HIT", "triangle < 7u"),
         // What shines on one side is of no kind.
-        (&by, "shading/material", "return kind & ~ONE_SIDED;", "return kind;"),
+        (&one_by_one, "shading/material", "return kind & ~ONE_SIDED;", "return kind;"),
         // A queue is one short, has the count of that before it, or workgroups rounded down.
         (&by, "organisation/plan_kind", "let found = kind_counts[QUEUE];", "let found = max(kind_counts[QUEUE], 1u) - 1u;"),
         (&by, "organisation/plan_kind", "atomicStore(&counts[OF_KIND], found);", ""),
