@@ -16,7 +16,7 @@ use support::{Pcg, assert_same_hits, brute_force, default_params};
 
 const SPONZA: &str = "../shared/scenes/sponza-crytek/sponza.obj";
 
-/// Builders that run on the host; tests/device_builders.rs has the others.
+/// Builders that run on the host; tests/device_builders has the others.
 fn builders() -> Vec<&'static str> {
     let schema = TreeParameters::schema();
     let builder = schema.iter().find(|p| p.name == "builder");

@@ -179,7 +179,7 @@ fn trees_that_list_a_triangle_in_several_leaves_are_traversed_to_the_bit_too() {
     let soup = scenes::lattice_soup(&mut rng, 600, 30);
     let rays = scenes::aimed_rays(&mut rng, &soup, 1500);
     let expected = brute_force(&soup, &rays);
-    // What is built on a device has tests/device_builders.rs.
+    // What is built on a device has tests/device_builders.
     let on_the_host = |name: &&&str| !name.starts_with("device-");
     for builder in names_of("builder").iter().filter(on_the_host) {
         let built = build(&Bvh, &soup, &params(&[("builder", builder)]));

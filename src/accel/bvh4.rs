@@ -92,6 +92,7 @@ impl WideNode for Node {
     const KERNEL: &'static str = "accel/bvh4";
     const WIDTH: usize = WIDTH;
     const MOST_NODES: u64 = INDEX_MASK as u64;
+    const BY_OCTANT: bool = false;
 
     fn pack(children: &[WideChild]) -> Self {
         let (quantisation, [lows, highs]) = Quantisation::of_children(children);

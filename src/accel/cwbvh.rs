@@ -86,39 +86,7 @@ impl WideNode for Node {
     const KERNEL: &'static str = "accel/cwbvh";
     const WIDTH: usize = WIDTH;
     const MOST_NODES: u64 = INDEX_MASK as u64;
-
-    /// Moves children to slots such that visiting slots in ascending order of `slot ^ octant of the
-    /// ray` is about front to back: greedily, the child and the slot of best agreement first. Slots
-    /// without a child get an empty leaf.
-    fn arrange(bounds: &Bounds, children: &mut Vec<WideChild>) {
-        let middle = bounds.doubled_centre();
-        let offset = |child: &WideChild| {
-            let centre = child.bounds.doubled_centre();
-            [0, 1, 2].map(|axis| centre[axis] - middle[axis])
-        };
-        // How far a child lies in the direction that a slot stands for.
-        let agreement = |child: &WideChild, slot: usize| -> f32 {
-            let along = |axis: usize| {
-                let x = offset(child)[axis];
-                if slot >> axis & 1 == 1 { x } else { -x }
-            };
-            along(0) + along(1) + along(2)
-        };
-        let mut pairs: Vec<(f32, usize, usize)> = Vec::with_capacity(WIDTH * WIDTH);
-        for (index, child) in children.iter().enumerate() {
-            pairs.extend((0..WIDTH).map(|slot| (agreement(child, slot), index, slot)));
-        }
-        pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
-        let mut slots = vec![WideChild::NOTHING; WIDTH];
-        let (mut placed, mut taken) = ([false; WIDTH], [false; WIDTH]);
-        for (_, index, slot) in pairs {
-            if !placed[index] && !taken[slot] {
-                (placed[index], taken[slot]) = (true, true);
-                slots[slot] = children[index];
-            }
-        }
-        *children = slots;
-    }
+    const BY_OCTANT: bool = true;
 
     fn pack(slots: &[WideChild]) -> Self {
         let (quantisation, [lows, highs]) = Quantisation::of_children(slots);

@@ -18,8 +18,8 @@ parameters! {
         /// binned SAH (Wald 2007); sweep: SAH at every triangle of three axes; longest-axis-sweep: of
         /// the longest axis (Dufay 2017); sbvh: spatial splits (Stich et al. 2009); ploc: bottom-up
         /// (Meister & Bittner 2018, crate obvhs), also with obvhs' reinsertion; lbvh: the radix tree over
-        /// Morton codes (Karras 2012); host-*, device-*: a tree that is made on the device, or the same to the
-        /// bit on the host
+        /// Morton codes (Karras 2012); host-*, device-*: a tree that is made (and collapsed) on the device, or
+        /// the same to the bit on the host
         builder: Builder = Builder::Binned;
         /// most triangles in a leaf
         leaf_size: usize = 4, in 1..=31;
@@ -118,7 +118,7 @@ impl TreeParameters {
     }
 
     /// What the device is told, if it is to build.
-    pub(super) fn on_device(&self) -> Option<parallel::Settings> {
+    pub(in crate::accel) fn on_device(&self) -> Option<parallel::Settings> {
         match self.builder {
             Builder::DeviceLbvh => Some(self.parallel(Method::Lbvh)),
             Builder::DevicePloc => Some(self.parallel(self.clustering())),

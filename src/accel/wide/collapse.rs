@@ -4,13 +4,21 @@
 //! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
 //! compressed wide BVHs", HPG 2017, section 3.2.
 
+use super::costs::Costs;
+use super::octants::arrange;
 use crate::accel::bounds::Bounds;
 use crate::accel::tree::{NodeKind, Tree, TreeParameters, distinct};
 use crate::accel::triangle::TriangleRecord;
 use crate::accel::{StructureStats, TriangleSoup};
 
-/// Most children of a node here; the cost table of a node has one entry less.
-const MAX_WIDTH: usize = 8;
+/// What the nodes of a wide tree are like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shape {
+    /// Most children, 2 to 8.
+    pub width: usize,
+    /// Whether children get slots by where they lie ([`arrange`]), of which there are 8.
+    pub by_octant: bool,
+}
 
 /// What a child of a wide node is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,15 +103,8 @@ impl WideTree {
             .collect()
     }
 
-    /// Collapses `tree`, whose leaves must hold at most `leaf_size` triangles, to nodes of 2 to 8 children.
-    /// `arrange` may permute
-    /// the children of a node (given its box) before they get their places.
-    pub fn collapse(
-        tree: &Tree,
-        width: usize,
-        settings: &TreeParameters,
-        mut arrange: impl FnMut(&Bounds, &mut Vec<WideChild>),
-    ) -> WideTree {
+    /// Collapses `tree`, whose leaves must hold at most `leaf_size` triangles.
+    pub fn collapse(tree: &Tree, shape: Shape, settings: &TreeParameters) -> WideTree {
         let mut out = WideTree {
             nodes: vec![Vec::new()],
             order: Vec::with_capacity(tree.order.len()),
@@ -112,22 +113,22 @@ impl WideTree {
         if tree.nodes.is_empty() {
             return out;
         }
-        let costs = Costs::new(tree, width, settings);
+        let costs = Costs::new(tree, shape.width, settings);
         // Wide nodes whose children are still to be found, as (place, binary node, depth).
         let mut open = vec![(0_u32, 0_u32, 1_u32)];
         let mut listed = Vec::new();
         while let Some((place, binary, depth)) = open.pop() {
             out.depth = out.depth.max(depth);
-            let mut roots = Vec::with_capacity(width);
-            costs.children(binary, &mut roots);
+            let roots = costs.children(binary).into_iter();
             let mut children: Vec<WideChild> = roots
-                .iter()
-                .map(|&root| WideChild {
+                .map(|root| WideChild {
                     bounds: tree.nodes[root as usize].bounds,
                     kind: costs.kind(root),
                 })
                 .collect();
-            arrange(&tree.nodes[binary as usize].bounds, &mut children);
+            if shape.by_octant {
+                children = arrange(&tree.nodes[binary as usize].bounds, &children);
+            }
             let first_open = open.len();
             for child in &mut children {
                 child.kind = match child.kind {
@@ -166,120 +167,6 @@ fn append_triangles(tree: &Tree, root: u32, order: &mut Vec<u32>) {
         NodeKind::Inner { left, right } => {
             append_triangles(tree, left, order);
             append_triangles(tree, right, order);
-        }
-    }
-}
-
-/// Least costs of representing the subtree of each binary node by 1, 2, … `width` − 1 children of a
-/// wide node (C(n, i) of the paper), and how many triangles it holds.
-struct Costs<'a> {
-    tree: &'a Tree,
-    width: usize,
-    settings: &'a TreeParameters,
-    cost: Vec<[f32; MAX_WIDTH - 1]>,
-    triangles: Vec<u32>,
-}
-
-impl<'a> Costs<'a> {
-    fn new(tree: &'a Tree, width: usize, settings: &'a TreeParameters) -> Self {
-        let mut costs = Self {
-            tree,
-            width,
-            settings,
-            cost: vec![[f32::INFINITY; MAX_WIDTH - 1]; tree.nodes.len()],
-            triangles: vec![0; tree.nodes.len()],
-        };
-        // Children come after their parents.
-        for node in (0..tree.nodes.len()).rev() {
-            costs.fill(node);
-        }
-        costs
-    }
-
-    fn fill(&mut self, node: usize) {
-        let (left, right) = match self.tree.nodes[node].kind {
-            NodeKind::Leaf { count, .. } => {
-                self.triangles[node] = count;
-                self.cost[node] = [self.leaf_cost(node); MAX_WIDTH - 1];
-                return;
-            }
-            NodeKind::Inner { left, right } => (left as usize, right as usize),
-        };
-        self.triangles[node] = self.triangles[left].saturating_add(self.triangles[right]);
-        let mut least = self.leaf_cost(node).min(self.inner_cost(node, left, right));
-        for children in 1..self.width {
-            if children > 1 {
-                least = least.min(self.shared(left, right, children).0);
-            }
-            self.cost[node][children - 1] = least;
-        }
-    }
-
-    fn leaf_cost(&self, node: usize) -> f32 {
-        let count = self.triangles[node];
-        if count as usize > self.settings.leaf_size {
-            return f32::INFINITY;
-        }
-        self.tree.nodes[node].bounds.half_area() * count as f32 * self.settings.intersection_cost
-    }
-
-    fn inner_cost(&self, node: usize, left: usize, right: usize) -> f32 {
-        let area = self.tree.nodes[node].bounds.half_area();
-        area * self.settings.traversal_cost + self.shared(left, right, self.width).0
-    }
-
-    /// Least cost of two subtrees with `children` children in all, and how many the left one gets.
-    fn shared(&self, left: usize, right: usize, children: usize) -> (f32, usize) {
-        let mut best = (f32::INFINITY, 1);
-        for k in 1..children {
-            let cost = self.cost[left][k - 1] + self.cost[right][children - k - 1];
-            if cost < best.0 {
-                best = (cost, k);
-            }
-        }
-        best
-    }
-
-    /// Whether a subtree that is one child is a leaf: its binary root in place of the first triangle.
-    fn kind(&self, root: u32) -> WideKind {
-        let node = root as usize;
-        match self.tree.nodes[node].kind {
-            NodeKind::Inner { left, right }
-                if self.leaf_cost(node) > self.inner_cost(node, left as usize, right as usize) =>
-            {
-                WideKind::Node(root)
-            }
-            _ => WideKind::Leaf {
-                first: root,
-                count: self.triangles[node],
-            },
-        }
-    }
-
-    /// Binary roots of the children of the wide node at `node`.
-    fn children(&self, node: u32, out: &mut Vec<u32>) {
-        match self.tree.nodes[node as usize].kind {
-            NodeKind::Inner { left, right } => self.split(left, right, self.width, out),
-            NodeKind::Leaf { .. } => out.push(node),
-        }
-    }
-
-    fn split(&self, left: u32, right: u32, children: usize, out: &mut Vec<u32>) {
-        let (_, k) = self.shared(left as usize, right as usize, children);
-        self.take(left, k, out);
-        self.take(right, children - k, out);
-    }
-
-    /// Appends the roots that stand for the subtree of `node` with at most `children` children.
-    fn take(&self, node: u32, children: usize, out: &mut Vec<u32>) {
-        let cost = &self.cost[node as usize];
-        let mut used = children;
-        while used > 1 && cost[used - 1] == cost[used - 2] {
-            used -= 1;
-        }
-        match self.tree.nodes[node as usize].kind {
-            NodeKind::Inner { left, right } if used > 1 => self.split(left, right, used, out),
-            _ => out.push(node),
         }
     }
 }
@@ -381,7 +268,11 @@ mod tests {
             let tree = random_tree(4 + random.below(5) as u32, &mut random);
             let triangles: Vec<u32> = (0..tree.nodes.len()).map(|n| below(&tree, n)).collect();
             for width in [2, 3, 4] {
-                let wide = WideTree::collapse(&tree, width, &settings(), |_, _| ());
+                let shape = Shape {
+                    width,
+                    by_octant: false,
+                };
+                let wide = WideTree::collapse(&tree, shape, &settings());
                 let found = cost_of(&wide, 0, &tree.nodes[0].bounds);
                 let least = least_cost(&tree, 0, &|n| triangles[n], width);
                 assert!(

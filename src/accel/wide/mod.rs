@@ -2,6 +2,9 @@
 //! boxes; their build, validation, buffers and figures.
 
 mod collapse;
+mod costs;
+mod device;
+mod octants;
 mod quantise;
 
 pub use collapse::{WideChild, WideKind};
@@ -12,7 +15,7 @@ use super::tracer::RefillParameters;
 use super::tree::{Coverage, NodeKind, Tree, TreeParameters};
 use super::triangle::TriangleRecord;
 use bytemuck::Pod;
-use collapse::WideTree;
+use collapse::{Shape, WideTree};
 use std::marker::PhantomData;
 use std::ops::Range;
 
@@ -57,9 +60,9 @@ pub trait WideNode: Pod + Send + Sync {
     const WIDTH: usize;
     /// Most nodes.
     const MOST_NODES: u64;
+    /// Whether children get slots by the octant that they lie in.
+    const BY_OCTANT: bool;
 
-    /// Moves the children of a node with this box to the slots they are to have.
-    fn arrange(_bounds: &Bounds, _children: &mut Vec<WideChild>) {}
     /// The node with these children in its slots.
     fn pack(slots: &[WideChild]) -> Self;
     /// Box of a slot, as kernels decode it.
@@ -105,9 +108,19 @@ impl<N: WideNode> Wide<N> {
         parameters: &WideParameters,
         log: &mut BuildLog,
     ) -> Result<Self, AccelError> {
-        let wide = log.phase("collapse", || {
-            WideTree::collapse(tree, N::WIDTH, &parameters.tree, N::arrange)
-        });
+        let shape = Shape {
+            width: N::WIDTH,
+            by_octant: N::BY_OCTANT,
+        };
+        let wide = match log.gpu().cloned() {
+            // Without a device the same to the bit: what a tree of one was fitted to may be laid out anywhere.
+            Some(gpu) if parameters.tree.on_device().is_some() => {
+                device::collapse(&gpu, tree, shape, &parameters.tree, log)?
+            }
+            _ => log.phase("collapse", || {
+                WideTree::collapse(tree, shape, &parameters.tree)
+            }),
+        };
         let what = format!("nodes of a {}", N::STRUCTURE);
         AccelError::check_limit(what, wide.nodes.len() as u64, N::MOST_NODES)?;
         Ok(log.phase("layout", || {

@@ -1,6 +1,7 @@
 //! The passes that build a tree or fit its boxes on the device; their kernels are in `kernels/accel/tree/parallel/device/`.
 //!
-//! Nodes are read back, and the host lays them out and collapses them. What that takes is a phase of its own.
+//! Nodes are read back, and the host lays them out, which bounds their depth; wide nodes are made of that by passes
+//! again (`accel/wide/device.rs`). What the way there and back takes are phases of their own.
 
 use super::rounds::Rounds;
 use super::{LinkedNode, LinkedTree, Method, Settings, too_large};
@@ -19,8 +20,21 @@ const BLOCK: u32 = 8;
 /// Words that `boxes.wesl` leaves of the whole scene, the last of which names a triangle that is too large.
 const SCENE_WORDS: u32 = 7;
 
-pub(super) fn failed(error: GpuError) -> AccelError {
+pub(in crate::accel) fn failed(error: GpuError) -> AccelError {
     AccelError::Device(error.to_string())
+}
+
+/// Plays a recording. What the clock of the device does not tell is the phase `transfer`: submission, copies to the
+/// host, waiting.
+pub(in crate::accel) fn play(
+    recording: &Recording,
+    log: &mut BuildLog,
+) -> Result<Played, AccelError> {
+    let played = log.play(recording)?;
+    if let Some(ms) = played.elapsed().gpu_ms {
+        log.note("transfer", (played.wall_ms() - ms).max(0.0));
+    }
+    Ok(played)
 }
 
 /// Builds the tree on the device of `log`: the same to the bit as [`super::build`], where its arithmetic is exact.
@@ -46,11 +60,11 @@ pub fn build(
     let long_codes = settings.long_codes;
     let sorted = passes.sort(&mut recording, long_codes).map_err(failed)?;
     let root = match settings.method {
-        _ if passes.count == 1 => passes.play(&recording, log).map(|_| 0),
+        _ if passes.count == 1 => play(&recording, log).map(|_| 0),
         Method::Lbvh => {
             let recorded = passes.radix_tree(&mut recording, &sorted);
             recorded.map_err(failed)?;
-            passes.play(&recording, log).map(|_| passes.count)
+            play(&recording, log).map(|_| passes.count)
         }
         Method::Ploc { radius } => {
             let rounds = Rounds::new(&passes, radius).map_err(failed)?;
@@ -134,16 +148,6 @@ impl<'a> Passes<'a> {
         Ok(())
     }
 
-    /// Plays a recording. What the clock of the device does not tell is the phase `transfer`: submission, copies to the
-    /// host, waiting.
-    pub fn play(&self, recording: &Recording, log: &mut BuildLog) -> Result<Played, AccelError> {
-        let played = log.play(recording)?;
-        if let Some(ms) = played.elapsed().gpu_ms {
-            log.note("transfer", (played.wall_ms() - ms).max(0.0));
-        }
-        Ok(played)
-    }
-
     /// The nodes, brought to the host.
     pub fn nodes(
         &self,
@@ -153,7 +157,7 @@ impl<'a> Passes<'a> {
         let mut recording = Recording::new();
         recording.download("scene", &self.scene);
         recording.download("nodes", &self.nodes);
-        let played = self.play(&recording, log)?;
+        let played = play(&recording, log)?;
         let start = Instant::now();
         let scene: Vec<u32> = played.download("scene").map_err(failed)?;
         let mut nodes: Vec<LinkedNode> = played.download("nodes").map_err(failed)?;

@@ -12,9 +12,9 @@ pub mod morton;
 mod refit;
 mod rounds;
 
-use super::Tree;
 use super::depth::limit_depth;
 use super::grow::lay_out;
+use super::{NodeKind, Tree};
 use crate::accel::triangle::TriangleRecord;
 use crate::accel::{AccelError, TriangleSoup};
 use boxes::{OrderedBox, doubled_centre, number, ordered};
@@ -147,6 +147,25 @@ impl From<LinkedTree> for Tree {
             }
             (node.around().into(), Some(node.children()))
         }))
+    }
+}
+
+impl Tree {
+    /// The nodes as passes read them; a leaf tells the first of its triangles alone.
+    pub(in crate::accel) fn linked(&self) -> Vec<LinkedNode> {
+        let nodes = self.nodes.par_iter().map(|node| {
+            let key = |corner: [f32; 3]| corner.map(|x| ordered(x.to_bits()));
+            let around = OrderedBox {
+                low: key(node.bounds.min),
+                high: key(node.bounds.max),
+            };
+            let links = match node.kind {
+                NodeKind::Inner { left, right } => [left, right],
+                NodeKind::Leaf { first, .. } => [self.order[first as usize], LEAF],
+            };
+            LinkedNode::new(around, links)
+        });
+        nodes.collect()
     }
 }
 

@@ -7,7 +7,7 @@
 
 use super::boxes::{OrderedBox, join};
 use super::check_coordinates;
-use super::device::{Passes, failed};
+use super::device::{Passes, failed, play};
 use crate::accel::tree::{NodeKind, Tree};
 use crate::accel::{AccelError, BuildLog, TriangleSoup};
 use crate::gpu::Recording;
@@ -74,7 +74,7 @@ impl Tree {
             Ok(passes)
         });
         let passes = passes.map_err(failed)?;
-        passes.play(&recording, log)?;
+        play(&recording, log)?;
         let fitted = passes.nodes(soup, log)?;
         for (node, fitted) in self.nodes.iter_mut().zip(&fitted[self.order.len()..]) {
             node.bounds = fitted.around().into();

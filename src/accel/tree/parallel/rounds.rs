@@ -1,6 +1,6 @@
 //! The rounds of clustering on the device: some to a submission, until one cluster is left.
 
-use super::device::{Passes, failed};
+use super::device::{Passes, failed, play};
 use crate::accel::tree::parameters::SAH_DEPTH;
 use crate::accel::{AccelError, BuildLog};
 use crate::gpu::{Bindings, GpuError, Groups, Recording, Storage, UniformValues, groups_for};
@@ -61,7 +61,7 @@ impl<'a> Rounds<'a> {
                 self.record(&mut recording, round).map_err(failed)?;
             }
             recording.download("state", &self.state);
-            let played = self.passes.play(&recording, log)?;
+            let played = play(&recording, log)?;
             let state: Vec<u32> = played.download("state").map_err(failed)?;
             if state[CLUSTERS] == 1 {
                 return Ok(state[NODES] - 1);

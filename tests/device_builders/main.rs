@@ -1,6 +1,9 @@
 //! Trees built on the device: equal to those of the host twin to the bit, valid, and passed by the gate over every
 //! structure that is made of a binary tree; and faults that these checks see.
 
+mod collapse;
+mod soups;
+#[path = "../support/mod.rs"]
 mod support;
 
 use raystone::accel::bounds::Bounds;
@@ -11,6 +14,7 @@ use raystone::gpu::Gpu;
 use raystone::measure::gate::Checks;
 use raystone::params::{ParamValue, Parameters as _, Params};
 use raystone::scene::builtin_scenes;
+use soups::{clusters, equal_positions, shrinking};
 use std::path::Path;
 use support::scenes::{self, lattice_soup};
 use support::{Pcg, Stage, default_params, gpu, is_exact, kernels_with, open, structures};
@@ -84,24 +88,6 @@ fn check(what: &str, soup: &TriangleSoup) {
     }
 }
 
-/// All triangles in one place: every code is the same, and places alone decide.
-fn equal_positions(count: usize) -> TriangleSoup {
-    let corner = glam::Vec3::new(0.25, 3.0, -7.0);
-    scenes::soup((0..count).map(|_| [corner, corner + glam::Vec3::X, corner + glam::Vec3::Y]))
-}
-
-/// Clusters of very different sizes and distances.
-fn clusters(random: &mut Pcg, count: usize) -> TriangleSoup {
-    let mut point =
-        |size: f32| size * glam::Vec3::new(random.signed(), random.signed(), random.signed());
-    let triangle = |place: usize| {
-        let size = 0.001 * 4.0_f32.powi((place % 5) as i32);
-        let at = glam::Vec3::splat((place % 7) as f32).powf(3.0) + point(size);
-        [at, at + point(size), at + point(size)]
-    };
-    scenes::soup((0..count).map(triangle).collect::<Vec<_>>())
-}
-
 #[test]
 fn trees_equal_the_host_twin_to_the_bit() {
     if !is_exact(gpu()) {
@@ -136,21 +122,6 @@ fn clustering_equals_the_host_twin_whatever_its_radius() {
         let device = on_device(gpu(), &soup, &settings).expect("a tree");
         assert_eq!(difference(&host, &device), None, "radius {radius}");
     }
-}
-
-/// Boxes that halve in size towards the origin: of all neighbours only the last two choose each other, so that most
-/// rounds of clustering are joined without a look.
-fn shrinking(count: i32) -> TriangleSoup {
-    let triangle = |i: i32| {
-        let size = 2.0_f32.powf(50.0 - 0.08 * i as f32);
-        let corner = glam::Vec3::splat(size);
-        [
-            corner,
-            corner + glam::Vec3::X * size,
-            corner + glam::Vec3::Y * size,
-        ]
-    };
-    scenes::soup((0..count).map(triangle))
 }
 
 #[test]

@@ -1,0 +1,42 @@
+//! Slots for the children of a wide node, such that visiting them in ascending order of `slot ^ octant of the ray` is
+//! about front to back. Twin of `kernels/accel/wide/octants.wesl`.
+//!
+//! Source: H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray traversal on GPUs through
+//! compressed wide BVHs", HPG 2017, section 3.3.
+
+use super::WideChild;
+use crate::accel::bounds::Bounds;
+
+/// One for each octant.
+const SLOTS: usize = 8;
+
+/// How far a child lies in the direction that a slot stands for.
+fn agreement(offset: [f32; 3], slot: usize) -> f32 {
+    let along = |axis: usize| {
+        let x = offset[axis];
+        if slot >> axis & 1 == 1 { x } else { -x }
+    };
+    along(0) + along(1) + along(2)
+}
+
+/// The children of a node with this box by slots: greedily, the child and the slot of best agreement first. Slots
+/// without a child get an empty leaf.
+pub fn arrange(bounds: &Bounds, children: &[WideChild]) -> Vec<WideChild> {
+    let middle = bounds.doubled_centre();
+    let mut pairs: Vec<(f32, usize, usize)> = Vec::with_capacity(SLOTS * SLOTS);
+    for (index, child) in children.iter().enumerate() {
+        let centre = child.bounds.doubled_centre();
+        let offset = [0, 1, 2].map(|axis| centre[axis] - middle[axis]);
+        pairs.extend((0..SLOTS).map(|slot| (agreement(offset, slot), index, slot)));
+    }
+    pairs.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
+    let mut slots = vec![WideChild::NOTHING; SLOTS];
+    let (mut placed, mut taken) = ([false; SLOTS], [false; SLOTS]);
+    for (_, index, slot) in pairs {
+        if !placed[index] && !taken[slot] {
+            (placed[index], taken[slot]) = (true, true);
+            slots[slot] = children[index];
+        }
+    }
+    slots
+}
