@@ -305,18 +305,29 @@ fn a_path_lengthens_and_lanes_fall_asleep_unless_they_are_compacted() {
         4,
     );
     let single = setting.tallies(&[0, 2], "bvh", Organisation::SingleKernel);
-    let compacted = setting.tallies(&[0, 2], "bvh", Organisation::Compacted);
+    let [compacted, by_warps, by_rays] = [
+        Organisation::Compacted,
+        Organisation::CompactedByWarps,
+        Organisation::CompactedByRays,
+    ]
+    .map(|organisation| setting.tallies(&[0, 2], "bvh", organisation));
     let efficiency =
         |t: &BTreeMap<String, Tally>, class: &str| t[class].efficiency().expect("issues");
     assert!(efficiency(&single, "bounce 1") < efficiency(&single, "primary"));
     assert!(efficiency(&single, "bounce 5") < efficiency(&single, "bounce 1"));
     for class in single.keys() {
-        let [s, c] = [&single, &compacted].map(|t| t[class]);
-        assert_eq!(
-            [s.rays, s.nodes, s.triangles, s.active, s.bytes],
-            [c.rays, c.nodes, c.triangles, c.active, c.bytes]
-        );
+        let s = single[class];
+        for c in [&compacted, &by_warps, &by_rays].map(|t| t[class]) {
+            assert_eq!(
+                [s.rays, s.nodes, s.triangles, s.active, s.bytes],
+                [c.rays, c.nodes, c.triangles, c.active, c.bytes]
+            );
+        }
     }
+    // An order of rays that is lost costs coherence; that of warps next to nothing.
+    let bounces = [&compacted, &by_warps, &by_rays].map(|t| efficiency(t, "bounce 1"));
+    assert!(bounces[2] < 0.98 * bounces[0], "{bounces:?}");
+    assert!((bounces[1] / bounces[0] - 1.0).abs() < 0.02, "{bounces:?}");
     assert!(efficiency(&compacted, "bounce 5") > 1.3 * efficiency(&single, "bounce 5"));
 }
 
@@ -425,8 +436,8 @@ fn a_run_records_coherence_twice_the_same_and_the_report_shows_it() {
     let records: Vec<_> = all_of::<CoherenceRecord>(&lines).collect();
     assert_eq!(records.len(), 6);
     for record in &records {
-        // Two numbers of samples, two organisations.
-        assert_eq!(record.at.len(), 4);
+        // Two numbers of samples, four organisations.
+        assert_eq!(record.at.len(), 8);
         for at in &record.at {
             let classes: Vec<&str> = at.classes.iter().map(|(class, _)| class.as_str()).collect();
             assert_eq!(

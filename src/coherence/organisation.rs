@@ -1,7 +1,10 @@
 //! Which rays the lanes of a warp have.
 
 use super::model::{Pass, Warp};
+use super::paths::RayClass;
 use super::trace::Trace;
+use crate::integrator::CountedRays;
+use crate::random::Pcg32;
 
 /// How rays are given to lanes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -11,17 +14,28 @@ pub enum Organisation {
     /// A kernel for each bounce: the rays that are left, in the order of their pixels, fill warps anew (stable
     /// compaction), among the warps of one group.
     Compacted,
+    /// The same with the warps' rays one behind the other in any order, as a scan or a ballot and one atomic leave them.
+    CompactedByWarps,
+    /// The same with the rays in any order, the worst that an atomic for each can do.
+    CompactedByRays,
 }
 
 impl Organisation {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::SingleKernel, Self::Compacted];
+    pub const ALL: [Self; 4] = [
+        Self::SingleKernel,
+        Self::Compacted,
+        Self::CompactedByWarps,
+        Self::CompactedByRays,
+    ];
 
     /// What it is called.
     pub const fn name(self) -> &'static str {
         match self {
             Self::SingleKernel => "single kernel",
             Self::Compacted => "compacted",
+            Self::CompactedByWarps => "compacted, warps in any order",
+            Self::CompactedByRays => "compacted, rays in any order",
         }
     }
 
@@ -29,31 +43,55 @@ impl Organisation {
     pub fn of(self, warps: Vec<Warp>) -> Vec<Warp> {
         match self {
             Self::SingleKernel => warps,
-            Self::Compacted => compacted(&warps),
+            _ => self.compacted(&warps),
         }
+    }
+
+    /// The rays that are left in a pass, as they follow each other. Those from the camera have not been compacted yet.
+    fn left(self, passes: &[&Pass], index: usize) -> Vec<Trace> {
+        let is_first = |pass: &&Pass| RayClass::of_word(pass.class).rays == CountedRays::Primary;
+        if self != Self::Compacted && passes.first().is_some_and(is_first) {
+            return Self::Compacted.left(passes, index);
+        }
+        let mut random = Pcg32::new(index as u64);
+        let of_warp = |pass: &&Pass| pass.lanes.iter().flatten().cloned().collect();
+        let mut warps: Vec<Vec<Trace>> = passes.iter().map(of_warp).collect();
+        if self == Self::CompactedByWarps {
+            shuffle(&mut warps, &mut random);
+        }
+        let mut rays = warps.concat();
+        if self == Self::CompactedByRays {
+            shuffle(&mut rays, &mut random);
+        }
+        rays
+    }
+
+    fn compacted(self, warps: &[Warp]) -> Vec<Warp> {
+        let mut filled = vec![Warp::default(); warps.len()];
+        let count = warps.first().map_or(0, |warp| warp.passes.len());
+        for index in 0..count {
+            let same: Vec<&Pass> = (warps.iter())
+                .filter_map(|warp| warp.passes.get(index))
+                .collect();
+            let lanes: usize = same.iter().map(|pass| pass.lanes.len()).sum();
+            let width = lanes / warps.len();
+            let class = same.first().map(|pass| pass.class).unwrap_or_default();
+            let left = self.left(&same, index);
+            for (warp, rays) in filled.iter_mut().zip(left.chunks(width.max(1))) {
+                let mut lanes: Vec<Option<Trace>> = rays.iter().cloned().map(Some).collect();
+                lanes.resize(width, None);
+                warp.passes.push(Pass { class, lanes });
+            }
+        }
+        filled
     }
 }
 
-fn compacted(warps: &[Warp]) -> Vec<Warp> {
-    let mut filled = vec![Warp::default(); warps.len()];
-    let passes = warps.first().map_or(0, |warp| warp.passes.len());
-    for index in 0..passes {
-        let same = warps.iter().filter_map(|warp| warp.passes.get(index));
-        let lanes: Vec<&Option<Trace>> = same.clone().flat_map(|pass| &pass.lanes).collect();
-        let width = lanes.len() / warps.len();
-        let alive: Vec<Option<Trace>> = lanes
-            .iter()
-            .filter(|lane| lane.is_some())
-            .map(|lane| (*lane).clone())
-            .collect();
-        let class = same.map(|pass| pass.class).next().unwrap_or_default();
-        for (warp, rays) in filled.iter_mut().zip(alive.chunks(width.max(1))) {
-            let mut lanes = rays.to_vec();
-            lanes.resize(width, None);
-            warp.passes.push(Pass { class, lanes });
-        }
+/// Any order with equal probability (Fisher & Yates).
+fn shuffle<T>(items: &mut [T], random: &mut Pcg32) {
+    for last in (1..items.len()).rev() {
+        items.swap(last, random.below(last + 1));
     }
-    filled
 }
 
 #[cfg(test)]
@@ -82,6 +120,20 @@ mod tests {
         assert_eq!(steps(&filled), [[1, 2, 3], [4, 0, 0]]);
         assert!(filled[2].passes.is_empty());
         assert!(filled[0].passes[0].class == 7);
+        // Whatever the order, the same rays; and those of a warp stay side by side where warps are in any order.
+        let sorted = |organisation: Organisation| {
+            let mut all = steps(&organisation.of(warps.clone())).concat();
+            all.sort_unstable();
+            all
+        };
+        for organisation in [
+            Organisation::CompactedByWarps,
+            Organisation::CompactedByRays,
+        ] {
+            assert_eq!(sorted(organisation), [0, 0, 1, 2, 3, 4]);
+        }
+        let by_warps = steps(&Organisation::CompactedByWarps.of(warps.clone())).concat();
+        assert!(by_warps.windows(2).any(|pair| pair == [1, 2]));
         assert_eq!(
             steps(&Organisation::SingleKernel.of(warps)),
             [[0, 1, 2], [3, 0, 0], [0, 4, 0]]

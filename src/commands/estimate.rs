@@ -1,7 +1,7 @@
 //! How long a plan would take, roughly.
 
 use raystone::config::{Axis, Cell, Experiment, Plan};
-use raystone::params::Variant;
+use raystone::params::{ParamValue, Variant};
 use raystone::run::Registries;
 use raystone::sampling::dimensions::{FIRST_BOUNCE, PER_BOUNCE};
 use std::fmt;
@@ -12,12 +12,15 @@ const RAYS_PER_SECOND: f64 = 2e6;
 const SECONDS_PER_KERNEL: f64 = 0.3;
 /// Classes of recorded rays that are timed, and those with shadow rays in other orders.
 const RAY_CLASSES: [u64; 2] = [5, 8];
+/// Elements per second that such an adapter compacts, all passes of a turn and its check together: as round.
+const ELEMENTS_PER_SECOND: f64 = 3e7;
 /// Bounces of a usual path: in a closed room paths take four to six rays, most under a sky two.
 const USUAL_BOUNCES: u32 = 2;
 
 /// Work of a plan that grows with its size.
 pub struct Estimate {
     rays: u64,
+    elements: u64,
     kernels: u64,
     warmup_s: f64,
 }
@@ -53,16 +56,26 @@ impl Estimate {
             .iter()
             .map(|cell| rounds * image(&cell[Axis::Integrator], timing.spp));
         let recorded = u64::from(experiment.gate.rays) + rounds * u64::from(timing.rays);
+        let elements = plan.compactions.iter().map(|cell| {
+            match cell[Axis::Integrator].params.0.get("elements") {
+                Some(ParamValue::Integer(count)) => rounds * u64::try_from(*count).unwrap_or(0),
+                _ => 0,
+            }
+        });
         let structures = plan.structures.len() as u64;
         let full_cells = plan.times.len() as u64;
-        let kernels = 2 * structures + full_cells;
+        let kernels = 2 * structures + full_cells + plan.compactions.len() as u64;
         let classes = RAY_CLASSES[usize::from(experiment.gate.shadow_orders)];
-        let warmups = classes * structures + full_cells;
+        let warmups = classes * structures + full_cells + plan.compactions.len() as u64;
+        // Peers answer the same rays without a judge's part.
+        let peers = plan.peers.len() as u64 * rounds * u64::from(timing.rays);
         Self {
             rays: errors.sum::<u64>()
                 + references.sum::<u64>()
                 + times.sum::<u64>()
-                + structures * classes * recorded,
+                + structures * classes * recorded
+                + classes * peers,
+            elements: elements.sum(),
             kernels,
             warmup_s: warmups as f64 * f64::from(timing.min_warmup_ms) / 1e3,
         }
@@ -70,6 +83,7 @@ impl Estimate {
 
     fn seconds(&self) -> f64 {
         self.rays as f64 / RAYS_PER_SECOND
+            + self.elements as f64 / ELEMENTS_PER_SECOND
             + self.kernels as f64 * SECONDS_PER_KERNEL
             + self.warmup_s
     }
@@ -89,12 +103,15 @@ impl fmt::Display for Estimate {
         write!(
             f,
             "estimate: about {} on a software adapter with two cores, from {} million rays at \
-             {} million a second, {} kernels at {SECONDS_PER_KERNEL} s each, and {:.0} s of \
+             {} million a second, {} million elements to be compacted at {} million a second, \
+             {} kernels at {SECONDS_PER_KERNEL} s each, and {:.0} s of \
              warm-up. These are round figures, nothing was measured here: a GPU needs a small part \
              of it. Loading, building, the judge and the report come on top.",
             duration(self.seconds()),
             millions(self.rays),
             RAYS_PER_SECOND / 1e6,
+            millions(self.elements),
+            ELEMENTS_PER_SECOND / 1e6,
             self.kernels,
             self.warmup_s,
         )
@@ -145,6 +162,11 @@ mod tests {
         assert_eq!(small.kernels, 3);
         assert!((small.warmup_s - 0.6).abs() < 1e-9);
         assert!(estimate(&["run.replicates=4"]).rays > small.rays);
+        assert_eq!(small.elements, 0);
+        let peers = estimate(&["axes.peer=obvhs-bvh2,obvhs-cwbvh"]);
+        assert_eq!(peers.rays, small.rays + 5 * 2 * 3 * 2000);
+        let compaction = estimate(&["axes.integrator=compaction:roger"]);
+        assert_eq!(compaction.elements, 3 << 20);
     }
 
     #[test]

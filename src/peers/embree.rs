@@ -1,8 +1,8 @@
 //! Intel's Embree, version 3 or 4, if its library is found at run time. Its own binary interface is declared here as far as it is needed:
 //! `rtcore_ray.h`, `rtcore_scene.h`, `rtcore_geometry.h`. Scenes are robust (`RTC_SCENE_FLAG_ROBUST`).
 
-use super::native::{Caster, NativeBatch, threads};
-use super::{BuiltPeer, Peer, PeerBatch};
+use super::native::Caster;
+use super::{BuiltPeer, Peer};
 use crate::accel::mask::is_cut_out;
 use crate::accel::{Hit, NO_HIT, Query, Ray, TriangleSoup};
 use crate::gpu::Gpu;
@@ -314,27 +314,17 @@ impl Caster for Built<'_> {
             },
         }
     }
-}
 
-impl BuiltPeer for Built<'_> {
-    fn about(&self) -> String {
+    fn version(&self) -> String {
         let [major, minor, patch] = [
             self.version / 10_000,
             self.version / 100 % 100,
             self.version % 100,
         ];
-        format!("Embree {major}.{minor}.{patch}, {}", threads())
+        format!("Embree {major}.{minor}.{patch}")
     }
 
     fn build_ms(&self) -> f64 {
         self.build_ms
-    }
-
-    fn batch<'a>(
-        &'a self,
-        query: Query,
-        rays: &'a [Ray],
-    ) -> Result<Box<dyn PeerBatch + 'a>, String> {
-        Ok(Box::new(NativeBatch::new(self, query, rays)))
     }
 }

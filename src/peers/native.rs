@@ -1,6 +1,6 @@
 //! What casters on the host have in common: answers in memory, found by all threads of the machine.
 
-use super::PeerBatch;
+use super::{BuiltPeer, PeerBatch};
 use crate::accel::{Hit, Query, Ray};
 use crate::gpu::{Elapsed, GpuError, Stopwatch};
 use rayon::prelude::*;
@@ -13,25 +13,47 @@ const CHUNK: usize = 1024;
 pub trait Caster: Sync {
     /// The nearest hit, or [`Hit::miss`]; any hit if only that is asked for.
     fn cast(&self, query: Query, ray: &Ray) -> Hit;
+
+    /// Its version.
+    fn version(&self) -> String;
+
+    /// See [`BuiltPeer::build_ms`].
+    fn build_ms(&self) -> f64;
+}
+
+impl<C: Caster> BuiltPeer for C {
+    fn about(&self) -> String {
+        let threads = match rayon::current_num_threads() {
+            1 => "1 thread".into(),
+            n => format!("{n} threads"),
+        };
+        format!("{}, {threads}", self.version())
+    }
+
+    fn build_ms(&self) -> f64 {
+        Caster::build_ms(self)
+    }
+
+    fn batch<'a>(
+        &'a self,
+        query: Query,
+        rays: &'a [Ray],
+    ) -> Result<Box<dyn PeerBatch + 'a>, String> {
+        Ok(Box::new(NativeBatch {
+            caster: self,
+            query,
+            rays,
+            hits: RefCell::default(),
+        }))
+    }
 }
 
 /// Rays that a caster answers.
-pub struct NativeBatch<'a, C> {
+struct NativeBatch<'a, C> {
     caster: &'a C,
     query: Query,
     rays: &'a [Ray],
     hits: RefCell<Vec<Hit>>,
-}
-
-impl<'a, C: Caster> NativeBatch<'a, C> {
-    pub fn new(caster: &'a C, query: Query, rays: &'a [Ray]) -> Self {
-        Self {
-            caster,
-            query,
-            rays,
-            hits: RefCell::default(),
-        }
-    }
 }
 
 impl<C: Caster> PeerBatch for NativeBatch<'_, C> {
@@ -52,13 +74,5 @@ impl<C: Caster> PeerBatch for NativeBatch<'_, C> {
 
     fn hits(&self) -> Result<Vec<Hit>, GpuError> {
         Ok(self.hits.borrow().clone())
-    }
-}
-
-/// How many threads answer, in words.
-pub fn threads() -> String {
-    match rayon::current_num_threads() {
-        1 => "1 thread".into(),
-        n => format!("{n} threads"),
     }
 }

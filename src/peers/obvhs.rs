@@ -1,7 +1,7 @@
 //! The crate `obvhs`: PLOC with reinsertion, a binary tree and one of eight compressed children.
 
-use super::native::{Caster, NativeBatch, threads};
-use super::{BuiltPeer, Peer, PeerBatch};
+use super::native::Caster;
+use super::{BuiltPeer, Peer};
 use crate::accel::mask::is_cut_out;
 use crate::accel::{Hit, Query, Ray, TriangleSoup};
 use crate::gpu::Gpu;
@@ -125,22 +125,12 @@ impl Caster for Built<'_> {
             },
         }
     }
-}
 
-impl BuiltPeer for Built<'_> {
-    fn about(&self) -> String {
-        format!("obvhs 0.4, {}", threads())
+    fn version(&self) -> String {
+        "obvhs 0.4".into()
     }
 
     fn build_ms(&self) -> f64 {
         self.build_ms
-    }
-
-    fn batch<'a>(
-        &'a self,
-        query: Query,
-        rays: &'a [Ray],
-    ) -> Result<Box<dyn PeerBatch + 'a>, String> {
-        Ok(Box::new(NativeBatch::new(self, query, rays)))
     }
 }

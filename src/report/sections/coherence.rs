@@ -59,7 +59,8 @@ fn machine(record: &CoherenceRecord) -> String {
          for each group and an L2 of {} ({}) for all, both empty at first, with lines of {} bytes, of which those go that were used \
          longest ago. An issue is a visit of a node or a test of a triangle that lanes of a warp do together; cycles are those of one \
          multiprocessor if nothing but throughput counted. Single kernel: lanes keep their pixels and wait once the path has ended; \
-         compacted: the rays that are left fill the group's warps anew at each bounce.",
+         compacted: the rays that are left fill the group's warps anew at each bounce, in their order or, where a compaction is \
+         unstable, with warps or rays in any order.",
         s.warp[0],
         s.warp[1],
         s.resolution[0],

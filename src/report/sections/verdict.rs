@@ -24,9 +24,12 @@ pub fn section(data: &RunData) -> Section {
         section.blocks.extend(warned);
         section.blocks.extend(apart(scene));
     }
-    let rule = match section.blocks.is_empty() {
-        true => "Nothing was measured.".to_owned(),
-        false => rule(data),
+    let rule = match (section.blocks.is_empty(), data.compactions.is_empty()) {
+        (true, true) => "Nothing was measured.".to_owned(),
+        (true, false) => "No structure and no sampler was measured. How the methods of compaction compare stands in \
+                          their own section."
+            .to_owned(),
+        (false, _) => rule(data),
     };
     section.blocks.push(Block::Paragraph(rule));
     section
