@@ -1,7 +1,7 @@
 //! `atomic`: one atomic for each element that stays.
 
-use super::passes::kernel;
-use super::{Compaction, Order, Passes};
+use super::passes::{bound, kernel};
+use super::{Compaction, Order, Passes, Stays};
 use crate::gpu::{Bindings, GpuError};
 use crate::parameters;
 
@@ -15,9 +15,17 @@ impl Compaction for Atomic {
         Order::Any
     }
 
+    fn keeps_apart(&self) -> bool {
+        true
+    }
+
     fn record(&self, passes: &mut Passes) -> Result<(), GpuError> {
         passes.clear_count();
         let items = passes.stream.capacity;
+        if let Stays::Apart(_) = passes.stream.stays {
+            let part = bound(&[], ("part", &[("capacity", items)]));
+            return passes.run_for(kernel("atomic").feature("apart", true), &part, items);
+        }
         passes.run_for(kernel("atomic"), &Bindings::new(), items)
     }
 }

@@ -30,7 +30,7 @@ pub use blelloch::Blelloch;
 pub use bucket_sort::BucketSort;
 pub use horn::Horn;
 pub use none::NoCompaction;
-pub use passes::{Passes, Stream};
+pub use passes::{Passes, Stays, Stream};
 pub use radix_sort::RadixSorted;
 pub use reduce_scan_scatter::ReduceScanScatter;
 pub use registry::CompactionRegistry;
@@ -59,6 +59,11 @@ pub trait Compaction: Send + Sync {
     /// Buckets that it puts one behind the other; flags are at most this.
     fn buckets(&self) -> u32 {
         1
+    }
+
+    /// Whether it can leave all buckets at once, each in a part of its own ([`Stays::Apart`]).
+    fn keeps_apart(&self) -> bool {
+        false
     }
 
     /// Why it cannot run on this adapter, if so.

@@ -5,6 +5,18 @@ use crate::gpu::{
     UniformValues, WORKGROUP_SIZE, grid_of,
 };
 
+/// What of a stream stays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stays {
+    /// Every bucket.
+    All,
+    /// This one alone; its elements are in the first then.
+    Bucket(u32),
+    /// So many buckets, each in a part of its own of [`Stream::kept`], with room for [`Stream::capacity`] elements; the words of
+    /// [`Stream::count`] tell how many are in each. For methods that [keep them apart](super::Compaction::keeps_apart).
+    Apart(u32),
+}
+
 /// A stream on the device, and where it is compacted to.
 #[derive(Debug, Clone)]
 pub struct Stream {
@@ -16,8 +28,8 @@ pub struct Stream {
     pub length: Storage,
     /// A word per element: 0 for a hole, else its bucket, from 1 on.
     pub flags: Storage,
-    /// The only bucket that stays, of all that flags tell apart; its elements are in the first one then.
-    pub bucket: Option<u32>,
+    /// Which of the buckets.
+    pub stays: Stays,
     /// The elements.
     pub elements: Storage,
     /// What stays; as large as [`Stream::elements`], and another buffer.
@@ -33,11 +45,11 @@ impl Stream {
         let wide = self.element_bytes.is_multiple_of(16);
         let cells = self.element_bytes / if wide { 16 } else { 4 };
         let kernel = kernel.constant("CELLS", cells).feature("wide_cells", wide);
-        match self.bucket {
-            Some(bucket) => kernel
+        match self.stays {
+            Stays::Bucket(bucket) => kernel
                 .constant("BUCKET", bucket)
                 .feature("one_bucket", true),
-            None => kernel,
+            Stays::All | Stays::Apart(_) => kernel,
         }
     }
 

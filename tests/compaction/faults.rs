@@ -25,7 +25,7 @@ const FAULTS: [Fault; 24] = [
     ("tile", ["copy_element(first + k, slot)", "copy_element(first, slot)"], "workgroup", &[("per_lane", 4)]),
     ("gather", ["kept_up_to(middle) > slot", "kept_up_to(middle) >= slot"], "blelloch", &[]),
     ("roger_blocks", ["excess == 0 && !is_hole(block_at, j)", "excess == 0"], "roger", &[("block", 16)]),
-    ("atomic", ["flag_of(element) != 0u", "flag_of(element) != 7u"], "atomic", &[]),
+    ("atomic", ["flag != 0u", "flag != 7u"], "atomic", &[]),
     // An order is lost that was promised.
     ("scatter", ["+ found.exclusive", "+ found.total - found.inclusive"], "reduce-scan-scatter", &[]),
     ("tile", ["(tile * SCAN_LANES + lane) * PER_LANE", "tile * SCAN_LANES * PER_LANE + lane"], "bucket-sort", &[("per_lane", 4)]),

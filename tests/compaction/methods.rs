@@ -1,7 +1,7 @@
 //! Every registered method against the host, at all sizes where something ends.
 
 use super::support::gpu;
-use raystone::compaction::{Compaction, CompactionRegistry, Passes, Stream};
+use raystone::compaction::{Compaction, CompactionRegistry, Passes, Stays, Stream};
 use raystone::gpu::{Gpu, Groups, Player, Recording, Storage};
 use raystone::measure::compaction::{Bench, Inputs, stream};
 use raystone::params::{ParamValue, Params, Variant};
@@ -179,7 +179,7 @@ fn an_indirect_dispatch_covers_what_stays() {
             element_bytes: 4,
             length: word(1),
             flags: word(1),
-            bucket: None,
+            stays: Stays::All,
             elements: word(1),
             kept: word(0),
             count: word(kept),

@@ -134,7 +134,7 @@ fn passes_of_the_collapse_are_timed_by_name() {
 }
 
 /// Kernel, what is wrong, and how.
-const FAULTS: [(&str, &str, &str, &str); 18] = [
+const FAULTS: [(&str, &str, &str, &str); 19] = [
     (
         "costs",
         "the last way to share children not tried",
@@ -150,8 +150,8 @@ const FAULTS: [(&str, &str, &str, &str); 18] = [
     (
         "costs",
         "the cost of the node itself forgotten",
-        "kept(half_area(node) * settings.traversal_cost) + share",
-        "share",
+        "kept(half_area(node) * settings.traversal_cost) + whole.cost",
+        "whole.cost",
     ),
     (
         "costs",
@@ -162,14 +162,20 @@ const FAULTS: [(&str, &str, &str, &str); 18] = [
     (
         "costs",
         "leaves of a triangle less",
-        "count > settings.leaf_size",
-        "count >= settings.leaf_size",
+        "triangles > settings.leaf_size",
+        "triangles >= settings.leaf_size",
     ),
     (
         "costs",
         "children taken that do not pay",
-        "while (most > 1u && cost_of(node, most) == cost_of(node, most - 1u))",
-        "while (false)",
+        "if (found.cost < least)",
+        "if (found.cost <= least)",
+    ),
+    (
+        "costs",
+        "a choice that does not pay taken for one that does",
+        "(1u << (BITS * (children - 1u))) - 1u",
+        "(1u << (BITS * children)) - 1u",
     ),
     (
         "costs",
@@ -200,8 +206,8 @@ const FAULTS: [(&str, &str, &str, &str); 18] = [
     (
         "octants",
         "a slot given twice",
-        "((placed >> child) & 1u) == 0u && slots[slot] == NOTHING",
-        "((placed >> child) & 1u) == 0u",
+        "((taken >> slot) & 1u) == 0u && (best.x",
+        "(best.x",
     ),
     (
         "device/levels",

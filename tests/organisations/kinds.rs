@@ -200,25 +200,30 @@ fn a_kernel_has_its_own_kind_alone_in_it() {
 fn planted_faults_are_seen() {
     let by = per_material(&[]);
     let sorted = per_material(&[("sorting", word("material"))]);
+    let one_by_one = per_material(&[("compaction", word("workgroup"))]);
     let mut unseen = Vec::new();
     #[rustfmt::skip]
     let faults = [
         // The kernel of another kind; a kind in no queue, and in that of its neighbour, too; what has met nothing is in none.
         (&by, "organisation/kinds", "FIRST_KIND + material_kind(", "FIRST_KIND + 0u * material_kind("),
         (&by, "organisation/kinds", "flags[at] = flag;", "flags[at] = select(flag, 0u, flag == FIRST_KIND + 4u);"),
-        (&by, "compaction/stream", "flags[element] == BUCKET", "flags[element] == BUCKET || flags[element] == BUCKET + 1u"),
+        (&one_by_one, "compaction/stream", "flags[element] == BUCKET", "flags[element] == BUCKET || flags[element] == BUCKET + 1u"),
         (&by, "organisation/kinds", "var flag = MISSED;", "var flag = 0u;"),
         (&by, "organisation/kinds", "triangle != NO_HIT", "triangle < 7u"),
         // What shines on one side is of no kind.
-        (&by, "shading/material", "return kind & ~ONE_SIDED;", "return kind;"),
+        (&one_by_one, "shading/material", "return kind & ~ONE_SIDED;", "return kind;"),
         // A queue is one short, has the count of that before it, or workgroups rounded down.
-        (&by, "organisation/plan_kind", "let found = kept_count[0];", "let found = max(kept_count[0], 1u) - 1u;"),
+        (&by, "organisation/plan_kind", "let found = kind_counts[QUEUE];", "let found = max(kind_counts[QUEUE], 1u) - 1u;"),
         (&by, "organisation/plan_kind", "atomicStore(&counts[OF_KIND], found);", ""),
         (&by, "organisation/plan_kind", "write_groups(found);", "write_groups(found / 64u * 64u);"),
         (&by, "organisation/shade", "at >= atomicLoad(&counts[OF_KIND])", "at + 1u >= atomicLoad(&counts[OF_KIND])"),
+        (&by, "organisation/plan_kind", "kind_counts[QUEUE]", "kind_counts[QUEUE ^ 1u]"),
+        (&by, "compaction/atomic", "kept_count[flag - 1u]", "kept_count[0u]"),
         // Paths of a neighbour, of any kind, and of the order before they were sorted.
-        (&by, "organisation/shade", "let place = order[at];", "let place = order[at + 1u];"),
-        (&by, "organisation/shade", "let place = order[at];", "let place = at;"),
+        (&by, "organisation/shade", "QUEUE * batch.capacity + at]", "(QUEUE ^ 1u) * batch.capacity + at]"),
+        (&by, "compaction/atomic", "(flag - 1u) * part.capacity", "(flag - 1u) * (part.capacity - 1u)"),
+        (&by, "organisation/shade", "order[QUEUE * batch.capacity + at];", "order[QUEUE * batch.capacity + at + 1u];"),
+        (&by, "organisation/shade", "let place = order[QUEUE * batch.capacity + at];", "let place = at;"),
         (&by, "organisation/kinds", "places[at] = at;", "places[at] = at / 2u;"),
         (&sorted, "organisation/kinds", "answers[places[at]].y", "answers[at].y"),
         // What a kind needs is not in its kernel.

@@ -13,20 +13,29 @@ const MAX_WIDTH: usize = 8;
 pub const WORDS: u64 = MAX_WIDTH as u64 - 1;
 /// Larger than the cost of any tree.
 const NEVER: f32 = 3.4e38;
+/// A wide node is cheaper than a leaf.
+const IS_NODE: u32 = 0x8000_0000;
+/// Bits of a choice.
+const BITS: u32 = 3;
+/// Fewest children that there is a choice for.
+const FEWEST: u32 = 2;
 
 /// C(n, i) of the paper for all nodes n and i below the width, and how many triangles each node holds.
 pub struct Costs<'a> {
     tree: &'a Tree,
-    width: usize,
+    width: u32,
     settings: &'a TreeParameters,
     costs: Vec<[f32; MAX_WIDTH - 1]>,
     triangles: Vec<u32>,
+    /// For 2, 3, … children three bits each, how many of them the first child's subtree gets; 0 where so many do not
+    /// pay. And [`IS_NODE`].
+    choices: Vec<u32>,
 }
 
 /// The least cost of two subtrees, and how many of the children the first one gets.
 struct Share {
     cost: f32,
-    first: usize,
+    first: u32,
 }
 
 impl<'a> Costs<'a> {
@@ -34,10 +43,11 @@ impl<'a> Costs<'a> {
     pub fn new(tree: &'a Tree, width: usize, settings: &'a TreeParameters) -> Self {
         let mut costs = Self {
             tree,
-            width,
+            width: width as u32,
             settings,
             costs: vec![[NEVER; MAX_WIDTH - 1]; tree.nodes.len()],
             triangles: vec![0; tree.nodes.len()],
+            choices: vec![0; tree.nodes.len()],
         };
         // Children come after their parents.
         for node in (0..tree.nodes.len() as u32).rev() {
@@ -58,8 +68,8 @@ impl<'a> Costs<'a> {
         self.tree.nodes[node as usize].bounds.half_area()
     }
 
-    fn cost_of(&self, node: u32, children: usize) -> f32 {
-        self.costs[node as usize][children - 1]
+    fn cost_of(&self, node: u32, children: u32) -> f32 {
+        self.costs[node as usize][children as usize - 1]
     }
 
     fn leaf_cost(&self, node: u32) -> f32 {
@@ -70,11 +80,11 @@ impl<'a> Costs<'a> {
         self.half_area(node) * count as f32 * self.settings.intersection_cost
     }
 
-    fn inner_cost(&self, node: u32, pair: [u32; 2]) -> f32 {
-        self.half_area(node) * self.settings.traversal_cost + self.share(pair, self.width).cost
+    fn inner_cost(&self, node: u32, whole: &Share) -> f32 {
+        self.half_area(node) * self.settings.traversal_cost + whole.cost
     }
 
-    fn share(&self, [left, right]: [u32; 2], children: usize) -> Share {
+    fn share(&self, [left, right]: [u32; 2], children: u32) -> Share {
         let mut best = Share {
             cost: NEVER,
             first: 1,
@@ -101,22 +111,29 @@ impl<'a> Costs<'a> {
         };
         let [left, right] = pair.map(|child| self.triangles[child as usize]);
         self.triangles[index] = left.saturating_add(right);
-        let mut least = self.leaf_cost(node).min(self.inner_cost(node, pair));
-        for children in 1..self.width {
-            if children > 1 {
-                least = least.min(self.share(pair, children).cost);
-            }
-            self.costs[index][children - 1] = least;
+        let whole = self.share(pair, self.width);
+        let as_node = self.inner_cost(node, &whole);
+        let mut choices = whole.first << (BITS * (self.width - FEWEST));
+        let mut least = self.leaf_cost(node);
+        if self.triangles[index] as usize > self.settings.leaf_size || as_node < least {
+            least = as_node;
+            choices |= IS_NODE;
         }
+        self.costs[index][0] = least;
+        for children in FEWEST..self.width {
+            let found = self.share(pair, children);
+            if found.cost < least {
+                least = found.cost;
+                choices |= found.first << (BITS * (children - FEWEST));
+            }
+            self.costs[index][children as usize - 1] = least;
+        }
+        self.choices[index] = choices;
     }
 
     /// Whether a node whose costs are known is a leaf, if it is one child.
     fn is_leaf(&self, node: u32) -> bool {
-        let Some(pair) = self.links(node) else {
-            return true;
-        };
-        self.triangles[node as usize] as usize <= self.settings.leaf_size
-            && self.leaf_cost(node) <= self.inner_cost(node, pair)
+        self.choices[node as usize] & IS_NODE == 0
     }
 
     /// What a subtree that is one child is: a leaf has its binary root in place of the first triangle.
@@ -130,32 +147,28 @@ impl<'a> Costs<'a> {
         }
     }
 
-    /// How many of so many children pay.
-    fn used(&self, node: u32, children: usize) -> usize {
-        let mut most = children;
-        while most > 1 && self.cost_of(node, most) == self.cost_of(node, most - 1) {
-            most -= 1;
-        }
-        most
-    }
-
     /// Binary roots of the children of the wide node in the place of `node`.
     pub fn children(&self, node: u32) -> Vec<u32> {
-        let mut roots = Vec::with_capacity(self.width);
-        // Subtrees with the children they get, the first last. The node itself is opened whatever it costs.
+        let mut roots = Vec::with_capacity(self.width as usize);
+        // Subtrees with the children they get, the first last.
         let mut open = vec![(node, self.width)];
-        while let Some((subtree, mut most)) = open.pop() {
-            if subtree != node {
-                most = self.used(subtree, most);
-            }
+        while let Some((subtree, children)) = open.pop() {
+            let choices = self.choices[subtree as usize];
+            let most = used(choices, children);
             match self.links(subtree) {
-                Some(pair) if most > 1 => {
-                    let first = self.share(pair, most).first;
-                    open.extend([(pair[1], most - first), (pair[0], first)]);
+                Some([left, right]) if most > 1 => {
+                    let first = choices >> (BITS * (most - FEWEST)) & 7;
+                    open.extend([(right, most - first), (left, first)]);
                 }
                 _ => roots.push(subtree),
             }
         }
         roots
     }
+}
+
+/// How many of so many children pay, by the choices of a node. All that a wide node may have do.
+fn used(choices: u32, children: u32) -> u32 {
+    let paying = choices & ((1 << (BITS * (children - 1))) - 1);
+    paying.checked_ilog2().map_or(1, |bit| bit / BITS + FEWEST)
 }

@@ -89,7 +89,7 @@ impl<'a> Passes<'a> {
             .uniform("settings", values)
             .buffer("nodes", &gpu.storage("tree nodes", &tree.linked())?)
             .buffer("costs", scratch("tree costs", costs::WORDS * nodes))
-            .buffer("below", scratch("tree below", 2 * nodes))
+            .buffer("below", scratch("tree below", 3 * nodes))
             .buffer("list", &gpu.zeroed("tree list", 4 * nodes)?)
             .buffer("starts", &gpu.zeroed("tree starts", 4 * (levels + 1))?)
             .buffer("counts", &gpu.storage("tree counts", &counts)?)

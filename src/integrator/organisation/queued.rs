@@ -3,11 +3,12 @@
 
 use super::{Organisation, shading, sorting};
 use crate::accel::{LiveRays, Query};
-use crate::compaction::{CompactionRegistry, Passes, Stream};
-use crate::gpu::{Bindings, Composition, GpuError, Groups, Storage, UniformValues, grid_of};
+use crate::compaction::{Compaction, CompactionRegistry, Passes, Stays, Stream};
+use crate::gpu::{Bindings, Composition, Gpu, GpuError, Groups, Storage, UniformValues, grid_of};
 use crate::integrator::{ImageSteps, Integrator};
 use crate::parameters;
 use crate::params::{Choice as _, Params, Variant};
+use std::sync::Arc;
 
 /// Rows of 16 bytes of a path: `PATH_ROWS` of `kernels/organisation/paths.wesl`.
 const PATH_BYTES: u64 = 7 * 16;
@@ -187,16 +188,12 @@ impl<'a> Queues<'a> {
         steps.trace_live(query, buffers, range, self.live(word))
     }
 
-    /// Brings what is flagged side by side, the slots of `elements` whose flags are of this bucket, or of any; tells where they are then.
-    /// How many stands in `kept_count`.
-    pub fn keep(
+    /// The compaction of a wavefront.
+    pub fn method(
         &self,
-        steps: &mut ImageSteps,
+        gpu: &Gpu,
         wavefront: &Wavefront,
-        elements: &Storage,
-        bucket: Option<u32>,
-    ) -> Result<Storage, GpuError> {
-        let gpu = steps.gpu().clone();
+    ) -> Result<Arc<dyn Compaction>, GpuError> {
         let method = match wavefront.compaction {
             CompactionMethod::Auto if gpu.is_software() => CompactionMethod::Atomic,
             CompactionMethod::Auto => CompactionMethod::Workgroup,
@@ -209,29 +206,42 @@ impl<'a> Queues<'a> {
         };
         let method = CompactionRegistry::default().configured(&method);
         let method = method.map_err(GpuError::Kernel)?;
-        if let Some(reason) = method.refusal(&gpu) {
-            return Err(GpuError::Kernel(reason));
+        match method.refusal(gpu) {
+            Some(reason) => Err(GpuError::Kernel(reason)),
+            None => Ok(method),
         }
-        let words = 4 * u64::from(self.capacity);
+    }
+
+    /// Brings what is flagged side by side: words of `elements`, one for each live path, go to `kept`, and how many are there to `count`.
+    pub fn keep(
+        &self,
+        steps: &mut ImageSteps,
+        method: &dyn Compaction,
+        stays: Stays,
+        [elements, kept, count]: [&Storage; 3],
+    ) -> Result<(), GpuError> {
+        let gpu = steps.gpu().clone();
         let stream = Stream {
             capacity: self.capacity,
             element_bytes: 4,
             length: self.scratch("counts", COUNTS_BYTES),
-            flags: self.scratch("flags", words),
-            bucket,
+            flags: self.scratch("flags", 4 * u64::from(self.capacity)),
+            stays,
             elements: elements.clone(),
-            kept: self.scratch("kept queue", words),
-            count: self.scratch("kept_count", COUNTS_BYTES),
+            kept: kept.clone(),
+            count: count.clone(),
         };
-        method.record(&mut Passes::new(&gpu, steps.recording(), &stream))?;
-        Ok(stream.kept)
+        method.record(&mut Passes::new(&gpu, steps.recording(), &stream))
     }
 
     /// Keeps the slots of live paths side by side.
     fn compact(&self, steps: &mut ImageSteps, wavefront: &Wavefront) -> Result<(), GpuError> {
         let place = steps.recording().len();
         let queue = self.scratch("queue", 4 * u64::from(self.capacity));
-        let kept = self.keep(steps, wavefront, &queue, None)?;
+        let method = self.method(steps.gpu(), wavefront)?;
+        let kept = self.scratch("kept queue", 4 * u64::from(self.capacity));
+        let count = self.scratch("kept_count", COUNTS_BYTES);
+        self.keep(steps, &*method, Stays::All, [&queue, &kept, &count])?;
         steps.recording().copy(&kept, &queue);
         self.run(steps, "plan", Groups::Direct([1, 1, 1]))?;
         steps.recording().name_since(place, "compaction");

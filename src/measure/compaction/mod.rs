@@ -6,7 +6,7 @@
 
 pub mod stream;
 
-use crate::compaction::{Compaction, CompactionRegistry, Order, Passes, Stream};
+use crate::compaction::{Compaction, CompactionRegistry, Order, Passes, Stays, Stream};
 use crate::config::COMPACTIONS;
 use crate::gpu::{
     Bindings, Composition, Elapsed, Gpu, GpuError, Player, Recording, Storage, grid_of,
@@ -134,7 +134,7 @@ impl Bench {
             element_bytes: bytes,
             length: (&gpu.storage("stream_length", &[length])?).into(),
             flags: inputs.flags_there.clone(),
-            bucket: None,
+            stays: Stays::All,
             elements: inputs.elements.clone(),
             kept: Storage::scratch(&format!("kept {kept_bytes}"), kept_bytes),
             count: Storage::scratch("kept count", 4),
