@@ -1,17 +1,16 @@
 //! `raystone run`.
 
 use super::arguments::{DeviceArguments, ExperimentArguments, plan};
-use super::estimate::Estimate;
 use super::failure::{BAD_INPUT, FAILED};
 use super::output::{self, print};
 use super::signals;
 use anyhow::Result;
 use clap::Args;
-use raystone::config::{Cell, Experiment};
+use raystone::config::{Cell, Experiment, Shard};
 use raystone::image::FileFormat;
 use raystone::measure::record::{Body, Line, read_records};
 use raystone::report::{failed_checks, terminal_tables, write_report};
-use raystone::run::{Existing, Kernels, Registries, RunError, RunSummary, user_cache};
+use raystone::run::{Estimate, Existing, Kernels, Registries, RunError, RunSummary, user_cache};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -26,6 +25,19 @@ pub struct Run {
     /// Replace the results that the folder holds, once the new ones are whole
     #[arg(long, conflicts_with = "number")]
     force: bool,
+    /// Go on with the results that the folder holds: cells that still hold (same kernels, scene, parameters, program) are kept, all
+    /// others are measured
+    #[arg(long, conflicts_with_all = ["number", "force"])]
+    resume: bool,
+    /// Run one of N parts of the plan, as 3/8; `raystone merge` joins them [default folder: results/NAME/shard-K-of-N]
+    #[arg(long, value_name = "K/N")]
+    shard: Option<Shard>,
+    /// End with the first cell that fails; `--resume` goes on later
+    #[arg(long, conflicts_with = "keep_going")]
+    fail_fast: bool,
+    /// Go on after cells that fail (the default)
+    #[arg(long)]
+    keep_going: bool,
     /// Where the folder holds results or is being written, take the first free one of DIR-2, DIR-3, …
     #[arg(long)]
     number: bool,
@@ -69,16 +81,20 @@ impl Run {
             return Ok(ExitCode::SUCCESS);
         }
         let existing = match (self.force, self.number || self.out.is_none()) {
+            _ if self.resume => Existing::Resume,
             (true, _) => Existing::Replace,
             (_, true) => Existing::Number,
             _ => Existing::Refuse,
         };
-        let out = self.out.unwrap_or_else(|| default_folder(&experiment.name));
+        let default = || default_folder(&experiment.name, self.shard);
+        let out = self.out.clone().unwrap_or_else(default);
         let mut options = self
             .device
             .options(out, &self.experiment.values, self.quiet);
         options.existing = existing;
         options.images = self.images;
+        options.shard = self.shard;
+        options.fail_fast = self.fail_fast && !self.keep_going;
         options.cache = user_cache().filter(|_| !self.no_cache);
         signals::watch(options.interrupt.clone())?;
         match raystone::run::run(&experiment, &plan, &registries, &options) {
@@ -110,6 +126,12 @@ fn linear_format(text: &str) -> Result<&'static FileFormat, String> {
 
 /// Writes the report of a run, prints its tables, and tells what failed.
 fn tell(summary: &RunSummary, quiet: bool) -> Result<ExitCode> {
+    if summary.kept > 0 && !quiet {
+        output::tell(&format!(
+            "{} of an earlier run still hold",
+            plural(summary.kept, "cell", "cells")
+        ));
+    }
     let page = write_report(&summary.out)?.html;
     let lines = read_records(&summary.out)?.lines;
     print(&match quiet {
@@ -157,8 +179,8 @@ fn failure(line: &Line) -> Option<String> {
     Some(format!("{}: {failure}", Cell::from(&line.key)))
 }
 
-/// `results/NAME`, where a name such as `../a b` cannot lead out of `results`.
-fn default_folder(name: &str) -> PathBuf {
+/// `results/NAME`, with a folder for a shard below it, where a name such as `../a b` cannot lead out of `results`.
+fn default_folder(name: &str, shard: Option<Shard>) -> PathBuf {
     let plain = |c: char| match c {
         '-' | '_' | '.' => c,
         c if c.is_alphanumeric() => c,
@@ -167,7 +189,11 @@ fn default_folder(name: &str) -> PathBuf {
     let name: String = name.chars().map(plain).collect();
     let name = name.trim_start_matches('.');
     let folder = if name.is_empty() { "run" } else { name };
-    PathBuf::from("results").join(folder)
+    let folder = PathBuf::from("results").join(folder);
+    match shard {
+        Some(shard) => folder.join(format!("shard-{}-of-{}", shard.number, shard.of)),
+        None => folder,
+    }
 }
 
 #[cfg(test)]
@@ -182,7 +208,10 @@ mod tests {
             ("..", "results/run"),
             ("λ-grid", "results/λ-grid"),
         ] {
-            assert_eq!(default_folder(name), Path::new(folder), "{name}");
+            assert_eq!(default_folder(name, None), Path::new(folder), "{name}");
         }
+        let third = "3/8".parse().ok();
+        let folder = Path::new("results/quick/shard-3-of-8");
+        assert_eq!(default_folder("quick", third), folder);
     }
 }

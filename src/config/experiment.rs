@@ -22,6 +22,8 @@ pub struct Experiment {
     pub source: String,
     /// The file's text, with the overrides appended as comments.
     pub text: String,
+    /// The overrides.
+    pub overrides: Vec<String>,
     /// Independent seeds per randomised sampler.
     pub replicates: u32,
     /// Seed of the first replicate.

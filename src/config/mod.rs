@@ -17,6 +17,7 @@ mod plan;
 mod product;
 mod section;
 mod tree;
+mod units;
 mod variants;
 
 pub use axis_map::AxisMap;
@@ -29,6 +30,7 @@ pub use experiment::{
 pub use keys::Axis;
 pub use pattern::Pattern;
 pub use plan::{Plan, Skipped};
+pub use units::{Shard, Unit, UnitKind, shards, unit_name};
 
 use crate::params::Entry;
 

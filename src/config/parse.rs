@@ -49,6 +49,7 @@ pub(super) fn parse(
         name,
         source: file.to_owned(),
         text: with_overrides(text, overrides),
+        overrides: overrides.to_vec(),
         replicates: run.unsigned("replicates")?,
         seed: run.unsigned("seed")?,
         resolution: run.unsigned_pair("resolution")?,

@@ -46,6 +46,8 @@ pub struct Plan {
     pub skipped: Vec<Skipped>,
     /// Seeds that the error of a randomised sampler is measured with.
     pub replicates: u32,
+    /// The filters that it was made with.
+    pub only: Vec<String>,
 }
 
 impl Plan {
@@ -118,6 +120,7 @@ impl Plan {
             kernels: Vec::new(),
             skipped,
             replicates: experiment.replicates,
+            only: only.to_vec(),
         };
         plan.finished(experiment, refused, only)
     }

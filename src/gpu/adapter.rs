@@ -3,6 +3,7 @@
 use super::GpuError;
 use super::compose::KernelLibrary;
 use super::pipeline::PipelineCache;
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 /// Which adapter to use.
@@ -59,6 +60,8 @@ pub struct Gpu {
     /// Kernel sources.
     pub kernels: KernelLibrary,
     pub(super) pipelines: Arc<Mutex<PipelineCache>>,
+    /// See [`Gpu::take_modules`].
+    pub(super) used: Arc<Mutex<BTreeMap<String, String>>>,
     lost: Arc<Mutex<Option<String>>>,
 }
 
@@ -240,6 +243,7 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
         loop_limit: None,
         kernels,
         pipelines: Arc::default(),
+        used: Arc::default(),
         lost,
     };
     gpu.loop_limit = super::probe::probe_loops(&gpu)?;

@@ -8,7 +8,10 @@
 
 use super::RunError;
 use crate::atomic::write_atomic;
-use crate::measure::record::{Body, InterruptedRecord, Line, PARTIAL, RECORDS_FILE, STRESS_FILE};
+use crate::measure::record::{
+    Body, InterruptedRecord, Line, PARTIAL, RECORDS_FILE, RecordError, STRESS_FILE, read_records,
+    text_of,
+};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -29,6 +32,8 @@ pub enum Existing {
     Replace,
     /// Take the first of `DIR`, `DIR-2`, `DIR-3`, … that holds none and that no run writes.
     Number,
+    /// Go on with them: what still holds is kept.
+    Resume,
 }
 
 /// The folder that a run writes.
@@ -37,7 +42,9 @@ pub(super) struct Folder {
     out: PathBuf,
     /// Name of the folder of images: one that the earlier results do not use.
     images: String,
-    /// Whether there are results of an earlier run.
+    /// Lines of the run that is resumed.
+    earlier: Mutex<Vec<Line>>,
+    /// Whether there are results of an earlier run that are not part of this one.
     replaces: bool,
     start: Instant,
     records: Mutex<Records>,
@@ -83,7 +90,7 @@ impl Folder {
         let mut number = 1;
         loop {
             let candidate = numbered(out, number);
-            match Self::open_one(&candidate, existing == Existing::Replace) {
+            match Self::open_one(&candidate, existing) {
                 Ok(folder) => return Ok(folder),
                 Err(Refusal::Unwritable(error)) => return Err(error),
                 Err(Refusal::Taken(_)) if existing == Existing::Number => number += 1,
@@ -92,7 +99,7 @@ impl Folder {
         }
     }
 
-    fn open_one(out: &Path, replace: bool) -> Result<Self, Refusal> {
+    fn open_one(out: &Path, existing: Existing) -> Result<Self, Refusal> {
         let failed = |path: &Path| {
             let path = path.to_owned();
             move |error| Refusal::Unwritable(unwritable(&path, &error))
@@ -107,7 +114,8 @@ impl Folder {
         let records = out.join(RECORDS_FILE);
         let results = [records.clone(), out.join(STRESS_FILE)];
         let results = results.into_iter().filter(|path| is_there(path));
-        if !replace && let Some(found) = results.chain(is_left_over.then_some(left_over)).next() {
+        let replaces = matches!(existing, Existing::Replace | Existing::Resume);
+        if !replaces && let Some(found) = results.chain(is_left_over.then_some(left_over)).next() {
             return Err(Refusal::Taken(format!(
                 "{} holds the results of another run; choose another folder with --out, let --number \
                  number it, or replace them with --force",
@@ -118,7 +126,14 @@ impl Folder {
             let error = io::ErrorKind::IsADirectory.into();
             return Err(Refusal::Unwritable(unwritable(&records, &error)));
         }
-        if is_left_over && !is_there(&records) {
+        let earlier = match existing {
+            Existing::Resume => earlier_lines(out).map_err(Refusal::Unwritable)?,
+            _ => Vec::new(),
+        };
+        if !earlier.is_empty() && is_left_over {
+            // Both parts in one place before anything is removed: whenever this run ends, nothing is lost.
+            keep(out, &earlier).map_err(failed(out))?;
+        } else if is_left_over && !is_there(&records) {
             // What a killed run measured is all there is: it is kept until the new results are whole.
             promote(out).map_err(failed(out))?;
         }
@@ -136,7 +151,8 @@ impl Folder {
         let file = options.read(true).write(true).create_new(true).open(&path);
         Ok(Self {
             images,
-            replaces: is_there(&records),
+            earlier: Mutex::new(earlier),
+            replaces: existing != Existing::Resume && is_there(&records),
             start: Instant::now(),
             records: Mutex::new(Records {
                 file: file.map_err(failed(&path))?,
@@ -151,6 +167,20 @@ impl Folder {
     /// Where the results are, or will be.
     pub fn out(&self) -> &Path {
         &self.out
+    }
+
+    /// The lines of the run that is resumed, once.
+    pub fn take_earlier(&self) -> Vec<Line> {
+        let mut earlier = self.earlier.lock().unwrap_or_else(PoisonError::into_inner);
+        std::mem::take(&mut earlier)
+    }
+
+    /// Leaves the folder as it was.
+    pub fn abandon(&self) {
+        let mut records = self.records();
+        records.state = State::Finished;
+        // Nothing was written: what stays behind is litter that the next run removes.
+        let _ = remove(&self.out.join(PARTIAL));
     }
 
     /// Name of an image as records have it, relative to the run's folder, and where to write it; the ending
@@ -233,17 +263,18 @@ impl Folder {
         // could not be moved, which keep the folder.
         let _ = remove(&partial.join(RECORDS_FILE));
         let _ = fs::remove_dir(&partial);
-        let _ = self.remove_images(&earlier);
+        let _ = self.remove_images(&earlier, &fs::read(&target).unwrap_or_default());
         Ok(())
     }
 
-    /// Removes the images of the earlier results: the folders that their records name.
-    fn remove_images(&self, earlier: &[u8]) -> io::Result<()> {
-        let earlier = String::from_utf8_lossy(earlier);
+    /// Removes the images of the earlier results: the folders that their records name, and those of now do not.
+    fn remove_images(&self, earlier: &[u8], now: &[u8]) -> io::Result<()> {
+        let [earlier, now] = [earlier, now].map(String::from_utf8_lossy);
         for entry in fs::read_dir(&self.out)? {
             let name = entry?.file_name().to_string_lossy().into_owned();
             let is_ours = name.starts_with(IMAGES) && name != self.images;
-            if is_ours && earlier.contains(&format!("\"{name}/")) {
+            let is_in = |records: &str| records.contains(&format!("\"{name}/"));
+            if is_ours && is_in(&earlier) && !is_in(&now) {
                 remove(&self.out.join(name))?;
             }
         }
@@ -336,6 +367,14 @@ fn remove(path: &Path) -> io::Result<()> {
 
 /// Makes the records that a killed run left in `partial/` those of the folder.
 fn promote(out: &Path) -> io::Result<()> {
+    promote_images(out)?;
+    fs::rename(
+        out.join(PARTIAL).join(RECORDS_FILE),
+        out.join(RECORDS_FILE),
+    )
+}
+
+fn promote_images(out: &Path) -> io::Result<()> {
     let partial = out.join(PARTIAL);
     for entry in fs::read_dir(&partial)? {
         let name = entry?.file_name();
@@ -344,7 +383,35 @@ fn promote(out: &Path) -> io::Result<()> {
             fs::rename(partial.join(&name), out.join(&name))?;
         }
     }
-    fs::rename(partial.join(RECORDS_FILE), out.join(RECORDS_FILE))
+    Ok(())
+}
+
+/// The lines of the run that a folder holds, and behind them those that a killed run left.
+///
+/// # Errors
+/// Records that cannot be read, or of another version.
+fn earlier_lines(out: &Path) -> Result<Vec<Line>, RunError> {
+    let mut lines = Vec::new();
+    for folder in [out.to_owned(), out.join(PARTIAL)] {
+        let path = folder.join(RECORDS_FILE);
+        if fs::symlink_metadata(&path).is_ok_and(|file| file.is_file() && file.len() > 0) {
+            let records = read_records(&folder);
+            let fault = |error: RecordError| RunError::Input(format!("cannot resume: {error}"));
+            match records {
+                // A run that was killed in its first line.
+                Err(RecordError::NoRecords { .. }) => {}
+                records => lines.extend(records.map_err(fault)?.lines),
+            }
+        }
+    }
+    Ok(lines)
+}
+
+/// Puts these lines in the place of the folder's records, and beside them the images of a killed run.
+fn keep(out: &Path, lines: &[Line]) -> io::Result<()> {
+    promote_images(out)?;
+    let text = text_of(lines).map_err(io::Error::other)?;
+    write_atomic(&out.join(RECORDS_FILE), text.as_bytes())
 }
 
 /// Makes and locks a folder that something else than a run writes: until the file is dropped, `None` where

@@ -27,6 +27,10 @@ pub(super) struct Yardstick {
     /// How far rounding alone may move it, relative.
     pub rounding: f64,
     pub exposure: f32,
+    /// Content hash of its record.
+    pub line: String,
+    /// What the kernels that it was rendered with are noted for.
+    pub name: String,
 }
 
 /// What references are rendered through: the fastest structure that passed with the embedded kernels, so
@@ -248,13 +252,16 @@ fn finish_reference(
     session.linear("reference", &labels, reference.image(), &about)?;
     line.body.image = image.unwrap_or_default();
     let done = format!("reference {}: done", labels.join(", "));
+    session.note_kernels(&done);
+    let sampler = format!("{}, {} spp", line.body.sampler, line.body.spp);
+    let hash = reference_hash(session, world, &line, &sampler);
     if !session.is_done(&done) {
-        let sampler = format!("{}, {} spp", line.body.sampler, line.body.spp);
-        let hash = reference_hash(session, world, &line, &sampler);
-        session.write(&line.hashed(hash).with_body(Body::Reference))?;
-        session.finish(done);
+        session.write(&line.hashed(&hash).with_body(Body::Reference))?;
+        session.finish(done.clone());
     }
     Ok(Yardstick {
+        line: hash,
+        name: done,
         reference,
         rounding,
         exposure,

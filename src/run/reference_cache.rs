@@ -129,7 +129,7 @@ fn trim(folder: &Path, most: u64) -> io::Result<()> {
 }
 
 /// Hash of the program's file: host code makes tables that kernels read.
-fn program() -> Option<&'static str> {
+pub(super) fn program() -> Option<&'static str> {
     static PROGRAM: OnceLock<Option<String>> = OnceLock::new();
     let hash = || {
         let bytes = fs::read(std::env::current_exe().ok()?).ok()?;
