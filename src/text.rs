@@ -61,9 +61,22 @@ mod tests {
 
     #[test]
     fn shell_words_come_back_from_a_shell() {
-        for text in ["a b", "it's", "$(x)`y`", "", "plain-1.2/x", "\"", "a\nb", "*", "~", "!x"] {
+        for text in [
+            "a b",
+            "it's",
+            "$(x)`y`",
+            "",
+            "plain-1.2/x",
+            "\"",
+            "a\nb",
+            "*",
+            "~",
+            "!x",
+        ] {
             let echo = format!("printf %s {}", shell_word(text));
-            let output = std::process::Command::new("sh").args(["-c", &echo]).output();
+            let output = std::process::Command::new("sh")
+                .args(["-c", &echo])
+                .output();
             assert_eq!(output.unwrap().stdout, text.as_bytes(), "{text:?}");
         }
         assert_eq!(shell_word("plain-1.2/x"), "plain-1.2/x");

@@ -34,9 +34,9 @@ impl Explain {
         };
         let stale = inventory.stale(state, &registries, &options)?;
         let mut text = format!("{}\n\n", state.unit.name);
-        writeln!(text, "kind         {}", state.unit.kind.plural())?;
+        writeln!(text, "kind          {}", state.unit.kind.plural())?;
         for (axis, variant) in variants(&state.unit.cell) {
-            writeln!(text, "{:<12} {variant}", axis.name())?;
+            writeln!(text, "{:<13} {variant}", axis.name())?;
         }
         if let Some(record) = &state.record {
             writeln!(text, "\n{}", outcome(record))?;
@@ -49,12 +49,12 @@ impl Explain {
                 ("timed on", &inputs.device),
             ] {
                 if !value.is_empty() {
-                    writeln!(text, "{what:<12} {value}")?;
+                    writeln!(text, "{what:<13} {value}")?;
                 }
             }
             let modules = inventory.modules(inputs);
             if !modules.is_empty() {
-                writeln!(text, "made of      {}", modules.join(", "))?;
+                writeln!(text, "made of       {}", modules.join(", "))?;
             }
         }
         match stale {
@@ -124,7 +124,8 @@ fn command(inventory: &Inventory, cell: &Cell) -> String {
     for value in &run.overrides {
         command += &format!(" --set {}", shell_word(value));
     }
-    for (axis, label) in variants(cell) {
+    let axes = &inventory.experiment.axes;
+    for (axis, label) in variants(cell).filter(|(axis, _)| axes[*axis].len() > 1) {
         command += &format!(" --only {}", shell_word(&format!("{axis}={label}")));
     }
     command

@@ -75,11 +75,7 @@ impl Plan {
             });
             let kinds = kinds.collect::<Vec<_>>().join(", ");
             let sum: f64 = own.iter().map(|place| seconds[*place]).sum();
-            writeln!(
-                text,
-                "  {number}/{of}  about {:>7}  {kinds}",
-                duration(sum)
-            )?;
+            writeln!(text, "  {number}/{of}  about {:>7}  {kinds}", duration(sum))?;
         }
         if empty > 0 {
             writeln!(

@@ -32,7 +32,10 @@ impl VerifyRun {
             writeln!(text, "failed        {}: {}", state.unit.name, record.reason)?;
         }
         for name in &inventory.contradicted {
-            writeln!(text, "contradicted  {name}: measured twice with different inputs")?;
+            writeln!(
+                text,
+                "contradicted  {name}: measured twice with different inputs"
+            )?;
         }
         for name in &inventory.foreign {
             writeln!(text, "not planned   {name}")?;
@@ -40,7 +43,8 @@ impl VerifyRun {
         if let Some(reason) = &inventory.interrupted {
             writeln!(text, "the run ended early: {reason}")?;
         }
-        let whole = settled == all && inventory.contradicted.is_empty() && inventory.foreign.is_empty();
+        let whole =
+            settled == all && inventory.contradicted.is_empty() && inventory.foreign.is_empty();
         if !whole {
             writeln!(
                 text,

@@ -167,9 +167,9 @@ impl FromStr for Shard {
 
     /// `3/8`: the third of eight.
     fn from_str(text: &str) -> Result<Self, String> {
-        let numbers = text.split_once('/').and_then(|(number, of)| {
-            Some((number.trim().parse().ok()?, of.trim().parse().ok()?))
-        });
+        let numbers = text
+            .split_once('/')
+            .and_then(|(number, of)| Some((number.trim().parse().ok()?, of.trim().parse().ok()?)));
         match numbers {
             Some((number, of)) if (1..=of).contains(&number) && of <= MOST_SHARDS => {
                 Ok(Self { number, of })
@@ -195,9 +195,7 @@ pub fn shards(units: &[Unit], of: usize, cost: impl Fn(&Unit) -> f64) -> Vec<usi
     let mut group_of = Vec::with_capacity(units.len());
     for unit in units {
         let (kind, cell) = unit.group();
-        let group = *groups
-            .entry((kind, cell.identity()))
-            .or_insert(costs.len());
+        let group = *groups.entry((kind, cell.identity())).or_insert(costs.len());
         if group == costs.len() {
             costs.push(0.0);
         }

@@ -12,7 +12,9 @@ use crate::coherence::{
 use crate::config::{Axis, Cell, Coherence, UnitKind, unit_name};
 use crate::measure::path_oracle::{self, PathOracle};
 use crate::measure::rays::RaySet;
-use crate::measure::record::{Body, ClassCoherence, CoherenceAt, CoherenceRecord, Key, Line, Outcome, Ran};
+use crate::measure::record::{
+    Body, ClassCoherence, CoherenceAt, CoherenceRecord, Key, Line, Outcome, Ran,
+};
 use std::collections::BTreeMap;
 
 /// What does not depend on the structure.

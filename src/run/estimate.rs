@@ -120,9 +120,7 @@ impl<'a> Estimate<'a> {
             },
             UnitKind::Compaction => Work {
                 elements: match integrator.params.0.get("elements") {
-                    Some(ParamValue::Integer(count)) => {
-                        rounds * u64::try_from(*count).unwrap_or(0)
-                    }
+                    Some(ParamValue::Integer(count)) => rounds * u64::try_from(*count).unwrap_or(0),
                     _ => 0,
                 },
                 kernels: 1,

@@ -368,10 +368,7 @@ fn remove(path: &Path) -> io::Result<()> {
 /// Makes the records that a killed run left in `partial/` those of the folder.
 fn promote(out: &Path) -> io::Result<()> {
     promote_images(out)?;
-    fs::rename(
-        out.join(PARTIAL).join(RECORDS_FILE),
-        out.join(RECORDS_FILE),
-    )
+    fs::rename(out.join(PARTIAL).join(RECORDS_FILE), out.join(RECORDS_FILE))
 }
 
 fn promote_images(out: &Path) -> io::Result<()> {

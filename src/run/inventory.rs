@@ -57,7 +57,10 @@ pub struct Inventory {
 ///
 /// # Errors
 /// The experiment in the records is none to this program.
-pub fn planned(run: &RunRecord, registries: &Registries) -> Result<(Experiment, Plan), ConfigError> {
+pub fn planned(
+    run: &RunRecord,
+    registries: &Registries,
+) -> Result<(Experiment, Plan), ConfigError> {
     // Overrides stand behind the text as comments, too.
     let text = &run.experiment_text;
     let experiment = Experiment::parse(
@@ -101,17 +104,15 @@ impl Inventory {
             .filter_map(|l| InterruptedRecord::of(&l.body));
         let interrupted = ended.last().map(|record| record.reason.clone());
         let mut of_unit: BTreeMap<String, Vec<CellRecord>> = BTreeMap::new();
-        for cell in records
-            .lines
-            .iter()
-            .filter_map(|l| CellRecord::of(&l.body))
-        {
+        for cell in records.lines.iter().filter_map(|l| CellRecord::of(&l.body)) {
             of_unit
                 .entry(cell.unit.clone())
                 .or_default()
                 .push(cell.clone());
         }
-        let contradicted = of_unit.iter().filter(|(_, records)| is_contradicted(records));
+        let contradicted = of_unit
+            .iter()
+            .filter(|(_, records)| is_contradicted(records));
         let contradicted = contradicted.map(|(name, _)| name.clone()).collect();
         let units = wanted_units(&records.lines, &experiment, &plan, registries);
         let all = plan.units(&experiment);
@@ -206,9 +207,7 @@ fn wanted_units(
 ) -> Vec<Unit> {
     let mut units = plan.units(experiment);
     let runs = lines.iter().filter_map(|line| RunRecord::of(&line.body));
-    let parts: Option<Vec<Shard>> = runs
-        .map(|run| run.shard.as_ref()?.parse().ok())
-        .collect();
+    let parts: Option<Vec<Shard>> = runs.map(|run| run.shard.as_ref()?.parse().ok()).collect();
     let Some(parts) = parts.filter(|parts| !parts.is_empty()) else {
         return units;
     };

@@ -277,9 +277,9 @@ fn check_devices(
         .collect();
     let mut devices: BTreeMap<&str, &Path> = BTreeMap::new();
     for (part, cells) in parts.iter().zip(chosen) {
-        let cells = cells.iter().filter(|cell| {
-            cell.outcome == Outcome::Done && timed.contains(cell.unit.as_str())
-        });
+        let cells = cells
+            .iter()
+            .filter(|cell| cell.outcome == Outcome::Done && timed.contains(cell.unit.as_str()));
         for cell in cells {
             devices.entry(&cell.inputs.device).or_insert(&part.dir);
         }
@@ -430,4 +430,3 @@ fn write(
     let text = text_of(lines).map_err(|e| input(format!("a record cannot be written: {e}")))?;
     write_atomic(&records, text.as_bytes()).map_err(|e| failed(&records, e))
 }
-

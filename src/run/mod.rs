@@ -37,9 +37,9 @@ mod world;
 
 pub use estimate::Estimate;
 pub use folder::{Existing, Interrupt, Interrupted, lock_folder};
-pub use kernels::{Kernels, kernel_library};
 pub use inputs::place;
 pub use inventory::{Inventory, State};
+pub use kernels::{Kernels, kernel_library};
 pub use known_images::verify_images;
 pub use merge::{Merged, merge};
 pub use reference_cache::user_cache;

@@ -122,9 +122,7 @@ fn judge_and_record(
     let blank = Line::new(Key::from(cell), ran, ());
     let hash = content_hash(&blank, &world.scene.hash, &[]);
     let paths = record.clone();
-    session
-        .judged_lines
-        .insert(key(world, cell), hash.clone());
+    session.judged_lines.insert(key(world, cell), hash.clone());
     session.write(&blank.hashed(&hash).with_body(|()| Body::Paths(paths)))?;
     Ok(record)
 }

@@ -2,9 +2,7 @@
 
 use super::inputs::Current;
 use crate::config::Unit;
-use crate::measure::record::{
-    Body, CellRecord, KernelSetRecord, Kind as _, Line, Outcome,
-};
+use crate::measure::record::{Body, CellRecord, KernelSetRecord, Kind as _, Line, Outcome};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// The lines that an earlier run left.

@@ -17,6 +17,7 @@ use crate::measure::record::{
     Body, CellRecord, FinishedRecord, KernelFolder, Line, Outcome, RunRecord, SkippedRecord, axis,
     text_of,
 };
+use crate::params::Variant;
 use crate::text::cell_hash;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -65,6 +66,8 @@ pub(super) struct Session<'a> {
     pub refused: BTreeMap<String, String>,
     /// Cells that are not measured: they have their record (and are not run again after a lost device), or another shard has them.
     done: HashSet<String>,
+    /// Units that failed in this run: nothing else is measured through them.
+    unusable: HashSet<String>,
     /// The units of the plan, in its order.
     pub units: Arc<Vec<Unit>>,
     /// Place of each unit by its name.
@@ -118,6 +121,14 @@ impl<'a> Session<'a> {
     pub fn abandon(&self) {
         if let Some(folder) = &self.folder {
             folder.abandon();
+        }
+    }
+
+    /// The content of a scene that was loaded.
+    pub fn note_scene(&mut self, scene: &Variant, hash: &str) {
+        if let Some(current) = &mut self.current {
+            let hash = Ok(hash.to_owned());
+            current.scenes.insert(scene.label.clone(), hash);
         }
     }
 
@@ -200,6 +211,7 @@ impl<'a> Session<'a> {
             if cell.outcome == Outcome::LeftOut {
                 self.skipped += 1;
                 self.refused.insert(cell.unit.clone(), cell.reason);
+                self.unusable.insert(cell.unit.clone());
             }
             self.done.insert(cell.unit);
         }
@@ -231,6 +243,11 @@ impl<'a> Session<'a> {
         !self.is_done(&unit_name(kind, cell))
     }
 
+    /// Whether a unit failed, or cannot be measured here.
+    pub fn is_unusable(&self, name: &str) -> bool {
+        self.unusable.contains(name)
+    }
+
     /// Kernels run on this device from now on.
     pub fn use_device(&mut self, gpu: &Gpu) {
         self.gpu = Some(gpu.clone());
@@ -255,6 +272,9 @@ impl<'a> Session<'a> {
     ) -> Result<(), RunError> {
         self.note_kernels(name);
         self.finish(name.to_owned());
+        if outcome != Outcome::Done {
+            self.unusable.insert(name.to_owned());
+        }
         let units = Arc::clone(&self.units);
         let unit = self.places.get(name).and_then(|place| units.get(*place));
         let (Some(unit), Some(current)) = (unit, &self.current) else {
@@ -313,6 +333,7 @@ impl<'a> Session<'a> {
         Self {
             places: places.collect(),
             units: Arc::new(units),
+            unusable: HashSet::new(),
             current: None,
             used: BTreeMap::new(),
             sets: HashSet::new(),

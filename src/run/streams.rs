@@ -66,7 +66,9 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
                     let line = line(&cell, kernel, &what, Body::Stream(record));
                     written.line(session, &line)?;
                 }
-                Err(reason) => written.failure(session, format!("stream {cell}, {what}"), reason)?,
+                Err(reason) => {
+                    written.failure(session, format!("stream {cell}, {what}"), reason)?
+                }
             }
         }
         if gpu.lost().is_none() {

@@ -229,10 +229,11 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
     // The last structure that was built: it serves all workgroups and kernels.
     let mut last: Option<Candidate> = None;
     for cell in cells {
-        if !is_needed(session, world, &cell) && !carries(session, world, &cell, &gated) {
+        let name = cell.to_string();
+        let is_wanted = is_needed(session, world, &cell) || carries(session, world, &cell, &gated);
+        if session.is_unusable(&name) || !is_wanted {
             continue;
         }
-        let name = cell.to_string();
         session.say(format!("{cell}: build and gate"));
         session.lose_device_on_request(world.gpu, &name);
         // What cannot serve goes before the next is built.
@@ -274,12 +275,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
     for structure in &timed {
         session.write(&structure.record.clone().with_body(Body::Structure))?;
         let lines = vec![structure.record.hash.clone()];
-        session.close(
-            &structure.cell.to_string(),
-            (Outcome::Done, ""),
-            lines,
-            &[],
-        )?;
+        session.close(&structure.cell.to_string(), (Outcome::Done, ""), lines, &[])?;
     }
     usable.append(&mut timed);
     Ok(usable)
@@ -305,7 +301,8 @@ fn carries(session: &Session, world: &World, cell: &Cell, gated: &[Gated]) -> bo
     let mut open = session
         .open_units()
         .filter(|unit| unit.cell.is_on(&world.cell));
-    let needs = |unit: &Unit| unit.kind == UnitKind::Sampler && unit.cell[Axis::Kernels] == *kernels;
+    let needs =
+        |unit: &Unit| unit.kind == UnitKind::Sampler && unit.cell[Axis::Kernels] == *kernels;
     !gated.iter().any(serves) && open.any(needs)
 }
 
