@@ -442,3 +442,66 @@ fn the_first_failure_ends_the_run_where_that_was_asked_for_and_it_can_be_resumed
             .all(|cell| cell.outcome == Outcome::Done)
     );
 }
+
+#[test]
+fn an_include_brings_back_what_an_exclude_takes_and_a_condition_ties_a_variant_to_cells() {
+    let plan_of = |changes: &[&str], more: &str| {
+        let text = experiment(changes) + more;
+        plan(&text, &Registries::default()).1
+    };
+    let scenes = "axes.scene = ['cornell-box', 'furnace-box']";
+    let all = plan_of(&[scenes], "");
+    assert_eq!((all.structures.len(), all.times.len()), (4, 8));
+    let exclude = "\n[[exclude]]\naccel = 'uniform-grid'\n";
+    let without = plan_of(&[scenes], exclude);
+    assert_eq!((without.structures.len(), without.times.len()), (2, 4));
+    let include =
+        "[[include]]\naccel = 'uniform-grid'\nscene = 'furnace-box'\nsequence = 'sobol'\n";
+    let with = plan_of(&[scenes], &format!("{exclude}{include}"));
+    // The structure comes back for the one cell that is timed with it.
+    assert_eq!((with.structures.len(), with.times.len()), (3, 5));
+    let out: usize = with.skipped.iter().map(|s| s.cells).sum();
+    assert_eq!(out, 3);
+    let when = "\n[accel.uniform-grid]\nlambda = [3, 8]\nwhen = { scene = 'furnace-box' }\n";
+    let tied = plan_of(&[scenes], when);
+    assert_eq!((tied.structures.len(), tied.times.len()), (4, 8));
+    assert!(
+        tied.skipped
+            .iter()
+            .any(|s| s.reason.contains("furnace-box"))
+    );
+    for (wrong, told) in [
+        ("\n[[include]]\naccel = 'octree'\n", "octree"),
+        ("\n[accel.bvh]\nwhen = { scnee = 'furnace-box' }\n", "scene"),
+        ("\n[accel.bvh]\nwhen = 'furnace-box'\n", "when"),
+        ("\n[[include]]\nacel = 'bvh'\n", "accel"),
+    ] {
+        let text = experiment(&[]) + wrong;
+        let catalogue = Registries::default().catalogue();
+        let refused = raystone::config::Experiment::parse(&text, "test", &[], &catalogue);
+        let refused = refused.expect_err(wrong).to_string();
+        assert!(refused.contains(told), "{refused}");
+    }
+}
+
+#[test]
+fn times_of_another_device_and_cells_of_another_program_are_measured_again() {
+    use UnitKind::{Sampler, Stream, Structure, Time};
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = experiment(&[]);
+    resume(&text, folder.path());
+    // Something is missing, so that an adapter is opened and looked at.
+    let take_out = |line: &mut Line| {
+        if let Body::Cell(cell) = &mut line.body {
+            match cell.inputs.device.is_empty() {
+                true => cell.inputs.program = "another".to_owned(),
+                false => cell.inputs.device = "another machine".to_owned(),
+            }
+        }
+    };
+    rewrite(folder.path(), take_out);
+    let (_, lines) = resume(&text, folder.path());
+    let all = names(&[Sampler, Stream, Structure, Time], &text);
+    assert_eq!(measured_again(&lines), all);
+    assert!(!text_of(&lines).expect("lines").contains("another machine"));
+}

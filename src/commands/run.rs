@@ -99,6 +99,14 @@ impl Run {
         signals::watch(options.interrupt.clone())?;
         match raystone::run::run(&experiment, &plan, &registries, &options) {
             Err(RunError::Interrupted) => signals::wait_for_end(),
+            Err(RunError::EndedEarly { folder, source }) if source.is_interruption() => {
+                let page = write_report(&folder)?.html;
+                output::tell(&format!(
+                    "interrupted; `--resume` goes on; report so far: {}",
+                    page.display()
+                ));
+                Ok(ExitCode::from(signals::INTERRUPTED))
+            }
             Err(RunError::EndedEarly { folder, source }) => {
                 write_report(&folder)?;
                 Err(RunError::EndedEarly { folder, source }.into())

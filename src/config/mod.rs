@@ -24,8 +24,8 @@ pub use axis_map::AxisMap;
 pub use cells::{COMPACTIONS, Cell, NO_PEER, is_compaction};
 pub use error::{ConfigError, Place};
 pub use experiment::{
-    Animation, Axes, Coherence, Discrepancy, Exclude, Experiment, Gate, Motion, REFERENCE_PARTS,
-    Reference, Rule, Seeds, SppCounts, StopRule, Timing,
+    Animation, Axes, CellSet, Coherence, Condition, Discrepancy, Experiment, Gate, Motion,
+    REFERENCE_PARTS, Reference, Rule, Seeds, SppCounts, StopRule, Timing,
 };
 pub use keys::Axis;
 pub use pattern::Pattern;

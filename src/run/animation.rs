@@ -69,6 +69,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             Some(reason) => (Outcome::Failed, reason.as_str()),
             None => (Outcome::Done, ""),
         };
+        session.progress.add(session.weights.animation);
         session.close(&name, ended, vec![hash], &["animation"])?;
     }
     Ok(())

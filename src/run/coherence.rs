@@ -69,6 +69,7 @@ fn write(
     let settings = format!("{:?}", line.body.settings);
     let hash = content_hash(&line, &world.scene.hash, &[("coherence", &settings)]);
     session.write(&line.hashed(&hash).with_body(Body::Coherence))?;
+    session.progress.add(session.weights.model);
     session.close(&name(cell), (Outcome::Done, ""), vec![hash], &[])
 }
 

@@ -39,6 +39,7 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
     let mut uploaded = Uploaded::new();
     let mut timed = Vec::new();
     for cell in &cells {
+        session.go_on()?;
         let gpu = device.of(&cell[Axis::Kernels])?;
         session.say(format!("{cell}: judging"));
         session.lose_device_on_request(gpu, &cell.to_string());
@@ -49,17 +50,17 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
             Err(Absent::Refused(reason)) => session.write_refused(cell.to_string(), reason)?,
             Err(Absent::Failed(reason)) => fail(session, cell, reason)?,
         }
-        session.progress.inc(1);
+        session.progress.add(session.weights.compaction);
         if gpu.lost().is_some() {
             return Ok(());
         }
     }
     let timing = session.experiment.timing;
     let seed = u64::from(session.experiment.seed);
-    let progress = session.progress.clone();
+    let (progress, weight) = (session.progress.clone(), session.weights.compaction);
     session.say("timing compactions");
     let measured = (session.clock).time("gpu", || {
-        interleave(&timed, &timing, seed, || progress.inc(1))
+        interleave(&timed, &timing, seed, || progress.add(weight))
     });
     let measured = match measured {
         Ok(measured) => measured,

@@ -92,6 +92,7 @@ fn all_errors(
     yardstick: &Yardstick,
 ) -> Result<(), RunError> {
     for cell in cells {
+        session.go_on()?;
         let text = cell.to_string();
         let fastest = match fastest(session, gated, cell) {
             Ok(fastest) => fastest,
@@ -277,7 +278,7 @@ fn all_samples(
         check_finite(&record)?;
         session.write(&line(Body::Error(record)))?;
         images.extend(snapshots.into_iter().last().map(|s| s.image));
-        session.progress.inc(1);
+        session.progress.add(session.weights.replicate);
     }
     Ok(Replicates {
         spp: session.experiment.spp.max(),
@@ -325,7 +326,7 @@ fn until_met(
         record.stop = Some(rule);
         draw(session, cell, yardstick, &mut record, snapshot)?;
         session.write(&line(Body::Error(record)))?;
-        session.progress.inc(1);
+        session.progress.add(session.weights.replicate);
     }
     Ok(Replicates {
         spp: last.first().map_or(0, |snapshot| snapshot.spp),

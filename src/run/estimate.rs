@@ -81,6 +81,16 @@ impl<'a> Estimate<'a> {
         self.whole.seconds()
     }
 
+    /// Seconds of an image.
+    pub(super) fn image_seconds(&self, integrator: &Variant, spp: u32) -> f64 {
+        self.rays_seconds(self.image(integrator, spp))
+    }
+
+    /// Seconds of so many rays.
+    pub(super) fn rays_seconds(&self, rays: u64) -> f64 {
+        rays as f64 / RAYS_PER_SECOND
+    }
+
     /// Rays of an image.
     fn image(&self, integrator: &Variant, spp: u32) -> u64 {
         let [width, height] = self.experiment.resolution.map(u64::from);

@@ -15,12 +15,15 @@ use crate::measure::record::{
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Instant;
 
 /// Empty; an operating-system lock on it ends with the process that holds it.
 const LOCK_FILE: &str = ".lock";
 const IMAGES: &str = "images";
+/// What was done when, for people.
+const LOG_FILE: &str = "run.log";
 
 /// What to do with a folder that holds results.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -191,6 +194,21 @@ impl Folder {
         (relative, path)
     }
 
+    /// Adds a line to `run.log`, with the seconds since the run began.
+    pub fn log(&self, text: &str) {
+        let path = self.out.join(LOG_FILE);
+        let is_link = fs::symlink_metadata(&path).is_ok_and(|meta| meta.is_symlink());
+        if is_link && remove(&path).is_err() {
+            return;
+        }
+        let plain = |c: char| if c.is_control() { ' ' } else { c };
+        let text: String = text.chars().map(plain).collect();
+        let line = format!("{:9.2} s  {text}\n", self.start.elapsed().as_secs_f64());
+        let mut options = OpenOptions::new();
+        let file = options.append(true).create(true).open(&path);
+        let _ = file.and_then(|mut file| file.write_all(line.as_bytes()));
+    }
+
     /// A panic elsewhere leaves whole lines, so the records can still be used.
     fn records(&self) -> MutexGuard<'_, Records> {
         self.records.lock().unwrap_or_else(PoisonError::into_inner)
@@ -316,11 +334,26 @@ pub enum Interrupted {
     Kept(PathBuf),
 }
 
-/// Ends a run early, from any thread, however long a step of the run takes: see [`Interrupt::now`].
+/// Ends a run early, from any thread: behind the cell that is being measured ([`Interrupt::ask`]), or however long a step of the run takes
+/// ([`Interrupt::now`]).
 #[derive(Debug, Clone, Default)]
-pub struct Interrupt(Arc<Mutex<Weak<Folder>>>);
+pub struct Interrupt {
+    folder: Arc<Mutex<Weak<Folder>>>,
+    asked: Arc<AtomicBool>,
+}
 
 impl Interrupt {
+    /// Asks the run to end as soon as what is being measured has its record. Whether it has begun at all.
+    pub fn ask(&self) -> bool {
+        self.asked.store(true, Ordering::Relaxed);
+        self.begun().upgrade().is_some()
+    }
+
+    /// Whether the run was asked to end.
+    pub(super) fn is_asked(&self) -> bool {
+        self.asked.load(Ordering::Relaxed)
+    }
+
     /// Keeps the records so far with a line that says `reason`; the run itself ends with [`RunError::Interrupted`] at its next record.
     pub fn now(&self, reason: &str) -> Interrupted {
         let folder = self.begun().upgrade();
@@ -333,7 +366,7 @@ impl Interrupt {
     }
 
     fn begun(&self) -> MutexGuard<'_, Weak<Folder>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.folder.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -49,6 +49,8 @@ fn settings(experiment: &Experiment, reference_file: &str, kind: UnitKind) -> St
         text: _,
         overrides: _,
         excludes: _,
+        includes: _,
+        conditions: _,
         replicates,
         seed,
         resolution,

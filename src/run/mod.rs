@@ -20,6 +20,7 @@ mod orders;
 mod paths;
 mod peers;
 mod primary;
+mod progress;
 mod reference;
 mod reference_cache;
 mod reference_file;
@@ -135,6 +136,11 @@ pub enum RunError {
 }
 
 impl RunError {
+    /// Whether somebody asked for the end.
+    pub fn is_interruption(&self) -> bool {
+        matches!(self, Self::Interrupted)
+    }
+
     /// The exit code of the program: 1 a wrong result, 2 bad usage or input, 3 no usable adapter.
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -239,7 +245,7 @@ pub fn run(
     };
     let kept = session.begin(&device, &kernels, (&earlier, current));
     let out = kept.and_then(|kept| Ok((kept, measure(&mut session, device, &kernels)?)));
-    let (kept, out) = out.map_err(|error| match options.interrupt.now(&error.to_string()) {
+    let (kept, out) = out.map_err(|error| match options.interrupt.now(&reason(&error)) {
         Interrupted::Kept(folder) => RunError::EndedEarly {
             folder,
             source: Box::new(error),
@@ -253,6 +259,14 @@ pub fn run(
         kept,
         out,
     })
+}
+
+/// Why a run ended early, for its last record.
+fn reason(error: &RunError) -> String {
+    match error {
+        RunError::Interrupted => "SIGINT".to_owned(),
+        error => error.to_string(),
+    }
 }
 
 /// The content of each scene as it is now.
@@ -321,6 +335,7 @@ fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Resul
         if session.is_done(&done) || !session.open_units().any(|unit| unit.cell.is_on(&cell)) {
             continue;
         }
+        session.go_on()?;
         run_world(session, device, &loaded, &cell)?;
         if device.gpu.lost().is_some() {
             break;
@@ -351,15 +366,17 @@ fn run_world(
             return session.leave_out(cell, reason);
         }
     };
-    session.progress.inc(session::SCENE_STEPS);
+    session.progress.add(session.weights.world);
     let gpu = &device.gpu;
     let gated = structures::run(session, &world)?;
+    session.go_on()?;
     if gpu.lost().is_none() {
         errors::run(session, &world, &gated)?;
     }
     if gpu.lost().is_none() {
         times::run(session, &world, &gated)?;
     }
+    session.go_on()?;
     coherence::run(session, &world, &gated)?;
     if gpu.lost().is_none() {
         animation::run(session, &world, &gated)?;
@@ -402,7 +419,7 @@ pub fn verify(
             }
         }
     }
-    session.progress.finish_and_clear();
+    session.progress.bar.finish_and_clear();
     Ok(verified)
 }
 

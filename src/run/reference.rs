@@ -110,7 +110,9 @@ pub(super) fn reference(
     let cached = kept.is_some();
     let parts = match kept {
         Some(parts) => {
-            session.progress.inc(parts.len() as u64);
+            session
+                .progress
+                .add(parts.len() as f64 * session.weights.reference_part);
             parts
         }
         None => rendered_parts(session, &renderer, spp, &seeds)?,
@@ -149,7 +151,7 @@ fn rendered_parts(
         let shots = session.clock.time("gpu", || renderer.render(&[spp], seed));
         let shots = shots.map_err(|e| e.to_string())?;
         parts.extend(shots.into_iter().map(|s| s.image));
-        session.progress.inc(1);
+        session.progress.add(session.weights.reference_part);
     }
     Ok(parts)
 }
@@ -177,7 +179,9 @@ fn reference_hash<B>(session: &Session, world: &World, line: &Line<B>, points: &
 fn file_reference(session: &mut Session, world: &World, cell: &Cell) -> Result<Yardstick, Fault> {
     let file = session.reference_file.as_ref();
     let file = file.ok_or_else(|| "no reference was read".to_owned())?;
-    session.progress.inc(u64::from(REFERENCE_PARTS));
+    session
+        .progress
+        .add(f64::from(REFERENCE_PARTS) * session.weights.reference_part);
     let reference = file.reference.clone();
     let record = ReferenceRecord {
         file: Some(file.name.clone()),
@@ -203,7 +207,9 @@ fn exact_reference(
     let reference = Image::new(width, height, pixels)
         .and_then(|image| Reference::from_parts(vec![image; REFERENCE_PARTS as usize]))
         .map_err(|e| e.to_string())?;
-    session.progress.inc(u64::from(REFERENCE_PARTS));
+    session
+        .progress
+        .add(f64::from(REFERENCE_PARTS) * session.weights.reference_part);
     let record = ReferenceRecord {
         exact: Some(value),
         ..reference_record(&reference)

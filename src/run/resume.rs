@@ -123,3 +123,119 @@ fn once<'a>(lines: impl Iterator<Item = &'a Line>) -> Vec<Line> {
     }
     whole
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::inputs::kernel_set;
+    use super::super::kernels::Kernels;
+    use super::super::{Estimate, Registries};
+    use super::*;
+    use crate::config::{Experiment, Plan, shards};
+    use crate::measure::record::{RECORDS_FILE, SkippedRecord, read_records, text_of};
+    use std::time::Instant;
+
+    /// An experiment with about `count` cells: parameters of one sequence and one structure.
+    fn large(count: usize) -> (Experiment, Plan) {
+        let edge = (count as f64).sqrt().ceil() as usize;
+        let list = |from: usize| {
+            let values: Vec<String> = (from..from + edge).map(|i| i.to_string()).collect();
+            values.join(", ")
+        };
+        let text = format!(
+            "[run]\nreplicates = 2\nspp = {{ pow2 = [0, 1] }}\n[axes]\nscene = [\"cornell-box\"]\n\
+             accel = [\"uniform-grid\"]\nsequence = [\"halton\"]\ndecorrelation = [\"micro-jitter\"]\n\
+             integrator = [\"path\"]\n[accel.uniform-grid]\nlambda = [{}]\n\
+             [decorrelation.micro-jitter]\namplitude = [{}]\n",
+            list(1),
+            (1..=edge)
+                .map(|i| format!("{:.5}", i as f64 / (2 * edge) as f64))
+                .collect::<Vec<_>>()
+                .join(", "),
+        );
+        let registries = Registries::default();
+        let experiment =
+            Experiment::parse(&text, "large", &[], &registries.catalogue()).expect("an experiment");
+        let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d));
+        (experiment, plan.expect("a plan"))
+    }
+
+    #[test]
+    fn a_plan_of_many_cells_is_made_and_divided_quickly() {
+        let start = Instant::now();
+        let (experiment, plan) = large(100_000);
+        let units = plan.units(&experiment);
+        let registries = Registries::default();
+        let estimate = Estimate::new(&experiment, &plan, &registries);
+        let numbers = shards(&units, 64, |unit| estimate.seconds_of(unit));
+        let seconds = start.elapsed().as_secs_f64();
+        assert!(units.len() >= 100_000 && numbers.len() == units.len());
+        // Two seconds are the bound for a program as released on a machine of its own.
+        assert!(seconds < 20.0, "{seconds}");
+        println!(
+            "{} cells planned and divided in {seconds:.2} s",
+            units.len()
+        );
+    }
+
+    #[test]
+    fn a_finished_run_of_many_cells_is_looked_through_quickly() {
+        let (experiment, plan) = large(10_000);
+        let units = plan.units(&experiment);
+        let registries = Registries::default();
+        let kernels = Kernels::load(&plan.kernels, &registries).expect("kernels");
+        let mut current = Current::new(&experiment, "", &kernels);
+        let scene = ("cornell-box".to_owned(), Ok("0123".to_owned()));
+        current.scenes.insert(scene.0, scene.1);
+        let library = crate::gpu::KernelLibrary::default();
+        let modules = library.names().take(40).map(str::to_owned);
+        let modules = modules.map(|name| {
+            let hash = library.text_hash(&name);
+            (name, hash)
+        });
+        let set = kernel_set("", modules.collect());
+        let mut lines = vec![Line::about_all(Body::Kernels(set.clone()))];
+        for unit in &units {
+            // As many bytes as the record of a structure has.
+            let record = SkippedRecord {
+                cell: unit.name.clone(),
+                reason: "x".repeat(4000),
+            };
+            let hash = blake3::hash(unit.name.as_bytes()).to_hex().to_string();
+            lines.push(Line::about_all(Body::Skipped(record)).hashed(&hash));
+            let mut inputs = current.inputs(unit);
+            inputs.kernels.clone_from(&set.id);
+            lines.push(Line::about_all(Body::Cell(CellRecord {
+                unit: unit.name.clone(),
+                outcome: Outcome::Done,
+                reason: String::new(),
+                inputs,
+                lines: vec![hash],
+            })));
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let text = text_of(&lines).expect("lines");
+        std::fs::write(folder.path().join(RECORDS_FILE), text).expect("a file");
+        let start = Instant::now();
+        let records = read_records(folder.path()).expect("records");
+        let earlier = Earlier::new(records.lines);
+        let kept = earlier.kept(&units, &current);
+        let seconds = start.elapsed().as_secs_f64();
+        assert_eq!((kept.cells.len(), kept.stale.len()), (units.len(), 0));
+        assert_eq!(kept.lines.len(), lines.len());
+        assert!(seconds < 20.0, "{seconds}");
+        println!("{} cells looked through in {seconds:.2} s", units.len());
+        // One that failed, one of another program and one that is gone.
+        let mut other = earlier.lines.clone();
+        for (place, line) in other.iter_mut().rev().step_by(2).take(2).enumerate() {
+            if let Body::Cell(cell) = &mut line.body {
+                match place {
+                    0 => cell.outcome = Outcome::Failed,
+                    _ => cell.inputs.program = "another".to_owned(),
+                }
+            }
+        }
+        other.remove(2);
+        let kept = Earlier::new(other).kept(&units, &current);
+        assert_eq!((kept.cells.len(), kept.stale.len()), (units.len() - 3, 2));
+    }
+}

@@ -4,12 +4,11 @@ use super::estimate::Estimate;
 use super::folder::Folder;
 use super::inputs::{Current, kernel_set, place};
 use super::kernels::{Device, Kernels};
+use super::progress::{Progress, Weights, expect};
 use super::reference_file::ReferenceFile;
 use super::resume::{Earlier, Kept};
 use super::{RunError, RunOptions};
-use crate::config::{
-    Axis, Cell, Experiment, Plan, REFERENCE_PARTS, Skipped, Unit, UnitKind, shards, unit_name,
-};
+use crate::config::{Axis, Cell, Experiment, Plan, Skipped, Unit, UnitKind, shards, unit_name};
 use crate::gpu::Environment;
 use crate::gpu::Gpu;
 use crate::image::{Attribute, Image, ImageError, Picture, write_png};
@@ -19,7 +18,6 @@ use crate::measure::record::{
 };
 use crate::params::Variant;
 use crate::text::cell_hash;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -55,7 +53,9 @@ pub(super) struct Session<'a> {
     pub registries: &'a super::Registries,
     pub options: &'a RunOptions,
     pub clock: Clock,
-    pub progress: ProgressBar,
+    pub progress: Progress,
+    /// Expected times of its steps.
+    pub weights: Weights,
     pub failed: usize,
     pub skipped: usize,
     /// Whether a scene could not be loaded.
@@ -157,6 +157,7 @@ impl<'a> Session<'a> {
         }
         self.current = Some(current);
         self.take_over(kept)?;
+        expect(self);
         self.write_start(environment, kernels.folders())?;
         Ok(count)
     }
@@ -305,6 +306,13 @@ impl<'a> Session<'a> {
             lines,
         };
         self.write(&Line::about_all(Body::Cell(record)))?;
+        let word = match outcome {
+            Outcome::Done => "done",
+            Outcome::Failed => "failed",
+            Outcome::LeftOut => "left out",
+        };
+        let between = if reason.is_empty() { "" } else { ": " };
+        self.log(&format!("{name}: {word}{between}{reason}"));
         if outcome == Outcome::Failed && self.options.fail_fast {
             return Err(RunError::Wrong(format!("{name} failed: {reason}")));
         }
@@ -318,15 +326,6 @@ impl<'a> Session<'a> {
         registries: &'a super::Registries,
         options: &'a RunOptions,
     ) -> Self {
-        let progress = if options.progress {
-            ProgressBar::new(steps(experiment, plan))
-        } else {
-            ProgressBar::hidden()
-        };
-        let style = ProgressStyle::with_template(
-            "{bar:32} {pos}/{len} · {elapsed} · about {eta} left · {wide_msg}",
-        );
-        progress.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         let units = plan.units(experiment);
         let places = units.iter().enumerate();
         let places = places.map(|(place, unit)| (unit.name.clone(), place));
@@ -344,7 +343,8 @@ impl<'a> Session<'a> {
             registries,
             options,
             clock: Clock::new(),
-            progress,
+            progress: Progress::new(options),
+            weights: Weights::default(),
             failed: 0,
             skipped: 0,
             bad_input: false,
@@ -386,10 +386,18 @@ impl<'a> Session<'a> {
         })))
     }
 
+    /// Writes a line to the log of the run. A log that cannot be written is no reason to end.
+    pub fn log(&self, text: &str) {
+        if let Some(folder) = &self.folder {
+            folder.log(text);
+        }
+    }
+
     /// Hands a warning on, above the progress bar.
     pub fn tell_warning(&self, text: &str) {
+        self.log(&format!("warning: {text}"));
         if let Some(tell) = self.options.warn {
-            self.progress.suspend(|| tell(text));
+            self.progress.bar.suspend(|| tell(text));
         }
     }
 
@@ -458,13 +466,21 @@ impl<'a> Session<'a> {
             failed: self.failed,
             skipped: self.skipped,
         };
-        self.progress.finish_and_clear();
+        self.progress.bar.finish_and_clear();
         self.write(&Line::about_all(Body::Finished(record)))?;
         let Some(folder) = &self.folder else {
             return Ok(self.options.out.clone());
         };
         folder.finish()?;
         Ok(folder.out().to_owned())
+    }
+
+    /// Ends the run here if somebody asked for it.
+    pub fn go_on(&self) -> Result<(), RunError> {
+        match self.options.interrupt.is_asked() {
+            true => Err(RunError::Interrupted),
+            false => Ok(()),
+        }
     }
 
     /// Whether a cell has its record.
@@ -491,14 +507,17 @@ impl<'a> Session<'a> {
 
     /// Tells how the run goes on: above the progress bar, or as a line.
     pub fn tell_progress(&self, text: &str) {
+        self.log(text);
         if let Some(tell) = self.options.tell {
-            self.progress.suspend(|| tell(text));
+            self.progress.bar.suspend(|| tell(text));
         }
     }
 
     /// Shows what is being done.
     pub fn say(&self, message: impl Into<String>) {
-        self.progress.set_message(message.into());
+        let message = message.into();
+        self.log(&message);
+        self.progress.say(message);
     }
 
     /// Writes a picture of this kind, of what the labels name: its path relative to the run's folder. One that
@@ -553,20 +572,6 @@ impl<'a> Session<'a> {
 
 fn unwritable(error: serde_json::Error) -> RunError {
     RunError::Input(format!("a record cannot be written: {error}"))
-}
-
-/// Progress steps that loading and judging a scene count for: as long as so many timed rounds, roughly.
-pub(super) const SCENE_STEPS: u64 = 20;
-
-/// Rough number of progress steps: scenes, builds and gates, compiled and timed cells, renders, streams.
-fn steps(experiment: &Experiment, plan: &Plan) -> u64 {
-    let rounds = u64::from(experiment.timing.rounds) + 1;
-    let structures = plan.structures.len() as u64 * (2 + 5 * rounds);
-    let times = (plan.times.len() + plan.compactions.len()) as u64 * (1 + rounds);
-    let worlds: usize = plan.scenes.iter().map(|s| plan.worlds(s).len()).sum();
-    let scenes = worlds as u64 * SCENE_STEPS;
-    let references = worlds * experiment.axes[Axis::Integrator].len() * REFERENCE_PARTS as usize;
-    scenes + structures + times + (plan.renders_planned() + references + plan.streams.len()) as u64
 }
 
 /// Content hash of the cell of a line: its key, the bytes of its scene, the kernels that ran, and what else

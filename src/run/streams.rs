@@ -55,6 +55,7 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
         if session.is_done(&cell.to_string()) {
             continue;
         }
+        session.go_on()?;
         let gpu = device.of(&cell[Axis::Kernels])?;
         session.say(format!("discrepancy of {cell}"));
         session.lose_device_on_request(gpu, &cell.to_string());
@@ -85,7 +86,7 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
             None => (Outcome::Done, ""),
         };
         session.close(&cell.to_string(), ended, written.hashes, &[])?;
-        session.progress.inc(1);
+        session.progress.add(session.weights.stream);
         if gpu.lost().is_some() {
             return Ok(());
         }

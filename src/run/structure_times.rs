@@ -90,11 +90,11 @@ pub(super) fn time_all(
     session.note_kernels("peers");
     let timing = session.experiment.timing;
     let seed = u64::from(session.experiment.seed);
-    let progress = session.progress.clone();
+    let (progress, weight) = (session.progress.clone(), session.weights.rays);
     let ours = timed.iter().map(|item| item as &dyn Measured);
     let all: Vec<&dyn Measured> = ours.chain(cast.iter().map(|item| item as _)).collect();
     let mut samples = match session.clock.time("gpu", || {
-        interleave(&all, &timing, seed, || progress.inc(1))
+        interleave(&all, &timing, seed, || progress.add(weight))
     }) {
         Ok(samples) => samples,
         Err((index, error)) => {

@@ -234,6 +234,10 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
         if session.is_unusable(&name) || !is_wanted {
             continue;
         }
+        // What was judged so far is still timed.
+        if session.go_on().is_err() {
+            break;
+        }
         session.say(format!("{cell}: build and gate"));
         session.lose_device_on_request(world.gpu, &name);
         // What cannot serve goes before the next is built.
@@ -254,7 +258,7 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
             None if session.is_done(&name) => {}
             None => write_failed(session, world, &cell, outcome.record)?,
         }
-        session.progress.inc(2);
+        session.progress.add(session.weights.gate);
         if world.gpu.lost().is_some() {
             return Ok(Vec::new());
         }

@@ -67,6 +67,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     let cells = cells.filter(|c| c.is_on(&world.cell) && !session.is_done(&c.to_string()));
     let mut timed = Vec::new();
     for cell in cells.cloned().collect::<Vec<_>>() {
+        session.go_on()?;
         let name = cell.to_string();
         timed.extend(prepare(session, world, gated, cell)?);
         session.note_kernels(&name);
@@ -77,9 +78,9 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     session.say(format!("{}: timing full cells", world.cell));
     let timing = session.experiment.timing;
     let seed = u64::from(session.experiment.seed);
-    let progress = session.progress.clone();
+    let (progress, weight) = (session.progress.clone(), session.weights.image);
     let samples = session.clock.time("gpu", || {
-        interleave(&timed, &timing, seed, || progress.inc(1))
+        interleave(&timed, &timing, seed, || progress.add(weight))
     });
     let samples = match samples {
         Ok(samples) => samples,
@@ -141,7 +142,7 @@ fn prepare<'a>(
         }
     }
     let compiled = compile(session, world, structure, cell.clone());
-    session.progress.inc(1);
+    session.progress.add(session.weights.compile);
     match compiled {
         Ok(item) => Ok(Some(item)),
         Err(reason) => fail(session, &cell, reason).map(|()| None),
