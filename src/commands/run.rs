@@ -6,11 +6,14 @@ use super::output::{self, print};
 use super::signals;
 use anyhow::Result;
 use clap::Args;
-use raystone::config::{Cell, Experiment, Shard};
+use raystone::config::{Cell, Experiment, Plan, Shard};
 use raystone::image::FileFormat;
 use raystone::measure::record::{Body, Line, read_records};
 use raystone::report::{failed_checks, terminal_tables, write_report};
-use raystone::run::{Estimate, Existing, Kernels, Registries, RunError, RunSummary, user_cache};
+use raystone::run::{
+    Estimate, Existing, Kernels, Registries, RunError, RunOptions, RunSummary, render_references,
+    user_cache,
+};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -29,9 +32,15 @@ pub struct Run {
     /// others are measured
     #[arg(long, conflicts_with_all = ["number", "force"])]
     resume: bool,
+    /// Where another run is writing the folder, wait until it ends instead of ending
+    #[arg(long)]
+    wait: bool,
     /// Run one of N parts of the plan, as 3/8; `raystone merge` joins them [default folder: results/NAME/shard-K-of-N]
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
+    /// Render the references alone and keep them where runs find them; with --shard, a part of their samples
+    #[arg(long, conflicts_with_all = ["no_cache", "resume", "force", "number"])]
+    references: bool,
     /// End with the first cell that fails; `--resume` goes on later
     #[arg(long, conflicts_with = "keep_going")]
     fail_fast: bool,
@@ -94,8 +103,12 @@ impl Run {
         options.existing = existing;
         options.images = self.images;
         options.shard = self.shard;
+        options.wait = self.wait;
         options.fail_fast = self.fail_fast && !self.keep_going;
         options.cache = user_cache().filter(|_| !self.no_cache);
+        if self.references {
+            return references(&experiment, &plan, &registries, &options);
+        }
         signals::watch(options.interrupt.clone())?;
         match raystone::run::run(&experiment, &plan, &registries, &options) {
             Err(RunError::Interrupted) => signals::wait_for_end(),
@@ -114,6 +127,29 @@ impl Run {
             summary => tell(&summary?, self.quiet),
         }
     }
+}
+
+/// Renders references alone.
+fn references(
+    experiment: &Experiment,
+    plan: &Plan,
+    registries: &Registries,
+    options: &RunOptions,
+) -> Result<ExitCode> {
+    let (rendered, failures) = render_references(experiment, plan, registries, options)?;
+    let folder = options.cache.as_deref().unwrap_or(Path::new("."));
+    print(&format!(
+        "{} rendered; kept in {}\n",
+        plural(rendered, "part of a reference", "parts of references"),
+        folder.display()
+    ))?;
+    for failure in &failures {
+        output::tell(&format!("failed: {failure}"));
+    }
+    Ok(match failures.is_empty() {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::from(FAILED),
+    })
 }
 
 /// The image to compare with as an override of an experiment.

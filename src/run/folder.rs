@@ -17,11 +17,13 @@ use std::io::{self, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Empty; an operating-system lock on it ends with the process that holds it.
 const LOCK_FILE: &str = ".lock";
 const IMAGES: &str = "images";
+/// How often a run that waits for another looks whether that has ended.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(500);
 /// What was done when, for people.
 const LOG_FILE: &str = "run.log";
 
@@ -74,6 +76,8 @@ enum State {
 enum Refusal {
     /// It holds results, or another run writes it: the next number may do.
     Taken(String),
+    /// Another run writes it now.
+    Busy(String),
     Unwritable(RunError),
 }
 
@@ -89,15 +93,20 @@ impl Folder {
     ///
     /// # Errors
     /// A folder that cannot be written, that another run writes, or that holds results.
-    pub fn open(out: &Path, existing: Existing) -> Result<Self, RunError> {
+    pub fn open(out: &Path, existing: Existing, wait: bool) -> Result<Self, RunError> {
         let mut number = 1;
         loop {
             let candidate = numbered(out, number);
             match Self::open_one(&candidate, existing) {
                 Ok(folder) => return Ok(folder),
                 Err(Refusal::Unwritable(error)) => return Err(error),
-                Err(Refusal::Taken(_)) if existing == Existing::Number => number += 1,
-                Err(Refusal::Taken(reason)) => return Err(RunError::Input(reason)),
+                Err(Refusal::Taken(_) | Refusal::Busy(_)) if existing == Existing::Number => {
+                    number += 1;
+                }
+                Err(Refusal::Busy(_)) if wait => std::thread::sleep(BETWEEN_LOOKS),
+                Err(Refusal::Taken(reason) | Refusal::Busy(reason)) => {
+                    return Err(RunError::Input(reason));
+                }
             }
         }
     }
@@ -452,7 +461,7 @@ fn keep(out: &Path, lines: &[Line]) -> io::Result<()> {
 pub fn lock_folder(out: &Path) -> Result<Option<File>, RunError> {
     fs::create_dir_all(out).map_err(|error| unwritable(out, &error))?;
     lock(out).map_err(|refusal| match refusal {
-        Refusal::Taken(reason) => RunError::Input(reason),
+        Refusal::Taken(reason) | Refusal::Busy(reason) => RunError::Input(reason),
         Refusal::Unwritable(error) => error,
     })
 }
@@ -468,7 +477,7 @@ fn lock(out: &Path) -> Result<Option<File>, Refusal> {
     let file = file.map_err(failed)?;
     match file.try_lock() {
         Ok(()) => Ok(Some(file)),
-        Err(TryLockError::WouldBlock) => Err(Refusal::Taken(format!(
+        Err(TryLockError::WouldBlock) => Err(Refusal::Busy(format!(
             "another run is writing to {}; wait until it ends, or choose another folder with --out",
             out.display()
         ))),

@@ -348,6 +348,7 @@ fn end(parts: &[Part]) -> Body {
         overhead_s: 0.0,
         failed: 0,
         skipped: 0,
+        load: Default::default(),
     };
     for part in parts {
         let lines = part.earlier.lines().iter();
@@ -356,6 +357,7 @@ fn end(parts: &[Part]) -> Body {
             sum.overhead_s += finished.overhead_s;
             sum.failed += finished.failed;
             sum.skipped += finished.skipped;
+            sum.load = finished.load;
             for (name, seconds) in &finished.parts_s {
                 *sum.parts_s.entry(name.clone()).or_default() += seconds;
             }

@@ -47,7 +47,7 @@ pub use reference_cache::user_cache;
 pub use registries::Registries;
 pub use render::{Pictures, Rendering, render};
 
-use crate::config::{Axis, Cell, Experiment, Plan, Shard, Unit};
+use crate::config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS, Shard, Unit};
 use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
 use crate::image::FileFormat;
 use crate::measure::record::{GateVerdict, PathsRecord};
@@ -85,6 +85,8 @@ pub struct RunOptions {
     pub allow_outside: bool,
     /// The part of the plan that is run; `None`: all of it.
     pub shard: Option<Shard>,
+    /// Whether to wait for another run that writes the folder.
+    pub wait: bool,
     /// Whether the first cell that fails ends the run.
     pub fail_fast: bool,
     /// Whether to draw a progress bar on standard error.
@@ -382,6 +384,74 @@ fn run_world(
         animation::run(session, &world, &gated)?;
     }
     Ok(())
+}
+
+/// Renders the references of a plan and keeps them in `options.cache`, where runs find them: all parts, or those that are a shard's. How many
+/// were rendered, and which references have none.
+///
+/// # Errors
+/// No adapter, or no cache.
+pub fn render_references(
+    experiment: &Experiment,
+    plan: &Plan,
+    registries: &Registries,
+    options: &RunOptions,
+) -> Result<(usize, Vec<String>), RunError> {
+    if options.cache.is_none() {
+        return Err(RunError::Input(
+            "there is no folder to keep references in: set RAYSTONE_CACHE".to_owned(),
+        ));
+    }
+    let device = Device::open(options, &Kernels::load(&plan.kernels, registries)?)?;
+    let mut session = Session::unrecorded(experiment, plan, registries, options);
+    session.reference_file = reference_file::ReferenceFile::load(experiment)?;
+    let shard = options.shard.unwrap_or(Shard { number: 1, of: 1 });
+    let (mut rendered, mut failures) = (0, Vec::new());
+    let mut part = 0;
+    for scene in &plan.scenes {
+        let loaded = match Loaded::new(&mut session, scene) {
+            Ok(loaded) => loaded,
+            Err(fault) => {
+                failures.push(format!("{scene}: {}", fault.of_cell()?));
+                continue;
+            }
+        };
+        for cell in plan.worlds(scene) {
+            let world = World::new(&mut session, &device, &loaded, &cell)?;
+            for wanted in references_of(plan, &cell) {
+                let own: Vec<usize> = (0..REFERENCE_PARTS as usize)
+                    .filter(|number| (part + number) % shard.of == shard.number - 1)
+                    .collect();
+                part += REFERENCE_PARTS as usize;
+                if own.is_empty() {
+                    continue;
+                }
+                let made = reference::reference_structure(&mut session, &world, &[]);
+                let made = made.and_then(|traced| {
+                    reference::keep_parts(&mut session, &world, &traced, &wanted, own.into_iter())
+                });
+                match made {
+                    Ok(count) => rendered += count,
+                    Err(fault) => failures.push(format!("{wanted}: {}", fault.of_cell()?)),
+                }
+            }
+        }
+    }
+    session.progress.bar.finish_and_clear();
+    Ok((rendered, failures))
+}
+
+/// What samplers of a world are compared under: the world with each integrator.
+fn references_of(plan: &Plan, world: &Cell) -> Vec<Cell> {
+    let axes = [&Cell::WORLD[..], &[Axis::Integrator]].concat();
+    let mut found: Vec<Cell> = Vec::new();
+    for cell in plan.samplers.iter().filter(|cell| cell.is_on(world)) {
+        let cell = cell.on(&axes);
+        if !found.contains(&cell) {
+            found.push(cell);
+        }
+    }
+    found
 }
 
 /// Runs the gate alone on every structure of a plan, with `rays` rays of each class; integrators are judged on all `trials`, too

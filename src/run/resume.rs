@@ -145,7 +145,7 @@ mod tests {
             "[run]\nreplicates = 2\nspp = {{ pow2 = [0, 1] }}\n[axes]\nscene = [\"cornell-box\"]\n\
              accel = [\"uniform-grid\"]\nsequence = [\"halton\"]\ndecorrelation = [\"micro-jitter\"]\n\
              integrator = [\"path\"]\n[accel.uniform-grid]\nlambda = [{}]\n\
-             [decorrelation.micro-jitter]\namplitude = [{}]\n",
+             [decorrelation.micro-jitter]\nk = [{}]\n",
             list(1),
             (1..=edge)
                 .map(|i| format!("{:.5}", i as f64 / (2 * edge) as f64))

@@ -9,8 +9,8 @@ use super::reference_file::ReferenceFile;
 use super::resume::{Earlier, Kept};
 use super::{RunError, RunOptions};
 use crate::config::{Axis, Cell, Experiment, Plan, Skipped, Unit, UnitKind, shards, unit_name};
-use crate::gpu::Environment;
 use crate::gpu::Gpu;
+use crate::gpu::{Environment, MachineLoad};
 use crate::image::{Attribute, Image, ImageError, Picture, write_png};
 use crate::measure::record::{
     Body, CellRecord, FinishedRecord, KernelFolder, Line, Outcome, RunRecord, SkippedRecord, axis,
@@ -103,7 +103,7 @@ impl<'a> Session<'a> {
         options: &'a RunOptions,
     ) -> Result<Self, RunError> {
         let reference_file = ReferenceFile::load(experiment)?;
-        let folder = Arc::new(Folder::open(&options.out, options.existing)?);
+        let folder = Arc::new(Folder::open(&options.out, options.existing, options.wait)?);
         options.interrupt.begin(&folder);
         let mut session = Self::unrecorded(experiment, plan, registries, options);
         session.folder = Some(folder);
@@ -465,6 +465,7 @@ impl<'a> Session<'a> {
             overhead_s,
             failed: self.failed,
             skipped: self.skipped,
+            load: MachineLoad::now(),
         };
         self.progress.bar.finish_and_clear();
         self.write(&Line::about_all(Body::Finished(record)))?;

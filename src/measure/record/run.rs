@@ -1,7 +1,7 @@
 //! What is recorded of a run as a whole, and of its scenes.
 
 use crate::geometry::Camera;
-use crate::gpu::Environment;
+use crate::gpu::{Environment, MachineLoad};
 use crate::measure::figure::Figure;
 use crate::scene::LoadReport;
 use serde::{Deserialize, Serialize};
@@ -114,6 +114,9 @@ pub struct FinishedRecord {
     pub failed: usize,
     /// Cells that were skipped.
     pub skipped: usize,
+    /// The state of the machine when the run ended.
+    #[serde(default)]
+    pub load: MachineLoad,
 }
 
 /// Last line of a run that was ended early: what it had not measured by then is missing.
