@@ -19,8 +19,10 @@ pub mod ruling;
 pub mod samplers;
 pub mod sections;
 pub mod terminal;
+pub mod terms;
 #[cfg(test)]
 mod tests;
+pub mod trust;
 pub mod values;
 
 pub use terminal::{failed_checks, terminal_tables};
@@ -28,7 +30,7 @@ pub use terminal::{failed_checks, terminal_tables};
 use crate::atomic::write_atomic;
 use crate::measure::record::{RecordError, read_records};
 use data::RunData;
-use document::{Block, Document};
+use document::Document;
 use std::path::{Path, PathBuf};
 
 /// What can go wrong while a report is written.
@@ -125,12 +127,7 @@ fn write_plots(dir: &Path, document: &Document) -> Result<Vec<PathBuf>, ReportEr
         source,
     })?;
     let mut written = Vec::new();
-    let blocks = document.sections.iter().flat_map(|section| &section.blocks);
-    let figures = blocks.filter_map(|block| match block {
-        Block::Figures(figures) => Some(figures),
-        _ => None,
-    });
-    for figure in figures.flatten() {
+    for figure in document.figures() {
         for (extension, bytes) in [("svg", figure.svg.as_bytes()), ("png", &figure.png)] {
             let path = folder.join(format!("{}.{extension}", figure.name));
             write_file(&path, bytes)?;

@@ -14,11 +14,21 @@ pub fn load(dir: &Path, path: &str, caption: impl Into<String>) -> Picture {
         }
         Err(reason) => (None, reason),
     };
+    let caption = caption.into();
     Picture {
-        caption: caption.into(),
+        alt: caption.clone(),
+        caption,
         path: path.into(),
         data,
         missing,
+    }
+}
+
+impl Picture {
+    /// The same picture with what is to be seen on it.
+    pub fn described(mut self, alt: impl Into<String>) -> Self {
+        self.alt = alt.into();
+        self
     }
 }
 

@@ -178,6 +178,7 @@ impl<'a> Session<'a> {
             renders_planned: self.plan.renders_planned(),
             kernels,
             figures: self.registries.figures.rows().cloned().collect(),
+            lenient: self.options.lenient,
         };
         self.write(&Line::about_all(Body::Run(record)))?;
         for skipped in &self.plan.skipped {
