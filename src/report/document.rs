@@ -267,7 +267,7 @@ pub struct TableCell {
     pub detail: String,
     /// How it is meant.
     pub tone: Tone,
-    /// Anchor that the text leads to, or empty.
+    /// Address that the text leads to, or empty.
     pub link: String,
 }
 
@@ -281,9 +281,9 @@ impl TableCell {
         }
     }
 
-    /// The same cell as a link to an anchor of the page.
-    pub fn linked(mut self, anchor: impl Into<String>) -> Self {
-        self.link = anchor.into();
+    /// The same cell as a link.
+    pub fn linked(mut self, address: impl Into<String>) -> Self {
+        self.link = address.into();
         self
     }
 

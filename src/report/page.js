@@ -47,14 +47,14 @@
           const open = folds.some((fold) => !fold.open);
           folds.forEach((fold) => (fold.open = open));
           event.target.textContent = open ? "Fold all" : "Unfold all";
-        }),
+        }, { class: "wide" }),
       );
     }
     nav.append(
-      button("Dark / light", () => {
+      button("◐", () => {
         const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
         root.dataset.theme = dark ? "light" : "dark";
-      }),
+      }, { "aria-label": "Dark or light", title: "Dark or light" }),
     );
     const links = new Map([...nav.querySelectorAll("a")].map((link) => [link.getAttribute("href").slice(1), link]));
     const seen = new Set();
@@ -179,7 +179,7 @@
   // The tone mapping of the pictures (Reinhard et al. 2002, equation 4, white at 4).
   const shown = ([r, g, b], exposure) => {
     if (![r, g, b].every(Number.isFinite)) return [255, 0, 255];
-    const bright = Math.max(0, 0.2126 * r + 0.7152 * g + 0.0722 * b) * exposure;
+    const bright = Math.max(0, 0.212671 * r + 0.71516 * g + 0.072169 * b) * exposure;
     const scale = (exposure * (1 + bright / 16)) / (1 + bright);
     return [r, g, b].map((v) => Math.round(255 * Math.min(1, Math.max(0, srgb(Math.max(0, v * scale))))));
   };
@@ -208,9 +208,12 @@
       [canvas.width, canvas.height] = [width, height];
       const figure = make("figure", "");
       const caption = make("figcaption", "");
-      figure.append(canvas, caption);
+      const stage = make("div", "", { class: "stage" });
+      const line = make("div", "", { class: "edge", hidden: "" });
+      stage.append(canvas, line);
+      figure.append(stage, caption);
       views.append(figure);
-      return { canvas, figure, caption, i };
+      return { canvas, figure, caption, line };
     });
     const paint = (canvas, colour) => {
       const context = canvas.getContext("2d");
@@ -228,6 +231,8 @@
       const edge = state.split * width;
       const of = (layer) => (x, y) => shown(at(layer, x, y), exposure);
       right.figure.hidden = state.mode !== "side";
+      left.line.hidden = state.mode !== "swipe";
+      left.line.style.left = `${100 * state.split}%`;
       if (state.mode === "swipe") paint(left.canvas, (x, y) => of(x + 0.5 < edge ? a : b)(x, y));
       if (state.mode === "side") paint(left.canvas, of(a)), paint(right.canvas, of(b));
       if (state.mode === "flip") paint(left.canvas, of(single));
@@ -242,7 +247,7 @@
       right.caption.textContent = b.name;
       for (const { canvas, caption } of canvases) {
         canvas.setAttribute("aria-label", caption.textContent);
-        canvas.style.width = state.zoom === "fit" ? `min(100%, ${Math.max(1, Math.floor(560 / width)) * width}px)` : `${Number(state.zoom) * width}px`;
+        canvas.style.width = state.zoom === "fit" ? `min(${Math.max(1, Math.floor(560 / width)) * width}px, 100vw - 3.5rem)` : `${Number(state.zoom) * width}px`;
         canvas.style.maxWidth = state.zoom === "fit" ? "" : "none";
       }
       views.style.overflowX = state.zoom === "fit" ? "" : "auto";

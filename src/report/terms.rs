@@ -33,7 +33,7 @@ const TERMS: &[Entry] = &[
     (
         "chord",
         &["chord"],
-        "Rays between two random points of the scene's bounding sphere: they come from nowhere that a camera looks from.",
+        "Rays between two random points of the scene's bounding box: they come from nowhere that a camera looks from.",
     ),
     (
         "bounce",

@@ -2,8 +2,10 @@
 
 pub mod animation;
 pub mod belief;
+pub mod cells;
 pub mod coherence;
 pub mod compactions;
+mod comparer;
 pub mod kernels;
 mod orders;
 pub mod organisations;
@@ -26,17 +28,19 @@ use super::document::*;
 use super::{format, terms};
 use crate::measure::record::{Interval, KernelFolder};
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
+use cells::Cells;
 use std::path::Path;
 
 /// Builds the whole report. `dir` is where the pictures lie; `warnings` come from reading.
-pub fn document(dir: &Path, data: &RunData, warnings: &[String]) -> Document {
+pub fn document(dir: &Path, data: &RunData, cells: &Cells, warnings: &[String]) -> Document {
     let mut sections = vec![verdict::section(dir, data), belief::section(data)];
     for (index, scene) in data.scenes.iter().enumerate() {
-        sections.push(scene_section(dir, data, index, scene));
+        sections.push(scene_section(dir, data, cells, index, scene));
     }
     sections.extend(streams::section(data));
     sections.extend(point_sets::section(data));
     sections.extend(compactions::section(data));
+    sections.extend(cells.section(data));
     sections.extend(run::sections(data));
     let mut document = Document {
         title: title(data),
@@ -143,7 +147,13 @@ fn kernels_banner(folder: &KernelFolder) -> String {
     text + ". References are rendered with the program's own."
 }
 
-fn scene_section(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> Section {
+fn scene_section(
+    dir: &Path,
+    data: &RunData,
+    cells: &Cells,
+    index: usize,
+    scene: &SceneGroup,
+) -> Section {
     let mut section = Section::new(format!("scene-{index}"), format!("Scene: {}", scene.name));
     let blocks = &mut section.blocks;
     blocks.extend(facts(scene));
@@ -152,14 +162,17 @@ fn scene_section(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -
     blocks.extend(animation::blocks(data, &format!("scene-{index}"), scene));
     for (number, view) in scene.views.iter().enumerate() {
         let stem = format!("scene-{index}-{}-{number}", file_stem(&view.name));
-        blocks.extend(samplers::blocks(dir, data, &stem, scene, view));
+        blocks.extend(samplers::blocks(dir, data, cells, &stem, (scene, view)));
     }
     let values: Vec<_> = scene
         .views
         .iter()
         .flat_map(|view| kernels::gains(scene, view))
         .collect();
-    blocks.extend(kernels::blocks(scene, &values));
+    blocks.extend(Block::fold(
+        "Kernels: gains, and what was compiled in and out",
+        kernels::blocks(scene, &values),
+    ));
     blocks.extend(organisations::blocks(scene));
     section
 }

@@ -1,6 +1,8 @@
 //! Samplers under one scene and integrator: errors, times, bias, pictures.
 
+use super::cells::Cells;
 use super::coherence;
+use super::comparer;
 use super::orders;
 use super::primary;
 use super::sampler_plots::{error_figures, histograms, pareto_figure};
@@ -22,9 +24,9 @@ use std::path::Path;
 pub fn blocks(
     dir: &Path,
     data: &RunData,
+    cells: &Cells,
     stem: &str,
-    scene: &SceneGroup,
-    view: &View,
+    (scene, view): (&SceneGroup, &View),
 ) -> Vec<Block> {
     let values = of_view(scene, view);
     let mut blocks = vec![Block::Heading(format!("Samplers with {}", view.name))];
@@ -34,6 +36,7 @@ pub fn blocks(
         view,
         Metric::RelMse,
     )));
+    blocks.extend(comparer::block(dir, data, stem, view));
     let table = |table: Table| table.into_block();
     let one = |block: Option<Block>| block.into_iter().collect::<Vec<Block>>();
     let mut numbers = one(table(error_table(view, &values, Metric::RelMse)));
@@ -45,8 +48,8 @@ pub fn blocks(
     )));
     numbers.extend(table(error_table(view, &values, Metric::Rmse)));
     numbers.extend(table(further_table(view, &values)));
-    let mut cells = one(Block::figures([pareto_figure(data, stem, view)]));
-    cells.extend(table(time_table(data, view, &values)));
+    let mut matrix = one(Block::figures([pareto_figure(data, stem, view)]));
+    matrix.extend(table(time_table(data, view, &values, cells)));
     let mut rays = one(table(orders::table(view, &values)));
     rays.extend(table(primary::table(view, &values)));
     rays.extend(coherence::blocks(data, stem, view, &values));
@@ -60,7 +63,7 @@ pub fn blocks(
         ),
         (
             "Time against error: structure × sampler, Pareto front",
-            cells,
+            matrix,
         ),
         (
             "What the error looks like: spectra and filters",
@@ -225,7 +228,7 @@ pub fn efficiency_table(view: &View, values: &[Value]) -> Table {
 }
 
 /// Milliseconds per spp of every cell.
-fn time_table(data: &RunData, view: &View, values: &[Value]) -> Table {
+fn time_table(data: &RunData, view: &View, values: &[Value], cells: &Cells) -> Table {
     let structures = view.timed_structures();
     let row = |(i, name): (usize, &String)| {
         let cell = TableCell::with_detail(name.clone(), format!("({})", letter(i)));
@@ -233,7 +236,7 @@ fn time_table(data: &RunData, view: &View, values: &[Value]) -> Table {
     };
     let bounds = format::median_bounds(view.times.iter().map(|time| time.ms.len()));
     let caption = format!(
-        "Time of full cells with {}, ms per spp: median [{bounds}]",
+        "Structure × sampler with {}: time of full cells, ms per spp: median [{bounds}]; each leads to its cell",
         view.name
     );
     let rows = structures.iter().enumerate().map(row);
@@ -241,15 +244,19 @@ fn time_table(data: &RunData, view: &View, values: &[Value]) -> Table {
     let mut table = rows.table(values, caption, &["ms-per-spp/v1"], &|key| {
         data.names.sampler(key)
     });
-    for time in view.times.iter().filter(|time| !is_valid_time(time)) {
-        let reason = match time.failure {
-            None => "image differs",
-            Some(_) => "FAILED",
-        };
+    for time in &view.times {
         let row = structures.iter().position(|s| *s == time.structure);
         let column = table.columns.iter().position(|c| c.title == time.sampler);
         if let (Some(row), Some(column)) = (row, column) {
-            table.rows[row][column] = TableCell::from(reason).toned(Tone::Bad);
+            let cell = &mut table.rows[row][column];
+            if !is_valid_time(time) {
+                let reason = match time.failure {
+                    None => "image differs",
+                    Some(_) => "FAILED",
+                };
+                *cell = TableCell::from(reason).toned(Tone::Bad);
+            }
+            cell.link = cells.link(&time.key);
         }
     }
     table

@@ -284,7 +284,7 @@ fn heat_maps(dir: &Path, scene: &SceneGroup) -> Option<Block> {
     let scale = (!maxima.is_empty()).then(|| ColorScale {
         gradient: viridis_css(),
         title: match shared {
-            Some(_) => "nodes + triangle tests per primary ray; the same scale for all, up to the costliest ray".into(),
+            Some(_) => "nodes + triangle tests per primary ray; the same scale for all; what costs more has the top colour".into(),
             None => "nodes + triangle tests per primary ray, share of each map's own top".into(),
         },
         labels: [0.0, 0.25, 0.5, 0.75, 1.0].map(label).to_vec(),

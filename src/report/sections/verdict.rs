@@ -21,6 +21,8 @@ pub use super::race::Race;
 
 /// Scenes whose answers are open at first; those of further ones unfold.
 const OPEN_SCENES: usize = 3;
+/// Pairs of dimensions whose point sets are judged in the open.
+const OPEN_PAIRS: usize = 2;
 /// Failures that the first screens name; the others stand in their own section.
 const NAMED_FAILURES: usize = 5;
 
@@ -37,7 +39,14 @@ pub fn section(dir: &Path, data: &RunData) -> Section {
             false => blocks.extend(Block::fold(format!("Verdict on {}", scene.name), answers)),
         }
     }
-    blocks.extend(answers("Verdict on point sets", &point_sets(data)));
+    let mut pairs = point_sets(data);
+    let further = pairs.split_off(pairs.len().min(OPEN_PAIRS));
+    blocks.extend(answers("Verdict on point sets", &pairs));
+    let further = answers("Further pairs of dimensions", &further);
+    blocks.extend(Block::fold(
+        "Verdict on further pairs of dimensions",
+        further,
+    ));
     let text = match (data.scenes.is_empty(), data.compactions.is_empty()) {
         (true, true) => "Nothing was measured.",
         (true, false) => {
@@ -120,8 +129,11 @@ fn amounts(data: &RunData) -> String {
     let spps = errors.map(|e| (e.spp, e.spp));
     let spp = spps.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     let spp = spp.map_or(String::new(), |(low, high)| match low == high {
-        true => format!(", {} spp", format::count(high.into())),
-        false => format!(", {low} to {} spp", format::count(high.into())),
+        true => format!(", {} per pixel", format::plural(high as usize, "sample")),
+        false => format!(
+            ", {low} to {} samples per pixel",
+            format::count(high.into())
+        ),
     });
     let most = samplers().map(|s| s.replicates.len()).max().unwrap_or(0);
     let [width, height] = first.resolution;
@@ -179,7 +191,7 @@ fn failed(data: &RunData) -> Option<Block> {
     }
     if failed.len() > NAMED_FAILURES {
         let more = format!("and {} more", failed.len() - NAMED_FAILURES);
-        let more = TableCell::from(more).linked("failures");
+        let more = TableCell::from(more).linked("#failures");
         table.rows.push(vec![more, TableCell::default()]);
     }
     table.into_block()
@@ -343,7 +355,7 @@ fn log_discrepancy(stream: &StreamRecord, at: &FigureAtCount) -> Option<LogFigur
         false => Vec::new(),
         true if freedom < 1.0 => return None,
         true => {
-            let error = 0.5 * (high - low) / student_t_quantile(0.975, freedom) / value;
+            let error = 0.5 * (high - low) / student_t_quantile(0.05, freedom) / value;
             vec![Spread {
                 variance: error * error,
                 freedom,
