@@ -82,7 +82,7 @@ pub fn write_report(dir: &Path) -> Result<ReportPaths, ReportError> {
     let data = RunData::new(&records.lines);
     let values = values::values(&data);
     let cells = Cells::new(&data, &values);
-    let mut document = sections::document(dir, &data, &cells, &records.warnings);
+    let mut document = sections::with_cells(dir, &data, &cells, &records.warnings);
     let (html, plots) = write_page(dir, &mut document)?;
     write_cells(dir, cells.document(&data))?;
     let summary = dir.join("summary.md");

@@ -193,10 +193,8 @@ fn nothing_is_headed_failed_where_nothing_failed_and_a_lenient_run_says_so() {
     });
     let said = |lines: &[Line]| {
         let data = RunData::new(lines);
-        let values = values::values(&data);
-        let cells = Cells::new(&data, &values);
         let nowhere = Path::new("no such folder");
-        markdown::summary(&sections::document(nowhere, &data, &cells, &[]))
+        markdown::summary(&sections::document(nowhere, &data, &[]))
     };
     let text = said(&clean);
     assert!(text.contains("The figures can be believed") && !text.contains("lenient"));

@@ -25,14 +25,20 @@ pub mod verdict;
 
 use super::data::{RunData, SceneGroup};
 use super::document::*;
-use super::{format, terms};
+use super::{format, terms, values};
 use crate::measure::record::{Interval, KernelFolder};
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
 use cells::Cells;
 use std::path::Path;
 
 /// Builds the whole report. `dir` is where the pictures lie; `warnings` come from reading.
-pub fn document(dir: &Path, data: &RunData, cells: &Cells, warnings: &[String]) -> Document {
+pub fn document(dir: &Path, data: &RunData, warnings: &[String]) -> Document {
+    let values = values::values(data);
+    with_cells(dir, data, &Cells::new(data, &values), warnings)
+}
+
+/// The same with cells that are known already.
+pub fn with_cells(dir: &Path, data: &RunData, cells: &Cells, warnings: &[String]) -> Document {
     let mut sections = vec![verdict::section(dir, data), belief::section(data)];
     for (index, scene) in data.scenes.iter().enumerate() {
         sections.push(scene_section(dir, data, cells, index, scene));
