@@ -216,7 +216,7 @@
       return { canvas, figure, caption, line };
     });
     const paint = (canvas, colour) => {
-      const context = canvas.getContext("2d");
+      const context = canvas.getContext("2d", { willReadFrequently: true });
       const image = context.createImageData(width, height);
       for (let y = 0; y < height; y++) {
         for (let x = 0; x < width; x++) image.data.set([...colour(x, y), 255], 4 * (y * width + x));

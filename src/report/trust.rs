@@ -42,8 +42,9 @@ pub fn doubt_of_errors(view: &View) -> Option<String> {
 
 /// What a check found wrong with a sampler, unless it is meant to be so.
 fn failure(sampler: &MeasuredSampler) -> Option<String> {
-    let by_design = sampler.bias.as_ref().is_some_and(|bias| bias.by_design);
-    let finite = sampler.replicates.iter().all(|r| r.non_finite_pixels == 0);
-    let fault = sampler.fault().filter(|_| !(by_design && finite))?;
-    Some(format!("{} is at fault ({fault})", sampler.name))
+    Some(format!(
+        "{} is at fault ({})",
+        sampler.name,
+        sampler.failure()?
+    ))
 }

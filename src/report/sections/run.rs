@@ -176,7 +176,7 @@ fn failed_cells(scene: &SceneGroup, view: &View) -> Vec<Failure> {
     };
     let sampler = |sampler: &MeasuredSampler| {
         let cell = format!("{} · {} · {}", scene.name, sampler.name, view.name);
-        Some(Failure::new(cell, FAILED, sampler.fault()?))
+        Some(Failure::new(cell, FAILED, sampler.failure()?))
     };
     let times = view.times.iter().filter_map(time);
     times

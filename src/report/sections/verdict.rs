@@ -94,16 +94,15 @@ fn question(data: &RunData) -> String {
     let views = data.views().map(|(_, view)| view.name.clone());
     let views = without_repeats(views.collect());
     let mut parts = Vec::new();
-    if let Some(structures) = named(&data.structures, "structure") {
-        parts.push(format!(
-            "which of {structures} answers rays and renders fastest"
-        ));
-    }
-    if let Some(samplers) = named(&data.samplers, "sampler") {
-        parts.push(format!(
-            "which of {samplers} errs least per sample and per second"
-        ));
-    }
+    let of = |names: &[String], noun, one: &str, many: &str| match names {
+        [] => None,
+        [only] => Some(format!("{one} {only}")),
+        names => Some(format!("which of {} {many}", named(names, noun)?)),
+    };
+    let fast = "answers rays and renders fastest";
+    parts.extend(of(&data.structures, "structure", "how fast is", fast));
+    let exact = "errs least per sample and per second";
+    parts.extend(of(&data.samplers, "sampler", "how exact is", exact));
     if parts.is_empty() {
         return "Asked: nothing that a structure or a sampler answers.".into();
     }
@@ -371,14 +370,17 @@ fn log_discrepancy(stream: &StreamRecord, at: &FigureAtCount) -> Option<LogFigur
 
 /// Who may not win, with the reason, and who is shown without being ranked.
 fn apart(scene: &SceneGroup) -> Vec<Block> {
-    let faulty =
-        (scene.structures.iter()).filter_map(|s| Some(format!("{} ({})", s.structure, s.fault()?)));
+    let brief = |fault: String| fault.split(';').next().unwrap_or_default().to_owned();
+    let faulty = scene
+        .structures
+        .iter()
+        .filter_map(|s| Some(format!("{} ({})", s.structure, brief(s.fault()?))));
     let samplers = || {
         let views = scene.views.iter();
         views.flat_map(|view| view.samplers.iter().map(move |s| (s, &view.name)))
     };
-    let biased =
-        samplers().filter_map(|(s, view)| Some(format!("{} with {view} ({})", s.name, s.fault()?)));
+    let biased = samplers()
+        .filter_map(|(s, view)| Some(format!("{} with {view} ({})", s.name, brief(s.fault()?))));
     let single = samplers().filter(|(s, _)| s.replicates.len() == 1);
     let single = single.map(|(s, view)| format!("{} with {view}", s.name));
     let said = [
