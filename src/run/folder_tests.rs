@@ -141,7 +141,7 @@ fn an_interrupted_run_takes_no_more_records() {
     let dir = tempfile::tempdir().unwrap();
     let handle = Interrupt::default();
     assert_eq!(handle.now("too early"), Interrupted::NotBegun);
-    let folder = Arc::new(Folder::open(dir.path(), Existing::Refuse).unwrap());
+    let folder = Arc::new(Folder::open(dir.path(), Existing::Refuse, false).unwrap());
     handle.begin(&folder);
     let Interrupted::Kept(kept) = handle.now("SIGINT") else {
         panic!("nothing was kept");
@@ -160,7 +160,7 @@ fn an_interrupted_run_takes_no_more_records() {
 #[test]
 fn a_full_disk_is_told_with_the_file_and_leaves_whole_lines() {
     let dir = tempfile::tempdir().unwrap();
-    let folder = Folder::open(dir.path(), Existing::Refuse).unwrap();
+    let folder = Folder::open(dir.path(), Existing::Refuse, false).unwrap();
     write(&folder, "first");
     let full = File::options().write(true).open("/dev/full").unwrap();
     let real = std::mem::replace(&mut folder.records().file, full);

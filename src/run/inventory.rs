@@ -86,11 +86,11 @@ impl Inventory {
         let dir = if is_partial { &partial } else { dir };
         let fault = |error: RecordError| RunError::Input(error.to_string());
         let records = read_records(dir).map_err(fault)?;
-        let runs = records
+        let mut runs = records
             .lines
             .iter()
             .filter_map(|line| RunRecord::of(&line.body));
-        let run = runs.last().cloned().ok_or_else(|| {
+        let run = runs.next_back().cloned().ok_or_else(|| {
             RunError::Input(format!(
                 "{} does not say of what experiment it is: its first line is missing",
                 dir.join(RECORDS_FILE).display()
@@ -98,11 +98,11 @@ impl Inventory {
         })?;
         let (experiment, plan) = planned(&run, registries)
             .map_err(|e| RunError::Input(format!("{}: {e}", dir.display())))?;
-        let ended = records
+        let mut ended = records
             .lines
             .iter()
             .filter_map(|l| InterruptedRecord::of(&l.body));
-        let interrupted = ended.last().map(|record| record.reason.clone());
+        let interrupted = ended.next_back().map(|record| record.reason.clone());
         let mut of_unit: BTreeMap<String, Vec<CellRecord>> = BTreeMap::new();
         for cell in records.lines.iter().filter_map(|l| CellRecord::of(&l.body)) {
             of_unit

@@ -269,7 +269,7 @@ mod tests {
         // Everything is done as expected, and yet the run goes on.
         for so_far in [1, 60, 600] {
             let left = shared(10.0, 10.0, so_far).left_s();
-            assert!(left >= 1.0 && left < 10.0, "{left}");
+            assert!((1.0..10.0).contains(&left), "{left}");
         }
         assert!(shared(0.0, 0.0, 0).left_s() >= 1.0);
     }
