@@ -56,7 +56,7 @@ pub static SOURCES: [Source; 15] = sources![
 ];
 
 /// What is not tested, and why.
-const NOT_COVERED: &str = include_str!("../../experiments/thesis/not-covered.toml");
+const NOT_COVERED: &str = include_str!("not-covered.toml");
 
 /// What of the digests no experiment tests.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
