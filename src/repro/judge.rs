@@ -147,10 +147,12 @@ fn combined(terms: impl Iterator<Item = (f64, Interval)>) -> Interval {
 /// `a / b`, both positive.
 pub fn ratio(a: Interval, b: Interval) -> Interval {
     let log = combined([(1.0, a), (-1.0, b)].into_iter());
+    // Not by logarithms: what is exact stays exact.
+    let value = a.value / b.value;
     Interval {
-        value: log.value.exp(),
-        low: log.low.exp(),
-        high: log.high.exp(),
+        value,
+        low: value * (log.low - log.value).exp(),
+        high: value * (log.high - log.value).exp(),
     }
 }
 
