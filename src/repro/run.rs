@@ -4,7 +4,7 @@ use super::Source;
 use super::claim::{Context, Row, judge};
 use super::judge::Verdict;
 use super::scenes::{IN_FILES, is_model, what_to_get};
-use crate::config::expect::{Substitute, Thesis, same_experiment};
+use crate::config::expect::{Compare, Substitute, Thesis, same_experiment};
 use crate::config::{ConfigError, Experiment, Plan};
 use crate::gpu::Environment;
 use crate::measure::record::{Body, Key, Line, RECORDS_FILE, RecordError, RunRecord, read_records};
@@ -66,7 +66,13 @@ pub struct Reproduced {
 impl Reproduced {
     /// The verdict on an expectation as a whole.
     pub fn verdict(&self, index: usize) -> Verdict {
-        Verdict::of_all(self.claims[index].iter().map(|row| row.verdict))
+        let found = Verdict::of_all(self.claims[index].iter().map(|row| row.verdict));
+        // What is only shown is no claim, whether there is something to show or not.
+        let only_shown = self.thesis.expects[index].compare == Compare::Shown;
+        match found != Verdict::Faulty && only_shown {
+            true => Verdict::Shown,
+            false => found,
+        }
     }
 }
 
