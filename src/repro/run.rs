@@ -44,6 +44,9 @@ pub enum ReproError {
     Report(#[from] ReportError),
 }
 
+/// A scene that ran, and its triangles if it was loaded.
+pub type Placed = (String, Option<usize>);
+
 /// A table with what was found.
 #[derive(Debug, Clone)]
 pub struct Reproduced {
@@ -58,7 +61,7 @@ pub struct Reproduced {
     /// Whether it was a short run.
     pub quick: bool,
     /// Original scene → ours with its triangles, or why there is none.
-    pub scenes: Vec<(Substitute, Result<(String, Option<usize>), String>)>,
+    pub scenes: Vec<(Substitute, Result<Placed, String>)>,
     /// Rows of each expectation, in the order of the file.
     pub claims: Vec<Vec<Row>>,
 }
