@@ -103,7 +103,12 @@ fn document(records: &[Line]) -> Document {
         section(
             "errors",
             "Error against scale and translation",
-            Block::figures(curves(records)).into_iter().collect(),
+            Block::fold(
+                "Error of the distance along the rungs, family by family",
+                Block::figures(curves(records)).into_iter().collect(),
+            )
+            .into_iter()
+            .collect(),
         ),
         section(
             "axes",
