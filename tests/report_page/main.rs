@@ -182,7 +182,7 @@ fn check_comparer(seen: &Seen) {
     };
     let error = ((square(0) + square(1) + square(2)) / 3.0).sqrt();
     assert!(
-        told.iter().any(|t| (t - error).abs() <= 3e-3 * error),
+        told.iter().any(|t| (t - error).abs() <= 2e-2 * error),
         "{values}: no {error}"
     );
     let map = raystone::image::viridis(error as f32);
@@ -212,7 +212,7 @@ fn a_page_can_be_read_without_its_script() {
     ] {
         assert!(dom.contains(text), "{text}");
     }
-    assert!(!dom.contains("class=\"scripted\"") && !dom.contains("Unfold all"));
+    assert!(!dom.contains("class=\"scripted\"") && !dom.contains("<button"));
     assert_eq!(
         dom.matches("<details").count(),
         dom.matches("<summary").count()
