@@ -13,7 +13,7 @@ use super::keys::{Axis, KEYS, OPTIONAL_SECTIONS};
 use super::section::{Section, texts};
 use super::tree::{self, Item, Table, Value};
 use super::variants::WHEN;
-use super::{Catalogue, variants};
+use super::{Catalogue, expect, variants};
 use crate::geometry::Camera;
 use crate::params::{Entry, Variant};
 use std::path::{Path, PathBuf};
@@ -79,6 +79,9 @@ pub(super) fn parse(
 /// Defaults, file and overrides in one tree.
 fn layers(text: &str, file: &str, overrides: &[String]) -> Result<Table, ConfigError> {
     let mut user = tree::parse_file(text, file)?;
+    // What a thesis says changes nothing that is measured; a fault in it is told all the same.
+    expect::Thesis::parse(text, file)?;
+    expect::take(&mut user);
     for text in overrides {
         tree::merge(&mut user, tree::parse_override(text)?);
     }
