@@ -2,6 +2,7 @@
 
 mod adapters;
 mod arguments;
+mod compare;
 mod discrepancy;
 mod doctor;
 mod estimate;
@@ -29,9 +30,10 @@ use std::sync::LazyLock;
 const EXIT_CODES: &str = "\
 Exit codes:
   0  done
-  1  done, but a gate or a cell failed
+  1  done, but a gate or a cell failed, or something is worse
   2  bad usage or input
   3  no usable adapter
+  4  a comparison is undecided
   130, 143  interrupted by SIGINT or SIGTERM; what was measured is kept";
 
 const EXAMPLES: &str = "\
@@ -80,6 +82,8 @@ enum Command {
     #[command(after_help = EXIT_CODES)]
     Report(report::Report),
     #[command(after_help = EXIT_CODES)]
+    Compare(compare::Compare),
+    #[command(after_help = EXIT_CODES)]
     Stress(stress::Stress),
     #[command(after_help = EXIT_CODES)]
     Trace(trace::Trace),
@@ -98,6 +102,7 @@ pub fn main() -> ExitCode {
         Command::Doctor(command) => command.execute(),
         Command::Discrepancy(command) => command.execute(),
         Command::Report(command) => command.execute(),
+        Command::Compare(command) => command.execute(),
         Command::Stress(command) => command.execute(),
         Command::Trace(command) => command.execute(),
         Command::ExportMitsuba(command) => command.execute(),
