@@ -110,7 +110,14 @@ impl Compare {
         if found.suspects().next().is_some() && options.judge_times {
             let cells: Vec<Finding> = found.suspects().cloned().collect();
             match self.confirm([&base, &candidate], &cells, &work) {
-                Ok(confirmed) => found = compare_sides(&base, &candidate, &options, &confirmed),
+                Ok(confirmed) => {
+                    found = compare_sides(&base, &candidate, &options, &confirmed);
+                    found.notes.push(format!(
+                        "{} times looked slower and were measured again, side by side.",
+                        cells.len()
+                    ));
+                    found.not_confirmed("the runs side by side have no times of it");
+                }
                 Err(why) => found.not_confirmed(&format!("{why:#}")),
             }
         }
@@ -218,7 +225,7 @@ impl Compare {
             let folder = work.folder()?;
             return Ok(in_turns(
                 programs,
-                sides[1],
+                sides,
                 &cells,
                 rounds,
                 &folder,

@@ -4,17 +4,17 @@
 //! round runs both, the order alternating, and a round is one pair of medians, so that what processes differ in by chance
 //! (memory, the hour) is part of the noise that the rounds show.
 
-use super::judge::TimeRatio;
+use super::judge::{IN_TURNS, TimeRatio};
 use super::side::{EMBEDDED, Side, SideError};
 use super::taken::{Evidence, Taken, taken};
-use super::{Confirmed, Finding};
+use super::{Confirmed, Finding, Identity};
 use crate::config::{Axis, Cell, ConfigError, Experiment, Plan};
 use crate::measure::record::{KernelFolder, RunRecord, all_of, axis};
 use crate::measure::statistics::median;
-use crate::run::{Existing, Registries, RunError, RunOptions, kernel_library, run};
+use crate::run::{Registries, RunError, RunOptions, kernel_library, run};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
+use std::process::{Command, Stdio};
 
 /// So many rounds at least: with fewer no permutation test passes a correction for some dozens of cells.
 pub const LEAST_ROUNDS: u32 = 21;
@@ -120,7 +120,6 @@ pub fn in_this_process(
     registries: &Registries,
     options: &RunOptions,
 ) -> Result<Confirmed, ConfirmError> {
-    let impossible = |text: &str| ConfirmError::Impossible(text.to_owned());
     let runs = sides.map(|side| all_of::<RunRecord>(&side.lines).next().map(|run| run.body));
     let [Some(base), Some(candidate)] = runs else {
         return Err(impossible("the records do not say what was run"));
@@ -154,20 +153,27 @@ pub fn in_this_process(
     Ok(ratios(&sides))
 }
 
+fn impossible(text: impl Into<String>) -> ConfirmError {
+    ConfirmError::Impossible(text.into())
+}
+
+fn failed(what: &Path, error: &std::io::Error) -> ConfirmError {
+    impossible(format!("{}: {error}", what.display()))
+}
+
 /// The one folder of kernels of a run, if it is as it was.
 fn folder(kernels: &[KernelFolder], registries: &Registries) -> Result<String, ConfirmError> {
-    let impossible = |text: String| Err(ConfirmError::Impossible(text));
     match kernels {
         [] => Ok(EMBEDDED.to_owned()),
         [one] => match kernel_library(Path::new(&one.folder), registries) {
             Ok(library) if library.hash() == one.hash => Ok(one.folder.clone()),
-            Ok(_) => impossible(format!(
+            Ok(_) => Err(impossible(format!(
                 "the kernels in {} are no more those of the run",
                 one.folder
-            )),
-            Err(error) => impossible(error.to_string()),
+            ))),
+            Err(error) => Err(impossible(error.to_string())),
         },
-        _ => impossible("a run has several folders of kernels".into()),
+        _ => Err(impossible("a run has several folders of kernels")),
     }
 }
 
@@ -182,52 +188,47 @@ fn ratios([a, b]: &[Side; 2]) -> Confirmed {
     pairs.collect()
 }
 
-/// Runs the programs of base and candidate in turns over the cells, each as the candidate's experiment says.
+/// Runs the programs of base and candidate in turns over the cells, each as the experiment of its own run says.
 ///
 /// # Errors
 /// A program cannot be started, or leaves no records.
 pub fn in_turns(
     programs: [&Path; 2],
-    candidate: &Side,
+    sides: [&Side; 2],
     cells: &[&Finding],
     rounds: u32,
     folder: &Path,
     adapter: Option<&str>,
 ) -> Result<Confirmed, ConfirmError> {
-    let run = all_of::<RunRecord>(&candidate.lines).next();
-    let run =
-        run.ok_or_else(|| ConfirmError::Impossible("the records do not say what was run".into()))?;
-    let (text, _, sets) = experiment(run.body);
-    let file = folder.join("experiment.toml");
-    let failed = |what: &Path, error: std::io::Error| {
-        ConfirmError::Impossible(format!("{}: {error}", what.display()))
-    };
-    std::fs::write(&file, text).map_err(|e| failed(&file, e))?;
+    let mut turns = Vec::new();
+    for (index, (program, side)) in programs.into_iter().zip(sides).enumerate() {
+        let run = all_of::<RunRecord>(&side.lines).next();
+        let run = run.ok_or_else(|| impossible("the records do not say what was run"))?;
+        let (text, _, sets) = experiment(run.body);
+        let file = folder.join(format!("experiment-{index}.toml"));
+        std::fs::write(&file, text).map_err(|e| failed(&file, &e))?;
+        turns.push((program, file, sets));
+    }
     let mut medians: [BTreeMap<_, Vec<f64>>; 2] = Default::default();
+    let out = folder.join("run");
     for round in 0..rounds as usize {
         for turn in [0, 1] {
             let which = (round + turn) % 2;
-            let out = folder.join("run");
-            let mut command = Command::new(programs[which]);
-            command
-                .arg("run")
-                .arg(&file)
-                .arg("--out")
-                .arg(&out)
-                .args(["--force", "--quiet"]);
+            let (program, file, sets) = &turns[which];
+            let mut command = Command::new(program);
+            command.arg("run").arg(file).arg("--out").arg(&out);
+            command.args(["--force", "--quiet"]);
             command.args(sets.iter().flat_map(|set| ["--set", set]));
             // Errors are not what is asked for.
             command.args(["--set", "run.replicates=2"]);
             command.args(only(cells).iter().flat_map(|only| ["--only", only]));
             command.args(adapter.iter().flat_map(|adapter| ["--adapter", adapter]));
-            command
-                .stdout(std::process::Stdio::null())
-                .stderr(std::process::Stdio::null());
-            command.status().map_err(|e| failed(programs[which], e))?;
+            command.stdout(Stdio::null()).stderr(Stdio::null());
+            command.status().map_err(|e| failed(program, &e))?;
             for (identity, ms) in times(&out)? {
                 medians[which].entry(identity).or_default().push(ms);
             }
-            std::fs::remove_dir_all(&out).map_err(|e| failed(&out, e))?;
+            std::fs::remove_dir_all(&out).map_err(|e| failed(&out, &e))?;
         }
     }
     let [base, candidate] = medians;
@@ -238,16 +239,13 @@ pub fn in_turns(
         .filter_map(|(identity, old)| {
             let new = candidate.get(&identity).filter(|ms| whole(ms))?;
             let ratios: Vec<f64> = old.iter().zip(new).map(|(a, b)| b / a).collect();
-            Some((
-                identity,
-                TimeRatio::of_rounds(&ratios, "processes in turns")?,
-            ))
+            Some((identity, TimeRatio::of_rounds(&ratios, IN_TURNS)?))
         });
     Ok(pairs.collect())
 }
 
 /// The median of each time of a run.
-fn times(out: &PathBuf) -> Result<Vec<((String, String), f64)>, ConfirmError> {
+fn times(out: &Path) -> Result<BTreeMap<Identity, f64>, ConfirmError> {
     let side = Side::read(out)?;
     let side = side.alone();
     let medians = taken(&side).into_iter().filter_map(|taken| {
@@ -277,13 +275,4 @@ fn only(cells: &[&Finding]) -> Vec<String> {
         }
     };
     axes.iter().flat_map(|axis| of(axis)).collect()
-}
-
-/// Options of a run whose results are only looked at.
-pub fn quietly(options: RunOptions, out: PathBuf) -> RunOptions {
-    RunOptions {
-        out,
-        existing: Existing::Replace,
-        ..options
-    }
 }

@@ -302,6 +302,9 @@ fn student(gap: f64, spread: Spread, margin: f64, how: &'static str) -> Measured
     }
 }
 
+/// What stands for a clock where two programs were run in turns.
+pub const IN_TURNS: &str = "processes in turns";
+
 /// Logarithm of the ratio of two times, with the noise of their rounds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeRatio {

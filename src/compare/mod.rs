@@ -122,8 +122,11 @@ impl Comparison {
     }
 }
 
-/// Times measured again, side by side: identity of the cell and figure → ratio.
-pub type Confirmed = BTreeMap<(String, String), TimeRatio>;
+/// What tells a figure of a cell from all others: labels of the cell, id of the figure.
+pub type Identity = (String, String);
+
+/// Times measured again, side by side.
+pub type Confirmed = BTreeMap<Identity, TimeRatio>;
 
 /// Compares two sides.
 pub fn compare_sides(

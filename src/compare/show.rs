@@ -371,14 +371,14 @@ fn rows(findings: &[&Finding], varied: &BTreeSet<String>) -> String {
 /// Text that a page of Markdown shows as it is: no markup, no tags, no mention of a person or an issue.
 fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
-    for c in plain(text).chars() {
+    // Pages make links of addresses.
+    for c in plain(text).replace("://", ":\u{2060}//").chars() {
         match c {
             '&' => out += "&amp;",
             '<' => out += "&lt;",
             '>' => out += "&gt;",
             '@' => out += "&#64;",
             '#' => out += "&#35;",
-            ':' => out += "&#58;",
             '\\' | '`' | '*' | '_' | '|' | '[' | ']' | '~' | '!' | '$' => out.extend(['\\', c]),
             c => out.push(c),
         }

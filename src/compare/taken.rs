@@ -1,5 +1,6 @@
 //! What a side says, figure by figure, with the evidence behind it: raw samples where the records keep them.
 
+use super::Identity;
 use super::facts::{fact, facts};
 use super::side::Side;
 use crate::measure::figure::{Figure, Spread};
@@ -63,7 +64,7 @@ pub struct Taken {
 
 impl Taken {
     /// What tells it from all others: labels, since programs of different versions may know different parameters.
-    pub fn identity(&self) -> (String, String) {
+    pub fn identity(&self) -> Identity {
         let labels: Vec<String> = self.key.labels().map(|(a, l)| format!("{a}={l}")).collect();
         (labels.join("\u{1}"), self.figure.id.to_string())
     }
@@ -109,12 +110,12 @@ pub fn taken(side: &Side) -> Vec<Taken> {
 
 /// Names of what a side says in two ways that contradict each other: of two lines on one thing a report takes the later
 /// one, a comparison neither.
-pub fn contradictions(side: &Side) -> Vec<(String, String)> {
+pub fn contradictions(side: &Side) -> Vec<Identity> {
     if !repeats(&side.lines) {
         return Vec::new();
     }
     let turned: Vec<Line> = side.lines.iter().rev().cloned().collect();
-    let by_identity = |all: Vec<Taken>| -> BTreeMap<(String, String), Evidence> {
+    let by_identity = |all: Vec<Taken>| -> BTreeMap<Identity, Evidence> {
         let pairs = all.into_iter().map(|t| (t.identity(), t.evidence));
         pairs.collect()
     };
@@ -177,7 +178,7 @@ fn of_lines(lines: &[Line]) -> Vec<Taken> {
     all
 }
 
-type Raw = BTreeMap<(String, String), Taken>;
+type Raw = BTreeMap<Identity, Taken>;
 
 fn of_value(data: &RunData, raw: &Raw, value: &Value) -> Option<Taken> {
     let number = match value.reading {

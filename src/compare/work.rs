@@ -2,10 +2,10 @@
 
 use super::drift::{Drift, Place};
 use super::facts::IMAGE;
-use super::judge::{Measured, Outcome, TimeRatio, Verdict, compare, direction};
+use super::judge::{IN_TURNS, Measured, Outcome, TimeRatio, Verdict, compare, direction};
 use super::side::{self, Side};
 use super::taken::{Evidence, Taken, contradictions, taken};
-use super::{Confirmed, Finding, Options};
+use super::{Confirmed, Finding, Identity, Options};
 use crate::measure::figure::Spread;
 use crate::measure::hypothesis::benjamini_hochberg;
 use crate::measure::record::axis;
@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(super) struct Open {
     pub finding: Finding,
     ratio: Option<TimeRatio>,
-    identity: (String, String),
+    identity: Identity,
 }
 
 pub(super) struct Work<'a> {
@@ -26,7 +26,7 @@ pub(super) struct Work<'a> {
     same_place: bool,
     pub findings: Vec<Open>,
     pub notes: Vec<String>,
-    contradicted: BTreeSet<(String, String)>,
+    contradicted: BTreeSet<Identity>,
 }
 
 impl<'a> Work<'a> {
@@ -143,18 +143,8 @@ impl<'a> Work<'a> {
     /// Measures the ratios of times against the drift of controls.
     pub fn measure_times(&mut self, confirmed: &Confirmed) {
         self.controls_did_the_same_work();
-        let mut drift = [Drift::default(), Drift::default()];
-        for open in self.findings.iter().filter(|open| open.finding.is_control) {
-            for (drift, ratio) in drift
-                .iter_mut()
-                .zip([open.ratio.as_ref(), confirmed.get(&open.identity)])
-            {
-                if let Some(ratio) = ratio {
-                    drift.add(place(&open.finding), ratio.log, ratio.rounds.variance);
-                }
-            }
-        }
-        let [of_runs, of_confirmed] = drift;
+        let of_runs = self.drift(|open| open.ratio.as_ref());
+        let of_confirmed = self.drift(|open| confirmed.get(&open.identity));
         if self.refused.is_none() {
             self.notes.extend(of_runs.words());
         }
@@ -166,6 +156,8 @@ impl<'a> Work<'a> {
                 continue;
             };
             let finding = &mut open.finding;
+            // Equal kernels say nothing of two programs that were run in turns.
+            finding.is_control &= ratio.clock != IN_TURNS;
             if refused && again.is_none() {
                 finding.why = "times of different devices or machines are not compared".into();
                 finding.is_control = false;
@@ -194,6 +186,17 @@ impl<'a> Work<'a> {
             }
             finding.measured = Some(measured);
         }
+    }
+
+    /// How far the controls moved that this is known of.
+    fn drift<'o>(&'o self, ratio: impl Fn(&'o Open) -> Option<&'o TimeRatio>) -> Drift {
+        let mut drift = Drift::default();
+        for open in self.findings.iter().filter(|open| open.finding.is_control) {
+            if let Some(ratio) = ratio(open).filter(|ratio| ratio.clock != IN_TURNS) {
+                drift.add(place(&open.finding), ratio.log, ratio.rounds.variance);
+            }
+        }
+        drift
     }
 
     /// Equal kernels are no control where an exact figure of the same structure differs: then the data did change.
