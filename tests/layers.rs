@@ -21,7 +21,7 @@ const LAYERS: [&[&str]; 12] = [
     &["report"],
     &["compare"],
 ];
-/// What stands above all layers and may use each of them; the last may use the one before.
+/// What stands above all layers and may use each of them; the last may use those before.
 const ABOVE: [&str; 2] = ["stress", "commands"];
 /// Pairs within a layer, of which the first may use the second.
 const TOGETHER: [(&str, &str); 1] = [("params", "text")];
