@@ -2,7 +2,6 @@
 
 mod adapters;
 mod arguments;
-mod compare;
 mod discrepancy;
 mod doctor;
 mod estimate;
@@ -22,6 +21,8 @@ mod system;
 mod trace;
 mod verify;
 mod verify_images;
+
+mod compare;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -73,6 +74,8 @@ enum Command {
     #[command(after_help = EXIT_CODES)]
     Verify(verify::Verify),
     #[command(after_help = EXIT_CODES)]
+    Compare(compare::Compare),
+    #[command(after_help = EXIT_CODES)]
     Points(points::Points),
     List(list::List),
     #[command(after_help = EXIT_CODES)]
@@ -81,8 +84,6 @@ enum Command {
     Discrepancy(discrepancy::Discrepancy),
     #[command(after_help = EXIT_CODES)]
     Report(report::Report),
-    #[command(after_help = EXIT_CODES)]
-    Compare(compare::Compare),
     #[command(after_help = EXIT_CODES)]
     Stress(stress::Stress),
     #[command(after_help = EXIT_CODES)]
@@ -97,12 +98,12 @@ pub fn main() -> ExitCode {
         Command::Run(command) => command.execute(),
         Command::Render(command) => command.execute(),
         Command::Verify(command) => command.execute(),
+        Command::Compare(command) => command.execute(),
         Command::Points(command) => command.execute(),
         Command::List(command) => command.execute(),
         Command::Doctor(command) => command.execute(),
         Command::Discrepancy(command) => command.execute(),
         Command::Report(command) => command.execute(),
-        Command::Compare(command) => command.execute(),
         Command::Stress(command) => command.execute(),
         Command::Trace(command) => command.execute(),
         Command::ExportMitsuba(command) => command.execute(),
