@@ -4,12 +4,14 @@ mod adapters;
 mod arguments;
 mod discrepancy;
 mod doctor;
-mod estimate;
+mod explain;
 mod export;
 mod failure;
 mod faults;
 mod list;
+mod merge;
 mod output;
+mod plan;
 mod points;
 mod points_plot;
 mod render;
@@ -23,6 +25,7 @@ mod system;
 mod trace;
 mod verify;
 mod verify_images;
+mod verify_run;
 
 mod compare;
 
@@ -85,6 +88,14 @@ enum Command {
     #[command(after_help = EXIT_CODES)]
     Discrepancy(discrepancy::Discrepancy),
     #[command(after_help = EXIT_CODES)]
+    Plan(plan::Plan),
+    #[command(after_help = EXIT_CODES)]
+    Merge(merge::Merge),
+    #[command(after_help = EXIT_CODES)]
+    VerifyRun(verify_run::VerifyRun),
+    #[command(after_help = EXIT_CODES)]
+    Explain(explain::Explain),
+    #[command(after_help = EXIT_CODES)]
     Report(report::Report),
     #[command(after_help = EXIT_CODES)]
     Repro(repro::Repro),
@@ -108,6 +119,10 @@ pub fn main() -> ExitCode {
         Command::List(command) => command.execute(),
         Command::Doctor(command) => command.execute(),
         Command::Discrepancy(command) => command.execute(),
+        Command::Plan(command) => command.execute(),
+        Command::Merge(command) => command.execute(),
+        Command::VerifyRun(command) => command.execute(),
+        Command::Explain(command) => command.execute(),
         Command::Report(command) => command.execute(),
         Command::Repro(command) => command.execute(),
         Command::Scenes(command) => command.execute(),
