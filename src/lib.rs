@@ -16,6 +16,7 @@ pub mod accel;
 pub mod atomic;
 pub mod coherence;
 pub mod compaction;
+pub mod compare;
 pub mod config;
 pub mod discrepancy;
 pub mod geometry;

@@ -21,8 +21,8 @@ const LAYERS: [&[&str]; 12] = [
     &["report"],
     &["repro"],
 ];
-/// What stands above all layers and may use each of them; the last may use the one before.
-const ABOVE: [&str; 2] = ["stress", "commands"];
+/// What stands above all layers and may use each of them; the last may use those before.
+const ABOVE: [&str; 3] = ["compare", "stress", "commands"];
 /// Pairs within a layer, of which the first may use the second.
 const TOGETHER: [(&str, &str); 1] = [("params", "text")];
 
@@ -38,7 +38,7 @@ fn allowed(user: &str, used: &str) -> bool {
     match (layer(user), layer(used)) {
         (Some(user), Some(used)) => used < user,
         (None, Some(_)) => ABOVE.contains(&user),
-        (None, None) => user == ABOVE[1] && used == ABOVE[0],
+        (None, None) => user == "commands" && ABOVE.contains(&used),
         (Some(_), None) => false,
     }
 }

@@ -27,6 +27,8 @@ mod verify;
 mod verify_images;
 mod verify_run;
 
+mod compare;
+
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 use std::sync::LazyLock;
@@ -34,9 +36,10 @@ use std::sync::LazyLock;
 const EXIT_CODES: &str = "\
 Exit codes:
   0  done
-  1  done, but a gate or a cell failed
+  1  done, but a gate or a cell failed, or something is worse
   2  bad usage or input
   3  no usable adapter
+  4  a comparison is undecided
   130, 143  interrupted by SIGINT or SIGTERM; what was measured is kept";
 
 const EXAMPLES: &str = "\
@@ -76,6 +79,8 @@ enum Command {
     #[command(after_help = EXIT_CODES)]
     Verify(verify::Verify),
     #[command(after_help = EXIT_CODES)]
+    Compare(compare::Compare),
+    #[command(after_help = EXIT_CODES)]
     Points(points::Points),
     List(list::List),
     #[command(after_help = EXIT_CODES)]
@@ -109,6 +114,7 @@ pub fn main() -> ExitCode {
         Command::Run(command) => command.execute(),
         Command::Render(command) => command.execute(),
         Command::Verify(command) => command.execute(),
+        Command::Compare(command) => command.execute(),
         Command::Points(command) => command.execute(),
         Command::List(command) => command.execute(),
         Command::Doctor(command) => command.execute(),

@@ -271,6 +271,9 @@ fn finish(
         record.mrays_s = median_interval(&rates);
         record.ms = samples.ms;
         record.wall_ms = samples.wall_ms;
+        if world.gpu.is_software() {
+            record.cpu_ms = samples.cpu_ms;
+        }
         record.stages = median_stages(&item.stages.borrow());
     }
     record.live_paths = counted.live_paths;
@@ -357,6 +360,7 @@ fn empty_record(session: &Session, cell: &Cell, failure: String) -> Line<TimeRec
         spp: session.experiment.timing.spp,
         ms: Vec::new(),
         wall_ms: Vec::new(),
+        cpu_ms: Vec::new(),
         ms_per_spp: None,
         rays: BTreeMap::new(),
         live_paths: Vec::new(),

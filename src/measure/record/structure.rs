@@ -233,6 +233,9 @@ pub struct TimeRecord {
     pub ms: Vec<f64>,
     /// The same renders by the wall clock, milliseconds.
     pub wall_ms: Vec<f64>,
+    /// The same in time of the processors, all threads of the process together; empty on adapters that work elsewhere.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cpu_ms: Vec<f64>,
     /// Milliseconds per sample per pixel for the whole image, median with interval; absent if the
     /// cell failed.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -1,0 +1,171 @@
+//! What continuous integration runs: `scripts/ci-compare` with programs that only pretend, and the files that GitHub reads.
+#![cfg(unix)]
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// An executable script.
+fn script(path: &Path, text: &str) {
+    fs::write(path, format!("#!/bin/sh\n{text}")).expect("written");
+    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).expect("executable");
+}
+
+struct Kit {
+    folder: tempfile::TempDir,
+}
+
+impl Kit {
+    /// A program whose run and comparison end with these codes, and a `gh` that notes what it is asked for.
+    fn new(run: i32, compare: i32, earlier_comment: &str) -> Self {
+        let kit = Self {
+            folder: tempfile::tempdir().expect("a folder"),
+        };
+        let program = format!(
+            "if [ \"$1\" = run ]; then mkdir -p \"$4\"; echo records > \"$4/records.jsonl\"; exit {run}; fi\n\
+             shift; echo \"$@\" > {0}/arguments; while [ $# -gt 0 ]; do [ \"$1\" = --markdown ] && echo verdict > \"$2\"; shift; done; exit {compare}\n",
+            kit.path("").display()
+        );
+        script(&kit.path("raystone"), &program);
+        let gh = format!(
+            "echo \"$@\" >> {0}/asked; case \"$*\" in *--paginate*) printf '{earlier_comment}';; esac\n",
+            kit.path("").display()
+        );
+        script(&kit.path("gh"), &gh);
+        kit
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn with_baseline(self) -> Self {
+        fs::create_dir(self.path("base")).expect("a folder");
+        fs::write(self.path("base/records.jsonl"), "records").expect("written");
+        self
+    }
+
+    fn execute(&self, on: &str) -> Output {
+        let paths = ["raystone", "", "base", "out"].map(|name| self.path(name));
+        let search = format!(
+            "{}:{}",
+            self.folder.path().display(),
+            std::env::var("PATH").expect("a path")
+        );
+        Command::new(concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/ci-compare"))
+            .args(paths)
+            .args(["--times", "show"])
+            .env("PATH", search)
+            .env("GITHUB_STEP_SUMMARY", self.path("summary"))
+            .env("GITHUB_REPOSITORY", "someone/something")
+            .env("COMMENT_ON", on)
+            .env("COMMENT_TITLE", "bvh")
+            .output()
+            .expect("the script starts")
+    }
+
+    fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap_or_default()
+    }
+}
+
+#[test]
+fn exit_codes_say_what_fails() {
+    // Run, comparison, and what the job ends with.
+    for (run, compare, end) in [
+        (0, 0, 0),
+        (0, 1, 1),
+        (0, 4, 0),
+        (1, 0, 1),
+        (1, 4, 1),
+        (0, 2, 2),
+        (0, 3, 3),
+        (2, 0, 2),
+        (3, 0, 3),
+    ] {
+        let kit = Kit::new(run, compare, "").with_baseline();
+        let output = kit.execute("");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned()
+            + &String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(end), "{run} {compare}: {text}");
+        assert_eq!(
+            text.contains("::warning::"),
+            compare == 4 && run < 2,
+            "{text}"
+        );
+        assert_eq!(kit.read("asked"), "");
+        let told = run < 2 && [0, 1, 4].contains(&compare);
+        assert_eq!(kit.read("summary") == "verdict\n", told, "{run} {compare}");
+    }
+    let kit = Kit::new(0, 0, "").with_baseline();
+    kit.execute("");
+    let arguments = kit.read("arguments");
+    assert!(
+        arguments.contains("/base ") && arguments.ends_with("--times show\n"),
+        "{arguments}"
+    );
+}
+
+#[test]
+fn a_first_run_becomes_the_baseline() {
+    for run in [0, 1] {
+        let kit = Kit::new(run, 9, "");
+        assert_eq!(kit.execute("").status.code(), Some(run));
+        assert!(kit.read("summary").contains("no baseline yet"));
+        assert_eq!(kit.read("out/run/records.jsonl"), "records\n");
+    }
+}
+
+#[test]
+fn one_comment_is_written_and_then_replaced() {
+    let kit = Kit::new(0, 1, "").with_baseline();
+    assert_eq!(kit.execute("7").status.code(), Some(1));
+    assert!(
+        kit.read("asked")
+            .contains("-X POST repos/someone/something/issues/7/comments"),
+        "{}",
+        kit.read("asked")
+    );
+    assert_eq!(
+        kit.read("out/comment.md.marked"),
+        "<!-- raystone compare: bvh -->\nverdict\n"
+    );
+    let kit = Kit::new(0, 0, "41\\n42\\n").with_baseline();
+    assert_eq!(kit.execute("7").status.code(), Some(0));
+    assert!(
+        kit.read("asked")
+            .contains("-X PATCH repos/someone/something/issues/comments/42"),
+        "{}",
+        kit.read("asked")
+    );
+    // A token that may not comment changes no verdict.
+    let kit = Kit::new(0, 0, "").with_baseline();
+    script(&kit.path("gh"), "exit 1\n");
+    let output = kit.execute("7");
+    assert_eq!(output.status.code(), Some(0));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("could not be written"));
+}
+
+#[test]
+fn the_action_and_its_page_name_the_same_inputs() {
+    let page = include_str!("../docs/ci.md");
+    let action = include_str!("../action.yml");
+    let inputs = action
+        .split("inputs:\n")
+        .nth(1)
+        .and_then(|rest| rest.split("\nruns:").next())
+        .expect("inputs");
+    let names = inputs
+        .lines()
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    let names: Vec<&str> = names
+        .map(|line| line.trim().trim_end_matches(':'))
+        .collect();
+    assert!(names.len() >= 5, "{names:?}");
+    for name in names {
+        assert!(page.contains(&format!("| `{name}` |")), "{name}");
+        let used = name == "token" || action.contains(&format!("inputs.{name}"));
+        assert!(used, "{name} is read by no step");
+    }
+}

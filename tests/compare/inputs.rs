@@ -1,0 +1,304 @@
+//! Exact figures, missing cells, other machines, broken files.
+
+use super::records::{Made, environment};
+use super::{compared, said};
+use raystone::compare::judge::Verdict;
+use raystone::compare::side::{Side, SideError};
+use raystone::compare::{Comparison, Confirmed, Options, compare_sides};
+use raystone::measure::record::{Body, Line, RecordError, text_of};
+
+/// The comparison with a candidate whose records are the same but for this.
+fn with(change: impl Fn(&mut Vec<Line>)) -> Comparison {
+    let base = Made::default();
+    let mut lines = base.lines();
+    change(&mut lines);
+    compared(&base.side(), &Side::new("made", lines, Vec::new()))
+}
+
+/// Changes the record of the fourth structure.
+fn with_structure(change: impl Fn(&mut raystone::measure::record::StructureRecord)) -> Comparison {
+    with(|lines| {
+        let records = lines.iter_mut().filter_map(|line| match &mut line.body {
+            Body::Structure(record) => Some(record),
+            _ => None,
+        });
+        records.skip(3).take(1).for_each(&change);
+    })
+}
+
+#[test]
+fn equal_records_are_the_same() {
+    let found = with(|_| ());
+    assert_eq!(found.verdict(), Verdict::Same);
+    assert!(found.count(Verdict::Same) > 100 && found.count(Verdict::Told) == 0);
+    assert_eq!(found.findings.len(), found.count(Verdict::Same));
+}
+
+#[test]
+fn a_counter_that_is_off_by_one_ray_is_worse_and_less_work_is_better() {
+    for (part, verdict) in [(0.001, Verdict::Worse), (-0.001, Verdict::Better)] {
+        let found = with_structure(|record| {
+            let counters = record.timings[1].counters.as_mut().expect("counters");
+            counters.nodes += part;
+        });
+        let said: Vec<_> = said(&found, "nodes-per-ray/v1")
+            .map(|f| f.verdict)
+            .collect();
+        assert_eq!(said, [verdict]);
+        assert_eq!(found.count(verdict), 1);
+    }
+}
+
+#[test]
+fn one_wrong_hit_and_one_hit_more_are_worse() {
+    let wrong = with_structure(|record| {
+        let gate = record.gate.as_mut().expect("a gate");
+        gate.classes[0].wrong = 1;
+        gate.passed = false;
+        record.timings.clear();
+    });
+    assert_eq!(wrong.verdict(), Verdict::Worse);
+    assert!(said(&wrong, "gate/v1").any(|f| f.verdict == Verdict::Worse));
+    // Figures that went with the gate are missed, too.
+    assert!(
+        said(&wrong, "mrays-per-s/v1")
+            .all(|f| f.verdict == Verdict::Undecided && f.why.contains("missing"))
+    );
+    for other in [0.749, 0.751] {
+        let hits = with_structure(|record| record.timings[0].hit_fraction = other);
+        assert!(said(&hits, "hit-share/v1").all(|f| f.verdict == Verdict::Worse));
+        assert_eq!(hits.verdict(), Verdict::Worse);
+    }
+}
+
+#[test]
+fn another_image_and_another_discrepancy_are_told() {
+    let image = with(|lines| {
+        let error = lines.iter_mut().find_map(|line| match &mut line.body {
+            Body::Error(record) => Some(record),
+            _ => None,
+        });
+        error.expect("an error").image_hash = "another".into();
+    });
+    assert_eq!(
+        (image.verdict(), image.count(Verdict::Worse)),
+        (Verdict::Worse, 1)
+    );
+    let star = with(|lines| {
+        let stream = lines.iter_mut().find_map(|line| match &mut line.body {
+            Body::Stream(record) => Some(record),
+            _ => None,
+        });
+        stream.expect("a stream").star[0].value =
+            raystone::measure::record::Interval::exact(0.0101);
+    });
+    let said: Vec<_> = said(&star, "star-discrepancy/v1")
+        .map(|f| f.verdict)
+        .collect();
+    assert_eq!(said, [Verdict::Worse]);
+}
+
+#[test]
+fn a_missing_cell_is_named_and_a_new_one_is_no_fault() {
+    let gone = with(|lines| lines.retain(|line| line.key.label("accel") != "structure-3"));
+    assert_eq!(gone.verdict(), Verdict::Undecided);
+    let missing = gone
+        .findings
+        .iter()
+        .filter(|f| f.verdict == Verdict::Undecided);
+    assert!(missing.clone().count() > 10);
+    assert!(
+        missing
+            .clone()
+            .all(|f| f.why == "missing in the candidate" && f.key.label("accel") == "structure-3")
+    );
+    let base = Made::default();
+    let more = Made {
+        structures: 13,
+        ..base.clone()
+    };
+    let found = compared(&base.side(), &more.side());
+    assert!(found.count(Verdict::New) > 10 && found.count(Verdict::Undecided) == 0);
+}
+
+#[test]
+fn times_of_another_machine_are_refused_and_all_else_is_compared() {
+    let found = with(|lines| {
+        for line in lines.iter_mut() {
+            if let Body::Run(record) = &mut line.body {
+                record.environment.cpu = "Another Processor".into();
+            }
+            if let Body::Structure(record) = &mut line.body {
+                record.stats.sah_cost = Some(13.0);
+            }
+        }
+    });
+    assert!(
+        found
+            .notes
+            .iter()
+            .any(|n| n.contains("processor: Some Processor against Another Processor")),
+        "{:?}",
+        found.notes
+    );
+    assert!(
+        found
+            .findings
+            .iter()
+            .filter(|f| f.is_time)
+            .all(|f| f.verdict == Verdict::Undecided && f.measured.is_none())
+    );
+    assert!(said(&found, "sah-cost/v1").all(|f| f.verdict == Verdict::Worse));
+    // Where times do not decide, a refusal leaves nothing open.
+    let base = Made::default();
+    let mut other = base.side();
+    if let Body::Run(record) = &mut other.lines[0].body {
+        record.environment = raystone::gpu::Environment {
+            driver: "another".into(),
+            ..environment()
+        };
+    }
+    let options = Options {
+        judge_times: false,
+        ..Options::default()
+    };
+    assert_eq!(
+        compare_sides(&base.side(), &other, &options, &Confirmed::new()).verdict(),
+        Verdict::Same
+    );
+}
+
+#[test]
+fn other_scenes_rays_and_parameters_are_not_compared_as_if_they_were_the_same() {
+    let scene = with(|lines| {
+        if let Body::Scene(record) = &mut lines[1].body {
+            record.scene_hash = "other".into();
+        }
+    });
+    assert!(
+        said(&scene, "nodes-per-ray/v1")
+            .all(|f| f.verdict == Verdict::Undecided && f.why.contains("scene abc"))
+    );
+    assert_eq!(said(&scene, "nodes-per-ray/v1").count(), 24);
+    let rays = with_structure(|record| record.timings[0].rays = 999);
+    assert_eq!(said(&rays, "nodes-per-ray/v1").count(), 1);
+    assert!(said(&rays, "nodes-per-ray/v1").all(|f| f.why.contains("999 rays")));
+}
+
+#[test]
+fn records_that_contradict_themselves_are_named() {
+    let found = with(|lines| {
+        let is_third = |line: &&Line| line.key.label("accel") == "structure-3";
+        let mut again = lines.iter().find(is_third).expect("a structure").clone();
+        if let Body::Structure(record) = &mut again.body {
+            record.stats.sah_cost = Some(11.0);
+        }
+        lines.push(again);
+    });
+    let said: Vec<_> = said(&found, "sah-cost/v1").collect();
+    assert_eq!(said.len(), 1);
+    assert!(
+        said[0].verdict == Verdict::Undecided && said[0].why.contains("contradict"),
+        "{said:?}"
+    );
+    // The same line twice contradicts nothing.
+    let twice = with(|lines| lines.extend(lines.clone()));
+    assert_eq!(twice.verdict(), Verdict::Same);
+}
+
+fn read(text: &str) -> Result<Side, SideError> {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("records.jsonl"), text).expect("written");
+    Side::read(folder.path())
+}
+
+#[test]
+fn cut_and_mixed_files_are_named() {
+    let base = Made::default();
+    let text = text_of(&base.lines()).expect("text");
+    let cut = read(&text[..text.len() - 30]).expect("whole lines before");
+    assert!(cut.notes[0].contains("cut off"), "{:?}", cut.notes);
+    assert!(
+        cut.notes[1].contains("did not reach its end"),
+        "{:?}",
+        cut.notes
+    );
+    let found = compared(&base.side(), &cut);
+    assert!(
+        found
+            .notes
+            .iter()
+            .any(|note| note.starts_with("candidate: line")),
+        "{:?}",
+        found.notes
+    );
+    // Cut in the middle of the file, of a version to come, and with a number that is none.
+    let (first, rest) = text.split_at(400);
+    let newer = text.replacen("raystone/2", "raystone/3", 1);
+    let nan = text.replacen("\"sah_cost\":12.5", "\"sah_cost\":NaN", 1);
+    let null = text.replacen("\"nodes\":20.0", "\"nodes\":null", 1);
+    for (text, said) in [
+        (format!("{first}\n{rest}"), "not a record"),
+        (newer, "raystone/3"),
+        (nan, "not a record"),
+        (null, "not a record"),
+    ] {
+        let error = read(&text).expect_err("no side").to_string();
+        assert!(error.contains(said), "{error}");
+    }
+    assert!(matches!(
+        read(""),
+        Err(SideError::Records(RecordError::NoRecords { .. }))
+    ));
+    let old =
+        r#"{"schema":"raystone/1","hash":"","record":{"kind":"skipped","cell":"a","reason":"b"}}"#;
+    let mixed = read(&format!("{old}\n{text}")).expect("both are read");
+    assert!(
+        mixed
+            .notes
+            .iter()
+            .any(|n| n.starts_with("1 of ") && n.contains("older schema")),
+        "{:?}",
+        mixed.notes
+    );
+}
+
+#[test]
+fn two_sets_of_kernels_of_one_run_are_its_two_sides() {
+    let base = Made::default();
+    let idea = Made {
+        candidate: true,
+        ..base.clone()
+    };
+    let mut lines = base.lines();
+    let of_idea = idea
+        .lines()
+        .into_iter()
+        .filter(|line| matches!(line.body, Body::Structure(_) | Body::Error(_)));
+    lines.extend(of_idea.map(|mut line| {
+        line.key = line.key.with("kernels", "idea");
+        line
+    }));
+    let run = Side::new("run", lines, Vec::new());
+    assert_eq!(run.kernels(), ["embedded", "idea"]);
+    let [a, b] = run.of_kernels(None).expect("two sides");
+    assert!(a.in_rounds && b.lines.iter().all(|line| line.key.get("kernels").is_none()));
+    let found = compared(&a, &b);
+    assert_eq!(
+        found.count(Verdict::Worse) + found.count(Verdict::Better),
+        0,
+        "{:?}",
+        found.findings[0]
+    );
+    assert!(run.of_kernels(Some(["embedded", "other"])).is_err());
+    assert!(
+        base.side()
+            .of_kernels(None)
+            .expect_err("one set")
+            .to_string()
+            .contains("second run")
+    );
+    // A run of other kernels alone is compared cell by cell.
+    let named = |line: &Line| !line.key.label("kernels").is_empty();
+    assert!(!b.alone().lines.iter().any(named));
+}

@@ -1,0 +1,20 @@
+//! The comparison of runs: what it may not miss, and when it may not cry.
+
+mod alarms;
+mod inputs;
+mod records;
+mod shown;
+
+use raystone::compare::judge::Verdict;
+use raystone::compare::side::Side;
+use raystone::compare::{Comparison, Confirmed, Finding, Options, compare_sides};
+
+fn compared(base: &Side, candidate: &Side) -> Comparison {
+    compare_sides(base, candidate, &Options::default(), &Confirmed::new())
+}
+
+/// What was said of a figure where it was not said to be the same.
+fn said<'a>(found: &'a Comparison, figure: &'a str) -> impl Iterator<Item = &'a Finding> {
+    let of = move |f: &&Finding| f.figure.id == figure && f.verdict != Verdict::Same;
+    found.findings.iter().filter(of)
+}

@@ -1,0 +1,108 @@
+//! What a reader sees.
+
+use super::compared;
+use super::records::Made;
+use raystone::compare::judge::Verdict;
+use raystone::compare::show::{json, markdown, terminal, verdict_line};
+use raystone::compare::side::Side;
+use raystone::measure::record::{Body, axis};
+
+const HOSTILE: &str = "\u{1b}[31mred\u{1b}[0m | <script>alert(1)</script> @someone #1 ![x](http://x) `\n# head \u{202e}";
+
+fn hostile() -> [Side; 2] {
+    let base = Made::default();
+    let named = |sah: f64| {
+        let mut lines = base.lines();
+        for line in &mut lines {
+            if line.key.label(axis::ACCEL) == "structure-3" {
+                line.key = line.key.clone().with(axis::ACCEL, HOSTILE);
+                if let Body::Structure(record) = &mut line.body {
+                    record.stats.sah_cost = Some(sah);
+                }
+            }
+        }
+        Side::new(HOSTILE, lines, vec![HOSTILE.into()])
+    };
+    [named(12.5), named(13.0)]
+}
+
+#[test]
+fn hostile_names_are_inert() {
+    let [base, candidate] = hostile();
+    let found = compared(&base, &candidate);
+    assert_eq!(found.verdict(), Verdict::Worse);
+    for width in [60, 80, 120] {
+        let text = terminal(&found, width);
+        assert!(!text.contains(['\u{1b}', '\u{202e}', '\r']), "{text}");
+        assert!(text.contains("[31mred"), "{text}");
+    }
+    let comment = markdown(&found);
+    let bad = [
+        "<script", "@someone", "#1 ", "![x]", "http://", "\n# head", "\u{1b}",
+    ];
+    for bad in bad {
+        assert!(!comment.contains(bad), "{bad} in {comment}");
+    }
+    // Rows stay rows.
+    let rows: Vec<&str> = comment
+        .lines()
+        .filter(|line| line.starts_with("| worse"))
+        .collect();
+    assert_eq!(rows.len(), 1);
+    let bars = rows[0].replace("\\|", "").matches('|').count();
+    assert_eq!(bars, 7, "{}", rows[0]);
+    let text = json(&found).to_string();
+    assert!(serde_json::from_str::<serde_json::Value>(&text).is_ok() && !text.contains('\u{1b}'));
+}
+
+#[test]
+fn lines_fit_the_width_and_the_worst_comes_first() {
+    let base = Made::default();
+    let candidate = Made {
+        worse: |sampler| if sampler == 2 { 1.01 } else { 1.0 },
+        ..base.clone()
+    };
+    let found = compared(&base.side(), &candidate.side());
+    for width in [80, 120] {
+        let text = terminal(&found, width);
+        let longest = text.lines().map(|line| line.chars().count()).max();
+        assert!(longest <= Some(width), "{longest:?}: {text}");
+    }
+    let text = terminal(&found, 120);
+    let first = text
+        .lines()
+        .skip_while(|line| !line.starts_with("verdict"))
+        .nth(1);
+    assert!(
+        first.is_some_and(|line| line.starts_with("worse")),
+        "{text}"
+    );
+    assert!(verdict_line(&found).starts_with("WORSE: "));
+    let value = json(&found);
+    assert_eq!(value["verdict"], "worse");
+    assert_eq!(
+        value["findings"].as_array().map(Vec::len),
+        Some(found.findings.len())
+    );
+}
+
+#[test]
+fn a_comment_stays_below_what_a_pull_request_takes() {
+    let base = Made {
+        structures: 400,
+        ..Made::default()
+    };
+    let mut other = base.side();
+    for line in &mut other.lines {
+        if let Body::Structure(record) = &mut line.body {
+            record.stats.sah_cost = Some(13.0);
+            record.stats.nodes += 1;
+        }
+    }
+    let text = markdown(&compared(&base.side(), &other));
+    assert!(text.len() < 65_536, "{}", text.len());
+    assert!(
+        text.contains("… and ") && text.contains("<details>"),
+        "{text}"
+    );
+}
