@@ -18,6 +18,7 @@ pub mod coherence;
 pub mod compaction;
 pub mod config;
 pub mod discrepancy;
+pub mod export;
 pub mod geometry;
 pub mod gpu;
 pub mod image;

@@ -2,13 +2,16 @@
 
 mod adapters;
 mod arguments;
+mod completions;
 mod discrepancy;
 mod doctor;
 mod estimate;
 mod export;
+mod exporting;
 mod failure;
 mod faults;
 mod list;
+mod list_json;
 mod output;
 mod points;
 mod points_plot;
@@ -85,6 +88,10 @@ enum Command {
     Trace(trace::Trace),
     #[command(after_help = EXIT_CODES)]
     ExportMitsuba(export::ExportMitsuba),
+    #[command(after_help = EXIT_CODES)]
+    Export(exporting::Export),
+    Completions(completions::Completions),
+    Man(completions::Man),
 }
 
 /// Reads the command line and does what it says; clap itself ends the program with 2 on bad usage.
@@ -101,6 +108,9 @@ pub fn main() -> ExitCode {
         Command::Stress(command) => command.execute(),
         Command::Trace(command) => command.execute(),
         Command::ExportMitsuba(command) => command.execute(),
+        Command::Export(command) => command.execute(),
+        Command::Completions(command) => command.execute(),
+        Command::Man(command) => command.execute(),
     };
     done.unwrap_or_else(failure::end)
 }

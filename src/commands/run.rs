@@ -3,14 +3,14 @@
 use super::arguments::{DeviceArguments, ExperimentArguments, plan};
 use super::estimate::Estimate;
 use super::failure::{BAD_INPUT, FAILED};
-use super::output::{self, print};
+use super::output::{self, print, screen};
 use super::signals;
 use anyhow::Result;
 use clap::Args;
 use raystone::config::{Cell, Experiment};
 use raystone::image::FileFormat;
 use raystone::measure::record::{Body, Line, read_records};
-use raystone::report::{failed_checks, terminal_tables, write_report};
+use raystone::report::{failed_checks, write_report};
 use raystone::run::{Existing, Kernels, Registries, RunError, RunSummary, user_cache};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -116,7 +116,7 @@ fn tell(summary: &RunSummary, quiet: bool) -> Result<ExitCode> {
         true => format!("{}\n", page.display()),
         false => format!(
             "{}\n\nreport: {}\n",
-            terminal_tables(&lines).trim_end(),
+            screen().tables(&lines).trim_end(),
             page.display()
         ),
     })?;
