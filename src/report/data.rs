@@ -1,6 +1,7 @@
 //! Records sorted by what they speak of: scene, integrator, sampler.
 
 use super::names::Names;
+use super::plot::marker::STRUCTURES;
 use super::samplers::MeasuredSampler;
 use crate::measure::bias::BiasVerdict;
 use crate::measure::figure::{FIGURES, Figure, figure};
@@ -66,6 +67,8 @@ pub struct View<'a> {
     key: Key,
     /// The integrator, with what else tells this view from others.
     pub name: String,
+    /// What the integrator's judge found wrong with single paths.
+    pub paths_fault: Option<String>,
     /// The reference image.
     pub reference: Option<Recorded<'a, ReferenceRecord>>,
     /// Samplers in the order in which they first appear.
@@ -210,6 +213,7 @@ impl<'a> RunData<'a> {
         for reference in all_of(lines) {
             data.refer_to(reference);
         }
+        data.doubt_integrators();
         data.name_competitors();
         data.judge_biases_together();
         data
@@ -285,6 +289,18 @@ impl<'a> RunData<'a> {
         }
     }
 
+    /// Tells views of what was found wrong with single paths of their integrators.
+    fn doubt_integrators(&mut self) {
+        let views = self.scenes.iter_mut().flat_map(|scene| &mut scene.views);
+        for view in views {
+            let is_its = |p: &&Recorded<PathsRecord>| {
+                p.key.agrees(&view.key, &[axis::SCENE, axis::INTEGRATOR])
+            };
+            let faults = self.paths.iter().filter(is_its);
+            view.paths_fault = faults.filter_map(|p| p.fault.clone()).next();
+        }
+    }
+
     fn name_competitors(&mut self) {
         let structures = self.scenes.iter().flat_map(|scene| {
             let measured = scene.structures.iter().map(|s| s.structure.clone());
@@ -313,12 +329,12 @@ impl<'a> RunData<'a> {
 
     /// Look of a structure in plots.
     pub fn structure_look(&self, name: &str) -> usize {
-        place(&self.structures, name)
+        STRUCTURES + place(&self.structures, name)
     }
 
     /// Look of a sampler in plots.
     pub fn sampler_look(&self, name: &str) -> usize {
-        place(&self.samplers, name)
+        place(&self.samplers, name) % STRUCTURES
     }
 
     fn scene(&mut self, name: &'a str) -> &mut SceneGroup<'a> {
@@ -338,6 +354,7 @@ impl<'a> RunData<'a> {
         let new = || View {
             key: key.only(&VIEW_AXES),
             name: name.clone(),
+            paths_fault: None,
             reference: None,
             samplers: Vec::new(),
             times: Vec::new(),

@@ -26,22 +26,39 @@ impl Document {
     /// # Errors
     /// If the drawing backend fails.
     pub fn paint(&mut self) -> Result<(), ReportError> {
-        let blocks = self
-            .sections
-            .iter_mut()
-            .flat_map(|section| &mut section.blocks);
-        let figures: Vec<&mut Illustration> = blocks
-            .filter_map(|block| match block {
-                Block::Figures(figures) => Some(figures),
-                _ => None,
-            })
-            .flatten()
-            .collect();
+        let mut figures = Vec::new();
+        for section in &mut self.sections {
+            figures_among(&mut section.blocks, &mut figures);
+        }
         figures.into_par_iter().try_for_each(|figure| {
             figure.svg = to_svg(&figure.drawing)?;
             figure.png = to_png(&figure.drawing)?;
             Ok(())
         })
+    }
+
+    /// Every figure, those in folds too.
+    pub fn figures(&self) -> Vec<&Illustration> {
+        let blocks = self.sections.iter().flat_map(|section| &section.blocks);
+        let figures = blocks
+            .flat_map(Block::leaves)
+            .filter_map(|block| match block {
+                Block::Figures(figures) => Some(figures),
+                _ => None,
+            });
+        figures.flatten().collect()
+    }
+}
+
+/// Gathers the figures among some blocks and in their folds.
+fn figures_among<'a>(blocks: &'a mut [Block], found: &mut Vec<&'a mut Illustration>) {
+    for block in blocks {
+        match block {
+            Block::Figures(figures) => found.extend(figures),
+            Block::Fold(fold) => figures_among(&mut fold.blocks, found),
+            Block::Beside(beside) => figures_among(&mut beside.blocks, found),
+            _ => {}
+        }
     }
 }
 
@@ -102,9 +119,38 @@ pub enum Block {
     Gallery(Gallery),
     /// Text as typed.
     Verbatim(String),
+    /// What opens on demand.
+    Fold(Fold),
+    /// Pictures beside other blocks.
+    Beside(Beside),
+    /// Words of the field, explained where they first stand.
+    Terms(Vec<Term>),
+    /// Images of one scene, to be compared pixel by pixel.
+    Comparer(Comparer),
 }
 
 impl Block {
+    /// Blocks that open on demand, if there are any.
+    pub fn fold(title: impl Into<String>, blocks: Vec<Self>) -> Option<Self> {
+        let title = title.into();
+        (!blocks.is_empty()).then(|| {
+            Self::Fold(Fold {
+                title,
+                blocks,
+                ..Fold::default()
+            })
+        })
+    }
+
+    /// The block, or those inside of it.
+    pub fn leaves(&self) -> Vec<&Self> {
+        match self {
+            Self::Fold(fold) => fold.blocks.iter().flat_map(Self::leaves).collect(),
+            Self::Beside(beside) => beside.blocks.iter().flat_map(Self::leaves).collect(),
+            leaf => vec![leaf],
+        }
+    }
+
     /// Plots, if any could be drawn.
     pub fn figures(figures: impl IntoIterator<Item = Option<Illustration>>) -> Option<Self> {
         let figures: Vec<Illustration> = figures.into_iter().flatten().collect();
@@ -124,6 +170,39 @@ impl Block {
             scale,
         }))
     }
+}
+
+/// Blocks that open on demand; print, Markdown and whoever searches the page see all of them.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Fold {
+    /// Anchor, unique in the document, or empty.
+    pub id: String,
+    /// What is inside.
+    pub title: String,
+    /// The gist of it in a few words.
+    pub note: String,
+    /// Whether it is open at first.
+    pub open: bool,
+    /// Content.
+    pub blocks: Vec<Block>,
+}
+
+/// Pictures beside other blocks.
+#[derive(Debug, Clone, Serialize)]
+pub struct Beside {
+    /// The pictures, one below the other.
+    pub pictures: Vec<Picture>,
+    /// What stands beside them.
+    pub blocks: Vec<Block>,
+}
+
+/// A word and what it means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Term {
+    /// The word.
+    pub word: &'static str,
+    /// One plain sentence.
+    pub meaning: &'static str,
 }
 
 /// How a text is meant.
@@ -188,6 +267,8 @@ pub struct TableCell {
     pub detail: String,
     /// How it is meant.
     pub tone: Tone,
+    /// Address that the text leads to, or empty.
+    pub link: String,
 }
 
 impl TableCell {
@@ -196,8 +277,14 @@ impl TableCell {
         Self {
             text: text.into(),
             detail: detail.into(),
-            tone: Tone::Plain,
+            ..Self::default()
         }
+    }
+
+    /// The same cell as a link.
+    pub fn linked(mut self, address: impl Into<String>) -> Self {
+        self.link = address.into();
+        self
     }
 
     /// How many replicates or seeds there are.
@@ -269,6 +356,8 @@ pub struct Illustration {
     pub name: String,
     /// What it shows.
     pub caption: String,
+    /// What is to be seen, for those who do not see it.
+    pub alt: String,
     /// Whether it takes the full width.
     pub wide: bool,
     /// What is painted.
@@ -287,6 +376,7 @@ impl Illustration {
         Self {
             name: name.into(),
             caption: caption.into(),
+            alt: drawing.says.clone(),
             wide: drawing.width > 600.0,
             drawing,
             svg: String::new(),
@@ -311,6 +401,8 @@ pub struct Gallery {
 pub struct Picture {
     /// What it is.
     pub caption: String,
+    /// What is to be seen, for those who do not see it.
+    pub alt: String,
     /// File relative to the run's folder.
     pub path: String,
     /// `data:` address, or `None` with the reason in `missing`.
@@ -328,4 +420,30 @@ pub struct ColorScale {
     pub title: String,
     /// Numbers at equal distances from left to right.
     pub labels: Vec<String>,
+}
+
+/// Images of one scene under one integrator.
+#[derive(Debug, Clone, Serialize)]
+pub struct Comparer {
+    /// What they show.
+    pub caption: String,
+    /// Anchor, unique in the document.
+    pub id: String,
+    /// Pixels in x and y.
+    pub size: [u32; 2],
+    /// What radiance is multiplied by before tone mapping.
+    pub exposure: f32,
+    /// The reference first.
+    pub layers: Vec<Layer>,
+    /// What is missing, in words; empty if nothing is.
+    pub note: String,
+}
+
+/// One image of a [`Comparer`].
+#[derive(Debug, Clone, Serialize)]
+pub struct Layer {
+    /// What made it.
+    pub name: String,
+    /// Linear radiance: 16-bit floats, red, green, blue, row by row from the top, low byte first, in Base64.
+    pub radiance: String,
 }

@@ -8,9 +8,27 @@ use crate::measure::statistics::LEAST_FOR_MEDIAN;
 /// What stands for an absent value.
 pub const ABSENT: &str = "–";
 
-/// A number with `digits` significant digits; scientific below 10⁻³ and from 10⁶ on, the dash for what
-/// is no number.
+/// A number with `digits` significant digits and a true minus; `6.33·10⁻⁴` below 10⁻³ and from 10⁶ on, the dash for
+/// what is no number.
 pub fn significant(value: f64, digits: usize) -> String {
+    let text = plain(value, digits);
+    match text.split_once('e') {
+        None => text.replace('-', "−"),
+        Some((mantissa, exponent)) => {
+            format!("{}·10{}", mantissa.replace('-', "−"), raised(exponent))
+        }
+    }
+}
+
+/// An exponent's digits as they stand raised.
+pub fn raised(exponent: &str) -> String {
+    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    let digit = |c: char| c.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]);
+    exponent.chars().map(digit).collect()
+}
+
+/// The same in plain characters.
+fn plain(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".into();
     }
@@ -197,10 +215,10 @@ mod tests {
         for (value, text) in [
             (9.999, "10.0"),
             (0.001234, "0.00123"),
-            (0.0001234, "1.23e-4"),
+            (0.0001234, "1.23·10⁻⁴"),
             (123_456.0, "123456"),
-            (1_234_567.0, "1.23e6"),
-            (-0.5, "-0.500"),
+            (1_234_567.0, "1.23·10⁶"),
+            (-0.5, "−0.500"),
             (0.0, "0"),
             (f64::NAN, "–"),
         ] {

@@ -18,9 +18,35 @@ pub fn summary(document: &Document) -> String {
     out
 }
 
-fn block(block: &Block) -> String {
-    match block {
+fn block(of: &Block) -> String {
+    match of {
         Block::Heading(text) => format!("### {}\n", escape(text)),
+        Block::Fold(fold) => {
+            let note = match fold.note.is_empty() {
+                true => String::new(),
+                false => format!("{}\n", escape(&fold.note)),
+            };
+            let inside: Vec<String> = fold.blocks.iter().map(block).collect();
+            format!(
+                "#### {}\n\n{note}\n{}",
+                escape(&fold.title),
+                inside.join("\n")
+            )
+        }
+        Block::Beside(beside) => {
+            let pictures: String = beside.pictures.iter().map(picture).collect();
+            let inside: Vec<String> = beside.blocks.iter().map(block).collect();
+            format!("{}\n{pictures}", inside.join("\n"))
+        }
+        Block::Terms(terms) => {
+            let line = |t: &Term| format!("- *{}*: {}\n", escape(t.word), escape(t.meaning));
+            terms.iter().map(line).collect()
+        }
+        Block::Comparer(comparer) => {
+            let names = comparer.layers.iter().map(|layer| escape(&layer.name));
+            let names = names.collect::<Vec<_>>().join(", ");
+            format!("{}: in the page, {names}\n", escape(&comparer.caption))
+        }
         Block::Paragraph(text) => format!("{}\n", escape(text)),
         Block::Verbatim(text) => {
             // A fence longer than any in the text.
@@ -42,16 +68,17 @@ fn block(block: &Block) -> String {
             figures.iter().map(line).collect()
         }
         Block::Gallery(gallery) => {
-            let line = |item: &Picture| {
-                let caption = escape(&item.caption);
-                match item.data {
-                    Some(_) => format!("- [{caption}](<{}>)\n", item.path),
-                    None => format!("- {caption}: {}\n", escape(&item.missing)),
-                }
-            };
-            let items: String = gallery.items.iter().map(line).collect();
+            let items: String = gallery.items.iter().map(picture).collect();
             format!("{}:\n\n{items}", escape(&gallery.caption))
         }
+    }
+}
+
+fn picture(item: &Picture) -> String {
+    let caption = escape(&item.caption);
+    match item.data {
+        Some(_) => format!("- [{caption}](<{}>)\n", item.path),
+        None => format!("- {caption}: {}\n", escape(&item.missing)),
     }
 }
 

@@ -19,8 +19,10 @@ pub mod ruling;
 pub mod samplers;
 pub mod sections;
 pub mod terminal;
+pub mod terms;
 #[cfg(test)]
 mod tests;
+pub mod trust;
 pub mod values;
 
 pub use terminal::{failed_checks, terminal_tables};
@@ -28,7 +30,8 @@ pub use terminal::{failed_checks, terminal_tables};
 use crate::atomic::write_atomic;
 use crate::measure::record::{RecordError, read_records};
 use data::RunData;
-use document::{Block, Document};
+use document::Document;
+use sections::cells::{self, Cells};
 use std::path::{Path, PathBuf};
 
 /// What can go wrong while a report is written.
@@ -68,7 +71,8 @@ pub struct ReportPaths {
     pub warnings: Vec<String>,
 }
 
-/// Writes `index.html`, `summary.md`, `figures.csv` and `plots/*.{svg,png}` beside the `records.jsonl` in `dir`.
+/// Writes `index.html`, `summary.md`, `figures.csv` and `plots/*.{svg,png}` beside the `records.jsonl` in `dir`, and
+/// `cells.html` where the page has no room for all cells.
 /// Each file is whole or absent: it is written under another name and renamed.
 ///
 /// # Errors
@@ -76,12 +80,15 @@ pub struct ReportPaths {
 pub fn write_report(dir: &Path) -> Result<ReportPaths, ReportError> {
     let records = read_records(dir)?;
     let data = RunData::new(&records.lines);
-    let mut document = sections::document(dir, &data, &records.warnings);
+    let values = values::values(&data);
+    let cells = Cells::new(&data, &values);
+    let mut document = sections::with_cells(dir, &data, &cells, &records.warnings);
     let (html, plots) = write_page(dir, &mut document)?;
+    write_cells(dir, cells.document(&data))?;
     let summary = dir.join("summary.md");
     write_file(&summary, markdown::summary(&document).as_bytes())?;
     let figures = dir.join("figures.csv");
-    write_file(&figures, values::csv(&values::values(&data)).as_bytes())?;
+    write_file(&figures, values::csv(&values).as_bytes())?;
     Ok(ReportPaths {
         html,
         summary,
@@ -89,6 +96,18 @@ pub fn write_report(dir: &Path) -> Result<ReportPaths, ReportError> {
         plots,
         warnings: records.warnings,
     })
+}
+
+/// Writes the page of the cells, or removes that of an earlier report.
+fn write_cells(dir: &Path, document: Option<Document>) -> Result<(), ReportError> {
+    let path = dir.join(cells::FILE);
+    match document {
+        Some(document) => write_file(&path, html::page(&document)?.as_bytes()),
+        None => {
+            let _ = std::fs::remove_file(&path);
+            Ok(())
+        }
+    }
 }
 
 /// Paints the document and writes `index.html` and `plots/*.{svg,png}` into `dir`, which is made if
@@ -125,12 +144,7 @@ fn write_plots(dir: &Path, document: &Document) -> Result<Vec<PathBuf>, ReportEr
         source,
     })?;
     let mut written = Vec::new();
-    let blocks = document.sections.iter().flat_map(|section| &section.blocks);
-    let figures = blocks.filter_map(|block| match block {
-        Block::Figures(figures) => Some(figures),
-        _ => None,
-    });
-    for figure in figures.flatten() {
+    for figure in document.figures() {
         for (extension, bytes) in [("svg", figure.svg.as_bytes()), ("png", &figure.png)] {
             let path = folder.join(format!("{}.{extension}", figure.name));
             write_file(&path, bytes)?;

@@ -2,7 +2,7 @@
 
 use super::document::Picture;
 use base64::Engine;
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
 /// Loads a picture that a record names relative to the run's folder `dir`. A missing file, or a name
 /// that leads out of the folder, gives a placeholder with the reason.
@@ -14,23 +14,36 @@ pub fn load(dir: &Path, path: &str, caption: impl Into<String>) -> Picture {
         }
         Err(reason) => (None, reason),
     };
+    let caption = caption.into();
     Picture {
-        caption: caption.into(),
+        alt: caption.clone(),
+        caption,
         path: path.into(),
         data,
         missing,
     }
 }
 
-fn read(dir: &Path, path: &str) -> Result<Vec<u8>, String> {
-    let inside = Path::new(path)
-        .components()
-        .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    if !inside {
-        return Err(format!("{path} lies outside the run's folder"));
+impl Picture {
+    /// The same picture with what is to be seen on it.
+    pub fn described(mut self, alt: impl Into<String>) -> Self {
+        self.alt = alt.into();
+        self
     }
-    let bytes =
-        std::fs::read(dir.join(path)).map_err(|error| format!("{path} is missing: {error}"))?;
+}
+
+/// The place of a file that a record names; `None` where the name leads out of the folder.
+pub fn inside(dir: &Path, path: &str) -> Option<PathBuf> {
+    let mut parts = Path::new(path).components();
+    let stays = parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    stays.then(|| dir.join(path))
+}
+
+fn read(dir: &Path, path: &str) -> Result<Vec<u8>, String> {
+    let Some(place) = inside(dir, path) else {
+        return Err(format!("{path} lies outside the run's folder"));
+    };
+    let bytes = std::fs::read(place).map_err(|error| format!("{path} is missing: {error}"))?;
     if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
         Ok(bytes)
     } else {

@@ -93,6 +93,11 @@ impl Ruling {
         }
     }
 
+    /// Whether there was any competition: two contenders, or a reason that none may win.
+    pub fn is_contest(&self) -> bool {
+        !matches!(self, Self::Nobody | Self::Alone(_))
+    }
+
     /// The best figure.
     pub fn figure(&self) -> String {
         match self {

@@ -160,6 +160,13 @@ impl<'a> MeasuredSampler<'a> {
         Some(format!("biased{design}: {tiles}{of_image}{weighted}"))
     }
 
+    /// The fault, unless the sampler is meant to have it.
+    pub fn failure(&self) -> Option<String> {
+        let by_design = self.bias.as_ref().is_some_and(|bias| bias.by_design);
+        let finite = self.replicates.iter().all(|r| r.non_finite_pixels == 0);
+        self.fault().filter(|_| !(by_design && finite))
+    }
+
     /// The full id of a metric as recorded.
     pub fn metric_id(&self, metric: Metric) -> Option<&'a str> {
         let errors = self

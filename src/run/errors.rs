@@ -449,7 +449,7 @@ pub(super) fn draw(
     let draw = |kind, picture: &Picture| session.picture(kind, &labels, picture);
     record.image = draw("image", &tone_map(&last.image, yardstick.exposure))?;
     let about = attributes(cell, &sampler_label(cell), last.spp, record.seed);
-    session.linear("image", &labels, &last.image, &about)?;
+    session.compared("image", &labels, &last.image, &about)?;
     let reference = &yardstick.reference;
     let map = error_map(&last.image, reference, ERROR_MAP_FULL_SCALE, viridis);
     record.error_map = draw("error", &map.map_err(|e| e.to_string())?)?;

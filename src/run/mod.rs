@@ -70,6 +70,8 @@ pub struct RunOptions {
     pub allow_outside: bool,
     /// Whether to draw a progress bar on standard error.
     pub progress: bool,
+    /// Whether the run is to end with exit code 0 whatever fails: recorded, and said in the report.
+    pub lenient: bool,
     /// Destroys the device when the turn of this cell comes: for tests of the recovery.
     pub lose_device_at: Option<String>,
     /// What to take the adapter's arithmetic for, instead of probing it: for tests of what depends on it.

@@ -245,7 +245,7 @@ fn finish_reference(
         line.body.spp,
         session.experiment.reference.seed,
     );
-    session.linear("reference", &labels, reference.image(), &about)?;
+    session.compared("reference", &labels, reference.image(), &about)?;
     line.body.image = image.unwrap_or_default();
     let done = format!("reference {}: done", labels.join(", "));
     if !session.is_done(&done) {

@@ -6,7 +6,7 @@ use super::{RunError, RunOptions};
 use crate::config::{Axis, Experiment, Plan, REFERENCE_PARTS, Skipped};
 use crate::gpu::Environment;
 use crate::gpu::Gpu;
-use crate::image::{Attribute, Image, ImageError, Picture, write_png};
+use crate::image::{Attribute, FileFormat, Image, ImageError, Picture, write_png};
 use crate::measure::record::{
     Body, FinishedRecord, KernelFolder, Line, RunRecord, SkippedRecord, axis,
 };
@@ -16,6 +16,9 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
+
+/// Pixels of images whose linear radiance is kept unasked: 1.5 MiB each.
+const MOST_KEPT_PIXELS: usize = 1 << 17;
 
 /// Where the wall time goes; what no part claims is the harness's own overhead.
 pub(super) struct Clock {
@@ -178,6 +181,7 @@ impl<'a> Session<'a> {
             renders_planned: self.plan.renders_planned(),
             kernels,
             figures: self.registries.figures.rows().cloned().collect(),
+            lenient: self.options.lenient,
         };
         self.write(&Line::about_all(Body::Run(record)))?;
         for skipped in &self.plan.skipped {
@@ -263,6 +267,29 @@ impl<'a> Session<'a> {
         picture: &Picture,
     ) -> Result<Option<String>, RunError> {
         self.image_file(kind, labels, "png", |path| write_png(path, picture))
+    }
+
+    /// Writes the linear radiance of a picture that the report compares pixel by pixel: in the format that the run was
+    /// asked for, else as EXR if it is small.
+    pub fn compared(
+        &self,
+        kind: &str,
+        labels: &[String],
+        image: &Image,
+        attributes: &[Attribute],
+    ) -> Result<(), RunError> {
+        let is_small = image.pixels.len() <= MOST_KEPT_PIXELS;
+        let exr = || {
+            FileFormat::of(Path::new("kept.exr"))
+                .ok()
+                .filter(|_| is_small)
+        };
+        let Some(format) = self.options.images.or_else(exr) else {
+            return Ok(());
+        };
+        let write = |path: &Path| format.write(path, image, attributes);
+        self.image_file(kind, labels, format.ending, write)?;
+        Ok(())
     }
 
     /// Writes linear radiance beside the pictures, if the run was asked for it.

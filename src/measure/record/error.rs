@@ -98,7 +98,8 @@ pub struct BiasRecord {
     /// p-value of all the tests of this sampler together, to be held against `alpha`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub p_of_all: Option<f64>,
-    /// Histogram of the p-values in ten equal bins: flat when there is no bias.
+    /// Histogram of the p-values in ten equal bins, without tiles whose difference rounding explains: flat when
+    /// there is no bias.
     pub p_histogram: Vec<usize>,
     /// Difference of the mean luminance of all replicates from the reference's beyond what rounding
     /// explains, in standard errors; absent where it is not testable or has no spread.

@@ -54,6 +54,9 @@ pub struct RunRecord {
     /// Figures from outside the crate that its records hold.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub figures: Vec<Figure>,
+    /// Whether the run was to end with exit code 0 whatever fails.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub lenient: bool,
 }
 
 /// A loaded scene.

@@ -209,6 +209,30 @@ fn positive_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     ends.reduce(|(low, high), (v, _)| (low.min(v), high.max(v)))
 }
 
+/// Decades that a plot may span before lone points at its ends are cut off.
+const MOST_DECADES: f64 = 6.0;
+/// Decades of nothing between lone points and the others.
+const LONE: f64 = 2.0;
+
+/// The least and the greatest of some positive values, without lone ones that would flatten all others: at most a tenth
+/// of them at either end, with two decades of nothing beside them. `None` without a positive value.
+pub fn without_lone_points(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let positive = values.filter(|v| v.is_finite() && *v > 0.0);
+    let mut logs: Vec<f64> = positive.map(f64::log10).collect();
+    logs.sort_unstable_by(f64::total_cmp);
+    let (&first, &last) = (logs.first()?, logs.last()?);
+    let (mut low, mut high) = (0, logs.len() - 1);
+    if last - first > MOST_DECADES {
+        let few = (logs.len() / 10).max(1);
+        let gap = |i: usize| logs[i + 1] - logs[i] > LONE;
+        let from_below = (0..few.min(high)).rev().find(|i| gap(*i));
+        low = from_below.map_or(0, |i| i + 1);
+        let from_above = (high.saturating_sub(few)..high).find(|i| gap(*i));
+        high = from_above.unwrap_or(high).max(low);
+    }
+    Some((10f64.powf(logs[low]), 10f64.powf(logs[high])))
+}
+
 fn plain(value: f64) -> String {
     match value >= 1.0 {
         true => format!("{value}"),
@@ -222,9 +246,7 @@ fn decimal_or_power(mantissa: u32, exponent: i32) -> String {
         let decimals = (-exponent).max(0) as usize;
         return format!("{:.decimals$}", f64::from(mantissa) * 10f64.powi(exponent));
     }
-    const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    let raised = |c: char| c.to_digit(10).map_or('⁻', |digit| RAISED[digit as usize]);
-    let power: String = exponent.to_string().chars().map(raised).collect();
+    let power = format::raised(&exponent.to_string());
     match mantissa {
         1 => format!("10{power}"),
         _ => format!("{mantissa}·10{power}"),
@@ -292,6 +314,25 @@ mod tests {
         assert!(has("10⁻⁵") && has("1"), "{long:?}");
         assert!(labels(log10(&[0.5])).len() >= 2);
         assert!(log10(&[0.0, -1.0, f64::NAN]).is_none() && log2(&[]).is_none());
+    }
+
+    #[test]
+    fn a_lone_point_far_away_is_cut_off_and_a_long_range_that_is_filled_is_not() {
+        let mut values: Vec<f64> = (1..=10).map(|i| 0.01 * f64::from(i)).collect();
+        let ends = |values: &[f64]| without_lone_points(values.iter().copied()).unwrap();
+        let near = |(a, b): (f64, f64), (c, d): (f64, f64)| {
+            assert!(
+                (a / c - 1.0).abs() < 1e-9 && (b / d - 1.0).abs() < 1e-9,
+                "{a} {b}"
+            )
+        };
+        values.push(1e-10);
+        near(ends(&values), (0.01, 0.1));
+        values.push(1e9);
+        near(ends(&values), (0.01, 0.1));
+        let filled: Vec<f64> = (0..20).map(|i| 10f64.powi(-i)).collect();
+        near(ends(&filled), (1e-19, 1.0));
+        near(ends(&[3.0]), (3.0, 3.0));
     }
 
     #[test]

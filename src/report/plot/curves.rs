@@ -1,12 +1,13 @@
 //! Curves with bands over a logarithmic y axis: error against samples or seconds, discrepancy against points,
 //! efficiency against bounces.
 
-use super::axis::{Axes, Axis};
+use super::axis::{Axes, Axis, without_lone_points};
 use super::drawing::{DIM, Drawing, INK, Ink};
 use super::legend;
 use super::marker;
 use crate::measure::record::Interval;
 use crate::report::document::Illustration;
+use crate::report::format;
 
 /// One point of a curve, with the ends of its 95 % interval (equal to `y` where there is none).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,15 +119,20 @@ impl CurvePlot {
         let ends = [x.min() * 1.05, x.max() / 1.05];
         let guides = self.guides.iter();
         let guide_ys = guides.flat_map(|guide| ends.map(|x| guide.at(x)));
-        let ys = points().flat_map(|p| [p.y, shown_low(p), p.high]);
+        let (low, high) = without_lone_points(points().map(|p| p.y))?;
+        let is_within = |p: &&CurvePoint| p.y >= low * 0.999 && p.y <= high * 1.001;
+        let ys = points().filter(is_within);
+        let ys = ys.flat_map(|p| [p.y, shown_low(p), p.high.min(p.y * 30.0)]);
         let y = Axis::log10(ys.chain(guide_ys), &self.y_title)?;
-        let rows = self.curves.len() + self.guides.len();
+        let beyond = points().count() - points().filter(is_within).count();
+        let rows = self.curves.len() + self.guides.len() + usize::from(beyond > 0);
         let mut drawing = Drawing::new(WIDTH, PLOT_HEIGHT + legend::height(rows));
         let axes = Axes::new(x, y, WIDTH, PLOT_HEIGHT);
         axes.draw(&mut drawing);
         let mut rows = legend::Rows::new(PLOT_HEIGHT, (16.0, WIDTH));
         for curve in &self.curves {
             curve.draw(&axes, self.x_ticks, &mut drawing);
+            self.tell(curve, &axes, &mut drawing);
             let (ink, exact) = (marker::ink(curve.look), curve.exact);
             rows.add(&mut drawing, &curve.label, INK, |drawing, y| {
                 curve_line(drawing, &[(16.0, y), (50.0, y)], ink, exact);
@@ -140,7 +146,52 @@ impl CurvePlot {
                 guide_line(drawing, &[(16.0, y), (50.0, y)], i);
             });
         }
+        if beyond > 0 {
+            let points = format::plural(beyond, "point");
+            let text = format!("{points} far beyond the axis, drawn at its edge");
+            rows.title(&mut drawing, &text, DIM);
+        }
+        drawing.says = self.says();
         Some(drawing)
+    }
+
+    /// Tells the values of a curve to who points at them.
+    fn tell(&self, curve: &Curve, axes: &Axes, drawing: &mut Drawing) {
+        for p in curve.points.iter().filter(|p| drawable(p, self.x_ticks)) {
+            let of = Interval {
+                value: p.y,
+                low: p.low,
+                high: p.high,
+            };
+            let (x, y) = (format::significant(p.x, 4), format::interval(&of));
+            let text = format!(
+                "{}\n{}: {x}\n{}: {y}",
+                curve.label, self.x_title, self.y_title
+            );
+            drawing.spot(axes.at(p.x, p.y), text);
+        }
+    }
+
+    /// What is to be seen: where each curve begins and ends.
+    fn says(&self) -> String {
+        let curve = |curve: &Curve| {
+            let mut points = curve.points.iter().filter(|p| drawable(p, self.x_ticks));
+            let first = points.next()?;
+            let at = |p: &CurvePoint| {
+                format!("{} at {}", format::number(p.y), format::significant(p.x, 4))
+            };
+            let to = points
+                .next_back()
+                .map_or(String::new(), |last| format!(" to {}", at(last)));
+            Some(format!("{}: {}{to}", curve.label, at(first)))
+        };
+        let curves: Vec<String> = self.curves.iter().filter_map(curve).collect();
+        format!(
+            "Curves of {} against {}. {}.",
+            self.y_title,
+            self.x_title,
+            curves.join("; ")
+        )
     }
 }
 

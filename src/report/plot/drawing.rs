@@ -98,6 +98,19 @@ pub struct Drawing {
     pub rasters: Vec<Raster>,
     /// From back to front.
     pub shapes: Vec<Shape>,
+    /// Places whose values are told to who points at them.
+    pub spots: Vec<Spot>,
+    /// What is to be seen, for those who do not see it.
+    pub says: String,
+}
+
+/// A place of a drawing and what is there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spot {
+    /// Its middle.
+    pub at: Point,
+    /// Name and values.
+    pub text: String,
 }
 
 impl Drawing {
@@ -108,7 +121,15 @@ impl Drawing {
             height,
             rasters: Vec::new(),
             shapes: Vec::new(),
+            spots: Vec::new(),
+            says: String::new(),
         }
+    }
+
+    /// Tells who points at a place what is there.
+    pub fn spot(&mut self, at: Point, text: impl Into<String>) {
+        let text = text.into();
+        self.spots.push(Spot { at, text });
     }
 
     /// Adds a polyline.

@@ -12,6 +12,19 @@ pub struct Histogram {
     pub biased: bool,
 }
 
+/// χ² with nine degrees of freedom that chance passes once in a hundred times.
+const CHANCE: f64 = 21.67;
+
+impl Histogram {
+    /// Whether chance explains how far the bars are from equal.
+    pub fn is_flat(&self) -> bool {
+        let total: usize = self.counts.iter().sum();
+        let mean = total as f64 / self.counts.len().max(1) as f64;
+        let square = |&n: &usize| (n as f64 - mean).powi(2) / mean;
+        mean == 0.0 || self.counts.iter().map(square).sum::<f64>() <= CHANCE
+    }
+}
+
 const FILL: Ink = Ink::solid([0x7a, 0x8a, 0x99]);
 
 impl Content for Histogram {
@@ -33,5 +46,21 @@ impl Content for Histogram {
         drawing.line(vec![area.at([0.0, 0.0]), area.at([1.0, 0.0])], GRID, 1.0);
         let line = [area.at([0.0, flat / top]), area.at([1.0, flat / top])];
         drawing.dashed_line(&line, INK, 1.0, 4.0, 3.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bars_that_chance_explains_are_flat_and_a_pile_is_not() {
+        let is_flat = |counts: [usize; 10]| {
+            let counts = counts.to_vec();
+            let biased = false;
+            Histogram { counts, biased }.is_flat()
+        };
+        assert!(is_flat([44, 41, 39, 47, 42, 40, 45, 46, 44, 44]));
+        assert!(!is_flat([6, 4, 6, 5, 6, 5, 7, 2, 7, 32]) && is_flat([0; 10]));
     }
 }

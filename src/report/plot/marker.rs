@@ -7,9 +7,27 @@ use std::f64::consts::PI;
 /// Number of different marker shapes.
 const SHAPES: usize = 7;
 
+/// Looks from here on are of structures, those below of samplers and all else: no colour stands for both.
+pub const STRUCTURES: usize = 56;
+
+/// Muted colours for structures.
+const MUTED: [[u8; 3]; 8] = [
+    [0x4b, 0x5d, 0x73],
+    [0x9a, 0x6b, 0x2f],
+    [0x5f, 0x7f, 0x3a],
+    [0x7a, 0x51, 0x95],
+    [0x9c, 0x4f, 0x5b],
+    [0x3b, 0x7f, 0x7a],
+    [0x8a, 0x8f, 0x98],
+    [0xb5, 0x93, 0x6b],
+];
+
 /// Colour of the category.
 pub fn ink(index: usize) -> Ink {
-    Ink::solid(categorical(index))
+    Ink::solid(match index.checked_sub(STRUCTURES) {
+        Some(structure) => MUTED[structure % MUTED.len()],
+        None => categorical(index),
+    })
 }
 
 /// Draws the marker of a category at a point; seven shapes, so that with eight colours 56

@@ -2,7 +2,7 @@
 //!
 //! The only font is the embedded one, so that a machine without fonts draws the same picture.
 
-use super::drawing::{Anchor, Drawing, FONT_PX, Ink, Point, Shape};
+use super::drawing::{Anchor, Drawing, FONT_PX, Ink, Point, Shape, Spot};
 use crate::report::ReportError;
 use image::ImageEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -70,11 +70,35 @@ pub fn to_svg(drawing: &Drawing) -> Result<String, ReportError> {
         let rasters: Result<String, _> = drawing.rasters.iter().map(|r| r.svg(SCALE)).collect();
         svg.insert_str(end, &rasters?);
     }
+    if let Some(end) = svg.rfind("</svg>") {
+        svg.insert_str(end, &spots(drawing, SCALE));
+    }
     Ok(svg.replacen(
         &format!(r#"width="{width}" height="{height}""#),
         &format!(r#"width="{}" height="{}""#, drawing.width, drawing.height),
         1,
     ))
+}
+
+/// Transparent discs whose titles a browser shows where the pointer rests.
+fn spots(drawing: &Drawing, scale: f64) -> String {
+    let disc = |Spot { at, text }: &Spot| {
+        let [x, y, r] = [at.0, at.1, 9.0].map(|v| v * scale);
+        let text = escaped(text);
+        format!(
+            "<circle cx=\"{x:.0}\" cy=\"{y:.0}\" r=\"{r:.0}\" fill-opacity=\"0\"><title>{text}</title></circle>\n"
+        )
+    };
+    let discs: String = drawing.spots.iter().map(disc).collect();
+    match discs.is_empty() {
+        true => discs,
+        false => format!("<g class=\"spots\">\n{discs}</g>\n"),
+    }
+}
+
+fn escaped(text: &str) -> String {
+    let text = text.replace('&', "&amp;").replace('<', "&lt;");
+    text.replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// The drawing as a PNG file of twice its size, smoothed by 2×2 samples per pixel.

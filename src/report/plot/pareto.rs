@@ -7,6 +7,7 @@ use super::marker;
 use crate::measure::comparison::Place;
 use crate::measure::record::Interval;
 use crate::measure::statistics::pareto_front;
+use crate::report::format;
 
 /// One cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,28 +91,39 @@ impl ParetoPlot {
         let mut drawing = Drawing::new(WIDTH, PLOT_HEIGHT + legend::height(rows) + legend::ROW);
         let axes = Axes::new(x, y, WIDTH, PLOT_HEIGHT);
         axes.draw(&mut drawing);
+        self.draw_uncertainty(&axes, &mut drawing);
         self.draw_front(&axes, &front, &mut drawing);
         for point in &self.points {
             self.draw_point(point, &axes, &mut drawing);
         }
         self.draw_labels(&axes, &front, &mut drawing);
         self.draw_legend(&front, &mut drawing);
+        let named: Vec<String> = front.iter().map(|&i| self.name(&self.points[i])).collect();
+        drawing.says = format!(
+            "{} cells as points of time and error. On the Pareto front, from fast to exact: {}.",
+            self.points.len(),
+            named.join("; ")
+        );
         Some(drawing)
     }
 
-    /// A staircase: what is above and right of it is beaten.
+    /// Between the front that all lower ends of the intervals would make and that of all upper ends.
+    fn draw_uncertainty(&self, axes: &Axes, drawing: &mut Drawing) {
+        let stairs = |end: fn(&Interval) -> f64| {
+            let corners = self.points.iter().map(|p| (end(&p.seconds), end(&p.error)));
+            let corners: Vec<Point> = corners.collect();
+            let front = pareto_front(&corners);
+            staircase(axes, front.into_iter().map(|i| corners[i]))
+        };
+        let (best, worst) = (stairs(|i| i.low), stairs(|i| i.high));
+        let band: Vec<Point> = best.into_iter().chain(worst.into_iter().rev()).collect();
+        drawing.area(band, DIM.with_alpha(0.16));
+    }
+
+    /// What is above and right of it is beaten.
     fn draw_front(&self, axes: &Axes, front: &[usize], drawing: &mut Drawing) {
-        let mut stairs: Vec<(f64, f64)> = Vec::new();
-        for &i in front {
-            let (x, y) = axes.at(self.points[i].seconds.value, self.points[i].error.value);
-            let from = stairs
-                .last()
-                .map_or(axes.at(axes.x.min(), axes.y.max()).1, |last| last.1);
-            stairs.extend([(x, from), (x, y)]);
-        }
-        if let Some(&(_, y)) = stairs.last() {
-            stairs.push((axes.at(axes.x.max(), axes.y.min()).0, y));
-        }
+        let corners = front.iter().map(|&i| &self.points[i]);
+        let stairs = staircase(axes, corners.map(|p| (p.seconds.value, p.error.value)));
         drawing.dashed_line(&stairs, DIM, 1.4, 6.0, 4.0);
     }
 
@@ -132,6 +144,14 @@ impl ParetoPlot {
             drawing.line(ends.to_vec(), ink.with_alpha(0.5), 1.2);
         }
         let at = axes.at(seconds.value, error.value);
+        let (time, off) = (format::interval(&seconds), format::interval(&error));
+        let text = format!(
+            "{}\n{}: {time}\n{}: {off}",
+            self.name(point),
+            self.x_title,
+            self.y_title
+        );
+        drawing.spot(at, text);
         marker::draw(drawing, self.samplers[point.sampler].1, at, 5.5, ink);
     }
 
@@ -187,7 +207,7 @@ impl ParetoPlot {
         left.y = left.y.max(right.y) + legend::ROW / 2.0;
         left.title(
             drawing,
-            "Pareto front: no cell is both faster and better (?: the noise leaves it open)",
+            "Pareto front: no cell is both faster and better (?: the noise leaves it open); grey: where it may lie",
             DIM,
         );
         let mut fronts = legend::Rows::new(left.y - legend::ROW / 2.0, (16.0, WIDTH));
@@ -197,6 +217,21 @@ impl ParetoPlot {
             });
         }
     }
+}
+
+/// The steps through some corners by growing time, from the upper edge to the right one.
+fn staircase(axes: &Axes, corners: impl Iterator<Item = Point>) -> Vec<Point> {
+    let mut stairs: Vec<Point> = Vec::new();
+    for (seconds, error) in corners {
+        let (x, y) = axes.at(seconds, error);
+        let top = || axes.at(axes.x.min(), axes.y.max()).1;
+        let from = stairs.last().map_or_else(top, |last| last.1);
+        stairs.extend([(x, from), (x, y)]);
+    }
+    if let Some(&(_, y)) = stairs.last() {
+        stairs.push((axes.at(axes.x.max(), axes.y.min()).0, y));
+    }
+    stairs
 }
 
 #[cfg(test)]

@@ -61,10 +61,49 @@ impl RatePlot {
             for bar in bars {
                 let x_at = |rate: f64| left + axis.share(rate) * (right - left);
                 bar.draw(&mut drawing, left, y + ROW / 2.0, x_at);
+                if let Some(rate) = bar.rate {
+                    let text = format!(
+                        "{}, {class} rays\n{} Mrays/s",
+                        bar.label,
+                        format::interval(&rate)
+                    );
+                    drawing.spot(
+                        (
+                            left + axis.share(rate.value) * (right - left),
+                            y + ROW / 2.0,
+                        ),
+                        text,
+                    );
+                }
                 y += ROW;
             }
         }
+        drawing.says = self.says();
         Some(drawing)
+    }
+
+    /// What is to be seen: the longest bar of each group and what has none.
+    fn says(&self) -> String {
+        let group = |(class, bars): &(String, Vec<Bar>)| {
+            let rated = bars.iter().filter_map(|bar| Some((bar, bar.rate?.value)));
+            let best = rated.max_by(|a, b| a.1.total_cmp(&b.1));
+            let best = best.map(|(bar, rate)| {
+                format!("{} is the longest with {}", bar.label, format::number(rate))
+            });
+            let without: Vec<&str> = (bars.iter().filter(|bar| bar.rate.is_none()))
+                .map(|bar| bar.label.as_str())
+                .collect();
+            let without = match without.is_empty() {
+                true => String::new(),
+                false => format!(", without a bar: {}", without.join(", ")),
+            };
+            format!("{class}: {}{without}", best.unwrap_or("no bar".into()))
+        };
+        let groups: Vec<String> = self.groups.iter().map(group).collect();
+        format!(
+            "Bars of Mrays/s by class of rays and structure. {}.",
+            groups.join("; ")
+        )
     }
 }
 

@@ -10,7 +10,20 @@ use crate::report::samplers::REFERENCE_SHARE;
 /// The section.
 pub fn section(data: &RunData) -> Section {
     let mut section = Section::new("belief", "Why to believe it");
-    section.blocks.push(Block::Checks(checks(data)));
+    let (passed, others): (Vec<Check>, Vec<Check>) = checks(data)
+        .into_iter()
+        .partition(|check| check.verdict == Verdict::Pass);
+    if !others.is_empty() {
+        section.blocks.push(Block::Checks(others));
+    }
+    if !passed.is_empty() {
+        section.blocks.push(Block::Fold(Fold {
+            title: format!("{} passed", plural(passed.len(), "check")),
+            note: "what was compared with what, and how often".into(),
+            blocks: vec![Block::Checks(passed)],
+            ..Fold::default()
+        }));
+    }
     section
 }
 

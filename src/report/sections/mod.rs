@@ -2,14 +2,17 @@
 
 pub mod animation;
 pub mod belief;
+pub mod cells;
 pub mod coherence;
 pub mod compactions;
+mod comparer;
 pub mod kernels;
 mod orders;
 pub mod organisations;
 pub mod peers;
 pub mod point_sets;
 mod primary;
+pub mod race;
 pub mod rendering;
 pub mod run;
 pub mod sampler_plots;
@@ -22,26 +25,37 @@ pub mod verdict;
 
 use super::data::{RunData, SceneGroup};
 use super::document::*;
-use super::format;
-use crate::measure::record::KernelFolder;
+use super::{format, terms, values};
+use crate::measure::record::{Interval, KernelFolder};
+use crate::measure::statistics::LEAST_FOR_MEDIAN;
+use cells::Cells;
 use std::path::Path;
 
 /// Builds the whole report. `dir` is where the pictures lie; `warnings` come from reading.
 pub fn document(dir: &Path, data: &RunData, warnings: &[String]) -> Document {
-    let mut sections = vec![verdict::section(data), belief::section(data)];
+    let values = values::values(data);
+    with_cells(dir, data, &Cells::new(data, &values), warnings)
+}
+
+/// The same with cells that are known already.
+pub fn with_cells(dir: &Path, data: &RunData, cells: &Cells, warnings: &[String]) -> Document {
+    let mut sections = vec![verdict::section(dir, data), belief::section(data)];
     for (index, scene) in data.scenes.iter().enumerate() {
-        sections.push(scene_section(dir, data, index, scene));
+        sections.push(scene_section(dir, data, cells, index, scene));
     }
     sections.extend(streams::section(data));
     sections.extend(point_sets::section(data));
     sections.extend(compactions::section(data));
+    sections.extend(cells.section(data));
     sections.extend(run::sections(data));
-    Document {
+    let mut document = Document {
         title: title(data),
         subtitle: subtitle(data),
         banners: banners(data, warnings),
         sections,
-    }
+    };
+    terms::explain(&mut document);
+    document
 }
 
 fn title(data: &RunData) -> String {
@@ -73,6 +87,10 @@ fn banners(data: &RunData, warnings: &[String]) -> Vec<Banner> {
             banners.extend((!e.timestamps).then(|| note(unstamped)));
         }
     }
+    banners.extend(busy(data).map(|text| note(&text)));
+    let lenient = data.run.is_some_and(|run| run.lenient);
+    let told = "The run was told to end with exit code 0 whatever fails (--lenient).";
+    banners.extend(lenient.then(|| note(told)));
     let folders = data.run.iter().flat_map(|run| &run.kernels);
     banners.extend(folders.map(|folder| note(&kernels_banner(folder))));
     let shown = "this report shows what was recorded until then.";
@@ -85,6 +103,29 @@ fn banners(data: &RunData, warnings: &[String]) -> Vec<Banner> {
     }
     banners.extend(warnings.iter().map(|warning| note(warning)));
     banners
+}
+
+/// Half-width of the intervals of times, relative, above which a machine is called busy.
+const CALM: f64 = 0.05;
+
+/// Whether times of the same work spread so widely that the machine did other things, too.
+fn busy(data: &RunData) -> Option<String> {
+    let structures = data.scenes.iter().flat_map(|scene| &scene.structures);
+    let timings = structures.flat_map(|s| &s.body.timings);
+    let often = timings.filter(|timing| timing.ms.len() >= LEAST_FOR_MEDIAN);
+    let rates = often.map(|timing| timing.mrays_s);
+    let half = |rate: Interval| 0.5 * (rate.high - rate.low) / rate.value;
+    let mut halves: Vec<f64> = rates.map(half).filter(|half| half.is_finite()).collect();
+    halves.sort_unstable_by(f64::total_cmp);
+    let middle = *halves.get(halves.len() / 2)?;
+    (middle > CALM).then(|| {
+        format!(
+            "The machine was busy or throttled: times of the same rays are known to ±{} only (median of the 95 % \
+             intervals; ±{} is calm). Small differences are lost in this.",
+            format::percent(middle),
+            format::percent(CALM)
+        )
+    })
 }
 
 /// Digits of a hash that tell two kernels apart.
@@ -112,7 +153,13 @@ fn kernels_banner(folder: &KernelFolder) -> String {
     text + ". References are rendered with the program's own."
 }
 
-fn scene_section(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> Section {
+fn scene_section(
+    dir: &Path,
+    data: &RunData,
+    cells: &Cells,
+    index: usize,
+    scene: &SceneGroup,
+) -> Section {
     let mut section = Section::new(format!("scene-{index}"), format!("Scene: {}", scene.name));
     let blocks = &mut section.blocks;
     blocks.extend(facts(scene));
@@ -121,14 +168,17 @@ fn scene_section(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -
     blocks.extend(animation::blocks(data, &format!("scene-{index}"), scene));
     for (number, view) in scene.views.iter().enumerate() {
         let stem = format!("scene-{index}-{}-{number}", file_stem(&view.name));
-        blocks.extend(samplers::blocks(dir, data, &stem, scene, view));
+        blocks.extend(samplers::blocks(dir, data, cells, &stem, (scene, view)));
     }
     let values: Vec<_> = scene
         .views
         .iter()
         .flat_map(|view| kernels::gains(scene, view))
         .collect();
-    blocks.extend(kernels::blocks(scene, &values));
+    blocks.extend(Block::fold(
+        "Kernels: gains, and what was compiled in and out",
+        kernels::blocks(scene, &values),
+    ));
     blocks.extend(organisations::blocks(scene));
     section
 }
@@ -153,7 +203,7 @@ fn facts(scene: &SceneGroup) -> Vec<Block> {
             format::plural(report.zero_area, "triangle")
         );
     }
-    let warning = |w: String| Block::Paragraph(format!("Loader: {w}"));
+    let warning = |w: String| Block::Paragraph(format!("While loading: {w}"));
     std::iter::once(Block::Paragraph(text))
         .chain(report.lines().into_iter().map(warning))
         .collect()

@@ -6,8 +6,8 @@ use crate::measure::figure::Better;
 use crate::measure::record::{Key, axis};
 use crate::measure::statistics::{LEAST_FOR_MEDIAN, Spread};
 use crate::report::data::{Measured, STRUCTURE_AXES, SceneGroup, View};
-use crate::report::format;
 use crate::report::ruling::{Contender, Ruling, judge};
+use crate::report::{format, trust};
 
 /// What else of a sampler than its kernels, which are those of the structure.
 const POINT_AXES: [&str; 3] = [axis::SEQUENCE, axis::DECORRELATION, axis::OFFSET];
@@ -71,6 +71,9 @@ fn geometric_mean(logs: &[LogFigure]) -> LogFigure {
 
 /// Which structure renders fastest.
 pub fn fastest(scene: &SceneGroup, view: &View) -> Ruling {
+    if let Some(reason) = trust::doubt_of_rendering(scene, view) {
+        return Ruling::Withheld(reason);
+    }
     let contender = |renderer: Renderer| Contender {
         name: renderer.name,
         figure: renderer.time.interval(),

@@ -11,7 +11,7 @@ const OVERHEAD_TARGET: f64 = 0.1;
 
 /// The closing sections.
 pub fn sections(data: &RunData) -> Vec<Section> {
-    [time(data), failures(data), environment(data)]
+    [failures_section(data), time(data), environment(data)]
         .into_iter()
         .flatten()
         .collect()
@@ -69,41 +69,96 @@ fn wall_table(finished: &FinishedRecord) -> Table {
     table
 }
 
-/// A cell, its state, and why.
-type Failure = (String, &'static str, String);
+/// State of a cell that failed.
+pub const FAILED: &str = "FAILED";
+/// State of a cell that was not tried.
+const LEFT_OUT: &str = "left out";
+/// State of what went wrong beside the measuring.
+const WARNING: &str = "warning";
 
-fn failures(data: &RunData) -> Option<Section> {
-    let mut rows: Vec<Failure> = data.scenes.iter().flat_map(failed_structures).collect();
-    rows.extend(
+/// A cell, its state, and why.
+pub struct Failure {
+    /// What it is of.
+    pub cell: String,
+    /// [`FAILED`], left out, or a warning.
+    pub state: &'static str,
+    /// Why.
+    pub reason: String,
+}
+
+impl Failure {
+    fn new(cell: impl Into<String>, state: &'static str, reason: impl Into<String>) -> Self {
+        let (cell, reason) = (cell.into(), reason.into());
+        Self {
+            cell,
+            state,
+            reason,
+        }
+    }
+}
+
+/// Everything that failed, was left out, or is warned of.
+pub fn failures(data: &RunData) -> Vec<Failure> {
+    let mut all: Vec<Failure> = data.scenes.iter().flat_map(failed_structures).collect();
+    all.extend(
         data.views()
             .flat_map(|(scene, view)| failed_cells(scene, view)),
     );
     for (records, state) in [
-        (&data.failed, "FAILED"),
-        (&data.skipped, "skipped"),
-        (&data.warnings, "warning"),
+        (&data.failed, FAILED),
+        (&data.skipped, LEFT_OUT),
+        (&data.warnings, WARNING),
     ] {
-        rows.extend((records.iter()).map(|r| (r.cell.clone(), state, r.reason.clone())));
+        all.extend((records.iter()).map(|r| Failure::new(&*r.cell, state, &*r.reason)));
     }
-    let mut table = Table::new("Failed and skipped cells", &["cell", ":state", ":reason"]);
-    for (cell, state, reason) in rows {
-        let tone = match state {
-            "FAILED" => Tone::Bad,
-            _ => Tone::Note,
+    all
+}
+
+fn failures_section(data: &RunData) -> Option<Section> {
+    let all = failures(data);
+    let of = |state: &str| all.iter().filter(|f| f.state == state).collect::<Vec<_>>();
+    let [failed, left_out, warnings] = [FAILED, LEFT_OUT, WARNING].map(of);
+    let title = match (failed.is_empty(), left_out.is_empty(), warnings.is_empty()) {
+        (true, true, true) => return None,
+        (false, true, _) => "What failed",
+        (false, false, _) => "What failed or was left out",
+        (true, false, _) => "What was left out",
+        (true, true, false) => "Warnings",
+    };
+    let mut section = Section::new("failures", title);
+    let table = |caption: &str, failures: &[&Failure], tone| {
+        let mut table = Table::new(caption, &["cell", ":why"]);
+        for failure in failures {
+            let reason = TableCell::from(failure.reason.clone()).toned(tone);
+            table.rows.push(vec![failure.cell.clone().into(), reason]);
+        }
+        table.into_block()
+    };
+    let blocks = &mut section.blocks;
+    blocks.extend(table("Failed", &failed, Tone::Bad));
+    blocks.extend(table("Warnings", &warnings, Tone::Note));
+    let mut reasons: Vec<&str> = left_out.iter().map(|f| f.reason.as_str()).collect();
+    reasons.sort_unstable();
+    reasons.dedup();
+    for reason in reasons {
+        let cells = left_out.iter().filter(|f| f.reason == reason);
+        let cells: Vec<&str> = cells.map(|f| f.cell.as_str()).collect();
+        let title = format!("Left out: {reason}");
+        let mut fold = Fold {
+            title,
+            note: format::plural(cells.len(), "cell"),
+            ..Fold::default()
         };
-        let state = TableCell::from(state).toned(tone);
-        table.rows.push(vec![cell.into(), state, reason.into()]);
+        fold.blocks.push(Block::Verbatim(cells.join("\n")));
+        blocks.push(Block::Fold(fold));
     }
-    let mut section = Section::new("failures", "Failed and skipped");
-    let none = || Block::Paragraph("No cell failed and none was skipped.".into());
-    section.blocks.push(table.into_block().unwrap_or_else(none));
     Some(section)
 }
 
 fn failed_structures(scene: &SceneGroup) -> Vec<Failure> {
     let failure = |s: &Measured<StructureRecord>| {
         let cell = format!("{} · {}", scene.name, s.structure);
-        Some((cell, "FAILED", s.fault()?))
+        Some(Failure::new(cell, FAILED, s.fault()?))
     };
     scene.structures.iter().filter_map(failure).collect()
 }
@@ -117,11 +172,11 @@ fn failed_cells(scene: &SceneGroup, view: &View) -> Vec<Failure> {
             "{} · {} · {} · {}",
             scene.name, time.structure, time.sampler, view.name
         );
-        Some((cell, "FAILED", reason))
+        Some(Failure::new(cell, FAILED, reason))
     };
     let sampler = |sampler: &MeasuredSampler| {
         let cell = format!("{} · {} · {}", scene.name, sampler.name, view.name);
-        Some((cell, "FAILED", sampler.fault()?))
+        Some(Failure::new(cell, FAILED, sampler.failure()?))
     };
     let times = view.times.iter().filter_map(time);
     times
@@ -172,8 +227,9 @@ fn environment(data: &RunData) -> Option<Section> {
     }
     let mut section = Section::new("environment", "Where it ran");
     section.blocks.extend(table.into_block());
-    section.blocks.push(Block::Heading("Experiment".into()));
-    let text = Block::Verbatim(run.experiment_text.clone());
-    section.blocks.push(text);
+    let text = vec![Block::Verbatim(run.experiment_text.clone())];
+    section
+        .blocks
+        .extend(Block::fold("The experiment file", text));
     Some(section)
 }

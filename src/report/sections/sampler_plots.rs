@@ -19,53 +19,54 @@ fn not_drawn(count: usize) -> String {
     }
 }
 
-/// Error against samples and against seconds, in both metrics.
-pub fn error_figures(data: &RunData, stem: &str, view: &View) -> Vec<Option<Illustration>> {
-    let mut figures = Vec::new();
-    for metric in [Metric::RelMse, Metric::Rmse] {
-        let name = metric.name();
-        let means = view.samplers.iter().flat_map(|s| s.mean_errors(metric));
-        let hidden = not_drawn(means.filter(|mean| !mean.resolved).count());
-        // What stands behind a sampler's name, and what one sample per pixel is on the x axis.
-        let plot =
-            |x_title: String, x_ticks, unit: &dyn Fn(&MeasuredSampler) -> Option<(String, f64)>| {
-                let curve = |s: &MeasuredSampler| {
-                    let (says, x) = unit(s)?;
-                    curve(data, s, metric, x, format!("{}{says}", s.name))
-                };
-                CurvePlot {
-                    x_title,
-                    x_ticks,
-                    y_title: format!("{name} (mean over replicates)"),
-                    curves: view.samplers.iter().filter_map(curve).collect(),
-                    guides: Vec::new(),
-                }
+/// Error against samples and against seconds.
+pub fn error_figures(
+    data: &RunData,
+    stem: &str,
+    view: &View,
+    metric: Metric,
+) -> [Option<Illustration>; 2] {
+    let name = metric.name();
+    let means = view.samplers.iter().flat_map(|s| s.mean_errors(metric));
+    let hidden = not_drawn(means.filter(|mean| !mean.resolved).count());
+    // What stands behind a sampler's name, and what one sample per pixel is on the x axis.
+    let plot =
+        |x_title: String, x_ticks, unit: &dyn Fn(&MeasuredSampler) -> Option<(String, f64)>| {
+            let curve = |s: &MeasuredSampler| {
+                let (says, x) = unit(s)?;
+                curve(data, s, metric, x, format!("{}{says}", s.name))
             };
-        let by_spp = plot("samples per pixel".into(), Ticks::PowersOfTwo, &|sampler| {
-            let slope = sampler.slope(metric);
-            let slope = slope.map(|slope| format!(": slope {}", format::slope(&slope)));
-            Some((slope.unwrap_or_default(), 1.0))
-        });
-        figures.push(by_spp.figure(
-            format!("{stem}-{}-spp", metric.stem()),
-            format!(
-                "{name} against samples. Bands: 95 % interval, of replicates and reference; dashed: deterministic.{hidden}"
-            ),
-        ));
-        let Some(structure) = view.fastest_structure() else {
-            continue;
+            CurvePlot {
+                x_title,
+                x_ticks,
+                y_title: format!("{name} (mean over replicates)"),
+                curves: view.samplers.iter().filter_map(curve).collect(),
+                guides: Vec::new(),
+            }
         };
+    let by_spp = plot("samples per pixel".into(), Ticks::PowersOfTwo, &|sampler| {
+        let slope = sampler.slope(metric);
+        let slope = slope.map(|slope| format!(": slope {}", format::slope(&slope)));
+        Some((slope.unwrap_or_default(), 1.0))
+    });
+    let by_spp = by_spp.figure(
+        format!("{stem}-{}-spp", metric.stem()),
+        format!(
+            "{name} against samples. Bands: 95 % interval, of replicates and reference; dashed: deterministic.{hidden}"
+        ),
+    );
+    let by_seconds = view.fastest_structure().and_then(|structure| {
         let x_title = format!("render time with {structure}, seconds");
-        let by_seconds = plot(x_title, Ticks::PowersOfTen, &|sampler| {
+        let plot = plot(x_title, Ticks::PowersOfTen, &|sampler| {
             let ms = view.ms_per_spp(&structure, &sampler.name)?.value;
             Some((format!(": {} ms per spp", format::number(ms)), ms / 1000.0))
         });
-        figures.push(by_seconds.figure(
+        plot.figure(
             format!("{stem}-{}-seconds", metric.stem()),
             format!("{name} against time: samples × measured ms per spp with {structure}.{hidden}"),
-        ));
-    }
-    figures
+        )
+    });
+    [by_spp, by_seconds]
 }
 
 fn curve(
@@ -167,11 +168,21 @@ pub fn histograms(stem: &str, view: &View) -> Option<Illustration> {
             false => sampler.name.clone(),
         };
         let histogram = Histogram { counts, biased };
-        let counted = bias.p_histogram.iter().any(|&n| n > 0);
-        counted.then(|| Panel::new(title, "p from 0 to 1", histogram))
+        let counted: usize = bias.p_histogram.iter().sum();
+        let note = match (biased, histogram.is_flat()) {
+            (true, _) => "p from 0 to 1: not flat, since it is biased",
+            (false, true) => "p from 0 to 1: flat within chance",
+            (false, false) => "p from 0 to 1: NOT flat, see below",
+        };
+        let note = format!("{note}; {counted} tiles");
+        (counted > 0).then(|| Panel::new(title, note, histogram))
     };
     let panels: Vec<Panel> = view.samplers.iter().filter_map(panel).collect();
-    let caption = "Bias check: p-values of all tiles per sampler; flat (dashed) without bias, red where biased.";
-    let drawing = (!panels.is_empty()).then(|| panels::draw(&panels, 3, (273.0, 90.0)))?;
+    let caption = "Bias check: p-values of the tiles of each sampler. Without bias all values from 0 to 1 are equally \
+                   likely, so that bars reach the dashed line but for chance (χ² over ten bars at 1 %); red where biased. \
+                   Tiles whose difference rounding explains, such as a black background, have p = 1 by definition: \
+                   records of today leave them out, in older ones they stand in the last bar. The test is cautious where \
+                   few pixels carry a tile's noise: small values are then rarer than chance would make them.";
+    let drawing = (!panels.is_empty()).then(|| panels::draw(&panels, 2, (410.0, 90.0)))?;
     Some(Illustration::new(format!("{stem}-bias"), caption, drawing))
 }

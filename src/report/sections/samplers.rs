@@ -1,11 +1,14 @@
 //! Samplers under one scene and integrator: errors, times, bias, pictures.
 
+use super::cells::Cells;
 use super::coherence;
+use super::comparer;
 use super::orders;
 use super::primary;
 use super::sampler_plots::{error_figures, histograms, pareto_figure};
 use super::spectrum;
 use super::verdict::Race;
+use crate::image::viridis_css;
 use crate::measure::bias::BiasVerdict;
 use crate::measure::record::{Key, axis};
 use crate::report::data::{RunData, SAMPLER_ROW, SceneGroup, View, is_valid_time};
@@ -21,27 +24,63 @@ use std::path::Path;
 pub fn blocks(
     dir: &Path,
     data: &RunData,
+    cells: &Cells,
     stem: &str,
-    scene: &SceneGroup,
-    view: &View,
+    (scene, view): (&SceneGroup, &View),
 ) -> Vec<Block> {
     let values = of_view(scene, view);
     let mut blocks = vec![Block::Heading(format!("Samplers with {}", view.name))];
-    blocks.extend(Block::figures(error_figures(data, stem, view)));
-    for metric in [Metric::RelMse, Metric::Rmse] {
-        blocks.extend(error_table(view, &values, metric).into_block());
-    }
-    blocks.extend(further_table(view, &values).into_block());
-    blocks.extend(spectrum::blocks(data, stem, view, &values));
-    blocks.extend(efficiency_table(view, &values).into_block());
-    blocks.extend(Block::figures([pareto_figure(data, stem, view)]));
-    blocks.extend(time_table(data, view, &values).into_block());
-    blocks.extend(orders::table(view, &values).into_block());
-    blocks.extend(primary::table(view, &values).into_block());
-    blocks.extend(coherence::blocks(data, stem, view, &values));
-    blocks.extend(bias_table(view, &values).into_block());
-    blocks.extend(Block::figures([histograms(stem, view)]));
-    blocks.extend(galleries(dir, view).into_iter().flatten());
+    blocks.extend(Block::figures(error_figures(
+        data,
+        stem,
+        view,
+        Metric::RelMse,
+    )));
+    blocks.extend(comparer::block(dir, data, stem, view));
+    let table = |table: Table| table.into_block();
+    let one = |block: Option<Block>| block.into_iter().collect::<Vec<Block>>();
+    let mut numbers = one(table(error_table(view, &values, Metric::RelMse)));
+    numbers.extend(Block::figures(error_figures(
+        data,
+        stem,
+        view,
+        Metric::Rmse,
+    )));
+    numbers.extend(table(error_table(view, &values, Metric::Rmse)));
+    numbers.extend(table(further_table(view, &values)));
+    let mut matrix = one(Block::figures([pareto_figure(data, stem, view)]));
+    matrix.extend(table(time_table(data, view, &values, cells)));
+    let mut rays = one(table(orders::table(view, &values)));
+    rays.extend(table(primary::table(view, &values)));
+    rays.extend(coherence::blocks(data, stem, view, &values));
+    let mut bias = one(table(bias_table(view, &values)));
+    bias.extend(Block::figures([histograms(stem, view)]));
+    let folds = [
+        ("Errors as numbers, and other metrics", numbers),
+        (
+            "What a second buys",
+            one(table(efficiency_table(view, &values))),
+        ),
+        (
+            "Time against error: structure × sampler, Pareto front",
+            matrix,
+        ),
+        (
+            "What the error looks like: spectra and filters",
+            spectrum::blocks(data, stem, view, &values),
+        ),
+        ("Order and coherence of the rays", rays),
+        ("Bias check", bias),
+        (
+            "Pictures and error maps",
+            galleries(dir, view).into_iter().flatten().collect(),
+        ),
+    ];
+    blocks.extend(
+        folds
+            .into_iter()
+            .filter_map(|(title, inside)| Block::fold(title, inside)),
+    );
     if blocks.len() == 1 {
         blocks.push(Block::Paragraph("Nothing was measured.".into()));
     }
@@ -189,7 +228,7 @@ pub fn efficiency_table(view: &View, values: &[Value]) -> Table {
 }
 
 /// Milliseconds per spp of every cell.
-fn time_table(data: &RunData, view: &View, values: &[Value]) -> Table {
+fn time_table(data: &RunData, view: &View, values: &[Value], cells: &Cells) -> Table {
     let structures = view.timed_structures();
     let row = |(i, name): (usize, &String)| {
         let cell = TableCell::with_detail(name.clone(), format!("({})", letter(i)));
@@ -197,7 +236,7 @@ fn time_table(data: &RunData, view: &View, values: &[Value]) -> Table {
     };
     let bounds = format::median_bounds(view.times.iter().map(|time| time.ms.len()));
     let caption = format!(
-        "Time of full cells with {}, ms per spp: median [{bounds}]",
+        "Structure × sampler with {}: time of full cells, ms per spp: median [{bounds}]; each leads to its cell",
         view.name
     );
     let rows = structures.iter().enumerate().map(row);
@@ -205,15 +244,19 @@ fn time_table(data: &RunData, view: &View, values: &[Value]) -> Table {
     let mut table = rows.table(values, caption, &["ms-per-spp/v1"], &|key| {
         data.names.sampler(key)
     });
-    for time in view.times.iter().filter(|time| !is_valid_time(time)) {
-        let reason = match time.failure {
-            None => "image differs",
-            Some(_) => "FAILED",
-        };
+    for time in &view.times {
         let row = structures.iter().position(|s| *s == time.structure);
         let column = table.columns.iter().position(|c| c.title == time.sampler);
         if let (Some(row), Some(column)) = (row, column) {
-            table.rows[row][column] = TableCell::from(reason).toned(Tone::Bad);
+            let cell = &mut table.rows[row][column];
+            if !is_valid_time(time) {
+                let reason = match time.failure {
+                    None => "image differs",
+                    Some(_) => "FAILED",
+                };
+                *cell = TableCell::from(reason).toned(Tone::Bad);
+            }
+            cell.link = cells.link(&time.key);
         }
     }
     table
@@ -239,7 +282,8 @@ fn galleries(dir: &Path, view: &View) -> [Option<Block>; 2] {
                 format!("reference: {spp} spp of {}, {origin}", reference.sampler)
             }
         };
-        renders.push(pictures::load(dir, &reference.image, caption));
+        let alt = format!("Reference image with {}", view.name);
+        renders.push(pictures::load(dir, &reference.image, caption).described(alt));
     }
     for sampler in &view.samplers {
         let mut replicates = sampler.replicates.iter();
@@ -247,12 +291,25 @@ fn galleries(dir: &Path, view: &View) -> [Option<Block>; 2] {
         let Some(first) = shown else { continue };
         let last = first.errors.last();
         let spp = last.map_or(String::new(), |error| format!(", {} spp", error.spp));
-        let load = |path: &String| pictures::load(dir, path, format!("{}{spp}", sampler.name));
-        renders.extend(first.image.as_ref().map(load));
-        errors.extend(first.error_map.as_ref().map(load));
+        let name = format!("{}{spp}", sampler.name);
+        let load = |path: &String, what: &str| {
+            let alt = format!("{what} of {name} with {}", view.name);
+            pictures::load(dir, path, name.clone()).described(alt)
+        };
+        renders.extend(first.image.as_ref().map(|path| load(path, "Image")));
+        errors.extend(first.error_map.as_ref().map(|path| load(path, "Error map")));
     }
-    [("Renders", renders), ("Error maps", errors)].map(|(what, items)| {
-        let caption = format!("{what} with {}", view.name);
-        Block::gallery(caption, items, None)
-    })
+    let scale = ColorScale {
+        gradient: viridis_css(),
+        title: "error of a pixel relative to the reference: √ of the mean over red, green and blue of \
+                (value − reference)² / (reference² + 0.01), no unit; the same scale for all, 1 and more in one colour; \
+                pixels that are no numbers in magenta"
+            .into(),
+        labels: [0.0, 0.25, 0.5, 0.75, 1.0].map(format::number).to_vec(),
+    };
+    let caption = |what: &str| format!("{what} with {}", view.name);
+    [
+        Block::gallery(caption("Renders"), renders, None),
+        Block::gallery(caption("Error maps"), errors, Some(scale)),
+    ]
 }

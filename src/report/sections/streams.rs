@@ -26,9 +26,7 @@ pub fn section(data: &RunData) -> Option<Section> {
     if data.streams.is_empty() && data.costs.is_empty() {
         return None;
     }
-    let mut section = Section::new("discrepancy", "Streams: discrepancy and integration error");
-    section.blocks.push(Block::Paragraph(TAPPED.into()));
-    section.blocks.extend(worst_table(data).into_block());
+    let mut section = Section::new("discrepancy", "Point streams");
     let mut pairs: Vec<Pair> = Vec::new();
     for stream in data.streams.iter().filter(|s| s.named) {
         let what = pair_of_dimensions(stream);
@@ -39,7 +37,12 @@ pub fn section(data: &RunData) -> Option<Section> {
     }
     let blocks = pairs.iter().flat_map(Pair::blocks);
     section.blocks.extend(blocks);
-    section.blocks.extend(cost_table(data).into_block());
+    let further = [worst_table(data), cost_table(data)];
+    let further = further.into_iter().filter_map(Table::into_block);
+    let mut inside = vec![Block::Paragraph(TAPPED.into())];
+    inside.extend(further);
+    let title = "What was tapped, the worst pairs, what drawing costs";
+    section.blocks.extend(Block::fold(title, inside));
     Some(section)
 }
 
@@ -73,9 +76,20 @@ impl<'a> Pair<'a> {
             self.count_table(&values, "centered/v1"),
             self.pixel_table(&values),
         ];
+        let mut figures = self.figures();
+        let integrals = figures.split_off(1);
         let mut blocks = vec![Block::Heading(self.what.clone())];
-        blocks.extend(Block::figures(self.figures()));
-        blocks.extend(tables.into_iter().filter_map(Table::into_block));
+        blocks.extend(Block::figures(figures));
+        let integrals = Block::figures(integrals).into_iter().collect();
+        blocks.extend(Block::fold(
+            format!("Errors of integrals: {}", self.what),
+            integrals,
+        ));
+        let tables = tables.into_iter().filter_map(Table::into_block).collect();
+        blocks.extend(Block::fold(
+            format!("Discrepancies as numbers: {}", self.what),
+            tables,
+        ));
         blocks
     }
 

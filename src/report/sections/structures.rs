@@ -31,20 +31,34 @@ pub fn blocks(dir: &Path, data: &RunData, index: usize, scene: &SceneGroup) -> V
         )]));
     }
     let values = of_structures(data, scene);
-    let mut tables = vec![speed_table(scene, &values)];
-    tables.extend(trade_off::break_even_table(scene, &values));
     let views = scene.views.iter();
-    tables.extend(views.filter_map(|view| trade_off::time_to_image_table(scene, view, &values)));
-    tables.extend([
-        build_table(scene, &values),
-        built(scene).table(&values, SHAPE, &SHAPE_FIGURES, FIGURES_ALONE),
-        outside_table(data, scene, &values),
-        leaf_table(scene, &values),
-        work_table(scene, &values),
-        coherence_table(scene, &values),
-    ]);
-    blocks.extend(tables.into_iter().filter_map(Table::into_block));
-    blocks.extend(heat_maps(dir, scene));
+    let to_image = views.filter_map(|view| trade_off::time_to_image_table(scene, view, &values));
+    let mut costs = vec![build_table(scene, &values)];
+    costs.extend(trade_off::break_even_table(scene, &values));
+    costs.extend(to_image);
+    let shape = built(scene).table(&values, SHAPE, &SHAPE_FIGURES, FIGURES_ALONE);
+    let folds = [
+        ("Speeds as numbers", vec![speed_table(scene, &values)]),
+        ("What a build costs and when it pays", costs),
+        (
+            "Size, shape and further figures",
+            vec![
+                shape,
+                leaf_table(scene, &values),
+                outside_table(data, scene, &values),
+            ],
+        ),
+        (
+            "Work per ray and coherence",
+            vec![work_table(scene, &values), coherence_table(scene, &values)],
+        ),
+    ];
+    for (title, tables) in folds {
+        let tables = tables.into_iter().filter_map(Table::into_block);
+        blocks.extend(Block::fold(title, tables.collect()));
+    }
+    let maps = heat_maps(dir, scene).into_iter().collect();
+    blocks.extend(Block::fold("Where rays cost most: heat maps", maps));
     blocks
 }
 
@@ -256,7 +270,11 @@ fn heat_maps(dir: &Path, scene: &SceneGroup) -> Option<Block> {
         if s.fault().is_some() {
             caption += ": FAILED";
         }
-        pictures::load(dir, path, caption)
+        let alt = format!(
+            "Heat map of {}: steps of each primary ray through {}",
+            scene.name, s.structure
+        );
+        pictures::load(dir, path, caption).described(alt)
     };
     let items: Vec<Picture> = mapped.iter().map(picture).collect();
     let label = |share: f64| match shared {
@@ -265,7 +283,10 @@ fn heat_maps(dir: &Path, scene: &SceneGroup) -> Option<Block> {
     };
     let scale = (!maxima.is_empty()).then(|| ColorScale {
         gradient: viridis_css(),
-        title: "nodes + triangle tests per primary ray".into(),
+        title: match shared {
+            Some(_) => "nodes + triangle tests per primary ray; the same scale for all; what costs more has the top colour".into(),
+            None => "nodes + triangle tests per primary ray, share of each map's own top".into(),
+        },
         labels: [0.0, 0.25, 0.5, 0.75, 1.0].map(label).to_vec(),
     });
     Block::gallery("Traversal cost of primary rays", items, scale)

@@ -1,43 +1,244 @@
-//! Who wins, per scene.
+//! What was asked, who wins, what failed, whether to believe it.
 
-use super::rendering;
+use super::{belief, rendering, run};
 use crate::measure::comparison::LogFigure;
-use crate::measure::figure::figure;
-use crate::measure::record::{ClassTiming, Interval, RayClass, StructureRecord, axis};
+use crate::measure::figure::{Better, figure};
+use crate::measure::hypothesis::student_t_quantile;
+use crate::measure::record::{
+    ClassTiming, FigureAtCount, Interval, RayClass, Recorded, StreamRecord, StructureRecord,
+    Verdict,
+};
 use crate::measure::statistics::{LEAST_FOR_MEDIAN, Spread};
-use crate::report::data::{Measured, RunData, SceneGroup, View};
+use crate::report::data::{Measured, RunData, SceneGroup, View, without_repeats};
 use crate::report::document::*;
-use crate::report::format;
 use crate::report::ruling::{Contender, Ruling, judge};
-use crate::report::samplers::{MeanError, MeasuredSampler, Metric, log_time, place_on};
-use crate::report::values::Value;
+use crate::report::samplers::{MeasuredSampler, Metric};
+use crate::report::values::pair_of_dimensions;
+use crate::report::{format, pictures, trust};
+use std::path::Path;
 
-/// The verdict box.
-pub fn section(data: &RunData) -> Section {
+pub use super::race::Race;
+
+/// Scenes whose answers are open at first; those of further ones unfold.
+const OPEN_SCENES: usize = 3;
+/// Pairs of dimensions whose point sets are judged in the open.
+const OPEN_PAIRS: usize = 2;
+/// Failures that the first screens name; the others stand in their own section.
+const NAMED_FAILURES: usize = 5;
+
+/// The first screens.
+pub fn section(dir: &Path, data: &RunData) -> Section {
     let mut section = Section::new("verdict", "Verdict");
-    for scene in &data.scenes {
-        let verdicts = table(scene).into_block();
-        let none = || Block::Paragraph(format!("On {} nothing could be compared.", scene.name));
-        section.blocks.push(verdicts.unwrap_or_else(none));
-        let lines = rendering::disagreements(scene).into_iter();
-        let warned = lines.map(|line| Block::Paragraph(format!("Warning: {line}.")));
-        section.blocks.extend(warned);
-        section.blocks.extend(apart(scene));
+    let blocks = &mut section.blocks;
+    blocks.push(asked(dir, data));
+    blocks.extend(failed(data));
+    for (index, scene) in data.scenes.iter().enumerate() {
+        let answers = of_scene(scene);
+        match index < OPEN_SCENES {
+            true => blocks.extend(answers),
+            false => blocks.extend(Block::fold(format!("Verdict on {}", scene.name), answers)),
+        }
     }
-    let rule = match (section.blocks.is_empty(), data.compactions.is_empty()) {
-        (true, true) => "Nothing was measured.".to_owned(),
-        (true, false) => "No structure and no sampler was measured. How the methods of compaction compare stands in \
-                          their own section."
-            .to_owned(),
-        (false, _) => rule(data),
+    let mut pairs = point_sets(data);
+    let further = pairs.split_off(pairs.len().min(OPEN_PAIRS));
+    blocks.extend(answers("Verdict on point sets", &pairs));
+    let further = answers("Further pairs of dimensions", &further);
+    blocks.extend(Block::fold(
+        "Verdict on further pairs of dimensions",
+        further,
+    ));
+    let text = match (data.scenes.is_empty(), data.compactions.is_empty()) {
+        (true, true) => "Nothing was measured.",
+        (true, false) => {
+            "No structure and no sampler was measured. How the methods of compaction compare stands in their own \
+             section."
+        }
+        (false, _) => {
+            let how = vec![Block::Paragraph(rule(data))];
+            blocks.extend(Block::fold("How winners are found", how));
+            return section;
+        }
     };
-    section.blocks.push(Block::Paragraph(rule));
+    blocks.push(Block::Paragraph(text.into()));
     section
+}
+
+/// What the run was about, beside pictures of its scenes, and whether its checks passed.
+fn asked(dir: &Path, data: &RunData) -> Block {
+    let picture = |scene: &SceneGroup| {
+        let references = scene.views.iter().filter_map(|view| view.reference);
+        let drawn = references.filter(|r| !r.body.image.is_empty());
+        let path = drawn.map(|r| &r.body.image).next()?;
+        let alt = format!("The scene {} as its reference image shows it", scene.name);
+        Some(pictures::load(dir, path, scene.name).described(alt))
+    };
+    let pictures = data.scenes.iter().filter_map(picture).take(OPEN_SCENES);
+    let mut blocks = vec![Block::Paragraph(question(data))];
+    blocks.push(Block::Checks(vec![summary(data)]));
+    Block::Beside(Beside {
+        pictures: pictures.collect(),
+        blocks,
+    })
+}
+
+fn question(data: &RunData) -> String {
+    let named = |names: &[String], noun: &str| match names.len() {
+        0 => None,
+        n => Some(format!(
+            "{} ({})",
+            format::plural(n, noun),
+            names.join(", ")
+        )),
+    };
+    let scenes: Vec<String> = data.scenes.iter().map(|s| s.name.to_owned()).collect();
+    let views = data.views().map(|(_, view)| view.name.clone());
+    let views = without_repeats(views.collect());
+    let mut parts = Vec::new();
+    let of = |names: &[String], noun, one: &str, many: &str| match names {
+        [] => None,
+        [only] => Some(format!("{one} {only}")),
+        names => Some(format!("which of {} {many}", named(names, noun)?)),
+    };
+    let fast = "answers rays and renders fastest";
+    parts.extend(of(&data.structures, "structure", "how fast is", fast));
+    let exact = "errs least per sample and per second";
+    parts.extend(of(&data.samplers, "sampler", "how exact is", exact));
+    if parts.is_empty() {
+        return "Asked: nothing that a structure or a sampler answers.".into();
+    }
+    let mut text = format!("Asked: {}", parts.join(", and "));
+    if let Some(scenes) = named(&scenes, "scene") {
+        text += &format!(", on {scenes}");
+    }
+    if !views.is_empty() {
+        text += &format!(", with {}", views.join(", "));
+    }
+    text + "." + &amounts(data)
+}
+
+/// Size of the images, samples and replicates, where there are images.
+fn amounts(data: &RunData) -> String {
+    let samplers = || data.views().flat_map(|(_, view)| &view.samplers);
+    let Some(first) = samplers().flat_map(|s| &s.replicates).next() else {
+        return String::new();
+    };
+    let errors = samplers()
+        .flat_map(|s| &s.replicates)
+        .flat_map(|r| &r.errors);
+    let spps = errors.map(|e| (e.spp, e.spp));
+    let spp = spps.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let spp = spp.map_or(String::new(), |(low, high)| match low == high {
+        true => format!(", {} per pixel", format::plural(high as usize, "sample")),
+        false => format!(
+            ", {low} to {} samples per pixel",
+            format::count(high.into())
+        ),
+    });
+    let most = samplers().map(|s| s.replicates.len()).max().unwrap_or(0);
+    let [width, height] = first.resolution;
+    format!(
+        " Images of {width} × {height} pixels{spp}, {}.",
+        format::plural(most, "replicate")
+    )
+}
+
+/// All checks in one.
+fn summary(data: &RunData) -> Check {
+    let checks = belief::checks(data);
+    let titles = |verdict: Verdict| -> Vec<&str> {
+        let of = checks.iter().filter(|check| check.verdict == verdict);
+        of.map(|check| check.title.as_str()).collect()
+    };
+    let (failed, open) = (titles(Verdict::Fail), titles(Verdict::Open));
+    let passed = checks.len() - failed.len() - open.len();
+    let of_all = format!(
+        "{passed} of {} passed",
+        format::plural(checks.len(), "check")
+    );
+    let (verdict, title) = match (failed.is_empty(), open.is_empty()) {
+        (false, _) => (Verdict::Fail, "Do not believe all of it"),
+        (true, false) => (Verdict::Open, "Not all could be checked"),
+        (true, true) => (Verdict::Pass, "The figures can be believed"),
+    };
+    let mut detail = of_all;
+    for (what, titles) in [("failed", failed), ("nothing to test for", open)] {
+        if !titles.is_empty() {
+            detail += &format!("; {what}: {}", titles.join(", "));
+        }
+    }
+    if verdict == Verdict::Fail {
+        detail += ". Questions that a failed check is about have no winner";
+        if data.run.is_some_and(|run| run.lenient) {
+            detail += "; the run was told to end with exit code 0 all the same (--lenient)";
+        }
+    }
+    Check {
+        verdict,
+        title: title.into(),
+        detail: detail + ".",
+    }
+}
+
+/// What failed, the first few.
+fn failed(data: &RunData) -> Option<Block> {
+    let failures = run::failures(data);
+    let failed: Vec<_> = failures.iter().filter(|f| f.state == run::FAILED).collect();
+    let mut table = Table::new("What failed", &["what", ":why"]);
+    for failure in failed.iter().take(NAMED_FAILURES) {
+        let reason = TableCell::from(failure.reason.clone()).toned(Tone::Bad);
+        table.rows.push(vec![failure.cell.clone().into(), reason]);
+    }
+    if failed.len() > NAMED_FAILURES {
+        let more = format!("and {} more", failed.len() - NAMED_FAILURES);
+        let more = TableCell::from(more).linked("#failures");
+        table.rows.push(vec![more, TableCell::default()]);
+    }
+    table.into_block()
+}
+
+/// Everything on one scene.
+fn of_scene(scene: &SceneGroup) -> Vec<Block> {
+    let rulings = rulings(scene);
+    let mut blocks = answers(&format!("Verdict on {}", scene.name), &rulings);
+    if blocks.is_empty() {
+        let none = format!("On {} nothing could be compared.", scene.name);
+        blocks.push(Block::Paragraph(none));
+    }
+    let warned = rendering::disagreements(scene).into_iter();
+    let warned = warned.map(|line| Check {
+        verdict: Verdict::Open,
+        title: "Rays and rendering disagree".into(),
+        detail: format!("{line}."),
+    });
+    let warned: Vec<Check> = warned.collect();
+    if !warned.is_empty() {
+        blocks.push(Block::Checks(warned));
+    }
+    blocks.extend(apart(scene));
+    blocks
+}
+
+/// The answers as a table, and what had no competition in a line.
+fn answers(caption: &str, rulings: &[(String, Ruling)]) -> Vec<Block> {
+    let alone = rulings.iter().filter(|(_, ruling)| !ruling.is_contest());
+    let alone = alone.map(|(question, ruling)| format!("{question}: {}", ruling.answer()));
+    let alone: Vec<String> = alone.collect();
+    let mut blocks: Vec<Block> = table_of(caption, rulings)
+        .into_block()
+        .into_iter()
+        .collect();
+    if !alone.is_empty() {
+        let text = format!("Without competition: {}.", alone.join("; "));
+        blocks.push(Block::Paragraph(text));
+    }
+    blocks
 }
 
 /// How winners are found, and how many comparisons that took.
 fn rule(data: &RunData) -> String {
-    let rulings = || data.scenes.iter().flat_map(rulings);
+    let of_scenes = data.scenes.iter().flat_map(rulings);
+    let all: Vec<_> = of_scenes.chain(point_sets(data)).collect();
+    let rulings = || all.iter();
     let compared = || rulings().map(|(_, ruling)| ruling.comparisons());
     let questions = compared().filter(|pairs| *pairs > 0).count();
     format!(
@@ -50,7 +251,7 @@ fn rule(data: &RunData) -> String {
 }
 
 /// Questions of one scene, each with what is ruled.
-fn rulings(scene: &SceneGroup) -> Vec<(String, Ruling)> {
+pub fn rulings(scene: &SceneGroup) -> Vec<(String, Ruling)> {
     let mut rulings = Vec::new();
     for class in ray_classes(scene) {
         let question = format!("fastest, {} rays (Mrays/s)", format::ray_class(class));
@@ -87,52 +288,99 @@ fn rulings(scene: &SceneGroup) -> Vec<(String, Ruling)> {
 
 /// The verdicts on one scene.
 pub fn table(scene: &SceneGroup) -> Table {
-    let mut table = Table::new(
-        format!("Verdict on {}", scene.name),
-        &[
-            "question",
-            ":answer",
-            ":figure [95 % interval]",
-            ":next best (ratio)",
-            "pairs compared",
-        ],
-    );
-    let rulings = rulings(scene);
-    let rows = rulings
-        .into_iter()
-        .map(|(question, ruling)| row(question, &ruling));
-    table.rows.extend(rows);
+    table_of(&format!("Verdict on {}", scene.name), &rulings(scene))
+}
+
+fn table_of(caption: &str, rulings: &[(String, Ruling)]) -> Table {
+    let heads = [
+        "question",
+        ":answer",
+        ":figure [95 % interval]",
+        ":next best (ratio)",
+    ];
+    let mut table = Table::new(caption, &heads);
+    let contests = rulings.iter().filter(|(_, ruling)| ruling.is_contest());
+    table
+        .rows
+        .extend(contests.map(|(question, ruling)| row(question, ruling)));
     table
 }
 
-fn row(question: String, ruling: &Ruling) -> Vec<TableCell> {
+fn row(question: &str, ruling: &Ruling) -> Vec<TableCell> {
     let tone = match ruling {
         Ruling::Winner(..) => Tone::Good,
-        Ruling::Nobody => Tone::Bad,
-        Ruling::Withheld(_) | Ruling::Alone(_) | Ruling::Unclear(..) => Tone::Note,
+        Ruling::Nobody | Ruling::Withheld(_) => Tone::Bad,
+        Ruling::Alone(_) | Ruling::Unclear(..) => Tone::Note,
     };
     let answer = TableCell::from(ruling.answer()).toned(tone);
     let (figure, next) = (ruling.figure(), ruling.runner_up());
-    let pairs = ruling.comparisons().to_string();
-    vec![
-        question.into(),
-        answer,
-        figure.into(),
-        next.into(),
-        pairs.into(),
-    ]
+    vec![question.into(), answer, figure.into(), next.into()]
+}
+
+/// Which sampler has the lowest D*, pair of dimensions by pair.
+fn point_sets(data: &RunData) -> Vec<(String, Ruling)> {
+    let named: Vec<_> = data.streams.iter().filter(|s| s.named).collect();
+    let pairs = named.iter().map(|s| pair_of_dimensions(s));
+    let pairs = without_repeats(pairs.collect()).into_iter();
+    let rule_on = |pair: String| {
+        let of_pair = named.iter().filter(|s| pair_of_dimensions(s) == pair);
+        let of_pair: Vec<&&Recorded<StreamRecord>> = of_pair.collect();
+        let has = |n: usize| of_pair.iter().all(|s| s.star.iter().any(|at| at.n == n));
+        let counts = of_pair.first()?.star.iter().rev().map(|at| at.n);
+        let n = { counts }.find(|n| has(*n))?;
+        let contender = |s: &&&Recorded<StreamRecord>| {
+            let at = s.star.iter().find(|at| at.n == n)?;
+            Some(Contender {
+                name: data.names.sampler(s.key),
+                figure: at.value,
+                log: log_discrepancy(s, at),
+            })
+        };
+        let contenders = of_pair.iter().filter_map(contender).collect();
+        let question = format!("lowest D*: {pair}, {} points", format::count(n as u64));
+        Some((question, judge(contenders, Better::Lower)))
+    };
+    pairs.filter_map(rule_on).collect()
+}
+
+/// D* with its noise over seeds; that of a deterministic set is exact.
+fn log_discrepancy(stream: &StreamRecord, at: &FigureAtCount) -> Option<LogFigure> {
+    let Interval { value, low, high } = at.value;
+    if value.is_nan() || value <= 0.0 {
+        return None;
+    }
+    let freedom = stream.seeds.saturating_sub(1) as f64;
+    let own = match stream.randomised {
+        false => Vec::new(),
+        true if freedom < 1.0 => return None,
+        true => {
+            let error = 0.5 * (high - low) / student_t_quantile(0.05, freedom) / value;
+            vec![Spread {
+                variance: error * error,
+                freedom,
+            }]
+        }
+    };
+    Some(LogFigure {
+        log: value.ln(),
+        own,
+        shared: Vec::new(),
+    })
 }
 
 /// Who may not win, with the reason, and who is shown without being ranked.
 fn apart(scene: &SceneGroup) -> Vec<Block> {
-    let faulty =
-        (scene.structures.iter()).filter_map(|s| Some(format!("{} ({})", s.structure, s.fault()?)));
+    let brief = |fault: String| fault.split(';').next().unwrap_or_default().to_owned();
+    let faulty = scene
+        .structures
+        .iter()
+        .filter_map(|s| Some(format!("{} ({})", s.structure, brief(s.fault()?))));
     let samplers = || {
         let views = scene.views.iter();
         views.flat_map(|view| view.samplers.iter().map(move |s| (s, &view.name)))
     };
-    let biased =
-        samplers().filter_map(|(s, view)| Some(format!("{} with {view} ({})", s.name, s.fault()?)));
+    let biased = samplers()
+        .filter_map(|(s, view)| Some(format!("{} with {view} ({})", s.name, brief(s.fault()?))));
     let single = samplers().filter(|(s, _)| s.replicates.len() == 1);
     let single = single.map(|(s, view)| format!("{} with {view}", s.name));
     let said = [
@@ -180,10 +428,13 @@ pub fn fastest(scene: &SceneGroup, class: RayClass) -> Ruling {
             log: class_speed(s, class),
         })
     };
-    judge(
-        scene.structures.iter().filter_map(contender).collect(),
-        figure("mrays-per-s/v1").better,
-    )
+    match trust::doubt_of_rays(scene) {
+        Some(reason) => Ruling::Withheld(reason),
+        None => judge(
+            scene.structures.iter().filter_map(contender).collect(),
+            figure("mrays-per-s/v1").better,
+        ),
+    }
 }
 
 /// Compares the samplers that have no fault at one spp.
@@ -199,195 +450,10 @@ pub fn best_per_sample(view: &View, spp: u32) -> Ruling {
     rank(view, fair.filter_map(contender).collect())
 }
 
-/// Ranks errors, if the reference is good enough for that.
-fn rank(view: &View, contenders: Vec<Contender>) -> Ruling {
-    match view.reference_fault() {
+/// Ranks errors, if the reference is good enough for that and no check of the images failed.
+pub(super) fn rank(view: &View, contenders: Vec<Contender>) -> Ruling {
+    match trust::doubt_of_errors(view) {
         Some(reason) => Ruling::Withheld(reason),
         None => judge(contenders, figure(Metric::RelMse.figure()).better),
-    }
-}
-
-/// Samplers at equal time, under the fastest structure.
-pub struct Race<'a> {
-    /// When the first of them ends: the time at which errors are compared.
-    pub seconds: f64,
-    /// The structure under which all were timed.
-    pub structure: String,
-    view: &'a View<'a>,
-    runners: Vec<Runner<'a>>,
-}
-
-struct Runner<'a> {
-    sampler: &'a MeasuredSampler<'a>,
-    /// Milliseconds per sample per pixel.
-    time: LogFigure,
-    /// Samples per pixel and seconds, growing; those whose errors are resolved.
-    curve: Vec<(u32, f64)>,
-}
-
-impl<'a> Runner<'a> {
-    fn new(view: &View, structure: &str, sampler: &'a MeasuredSampler<'a>) -> Option<Self> {
-        let time = log_time(view.time(structure, &sampler.name)?)?;
-        let means = sampler.mean_errors(Metric::RelMse);
-        let resolved = means.iter().filter(|mean| mean.resolved);
-        let at = |m: &MeanError| (m.spp, f64::from(m.spp) * time.log.exp() / 1000.0);
-        Some(Self {
-            sampler,
-            curve: resolved.map(at).collect(),
-            time,
-        })
-    }
-
-    /// Whether all its noise is known.
-    fn is_ranked(&self) -> bool {
-        self.sampler.is_ranked() && !self.time.own.is_empty()
-    }
-
-    /// The noise of the time in a figure that goes as this power of it; none beside an image whose own noise is not
-    /// known.
-    fn noise(&self, power: f64) -> Option<Spread> {
-        let noise = self.time.own.first().filter(|_| self.sampler.is_ranked())?;
-        Some(noise.times(power * power))
-    }
-
-    /// The error after so many seconds. A time per sample that is off by a part moves it along the curve.
-    fn error_after(&self, seconds: f64) -> Option<LogFigure> {
-        let times: Vec<f64> = self.curve.iter().map(|at| at.1).collect();
-        let (neighbours, share) = place_on(&times, seconds)?;
-        let [a, b] = neighbours.map(|i| self.curve[i].0);
-        let error = |spps, share| self.sampler.log_error(Metric::RelMse, spps, share);
-        // At a point of the curve, errors are taken to fall as one over the samples.
-        let slope = match a < b {
-            true => {
-                (error([b; 2], 0.0)?.log - error([a; 2], 0.0)?.log)
-                    / (f64::from(b) / f64::from(a)).ln()
-            }
-            false => -1.0,
-        };
-        Some(error([a, b], share)?.with_noise(self.noise(slope)))
-    }
-
-    /// Error × seconds, one over the efficiency.
-    fn error_seconds(&self, spp: u32) -> Option<LogFigure> {
-        let error = self.sampler.log_error(Metric::RelMse, [spp; 2], 0.0)?;
-        let seconds = f64::from(spp) * self.time.log.exp() / 1000.0;
-        Some(error.scaled(seconds).with_noise(self.noise(1.0)))
-    }
-
-    /// Seconds until the error falls to `target`.
-    fn seconds_to(&self, target: f64) -> Option<LogFigure> {
-        let spp = self.sampler.spp_to(Metric::RelMse, target)?;
-        Some(
-            spp.scaled(self.time.log.exp() / 1000.0)
-                .with_noise(self.noise(1.0)),
-        )
-    }
-}
-
-impl<'a> Race<'a> {
-    /// `None` without a sampler that has both errors and a time.
-    pub fn new(view: &'a View<'a>) -> Option<Self> {
-        let structure = view.fastest_structure()?;
-        let runner = |sampler: &'a MeasuredSampler<'a>| {
-            let runner = Runner::new(view, &structure, sampler)?;
-            (!runner.curve.is_empty() && sampler.fault().is_none()).then_some(runner)
-        };
-        let runners: Vec<Runner> = view.samplers.iter().filter_map(runner).collect();
-        let seconds = runners
-            .iter()
-            .filter_map(|r| Some(r.curve.last()?.1))
-            .reduce(f64::min)?;
-        Some(Self {
-            seconds,
-            structure,
-            view,
-            runners,
-        })
-    }
-
-    /// The error that samples and seconds are counted to: that of the rule that ends cells, else the least
-    /// that all of the race reach, rounded up to two digits.
-    fn target(&self) -> Option<f64> {
-        let stopped = self.view.samplers.iter().flat_map(|s| &s.replicates);
-        if let Some(rule) = stopped.filter_map(|r| r.stop.as_ref()).next() {
-            return Some(rule.relmse);
-        }
-        let last = |runner: &Runner| {
-            let (spp, _) = runner.curve.last()?;
-            Some(
-                runner
-                    .sampler
-                    .mean_error_at(Metric::RelMse, *spp)?
-                    .error
-                    .value,
-            )
-        };
-        let most = self.runners.iter().filter_map(last).reduce(f64::max)?;
-        let unit = 10f64.powf(most.log10().floor() - 1.0);
-        (most > 0.0).then(|| (most / unit).ceil() * unit)
-    }
-
-    /// What a second buys: error × time at the common spp, errors when the race ends, samples and seconds to an
-    /// error.
-    pub fn values(&self) -> Vec<Value<'static>> {
-        let metric = Metric::RelMse.name();
-        let (common, target) = (self.view.common_spp(), self.target());
-        let mut values = Vec::new();
-        for sampler in &self.view.samplers {
-            let Some(time) = self.view.time(&self.structure, &sampler.name) else {
-                continue;
-            };
-            let Some(runner) = Runner::new(self.view, &self.structure, sampler) else {
-                continue;
-            };
-            let mut add = |what: String, id: &str, figure: Option<LogFigure>| {
-                let key = time.key.clone().with(axis::SUBJECT, what);
-                let figure = figure.map(|figure| figure.interval());
-                values.extend(Value::known(&key, [(id, figure)]));
-            };
-            let resolved = |spp: &u32| runner.curve.iter().any(|at| at.0 == *spp);
-            if let Some(spp) = common.filter(resolved) {
-                let what = format!("{metric} × seconds at {spp} spp");
-                add(what, "error-seconds/v1", runner.error_seconds(spp));
-            }
-            let what = format!("{metric} after {} s", format::number(self.seconds));
-            let fair = sampler.fault().is_none();
-            let end = runner.error_after(self.seconds).filter(|_| fair);
-            add(what, "error-at-time/v1", end);
-            if let Some(target) = target {
-                let to = format!("to {metric} {}", format::significant(target, 2));
-                let spp = sampler.spp_to(Metric::RelMse, target);
-                add(format!("spp {to}"), "spp-to-error/v1", spp);
-                add(
-                    format!("seconds {to}"),
-                    "seconds-to-error/v1",
-                    runner.seconds_to(target),
-                );
-            }
-        }
-        values
-    }
-
-    /// Error of a sampler when the race ends.
-    pub fn error_of(&self, sampler: &str) -> Option<Interval> {
-        let is_it = |runner: &&Runner| runner.sampler.name == sampler;
-        let runner = self.runners.iter().find(is_it)?;
-        Some(runner.error_after(self.seconds)?.interval())
-    }
-
-    /// Who has the least error when the race ends.
-    pub fn ruling(&self) -> Ruling {
-        let contender = |runner: &Runner| {
-            let log = runner.error_after(self.seconds)?;
-            Some(Contender {
-                name: runner.sampler.name.clone(),
-                figure: log.interval(),
-                log: Some(log).filter(|_| runner.is_ranked()),
-            })
-        };
-        rank(
-            self.view,
-            self.runners.iter().filter_map(contender).collect(),
-        )
     }
 }

@@ -5,14 +5,12 @@ mod families;
 mod figures;
 mod values;
 
-#[cfg(test)]
-use crate::measure::record::Verdict;
-use crate::measure::record::{Recorded, SkippedRecord, axis};
+use crate::measure::record::{Recorded, SkippedRecord, Verdict, axis};
 use crate::report::data::without_repeats;
 use crate::report::document::{Banner, Block, Check, Document, Section, Table, Tone};
 use crate::report::terminal::Screen;
 use crate::report::values::csv;
-use crate::report::{ReportError, format, write_file, write_page};
+use crate::report::{ReportError, format, terms, write_file, write_page};
 use crate::stress::families::FAMILIES;
 use crate::stress::record::{Findings, Line, Record, TargetRecord};
 use crate::stress::targets::{cells, shots, suite};
@@ -75,12 +73,17 @@ fn document(records: &[Line]) -> Document {
     let maps = tests.iter().map(|test| heat_map(records, test));
     let left_out = skipped(records).map(|s| format!("{}: {}", s.cell, s.reason));
     let left_out: Vec<String> = left_out.collect();
+    let fold = |title: &str, tables: Vec<Table>| Block::fold(title, shown(tables).collect());
+    let by_test = tests.iter().flat_map(|test| {
+        let tables = vec![count_table(records, test), error_table(records, test)];
+        fold(&format!("Families with {test}, as numbers"), tables)
+    });
+    let verbatim = |texts: &[String]| match texts.is_empty() {
+        true => Vec::new(),
+        false => vec![Block::Verbatim(texts.join("\n"))],
+    };
     let mut sections = vec![
-        section(
-            "targets",
-            "Targets of the default configuration",
-            vec![Block::Checks(checks(records))],
-        ),
+        section("verdict", "Verdict", verdict(records)),
         section(
             "maps",
             "Where hits are lost",
@@ -91,10 +94,10 @@ fn document(records: &[Line]) -> Document {
         ),
         section(
             "families",
-            "Families",
-            [family_legend()]
-                .into_iter()
-                .chain(shown(by_test(records)))
+            "Families of hard scenes and rays",
+            (Block::fold("What each family is", vec![family_legend()]).into_iter())
+                .chain(fold("Every cell at a glance", vec![matrix_table(records)]))
+                .chain(by_test)
                 .collect(),
         ),
         section(
@@ -105,29 +108,70 @@ fn document(records: &[Line]) -> Document {
         section(
             "axes",
             "Shots, box tests, offsets, cost",
-            shown(axes::tables(records)).collect(),
+            axes::tables(records)
+                .into_iter()
+                .flat_map(|table| fold(&table.caption.clone(), vec![table]))
+                .collect(),
         ),
         section(
             "worst",
             "Worst rays",
-            shown(vec![worst_table(records)]).collect(),
+            (fold(
+                "The ray to look at first in each cell",
+                vec![worst_table(records)],
+            ))
+            .into_iter()
+            .collect(),
         ),
         section(
             "left-out",
             "Left out",
-            match left_out.is_empty() {
-                true => Vec::new(),
-                false => vec![Block::Verbatim(left_out.join("\n"))],
-            },
+            Block::fold("Cases that were not tried, and why", verbatim(&left_out))
+                .into_iter()
+                .collect(),
         ),
     ];
     sections.retain(|section| !section.blocks.is_empty());
-    Document {
+    let mut document = Document {
         title: "Raystone: numerical stress suite".into(),
         subtitle: subtitle(records),
         banners: banners(records),
         sections,
-    }
+    };
+    terms::explain(&mut document);
+    document
+}
+
+/// Whether the default configuration holds, and what misses its target; what holds is folded.
+fn verdict(records: &[Line]) -> Vec<Block> {
+    let checks = checks(records);
+    let count = |verdict: Verdict| checks.iter().filter(|c| c.verdict == verdict).count();
+    let [passed, failed, open] = [Verdict::Pass, Verdict::Fail, Verdict::Open].map(count);
+    let title = match (failed, open) {
+        _ if checks.is_empty() => "The suite holds no target",
+        (0, 0) => "The default configuration meets every target",
+        (0, _) => "No target is missed, but not all were looked at",
+        _ => "The default configuration misses a target",
+    };
+    let rest = format!("{failed} missed, {open} not looked at");
+    let summary = Check {
+        verdict: Verdict::new(passed + failed > 0 && open == 0, failed > 0),
+        title: title.into(),
+        detail: format!(
+            "{passed} of {} met; {rest}.",
+            format::plural(checks.len(), "target")
+        ),
+    };
+    let (met, others): (Vec<Check>, Vec<Check>) = checks
+        .into_iter()
+        .partition(|check| check.verdict == Verdict::Pass);
+    let mut blocks = vec![Block::Checks([vec![summary], others].concat())];
+    let met = match met.is_empty() {
+        true => Vec::new(),
+        false => vec![Block::Checks(met)],
+    };
+    blocks.extend(Block::fold("Targets that are met", met));
+    blocks
 }
 
 fn subtitle(records: &[Line]) -> String {

@@ -1,0 +1,258 @@
+//! Every cell: what it is, what ran, what was found, and how to repeat it.
+
+use crate::config::Axis;
+use crate::measure::record::{Key, Ran, axis};
+use crate::report::data::RunData;
+use crate::report::document::*;
+use crate::report::format;
+use crate::report::values::Value;
+use std::collections::{BTreeMap, HashMap};
+
+/// Cells that the page itself holds; more stand in a file of their own.
+pub const MOST_INSIDE: usize = 200;
+/// That file.
+pub const FILE: &str = "cells.html";
+/// Digits of a hash that tell two kernels apart.
+const SHORT_HASH: usize = 16;
+
+/// All cells of a run, in the order of their values.
+pub struct Cells<'a> {
+    found: Vec<Cell<'a>>,
+}
+
+struct Cell<'a> {
+    key: Key,
+    ran: Option<&'a Ran>,
+    values: Vec<&'a Value<'a>>,
+}
+
+/// The axes that a cell is chosen by; what else is in a key tells its figures apart.
+fn of_cell(key: &Key) -> Key {
+    let axes = Axis::ALL.map(Axis::name);
+    key.only(&axes)
+}
+
+/// Anchor of the cell that a key belongs to.
+fn anchor(key: &Key) -> String {
+    let hash = blake3::hash(key.to_string().as_bytes()).to_hex();
+    format!("cell-{}", &hash[..12])
+}
+
+impl<'a> Cells<'a> {
+    /// The cells that these values are of.
+    pub fn new(data: &RunData<'a>, values: &'a [Value<'a>]) -> Self {
+        let mut ran: HashMap<String, &Ran> = HashMap::new();
+        for scene in &data.scenes {
+            for s in &scene.structures {
+                ran.insert(of_cell(&s.key).to_string(), s.ran);
+            }
+            for time in scene.views.iter().flat_map(|view| &view.times) {
+                ran.insert(of_cell(&time.key).to_string(), time.ran);
+            }
+        }
+        let mut places: HashMap<String, usize> = HashMap::new();
+        let mut found: Vec<Cell> = Vec::new();
+        for value in values {
+            let key = of_cell(&value.key);
+            if key.is_empty() {
+                continue;
+            }
+            let name = key.to_string();
+            let place = *places.entry(name.clone()).or_insert_with(|| {
+                let ran = ran.get(&name).copied();
+                found.push(Cell {
+                    key,
+                    ran,
+                    values: Vec::new(),
+                });
+                found.len() - 1
+            });
+            found[place].values.push(value);
+        }
+        Self { found }
+    }
+
+    /// Where the cell of a key is told of.
+    pub fn link(&self, key: &Key) -> String {
+        let file = if self.is_inside() { "" } else { FILE };
+        format!("{file}#{}", anchor(&of_cell(key)))
+    }
+
+    /// Whether all of them stand in the page itself.
+    fn is_inside(&self) -> bool {
+        self.found.len() <= MOST_INSIDE
+    }
+
+    /// The section of the page: the cells, or where they are.
+    pub fn section(&self, data: &RunData) -> Option<Section> {
+        if self.found.is_empty() {
+            return None;
+        }
+        let mut section = Section::new("cells", "Every cell, and how to repeat it");
+        match self.is_inside() {
+            true => section.blocks = self.blocks(data),
+            false => section.blocks.push(Block::Paragraph(format!(
+                "{} stand in {FILE} beside this page: what each is, which kernel ran, its figures, and the command that \
+                 repeats it.",
+                format::plural(self.found.len(), "cell")
+            ))),
+        }
+        Some(section)
+    }
+
+    /// The page of the cells, where there are too many for the other.
+    pub fn document(&self, data: &RunData) -> Option<Document> {
+        let mut section = Section::new("cells", "Every cell, and how to repeat it");
+        section.blocks = self.blocks(data);
+        (!self.is_inside()).then(|| Document {
+            title: data
+                .run
+                .map_or("Cells".into(), |run| format!("Cells of {}", run.name)),
+            subtitle: format::plural(self.found.len(), "cell"),
+            sections: vec![section],
+            ..Document::default()
+        })
+    }
+
+    fn blocks(&self, data: &RunData) -> Vec<Block> {
+        self.found.iter().map(|cell| cell.fold(data)).collect()
+    }
+}
+
+impl Cell<'_> {
+    fn fold(&self, data: &RunData) -> Block {
+        let labels = self.key.labels().map(|(_, label)| label);
+        let mut blocks = Vec::new();
+        let mut facts = Table::new("What it is", &["axis", ":value"]);
+        for (axis, label) in self.key.labels() {
+            facts.rows.push(vec![axis.into(), label.into()]);
+        }
+        if let Some(ran) = self.ran {
+            let hash: String = ran.kernel_hash.chars().take(SHORT_HASH).collect();
+            let further = [
+                ("kernel", hash),
+                ("features in it", ran.features.join(", ")),
+                ("features left out", ran.left_out.join(", ")),
+            ];
+            let known = further.into_iter().filter(|(_, text)| !text.is_empty());
+            let rows = known.map(|(what, text)| vec![what.into(), text.into()]);
+            facts.rows.extend(rows);
+        }
+        blocks.extend(facts.into_block());
+        if let Some(run) = data.run {
+            let command = command(&run.experiment, &run.experiment_text, &self.key);
+            blocks.push(Block::Verbatim(command));
+        }
+        blocks.extend(self.figures().into_block());
+        Block::Fold(Fold {
+            id: anchor(&self.key),
+            title: labels.collect::<Vec<_>>().join(" · "),
+            note: format::plural(self.values.len(), "figure"),
+            blocks,
+            ..Fold::default()
+        })
+    }
+
+    fn figures(&self) -> Table {
+        let mut table = Table::new("What was found", &["figure", ":of", "value", ":unit"]);
+        for value in &self.values {
+            let further = value
+                .key
+                .labels()
+                .filter(|(axis, _)| Axis::from_name(axis).is_none());
+            let further: BTreeMap<&str, &str> = further.collect();
+            let of = |(axis, label): (&&str, &&str)| match *axis {
+                axis::RAYS | axis::SUBJECT => (*label).to_owned(),
+                axis => format!("{axis} {label}"),
+            };
+            let of: Vec<String> = further.iter().map(of).collect();
+            table.rows.push(vec![
+                (&*value.figure.title).into(),
+                of.join(", ").into(),
+                value.cell(),
+                (&*value.figure.unit).into(),
+            ]);
+        }
+        table
+    }
+}
+
+/// The command that repeats a cell: names with what a pattern or a shell would take for its own are patterns that
+/// they fit.
+fn command(file: &str, text: &str, key: &Key) -> String {
+    let mut command = format!("raystone run {}", quoted(file));
+    for set in text
+        .lines()
+        .filter_map(|line| line.strip_prefix("# --set "))
+    {
+        command += &format!(" --set {}", quoted(&visible(set)));
+    }
+    let of = |(axis, label): (&str, &str)| {
+        let checked = label.strip_suffix(" (unchecked)").unwrap_or(label);
+        format!("{axis}={}", pattern(checked))
+    };
+    let only = key.labels().map(of);
+    let only: Vec<String> = only.collect();
+    command + &format!(" --only {}", quoted(&only.join(",")))
+}
+
+/// A pattern of `--only` that a label fits.
+fn pattern(label: &str) -> String {
+    let mut depth = 0usize;
+    let plain = |(i, c): (usize, char)| {
+        match c {
+            '(' => depth += 1,
+            ')' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        let separates = c == ',' && depth == 0;
+        let negates = c == '!' && i == 0;
+        if separates || negates || !is_visible(c) {
+            '*'
+        } else {
+            c
+        }
+    };
+    label.chars().enumerate().map(plain).collect()
+}
+
+/// Whether a character shows as itself, and turns no text round.
+fn is_visible(c: char) -> bool {
+    let turns = matches!(c, '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}');
+    !c.is_control() && !turns
+}
+
+fn visible(text: &str) -> String {
+    text.chars().filter(|c| is_visible(*c)).collect()
+}
+
+/// One word of a POSIX shell.
+fn quoted(text: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
+    match !text.is_empty() && text.chars().all(is_plain) {
+        true => text.to_owned(),
+        false => format!("'{}'", visible(text).replace('\'', r"'\''")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_is_one_line_whatever_stands_in_names() {
+        let key = Key::default()
+            .with(axis::SCENE, "a'; rm -rf ~\n\u{202e}.obj")
+            .with(axis::ACCEL, "!grid(a=1,b=2),x");
+        let text = "[run]\n# --set run.replicates=4\n";
+        let line = command("my file.toml", text, &key);
+        assert_eq!(
+            line,
+            r"raystone run 'my file.toml' --set run.replicates=4 --only 'scene=a'\''; rm -rf ~**.obj,accel=*grid(a=1,b=2)*x'"
+        );
+        assert_eq!(
+            command("a.toml", "", &Key::default().with(axis::ACCEL, "bvh")),
+            "raystone run a.toml --only accel=bvh"
+        );
+    }
+}

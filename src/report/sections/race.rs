@@ -1,0 +1,196 @@
+//! Samplers at equal time.
+
+use super::verdict::rank;
+use crate::measure::comparison::LogFigure;
+use crate::measure::record::{Interval, axis};
+use crate::measure::statistics::Spread;
+use crate::report::data::View;
+use crate::report::format;
+use crate::report::ruling::{Contender, Ruling};
+use crate::report::samplers::{MeanError, MeasuredSampler, Metric, log_time, place_on};
+use crate::report::values::Value;
+
+/// Samplers at equal time, under the fastest structure.
+pub struct Race<'a> {
+    /// When the first of them ends: the time at which errors are compared.
+    pub seconds: f64,
+    /// The structure under which all were timed.
+    pub structure: String,
+    view: &'a View<'a>,
+    runners: Vec<Runner<'a>>,
+}
+
+struct Runner<'a> {
+    sampler: &'a MeasuredSampler<'a>,
+    /// Milliseconds per sample per pixel.
+    time: LogFigure,
+    /// Samples per pixel and seconds, growing; those whose errors are resolved.
+    curve: Vec<(u32, f64)>,
+}
+
+impl<'a> Runner<'a> {
+    fn new(view: &View, structure: &str, sampler: &'a MeasuredSampler<'a>) -> Option<Self> {
+        let time = log_time(view.time(structure, &sampler.name)?)?;
+        let means = sampler.mean_errors(Metric::RelMse);
+        let resolved = means.iter().filter(|mean| mean.resolved);
+        let at = |m: &MeanError| (m.spp, f64::from(m.spp) * time.log.exp() / 1000.0);
+        Some(Self {
+            sampler,
+            curve: resolved.map(at).collect(),
+            time,
+        })
+    }
+
+    /// Whether all its noise is known.
+    fn is_ranked(&self) -> bool {
+        self.sampler.is_ranked() && !self.time.own.is_empty()
+    }
+
+    /// The noise of the time in a figure that goes as this power of it; none beside an image whose own noise is not
+    /// known.
+    fn noise(&self, power: f64) -> Option<Spread> {
+        let noise = self.time.own.first().filter(|_| self.sampler.is_ranked())?;
+        Some(noise.times(power * power))
+    }
+
+    /// The error after so many seconds. A time per sample that is off by a part moves it along the curve.
+    fn error_after(&self, seconds: f64) -> Option<LogFigure> {
+        let times: Vec<f64> = self.curve.iter().map(|at| at.1).collect();
+        let (neighbours, share) = place_on(&times, seconds)?;
+        let [a, b] = neighbours.map(|i| self.curve[i].0);
+        let error = |spps, share| self.sampler.log_error(Metric::RelMse, spps, share);
+        // At a point of the curve, errors are taken to fall as one over the samples.
+        let slope = match a < b {
+            true => {
+                (error([b; 2], 0.0)?.log - error([a; 2], 0.0)?.log)
+                    / (f64::from(b) / f64::from(a)).ln()
+            }
+            false => -1.0,
+        };
+        Some(error([a, b], share)?.with_noise(self.noise(slope)))
+    }
+
+    /// Error × seconds, one over the efficiency.
+    fn error_seconds(&self, spp: u32) -> Option<LogFigure> {
+        let error = self.sampler.log_error(Metric::RelMse, [spp; 2], 0.0)?;
+        let seconds = f64::from(spp) * self.time.log.exp() / 1000.0;
+        Some(error.scaled(seconds).with_noise(self.noise(1.0)))
+    }
+
+    /// Seconds until the error falls to `target`.
+    fn seconds_to(&self, target: f64) -> Option<LogFigure> {
+        let spp = self.sampler.spp_to(Metric::RelMse, target)?;
+        Some(
+            spp.scaled(self.time.log.exp() / 1000.0)
+                .with_noise(self.noise(1.0)),
+        )
+    }
+}
+
+impl<'a> Race<'a> {
+    /// `None` without a sampler that has both errors and a time.
+    pub fn new(view: &'a View<'a>) -> Option<Self> {
+        let structure = view.fastest_structure()?;
+        let runner = |sampler: &'a MeasuredSampler<'a>| {
+            let runner = Runner::new(view, &structure, sampler)?;
+            (!runner.curve.is_empty() && sampler.fault().is_none()).then_some(runner)
+        };
+        let runners: Vec<Runner> = view.samplers.iter().filter_map(runner).collect();
+        let seconds = runners
+            .iter()
+            .filter_map(|r| Some(r.curve.last()?.1))
+            .reduce(f64::min)?;
+        Some(Self {
+            seconds,
+            structure,
+            view,
+            runners,
+        })
+    }
+
+    /// The error that samples and seconds are counted to: that of the rule that ends cells, else the least
+    /// that all of the race reach, rounded up to two digits.
+    fn target(&self) -> Option<f64> {
+        let stopped = self.view.samplers.iter().flat_map(|s| &s.replicates);
+        if let Some(rule) = stopped.filter_map(|r| r.stop.as_ref()).next() {
+            return Some(rule.relmse);
+        }
+        let last = |runner: &Runner| {
+            let (spp, _) = runner.curve.last()?;
+            Some(
+                runner
+                    .sampler
+                    .mean_error_at(Metric::RelMse, *spp)?
+                    .error
+                    .value,
+            )
+        };
+        let most = self.runners.iter().filter_map(last).reduce(f64::max)?;
+        let unit = 10f64.powf(most.log10().floor() - 1.0);
+        (most > 0.0).then(|| (most / unit).ceil() * unit)
+    }
+
+    /// What a second buys: error × time at the common spp, errors when the race ends, samples and seconds to an
+    /// error.
+    pub fn values(&self) -> Vec<Value<'static>> {
+        let metric = Metric::RelMse.name();
+        let (common, target) = (self.view.common_spp(), self.target());
+        let mut values = Vec::new();
+        for sampler in &self.view.samplers {
+            let Some(time) = self.view.time(&self.structure, &sampler.name) else {
+                continue;
+            };
+            let Some(runner) = Runner::new(self.view, &self.structure, sampler) else {
+                continue;
+            };
+            let mut add = |what: String, id: &str, figure: Option<LogFigure>| {
+                let key = time.key.clone().with(axis::SUBJECT, what);
+                let figure = figure.map(|figure| figure.interval());
+                values.extend(Value::known(&key, [(id, figure)]));
+            };
+            let resolved = |spp: &u32| runner.curve.iter().any(|at| at.0 == *spp);
+            if let Some(spp) = common.filter(resolved) {
+                let what = format!("{metric} × seconds at {spp} spp");
+                add(what, "error-seconds/v1", runner.error_seconds(spp));
+            }
+            let what = format!("{metric} after {} s", format::number(self.seconds));
+            let fair = sampler.fault().is_none();
+            let end = runner.error_after(self.seconds).filter(|_| fair);
+            add(what, "error-at-time/v1", end);
+            if let Some(target) = target {
+                let to = format!("to {metric} {}", format::significant(target, 2));
+                let spp = sampler.spp_to(Metric::RelMse, target);
+                add(format!("spp {to}"), "spp-to-error/v1", spp);
+                add(
+                    format!("seconds {to}"),
+                    "seconds-to-error/v1",
+                    runner.seconds_to(target),
+                );
+            }
+        }
+        values
+    }
+
+    /// Error of a sampler when the race ends.
+    pub fn error_of(&self, sampler: &str) -> Option<Interval> {
+        let is_it = |runner: &&Runner| runner.sampler.name == sampler;
+        let runner = self.runners.iter().find(is_it)?;
+        Some(runner.error_after(self.seconds)?.interval())
+    }
+
+    /// Who has the least error when the race ends.
+    pub fn ruling(&self) -> Ruling {
+        let contender = |runner: &Runner| {
+            let log = runner.error_after(self.seconds)?;
+            Some(Contender {
+                name: runner.sampler.name.clone(),
+                figure: log.interval(),
+                log: Some(log).filter(|_| runner.is_ranked()),
+            })
+        };
+        rank(
+            self.view,
+            self.runners.iter().filter_map(contender).collect(),
+        )
+    }
+}
