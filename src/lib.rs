@@ -21,6 +21,7 @@ pub mod discrepancy;
 pub mod export;
 pub mod geometry;
 pub mod gpu;
+pub mod history;
 pub mod image;
 pub mod integrator;
 pub mod measure;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// Layers from the bottom: a module may use those above its own line here, and those of the same line
 /// that stand together in [`TOGETHER`].
-const LAYERS: [&[&str]; 12] = [
+const LAYERS: [&[&str]; 13] = [
     &["atomic", "text", "geometry", "params", "random"],
     &["image"],
     &["gpu", "sampling", "discrepancy", "oracle"],
@@ -20,6 +20,7 @@ const LAYERS: [&[&str]; 12] = [
     &["run"],
     &["report"],
     &["export"],
+    &["history"],
 ];
 /// What stands above all layers and may use each of them; the last may use the one before.
 const ABOVE: [&str; 2] = ["stress", "commands"];

@@ -10,6 +10,7 @@ mod export;
 mod exporting;
 mod failure;
 mod faults;
+mod history;
 mod list;
 mod list_json;
 mod output;
@@ -18,6 +19,7 @@ mod points_plot;
 mod render;
 mod report;
 mod run;
+mod schema;
 mod signals;
 mod stress;
 mod system;
@@ -90,6 +92,9 @@ enum Command {
     ExportMitsuba(export::ExportMitsuba),
     #[command(after_help = EXIT_CODES)]
     Export(exporting::Export),
+    #[command(after_help = EXIT_CODES)]
+    History(history::HistoryOf),
+    Schema(schema::Schema),
     Completions(completions::Completions),
     Man(completions::Man),
 }
@@ -109,6 +114,8 @@ pub fn main() -> ExitCode {
         Command::Trace(command) => command.execute(),
         Command::ExportMitsuba(command) => command.execute(),
         Command::Export(command) => command.execute(),
+        Command::History(command) => command.execute(),
+        Command::Schema(command) => command.execute(),
         Command::Completions(command) => command.execute(),
         Command::Man(command) => command.execute(),
     };

@@ -3,7 +3,8 @@
 use super::arguments::{DeviceArguments, ExperimentArguments, plan};
 use super::estimate::Estimate;
 use super::failure::{BAD_INPUT, FAILED};
-use super::output::{self, print, screen};
+use super::output::{self, OutputArguments, print, print_json, screen};
+use super::report::findings;
 use super::signals;
 use anyhow::Result;
 use clap::Args;
@@ -54,6 +55,8 @@ pub struct Run {
     /// No progress bar and no tables: print the report's path only
     #[arg(long, short)]
     quiet: bool,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 impl Run {
@@ -91,6 +94,14 @@ impl Run {
                 write_report(&folder)?;
                 Err(RunError::EndedEarly { folder, source }.into())
             }
+            summary if self.output.json => {
+                let summary = summary?;
+                print_json(
+                    "run",
+                    findings(&summary.out, &write_report(&summary.out)?.html)?,
+                )?;
+                tell_failures(&summary, self.lenient)
+            }
             summary => tell(&summary?, self.quiet, self.lenient),
         }
     }
@@ -124,6 +135,12 @@ fn tell(summary: &RunSummary, quiet: bool, lenient: bool) -> Result<ExitCode> {
             page.display()
         ),
     })?;
+    tell_failures(summary, lenient)
+}
+
+/// Tells what failed; the exit code to end with.
+fn tell_failures(summary: &RunSummary, lenient: bool) -> Result<ExitCode> {
+    let lines = read_records(&summary.out)?.lines;
     let failed_checks = failed_checks(&lines);
     if summary.failed == 0 && !summary.bad_input && failed_checks.is_empty() {
         return Ok(ExitCode::SUCCESS);

@@ -10,10 +10,12 @@ mod junit;
 mod latex;
 mod npy;
 pub mod samples;
+mod schema;
 pub mod select;
 mod tables;
 
 pub use json::{OUTPUT_SCHEMA, checks_json, values_json};
+pub use schema::record_schema;
 
 use crate::image::ImageError;
 use crate::measure::figure::Better;

@@ -4,7 +4,7 @@ use super::{Gpu, probe_arithmetic};
 use serde::{Deserialize, Serialize};
 
 /// Machine, adapter, driver and program that produced a result.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Environment {
     /// Adapter name as the driver gives it.
     pub adapter: String,
