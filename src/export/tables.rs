@@ -5,6 +5,7 @@ use crate::measure::record::{Key, axis};
 use crate::report::document::Table;
 use crate::report::markdown;
 use crate::report::pivot::Rows;
+use crate::report::terminal::shown;
 use crate::report::values::{Reading, Value};
 
 /// Axes that make good columns, the best first.
@@ -15,8 +16,9 @@ const MOST_COLUMNS: usize = 9;
 pub fn markdown(source: &Source) -> Exported {
     let tables = tables(&source.values);
     let texts: Vec<String> = tables.iter().map(markdown::table).collect();
+    let lines: Vec<String> = texts.join("\n").split('\n').map(shown).collect();
     Exported {
-        text: texts.join("\n"),
+        text: lines.join("\n"),
         left_out: Vec::new(),
     }
 }

@@ -273,7 +273,7 @@ fn records_that_are_cut_or_of_another_version_are_named() {
         "{words}"
     );
     let mut lines: Vec<&str> = whole.lines().collect();
-    let half = &lines[3][..lines[3].len() / 2];
+    let half = &lines[3][..lines[3].floor_char_boundary(lines[3].len() / 2)];
     lines[3] = half;
     let inside = folder_of(&(lines.join("\n") + "\n"));
     let other =
@@ -291,7 +291,7 @@ fn records_that_are_cut_or_of_another_version_are_named() {
             } else {
                 &[]
             };
-            let output = program(&[&[command, text(folder.path())], format].concat());
+            let output = program(&[&[command, text(folder.path())][..], format].concat());
             let words = String::from_utf8_lossy(&output.stderr).into_owned();
             assert_eq!(output.status.code(), Some(2), "{words}");
             assert!(words.contains(told), "{words}");
