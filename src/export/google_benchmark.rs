@@ -7,6 +7,9 @@ use super::{Exported, Source, name, pretty};
 use crate::report::format;
 use serde_json::{Value as Json, json};
 
+/// Nanoseconds of a millisecond: `compare.py` prints whole numbers.
+const NS: f64 = 1e6;
+
 pub fn write(source: &Source) -> Exported {
     let rows = source.samples.iter().enumerate();
     let benchmarks: Vec<Json> = rows
@@ -55,9 +58,9 @@ fn repetitions(family: usize, samples: &Samples) -> Vec<Json> {
             "repetition_index": index,
             "threads": 1,
             "iterations": 1,
-            "real_time": ms,
-            "cpu_time": cpu_ms,
-            "time_unit": "ms",
+            "real_time": ms * NS,
+            "cpu_time": cpu_ms * NS,
+            "time_unit": "ns",
             "label": label,
         });
         if let Some(rays) = samples.rays.filter(|_| *ms > 0.0) {

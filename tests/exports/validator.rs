@@ -79,7 +79,7 @@ pub fn google_benchmark(file: &Value) -> Checked {
         }
         let repetition = number(one, "repetition_index")? as usize;
         let sound = one["run_type"] == "iteration"
-            && one["time_unit"] == "ms"
+            && one["time_unit"] == "ns"
             && one["name"].is_string()
             && one["run_name"] == one["name"]
             && repetition == next;
