@@ -150,7 +150,8 @@ mod tests {
 
     #[test]
     fn eight_runs_are_enough_and_seven_are_not() {
-        let step = |n: usize| (0..n).map(|i| f64::from(u8::from(i >= n / 2)) + 1e-3 * i as f64);
+        let step =
+            |n: usize| (0..n).map(move |i| f64::from(u8::from(i >= n / 2)) + 1e-3 * i as f64);
         assert_eq!(
             e_divisive(&step(LEAST_RUNS).collect::<Vec<_>>(), 0.05).len(),
             1

@@ -10,6 +10,8 @@ use serde_json::{Value as Json, json};
 
 /// Series of a plot: more cannot be told apart.
 const IN_PLOT: usize = 6;
+/// Of more series than this, those that change are drawn alone.
+const MOST_DRAWN: usize = 200;
 
 impl History<'_> {
     /// The runs by number.
@@ -86,6 +88,9 @@ impl History<'_> {
                 super::change::LEAST_RUNS
             );
         }
+        if !self.draws_all() {
+            text += " Only what changes is drawn: --figure and --only choose fewer series.";
+        }
         if self.left_out > 0 {
             text += &format!(
                 " {} values are no numbers and were left out.",
@@ -93,6 +98,10 @@ impl History<'_> {
             );
         }
         text
+    }
+
+    fn draws_all(&self) -> bool {
+        self.series.len() <= MOST_DRAWN
     }
 
     /// The page: runs, changes, and plots of each figure over the runs.
@@ -119,14 +128,16 @@ impl History<'_> {
                 ids.push(&series.figure.id);
             }
         }
+        let is_drawn = |s: &&Series| !s.changes.is_empty() || self.draws_all();
         let section = |id: &&str| {
             let of_figure = self.series.iter().filter(|s| s.figure.id == **id);
-            let of_figure: Vec<&Series> = of_figure.collect();
+            let heading = of_figure.clone().next().map(|s| s.figure.heading());
+            let of_figure: Vec<&Series> = of_figure.filter(is_drawn).collect();
             let name: String = id
                 .chars()
                 .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
                 .collect();
-            let mut section = Section::new(name.clone(), of_figure[0].figure.heading());
+            let mut section = Section::new(name.clone(), heading.unwrap_or_default());
             let plots = of_figure.chunks(IN_PLOT).enumerate();
             let plots = plots.map(|(i, some)| {
                 let caption = "Value by run, with intervals; dashed: levels between changes";
