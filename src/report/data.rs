@@ -371,6 +371,7 @@ impl<'a> RunData<'a> {
             key: key.only(&SAMPLER_AXES),
             name,
             replicates: Vec::new(),
+            means: Default::default(),
             bias: None,
             spectrum: None,
         };

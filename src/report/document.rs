@@ -7,6 +7,9 @@ use crate::measure::record::Verdict;
 use rayon::prelude::*;
 use serde::Serialize;
 
+/// Bytes of plots that a page holds.
+const MOST_INLINE: usize = 4_000_000;
+
 /// The whole report.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Document {
@@ -33,8 +36,24 @@ impl Document {
         figures.into_par_iter().try_for_each(|figure| {
             figure.svg = to_svg(&figure.drawing)?;
             figure.png = to_png(&figure.drawing)?;
-            Ok(())
-        })
+            Ok::<(), ReportError>(())
+        })?;
+        self.choose_inline();
+        Ok(())
+    }
+
+    /// Lets the first figures stand in the page, as many as it has room for; the others it leads to.
+    fn choose_inline(&mut self) {
+        let mut figures = Vec::new();
+        for section in &mut self.sections {
+            figures_among(&mut section.blocks, &mut figures);
+        }
+        let mut left = MOST_INLINE;
+        for figure in figures {
+            let room = left.checked_sub(figure.svg.len());
+            figure.inline = room.is_some();
+            left = room.unwrap_or(left);
+        }
     }
 
     /// Every figure, those in folds too.
@@ -365,6 +384,8 @@ pub struct Illustration {
     pub drawing: Drawing,
     /// SVG document; empty until [`Document::paint`].
     pub svg: String,
+    /// Whether the page holds it; else it leads to the file.
+    pub inline: bool,
     /// PNG file; empty until [`Document::paint`].
     #[serde(skip)]
     pub png: Vec<u8>,
@@ -380,6 +401,7 @@ impl Illustration {
             wide: drawing.width > 600.0,
             drawing,
             svg: String::new(),
+            inline: true,
             png: Vec::new(),
         }
     }

@@ -50,6 +50,8 @@ impl<'a> Rows<'a> {
         figures: &[&str],
         across: Part,
     ) -> Table {
+        let shown = values.iter().filter(|v| figures.contains(&&*v.figure.id));
+        let values: Vec<&Value> = shown.collect();
         let mut columns: Vec<(&Value, String)> = Vec::new();
         for id in figures {
             for value in values.iter().filter(|value| value.figure.id == *id) {
@@ -73,9 +75,10 @@ impl<'a> Rows<'a> {
         }
         for (key, mut cells) in self.rows {
             let in_row = values.iter().filter(|v| v.key.agrees(&key, self.by));
-            let in_row: Vec<&Value> = in_row.collect();
+            let in_row: Vec<&&Value> = in_row.collect();
             cells.extend(columns.iter().map(|(first, part)| {
-                let is_it = |v: &&&Value| v.figure.id == first.figure.id && across(&v.key) == *part;
+                let is_it =
+                    |v: &&&&Value| v.figure.id == first.figure.id && across(&v.key) == *part;
                 let found = in_row.iter().find(is_it);
                 found.map_or_else(|| format::ABSENT.into(), |value| value.cell())
             }));

@@ -11,6 +11,8 @@ use crate::measure::statistics::{
     LEAST_FOR_MEDIAN, jackknife_interval, log_log_fit, mean_interval, positive_interval,
 };
 
+use std::sync::OnceLock;
+
 /// What an error is that its reference is too noisy for: its estimate is not clearly above 0.
 pub const UNRESOLVED: &str = "below what the reference can resolve";
 
@@ -26,6 +28,8 @@ pub struct MeasuredSampler<'a> {
     pub name: String,
     /// Its replicates.
     pub replicates: Vec<&'a ErrorRecord>,
+    /// Mean errors, relMSE and RMSE, once they were asked for.
+    pub means: [OnceLock<Vec<MeanError>>; 2],
     /// Verdict on its bias.
     pub bias: Option<BiasRecord>,
     /// What its error looks like.
@@ -179,8 +183,13 @@ impl<'a> MeasuredSampler<'a> {
         id(unbiased).or_else(|| id(plain)).map(String::as_str)
     }
 
-    /// Mean error by growing spp, over the replicates that have it.
+    /// Mean error by growing spp, over the replicates that have it; computed once they are all there.
     pub fn mean_errors(&self, metric: Metric) -> Vec<MeanError> {
+        let place = &self.means[usize::from(metric == Metric::Rmse)];
+        place.get_or_init(|| self.computed_means(metric)).clone()
+    }
+
+    fn computed_means(&self, metric: Metric) -> Vec<MeanError> {
         let Some(id) = self.metric_id(metric) else {
             return Vec::new();
         };

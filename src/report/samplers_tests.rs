@@ -57,6 +57,7 @@ fn sampler(records: &[ErrorRecord]) -> MeasuredSampler<'_> {
         key: Key::default(),
         name: "a × b".into(),
         replicates: records.iter().collect(),
+        means: Default::default(),
         bias: None,
         spectrum: None,
     }

@@ -116,6 +116,29 @@ fn a_run_writes_linear_images_and_takes_one_as_the_reference_of_another() {
 }
 
 #[test]
+fn a_check_that_fails_is_the_exit_code_unless_the_run_is_lenient_which_its_page_says() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    // As few samples as a reference may have are too few for the errors.
+    let noisy = ["--no-cache", "--set", "reference.spp=8"];
+    let page = |name: &str| {
+        let page = folder.path().join(name).join("index.html");
+        std::fs::read_to_string(page).expect("a page")
+    };
+    let (code, said, _) = run(folder.path(), "strict", &noisy);
+    assert_eq!(code, 1, "{said}");
+    assert!(said.contains("failed: Reference noise"), "{said}");
+    assert!(page("strict").contains("no winner: ") && !page("strict").contains("--lenient"));
+    let (code, said, _) = run(
+        folder.path(),
+        "lenient",
+        &[&noisy[..], &["--lenient"]].concat(),
+    );
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("failed: Reference noise"), "{said}");
+    assert!(page("lenient").contains("no winner: ") && page("lenient").contains("--lenient"));
+}
+
+#[test]
 fn a_reference_that_does_not_fit_ends_with_2_before_anything_is_measured() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let wrong = folder.path().join("wrong.pfm");

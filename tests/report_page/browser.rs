@@ -41,8 +41,8 @@ impl Browser {
     }
 
     /// The document after loading, as text.
-    pub fn dump(&self, page: &Path, more: &[&str]) -> String {
-        let (dom, _) = self.run(page, more);
+    pub fn dump(&self, page: &Path) -> String {
+        let (dom, _) = self.run(page, &[]);
         dom
     }
 

@@ -1,6 +1,6 @@
 //! Tables of coloured numbers: counts by row and column, and a number for every pair of dimensions.
 
-use super::drawing::{Anchor, Drawing, FAILED, INK, Ink};
+use super::drawing::{Anchor, DIM, Drawing, FAILED, INK, Ink};
 use super::paint::text_width;
 use crate::image::viridis;
 use crate::report::format;
@@ -38,17 +38,28 @@ pub struct HeatMap {
     pub columns: Vec<String>,
     /// Row by row; nothing where there is no value.
     pub tiles: Vec<Vec<Option<Tile>>>,
+    /// What the ends of the colours stand for.
+    ends: [String; 2],
+    /// What is between them: quantity, unit, and how it is spread.
+    between: String,
 }
 
+/// Width and height of the scale of colours below the cells, and height of all that belongs to it, pixels.
+const SCALE: [f64; 3] = [180.0, 12.0, 44.0];
+/// Steps of the scale.
+const STEPS: usize = 60;
+
 impl HeatMap {
-    /// Counts, coloured by their logarithm; some are marked.
+    /// Counts of something in a unit, coloured by their logarithm; some are marked.
     pub fn of_counts(
+        what: &str,
         rows: Vec<String>,
         columns: Vec<String>,
         values: &[Vec<Option<(f64, bool)>>],
     ) -> Self {
         let greatest = values.iter().flatten().flatten().map(|v| v.0);
-        let scale = (1.0 + greatest.fold(0.0, f64::max)).ln();
+        let greatest = greatest.fold(0.0, f64::max);
+        let scale = (1.0 + greatest).ln();
         let tile = |(value, marked): (f64, bool)| Tile {
             text: match value {
                 0.0 => "0".to_owned(),
@@ -64,6 +75,8 @@ impl HeatMap {
             rows,
             columns,
             tiles: values.iter().map(row).collect(),
+            ends: ["few".into(), format::significant(greatest, 2)],
+            between: format!("{what}; logarithm of 1 + value, one scale for all; grey: 0"),
         }
     }
 
@@ -91,6 +104,8 @@ impl HeatMap {
             rows: names.iter().skip(1).cloned().collect(),
             columns: names.iter().take(size).cloned().collect(),
             tiles,
+            ends: [low, low + range].map(format::number),
+            between: "least to greatest, linear, no unit".into(),
         }
     }
 
@@ -104,7 +119,8 @@ impl HeatMap {
         let head = if upright { 20.0 } else { length(&self.columns) };
         let (left, top) = (length(&self.rows) + 2.0 * MARGIN, head + 2.0 * MARGIN);
         let width = left + self.columns.len() as f64 * cell + MARGIN;
-        let height = top + self.rows.len() as f64 * HEIGHT + MARGIN;
+        let cells = top + self.rows.len() as f64 * HEIGHT + MARGIN;
+        let height = cells + SCALE[2];
         let mut drawing = Drawing::new(width.max(LEAST_WIDTH), height);
         for (column, name) in self.columns.iter().enumerate() {
             let x = left + (column as f64 + 0.5) * cell;
@@ -123,7 +139,55 @@ impl HeatMap {
                     .for_each(|tile| tile.draw(&mut drawing, (x, y), end));
             }
         }
+        if tiles().any(|tile| tile.share.is_some()) {
+            self.draw_scale(&mut drawing, cells);
+        }
+        drawing.says = self.says();
         Some(drawing)
+    }
+
+    fn draw_scale(&self, drawing: &mut Drawing, top: f64) {
+        let [width, height, _] = SCALE;
+        let [low, high] = &self.ends;
+        let left = 2.0 * MARGIN + text_width(low);
+        let middle = top + 0.5 * height;
+        drawing.text((MARGIN, middle), low, INK, Anchor::Start);
+        let step = width / STEPS as f64;
+        for i in 0..STEPS {
+            let color = viridis(i as f32 / (STEPS - 1) as f32);
+            let x = left + i as f64 * step;
+            drawing.bar((x, top), (x + step + 0.3, top + height), Ink::solid(color));
+        }
+        drawing.text((left + width + MARGIN, middle), high, INK, Anchor::Start);
+        drawing.text(
+            (MARGIN, top + height + 14.0),
+            &self.between,
+            DIM,
+            Anchor::Start,
+        );
+    }
+
+    /// What is to be seen: the cells with the greatest numbers.
+    fn says(&self) -> String {
+        let mut shares: Vec<(f64, String)> = Vec::new();
+        for (name, row) in self.rows.iter().zip(&self.tiles) {
+            for (column, tile) in self.columns.iter().zip(row) {
+                let Some((share, tile)) = tile.as_ref().and_then(|t| Some((t.share?, t))) else {
+                    continue;
+                };
+                shares.push((share, format!("{name}, {column}: {}", tile.text)));
+            }
+        }
+        shares.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let greatest: Vec<String> = shares.into_iter().take(5).map(|(_, text)| text).collect();
+        let (rows, columns) = (self.rows.len(), self.columns.len());
+        match greatest.is_empty() {
+            true => format!("Table of {rows} by {columns} cells, all 0."),
+            false => format!(
+                "Table of {rows} by {columns} coloured numbers; the greatest: {}.",
+                greatest.join("; ")
+            ),
+        }
     }
 }
 
@@ -143,11 +207,18 @@ impl Tile {
     }
 }
 
+/// Text on bright cells; not the ink of pages, which dark ones make bright.
+const NEAR_BLACK: [u8; 3] = [1; 3];
+
 /// Black or white, whichever contrasts more with the colour (WCAG 2.1: equal at a luminance of 0.179).
 fn legible_on(rgb: [u8; 3]) -> Ink {
     let linear = rgb.map(|c| (f64::from(c) / 255.0).powf(2.2));
     let luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
-    Ink::solid(if luminance > 0.179 { [0; 3] } else { [255; 3] })
+    Ink::solid(if luminance > 0.179 {
+        NEAR_BLACK
+    } else {
+        [255; 3]
+    })
 }
 
 #[cfg(test)]
@@ -171,22 +242,41 @@ mod tests {
             vec![None, Some((3.0, false))],
         ];
         let (rows, columns) = (names(&["bvh", "octree"]), names(&["edges", "needles"]));
-        let drawing = HeatMap::of_counts(rows, columns, &counts).draw().unwrap();
-        let expected = ["0", "25", "3.0", "bvh", "edges", "needles", "octree"];
-        assert_eq!(sorted(&drawing), expected);
+        let drawing = HeatMap::of_counts("rays", rows, columns, &counts)
+            .draw()
+            .unwrap();
+        let found = sorted(&drawing);
+        for text in ["0", "25", "3.0", "bvh", "edges", "needles", "octree", "few"] {
+            assert!(found.contains(&text), "{text} in {found:?}");
+        }
+        let unit = "rays; logarithm of 1 + value, one scale for all; grey: 0";
+        assert!(found.contains(&unit) && drawing.says.contains("bvh, needles: 25"));
         let pairs = [(0, 1, 0.125), (0, 2, 0.5), (1, 2, 0.25)];
         let matrix = HeatMap::of_pairs(&names(&["0", "3", "7"]), &pairs);
         let drawing = matrix.draw().unwrap();
-        let expected = ["0", "0.125", "0.250", "0.500", "3", "3", "7"];
-        assert_eq!(sorted(&drawing), expected);
+        let found = sorted(&drawing);
+        for (text, count) in [
+            ("0", 1),
+            ("0.125", 2),
+            ("0.250", 1),
+            ("0.500", 2),
+            ("3", 2),
+            ("7", 1),
+        ] {
+            assert_eq!(
+                found.iter().filter(|t| **t == text).count(),
+                count,
+                "{text}"
+            );
+        }
         assert_eq!(matrix.tiles[1][0].as_ref().unwrap().text, "0.500");
-        assert!(HeatMap::of_counts(vec![], vec![], &[]).draw().is_none());
+        assert!(HeatMap::of_counts("", vec![], vec![], &[]).draw().is_none());
         assert!(HeatMap::of_pairs(&names(&["4"]), &[]).draw().is_none());
     }
 
     #[test]
     fn numbers_are_white_on_violet_and_black_on_yellow() {
         assert_eq!(legible_on(viridis(0.0)).rgb, [255; 3]);
-        assert_eq!(legible_on(viridis(1.0)).rgb, [0; 3]);
+        assert_eq!(legible_on(viridis(1.0)).rgb, NEAR_BLACK);
     }
 }

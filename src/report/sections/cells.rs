@@ -69,6 +69,18 @@ impl<'a> Cells<'a> {
             });
             found[place].values.push(value);
         }
+        // What failed has no figure, but a key.
+        let views = data.scenes.iter().flat_map(|scene| &scene.views);
+        for time in views.flat_map(|view| &view.times) {
+            let key = of_cell(&time.key);
+            if !places.contains_key(&key.to_string()) {
+                found.push(Cell {
+                    key,
+                    ran: Some(time.ran),
+                    values: Vec::new(),
+                });
+            }
+        }
         Self { found }
     }
 

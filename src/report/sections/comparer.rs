@@ -9,7 +9,7 @@ use half::f16;
 use std::path::Path;
 
 /// Characters of radiance that all comparers of a page may hold together: the page stays below 10 MB.
-const MOST_CHARACTERS: usize = 5_000_000;
+const MOST_CHARACTERS: usize = 3_000_000;
 
 /// The reference and the first replicate of each sampler; `None` where there is nothing to compare.
 pub fn block(dir: &Path, data: &RunData, stem: &str, view: &View) -> Option<Block> {

@@ -136,7 +136,7 @@ fn failures_section(data: &RunData) -> Option<Section> {
     };
     let blocks = &mut section.blocks;
     blocks.extend(table("Failed", &failed, Tone::Bad));
-    blocks.extend(table("Warnings", &warnings, Tone::Note));
+    blocks.extend(table("Every warning of the run", &warnings, Tone::Note));
     let mut reasons: Vec<&str> = left_out.iter().map(|f| f.reason.as_str()).collect();
     reasons.sort_unstable();
     reasons.dedup();

@@ -30,7 +30,8 @@ pub(super) fn heat_map(records: &[Line], test: &str) -> Option<Illustration> {
     };
     let row = |accel: &String| columns.iter().map(|f| value(accel, f)).collect();
     let values: Vec<_> = rows.iter().map(row).collect();
-    let drawing = HeatMap::of_counts(rows, columns, &values).draw()?;
+    let drawing =
+        HeatMap::of_counts("lost hits per million rays", rows, columns, &values).draw()?;
     let caption = format!("{test}: lost hits per million rays");
     Some(Illustration::new(
         format!("lost-hits-{test}"),

@@ -103,7 +103,12 @@ fn document(records: &[Line]) -> Document {
         section(
             "errors",
             "Error against scale and translation",
-            Block::figures(curves(records)).into_iter().collect(),
+            Block::fold(
+                "Error of the distance along the rungs, family by family",
+                Block::figures(curves(records)).into_iter().collect(),
+            )
+            .into_iter()
+            .collect(),
         ),
         section(
             "axes",
@@ -158,8 +163,8 @@ fn verdict(records: &[Line]) -> Vec<Block> {
         verdict: Verdict::new(passed + failed > 0 && open == 0, failed > 0),
         title: title.into(),
         detail: format!(
-            "{passed} of {} met; {rest}.",
-            format::plural(checks.len(), "target")
+            "Targets of the default configuration: {passed} of {} met; {rest}.",
+            checks.len()
         ),
     };
     let (met, others): (Vec<Check>, Vec<Check>) = checks
