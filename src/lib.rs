@@ -30,6 +30,7 @@ pub mod params;
 pub mod peers;
 pub mod random;
 pub mod report;
+pub mod repro;
 pub mod run;
 pub mod sampling;
 pub mod scene;

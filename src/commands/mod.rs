@@ -18,7 +18,9 @@ mod points;
 mod points_plot;
 mod render;
 mod report;
+mod repro;
 mod run;
+mod scenes;
 mod schema;
 mod signals;
 mod stress;
@@ -85,6 +87,9 @@ enum Command {
     #[command(after_help = EXIT_CODES)]
     Report(report::Report),
     #[command(after_help = EXIT_CODES)]
+    Repro(repro::Repro),
+    Scenes(scenes::Scenes),
+    #[command(after_help = EXIT_CODES)]
     Stress(stress::Stress),
     #[command(after_help = EXIT_CODES)]
     Trace(trace::Trace),
@@ -110,6 +115,8 @@ pub fn main() -> ExitCode {
         Command::Doctor(command) => command.execute(),
         Command::Discrepancy(command) => command.execute(),
         Command::Report(command) => command.execute(),
+        Command::Repro(command) => command.execute(),
+        Command::Scenes(command) => command.execute(),
         Command::Stress(command) => command.execute(),
         Command::Trace(command) => command.execute(),
         Command::ExportMitsuba(command) => command.execute(),

@@ -9,6 +9,7 @@ mod axis_map;
 mod cells;
 mod check;
 mod error;
+pub mod expect;
 mod experiment;
 pub mod keys;
 mod parse;

@@ -12,7 +12,7 @@ use super::experiment::{
 use super::keys::{Axis, KEYS, OPTIONAL_SECTIONS};
 use super::section::{Section, texts};
 use super::tree::{self, Item, Table, Value};
-use super::{Catalogue, variants};
+use super::{Catalogue, expect, variants};
 use crate::geometry::Camera;
 use crate::params::Variant;
 use std::path::{Path, PathBuf};
@@ -75,6 +75,9 @@ pub(super) fn parse(
 /// Defaults, file and overrides in one tree.
 fn layers(text: &str, file: &str, overrides: &[String]) -> Result<Table, ConfigError> {
     let mut user = tree::parse_file(text, file)?;
+    // What a thesis says changes nothing that is measured; a fault in it is told all the same.
+    expect::Thesis::parse(text, file)?;
+    expect::take(&mut user);
     for text in overrides {
         tree::merge(&mut user, tree::parse_override(text)?);
     }

@@ -24,6 +24,14 @@ impl Pattern {
         fits == positive
     }
 
+    /// Whether the pattern chooses a plain text.
+    pub fn fits_text(&self, text: &str) -> bool {
+        match self.0.strip_prefix('!') {
+            Some(rest) => !glob_matches(rest, text),
+            None => glob_matches(&self.0, text),
+        }
+    }
+
     /// The pattern without its negation: what must exist for the pattern to make sense.
     pub(super) fn without_negation(&self) -> Pattern {
         Pattern(self.0.trim_start_matches('!').to_owned())

@@ -1,0 +1,195 @@
+//! `raystone repro`.
+
+use super::failure::{BAD_INPUT, FAILED};
+use super::output::{print, tell};
+use super::signals;
+use anyhow::{Result, anyhow};
+use clap::Args;
+use raystone::gpu::{AdapterChoice, GpuError};
+use raystone::report::{html, markdown, write_file, write_page};
+use raystone::repro::judge::Verdict;
+use raystone::repro::run::{ReproError, Reproduced, Settings, recorded, reproduce};
+use raystone::repro::{NotCovered, Source, chosen, latex, not_covered, page, scenes};
+use raystone::run::{Registries, RunError, RunOptions, user_cache};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Run tables and figures of four theses, with their numbers beside ours and a verdict on every claim
+#[derive(Args)]
+pub struct Repro {
+    /// Tables, by name; all without any
+    name: Vec<String>,
+    /// List the tables, with what each claims, and end
+    #[arg(long)]
+    list: bool,
+    /// Short runs on small built-in scenes
+    #[arg(long)]
+    quick: bool,
+    /// Folder of models [default: ../shared/scenes if it is there, else raystone/scenes in the user's data]
+    #[arg(long, value_name = "DIR")]
+    scenes: Option<PathBuf>,
+    /// Folder for everything that is written [default: results/repro, or results/repro-quick]
+    #[arg(long, short, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Run again what the folder holds whole; otherwise a run goes on where an earlier one ended
+    #[arg(long)]
+    force: bool,
+    /// Run the I-th of N shares of the tables (I from 0) and write no page; a run without it then reads them all
+    #[arg(long, value_name = "I/N", value_parser = share)]
+    shard: Option<[usize; 2]>,
+    /// Run nothing: write the pages from the records that are there
+    #[arg(long, conflicts_with = "force")]
+    pages: bool,
+    /// Adapter, by its number in `raystone list adapter` or a part of its name
+    #[arg(long, value_name = "INDEX|NAME")]
+    adapter: Option<AdapterChoice>,
+}
+
+fn share(text: &str) -> Result<[usize; 2], String> {
+    let numbers = text.split_once('/').map(|(i, n)| (i.parse(), n.parse()));
+    match numbers {
+        Some((Ok(i), Ok(n))) if i < n => Ok([i, n]),
+        _ => Err("write I/N with I below N, for instance 0/4".to_owned()),
+    }
+}
+
+impl Repro {
+    pub fn execute(self) -> Result<ExitCode> {
+        let sources = chosen(&self.name).map_err(|problem| anyhow!(problem))?;
+        let not_covered = not_covered()?;
+        if self.list {
+            print(&list(&sources, &not_covered)?)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        let folder = if self.quick { "repro-quick" } else { "repro" };
+        let settings = Settings {
+            quick: self.quick,
+            scenes: scenes::directory(self.scenes.as_deref()),
+            out: self
+                .out
+                .clone()
+                .unwrap_or_else(|| PathBuf::from("results").join(folder)),
+            force: self.force,
+        };
+        let registries = Registries::default();
+        let options = RunOptions {
+            adapter: self.adapter.clone().unwrap_or_default(),
+            warn: Some(super::output::warn),
+            cache: user_cache(),
+            ..RunOptions::default()
+        };
+        signals::watch(options.interrupt.clone())?;
+        let (mut tables, mut failed) = (Vec::new(), Vec::new());
+        for (index, source) in sources.iter().enumerate() {
+            let mine = self.shard.is_none_or(|[i, n]| index % n == i);
+            let found = match self.pages || !mine {
+                true => recorded(source, &settings, &registries),
+                false => {
+                    tell(&format!(
+                        "{} ({} of {})",
+                        source.name,
+                        index + 1,
+                        sources.len()
+                    ));
+                    reproduce(source, &settings, &registries, &options).map(Some)
+                }
+            };
+            match found {
+                Ok(table) => tables.extend(table),
+                Err(error) if ends_all(&error) => return Err(error.into()),
+                Err(ReproError::Run(RunError::Interrupted)) => signals::wait_for_end(),
+                Err(error) => failed.push((source.name.to_owned(), error.to_string())),
+            }
+        }
+        if self.shard.is_some() {
+            return Ok(end(&tables, &failed));
+        }
+        let html = write(&settings, &tables, &failed, &not_covered)?;
+        print(&format!(
+            "{}\nreport: {}\n",
+            in_words(&tables),
+            html.display()
+        ))?;
+        Ok(end(&tables, &failed))
+    }
+}
+
+/// Whether no other table would fare better: there is no adapter.
+fn ends_all(error: &ReproError) -> bool {
+    matches!(error, ReproError::Run(error @ RunError::Gpu(GpuError::NoAdapter | GpuError::UnknownAdapter { .. })) if error.exit_code() == 3)
+}
+
+fn end(tables: &[Reproduced], failed: &[(String, String)]) -> ExitCode {
+    for (name, reason) in failed {
+        tell(&format!("failed: {name}: {reason}"));
+    }
+    let mut faults = 0;
+    for table in tables {
+        for row in table.claims.iter().flatten() {
+            if row.verdict == Verdict::Faulty {
+                tell(&format!(
+                    "faulty expectation: {}: {}",
+                    table.name, row.reason
+                ));
+                faults += 1;
+            }
+        }
+    }
+    match (failed.is_empty(), faults) {
+        (false, _) => ExitCode::from(FAILED),
+        (true, 0) => ExitCode::SUCCESS,
+        _ => ExitCode::from(BAD_INPUT),
+    }
+}
+
+fn write(
+    settings: &Settings,
+    tables: &[Reproduced],
+    failed: &[(String, String)],
+    not_covered: &NotCovered,
+) -> Result<PathBuf> {
+    let mut document = page::document(tables, failed, not_covered);
+    std::fs::create_dir_all(&settings.out)?;
+    let (index, _) = write_page(&settings.out, &mut document)?;
+    let html = settings.out.join("repro.html");
+    write_file(&html, html::page(&document)?.as_bytes())?;
+    std::fs::remove_file(index)?;
+    let summary = markdown::summary(&document);
+    write_file(&settings.out.join("repro.md"), summary.as_bytes())?;
+    write_file(
+        &settings.out.join("repro.tex"),
+        latex::tables(tables).as_bytes(),
+    )?;
+    Ok(html)
+}
+
+fn in_words(tables: &[Reproduced]) -> String {
+    let mut text = String::new();
+    for table in tables {
+        text += &format!("\n{}: {}\n", table.name, table.thesis.title);
+        for (index, expect) in table.thesis.expects.iter().enumerate() {
+            let verdict = table.verdict(index);
+            if verdict != Verdict::Shown {
+                let claim = page::claim_name(expect);
+                text += &format!("  {:17}  {claim}: {}\n", verdict.word(), expect.says);
+            }
+        }
+    }
+    format!("{text}\n{}", page::tally(tables))
+}
+
+fn list(sources: &[Source], not_covered: &NotCovered) -> Result<String> {
+    let mut text = String::new();
+    for source in sources {
+        let thesis = source.thesis()?;
+        text += &format!("{}\n    {}\n", source.name, thesis.title);
+        for expect in &thesis.expects {
+            text += &format!("      {}: {}\n", page::claim_name(expect), expect.says);
+        }
+    }
+    text += "\nNot yet:\n";
+    for table in &not_covered.table {
+        text += &format!("{}\n    {}: {}\n", table.name, table.title, table.why);
+    }
+    Ok(text)
+}

@@ -1,0 +1,392 @@
+//! What an experiment should show: the numbers and claims of a thesis, beside the experiment that tests them.
+//!
+//! An experiment file of a thesis has four more sections, which a plain run passes over: `[thesis]` says what is
+//! reproduced, `[[substitute]]` which scene stands for which, `[[expect]]` what is claimed, `[quick]` what a short run
+//! changes. docs/repro.md describes them.
+
+use super::error::{ConfigError, Place};
+use super::tree::Table;
+use crate::text::nearest;
+use serde::Deserialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// The sections of this module.
+const SECTIONS: [&str; 4] = ["thesis", "substitute", "expect", "quick"];
+
+/// What a thesis printed, and how the experiment tests it.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Thesis {
+    /// What is reproduced.
+    pub title: String,
+    /// Stem of the digest's file, for instance `dufay-2017`.
+    pub source: String,
+    /// How an ambiguous text was read, what differs, and why.
+    #[serde(default)]
+    pub reading: String,
+    /// Scenes in the place of the thesis's.
+    #[serde(skip)]
+    pub substitutes: Vec<Substitute>,
+    /// What is expected.
+    #[serde(skip)]
+    pub expects: Vec<Expect>,
+    /// Overrides (`section.key=value`) that make a run short and built-in.
+    #[serde(skip)]
+    pub quick: Vec<String>,
+}
+
+/// A scene in the place of the thesis's.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Substitute {
+    /// What the thesis calls its scene.
+    pub original: String,
+    /// Its triangles there.
+    #[serde(default)]
+    pub triangles: Option<u64>,
+    /// Ours: a built-in scene, or a path below the scene directory; none if nothing fits.
+    #[serde(default)]
+    pub scene: Option<String>,
+    /// A built-in scene for short runs; none leaves it out of them.
+    #[serde(default)]
+    pub quick: Option<String>,
+    /// How they differ.
+    #[serde(default)]
+    pub why: String,
+}
+
+/// How values are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Compare {
+    /// Not at all: both are shown.
+    Shown,
+    /// The value itself against bounds.
+    Bound,
+    /// The value over another one against bounds.
+    Ratio,
+    /// Values of several selections ascend in the order given.
+    Order,
+    /// The exponent of a power law along an axis against bounds.
+    Slope,
+}
+
+/// On which devices a figure speaks.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Speaks {
+    /// Counts, errors, times of the host: wherever it was measured.
+    #[default]
+    Any,
+    /// Times of a device: not on a software adapter.
+    Gpu,
+}
+
+/// Axis → pattern (see [`super::Pattern`]) that its label has to fit.
+pub type Pick = BTreeMap<String, String>;
+
+/// An expectation.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Expect {
+    /// Name, unique in its file.
+    pub id: String,
+    /// What the thesis claims, or prints.
+    pub says: String,
+    /// Hypotheses of the digest that it tests, for instance `H5`.
+    #[serde(default)]
+    pub claims: Vec<String>,
+    /// The figure, see [`crate::measure`]'s table of figures.
+    pub figure: String,
+    /// How values are compared.
+    pub compare: Compare,
+    /// What is compared.
+    #[serde(default)]
+    pub of: Pick,
+    /// What it is divided by.
+    #[serde(default)]
+    pub over: Pick,
+    /// Selections whose values should ascend.
+    #[serde(default)]
+    pub order: Vec<Pick>,
+    /// Axis of numbers that a slope is taken along.
+    #[serde(default)]
+    pub along: Option<String>,
+    /// Least value (ratio, exponent) that agrees.
+    #[serde(default)]
+    pub least: Option<f64>,
+    /// Greatest one.
+    #[serde(default)]
+    pub most: Option<f64>,
+    /// Factor about the thesis's value within which ours agrees.
+    #[serde(default)]
+    pub within: Option<f64>,
+    /// Distance from the thesis's value within which ours agrees.
+    #[serde(default)]
+    pub off_by: Option<f64>,
+    /// Unit of the thesis's values, where they are values of the figure; empty: that of the figure.
+    #[serde(default)]
+    pub unit: String,
+    /// On which devices it speaks.
+    #[serde(default)]
+    pub device: Speaks,
+    /// Column of the original's table.
+    #[serde(default)]
+    pub column: String,
+    /// How an ambiguous text was read.
+    #[serde(default)]
+    pub reading: String,
+    /// Counted figures that explain, compared or shown in the same way.
+    #[serde(default)]
+    pub explain: Vec<String>,
+    /// The places of the original's table; without any, wherever the selections fit.
+    #[serde(default)]
+    pub at: Vec<At>,
+}
+
+/// A place of the original's table.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct At {
+    /// Row of the original's table.
+    #[serde(default)]
+    pub row: String,
+    /// Column, if another than that of the expectation.
+    #[serde(default)]
+    pub column: String,
+    /// Original scene, see [`Substitute::original`].
+    #[serde(default)]
+    pub on: Option<String>,
+    /// What the thesis prints.
+    #[serde(default)]
+    pub thesis: Option<f64>,
+    /// More of [`Expect::of`].
+    #[serde(default)]
+    pub of: Pick,
+    /// More of [`Expect::over`].
+    #[serde(default)]
+    pub over: Pick,
+    /// In the place of [`Expect::least`].
+    #[serde(default)]
+    pub least: Option<f64>,
+    /// In the place of [`Expect::most`].
+    #[serde(default)]
+    pub most: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct File {
+    thesis: Option<Thesis>,
+    #[serde(default)]
+    substitute: Vec<Substitute>,
+    #[serde(default)]
+    expect: Vec<Expect>,
+    #[serde(default)]
+    quick: Quick,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Quick {
+    #[serde(default)]
+    set: Vec<String>,
+}
+
+impl Thesis {
+    /// Reads these sections of an experiment; `None` without `[thesis]`.
+    ///
+    /// # Errors
+    /// An unknown key (with the nearest known one), a wrong type, an expectation that cannot be judged.
+    pub fn parse(text: &str, file: &str) -> Result<Option<Self>, ConfigError> {
+        let parsed: File = toml::from_str(text).map_err(|error| fault(text, file, &error))?;
+        let Some(mut thesis) = parsed.thesis else {
+            if parsed.expect.is_empty() {
+                return Ok(None);
+            }
+            let problem = "[[expect]] without [thesis]: say of what, with `title` and `source`";
+            return Err(refused(file, problem.to_owned()));
+        };
+        thesis.substitutes = parsed.substitute;
+        thesis.expects = parsed.expect;
+        thesis.quick = parsed.quick.set;
+        thesis.check(file)?;
+        Ok(Some(thesis))
+    }
+
+    fn check(&self, file: &str) -> Result<(), ConfigError> {
+        let mut ids = BTreeSet::new();
+        for expect in &self.expects {
+            let complaint = match ids.insert(&expect.id) {
+                false => Some("another one has this id".to_owned()),
+                true => expect.complaint(&self.substitutes),
+            };
+            if let Some(complaint) = complaint {
+                let problem = format!("[[expect]] id = \"{}\": {complaint}", expect.id);
+                return Err(refused(file, problem));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Expect {
+    /// What is wrong with it, if anything is.
+    fn complaint(&self, substitutes: &[Substitute]) -> Option<String> {
+        let bounds = [self.least, self.most, self.within, self.off_by];
+        let at_bounds = |at: &At| at.least.or(at.most).is_some();
+        let bounded = bounds.iter().any(Option::is_some)
+            || (!self.at.is_empty() && self.at.iter().all(at_bounds));
+        let needs_thesis = self.within.or(self.off_by).is_some();
+        if let Some(on) = (self.at.iter().filter_map(|at| at.on.as_ref()))
+            .find(|on| substitutes.iter().all(|s| s.original != **on))
+        {
+            let known = substitutes.iter().map(|s| s.original.as_str());
+            let near = nearest(on, known).unwrap_or("none");
+            return Some(format!(
+                "no [[substitute]] is called \"{on}\"; did you mean \"{near}\"?"
+            ));
+        }
+        if needs_thesis && (self.at.is_empty() || self.at.iter().any(|at| at.thesis.is_none())) {
+            return Some(
+                "`within` and `off_by` need a `thesis` value at every place of `at`".to_owned(),
+            );
+        }
+        if self.within.is_some_and(|factor| factor < 1.0) {
+            return Some("`within` is a factor: at least 1".to_owned());
+        }
+        let lacks = match self.compare {
+            Compare::Shown => None,
+            Compare::Order => {
+                (self.order.len() < 2).then_some("`order`, a list of two or more selections")
+            }
+            _ if !bounded => Some("a bound: `least`, `most`, `within` or `off_by`"),
+            Compare::Ratio => {
+                let over = !self.over.is_empty() || self.at.iter().any(|at| !at.over.is_empty());
+                (!over).then_some("`over`, what to divide by")
+            }
+            Compare::Slope => {
+                let along = self.along.is_none();
+                along.then_some("`along`, the axis of numbers, for instance \"spp\"")
+            }
+            Compare::Bound => None,
+        };
+        lacks.map(|what| format!("it needs {what}"))
+    }
+}
+
+fn refused(file: &str, reason: String) -> ConfigError {
+    ConfigError::Refused {
+        at: file.to_owned(),
+        reason,
+    }
+}
+
+/// A fault of one of these sections, with the nearest known key where one is unknown.
+fn fault(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
+    let offset = error.span().map_or(0, |span| span.start);
+    let line = 1 + text[..offset.min(text.len())].matches('\n').count();
+    let at = Place::File {
+        file: Arc::from(file),
+        line,
+    };
+    let quoted: Vec<&str> = error.message().split('`').skip(1).step_by(2).collect();
+    match (error.message().starts_with("unknown field"), &quoted[..]) {
+        (true, [name, known @ ..]) => ConfigError::Unknown {
+            at,
+            what: "key".to_owned(),
+            name: (*name).to_owned(),
+            known: known.iter().map(|name| (*name).to_owned()).collect(),
+        },
+        _ => ConfigError::Syntax {
+            at,
+            message: error.message().to_owned(),
+        },
+    }
+}
+
+/// Takes these sections out of an experiment's tree, which has no use for them.
+pub(super) fn take(tree: &mut Table) {
+    for section in SECTIONS {
+        tree.remove(section);
+    }
+}
+
+/// Whether two texts are the same experiment: equal but for comments and these sections, with the same overrides
+/// behind them (as `# --set …`).
+pub fn same_experiment(a: &str, b: &str) -> bool {
+    let read = |text: &str| {
+        let mut table: toml::Table = toml::from_str(text).ok()?;
+        for section in SECTIONS {
+            table.remove(section);
+        }
+        let overrides = text.lines().filter(|line| line.starts_with("# --set "));
+        Some((table, overrides.map(str::to_owned).collect::<Vec<_>>()))
+    };
+    read(a).is_some_and(|a| Some(a) == read(b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEAD: &str = "[thesis]\ntitle = \"t\"\nsource = \"s\"\n";
+    const ITEM: &str =
+        "[[expect]]\nid = \"a\"\nsays = \"b\"\nfigure = \"f/v1\"\ncompare = \"bound\"\n";
+
+    fn complaint(text: &str) -> String {
+        let error = Thesis::parse(text, "x.toml").expect_err("a fault");
+        error.to_string()
+    }
+
+    #[test]
+    fn an_unknown_key_names_the_nearest_known_one_and_its_line() {
+        let text = complaint(&format!("{HEAD}{ITEM}lest = 1.0\n"));
+        assert!(
+            text.contains("x.toml:9") && text.contains("`least`"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn an_expectation_that_cannot_be_judged_is_refused() {
+        let bound = complaint(&format!("{HEAD}{ITEM}"));
+        assert!(
+            bound.contains("\"a\"") && bound.contains("`least`"),
+            "{bound}"
+        );
+        let twice = complaint(&format!("{HEAD}{ITEM}least = 1.0\n{ITEM}least = 1.0\n"));
+        assert!(twice.contains("another one"), "{twice}");
+        let ratio = ITEM.replace("bound", "ratio");
+        assert!(complaint(&format!("{HEAD}{ratio}least = 1.0\n")).contains("`over`"));
+        let slope = ITEM.replace("bound", "slope");
+        assert!(complaint(&format!("{HEAD}{slope}least = 1.0\n")).contains("`along`"));
+        let order = ITEM.replace("bound", "order");
+        assert!(complaint(&format!("{HEAD}{order}")).contains("`order`"));
+        let on = format!("{HEAD}{ITEM}least = 1.0\nat = [{{ on = \"Spnza\" }}]\n");
+        let sponza = "[[substitute]]\noriginal = \"Sponza\"\n";
+        assert!(complaint(&format!("{on}{sponza}")).contains("did you mean \"Sponza\""));
+        let within = complaint(&format!(
+            "{HEAD}{ITEM}within = 1.1\nat = [{{ row = \"x\" }}]\n"
+        ));
+        assert!(within.contains("`thesis`"), "{within}");
+        assert!(complaint(ITEM).contains("[thesis]"));
+        assert!(
+            Thesis::parse("[run]\nname = \"x\"\n", "x")
+                .expect("none")
+                .is_none()
+        );
+    }
+
+    #[test]
+    fn expectations_do_not_make_another_experiment_but_values_and_overrides_do() {
+        let base = "[run]\nspp = [1]\n";
+        let thesis = format!("# said\n{HEAD}{ITEM}least = 1.0\n{base}");
+        assert!(same_experiment(base, &thesis));
+        assert!(!same_experiment(base, "[run]\nspp = [2]\n"));
+        assert!(!same_experiment(
+            base,
+            &format!("{base}# --set run.seed=2\n")
+        ));
+    }
+}

@@ -1,0 +1,269 @@
+//! Runs the experiment of a table, unless its records are there, and judges what it expects.
+
+use super::Source;
+use super::claim::{Context, Row, judge};
+use super::judge::Verdict;
+use super::scenes::{IN_FILES, is_model, what_to_get};
+use crate::config::expect::{Compare, Substitute, Thesis, same_experiment};
+use crate::config::{ConfigError, Experiment, Plan};
+use crate::gpu::Environment;
+use crate::measure::record::{Body, Key, Line, RECORDS_FILE, RecordError, RunRecord, read_records};
+use crate::report::data::RunData;
+use crate::report::{ReportError, values::values, write_report};
+use crate::run::{Existing, Registries, RunError, RunOptions};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// How tables are run.
+#[derive(Debug, Clone, Default)]
+pub struct Settings {
+    /// Short runs on built-in scenes.
+    pub quick: bool,
+    /// The scene directory.
+    pub scenes: PathBuf,
+    /// Folder of all tables.
+    pub out: PathBuf,
+    /// Run again what is there.
+    pub force: bool,
+}
+
+/// Why a table has no verdicts.
+#[derive(Debug, Error)]
+pub enum ReproError {
+    /// Its file or an override is wrong.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// It could not be run.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// Its records cannot be read.
+    #[error(transparent)]
+    Records(#[from] RecordError),
+    /// Its report cannot be written.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+}
+
+/// A scene that ran, and its triangles if it was loaded.
+pub type Placed = (String, Option<usize>);
+
+/// A table with what was found.
+#[derive(Debug, Clone)]
+pub struct Reproduced {
+    /// Its name.
+    pub name: &'static str,
+    /// What the thesis says.
+    pub thesis: Thesis,
+    /// Where it ran; `None` if nothing did.
+    pub environment: Option<Environment>,
+    /// When, seconds since 1970-01-01 UTC.
+    pub started: u64,
+    /// Whether it was a short run.
+    pub quick: bool,
+    /// Original scene → ours with its triangles, or why there is none.
+    pub scenes: Vec<(Substitute, Result<Placed, String>)>,
+    /// Rows of each expectation, in the order of the file.
+    pub claims: Vec<Vec<Row>>,
+}
+
+impl Reproduced {
+    /// The verdict on an expectation as a whole.
+    pub fn verdict(&self, index: usize) -> Verdict {
+        let found = Verdict::of_all(self.claims[index].iter().map(|row| row.verdict));
+        // What is only shown is no claim, whether there is something to show or not.
+        let only_shown = self.thesis.expects[index].compare == Compare::Shown;
+        match found != Verdict::Faulty && only_shown {
+            true => Verdict::Shown,
+            false => found,
+        }
+    }
+}
+
+/// What runs for a table: the experiment, and which scenes stand for which.
+pub struct Prepared {
+    /// The experiment.
+    pub experiment: Experiment,
+    /// What the thesis says.
+    pub thesis: Thesis,
+    /// Scene of each substitute, or why it has none.
+    pub scenes: Vec<(Substitute, Result<String, String>)>,
+}
+
+/// Reads a table's file, with the scenes that are there and, if asked for, what makes it short.
+///
+/// # Errors
+/// A fault of the file.
+pub fn prepare(
+    source: &Source,
+    settings: &Settings,
+    registries: &Registries,
+) -> Result<Prepared, ConfigError> {
+    let thesis = source.thesis()?;
+    let stand_in = |s: &Substitute| (s.clone(), scene_of(s, settings));
+    let scenes: Vec<_> = thesis.substitutes.iter().map(stand_in).collect();
+    let mut overrides = match settings.quick {
+        true => thesis.quick.clone(),
+        false => Vec::new(),
+    };
+    let mut there: Vec<String> = Vec::new();
+    for scene in scenes.iter().filter_map(|(_, scene)| scene.as_ref().ok()) {
+        if !there.contains(scene) {
+            there.push(scene.clone());
+        }
+    }
+    if !there.is_empty() {
+        overrides.insert(0, format!("axes.scene={}", toml::Value::from(there)));
+    }
+    let folder = settings.scenes.display().to_string();
+    let text = source.text.replace(IN_FILES, &folder);
+    let file = format!("{}.toml", source.name);
+    let experiment = Experiment::parse(&text, &file, &overrides, &registries.catalogue())?;
+    Ok(Prepared {
+        experiment,
+        thesis,
+        scenes,
+    })
+}
+
+/// The scene in the place of the thesis's.
+fn scene_of(substitute: &Substitute, settings: &Settings) -> Result<String, String> {
+    let original = &substitute.original;
+    if settings.quick {
+        let none = || format!("no built-in scene stands for {original}; run it without --quick");
+        return substitute.quick.clone().ok_or_else(none);
+    }
+    let none = || format!("no scene stands for {original}: {}", substitute.why);
+    let scene = substitute.scene.clone().ok_or_else(none)?;
+    if !is_model(&scene) {
+        return Ok(scene);
+    }
+    let path = settings.scenes.join(&scene);
+    match path.is_file() {
+        true => Ok(path.display().to_string()),
+        false => Err(what_to_get(&scene, &settings.scenes)),
+    }
+}
+
+/// Runs a table unless its records are there, and judges it.
+///
+/// # Errors
+/// A fault of its file, or a run that ends early.
+pub fn reproduce(
+    source: &Source,
+    settings: &Settings,
+    registries: &Registries,
+    options: &RunOptions,
+) -> Result<Reproduced, ReproError> {
+    let prepared = prepare(source, settings, registries)?;
+    let out = settings.out.join(source.name);
+    if settings.force || !is_done(&out, &prepared.experiment.text) {
+        let experiment = &prepared.experiment;
+        let randomised = |s: &_, d: &_| registries.is_randomised(s, d);
+        let plan = Plan::new(experiment, &[], randomised)?;
+        let mut options = options.clone();
+        options.out = out.clone();
+        options.existing = Existing::Replace;
+        crate::run::run(experiment, &plan, registries, &options)?;
+        write_report(&out)?;
+    }
+    judged(source.name, settings.quick, prepared, &out)
+}
+
+/// A table's verdicts from its records alone; `None` if it has none that are whole.
+///
+/// # Errors
+/// A fault of its file, or records that cannot be read.
+pub fn recorded(
+    source: &Source,
+    settings: &Settings,
+    registries: &Registries,
+) -> Result<Option<Reproduced>, ReproError> {
+    let prepared = prepare(source, settings, registries)?;
+    let out = settings.out.join(source.name);
+    match is_done(&out, &prepared.experiment.text) {
+        true => judged(source.name, settings.quick, prepared, &out).map(Some),
+        false => Ok(None),
+    }
+}
+
+/// Whether a folder holds the whole records of this experiment.
+pub fn is_done(out: &Path, text: &str) -> bool {
+    if !out.join(RECORDS_FILE).is_file() {
+        return false;
+    }
+    let Ok(records) = read_records(out) else {
+        return false;
+    };
+    let lines = || records.lines.iter().map(|line| &line.body);
+    let same =
+        |body: &Body| matches!(body, Body::Run(r) if same_experiment(&r.experiment_text, text));
+    let finished = |body: &Body| matches!(body, Body::Finished(_));
+    lines().any(same) && lines().any(finished)
+}
+
+fn judged(
+    name: &'static str,
+    quick: bool,
+    prepared: Prepared,
+    out: &Path,
+) -> Result<Reproduced, ReproError> {
+    let lines = read_records(out)?.lines;
+    let data = RunData::new(&lines);
+    let run = data.run;
+    let context = Context {
+        software: run.is_none_or(|run| run.environment.software),
+        scenes: (prepared.scenes.iter())
+            .map(|(s, ours)| (s.original.clone(), ours.clone().map(|ours| pattern(&ours))))
+            .collect(),
+        absent: lines.iter().filter_map(absent).collect(),
+    };
+    let values = values(&data);
+    let claims = prepared.thesis.expects.iter();
+    let claims = claims.map(|expect| judge(expect, &values, &context));
+    let claims = claims.collect();
+    let triangles = |ours: &str| {
+        let wanted = pattern(ours);
+        let scene = data
+            .scenes
+            .iter()
+            .find(|scene| crate::config::Pattern::new(wanted.as_str()).fits_text(scene.name));
+        scene.and_then(|scene| Some(scene.record?.triangles))
+    };
+    let scenes = prepared.scenes.into_iter().map(|(substitute, ours)| {
+        let counted = ours.map(|ours| {
+            let count = triangles(&ours);
+            (ours, count)
+        });
+        (substitute, counted)
+    });
+    Ok(Reproduced {
+        name,
+        scenes: scenes.collect(),
+        thesis: prepared.thesis,
+        environment: run.map(|run: &RunRecord| run.environment.clone()),
+        started: run.map_or(0, |run| run.started_unix_s),
+        quick,
+        claims,
+    })
+}
+
+/// The pattern of a scene's label: a path by its file's name, a built-in scene whatever its parameters.
+fn pattern(scene: &str) -> String {
+    let file = Path::new(scene).file_name();
+    let file = file.map_or(scene.into(), |file| file.to_string_lossy());
+    match is_model(scene) {
+        true => format!("*{file}*"),
+        false => format!("{file}*"),
+    }
+}
+
+/// What a line says was left out, or failed, and why.
+fn absent(line: &Line) -> Option<(Key, String)> {
+    let reason = match &line.body {
+        Body::Skipped(record) | Body::Failed(record) => record.reason.clone(),
+        Body::Structure(record) => record.failure.clone()?,
+        Body::Time(record) => record.failure.clone()?,
+        _ => return None,
+    };
+    (!line.key.is_empty()).then(|| (line.key.clone(), reason))
+}
