@@ -2,7 +2,7 @@
 
 use super::{Change, History, LEVEL, Series};
 use crate::measure::figure::Spread;
-use crate::measure::record::Interval;
+use crate::measure::record::{Interval, Key};
 use crate::report::document::{Block, Document, Section, Table, TableCell};
 use crate::report::format;
 use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
@@ -140,8 +140,9 @@ impl History<'_> {
             let mut section = Section::new(name.clone(), heading.unwrap_or_default());
             let plots = of_figure.chunks(IN_PLOT).enumerate();
             let plots = plots.map(|(i, some)| {
+                let shared = shared(some).to_string();
                 let caption = "Value by run, with intervals; dashed: levels between changes";
-                plot(some).figure(format!("{name}-{i}"), caption)
+                plot(some).figure(format!("{name}-{i}"), format!("{caption}. {shared}"))
             });
             section.blocks.extend(Block::figures(plots));
             section
@@ -192,30 +193,35 @@ impl History<'_> {
 
 fn plot(series: &[&Series]) -> CurvePlot {
     let several = series.iter().any(|s| s.device != series[0].device);
+    let shared = shared(series);
     let mut curves = Vec::new();
     for (look, series) in series.iter().enumerate() {
-        let points = series.points.iter();
-        let device = if several {
-            format!(" on {}", series.device)
-        } else {
-            String::new()
+        let own = series
+            .key
+            .labels()
+            .filter(|(axis, _)| shared.get(axis).is_none());
+        let mut own: Vec<&str> = own.map(|(_, label)| label).collect();
+        own.extend(several.then_some(series.device.as_str()));
+        let label = match own.is_empty() {
+            true => series.key.to_string(),
+            false => own.join(", "),
         };
-        curves.push(Curve {
-            label: format!("{}{device}", series.key),
-            look,
-            exact: false,
-            points: points
-                .map(|(run, value)| CurvePoint::new(*run as f64, value))
-                .collect(),
-        });
+        let points = series.points.iter();
+        let points = points.map(|(run, value)| CurvePoint::new(*run as f64, value));
         if !series.changes.is_empty() {
             curves.push(Curve {
-                label: format!("{}{device}: levels", series.key),
+                label: format!("levels of {label}"),
                 look,
                 exact: true,
                 points: levels(series),
             });
         }
+        curves.push(Curve {
+            label,
+            look,
+            exact: false,
+            points: points.collect(),
+        });
     }
     CurvePlot {
         x_title: "run, by time".into(),
@@ -224,6 +230,14 @@ fn plot(series: &[&Series]) -> CurvePlot {
         curves,
         guides: Vec::new(),
     }
+}
+
+/// What the keys of all series have in common.
+fn shared(series: &[&Series]) -> Key {
+    let first = &series[0].key;
+    let same = |axis: &&str| series.iter().all(|s| s.key.agrees(first, &[*axis]));
+    let axes: Vec<&str> = first.labels().map(|(axis, _)| axis).filter(same).collect();
+    first.only(&axes)
 }
 
 /// Steps from level to level, each half a run before the first of a new level.
