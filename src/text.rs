@@ -16,6 +16,15 @@ pub fn cell_hash(parts: &[(&str, &str)]) -> String {
     hasher.finalize().to_hex().to_string()
 }
 
+/// A text as one word of a POSIX shell, whatever characters are in it.
+pub fn shell_word(text: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
+    match !text.is_empty() && text.chars().all(is_plain) {
+        true => text.to_owned(),
+        false => format!("'{}'", text.replace('\'', "'\\''")),
+    }
+}
+
 /// Characters of names that are compared: the time and the memory that it takes are their product.
 const COMPARED: usize = 64;
 
@@ -48,6 +57,29 @@ mod tests {
         assert_eq!(nearest("grid", known), Some("uniform-grid"));
         assert_eq!(nearest("Roped_BVH", known), Some("roped-bvh"));
         assert_eq!(nearest("bvh", []), None);
+    }
+
+    #[test]
+    fn shell_words_come_back_from_a_shell() {
+        for text in [
+            "a b",
+            "it's",
+            "$(x)`y`",
+            "",
+            "plain-1.2/x",
+            "\"",
+            "a\nb",
+            "*",
+            "~",
+            "!x",
+        ] {
+            let echo = format!("printf %s {}", shell_word(text));
+            let output = std::process::Command::new("sh")
+                .args(["-c", &echo])
+                .output();
+            assert_eq!(output.unwrap().stdout, text.as_bytes(), "{text:?}");
+        }
+        assert_eq!(shell_word("plain-1.2/x"), "plain-1.2/x");
     }
 
     #[test]

@@ -83,6 +83,8 @@ fn subject(line: &Line) -> (String, bool) {
         Body::Skipped(r) => (format!("skipped {}", r.cell), false),
         Body::Failed(r) => (r.cell.clone(), true),
         Body::Warning(r) => (format!("warning of {}", r.cell), false),
+        Body::Kernels(r) => (format!("kernels {}", r.id), false),
+        Body::Cell(r) => (format!("cell {}", r.unit), false),
         Body::Interrupted(_) => ("interrupted".to_owned(), false),
         Body::Finished(_) => ("finished".to_owned(), false),
     }
@@ -98,7 +100,16 @@ fn outcome(scenes: &[&str], lose_device_at: Option<&str>) -> Outcome {
         Some(Body::Finished(end)) => assert_eq!(end.failed, summary.failed),
         other => panic!("the last record is {other:?}"),
     }
+    let mut closed = BTreeSet::new();
     for line in lines {
+        match &line.body {
+            Body::Cell(cell) => {
+                assert!(closed.insert(cell.unit.clone()), "{} twice", cell.unit);
+                continue;
+            }
+            Body::Kernels(_) => continue,
+            _ => {}
+        }
         let (subject, is_failure) = subject(&line);
         if is_failure {
             failed.insert(subject.clone());

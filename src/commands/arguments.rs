@@ -30,6 +30,7 @@ impl DeviceArguments {
             allow_outside: values.allow_outside,
             adapter: self.adapter.clone().unwrap_or_default(),
             warn: Some(super::output::warn),
+            tell: (!quiet).then_some(super::output::tell as fn(&str)),
             progress: !quiet && std::io::stderr().is_terminal(),
             ..RunOptions::default()
         }

@@ -5,7 +5,7 @@ mod arguments;
 mod completions;
 mod discrepancy;
 mod doctor;
-mod estimate;
+mod explain;
 mod export;
 mod exporting;
 mod failure;
@@ -13,7 +13,9 @@ mod faults;
 mod history;
 mod list;
 mod list_json;
+mod merge;
 mod output;
+mod plan;
 mod points;
 mod points_plot;
 mod render;
@@ -28,6 +30,7 @@ mod system;
 mod trace;
 mod verify;
 mod verify_images;
+mod verify_run;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -85,6 +88,14 @@ enum Command {
     #[command(after_help = EXIT_CODES)]
     Discrepancy(discrepancy::Discrepancy),
     #[command(after_help = EXIT_CODES)]
+    Plan(plan::Plan),
+    #[command(after_help = EXIT_CODES)]
+    Merge(merge::Merge),
+    #[command(after_help = EXIT_CODES)]
+    VerifyRun(verify_run::VerifyRun),
+    #[command(after_help = EXIT_CODES)]
+    Explain(explain::Explain),
+    #[command(after_help = EXIT_CODES)]
     Report(report::Report),
     #[command(after_help = EXIT_CODES)]
     Repro(repro::Repro),
@@ -114,6 +125,10 @@ pub fn main() -> ExitCode {
         Command::List(command) => command.execute(),
         Command::Doctor(command) => command.execute(),
         Command::Discrepancy(command) => command.execute(),
+        Command::Plan(command) => command.execute(),
+        Command::Merge(command) => command.execute(),
+        Command::VerifyRun(command) => command.execute(),
+        Command::Explain(command) => command.execute(),
         Command::Report(command) => command.execute(),
         Command::Repro(command) => command.execute(),
         Command::Scenes(command) => command.execute(),

@@ -1,18 +1,20 @@
 //! `raystone run`.
 
 use super::arguments::{DeviceArguments, ExperimentArguments, plan};
-use super::estimate::Estimate;
 use super::failure::{BAD_INPUT, FAILED};
 use super::output::{self, OutputArguments, print, print_json, screen};
 use super::report::findings;
 use super::signals;
 use anyhow::Result;
 use clap::Args;
-use raystone::config::{Cell, Experiment};
+use raystone::config::{Cell, Experiment, Plan, Shard};
 use raystone::image::FileFormat;
 use raystone::measure::record::{Body, Line, read_records};
 use raystone::report::{failed_checks, write_report};
-use raystone::run::{Existing, Kernels, Registries, RunError, RunSummary, user_cache};
+use raystone::run::{
+    Estimate, Existing, Kernels, Registries, RunError, RunOptions, RunSummary, render_references,
+    user_cache,
+};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -27,6 +29,25 @@ pub struct Run {
     /// Replace the results that the folder holds, once the new ones are whole
     #[arg(long, conflicts_with = "number")]
     force: bool,
+    /// Go on with the results that the folder holds: cells that still hold (same kernels, scene, parameters, program) are kept, all
+    /// others are measured
+    #[arg(long, conflicts_with_all = ["number", "force"])]
+    resume: bool,
+    /// Where another run is writing the folder, wait until it ends instead of ending
+    #[arg(long)]
+    wait: bool,
+    /// Run one of N parts of the plan, as 3/8; `raystone merge` joins them [default folder: results/NAME/shard-K-of-N]
+    #[arg(long, value_name = "K/N")]
+    shard: Option<Shard>,
+    /// Render the references alone and keep them where runs find them; with --shard, a part of their samples
+    #[arg(long, conflicts_with_all = ["no_cache", "resume", "force", "number"])]
+    references: bool,
+    /// End with the first cell that fails; `--resume` goes on later
+    #[arg(long, conflicts_with = "keep_going")]
+    fail_fast: bool,
+    /// Go on after cells that fail (the default)
+    #[arg(long)]
+    keep_going: bool,
     /// Where the folder holds results or is being written, take the first free one of DIR-2, DIR-3, …
     #[arg(long)]
     number: bool,
@@ -75,21 +96,37 @@ impl Run {
             return Ok(ExitCode::SUCCESS);
         }
         let existing = match (self.force, self.number || self.out.is_none()) {
+            _ if self.resume => Existing::Resume,
             (true, _) => Existing::Replace,
             (_, true) => Existing::Number,
             _ => Existing::Refuse,
         };
-        let out = self.out.unwrap_or_else(|| default_folder(&experiment.name));
+        let default = || default_folder(&experiment.name, self.shard);
+        let out = self.out.clone().unwrap_or_else(default);
         let mut options = self
             .device
             .options(out, &self.experiment.values, self.quiet);
         options.existing = existing;
         options.images = self.images;
+        options.shard = self.shard;
+        options.wait = self.wait;
+        options.fail_fast = self.fail_fast && !self.keep_going;
         options.lenient = self.lenient;
         options.cache = user_cache().filter(|_| !self.no_cache);
+        if self.references {
+            return references(&experiment, &plan, &registries, &options);
+        }
         signals::watch(options.interrupt.clone())?;
         match raystone::run::run(&experiment, &plan, &registries, &options) {
             Err(RunError::Interrupted) => signals::wait_for_end(),
+            Err(RunError::EndedEarly { folder, source }) if source.is_interruption() => {
+                let page = write_report(&folder)?.html;
+                output::tell(&format!(
+                    "interrupted; `--resume` goes on; report so far: {}",
+                    page.display()
+                ));
+                Ok(ExitCode::from(signals::INTERRUPTED))
+            }
             Err(RunError::EndedEarly { folder, source }) => {
                 write_report(&folder)?;
                 Err(RunError::EndedEarly { folder, source }.into())
@@ -105,6 +142,29 @@ impl Run {
             summary => tell(&summary?, self.quiet, self.lenient),
         }
     }
+}
+
+/// Renders references alone.
+fn references(
+    experiment: &Experiment,
+    plan: &Plan,
+    registries: &Registries,
+    options: &RunOptions,
+) -> Result<ExitCode> {
+    let (rendered, failures) = render_references(experiment, plan, registries, options)?;
+    let folder = options.cache.as_deref().unwrap_or(Path::new("."));
+    print(&format!(
+        "{} rendered; kept in {}\n",
+        plural(rendered, "part of a reference", "parts of references"),
+        folder.display()
+    ))?;
+    for failure in &failures {
+        output::tell(&format!("failed: {failure}"));
+    }
+    Ok(match failures.is_empty() {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::from(FAILED),
+    })
 }
 
 /// The image to compare with as an override of an experiment.
@@ -125,6 +185,12 @@ fn linear_format(text: &str) -> Result<&'static FileFormat, String> {
 
 /// Writes the report of a run, prints its tables, and tells what failed.
 fn tell(summary: &RunSummary, quiet: bool, lenient: bool) -> Result<ExitCode> {
+    if summary.kept > 0 && !quiet {
+        output::tell(&format!(
+            "{} of an earlier run still hold",
+            plural(summary.kept, "cell", "cells")
+        ));
+    }
     let page = write_report(&summary.out)?.html;
     let lines = read_records(&summary.out)?.lines;
     print(&match quiet {
@@ -178,8 +244,8 @@ fn failure(line: &Line) -> Option<String> {
     Some(format!("{}: {failure}", Cell::from(&line.key)))
 }
 
-/// `results/NAME`, where a name such as `../a b` cannot lead out of `results`.
-fn default_folder(name: &str) -> PathBuf {
+/// `results/NAME`, with a folder for a shard below it, where a name such as `../a b` cannot lead out of `results`.
+fn default_folder(name: &str, shard: Option<Shard>) -> PathBuf {
     let plain = |c: char| match c {
         '-' | '_' | '.' => c,
         c if c.is_alphanumeric() => c,
@@ -188,7 +254,11 @@ fn default_folder(name: &str) -> PathBuf {
     let name: String = name.chars().map(plain).collect();
     let name = name.trim_start_matches('.');
     let folder = if name.is_empty() { "run" } else { name };
-    PathBuf::from("results").join(folder)
+    let folder = PathBuf::from("results").join(folder);
+    match shard {
+        Some(shard) => folder.join(format!("shard-{}-of-{}", shard.number, shard.of)),
+        None => folder,
+    }
 }
 
 #[cfg(test)]
@@ -203,7 +273,10 @@ mod tests {
             ("..", "results/run"),
             ("λ-grid", "results/λ-grid"),
         ] {
-            assert_eq!(default_folder(name), Path::new(folder), "{name}");
+            assert_eq!(default_folder(name, None), Path::new(folder), "{name}");
         }
+        let third = "3/8".parse().ok();
+        let folder = Path::new("results/quick/shard-3-of-8");
+        assert_eq!(default_folder("quick", third), folder);
     }
 }

@@ -89,6 +89,15 @@ impl Cell {
         self
     }
 
+    /// Everything that stands on its axes, as a text that no other cell of the experiment has.
+    pub fn identity(&self) -> String {
+        let labels = self.variants.iter().map(|(_, variant)| match variant {
+            Some(variant) => variant.label.as_str(),
+            None => "",
+        });
+        labels.collect::<Vec<_>>().join("\u{1f}")
+    }
+
     /// The part of the cell on these axes.
     #[must_use]
     pub fn on(&self, axes: &[Axis]) -> Self {

@@ -42,8 +42,8 @@ pub(super) fn check_sections(tree: &Table, catalogue: &Catalogue) -> Result<(), 
                 variants::resolve(axis, item, entry, catalogue)?;
                 parameter_tables(axis, entry, item)?;
             }
-        } else if name == "exclude" {
-            for (_, table) in exclude_tables(item)? {
+        } else if name == "exclude" || name == "include" {
+            for (_, table) in cell_tables(name, item)? {
                 check_keys(name, table)?;
             }
         } else {
@@ -83,17 +83,21 @@ pub(super) fn as_table<'t>(
     }
 }
 
-pub(super) fn exclude_tables(item: &Item) -> Result<Vec<(&Place, &Table)>, ConfigError> {
-    const EXPECTED: &str = "a list of tables, each under a line [[exclude]]";
+/// The tables of a section that names cells.
+pub(super) fn cell_tables<'t>(
+    section: &str,
+    item: &'t Item,
+) -> Result<Vec<(&'t Place, &'t Table)>, ConfigError> {
+    let expected = format!("a list of tables, each under a line [[{section}]]");
     match &item.value {
         Value::List(items) => items
             .iter()
-            .map(|item| Ok((&item.at, as_table(item, "exclude", EXPECTED)?)))
+            .map(|item| Ok((&item.at, as_table(item, section, &expected)?)))
             .collect(),
         other => Err(ConfigError::WrongType {
             at: item.at.clone(),
-            key: "exclude".to_owned(),
-            expected: EXPECTED.to_owned(),
+            key: section.to_owned(),
+            expected,
             found: other.describe(),
         }),
     }

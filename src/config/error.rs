@@ -172,12 +172,14 @@ pub enum ConfigError {
         known: Vec<String>,
     },
     /// An exclude whose patterns all fit something, but never the same cell.
-    #[error("{at}: this [[exclude]] ({exclude}) fits no cell; correct or remove it")]
+    #[error("{at}: this [[{section}]] ({exclude}) fits no cell; correct or remove it")]
     UselessExclude {
         /// Where.
         at: Place,
         /// Its patterns.
         exclude: String,
+        /// `exclude` or `include`.
+        section: &'static str,
     },
     /// A sequence and a decorrelation that make no sense together.
     #[error("{at}: {reason}")]

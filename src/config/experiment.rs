@@ -22,6 +22,8 @@ pub struct Experiment {
     pub source: String,
     /// The file's text, with the overrides appended as comments.
     pub text: String,
+    /// The overrides.
+    pub overrides: Vec<String>,
     /// Independent seeds per randomised sampler.
     pub replicates: u32,
     /// Seed of the first replicate.
@@ -38,8 +40,12 @@ pub struct Experiment {
     pub camera: Option<Camera>,
     /// What is varied.
     pub axes: Axes,
-    /// Cells left out.
-    pub excludes: Vec<Exclude>,
+    /// Cells left out …
+    pub excludes: Vec<CellSet>,
+    /// … but these.
+    pub includes: Vec<CellSet>,
+    /// Variants that go with some cells only.
+    pub conditions: Vec<Condition>,
     /// The image that errors are taken against.
     pub reference: Reference,
     /// The timing protocol.
@@ -99,9 +105,20 @@ impl SppCounts {
 /// The axes of the product, each with at least one variant.
 pub type Axes = AxisMap<Vec<Variant>>;
 
-/// Cells left out: those that fit a pattern on every axis named.
+/// A variant that goes with some cells only.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Exclude {
+pub struct Condition {
+    /// Its axis.
+    pub axis: Axis,
+    /// Its label.
+    pub label: String,
+    /// The cells: any of these sets.
+    pub cells: Vec<CellSet>,
+}
+
+/// Cells that fit a pattern on every axis named.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellSet {
     /// Where it was written.
     pub at: Place,
     /// Patterns by axis: any one of an axis' patterns has to fit. Never empty.
@@ -111,7 +128,7 @@ pub struct Exclude {
     pub lenient: bool,
 }
 
-impl fmt::Display for Exclude {
+impl fmt::Display for CellSet {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (i, (axis, patterns)) in self.patterns.iter().enumerate() {
             let separator = if i == 0 { "" } else { ", " };

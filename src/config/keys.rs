@@ -271,6 +271,18 @@ pub const KEYS: &[KeyRow] = &[
     key("exclude", "peer", ValueKind::Patterns(Axis::Peer), None, "… these peers …"),
     key("exclude", "workgroup", ValueKind::Patterns(Axis::Workgroup), None, "… these workgroups …"),
     key("exclude", "kernels", ValueKind::Patterns(Axis::Kernels), None, "… and these kernels are left out."),
+    key("include", "scene", ValueKind::Patterns(Axis::Scene), None, "Cells of these scenes …"),
+    key("include", "accel", ValueKind::Patterns(Axis::Accel), None, "… with these structures …"),
+    key("include", "sequence", ValueKind::Patterns(Axis::Sequence), None, "… these sequences …"),
+    key("include", "decorrelation", ValueKind::Patterns(Axis::Decorrelation), None, "… these decorrelations …"),
+    key("include", "integrator", ValueKind::Patterns(Axis::Integrator), None, "… these integrators …"),
+    key("include", "triangle", ValueKind::Patterns(Axis::Triangle), None, "… these triangle tests …"),
+    key("include", "box_test", ValueKind::Patterns(Axis::BoxTest), None, "… these box tests …"),
+    key("include", "offset", ValueKind::Patterns(Axis::Offset), None, "… these offsets …"),
+    key("include", "organisation", ValueKind::Patterns(Axis::Organisation), None, "… these organisations …"),
+    key("include", "peer", ValueKind::Patterns(Axis::Peer), None, "… these peers …"),
+    key("include", "workgroup", ValueKind::Patterns(Axis::Workgroup), None, "… these workgroups …"),
+    key("include", "kernels", ValueKind::Patterns(Axis::Kernels), None, "… and these kernels are kept, though an exclude takes them out."),
     key("reference", "spp", integer(2, 1 << 24), Some("16384"), "Samples per pixel of the reference image, both halves together."),
     key("reference", "sequence", ValueKind::Name(Axis::Sequence), Some("\"pixel-hash\""), "Sequence of the reference, with its default parameters."),
     key("reference", "decorrelation", ValueKind::Name(Axis::Decorrelation), Some("\"none\""), "Decorrelation of the reference, with its default parameters."),
@@ -310,7 +322,7 @@ pub const KEYS: &[KeyRow] = &[
 ];
 
 /// Sections that may be absent altogether; their defaults apply only when they are used.
-pub const OPTIONAL_SECTIONS: &[&str] = &["camera", "exclude", "coherence", "animation"];
+pub const OPTIONAL_SECTIONS: &[&str] = &["camera", "exclude", "include", "coherence", "animation"];
 
 /// The row of a key, if there is one.
 pub fn find(section: &str, name: &str) -> Option<&'static KeyRow> {
@@ -369,6 +381,7 @@ mod tests {
             assert_eq!(Axis::from_name(axis.name()), Some(axis));
             assert!(find("axes", axis.name()).is_some());
             assert!(find("exclude", axis.name()).is_some());
+            assert!(find("include", axis.name()).is_some());
         }
         assert_eq!(Axis::from_name("sampler"), None);
     }

@@ -18,18 +18,20 @@ mod plan;
 mod product;
 mod section;
 mod tree;
+mod units;
 mod variants;
 
 pub use axis_map::AxisMap;
 pub use cells::{COMPACTIONS, Cell, NO_PEER, is_compaction};
 pub use error::{ConfigError, Place};
 pub use experiment::{
-    Animation, Axes, Coherence, Discrepancy, Exclude, Experiment, Gate, Motion, REFERENCE_PARTS,
-    Reference, Rule, Seeds, SppCounts, StopRule, Timing,
+    Animation, Axes, CellSet, Coherence, Condition, Discrepancy, Experiment, Gate, Motion,
+    REFERENCE_PARTS, Reference, Rule, Seeds, SppCounts, StopRule, Timing,
 };
 pub use keys::Axis;
 pub use pattern::Pattern;
 pub use plan::{Plan, Skipped};
+pub use units::{Shard, Unit, UnitKind, shards, unit_name};
 
 use crate::params::Entry;
 

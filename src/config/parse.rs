@@ -2,19 +2,20 @@
 
 use super::cells::COMPACTIONS;
 use super::check::{
-    as_table, check_on_axis, check_sections, exclude_tables, parameter_tables, pattern_list,
+    as_table, cell_tables, check_on_axis, check_sections, parameter_tables, pattern_list,
 };
 use super::error::{ConfigError, Place};
 use super::experiment::{
-    Animation, Axes, Coherence, Discrepancy, Exclude, Experiment, Gate, Motion, Reference, Rule,
-    Timing,
+    Animation, Axes, CellSet, Coherence, Condition, Discrepancy, Experiment, Gate, Motion,
+    Reference, Rule, Timing,
 };
 use super::keys::{Axis, KEYS, OPTIONAL_SECTIONS};
 use super::section::{Section, texts};
 use super::tree::{self, Item, Table, Value};
+use super::variants::WHEN;
 use super::{Catalogue, expect, variants};
 use crate::geometry::Camera;
-use crate::params::Variant;
+use crate::params::{Entry, Variant};
 use std::path::{Path, PathBuf};
 
 /// Parses and checks an experiment; see [`Experiment::parse`].
@@ -49,6 +50,7 @@ pub(super) fn parse(
         name,
         source: file.to_owned(),
         text: with_overrides(text, overrides),
+        overrides: overrides.to_vec(),
         replicates: run.unsigned("replicates")?,
         seed: run.unsigned("seed")?,
         resolution: run.unsigned_pair("resolution")?,
@@ -58,7 +60,9 @@ pub(super) fn parse(
             .transpose()?,
         runtime_checks: run.flag("runtime_checks")?,
         camera: reader.camera()?,
-        excludes: reader.excludes(&axes)?,
+        excludes: reader.cell_sets("exclude", &axes)?,
+        includes: reader.cell_sets("include", &axes)?,
+        conditions: reader.conditions(&axes)?,
         axes,
         reference: reader.reference()?,
         timing: reader.timing()?,
@@ -285,36 +289,123 @@ impl<'t> Reader<'t> {
         Ok(Some(camera))
     }
 
-    fn excludes(&self, axes: &Axes) -> Result<Vec<Exclude>, ConfigError> {
-        let Some(item) = self.tree.get("exclude") else {
+    /// Cells that are left out, or kept.
+    fn cell_sets(&self, section: &str, axes: &Axes) -> Result<Vec<CellSet>, ConfigError> {
+        let Some(item) = self.tree.get(section) else {
             return Ok(Vec::new());
         };
-        let tables = exclude_tables(item)?;
-        let excludes = tables.into_iter().map(|(at, table)| {
-            let mut patterns = Vec::new();
-            let mut lenient = false;
-            for axis in Axis::ALL {
-                let Some(item) = table.get(axis.name()) else {
-                    continue;
-                };
-                let texts = texts(&format!("exclude.{axis}"), item)?;
-                let changed = self.is_overridden(axis)?;
-                lenient |= changed;
-                patterns.push((axis, pattern_list(axis, &texts, axes, changed)?));
-            }
-            if patterns.is_empty() {
-                return Err(ConfigError::Empty {
-                    at: at.clone(),
-                    key: "exclude".to_owned(),
-                });
-            }
-            Ok(Exclude {
+        let tables = cell_tables(section, item)?.into_iter();
+        tables
+            .map(|(at, table)| self.cell_set(section, (at, table), axes))
+            .collect()
+    }
+
+    /// The patterns of a table, by axis.
+    fn cell_set(
+        &self,
+        section: &str,
+        (at, table): (&Place, &Table),
+        axes: &Axes,
+    ) -> Result<CellSet, ConfigError> {
+        let mut patterns = Vec::new();
+        let mut lenient = false;
+        for axis in Axis::ALL {
+            let Some(item) = table.get(axis.name()) else {
+                continue;
+            };
+            let texts = texts(&format!("{section}.{axis}"), item)?;
+            let changed = self.is_overridden(axis)?;
+            lenient |= changed;
+            patterns.push((axis, pattern_list(axis, &texts, axes, changed)?));
+        }
+        if patterns.is_empty() {
+            return Err(ConfigError::Empty {
                 at: at.clone(),
-                patterns,
-                lenient,
-            })
-        });
-        excludes.collect()
+                key: section.to_owned(),
+            });
+        }
+        Ok(CellSet {
+            at: at.clone(),
+            patterns,
+            lenient,
+        })
+    }
+
+    /// What `when` says in tables of parameters.
+    fn conditions(&self, axes: &Axes) -> Result<Vec<Condition>, ConfigError> {
+        let mut conditions = Vec::new();
+        for axis in Axis::ALL {
+            for variant in &axes[axis] {
+                let mut cells = Vec::new();
+                for table in self.tables_of(axis, &variant.name)? {
+                    let entry = self.entry(axis, &variant.name)?;
+                    if !variants::expand(axis, &entry, table)?
+                        .iter()
+                        .any(|other| other.params == variant.params)
+                    {
+                        continue;
+                    }
+                    cells.push(match table.get(WHEN) {
+                        Some(item) => Some(self.condition(axis, &variant.name, item, axes)?),
+                        None => None,
+                    });
+                }
+                // A table without a condition makes the variant whatever others say.
+                let cells: Option<Vec<CellSet>> = cells.into_iter().collect();
+                if let Some(cells) = cells.filter(|cells| !cells.is_empty()) {
+                    conditions.push(Condition {
+                        axis,
+                        label: variant.label.clone(),
+                        cells,
+                    });
+                }
+            }
+        }
+        Ok(conditions)
+    }
+
+    fn condition(
+        &self,
+        axis: Axis,
+        name: &str,
+        item: &Item,
+        axes: &Axes,
+    ) -> Result<CellSet, ConfigError> {
+        let key = format!("{axis}.{name}.{WHEN}");
+        let table = as_table(
+            item,
+            &key,
+            "axes with patterns, as in { scene = \"sponza\" }",
+        )?;
+        let unknown = |(name, _): &(&String, &Item)| Axis::from_name(name).is_none();
+        if let Some((name, item)) = table.iter().find(unknown) {
+            return Err(ConfigError::Unknown {
+                at: item.at.clone(),
+                what: format!("axis in `{key}`"),
+                name: name.clone(),
+                known: Axis::ALL.map(|axis| axis.name().to_owned()).to_vec(),
+            });
+        }
+        self.cell_set(&key, (&item.at, table), axes)
+    }
+
+    /// The tables of parameters of an entry on an axis.
+    fn tables_of(&self, axis: Axis, name: &str) -> Result<Vec<&'t Table>, ConfigError> {
+        match self.tree.get(axis.name()) {
+            Some(item) => match as_table(item, axis.name(), "sections")?.get(name) {
+                Some(item) => parameter_tables(axis, name, item),
+                None => Ok(Vec::new()),
+            },
+            None => Ok(Vec::new()),
+        }
+    }
+
+    fn entry(&self, axis: Axis, name: &str) -> Result<Entry, ConfigError> {
+        let at = Item {
+            at: Place::Default,
+            value: Value::Text(name.to_owned()),
+        };
+        variants::resolve(axis, &at, name, self.catalogue)
     }
 
     /// Whether the command line changed the names or the parameters of an axis.

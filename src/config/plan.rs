@@ -8,7 +8,7 @@ use super::ConfigError;
 use super::cells::{Cell, NO_PEER, is_compaction};
 use super::experiment::Experiment;
 use super::keys::Axis;
-use super::product::{Filter, Point, check_size, excluded, product, refused};
+use super::product::{Filter, Point, check_size, excluded, included, product, refused, unmet};
 use crate::params::Variant;
 use std::fmt::{self, Write as _};
 
@@ -46,6 +46,8 @@ pub struct Plan {
     pub skipped: Vec<Skipped>,
     /// Seeds that the error of a randomised sampler is measured with.
     pub replicates: u32,
+    /// The filters that it was made with.
+    pub only: Vec<String>,
 }
 
 impl Plan {
@@ -77,8 +79,12 @@ impl Plan {
         let full = product(axes, &Cell::FULL);
         let mut skipped = Vec::new();
         for exclude in &experiment.excludes {
-            skipped.extend(excluded(exclude, &full, &filter)?);
+            skipped.extend(excluded(exclude, experiment, &full, &filter)?);
         }
+        for include in &experiment.includes {
+            included(include, &full)?;
+        }
+        skipped.extend(unmet(experiment, &full, &filter));
         let mut wanted = full;
         wanted.retain(|point| is_wanted(experiment, &filter, point));
         let refused = refused(&wanted, &is_randomised);
@@ -118,6 +124,7 @@ impl Plan {
             kernels: Vec::new(),
             skipped,
             replicates: experiment.replicates,
+            only: only.to_vec(),
         };
         plan.finished(experiment, refused, only)
     }
@@ -260,7 +267,7 @@ impl Plan {
 
 /// Whether a point passes the filters and no exclude takes it out.
 fn is_wanted(experiment: &Experiment, filter: &Filter, point: &Point) -> bool {
-    filter.fits(point) && !experiment.excludes.iter().any(|e| e.covers(point))
+    filter.fits(point) && experiment.keeps(point)
 }
 
 /// The variants of an axis that some of these cells need.

@@ -4,7 +4,7 @@ use super::ConfigError;
 use super::axis_map::AxisMap;
 use super::cells::Cell;
 use super::error::Place;
-use super::experiment::{Axes, Exclude, Experiment};
+use super::experiment::{Axes, CellSet, Condition, Experiment};
 use super::keys::Axis;
 use super::pattern::Pattern;
 use super::plan::Skipped;
@@ -88,23 +88,55 @@ pub(super) fn refused(full: &[Point], is_randomised: &impl IsRandomised) -> Vec<
 
 /// What one exclude takes out of the filtered product.
 pub(super) fn excluded(
-    exclude: &Exclude,
+    exclude: &CellSet,
+    experiment: &Experiment,
     full: &[Point],
     filter: &Filter,
 ) -> Result<Option<Skipped>, ConfigError> {
-    let covered: Vec<_> = full.iter().filter(|point| exclude.covers(point)).collect();
+    let covered = full.iter().filter(|point| exclude.covers(point));
+    let covered: Vec<_> = covered.collect();
     if covered.is_empty() && !exclude.lenient {
         return Err(ConfigError::UselessExclude {
             at: exclude.at.clone(),
+            section: "exclude",
             exclude: exclude.to_string(),
         });
     }
-    let cells = covered.iter().filter(|point| filter.fits(point)).count();
+    let includes = &experiment.includes;
+    let is_out = |point: &&&Point| filter.fits(point) && !includes.iter().any(|i| i.touches(point));
+    let cells = covered.iter().filter(is_out).count();
     Ok((cells > 0).then(|| Skipped {
         cell: exclude.to_string(),
         reason: format!("excluded by {}", exclude.at),
         cells,
     }))
+}
+
+/// That an include fits a cell: if not, it is likely misspelt.
+pub(super) fn included(include: &CellSet, full: &[Point]) -> Result<(), ConfigError> {
+    match include.lenient || full.iter().any(|point| include.covers(point)) {
+        true => Ok(()),
+        false => Err(ConfigError::UselessExclude {
+            at: include.at.clone(),
+            section: "include",
+            exclude: include.to_string(),
+        }),
+    }
+}
+
+/// What conditions of variants take out of the filtered product.
+pub(super) fn unmet(experiment: &Experiment, full: &[Point], filter: &Filter) -> Vec<Skipped> {
+    let skipped = experiment.conditions.iter().filter_map(|condition| {
+        let is_out = |point: &&Point| filter.fits(point) && !condition.allows(point);
+        let cells = full.iter().filter(is_out).count();
+        let sets: Vec<String> = condition.cells.iter().map(CellSet::to_string).collect();
+        (cells > 0).then(|| Skipped {
+            cell: format!("{} {}", condition.axis, condition.label),
+            reason: format!("goes only with {}", sets.join(", or ")),
+            cells,
+        })
+    });
+    skipped.collect()
 }
 
 /// All points of the product of the axes in `which`, the last one running fastest.
@@ -125,13 +157,38 @@ pub(super) fn product<'a>(axes: &'a Axes, which: &[Axis]) -> Vec<Point<'a>> {
     points
 }
 
-impl Exclude {
+impl CellSet {
     /// Whether the point has every axis that the exclude names, and fits on each.
     pub(super) fn covers(&self, point: &Point) -> bool {
         self.patterns.iter().all(|(axis, patterns)| {
             let variant = point.get(*axis);
             variant.is_some_and(|variant| patterns.iter().any(|p| p.matches(variant)))
         })
+    }
+
+    /// Whether the point fits on each axis that it has of those named.
+    pub(super) fn touches(&self, point: &Point) -> bool {
+        self.patterns.iter().all(|(axis, patterns)| {
+            let variant = point.get(*axis);
+            variant.is_none_or(|variant| patterns.iter().any(|p| p.matches(variant)))
+        })
+    }
+}
+
+impl Condition {
+    /// Whether the point has another variant, or fits.
+    pub(super) fn allows(&self, point: &Point) -> bool {
+        let is_its = |variant: &Variant| variant.label == self.label;
+        !point.get(self.axis).is_some_and(is_its) || self.cells.iter().any(|c| c.touches(point))
+    }
+}
+
+impl Experiment {
+    /// Whether nothing of the experiment leaves a point out.
+    pub(super) fn keeps(&self, point: &Point) -> bool {
+        let is_excluded = self.excludes.iter().any(|e| e.covers(point));
+        (!is_excluded || self.includes.iter().any(|i| i.touches(point)))
+            && self.conditions.iter().all(|c| c.allows(point))
     }
 }
 

@@ -68,6 +68,9 @@ fn is_path(text: &str) -> bool {
 /// Label of the embedded kernels on their axis.
 const EMBEDDED: &str = "embedded";
 
+/// Key of a table of parameters that says with what its variants go.
+pub(super) const WHEN: &str = "when";
+
 /// All variants of `entry`: the product of the values that `section` (one `[axis.NAME]`) lists.
 pub(super) fn expand(
     axis: Axis,
@@ -76,6 +79,7 @@ pub(super) fn expand(
 ) -> Result<Vec<Variant>, ConfigError> {
     if let Some((name, item)) = section
         .iter()
+        .filter(|(name, _)| name.as_str() != WHEN)
         .find(|(name, _)| entry.schema.iter().all(|p| p.name != name.as_str()))
     {
         return Err(ConfigError::Unknown {

@@ -3,6 +3,7 @@
 use super::GpuError;
 use super::compose::KernelLibrary;
 use super::pipeline::PipelineCache;
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 /// Which adapter to use.
@@ -13,7 +14,7 @@ pub enum AdapterChoice {
     Best,
     /// Position in the list of `raystone list`.
     Index(usize),
-    /// Part of the adapter's name, upper or lower case.
+    /// Part of the adapter's name, upper or lower case, or its place on the PCI bus, as `0000:65:00.0` or a part of it with a colon.
     Name(String),
 }
 
@@ -59,6 +60,8 @@ pub struct Gpu {
     /// Kernel sources.
     pub kernels: KernelLibrary,
     pub(super) pipelines: Arc<Mutex<PipelineCache>>,
+    /// See [`Gpu::take_modules`].
+    pub(super) used: Arc<Mutex<BTreeMap<String, String>>>,
     lost: Arc<Mutex<Option<String>>>,
 }
 
@@ -130,9 +133,16 @@ fn choose(found: Vec<wgpu::Adapter>, choice: &AdapterChoice) -> Result<wgpu::Ada
     let position = match choice {
         AdapterChoice::Best => Some(0),
         AdapterChoice::Index(i) => (*i < names.len()).then_some(*i),
-        AdapterChoice::Name(part) => names
-            .iter()
-            .position(|n| n.to_lowercase().contains(&part.to_lowercase())),
+        AdapterChoice::Name(part) => {
+            let part = part.to_lowercase();
+            let is_at = |a: &wgpu::Adapter| {
+                let place = a.get_info().device_pci_bus_id.to_lowercase();
+                part.contains(':') && place.contains(&part)
+            };
+            let is_called = |name: &String| name.to_lowercase().contains(&part);
+            let by_place = found.iter().position(is_at);
+            by_place.or_else(|| names.iter().position(is_called))
+        }
     };
     match position.and_then(|p| found.into_iter().nth(p)) {
         Some(adapter) => Ok(adapter),
@@ -240,6 +250,7 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
         loop_limit: None,
         kernels,
         pipelines: Arc::default(),
+        used: Arc::default(),
         lost,
     };
     gpu.loop_limit = super::probe::probe_loops(&gpu)?;

@@ -101,6 +101,11 @@ impl KernelLibrary {
         self.overridden.iter().map(String::as_str).collect()
     }
 
+    /// Whether a module of this name came from an override folder.
+    pub fn overrides(&self, name: &str) -> bool {
+        self.overridden.contains(name)
+    }
+
     /// Whether a module of this name is in the program.
     pub fn is_embedded(name: &str) -> bool {
         EMBEDDED.iter().any(|(known, _)| *known == name)
@@ -165,6 +170,20 @@ impl KernelLibrary {
         self.files.get(name).map(|(_, text)| text.as_str())
     }
 
+    /// The first 16 hexadecimal digits of BLAKE3 of a module's text; of nothing where there is no such module.
+    pub fn text_hash(&self, name: &str) -> String {
+        let text = self.text(name).unwrap_or_default();
+        blake3::hash(text.as_bytes()).to_hex()[..16].to_owned()
+    }
+
+    /// The name of a module, behind an `@` where it comes from an override folder.
+    pub fn marked(&self, name: &str) -> String {
+        match self.overrides(name) {
+            true => format!("@{name}"),
+            false => name.to_owned(),
+        }
+    }
+
     /// Composes one kernel.
     ///
     /// # Errors
@@ -224,6 +243,9 @@ impl KernelLibrary {
             wgsl,
             module,
             info,
+            modules: (result.modules.iter())
+                .filter_map(|path| composition.module_of(&path.to_string()))
+                .collect(),
             map: result.sourcemap.unwrap_or_default(),
         })
     }
@@ -330,6 +352,16 @@ impl Composition {
         self
     }
 
+    /// The module behind a path (`package::accel::bvh`), with slashes; none for the virtual module of constants.
+    fn module_of(&self, path: &str) -> Option<String> {
+        let name = path.strip_prefix("package::")?.replace("::", "/");
+        match name.strip_prefix("active/") {
+            Some("constants") => None,
+            Some(role) => self.active.get(role).cloned(),
+            None => Some(name),
+        }
+    }
+
     /// Switches a feature on.
     #[must_use]
     pub fn feature(mut self, name: &str, on: bool) -> Self {
@@ -356,6 +388,8 @@ pub struct ComposedKernel {
     pub(super) module: naga::Module,
     pub(super) info: naga::valid::ModuleInfo,
     map: BasicSourceMap,
+    /// Names of the modules that it was made of, with slashes.
+    pub modules: Vec<String>,
 }
 
 impl ComposedKernel {

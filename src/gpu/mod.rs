@@ -24,7 +24,7 @@ pub use adapter::{AdapterChoice, AdapterSummary, Gpu, RawDevice, adapters, open}
 pub use bindings::{Bindings, MAX_PARTS, Storage};
 pub use clock::{Elapsed, Stopwatch};
 pub use compose::{ComposedKernel, Composition, KernelLibrary};
-pub use environment::{Environment, capture, cpu_model, device_type};
+pub use environment::{Environment, MachineLoad, capture, cpu_model, device_type};
 pub(crate) use kernel_errors::LOOPS_CUT;
 pub use kernel_errors::{KERNEL_ERRORS, kernel_errors};
 pub use pipeline::{Pipeline, TEXELS_PER_ROW, WORKGROUP_EDGE, WORKGROUP_SIZE};

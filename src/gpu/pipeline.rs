@@ -118,10 +118,12 @@ impl Gpu {
             known.find_map(|(library, p)| is_it(library, p).then(|| Arc::clone(p)))
         };
         if let Some(pipeline) = known(&|other, _| other == library) {
+            self.note_modules(&pipeline.kernel);
             return Ok(pipeline);
         }
         let start = Instant::now();
         let kernel = self.kernels.compose(&key.0)?;
+        self.note_modules(&kernel);
         let pipeline = match known(&|_, pipeline| pipeline.kernel.wgsl == kernel.wgsl) {
             Some(pipeline) => pipeline,
             None => Arc::new(self.compile(kernel, runtime_checks, start)?),
@@ -131,6 +133,25 @@ impl Gpu {
             known.insert(library.to_owned(), Arc::clone(&pipeline));
         }
         Ok(pipeline)
+    }
+
+    /// Notes what a kernel was made of.
+    pub(super) fn note_modules(&self, kernel: &ComposedKernel) {
+        let Ok(mut used) = self.used.lock() else {
+            return;
+        };
+        for name in &kernel.modules {
+            let hash = self.kernels.text_hash(name);
+            used.insert(self.kernels.marked(name), hash);
+        }
+    }
+
+    /// The modules of all kernels that were asked for since the last call, on this device and on those that share it:
+    /// [marked](super::KernelLibrary::marked) names and [hashes of texts](super::KernelLibrary::text_hash).
+    pub fn take_modules(&self) -> BTreeMap<String, String> {
+        let used = self.used.lock();
+        used.map(|mut used| std::mem::take(&mut *used))
+            .unwrap_or_default()
     }
 
     fn compile(

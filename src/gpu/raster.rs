@@ -40,6 +40,7 @@ impl Gpu {
         size: [u32; 2],
     ) -> Result<Raster, GpuError> {
         let kernel = self.kernels.compose(&bound.compose(composition.clone()))?;
+        self.note_modules(&kernel);
         let edge = u64::from(self.limits.max_texture_dimension_2d);
         for pixels in size {
             check("an edge of a rasterised image", pixels.into(), edge)?;

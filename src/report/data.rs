@@ -192,7 +192,7 @@ impl<'a> RunData<'a> {
                     let scene = data.scene(line.key.label(axis::SCENE));
                     put(&mut scene.peers, line.of(record), |a, b| a.key == b.key)
                 }
-                Body::Reference(_) => {}
+                Body::Reference(_) | Body::Kernels(_) | Body::Cell(_) => {}
                 Body::Paths(record) => put(&mut data.paths, line.of(record), |a, b| a.key == b.key),
                 Body::Time(record) => {
                     let measured = data.of_cell(line, record);

@@ -76,7 +76,7 @@ pub(super) fn by_tile(
         };
         draw(session, cell, yardstick, &mut record, &snapshot)?;
         session.write(&line(Body::Error(record)))?;
-        session.progress.inc(1);
+        session.progress.add(session.weights.replicate);
     }
     Ok(Replicates { spp, images })
 }

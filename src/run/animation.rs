@@ -4,12 +4,12 @@ use super::RunError;
 use super::session::{Session, content_hash};
 use super::structures::Gated;
 use super::world::World;
-use crate::config::{Animation, Axis, Skipped};
+use crate::config::{Animation, Axis, UnitKind, unit_name};
 use crate::gpu::Gpu;
 use crate::integrator::Stage;
 use crate::measure::animation::{Actor, Frame, moved, take_over};
 use crate::measure::gate::{Checks, Judge};
-use crate::measure::record::{AnimationRecord, Body, Key, Line, Ran};
+use crate::measure::record::{AnimationRecord, Body, Key, Line, Outcome, Ran};
 
 /// A structure whose frames are recorded.
 struct Part<'a> {
@@ -25,7 +25,10 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         return Ok(());
     };
     if let Err(reason) = moved(&world.scene, &animation, 0) {
-        return skip(session, format!("animation of {}", world.cell), reason);
+        for structure in gated {
+            session.write_refused(name(structure), reason.clone())?;
+        }
+        return Ok(());
     }
     let mut parts = Vec::new();
     for structure in gated {
@@ -34,7 +37,7 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         }
         match part(session, world, structure, animation) {
             Ok(part) => parts.push(part),
-            Err(reason) => skip(session, name(structure), reason)?,
+            Err(reason) => session.write_refused(name(structure), reason)?,
         }
     }
     for number in 0..animation.frames {
@@ -49,9 +52,11 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
             }
         }
     }
+    session.note_kernels("animation");
     for part in parts {
         session.failed += usize::from(part.record.failure.is_some());
-        session.finish(name(part.gated));
+        let failure = part.record.failure.clone();
+        let name = name(part.gated);
         let ran = Ran {
             unchecked: !part.gated.runtime_checks,
             ..Ran::default()
@@ -59,22 +64,19 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         let line = Line::new(Key::from(&part.gated.cell), ran, part.record);
         let settings = format!("{animation:?}");
         let hash = content_hash(&line, &world.scene.hash, &[("animation", &settings)]);
-        session.write(&line.hashed(hash).with_body(Body::Animation))?;
+        session.write(&line.hashed(&hash).with_body(Body::Animation))?;
+        let ended = match &failure {
+            Some(reason) => (Outcome::Failed, reason.as_str()),
+            None => (Outcome::Done, ""),
+        };
+        session.progress.add(session.weights.animation);
+        session.close(&name, ended, vec![hash], &["animation"])?;
     }
     Ok(())
 }
 
 fn name(structure: &Gated) -> String {
-    format!("animation of {}", structure.cell)
-}
-
-fn skip(session: &mut Session, cell: String, reason: String) -> Result<(), RunError> {
-    session.finish(cell.clone());
-    session.write_skipped(&Skipped {
-        cell,
-        reason,
-        cells: 1,
-    })
+    unit_name(UnitKind::Animation, &structure.cell)
 }
 
 fn part<'a>(

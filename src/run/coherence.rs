@@ -9,10 +9,12 @@ use crate::accel::{BuildLog, CpuTwin};
 use crate::coherence::{
     Machine, Memory, Organisation, RayClass, Rays, View, groups_of, of_rays, run as run_model,
 };
-use crate::config::{Axis, Cell, Coherence, Skipped};
+use crate::config::{Axis, Cell, Coherence, UnitKind, unit_name};
 use crate::measure::path_oracle::{self, PathOracle};
 use crate::measure::rays::RaySet;
-use crate::measure::record::{Body, ClassCoherence, CoherenceAt, CoherenceRecord, Key, Line, Ran};
+use crate::measure::record::{
+    Body, ClassCoherence, CoherenceAt, CoherenceRecord, Key, Line, Outcome, Ran,
+};
 use std::collections::BTreeMap;
 
 /// What does not depend on the structure.
@@ -27,14 +29,8 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     let Some(settings) = session.experiment.coherence.clone() else {
         return Ok(());
     };
-    let cells = session.plan.times.iter();
-    // The model has organisations of its own.
-    let axes = &session.experiment.axes;
-    let is_first = |c: &&Cell, axis| c.get(axis) == axes[axis].first();
-    let cells = cells.filter(|c| {
-        c.is_on(&world.cell) && is_first(c, Axis::Organisation) && is_first(c, Axis::Workgroup)
-    });
-    let cells: Vec<Cell> = cells.cloned().collect();
+    let mut cells = session.plan.modelled(session.experiment);
+    cells.retain(|cell| cell.is_on(&world.cell));
     if cells.is_empty() {
         return Ok(());
     }
@@ -50,14 +46,9 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
         }
         let records = of_structure(session, world, structure, &own, (&settings, &mut known));
         for (cell, record) in own.into_iter().zip(records) {
-            session.finish(name(cell));
             match record {
                 Ok(record) => write(session, world, cell, record)?,
-                Err(reason) => session.write_skipped(&Skipped {
-                    cell: name(cell),
-                    reason,
-                    cells: 1,
-                })?,
+                Err(reason) => session.write_refused(name(cell), reason)?,
             }
         }
     }
@@ -65,11 +56,11 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
 }
 
 fn name(cell: &Cell) -> String {
-    format!("coherence of {cell}")
+    unit_name(UnitKind::Coherence, cell)
 }
 
 fn write(
-    session: &Session,
+    session: &mut Session,
     world: &World,
     cell: &Cell,
     record: CoherenceRecord,
@@ -77,7 +68,9 @@ fn write(
     let line = Line::new(Key::from(cell), Ran::default(), record);
     let settings = format!("{:?}", line.body.settings);
     let hash = content_hash(&line, &world.scene.hash, &[("coherence", &settings)]);
-    session.write(&line.hashed(hash).with_body(Body::Coherence))
+    session.write(&line.hashed(&hash).with_body(Body::Coherence))?;
+    session.progress.add(session.weights.model);
+    session.close(&name(cell), (Outcome::Done, ""), vec![hash], &[])
 }
 
 /// Each cell of a structure, or why there is nothing to say of it.

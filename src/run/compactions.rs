@@ -7,7 +7,7 @@ use crate::compaction::Order;
 use crate::config::{Axis, Cell};
 use crate::gpu::{Elapsed, Gpu, GpuError, Player};
 use crate::measure::compaction::{Bench, Inputs, Load, benched, stream};
-use crate::measure::record::{Body, CompactionRecord, Key, Line, Ran};
+use crate::measure::record::{Body, CompactionRecord, Key, Line, Outcome, Ran};
 use crate::measure::statistics::median_interval;
 use crate::measure::timing::{Measured, Samples, interleave, millions_per_second};
 use std::sync::Arc;
@@ -39,25 +39,28 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
     let mut uploaded = Uploaded::new();
     let mut timed = Vec::new();
     for cell in &cells {
+        session.go_on()?;
         let gpu = device.of(&cell[Axis::Kernels])?;
         session.say(format!("{cell}: judging"));
         session.lose_device_on_request(gpu, &cell.to_string());
-        match prepare(session, gpu, &player, &mut uploaded, cell, &cells) {
+        let prepared = prepare(session, gpu, &player, &mut uploaded, cell, &cells);
+        session.note_kernels(&cell.to_string());
+        match prepared {
             Ok(item) => timed.push(item),
             Err(Absent::Refused(reason)) => session.write_refused(cell.to_string(), reason)?,
             Err(Absent::Failed(reason)) => fail(session, cell, reason)?,
         }
-        session.progress.inc(1);
+        session.progress.add(session.weights.compaction);
         if gpu.lost().is_some() {
             return Ok(());
         }
     }
     let timing = session.experiment.timing;
     let seed = u64::from(session.experiment.seed);
-    let progress = session.progress.clone();
+    let (progress, weight) = (session.progress.clone(), session.weights.compaction);
     session.say("timing compactions");
     let measured = (session.clock).time("gpu", || {
-        interleave(&timed, &timing, seed, || progress.inc(1))
+        interleave(&timed, &timing, seed, || progress.add(weight))
     });
     let measured = match measured {
         Ok(measured) => measured,
@@ -171,8 +174,13 @@ fn fail(session: &mut Session, cell: &Cell, reason: String) -> Result<(), RunErr
 }
 
 fn write(session: &mut Session, cell: &Cell, record: CompactionRecord) -> Result<(), RunError> {
-    session.finish(cell.to_string());
+    let failure = record.failure.clone();
     let line = Line::new(Key::from(cell), Ran::default(), Body::Compaction(record));
     let hash = content_hash(&line, "", &[("what", "compaction")]);
-    session.write(&line.hashed(hash))
+    session.write(&line.hashed(&hash))?;
+    let ended = match &failure {
+        Some(reason) => (Outcome::Failed, reason.as_str()),
+        None => (Outcome::Done, ""),
+    };
+    session.close(&cell.to_string(), ended, vec![hash], &[])
 }

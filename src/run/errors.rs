@@ -15,7 +15,7 @@ use crate::integrator::{Renderer, Snapshot, rounding_bound};
 use crate::measure::bias::{BiasOptions, BiasVerdict, check_bias};
 use crate::measure::metrics::{error_map, measure};
 use crate::measure::record::{
-    BiasRecord, Body, ErrorAtSpp, ErrorRecord, Key, Line, Ran, SpectrumRecord,
+    BiasRecord, Body, ErrorAtSpp, ErrorRecord, Key, Line, Outcome, Ran, SpectrumRecord,
 };
 use crate::measure::spectrum::{
     ErrorSpectrum, error_spectrum, luminance_error, mean_filtered, mean_power,
@@ -92,6 +92,7 @@ fn all_errors(
     yardstick: &Yardstick,
 ) -> Result<(), RunError> {
     for cell in cells {
+        session.go_on()?;
         let text = cell.to_string();
         let fastest = match fastest(session, gated, cell) {
             Ok(fastest) => fastest,
@@ -213,7 +214,6 @@ fn sampler_error(
         (None, _) => all_samples(session, cell, yardstick, &passes, &line)?,
         (Some(rule), _) => until_met(session, cell, yardstick, &passes, &line, rule)?,
     };
-    session.finish(cell.to_string());
     let spp = replicates.spp;
     let finals = replicates.images;
     write_spread(session, cell, spp, &finals)?;
@@ -221,6 +221,11 @@ fn sampler_error(
     session.write(&line(Body::Bias(bias)))?;
     let spectrum = spectrum_record(session, spp, &finals, yardstick)?;
     session.write(&line(Body::Spectrum(spectrum)))?;
+    let judged = session.judged_lines.get(&paths::key(world, cell)).cloned();
+    let mut lines = vec![hash.clone(), yardstick.line.clone()];
+    lines.extend(judged);
+    let name = cell.to_string();
+    session.close(&name, (Outcome::Done, ""), lines, &[&yardstick.name])?;
     Ok(())
 }
 
@@ -273,7 +278,7 @@ fn all_samples(
         check_finite(&record)?;
         session.write(&line(Body::Error(record)))?;
         images.extend(snapshots.into_iter().last().map(|s| s.image));
-        session.progress.inc(1);
+        session.progress.add(session.weights.replicate);
     }
     Ok(Replicates {
         spp: session.experiment.spp.max(),
@@ -321,7 +326,7 @@ fn until_met(
         record.stop = Some(rule);
         draw(session, cell, yardstick, &mut record, snapshot)?;
         session.write(&line(Body::Error(record)))?;
-        session.progress.inc(1);
+        session.progress.add(session.weights.replicate);
     }
     Ok(Replicates {
         spp: last.first().map_or(0, |snapshot| snapshot.spp),

@@ -8,16 +8,24 @@
 
 use super::RunError;
 use crate::atomic::write_atomic;
-use crate::measure::record::{Body, InterruptedRecord, Line, PARTIAL, RECORDS_FILE, STRESS_FILE};
+use crate::measure::record::{
+    Body, InterruptedRecord, Line, PARTIAL, RECORDS_FILE, RecordError, STRESS_FILE, read_records,
+    text_of,
+};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Empty; an operating-system lock on it ends with the process that holds it.
 const LOCK_FILE: &str = ".lock";
 const IMAGES: &str = "images";
+/// How often a run that waits for another looks whether that has ended.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(500);
+/// What was done when, for people.
+const LOG_FILE: &str = "run.log";
 
 /// What to do with a folder that holds results.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -29,6 +37,8 @@ pub enum Existing {
     Replace,
     /// Take the first of `DIR`, `DIR-2`, `DIR-3`, … that holds none and that no run writes.
     Number,
+    /// Go on with them: what still holds is kept.
+    Resume,
 }
 
 /// The folder that a run writes.
@@ -37,7 +47,9 @@ pub(super) struct Folder {
     out: PathBuf,
     /// Name of the folder of images: one that the earlier results do not use.
     images: String,
-    /// Whether there are results of an earlier run.
+    /// Lines of the run that is resumed.
+    earlier: Mutex<Vec<Line>>,
+    /// Whether there are results of an earlier run that are not part of this one.
     replaces: bool,
     start: Instant,
     records: Mutex<Records>,
@@ -64,6 +76,8 @@ enum State {
 enum Refusal {
     /// It holds results, or another run writes it: the next number may do.
     Taken(String),
+    /// Another run writes it now.
+    Busy(String),
     Unwritable(RunError),
 }
 
@@ -79,20 +93,25 @@ impl Folder {
     ///
     /// # Errors
     /// A folder that cannot be written, that another run writes, or that holds results.
-    pub fn open(out: &Path, existing: Existing) -> Result<Self, RunError> {
+    pub fn open(out: &Path, existing: Existing, wait: bool) -> Result<Self, RunError> {
         let mut number = 1;
         loop {
             let candidate = numbered(out, number);
-            match Self::open_one(&candidate, existing == Existing::Replace) {
+            match Self::open_one(&candidate, existing) {
                 Ok(folder) => return Ok(folder),
                 Err(Refusal::Unwritable(error)) => return Err(error),
-                Err(Refusal::Taken(_)) if existing == Existing::Number => number += 1,
-                Err(Refusal::Taken(reason)) => return Err(RunError::Input(reason)),
+                Err(Refusal::Taken(_) | Refusal::Busy(_)) if existing == Existing::Number => {
+                    number += 1;
+                }
+                Err(Refusal::Busy(_)) if wait => std::thread::sleep(BETWEEN_LOOKS),
+                Err(Refusal::Taken(reason) | Refusal::Busy(reason)) => {
+                    return Err(RunError::Input(reason));
+                }
             }
         }
     }
 
-    fn open_one(out: &Path, replace: bool) -> Result<Self, Refusal> {
+    fn open_one(out: &Path, existing: Existing) -> Result<Self, Refusal> {
         let failed = |path: &Path| {
             let path = path.to_owned();
             move |error| Refusal::Unwritable(unwritable(&path, &error))
@@ -107,7 +126,8 @@ impl Folder {
         let records = out.join(RECORDS_FILE);
         let results = [records.clone(), out.join(STRESS_FILE)];
         let results = results.into_iter().filter(|path| is_there(path));
-        if !replace && let Some(found) = results.chain(is_left_over.then_some(left_over)).next() {
+        let replaces = matches!(existing, Existing::Replace | Existing::Resume);
+        if !replaces && let Some(found) = results.chain(is_left_over.then_some(left_over)).next() {
             return Err(Refusal::Taken(format!(
                 "{} holds the results of another run; choose another folder with --out, let --number \
                  number it, or replace them with --force",
@@ -118,7 +138,14 @@ impl Folder {
             let error = io::ErrorKind::IsADirectory.into();
             return Err(Refusal::Unwritable(unwritable(&records, &error)));
         }
-        if is_left_over && !is_there(&records) {
+        let earlier = match existing {
+            Existing::Resume => earlier_lines(out).map_err(Refusal::Unwritable)?,
+            _ => Vec::new(),
+        };
+        if !earlier.is_empty() && is_left_over {
+            // Both parts in one place before anything is removed: whenever this run ends, nothing is lost.
+            keep(out, &earlier).map_err(failed(out))?;
+        } else if is_left_over && !is_there(&records) {
             // What a killed run measured is all there is: it is kept until the new results are whole.
             promote(out).map_err(failed(out))?;
         }
@@ -136,7 +163,8 @@ impl Folder {
         let file = options.read(true).write(true).create_new(true).open(&path);
         Ok(Self {
             images,
-            replaces: is_there(&records),
+            earlier: Mutex::new(earlier),
+            replaces: existing != Existing::Resume && is_there(&records),
             start: Instant::now(),
             records: Mutex::new(Records {
                 file: file.map_err(failed(&path))?,
@@ -153,12 +181,41 @@ impl Folder {
         &self.out
     }
 
+    /// The lines of the run that is resumed, once.
+    pub fn take_earlier(&self) -> Vec<Line> {
+        let mut earlier = self.earlier.lock().unwrap_or_else(PoisonError::into_inner);
+        std::mem::take(&mut earlier)
+    }
+
+    /// Leaves the folder as it was.
+    pub fn abandon(&self) {
+        let mut records = self.records();
+        records.state = State::Finished;
+        // Nothing was written: what stays behind is litter that the next run removes.
+        let _ = remove(&self.out.join(PARTIAL));
+    }
+
     /// Name of an image as records have it, relative to the run's folder, and where to write it; the ending
     /// of the file without its dot.
     pub fn image(&self, parts: &[&str], ending: &str) -> (String, PathBuf) {
         let relative = format!("{}/{}.{ending}", self.images, slug(parts));
         let path = self.out.join(PARTIAL).join(&relative);
         (relative, path)
+    }
+
+    /// Adds a line to `run.log`, with the seconds since the run began.
+    pub fn log(&self, text: &str) {
+        let path = self.out.join(LOG_FILE);
+        let is_link = fs::symlink_metadata(&path).is_ok_and(|meta| meta.is_symlink());
+        if is_link && remove(&path).is_err() {
+            return;
+        }
+        let plain = |c: char| if c.is_control() { ' ' } else { c };
+        let text: String = text.chars().map(plain).collect();
+        let line = format!("{:9.2} s  {text}\n", self.start.elapsed().as_secs_f64());
+        let mut options = OpenOptions::new();
+        let file = options.append(true).create(true).open(&path);
+        let _ = file.and_then(|mut file| file.write_all(line.as_bytes()));
     }
 
     /// A panic elsewhere leaves whole lines, so the records can still be used.
@@ -233,17 +290,18 @@ impl Folder {
         // could not be moved, which keep the folder.
         let _ = remove(&partial.join(RECORDS_FILE));
         let _ = fs::remove_dir(&partial);
-        let _ = self.remove_images(&earlier);
+        let _ = self.remove_images(&earlier, &fs::read(&target).unwrap_or_default());
         Ok(())
     }
 
-    /// Removes the images of the earlier results: the folders that their records name.
-    fn remove_images(&self, earlier: &[u8]) -> io::Result<()> {
-        let earlier = String::from_utf8_lossy(earlier);
+    /// Removes the images of the earlier results: the folders that their records name, and those of now do not.
+    fn remove_images(&self, earlier: &[u8], now: &[u8]) -> io::Result<()> {
+        let [earlier, now] = [earlier, now].map(String::from_utf8_lossy);
         for entry in fs::read_dir(&self.out)? {
             let name = entry?.file_name().to_string_lossy().into_owned();
             let is_ours = name.starts_with(IMAGES) && name != self.images;
-            if is_ours && earlier.contains(&format!("\"{name}/")) {
+            let is_in = |records: &str| records.contains(&format!("\"{name}/"));
+            if is_ours && is_in(&earlier) && !is_in(&now) {
                 remove(&self.out.join(name))?;
             }
         }
@@ -285,11 +343,26 @@ pub enum Interrupted {
     Kept(PathBuf),
 }
 
-/// Ends a run early, from any thread, however long a step of the run takes: see [`Interrupt::now`].
+/// Ends a run early, from any thread: behind the cell that is being measured ([`Interrupt::ask`]), or however long a step of the run takes
+/// ([`Interrupt::now`]).
 #[derive(Debug, Clone, Default)]
-pub struct Interrupt(Arc<Mutex<Weak<Folder>>>);
+pub struct Interrupt {
+    folder: Arc<Mutex<Weak<Folder>>>,
+    asked: Arc<AtomicBool>,
+}
 
 impl Interrupt {
+    /// Asks the run to end as soon as what is being measured has its record. Whether it has begun at all.
+    pub fn ask(&self) -> bool {
+        self.asked.store(true, Ordering::Relaxed);
+        self.begun().upgrade().is_some()
+    }
+
+    /// Whether the run was asked to end.
+    pub(super) fn is_asked(&self) -> bool {
+        self.asked.load(Ordering::Relaxed)
+    }
+
     /// Keeps the records so far with a line that says `reason`; the run itself ends with [`RunError::Interrupted`] at its next record.
     pub fn now(&self, reason: &str) -> Interrupted {
         let folder = self.begun().upgrade();
@@ -302,7 +375,7 @@ impl Interrupt {
     }
 
     fn begun(&self) -> MutexGuard<'_, Weak<Folder>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.folder.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -336,6 +409,11 @@ fn remove(path: &Path) -> io::Result<()> {
 
 /// Makes the records that a killed run left in `partial/` those of the folder.
 fn promote(out: &Path) -> io::Result<()> {
+    promote_images(out)?;
+    fs::rename(out.join(PARTIAL).join(RECORDS_FILE), out.join(RECORDS_FILE))
+}
+
+fn promote_images(out: &Path) -> io::Result<()> {
     let partial = out.join(PARTIAL);
     for entry in fs::read_dir(&partial)? {
         let name = entry?.file_name();
@@ -344,7 +422,35 @@ fn promote(out: &Path) -> io::Result<()> {
             fs::rename(partial.join(&name), out.join(&name))?;
         }
     }
-    fs::rename(partial.join(RECORDS_FILE), out.join(RECORDS_FILE))
+    Ok(())
+}
+
+/// The lines of the run that a folder holds, and behind them those that a killed run left.
+///
+/// # Errors
+/// Records that cannot be read, or of another version.
+fn earlier_lines(out: &Path) -> Result<Vec<Line>, RunError> {
+    let mut lines = Vec::new();
+    for folder in [out.to_owned(), out.join(PARTIAL)] {
+        let path = folder.join(RECORDS_FILE);
+        if fs::symlink_metadata(&path).is_ok_and(|file| file.is_file() && file.len() > 0) {
+            let records = read_records(&folder);
+            let fault = |error: RecordError| RunError::Input(format!("cannot resume: {error}"));
+            match records {
+                // A run that was killed in its first line.
+                Err(RecordError::NoRecords { .. }) => {}
+                records => lines.extend(records.map_err(fault)?.lines),
+            }
+        }
+    }
+    Ok(lines)
+}
+
+/// Puts these lines in the place of the folder's records, and beside them the images of a killed run.
+fn keep(out: &Path, lines: &[Line]) -> io::Result<()> {
+    promote_images(out)?;
+    let text = text_of(lines).map_err(io::Error::other)?;
+    write_atomic(&out.join(RECORDS_FILE), text.as_bytes())
 }
 
 /// Makes and locks a folder that something else than a run writes: until the file is dropped, `None` where
@@ -355,7 +461,7 @@ fn promote(out: &Path) -> io::Result<()> {
 pub fn lock_folder(out: &Path) -> Result<Option<File>, RunError> {
     fs::create_dir_all(out).map_err(|error| unwritable(out, &error))?;
     lock(out).map_err(|refusal| match refusal {
-        Refusal::Taken(reason) => RunError::Input(reason),
+        Refusal::Taken(reason) | Refusal::Busy(reason) => RunError::Input(reason),
         Refusal::Unwritable(error) => error,
     })
 }
@@ -371,7 +477,7 @@ fn lock(out: &Path) -> Result<Option<File>, Refusal> {
     let file = file.map_err(failed)?;
     match file.try_lock() {
         Ok(()) => Ok(Some(file)),
-        Err(TryLockError::WouldBlock) => Err(Refusal::Taken(format!(
+        Err(TryLockError::WouldBlock) => Err(Refusal::Busy(format!(
             "another run is writing to {}; wait until it ends, or choose another folder with --out",
             out.display()
         ))),

@@ -39,14 +39,14 @@ fn read(out: &Path) -> String {
 fn results_are_replaced_only_by_whole_ones_and_only_on_request() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("run");
-    let first = Folder::open(&out, Existing::Refuse).unwrap();
+    let first = Folder::open(&out, Existing::Refuse, false).unwrap();
     write(&first, "\"images/heat\" first");
     first.finish().unwrap();
     drop(first);
-    assert!(Folder::open(&out, Existing::Refuse).is_err());
+    assert!(Folder::open(&out, Existing::Refuse, false).is_err());
     assert!(out.join("images").is_dir() && !out.join(PARTIAL).exists());
 
-    let second = Folder::open(&out, Existing::Replace).unwrap();
+    let second = Folder::open(&out, Existing::Replace, false).unwrap();
     write(&second, "\"images-2/heat\" second");
     assert!(read(&out).ends_with("first\n"), "replaced too early");
     assert_eq!(fs::read_dir(out.join("images")).unwrap().count(), 1);
@@ -55,7 +55,7 @@ fn results_are_replaced_only_by_whole_ones_and_only_on_request() {
     assert!(read(&out.join(PARTIAL)).ends_with("second\n"));
 
     fs::create_dir(out.join("images-of-mine")).unwrap();
-    let third = Folder::open(&out, Existing::Replace).unwrap();
+    let third = Folder::open(&out, Existing::Replace, false).unwrap();
     write(&third, "\"images-2/heat\" third");
     third.finish().unwrap();
     assert!(read(&out).ends_with("third\n"));
@@ -67,13 +67,18 @@ fn results_are_replaced_only_by_whole_ones_and_only_on_request() {
 fn what_a_killed_run_measured_counts_as_results() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path();
-    write(&Folder::open(out, Existing::Refuse).unwrap(), "killed");
-    let error = Folder::open(out, Existing::Refuse).unwrap_err().to_string();
+    write(
+        &Folder::open(out, Existing::Refuse, false).unwrap(),
+        "killed",
+    );
+    let error = Folder::open(out, Existing::Refuse, false)
+        .unwrap_err()
+        .to_string();
     assert!(
         error.contains(PARTIAL) && error.contains("--force"),
         "{error}"
     );
-    let forced = Folder::open(out, Existing::Replace).unwrap();
+    let forced = Folder::open(out, Existing::Replace, false).unwrap();
     drop(forced);
     assert_eq!(read(out), "killed\n");
     assert!(out.join("images").is_dir());
@@ -83,16 +88,16 @@ fn what_a_killed_run_measured_counts_as_results() {
 fn a_folder_that_is_being_written_is_refused_or_numbered() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("run");
-    let first = Folder::open(&out, Existing::Refuse).unwrap();
+    let first = Folder::open(&out, Existing::Refuse, false).unwrap();
     for existing in [Existing::Refuse, Existing::Replace] {
-        let error = Folder::open(&out, existing).unwrap_err().to_string();
+        let error = Folder::open(&out, existing, false).unwrap_err().to_string();
         assert!(error.contains("another run is writing"), "{error}");
     }
-    let second = Folder::open(&out, Existing::Number).unwrap();
+    let second = Folder::open(&out, Existing::Number, false).unwrap();
     assert_eq!(second.out(), dir.path().join("run-2"));
     assert_eq!(numbered(Path::new("a/b/"), 3), Path::new("a/b-3"));
     drop(first);
-    let again = Folder::open(&out, Existing::Number).unwrap();
+    let again = Folder::open(&out, Existing::Number, false).unwrap();
     assert_eq!(again.out(), out, "nothing was written there");
 }
 
@@ -111,7 +116,7 @@ fn links_are_replaced_and_not_followed() {
     symlink(&other, out.join(PARTIAL)).unwrap();
     symlink(&precious, out.join(LOCK_FILE)).unwrap();
     symlink(&precious, out.join(RECORDS_FILE)).unwrap();
-    let folder = Folder::open(&out, Existing::Replace).unwrap();
+    let folder = Folder::open(&out, Existing::Replace, false).unwrap();
     write(&folder, "new");
     folder.finish().unwrap();
     assert_eq!(read(&out), "new\n");
@@ -123,7 +128,7 @@ fn links_are_replaced_and_not_followed() {
 fn a_folder_taken_away_comes_back_with_the_records() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("run");
-    let folder = Folder::open(&out, Existing::Refuse).unwrap();
+    let folder = Folder::open(&out, Existing::Refuse, false).unwrap();
     write(&folder, "first");
     fs::remove_dir_all(&out).unwrap();
     folder.append("second\n").unwrap();
@@ -136,7 +141,7 @@ fn an_interrupted_run_takes_no_more_records() {
     let dir = tempfile::tempdir().unwrap();
     let handle = Interrupt::default();
     assert_eq!(handle.now("too early"), Interrupted::NotBegun);
-    let folder = Arc::new(Folder::open(dir.path(), Existing::Refuse).unwrap());
+    let folder = Arc::new(Folder::open(dir.path(), Existing::Refuse, false).unwrap());
     handle.begin(&folder);
     let Interrupted::Kept(kept) = handle.now("SIGINT") else {
         panic!("nothing was kept");
@@ -155,7 +160,7 @@ fn an_interrupted_run_takes_no_more_records() {
 #[test]
 fn a_full_disk_is_told_with_the_file_and_leaves_whole_lines() {
     let dir = tempfile::tempdir().unwrap();
-    let folder = Folder::open(dir.path(), Existing::Refuse).unwrap();
+    let folder = Folder::open(dir.path(), Existing::Refuse, false).unwrap();
     write(&folder, "first");
     let full = File::options().write(true).open("/dev/full").unwrap();
     let real = std::mem::replace(&mut folder.records().file, full);

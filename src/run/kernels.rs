@@ -2,7 +2,7 @@
 
 use super::{Registries, RunError, RunOptions};
 use crate::gpu::{self, Gpu, KernelLibrary};
-use crate::measure::record::{KernelFile, KernelFolder};
+use crate::measure::record::{KernelFile, KernelFolder, KernelSetRecord};
 use crate::params::Variant;
 use std::path::Path;
 
@@ -40,6 +40,25 @@ impl Kernels {
             embedded: registries.library(),
             folders: folders.map(library).collect::<Result<_, RunError>>()?,
         })
+    }
+
+    /// Why kernels that were made of these modules are others now; `None` if they are not.
+    pub(super) fn changed(&self, set: &KernelSetRecord) -> Option<String> {
+        let folder = (self.folders.iter()).find(|(kernels, _)| kernels.label == set.kernels);
+        let folder = folder.map(|(_, library)| library);
+        if !set.kernels.is_empty() && folder.is_none() {
+            return Some(format!("there is no folder of kernels {} now", set.kernels));
+        }
+        let is_other = |(name, hash): &(&String, &String)| match name.strip_prefix('@') {
+            Some(name) => folder.is_none_or(|f| !f.overrides(name) || f.text_hash(name) != **hash),
+            None => {
+                folder.is_some_and(|folder| folder.overrides(name))
+                    || self.embedded.text_hash(name) != **hash
+            }
+        };
+        let other = set.modules.iter().filter(is_other);
+        let names: Vec<&str> = other.map(|(name, _)| name.as_str()).collect();
+        (!names.is_empty()).then(|| format!("kernels changed: {}", names.join(", ")))
     }
 
     /// What is recorded of them.

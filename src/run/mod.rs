@@ -8,19 +8,25 @@ mod animation;
 mod coherence;
 mod compactions;
 mod errors;
+mod estimate;
 mod folder;
 mod images;
+mod inputs;
+mod inventory;
 mod kernels;
 mod known_images;
+mod merge;
 mod orders;
 mod paths;
 mod peers;
 mod primary;
+mod progress;
 mod reference;
 mod reference_cache;
 mod reference_file;
 mod registries;
 mod render;
+mod resume;
 mod session;
 mod streams;
 mod structure_times;
@@ -30,21 +36,28 @@ mod trial;
 mod words;
 mod world;
 
+pub use estimate::Estimate;
 pub use folder::{Existing, Interrupt, Interrupted, lock_folder};
+pub use inputs::place;
+pub use inventory::{Inventory, State};
 pub use kernels::{Kernels, kernel_library};
 pub use known_images::verify_images;
+pub use merge::{Merged, merge};
 pub use reference_cache::user_cache;
 pub use registries::Registries;
 pub use render::{Pictures, Rendering, render};
 
-use crate::config::{Cell, Experiment, Plan};
+use crate::config::{Axis, Cell, Experiment, Plan, REFERENCE_PARTS, Shard, Unit};
 use crate::gpu::{AdapterChoice, ArithmeticProbe, GpuError};
 use crate::image::FileFormat;
 use crate::measure::record::{GateVerdict, PathsRecord};
 pub use crate::measure::words::dump_stream;
 use crate::params::Variant;
+use crate::scene::{self, LoadOptions};
+use inputs::Current;
 use kernels::Device;
 use session::Session;
+use std::collections::HashMap;
 use std::path::PathBuf;
 use thiserror::Error;
 use world::{Absent, Loaded, World};
@@ -60,6 +73,8 @@ pub struct RunOptions {
     pub interrupt: Interrupt,
     /// Is told what went wrong beside the measuring, at once.
     pub warn: Option<fn(&str)>,
+    /// Is told how the run goes on, line by line.
+    pub tell: Option<fn(&str)>,
     /// Which adapter.
     pub adapter: AdapterChoice,
     /// Whether, and in which format, linear radiance is written beside the pictures of a run.
@@ -68,6 +83,12 @@ pub struct RunOptions {
     pub cache: Option<PathBuf>,
     /// Whether models may name files outside their folder: see [`crate::scene::LoadOptions`].
     pub allow_outside: bool,
+    /// The part of the plan that is run; `None`: all of it.
+    pub shard: Option<Shard>,
+    /// Whether to wait for another run that writes the folder.
+    pub wait: bool,
+    /// Whether the first cell that fails ends the run.
+    pub fail_fast: bool,
     /// Whether to draw a progress bar on standard error.
     pub progress: bool,
     /// Whether the run is to end with exit code 0 whatever fails: recorded, and said in the report.
@@ -85,6 +106,8 @@ pub struct RunSummary {
     pub failed: usize,
     /// Cells left out with a reason.
     pub skipped: usize,
+    /// Cells of an earlier run that still held.
+    pub kept: usize,
     /// Whether a scene could not be loaded (exit code 2).
     pub bad_input: bool,
     /// Folder of the records.
@@ -117,6 +140,11 @@ pub enum RunError {
 }
 
 impl RunError {
+    /// Whether somebody asked for the end.
+    pub fn is_interruption(&self) -> bool {
+        matches!(self, Self::Interrupted)
+    }
+
     /// The exit code of the program: 1 a wrong result, 2 bad usage or input, 3 no usable adapter.
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -194,23 +222,69 @@ pub fn run(
     options: &RunOptions,
 ) -> Result<RunSummary, RunError> {
     let kernels = Kernels::load(&plan.kernels, registries)?;
-    let device = Device::open(options, &kernels)?;
+    let is_resumed = options.existing == Existing::Resume;
+    // Without an adapter no folder is touched; a run that has nothing to do needs none.
+    let device = (!is_resumed).then(|| Device::open(options, &kernels));
+    let device = device.transpose()?;
     let mut session = Session::new(experiment, plan, registries, options)?;
-    let out = measure(&mut session, device, &kernels).map_err(|error| {
-        match options.interrupt.now(&error.to_string()) {
-            Interrupted::Kept(folder) => RunError::EndedEarly {
-                folder,
-                source: Box::new(error),
-            },
-            _ => error,
+    session.keep_shard();
+    let earlier = session.take_earlier();
+    let file = session.reference_file.as_ref().map(|file| &*file.hash);
+    let mut current = Current::new(experiment, file.unwrap_or_default(), &kernels);
+    if !earlier.is_empty() {
+        current.scenes = scene_hashes(plan, options);
+        let kept = earlier.kept(&session.units, &current);
+        if session.open_beside(&kept) == 0 {
+            session.abandon();
+            return Ok(RunSummary {
+                kept: kept.cells.len(),
+                out: options.out.clone(),
+                ..RunSummary::default()
+            });
         }
+    }
+    let device = match device {
+        Some(device) => device,
+        None => Device::open(options, &kernels).inspect_err(|_| session.abandon())?,
+    };
+    let kept = session.begin(&device, &kernels, (&earlier, current));
+    let out = kept.and_then(|kept| Ok((kept, measure(&mut session, device, &kernels)?)));
+    let (kept, out) = out.map_err(|error| match options.interrupt.now(&reason(&error)) {
+        Interrupted::Kept(folder) => RunError::EndedEarly {
+            folder,
+            source: Box::new(error),
+        },
+        _ => error,
     })?;
     Ok(RunSummary {
         failed: session.failed,
         skipped: session.skipped,
         bad_input: session.bad_input,
+        kept,
         out,
     })
+}
+
+/// Why a run ended early, for its last record.
+fn reason(error: &RunError) -> String {
+    match error {
+        RunError::Interrupted => "SIGINT".to_owned(),
+        error => error.to_string(),
+    }
+}
+
+/// The content of each scene as it is now.
+fn scene_hashes(plan: &Plan, options: &RunOptions) -> HashMap<String, Result<String, String>> {
+    let load = LoadOptions {
+        allow_outside: options.allow_outside,
+        ..LoadOptions::default()
+    };
+    let hash = |scene: &Variant| {
+        let loaded = scene::load(scene, &load);
+        let hash = loaded.map(|s| s.hash).map_err(|e| e.to_string());
+        (scene.label.clone(), hash)
+    };
+    plan.scenes.iter().map(hash).collect()
 }
 
 /// Writes every record, and puts them in their place: the folder.
@@ -219,7 +293,6 @@ fn measure(
     mut device: Device,
     kernels: &Kernels,
 ) -> Result<PathBuf, RunError> {
-    session.write_start(crate::gpu::capture(&device.gpu), kernels.folders())?;
     let (plan, options) = (session.plan, session.options);
     for scene in &plan.scenes {
         // A lost device fails the cell that lost it; the rest goes on with a fresh one. Every turn
@@ -230,6 +303,7 @@ fn measure(
                 break;
             }
             device = Device::open(options, kernels)?;
+            session.use_device(&device.gpu);
         }
     }
     loop {
@@ -241,28 +315,31 @@ fn measure(
             break;
         }
         device = Device::open(options, kernels)?;
+        session.use_device(&device.gpu);
     }
     session.write_end()
 }
 
 fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Result<(), RunError> {
     let failed = format!("scene {variant}: failed");
-    if session.is_done(&failed) {
+    let is_on = |unit: &Unit| unit.cell.get(Axis::Scene) == Some(variant);
+    if session.is_done(&failed) || !session.open_units().any(is_on) {
         return Ok(());
     }
     let loaded = match Loaded::new(session, variant) {
         Ok(loaded) => loaded,
         Err(fault) => {
             session.bad_input = true;
-            return session.write_failure(&failed, fault.of_cell()?);
+            return session.fail_all(&failed, is_on, fault.of_cell()?);
         }
     };
     for cell in session.plan.worlds(variant) {
         // After a lost device worlds that are complete are not built again.
         let done = format!("world {cell}: done");
-        if session.is_done(&done) {
+        if session.is_done(&done) || !session.open_units().any(|unit| unit.cell.is_on(&cell)) {
             continue;
         }
+        session.go_on()?;
         run_world(session, device, &loaded, &cell)?;
         if device.gpu.lost().is_some() {
             break;
@@ -286,27 +363,97 @@ fn run_world(
         Ok(world) => world,
         Err(Absent::BadInput(reason)) => {
             session.bad_input = true;
-            return session.write_failure(&failed, reason);
+            return session.fail_all(&failed, |unit| unit.cell.is_on(cell), reason);
         }
         Err(Absent::NotKept(reason)) => {
             session.finish(failed);
-            return session.write_skipped(&session.plan.all_on(cell, reason));
+            return session.leave_out(cell, reason);
         }
     };
-    session.progress.inc(session::SCENE_STEPS);
+    session.progress.add(session.weights.world);
     let gpu = &device.gpu;
     let gated = structures::run(session, &world)?;
+    session.go_on()?;
     if gpu.lost().is_none() {
         errors::run(session, &world, &gated)?;
     }
     if gpu.lost().is_none() {
         times::run(session, &world, &gated)?;
     }
+    session.go_on()?;
     coherence::run(session, &world, &gated)?;
     if gpu.lost().is_none() {
         animation::run(session, &world, &gated)?;
     }
     Ok(())
+}
+
+/// Renders the references of a plan and keeps them in `options.cache`, where runs find them: all parts, or those that are a shard's. How many
+/// were rendered, and which references have none.
+///
+/// # Errors
+/// No adapter, or no cache.
+pub fn render_references(
+    experiment: &Experiment,
+    plan: &Plan,
+    registries: &Registries,
+    options: &RunOptions,
+) -> Result<(usize, Vec<String>), RunError> {
+    if options.cache.is_none() {
+        return Err(RunError::Input(
+            "there is no folder to keep references in: set RAYSTONE_CACHE".to_owned(),
+        ));
+    }
+    let device = Device::open(options, &Kernels::load(&plan.kernels, registries)?)?;
+    let mut session = Session::unrecorded(experiment, plan, registries, options);
+    session.reference_file = reference_file::ReferenceFile::load(experiment)?;
+    let shard = options.shard.unwrap_or(Shard { number: 1, of: 1 });
+    let (mut rendered, mut failures) = (0, Vec::new());
+    let mut part = 0;
+    for scene in &plan.scenes {
+        let loaded = match Loaded::new(&mut session, scene) {
+            Ok(loaded) => loaded,
+            Err(fault) => {
+                failures.push(format!("{scene}: {}", fault.of_cell()?));
+                continue;
+            }
+        };
+        for cell in plan.worlds(scene) {
+            let world = World::new(&mut session, &device, &loaded, &cell)?;
+            for wanted in references_of(plan, &cell) {
+                let own: Vec<usize> = (0..REFERENCE_PARTS as usize)
+                    .filter(|number| (part + number) % shard.of == shard.number - 1)
+                    .collect();
+                part += REFERENCE_PARTS as usize;
+                if own.is_empty() {
+                    continue;
+                }
+                let made = reference::reference_structure(&mut session, &world, &[]);
+                let made = made.and_then(|traced| {
+                    reference::keep_parts(&mut session, &world, &traced, &wanted, own.into_iter())
+                });
+                match made {
+                    Ok(count) => rendered += count,
+                    Err(fault) => failures.push(format!("{wanted}: {}", fault.of_cell()?)),
+                }
+            }
+        }
+    }
+    session.progress.bar.finish_and_clear();
+    Ok((rendered, failures))
+}
+
+/// What samplers of a world are compared under: the world with each integrator.
+fn references_of(plan: &Plan, world: &Cell) -> Vec<Cell> {
+    let axes = [&Cell::WORLD[..], &[Axis::Integrator]].concat();
+    let mut found: Vec<Cell> = Vec::new();
+    for cell in plan.samplers.iter().filter(|cell| cell.is_on(world)) {
+        let cell = cell.on(&axes);
+        if !found.contains(&cell) {
+            found.push(cell);
+        }
+    }
+    found
 }
 
 /// Runs the gate alone on every structure of a plan, with `rays` rays of each class; integrators are judged on all `trials`, too
@@ -344,7 +491,7 @@ pub fn verify(
             }
         }
     }
-    session.progress.finish_and_clear();
+    session.progress.bar.finish_and_clear();
     Ok(verified)
 }
 

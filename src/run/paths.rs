@@ -93,7 +93,7 @@ pub(super) fn verify(
     Ok(judged)
 }
 
-fn key(world: &World, cell: &Cell) -> String {
+pub(super) fn key(world: &World, cell: &Cell) -> String {
     format!("{}, {}", world.cell, cell.on(&AXES))
 }
 
@@ -122,6 +122,7 @@ fn judge_and_record(
     let blank = Line::new(Key::from(cell), ran, ());
     let hash = content_hash(&blank, &world.scene.hash, &[]);
     let paths = record.clone();
+    session.judged_lines.insert(key(world, cell), hash.clone());
     session.write(&blank.hashed(&hash).with_body(|()| Body::Paths(paths)))?;
     Ok(record)
 }

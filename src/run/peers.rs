@@ -7,7 +7,7 @@ use crate::config::{Axis, Cell};
 use crate::gpu::{Elapsed, GpuError};
 use crate::measure::peer_judge::differences;
 use crate::measure::rays::RaySet;
-use crate::measure::record::{Body, Key, Line, PeerRecord, PeerTiming, Ran};
+use crate::measure::record::{Body, Key, Line, Outcome, PeerRecord, PeerTiming, Ran};
 use crate::measure::timing::{Measured, Samples, Watch, millions_per_second};
 use crate::peers::{BuiltPeer, PeerBatch};
 
@@ -150,8 +150,13 @@ pub(super) fn write(
         }
         let line = Line::new(Key::from(&one.cell), Ran::default(), record);
         let hash = content_hash(&line, &world.scene.hash, &[]);
-        session.write(&line.hashed(hash).with_body(Body::Peer))?;
-        session.finish(one.cell.to_string());
+        let failure = line.body.failure.clone();
+        session.write(&line.hashed(&hash).with_body(Body::Peer))?;
+        let ended = match &failure {
+            Some(reason) => (Outcome::Failed, reason.as_str()),
+            None => (Outcome::Done, ""),
+        };
+        session.close(&one.cell.to_string(), ended, vec![hash], &["peers"])?;
     }
     Ok(())
 }

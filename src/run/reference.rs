@@ -27,6 +27,10 @@ pub(super) struct Yardstick {
     /// How far rounding alone may move it, relative.
     pub rounding: f64,
     pub exposure: f32,
+    /// Content hash of its record.
+    pub line: String,
+    /// What the kernels that it was rendered with are noted for.
+    pub name: String,
 }
 
 /// What references are rendered through: the fastest structure that passed with the embedded kernels, so
@@ -68,84 +72,148 @@ pub(super) fn reference(
 ) -> Result<Yardstick, Fault> {
     session.say(format!("{cell}: reference"));
     let start = Instant::now();
-    let settings = &session.experiment.reference;
-    let offset = Axis::Offset.default_name().unwrap_or_default();
-    let offset = Variant {
-        name: offset.to_owned(),
-        label: offset.to_owned(),
-        ..Variant::default()
-    };
-    let cell = cell.clone().with(Axis::Offset, &offset);
+    let cell = at_default_offset(cell);
     let key = Key::from(&cell);
     if session.reference_file.is_some() {
         return file_reference(session, world, &cell);
     }
-    let integrator = (session.registries.integrators).configured(&cell[Axis::Integrator]);
-    if let Some(value) = integrator.ok().and_then(|i| i.facts.exact) {
+    if let Some(value) = exact_value(session, &cell) {
         return exact_reference(session, world, &cell, value);
     }
-    let cell = (cell.with(Axis::Sequence, &settings.sequence))
-        .with(Axis::Decorrelation, &settings.decorrelation);
-    let spp = (settings.spp / REFERENCE_PARTS).max(1);
-    let estimator = Estimator::new(session, &cell, spp)?;
-    let seeds = session.experiment.seeds().reference_parts;
-    let renderer = estimator.renderer(session, world, traced, &seeds, [true, false])?;
-    let sampler = estimator.sampler.label();
-    let ran = Ran::kernel(renderer.kernel_hash());
-    let blank = Line::new(key, ran, ());
-    let words = bytemuck::cast_slice(estimator.sampler.table.words());
-    let points = format!("{sampler}, {spp} spp, {}", blake3::hash(words).to_hex());
-    let hash = reference_hash(session, world, &blank, &points);
-    let size = session.experiment.resolution;
-    let place = session
-        .options
-        .cache
-        .as_ref()
-        .and_then(|folder| Kept::new(folder, world, &hash, size, REFERENCE_PARTS as usize));
-    let kept = place.as_ref().and_then(Kept::read);
-    let cached = kept.is_some();
-    let parts = match kept {
-        Some(parts) => {
-            session.progress.inc(parts.len() as u64);
-            parts
-        }
-        None => rendered_parts(session, &renderer, spp, &seeds)?,
-    };
-    if let Some(Err(error)) = place.filter(|_| !cached).map(|place| place.write(&parts)) {
-        session.warn("reference", format!("is not kept for later runs: {error}"))?;
-    }
+    let rendered = rendered(session, world, traced, &cell, 0..REFERENCE_PARTS as usize)?;
+    let cached = rendered.parts.iter().all(|part| part.cached);
+    let parts = rendered.parts.into_iter().map(|part| part.image).collect();
     let reference = Reference::from_parts(parts).map_err(|e| e.to_string())?;
     let record = ReferenceRecord {
-        spp: spp * REFERENCE_PARTS,
+        spp: rendered.spp * REFERENCE_PARTS,
         cached,
-        sampler,
+        sampler: rendered.sampler,
         seconds: start.elapsed().as_secs_f64(),
         ..reference_record(&reference)
     };
-    let line = blank.with_body(|()| record);
+    let line = Line::new(key, Ran::kernel(rendered.kernel), record);
     Ok(finish_reference(
         session,
         world,
         &cell,
         line,
         reference,
-        rounding_bound(spp),
+        rounding_bound(rendered.spp),
     )?)
 }
 
-/// The independent parts of a reference.
-fn rendered_parts(
+/// Renders those of the parts of a reference that are not kept yet, of every so many one, and keeps them: how many were rendered. References
+/// that are known or read from a file have no parts.
+pub(super) fn keep_parts(
     session: &mut Session,
-    renderer: &Renderer,
+    world: &World,
+    traced: &Traced,
+    cell: &Cell,
+    wanted: impl Iterator<Item = usize>,
+) -> Result<usize, Fault> {
+    let cell = at_default_offset(cell);
+    if session.reference_file.is_some() || exact_value(session, &cell).is_some() {
+        return Ok(0);
+    }
+    let rendered = rendered(session, world, traced, &cell, wanted)?;
+    Ok(rendered.parts.iter().filter(|part| !part.cached).count())
+}
+
+fn at_default_offset(cell: &Cell) -> Cell {
+    let offset = Axis::Offset.default_name().unwrap_or_default();
+    let offset = Variant {
+        name: offset.to_owned(),
+        label: offset.to_owned(),
+        ..Variant::default()
+    };
+    cell.clone().with(Axis::Offset, &offset)
+}
+
+/// The value of every pixel, if the integrator knows it.
+fn exact_value(session: &Session, cell: &Cell) -> Option<f64> {
+    let integrators = &session.registries.integrators;
+    let integrator = integrators.configured(&cell[Axis::Integrator]).ok()?;
+    integrator.facts.exact
+}
+
+/// Parts of a reference, and what they were rendered with.
+struct Rendered {
+    parts: Vec<Part>,
+    /// Samples per pixel of a part.
     spp: u32,
-    seeds: &[u32],
-) -> Result<Vec<Image>, Fault> {
+    sampler: String,
+    /// Hash of the kernel.
+    kernel: String,
+}
+
+fn rendered(
+    session: &mut Session,
+    world: &World,
+    traced: &Traced,
+    cell: &Cell,
+    wanted: impl Iterator<Item = usize>,
+) -> Result<Rendered, Fault> {
+    let settings = &session.experiment.reference;
+    let key = Key::from(cell);
+    let cell = (cell.clone().with(Axis::Sequence, &settings.sequence))
+        .with(Axis::Decorrelation, &settings.decorrelation);
+    let spp = (settings.spp / REFERENCE_PARTS).max(1);
+    let estimator = Estimator::new(session, &cell, spp)?;
+    let seeds = session.experiment.seeds().reference_parts;
+    let renderer = estimator.renderer(session, world, traced, &seeds, [true, false])?;
+    let sampler = estimator.sampler.label();
+    let words = bytemuck::cast_slice(estimator.sampler.table.words());
+    let points = format!("{sampler}, {spp} spp, {}", blake3::hash(words).to_hex());
+    // Whatever structure the rays go through, the image is the same to the bit; the kernels are the program's, whose bytes are part of the
+    // place.
+    let hash = reference_hash(session, world, &Line::new(key, Ran::default(), ()), &points);
+    Ok(Rendered {
+        parts: parts(session, world, &renderer, (spp, &seeds, &hash), wanted)?,
+        spp,
+        sampler,
+        kernel: renderer.kernel_hash(),
+    })
+}
+
+/// An independent part of a reference: so many samples with a seed of its own.
+pub(super) struct Part {
+    pub image: Image,
+    /// Whether an earlier run rendered it.
+    pub cached: bool,
+}
+
+/// Those of the parts of a reference that are asked for, each kept on its own: runs that share a folder of kept references share the work,
+/// and the reference is the same to the bit whoever rendered which part.
+fn parts(
+    session: &mut Session,
+    world: &World,
+    renderer: &Renderer,
+    (spp, seeds, hash): (u32, &[u32], &str),
+    wanted: impl Iterator<Item = usize>,
+) -> Result<Vec<Part>, Fault> {
+    let size = session.experiment.resolution;
     let mut parts = Vec::new();
-    for &seed in seeds {
-        let shots = session.clock.time("gpu", || renderer.render(&[spp], seed));
-        let shots = shots.map_err(|e| e.to_string())?;
-        parts.extend(shots.into_iter().map(|s| s.image));
-        session.progress.inc(1);
+    for number in wanted {
+        let folder = session.options.cache.as_ref();
+        let name = format!("{hash}, part {number}");
+        let place = folder.and_then(|folder| Kept::new(folder, world, &name, size));
+        let kept = place.as_ref().and_then(Kept::read);
+        let cached = kept.is_some();
+        let image = match kept {
+            Some(image) => image,
+            None => {
+                let render = || renderer.render(&[spp], seeds[number]);
+                let shots = session.clock.time("gpu", render);
+                let shots = shots.map_err(|e| e.to_string())?;
+                let last = shots.into_iter().last();
+                last.ok_or("nothing was rendered".to_owned())?.image
+            }
+        };
+        if let Some(Err(error)) = place.filter(|_| !cached).map(|place| place.write(&image)) {
+            session.warn("reference", format!("is not kept for later runs: {error}"))?;
+        }
+        parts.push(Part { image, cached });
+        session.progress.add(session.weights.reference_part);
     }
     Ok(parts)
 }
@@ -173,7 +241,9 @@ fn reference_hash<B>(session: &Session, world: &World, line: &Line<B>, points: &
 fn file_reference(session: &mut Session, world: &World, cell: &Cell) -> Result<Yardstick, Fault> {
     let file = session.reference_file.as_ref();
     let file = file.ok_or_else(|| "no reference was read".to_owned())?;
-    session.progress.inc(u64::from(REFERENCE_PARTS));
+    session
+        .progress
+        .add(f64::from(REFERENCE_PARTS) * session.weights.reference_part);
     let reference = file.reference.clone();
     let record = ReferenceRecord {
         file: Some(file.name.clone()),
@@ -199,7 +269,9 @@ fn exact_reference(
     let reference = Image::new(width, height, pixels)
         .and_then(|image| Reference::from_parts(vec![image; REFERENCE_PARTS as usize]))
         .map_err(|e| e.to_string())?;
-    session.progress.inc(u64::from(REFERENCE_PARTS));
+    session
+        .progress
+        .add(f64::from(REFERENCE_PARTS) * session.weights.reference_part);
     let record = ReferenceRecord {
         exact: Some(value),
         ..reference_record(&reference)
@@ -248,13 +320,16 @@ fn finish_reference(
     session.compared("reference", &labels, reference.image(), &about)?;
     line.body.image = image.unwrap_or_default();
     let done = format!("reference {}: done", labels.join(", "));
+    session.note_kernels(&done);
+    let sampler = format!("{}, {} spp", line.body.sampler, line.body.spp);
+    let hash = reference_hash(session, world, &line, &sampler);
     if !session.is_done(&done) {
-        let sampler = format!("{}, {} spp", line.body.sampler, line.body.spp);
-        let hash = reference_hash(session, world, &line, &sampler);
-        session.write(&line.hashed(hash).with_body(Body::Reference))?;
-        session.finish(done);
+        session.write(&line.hashed(&hash).with_body(Body::Reference))?;
+        session.finish(done.clone());
     }
     Ok(Yardstick {
+        line: hash,
+        name: done,
         reference,
         rounding,
         exposure,

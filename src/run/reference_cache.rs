@@ -34,23 +34,15 @@ pub fn user_cache() -> Option<PathBuf> {
     Some(caches.join("raystone"))
 }
 
-/// Where one reference is, or will be, kept.
+/// Where a part of a reference is, or will be, kept.
 pub(super) struct Kept {
     path: PathBuf,
     size: [u32; 2],
-    parts: usize,
 }
 
 impl Kept {
-    /// The place of a reference of so many `parts`, known by `hash` and rendered in `world`; absent where the
-    /// program cannot be read.
-    pub fn new(
-        folder: &Path,
-        world: &World,
-        hash: &str,
-        size: [u32; 2],
-        parts: usize,
-    ) -> Option<Self> {
+    /// The place of a part that is known by `hash` and rendered in `world`; absent where the program cannot be read.
+    pub fn new(folder: &Path, world: &World, hash: &str, size: [u32; 2]) -> Option<Self> {
         let about = &world.gpu.info;
         let machine = format!("{:?}", (&about.name, &about.driver, &about.driver_info));
         let key = cell_hash(&[
@@ -58,44 +50,34 @@ impl Kept {
             ("machine", &machine),
             ("program", program()?),
         ]);
-        let path = folder.join("references").join(format!("{key}.parts"));
-        Some(Self { path, size, parts })
+        let path = folder.join("references").join(format!("{key}.part"));
+        Some(Self { path, size })
     }
 
-    /// The parts, if they are there and whole.
-    pub fn read(&self) -> Option<Vec<Image>> {
+    /// The part, if it is there and whole.
+    pub fn read(&self) -> Option<Image> {
         let bytes = fs::read(&self.path).ok()?;
         let (pixels, hash) = bytes.split_at_checked(bytes.len().checked_sub(HASH)?)?;
         let [width, height] = self.size;
-        let of_part = width as usize * height as usize * size_of::<[f32; 3]>();
-        if blake3::hash(pixels).as_bytes() != hash || pixels.len() != self.parts * of_part {
+        let whole = width as usize * height as usize * size_of::<[f32; 3]>();
+        if blake3::hash(pixels).as_bytes() != hash || pixels.len() != whole {
             return None;
         }
-        let image = |part: &[u8]| {
-            let pixels = part.chunks_exact(size_of::<[f32; 3]>());
-            let pixels = pixels.map(bytemuck::pod_read_unaligned).collect();
-            Image::new(width, height, pixels).ok()
-        };
-        let parts = pixels
-            .chunks_exact(of_part)
-            .map(image)
-            .collect::<Option<_>>();
+        let pixels = pixels.chunks_exact(size_of::<[f32; 3]>());
+        let pixels = pixels.map(bytemuck::pod_read_unaligned).collect();
         if let Ok(file) = File::options().append(true).open(&self.path) {
             // Which were used last is only a guess at which will be wanted.
             let _ = file.set_modified(SystemTime::now());
         }
-        parts
+        Image::new(width, height, pixels).ok()
     }
 
-    /// Keeps the parts, and lets go of what was not used for longest.
+    /// Keeps the part, and lets go of what was not used for longest.
     ///
     /// # Errors
     /// Those of the file system.
-    pub fn write(&self, parts: &[Image]) -> io::Result<()> {
-        let mut bytes = Vec::new();
-        for part in parts {
-            bytes.extend_from_slice(bytemuck::cast_slice(&part.pixels));
-        }
+    pub fn write(&self, part: &Image) -> io::Result<()> {
+        let mut bytes = bytemuck::cast_slice(&part.pixels).to_vec();
         let hash = blake3::hash(&bytes);
         bytes.extend_from_slice(hash.as_bytes());
         let folder = self.path.parent().unwrap_or(Path::new("."));
@@ -129,7 +111,7 @@ fn trim(folder: &Path, most: u64) -> io::Result<()> {
 }
 
 /// Hash of the program's file: host code makes tables that kernels read.
-fn program() -> Option<&'static str> {
+pub(super) fn program() -> Option<&'static str> {
     static PROGRAM: OnceLock<Option<String>> = OnceLock::new();
     let hash = || {
         let bytes = fs::read(std::env::current_exe().ok()?).ok()?;
@@ -142,34 +124,32 @@ fn program() -> Option<&'static str> {
 mod tests {
     use super::*;
 
-    fn kept(folder: &Path, name: &str, parts: usize) -> Kept {
+    fn kept(folder: &Path, name: &str, size: [u32; 2]) -> Kept {
         Kept {
             path: folder.join("references").join(name),
-            size: [3, 2],
-            parts,
+            size,
         }
     }
 
-    fn images(count: usize) -> Vec<Image> {
-        let image = |i: usize| Image::new(3, 2, vec![[i as f32, 0.5, f32::MIN_POSITIVE]; 6]);
-        (0..count).map(|i| image(i).unwrap()).collect()
+    fn image() -> Image {
+        Image::new(3, 2, vec![[1.5, 0.5, f32::MIN_POSITIVE]; 6]).unwrap()
     }
 
     #[test]
     fn what_is_kept_comes_back_to_the_bit_and_what_is_damaged_does_not() {
         let folder = tempfile::tempdir().unwrap();
-        let place = kept(folder.path(), "a.parts", 4);
+        let place = kept(folder.path(), "a.part", [3, 2]);
         assert!(place.read().is_none());
-        place.write(&images(4)).unwrap();
-        assert_eq!(place.read().unwrap(), images(4));
-        // Of another size or number.
-        assert!(kept(folder.path(), "a.parts", 3).read().is_none());
+        place.write(&image()).unwrap();
+        assert_eq!(place.read().unwrap(), image());
+        // Of another size.
+        assert!(kept(folder.path(), "a.part", [3, 3]).read().is_none());
         let whole = fs::read(&place.path).unwrap();
         for end in [0, 1, HASH, whole.len() - 1] {
             fs::write(&place.path, &whole[..end]).unwrap();
             assert!(place.read().is_none(), "{end} bytes");
         }
-        for at in [0, 100, whole.len() - 1] {
+        for at in [0, 50, whole.len() - 1] {
             let mut damaged = whole.clone();
             damaged[at] ^= 1;
             fs::write(&place.path, damaged).unwrap();
@@ -180,9 +160,9 @@ mod tests {
     #[test]
     fn what_was_not_used_for_longest_goes_first() {
         let folder = tempfile::tempdir().unwrap();
-        let places = ["a", "b", "c"].map(|name| kept(folder.path(), name, 1));
+        let places = ["a", "b", "c"].map(|name| kept(folder.path(), name, [3, 2]));
         for place in &places {
-            place.write(&images(1)).unwrap();
+            place.write(&image()).unwrap();
             std::thread::sleep(std::time::Duration::from_millis(20));
         }
         assert!(places[0].read().is_some());

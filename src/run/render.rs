@@ -159,7 +159,7 @@ pub fn render(
     rendering.samples_s = compiled.elapsed().as_secs_f64();
     rendering.non_finite_pixels = image.non_finite_pixels();
     rendering.total_s = start.elapsed().as_secs_f64();
-    session.progress.finish_and_clear();
+    session.progress.bar.finish_and_clear();
     Ok(rendering)
 }
 
@@ -192,9 +192,9 @@ fn add_all_samples(
     let style =
         ProgressStyle::with_template("{bar:32} {pos}/{len} spp · {elapsed} · about {eta} left");
     if let Ok(style) = style {
-        session.progress.set_style(style);
+        session.progress.bar.set_style(style);
     }
-    session.progress.set_length(u64::from(spp));
+    session.progress.bar.set_length(u64::from(spp));
     renderer.reset()?;
     let start = Instant::now();
     let (mut done, mut shown, mut last) = (0, 0, start);
@@ -204,7 +204,7 @@ fn add_all_samples(
         let step = step.min(spp - done);
         renderer.add_samples(done, step, seed)?;
         done += step;
-        session.progress.set_position(u64::from(done));
+        session.progress.bar.set_position(u64::from(done));
         let due = done >= 2 * shown && last.elapsed() >= REFRESH;
         if shown == 0 || due || done == spp {
             let image = renderer.image()?;

@@ -1,18 +1,24 @@
 //! What lives as long as a run: records, clock, progress, cells already done.
 
+use super::estimate::Estimate;
 use super::folder::Folder;
+use super::inputs::{Current, kernel_set, place};
+use super::kernels::{Device, Kernels};
+use super::progress::{Progress, Weights, expect};
 use super::reference_file::ReferenceFile;
+use super::resume::{Earlier, Kept};
 use super::{RunError, RunOptions};
-use crate::config::{Axis, Experiment, Plan, REFERENCE_PARTS, Skipped};
-use crate::gpu::Environment;
+use crate::config::{Axis, Cell, Experiment, Plan, Skipped, Unit, UnitKind, shards, unit_name};
 use crate::gpu::Gpu;
+use crate::gpu::{Environment, MachineLoad};
 use crate::image::{Attribute, FileFormat, Image, ImageError, Picture, write_png};
 use crate::measure::record::{
-    Body, FinishedRecord, KernelFolder, Line, RunRecord, SkippedRecord, axis,
+    Body, CellRecord, FinishedRecord, KernelFolder, Line, Outcome, RunRecord, SkippedRecord, axis,
+    text_of,
 };
+use crate::params::Variant;
 use crate::text::cell_hash;
-use indicatif::{ProgressBar, ProgressStyle};
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
@@ -50,7 +56,9 @@ pub(super) struct Session<'a> {
     pub registries: &'a super::Registries,
     pub options: &'a RunOptions,
     pub clock: Clock,
-    pub progress: ProgressBar,
+    pub progress: Progress,
+    /// Expected times of its steps.
+    pub weights: Weights,
     pub failed: usize,
     pub skipped: usize,
     /// Whether a scene could not be loaded.
@@ -59,8 +67,24 @@ pub(super) struct Session<'a> {
     pub trial: super::trial::Trial,
     /// Cells that need longer loops than the driver runs, with the reason.
     pub refused: BTreeMap<String, String>,
-    /// Cells that have their record: not run again after a lost device.
+    /// Cells that are not measured: they have their record (and are not run again after a lost device), or another shard has them.
     done: HashSet<String>,
+    /// Units that failed in this run: nothing else is measured through them.
+    unusable: HashSet<String>,
+    /// The units of the plan, in its order.
+    pub units: Arc<Vec<Unit>>,
+    /// Place of each unit by its name.
+    places: HashMap<String, usize>,
+    /// What cells depend on.
+    pub current: Option<Current<'a>>,
+    /// Modules of kernels that were used for a unit, or for something that several share.
+    used: BTreeMap<String, BTreeMap<String, String>>,
+    /// Kernel sets that are recorded.
+    sets: HashSet<String>,
+    /// The device that kernels run on.
+    gpu: Option<Gpu>,
+    /// Hashes of the lines that judge an integrator.
+    pub judged_lines: BTreeMap<String, String>,
     /// Samplers whose words were compared with the twin's.
     pub compared: HashSet<String>,
     /// What images are compared with, if it is not rendered.
@@ -82,12 +106,220 @@ impl<'a> Session<'a> {
         options: &'a RunOptions,
     ) -> Result<Self, RunError> {
         let reference_file = ReferenceFile::load(experiment)?;
-        let folder = Arc::new(Folder::open(&options.out, options.existing)?);
+        let folder = Arc::new(Folder::open(&options.out, options.existing, options.wait)?);
         options.interrupt.begin(&folder);
         let mut session = Self::unrecorded(experiment, plan, registries, options);
         session.folder = Some(folder);
         session.reference_file = reference_file;
         Ok(session)
+    }
+
+    /// The lines of the run that is resumed.
+    pub fn take_earlier(&self) -> Earlier {
+        let lines = self.folder.as_ref().map(|folder| folder.take_earlier());
+        Earlier::new(lines.unwrap_or_default())
+    }
+
+    /// Leaves the folder as it was.
+    pub fn abandon(&self) {
+        if let Some(folder) = &self.folder {
+            folder.abandon();
+        }
+    }
+
+    /// The content of a scene that was loaded.
+    pub fn note_scene(&mut self, scene: &Variant, hash: &str) {
+        if let Some(current) = &mut self.current {
+            let hash = Ok(hash.to_owned());
+            current.scenes.insert(scene.label.clone(), hash);
+        }
+    }
+
+    /// How many units are left to be measured beside those that are kept.
+    pub fn open_beside(&self, kept: &Kept) -> usize {
+        let names: HashSet<&str> = kept.cells.iter().map(|cell| cell.unit.as_str()).collect();
+        let open = self.open_units();
+        open.filter(|unit| !names.contains(unit.name.as_str()))
+            .count()
+    }
+
+    /// Takes over what still holds of an earlier run on this device, and writes the first line of this one: how many cells hold.
+    pub fn begin(
+        &mut self,
+        device: &Device,
+        kernels: &Kernels,
+        (earlier, mut current): (&Earlier, Current<'a>),
+    ) -> Result<usize, RunError> {
+        self.use_device(&device.gpu);
+        let environment = crate::gpu::capture(&device.gpu);
+        current.device = Some(place(&environment));
+        let kept = earlier.kept(&self.units, &current);
+        let count = kept.cells.len();
+        for (unit, why) in &kept.stale {
+            self.tell_progress(&format!("{unit}: again, {why}"));
+        }
+        self.current = Some(current);
+        self.take_over(kept)?;
+        expect(self);
+        self.write_start(environment, kernels.folders())?;
+        Ok(count)
+    }
+
+    /// Fails all units that are not measured yet and that `is_one`, for one reason, which is told once.
+    pub fn fail_all(
+        &mut self,
+        about: &str,
+        is_one: impl Fn(&Unit) -> bool,
+        reason: String,
+    ) -> Result<(), RunError> {
+        self.write_failure(about, reason.clone())?;
+        let open = self.open_units().filter(|unit| is_one(unit));
+        let names: Vec<String> = open.map(|unit| unit.name.clone()).collect();
+        for name in names {
+            self.close(&name, (Outcome::Failed, &reason), Vec::new(), &[])?;
+        }
+        Ok(())
+    }
+
+    /// Leaves out all units of a world that are not measured yet, for one reason, which is told once.
+    pub fn leave_out(&mut self, world: &Cell, reason: String) -> Result<(), RunError> {
+        let skipped = self.plan.all_on(world, reason.clone());
+        self.skipped += skipped.cells;
+        let hash = cell_hash(&[("left out", &skipped.cell), ("reason", &reason)]);
+        let record = SkippedRecord {
+            cell: skipped.cell,
+            reason: skipped.reason,
+        };
+        self.write(&Line::about_all(Body::Skipped(record)).hashed(&hash))?;
+        let open = self.open_units().filter(|unit| unit.cell.is_on(world));
+        let names: Vec<String> = open.map(|unit| unit.name.clone()).collect();
+        for name in names {
+            let lines = vec![hash.clone()];
+            self.close(&name, (Outcome::LeftOut, &reason), lines, &[])?;
+        }
+        Ok(())
+    }
+
+    /// Takes over what still holds of an earlier run.
+    fn take_over(&mut self, kept: Kept) -> Result<(), RunError> {
+        for line in &kept.lines {
+            if let Body::Kernels(set) = &line.body {
+                self.sets.insert(set.id.clone());
+            }
+        }
+        let text = text_of(&kept.lines).map_err(unwritable)?;
+        if let (Some(folder), false) = (&self.folder, text.is_empty()) {
+            folder.append(&text)?;
+        }
+        for cell in kept.cells {
+            if cell.outcome == Outcome::LeftOut {
+                self.skipped += 1;
+                self.refused.insert(cell.unit.clone(), cell.reason);
+                self.unusable.insert(cell.unit.clone());
+            }
+            self.done.insert(cell.unit);
+        }
+        Ok(())
+    }
+
+    /// Leaves all units to others that are not of the shard of the options.
+    pub fn keep_shard(&mut self) {
+        let Some(shard) = self.options.shard else {
+            return;
+        };
+        let units = Arc::clone(&self.units);
+        let estimate = Estimate::new(self.experiment, self.plan, self.registries);
+        let numbers = shards(&units, shard.of, |unit| estimate.seconds_of(unit));
+        for (unit, number) in units.iter().zip(numbers) {
+            if number != shard.number {
+                self.done.insert(unit.name.clone());
+            }
+        }
+    }
+
+    /// The units that are not measured yet.
+    pub fn open_units(&self) -> impl Iterator<Item = &Unit> {
+        self.units.iter().filter(|unit| !self.is_done(&unit.name))
+    }
+
+    /// Whether a unit of the plan is not measured yet.
+    pub fn is_open(&self, kind: UnitKind, cell: &Cell) -> bool {
+        !self.is_done(&unit_name(kind, cell))
+    }
+
+    /// Whether a unit failed, or cannot be measured here.
+    pub fn is_unusable(&self, name: &str) -> bool {
+        self.unusable.contains(name)
+    }
+
+    /// Kernels run on this device from now on.
+    pub fn use_device(&mut self, gpu: &Gpu) {
+        self.gpu = Some(gpu.clone());
+    }
+
+    /// Counts the kernels that were asked for since the last call as used for this: a unit, or something that several share.
+    pub fn note_kernels(&mut self, used_for: &str) {
+        let modules = self.gpu.as_ref().map(Gpu::take_modules).unwrap_or_default();
+        if !modules.is_empty() {
+            let used = self.used.entry(used_for.to_owned()).or_default();
+            used.extend(modules);
+        }
+    }
+
+    /// A unit ended, and all its lines are written: those of these hashes. What was noted for `shared` counts for it, too.
+    pub fn close(
+        &mut self,
+        name: &str,
+        (outcome, reason): (Outcome, &str),
+        lines: Vec<String>,
+        shared: &[&str],
+    ) -> Result<(), RunError> {
+        self.note_kernels(name);
+        self.finish(name.to_owned());
+        if outcome != Outcome::Done {
+            self.unusable.insert(name.to_owned());
+        }
+        let units = Arc::clone(&self.units);
+        let unit = self.places.get(name).and_then(|place| units.get(*place));
+        let (Some(unit), Some(current)) = (unit, &self.current) else {
+            return Ok(());
+        };
+        let mut inputs = current.inputs(unit);
+        let mut modules = self.used.remove(name).unwrap_or_default();
+        for other in shared.iter().filter_map(|name| self.used.get(*name)) {
+            modules.extend(other.clone());
+        }
+        if !modules.is_empty() {
+            let kernels = &unit.cell[Axis::Kernels];
+            let label = match kernels.name.is_empty() {
+                true => "",
+                false => &kernels.label,
+            };
+            let set = kernel_set(label, modules);
+            inputs.kernels.clone_from(&set.id);
+            if self.sets.insert(set.id.clone()) {
+                self.write(&Line::about_all(Body::Kernels(set)))?;
+            }
+        }
+        let record = CellRecord {
+            unit: name.to_owned(),
+            outcome,
+            reason: reason.to_owned(),
+            inputs,
+            lines,
+        };
+        self.write(&Line::about_all(Body::Cell(record)))?;
+        let word = match outcome {
+            Outcome::Done => "done",
+            Outcome::Failed => "failed",
+            Outcome::LeftOut => "left out",
+        };
+        let between = if reason.is_empty() { "" } else { ": " };
+        self.log(&format!("{name}: {word}{between}{reason}"));
+        if outcome == Outcome::Failed && self.options.fail_fast {
+            return Err(RunError::Wrong(format!("{name} failed: {reason}")));
+        }
+        Ok(())
     }
 
     /// A session that writes nothing.
@@ -97,22 +329,25 @@ impl<'a> Session<'a> {
         registries: &'a super::Registries,
         options: &'a RunOptions,
     ) -> Self {
-        let progress = if options.progress {
-            ProgressBar::new(steps(experiment, plan))
-        } else {
-            ProgressBar::hidden()
-        };
-        let style = ProgressStyle::with_template(
-            "{bar:32} {pos}/{len} · {elapsed} · about {eta} left · {wide_msg}",
-        );
-        progress.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let units = plan.units(experiment);
+        let places = units.iter().enumerate();
+        let places = places.map(|(place, unit)| (unit.name.clone(), place));
         Self {
+            places: places.collect(),
+            units: Arc::new(units),
+            unusable: HashSet::new(),
+            current: None,
+            used: BTreeMap::new(),
+            sets: HashSet::new(),
+            gpu: None,
+            judged_lines: BTreeMap::new(),
             experiment,
             plan,
             registries,
             options,
             clock: Clock::new(),
-            progress,
+            progress: Progress::new(options),
+            weights: Weights::default(),
             failed: 0,
             skipped: 0,
             bad_input: false,
@@ -139,8 +374,7 @@ impl<'a> Session<'a> {
         let Some(folder) = &self.folder else {
             return Ok(());
         };
-        let mut text = serde_json::to_string(line)
-            .map_err(|e| RunError::Input(format!("a record cannot be written: {e}")))?;
+        let mut text = serde_json::to_string(line).map_err(unwritable)?;
         text.push('\n');
         folder.append(&text)
     }
@@ -155,15 +389,23 @@ impl<'a> Session<'a> {
         })))
     }
 
+    /// Writes a line to the log of the run. A log that cannot be written is no reason to end.
+    pub fn log(&self, text: &str) {
+        if let Some(folder) = &self.folder {
+            folder.log(text);
+        }
+    }
+
     /// Hands a warning on, above the progress bar.
     pub fn tell_warning(&self, text: &str) {
+        self.log(&format!("warning: {text}"));
         if let Some(tell) = self.options.warn {
-            self.progress.suspend(|| tell(text));
+            self.progress.bar.suspend(|| tell(text));
         }
     }
 
     /// The first record.
-    pub fn write_start(
+    fn write_start(
         &mut self,
         environment: Environment,
         kernels: Vec<KernelFolder>,
@@ -180,6 +422,9 @@ impl<'a> Session<'a> {
             renders_full_product: self.plan.renders_full_product(),
             renders_planned: self.plan.renders_planned(),
             kernels,
+            overrides: self.experiment.overrides.clone(),
+            only: self.plan.only.clone(),
+            shard: self.options.shard.map(|shard| shard.to_string()),
             figures: self.registries.figures.rows().cloned().collect(),
             lenient: self.options.lenient,
         };
@@ -202,13 +447,15 @@ impl<'a> Session<'a> {
 
     /// Records a cell that needs longer loops than the driver runs.
     pub fn write_refused(&mut self, cell: String, reason: String) -> Result<(), RunError> {
-        self.finish(cell.clone());
         self.refused.insert(cell.clone(), reason.clone());
-        self.write_skipped(&Skipped {
-            cell,
-            reason,
-            cells: 1,
-        })
+        self.skipped += 1;
+        let hash = cell_hash(&[("left out", &cell), ("reason", &reason)]);
+        let record = SkippedRecord {
+            cell: cell.clone(),
+            reason: reason.clone(),
+        };
+        self.write(&Line::about_all(Body::Skipped(record)).hashed(&hash))?;
+        self.close(&cell, (Outcome::LeftOut, &reason), vec![hash], &[])
     }
 
     /// The last record; puts the results in their place, and tells where that is.
@@ -222,14 +469,23 @@ impl<'a> Session<'a> {
             overhead_s,
             failed: self.failed,
             skipped: self.skipped,
+            load: MachineLoad::now(),
         };
-        self.progress.finish_and_clear();
+        self.progress.bar.finish_and_clear();
         self.write(&Line::about_all(Body::Finished(record)))?;
         let Some(folder) = &self.folder else {
             return Ok(self.options.out.clone());
         };
         folder.finish()?;
         Ok(folder.out().to_owned())
+    }
+
+    /// Ends the run here if somebody asked for it.
+    pub fn go_on(&self) -> Result<(), RunError> {
+        match self.options.interrupt.is_asked() {
+            true => Err(RunError::Interrupted),
+            false => Ok(()),
+        }
     }
 
     /// Whether a cell has its record.
@@ -245,17 +501,28 @@ impl<'a> Session<'a> {
     /// Records a cell that failed without a record of its own kind.
     pub fn write_failure(&mut self, cell: &str, reason: String) -> Result<(), RunError> {
         self.failed += 1;
-        self.finish(cell.to_owned());
-        let cell = cell.to_owned();
-        self.write(&Line::about_all(Body::Failed(SkippedRecord {
-            cell,
-            reason,
-        })))
+        let hash = cell_hash(&[("failed", cell), ("reason", &reason)]);
+        let record = SkippedRecord {
+            cell: cell.to_owned(),
+            reason: reason.clone(),
+        };
+        self.write(&Line::about_all(Body::Failed(record)).hashed(&hash))?;
+        self.close(cell, (Outcome::Failed, &reason), vec![hash], &[])
+    }
+
+    /// Tells how the run goes on: above the progress bar, or as a line.
+    pub fn tell_progress(&self, text: &str) {
+        self.log(text);
+        if let Some(tell) = self.options.tell {
+            self.progress.bar.suspend(|| tell(text));
+        }
     }
 
     /// Shows what is being done.
     pub fn say(&self, message: impl Into<String>) {
-        self.progress.set_message(message.into());
+        let message = message.into();
+        self.log(&message);
+        self.progress.say(message);
     }
 
     /// Writes a picture of this kind, of what the labels name: its path relative to the run's folder. One that
@@ -331,18 +598,8 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Progress steps that loading and judging a scene count for: as long as so many timed rounds, roughly.
-pub(super) const SCENE_STEPS: u64 = 20;
-
-/// Rough number of progress steps: scenes, builds and gates, compiled and timed cells, renders, streams.
-fn steps(experiment: &Experiment, plan: &Plan) -> u64 {
-    let rounds = u64::from(experiment.timing.rounds) + 1;
-    let structures = plan.structures.len() as u64 * (2 + 5 * rounds);
-    let times = (plan.times.len() + plan.compactions.len()) as u64 * (1 + rounds);
-    let worlds: usize = plan.scenes.iter().map(|s| plan.worlds(s).len()).sum();
-    let scenes = worlds as u64 * SCENE_STEPS;
-    let references = worlds * experiment.axes[Axis::Integrator].len() * REFERENCE_PARTS as usize;
-    scenes + structures + times + (plan.renders_planned() + references + plan.streams.len()) as u64
+fn unwritable(error: serde_json::Error) -> RunError {
+    RunError::Input(format!("a record cannot be written: {error}"))
 }
 
 /// Content hash of the cell of a line: its key, the bytes of its scene, the kernels that ran, and what else

@@ -8,7 +8,7 @@ use crate::config::{Axis, Cell, is_compaction};
 use crate::discrepancy::{Budget, PointSet, radial_spectrum, star_2d};
 use crate::gpu::Gpu;
 use crate::measure::record::{
-    Body, Key, Line, PixelsAtCount, Ran, RecordedPoints, SamplerCostRecord, StreamRecord,
+    Body, Key, Line, Outcome, PixelsAtCount, Ran, RecordedPoints, SamplerCostRecord, StreamRecord,
 };
 use crate::measure::sampler_cost::sampler_cost;
 use crate::measure::stream::{COPIES, SeedFigures, coverage, neighbour_angle, over_seeds};
@@ -55,29 +55,38 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
         if session.is_done(&cell.to_string()) {
             continue;
         }
+        session.go_on()?;
         let gpu = device.of(&cell[Axis::Kernels])?;
         session.say(format!("discrepancy of {cell}"));
         session.lose_device_on_request(gpu, &cell.to_string());
-        for pair in pairs(session, gpu, &cell)? {
+        let mut written = Written::default();
+        for pair in pairs(session, gpu, &cell, &mut written)? {
+            let what = format!("{:?}", pair.dimensions);
             match stream_record(session, gpu, &cell, pair) {
                 Ok((kernel, record)) => {
-                    let what = format!("{:?}", pair.dimensions);
-                    session.write(&line(&cell, kernel, &what, Body::Stream(record)))?;
+                    let line = line(&cell, kernel, &what, Body::Stream(record));
+                    written.line(session, &line)?;
                 }
-                Err(reason) => session
-                    .write_failure(&format!("stream {cell}, {:?}", pair.dimensions), reason)?,
+                Err(reason) => {
+                    written.failure(session, format!("stream {cell}, {what}"), reason)?
+                }
             }
         }
         if gpu.lost().is_none() {
             match cost_record(session, gpu, &cell) {
                 Ok((record, kernel)) => {
-                    session.write(&line(&cell, kernel, "cost", Body::SamplerCost(record)))?;
+                    let line = line(&cell, kernel, "cost", Body::SamplerCost(record));
+                    written.line(session, &line)?;
                 }
-                Err(reason) => session.write_failure(&format!("cost of {cell}"), reason)?,
+                Err(reason) => written.failure(session, format!("cost of {cell}"), reason)?,
             }
         }
-        session.finish(cell.to_string());
-        session.progress.inc(1);
+        let ended = match &written.failure {
+            Some(reason) => (Outcome::Failed, reason.as_str()),
+            None => (Outcome::Done, ""),
+        };
+        session.close(&cell.to_string(), ended, written.hashes, &[])?;
+        session.progress.add(session.weights.stream);
         if gpu.lost().is_some() {
             return Ok(());
         }
@@ -85,8 +94,37 @@ pub(super) fn run(session: &mut Session, device: &Device) -> Result<(), RunError
     Ok(())
 }
 
+/// What was written of a stream.
+#[derive(Default)]
+struct Written {
+    hashes: Vec<String>,
+    failure: Option<String>,
+}
+
+impl Written {
+    fn line(&mut self, session: &Session, line: &Line) -> Result<(), RunError> {
+        self.hashes.push(line.hash.clone());
+        session.write(line)
+    }
+
+    fn failure(
+        &mut self,
+        session: &mut Session,
+        what: String,
+        reason: String,
+    ) -> Result<(), RunError> {
+        self.failure.get_or_insert_with(|| reason.clone());
+        session.write_failure(&what, reason)
+    }
+}
+
 /// The pairs of the experiment and the worst of those that its integrators draw.
-fn pairs(session: &mut Session, gpu: &Gpu, cell: &Cell) -> Result<Vec<Pair>, RunError> {
+fn pairs(
+    session: &mut Session,
+    gpu: &Gpu,
+    cell: &Cell,
+    written: &mut Written,
+) -> Result<Vec<Pair>, RunError> {
     let named = |&dimensions: &[u32; 2]| Pair {
         dimensions,
         named: true,
@@ -99,7 +137,7 @@ fn pairs(session: &mut Session, gpu: &Gpu, cell: &Cell) -> Result<Vec<Pair>, Run
         // The named pairs fail for the same reason.
         Err(_) if gpu.lost().is_some() => None,
         Err(reason) => {
-            session.write_failure(&format!("worst pair of {cell}"), reason)?;
+            written.failure(session, format!("worst pair of {cell}"), reason)?;
             None
         }
     };

@@ -83,16 +83,18 @@ pub(super) fn time_all(
                 Err(error) => failures[structure] = Some(error.to_string()),
             }
         }
+        session.note_kernels(&one.cell.to_string());
     }
     let rivals = peers::build(session, world);
     let (cast, refused) = peers::batches(&rivals, world);
+    session.note_kernels("peers");
     let timing = session.experiment.timing;
     let seed = u64::from(session.experiment.seed);
-    let progress = session.progress.clone();
+    let (progress, weight) = (session.progress.clone(), session.weights.rays);
     let ours = timed.iter().map(|item| item as &dyn Measured);
     let all: Vec<&dyn Measured> = ours.chain(cast.iter().map(|item| item as _)).collect();
     let mut samples = match session.clock.time("gpu", || {
-        interleave(&all, &timing, seed, || progress.inc(1))
+        interleave(&all, &timing, seed, || progress.add(weight))
     }) {
         Ok(samples) => samples,
         Err((index, error)) => {
@@ -112,6 +114,7 @@ pub(super) fn time_all(
             Err(fault) => failures[item.structure] = Some(fault.of_cell()?),
         }
         one.record.ran.features = item.batch.tracer().features();
+        session.note_kernels(&one.cell.to_string());
     }
     let mut kept = Vec::new();
     for (mut one, failure) in gated.into_iter().zip(failures) {
@@ -207,6 +210,7 @@ pub(super) fn draw_heat_maps(
                 &rays,
             )
         });
+        session.note_kernels(&structure.cell.to_string());
         let Ok(Some(work)) = work else { continue };
         structure.costs = vec![0.0; rays.len()];
         for (pixel, counters) in pixels.iter().zip(&work) {

@@ -6,11 +6,11 @@ use super::structure_times::{draw_heat_maps, time_all};
 use super::world::World;
 use crate::accel::tracer::kernel_hash;
 use crate::accel::{AccelError, BuildLog, BuiltAccel, Space, StructureStats, Traced};
-use crate::config::{Axis, Cell};
+use crate::config::{Axis, Cell, Unit, UnitKind};
 use crate::gpu::{Gpu, GpuError};
 use crate::measure::gate::{fault_text, gate};
 use crate::measure::memory::peak_bytes;
-use crate::measure::record::{Body, GateVerdict, Key, Line, Ran, StructureRecord};
+use crate::measure::record::{Body, GateVerdict, Key, Line, Outcome, Ran, StructureRecord};
 use std::time::Instant;
 
 /// A structure that passed its gate.
@@ -222,20 +222,29 @@ fn empty_record(cell: &Cell, runtime_checks: bool) -> Line<StructureRecord> {
 /// Everything about the structures of a world; returns those that may be used further.
 pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, RunError> {
     let cells = session.plan.structures.iter();
-    let cells: Vec<Cell> = cells.filter(|c| c.is_on(&world.cell)).cloned().collect();
-    let mut gated = Vec::new();
+    let mut cells: Vec<Cell> = cells.filter(|c| c.is_on(&world.cell)).cloned().collect();
+    // What nothing else serves comes last, so that it is known whether it is needed.
+    cells.sort_by_key(|cell| !is_needed(session, world, cell));
+    let mut gated: Vec<Gated> = Vec::new();
     // The last structure that was built: it serves all workgroups and kernels.
     let mut last: Option<Candidate> = None;
     for cell in cells {
-        if session.is_done(&cell.to_string()) && !session.is_done(&passed(&cell)) {
+        let name = cell.to_string();
+        let is_wanted = is_needed(session, world, &cell) || carries(session, world, &cell, &gated);
+        if session.is_unusable(&name) || !is_wanted {
             continue;
         }
+        // What was judged so far is still timed.
+        if session.go_on().is_err() {
+            break;
+        }
         session.say(format!("{cell}: build and gate"));
-        session.lose_device_on_request(world.gpu, &cell.to_string());
+        session.lose_device_on_request(world.gpu, &name);
         // What cannot serve goes before the next is built.
         let same = (last.take()).filter(|other| other.cell[Axis::Accel] == cell[Axis::Accel]);
         let built = same.unwrap_or_else(|| build(session, world, &cell));
         let outcome = gate_with(session, world, built.clone(), &cell)?;
+        session.note_kernels(&name);
         last = Some(built);
         match outcome.traced {
             Some(traced) => gated.push(Gated {
@@ -246,37 +255,59 @@ pub(super) fn run(session: &mut Session, world: &World) -> Result<Vec<Gated>, Ru
                 cell,
                 costs: Vec::new(),
             }),
+            None if session.is_done(&name) => {}
             None => write_failed(session, world, &cell, outcome.record)?,
         }
-        session.progress.inc(2);
+        session.progress.add(session.weights.gate);
         if world.gpu.lost().is_some() {
             return Ok(Vec::new());
         }
     }
     drop(last);
-    let gated = time_all(session, world, gated)?;
-    let mut gated = draw_heat_maps(session, world, gated)?;
+    // Those whose record is there serve others, and are not timed again.
+    let is_open = |g: &Gated| session.is_open(UnitKind::Structure, &g.cell);
+    let (open, mut usable): (Vec<_>, Vec<_>) = gated.into_iter().partition(is_open);
+    let timed = time_all(session, world, open)?;
+    let mut timed = draw_heat_maps(session, world, timed)?;
     if let Some(settings) = session.experiment.coherence.clone() {
-        for structure in &mut gated {
+        for structure in &mut timed {
             let modelled = super::coherence::of_recorded_rays(session, world, structure, &settings);
             // Why there is none is told of its cells.
             structure.record.body.coherence = modelled.ok();
         }
     }
-    for structure in &gated {
-        let cell = structure.cell.to_string();
-        if !session.is_done(&cell) {
-            session.write(&structure.record.clone().with_body(Body::Structure))?;
-            session.finish(cell);
-            session.finish(passed(&structure.cell));
-        }
+    for structure in &timed {
+        session.write(&structure.record.clone().with_body(Body::Structure))?;
+        let lines = vec![structure.record.hash.clone()];
+        session.close(&structure.cell.to_string(), (Outcome::Done, ""), lines, &[])?;
     }
-    Ok(gated)
+    usable.append(&mut timed);
+    Ok(usable)
 }
 
-/// Marks a structure that passed: it is built again after a lost device.
-fn passed(cell: &Cell) -> String {
-    format!("{cell}: passed")
+/// Whether something that is not measured yet is of this structure.
+fn is_needed(session: &Session, world: &World, cell: &Cell) -> bool {
+    let mut open = session
+        .open_units()
+        .filter(|unit| unit.cell.is_on(&world.cell));
+    open.any(|unit| match unit.kind {
+        UnitKind::Structure | UnitKind::Animation => unit.cell == *cell,
+        UnitKind::Time | UnitKind::Coherence => unit.cell.is_on(cell),
+        _ => false,
+    })
+}
+
+/// Whether a sampler that is not measured yet has nothing else to be rendered through. Hits are equal to the bit in
+/// every structure, so that any will do.
+fn carries(session: &Session, world: &World, cell: &Cell, gated: &[Gated]) -> bool {
+    let kernels = &cell[Axis::Kernels];
+    let serves = |g: &Gated| g.cell[Axis::Kernels] == *kernels && g.traced.is_inline();
+    let mut open = session
+        .open_units()
+        .filter(|unit| unit.cell.is_on(&world.cell));
+    let needs =
+        |unit: &Unit| unit.kind == UnitKind::Sampler && unit.cell[Axis::Kernels] == *kernels;
+    !gated.iter().any(serves) && open.any(needs)
 }
 
 fn hashed(world: &World, record: Line<StructureRecord>) -> Line<StructureRecord> {
@@ -294,6 +325,10 @@ pub(super) fn write_failed(
         return session.write_refused(cell.to_string(), record.body.failure.unwrap_or_default());
     }
     session.failed += 1;
-    session.finish(cell.to_string());
-    session.write(&hashed(world, record).with_body(Body::Structure))
+    let reason = record.body.failure.clone().unwrap_or_default();
+    let record = hashed(world, record);
+    let lines = vec![record.hash.clone()];
+    session.write(&record.with_body(Body::Structure))?;
+    let failed = (Outcome::Failed, &*reason);
+    session.close(&cell.to_string(), failed, lines, &[])
 }

@@ -12,9 +12,10 @@ use crate::accel::Space;
 use crate::config::{Axis, Cell};
 use crate::gpu::{Elapsed, GpuError, slow_slice};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer, TRACED_CLASSES};
-use crate::measure::record::{Body, Key, Line, Ran, TimeRecord};
+use crate::measure::record::{Body, Key, Line, Outcome, Ran, TimeRecord};
 use crate::measure::statistics::{median, median_interval};
 use crate::measure::timing::{Measured, Samples, Watch, interleave};
+use crate::text::cell_hash;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
@@ -66,7 +67,10 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     let cells = cells.filter(|c| c.is_on(&world.cell) && !session.is_done(&c.to_string()));
     let mut timed = Vec::new();
     for cell in cells.cloned().collect::<Vec<_>>() {
+        session.go_on()?;
+        let name = cell.to_string();
         timed.extend(prepare(session, world, gated, cell)?);
+        session.note_kernels(&name);
         if world.gpu.lost().is_some() {
             return Ok(());
         }
@@ -74,9 +78,9 @@ pub(super) fn run(session: &mut Session, world: &World, gated: &[Gated]) -> Resu
     session.say(format!("{}: timing full cells", world.cell));
     let timing = session.experiment.timing;
     let seed = u64::from(session.experiment.seed);
-    let progress = session.progress.clone();
+    let (progress, weight) = (session.progress.clone(), session.weights.image);
     let samples = session.clock.time("gpu", || {
-        interleave(&timed, &timing, seed, || progress.inc(1))
+        interleave(&timed, &timing, seed, || progress.add(weight))
     });
     let samples = match samples {
         Ok(samples) => samples,
@@ -138,7 +142,7 @@ fn prepare<'a>(
         }
     }
     let compiled = compile(session, world, structure, cell.clone());
-    session.progress.inc(1);
+    session.progress.add(session.weights.compile);
     match compiled {
         Ok(item) => Ok(Some(item)),
         Err(reason) => fail(session, &cell, reason).map(|()| None),
@@ -153,9 +157,21 @@ fn write(
 ) -> Result<(), RunError> {
     let device = format!("{:?}", world.gpu.info);
     let hash = content_hash(&record, &world.scene.hash, &[("device", &device)]);
-    session.failed += usize::from(record.body.failure.is_some());
-    session.finish(item.cell.to_string());
-    session.write(&record.hashed(hash).with_body(Body::Time))
+    let failure = record.body.failure.clone();
+    session.failed += usize::from(failure.is_some());
+    session.write(&record.hashed(&hash).with_body(Body::Time))?;
+    let ended = match &failure {
+        Some(reason) => (Outcome::Failed, reason.as_str()),
+        None => (Outcome::Done, ""),
+    };
+    let mut lines = vec![hash];
+    lines.extend(
+        session
+            .judged_lines
+            .get(&paths::key(world, &item.cell))
+            .cloned(),
+    );
+    session.close(&item.cell.to_string(), ended, lines, &[])
 }
 
 /// Why the driver cannot run the structure of a cell, if that is so.
@@ -357,7 +373,9 @@ fn empty_record(session: &Session, cell: &Cell, failure: String) -> Line<TimeRec
 
 fn fail(session: &mut Session, cell: &Cell, reason: String) -> Result<(), RunError> {
     session.failed += 1;
-    session.finish(cell.to_string());
-    let record = empty_record(session, cell, reason);
-    session.write(&record.with_body(Body::Time))
+    let record = empty_record(session, cell, reason.clone());
+    let name = cell.to_string();
+    let hash = cell_hash(&[("failed", &name), ("reason", &reason)]);
+    session.write(&record.hashed(&hash).with_body(Body::Time))?;
+    session.close(&name, (Outcome::Failed, &reason), vec![hash], &[])
 }

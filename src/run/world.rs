@@ -79,6 +79,7 @@ impl Loaded {
         let own = || scene.view(session.experiment.aspect());
         let camera = session.experiment.camera.unwrap_or_else(own);
         camera.validate().map_err(|e| e.to_string())?;
+        session.note_scene(variant, &scene.hash);
         let cell = format!("scene {variant}");
         if !session.is_done(&cell) {
             for line in scene.report.lines() {

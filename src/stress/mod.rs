@@ -184,7 +184,7 @@ fn first_record(gpu: &Gpu, settings: &StressOptions, exact: bool) -> SuiteRecord
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     SuiteRecord {
         started_unix_s: now.map_or(0, |d| d.as_secs()),
-        environment: capture_environment(gpu),
+        environment: Box::new(capture_environment(gpu)),
         quick: settings.quick,
         seed: settings.seed,
         rays: settings.rays,

@@ -68,7 +68,7 @@ pub struct SuiteRecord {
     /// Start, seconds since 1970.
     pub started_unix_s: u64,
     /// Machine, adapter, driver, program.
-    pub environment: Environment,
+    pub environment: Box<Environment>,
     /// Whether a few rungs only were climbed.
     pub quick: bool,
     /// Seed.

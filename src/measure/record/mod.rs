@@ -3,6 +3,7 @@
 //! never 0.
 
 mod animation;
+mod cell;
 mod coherence;
 mod compaction;
 mod error;
@@ -16,6 +17,7 @@ mod stream;
 mod structure;
 
 pub use animation::*;
+pub use cell::*;
 pub use coherence::*;
 pub use compaction::CompactionRecord;
 pub use error::*;
@@ -166,6 +168,10 @@ pub enum Body {
     Failed(SkippedRecord),
     /// Something that went wrong beside the measuring, which is not touched by it.
     Warning(SkippedRecord),
+    /// What kernels were made of, for the cells that name it.
+    Kernels(KernelSetRecord),
+    /// A cell is done, failed or left out: the last line of all that were written of it.
+    Cell(CellRecord),
     /// Last line: where the wall time went, how many cells failed.
     Finished(FinishedRecord),
     /// Last line of a run that was ended early.
@@ -208,6 +214,8 @@ kinds! {
     Stream: StreamRecord,
     SamplerCost: SamplerCostRecord,
     Compaction: CompactionRecord,
+    Kernels: KernelSetRecord,
+    Cell: CellRecord,
     Finished: FinishedRecord,
     Interrupted: InterruptedRecord,
 }

@@ -1,7 +1,7 @@
 //! What is recorded of a run as a whole, and of its scenes.
 
 use crate::geometry::Camera;
-use crate::gpu::Environment;
+use crate::gpu::{Environment, MachineLoad};
 use crate::measure::figure::Figure;
 use crate::scene::LoadReport;
 use serde::{Deserialize, Serialize};
@@ -51,6 +51,15 @@ pub struct RunRecord {
     /// Folders of kernels that stood in the place of embedded ones.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub kernels: Vec<KernelFolder>,
+    /// Values that were laid over the experiment, `section.key=value`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub overrides: Vec<String>,
+    /// Filters of its cells.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub only: Vec<String>,
+    /// The part of the plan that was run, as `3/8`; absent for all of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shard: Option<String>,
     /// Figures from outside the crate that its records hold.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub figures: Vec<Figure>,
@@ -108,6 +117,9 @@ pub struct FinishedRecord {
     pub failed: usize,
     /// Cells that were skipped.
     pub skipped: usize,
+    /// The state of the machine when the run ended.
+    #[serde(default)]
+    pub load: MachineLoad,
 }
 
 /// Last line of a run that was ended early: what it had not measured by then is missing.

@@ -88,6 +88,7 @@ fn banners(data: &RunData, warnings: &[String]) -> Vec<Banner> {
         }
     }
     banners.extend(busy(data).map(|text| note(&text)));
+    banners.extend(loaded(data).into_iter().map(|text| note(&text)));
     let lenient = data.run.is_some_and(|run| run.lenient);
     let told = "The run was told to end with exit code 0 whatever fails (--lenient).";
     banners.extend(lenient.then(|| note(told)));
@@ -105,6 +106,8 @@ fn banners(data: &RunData, warnings: &[String]) -> Vec<Banner> {
     banners
 }
 
+/// Load of the machine over its processors from which it is called busy.
+const BUSY: f64 = 0.7;
 /// Half-width of the intervals of times, relative, above which a machine is called busy.
 const CALM: f64 = 0.05;
 
@@ -126,6 +129,32 @@ fn busy(data: &RunData) -> Option<String> {
             format::percent(CALM)
         )
     })
+}
+
+/// What the system said of other work and of heat.
+fn loaded(data: &RunData) -> Vec<String> {
+    let Some(run) = data.run else {
+        return Vec::new();
+    };
+    let (e, before) = (&run.environment, run.environment.load);
+    let mut said = Vec::new();
+    if let Some(load) = before.minute.filter(|l| *l > BUSY * e.cpu_threads as f64) {
+        said.push(format!(
+            "The machine was busy when the run began: a load of {} on {}. Times may be of other work, too.",
+            format::number(load),
+            format::plural(e.cpu_threads, "processor")
+        ));
+    }
+    let after = data.finished.and_then(|finished| finished.load.throttled);
+    if let (Some(before), Some(after)) = (before.throttled, after)
+        && after > before
+    {
+        said.push(format!(
+            "Processors were throttled for heat {} during the run: times are too long.",
+            format::plural((after - before) as usize, "time")
+        ));
+    }
+    said
 }
 
 /// Digits of a hash that tell two kernels apart.

@@ -1,0 +1,132 @@
+//! `raystone explain`.
+
+use super::output::print;
+use anyhow::{Result, bail};
+use clap::Args;
+use raystone::config::{Axis, Cell};
+use raystone::measure::record::{CellRecord, Outcome};
+use raystone::run::{Inventory, Registries, RunOptions, State};
+use raystone::text::{nearest, shell_word};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Tell of a cell what it is, why it is up to date or not, and how to measure it alone
+#[derive(Args)]
+pub struct Explain {
+    /// Folder that a run wrote
+    dir: PathBuf,
+    /// The cell: its name as reports and `raystone verify-run` have it, or a part of it that no other has
+    cell: String,
+    /// Let glTF models name files outside their folder, and OBJ models absolute paths
+    #[arg(long)]
+    allow_outside: bool,
+}
+
+impl Explain {
+    pub fn execute(self) -> Result<ExitCode> {
+        let registries = Registries::default();
+        let inventory = Inventory::read(&self.dir, &registries)?;
+        let state = self.find(&inventory)?;
+        let options = RunOptions {
+            allow_outside: self.allow_outside,
+            ..RunOptions::default()
+        };
+        let stale = inventory.stale(state, &registries, &options)?;
+        let mut text = format!("{}\n\n", state.unit.name);
+        writeln!(text, "kind          {}", state.unit.kind.plural())?;
+        for (axis, variant) in variants(&state.unit.cell) {
+            writeln!(text, "{:<13} {variant}", axis.name())?;
+        }
+        if let Some(record) = &state.record {
+            writeln!(text, "\n{}", outcome(record))?;
+            let inputs = &record.inputs;
+            for (what, value) in [
+                ("program", &inputs.program),
+                ("settings", &inputs.settings),
+                ("scene", &inputs.scene),
+                ("kernels", &inputs.kernels),
+                ("timed on", &inputs.device),
+            ] {
+                if !value.is_empty() {
+                    writeln!(text, "{what:<13} {value}")?;
+                }
+            }
+            let modules = inventory.modules(inputs);
+            if !modules.is_empty() {
+                writeln!(text, "made of       {}", modules.join(", "))?;
+            }
+        }
+        match stale {
+            None => writeln!(text, "\nup to date: `--resume` keeps it")?,
+            Some(why) => writeln!(text, "\nnot up to date: {why}")?,
+        }
+        writeln!(text, "\nalone: {}", command(&inventory, &state.unit.cell))?;
+        print(&text)?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn find<'i>(&self, inventory: &'i Inventory) -> Result<&'i State> {
+        let states = &inventory.states;
+        if let Some(state) = states.iter().find(|state| state.unit.name == self.cell) {
+            return Ok(state);
+        }
+        let holds = |state: &&State| state.unit.name.contains(&self.cell);
+        let found: Vec<&State> = states.iter().filter(holds).collect();
+        match found.as_slice() {
+            [one] => Ok(one),
+            [] => {
+                let names = states.iter().map(|state| state.unit.name.as_str());
+                let near = nearest(&self.cell, names).unwrap_or_default();
+                bail!(
+                    "{} has no cell `{}`; did you mean `{near}`?",
+                    self.dir.display(),
+                    self.cell
+                )
+            }
+            several => {
+                let names = several.iter().map(|state| state.unit.name.as_str());
+                let names: Vec<&str> = names.take(8).collect();
+                bail!(
+                    "`{}` is a part of {} names: {}{}",
+                    self.cell,
+                    several.len(),
+                    names.join("; "),
+                    if several.len() > names.len() {
+                        "; …"
+                    } else {
+                        ""
+                    }
+                )
+            }
+        }
+    }
+}
+
+fn variants(cell: &Cell) -> impl Iterator<Item = (Axis, &str)> {
+    Axis::ALL
+        .into_iter()
+        .filter_map(|axis| Some((axis, cell.get(axis)?.label.as_str())))
+}
+
+fn outcome(record: &CellRecord) -> String {
+    match record.outcome {
+        Outcome::Done => "measured".to_owned(),
+        Outcome::Failed => format!("failed: {}", record.reason),
+        Outcome::LeftOut => format!("left out: {}", record.reason),
+    }
+}
+
+/// The command that measures a cell alone: a filter on each axis that matters to it.
+fn command(inventory: &Inventory, cell: &Cell) -> String {
+    let run = &inventory.run;
+    let mut command = format!("raystone run {}", shell_word(&run.experiment));
+    for value in &run.overrides {
+        command += &format!(" --set {}", shell_word(value));
+    }
+    let axes = &inventory.experiment.axes;
+    for (axis, label) in variants(cell).filter(|(axis, _)| axes[*axis].len() > 1) {
+        command += &format!(" --only {}", shell_word(&format!("{axis}={label}")));
+    }
+    command
+}

@@ -1,0 +1,112 @@
+//! `raystone plan`.
+
+use super::arguments::{ExperimentArguments, plan};
+use super::output::print;
+use anyhow::Result;
+use clap::Args;
+use raystone::config::{Experiment, Plan as Cells, Unit, UnitKind, shards};
+use raystone::run::{Estimate, Registries};
+use raystone::text::shell_word;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Divide an experiment into shards: what each would measure, how long that would take, and how to run and join them
+#[derive(Args)]
+pub struct Plan {
+    /// Experiment file (TOML), see docs/experiments.md
+    file: PathBuf,
+    /// Number of shards
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    shards: u16,
+    /// Print every cell with the number of its shard
+    #[arg(long)]
+    cells: bool,
+    #[command(flatten)]
+    experiment: ExperimentArguments,
+}
+
+impl Plan {
+    pub fn execute(self) -> Result<ExitCode> {
+        let registries = Registries::default();
+        let overrides = &self.experiment.values.set;
+        let experiment = Experiment::load(&self.file, overrides, &registries.catalogue())?;
+        let cells = plan(&experiment, &self.experiment.only, &registries)?;
+        let units = cells.units(&experiment);
+        let estimate = Estimate::new(&experiment, &cells, &registries);
+        let cost = |unit: &Unit| estimate.seconds_of(unit);
+        let of = usize::from(self.shards);
+        let numbers = shards(&units, of, cost);
+        let mut text = String::new();
+        if self.cells {
+            for (unit, number) in units.iter().zip(&numbers) {
+                writeln!(text, "{number}/{of}\t{:?}\t{}", unit.kind, unit.name)?;
+            }
+            print(&text)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        self.describe(&mut text, (&cells, &units, &numbers), &estimate)?;
+        print(&text)?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn describe(
+        &self,
+        text: &mut String,
+        (plan, units, numbers): (&Cells, &[Unit], &[usize]),
+        estimate: &Estimate,
+    ) -> Result<()> {
+        let of = usize::from(self.shards);
+        let [cells, skipped] = [units.len(), plan.skipped.iter().map(|s| s.cells).sum()];
+        writeln!(text, "{cells} cells, {skipped} left out; {of} shards:\n")?;
+        let mut empty = 0;
+        let seconds: Vec<f64> = units.iter().map(|unit| estimate.seconds_of(unit)).collect();
+        for number in 1..=of {
+            let own = |place: &usize| numbers[*place] == number;
+            let own: Vec<usize> = (0..units.len()).filter(own).collect();
+            if own.is_empty() {
+                empty += 1;
+                continue;
+            }
+            let kinds = UnitKind::ALL.into_iter().filter_map(|kind| {
+                let count = own.iter().filter(|place| units[**place].kind == kind);
+                let count = count.count();
+                (count > 0).then(|| format!("{count} {}", kind.plural()))
+            });
+            let kinds = kinds.collect::<Vec<_>>().join(", ");
+            let sum: f64 = own.iter().map(|place| seconds[*place]).sum();
+            writeln!(text, "  {number}/{of}  about {:>7}  {kinds}", duration(sum))?;
+        }
+        if empty > 0 {
+            writeln!(
+                text,
+                "\n{empty} shards have nothing to do: what is timed in the same rounds stays together."
+            )?;
+        }
+        let file = shell_word(&self.file.to_string_lossy());
+        let also: String = (self.experiment.values.set.iter())
+            .map(|value| format!(" --set {}", shell_word(value)))
+            .chain(
+                (self.experiment.only.iter())
+                    .map(|filter| format!(" --only {}", shell_word(filter))),
+            )
+            .collect();
+        writeln!(
+            text,
+            "\nTimes are estimates for a software adapter with two cores; references and judges, which every shard \
+             needs on its own, come on top.\n\n\
+             Run each, wherever:  raystone run {file}{also} --shard K/{of} --resume --out DIR/K\n\
+             and join them:       raystone merge DIR/* --out ALL"
+        )?;
+        Ok(())
+    }
+}
+
+/// A time with the precision of an estimate.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        ..100.0 => format!("{:.0} s", seconds.ceil()),
+        ..6000.0 => format!("{:.0} min", (seconds / 60.0).ceil()),
+        _ => format!("{:.1} h", seconds / 3600.0),
+    }
+}

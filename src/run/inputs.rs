@@ -1,0 +1,186 @@
+//! What the figures of a cell depend on, and whether those of an earlier run still hold.
+
+use super::kernels::Kernels;
+use crate::config::{Axis, Experiment, Unit, UnitKind, is_compaction};
+use crate::gpu::Environment;
+use crate::measure::record::{CellRecord, Inputs, KernelSetRecord, Key};
+use crate::text::cell_hash;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::OnceLock;
+
+/// Digits of the hashes that are kept.
+const DIGITS: usize = 16;
+
+fn short(parts: &[(&str, &str)]) -> String {
+    cell_hash(parts)[..DIGITS].to_owned()
+}
+
+/// The sources that figures depend on: the hash that the build noted, and of programs that use the library (with registries of their
+/// own) the bytes of the program.
+pub(super) fn program() -> &'static str {
+    static PROGRAM: OnceLock<String> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let own = env!("RAYSTONE_HOST");
+        let is_own = std::env::current_exe().is_ok_and(|path| {
+            let stem = path.file_stem();
+            stem.is_some_and(|stem| stem == env!("CARGO_PKG_NAME"))
+        });
+        match super::reference_cache::program().filter(|_| !is_own) {
+            Some(bytes) => short(&[("host", own), ("program", bytes)]),
+            None => own.to_owned(),
+        }
+    })
+}
+
+/// Where clocks were read: figures of other places must not be compared.
+pub fn place(environment: &Environment) -> String {
+    let e = environment;
+    format!(
+        "{} ({} {}, {}), {} × {}, {}",
+        e.adapter, e.driver, e.driver_info, e.backend, e.cpu_threads, e.cpu, e.os
+    )
+}
+
+/// The settings of an experiment that matter to a kind of cells. A field that is added to experiments has to be placed here.
+fn settings(experiment: &Experiment, reference_file: &str, kind: UnitKind) -> String {
+    let Experiment {
+        name: _,
+        source: _,
+        text: _,
+        overrides: _,
+        excludes: _,
+        includes: _,
+        conditions: _,
+        replicates,
+        seed,
+        resolution,
+        spp,
+        stop,
+        runtime_checks,
+        camera,
+        axes,
+        reference,
+        timing,
+        gate,
+        discrepancy,
+        coherence,
+        animation,
+    } = experiment;
+    let image = (seed, camera, resolution, runtime_checks);
+    match kind {
+        UnitKind::Structure | UnitKind::Peer => format!("{:?}", (image, gate, timing, coherence)),
+        UnitKind::Animation => format!("{:?}", (image, gate, timing, animation)),
+        UnitKind::Sampler => {
+            format!(
+                "{:?}",
+                (image, replicates, spp, stop, reference, reference_file)
+            )
+        }
+        UnitKind::Time => format!("{:?}", (image, timing, spp)),
+        UnitKind::Coherence => format!("{:?}", (seed, camera, coherence)),
+        UnitKind::Compaction => format!("{:?}", (seed, timing)),
+        UnitKind::Stream => {
+            // The worst pair of dimensions is looked for among those of all integrators.
+            let drawn = axes[Axis::Integrator].iter().filter(|i| !is_compaction(i));
+            let drawn: Vec<&str> = drawn.map(|integrator| integrator.label.as_str()).collect();
+            format!("{:?}", (seed, resolution, discrepancy, drawn))
+        }
+    }
+}
+
+/// What the cells of a run depend on now.
+pub(super) struct Current<'a> {
+    settings: BTreeMap<UnitKind, String>,
+    kernels: &'a Kernels,
+    /// Label of a scene → hash of its content, or why it has none.
+    pub scenes: HashMap<String, Result<String, String>>,
+    /// Where clocks are read; unknown before a device is open.
+    pub device: Option<String>,
+}
+
+impl<'a> Current<'a> {
+    /// Of an experiment with these kernels; the hash of the image that is compared with, if it is a file's.
+    pub fn new(experiment: &Experiment, reference_file: &str, kernels: &'a Kernels) -> Self {
+        let of = |kind| (kind, settings(experiment, reference_file, kind));
+        Self {
+            settings: UnitKind::ALL.into_iter().map(of).collect(),
+            kernels,
+            scenes: HashMap::new(),
+            device: None,
+        }
+    }
+
+    /// Hash of the parameters of a unit and of the settings that matter to it.
+    pub fn settings_of(&self, unit: &Unit) -> String {
+        let key = serde_json::to_string(&Key::from(&unit.cell)).unwrap_or_default();
+        let settings = self.settings.get(&unit.kind).map_or("", String::as_str);
+        let kind = format!("{:?}", unit.kind);
+        short(&[("kind", &kind), ("key", &key), ("settings", settings)])
+    }
+
+    /// What a unit depends on that is known before it is measured.
+    pub fn inputs(&self, unit: &Unit) -> Inputs {
+        let scene = unit.cell.get(Axis::Scene);
+        let scene = scene.and_then(|scene| self.scenes.get(&scene.label)?.clone().ok());
+        Inputs {
+            program: program().to_owned(),
+            settings: self.settings_of(unit),
+            scene: scene.unwrap_or_default(),
+            kernels: String::new(),
+            device: match unit.kind.is_timed() {
+                true => self.device.clone().unwrap_or_default(),
+                false => String::new(),
+            },
+        }
+    }
+
+    /// Why what was recorded of a unit does not hold any more; `None` if it does.
+    pub fn stale(
+        &self,
+        unit: &Unit,
+        record: &CellRecord,
+        sets: &HashMap<&str, &KernelSetRecord>,
+    ) -> Option<String> {
+        let was = &record.inputs;
+        if was.program != program() {
+            return Some("another program measured it".to_owned());
+        }
+        if was.settings != self.settings_of(unit) {
+            return Some("its parameters or the settings that it depends on changed".to_owned());
+        }
+        let scene = unit.cell.get(Axis::Scene);
+        let scene = scene.and_then(|scene| self.scenes.get(&scene.label));
+        match scene {
+            Some(Ok(hash)) if *hash != was.scene => return Some("its scene changed".to_owned()),
+            Some(Err(reason)) => return Some(format!("its scene cannot be loaded: {reason}")),
+            _ => {}
+        }
+        let device = self.device.as_ref().filter(|_| unit.kind.is_timed());
+        if let Some(device) = device.filter(|device| **device != was.device) {
+            let before = &was.device;
+            return Some(format!("it was timed on {before}, and this is {device}"));
+        }
+        if was.kernels.is_empty() {
+            return None;
+        }
+        match sets.get(was.kernels.as_str()) {
+            Some(set) => self.kernels.changed(set),
+            None => Some("what its kernels were made of is not recorded".to_owned()),
+        }
+    }
+}
+
+/// The record of the modules that kernels were made of.
+pub(super) fn kernel_set(kernels: &str, modules: BTreeMap<String, String>) -> KernelSetRecord {
+    let mut parts = vec![("kernels", kernels)];
+    parts.extend(
+        modules
+            .iter()
+            .map(|(name, hash)| (name.as_str(), hash.as_str())),
+    );
+    KernelSetRecord {
+        id: short(&parts),
+        kernels: kernels.to_owned(),
+        modules,
+    }
+}
