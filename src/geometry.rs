@@ -104,13 +104,16 @@ impl FromStr for Ray {
 }
 
 /// A pinhole camera. Rays start at `eye`; pixel (0, 0) is the top left one.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Camera {
     /// Position of the pinhole, scene units.
+    #[schemars(with = "[f32; 3]")]
     pub eye: Vec3,
     /// Point that projects to the centre of the image.
+    #[schemars(with = "[f32; 3]")]
     pub target: Vec3,
     /// Up direction; need not be normalised or orthogonal to the viewing direction.
+    #[schemars(with = "[f32; 3]")]
     pub up: Vec3,
     /// Vertical field of view, degrees, in (0, 180).
     pub vertical_fov_degrees: f32,

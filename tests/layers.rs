@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// Layers from the bottom: a module may use those above its own line here, and those of the same line
 /// that stand together in [`TOGETHER`].
-const LAYERS: [&[&str]; 12] = [
+const LAYERS: [&[&str]; 14] = [
     &["atomic", "text", "geometry", "params", "random"],
     &["image"],
     &["gpu", "sampling", "discrepancy", "oracle"],
@@ -19,6 +19,8 @@ const LAYERS: [&[&str]; 12] = [
     &["coherence"],
     &["run"],
     &["report"],
+    &["export"],
+    &["history"],
     &["repro"],
 ];
 /// What stands above all layers and may use each of them; the last may use those before.

@@ -6,6 +6,7 @@ mod support;
 use raystone::accel::triangle::{MoellerTrumbore, TriangleTest as _};
 use raystone::gpu::{Gpu, probe_arithmetic};
 use raystone::measure::record::{Key, axis};
+use raystone::report::terminal::Screen;
 use raystone::stress::record::{Line, read, write};
 use raystone::stress::report::{stress_tables, write_stress_page};
 use raystone::stress::targets::{cells, shots};
@@ -69,7 +70,7 @@ fn a_small_suite_finds_no_difference_from_brute_force_and_writes_tables_records_
     ] {
         assert!(html.contains(text), "{text}");
     }
-    let tables = stress_tables(&records);
+    let tables = stress_tables(&records, Screen::default());
     assert!(
         tables.contains("brute-force") && tables.contains("PASS"),
         "{tables}"

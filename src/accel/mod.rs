@@ -326,7 +326,18 @@ pub type BuildResult = Result<Box<dyn BuiltAccel>, AccelError>;
 
 /// In which space a structure meets triangles, and so which judge it has to equal to the bit.
 #[derive(
-    Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+    Debug,
+    Clone,
+    Copy,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    schemars::JsonSchema,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Space {

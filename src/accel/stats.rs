@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// A timed phase of a build.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Phase {
     /// For instance `bounds`, `binned-sah`, `layout`.
     pub name: String,
@@ -16,7 +16,7 @@ pub struct Phase {
 }
 
 /// Static figures of a built structure.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct StructureStats {
     /// Nodes (inner and leaf) or cells.
     pub nodes: u64,

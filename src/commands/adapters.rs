@@ -2,6 +2,7 @@
 
 use raystone::gpu::AdapterSummary;
 use raystone::report::format::bytes;
+use serde_json::{Value, json};
 
 /// What kind of device it is.
 pub fn kind(adapter: &AdapterSummary) -> &'static str {
@@ -44,6 +45,19 @@ pub fn describe(adapter: &AdapterSummary) -> String {
         driver(adapter),
         bytes(largest_binding(&adapter.limits)),
     )
+}
+
+/// What [`describe`] says, as JSON.
+pub fn json(adapter: &AdapterSummary) -> Value {
+    json!({
+        "index": adapter.index,
+        "name": adapter.info.name,
+        "kind": kind(adapter),
+        "backend": adapter.info.backend.to_str(),
+        "driver": driver(adapter),
+        "timestamps": adapter.timestamps,
+        "largest_binding_bytes": largest_binding(&adapter.limits),
+    })
 }
 
 /// Major version of the Mesa that a driver is part of, if its version text says so.

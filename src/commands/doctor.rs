@@ -2,7 +2,7 @@
 
 use super::adapters::{self, largest_binding, mesa_major};
 use super::failure::{NO_ADAPTER, tell_error};
-use super::output::print;
+use super::output::{OutputArguments, print, print_json};
 use super::system::{self, System};
 use anyhow::Result;
 use clap::Args;
@@ -12,6 +12,7 @@ use raystone::gpu::{
     probe_arithmetic,
 };
 use raystone::report::format::{bytes, count};
+use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
@@ -21,6 +22,8 @@ pub struct Doctor {
     /// Adapter to examine, by its number or a part of its name [default: the one that would be used]
     #[arg(long, value_name = "INDEX|NAME")]
     adapter: Option<AdapterChoice>,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 impl Doctor {
@@ -40,23 +43,45 @@ impl Doctor {
         let choice = self.adapter.unwrap_or_default();
         let examined = gpu::open(&choice, KernelLibrary::default())
             .and_then(|gpu| examine(&gpu, &choice, &found, &system));
-        let failed = match examined {
-            Ok(findings) => {
-                text += &findings;
-                None
-            }
-            Err(failure) => Some(failure),
+        let (examined, failed) = match examined {
+            Ok(findings) => (Some(findings), None),
+            Err(failure) => (None, Some(failure)),
         };
+        text += &examined.as_ref().map_or(String::new(), Examined::text);
         if found.is_empty() {
             text += &remedy(&system);
         }
-        print(&text)?;
+        match self.output.json {
+            true => print_json("doctor", as_json(&system, &found, examined.as_ref()))?,
+            false => print(&text)?,
+        }
         // Whatever it was: this is no adapter that a command could use.
         Ok(failed.map_or(ExitCode::SUCCESS, |failure| {
             tell_error(&failure.into());
             ExitCode::from(NO_ADAPTER)
         }))
     }
+}
+
+/// What [`Doctor`] says, as JSON; `in_use` is null where no adapter works.
+fn as_json(system: &System, found: &[AdapterSummary], examined: Option<&Examined>) -> Value {
+    let in_use = examined.map(|examined| {
+        let rows = examined.rows.iter().map(|(name, what)| {
+            let words: Vec<&str> = what.split_whitespace().collect();
+            (name.replace(' ', "_"), Value::from(words.join(" ")))
+        });
+        let rows: Map<String, Value> = rows.collect();
+        json!({ "adapter": examined.adapter, "whole_loops": examined.whole_loops, "findings": rows })
+    });
+    json!({
+        "version": super::VERSION.as_str(),
+        "system": system.name,
+        "architecture": std::env::consts::ARCH,
+        "processor": system::processor(),
+        "adapters": found.iter().map(adapters::json).collect::<Vec<Value>>(),
+        "in_use": in_use,
+        "remedy": found.is_empty().then(|| remedy(system).trim().to_owned()),
+    })
 }
 
 fn machine(system: &System) -> String {
@@ -100,7 +125,7 @@ fn examine(
     choice: &AdapterChoice,
     found: &[AdapterSummary],
     system: &System,
-) -> Result<String, GpuError> {
+) -> Result<Examined, GpuError> {
     let probe = probe_arithmetic(gpu)?;
     let position = found.iter().find(|adapter| adapter.info == gpu.info);
     let number = position.map_or(String::new(), |adapter| format!("{}, ", adapter.index));
@@ -130,15 +155,33 @@ fn examine(
         ("timestamps", timestamps.into()),
         ("scene size", size),
     ];
-    let mut text = format!("\nAdapter in use: {number}{}; {reason}\n", gpu.info.name);
-    for (name, what) in rows.into_iter().chain(speed(gpu, system)) {
-        let _ = writeln!(text, "  {name:<10}  {what}");
+    Ok(Examined {
+        adapter: gpu.info.name.clone(),
+        head: format!("\nAdapter in use: {number}{}; {reason}\n", gpu.info.name),
+        rows: rows.into_iter().chain(speed(gpu, system)).collect(),
+        whole_loops: gpu.loop_limit.is_none(),
+    })
+}
+
+/// What was found of the adapter in use.
+struct Examined {
+    adapter: String,
+    head: String,
+    rows: Vec<(&'static str, String)>,
+    whole_loops: bool,
+}
+
+impl Examined {
+    fn text(&self) -> String {
+        let mut text = self.head.clone();
+        for (name, what) in &self.rows {
+            let _ = writeln!(text, "  {name:<10}  {what}");
+        }
+        text + match self.whole_loops {
+            true => "\nEverything that Raystone needs works here.\n",
+            false => "\nRaystone works here, but for what loops long: see above.\n",
+        }
     }
-    text += match gpu.loop_limit {
-        None => "\nEverything that Raystone needs works here.\n",
-        Some(_) => "\nRaystone works here, but for what loops long: see above.\n",
-    };
-    Ok(text)
 }
 
 fn denormals(probe: ArithmeticProbe) -> &'static str {

@@ -1,6 +1,6 @@
 //! How a command fails: one sentence on standard error and an exit code.
 
-use super::output::tell;
+use super::output::tell_marked;
 use raystone::gpu::GpuError;
 use raystone::run::RunError;
 use std::process::ExitCode;
@@ -14,7 +14,7 @@ pub const NO_ADAPTER: u8 = 3;
 
 /// Writes `error: …` to standard error.
 pub fn tell_error(error: &anyhow::Error) {
-    tell(&format!("error: {}", sentence(error)));
+    tell_marked("error:", 31, &sentence(error));
 }
 
 /// Tells an error; the exit code to end with.

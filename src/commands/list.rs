@@ -1,11 +1,14 @@
 //! `raystone list`.
 
 use super::adapters;
-use super::output::print;
+use super::list_json::lists;
+use super::output::{OutputArguments, print, print_json};
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use raystone::config::Axis;
 use raystone::discrepancy::Measure;
+use raystone::export::FORMATS;
+use raystone::measure::figure::{Better, FIGURES};
 use raystone::measure::metrics::METRICS;
 use raystone::params::{Entry, Parameter};
 use raystone::run::Registries;
@@ -14,15 +17,17 @@ use std::fmt::Write as _;
 use std::process::ExitCode;
 
 /// List everything that can be named: scenes, structures, samplers, integrators, materials, lights, metrics,
-/// measures, adapters
+/// measures, figures, formats, adapters
 #[derive(Args)]
 pub struct List {
     /// What to list [default: everything]
     what: Option<Topic>,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Topic {
+pub enum Topic {
     #[value(alias = "scenes")]
     Scene,
     #[value(alias = "accels", alias = "structure", alias = "structures")]
@@ -53,8 +58,32 @@ enum Topic {
     Metric,
     #[value(alias = "measures", alias = "discrepancy")]
     Measure,
+    #[value(alias = "figures")]
+    Figure,
+    #[value(alias = "formats")]
+    Format,
     #[value(alias = "adapters")]
     Adapter,
+}
+
+impl Topic {
+    /// The axis that it lists; `None` for what is no axis of experiments.
+    pub fn axis(self) -> Option<Axis> {
+        Some(match self {
+            Self::Scene => Axis::Scene,
+            Self::Accel => Axis::Accel,
+            Self::Sequence => Axis::Sequence,
+            Self::Decorrelation => Axis::Decorrelation,
+            Self::Integrator => Axis::Integrator,
+            Self::Triangle => Axis::Triangle,
+            Self::BoxTest => Axis::BoxTest,
+            Self::Offset => Axis::Offset,
+            Self::Organisation => Axis::Organisation,
+            Self::Peer => Axis::Peer,
+            Self::Workgroup => Axis::Workgroup,
+            _ => return None,
+        })
+    }
 }
 
 impl List {
@@ -64,30 +93,32 @@ impl List {
             Some(topic) => std::slice::from_ref(topic),
             None => Topic::value_variants(),
         };
-        let axis = |axis| entries(axis, &catalogue[axis]);
+        if self.output.json {
+            // Drivers are loaded, and may print, only where they are asked for.
+            let asked = topics.iter().copied();
+            let asked = asked.filter(|topic| self.what.is_some() || *topic != Topic::Adapter);
+            let asked: Vec<Topic> = asked.collect();
+            print_json("list", lists(&asked, &catalogue))?;
+            return Ok(ExitCode::SUCCESS);
+        }
         let sections: Vec<String> = topics
             .iter()
-            .map(|topic| match topic {
-                Topic::Scene => axis(Axis::Scene),
-                Topic::Accel => axis(Axis::Accel),
-                Topic::Sequence => axis(Axis::Sequence),
-                Topic::Decorrelation => axis(Axis::Decorrelation),
-                Topic::Integrator => axis(Axis::Integrator),
-                Topic::Triangle => axis(Axis::Triangle),
-                Topic::BoxTest => axis(Axis::BoxTest),
-                Topic::Offset => axis(Axis::Offset),
-                Topic::Organisation => axis(Axis::Organisation),
-                Topic::Peer => axis(Axis::Peer),
-                Topic::Workgroup => axis(Axis::Workgroup),
-                Topic::Material => materials(),
-                Topic::Light => lights(),
-                Topic::Metric => metrics(),
-                Topic::Measure => measures(),
+            .map(|topic| match (topic, topic.axis()) {
+                (_, Some(axis)) => entries(axis, &catalogue[axis]),
+                (Topic::Material, _) => materials(),
+                (Topic::Light, _) => lights(),
+                (Topic::Metric, _) => metrics(),
+                (Topic::Measure, _) => measures(),
+                (Topic::Format, _) => formats(),
+                (Topic::Figure, _) if self.what.is_none() => {
+                    "figure: of the table of figures, by `raystone list figure`\n".to_owned()
+                }
+                (Topic::Figure, _) => figures(),
                 // Drivers are loaded, and may print, only where they are asked for.
-                Topic::Adapter if self.what.is_none() => {
+                _ if self.what.is_none() => {
                     "adapter: of this machine, by `raystone list adapter`\n".to_owned()
                 }
-                Topic::Adapter => adapter_list(),
+                _ => adapter_list(),
             })
             .collect();
         print(&sections.join("\n"))?;
@@ -195,6 +226,31 @@ fn measures() -> String {
             measure.name(),
             measure.description()
         );
+    }
+    text
+}
+
+fn figures() -> String {
+    let width = FIGURES.iter().map(|figure| figure.id.len()).max();
+    let width = width.unwrap_or(0);
+    let mut text = "figure: what is measured\n".to_owned();
+    for figure in &FIGURES {
+        let better = match figure.better {
+            Better::Higher => ", higher is better",
+            Better::Lower => ", lower is better",
+            Better::Neither => "",
+        };
+        let _ = writeln!(text, "  {:width$}  {}{better}", figure.id, figure.heading());
+    }
+    text
+}
+
+fn formats() -> String {
+    let width = FORMATS.iter().map(|format| format.name.len()).max();
+    let width = width.unwrap_or(0);
+    let mut text = "format: of `raystone export`\n".to_owned();
+    for format in &FORMATS {
+        let _ = writeln!(text, "  {:width$}  {}", format.name, format.description);
     }
     text
 }

@@ -2,13 +2,17 @@
 
 mod adapters;
 mod arguments;
+mod completions;
 mod discrepancy;
 mod doctor;
 mod explain;
 mod export;
+mod exporting;
 mod failure;
 mod faults;
+mod history;
 mod list;
+mod list_json;
 mod merge;
 mod output;
 mod plan;
@@ -19,6 +23,7 @@ mod report;
 mod repro;
 mod run;
 mod scenes;
+mod schema;
 mod signals;
 mod stress;
 mod system;
@@ -106,6 +111,13 @@ enum Command {
     Trace(trace::Trace),
     #[command(after_help = EXIT_CODES)]
     ExportMitsuba(export::ExportMitsuba),
+    #[command(after_help = EXIT_CODES)]
+    Export(exporting::Export),
+    #[command(after_help = EXIT_CODES)]
+    History(history::HistoryOf),
+    Schema(schema::Schema),
+    Completions(completions::Completions),
+    Man(completions::Man),
 }
 
 /// Reads the command line and does what it says; clap itself ends the program with 2 on bad usage.
@@ -129,6 +141,11 @@ pub fn main() -> ExitCode {
         Command::Stress(command) => command.execute(),
         Command::Trace(command) => command.execute(),
         Command::ExportMitsuba(command) => command.execute(),
+        Command::Export(command) => command.execute(),
+        Command::History(command) => command.execute(),
+        Command::Schema(command) => command.execute(),
+        Command::Completions(command) => command.execute(),
+        Command::Man(command) => command.execute(),
     };
     done.unwrap_or_else(failure::end)
 }

@@ -1,7 +1,19 @@
 //! Standard output and standard error.
 
 use anyhow::{Context as _, Result};
-use std::io::{ErrorKind, Write as _};
+use clap::Args;
+use raystone::export::OUTPUT_SCHEMA;
+use raystone::report::terminal::{Screen, shown};
+use serde_json::{Value, json};
+use std::io::{ErrorKind, IsTerminal as _, Write as _};
+
+/// How a command prints what it found.
+#[derive(Args, Clone, Copy)]
+pub struct OutputArguments {
+    /// Print JSON instead of text, see docs/json.md
+    #[arg(long)]
+    pub json: bool,
+}
 
 /// Writes `text` to standard output.
 ///
@@ -19,13 +31,58 @@ pub fn print(text: &str) -> Result<()> {
     .context("cannot write to standard output")
 }
 
+/// Writes what a command found as one JSON object: version, command, and these fields.
+pub fn print_json(command: &str, fields: Value) -> Result<()> {
+    let mut object = json!({ "schema": OUTPUT_SCHEMA, "command": command });
+    if let (Value::Object(object), Value::Object(fields)) = (&mut object, fields) {
+        object.extend(fields);
+    }
+    print(&format!("{object:#}\n"))
+}
+
+/// Narrower screens are taken for this wide.
+const NARROWEST_SCREEN: usize = 20;
+
+/// What standard output is: as wide as COLUMNS says, else as the terminal is, else without end.
+pub fn screen() -> Screen {
+    let terminal = console::Term::stdout();
+    let is_terminal = terminal.is_term();
+    let said = std::env::var("COLUMNS").ok();
+    let said = said.and_then(|text| text.trim().parse().ok());
+    let found = || Some(usize::from(terminal.size_checked()?.1));
+    let width = said.or_else(|| is_terminal.then(found).flatten());
+    Screen {
+        width: width.map(|width| width.max(NARROWEST_SCREEN)),
+        colour: is_terminal && shows_colours(),
+    }
+}
+
+/// Whether colours are wanted: see <https://no-color.org>.
+fn shows_colours() -> bool {
+    let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    !is_set("NO_COLOR") && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
+}
+
 /// Writes a line to standard error. A terminal that went away is no reason to end: what is measured
 /// counts.
 pub fn tell(text: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{text}");
+    let lines: Vec<String> = text.split('\n').map(shown).collect();
+    let _ = writeln!(std::io::stderr().lock(), "{}", lines.join("\n"));
 }
 
 /// Writes `warning: …` to standard error.
 pub fn warn(text: &str) {
-    tell(&format!("warning: {text}"));
+    tell_marked("warning:", 33, text);
+}
+
+/// Writes a line behind a mark, in colour where standard error is a terminal that shows it.
+pub fn tell_marked(mark: &str, colour: u8, text: &str) {
+    if std::io::stderr().is_terminal() && shows_colours() {
+        let mut error = std::io::stderr().lock();
+        let _ = write!(error, "\u{1b}[{colour}m{mark}\u{1b}[0m ");
+        drop(error);
+        tell(text);
+    } else {
+        tell(&format!("{mark} {text}"));
+    }
 }

@@ -1,13 +1,18 @@
 //! `raystone report`.
 
-use super::output::{print, warn};
+use super::output::{OutputArguments, print, print_json, warn};
 use anyhow::Result;
 use clap::Args;
-use raystone::measure::record::{PARTIAL, RECORDS_FILE, STRESS_FILE};
+use raystone::export::{checks_json, values_json};
+use raystone::measure::record::{PARTIAL, RECORDS_FILE, STRESS_FILE, read_records};
+use raystone::report::data::RunData;
+use raystone::report::sections::belief::checks;
+use raystone::report::values::values;
 use raystone::report::write_report;
 use raystone::stress::record::read;
 use raystone::stress::report::write_stress_page;
-use std::path::PathBuf;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Write the report of a run, or of the stress suite, again from its records
@@ -15,6 +20,8 @@ use std::process::ExitCode;
 pub struct Report {
     /// Folder that a run wrote, with records.jsonl, or the stress suite, with stress.jsonl
     dir: PathBuf,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 impl Report {
@@ -23,7 +30,10 @@ impl Report {
         if is_suite && !self.dir.join(RECORDS_FILE).exists() {
             let records = read(&self.dir)?;
             let page = write_stress_page(&self.dir, &records)?;
-            print(&format!("report: {}\n", page.display()))?;
+            match self.output.json {
+                true => print_json("report", json!({ "report": page }))?,
+                false => print(&format!("report: {}\n", page.display()))?,
+            }
             return Ok(ExitCode::SUCCESS);
         }
         let partial = self.dir.join(PARTIAL);
@@ -33,7 +43,23 @@ impl Report {
         for warning in &paths.warnings {
             warn(warning);
         }
-        print(&format!("report: {}\n", paths.html.display()))?;
+        match self.output.json {
+            true => print_json("report", findings(dir, &paths.html)?)?,
+            false => print(&format!("report: {}\n", paths.html.display()))?,
+        }
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// Page, figures and checks of a run, as JSON.
+pub fn findings(dir: &Path, page: &Path) -> Result<Value> {
+    let records = read_records(dir)?;
+    let data = RunData::new(&records.lines);
+    Ok(json!({
+        "report": page,
+        "run": data.run,
+        "figures": values_json(&values(&data)),
+        "checks": checks_json(&checks(&data)),
+        "warnings": records.warnings,
+    }))
 }

@@ -2,14 +2,15 @@
 
 use super::arguments::{DeviceArguments, ExperimentArguments, plan};
 use super::failure::{BAD_INPUT, FAILED};
-use super::output::{self, print};
+use super::output::{self, OutputArguments, print, print_json, screen};
+use super::report::findings;
 use super::signals;
 use anyhow::Result;
 use clap::Args;
 use raystone::config::{Cell, Experiment, Plan, Shard};
 use raystone::image::FileFormat;
 use raystone::measure::record::{Body, Line, read_records};
-use raystone::report::{failed_checks, terminal_tables, write_report};
+use raystone::report::{failed_checks, write_report};
 use raystone::run::{
     Estimate, Existing, Kernels, Registries, RunError, RunOptions, RunSummary, render_references,
     user_cache,
@@ -75,6 +76,8 @@ pub struct Run {
     /// No progress bar and no tables: print the report's path only
     #[arg(long, short)]
     quiet: bool,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 impl Run {
@@ -127,6 +130,14 @@ impl Run {
             Err(RunError::EndedEarly { folder, source }) => {
                 write_report(&folder)?;
                 Err(RunError::EndedEarly { folder, source }.into())
+            }
+            summary if self.output.json => {
+                let summary = summary?;
+                print_json(
+                    "run",
+                    findings(&summary.out, &write_report(&summary.out)?.html)?,
+                )?;
+                tell_failures(&summary, self.lenient)
             }
             summary => tell(&summary?, self.quiet, self.lenient),
         }
@@ -186,10 +197,16 @@ fn tell(summary: &RunSummary, quiet: bool, lenient: bool) -> Result<ExitCode> {
         true => format!("{}\n", page.display()),
         false => format!(
             "{}\n\nreport: {}\n",
-            terminal_tables(&lines).trim_end(),
+            screen().tables(&lines).trim_end(),
             page.display()
         ),
     })?;
+    tell_failures(summary, lenient)
+}
+
+/// Tells what failed; the exit code to end with.
+fn tell_failures(summary: &RunSummary, lenient: bool) -> Result<ExitCode> {
+    let lines = read_records(&summary.out)?.lines;
     let failed_checks = failed_checks(&lines);
     if summary.failed == 0 && !summary.bad_input && failed_checks.is_empty() {
         return Ok(ExitCode::SUCCESS);

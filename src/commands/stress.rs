@@ -3,7 +3,7 @@
 use super::arguments::{DeviceArguments, warn_of};
 use super::failure::FAILED;
 use super::faults::plant_faults;
-use super::output::{print, tell};
+use super::output::{print, screen, tell};
 use anyhow::Result;
 use clap::Args;
 use raystone::measure::record::Verdict;
@@ -83,7 +83,7 @@ impl Stress {
         let page = write_stress_page(&self.out, &records)?;
         print(&format!(
             "{}report: {}\n",
-            stress_tables(&records),
+            stress_tables(&records, screen()),
             page.display()
         ))?;
         Ok(match records.iter().any(is_missed_target) {

@@ -2,17 +2,17 @@
 
 use super::arguments::{DeviceArguments, ExperimentArguments, list_override, plan};
 use super::failure::{BAD_INPUT, FAILED};
-use super::output::{print, tell};
+use super::output::{OutputArguments, print, print_json, screen, tell};
 use super::verify_images;
 use anyhow::Result;
 use clap::Args;
 use raystone::config::{Axis, Catalogue, Cell, Experiment, Plan, Skipped};
-use raystone::measure::record::{ClassVerdict, GateVerdict, JudgeCheck, PathsRecord, Verdict};
+use raystone::measure::record::{ClassVerdict, GateVerdict, JudgeCheck, Key, PathsRecord, Verdict};
 use raystone::report::document::{Table, TableCell};
 use raystone::report::format::{count, ray_class};
-use raystone::report::terminal::aligned;
 use raystone::run::{Registries, Verified};
 use raystone::scene::{LoadOptions, load};
+use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -45,12 +45,14 @@ pub struct Verify {
     #[arg(long, value_name = "N")]
     rays: Option<u32>,
     /// Render known images instead: scenes with answers in closed form, or by quadrature, each judged to 0.2 % or better
-    #[arg(long, conflicts_with_all = ["file", "scene", "accel", "rays", "set", "only"])]
+    #[arg(long, conflicts_with_all = ["file", "scene", "accel", "rays", "set", "only", "json"])]
     images: bool,
     #[command(flatten)]
     experiment: ExperimentArguments,
     #[command(flatten)]
     device: DeviceArguments,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 impl Verify {
@@ -85,27 +87,22 @@ impl Verify {
         let trials = self.file.is_none() && self.scene.is_empty();
         let verified =
             raystone::run::verify(&experiment, &plan, &registries, &options, rays, trials)?;
-        print(&table(&verified))?;
         let paths: Vec<_> = verified.iter().flat_map(|v| &v.paths).collect();
-        print(&paths_table(&paths))?;
         let refused = verified.iter().filter(|v| v.refused).count();
         let failed = verified.iter().filter(|v| !passed(v)).count() - refused;
         let failed_paths = paths.iter().filter(|(_, p)| p.fault.is_some()).count();
-        let all = verified.len() - refused;
-        print(&format!("{} of {all} structures passed\n", all - failed))?;
-        if refused > 0 {
-            print(&format!(
-                "{refused} left out: the driver ends their loops\n"
-            ))?;
+        match self.output.json {
+            true => print_json("verify", as_json(&verified, &plan.skipped))?,
+            false => {
+                print(&format!("{}{}", table(&verified), paths_table(&paths)))?;
+                print(&ending(verified.len() - refused, failed, refused))?;
+                if !paths.is_empty() {
+                    let (right, all) = (paths.len() - failed_paths, paths.len());
+                    print(&format!("{right} of {all} integrators did not fail\n"))?;
+                }
+            }
         }
         let bad_input = verified.iter().any(|v| v.bad_input);
-        if !paths.is_empty() {
-            let right = paths.len() - failed_paths;
-            print(&format!(
-                "{right} of {} integrators did not fail\n",
-                paths.len()
-            ))?;
-        }
         Ok(match failed + failed_paths {
             0 => ExitCode::SUCCESS,
             _ if bad_input => ExitCode::from(BAD_INPUT),
@@ -190,6 +187,40 @@ fn passed(verified: &Verified) -> bool {
         .is_ok_and(|verdict| verdict.passed)
 }
 
+/// How many structures passed, and how many could not be judged.
+fn ending(all: usize, failed: usize, refused: usize) -> String {
+    let left_out = match refused {
+        0 => String::new(),
+        _ => format!("{refused} left out: the driver ends their loops\n"),
+    };
+    format!("{} of {all} structures passed\n{left_out}", all - failed)
+}
+
+/// Every structure with its verdict or why there is none, and every integrator.
+fn as_json(verified: &[Verified], skipped: &[Skipped]) -> Value {
+    let structures = verified.iter().map(|one| {
+        json!({
+            "cell": one.cell.to_string(),
+            "key": Key::from(&one.cell),
+            "passed": passed(one),
+            "refused": one.refused,
+            "gate": one.verdict.as_ref().ok(),
+            "failure": one.verdict.as_ref().err(),
+        })
+    });
+    let paths = verified.iter().flat_map(|one| &one.paths).map(|(cell, paths)| {
+        json!({ "cell": cell.to_string(), "verdict": paths.verdict(), "paths": paths })
+    });
+    let skipped = skipped
+        .iter()
+        .map(|s| json!({ "cell": s.cell, "reason": s.reason }));
+    json!({
+        "structures": structures.collect::<Vec<Value>>(),
+        "integrators": paths.collect::<Vec<Value>>(),
+        "left_out": skipped.collect::<Vec<Value>>(),
+    })
+}
+
 /// A row per ray class, and what else went wrong below the table.
 fn table(verified: &[Verified]) -> String {
     let columns = [
@@ -226,7 +257,11 @@ fn table(verified: &[Verified]) -> String {
     let legend = "brute force: the judge against it, wrong of rays; \
                   oracle: the judge against double precision, agree / ambiguous / wrong; \
                   kept: found on disk, checked before\n";
-    format!("{}{legend}{details}", aligned(&table))
+    format!(
+        "{}{}{details}",
+        screen().table(&table),
+        screen().lines(legend.trim_end())
+    )
 }
 
 /// A row per integrator, and what went wrong below the table.
@@ -271,7 +306,7 @@ fn paths_table(judged: &[&(Cell, PathsRecord)]) -> String {
     }
     match judged.is_empty() {
         true => String::new(),
-        false => format!("{}{details}", aligned(&table)),
+        false => format!("{}{details}", screen().table(&table)),
     }
 }
 

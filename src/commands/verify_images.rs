@@ -2,12 +2,11 @@
 
 use super::arguments::{DeviceArguments, ValueArguments};
 use super::failure::FAILED;
-use super::output::print;
+use super::output::{print, screen};
 use anyhow::Result;
 use raystone::measure::known_images::{NOISE, SYSTEMATIC, Seen};
 use raystone::report::document::{Table, TableCell};
 use raystone::report::format::count;
-use raystone::report::terminal::aligned;
 use raystone::run::{Registries, verify_images};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -75,5 +74,9 @@ fn table(all: &[Seen]) -> String {
         100.0 * SYSTEMATIC,
         100.0 * NOISE
     );
-    format!("{}{legend}{details}", aligned(&table))
+    format!(
+        "{}{}{details}",
+        screen().table(&table),
+        screen().lines(legend.trim_end())
+    )
 }

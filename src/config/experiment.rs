@@ -61,7 +61,7 @@ pub struct Experiment {
 }
 
 /// Ends a sampler at one of the numbers of samples where its relMSE is below a target.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct StopRule {
     /// Target, positive.
     pub relmse: f64,
@@ -222,7 +222,7 @@ pub struct Discrepancy {
 }
 
 /// How a scene moves from frame to frame.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Animation {
     /// What moves.
     pub motion: Motion,
@@ -235,7 +235,7 @@ pub struct Animation {
 }
 
 /// What moves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Motion {
     /// Every vertex, in a wave that travels through the scene.
@@ -252,7 +252,7 @@ impl Animation {
 }
 
 /// What the model of coherence looks at, and the machine.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Coherence {
     /// Width and height of the image, pixels.
     pub resolution: [u32; 2],
@@ -281,7 +281,7 @@ pub struct Coherence {
 }
 
 /// How a turn of a warp goes on after its visits of nodes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rule {
     /// While any lane has a triangle to test, those that have one test it; then comes the next turn. This is how the

@@ -49,7 +49,7 @@ impl Entry {
 }
 
 /// A registry entry with all its parameters set.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Variant {
     /// Name in the registry.
     pub name: String,

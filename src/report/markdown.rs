@@ -82,7 +82,8 @@ fn picture(item: &Picture) -> String {
     }
 }
 
-fn table(table: &Table) -> String {
+/// A table with its caption before it.
+pub fn table(table: &Table) -> String {
     let columns = || table.columns.iter();
     let heads: String = columns()
         .map(|column| format!(" {} |", escape(&column.title)))

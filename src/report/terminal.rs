@@ -1,7 +1,7 @@
 //! The essence of a report for the end of a run.
 
 use super::data::RunData;
-use super::document::{Table, TableCell};
+use super::document::{Check, Table, TableCell};
 use super::samplers::Metric;
 use super::sections::{
     animation, belief, compactions, kernels, rendering, run, samplers, structures, verdict,
@@ -9,44 +9,18 @@ use super::sections::{
 use super::values::{of_structures, of_view};
 use crate::measure::record::{Line, Verdict};
 
-/// Verdicts, speeds, errors and checks as aligned plain text.
+/// Where text is shown.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Screen {
+    /// Columns of characters; `None` for a file or a pipe, where lines may have any length.
+    pub width: Option<usize>,
+    /// Whether it shows colours.
+    pub colour: bool,
+}
+
+/// Verdicts, speeds, errors and checks as aligned plain text of any width.
 pub fn terminal_tables(records: &[Line]) -> String {
-    let data = RunData::new(records);
-    let mut tables = Vec::new();
-    for scene in &data.scenes {
-        let values = of_structures(&data, scene);
-        tables.push(structures::speed_table(scene, &values));
-        tables.push(structures::outside_table(&data, scene, &values));
-        let of_frames = animation::values(&data, scene);
-        tables.push(animation::costs_table(scene, &of_frames));
-        let mut of_views = Vec::new();
-        for view in &scene.views {
-            let values = of_view(scene, view);
-            tables.push(samplers::error_table(view, &values, Metric::RelMse));
-            tables.push(samplers::efficiency_table(view, &values));
-            of_views.extend(values);
-        }
-        tables.push(kernels::gains_table(scene, &of_views));
-        tables.push(verdict::table(scene));
-    }
-    let values = compactions::values(&data);
-    tables.push(compactions::growth_table(&data, &values));
-    tables.push(compactions::table(&data, &values));
-    let mut out = String::new();
-    for table in tables.iter().filter(|table| !table.rows.is_empty()) {
-        out += &(aligned(table) + "\n");
-    }
-    for line in data.scenes.iter().flat_map(rendering::disagreements) {
-        out += &format!("warning: {line}\n");
-    }
-    if data.run.is_some_and(|run| run.environment.software) {
-        out += "Software adapter: times compare structures on this adapter only.\n";
-    }
-    out += &run::overhead(&data).map_or(String::new(), |text| text + "\n");
-    belief::checks(&data)
-        .iter()
-        .for_each(|check| out += &check.line());
-    out
+    Screen::default().tables(records)
 }
 
 /// The checks that failed, each with what it found: any is a failure of the run.
@@ -58,41 +32,303 @@ pub fn failed_checks(records: &[Line]) -> Vec<String> {
         .collect()
 }
 
-/// The table with columns padded to equal width; of figures only the value is kept, since intervals
-/// would not fit a terminal, except in tables of text.
-pub fn aligned(table: &Table) -> String {
-    let wordy = table.columns.iter().filter(|column| column.text).count() > 2;
-    let shown = |cell: &TableCell| match wordy {
-        true => cell.flat(),
-        false => cell.text.clone(),
-    };
-    let heads = table.columns.iter().map(|column| column.title.clone());
-    let rows = table.rows.iter().map(|row| row.iter().map(shown).collect());
-    let lines: Vec<Vec<String>> = std::iter::once(heads.collect()).chain(rows).collect();
-    let width = |i: usize| {
-        let cells = lines.iter().filter_map(|line| line.get(i));
-        cells.map(|text| text.chars().count()).max().unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..table.columns.len()).map(width).collect();
-    let padded = |(i, text): (usize, &String)| {
-        let width = widths[i];
-        match table.columns[i].text {
-            true => format!("{text:<width$}"),
-            false => format!("{text:>width$}"),
+impl Screen {
+    /// Verdicts, speeds, errors and checks.
+    pub fn tables(self, records: &[Line]) -> String {
+        let data = RunData::new(records);
+        let tables = tables(&data);
+        let mut out = String::new();
+        for table in tables.iter().filter(|table| !table.rows.is_empty()) {
+            out += &(self.table(table) + "\n");
         }
-    };
-    let line = |cells: &Vec<String>| {
-        let cells: Vec<String> = cells.iter().enumerate().map(padded).collect();
-        cells.join("  ").trim_end().to_owned() + "\n"
-    };
-    let rule = "─".repeat(widths.iter().sum::<usize>() + 2 * widths.len().saturating_sub(1));
-    let body: String = lines[1..].iter().map(line).collect();
-    format!("{}\n{}{rule}\n{body}", table.caption, line(&lines[0]))
+        for line in data.scenes.iter().flat_map(rendering::disagreements) {
+            out += &self.lines(&format!("warning: {line}"));
+        }
+        if data.run.is_some_and(|run| run.environment.software) {
+            out += &self.lines("Software adapter: times compare structures on this adapter only.");
+        }
+        if let Some(text) = run::overhead(&data) {
+            out += &self.lines(&text);
+        }
+        belief::checks(&data)
+            .iter()
+            .for_each(|check| out += &self.check(check));
+        out
+    }
+
+    /// A check, its verdict in colour where the screen shows any: the word alone says it.
+    pub fn check(self, check: &Check) -> String {
+        let text = self.lines(check.line().trim_end());
+        let word = check.verdict.word();
+        let colour = match check.verdict {
+            Verdict::Pass => 32,
+            Verdict::Fail => 31,
+            Verdict::Open => 33,
+        };
+        match text.strip_prefix(word) {
+            Some(rest) if self.colour => format!("\u{1b}[{colour}m{word}\u{1b}[0m{rest}"),
+            _ => text,
+        }
+    }
+
+    /// A text with line breaks where words end, and one at its end.
+    pub fn lines(self, text: &str) -> String {
+        let text = shown(text);
+        match self.width {
+            None => text + "\n",
+            Some(width) => wrapped(&text, width).join("\n") + "\n",
+        }
+    }
+
+    /// The table with columns padded to equal width; of figures only the value is kept, since intervals
+    /// would not fit a terminal, except in tables of text. Where the lines are too long, heads and texts go on in
+    /// the next line, and then columns go on below, beside the first one again: a figure is never cut.
+    pub fn table(self, table: &Table) -> String {
+        let grid = Grid::new(table);
+        let mut out = self.lines(&table.caption);
+        match self.width {
+            Some(width) if grid.natural().iter().sum::<usize>() > width => {
+                let widths = grid.fitted(width);
+                for columns in grid.blocks(&widths, width) {
+                    out += &grid.block(&columns, &widths);
+                }
+            }
+            _ => out += &grid.block(&Vec::from_iter(0..grid.columns()), &grid.natural()),
+        }
+        out
+    }
+}
+
+/// Every table that the end of a run shows.
+fn tables(data: &RunData) -> Vec<Table> {
+    let mut tables = Vec::new();
+    for scene in &data.scenes {
+        let values = of_structures(data, scene);
+        tables.push(structures::speed_table(scene, &values));
+        tables.push(structures::outside_table(data, scene, &values));
+        let of_frames = animation::values(data, scene);
+        tables.push(animation::costs_table(scene, &of_frames));
+        let mut of_views = Vec::new();
+        for view in &scene.views {
+            let values = of_view(scene, view);
+            tables.push(samplers::error_table(view, &values, Metric::RelMse));
+            tables.push(samplers::efficiency_table(view, &values));
+            of_views.extend(values);
+        }
+        tables.push(kernels::gains_table(scene, &of_views));
+        tables.push(verdict::table(scene));
+    }
+    let values = compactions::values(data);
+    tables.push(compactions::growth_table(data, &values));
+    tables.push(compactions::table(data, &values));
+    tables
+}
+
+/// Blanks between columns.
+const GAP: usize = 2;
+/// No text is broken into narrower columns than this.
+const NARROWEST: usize = 12;
+
+/// Texts of a table, its heads first, with their columns.
+struct Grid {
+    texts: Vec<Vec<String>>,
+    is_text: Vec<bool>,
+}
+
+impl Grid {
+    fn new(table: &Table) -> Self {
+        let wordy = table.columns.iter().filter(|column| column.text).count() > 2;
+        let text = |cell: &TableCell| match wordy {
+            true => shown(&cell.flat()),
+            false => shown(&cell.text),
+        };
+        let heads = table.columns.iter().map(|column| shown(&column.title));
+        let rows = table.rows.iter().map(|row| row.iter().map(text).collect());
+        Self {
+            texts: std::iter::once(heads.collect()).chain(rows).collect(),
+            is_text: table.columns.iter().map(|column| column.text).collect(),
+        }
+    }
+
+    fn columns(&self) -> usize {
+        self.is_text.len()
+    }
+
+    /// The greatest width of what a column holds, below its head or with it.
+    fn widest(&self, column: usize, with_head: bool) -> usize {
+        let rows = self.texts.iter().skip(usize::from(!with_head));
+        let cells = rows.filter_map(|row| row.get(column));
+        cells.map(|text| width_of(text)).max().unwrap_or(0)
+    }
+
+    /// Widths of whole texts, each with the gap before it.
+    fn natural(&self) -> Vec<usize> {
+        let columns = 0..self.columns();
+        let gap = |column| if column == 0 { 0 } else { GAP };
+        columns.map(|c| gap(c) + self.widest(c, true)).collect()
+    }
+
+    /// Widths, with gaps, of columns whose heads are broken, and then of texts that are, the widest first, until
+    /// the table fits or no text gets narrower.
+    fn fitted(&self, width: usize) -> Vec<usize> {
+        let natural = self.natural();
+        let gap = |column| if column == 0 { 0 } else { GAP };
+        let head = |column: usize| {
+            let words = self.texts[0][column].split(' ').map(width_of);
+            words.max().unwrap_or(0)
+        };
+        let least = |column| gap(column) + self.widest(column, false).max(head(column));
+        let mut widths: Vec<usize> = (0..self.columns()).map(least).collect();
+        let texts = || (0..self.columns()).filter(|column| self.is_text[*column]);
+        while widths.iter().sum::<usize>() > width {
+            let Some(widest) = texts().max_by_key(|column| widths[*column]) else {
+                break;
+            };
+            if widths[widest] <= gap(widest) + NARROWEST {
+                break;
+            }
+            widths[widest] -= 1;
+        }
+        // What is left over goes back to the heads.
+        let mut spare = width.saturating_sub(widths.iter().sum());
+        for (wide, natural) in widths.iter_mut().zip(natural) {
+            let more = natural.saturating_sub(*wide).min(spare);
+            *wide += more;
+            spare -= more;
+        }
+        widths
+    }
+
+    /// Columns that stand beside each other: all, or as many as fit beside the first.
+    fn blocks(&self, widths: &[usize], width: usize) -> Vec<Vec<usize>> {
+        let mut blocks = Vec::new();
+        let mut block = vec![0];
+        let mut used = widths.first().copied().unwrap_or(0);
+        for (column, wide) in widths.iter().copied().enumerate().skip(1) {
+            if used + wide > width && block.len() > 1 {
+                blocks.push(std::mem::replace(&mut block, vec![0]));
+                used = widths[0];
+            }
+            block.push(column);
+            used += wide;
+        }
+        blocks.push(block);
+        blocks
+    }
+
+    /// These columns: heads, a rule, rows.
+    fn block(&self, columns: &[usize], widths: &[usize]) -> String {
+        let inner = |column: usize| match column {
+            0 => widths[0],
+            _ => widths[column] - GAP,
+        };
+        let rule: usize = columns.iter().map(|column| widths[*column]).sum();
+        let mut out = String::new();
+        for (number, row) in self.texts.iter().enumerate() {
+            let cell = |column: &usize| {
+                let text = row.get(*column).map_or("", String::as_str);
+                wrapped(text, inner(*column))
+            };
+            let cells: Vec<Vec<String>> = columns.iter().map(cell).collect();
+            let height = cells.iter().map(Vec::len).max().unwrap_or(0);
+            for line in 0..height {
+                let mut parts = Vec::new();
+                for (cell, column) in cells.iter().zip(columns) {
+                    // Broken heads stand on the rule.
+                    let from = if number == 0 { height - cell.len() } else { 0 };
+                    let text = line.checked_sub(from).and_then(|at| cell.get(at));
+                    let text = text.map_or("", String::as_str);
+                    let blanks = " ".repeat(inner(*column).saturating_sub(width_of(text)));
+                    parts.push(match self.is_text[*column] {
+                        true => format!("{text}{blanks}"),
+                        false => format!("{blanks}{text}"),
+                    });
+                }
+                out += &(parts.join(&" ".repeat(GAP)).trim_end().to_owned() + "\n");
+            }
+            if number == 0 {
+                out += &("─".repeat(rule) + "\n");
+            }
+        }
+        out
+    }
+}
+
+/// Cells of a terminal that a text takes: two for a wide character of East Asia.
+fn width_of(text: &str) -> usize {
+    console::measure_text_width(text)
+}
+
+/// Text without what a terminal would obey: control characters are shown by their numbers.
+pub fn shown(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\n' => out.push(' '),
+            c if c.is_control() => out += &format!("[U+{:04X}]", u32::from(c)),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// Lines of at most this width: broken at blanks, and inside of words that are longer.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let width = width.max(1);
+    let (mut lines, mut line) = (Vec::new(), String::new());
+    for word in text.split(' ') {
+        let joined = match line.is_empty() {
+            true => word.to_owned(),
+            false => format!("{line} {word}"),
+        };
+        if width_of(&joined) <= width {
+            line = joined;
+            continue;
+        }
+        if !line.is_empty() {
+            lines.push(std::mem::take(&mut line));
+        }
+        for c in word.chars() {
+            line.push(c);
+            if width_of(&line) > width && line.chars().count() > 1 {
+                line.pop();
+                lines.push(std::mem::replace(&mut line, c.to_string()));
+            }
+        }
+    }
+    lines.push(line);
+    lines
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const PLAIN: Screen = Screen {
+        width: None,
+        colour: false,
+    };
+
+    fn screen(width: usize) -> Screen {
+        let width = Some(width);
+        Screen { width, ..PLAIN }
+    }
+
+    fn wide_table() -> Table {
+        let mut table = Table::new("speed", &["structure"]);
+        for spp in 0..20 {
+            table.add_column(format!("relMSE at {} spp", 1 << spp));
+        }
+        let row = |name: &str| {
+            let figures = (0..20).map(|i| TableCell::from(format!("{}.25e-{i}", 7 + i)));
+            std::iter::once(name.into()).chain(figures).collect()
+        };
+        table.rows.push(row("bvh"));
+        table.rows.push(row(
+            "a structure of a long name, builder=sweep, leaf_size=4, width=8",
+        ));
+        table
+    }
 
     #[test]
     fn columns_line_up_and_figures_stand_right() {
@@ -101,9 +337,63 @@ mod tests {
             .rows
             .push(vec!["bvh".into(), TableCell::with_detail("5.02", "[4, 6]")]);
         table.rows.push(vec!["uniform-grid λ".into(), "1".into()]);
-        let text = aligned(&table);
+        let text = PLAIN.table(&table);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines[3], "bvh                5.02");
         assert_eq!(lines[4], "uniform-grid λ        1");
+        // What fits is the same.
+        assert_eq!(screen(80).table(&table), text);
+    }
+
+    #[test]
+    fn a_table_fits_every_width_and_keeps_every_figure_whole() {
+        let table = wide_table();
+        for width in [40, 80, 120, 200] {
+            let text = screen(width).table(&table);
+            assert!(
+                text.lines().all(|line| width_of(line) <= width),
+                "{width}\n{text}"
+            );
+            for figure in table.rows.iter().flat_map(|row| &row[1..]) {
+                let mut words = text.split_whitespace();
+                assert!(
+                    words.any(|word| word == figure.text),
+                    "{width}: {}",
+                    figure.text
+                );
+            }
+            let words = text.split_whitespace();
+            let of_name = words.filter(|word| *word == "structure").count();
+            // Each block names its rows again.
+            assert!(of_name >= 2, "{text}");
+        }
+        assert!(PLAIN.table(&table).lines().any(|line| width_of(line) > 200));
+    }
+
+    #[test]
+    fn what_a_terminal_would_obey_is_shown_instead() {
+        let mut table = Table::new("a\u{1b}]0;b", &["scene\u{7}"]);
+        table.rows.push(vec!["x\u{1b}[2J\r".into()]);
+        let text = PLAIN.table(&table);
+        assert!(
+            !text.contains(|c: char| c.is_control() && c != '\n'),
+            "{text:?}"
+        );
+        assert!(text.contains("x[U+001B][2J[U+000D]"), "{text}");
+    }
+
+    #[test]
+    fn colour_is_beside_the_words_and_only_where_it_is_shown() {
+        let check = Check {
+            verdict: Verdict::Fail,
+            title: "t".into(),
+            detail: "d".into(),
+        };
+        assert_eq!(PLAIN.check(&check), "FAIL  t: d\n");
+        let coloured = Screen {
+            colour: true,
+            ..PLAIN
+        };
+        assert_eq!(coloured.check(&check), "\u{1b}[31mFAIL\u{1b}[0m  t: d\n");
     }
 }

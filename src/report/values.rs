@@ -440,11 +440,19 @@ pub fn csv(values: &[Value]) -> String {
             Reading::Word(word) => (*word).to_owned(),
             _ => figure.spread.words().to_owned(),
         };
-        let labels = axes.iter().map(|axis| key.label(axis).to_owned());
+        let labels = axes.iter().map(|axis| no_formula(key.label(axis)));
         let row = [&figure.id, &figure.title, &figure.unit].map(ToString::to_string);
         text += &line(labels.chain(row).chain(numbers).chain([spread]));
     }
     text
+}
+
+/// A name that a spreadsheet would take for a formula has an apostrophe before it.
+fn no_formula(name: &str) -> String {
+    match name.starts_with(['=', '+', '-', '@', '\t', '\r']) {
+        true => format!("'{}", crate::report::terminal::shown(name)),
+        false => crate::report::terminal::shown(name),
+    }
 }
 
 fn line(fields: impl Iterator<Item = String>) -> String {

@@ -76,7 +76,7 @@ pub struct Texture {
 }
 
 /// What went wrong or was approximated while a scene was loaded: counted, shown, kept in the record.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct LoadReport {
     /// Triangles dropped because a vertex was NaN or infinite.
     pub dropped_non_finite: usize,

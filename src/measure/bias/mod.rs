@@ -60,7 +60,7 @@ impl Default for BiasOptions {
 }
 
 /// What the test says.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BiasVerdict {
     /// Neither the whole image nor a tile was rejected. This is not a proof: a bias far below the noise

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// A structure over the frames of an animation: what was built over the first, taken over to each (*refitted*), and built
 /// anew for each (*rebuilt*).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct AnimationRecord {
     /// What moves, and how.
     pub settings: Animation,
@@ -19,7 +19,7 @@ pub struct AnimationRecord {
 }
 
 /// A frame whose gates both passed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FrameRecord {
     /// Number, from 0.
     pub frame: u32,
@@ -39,7 +39,7 @@ pub struct FrameRecord {
 }
 
 /// Rays of a class through the refitted and the rebuilt structure, in this order.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FrameRays {
     /// What they are.
     pub class: RayClass,
@@ -52,7 +52,7 @@ pub struct FrameRays {
 }
 
 /// Milliseconds of the same work in each round, by several clocks.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Cost {
     /// Of all threads of the process; empty where the system does not tell.
     pub processor_ms: Vec<f64>,

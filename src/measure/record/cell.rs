@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// How a cell ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
     /// All its records are written.
@@ -16,7 +16,7 @@ pub enum Outcome {
 }
 
 /// Modules that kernels were made of.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct KernelSetRecord {
     /// Hash of `kernels` and `modules`.
     pub id: String,
@@ -28,7 +28,7 @@ pub struct KernelSetRecord {
 }
 
 /// That a cell ended, and what it depends on.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CellRecord {
     /// Its name, see [`crate::config::Unit`].
     pub unit: String,
@@ -46,7 +46,7 @@ pub struct CellRecord {
 }
 
 /// What the figures of a cell depend on.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default)]
 pub struct Inputs {
     /// The program's sources on the host, as far as figures depend on them.

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::ops::AddAssign;
 
 /// Coherence of a full cell.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CoherenceRecord {
     /// The machine, and what was looked at.
     pub settings: Coherence,
@@ -17,7 +17,7 @@ pub struct CoherenceRecord {
 }
 
 /// Coherence at a number of samples per pixel.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CoherenceAt {
     /// Samples per pixel that the sampler was made for.
     pub spp: u32,
@@ -54,7 +54,9 @@ impl CoherenceAt {
 }
 
 /// Counts of one class of rays.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 pub struct Tally {
     /// Rays.
     pub rays: u64,

@@ -4,7 +4,7 @@ use super::Interval;
 use serde::{Deserialize, Serialize};
 
 /// A compaction of a stream.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CompactionRecord {
     /// Elements of the stream.
     pub elements: u32,

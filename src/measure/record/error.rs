@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// A reference image.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ReferenceRecord {
     /// Samples per pixel of both halves together; 0 if nothing had to be rendered.
     pub spp: u32,
@@ -37,7 +37,7 @@ pub struct ReferenceRecord {
 }
 
 /// Error at one number of samples.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ErrorAtSpp {
     /// Samples per pixel.
     pub spp: u32,
@@ -53,7 +53,7 @@ pub struct ErrorAtSpp {
 }
 
 /// Error of one replicate.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ErrorRecord {
     /// Whether the pair is randomised by its seed; a deterministic pair has one replicate.
     pub randomised: bool,
@@ -80,7 +80,7 @@ pub struct ErrorRecord {
 
 /// Bias check of one sampler: t-tests of the replicates against the reference, for the whole image, for a mean in
 /// which noisy places count less, and per tile.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct BiasRecord {
     /// Tiles tested.
     pub tiles: usize,
@@ -131,7 +131,7 @@ pub struct BiasRecord {
 
 /// The signed luminance error of the image at the highest spp, see [`crate::measure::spectrum`]: means
 /// over replicates with intervals.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct SpectrumRecord {
     /// Samples per pixel.
     pub spp: u32,
@@ -154,7 +154,7 @@ pub struct SpectrumRecord {
 pub const OUTLIER_QUANTILES: [f64; 4] = [0.5, 0.75, 0.95, 1.0];
 
 /// A point of a radial spectrum.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PowerAt {
     /// Cycles per pixel.
     pub frequency: f64,
@@ -167,7 +167,7 @@ pub struct PowerAt {
 }
 
 /// Error after a Gaussian filter.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FilteredError {
     /// Standard deviation of the filter, pixels; 0 is no filter.
     pub sigma: f64,

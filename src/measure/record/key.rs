@@ -77,16 +77,16 @@ pub mod axis {
 }
 
 /// Axis → what was taken of it. An axis that does not matter to a figure is absent.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(transparent)]
 pub struct Key(BTreeMap<String, Written>);
 
 /// A variant as it is written: a plain name where its label says all.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(from = "PlainOrWhole", into = "PlainOrWhole")]
 struct Written(Variant);
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(untagged)]
 enum PlainOrWhole {
     Plain(String),

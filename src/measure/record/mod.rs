@@ -38,7 +38,7 @@ use std::ops::Deref;
 pub const SCHEMA: &str = "raystone/2";
 
 /// One line: of a run, or of another file of records with bodies of its own.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Line<B = Body> {
     /// Always [`SCHEMA`].
     pub schema: String,
@@ -128,7 +128,7 @@ impl<T> Deref for Recorded<'_, T> {
 }
 
 /// What a line of a run holds.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Body {
     /// First line: what is run, where, and how many runs the plan saves.
@@ -228,7 +228,7 @@ pub fn all_of<'a, T: Kind + 'a>(lines: &'a [Line]) -> impl Iterator<Item = Recor
 }
 
 /// What figures were taken with, beyond their key.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default)]
 pub struct Ran {
     /// BLAKE3 of the composed text of the kernels that ran; empty if it did not come to that.
@@ -260,7 +260,7 @@ impl Ran {
 }
 
 /// A figure with its 95 % interval, see [`crate::measure::statistics`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Interval {
     /// The estimate (median for times and rates, mean for errors).
     pub value: f64,
@@ -292,7 +292,7 @@ impl Interval {
 }
 
 /// What a check says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// It was looked at, and holds.

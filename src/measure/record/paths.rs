@@ -4,7 +4,7 @@ use super::Verdict;
 use serde::{Deserialize, Serialize};
 
 /// Single paths of an integrator against the oracle for images, see [`crate::measure::image_gate`].
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PathsRecord {
     /// Paths judged; 0 if none could be.
     pub paths: usize,

@@ -4,7 +4,7 @@ use super::{Interval, RayClass};
 use serde::{Deserialize, Serialize};
 
 /// Speed of one ray class through a peer, and how its answers differ.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PeerTiming {
     /// Which rays: those of the structures.
     pub class: RayClass,
@@ -27,7 +27,7 @@ pub struct PeerTiming {
 }
 
 /// A ray caster of others on a scene.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PeerRecord {
     /// Version, and on what it ran.
     pub about: String,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// A folder of kernels that a run put in the place of embedded ones.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct KernelFolder {
     /// Its label, as in [`Ran::kernels`].
     pub label: String,
@@ -21,7 +21,7 @@ pub struct KernelFolder {
 }
 
 /// A kernel of a folder.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct KernelFile {
     /// Path below the folder.
     pub file: String,
@@ -32,7 +32,7 @@ pub struct KernelFile {
 }
 
 /// First line of a run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct RunRecord {
     /// `run.name` of the experiment.
     pub name: String,
@@ -69,7 +69,7 @@ pub struct RunRecord {
 }
 
 /// A loaded scene.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct SceneRecord {
     /// Number of triangles.
     pub triangles: usize,
@@ -96,7 +96,7 @@ pub struct SceneRecord {
 }
 
 /// A cell left out, or failed, or with a warning.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct SkippedRecord {
     /// The cell, in words.
     pub cell: String,
@@ -105,7 +105,7 @@ pub struct SkippedRecord {
 }
 
 /// Last line of a run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FinishedRecord {
     /// Whole wall time, seconds.
     pub wall_s: f64,
@@ -123,7 +123,7 @@ pub struct FinishedRecord {
 }
 
 /// Last line of a run that was ended early: what it had not measured by then is missing.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct InterruptedRecord {
     /// What ended it, for instance `SIGINT`.
     pub reason: String,

@@ -7,7 +7,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};
 
 /// Star discrepancy of a dumped stream.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct StreamRecord {
     /// The two dimensions of the path's table.
     pub dimensions: [u32; 2],
@@ -42,7 +42,7 @@ fn yes() -> bool {
 }
 
 /// The words of a stream, for pictures.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct RecordedPoints {
     /// Samples of each pixel; the sampler was made for so many.
     pub samples: u32,
@@ -84,7 +84,7 @@ impl RecordedPoints {
 }
 
 /// Figures of a dumped stream beside its star discrepancy.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default)]
 pub struct StreamFigures {
     /// Exponent of D* in N: slope of the mean over seeds.
@@ -102,7 +102,7 @@ pub struct StreamFigures {
 }
 
 /// A figure at one number of points: mean over seeds with interval.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FigureAtCount {
     /// Number of points.
     pub n: usize,
@@ -111,7 +111,7 @@ pub struct FigureAtCount {
 }
 
 /// Errors of one function on the unit square.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct IntegrandFigures {
     /// Its name, as in `integrand:NAME`.
     pub function: String,
@@ -124,7 +124,7 @@ pub struct IntegrandFigures {
 }
 
 /// What several pixels draw for N samples each, one seed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PixelsAtCount {
     /// Samples of a pixel.
     pub n: usize,
@@ -135,7 +135,7 @@ pub struct PixelsAtCount {
 }
 
 /// What drawing from a sampler costs, see [`crate::measure::sampler_cost`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct SamplerCostRecord {
     /// Nanoseconds of adapter time per two-dimensional sample, loop taken off: median of the rounds with
     /// its 95 % interval. Near zero it may be negative.

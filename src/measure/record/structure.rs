@@ -7,7 +7,19 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Ray classes of the recorded ray sets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum RayClass {
     /// Camera rays through pixel centres, 8×8 tiles; closest hit.
@@ -31,7 +43,7 @@ pub enum RayClass {
 }
 
 /// Gate result for one ray class.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ClassVerdict {
     /// Which rays.
     pub class: RayClass,
@@ -46,7 +58,7 @@ pub struct ClassVerdict {
 }
 
 /// Comparison of the judge with a slower, simpler judge.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct JudgeCheck {
     /// Rays compared.
     pub rays: usize,
@@ -63,7 +75,7 @@ pub struct JudgeCheck {
 }
 
 /// The verdict of the gate on one structure and scene.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct GateVerdict {
     /// Nothing wrong, no fuse blown, judge itself sound.
     pub passed: bool,
@@ -83,7 +95,7 @@ pub struct GateVerdict {
 }
 
 /// Work counted per ray, means over a class.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CountersPerRay {
     /// Nodes or cells visited.
     pub nodes: f64,
@@ -111,7 +123,7 @@ impl CountersPerRay {
 }
 
 /// Speed of one ray class through one structure.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ClassTiming {
     /// Which rays.
     pub class: RayClass,
@@ -138,7 +150,7 @@ pub struct ClassTiming {
 }
 
 /// Coherence of recorded rays, as they follow each other.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ClassCoherence {
     /// The machine, and how many rays were looked at.
     pub settings: Coherence,
@@ -147,7 +159,7 @@ pub struct ClassCoherence {
 }
 
 /// A structure on a scene.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct StructureRecord {
     /// Whether the failure is the driver's, which ends loops too early for this structure: the cell then
     /// counts as skipped.
@@ -189,7 +201,7 @@ pub struct StructureRecord {
 }
 
 /// Time of a full cell whose pixels are taken in an order of passes: see [`crate::integrator::Order`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct OrderTime {
     /// Which.
     pub order: String,
@@ -202,7 +214,7 @@ pub struct OrderTime {
 }
 
 /// Paths that begin at rasterised triangles, against rays through the same points with the same samples behind them.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PrimaryRecord {
     /// Pixels that were compared.
     pub pixels: u64,
@@ -223,7 +235,7 @@ pub struct PrimaryRecord {
 }
 
 /// Time of a full cell.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct TimeRecord {
     /// Image size in pixels.
     pub resolution: [u32; 2],

@@ -8,7 +8,7 @@ mod values;
 use crate::measure::record::{Recorded, SkippedRecord, Verdict, axis};
 use crate::report::data::without_repeats;
 use crate::report::document::{Banner, Block, Check, Document, Section, Table, Tone};
-use crate::report::terminal::aligned;
+use crate::report::terminal::Screen;
 use crate::report::values::csv;
 use crate::report::{ReportError, format, terms, write_file, write_page};
 use crate::stress::families::FAMILIES;
@@ -33,20 +33,20 @@ pub fn write_stress_page(dir: &Path, records: &[Line]) -> Result<PathBuf, Report
 }
 
 /// Targets, families and the matrix as aligned plain text.
-pub fn stress_tables(records: &[Line]) -> String {
+pub fn stress_tables(records: &[Line], screen: Screen) -> String {
     let mut tables = by_test(records);
     tables.push(matrix_table(records));
     tables.extend(axes::tables(records));
     let mut text = String::new();
     for table in tables.iter().filter(|table| !table.rows.is_empty()) {
-        text += &(aligned(table) + "\n");
+        text += &(screen.table(table) + "\n");
     }
     for skipped in skipped(records).filter(|s| !s.reason.starts_with("every case")) {
-        text += &format!("skipped: {}: {}\n", skipped.cell, skipped.reason);
+        text += &screen.lines(&format!("skipped: {}: {}", skipped.cell, skipped.reason));
     }
     checks(records)
         .iter()
-        .for_each(|check| text += &check.line());
+        .for_each(|check| text += &screen.check(check));
     text
 }
 

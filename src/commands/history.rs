@@ -1,0 +1,68 @@
+//! `raystone history`.
+
+use super::output::{OutputArguments, print, print_json, screen, warn};
+use anyhow::Result;
+use clap::Args;
+use raystone::export::select::Selection;
+use raystone::history::History;
+use raystone::measure::record::read_records;
+use raystone::report::write_page;
+use serde_json::json;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Show how figures changed over the runs of several commits: a table, and a page with plots
+#[derive(Args)]
+pub struct HistoryOf {
+    /// Folders that runs wrote; they are taken in the order of their time
+    #[arg(required = true)]
+    dirs: Vec<PathBuf>,
+    /// Figure, by its id with or without the version, or a pattern of ids; may be given many times [default: all that
+    /// rank]
+    #[arg(long, value_name = "ID")]
+    figure: Vec<String>,
+    /// Keep what fits: `--only 'accel=*bvh,scene=cornell-box'`; patterns of one axis are alternatives
+    #[arg(long, value_name = "AXIS=PATTERN,…")]
+    only: Vec<String>,
+    /// Folder for the page and its plots [default: none is written]
+    #[arg(long, short, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArguments,
+}
+
+impl HistoryOf {
+    pub fn execute(self) -> Result<ExitCode> {
+        let mut all = Vec::new();
+        for dir in self.dirs {
+            let records = read_records(&dir)?;
+            for warning in &records.warnings {
+                warn(&format!("{}: {warning}", dir.display()));
+            }
+            all.push((dir, records.lines));
+        }
+        let history = History::new(&all, &Selection::new(&self.figure, &self.only)?)?;
+        let page = match &self.out {
+            Some(folder) => Some(write_page(folder, &mut history.document())?.0),
+            None => None,
+        };
+        if self.output.json {
+            let mut found = history.json();
+            found["page"] = json!(page);
+            print_json("history", found)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        let screen = screen();
+        let mut text = screen.table(&history.runs_table()) + "\n";
+        let changes = history.changes_table();
+        if !changes.rows.is_empty() {
+            text += &(screen.table(&changes) + "\n");
+        }
+        text += &screen.lines(&history.summary());
+        if let Some(page) = page {
+            text += &format!("page: {}\n", page.display());
+        }
+        print(&text)?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
