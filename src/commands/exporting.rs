@@ -50,7 +50,8 @@ impl Export {
             );
         }
         let name = self.format.name;
-        if !self.format.selective && !(self.figure.is_empty() && self.only.is_empty()) {
+        let chooses = !self.figure.is_empty() || !self.only.is_empty();
+        if chooses && !self.format.selective {
             bail!("--format {name} holds no figures to choose from: leave out --figure and --only");
         }
         let records = read_records(&self.dir)?;
