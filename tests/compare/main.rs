@@ -2,6 +2,7 @@
 
 mod alarms;
 mod inputs;
+mod judged;
 mod records;
 mod shown;
 

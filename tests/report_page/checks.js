@@ -52,7 +52,11 @@
     if (box) {
       box.scrollIntoView();
       (box.previousElementSibling ?? box).scrollIntoView();
-      for (let i = 0; i < 40 && !box.querySelector("canvas"); i++) await wait(50);
+      // It wakes when a frame shows it, and frames come late on a busy machine: each turn asks for one.
+      for (let i = 0; i < 400 && !box.querySelector("canvas"); i++) {
+        scrollBy(0, i % 2 ? 1 : -1);
+        await Promise.race([new Promise(requestAnimationFrame), wait(50)]);
+      }
       const canvas = box.querySelector("canvas");
       const press = (mode) => box.querySelector(`button[data-mode=${mode}]`).click();
       const pixel = (x, y, of = canvas) => [...of.getContext("2d").getImageData(x, y, 1, 1).data].slice(0, 3);
