@@ -133,15 +133,21 @@ mod tests {
 
     #[test]
     fn steps_are_found_where_they_are() {
+        // Beside the steps, one level in twenty is split for nothing.
+        let (mut exact, mut both) = (0, 0);
+        for seed in 0..40 {
+            let mut random = Pcg32::new(seed);
+            let mut values = noise(&mut random, 10, 0.0);
+            values.extend(noise(&mut random, 10, 6.0));
+            values.extend(noise(&mut random, 10, 2.0));
+            let found = e_divisive(&values, 0.05);
+            let found: Vec<usize> = found.iter().map(|(at, _)| *at).collect();
+            exact += usize::from(found == [10, 20]);
+            both += usize::from(found.contains(&10) && found.contains(&20));
+        }
+        // Of 40, a step is missed or moved by chance now and then; 8 or more splits for nothing have a chance of 0.1 %.
+        assert!(both >= 38 && exact >= 32, "{both}, {exact}");
         let mut random = Pcg32::new(3);
-        let mut values = noise(&mut random, 10, 0.0);
-        values.extend(noise(&mut random, 10, 6.0));
-        values.extend(noise(&mut random, 10, 2.0));
-        let found: Vec<usize> = e_divisive(&values, 0.05)
-            .iter()
-            .map(|(at, _)| *at)
-            .collect();
-        assert_eq!(found, [10, 20]);
         // One far run is no level.
         let mut outlier = noise(&mut random, 20, 0.0);
         outlier[12] = 50.0;
