@@ -1,7 +1,7 @@
 //! The page of all tables: verdicts first, then each table in the layout of the original with both numbers.
 
 use super::claim::Row;
-use super::judge::{ONCE, Verdict};
+use super::judge::{ONCE, ONCE_MS, Verdict};
 use super::run::Reproduced;
 use super::{NotCovered, plots};
 use crate::config::expect::Expect;
@@ -71,7 +71,7 @@ fn summary(tables: &[Reproduced]) -> Section {
         "Claims: {}. A claim about several places is contradicted by one of them, and supported where all that can be tested \
          support it. Absolute times are shown, never judged. Intervals are of 95 %; those of ratios and slopes combine the \
          intervals of their parts on logarithms (Zou & Donner 2008). What was measured once is taken to be within a factor of \
-         {ONCE}. A contradicted claim is a finding.",
+         {ONCE}, and a time to within {ONCE_MS} ms besides. A contradicted claim is a finding.",
         tally(tables)
     )));
     let columns = [
