@@ -305,11 +305,13 @@ fn fault(text: &str, file: &str, error: &toml::de::Error) -> ConfigError {
     }
 }
 
-/// Takes these sections out of an experiment's tree, which has no use for them.
-pub(super) fn take(tree: &mut Table) {
+/// Takes these sections out of an experiment's tree, which has no use for them: whether there were any.
+pub(super) fn take(tree: &mut Table) -> bool {
+    let mut any = false;
     for section in SECTIONS {
-        tree.remove(section);
+        any |= tree.remove(section).is_some();
     }
+    any
 }
 
 /// Whether two texts are the same experiment: equal but for comments and these sections, with the same overrides

@@ -80,8 +80,9 @@ pub(super) fn parse(
 fn layers(text: &str, file: &str, overrides: &[String]) -> Result<Table, ConfigError> {
     let mut user = tree::parse_file(text, file)?;
     // What a thesis says changes nothing that is measured; a fault in it is told all the same.
-    expect::Thesis::parse(text, file)?;
-    expect::take(&mut user);
+    if expect::take(&mut user) {
+        expect::Thesis::parse(text, file)?;
+    }
     for text in overrides {
         tree::merge(&mut user, tree::parse_override(text)?);
     }
