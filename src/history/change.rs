@@ -147,11 +147,14 @@ mod tests {
         }
         // Of 40, a step is missed or moved by chance now and then; 8 or more splits for nothing have a chance of 0.1 %.
         assert!(both >= 38 && exact >= 32, "{both}, {exact}");
-        let mut random = Pcg32::new(3);
         // One far run is no level.
-        let mut outlier = noise(&mut random, 20, 0.0);
-        outlier[12] = 50.0;
-        assert!(e_divisive(&outlier, 0.05).is_empty());
+        let alarms = (0..40).filter(|seed| {
+            let mut outlier = noise(&mut Pcg32::new(*seed), 20, 0.0);
+            outlier[12] = 50.0;
+            !e_divisive(&outlier, 0.05).is_empty()
+        });
+        let alarms = alarms.count();
+        assert!(alarms <= 8, "{alarms}");
     }
 
     #[test]
