@@ -8,6 +8,7 @@ use crate::measure::figure::{FIGURES, Figure, figure};
 use crate::measure::gate::fault_text;
 use crate::measure::record::*;
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::ops::Deref;
 
 /// Everything a run recorded.
@@ -33,6 +34,8 @@ pub struct RunData<'a> {
     pub compactions: Vec<Recorded<'a, CompactionRecord>>,
     /// Cells left out.
     pub skipped: Vec<&'a SkippedRecord>,
+    /// When the runs began that times were measured in: several after a run that was resumed, or joined of parts.
+    pub sittings: BTreeSet<u64>,
     /// Cells that failed without a record of their own kind.
     pub failed: Vec<&'a SkippedRecord>,
     /// What competitors are called.
@@ -192,7 +195,12 @@ impl<'a> RunData<'a> {
                     let scene = data.scene(line.key.label(axis::SCENE));
                     put(&mut scene.peers, line.of(record), |a, b| a.key == b.key)
                 }
-                Body::Reference(_) | Body::Kernels(_) | Body::Cell(_) => {}
+                Body::Reference(_) | Body::Kernels(_) => {}
+                Body::Cell(record) => {
+                    if !record.inputs.device.is_empty() {
+                        data.sittings.insert(record.run_began_unix_s);
+                    }
+                }
                 Body::Paths(record) => put(&mut data.paths, line.of(record), |a, b| a.key == b.key),
                 Body::Time(record) => {
                     let measured = data.of_cell(line, record);

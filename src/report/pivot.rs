@@ -1,5 +1,7 @@
 //! Tables of figures: rows by some axes of the key, columns by figure and another part of it.
 
+use std::collections::{HashMap, HashSet};
+
 use super::document::{Table, TableCell};
 use super::format;
 use super::values::Value;
@@ -32,10 +34,11 @@ impl<'a> Rows<'a> {
     /// A row for each combination of labels in the values, in their order.
     pub fn of_labels(by: &'a [&'a str], heads: &'a [&'a str], values: &[Value]) -> Self {
         let mut rows: Vec<(Key, Vec<TableCell>)> = Vec::new();
+        let mut known = HashSet::new();
         for Value { key, .. } in values {
-            if rows.iter().all(|(known, _)| !known.agrees(key, by)) {
-                let labels = by.iter().map(|axis| key.label(axis).into());
-                rows.push((key.clone(), labels.collect()));
+            let labels = key.labels_on(by);
+            if known.insert(labels.clone()) {
+                rows.push((key.clone(), labels.into_iter().map(Into::into).collect()));
             }
         }
         Self { by, heads, rows }
@@ -51,15 +54,21 @@ impl<'a> Rows<'a> {
         across: Part,
     ) -> Table {
         let shown = values.iter().filter(|v| figures.contains(&&*v.figure.id));
-        let values: Vec<&Value> = shown.collect();
-        let mut columns: Vec<(&Value, String)> = Vec::new();
+        let shown: Vec<(&Value, String)> = shown.map(|v| (v, across(&v.key))).collect();
+        let mut columns: Vec<(&Value, &str)> = Vec::new();
+        let mut known = HashSet::new();
         for id in figures {
-            for value in values.iter().filter(|value| value.figure.id == *id) {
-                let part = across(&value.key);
-                if (columns.iter()).all(|c| c.0.figure.id != *id || c.1 != part) {
+            for (value, part) in shown.iter().filter(|(value, _)| value.figure.id == *id) {
+                if known.insert((id, part)) {
                     columns.push((value, part));
                 }
             }
+        }
+        // The first of several values of one cell stands there.
+        let mut found: HashMap<_, &Value> = HashMap::new();
+        for (value, part) in &shown {
+            let place = (value.key.labels_on(self.by), &*value.figure.id, &**part);
+            found.entry(place).or_insert(value);
         }
         if columns.is_empty() && self.heads.len() < 2 {
             return Table::default();
@@ -69,18 +78,15 @@ impl<'a> Rows<'a> {
             let shared = columns.iter().filter(|(_, other)| other == part).count() > 1;
             table.add_column(match (part.is_empty(), shared) {
                 (true, _) => value.figure.heading(),
-                (false, false) => part.clone(),
+                (false, false) => (*part).to_owned(),
                 (false, true) => format!("{}, {part}", value.figure.title),
             });
         }
         for (key, mut cells) in self.rows {
-            let in_row = values.iter().filter(|v| v.key.agrees(&key, self.by));
-            let in_row: Vec<&&Value> = in_row.collect();
+            let labels = key.labels_on(self.by);
             cells.extend(columns.iter().map(|(first, part)| {
-                let is_it =
-                    |v: &&&&Value| v.figure.id == first.figure.id && across(&v.key) == *part;
-                let found = in_row.iter().find(is_it);
-                found.map_or_else(|| format::ABSENT.into(), |value| value.cell())
+                let value = found.get(&(labels.clone(), &*first.figure.id, *part));
+                value.map_or_else(|| format::ABSENT.into(), |value| value.cell())
             }));
             table.rows.push(cells);
         }

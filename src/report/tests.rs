@@ -446,3 +446,24 @@ fn the_terminal_shows_tables_and_checks() {
     }
     assert!(!terminal_tables(&[]).contains("NaN"));
 }
+
+#[test]
+fn times_of_several_runs_are_named_as_such_and_cells_without_a_clock_are_not_counted() {
+    let cell = |device: &str, began: u64| {
+        let body = serde_json::json!({
+            "kind": "cell", "unit": "u", "outcome": "done", "device": device, "run_began_unix_s": began,
+        });
+        Line::about_all(serde_json::from_value(body).unwrap())
+    };
+    let page = |name: &str, cells: [Line; 2]| report(name, &[small_run(), cells.into()].concat()).0;
+    let told = "Times were measured in 2 runs that began between 2023-11-14 22:13 UTC and 2023-11-15 22:13 UTC";
+    let (day, next) = (1_700_000_000, 1_700_086_400);
+    let html = page("sittings", [cell("a", next), cell("a", day)]);
+    assert!(html.contains(told));
+    for others in [
+        [cell("a", day), cell("a", day)],
+        [cell("a", day), cell("", next)],
+    ] {
+        assert!(!page("one sitting", others).contains("Times were measured in"));
+    }
+}

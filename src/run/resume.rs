@@ -208,6 +208,7 @@ mod tests {
                 unit: unit.name.clone(),
                 outcome: Outcome::Done,
                 reason: String::new(),
+                run_began_unix_s: 0,
                 inputs,
                 lines: vec![hash],
             })));

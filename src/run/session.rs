@@ -29,13 +29,17 @@ const MOST_KEPT_PIXELS: usize = 1 << 17;
 /// Where the wall time goes; what no part claims is the harness's own overhead.
 pub(super) struct Clock {
     start: Instant,
+    /// Seconds from 1970 to `start`.
+    began_unix_s: u64,
     parts_s: BTreeMap<String, f64>,
 }
 
 impl Clock {
     fn new() -> Self {
+        let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
         Self {
             start: Instant::now(),
+            began_unix_s: since_1970.map_or(0, |since| since.as_secs()),
             parts_s: BTreeMap::new(),
         }
     }
@@ -305,6 +309,7 @@ impl<'a> Session<'a> {
             unit: name.to_owned(),
             outcome,
             reason: reason.to_owned(),
+            run_began_unix_s: self.clock.began_unix_s,
             inputs,
             lines,
         };
@@ -410,14 +415,11 @@ impl<'a> Session<'a> {
         environment: Environment,
         kernels: Vec<KernelFolder>,
     ) -> Result<(), RunError> {
-        let seconds = SystemTime::now()
-            .duration_since(SystemTime::UNIX_EPOCH)
-            .map_or(0, |d| d.as_secs());
         let record = RunRecord {
             name: self.experiment.name.clone(),
             experiment: self.experiment.source.clone(),
             experiment_text: self.experiment.text.clone(),
-            started_unix_s: seconds,
+            started_unix_s: self.clock.began_unix_s,
             environment,
             renders_full_product: self.plan.renders_full_product(),
             renders_planned: self.plan.renders_planned(),

@@ -37,6 +37,10 @@ pub struct CellRecord {
     /// Why, if it is not done.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub reason: String,
+    /// When the run began that measured it, in seconds since 1970; 0 in records of older programs. Cells with another
+    /// value than their neighbours' were measured in another run that this one went on with, or was merged with.
+    #[serde(default)]
+    pub run_began_unix_s: u64,
     /// What it depends on.
     #[serde(flatten)]
     pub inputs: Inputs,

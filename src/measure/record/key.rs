@@ -203,6 +203,13 @@ impl Key {
             .all(|axis| self.label(axis) == other.label(axis))
     }
 
+    /// The labels on some axes, in their order, empty where an axis does not matter: equal for keys that [agree].
+    ///
+    /// [agree]: Self::agrees
+    pub fn labels_on(&self, axes: &[&str]) -> Vec<&str> {
+        axes.iter().map(|axis| self.label(axis)).collect()
+    }
+
     /// Whether no axis matters.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()

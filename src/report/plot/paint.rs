@@ -101,20 +101,24 @@ fn escaped(text: &str) -> String {
     text.replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// The drawing as a PNG file of twice its size, smoothed by 2×2 samples per pixel.
+/// Above this height, in CSS pixels, a drawing is mostly legend: its PNG file has its own size, not twice that. Dozens
+/// of them would cost a report more time than everything else; the SVG file stays as sharp as it is.
+const TALL: f64 = 1000.0;
+
+/// The drawing as a PNG file of twice its size (its own above [`TALL`]), smoothed by 2×2 samples per pixel.
 pub fn to_png(drawing: &Drawing) -> Result<Vec<u8>, ReportError> {
-    const SCALE: f64 = 4.0;
-    let (width, height) = scaled_size(drawing, SCALE);
+    let scale = if drawing.height > TALL { 2.0 } else { 4.0 };
+    let (width, height) = scaled_size(drawing, scale);
     // White already: painting it pixel by pixel would take longer than the plot.
     let mut pixels = vec![255u8; width as usize * height as usize * 3];
     for raster in &drawing.rasters {
-        raster.blit(&mut pixels, width as usize, SCALE);
+        raster.blit(&mut pixels, width as usize, scale);
     }
     let backend = BitMapBackend::with_buffer(&mut pixels, (width, height));
-    paint(drawing, backend, SCALE, 2.5)?;
+    paint(drawing, backend, scale, 0.625 * scale)?;
     let mut png = Vec::new();
-    // Flat colours compress best unfiltered.
-    PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::NoFilter)
+    // Flat colours compress best unfiltered; the usual level 6 takes twice the time for 3 % fewer bytes.
+    PngEncoder::new_with_quality(&mut png, CompressionType::Level(4), FilterType::NoFilter)
         .write_image(
             &halve(&pixels, width as usize),
             width / 2,
@@ -240,6 +244,10 @@ mod tests {
         assert_eq!(picture.dimensions(), (240, 80));
         assert!(picture.pixels().any(|p| p.0[0] == 255));
         assert!(picture.pixels().any(|p| p.0[0] < 80));
+        let mut tall = sample();
+        tall.height = TALL + 100.0;
+        let picture = image::load_from_memory(&to_png(&tall).unwrap()).unwrap();
+        assert_eq!((picture.width(), picture.height()), (120, 1100));
     }
 
     #[test]

@@ -89,6 +89,7 @@ fn banners(data: &RunData, warnings: &[String]) -> Vec<Banner> {
     }
     banners.extend(busy(data).map(|text| note(&text)));
     banners.extend(loaded(data).into_iter().map(|text| note(&text)));
+    banners.extend(sittings(data).map(|text| note(&text)));
     let lenient = data.run.is_some_and(|run| run.lenient);
     let told = "The run was told to end with exit code 0 whatever fails (--lenient).";
     banners.extend(lenient.then(|| note(told)));
@@ -155,6 +156,21 @@ fn loaded(data: &RunData) -> Vec<String> {
         ));
     }
     said
+}
+
+/// That times are of different hours.
+fn sittings(data: &RunData) -> Option<String> {
+    let (first, last) = (data.sittings.first()?, data.sittings.last()?);
+    (first != last).then(|| {
+        format!(
+            "Times were measured in {} runs that began between {} and {} (resumed, or joined of parts). What stands in \
+             one table of a scene was timed in turns within one of them; across scenes and samplers the machine may \
+             have been another.",
+            data.sittings.len(),
+            format::utc(*first),
+            format::utc(*last)
+        )
+    })
 }
 
 /// Digits of a hash that tell two kernels apart.
