@@ -33,7 +33,7 @@ impl Plan {
         let experiment = Experiment::load(&self.file, overrides, &registries.catalogue())?;
         let cells = plan(&experiment, &self.experiment.only, &registries)?;
         let units = cells.units(&experiment);
-        let estimate = Estimate::new(&experiment, &cells, &registries);
+        let estimate = Estimate::new(&experiment, &cells, &units, &registries);
         let cost = |unit: &Unit| estimate.seconds_of(unit);
         let of = usize::from(self.shards);
         let numbers = shards(&units, of, cost);

@@ -91,7 +91,7 @@ impl Run {
         let plan = plan(&experiment, &self.experiment.only, &registries)?;
         if self.dry_run {
             Kernels::load(&plan.kernels, &registries)?;
-            let estimate = Estimate::new(&experiment, &plan, &registries);
+            let estimate = Estimate::new(&experiment, &plan, &plan.units(&experiment), &registries);
             print(&format!("{}\n{estimate}\n", plan.describe().trim_end()))?;
             return Ok(ExitCode::SUCCESS);
         }

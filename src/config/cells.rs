@@ -6,11 +6,13 @@ use crate::params::{Params, Variant};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::Index;
+use std::sync::Arc;
 
 /// What is run together, and recorded under one key: a variant on each axis that matters to it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Cell {
-    variants: AxisMap<Option<Variant>>,
+    /// Shared: a sweep has many cells and few variants.
+    variants: AxisMap<Option<Arc<Variant>>>,
     /// Whether each seed makes its sampler draw other numbers; no without one.
     pub randomised: bool,
 }
@@ -79,13 +81,19 @@ impl Cell {
 
     /// The variant on an axis, if that matters.
     pub fn get(&self, axis: Axis) -> Option<&Variant> {
-        self.variants[axis].as_ref()
+        self.variants[axis].as_deref()
     }
 
     /// The same cell with this variant on an axis.
     #[must_use]
-    pub fn with(mut self, axis: Axis, variant: &Variant) -> Self {
-        self.variants[axis] = Some(variant.clone());
+    pub fn with(self, axis: Axis, variant: &Variant) -> Self {
+        self.sharing(axis, &Arc::new(variant.clone()))
+    }
+
+    /// The same cell with a variant on an axis that other cells have as well.
+    #[must_use]
+    pub(super) fn sharing(mut self, axis: Axis, variant: &Arc<Variant>) -> Self {
+        self.variants[axis] = Some(Arc::clone(variant));
         self
     }
 
@@ -103,9 +111,9 @@ impl Cell {
     pub fn on(&self, axes: &[Axis]) -> Self {
         let variants = axes
             .iter()
-            .filter_map(|&axis| Some((axis, self.get(axis)?)));
+            .filter_map(|&axis| Some((axis, self.variants[axis].as_ref()?)));
         variants.fold(Self::default(), |cell, (axis, variant)| {
-            cell.with(axis, variant)
+            cell.sharing(axis, variant)
         })
     }
 

@@ -8,8 +8,11 @@ use super::ConfigError;
 use super::cells::{Cell, NO_PEER, is_compaction};
 use super::experiment::Experiment;
 use super::keys::Axis;
-use super::product::{Filter, Point, check_size, excluded, included, product, refused, unmet};
+use super::product::{
+    Filter, Point, asked_once, check_size, excluded, included, product, refused, shared, unmet,
+};
 use crate::params::Variant;
+use std::collections::HashSet;
 use std::fmt::{self, Write as _};
 
 /// Cells left out, with the reason.
@@ -76,7 +79,9 @@ impl Plan {
         let axes = &experiment.axes;
         check_size(experiment)?;
         let filter = Filter::parse(only, axes)?;
-        let full = product(axes, &Cell::FULL);
+        let variants = shared(axes);
+        let is_randomised = asked_once(is_randomised);
+        let full = product(&variants, &Cell::FULL);
         let mut skipped = Vec::new();
         for exclude in &experiment.excludes {
             skipped.extend(excluded(exclude, experiment, &full, &filter)?);
@@ -90,7 +95,7 @@ impl Plan {
         let refused = refused(&wanted, &is_randomised);
         let renders = !axes[Axis::Integrator].iter().all(is_compaction);
         let cells = |which: &[Axis]| -> Vec<Cell> {
-            let mut points = product(axes, which);
+            let mut points = product(&variants, which);
             points.retain(|point| {
                 is_wanted(experiment, &filter, point) && point.refusal(&is_randomised).is_none()
             });
@@ -107,11 +112,11 @@ impl Plan {
         let mut peers = rendering(&Cell::PEER);
         peers.retain(|cell| cell[Axis::Peer].name != NO_PEER);
         let structures = rendering(&Cell::STRUCTURE);
-        let (samplers, untraceable): (Vec<_>, Vec<_>) = (rendering(&Cell::SAMPLER).into_iter())
-            .partition(|cell| {
-                let place = |cell: &Cell| cell.on(&[&Cell::WORLD[..], &[Axis::Kernels]].concat());
-                structures.iter().any(|s| place(s) == place(cell))
-            });
+        let place = [&Cell::WORLD[..], &[Axis::Kernels]].concat();
+        let place = |cell: &Cell| cell.on(&place).identity();
+        let places: HashSet<String> = structures.iter().map(place).collect();
+        let (samplers, untraceable): (Vec<_>, Vec<_>) =
+            (rendering(&Cell::SAMPLER).into_iter()).partition(|cell| places.contains(&place(cell)));
         skipped.extend(untraceable.iter().map(no_structure));
         let plan = Self {
             scenes: needed(&axes[Axis::Scene], Axis::Scene, [&structures, &[], &[]]),

@@ -10,6 +10,9 @@ use super::pattern::Pattern;
 use super::plan::Skipped;
 use crate::params::Variant;
 use crate::text::nearest;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Cells of the full product, before anything is left out.
 const MAX_CELLS: usize = 1 << 20;
@@ -36,13 +39,38 @@ pub(super) fn check_size(experiment: &Experiment) -> Result<(), ConfigError> {
 pub(super) trait IsRandomised: Fn(&Variant, &Variant) -> Result<bool, String> {}
 impl<F: Fn(&Variant, &Variant) -> Result<bool, String>> IsRandomised for F {}
 
+/// The same, asked once for each pair of variants that live as long as the answer is used.
+pub(super) fn asked_once(is_randomised: impl IsRandomised) -> impl IsRandomised {
+    let known: RefCell<HashMap<[*const Variant; 2], Result<bool, String>>> = RefCell::default();
+    move |sequence: &Variant, decorrelation: &Variant| {
+        let mut known = known.borrow_mut();
+        let pair = [sequence, decorrelation].map(std::ptr::from_ref);
+        let answer = known.entry(pair);
+        answer
+            .or_insert_with(|| is_randomised(sequence, decorrelation))
+            .clone()
+    }
+}
+
 /// A point of the product of some axes.
 #[derive(Clone)]
-pub(super) struct Point<'a>(AxisMap<Option<&'a Variant>>);
+pub(super) struct Point<'a>(AxisMap<Option<&'a Arc<Variant>>>);
+
+/// The variants of each axis, to be shared by cells.
+pub(super) type Shared = AxisMap<Vec<Arc<Variant>>>;
+
+/// The axes of an experiment, to be shared.
+pub(super) fn shared(axes: &Axes) -> Shared {
+    let mut shared = Shared::default();
+    for (axis, variants) in axes.iter() {
+        shared[axis] = variants.iter().cloned().map(Arc::new).collect();
+    }
+    shared
+}
 
 impl Point<'_> {
     fn get(&self, axis: Axis) -> Option<&Variant> {
-        self.0[axis]
+        self.0[axis].map(|variant| &**variant)
     }
 
     /// Why its sequence and decorrelation make no sense together, if it has both and they do not.
@@ -55,7 +83,7 @@ impl Point<'_> {
         let variants = self.0.iter();
         let variants = variants.filter_map(|(axis, variant)| Some((axis, (*variant)?)));
         let mut cell = variants.fold(Cell::default(), |cell, (axis, variant)| {
-            cell.with(axis, variant)
+            cell.sharing(axis, variant)
         });
         let pair = (self.get(Axis::Sequence), self.get(Axis::Decorrelation));
         let randomised = match pair {
@@ -140,7 +168,7 @@ pub(super) fn unmet(experiment: &Experiment, full: &[Point], filter: &Filter) ->
 }
 
 /// All points of the product of the axes in `which`, the last one running fastest.
-pub(super) fn product<'a>(axes: &'a Axes, which: &[Axis]) -> Vec<Point<'a>> {
+pub(super) fn product<'a>(axes: &'a Shared, which: &[Axis]) -> Vec<Point<'a>> {
     let mut points = vec![Point(AxisMap::default())];
     for &axis in which {
         points = points

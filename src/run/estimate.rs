@@ -50,22 +50,30 @@ impl AddAssign for Work {
 pub struct Estimate<'a> {
     experiment: &'a Experiment,
     plan: &'a Plan,
-    registries: &'a Registries,
+    /// Rays of a sample by label of the integrator.
+    rays_per_sample: BTreeMap<&'a str, u64>,
     /// Of all units and references.
     whole: Work,
 }
 
 impl<'a> Estimate<'a> {
-    /// Counts the rays and kernels of a plan.
-    pub fn new(experiment: &'a Experiment, plan: &'a Plan, registries: &'a Registries) -> Self {
+    /// Counts the rays and kernels of a plan with these [units](Plan::units).
+    pub fn new(
+        experiment: &'a Experiment,
+        plan: &'a Plan,
+        units: &[Unit],
+        registries: &Registries,
+    ) -> Self {
+        let integrators = experiment.axes[Axis::Integrator].iter();
+        let rays = |i: &'a Variant| (i.label.as_str(), rays_per_sample(registries, i));
         let mut estimate = Self {
             experiment,
             plan,
-            registries,
+            rays_per_sample: integrators.map(rays).collect(),
             whole: Work::default(),
         };
-        for unit in plan.units(experiment) {
-            estimate.whole += estimate.of_unit(&unit);
+        for unit in units {
+            estimate.whole += estimate.of_unit(unit);
         }
         estimate.whole.rays += estimate.references();
         estimate
@@ -94,7 +102,8 @@ impl<'a> Estimate<'a> {
     /// Rays of an image.
     fn image(&self, integrator: &Variant, spp: u32) -> u64 {
         let [width, height] = self.experiment.resolution.map(u64::from);
-        width * height * u64::from(spp) * rays_per_sample(self.registries, integrator)
+        let rays = self.rays_per_sample.get(integrator.label.as_str());
+        width * height * u64::from(spp) * rays.copied().unwrap_or(1)
     }
 
     fn of_unit(&self, unit: &Unit) -> Work {
@@ -217,8 +226,8 @@ mod tests {
         let experiment =
             Experiment::parse(text, "test", &overrides, &registries.catalogue()).unwrap();
         let plan = Plan::new(&experiment, &[], |s, d| registries.is_randomised(s, d)).unwrap();
-        let estimate = Estimate::new(&experiment, &plan, &registries);
         let units = plan.units(&experiment);
+        let estimate = Estimate::new(&experiment, &plan, &units, &registries);
         let parts: f64 = units.iter().map(|unit| estimate.seconds_of(unit)).sum();
         let references = estimate.references() as f64 / RAYS_PER_SECOND;
         assert!((parts + references - estimate.seconds()).abs() < 1e-9);

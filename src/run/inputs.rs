@@ -134,12 +134,23 @@ impl<'a> Current<'a> {
         }
     }
 
-    /// Why what was recorded of a unit does not hold any more; `None` if it does.
+    /// Of each set of modules of kernels, by its id, what changed since; `None` if nothing did.
+    pub fn changed<'s>(
+        &self,
+        sets: &HashMap<&'s str, &KernelSetRecord>,
+    ) -> HashMap<&'s str, Option<String>> {
+        let sets = sets.iter();
+        sets.map(|(id, set)| (*id, self.kernels.changed(set)))
+            .collect()
+    }
+
+    /// Why what was recorded of a unit does not hold any more; `None` if it does. `sets`: see
+    /// [`Self::changed`].
     pub fn stale(
         &self,
         unit: &Unit,
         record: &CellRecord,
-        sets: &HashMap<&str, &KernelSetRecord>,
+        sets: &HashMap<&str, Option<String>>,
     ) -> Option<String> {
         let was = &record.inputs;
         if was.program != program() {
@@ -164,7 +175,7 @@ impl<'a> Current<'a> {
             return None;
         }
         match sets.get(was.kernels.as_str()) {
-            Some(set) => self.kernels.changed(set),
+            Some(changed) => changed.clone(),
             None => Some("what its kernels were made of is not recorded".to_owned()),
         }
     }

@@ -183,7 +183,8 @@ impl Inventory {
             let hash = loaded.map(|s| s.hash).map_err(|e| e.to_string());
             current.scenes.insert(scene.label.clone(), hash);
         }
-        Ok(current.stale(&state.unit, record, &self.earlier.kernel_sets()))
+        let sets = current.changed(&self.earlier.kernel_sets());
+        Ok(current.stale(&state.unit, record, &sets))
     }
 
     /// Names of the modules that the kernels of a cell were made of.
@@ -211,7 +212,7 @@ fn wanted_units(
     let Some(parts) = parts.filter(|parts| !parts.is_empty()) else {
         return units;
     };
-    let estimate = Estimate::new(experiment, plan, registries);
+    let estimate = Estimate::new(experiment, plan, &units, registries);
     let cost = |unit: &Unit| estimate.seconds_of(unit);
     let mut wanted = vec![false; units.len()];
     for part in parts {

@@ -48,7 +48,7 @@ pub(super) struct Weights {
 }
 
 impl Weights {
-    pub fn new(experiment: &Experiment, plan: &Plan, estimate: &Estimate) -> Self {
+    pub fn new(experiment: &Experiment, plan: &Plan, units: &[Unit], estimate: &Estimate) -> Self {
         let megabytes =
             |scene: &str| std::fs::metadata(scene).map_or(0.0, |m| m.len() as f64 / 1e6);
         let sizes = plan.scenes.iter().map(|scene| megabytes(&scene.name));
@@ -64,9 +64,10 @@ impl Weights {
         let warmup = f64::from(timing.min_warmup_ms) / 1e3 / rounds;
         let rays = |count: u32| estimate.rays_seconds(u64::from(count));
         let compactions = plan.compactions.len().max(1) as f64;
-        let of_compactions = plan.units(experiment).into_iter();
-        let of_compactions = of_compactions.filter(|unit| unit.kind == UnitKind::Compaction);
-        let of_compactions: f64 = of_compactions.map(|unit| estimate.seconds_of(&unit)).sum();
+        let of_compactions = units
+            .iter()
+            .filter(|unit| unit.kind == UnitKind::Compaction);
+        let of_compactions: f64 = of_compactions.map(|unit| estimate.seconds_of(unit)).sum();
         Self {
             world: 1.0 + 0.3 * megabytes,
             gate: 0.6 + 5.0 * rays(experiment.gate.rays) + 0.15 * megabytes,
@@ -239,8 +240,8 @@ fn duration(seconds: f64) -> String {
 /// Sets what the open units of a run are expected to take.
 pub(super) fn expect(session: &mut Session) {
     let (experiment, plan) = (session.experiment, session.plan);
-    let estimate = Estimate::new(experiment, plan, session.registries);
-    session.weights = Weights::new(experiment, plan, &estimate);
+    let estimate = Estimate::new(experiment, plan, &session.units, session.registries);
+    session.weights = Weights::new(experiment, plan, &session.units, &estimate);
     let seconds = session.weights.of(session.open_units(), experiment, plan);
     session.progress.expect(seconds);
 }

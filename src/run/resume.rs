@@ -57,7 +57,7 @@ impl Earlier {
     /// What still holds of these units.
     pub fn kept(&self, units: &[Unit], current: &Current) -> Kept {
         let cells = self.cells();
-        let sets = self.kernel_sets();
+        let sets = current.changed(&self.kernel_sets());
         let mut kept = Kept::default();
         for unit in units {
             let Some(record) = cells.get(unit.name.as_str()) else {
@@ -165,7 +165,7 @@ mod tests {
         let (experiment, plan) = large(100_000);
         let units = plan.units(&experiment);
         let registries = Registries::default();
-        let estimate = Estimate::new(&experiment, &plan, &registries);
+        let estimate = Estimate::new(&experiment, &plan, &units, &registries);
         let numbers = shards(&units, 64, |unit| estimate.seconds_of(unit));
         let seconds = start.elapsed().as_secs_f64();
         assert!(units.len() >= 100_000 && numbers.len() == units.len());

@@ -232,7 +232,7 @@ impl<'a> Session<'a> {
             return;
         };
         let units = Arc::clone(&self.units);
-        let estimate = Estimate::new(self.experiment, self.plan, self.registries);
+        let estimate = Estimate::new(self.experiment, self.plan, &units, self.registries);
         let numbers = shards(&units, shard.of, |unit| estimate.seconds_of(unit));
         for (unit, number) in units.iter().zip(numbers) {
             if number != shard.number {
