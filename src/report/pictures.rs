@@ -2,6 +2,7 @@
 
 use super::document::Picture;
 use base64::Engine;
+use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
 
 /// Loads a picture that a record names relative to the run's folder `dir`. A missing file, or a name
@@ -43,7 +44,10 @@ fn read(dir: &Path, path: &str) -> Result<Vec<u8>, String> {
     let Some(place) = inside(dir, path) else {
         return Err(format!("{path} lies outside the run's folder"));
     };
-    let bytes = std::fs::read(place).map_err(|error| format!("{path} is missing: {error}"))?;
+    let bytes = std::fs::read(place).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => format!("{path} is missing"),
+        _ => format!("{path} cannot be read: {error}"),
+    })?;
     if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
         Ok(bytes)
     } else {

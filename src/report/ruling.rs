@@ -39,6 +39,9 @@ pub enum Ruling {
 /// for all pairs ([`Pairs`]).
 pub fn judge(mut contenders: Vec<Contender>, better: Better) -> Ruling {
     contenders.retain(|c| c.figure.value.is_finite());
+    if let [only] = &contenders[..] {
+        return Ruling::Alone(only.clone());
+    }
     let measured = contenders.len();
     contenders.retain(|c| c.log.is_some());
     if contenders.is_empty() && measured > 0 {
@@ -204,7 +207,9 @@ mod tests {
         for (better, figures, answer) in answers {
             assert_eq!(said(better, figures)[0], answer, "{figures:?}");
         }
-        let [answer, figure, next] = said(Lower, &[(1.0, 0.0, false)]);
+        // One has no need of a spread: there is nobody to be compared with.
+        assert_eq!(said(Lower, &[(1.0, 0.0, false)])[0], "a (alone)");
+        let [answer, figure, next] = said(Lower, &[(1.0, 0.0, false), (2.0, 0.0, false)]);
         assert!(answer.starts_with("no winner: "), "{answer}");
         assert_eq!([figure, next], ["–", "–"]);
         // Errors of nothing have no ratio.

@@ -26,6 +26,9 @@ const OPEN_PAIRS: usize = 2;
 /// Failures that the first screens name; the others stand in their own section.
 const NAMED_FAILURES: usize = 5;
 
+/// Kinds of images that the question names.
+const NAMED_VIEWS: usize = 4;
+
 /// The first screens.
 pub fn section(dir: &Path, data: &RunData) -> Section {
     let mut section = Section::new("verdict", "Verdict");
@@ -111,9 +114,19 @@ fn question(data: &RunData) -> String {
         text += &format!(", on {scenes}");
     }
     if !views.is_empty() {
-        text += &format!(", with {}", views.join(", "));
+        text += &format!(", with {}", some_of(&views));
     }
     text + "." + &amounts(data)
+}
+
+/// Names, of many the first ones and how many more there are.
+fn some_of(names: &[String]) -> String {
+    let more = names.len().saturating_sub(NAMED_VIEWS);
+    let shown = names[..names.len() - more].join(", ");
+    match more {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
 }
 
 /// Size of the images, samples and replicates, where there are images.
@@ -218,20 +231,29 @@ fn of_scene(scene: &SceneGroup) -> Vec<Block> {
     blocks
 }
 
-/// The answers as a table, and what had no competition in a line.
+/// The answers as a table, and what had no competition in a line for each that was alone.
 fn answers(caption: &str, rulings: &[(String, Ruling)]) -> Vec<Block> {
     let alone = rulings.iter().filter(|(_, ruling)| !ruling.is_contest());
-    let alone = alone.map(|(question, ruling)| format!("{question}: {}", ruling.answer()));
-    let alone: Vec<String> = alone.collect();
-    let mut blocks: Vec<Block> = table_of(caption, rulings)
-        .into_block()
-        .into_iter()
-        .collect();
-    if !alone.is_empty() {
-        let text = format!("Without competition: {}.", alone.join("; "));
-        blocks.push(Block::Paragraph(text));
-    }
+    let alone = by_answer(alone.cloned().collect());
+    let mut blocks = Vec::from_iter(table_of(caption, rulings).into_block());
+    blocks.extend(alone.into_iter().map(|(questions, ruling)| {
+        let (answer, questions) = (ruling.answer(), questions.join("; "));
+        Block::Paragraph(format!("Without competition: {answer} in {questions}."))
+    }));
     blocks
+}
+
+/// The rulings, with all questions that have the same answer in words together, where the first of them stood.
+fn by_answer(rulings: Vec<(String, Ruling)>) -> Vec<(Vec<String>, Ruling)> {
+    let mut grouped: Vec<(Vec<String>, Ruling)> = Vec::new();
+    for (question, ruling) in rulings {
+        let answer = ruling.answer();
+        match { grouped.iter_mut() }.find(|(_, other)| other.answer() == answer) {
+            Some((questions, _)) => questions.push(question),
+            None => grouped.push((vec![question], ruling)),
+        }
+    }
+    grouped
 }
 
 /// How winners are found, and how many comparisons that took.
@@ -300,9 +322,16 @@ fn table_of(caption: &str, rulings: &[(String, Ruling)]) -> Table {
     ];
     let mut table = Table::new(caption, &heads);
     let contests = rulings.iter().filter(|(_, ruling)| ruling.is_contest());
+    let is_withheld = |(_, ruling): &&(String, Ruling)| matches!(ruling, Ruling::Withheld(_));
+    let (withheld, ruled): (Vec<_>, Vec<_>) = contests.partition(is_withheld);
+    let ruled = ruled.iter().map(|(question, ruling)| row(question, ruling));
+    table.rows.extend(ruled);
+    // Questions that one failed check takes the answer from are a row of their own.
+    let withheld = by_answer(withheld.into_iter().cloned().collect());
+    let withheld = withheld.iter();
     table
         .rows
-        .extend(contests.map(|(question, ruling)| row(question, ruling)));
+        .extend(withheld.map(|(questions, ruling)| row(&questions.join("; "), ruling)));
     table
 }
 
@@ -381,7 +410,9 @@ fn apart(scene: &SceneGroup) -> Vec<Block> {
     };
     let biased = samplers()
         .filter_map(|(s, view)| Some(format!("{} with {view} ({})", s.name, brief(s.fault()?))));
-    let single = samplers().filter(|(s, _)| s.replicates.len() == 1);
+    let contested = scene.views.iter().filter(|view| view.samplers.len() > 1);
+    let single = contested.flat_map(|view| view.samplers.iter().map(move |s| (s, &view.name)));
+    let single = single.filter(|(s, _)| s.replicates.len() == 1);
     let single = single.map(|(s, view)| format!("{} with {view}", s.name));
     let said = [
         (
