@@ -1,11 +1,10 @@
 //! `raystone discrepancy`.
 
-use super::output::print;
+use super::output::print_json;
 use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Args;
 use raystone::discrepancy::{Budget, DiscrepancyError, Measure, PointSet, Value, measure};
 use raystone::text::nearest;
-use serde::Serialize;
 use serde_json::{Map, json};
 use std::io::Read as _;
 use std::path::PathBuf;
@@ -37,14 +36,6 @@ pub struct Discrepancy {
     budget: f64,
 }
 
-/// What is printed.
-#[derive(Serialize)]
-struct Results {
-    n: usize,
-    dim: usize,
-    measures: Map<String, serde_json::Value>,
-}
-
 impl Discrepancy {
     pub fn execute(self) -> Result<ExitCode> {
         let measures = measures(&self.measure)?;
@@ -59,12 +50,10 @@ impl Discrepancy {
             let seconds = clock.elapsed().as_secs_f64();
             results.insert(kind.name().to_owned(), fields(result, seconds));
         }
-        let all = Results {
-            n: points.len(),
-            dim: points.dim(),
-            measures: results,
-        };
-        print(&(serde_json::to_string_pretty(&all)? + "\n"))?;
+        print_json(
+            "discrepancy",
+            json!({ "n": points.len(), "dim": points.dim(), "measures": results }),
+        )?;
         Ok(ExitCode::SUCCESS)
     }
 

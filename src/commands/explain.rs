@@ -1,12 +1,14 @@
 //! `raystone explain`.
 
-use super::output::print;
+use super::output::{OutputArguments, print, print_json};
 use anyhow::{Result, bail};
 use clap::Args;
 use raystone::config::{Axis, Cell};
 use raystone::measure::record::{CellRecord, Outcome};
 use raystone::run::{Inventory, Registries, RunOptions, State};
 use raystone::text::{nearest, shell_word};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -21,6 +23,8 @@ pub struct Explain {
     /// Let glTF models name files outside their folder, and OBJ models absolute paths
     #[arg(long)]
     allow_outside: bool,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 impl Explain {
@@ -33,36 +37,10 @@ impl Explain {
             ..RunOptions::default()
         };
         let stale = inventory.stale(state, &registries, &options)?;
-        let mut text = format!("{}\n\n", state.unit.name);
-        writeln!(text, "kind          {}", state.unit.kind.plural())?;
-        for (axis, variant) in variants(&state.unit.cell) {
-            writeln!(text, "{:<13} {variant}", axis.name())?;
+        match self.output.json {
+            true => print_json("explain", as_json(&inventory, state, stale))?,
+            false => print(&in_words(&inventory, state, stale)?)?,
         }
-        if let Some(record) = &state.record {
-            writeln!(text, "\n{}", outcome(record))?;
-            let inputs = &record.inputs;
-            for (what, value) in [
-                ("program", &inputs.program),
-                ("settings", &inputs.settings),
-                ("scene", &inputs.scene),
-                ("kernels", &inputs.kernels),
-                ("timed on", &inputs.device),
-            ] {
-                if !value.is_empty() {
-                    writeln!(text, "{what:<13} {value}")?;
-                }
-            }
-            let modules = inventory.modules(inputs);
-            if !modules.is_empty() {
-                writeln!(text, "made of       {}", modules.join(", "))?;
-            }
-        }
-        match stale {
-            None => writeln!(text, "\nup to date: `--resume` keeps it")?,
-            Some(why) => writeln!(text, "\nnot up to date: {why}")?,
-        }
-        writeln!(text, "\nalone: {}", command(&inventory, &state.unit.cell))?;
-        print(&text)?;
         Ok(ExitCode::SUCCESS)
     }
 
@@ -101,6 +79,53 @@ impl Explain {
             }
         }
     }
+}
+
+fn in_words(inventory: &Inventory, state: &State, stale: Option<String>) -> Result<String> {
+    let mut text = format!("{}\n\n", state.unit.name);
+    writeln!(text, "kind          {}", state.unit.kind.plural())?;
+    for (axis, variant) in variants(&state.unit.cell) {
+        writeln!(text, "{:<13} {variant}", axis.name())?;
+    }
+    if let Some(record) = &state.record {
+        writeln!(text, "\n{}", outcome(record))?;
+        let inputs = &record.inputs;
+        for (what, value) in [
+            ("program", &inputs.program),
+            ("settings", &inputs.settings),
+            ("scene", &inputs.scene),
+            ("kernels", &inputs.kernels),
+            ("timed on", &inputs.device),
+        ] {
+            if !value.is_empty() {
+                writeln!(text, "{what:<13} {value}")?;
+            }
+        }
+        let modules = inventory.modules(inputs);
+        if !modules.is_empty() {
+            writeln!(text, "made of       {}", modules.join(", "))?;
+        }
+    }
+    match stale {
+        None => writeln!(text, "\nup to date: `--resume` keeps it")?,
+        Some(why) => writeln!(text, "\nnot up to date: {why}")?,
+    }
+    writeln!(text, "\nalone: {}", command(&inventory, &state.unit.cell))?;
+    Ok(text)
+}
+
+fn as_json(inventory: &Inventory, state: &State, stale: Option<String>) -> Value {
+    let modules = state.record.as_ref().map(|r| inventory.modules(&r.inputs));
+    json!({
+        "cell": state.unit.name,
+        "kind": state.unit.kind,
+        "key": variants(&state.unit.cell).map(|(a, v)| (a.name(), v)).collect::<BTreeMap<_, _>>(),
+        "record": state.record,
+        "modules": modules,
+        "up_to_date": stale.is_none(),
+        "why_not": stale,
+        "alone": command(inventory, &state.unit.cell),
+    })
 }
 
 fn variants(cell: &Cell) -> impl Iterator<Item = (Axis, &str)> {

@@ -1,11 +1,12 @@
 //! `raystone merge`.
 
 use super::failure::FAILED;
-use super::output::{print, warn};
+use super::output::{OutputArguments, print, print_json, warn};
 use anyhow::Result;
 use clap::Args;
 use raystone::report::write_report;
 use raystone::run::{Registries, merge};
+use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -21,6 +22,8 @@ pub struct Merge {
     /// Where shards ran on several devices: take the times of those alone whose description holds this text
     #[arg(long, value_name = "TEXT")]
     device: Option<String>,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 impl Merge {
@@ -31,12 +34,22 @@ impl Merge {
             warn(note);
         }
         let page = write_report(&self.out)?.html;
-        print(&format!(
-            "{} cells of {} folders\n\nreport: {}\n",
-            merged.cells,
-            self.dirs.len(),
-            page.display()
-        ))?;
+        let cells = merged.cells;
+        if self.output.json {
+            let fields = json!({
+                "cells": cells,
+                "whole": !merged.incomplete,
+                "notes": merged.notes,
+                "report": page,
+            });
+            print_json("merge", fields)?;
+        } else {
+            print(&format!(
+                "{cells} cells of {} folders\n\nreport: {}\n",
+                self.dirs.len(),
+                page.display()
+            ))?;
+        }
         Ok(match merged.incomplete {
             true => ExitCode::from(FAILED),
             false => ExitCode::SUCCESS,

@@ -1,12 +1,14 @@
 //! `raystone plan`.
 
 use super::arguments::{ExperimentArguments, plan};
-use super::output::print;
+use super::output::{OutputArguments, print, print_json};
 use anyhow::Result;
 use clap::Args;
-use raystone::config::{Experiment, Plan as Cells, Unit, UnitKind, shards};
+use raystone::config::{Axis, Experiment, Plan as Cells, Skipped, Unit, UnitKind, shards};
 use raystone::run::{Estimate, Registries};
 use raystone::text::shell_word;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -24,6 +26,8 @@ pub struct Plan {
     cells: bool,
     #[command(flatten)]
     experiment: ExperimentArguments,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 impl Plan {
@@ -37,6 +41,20 @@ impl Plan {
         let cost = |unit: &Unit| estimate.seconds_of(unit);
         let of = usize::from(self.shards);
         let numbers = shards(&units, of, cost);
+        if self.output.json {
+            let mut fields = as_json(&cells, &units, &estimate);
+            for (entry, number) in fields["cells"]
+                .as_array_mut()
+                .into_iter()
+                .flatten()
+                .zip(&numbers)
+            {
+                entry["shard"] = json!(number);
+            }
+            fields["shards"] = json!(of);
+            print_json("plan", fields)?;
+            return Ok(ExitCode::SUCCESS);
+        }
         let mut text = String::new();
         if self.cells {
             for (unit, number) in units.iter().zip(&numbers) {
@@ -100,6 +118,22 @@ impl Plan {
         )?;
         Ok(())
     }
+}
+
+/// Every cell of a plan with its kind and the seconds that it is expected to take, and what is left out.
+pub fn as_json(plan: &Cells, units: &[Unit], estimate: &Estimate) -> Value {
+    let cell = |unit: &Unit| {
+        let axes = Axis::ALL.into_iter();
+        let axes = axes.filter_map(|axis| Some((axis.name(), unit.cell.get(axis)?.label.as_str())));
+        let key: BTreeMap<_, _> = axes.collect();
+        json!({ "cell": unit.name, "kind": unit.kind, "key": key, "seconds": estimate.seconds_of(unit) })
+    };
+    let left_out = |s: &Skipped| json!({ "cell": s.cell, "reason": s.reason, "cells": s.cells });
+    json!({
+        "cells": units.iter().map(cell).collect::<Vec<_>>(),
+        "seconds": estimate.seconds(),
+        "left_out": plan.skipped.iter().map(left_out).collect::<Vec<_>>(),
+    })
 }
 
 /// A time with the precision of an estimate.

@@ -1,7 +1,7 @@
 //! `raystone points`.
 
 use super::arguments::{DeviceArguments, list_override};
-use super::output::print;
+use super::output::{OutputArguments, print, print_json};
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use raystone::config::{Axis, Catalogue, Experiment};
@@ -10,6 +10,7 @@ use raystone::params::{Entry, Variant};
 use raystone::run::{Registries, dump_stream};
 use raystone::sampling::{Coordinate, Demand, Sampler};
 use raystone::text::nearest;
+use serde_json::json;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -63,6 +64,8 @@ pub struct Points {
     gpu: bool,
     #[command(flatten)]
     device: DeviceArguments,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 impl Points {
@@ -87,13 +90,21 @@ impl Points {
         if let Some(folder) = &self.plot {
             return self.draw(&stream, pixel, folder);
         }
+        let mut points: Vec<Vec<f64>> = Vec::new();
         let per_batch = (BATCH / self.dims.len()).max(1) as u32;
         let mut first = 0;
         while first < self.count {
             let count = per_batch.min(self.count - first);
             let words = stream.words(&self.coordinates(pixel, first..first + count, &self.dims))?;
-            print(&lines(&words, self.dims.len()))?;
+            let batch = words.chunks_exact(self.dims.len());
+            match self.output.json {
+                true => points.extend(batch.map(|point| point.iter().map(fraction).collect())),
+                false => print(&lines(batch))?,
+            }
             first += count;
+        }
+        if self.output.json {
+            print_json("points", json!({ "dims": self.dims, "points": points }))?;
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -208,18 +219,19 @@ fn unknown_parameter(param: &str, key: &str, entries: &[(Axis, &Entry)]) -> anyh
     anyhow!("--param {param}: {sequence} × {decorrelation} has no parameter `{key}`; {hint}")
 }
 
+/// A fraction of 2³²: exact in double precision.
+fn fraction(word: &u32) -> f64 {
+    f64::from(*word) * 2.0_f64.powi(-32)
+}
+
 /// One point a line.
-fn lines(words: &[u32], dimensions: usize) -> String {
-    let mut text = String::with_capacity(words.len() * 24);
-    for point in words.chunks_exact(dimensions) {
+fn lines<'w>(points: impl Iterator<Item = &'w [u32]>) -> String {
+    let mut text = String::new();
+    for point in points {
         for (i, word) in point.iter().enumerate() {
             let separator = if i == 0 { "" } else { " " };
-            // Writing to a string cannot fail. A fraction of 2³² is exact in double precision.
-            let _ = write!(
-                text,
-                "{separator}{:.16e}",
-                f64::from(*word) * 2.0_f64.powi(-32)
-            );
+            // Writing to a string cannot fail.
+            let _ = write!(text, "{separator}{:.16e}", fraction(word));
         }
         text.push('\n');
     }
@@ -239,7 +251,7 @@ mod tests {
 
     #[test]
     fn numbers_have_17_significant_digits_and_come_back_as_they_were() {
-        let text = lines(&[0x8000_0000, u32::MAX, 1, 0], 2);
+        let text = lines([0x8000_0000, u32::MAX, 1, 0].chunks_exact(2));
         let rows: Vec<_> = text.lines().collect();
         assert_eq!(rows.len(), 2);
         assert_eq!(rows[0].split(' ').next(), Some("5.0000000000000000e-1"));

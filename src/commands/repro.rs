@@ -1,17 +1,19 @@
 //! `raystone repro`.
 
 use super::failure::{BAD_INPUT, FAILED};
-use super::output::{print, tell};
+use super::output::{OutputArguments, print, print_json, tell};
 use super::signals;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use raystone::gpu::{AdapterChoice, GpuError};
 use raystone::report::{html, markdown, write_file, write_page};
+use raystone::repro::claim::Row;
 use raystone::repro::judge::Verdict;
 use raystone::repro::run::{ReproError, Reproduced, Settings, recorded, reproduce};
 use raystone::repro::{NotCovered, Source, chosen, latex, not_covered, page, scenes};
 use raystone::run::{Registries, RunError, RunOptions, user_cache};
-use std::path::PathBuf;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Run tables and figures of four theses, with their numbers beside ours and a verdict on every claim
@@ -43,6 +45,8 @@ pub struct Repro {
     /// Adapter, by its number in `raystone list adapter` or a part of its name
     #[arg(long, value_name = "INDEX|NAME")]
     adapter: Option<AdapterChoice>,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 fn share(text: &str) -> Result<[usize; 2], String> {
@@ -58,7 +62,10 @@ impl Repro {
         let sources = chosen(&self.name).map_err(|problem| anyhow!(problem))?;
         let not_covered = not_covered()?;
         if self.list {
-            print(&list(&sources, &not_covered)?)?;
+            match self.output.json {
+                true => print_json("repro", list_json(&sources, &not_covered)?)?,
+                false => print(&list(&sources, &not_covered)?)?,
+            }
             return Ok(ExitCode::SUCCESS);
         }
         let folder = if self.quick { "repro-quick" } else { "repro" };
@@ -105,11 +112,14 @@ impl Repro {
             return Ok(end(&tables, &failed));
         }
         let html = write(&settings, &tables, &failed, &not_covered)?;
-        print(&format!(
-            "{}\nreport: {}\n",
-            in_words(&tables),
-            html.display()
-        ))?;
+        match self.output.json {
+            true => print_json("repro", as_json(&tables, &failed, &html))?,
+            false => print(&format!(
+                "{}\nreport: {}\n",
+                in_words(&tables),
+                html.display()
+            ))?,
+        }
         Ok(end(&tables, &failed))
     }
 }
@@ -176,6 +186,63 @@ fn in_words(tables: &[Reproduced]) -> String {
         }
     }
     format!("{text}\n{}", page::tally(tables))
+}
+
+fn row_json(row: &Row) -> Value {
+    json!({
+        "row": row.row,
+        "column": row.column,
+        "x": row.x,
+        "thesis": row.thesis,
+        "ours": row.ours,
+        "verdict": row.verdict.word(),
+        "reason": row.reason,
+        "counted": row.counted,
+    })
+}
+
+fn as_json(tables: &[Reproduced], failed: &[(String, String)], html: &Path) -> Value {
+    let claims = |table: &Reproduced| {
+        let claims = table.thesis.expects.iter().enumerate();
+        let claim = |(index, expect)| {
+            json!({
+                "claim": page::claim_name(expect),
+                "says": expect.says,
+                "verdict": table.verdict(index).word(),
+                "rows": table.claims[index].iter().map(row_json).collect::<Vec<_>>(),
+            })
+        };
+        claims.map(claim).collect::<Vec<_>>()
+    };
+    let table = |table: &Reproduced| {
+        json!({
+            "name": table.name,
+            "title": table.thesis.title,
+            "started_unix_s": table.started,
+            "quick": table.quick,
+            "device": table.environment.as_ref().map(|e| &e.adapter),
+            "claims": claims(table),
+        })
+    };
+    let failure = |(name, reason): &(String, String)| json!({ "name": name, "reason": reason });
+    json!({
+        "tables": tables.iter().map(table).collect::<Vec<_>>(),
+        "failed": failed.iter().map(failure).collect::<Vec<_>>(),
+        "report": html,
+    })
+}
+
+fn list_json(sources: &[Source], not_covered: &NotCovered) -> Result<Value> {
+    let table = |source: &Source| -> Result<Value> {
+        let thesis = source.thesis()?;
+        let claim = |e| json!({ "claim": page::claim_name(e), "says": e.says });
+        let claims: Vec<Value> = thesis.expects.iter().map(claim).collect();
+        Ok(json!({ "name": source.name, "title": thesis.title, "claims": claims }))
+    };
+    let tables: Result<Vec<Value>> = sources.iter().map(table).collect();
+    let not_yet = not_covered.table.iter();
+    let not_yet = not_yet.map(|t| json!({ "name": t.name, "title": t.title, "why": t.why }));
+    Ok(json!({ "tables": tables?, "not_yet": not_yet.collect::<Vec<_>>() }))
 }
 
 fn list(sources: &[Source], not_covered: &NotCovered) -> Result<String> {

@@ -91,7 +91,12 @@ impl Run {
         let plan = plan(&experiment, &self.experiment.only, &registries)?;
         if self.dry_run {
             Kernels::load(&plan.kernels, &registries)?;
-            let estimate = Estimate::new(&experiment, &plan, &plan.units(&experiment), &registries);
+            let units = plan.units(&experiment);
+            let estimate = Estimate::new(&experiment, &plan, &units, &registries);
+            if self.output.json {
+                print_json("run", super::plan::as_json(&plan, &units, &estimate))?;
+                return Ok(ExitCode::SUCCESS);
+            }
             print(&format!("{}\n{estimate}\n", plan.describe().trim_end()))?;
             return Ok(ExitCode::SUCCESS);
         }

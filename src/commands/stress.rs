@@ -3,7 +3,7 @@
 use super::arguments::{DeviceArguments, warn_of};
 use super::failure::FAILED;
 use super::faults::plant_faults;
-use super::output::{print, screen, tell};
+use super::output::{OutputArguments, print, print_json, screen, tell};
 use anyhow::Result;
 use clap::Args;
 use raystone::measure::record::Verdict;
@@ -12,6 +12,7 @@ use raystone::scene::named;
 use raystone::stress::record::{Line, Record, write};
 use raystone::stress::report::{stress_tables, write_stress_page};
 use raystone::stress::{StressOptions, run};
+use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -54,6 +55,8 @@ pub struct Stress {
     out: PathBuf,
     #[command(flatten)]
     device: DeviceArguments,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 impl Stress {
@@ -81,11 +84,14 @@ impl Stress {
         let records = run(&gpus, &settings, &progress)?;
         write(&self.out, &records)?;
         let page = write_stress_page(&self.out, &records)?;
-        print(&format!(
-            "{}report: {}\n",
-            stress_tables(&records, screen()),
-            page.display()
-        ))?;
+        match self.output.json {
+            true => print_json("stress", json!({ "records": records, "report": page }))?,
+            false => print(&format!(
+                "{}report: {}\n",
+                stress_tables(&records, screen()),
+                page.display()
+            ))?,
+        }
         Ok(match records.iter().any(is_missed_target) {
             true => ExitCode::from(FAILED),
             false => ExitCode::SUCCESS,

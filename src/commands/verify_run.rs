@@ -1,10 +1,11 @@
 //! `raystone verify-run`.
 
 use super::failure::FAILED;
-use super::output::{print, warn};
+use super::output::{OutputArguments, print, print_json, warn};
 use anyhow::Result;
 use clap::Args;
 use raystone::run::{Inventory, Registries};
+use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -14,6 +15,8 @@ use std::process::ExitCode;
 pub struct VerifyRun {
     /// Folder that a run or `raystone merge` wrote
     dir: PathBuf,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 impl VerifyRun {
@@ -24,6 +27,24 @@ impl VerifyRun {
         }
         let all = inventory.states.len();
         let settled = inventory.states.iter().filter(|s| s.is_settled()).count();
+        let whole =
+            settled == all && inventory.contradicted.is_empty() && inventory.foreign.is_empty();
+        match self.output.json {
+            true => print_json("verify-run", as_json(&inventory, [settled, all], whole))?,
+            false => print(&self.in_words(&inventory, [settled, all], whole)?)?,
+        }
+        Ok(match whole {
+            true => ExitCode::SUCCESS,
+            false => ExitCode::from(FAILED),
+        })
+    }
+
+    fn in_words(
+        &self,
+        inventory: &Inventory,
+        [settled, all]: [usize; 2],
+        whole: bool,
+    ) -> Result<String> {
         let mut text = format!("{settled} of {all} cells are measured or left out with a reason\n");
         for state in inventory.missing() {
             writeln!(text, "missing       {}", state.unit.name)?;
@@ -43,8 +64,6 @@ impl VerifyRun {
         if let Some(reason) = &inventory.interrupted {
             writeln!(text, "the run ended early: {reason}")?;
         }
-        let whole =
-            settled == all && inventory.contradicted.is_empty() && inventory.foreign.is_empty();
         if !whole {
             writeln!(
                 text,
@@ -52,10 +71,23 @@ impl VerifyRun {
                 self.dir.display()
             )?;
         }
-        print(&text)?;
-        Ok(match whole {
-            true => ExitCode::SUCCESS,
-            false => ExitCode::from(FAILED),
-        })
+        Ok(text)
     }
+}
+
+fn as_json(inventory: &Inventory, [settled, all]: [usize; 2], whole: bool) -> Value {
+    let missing = inventory.missing().map(|state| state.unit.name.as_str());
+    let failed = inventory.failed();
+    let failed =
+        failed.map(|(state, record)| json!({ "cell": state.unit.name, "reason": record.reason }));
+    json!({
+        "cells": all,
+        "settled": settled,
+        "whole": whole,
+        "missing": missing.collect::<Vec<_>>(),
+        "failed": failed.collect::<Vec<_>>(),
+        "contradicted": inventory.contradicted,
+        "not_planned": inventory.foreign,
+        "interrupted": inventory.interrupted,
+    })
 }

@@ -4,12 +4,14 @@ use super::cells::Cell;
 use super::experiment::Experiment;
 use super::keys::Axis;
 use super::plan::Plan;
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
 /// What is measured of a unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum UnitKind {
     /// Build, gate and speed of a structure.
     Structure,

@@ -413,7 +413,20 @@ fn devices_are_never_in_one_series() {
 #[test]
 fn json_has_one_head_for_every_command() {
     let folder = run_folder();
-    let commands: [&[&str]; 5] = [
+    let points = RUN.path().join("points.txt");
+    std::fs::write(&points, "0.5 0.25\n0.75 0.5\n").expect("a file");
+    let merged = RUN.path().join("merged");
+    let tiny = "tests/data/tiny.toml";
+    let commands: [&[&str]; 14] = [
+        &["plan", tiny, "--json"],
+        &["run", tiny, "--dry-run", "--json"],
+        &["merge", text(&folder), "--out", text(&merged), "--json"],
+        &["verify-run", text(&folder), "--json"],
+        &["explain", text(&folder), "cornell-box, bvh", "--json"],
+        &["repro", "--list", "--json"],
+        &["scenes", "--json"],
+        &["points", "--sequence", "sobol", "--count", "3", "--json"],
+        &["discrepancy", text(&points)],
         &["list", "--json"],
         &["list", "figure", "--json"],
         &["doctor", "--json"],

@@ -132,16 +132,14 @@ pub fn to_png(drawing: &Drawing) -> Result<Vec<u8>, ReportError> {
 /// An RGB picture of half the size: means of 2×2 pixels. `width` pixels a row, even in both
 /// directions.
 fn halve(pixels: &[u8], width: usize) -> Vec<u8> {
-    let mut half = Vec::with_capacity(pixels.len() / 4);
-    for rows in pixels.chunks_exact(width * 6) {
+    let mut half = vec![0; pixels.len() / (width * 6) * (width / 2) * 3];
+    for (row, rows) in (half.chunks_exact_mut(width / 2 * 3)).zip(pixels.chunks_exact(width * 6)) {
         let (upper, lower) = rows.split_at(width * 3);
-        for (a, b) in upper.chunks_exact(6).zip(lower.chunks_exact(6)) {
-            for c in 0..3 {
-                let sum = [a[c], a[c + 3], b[c], b[c + 3]]
-                    .map(u16::from)
-                    .iter()
-                    .sum::<u16>();
-                half.push(((sum + 2) / 4) as u8);
+        let blocks = upper.chunks_exact(6).zip(lower.chunks_exact(6));
+        for (pixel, (a, b)) in row.chunks_exact_mut(3).zip(blocks) {
+            for (c, mean) in pixel.iter_mut().enumerate() {
+                let sum = [a[c], a[c + 3], b[c], b[c + 3]].map(u16::from);
+                *mean = ((sum.iter().sum::<u16>() + 2) / 4) as u8;
             }
         }
     }
