@@ -1,14 +1,15 @@
 //! Tables of theses: every file is sound, every claim of the digests is covered or said not to be, transcribed numbers
 //! stand in the digests, and verdicts see planted faults.
 
-use raystone::config::Experiment;
-use raystone::config::expect::{Compare, Expect, Thesis};
+use raystone::config::expect::{Compare, Expect, Pick, Thesis};
+use raystone::config::{Axis, Experiment, Pattern};
 use raystone::measure::figure::FIGURES;
 use raystone::measure::record::{Interval, Key};
+use raystone::params::Variant;
 use raystone::report::values::Value;
 use raystone::repro::claim::{Context, Row, judge};
 use raystone::repro::judge::Verdict;
-use raystone::repro::run::{Settings, prepare};
+use raystone::repro::run::{Prepared, Settings, prepare};
 use raystone::repro::{SOURCES, chosen, not_covered, scenes};
 use raystone::run::Registries;
 use std::collections::BTreeSet;
@@ -67,8 +68,48 @@ fn every_file_is_embedded_and_is_a_sound_experiment_whole_and_quick() {
                     assert!(told, "{reason}");
                 }
             }
+            let missing = unmeasured(&prepared, quick);
+            assert_eq!(missing, [""; 0], "{}, short: {quick}", source.name);
         }
     }
+}
+
+/// What expectations speak of and no cell of the experiment is.
+fn unmeasured(prepared: &Prepared, quick: bool) -> Vec<String> {
+    let mut missing = Vec::new();
+    let axes = &prepared.experiment.axes;
+    let mut look = |id: &str, pick: &Pick| {
+        for (name, pattern) in pick {
+            let axis = Axis::from_name(name).filter(|axis| *axis != Axis::Scene);
+            let fits = |v: &Variant| Pattern::new(pattern.as_str()).fits_text(&v.label);
+            if axis.is_some_and(|axis| !axes[axis].iter().any(fits)) {
+                missing.push(format!("{id}: {name} = {pattern}"));
+            }
+        }
+    };
+    for expect in &prepared.thesis.expects {
+        look(&expect.id, &expect.of);
+        look(&expect.id, &expect.over);
+        for at in expect.at.iter().filter(|at| !(quick && at.full_only)) {
+            look(&expect.id, &at.of);
+            look(&expect.id, &at.over);
+        }
+    }
+    missing
+}
+
+#[test]
+fn a_place_that_a_short_run_leaves_out_is_tested_by_a_whole_one_alone() {
+    let at = "least = 1.0\nat = [{ row = \"large\", full_only = true }]\n";
+    let said = |quick| {
+        let context = Context {
+            quick,
+            ..Context::default()
+        };
+        found(&(RATIO.to_owned() + at), &context).verdict
+    };
+    assert_eq!(said(true), Verdict::NotTestable);
+    assert_eq!(said(false), Verdict::Supported);
 }
 
 #[test]

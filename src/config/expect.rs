@@ -173,6 +173,9 @@ pub struct At {
     /// In the place of [`Expect::most`].
     #[serde(default)]
     pub most: Option<f64>,
+    /// Whether a short run leaves it out.
+    #[serde(default)]
+    pub full_only: bool,
 }
 
 #[derive(Deserialize)]

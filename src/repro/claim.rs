@@ -12,6 +12,8 @@ use crate::report::values::{Reading, Value};
 pub struct Context {
     /// Whether it ran on a software adapter.
     pub software: bool,
+    /// Whether it is a short run.
+    pub quick: bool,
     /// Original scene → pattern of ours, or why there is none.
     pub scenes: Vec<(String, Result<String, String>)>,
     /// What was left out or failed: the cell in words, and why.
@@ -83,6 +85,10 @@ impl<'e> Place<'e> {
     }
 
     fn rows(&self, values: &[Value]) -> Vec<Row> {
+        if self.at.full_only && self.context.quick {
+            let reason = "a short run leaves this size out".to_owned();
+            return vec![self.row(None, Verdict::NotTestable, reason)];
+        }
         if let Some(Err(reason)) = &self.scene {
             return vec![self.row(None, Verdict::NotTestable, reason.clone())];
         }

@@ -211,6 +211,7 @@ fn judged(
     let data = RunData::new(&lines);
     let run = data.run;
     let context = Context {
+        quick,
         software: run.is_none_or(|run| run.environment.software),
         scenes: (prepared.scenes.iter())
             .map(|(s, ours)| (s.original.clone(), ours.clone().map(|ours| pattern(&ours))))
