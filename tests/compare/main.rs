@@ -3,6 +3,7 @@
 mod alarms;
 mod inputs;
 mod judged;
+mod limits;
 mod records;
 mod shown;
 

@@ -1,0 +1,287 @@
+//! Where a comparison has to say less: what is no control, what was measured once or against another reference, what
+//! lies within the effect that counts by its value alone.
+
+use super::records::{Made, QUIET, SHARED};
+use super::{compared, said};
+use raystone::compare::Finding;
+use raystone::compare::drift::{Drift, Place};
+use raystone::compare::judge::{Effects, Outcome, TimeRatio, Verdict, compare};
+use raystone::compare::side::Side;
+use raystone::compare::signed_rank::SignedRank;
+use raystone::compare::taken::Evidence;
+use raystone::measure::figure::figure;
+use raystone::measure::record::{Body, Line, SkippedRecord};
+use raystone::params::{ParamValue, Params, Variant};
+
+fn side(lines: Vec<Line>) -> Side {
+    Side::new("made", lines, Vec::new())
+}
+
+/// Two runs of a quiet machine; in the second half of the structures the kernels differ.
+fn quiet(slower: fn(usize) -> f64) -> [Made; 2] {
+    let base = Made {
+        rounds: 21,
+        noise: QUIET,
+        ..Made::default()
+    };
+    let candidate = Made {
+        seed: 2,
+        machine: 2,
+        candidate: true,
+        slower,
+        ..base.clone()
+    };
+    [base, candidate]
+}
+
+/// The times of a structure.
+fn times<'f>(found: &'f [Finding], structure: &str) -> Vec<&'f Finding> {
+    let of = |f: &&Finding| f.is_time && f.key.label("accel") == structure;
+    found.iter().filter(of).collect()
+}
+
+#[test]
+fn a_control_that_moves_alone_is_not_called_worse() {
+    let [base, candidate] = quiet(|_| 1.0);
+    let mut lines = candidate.lines();
+    for line in &mut lines {
+        // In one class of rays: two that moved alike would be drift.
+        if let (Body::Structure(record), "structure-2") = (&mut line.body, line.key.label("accel"))
+        {
+            let timing = &mut record.timings[0];
+            let all = timing.ms.iter_mut().chain(&mut timing.cpu_ms);
+            all.for_each(|ms| *ms *= 1.3);
+        }
+    }
+    let found = compared(&base.side(), &side(lines));
+    let moved = times(&found.findings, "structure-2");
+    assert!(moved.len() >= 2 && moved.iter().all(|f| f.is_control));
+    assert!(moved.iter().all(|f| f.verdict != Verdict::Worse));
+    let told = |f: &&Finding| f.why.contains("moved unlike all others");
+    assert!(moved.into_iter().any(|f| told(&f)));
+}
+
+#[test]
+fn equal_kernels_are_no_control_where_an_exact_figure_of_the_structure_differs() {
+    let base = Made::default();
+    let mut lines = base.lines();
+    for line in &mut lines {
+        if let (Body::Structure(record), "structure-3") = (&mut line.body, line.key.label("accel"))
+        {
+            record.stats.sah_cost = Some(11.0);
+        }
+    }
+    let found = compared(&base.side(), &side(lines));
+    let is_control = |name| times(&found.findings, name).iter().all(|f| f.is_control);
+    assert!(!is_control("structure-3") && is_control("structure-4"));
+}
+
+#[test]
+fn what_looks_slower_in_two_runs_is_to_be_measured_again() {
+    let [base, candidate] = quiet(|structure| if structure == 8 { 1.3 } else { 1.0 });
+    let found = compared(&base.side(), &candidate.side());
+    let suspects: Vec<&str> = found.suspects().map(|f| f.key.label("accel")).collect();
+    assert!(suspects.len() >= 2 && suspects.iter().all(|name| *name == "structure-8"));
+}
+
+#[test]
+fn the_same_is_said_only_where_the_whole_interval_is_within_the_effect() {
+    let pair = |seed| {
+        let base = Made {
+            seed,
+            noise: SHARED,
+            ..Made::default()
+        };
+        let candidate = Made {
+            seed: seed + 100,
+            machine: seed + 100,
+            candidate: true,
+            ..base.clone()
+        };
+        compared(&base.side(), &candidate.side()).findings
+    };
+    let mut open = 0;
+    for finding in (1..20).flat_map(pair).filter(|f| !f.is_control) {
+        let Some(measured) = finding.measured else {
+            continue;
+        };
+        let (change, margin) = (measured.change, measured.margin);
+        let within = change.low > -margin && change.high < margin;
+        open += usize::from(!within && change.value.abs() < margin);
+        assert!(within || finding.verdict != Verdict::Same, "{finding:?}");
+    }
+    assert!(open > 10, "only {open} of small value and wide interval");
+}
+
+#[test]
+fn times_of_another_machine_are_refused_even_where_controls_tell_its_drift() {
+    let [base, candidate] = quiet(|structure| if structure == 8 { 1.3 } else { 1.0 });
+    let mut lines = candidate.lines();
+    if let Body::Run(record) = &mut lines[0].body {
+        record.environment.cpu = "Another Processor".into();
+    }
+    let found = compared(&base.side(), &side(lines));
+    let mut of_time = found.findings.iter().filter(|f| f.is_time);
+    assert!(of_time.all(|f| f.verdict == Verdict::Undecided && f.measured.is_none()));
+}
+
+#[test]
+fn another_default_under_the_same_label_is_other_work() {
+    let with_leaves = |size: i64| {
+        let value = ("leaf_size".to_owned(), ParamValue::Integer(size));
+        let variant = Variant {
+            name: "structure-3".into(),
+            params: Params([value].into()),
+            label: "structure-3".into(),
+        };
+        let mut lines = Made::default().lines();
+        for line in &mut lines {
+            if line.key.label("accel") == "structure-3" {
+                line.key = line.key.clone().with_variant("accel", &variant);
+            }
+        }
+        side(lines)
+    };
+    let found = compared(&with_leaves(4), &with_leaves(8));
+    let told: Vec<_> = found
+        .findings
+        .iter()
+        .filter(|f| f.verdict != Verdict::Same)
+        .collect();
+    assert!(told.len() > 5);
+    for finding in told {
+        assert_eq!(finding.verdict, Verdict::Undecided, "{finding:?}");
+        assert!(
+            finding.why.contains("leaf_size was 4 and is 8"),
+            "{}",
+            finding.why
+        );
+    }
+}
+
+#[test]
+fn a_cell_that_fails_now_is_worse_and_one_that_failed_before_is_better() {
+    let sound = Made::default().lines();
+    let mut failing = sound.clone();
+    let failed = SkippedRecord {
+        cell: "box, structure-3".into(),
+        reason: "out of memory".into(),
+    };
+    failing.insert(2, Line::about_all(Body::Failed(failed)));
+    for (base, candidate, verdict) in [
+        (&sound, &failing, Verdict::Worse),
+        (&failing, &sound, Verdict::Better),
+    ] {
+        let found = compared(&side(base.clone()), &side(candidate.clone()));
+        let said: Vec<_> = said(&found, "cell/v1").map(|f| f.verdict).collect();
+        assert_eq!((said, found.verdict()), (vec![verdict], verdict));
+    }
+}
+
+#[test]
+fn what_was_measured_once_is_told_and_decides_nothing() {
+    let base = Made::default();
+    let mut lines = base.lines();
+    for line in &mut lines {
+        if let Body::Structure(record) = &mut line.body {
+            record.build_ms *= 10.0;
+            record.build.iter_mut().for_each(|step| step.ms *= 10.0);
+        }
+    }
+    let found = compared(&base.side(), &side(lines));
+    assert!(said(&found, "build-ms/v1").count() == 12);
+    assert!(said(&found, "build-ms/v1").all(|f| f.verdict == Verdict::Told));
+    assert_eq!(found.verdict(), Verdict::Same);
+}
+
+/// Evidence of eight seeds from the first on.
+fn seeds(first: u32, values: [f64; 8]) -> Evidence {
+    Evidence::Seeds {
+        values: (first..).zip(values).collect(),
+        reference: String::new(),
+    }
+}
+
+#[test]
+fn errors_against_other_references_are_paired_by_nothing() {
+    let error = figure("relmse-unbiased/v1");
+    let values = [1.0, 1.1, 0.9, 1.05, 0.95, 1.02, 0.98, 1.0];
+    let base = seeds(1, values);
+    let slightly = |first| seeds(first, values.map(|x| 1.01 * x));
+    let outcome = |other: &Evidence| compare(error, &base, other, &Effects::default());
+    let Outcome::Tested(pairs) = outcome(&slightly(1)) else {
+        panic!("equal seeds are pairs");
+    };
+    // The interval is that of the signed ranks at the level that is promised.
+    let gaps = values.map(|x| 0.01 * x / (values.iter().sum::<f64>() / 8.0));
+    let [low, high] = SignedRank::new(&gaps).expect("a test").interval(0.05);
+    assert!((pairs.change.low - low).abs() < 1e-9 && (pairs.change.high - high).abs() < 1e-9);
+    let Outcome::Tested(samples) = outcome(&slightly(9)) else {
+        panic!("other seeds are two samples");
+    };
+    assert!(samples.p > 0.5 && pairs.p < 0.01, "{samples:?} {pairs:?}");
+    for first in [1, 9] {
+        let Evidence::Seeds { values, .. } = slightly(first) else {
+            unreachable!("seeds");
+        };
+        let reference = "another".to_owned();
+        let other = outcome(&Evidence::Seeds { values, reference });
+        assert!(
+            matches!(other, Outcome::Known(Verdict::Undecided, _)),
+            "{other:?}"
+        );
+    }
+}
+
+#[test]
+fn rounds_of_one_process_are_compared_round_by_round() {
+    let times = |factor: f64| Evidence::Times {
+        adapter: [1.0, 2.0, 1.5, 3.0, 1.2, 2.5, 1.1, 1.9]
+            .map(|ms| factor * ms)
+            .into(),
+        processors: Vec::new(),
+    };
+    let ratio = |in_rounds| TimeRatio::new(&times(1.0), &times(1.05), in_rounds).expect("a ratio");
+    let (together, apart) = (ratio(true).rounds.variance, ratio(false).rounds.variance);
+    assert!(together < 1e-20 && apart > 1e-3, "{together} {apart}");
+}
+
+#[test]
+fn drift_is_that_of_the_scene_or_of_all_whichever_moved_more_and_leaves_the_cell_itself_out() {
+    let place = |scene: &str| Place {
+        figure: "speed".into(),
+        scene: scene.into(),
+    };
+    let with = |controls: &[(&str, f64)]| {
+        let mut drift = Drift::default();
+        for (scene, log) in controls {
+            drift.add(place(scene), *log, 1e-6);
+        }
+        drift
+    };
+    let variance = |drift: &Drift, scene: &str, rounds: f64, itself: Option<f64>| {
+        Some(drift.of(&place(scene), rounds, itself)?.variance)
+    };
+    let calm_here = [
+        ("a", 0.01),
+        ("a", -0.01),
+        ("a", 0.01),
+        ("b", 0.1),
+        ("b", -0.1),
+        ("b", 0.1),
+    ];
+    let drift = with(&calm_here);
+    // The scene itself is calm and all together are not; and the other way round.
+    let all = (3.0 * 1e-4 + 3.0 * 1e-2) / 6.0;
+    assert!((variance(&drift, "a", 1e-6, None).expect("known") - all).abs() < 1e-12);
+    assert!((variance(&drift, "b", 1e-6, None).expect("known") - 1e-2).abs() < 1e-12);
+    // Rounds that are noisier than those of controls count by what they have more.
+    let noisy = variance(&drift, "b", 1e-3, None).expect("known");
+    assert!((noisy - (1e-2 + 1e-3 - 1e-6)).abs() < 1e-12);
+    // Fewer than three controls tell nothing, and none is a control of its own.
+    assert_eq!(variance(&with(&calm_here[..2]), "a", 1e-6, None), None);
+    assert_eq!(
+        variance(&with(&calm_here[..3]), "a", 1e-6, Some(0.01)),
+        None
+    );
+}
