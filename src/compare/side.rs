@@ -201,6 +201,8 @@ fn is_of_kernels(body: &Body) -> bool {
             | Body::Warning(_)
             | Body::Finished(_)
             | Body::Interrupted(_)
+            | Body::Kernels(_)
+            | Body::Cell(_)
     )
 }
 

@@ -298,7 +298,24 @@ fn two_sets_of_kernels_of_one_run_are_its_two_sides() {
             .to_string()
             .contains("second run")
     );
-    // A run of other kernels alone is compared cell by cell.
+}
+
+#[test]
+fn a_run_of_other_kernels_alone_is_compared_cell_by_cell() {
+    let base = Made::default();
+    let mut lines = base.lines();
+    let of_cells = |line: &&mut Line| {
+        matches!(
+            line.body,
+            Body::Structure(_) | Body::Error(_) | Body::Stream(_)
+        )
+    };
+    for line in lines.iter_mut().filter(of_cells) {
+        line.key = line.key.clone().with("kernels", "idea");
+    }
+    let idea = Side::new("idea", lines, Vec::new()).alone();
     let named = |line: &Line| !line.key.label("kernels").is_empty();
-    assert!(!b.alone().lines.iter().any(named));
+    assert!(!idea.lines.iter().any(named) && !idea.in_rounds);
+    let found = compared(&base.side().alone(), &idea);
+    assert_eq!(found.findings.len(), found.count(Verdict::Same));
 }

@@ -145,6 +145,10 @@ impl Made {
         for sampler in 0..4 {
             lines.extend(self.sampler(sampler));
         }
+        // As every run has them: about no kernels in their key.
+        let set = json!({ "kind": "kernels", "id": "set", "modules": { "accel/bvh": "0123" } });
+        let done = json!({ "kind": "cell", "unit": "box, structure-0", "outcome": "done", "kernels": "set" });
+        lines.extend([line(&[], "", set), line(&[], "", done)]);
         let end = json!({
             "kind": "finished", "wall_s": 1.0, "parts_s": {}, "overhead_s": 0.0, "failed": 0, "skipped": 0,
         });
