@@ -101,7 +101,7 @@ fn known(verdict: Verdict, why: impl Into<String>) -> Outcome {
 /// Probability with which an interval misses.
 pub const ALPHA: f64 = 0.05;
 
-/// Compares everything but times: what they need beside the samples is in [`of_times`].
+/// Compares everything but times: what they need beside the samples is in [`TimeRatio`].
 pub fn compare(figure: &Figure, a: &Evidence, b: &Evidence, effects: &Effects) -> Outcome {
     match (a, b) {
         (Evidence::Exact(a), Evidence::Exact(b)) => exact(figure, *a, *b, effects),

@@ -3,7 +3,7 @@
 //! [`Experiment::load`] reads a file, lays the defaults under it and the overrides of the command
 //! line over it, and checks every key against [`keys::KEYS`] and every name against a
 //! [`Catalogue`]. [`Plan::new`] turns the axes into the cells that have to be run, and
-//! [`cell_hash`] gives each its content hash.
+//! [`cell_hash`](crate::text::cell_hash) gives each its content hash.
 
 mod axis_map;
 mod cells;

@@ -10,9 +10,9 @@
 //! | what | how | cost |
 //! |---|---|---|
 //! | star, 1-D | sorted points | N log N |
-//! | star, 2-D | [`planar`]: a tournament over y, its winners followed over the sweep in x | ~ N log N |
-//! | star, 3-D and up | [`orthants`]: orthants decomposed until counts are sums, cells that cannot win dropped | between N and N^(1+d/2) cells in practice |
-//! | star, over budget | the same with a tolerance, [`ascent`] from below | the budget |
+//! | star, 2-D | `planar`: a tournament over y, its winners followed over the sweep in x | ~ N log N |
+//! | star, 3-D and up | `orthants`: orthants decomposed until counts are sums, cells that cannot win dropped | between N and N^(1+d/2) cells in practice |
+//! | star, over budget | the same with a tolerance, `ascent` from below | the budget |
 //! | square means | [`quadratic`]: L2-star, centered, wrap-around, mixture, average | N² d |
 //!
 //! [`measure()`] does any of them by [`Measure`], under a [`Budget`] of time.

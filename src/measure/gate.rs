@@ -6,7 +6,7 @@
 //! if both triangles lie within 4 ulp of the same distance in f64; ties are counted and shown.
 //!
 //! A scene of instances has a second judge, for structures that take rays to the objects' spaces:
-//! see [`super::instance_judge`].
+//! see `instance_judge`.
 
 use super::holes::SceneHoles;
 use super::instance_judge;

@@ -4,7 +4,7 @@
 //! Each path is put into one of four classes:
 //!
 //! * it *agrees*: every channel within [`TOLERANCE`], relative, or below a floor of [`FLOOR`] of the mean radiance;
-//! * it is *ill-conditioned*: it differs by more, but by no more than [`SPREAD`] times what the same path does when a few
+//! * it is *ill-conditioned*: it differs by more, but by no more than `SPREAD` times what the same path does when a few
 //!   roundings of f32 are played in f64 ([`Rounding`]), all its decisions being the same: texture coordinates on long triangles,
 //!   grazing light;
 //! * it is a *flip*: with as many roundings the oracle decides otherwise somewhere (an edge, an occluder, a random number against a

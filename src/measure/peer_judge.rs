@@ -21,7 +21,7 @@ pub struct Differences {
     pub unlike: usize,
     /// How many of them were put to the oracle.
     pub judged: usize,
-    /// Greatest difference of a distance at the same triangle from the judge's or the exact one, whichever is nearer: see [`EXPLAINED`].
+    /// Greatest difference of a distance at the same triangle from the judge's or the exact one, whichever is nearer: see `EXPLAINED`.
     pub farthest: f64,
 }
 

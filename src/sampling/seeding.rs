@@ -76,7 +76,7 @@ impl Seeding {
 }
 
 /// The pixel at this place of the image as workgroups hold it, whose pixels lie so far apart: the place is moved within a tile
-/// of [`EDGE`]·`stride` pixels, and each place has a pixel of its own.
+/// of `EDGE`·`stride` pixels, and each place has a pixel of its own.
 pub fn paired([x, y]: [u32; 2], stride: u32) -> [u32; 2] {
     [x, y].map(|at| {
         let (tile, within) = (at / (EDGE * stride), at % (EDGE * stride));

@@ -105,7 +105,7 @@ impl TriangleRecord {
     }
 }
 
-/// A ray–triangle test, registered by a line of [`super::registry`].
+/// A ray–triangle test, registered by a line of its registry.
 pub trait TriangleTest: Send + Sync {
     /// Name as a user types it.
     fn name(&self) -> &'static str;

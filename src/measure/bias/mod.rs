@@ -6,7 +6,7 @@
 //! a third of the level:
 //!
 //! * of the mean of the whole image, which sees any bias that adds up;
-//! * of a mean in which noisy places count less ([`weights`]), which sees a small bias that all pixels share: on
+//! * of a mean in which noisy places count less (`weights`), which sees a small bias that all pixels share: on
 //!   the Cornell box, where most of the noise comes from the edges of the lamp, its standard error is a fifth of
 //!   the plain mean's;
 //! * per tile, for a bias that stays in its place: over all tiles the Benjamini–Hochberg procedure bounds the

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 /// A folder of kernels that a run put in the place of embedded ones.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct KernelFolder {
-    /// Its label, as in [`Ran::kernels`].
+    /// Its label, as in the axis of kernels in [`Key`](super::Key).
     pub label: String,
     /// The folder as given.
     pub folder: String,

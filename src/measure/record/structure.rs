@@ -38,7 +38,7 @@ pub enum RayClass {
     Bounce,
     /// Rays between random points of the bounding box; closest hit.
     Chord,
-    /// Rays that faults hide behind (see [`super::hard_rays`]); both queries, never timed.
+    /// Rays that faults hide behind (see [`hard_rays`](crate::measure::hard_rays)); both queries, never timed.
     Hard,
 }
 

@@ -105,7 +105,7 @@ fn escaped(text: &str) -> String {
 /// of them would cost a report more time than everything else; the SVG file stays as sharp as it is.
 const TALL: f64 = 1000.0;
 
-/// The drawing as a PNG file of twice its size (its own above [`TALL`]), smoothed by 2×2 samples per pixel.
+/// The drawing as a PNG file of twice its size (its own above `TALL`), smoothed by 2×2 samples per pixel.
 pub fn to_png(drawing: &Drawing) -> Result<Vec<u8>, ReportError> {
     let scale = if drawing.height > TALL { 2.0 } else { 4.0 };
     let (width, height) = scaled_size(drawing, scale);
