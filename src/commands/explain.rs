@@ -110,7 +110,7 @@ fn in_words(inventory: &Inventory, state: &State, stale: Option<String>) -> Resu
         None => writeln!(text, "\nup to date: `--resume` keeps it")?,
         Some(why) => writeln!(text, "\nnot up to date: {why}")?,
     }
-    writeln!(text, "\nalone: {}", command(&inventory, &state.unit.cell))?;
+    writeln!(text, "\nalone: {}", command(inventory, &state.unit.cell))?;
     Ok(text)
 }
 
