@@ -126,7 +126,15 @@ fn plot(data: &RunData, parameter: &str) -> Option<Illustration> {
             points: cells.iter().filter_map(point).collect(),
         })
     };
-    let curves = over(data, parameter).into_iter().filter_map(curve);
+    let mut curves: Vec<Curve> = { over(data, parameter).into_iter() }
+        .filter_map(curve)
+        .collect();
+    // Of one method there may be several: then no colour stands for a method.
+    let looks: BTreeSet<usize> = curves.iter().map(|curve| curve.look).collect();
+    if looks.len() < curves.len() {
+        let numbered = curves.iter_mut().enumerate();
+        numbered.for_each(|(place, curve)| curve.look = place);
+    }
     let (y_title, says) = match whole {
         true => ("time, ms", "Time of a compaction"),
         false => ("time per element, ns", "Time per element of the stream"),
@@ -141,7 +149,7 @@ fn plot(data: &RunData, parameter: &str) -> Option<Illustration> {
         x_title: x_title.to_owned(),
         x_ticks,
         y_title: y_title.to_owned(),
-        curves: curves.collect(),
+        curves,
         guides: Vec::new(),
     };
     let caption = format!("{says}, against {x_title}. Bands: 95 % interval of the median.");

@@ -6,7 +6,7 @@ use crate::measure::figure::{Better, figure};
 use crate::measure::hypothesis::student_t_quantile;
 use crate::measure::record::{
     ClassTiming, FigureAtCount, Interval, RayClass, Recorded, StreamRecord, StructureRecord,
-    Verdict,
+    Verdict, axis,
 };
 use crate::measure::statistics::{LEAST_FOR_MEDIAN, Spread};
 use crate::report::data::{Measured, RunData, SceneGroup, View, without_repeats};
@@ -106,6 +106,13 @@ fn question(data: &RunData) -> String {
     parts.extend(of(&data.structures, "structure", "how fast is", fast));
     let exact = "errs least per sample and per second";
     parts.extend(of(&data.samplers, "sampler", "how exact is", exact));
+    let mut methods: Vec<String> = { data.compactions.iter() }
+        .map(|c| c.key.name(axis::INTEGRATOR).to_owned())
+        .collect();
+    methods = without_repeats(methods);
+    let compact = "compacts streams fastest";
+    let how = "how fast streams are compacted by";
+    parts.extend(of(&methods, "method", how, compact));
     if parts.is_empty() {
         return "Asked: nothing that a structure or a sampler answers.".into();
     }
@@ -235,12 +242,30 @@ fn of_scene(scene: &SceneGroup) -> Vec<Block> {
 fn answers(caption: &str, rulings: &[(String, Ruling)]) -> Vec<Block> {
     let alone = rulings.iter().filter(|(_, ruling)| !ruling.is_contest());
     let alone = by_answer(alone.cloned().collect());
-    let mut blocks = Vec::from_iter(table_of(caption, rulings).into_block());
+    let table = table_of(caption, rulings).into_block();
+    let place = match &table {
+        Some(_) => String::new(),
+        None => caption.replacen("Verdict on", " on", 1),
+    };
+    let mut blocks = Vec::from_iter(table);
     blocks.extend(alone.into_iter().map(|(questions, ruling)| {
-        let (answer, questions) = (ruling.answer(), questions.join("; "));
-        Block::Paragraph(format!("Without competition: {answer} in {questions}."))
+        let (answer, questions) = (ruling.answer(), together(&questions));
+        Block::Paragraph(format!(
+            "Without competition{place}: {answer} in {questions}."
+        ))
     }));
     blocks
+}
+
+/// Questions that are listed; of more only their number.
+const LISTED: usize = 2;
+
+/// Questions that have one answer.
+fn together(questions: &[String]) -> String {
+    match questions.len() <= LISTED {
+        true => questions.join("; "),
+        false => format!("{} questions", format::count(questions.len() as u64)),
+    }
 }
 
 /// The rulings, with all questions that have the same answer in words together, where the first of them stood.
@@ -324,18 +349,25 @@ fn table_of(caption: &str, rulings: &[(String, Ruling)]) -> Table {
     let contests = rulings.iter().filter(|(_, ruling)| ruling.is_contest());
     let is_withheld = |(_, ruling): &&(String, Ruling)| matches!(ruling, Ruling::Withheld(_));
     let (withheld, ruled): (Vec<_>, Vec<_>) = contests.partition(is_withheld);
-    let ruled = ruled.iter().map(|(question, ruling)| row(question, ruling));
+    let ruled = ruled
+        .iter()
+        .map(|(question, ruling)| row(question.as_str().into(), ruling));
     table.rows.extend(ruled);
     // Questions that one failed check takes the answer from are a row of their own.
     let withheld = by_answer(withheld.into_iter().cloned().collect());
-    let withheld = withheld.iter();
-    table
-        .rows
-        .extend(withheld.map(|(questions, ruling)| row(&questions.join("; "), ruling)));
+    let withheld = withheld.iter().map(|(questions, ruling)| {
+        let all = questions.join("; ");
+        let question = match together(questions) {
+            short if short == all => all.into(),
+            short => TableCell::with_detail(short, all),
+        };
+        row(question, ruling)
+    });
+    table.rows.extend(withheld);
     table
 }
 
-fn row(question: &str, ruling: &Ruling) -> Vec<TableCell> {
+fn row(question: TableCell, ruling: &Ruling) -> Vec<TableCell> {
     let tone = match ruling {
         Ruling::Winner(..) => Tone::Good,
         Ruling::Nobody | Ruling::Withheld(_) => Tone::Bad,
@@ -343,7 +375,7 @@ fn row(question: &str, ruling: &Ruling) -> Vec<TableCell> {
     };
     let answer = TableCell::from(ruling.answer()).toned(tone);
     let (figure, next) = (ruling.figure(), ruling.runner_up());
-    vec![question.into(), answer, figure.into(), next.into()]
+    vec![question, answer, figure.into(), next.into()]
 }
 
 /// Which sampler has the lowest D*, pair of dimensions by pair.
