@@ -2,7 +2,7 @@
 
 use super::arguments::ValueArguments;
 use super::failure::FAILED;
-use super::output::{print, tell};
+use super::output::{print, print_json, screen, tell};
 use super::signals;
 use anyhow::{Context as _, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
@@ -262,19 +262,14 @@ impl Compare {
                 .with_context(|| format!("cannot write {}", path.display()))?;
         }
         match self.json {
-            true => print(&format!("{:#}\n", show::json(found))),
-            false => print(&show::terminal(found, width())),
+            true => print_json("compare", show::json(found)),
+            false => print(&show::terminal(found, screen().width.unwrap_or(IN_A_FILE))),
         }
     }
 }
 
-/// Columns of the terminal as `COLUMNS` says, else as many as most have.
-fn width() -> usize {
-    let columns = std::env::var("COLUMNS")
-        .ok()
-        .and_then(|text| text.parse().ok());
-    columns.filter(|n| *n >= 40).unwrap_or(100)
-}
+/// Columns of a comparison that goes to no terminal.
+const IN_A_FILE: usize = 100;
 
 /// A folder that goes with its owner; made when it is needed.
 #[derive(Default)]

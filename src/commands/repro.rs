@@ -5,7 +5,7 @@ use super::output::{OutputArguments, print, print_json, tell};
 use super::signals;
 use anyhow::{Result, anyhow};
 use clap::Args;
-use raystone::gpu::{AdapterChoice, GpuError};
+use raystone::gpu::{AdapterChoice, GpuError, is_software};
 use raystone::report::{html, markdown, write_file, write_page};
 use raystone::repro::claim::Row;
 use raystone::repro::judge::Verdict;
@@ -69,8 +69,9 @@ impl Repro {
             return Ok(ExitCode::SUCCESS);
         }
         let folder = if self.quick { "repro-quick" } else { "repro" };
-        let settings = Settings {
+        let mut settings = Settings {
             quick: self.quick,
+            software: false,
             scenes: scenes::directory(self.scenes.as_deref()),
             out: self
                 .out
@@ -85,6 +86,8 @@ impl Repro {
             cache: user_cache(),
             ..RunOptions::default()
         };
+        // Without an adapter what is recorded can be judged all the same; a run says that there is none.
+        settings.software = is_software(&options.adapter).unwrap_or(true);
         signals::watch(options.interrupt.clone())?;
         let (mut tables, mut failed) = (Vec::new(), Vec::new());
         for (index, source) in sources.iter().enumerate() {
@@ -220,6 +223,7 @@ fn as_json(tables: &[Reproduced], failed: &[(String, String)], html: &Path) -> V
             "title": table.thesis.title,
             "started_unix_s": table.started,
             "quick": table.quick,
+            "changes": table.changes,
             "device": table.environment.as_ref().map(|e| &e.adapter),
             "claims": claims(table),
         })

@@ -412,7 +412,6 @@ pub fn json(comparison: &Comparison) -> Value {
         })
     };
     json!({
-        "schema": "raystone-compare/1",
         "verdict": comparison.verdict(),
         "base": comparison.names[0],
         "candidate": comparison.names[1],

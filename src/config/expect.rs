@@ -1,8 +1,8 @@
 //! What an experiment should show: the numbers and claims of a thesis, beside the experiment that tests them.
 //!
-//! An experiment file of a thesis has four more sections, which a plain run passes over: `[thesis]` says what is
+//! An experiment file of a thesis has more sections, which a plain run passes over: `[thesis]` says what is
 //! reproduced, `[[substitute]]` which scene stands for which, `[[expect]]` what is claimed, `[quick]` what a short run
-//! changes. docs/repro.md describes them.
+//! changes, `[software]` what a whole run on a software adapter does. docs/repro.md describes them.
 
 use super::error::{ConfigError, Place};
 use super::tree::Table;
@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// The sections of this module.
-const SECTIONS: [&str; 4] = ["thesis", "substitute", "expect", "quick"];
+const SECTIONS: [&str; 5] = ["thesis", "substitute", "expect", "quick", "software"];
 
 /// What a thesis printed, and how the experiment tests it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -34,6 +34,9 @@ pub struct Thesis {
     /// Overrides (`section.key=value`) that make a run short and built-in.
     #[serde(skip)]
     pub quick: Vec<String>,
+    /// Overrides of a whole run on a software adapter, where sizes of a GPU would take hours.
+    #[serde(skip)]
+    pub software: Vec<String>,
 }
 
 /// A scene in the place of the thesis's.
@@ -45,10 +48,11 @@ pub struct Substitute {
     /// Its triangles there.
     #[serde(default)]
     pub triangles: Option<u64>,
-    /// Ours: a built-in scene, or a path below the scene directory; none if nothing fits.
+    /// Ours: a built-in scene (of which a pattern can choose a variant: `instances(*count=8*`), or a path below the scene
+    /// directory; none if nothing fits.
     #[serde(default)]
     pub scene: Option<String>,
-    /// A built-in scene for short runs; none leaves it out of them.
+    /// The same for short runs, built in; none leaves it out of them.
     #[serde(default)]
     pub quick: Option<String>,
     /// How they differ.
@@ -186,12 +190,15 @@ struct File {
     #[serde(default)]
     expect: Vec<Expect>,
     #[serde(default)]
-    quick: Quick,
+    quick: Changes,
+    #[serde(default)]
+    software: Changes,
 }
 
+/// What a kind of run changes.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Quick {
+struct Changes {
     #[serde(default)]
     set: Vec<String>,
 }
@@ -213,6 +220,7 @@ impl Thesis {
         thesis.substitutes = parsed.substitute;
         thesis.expects = parsed.expect;
         thesis.quick = parsed.quick.set;
+        thesis.software = parsed.software.set;
         thesis.check(file)?;
         Ok(Some(thesis))
     }

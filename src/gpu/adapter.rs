@@ -204,6 +204,15 @@ impl RawDevice {
     }
 }
 
+/// Whether the chosen adapter is a software rasteriser; it is not opened.
+///
+/// # Errors
+/// No adapter, or no such adapter.
+pub fn is_software(choice: &AdapterChoice) -> Result<bool, GpuError> {
+    let adapter = choose(enumerate(), choice)?;
+    Ok(adapter.get_info().device_type == wgpu::DeviceType::Cpu)
+}
+
 /// Opens the chosen adapter.
 ///
 /// # Errors

@@ -20,7 +20,7 @@ mod slices;
 mod sort;
 mod uniform;
 
-pub use adapter::{AdapterChoice, AdapterSummary, Gpu, RawDevice, adapters, open};
+pub use adapter::{AdapterChoice, AdapterSummary, Gpu, RawDevice, adapters, is_software, open};
 pub use bindings::{Bindings, MAX_PARTS, Storage};
 pub use clock::{Elapsed, Stopwatch};
 pub use compose::{ComposedKernel, Composition, KernelLibrary};

@@ -218,8 +218,8 @@ pub static FIGURES: [Figure; 142] = [
     Figure::new("l2-star-exponent/v1", "L2-star exponent", "", Lower, Exponent, Mean),
     Figure::new("integral-rmse/v1", "RMSE of an integral", "", Lower, THREE, Mean),
     Figure::new("integral-exponent/v1", "exponent of that RMSE", "", Lower, Exponent, Mean),
-    Figure::new("neighbour-angle/v1", "angle", "degrees", Neither, THREE, Single),
-    Figure::new("coverage/v1", "coverage", "", Higher, Percent, Single),
+    Figure::new("neighbour-angle/v1", "angle", "degrees", Neither, THREE, Exact),
+    Figure::new("coverage/v1", "coverage", "", Higher, Percent, Exact),
     Figure::new("ns-per-sample/v1", "ns per sample", "", Lower, THREE, Median),
     Figure::new("loop-ns/v1", "empty loop", "ns", Neither, THREE, Median),
     // Compactions of streams.

@@ -7,6 +7,10 @@ use crate::measure::record::Verdict;
 use rayon::prelude::*;
 use serde::Serialize;
 
+/// Figures whose PNG files are as fine as print wants them. With hundreds of them, painting and packing would cost a report more
+/// time than everything else; the files of the others have their own size, and all SVG files are as sharp.
+const MOST_FOR_PRINT: usize = 48;
+
 /// Bytes of plots that a page holds.
 const MOST_INLINE: usize = 4_000_000;
 
@@ -33,9 +37,10 @@ impl Document {
         for section in &mut self.sections {
             figures_among(&mut section.blocks, &mut figures);
         }
-        figures.into_par_iter().try_for_each(|figure| {
+        let figures = figures.into_par_iter().enumerate();
+        figures.try_for_each(|(place, figure)| {
             figure.svg = to_svg(&figure.drawing)?;
-            figure.png = to_png(&figure.drawing)?;
+            figure.png = to_png(&figure.drawing, place < MOST_FOR_PRINT)?;
             Ok::<(), ReportError>(())
         })?;
         self.choose_inline();

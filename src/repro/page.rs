@@ -168,6 +168,17 @@ fn section(table: &Reproduced) -> Section {
     if !table.thesis.reading.is_empty() {
         blocks.push(Block::Paragraph(table.thesis.reading.trim().to_owned()));
     }
+    if !table.changes.is_empty() {
+        let kind = if table.quick {
+            "This short run"
+        } else {
+            "On a software adapter the run"
+        };
+        blocks.push(Block::Paragraph(format!(
+            "{kind} has {}.",
+            table.changes.join(", ")
+        )));
+    }
     blocks.extend(scenes(table).into_block());
     blocks.extend(original(table).map(Block::Table));
     blocks.extend(plots::of(table));

@@ -3,11 +3,13 @@
 use super::Source;
 use super::claim::{Context, Row, judge};
 use super::judge::Verdict;
-use super::scenes::{IN_FILES, is_model, what_to_get};
+use super::scenes::{IN_FILES, is_model, name_of, what_to_get};
 use crate::config::expect::{Compare, Substitute, Thesis, same_experiment};
 use crate::config::{ConfigError, Experiment, Plan};
 use crate::gpu::Environment;
-use crate::measure::record::{Body, Key, Line, RECORDS_FILE, RecordError, RunRecord, read_records};
+use crate::measure::record::{
+    Body, Key, Line, PARTIAL, RECORDS_FILE, RecordError, RunRecord, read_records,
+};
 use crate::report::data::RunData;
 use crate::report::{ReportError, values::values, write_report};
 use crate::run::{Existing, Registries, RunError, RunOptions};
@@ -19,6 +21,8 @@ use thiserror::Error;
 pub struct Settings {
     /// Short runs on built-in scenes.
     pub quick: bool,
+    /// Whether the adapter is a software rasteriser, which runs some tables smaller.
+    pub software: bool,
     /// The scene directory.
     pub scenes: PathBuf,
     /// Folder of all tables.
@@ -60,6 +64,8 @@ pub struct Reproduced {
     pub started: u64,
     /// Whether it was a short run.
     pub quick: bool,
+    /// What the run changed of the experiment.
+    pub changes: Vec<String>,
     /// Original scene → ours with its triangles, or why there is none.
     pub scenes: Vec<(Substitute, Result<Placed, String>)>,
     /// Rows of each expectation, in the order of the file.
@@ -87,6 +93,8 @@ pub struct Prepared {
     pub thesis: Thesis,
     /// Scene of each substitute, or why it has none.
     pub scenes: Vec<(Substitute, Result<String, String>)>,
+    /// What a short run, or one on a software adapter, changes.
+    pub changes: Vec<String>,
 }
 
 /// Reads a table's file, with the scenes that are there and, if asked for, what makes it short.
@@ -101,14 +109,17 @@ pub fn prepare(
     let thesis = source.thesis()?;
     let stand_in = |s: &Substitute| (s.clone(), scene_of(s, settings));
     let scenes: Vec<_> = thesis.substitutes.iter().map(stand_in).collect();
-    let mut overrides = match settings.quick {
-        true => thesis.quick.clone(),
-        false => Vec::new(),
+    let changes = match (settings.quick, settings.software) {
+        (true, _) => thesis.quick.clone(),
+        (false, true) => thesis.software.clone(),
+        (false, false) => Vec::new(),
     };
+    let mut overrides = changes.clone();
     let mut there: Vec<String> = Vec::new();
     for scene in scenes.iter().filter_map(|(_, scene)| scene.as_ref().ok()) {
-        if !there.contains(scene) {
-            there.push(scene.clone());
+        let scene = name_of(scene).to_owned();
+        if !there.contains(&scene) {
+            there.push(scene);
         }
     }
     if !there.is_empty() {
@@ -122,6 +133,7 @@ pub fn prepare(
         experiment,
         thesis,
         scenes,
+        changes,
     })
 }
 
@@ -162,7 +174,10 @@ pub fn reproduce(
         let plan = Plan::new(experiment, &[], randomised)?;
         let mut options = options.clone();
         options.out = out.clone();
-        options.existing = Existing::Replace;
+        options.existing = match !settings.force && is_of(&out.join(PARTIAL), &experiment.text) {
+            true => Existing::Resume,
+            false => Existing::Replace,
+        };
         crate::run::run(experiment, &plan, registries, &options)?;
         write_report(&out)?;
     }
@@ -178,27 +193,35 @@ pub fn recorded(
     settings: &Settings,
     registries: &Registries,
 ) -> Result<Option<Reproduced>, ReproError> {
-    let prepared = prepare(source, settings, registries)?;
     let out = settings.out.join(source.name);
-    match is_done(&out, &prepared.experiment.text) {
-        true => judged(source.name, settings.quick, prepared, &out).map(Some),
-        false => Ok(None),
+    // Which adapter it ran on is not known.
+    for software in [settings.software, !settings.software] {
+        let settings = Settings {
+            software,
+            ..settings.clone()
+        };
+        let prepared = prepare(source, &settings, registries)?;
+        if is_done(&out, &prepared.experiment.text) {
+            return judged(source.name, settings.quick, prepared, &out).map(Some);
+        }
     }
+    Ok(None)
+}
+
+/// Whether a folder holds records of this experiment, be they whole or what is left of a killed run.
+fn is_of(folder: &Path, text: &str) -> bool {
+    let same = |line: &Line| matches!(&line.body, Body::Run(r) if same_experiment(&r.experiment_text, text));
+    let records = read_records(folder);
+    records.is_ok_and(|records| records.lines.iter().any(same))
 }
 
 /// Whether a folder holds the whole records of this experiment.
 pub fn is_done(out: &Path, text: &str) -> bool {
-    if !out.join(RECORDS_FILE).is_file() {
+    if !out.join(RECORDS_FILE).is_file() || !is_of(out, text) {
         return false;
     }
-    let Ok(records) = read_records(out) else {
-        return false;
-    };
-    let lines = || records.lines.iter().map(|line| &line.body);
-    let same =
-        |body: &Body| matches!(body, Body::Run(r) if same_experiment(&r.experiment_text, text));
-    let finished = |body: &Body| matches!(body, Body::Finished(_));
-    lines().any(same) && lines().any(finished)
+    let finished = |line: &Line| matches!(line.body, Body::Finished(_));
+    read_records(out).is_ok_and(|records| records.lines.iter().any(finished))
 }
 
 fn judged(
@@ -244,12 +267,16 @@ fn judged(
         environment: run.map(|run: &RunRecord| run.environment.clone()),
         started: run.map_or(0, |run| run.started_unix_s),
         quick,
+        changes: prepared.changes,
         claims,
     })
 }
 
-/// The pattern of a scene's label: a path by its file's name, a built-in scene whatever its parameters.
+/// The pattern of a scene's label: a path by its file's name, a built-in scene whatever its parameters, unless it is a pattern itself.
 fn pattern(scene: &str) -> String {
+    if name_of(scene) != scene {
+        return scene.to_owned();
+    }
     let file = Path::new(scene).file_name();
     let file = file.map_or(scene.into(), |file| file.to_string_lossy());
     match is_model(scene) {

@@ -16,7 +16,7 @@ pub struct Model {
 }
 
 /// Every model that an experiment of `experiments/thesis` names.
-pub static MODELS: [Model; 6] = [
+pub static MODELS: [Model; 7] = [
     Model {
         path: "sponza-crytek/sponza.obj",
         triangles: 262_267,
@@ -53,6 +53,12 @@ pub static MODELS: [Model; 6] = [
         licence: "Stanford 3D Scanning Repository, for research, with credit",
         from: "https://graphics.stanford.edu/data/3Dscanrep",
     },
+    Model {
+        path: "stanford-dragon/dragon_100k.obj",
+        triangles: 99_999,
+        licence: "Stanford 3D Scanning Repository, for research, with credit",
+        from: "https://graphics.stanford.edu/data/3Dscanrep, reduced to 100,000 triangles",
+    },
 ];
 
 /// The folder that experiments name models by.
@@ -73,9 +79,14 @@ pub fn directory(asked: Option<&Path>) -> PathBuf {
     data.map_or(shared, |data| data.join("raystone").join("scenes"))
 }
 
+/// The scene of a substitute that names one of its variants by a pattern, as `instances(*count=8*`.
+pub fn name_of(scene: &str) -> &str {
+    scene.split_once('(').map_or(scene, |(name, _)| name)
+}
+
 /// Whether a substitute is a path, and not a built-in scene.
 pub fn is_model(scene: &str) -> bool {
-    scene.contains('.')
+    name_of(scene).contains('.')
 }
 
 /// What to get where a model is missing.

@@ -149,12 +149,23 @@ impl SceneBuilder {
         material: u32,
         uvs: &[[Vec2; 3]],
     ) {
+        self.place_looking(object, to_world, |_| material, uvs);
+    }
+
+    /// The same with a material of each of its triangles.
+    pub fn place_looking(
+        &mut self,
+        object: u32,
+        to_world: Transform,
+        material: impl Fn(usize) -> u32,
+        uvs: &[[Vec2; 3]],
+    ) {
         match self.assembly.place(object, to_world) {
             Ok(instance) => {
                 let copy: Vec<Triangle> = self.assembly.copy(&instance).collect();
                 for (id, triangle) in copy.iter().enumerate() {
                     let uvs = uvs.get(id).copied().unwrap_or_default();
-                    self.push_corners(triangle.vertices, uvs, None, material);
+                    self.push_corners(triangle.vertices, uvs, None, material(id));
                 }
             }
             Err(error) => {

@@ -78,6 +78,23 @@ pub enum SceneError {
         /// Which, and why.
         source: super::InstanceError,
     },
+    /// More triangles than a machine can be expected to hold.
+    #[error(
+        "{name}: {copies} copies have {needed} triangles, the limit is {limit}; set `copies` lower, or \
+         most_triangles = {most}"
+    )]
+    TooManyCopies {
+        /// The scene, as typed.
+        name: String,
+        /// Copies that were asked for.
+        copies: usize,
+        /// Their triangles.
+        needed: usize,
+        /// Most triangles of all copies.
+        limit: usize,
+        /// Most triangles of one of so many.
+        most: usize,
+    },
     /// A parameter that the built-in scene does not have, or a value that it does not allow.
     #[error(transparent)]
     Parameter(#[from] ParamError),

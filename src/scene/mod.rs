@@ -8,6 +8,7 @@ mod builder;
 pub mod builtin;
 mod camera;
 mod content;
+mod copies;
 mod daylight;
 mod environment;
 mod error;
@@ -182,13 +183,23 @@ pub fn named(name: &str) -> Result<SceneData, SceneError> {
 pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, SceneError> {
     let mut variant = variant.clone();
     let mut common = Params::default();
-    for name in [ENVIRONMENT, HUNG_LAMPS] {
+    for name in [MOST_TRIANGLES, COPIES, ENVIRONMENT, HUNG_LAMPS] {
         common.0.extend(variant.params.0.remove_entry(name));
     }
     let common = common.completed(&common_parameters())?;
     let mut scene = load_alone(&variant, options)?;
-    if let Some(ParamValue::Integer(lamps @ 1..)) = common.0.get(HUNG_LAMPS) {
-        scene = hung_lamps::hang(scene, *lamps as u32);
+    let number = |name| match common.0.get(name) {
+        Some(ParamValue::Integer(number @ 1..)) => Some(*number as usize),
+        _ => None,
+    };
+    if let Some(most) = number(MOST_TRIANGLES) {
+        scene = copies::with_at_most(scene, most)?;
+    }
+    if let Some(copies) = number(COPIES) {
+        scene = copies::on_a_plane(scene, copies)?;
+    }
+    if let Some(lamps) = number(HUNG_LAMPS) {
+        scene = hung_lamps::hang(scene, lamps as u32);
     }
     match common.0.get(ENVIRONMENT) {
         Some(ParamValue::Name(file)) if !file.is_empty() => scene.under(Path::new(file)),
@@ -202,6 +213,12 @@ const ENVIRONMENT: &str = "environment";
 /// The parameter of every scene that says how many lamps are hung into it.
 const HUNG_LAMPS: &str = "hung_lamps";
 
+/// The parameter of every scene that says how many triangles may be left of it.
+const MOST_TRIANGLES: &str = "most_triangles";
+
+/// The parameter of every scene that says how many copies of it stand on a plane.
+const COPIES: &str = "copies";
+
 /// What every scene has as parameters, built in or not.
 pub fn common_parameters() -> ParameterSchema {
     vec![
@@ -210,6 +227,24 @@ pub fn common_parameters() -> ParameterSchema {
             description: "equirectangular map (HDR, EXR, PFM or NPY) that lights the scene from all around; none if empty",
             default: ParamValue::Name(String::new()),
             range: ParamRange::Text,
+        },
+        Parameter {
+            name: MOST_TRIANGLES,
+            description: "vertices are merged until the scene has no more triangles; 0 leaves it as it is",
+            default: ParamValue::Integer(0),
+            range: ParamRange::Integer {
+                min: 0,
+                max: u32::MAX.into(),
+            },
+        },
+        Parameter {
+            name: COPIES,
+            description: "copies of the scene that stand on a plane, turned about the vertical; 0 leaves it as it is",
+            default: ParamValue::Integer(0),
+            range: ParamRange::Integer {
+                min: 0,
+                max: 65_536,
+            },
         },
         Parameter {
             name: HUNG_LAMPS,

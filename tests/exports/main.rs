@@ -417,7 +417,14 @@ fn json_has_one_head_for_every_command() {
     std::fs::write(&points, "0.5 0.25\n0.75 0.5\n").expect("a file");
     let merged = RUN.path().join("merged");
     let tiny = "tests/data/tiny.toml";
-    let commands: [&[&str]; 14] = [
+    let commands: [&[&str]; 15] = [
+        &[
+            "compare",
+            text(&folder),
+            text(&folder),
+            "--no-confirm",
+            "--json",
+        ],
         &["plan", tiny, "--json"],
         &["run", tiny, "--dry-run", "--json"],
         &["merge", text(&folder), "--out", text(&merged), "--json"],

@@ -93,19 +93,22 @@ impl Axis {
         let air = air.max((3.0 * low / high).sqrt());
         let (min, max) = (low / air, high * air);
         let decades = (max / min).log10();
+        // In tenths of a power of ten.
         let labelled: &[u32] = match decades {
-            _ if decades < 1.2 => &[1, 2, 3, 4, 5, 6, 8],
-            _ if decades < 3.0 => &[1, 2, 5],
-            _ => &[1],
+            _ if decades < 0.7 => &[10, 12, 15, 20, 25, 30, 40, 50, 60, 80],
+            _ if decades < 1.2 => &[10, 20, 30, 40, 50, 60, 80],
+            _ if decades < 3.0 => &[10, 20, 50],
+            _ => &[10],
         };
         let mut ticks = Vec::new();
         let stride = (decades / 8.0).ceil().max(1.0) as i32;
         for exponent in min.log10().floor() as i32..=max.log10().ceil() as i32 {
-            for mantissa in 1..10 {
-                let value = f64::from(mantissa) * 10f64.powi(exponent);
-                let shown = labelled.contains(&mantissa) && exponent.rem_euclid(stride) == 0;
-                let label = shown.then(|| decimal_or_power(mantissa, exponent));
-                if (min..=max).contains(&value) && (shown || decades < 4.0) {
+            for tenths in 10..100 {
+                let value = f64::from(tenths) * 10f64.powi(exponent - 1);
+                let shown = labelled.contains(&tenths) && exponent.rem_euclid(stride) == 0;
+                let label = shown.then(|| decimal_or_power(tenths, exponent));
+                let between = tenths % 10 == 0 && decades < 4.0;
+                if (min..=max).contains(&value) && (shown || between) {
                     let label = label.unwrap_or_default();
                     ticks.push(Tick { value, label });
                 }
@@ -240,15 +243,21 @@ fn plain(value: f64) -> String {
     }
 }
 
-/// `0.02`, `1000`, or `2·10⁻⁵` where that is shorter.
-fn decimal_or_power(mantissa: u32, exponent: i32) -> String {
+/// So many tenths of a power of ten: `0.02`, `1.5`, `1000`, or `2·10⁻⁵` where that is shorter.
+fn decimal_or_power(tenths: u32, exponent: i32) -> String {
+    let mantissa = f64::from(tenths) / 10.0;
     if (-3..=4).contains(&exponent) {
-        let decimals = (-exponent).max(0) as usize;
-        return format!("{:.decimals$}", f64::from(mantissa) * 10f64.powi(exponent));
+        let last = if tenths.is_multiple_of(10) {
+            exponent
+        } else {
+            exponent - 1
+        };
+        let decimals = (-last).max(0) as usize;
+        return format!("{:.decimals$}", mantissa * 10f64.powi(exponent));
     }
     let power = format::raised(&exponent.to_string());
-    match mantissa {
-        1 => format!("10{power}"),
+    match tenths {
+        10 => format!("10{power}"),
         _ => format!("{mantissa}·10{power}"),
     }
 }
@@ -313,6 +322,9 @@ mod tests {
         let has = |label: &str| long.iter().any(|known| known == label);
         assert!(has("10⁻⁵") && has("1"), "{long:?}");
         assert!(labels(log10(&[0.5])).len() >= 2);
+        assert_eq!(labels(log10(&[1.1, 2.2])), ["1", "1.2", "1.5", "2"]);
+        assert_eq!(labels(log10(&[1.1e-6, 1.4e-6])).len(), 3);
+        assert!(labels(log10(&[120.0, 180.0])).contains(&"150".into()));
         assert!(log10(&[0.0, -1.0, f64::NAN]).is_none() && log2(&[]).is_none());
     }
 

@@ -105,9 +105,11 @@ fn escaped(text: &str) -> String {
 /// of them would cost a report more time than everything else; the SVG file stays as sharp as it is.
 const TALL: f64 = 1000.0;
 
-/// The drawing as a PNG file of twice its size (its own above `TALL`), smoothed by 2×2 samples per pixel.
-pub fn to_png(drawing: &Drawing) -> Result<Vec<u8>, ReportError> {
-    let scale = if drawing.height > TALL { 2.0 } else { 4.0 };
+/// The drawing as a PNG file, smoothed by 2×2 samples per pixel: of twice its size `for_print` (its own above `TALL`),
+/// else of its own.
+pub fn to_png(drawing: &Drawing, for_print: bool) -> Result<Vec<u8>, ReportError> {
+    let is_fine = for_print && drawing.height <= TALL;
+    let scale = if is_fine { 4.0 } else { 2.0 };
     let (width, height) = scaled_size(drawing, scale);
     // White already: painting it pixel by pixel would take longer than the plot.
     let mut pixels = vec![255u8; width as usize * height as usize * 3];
@@ -237,15 +239,20 @@ mod tests {
 
     #[test]
     fn png_has_twice_the_size_and_both_paper_and_ink() {
-        let png = to_png(&sample()).unwrap();
+        let png = to_png(&sample(), true).unwrap();
         let picture = image::load_from_memory(&png).unwrap().to_luma8();
         assert_eq!(picture.dimensions(), (240, 80));
         assert!(picture.pixels().any(|p| p.0[0] == 255));
         assert!(picture.pixels().any(|p| p.0[0] < 80));
         let mut tall = sample();
         tall.height = TALL + 100.0;
-        let picture = image::load_from_memory(&to_png(&tall).unwrap()).unwrap();
-        assert_eq!((picture.width(), picture.height()), (120, 1100));
+        let size = |drawing: &Drawing, for_print: bool| {
+            let png = to_png(drawing, for_print).unwrap();
+            let picture = image::load_from_memory(&png).unwrap();
+            (picture.width(), picture.height())
+        };
+        assert_eq!(size(&tall, true), (120, 1100));
+        assert_eq!(size(&sample(), false), (120, 40));
     }
 
     #[test]

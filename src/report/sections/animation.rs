@@ -23,14 +23,15 @@ pub fn blocks(data: &RunData, stem: &str, scene: &SceneGroup) -> Vec<Block> {
         return Vec::new();
     };
     let values = values(data, scene);
-    let mut blocks = vec![Block::Paragraph(introduction(&first.settings))];
-    blocks.extend(Block::figures(plots(data, stem, scene)));
-    let tables = [
-        costs_table(scene, &values),
-        rays_table(scene, &values),
-        failures_table(scene),
+    let mut blocks = vec![
+        Block::Heading("In motion".into()),
+        Block::Paragraph(introduction(&first.settings)),
     ];
-    blocks.extend(tables.into_iter().filter_map(Table::into_block));
+    blocks.extend(Block::figures(plots(data, stem, scene)));
+    blocks.extend(failures_table(scene).into_block());
+    let tables = [costs_table(scene, &values), rays_table(scene, &values)];
+    let tables = tables.into_iter().filter_map(Table::into_block).collect();
+    blocks.extend(Block::fold("Frames as numbers", tables));
     blocks
 }
 

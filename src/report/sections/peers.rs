@@ -108,7 +108,10 @@ pub fn blocks(scene: &SceneGroup) -> Vec<Block> {
                  rounding, where the triangle is another the double-precision oracle has to agree (at most 256 rays a class, spread over all that \
                  differ), and one that is wrong gets no figures. Time of the processors is that of all threads together, for which it does not \
                  matter what else the machine does.";
-    let mut blocks = vec![Block::Paragraph(about.into())];
+    let mut blocks = vec![
+        Block::Heading("Ray casters of others".into()),
+        Block::Paragraph(about.into()),
+    ];
     blocks.extend(scene.peers.iter().map(|peer| Block::Paragraph(told(peer))));
     let values = values(scene);
     let table = |figure: &str, rows: &[&'static str], heads: &[&str], caption: &str| {

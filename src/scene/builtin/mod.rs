@@ -2,6 +2,7 @@
 //!
 //! A new scene is one file here and one line in `BUILTINS`.
 
+mod city;
 mod cornell_box;
 mod displaced_sphere;
 mod far_corners;
@@ -52,7 +53,7 @@ impl Builtin {
 }
 
 /// The registry.
-const BUILTINS: [Builtin; 14] = [
+const BUILTINS: [Builtin; 15] = [
     Builtin::of::<cornell_box::CornellBox>(),
     Builtin::of::<displaced_sphere::DisplacedSphere>(),
     Builtin::of::<triangle_soup::TriangleSoup>(),
@@ -67,6 +68,7 @@ const BUILTINS: [Builtin; 14] = [
     Builtin::of::<lamps::ManyLights>(),
     Builtin::of::<foliage::Foliage>(),
     Builtin::of::<hairball::Hairball>(),
+    Builtin::of::<city::City>(),
 ];
 
 /// The built-in scenes with their parameters, for the parser, lists and docs.
