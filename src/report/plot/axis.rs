@@ -322,8 +322,8 @@ mod tests {
         let has = |label: &str| long.iter().any(|known| known == label);
         assert!(has("10⁻⁵") && has("1"), "{long:?}");
         assert!(labels(log10(&[0.5])).len() >= 2);
-        assert_eq!(labels(log10(&[1.1, 2.2])), ["1", "1.2", "1.5", "2"]);
-        assert_eq!(labels(log10(&[1.1e-6, 1.4e-6])).len(), 3);
+        assert_eq!(labels(log10(&[1.1, 2.2])), ["1", "1.2", "1.5", "2", "2.5"]);
+        assert_eq!(labels(log10(&[1.1e-6, 1.4e-6])).len(), 5);
         assert!(labels(log10(&[120.0, 180.0])).contains(&"150".into()));
         assert!(log10(&[0.0, -1.0, f64::NAN]).is_none() && log2(&[]).is_none());
     }
