@@ -7,9 +7,13 @@ use crate::measure::record::Verdict;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Figures whose PNG files are as fine as print wants them. With hundreds of them, painting and packing would cost a report more
-/// time than everything else; the files of the others have their own size, and all SVG files are as sharp.
+/// Figures whose PNG files are as fine as print wants them, and those that have one at all: with hundreds, painting and packing
+/// would cost a report more time than everything else. The files of those between have their own size; SVG files are all sharp.
 const MOST_FOR_PRINT: usize = 48;
+const MOST_PNG: usize = 192;
+
+/// Figures that are painted before they are written: painted ones are larger than what they show.
+const AT_ONCE: usize = 64;
 
 /// Bytes of plots that a page holds.
 const MOST_INLINE: usize = 4_000_000;
@@ -28,49 +32,56 @@ pub struct Document {
 }
 
 impl Document {
-    /// Paints every figure, on all cores.
+    /// Paints every figure, on all cores, and hands each to `write` with its files: SVG, and PNG unless there are too many. The first
+    /// figures stand in the page, as many as it has room for; what was painted of the others, to which it leads, is let go.
     ///
     /// # Errors
-    /// If the drawing backend fails.
-    pub fn paint(&mut self) -> Result<(), ReportError> {
+    /// If the drawing backend fails, or `write` does.
+    pub fn paint(
+        &mut self,
+        mut write: impl FnMut(&str, &Painted) -> Result<(), ReportError>,
+    ) -> Result<(), ReportError> {
         let mut figures = Vec::new();
         for section in &mut self.sections {
             figures_among(&mut section.blocks, &mut figures);
         }
-        let figures = figures.into_par_iter().enumerate();
-        figures.try_for_each(|(place, figure)| {
-            figure.svg = to_svg(&figure.drawing)?;
-            figure.png = to_png(&figure.drawing, place < MOST_FOR_PRINT)?;
-            Ok::<(), ReportError>(())
-        })?;
-        self.choose_inline();
+        let mut room = MOST_INLINE;
+        for (batch, figures) in figures.chunks_mut(AT_ONCE).enumerate() {
+            let first = batch * AT_ONCE;
+            let painted = figures.par_iter().enumerate();
+            let painted = painted.map(|(i, figure)| Painted::of(&figure.drawing, first + i));
+            let painted: Vec<Painted> = painted.collect::<Result<_, _>>()?;
+            for (figure, painted) in figures.iter_mut().zip(painted) {
+                write(&figure.name, &painted)?;
+                figure.drawing = Drawing::new(0.0, 0.0);
+                figure.has_png = painted.png.is_some();
+                let left = room.checked_sub(painted.svg.len());
+                figure.inline = left.is_some();
+                if let Some(left) = left {
+                    (room, figure.svg) = (left, painted.svg);
+                }
+            }
+        }
         Ok(())
     }
+}
 
-    /// Lets the first figures stand in the page, as many as it has room for; the others it leads to.
-    fn choose_inline(&mut self) {
-        let mut figures = Vec::new();
-        for section in &mut self.sections {
-            figures_among(&mut section.blocks, &mut figures);
-        }
-        let mut left = MOST_INLINE;
-        for figure in figures {
-            let room = left.checked_sub(figure.svg.len());
-            figure.inline = room.is_some();
-            left = room.unwrap_or(left);
-        }
-    }
+/// The files of a figure.
+pub struct Painted {
+    /// SVG document.
+    pub svg: String,
+    /// PNG file.
+    pub png: Option<Vec<u8>>,
+}
 
-    /// Every figure, those in folds too.
-    pub fn figures(&self) -> Vec<&Illustration> {
-        let blocks = self.sections.iter().flat_map(|section| &section.blocks);
-        let figures = blocks
-            .flat_map(Block::leaves)
-            .filter_map(|block| match block {
-                Block::Figures(figures) => Some(figures),
-                _ => None,
-            });
-        figures.flatten().collect()
+impl Painted {
+    /// The files of the figure in this place of its report.
+    fn of(drawing: &Drawing, place: usize) -> Result<Self, ReportError> {
+        let png = (place < MOST_PNG).then(|| to_png(drawing, place < MOST_FOR_PRINT));
+        Ok(Self {
+            svg: to_svg(drawing)?,
+            png: png.transpose()?,
+        })
     }
 }
 
@@ -391,9 +402,8 @@ pub struct Illustration {
     pub svg: String,
     /// Whether the page holds it; else it leads to the file.
     pub inline: bool,
-    /// PNG file; empty until [`Document::paint`].
-    #[serde(skip)]
-    pub png: Vec<u8>,
+    /// Whether it has a PNG file, too.
+    pub has_png: bool,
 }
 
 impl Illustration {
@@ -407,7 +417,7 @@ impl Illustration {
             drawing,
             svg: String::new(),
             inline: true,
-            png: Vec::new(),
+            has_png: true,
         }
     }
 }
@@ -473,4 +483,55 @@ pub struct Layer {
     pub name: String,
     /// Linear radiance: 16-bit floats, red, green, blue, row by row from the top, low byte first, in Base64.
     pub radiance: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_many_figures_the_first_have_fine_files_and_all_are_written_in_order() {
+        let plot = |i: usize| {
+            let mut drawing = Drawing::new(40.0, 30.0);
+            drawing.says = format!("plot {i}");
+            Illustration::new(format!("p{i}"), "", drawing)
+        };
+        let mut section = Section::new("s", "S");
+        let inner = Block::fold(
+            "more",
+            vec![Block::Figures((100..MOST_PNG + 3).map(plot).collect())],
+        );
+        section.blocks = vec![Block::Figures((0..100).map(plot).collect())];
+        section.blocks.extend(inner);
+        let mut document = Document {
+            sections: vec![section],
+            ..Document::default()
+        };
+        let mut widths = Vec::new();
+        let write = |name: &str, painted: &Painted| {
+            assert_eq!(name, format!("p{}", widths.len()));
+            assert!(painted.svg.starts_with("<svg"));
+            let read = |png: &Vec<u8>| image::load_from_memory(png).map(|p| p.width());
+            widths.push(
+                painted
+                    .png
+                    .as_ref()
+                    .map(|png| read(png).expect("a PNG file")),
+            );
+            Ok(())
+        };
+        document.paint(write).expect("painted");
+        let expected = |i: usize| match i {
+            0..MOST_FOR_PRINT => Some(80),
+            MOST_FOR_PRINT..MOST_PNG => Some(40),
+            _ => None,
+        };
+        assert_eq!(widths, (0..MOST_PNG + 3).map(expected).collect::<Vec<_>>());
+        let mut figures = Vec::new();
+        figures_among(&mut document.sections[0].blocks, &mut figures);
+        assert!(figures.iter().all(|f| f.inline && !f.svg.is_empty()));
+        let files = figures.iter().filter(|f| f.has_png).count();
+        assert_eq!(files, MOST_PNG);
+        assert_eq!(figures[0].alt, "plot 0");
+    }
 }

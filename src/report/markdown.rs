@@ -63,8 +63,11 @@ fn block(of: &Block) -> String {
         }
         Block::Table(content) => table(content),
         Block::Figures(figures) => {
-            let line =
-                |f: &Illustration| format!("![{}](plots/{}.png)\n\n", escape(&f.caption), f.name);
+            let line = |f: &Illustration| {
+                let extension = if f.has_png { "png" } else { "svg" };
+                let caption = escape(&f.caption);
+                format!("![{caption}](plots/{}.{extension})\n\n", f.name)
+            };
             figures.iter().map(line).collect()
         }
         Block::Gallery(gallery) => {

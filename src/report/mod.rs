@@ -119,8 +119,22 @@ pub fn write_page(
     dir: &Path,
     document: &mut Document,
 ) -> Result<(PathBuf, Vec<PathBuf>), ReportError> {
-    document.paint()?;
-    let plots = write_plots(dir, document)?;
+    let folder = dir.join("plots");
+    std::fs::create_dir_all(&folder).map_err(|source| ReportError::Write {
+        path: folder.clone(),
+        source,
+    })?;
+    let mut plots = Vec::new();
+    document.paint(|name, painted| {
+        let svg = Some(("svg", painted.svg.as_bytes()));
+        let png = painted.png.as_ref().map(|png| ("png", &png[..]));
+        for (extension, bytes) in svg.into_iter().chain(png) {
+            let path = folder.join(format!("{name}.{extension}"));
+            write_file(&path, bytes)?;
+            plots.push(path);
+        }
+        Ok(())
+    })?;
     let html = dir.join("index.html");
     write_file(&html, html::page(document)?.as_bytes())?;
     Ok((html, plots))
@@ -135,21 +149,4 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
         path: path.into(),
         source,
     })
-}
-
-fn write_plots(dir: &Path, document: &Document) -> Result<Vec<PathBuf>, ReportError> {
-    let folder = dir.join("plots");
-    std::fs::create_dir_all(&folder).map_err(|source| ReportError::Write {
-        path: folder.clone(),
-        source,
-    })?;
-    let mut written = Vec::new();
-    for figure in document.figures() {
-        for (extension, bytes) in [("svg", figure.svg.as_bytes()), ("png", &figure.png)] {
-            let path = folder.join(format!("{}.{extension}", figure.name));
-            write_file(&path, bytes)?;
-            written.push(path);
-        }
-    }
-    Ok(written)
 }
