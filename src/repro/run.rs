@@ -5,7 +5,7 @@ use super::claim::{Context, Row, judge};
 use super::judge::Verdict;
 use super::scenes::{IN_FILES, is_model, name_of, what_to_get};
 use crate::config::expect::{Compare, Substitute, Thesis, same_experiment};
-use crate::config::{ConfigError, Experiment, Plan};
+use crate::config::{ConfigError, Experiment, Pattern, Plan};
 use crate::gpu::Environment;
 use crate::measure::record::{
     Body, Key, Line, PARTIAL, RECORDS_FILE, RecordError, RunRecord, read_records,
@@ -245,21 +245,17 @@ fn judged(
     let claims = prepared.thesis.expects.iter();
     let claims = claims.map(|expect| judge(expect, &values, &context));
     let claims = claims.collect();
-    let triangles = |ours: &str| {
-        let wanted = pattern(ours);
-        let scene = data
-            .scenes
-            .iter()
-            .find(|scene| crate::config::Pattern::new(wanted.as_str()).fits_text(scene.name));
-        scene.and_then(|scene| Some(scene.record?.triangles))
+    let placed = |ours: String| {
+        let wanted = Pattern::new(pattern(&ours));
+        let mut scenes = data.scenes.iter();
+        let scene = scenes.find(|scene| wanted.fits_text(scene.name));
+        let count = scene.and_then(|scene| Some(scene.record?.triangles));
+        // A pattern is shown as what it chose.
+        let chosen = scene.filter(|_| name_of(&ours) != ours);
+        (chosen.map_or(ours, |scene| scene.name.to_owned()), count)
     };
-    let scenes = prepared.scenes.into_iter().map(|(substitute, ours)| {
-        let counted = ours.map(|ours| {
-            let count = triangles(&ours);
-            (ours, count)
-        });
-        (substitute, counted)
-    });
+    let scenes = prepared.scenes.into_iter();
+    let scenes = scenes.map(|(substitute, ours)| (substitute, ours.map(placed)));
     Ok(Reproduced {
         name,
         scenes: scenes.collect(),
