@@ -50,15 +50,15 @@ const SCALE: [f64; 3] = [180.0, 12.0, 44.0];
 const STEPS: usize = 60;
 
 impl HeatMap {
-    /// Counts of something in a unit, coloured by their logarithm; some are marked.
+    /// Counts of something in a unit, coloured by their logarithm up to `greatest`, which maps that stand side by side have in
+    /// common; some are marked.
     pub fn of_counts(
         what: &str,
         rows: Vec<String>,
         columns: Vec<String>,
         values: &[Vec<Option<(f64, bool)>>],
+        greatest: f64,
     ) -> Self {
-        let greatest = values.iter().flatten().flatten().map(|v| v.0);
-        let greatest = greatest.fold(0.0, f64::max);
         let scale = (1.0 + greatest).ln();
         let tile = |(value, marked): (f64, bool)| Tile {
             text: match value {
@@ -76,7 +76,7 @@ impl HeatMap {
             columns,
             tiles: values.iter().map(row).collect(),
             ends: ["few".into(), format::significant(greatest, 2)],
-            between: format!("{what}; logarithm of 1 + value, one scale for all; grey: 0"),
+            between: format!("{what}; logarithm of 1 + value, one scale for all maps; grey: 0"),
         }
     }
 
@@ -242,14 +242,16 @@ mod tests {
             vec![None, Some((3.0, false))],
         ];
         let (rows, columns) = (names(&["bvh", "octree"]), names(&["edges", "needles"]));
-        let drawing = HeatMap::of_counts("rays", rows, columns, &counts)
+        let drawing = HeatMap::of_counts("rays", rows, columns, &counts, 40.0)
             .draw()
             .unwrap();
         let found = sorted(&drawing);
-        for text in ["0", "25", "3.0", "bvh", "edges", "needles", "octree", "few"] {
+        for text in [
+            "0", "25", "40", "3.0", "bvh", "edges", "needles", "octree", "few",
+        ] {
             assert!(found.contains(&text), "{text} in {found:?}");
         }
-        let unit = "rays; logarithm of 1 + value, one scale for all; grey: 0";
+        let unit = "rays; logarithm of 1 + value, one scale for all maps; grey: 0";
         assert!(found.contains(&unit) && drawing.says.contains("bvh, needles: 25"));
         let pairs = [(0, 1, 0.125), (0, 2, 0.5), (1, 2, 0.25)];
         let matrix = HeatMap::of_pairs(&names(&["0", "3", "7"]), &pairs);
@@ -270,7 +272,8 @@ mod tests {
             );
         }
         assert_eq!(matrix.tiles[1][0].as_ref().unwrap().text, "0.500");
-        assert!(HeatMap::of_counts("", vec![], vec![], &[]).draw().is_none());
+        let none = HeatMap::of_counts("", vec![], vec![], &[], 0.0);
+        assert!(none.draw().is_none());
         assert!(HeatMap::of_pairs(&names(&["4"]), &[]).draw().is_none());
     }
 

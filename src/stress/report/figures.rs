@@ -13,6 +13,29 @@ use crate::stress::suite::BRUTE_FORCE;
 /// Families whose errors are drawn over the rungs.
 const CURVES: [&str; 4] = ["watertight", "edges", "axis-parallel", "needles"];
 
+/// Lost hits of a cell per million rays, and whether it differs from brute force.
+fn lost_hits(records: &[Line], test: &str, accel: &str, family: &str) -> Option<(f64, bool)> {
+    let cell = cell(records, test, accel, family)?;
+    let lost = cell
+        .count("cracks/v1")
+        .max(cell.count("unexplained-misses/v1"));
+    let share = lost as f64 / cell.count("rays/v1").max(1) as f64;
+    Some((1e6 * share, cell.count("differing/v1") > 0))
+}
+
+/// The most that any cell loses: where the colours of all maps end.
+fn greatest_loss(records: &[Line]) -> f64 {
+    let mut greatest = 0.0f64;
+    for test in triangles(records) {
+        for accel in structures(records) {
+            let of = |family: &str| lost_hits(records, &test, &accel, family);
+            let lost = FAMILIES.iter().filter_map(|family| of(family.name));
+            greatest = lost.map(|(lost, _)| lost).fold(greatest, f64::max);
+        }
+    }
+    greatest
+}
+
 pub(super) fn heat_map(records: &[Line], test: &str) -> Option<Illustration> {
     let is_tried = |accel: &str, family: &str| cell(records, test, accel, family).is_some();
     let mut rows = structures(records);
@@ -20,18 +43,12 @@ pub(super) fn heat_map(records: &[Line], test: &str) -> Option<Illustration> {
     let columns = FAMILIES.iter().map(|f| f.name.to_owned());
     let columns = columns.filter(|f| rows.iter().any(|accel| is_tried(accel, f)));
     let columns: Vec<String> = columns.collect();
-    let value = |accel: &str, family: &str| {
-        let cell = cell(records, test, accel, family)?;
-        let lost = cell
-            .count("cracks/v1")
-            .max(cell.count("unexplained-misses/v1"));
-        let share = lost as f64 / cell.count("rays/v1").max(1) as f64;
-        Some((1e6 * share, cell.count("differing/v1") > 0))
-    };
+    let value = |accel: &String, family: &str| lost_hits(records, test, accel, family);
     let row = |accel: &String| columns.iter().map(|f| value(accel, f)).collect();
     let values: Vec<_> = rows.iter().map(row).collect();
-    let drawing =
-        HeatMap::of_counts("lost hits per million rays", rows, columns, &values).draw()?;
+    let greatest = greatest_loss(records);
+    let what = "lost hits per million rays";
+    let drawing = HeatMap::of_counts(what, rows, columns, &values, greatest).draw()?;
     let caption = format!("{test}: lost hits per million rays");
     Some(Illustration::new(
         format!("lost-hits-{test}"),
