@@ -98,6 +98,9 @@ const DERIVED: [&str; 24] = [
     "rays/v1",
 ];
 
+/// A check of the run that failed.
+const CHECK: &str = "check/v1";
+
 /// Whether a figure follows from others; those of the check for bias do, which has a verdict.
 fn is_derived(id: &str) -> bool {
     DERIVED.contains(&id) || id.starts_with("bias-") || id.starts_with("growth-")
@@ -122,7 +125,9 @@ pub fn contradictions(side: &Side) -> Vec<Identity> {
     let earlier = by_identity(of_lines(&turned));
     let of_record = |e: &Evidence| !matches!(e, Evidence::Times { .. } | Evidence::Once(_));
     let later = by_identity(of_lines(&side.lines)).into_iter();
-    let differing = later.filter(|(id, evidence)| {
+    // A check tells what others say, in their order.
+    let differing = later.filter(|((_, figure), _)| figure != CHECK);
+    let differing = differing.filter(|(id, evidence)| {
         let other = earlier.get(id);
         of_record(evidence) && other.is_some_and(|other| !is_like(other, evidence))
     });
@@ -132,7 +137,11 @@ pub fn contradictions(side: &Side) -> Vec<Identity> {
 /// Whether two lines are on the same thing, as far as keys tell.
 fn repeats(lines: &[Line]) -> bool {
     let mut seen = BTreeSet::new();
+    // What has no key is of the run, and of cells and modules, of which there are many.
     let is_new = |line: &Line| {
+        if line.key.is_empty() {
+            return true;
+        }
         let number = match &line.body {
             Body::Error(record) => record.replicate,
             Body::Stream(record) => record.dimensions[0] << 16 | record.dimensions[1],
@@ -173,7 +182,7 @@ fn of_lines(lines: &[Line]) -> Vec<Taken> {
     all.extend(failed.map(|text| {
         let (title, detail) = text.split_once(": ").unwrap_or((&text, ""));
         let key = Key::default().with(axis::SUBJECT, title);
-        fact(&key, "check/v1", "check of the run", detail, true)
+        fact(&key, CHECK, "check of the run", detail, true)
     }));
     all
 }

@@ -80,6 +80,8 @@ impl<'a> Work<'a> {
     fn pair(&self, old: &Taken, new: &Taken) -> Open {
         let identity = old.identity();
         let is_time = matches!(old.evidence, Evidence::Times { .. });
+        // Equal to the bit, round by round: one was copied, as resumed runs do. It tells no drift either.
+        let is_copy = is_time && self.refused.is_none() && old.evidence == new.evidence;
         let outcome = if self.contradicted.contains(&identity) {
             Outcome::Known(
                 Verdict::Undecided,
@@ -87,6 +89,8 @@ impl<'a> Work<'a> {
             )
         } else if let Some(why) = other_work(old, new) {
             Outcome::Known(Verdict::Undecided, why)
+        } else if is_copy {
+            Outcome::Known(Verdict::Same, "the same measurement".into())
         } else if is_time {
             Outcome::Known(Verdict::Undecided, "its times cannot be compared".into())
         } else if old.figure.id == IMAGE && old.evidence != new.evidence {
@@ -99,8 +103,10 @@ impl<'a> Work<'a> {
                 &self.options.effects,
             )
         };
-        let comparable =
-            is_time && other_work(old, new).is_none() && !self.contradicted.contains(&identity);
+        let comparable = is_time
+            && !is_copy
+            && other_work(old, new).is_none()
+            && !self.contradicted.contains(&identity);
         let ratio = TimeRatio::new(&old.evidence, &new.evidence, self.in_rounds);
         let (verdict, why, measured) = match outcome {
             Outcome::Known(verdict, why) => (verdict, why, None),

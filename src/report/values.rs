@@ -10,6 +10,7 @@ use super::sections::{
 use crate::measure::figure::{Figure, figure};
 use crate::measure::record::*;
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 
 /// A figure of one key.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,6 +101,7 @@ pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
         values.extend(animation::values(data, scene));
         values.extend(peers::values(scene));
         values.extend(scene.views.iter().flat_map(|view| of_view(scene, view)));
+        values.extend(of_references(scene));
     }
     values.extend(data.streams.iter().flat_map(|s| of_stream(s)));
     values.extend(data.costs.iter().flat_map(|c| of_cost(c)));
@@ -247,14 +249,23 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
         values.extend(time.primary.iter().flat_map(|p| of_primary(&time.key, p)));
     }
     values.extend(view.coherence.iter().flat_map(|c| of_coherence(&c.key, c)));
-    let reference = view.reference.iter();
-    let mse = reference.filter_map(|r| Some(Value::new(r.key, "reference-mse/v1", r.mse?)));
-    values.extend(mse);
     values.extend(Race::new(view).iter().flat_map(Race::values));
     values.extend(trade_off::times_to_image(scene, view));
     values.extend(kernels::gains(scene, view));
     values.extend(organisations::against_single(scene, view));
     values
+}
+
+/// Errors of references, of which views have some in common.
+fn of_references<'a>(scene: &SceneGroup<'a>) -> Vec<Value<'a>> {
+    let mut known = BTreeSet::new();
+    let references = scene
+        .views
+        .iter()
+        .filter_map(|view| view.reference.as_ref());
+    let references = references.filter(|r| known.insert(r.key.to_string()));
+    let mse = references.filter_map(|r| Some(Value::new(r.key, "reference-mse/v1", r.mse?)));
+    mse.collect()
 }
 
 /// Times of a cell in orders of passes.

@@ -206,6 +206,51 @@ fn records_that_contradict_themselves_are_named() {
     assert_eq!(twice.verdict(), Verdict::Same);
 }
 
+/// Findings of a figure, whatever they are.
+fn of(found: &Comparison, figure: &str) -> usize {
+    let is_it = |f: &&raystone::compare::Finding| f.figure.id == figure;
+    found.findings.iter().filter(is_it).count()
+}
+
+#[test]
+fn a_run_of_many_cells_whose_checks_failed_is_the_same_as_itself() {
+    let mut lines = Made::default().lines();
+    // Named by checks in the order in which they come.
+    for line in &mut lines {
+        if let Body::Structure(record) = &mut line.body
+            && ["structure-2", "structure-5"].contains(&line.key.label("accel"))
+        {
+            record.gate.as_mut().expect("a gate").passed = false;
+            record.timings.clear();
+        }
+    }
+    let done = lines.iter().find(|line| matches!(line.body, Body::Cell(_)));
+    lines.push(done.expect("a finished cell").clone());
+    let side = Side::new("made", lines, Vec::new());
+    let found = compared(&side, &side.clone());
+    assert!(of(&found, "check/v1") > 0);
+    assert_eq!(found.verdict(), Verdict::Same, "{:?}", found.findings);
+}
+
+#[test]
+fn cells_that_share_a_reference_say_its_error_once() {
+    let mut lines = Made::default().lines();
+    let of_samplers = lines
+        .iter()
+        .filter(|line| matches!(line.body, Body::Error(_)));
+    let others = of_samplers.map(|line| {
+        let mut other = line.clone();
+        other.key = other.key.with("organisation", "multi-kernel");
+        other
+    });
+    let others: Vec<Line> = others.collect();
+    lines.extend(others);
+    let side = Side::new("made", lines, Vec::new());
+    let found = compared(&side, &side.clone());
+    assert_eq!(of(&found, "reference-mse/v1"), 1);
+    assert_eq!(found.verdict(), Verdict::Same, "{:?}", found.findings);
+}
+
 fn read(text: &str) -> Result<Side, SideError> {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("records.jsonl"), text).expect("written");

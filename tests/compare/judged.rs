@@ -59,7 +59,11 @@ fn an_effect_that_does_not_count_is_the_same() {
 #[test]
 fn what_was_measured_again_in_turns_counts_even_of_equal_kernels() {
     let base = Made::default();
-    let found = compared(&base.side(), &base.side());
+    let later = Made {
+        seed: 2,
+        ..Made::default()
+    };
+    let found = compared(&base.side(), &later.side());
     assert!(found.findings.iter().any(|f| f.is_time && f.is_control));
     let again = |ratio: f64| -> Confirmed {
         let ratios = [

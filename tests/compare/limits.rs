@@ -64,7 +64,11 @@ fn a_control_that_moves_alone_is_not_called_worse() {
 #[test]
 fn equal_kernels_are_no_control_where_an_exact_figure_of_the_structure_differs() {
     let base = Made::default();
-    let mut lines = base.lines();
+    let later = Made {
+        seed: 2,
+        ..Made::default()
+    };
+    let mut lines = later.lines();
     for line in &mut lines {
         if let (Body::Structure(record), "structure-3") = (&mut line.body, line.key.label("accel"))
         {
@@ -74,6 +78,37 @@ fn equal_kernels_are_no_control_where_an_exact_figure_of_the_structure_differs()
     let found = compared(&base.side(), &side(lines));
     let is_control = |name| times(&found.findings, name).iter().all(|f| f.is_control);
     assert!(!is_control("structure-3") && is_control("structure-4"));
+}
+
+#[test]
+fn a_copied_measurement_is_the_same_and_tells_no_drift() {
+    let base = Made::default();
+    let of = |side: &Side| compared(&base.side(), side);
+    let copied = of(&base.side());
+    let times: Vec<_> = copied.findings.iter().filter(|f| f.is_time).collect();
+    assert!(!times.is_empty() && times.iter().all(|f| f.verdict == Verdict::Same));
+    assert!(times.iter().all(|f| !f.is_control && f.measured.is_none()));
+    // Too few cells for a drift: what was copied is the same nevertheless.
+    let few = Made {
+        structures: 1,
+        ..Made::default()
+    };
+    assert_eq!(compared(&few.side(), &few.side()).verdict(), Verdict::Same);
+    // A candidate whose cells but one were copied has one control.
+    let later = Made {
+        seed: 2,
+        ..Made::default()
+    };
+    let mut lines = base.lines();
+    for (line, other) in lines.iter_mut().zip(later.lines()) {
+        if line.key.label("accel") == "structure-4" {
+            *line = other;
+        }
+    }
+    let found = of(&side(lines));
+    let controls = found.findings.iter().filter(|f| f.is_control);
+    let names: Vec<&str> = controls.map(|f| f.key.label("accel")).collect();
+    assert!(!names.is_empty() && names.iter().all(|name| *name == "structure-4"));
 }
 
 #[test]
