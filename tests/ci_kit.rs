@@ -1,4 +1,5 @@
-//! What continuous integration runs: `scripts/ci-compare` with programs that only pretend, and the files that GitHub reads.
+//! What continuous integration and clusters run: `scripts/ci-compare` with programs that only pretend, the files that GitHub reads, and
+//! a sweep on a Slurm of two nodes.
 #![cfg(unix)]
 
 use std::fs;
@@ -167,5 +168,70 @@ fn the_action_and_its_page_name_the_same_inputs() {
         assert!(page.contains(&format!("| `{name}` |")), "{name}");
         let used = name == "token" || action.contains(&format!("inputs.{name}"));
         assert!(used, "{name} is read by no step");
+    }
+}
+
+/// Exit code of a script that cannot do its work here (Automake's).
+const SKIPPED: i32 = 77;
+
+#[test]
+fn a_sweep_on_slurm_outlives_a_node_and_equals_a_run_on_one_machine() {
+    let script = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/scripts/slurm/test-on-loopback"
+    );
+    let output = Command::new(script)
+        .env("RAYSTONE", env!("CARGO_BIN_EXE_raystone"))
+        .output()
+        .expect("the script starts");
+    let told = String::from_utf8_lossy(&output.stderr);
+    println!("{told}");
+    if output.status.code() == Some(SKIPPED) {
+        assert!(told.contains("skipped"), "{told}");
+        return;
+    }
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{printed}\n{told}");
+    assert!(told.contains("equal: "), "{told}");
+}
+
+/// Somebody who repeats one shard of eight by hand submits an array of one, and an option may hold spaces.
+#[test]
+fn an_element_of_an_array_runs_its_shard_of_all_with_whole_options() {
+    let kit = Kit::new(0, 0, "");
+    script(
+        &kit.path("raystone"),
+        "for a in \"$@\"; do echo \"<$a>\"; done\n",
+    );
+    script(
+        &kit.path("sbatch"),
+        "echo 1; [ -n \"$SHARDS\" ] && [ ! -e \"$OUT/ran\" ] && touch \"$OUT/ran\" && \
+         SLURM_ARRAY_TASK_ID=3 SLURM_ARRAY_TASK_COUNT=1 bash \"$SWEEP\" > \"$OUT/printed\"; exit 0\n",
+    );
+    let scripts = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/slurm");
+    let search = format!(
+        "{}:{}",
+        kit.folder.path().display(),
+        std::env::var("PATH").expect("a path")
+    );
+    let output = Command::new(format!("{scripts}/submit"))
+        .args(["my sweep.toml", "8"])
+        .arg(kit.path("out"))
+        .args(["--set", "run.spp=[1, 4]"])
+        .env("PATH", search)
+        .env("RAYSTONE", kit.path("raystone"))
+        .env("SWEEP", format!("{scripts}/sweep.sbatch"))
+        .output()
+        .expect("the script starts");
+    assert!(output.status.success(), "{output:?}");
+    let printed = kit.read("out/printed");
+    for word in [
+        "<3/8>",
+        "<my sweep.toml>",
+        "<run.spp=[1, 4]>",
+        "<--resume>",
+        "<--wait>",
+    ] {
+        assert!(printed.contains(word), "{word} is not in {printed}");
     }
 }

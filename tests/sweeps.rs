@@ -384,6 +384,57 @@ fn what_does_not_belong_together_is_not_joined() {
     }
 }
 
+/// Which structure is fastest is a matter of clocks: of two machines that measured one cell, each may have rendered through another.
+#[test]
+fn images_through_different_structures_agree_if_they_are_equal() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (one, other) = (folder.path().join("one"), folder.path().join("other"));
+    let text = experiment(&[]);
+    resume(&text, &one);
+    copy_folder(&one, &other);
+    // Lines that tell another kernel have another hash, and the cells other modules.
+    let through_another = |module: &str| {
+        rewrite(&other, |line| match &mut line.body {
+            Body::Error(_) | Body::Bias(_) => line.hash = format!("0{}", &line.hash[1..]),
+            Body::Kernels(set) => {
+                set.id = format!("0{}", &set.id[1..]);
+                let hash = "0123456789abcdef".to_owned();
+                set.modules.insert(module.to_owned(), hash);
+            }
+            Body::Cell(cell) => {
+                let kernels = &mut cell.inputs.kernels;
+                *kernels = kernels.get(1..).map_or(String::new(), |k| format!("0{k}"));
+                for hash in &mut cell.lines {
+                    *hash = format!("0{}", &hash[1..]);
+                }
+            }
+            // So that all lines of a cell are found.
+            _ if line.hash.len() > 1 => line.hash = format!("0{}", &line.hash[1..]),
+            _ => {}
+        });
+    };
+    through_another("accel/another");
+    let dirs = [one.clone(), other.clone()];
+    let merged = joined(&dirs, &folder.path().join("joined")).unwrap_or_else(|e| panic!("{e}"));
+    assert!(!merged.incomplete);
+    assert!(
+        merged.notes.iter().any(|note| note.contains("agree with")),
+        "{merged:?}"
+    );
+    // What differs is found all the same.
+    rewrite(&other, |line| {
+        if let Body::Error(record) = &mut line.body {
+            record.image_hash.insert(0, '0');
+        }
+    });
+    let out = folder.path().join("out");
+    assert!(refused(&dirs, &out).contains("figures"));
+    // And a module that both used has to be the same.
+    through_another("common/errors");
+    let told = refused(&dirs, &out);
+    assert!(told.contains("the kernels"), "{told}");
+}
+
 #[test]
 fn records_that_name_pictures_elsewhere_bring_none_along() {
     let folder = tempfile::tempdir().expect("a folder");

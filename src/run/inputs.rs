@@ -181,6 +181,32 @@ impl<'a> Current<'a> {
     }
 }
 
+/// What one measurement of a cell was made of: its inputs, and the modules of its kernels if they are recorded.
+pub(super) type MadeOf<'a> = (&'a Inputs, Option<&'a KernelSetRecord>);
+
+/// What two measurements of one cell were made of that must not differ, and does. Where errors are rendered through the fastest structure,
+/// two machines may take different ones: of the modules, only those that both used have to be equal.
+pub(super) fn differing((a, set_a): MadeOf, (b, set_b): MadeOf) -> Option<&'static str> {
+    let other_kernels = match (set_a, set_b) {
+        (Some(a), Some(b)) => {
+            let mut both =
+                (a.modules.iter()).filter_map(|(name, hash)| Some((hash, b.modules.get(name)?)));
+            a.kernels != b.kernels || both.any(|(a, b)| a != b)
+        }
+        _ => a.kernels != b.kernels,
+    };
+    let differs = [
+        ("the program", a.program != b.program),
+        ("the settings", a.settings != b.settings),
+        ("the scene", a.scene != b.scene),
+        ("the kernels", other_kernels),
+    ];
+    differs
+        .into_iter()
+        .find(|(_, differs)| *differs)
+        .map(|(what, _)| what)
+}
+
 /// The record of the modules that kernels were made of.
 pub(super) fn kernel_set(kernels: &str, modules: BTreeMap<String, String>) -> KernelSetRecord {
     let mut parts = vec![("kernels", kernels)];

@@ -1,13 +1,13 @@
 //! What the records of a folder hold of the plan that they were made by: which cells are done, which are missing, and whether they still hold.
 
-use super::inputs::Current;
+use super::inputs::{Current, MadeOf, differing};
 use super::kernels::Kernels;
 use super::resume::Earlier;
 use super::{Estimate, Registries, RunError, RunOptions};
 use crate::config::{ConfigError, Experiment, Plan, Shard, Unit, shards};
 use crate::measure::record::{
-    CellRecord, Inputs, InterruptedRecord, Kind as _, Line, Outcome, RECORDS_FILE, RecordError,
-    RunRecord, read_records,
+    CellRecord, Inputs, InterruptedRecord, KernelSetRecord, Kind as _, Line, Outcome, RECORDS_FILE,
+    RecordError, RunRecord, read_records,
 };
 use crate::scene::{self, LoadOptions};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -110,10 +110,6 @@ impl Inventory {
                 .or_default()
                 .push(cell.clone());
         }
-        let contradicted = of_unit
-            .iter()
-            .filter(|(_, records)| is_contradicted(records));
-        let contradicted = contradicted.map(|(name, _)| name.clone()).collect();
         let units = wanted_units(&records.lines, &experiment, &plan, registries);
         let all = plan.units(&experiment);
         let known: BTreeSet<&str> = all.iter().map(|unit| unit.name.as_str()).collect();
@@ -125,14 +121,21 @@ impl Inventory {
                 .and_then(|records| records.last().cloned()),
             unit,
         });
+        let states = states.collect();
+        let earlier = Earlier::new(records.lines);
+        let sets = earlier.kernel_sets();
+        let contradicted = of_unit
+            .iter()
+            .filter(|(_, records)| is_contradicted(records, &sets));
+        let contradicted = contradicted.map(|(name, _)| name.clone()).collect();
         Ok(Self {
-            states: states.collect(),
+            states,
             dir: dir.to_owned(),
             foreign,
             contradicted,
             interrupted,
             warnings: records.warnings,
-            earlier: Earlier::new(records.lines),
+            earlier,
             experiment,
             plan,
             run,
@@ -227,13 +230,18 @@ fn wanted_units(
 }
 
 /// Whether records of one cell, all of them done, depend on different things.
-fn is_contradicted(records: &[CellRecord]) -> bool {
+fn is_contradicted(records: &[CellRecord], sets: &HashMap<&str, &KernelSetRecord>) -> bool {
     let done = records
         .iter()
-        .filter(|record| record.outcome == Outcome::Done);
-    let done: Vec<&CellRecord> = done.collect();
-    let Some((last, before)) = done.split_last() else {
+        .filter(|record| record.outcome == Outcome::Done)
+        .map(|record| &record.inputs);
+    let made_of: Vec<MadeOf> = done
+        .map(|inputs| (inputs, sets.get(&*inputs.kernels).copied()))
+        .collect();
+    let Some((last, before)) = made_of.split_last() else {
         return false;
     };
-    before.iter().any(|record| record.inputs != last.inputs)
+    before
+        .iter()
+        .any(|one| one.0.device != last.0.device || differing(*one, *last).is_some())
 }

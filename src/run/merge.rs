@@ -4,16 +4,17 @@
 //! taken from one device alone. What does not depend on the device (errors, discrepancies, models) comes from any.
 
 use super::folder::lock_folder;
+use super::inputs::{MadeOf, differing};
 use super::resume::Earlier;
 use super::{Registries, RunError};
 use crate::atomic::write_atomic;
 use crate::config::Unit;
 use crate::measure::record::{
-    Body, CellRecord, FinishedRecord, InterruptedRecord, Kind as _, Line, Outcome, RECORDS_FILE,
-    RunRecord, SkippedRecord, read_records, text_of,
+    Body, CellRecord, FinishedRecord, InterruptedRecord, KernelSetRecord, Kind as _, Line, Outcome,
+    RECORDS_FILE, RunRecord, SkippedRecord, read_records, text_of,
 };
 use serde_json::json;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -155,24 +156,19 @@ fn choose(
     device: Option<&str>,
     merged: &mut Merged,
 ) -> Result<Vec<Vec<CellRecord>>, RunError> {
-    let cells: Vec<BTreeMap<&str, &CellRecord>> =
-        parts.iter().map(|part| part.earlier.cells()).collect();
-    let evidence: Vec<_> = parts
-        .iter()
-        .map(|part| evidence_of(part.earlier.lines()))
-        .collect();
+    let all: Vec<Holder> = parts.iter().map(Holder::new).collect();
     let mut chosen = vec![Vec::new(); parts.len()];
     let (mut twice, mut elsewhere) = (0, 0);
     for unit in units {
-        let holders = cells.iter().enumerate();
-        let holders = holders.filter_map(|(i, cells)| Some((i, *cells.get(unit.name.as_str())?)));
+        let holders = all.iter().enumerate();
+        let holders = holders.filter_map(|(i, of)| Some((i, *of.cells.get(unit.name.as_str())?)));
         let mut holders: Vec<(usize, &CellRecord)> = holders.collect();
         if let Some(device) = device.filter(|_| unit.kind.is_timed()) {
-            let all = holders.len();
+            let before = holders.len();
             holders.retain(|(_, cell)| {
                 cell.outcome != Outcome::Done || cell.inputs.device.contains(device)
             });
-            elsewhere += usize::from(holders.is_empty() && all > 0);
+            elsewhere += usize::from(holders.is_empty() && before > 0);
         }
         // What is done comes before what was left out, and that before what failed.
         holders.sort_by_key(|(_, cell)| cell.outcome as u8 != Outcome::Done as u8);
@@ -183,7 +179,7 @@ fn choose(
         for &(other, record) in &holders[1..] {
             if record.outcome == Outcome::Done && cell.outcome == Outcome::Done {
                 twice += 1;
-                let fault = contradiction((cell, &evidence[place]), (record, &evidence[other]));
+                let fault = contradiction((&all[place], cell), (&all[other], record));
                 if let Some(what) = fault {
                     return Err(input(format!(
                         "{} and {} contradict each other on {}: {what}; measure it again, or leave one of them out",
@@ -210,56 +206,99 @@ fn choose(
     Ok(chosen)
 }
 
-/// What two records of one cell differ in that they must not.
-fn contradiction(
-    (a, evidence_a): (&CellRecord, &BTreeMap<String, String>),
-    (b, evidence_b): (&CellRecord, &BTreeMap<String, String>),
-) -> Option<String> {
-    let inputs = [
-        ("the program", &a.inputs.program, &b.inputs.program),
-        ("the settings", &a.inputs.settings, &b.inputs.settings),
-        ("the scene", &a.inputs.scene, &b.inputs.scene),
-        ("the kernels", &a.inputs.kernels, &b.inputs.kernels),
-    ];
-    if let Some((what, ..)) = inputs.iter().find(|(_, a, b)| a != b) {
-        return Some(format!("{what} that it was measured with differ"));
-    }
-    let of = |cell: &CellRecord, evidence: &BTreeMap<String, String>| -> Vec<(String, String)> {
-        let is_its = |key: &&String| cell.lines.iter().any(|hash| key.contains(hash.as_str()));
-        let found = evidence.iter().filter(|(key, _)| is_its(key));
-        found.map(|(k, v)| (k.clone(), v.clone())).collect()
-    };
-    let (found_a, found_b) = (of(a, evidence_a), of(b, evidence_b));
-    let differ = found_a.iter().any(|(key, value)| {
-        let other = found_b.iter().find(|(other, _)| other == key);
-        other.is_some_and(|(_, other)| other != value)
-    });
-    differ.then(|| "figures that no clock is part of differ".to_owned())
+/// What a folder says of its cells.
+struct Holder<'a> {
+    cells: BTreeMap<&'a str, &'a CellRecord>,
+    sets: HashMap<&'a str, &'a KernelSetRecord>,
+    evidence: Vec<Evidence>,
 }
 
-/// What of a line has to be the same whenever it is measured on one device: by content hash, kind and number.
-fn evidence_of(lines: &[Line]) -> BTreeMap<String, String> {
-    let mut found = BTreeMap::new();
+impl<'a> Holder<'a> {
+    fn new(part: &'a Part) -> Self {
+        Self {
+            cells: part.earlier.cells(),
+            sets: part.earlier.kernel_sets(),
+            evidence: evidence_of(part.earlier.lines()),
+        }
+    }
+
+    fn made_of<'c>(&'c self, cell: &'c CellRecord) -> MadeOf<'c> {
+        (&cell.inputs, self.sets.get(&*cell.inputs.kernels).copied())
+    }
+
+    /// What was found for a cell, by what it is about.
+    fn found(&self, cell: &CellRecord) -> BTreeMap<&str, BTreeSet<&str>> {
+        let lines: HashSet<&str> = cell.lines.iter().map(String::as_str).collect();
+        let mut found: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+        for one in self
+            .evidence
+            .iter()
+            .filter(|one| lines.contains(&*one.line))
+        {
+            found.entry(&one.about).or_default().insert(&one.value);
+        }
+        found
+    }
+}
+
+/// What two records of one cell differ in that they must not.
+fn contradiction(a: (&Holder, &CellRecord), b: (&Holder, &CellRecord)) -> Option<String> {
+    if let Some(what) = differing(a.0.made_of(a.1), b.0.made_of(b.1)) {
+        return Some(format!("{what} that it was measured with differ"));
+    }
+    let (found_a, found_b) = (a.0.found(a.1), b.0.found(b.1));
+    let differ =
+        |(about, value): (&&str, _)| found_b.get(about).is_some_and(|other| other != value);
+    found_a
+        .iter()
+        .any(differ)
+        .then(|| "figures that no clock is part of differ".to_owned())
+}
+
+/// What has to be the same whenever it is measured on one device.
+struct Evidence {
+    /// Hash of the line that has it.
+    line: String,
+    /// Device, cell, kind and number. Not the line's hash: that tells through which structure an image was rendered, and images are
+    /// equal whichever it was.
+    about: String,
+    value: String,
+}
+
+fn evidence_of(lines: &[Line]) -> Vec<Evidence> {
+    let mut found = Vec::new();
     // Rounding may differ from device to device.
     let mut place = String::new();
     for line in lines {
         if let Body::Run(run) = &line.body {
             place = super::inputs::place(&run.environment);
         }
-        let evidence = match &line.body {
-            Body::Error(r) => json!(["error", r.replicate, r.errors, r.image_hash]),
-            Body::Bias(r) => json!(["bias", 0, r.p_of_all, r.min_p]),
-            Body::Stream(r) => json!(["stream", 0, r.star, r.figures]),
-            Body::Coherence(r) => json!(["coherence", 0, r]),
-            Body::Time(r) => json!(["time", 0, r.image_hash, r.rays]),
+        let (kind, value) = match &line.body {
+            Body::Error(r) => (
+                format!("error {}", r.replicate),
+                json!([r.errors, r.image_hash]),
+            ),
+            Body::Bias(r) => ("bias".to_owned(), json!([r.p_of_all, r.min_p])),
+            Body::Stream(r) => (
+                format!("stream {:?}", r.dimensions),
+                json!([r.star, r.figures]),
+            ),
+            Body::Coherence(r) => ("coherence".to_owned(), json!(r)),
+            Body::Time(r) => ("time".to_owned(), json!([r.image_hash, r.rays])),
             Body::Structure(r) => {
                 let counters: Vec<_> = r.timings.iter().map(|t| (t.class, t.counters)).collect();
-                json!(["structure", 0, r.stats.nodes, r.stats.sah_cost, counters])
+                (
+                    "structure".to_owned(),
+                    json!([r.stats.nodes, r.stats.sah_cost, counters]),
+                )
             }
             _ => continue,
         };
-        let key = format!("{place} {} {} {}", line.hash, evidence[0], evidence[1]);
-        found.insert(key, evidence.to_string());
+        found.push(Evidence {
+            line: line.hash.clone(),
+            about: format!("{place} {} {kind}", line.key),
+            value: value.to_string(),
+        });
     }
     found
 }
