@@ -159,6 +159,9 @@ fn exact(figure: &Figure, a: f64, b: f64, effects: &Effects) -> Outcome {
     if a == b {
         return known(Verdict::Same, "");
     }
+    if !a.is_finite() || !b.is_finite() {
+        return known(Verdict::Undecided, "a value is no finite number");
+    }
     let part = (b - a) / a.abs();
     if part.abs() <= effects.exact {
         return known(Verdict::Same, "within what --exact allows");

@@ -8,7 +8,8 @@ use super::taken::{Evidence, Taken, contradictions, taken};
 use super::{Confirmed, Finding, Identity, Options};
 use crate::measure::figure::Spread;
 use crate::measure::hypothesis::benjamini_hochberg;
-use crate::measure::record::axis;
+use crate::measure::record::{RunRecord, all_of, axis};
+use crate::report::format;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A finding on its way to a verdict.
@@ -45,6 +46,7 @@ impl<'a> Work<'a> {
             .collect();
         let refused = refusal(base, candidate);
         notes.extend(refused.clone());
+        notes.extend(turned_round(base, candidate));
         Self {
             options,
             in_rounds: base.in_rounds && candidate.in_rounds,
@@ -343,6 +345,23 @@ fn other_work(old: &Taken, new: &Taken) -> Option<String> {
         (before != value).then(|| format!("another default: {name} was {before} and is {value}"))
     };
     new.iter().find_map(changed)
+}
+
+/// A word where the candidate is older than the base, as where the two are given in the wrong order.
+fn turned_round(base: &Side, candidate: &Side) -> Option<String> {
+    let start = |side: &Side| {
+        all_of::<RunRecord>(&side.lines)
+            .next()
+            .map(|run| run.body.started_unix_s)
+    };
+    let (old, new) = (start(base)?, start(candidate)?);
+    (new < old).then(|| {
+        format!(
+            "The candidate was measured before the base ({} and {}): BASE comes first.",
+            format::utc(new),
+            format::utc(old)
+        )
+    })
 }
 
 /// Why the times of two sides cannot be compared, if so.

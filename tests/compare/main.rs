@@ -4,6 +4,7 @@ mod alarms;
 mod inputs;
 mod judged;
 mod limits;
+mod program;
 mod records;
 mod shown;
 
