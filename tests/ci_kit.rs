@@ -99,7 +99,11 @@ fn exit_codes_say_what_fails() {
         assert_eq!(kit.read("summary") == "verdict\n", told, "{run} {compare}");
         // What could not be done is told, too, with the words of the program as they are.
         let failed = format!("(exit code {end})\n\n    error: <b>no</b> @someone\n");
-        assert_eq!(kit.read("summary").contains(&failed), !told, "{run} {compare}");
+        assert_eq!(
+            kit.read("summary").contains(&failed),
+            !told,
+            "{run} {compare}"
+        );
         assert!(text.contains("error: <b>no</b> @someone"), "{text}");
     }
     let kit = Kit::new(0, 0, "").with_baseline();

@@ -339,7 +339,11 @@ impl TimeRatio {
         };
         let (a, b, clock) = match c.is_empty() || d.is_empty() {
             true => (a, b, "adapter time"),
-            false => (c, d, "processor time"),
+            false => (
+                c,
+                d,
+                "processor time (the values are by the adapter's clock)",
+            ),
         };
         match in_rounds && a.len() == b.len() {
             true => Self::of_rounds(

@@ -229,6 +229,12 @@ fn other_programs_read_both_sides_as_they_are() {
         comment.contains("| 12.5 → 13.0 | +4.00 % | exact |"),
         "{comment}"
     );
+    // What differs behind the digits of a table is shown with all of them.
+    let (_, text) = pair(&with_cost(12.5), &with_cost(12.5000125)).code(&[]);
+    assert!(
+        text.contains("12.5 → 12.5000125") && text.contains("+1.0e−4 %"),
+        "{text}"
+    );
     let errors = Made {
         worse: |sampler| if sampler == 2 { 1.01 } else { 1.0 },
         ..Made::default()
