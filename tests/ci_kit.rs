@@ -24,7 +24,7 @@ impl Kit {
             folder: tempfile::tempdir().expect("a folder"),
         };
         let program = format!(
-            "if [ \"$1\" = run ]; then mkdir -p \"$4\"; echo records > \"$4/records.jsonl\"; exit {run}; fi\n\
+            "echo 'error: <b>no</b> @someone' >&2; if [ \"$1\" = run ]; then mkdir -p \"$4\"; echo records > \"$4/records.jsonl\"; exit {run}; fi\n\
              shift; echo \"$@\" > {0}/arguments; while [ $# -gt 0 ]; do [ \"$1\" = --markdown ] && echo verdict > \"$2\"; shift; done; exit {compare}\n",
             kit.path("").display()
         );
@@ -98,6 +98,14 @@ fn exit_codes_say_what_fails() {
         assert_eq!(kit.read("asked"), "");
         let told = run < 2 && [0, 1, 4].contains(&compare);
         assert_eq!(kit.read("summary") == "verdict\n", told, "{run} {compare}");
+        // What could not be done is told, too, with the words of the program as they are.
+        let failed = format!("(exit code {end})\n\n    error: <b>no</b> @someone\n");
+        assert_eq!(
+            kit.read("summary").contains(&failed),
+            !told,
+            "{run} {compare}"
+        );
+        assert!(text.contains("error: <b>no</b> @someone"), "{text}");
     }
     let kit = Kit::new(0, 0, "").with_baseline();
     kit.execute("");

@@ -121,6 +121,13 @@ impl Compare {
                 Err(why) => found.not_confirmed(&format!("{why:#}")),
             }
         }
+        if let [base, candidate] = &self.paths[..]
+            && let (Ok(a), Ok(b)) = (base.canonicalize(), candidate.canonicalize())
+            && a == b
+        {
+            let note = "BASE and CANDIDATE are the same records: nothing can differ.";
+            found.notes.insert(0, note.into());
+        }
         self.write(&found)?;
         Ok(match found.verdict() {
             Verdict::Worse => ExitCode::from(FAILED),
@@ -263,13 +270,10 @@ impl Compare {
         }
         match self.json {
             true => print_json("compare", show::json(found)),
-            false => print(&show::terminal(found, screen().width.unwrap_or(IN_A_FILE))),
+            false => print(&show::terminal(found, screen())),
         }
     }
 }
-
-/// Columns of a comparison that goes to no terminal.
-const IN_A_FILE: usize = 100;
 
 /// A folder that goes with its owner; made when it is needed.
 #[derive(Default)]

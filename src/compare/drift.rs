@@ -7,6 +7,7 @@
 //! widens intervals and shifts none. A cell whose own rounds are noisier than those of controls has that much more.
 
 use crate::measure::statistics::Spread;
+use crate::report::format::plural;
 
 /// Fewer controls show no drift.
 pub const LEAST_CONTROLS: usize = 3;
@@ -79,8 +80,8 @@ impl Drift {
         let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let square = logs.iter().map(|x| x * x).sum::<f64>() / logs.len() as f64;
         format!(
-            "{figure}: times of {} cells with equal kernels and work moved by {:+.1} to {:+.1} % (root mean square {:.1} %)",
-            logs.len(),
+            "{figure}: times of {} with equal kernels and work moved by {:+.1} to {:+.1} % (root mean square {:.1} %)",
+            plural(logs.len(), "cell"),
             100.0 * least.exp_m1(),
             100.0 * most.exp_m1(),
             100.0 * square.sqrt()

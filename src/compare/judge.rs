@@ -159,6 +159,9 @@ fn exact(figure: &Figure, a: f64, b: f64, effects: &Effects) -> Outcome {
     if a == b {
         return known(Verdict::Same, "");
     }
+    if !a.is_finite() || !b.is_finite() {
+        return known(Verdict::Undecided, "a value is no finite number");
+    }
     let part = (b - a) / a.abs();
     if part.abs() <= effects.exact {
         return known(Verdict::Same, "within what --exact allows");
@@ -336,7 +339,11 @@ impl TimeRatio {
         };
         let (a, b, clock) = match c.is_empty() || d.is_empty() {
             true => (a, b, "adapter time"),
-            false => (c, d, "processor time"),
+            false => (
+                c,
+                d,
+                "processor time (the values are by the adapter's clock)",
+            ),
         };
         match in_rounds && a.len() == b.len() {
             true => Self::of_rounds(

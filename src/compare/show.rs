@@ -4,7 +4,9 @@ use super::judge::Verdict;
 use super::{Comparison, Finding};
 use crate::measure::figure::Shown;
 use crate::measure::record::{Interval, axis};
+use crate::report::document::{Table, TableCell, Tone};
 use crate::report::format;
+use crate::report::terminal::{Screen, shown};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
@@ -14,8 +16,8 @@ const MOST_ROWS: usize = 20;
 const MOST_ALIKE: usize = 4;
 /// A comment of GitHub has 65,536 characters at most; details beyond this are counted.
 const MOST_DETAILS: usize = 40_000;
-/// From this width on the values themselves are shown beside the change.
-const WIDE: usize = 100;
+/// Texts of facts are cut to so many characters; the records have them whole.
+const MOST_CHARACTERS: usize = 40;
 
 /// Verdicts that a reader looks at first, in this order.
 const NOTABLE: [Verdict; 5] = [
@@ -45,19 +47,8 @@ pub fn verdict_line(comparison: &Comparison) -> String {
             )
         })
         .collect();
-    let [base, candidate] = comparison.names.each_ref().map(|name| plain(name));
+    let [base, candidate] = &comparison.names;
     format!("{word}: {candidate} against {base}: {}", counts.join(", "))
-}
-
-/// Text without what a terminal or a page would act on: control characters, and those that turn the direction of text.
-fn plain(text: &str) -> String {
-    let acts = |c: char| {
-        c.is_control()
-            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
-    };
-    text.chars()
-        .map(|c| if acts(c) { '\u{fffd}' } else { c })
-        .collect()
 }
 
 /// Axes on which the findings differ: what all share need not be named each time.
@@ -90,7 +81,7 @@ fn cell(finding: &Finding, varied: &BTreeSet<String>) -> String {
         }
         _ => label.to_owned(),
     });
-    plain(&words.collect::<Vec<_>>().join(", "))
+    words.collect::<Vec<_>>().join(", ")
 }
 
 /// The difference with its interval, in the figure's own direction.
@@ -132,7 +123,7 @@ fn exact_change(finding: &Finding) -> Option<String> {
 
 fn values(finding: &Finding) -> String {
     let [old, new] = finding.shown.each_ref().map(|side| match side {
-        Some(text) => plain(&text.chars().take(40).collect::<String>()),
+        Some(text) => shortened(text),
         None => format::ABSENT.to_owned(),
     });
     format!("{old} → {new}")
@@ -169,114 +160,92 @@ fn listed(comparison: &Comparison, verdict: Verdict) -> (Vec<&Finding>, Vec<(Str
     )
 }
 
-/// What changed first, as a table of at most so many columns; the verdict comes last, where a terminal ends.
-pub fn terminal(comparison: &Comparison, width: usize) -> String {
+/// What changed first, as a table; the verdict comes last, where a terminal ends.
+pub fn terminal(comparison: &Comparison, screen: Screen) -> String {
+    let (table, reasons, more) = changes(comparison);
+    let notes = comparison.notes.iter().map(|note| format!("note: {note}"));
+    let mut out: String = notes.map(|note| screen.lines(&note)).collect();
+    if !table.rows.is_empty() {
+        out += &screen.table(&table);
+    }
+    for (number, why) in reasons.iter().enumerate() {
+        out += &screen.lines(&format!("({}) {why}", number + 1));
+    }
+    out.extend(more.iter().map(|line| screen.lines(line)));
+    if comparison.tests > 0 {
+        out += &screen.lines(&of_tests(comparison));
+    }
+    out + &screen.lines(&verdict_line(comparison))
+}
+
+/// What is not the same, the numbered reasons that its last column names, and what was left out as alike.
+fn changes(comparison: &Comparison) -> (Table, Vec<&str>, Vec<String>) {
     let varied = varied(comparison);
-    let heads = [
-        "verdict",
-        "figure",
-        "change [95 %]",
-        "base → candidate",
-        "cell",
-    ]
-    .map(str::to_owned);
-    let mut rows: Vec<([String; 5], String)> = vec![(heads, String::new())];
-    let mut more = Vec::new();
+    let mut table = Table::new(
+        "What is not the same",
+        &[
+            "verdict",
+            ":figure",
+            "change [95 %]",
+            ":base → candidate",
+            ":cell",
+            "why",
+        ],
+    );
+    let (mut reasons, mut more) = (Vec::new(), Vec::new());
     for verdict in NOTABLE {
         let (kept, left_out) = listed(comparison, verdict);
-        rows.extend(kept.into_iter().map(|f| {
-            let row = [
-                verdict.word().into(),
-                plain(&f.figure.title),
-                change(f),
-                values(f),
-                cell(f, &varied),
-            ];
-            (row, plain(&f.why))
-        }));
-        more.extend(
-            left_out
-                .into_iter()
-                .map(|(why, n)| format!("{n} more {}: {}", verdict.word(), plain(&why))),
-        );
-    }
-    let mut out = String::new();
-    for note in &comparison.notes {
-        out += &wrapped(&format!("note: {}", plain(note)), width, "      ");
-    }
-    if rows.len() > 1 {
-        out += &table(&rows, width);
-    }
-    for line in more {
-        out += &wrapped(&line, width, "  ");
-    }
-    let tests = comparison.tests;
-    if tests > 0 {
-        let text = format!(
-            "{} tested together; of those called better or worse at most {} is expected to be false.",
-            format::plural(tests, "difference"),
-            format::percent(comparison.alpha)
-        );
-        out += &wrapped(&text, width, "");
-    }
-    out + &wrapped(&verdict_line(comparison), width, "  ")
-}
-
-/// Rows as columns, each with its reason below where that is not the one above.
-fn table(rows: &[([String; 5], String)], width: usize) -> String {
-    let columns: &[usize] = if width >= WIDE {
-        &[0, 1, 2, 3]
-    } else {
-        &[0, 1, 2]
-    };
-    let most = |column: usize| if column == 3 { 28 } else { 30 };
-    let size = |column: usize| {
-        let sizes = rows.iter().map(|(row, _)| row[column].chars().count());
-        sizes.max().unwrap_or(0).min(most(column))
-    };
-    let sizes: Vec<usize> = columns.iter().map(|c| size(*c)).collect();
-    let left = sizes.iter().sum::<usize>() + 2 * sizes.len();
-    let mut out = String::new();
-    let mut last = "";
-    for (row, why) in rows {
-        let cells = columns.iter().zip(&sizes);
-        let cells = cells.map(|(c, size)| format!("{:<size$}  ", shortened(&row[*c], *size)));
-        let text = cells.collect::<String>() + &row[4];
-        out += &wrapped(&text, width, &" ".repeat(left.min(width / 2)));
-        if !why.is_empty() && why != last {
-            out += &wrapped(&format!("  ({why})"), width, "   ");
+        for f in kept {
+            let why = match reasons.iter().position(|known| *known == f.why) {
+                _ if f.why.is_empty() => String::new(),
+                Some(at) => format!("({})", at + 1),
+                None => {
+                    reasons.push(&*f.why);
+                    format!("({})", reasons.len())
+                }
+            };
+            table.rows.push(vec![
+                TableCell::from(verdict.word()).toned(tone(verdict)),
+                f.figure.title.as_ref().into(),
+                change(f).into(),
+                values(f).into(),
+                cell(f, &varied).into(),
+                why.into(),
+            ]);
         }
-        last = why;
+        let lines = left_out.into_iter();
+        more.extend(lines.map(|(why, n)| format!("{n} more {}: {why}", verdict.word())));
     }
-    out
+    (table, reasons, more)
 }
 
-/// A text of at most so many characters.
-fn shortened(text: &str, most: usize) -> String {
-    match text.chars().count() > most {
-        true => text
-            .chars()
-            .take(most.saturating_sub(1))
-            .chain(['…'])
-            .collect(),
+fn tone(verdict: Verdict) -> Tone {
+    match verdict {
+        Verdict::Worse => Tone::Bad,
+        Verdict::Better => Tone::Good,
+        Verdict::Undecided => Tone::Note,
+        _ => Tone::Plain,
+    }
+}
+
+/// How many differences were tested, and what the verdicts are worth.
+fn of_tests(comparison: &Comparison) -> String {
+    format!(
+        "{} tested together; of those called better or worse at most {} is expected to be false.",
+        format::plural(comparison.tests, "difference"),
+        format::percent(comparison.alpha)
+    )
+}
+
+/// A text of at most [`MOST_CHARACTERS`].
+fn shortened(text: &str) -> String {
+    match text.chars().count() > MOST_CHARACTERS {
+        true => {
+            let kept = text.chars().take(MOST_CHARACTERS - 1);
+            kept.chain(['…']).collect()
+        }
         false => text.to_owned(),
     }
-}
-
-/// Lines of at most so many characters, broken between words, the later ones behind `indent`. Spaces in columns stay.
-fn wrapped(text: &str, width: usize, indent: &str) -> String {
-    let mut out = String::new();
-    let mut line = String::new();
-    for word in text.split_inclusive(' ') {
-        let long = line.chars().count() + word.trim_end().chars().count() > width;
-        if long && !line.trim().is_empty() {
-            out += line.trim_end();
-            out.push('\n');
-            line = indent.to_owned();
-        }
-        line += word;
-    }
-    out + line.trim_end() + "\n"
 }
 
 /// As a comment: a line of verdict, a short table, everything else folded.
@@ -321,11 +290,7 @@ pub fn markdown(comparison: &Comparison) -> String {
         &same,
         &varied,
     );
-    out + &format!(
-        "\n{} tested together; of those called better or worse at most {} is expected to be false.\n",
-        format::plural(comparison.tests, "difference"),
-        format::percent(comparison.alpha)
-    )
+    out + &format!("\n{}\n", of_tests(comparison))
 }
 
 fn folded(title: &str, findings: &[&Finding], varied: &BTreeSet<String>) -> String {
@@ -372,7 +337,7 @@ fn rows(findings: &[&Finding], varied: &BTreeSet<String>) -> String {
 fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     // Pages make links of addresses.
-    for c in plain(text).replace("://", ":\u{2060}//").chars() {
+    for c in shown(text).replace("://", ":\u{2060}//").chars() {
         match c {
             '&' => out += "&amp;",
             '<' => out += "&lt;",

@@ -161,24 +161,35 @@ impl Side {
 
     /// The records of these kernels and those that all kernels share, as if there were no such axis.
     fn part(&self, wanted: &str) -> Self {
-        let mark = format!("@{wanted}");
-        let kept = self.lines.iter().filter(|line| match &line.body {
-            Body::Failed(cell) | Body::Skipped(cell) | Body::Warning(cell) => {
-                cell.cell.contains(&mark) || (wanted == EMBEDDED && !cell.cell.contains('@'))
-            }
-            body => !is_of_kernels(body) || label(&line.key) == wanted,
-        });
-        let renamed = kept.cloned().map(|mut line| {
+        let kept = self.lines.iter().filter_map(|line| {
+            let mut line = line.clone();
+            let is_kept = match &mut line.body {
+                Body::Failed(cell) | Body::Skipped(cell) | Body::Warning(cell) => {
+                    let text = without_kernels(&cell.cell, wanted);
+                    text.map(|text| cell.cell = text).is_some()
+                }
+                body => !is_of_kernels(body) || label(&line.key) == wanted,
+            };
             line.key = line.key.with(axis::KERNELS, "");
-            line
+            is_kept.then_some(line)
         });
         Self {
             name: wanted.to_owned(),
-            lines: renamed.collect(),
+            lines: kept.collect(),
             notes: self.notes.clone(),
             in_rounds: true,
         }
     }
+}
+
+/// A cell in words (`box, bvh, @idea`) without these kernels; `None` if it is of others.
+fn without_kernels(cell: &str, kernels: &str) -> Option<String> {
+    let mark = format!("@{kernels}");
+    let mut parts: Vec<&str> = cell.split(", ").collect();
+    let marked = parts.iter().any(|part| part.starts_with('@'));
+    parts.retain(|part| *part != mark);
+    let own = parts.len() < cell.split(", ").count();
+    (own || (kernels == EMBEDDED && !marked)).then(|| parts.join(", "))
 }
 
 fn label(key: &Key) -> &str {

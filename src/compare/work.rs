@@ -8,7 +8,8 @@ use super::taken::{Evidence, Taken, contradictions, taken};
 use super::{Confirmed, Finding, Identity, Options};
 use crate::measure::figure::Spread;
 use crate::measure::hypothesis::benjamini_hochberg;
-use crate::measure::record::axis;
+use crate::measure::record::{FinishedRecord, RunRecord, all_of, axis};
+use crate::report::format;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A finding on its way to a verdict.
@@ -45,6 +46,7 @@ impl<'a> Work<'a> {
             .collect();
         let refused = refusal(base, candidate);
         notes.extend(refused.clone());
+        notes.extend(turned_round(base, candidate));
         Self {
             options,
             in_rounds: base.in_rounds && candidate.in_rounds,
@@ -73,7 +75,16 @@ impl<'a> Work<'a> {
             self.findings.push(open);
         }
         let rest = order.iter().filter_map(|identity| theirs.remove(identity));
-        let rest: Vec<Open> = rest.map(|new| alone(&new, 1)).collect();
+        let ended = all_of::<FinishedRecord>(&base.lines).next().is_some();
+        let rest = rest.map(|new| {
+            let mut open = alone(&new, 1);
+            if open.finding.verdict == Verdict::New && !ended {
+                open.finding.verdict = Verdict::Undecided;
+                open.finding.why = "the base did not reach its end, and lacks it".into();
+            }
+            open
+        });
+        let rest: Vec<Open> = rest.collect();
         self.findings.extend(rest);
     }
 
@@ -103,10 +114,8 @@ impl<'a> Work<'a> {
                 &self.options.effects,
             )
         };
-        let comparable = is_time
-            && !is_copy
-            && other_work(old, new).is_none()
-            && !self.contradicted.contains(&identity);
+        // Two lines of times contradict nothing: `contradictions` passes them over.
+        let comparable = is_time && !is_copy && other_work(old, new).is_none();
         let ratio = TimeRatio::new(&old.evidence, &new.evidence, self.in_rounds);
         let (verdict, why, measured) = match outcome {
             Outcome::Known(verdict, why) => (verdict, why, None),
@@ -118,7 +127,7 @@ impl<'a> Work<'a> {
             finding: Finding {
                 key: new.key.clone(),
                 figure: new.figure.clone(),
-                shown: [Some(old.shown.clone()), Some(new.shown.clone())],
+                shown: shown(old, new).map(Some),
                 measured,
                 exact_change: exact_change(&old.evidence, &new.evidence),
                 verdict,
@@ -275,6 +284,16 @@ fn decide(finding: &mut Finding, rejected: bool) {
     }
 }
 
+/// The values as they are read; exact ones that differ in digits that tables leave out, with all of them.
+fn shown(old: &Taken, new: &Taken) -> [String; 2] {
+    match (&old.evidence, &new.evidence) {
+        (Evidence::Exact(a), Evidence::Exact(b)) if a != b && old.shown == new.shown => {
+            [a, b].map(f64::to_string)
+        }
+        _ => [old, new].map(|taken| taken.shown.clone()),
+    }
+}
+
 fn exact_change(old: &Evidence, new: &Evidence) -> Option<f64> {
     match (old, new) {
         (Evidence::Exact(a), Evidence::Exact(b)) | (Evidence::Once(a), Evidence::Once(b)) => {
@@ -343,6 +362,23 @@ fn other_work(old: &Taken, new: &Taken) -> Option<String> {
         (before != value).then(|| format!("another default: {name} was {before} and is {value}"))
     };
     new.iter().find_map(changed)
+}
+
+/// A word where the candidate is older than the base, as where the two are given in the wrong order.
+fn turned_round(base: &Side, candidate: &Side) -> Option<String> {
+    let start = |side: &Side| {
+        all_of::<RunRecord>(&side.lines)
+            .next()
+            .map(|run| run.body.started_unix_s)
+    };
+    let (old, new) = (start(base)?, start(candidate)?);
+    (new < old).then(|| {
+        format!(
+            "The candidate was measured before the base ({} and {}): BASE comes first.",
+            format::utc(new),
+            format::utc(old)
+        )
+    })
 }
 
 /// Why the times of two sides cannot be compared, if so.

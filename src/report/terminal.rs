@@ -1,7 +1,7 @@
 //! The essence of a report for the end of a run.
 
 use super::data::RunData;
-use super::document::{Check, Table, TableCell};
+use super::document::{Check, Table, TableCell, Tone};
 use super::samplers::Metric;
 use super::sections::{
     animation, belief, compactions, kernels, rendering, run, samplers, structures, verdict,
@@ -60,14 +60,28 @@ impl Screen {
     pub fn check(self, check: &Check) -> String {
         let text = self.lines(check.line().trim_end());
         let word = check.verdict.word();
-        let colour = match check.verdict {
-            Verdict::Pass => 32,
-            Verdict::Fail => 31,
-            Verdict::Open => 33,
+        let tone = match check.verdict {
+            Verdict::Pass => Tone::Good,
+            Verdict::Fail => Tone::Bad,
+            Verdict::Open => Tone::Note,
         };
         match text.strip_prefix(word) {
-            Some(rest) if self.colour => format!("\u{1b}[{colour}m{word}\u{1b}[0m{rest}"),
-            _ => text,
+            Some(rest) => self.toned(word, tone) + rest,
+            None => text,
+        }
+    }
+
+    /// A text in the colour of its tone, where the screen shows any.
+    fn toned(self, text: &str, tone: Tone) -> String {
+        let colour = match tone {
+            Tone::Good => 32,
+            Tone::Bad => 31,
+            Tone::Note => 33,
+            Tone::Plain => return text.to_owned(),
+        };
+        match self.colour && !text.is_empty() {
+            true => format!("\u{1b}[{colour}m{text}\u{1b}[0m"),
+            false => text.to_owned(),
         }
     }
 
@@ -90,10 +104,10 @@ impl Screen {
             Some(width) if grid.natural().iter().sum::<usize>() > width => {
                 let widths = grid.fitted(width);
                 for columns in grid.blocks(&widths, width) {
-                    out += &grid.block(&columns, &widths);
+                    out += &grid.block(&columns, &widths, self);
                 }
             }
-            _ => out += &grid.block(&Vec::from_iter(0..grid.columns()), &grid.natural()),
+            _ => out += &grid.block(&Vec::from_iter(0..grid.columns()), &grid.natural(), self),
         }
         out
     }
@@ -132,6 +146,8 @@ const NARROWEST: usize = 12;
 /// Texts of a table, its heads first, with their columns.
 struct Grid {
     texts: Vec<Vec<String>>,
+    /// Of the rows below the heads.
+    tones: Vec<Vec<Tone>>,
     is_text: Vec<bool>,
 }
 
@@ -144,7 +160,11 @@ impl Grid {
         };
         let heads = table.columns.iter().map(|column| shown(&column.title));
         let rows = table.rows.iter().map(|row| row.iter().map(text).collect());
+        let tones = table.rows.iter();
         Self {
+            tones: tones
+                .map(|row| row.iter().map(|cell| cell.tone).collect())
+                .collect(),
             texts: std::iter::once(heads.collect()).chain(rows).collect(),
             is_text: table.columns.iter().map(|column| column.text).collect(),
         }
@@ -216,8 +236,14 @@ impl Grid {
         blocks
     }
 
+    fn tone(&self, row: usize, column: usize) -> Tone {
+        let tones = row.checked_sub(1).and_then(|row| self.tones.get(row));
+        let tone = tones.and_then(|tones| tones.get(column));
+        tone.copied().unwrap_or_default()
+    }
+
     /// These columns: heads, a rule, rows.
-    fn block(&self, columns: &[usize], widths: &[usize]) -> String {
+    fn block(&self, columns: &[usize], widths: &[usize], screen: Screen) -> String {
         let inner = |column: usize| match column {
             0 => widths[0],
             _ => widths[column] - GAP,
@@ -239,6 +265,7 @@ impl Grid {
                     let text = line.checked_sub(from).and_then(|at| cell.get(at));
                     let text = text.map_or("", String::as_str);
                     let blanks = " ".repeat(inner(*column).saturating_sub(width_of(text)));
+                    let text = screen.toned(text, self.tone(number, *column));
                     parts.push(match self.is_text[*column] {
                         true => format!("{text}{blanks}"),
                         false => format!("{blanks}{text}"),
@@ -259,13 +286,18 @@ fn width_of(text: &str) -> usize {
     console::measure_text_width(text)
 }
 
-/// Text without what a terminal would obey: control characters are shown by their numbers.
+/// Text without what a terminal or a page would obey or hide: control characters, those that turn the direction of text,
+/// and those without width are shown by their numbers.
 pub fn shown(text: &str) -> String {
+    let acts = |c: char| {
+        c.is_control()
+            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
+    };
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
             '\n' => out.push(' '),
-            c if c.is_control() => out += &format!("[U+{:04X}]", u32::from(c)),
+            c if acts(c) => out += &format!("[U+{:04X}]", u32::from(c)),
             c => out.push(c),
         }
     }
@@ -375,6 +407,7 @@ mod tests {
         let mut table = Table::new("a\u{1b}]0;b", &["scene\u{7}"]);
         table.rows.push(vec!["x\u{1b}[2J\r".into()]);
         let text = PLAIN.table(&table);
+        assert_eq!(shown("a\u{202e}b\u{feff}"), "a[U+202E]b[U+FEFF]");
         assert!(
             !text.contains(|c: char| c.is_control() && c != '\n'),
             "{text:?}"
@@ -395,5 +428,19 @@ mod tests {
             ..PLAIN
         };
         assert_eq!(coloured.check(&check), "\u{1b}[31mFAIL\u{1b}[0m  t: d\n");
+        let mut table = Table::new("", &["gate", "time"]);
+        let cell = TableCell::from("FAILED").toned(super::Tone::Bad);
+        table
+            .rows
+            .extend([vec![cell, "1".into()], vec!["passed".into(), "2".into()]]);
+        let row = |screen: Screen, row: usize| {
+            screen.table(&table).lines().nth(3 + row).map(str::to_owned)
+        };
+        assert_eq!(
+            row(coloured, 0).as_deref(),
+            Some("\u{1b}[31mFAILED\u{1b}[0m     1")
+        );
+        // The columns are as wide as without.
+        assert_eq!(row(coloured, 1), row(PLAIN, 1));
     }
 }

@@ -346,6 +346,53 @@ fn two_sets_of_kernels_of_one_run_are_its_two_sides() {
 }
 
 #[test]
+fn cells_that_failed_belong_to_their_kernels_alone() {
+    let mut lines = Made::default().lines();
+    for kernels in ["idea", "idea-2"] {
+        let other = Made::default().lines().into_iter();
+        let of_cells = other.filter(|line| {
+            matches!(
+                line.body,
+                Body::Structure(_) | Body::Error(_) | Body::Stream(_)
+            )
+        });
+        lines.extend(of_cells.map(|mut line| {
+            line.key = line.key.with("kernels", kernels);
+            line
+        }));
+    }
+    let failed = |cell: &str| {
+        let record = raystone::measure::record::SkippedRecord {
+            cell: cell.into(),
+            reason: "out of memory".into(),
+        };
+        Line::about_all(Body::Failed(record))
+    };
+    // One fails with the new kernels alone, one with all.
+    lines.extend(
+        [
+            "box, grid, @idea-2",
+            "box, bvh",
+            "box, bvh, @idea",
+            "box, bvh, @idea-2",
+        ]
+        .map(failed),
+    );
+    let run = Side::new("run", lines, Vec::new());
+    for (kernels, worse) in [("idea", 0), ("idea-2", 1)] {
+        let [a, b] = run
+            .of_kernels(Some(["embedded", kernels]))
+            .expect("two sides");
+        let found = compared(&a, &b);
+        let names: Vec<_> = said(&found, "cell/v1")
+            .map(|f| f.key.label("subject"))
+            .collect();
+        assert_eq!(names, ["box, grid"; 1][..worse], "{:?}", found.findings[0]);
+        assert_eq!(found.count(Verdict::Worse), worse);
+    }
+}
+
+#[test]
 fn a_run_of_other_kernels_alone_is_compared_cell_by_cell() {
     let base = Made::default();
     let mut lines = base.lines();

@@ -320,3 +320,33 @@ fn drift_is_that_of_the_scene_or_of_all_whichever_moved_more_and_leaves_the_cell
         None
     );
 }
+
+#[test]
+fn what_is_no_number_any_more_is_open_and_a_base_of_zero_hides_nothing() {
+    let cost = figure("sah-cost/v1");
+    let allowed = Effects {
+        exact: 0.5,
+        ..Effects::default()
+    };
+    let verdict =
+        |a: f64, b: f64| match compare(cost, &Evidence::Exact(a), &Evidence::Exact(b), &allowed) {
+            Outcome::Known(verdict, _) => verdict,
+            Outcome::Tested(_) => panic!("nothing is tested"),
+        };
+    for (a, b, wanted) in [
+        (1.0, f64::NAN, Verdict::Undecided),
+        (1.0, f64::INFINITY, Verdict::Undecided),
+        (f64::NAN, 1.0, Verdict::Undecided),
+        (f64::INFINITY, f64::INFINITY, Verdict::Same),
+        (0.0, 1e-9, Verdict::Worse),
+        (0.0, -1e-9, Verdict::Better),
+        (-2.0, -1.0, Verdict::Same),
+        (-1.0, -2.0, Verdict::Better),
+        // Half of the base, not of the candidate.
+        (2.0, 3.0, Verdict::Same),
+        (2.0, 3.1, Verdict::Worse),
+        (3.0, 1.4, Verdict::Better),
+    ] {
+        assert_eq!(verdict(a, b), wanted, "{a} {b}");
+    }
+}

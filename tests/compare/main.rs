@@ -1,9 +1,12 @@
 //! The comparison of runs: what it may not miss, and when it may not cry.
 
 mod alarms;
+mod evidence;
 mod inputs;
 mod judged;
 mod limits;
+mod machine;
+mod program;
 mod records;
 mod shown;
 

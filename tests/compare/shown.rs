@@ -6,8 +6,16 @@ use raystone::compare::judge::Verdict;
 use raystone::compare::show::{json, markdown, terminal, verdict_line};
 use raystone::compare::side::Side;
 use raystone::measure::record::{Body, axis};
+use raystone::report::terminal::Screen;
 
 const HOSTILE: &str = "\u{1b}[31mred\u{1b}[0m | <script>alert(1)</script> @someone #1 ![x](http://x) `\n# head \u{202e}";
+
+fn screen(width: usize) -> Screen {
+    Screen {
+        width: Some(width),
+        colour: false,
+    }
+}
 
 fn hostile() -> [Side; 2] {
     let base = Made::default();
@@ -32,7 +40,7 @@ fn hostile_names_are_inert() {
     let found = compared(&base, &candidate);
     assert_eq!(found.verdict(), Verdict::Worse);
     for width in [60, 80, 120] {
-        let text = terminal(&found, width);
+        let text = terminal(&found, screen(width));
         assert!(!text.contains(['\u{1b}', '\u{202e}', '\r']), "{text}");
         assert!(text.contains("[31mred"), "{text}");
     }
@@ -64,19 +72,27 @@ fn lines_fit_the_width_and_the_worst_comes_first() {
     };
     let found = compared(&base.side(), &candidate.side());
     for width in [80, 120] {
-        let text = terminal(&found, width);
+        let text = terminal(&found, screen(width));
         let longest = text.lines().map(|line| line.chars().count()).max();
         assert!(longest <= Some(width), "{longest:?}: {text}");
     }
-    let text = terminal(&found, 120);
+    let text = terminal(&found, screen(120));
     let first = text
         .lines()
         .skip_while(|line| !line.starts_with("verdict"))
-        .nth(1);
+        .nth(2);
     assert!(
-        first.is_some_and(|line| line.starts_with("worse")),
+        first.is_some_and(|line| line.starts_with("worse") && line.ends_with("(1)")),
         "{text}"
     );
+    assert!(text.contains("\n(1) pairs of equal seeds\n"), "{text}");
+    // In colour where it is asked for.
+    let coloured = Screen {
+        colour: true,
+        ..screen(120)
+    };
+    assert!(!text.contains('\u{1b}'));
+    assert!(terminal(&found, coloured).contains("\n\u{1b}[31mworse\u{1b}[0m "));
     assert!(verdict_line(&found).starts_with("WORSE: "));
     let value = json(&found);
     assert_eq!(value["verdict"], "worse");
