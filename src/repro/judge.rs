@@ -2,8 +2,8 @@
 //!
 //! The interval of a ratio or of a fitted exponent is that of the *method of variance estimates recovery* on
 //! logarithms (Zou & Donner 2008; Donner & Zou 2012): each side's own 95 % interval, asymmetric as it is, gives its
-//! part of the spread, and the parts add in squares. It takes both sides for independent; where they were measured
-//! in the same interleaved rounds their errors agree in part, and the interval is wider than it need be.
+//! part of the spread, and the parts add in squares. It takes both sides for independent; ratios of what was timed in the
+//! same rounds are those of [`super::rounds`].
 
 use crate::measure::figure::{Figure, Spread};
 use crate::measure::record::Interval;

@@ -9,6 +9,7 @@ pub mod judge;
 pub mod latex;
 pub mod page;
 mod plots;
+pub mod rounds;
 pub mod run;
 pub mod scenes;
 pub mod select;

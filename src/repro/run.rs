@@ -3,6 +3,7 @@
 use super::Source;
 use super::claim::{Context, Row, judge};
 use super::judge::Verdict;
+use super::rounds::Rounds;
 use super::scenes::{IN_FILES, is_model, name_of, what_to_get};
 use crate::config::expect::{Compare, Substitute, Thesis, same_experiment};
 use crate::config::{ConfigError, Experiment, Pattern, Plan};
@@ -240,6 +241,7 @@ fn judged(
             .map(|(s, ours)| (s.original.clone(), ours.clone().map(|ours| pattern(&ours))))
             .collect(),
         absent: lines.iter().filter_map(absent).collect(),
+        rounds: Rounds::new(&lines),
     };
     let values = values(&data);
     let claims = prepared.thesis.expects.iter();
