@@ -2,6 +2,7 @@
 //! stand in the digests, and verdicts see planted faults.
 
 mod numbers;
+mod pages;
 mod printed;
 mod rounds;
 mod verdicts;

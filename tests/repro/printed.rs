@@ -124,6 +124,7 @@ impl<'e> Place<'e> {
             "nilsson-table-5-4" => self.nilsson_5_4(text),
             "dufay-table-2-2" => self.dufay_2_2(text),
             "dufay-tables-3-2-to-3-5" => self.dufay_3(text),
+            "dufay-h3b-path-depth" => self.depth(text),
             "dufay-table-4-1" => self.dufay_4_1(text),
             "dufay-table-4-2" => self.dufay_4_2(text),
             "dufay-table-5-1" => self.dufay_5_1(text),
@@ -268,6 +269,22 @@ impl<'e> Place<'e> {
             self.on().to_owned(),
             self.factor(table.at(&[row], factor), value)?,
         ))
+    }
+
+    /// The factor at the depth below over that at the depth above: times are of MK over SK.
+    fn depth(&self, text: &str) -> Option<(String, f64)> {
+        let row = &*self.at.row;
+        let tables = [("GTX 570", "3.4"), ("Titan X", "3.5")];
+        let (_, number) = tables.iter().find(|(gpu, _)| *gpu == row)?;
+        let table = Printed::new(text, &format!("**Table {number}"));
+        let factor = |pick: &Pick| {
+            let depths = [("path(max_depth=3,*", "3"), ("path(max_depth=7,*", "7")];
+            let depth = named(pick, "integrator", &depths)?;
+            let scene = format!("{} ({depth} bounces)", self.on());
+            let at = |column| table.at(&[&scene], column);
+            Some(at("MK (s)")? / at("SK (s)")?)
+        };
+        Some((row.to_owned(), self.quotient(factor)?))
     }
 
     fn dufay_4_1(&self, text: &str) -> Option<(String, f64)> {
