@@ -210,6 +210,9 @@ mod tests {
         assert_eq!(between.judge(i(1.03, 1.04, 1.05)), Verdict::Contradicted);
         assert_eq!(between.judge(i(0.9, 1.0, 1.1)), Verdict::Undecided);
         assert_eq!(between.judge(i(f64::NAN, 1.0, 1.1)), Verdict::Undecided);
+        let at_most = Bounds::new(None, Some(2.0));
+        let words = [at_least, at_most, between, Bounds::new(None, None)].map(Bounds::words);
+        assert_eq!(words, ["≥ 1", "≤ 2", "0.975 … 1.025", "anything"]);
     }
 
     #[test]
@@ -257,6 +260,9 @@ mod tests {
     fn units_convert_within_their_kind() {
         assert_eq!(factor("s", "ms"), Some(1000.0));
         assert_eq!(factor("%", ""), Some(0.01));
+        assert_eq!(factor("ns", "ms"), Some(1e-6));
+        assert_eq!(factor("KiB", "bytes"), Some(1024.0));
+        assert_eq!(factor("Mrays/s", "rays/s"), Some(1e6));
         assert_eq!(factor("ms", "Mrays/s"), None);
         assert_eq!(factor("furlongs", "furlongs"), Some(1.0));
     }

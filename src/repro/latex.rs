@@ -70,6 +70,10 @@ mod tests {
     #[test]
     fn what_latex_reads_as_commands_is_shown() {
         assert_eq!(super::escape("5 % of a_b & c"), "5 \\% of a\\_b \\& c");
+        assert_eq!(
+            super::escape("≥ ≤ – √×μ"),
+            "$\\geq$ $\\leq$ -- $\\surd$$\\times$$\\mu$"
+        );
         assert_eq!(super::escape("\\x·y"), "\\textbackslash{}x$\\cdot$y");
     }
 }

@@ -138,7 +138,16 @@ fn places(rows: &[Row]) -> String {
             ];
             let said = all.into_iter().filter(|v| count(*v) > 0);
             let said: Vec<String> = said.map(|v| format!("{} {}", count(v), v.word())).collect();
-            said.join(", ")
+            // Where nothing could be tested, the reason of most places.
+            let reasons = rows.iter().map(|row| row.reason.as_str());
+            let times = |reason: &str| rows.iter().filter(|row| row.reason == reason).count();
+            let reason = reasons
+                .max_by_key(|reason| times(reason))
+                .unwrap_or_default();
+            match count(Verdict::NotTestable) == rows.len() {
+                true => format!("{} places: {reason}", rows.len()),
+                false => said.join(", "),
+            }
         }
     }
 }
@@ -157,11 +166,9 @@ pub fn interval(i: Interval) -> String {
 }
 
 fn section(table: &Reproduced) -> Section {
-    let mut section = Section::new(
-        table.name,
-        format!("{}: {}", table.name, table.thesis.title),
-    );
+    let mut section = Section::new(table.name, table.name);
     let blocks = &mut section.blocks;
+    blocks.push(Block::Heading(table.thesis.title.clone()));
     if let Some(environment) = &table.environment {
         let place = format::where_and_when(environment, table.started);
         blocks.push(Block::Paragraph(place));

@@ -252,9 +252,8 @@ fn judged(
         let mut scenes = data.scenes.iter();
         let scene = scenes.find(|scene| wanted.fits_text(scene.name));
         let count = scene.and_then(|scene| Some(scene.record?.triangles));
-        // A pattern is shown as what it chose.
-        let chosen = scene.filter(|_| name_of(&ours) != ours);
-        (chosen.map_or(ours, |scene| scene.name.to_owned()), count)
+        // A pattern is shown as what it chose, a path as the name of its file.
+        (scene.map_or(ours, |scene| scene.name.to_owned()), count)
     };
     let scenes = prepared.scenes.into_iter();
     let scenes = scenes.map(|(substitute, ours)| (substitute, ours.map(placed)));

@@ -248,3 +248,11 @@ fn an_unknown_table_names_the_known_ones_and_one_that_is_not_yet_says_what_is_mi
     let not_yet = ask("pfeuti-table-4-1").expect_err("not yet");
     assert!(not_yet.contains("photon"), "{not_yet}");
 }
+
+#[test]
+fn a_model_is_a_path_a_built_in_scene_with_parameters_is_none() {
+    assert!(scenes::is_model("sponza/sponza.obj") && !scenes::is_model("instances(overlap=0.5)"));
+    let last = &scenes::MODELS[scenes::MODELS.len() - 1];
+    let text = scenes::what_to_get(last.path, Path::new("here"));
+    assert!(text.contains(last.from), "{text}");
+}

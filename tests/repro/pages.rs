@@ -1,10 +1,12 @@
 //! From a folder of records to verdicts and pages: which records count, what stands for which scene, what a page says first.
 
 use super::root;
+use super::rounds::{A, B, HERE, Sitting, drifted, timed};
 use raystone::config::expect::Thesis;
-use raystone::measure::record::{Key, Line, Ran, text_of};
+use raystone::measure::record::{Body, Interval, Key, Line, Ran, text_of};
 use raystone::report::data::RunData;
-use raystone::report::{document::Document, html, markdown, sections};
+use raystone::report::document::{Block, Document, Tone};
+use raystone::report::{html, markdown, sections};
 use raystone::repro::judge::Verdict;
 use raystone::repro::run::{Reproduced, Settings, is_done, prepare, recorded};
 use raystone::repro::{NotCovered, Source, latex, page};
@@ -73,8 +75,9 @@ of = { accel = "kd-tree*" }
 over = { accel = "bvh*" }
 least = 1.5
 claims = ["H1"]
+column = "nodes"
 at = [
-    { on = "Box of 2001", thesis = 3.5 },
+    { row = "5 %", on = "Box of 2001", thesis = 3.5 },
     { on = "Ball of 2001" },
     { on = "Gone" },
 ]
@@ -99,6 +102,16 @@ over = { accel = "bvh*" }
 least = 1.0
 device = "gpu"
 claims = ["H3"]
+at = [{ on = "Box of 2001" }, { on = "Ball of 2001" }]
+
+[[expect]]
+id = "paced"
+says = "A BVH renders twice as fast, by the host's clock"
+figure = "ms-per-spp/v1"
+compare = "ratio"
+of = { accel = "kd-tree*" }
+over = { accel = "bvh*" }
+least = 1.9
 at = [{ on = "Box of 2001" }, { on = "Ball of 2001" }]
 "#;
 
@@ -172,7 +185,9 @@ fn finished() -> Line {
 /// What a run with these settings would record.
 fn lines(settings: &Settings, software: bool) -> Vec<Line> {
     let prepared = prepare(&source(), settings, &Registries::default()).expect("sound");
-    vec![
+    let at = |scene| Sitting { scene, ..HERE };
+    let [box_at, ball] = ["cornell-box", "displaced-sphere"].map(at);
+    let mut lines = vec![
         run(&prepared.experiment.text, software),
         scene("cornell-box", 34),
         scene("displaced-sphere", 70_001),
@@ -180,8 +195,13 @@ fn lines(settings: &Settings, software: bool) -> Vec<Line> {
         structure("cornell-box", "kd-tree", [6.0, 200.0], None),
         structure("displaced-sphere", "bvh", [7.0, 100.0], None),
         structure("displaced-sphere", "kd-tree", [8.0, 300.0], None),
-        finished(),
-    ]
+    ];
+    for at in [box_at, ball] {
+        lines.extend(timed("kd-tree", at, &drifted(A)));
+        lines.extend(timed("bvh", at, &drifted(B)));
+    }
+    lines.push(finished());
+    lines
 }
 
 fn judged(settings: &Settings, lines: &[Line]) -> Option<Reproduced> {
@@ -204,16 +224,16 @@ fn records_are_judged_and_a_clock_speaks_on_a_device_alone() {
     let device = judged(&settings, &lines(&settings, false)).expect("a table");
     assert_eq!(
         verdicts(&device),
-        [Shown, Supported, Contradicted, Supported]
+        [Shown, Supported, Contradicted, Supported, Supported]
     );
     let software = judged(&settings, &lines(&settings, true)).expect("a table");
     assert_eq!(
         verdicts(&software),
-        [Shown, Supported, Contradicted, NotTestable]
+        [Shown, Supported, Contradicted, NotTestable, Supported]
     );
     assert_eq!(
         page::tally(&[software.clone(), device]),
-        "3 supported, 2 contradicted, 1 not testable here"
+        "5 supported, 2 contradicted, 1 not testable here"
     );
     // What stands for which scene, with its own triangles.
     let scenes: Vec<(String, Option<(String, Option<usize>)>)> = (software.scenes.iter())
@@ -299,6 +319,23 @@ fn a_structure_that_failed_or_was_left_out_is_not_testable_and_never_supported()
     absent.remove(6);
     let table = judged(&settings, &absent).expect("a table");
     assert_eq!(table.verdict(1), Verdict::Faulty);
+    // What is only shown has faults, too.
+    absent.remove(5);
+    let table = judged(&settings, &absent).expect("a table");
+    assert_eq!(table.verdict(0), Verdict::Faulty);
+    // A time that failed says why.
+    let mut slow = lines(&settings, false);
+    for line in &mut slow {
+        if let Body::Time(record) = &mut line.body {
+            record.failure = Some("another image".to_owned());
+            record.ms_per_spp = None;
+        }
+    }
+    let row = judged(&settings, &slow).expect("a table").claims[4].remove(0);
+    assert_eq!(
+        (row.verdict, &*row.reason),
+        (Verdict::NotTestable, "another image")
+    );
 }
 
 fn shown(tables: &[Reproduced], failed: &page::Failures) -> (Document, String) {
@@ -320,20 +357,48 @@ fn the_page_begins_with_counts_and_shows_the_theses_number_before_ours() {
     let (document, text) = shown(std::slice::from_ref(&table), &failures);
     for part in [
         "other-table could not be run: no disk",
-        "Claims: 1 supported, 1 contradicted, 1 not testable here.",
+        "Claims: 2 supported, 1 contradicted, 1 not testable here.",
         "| made | H1 | A kd-tree has more nodes | **supported** | 2 supported, 1 not testable here |",
         "| made | H2 | No ball has leaves beside a \\| or \\*stars\\* | **contradicted** | 50.0 |",
         "| Box of 2001 | 1,234 | cornell-box | 34 |",
         "| Ball of 2001 | 5,678 | displaced-sphere | 70,001 | Round, too. |",
         "| Gone | 99 | – |",
-        "| 5 % | 11.0 \\| 5.00 |",
-        "| ball | 22.0 \\| 7.00 |",
-        "| gone | 33.0 \\| – |",
-        "| Box of 2001 | 3.50 | 2.00 | **supported** | agrees: ≥ 1.5 |",
+        "| 5 % | 11.0 \\| 5.00 | 3.50 \\| 2.00 |",
+        "| made | H3 | A BVH takes fewer bytes, by a clock | not testable here | 2 places: times of a software adapter say nothing of a GPU |",
+        "| ball | 22.0 \\| 7.00 | – |",
+        "| gone | 33.0 \\| – | – |",
+        "| 5 %, nodes | 3.50 | 2.00 | **supported** | agrees: ≥ 1.5 |",
     ] {
         assert!(text.contains(part), "{part} in\n{text}");
     }
-    assert!(!text.contains("A short run"));
+    assert!(!text.contains("A short run") && !text.contains("| made | ms |"));
+    let tones = document.sections[0]
+        .blocks
+        .iter()
+        .find_map(|block| match block {
+            Block::Table(table) => Some(
+                table
+                    .rows
+                    .iter()
+                    .map(|row| (row[3].text.clone(), row[3].tone))
+                    .collect::<Vec<_>>(),
+            ),
+            _ => None,
+        });
+    let tone = |word: &str, tone| (word.to_owned(), tone);
+    let all = [
+        tone("supported", Tone::Good),
+        tone("contradicted", Tone::Bad),
+        tone("not testable here", Tone::Plain),
+        tone("supported", Tone::Good),
+    ];
+    assert_eq!(tones.expect("a table"), all);
+    let i = Interval {
+        value: 2.0,
+        low: 1.0,
+        high: 3.0,
+    };
+    assert_eq!(page::interval(i), "2.00 [1.00, 3.00]");
     let html = html::page(&document).expect("a page");
     assert!(html.contains("5 % of A &amp; B_c") && !html.contains("A & B_c"));
     let quick = Settings {
@@ -361,10 +426,10 @@ fn latex_has_a_pair_of_columns_for_each_with_names_that_it_can_read() {
     let text = latex::tables(&[table]);
     for part in [
         "\\caption{Someone 2001, Table 1: 5 \\% of A \\& B\\_c}",
-        "\\begin{tabular}{lrr}",
-        " & \\multicolumn{2}{c}{A \\& B} \\\\",
-        " & thesis & ours \\\\",
-        "5 \\% & 11.0 & 5.00 \\\\",
+        "\\begin{tabular}{lrrrr}",
+        " & \\multicolumn{2}{c}{A \\& B} & \\multicolumn{2}{c}{nodes} \\\\",
+        " & thesis & ours & thesis & ours \\\\",
+        "5 \\% & 11.0 & 5.00 & 3.50 & 2.00 \\\\",
         "gone & 33.0 & --",
         "\\label{tab:made}",
     ] {

@@ -13,23 +13,25 @@ use serde_json::json;
 /// The machine at each of eight rounds: three of them half as fast.
 const DRIFT: [f64; 8] = [1.0, 1.02, 2.0, 1.9, 1.01, 2.1, 0.99, 1.0];
 /// Noise of each side alone.
-const A: [f64; 8] = [2.0, 2.01, 1.99, 2.02, 2.0, 1.98, 2.01, 1.99];
-const B: [f64; 8] = [1.0, 0.99, 1.01, 1.0, 1.01, 0.99, 1.0, 1.0];
+pub const A: [f64; 8] = [2.0, 2.01, 1.99, 2.02, 2.0, 1.98, 2.01, 1.99];
+pub const B: [f64; 8] = [1.0, 0.99, 1.01, 1.0, 1.01, 0.99, 1.0, 1.0];
 
 /// When and where a cell was timed, in which rounds.
 #[derive(Clone, Copy)]
-struct Sitting {
-    began: u64,
-    device: &'static str,
-    scene: &'static str,
-    triangle: &'static str,
+pub struct Sitting {
+    pub began: u64,
+    pub device: &'static str,
+    pub scene: &'static str,
+    pub triangle: &'static str,
+    pub box_test: &'static str,
 }
 
-const HERE: Sitting = Sitting {
+pub const HERE: Sitting = Sitting {
     began: 1_700_000_000,
     device: "a GPU",
     scene: "box",
     triangle: "watertight",
+    box_test: "padded",
 };
 
 fn interval(ms: &[f64]) -> serde_json::Value {
@@ -37,7 +39,7 @@ fn interval(ms: &[f64]) -> serde_json::Value {
     json!({ "value": i.value, "low": i.low, "high": i.high })
 }
 
-fn drifted(own: [f64; 8]) -> Vec<f64> {
+pub fn drifted(own: [f64; 8]) -> Vec<f64> {
     own.iter()
         .zip(DRIFT)
         .map(|(own, drift)| own * drift)
@@ -45,16 +47,22 @@ fn drifted(own: [f64; 8]) -> Vec<f64> {
 }
 
 /// Time of a full cell with these milliseconds, and that it is done.
-fn timed(accel: &str, at: Sitting, ms: &[f64]) -> [Line; 2] {
+pub fn timed(accel: &str, at: Sitting, ms: &[f64]) -> [Line; 2] {
+    sampled(accel, at, ms, 2)
+}
+
+fn sampled(accel: &str, at: Sitting, ms: &[f64], spp: u32) -> [Line; 2] {
     let rates: Vec<f64> = ms.iter().map(|ms| 3e3 / ms * 1e-3).collect();
     let body = json!({
-        "kind": "time", "resolution": [8, 8], "spp": 2, "ms": ms, "wall_ms": ms,
-        "ms_per_spp": interval(&ms.iter().map(|ms| ms / 2.0).collect::<Vec<_>>()),
+        "kind": "time", "resolution": [8, 8], "spp": spp, "ms": ms, "wall_ms": ms,
+        "ms_per_spp": interval(&ms.iter().map(|ms| ms / f64::from(spp)).collect::<Vec<_>>()),
         "rays": { "primary": 1000, "shadow": 2000, "skipped": 500 }, "mrays_s": interval(&rates),
         "image_hash": "x", "image_equal": true, "failure": null,
     });
     let key = Key::default().with("scene", at.scene).with("accel", accel);
-    let key = key.with("triangle", at.triangle);
+    let key = key
+        .with("triangle", at.triangle)
+        .with("box_test", at.box_test);
     lines(key, accel, at, body)
 }
 
@@ -77,20 +85,29 @@ fn traced(accel: &str, at: Sitting, ms: [&[f64]; 2]) -> [Line; 2] {
         "heat_map": null, "heat_map_max": null, "failure": null,
     });
     let key = Key::default().with("scene", at.scene).with("accel", accel);
-    lines(key.with("triangle", at.triangle), accel, at, body)
+    lines(
+        key.with("triangle", at.triangle)
+            .with("box_test", at.box_test),
+        accel,
+        at,
+        body,
+    )
 }
 
-fn compacted(method: &str, at: Sitting, ms: &[f64]) -> [Line; 2] {
-    let per_element: Vec<f64> = ms.iter().map(|ms| 1e6 * ms / 1000.0).collect();
+fn compacted(method: &str, at: Sitting, ms: &[f64], elements: f64) -> [Line; 2] {
+    let per_element: Vec<f64> = ms.iter().map(|ms| 1e6 * ms / elements).collect();
     let body = json!({
-        "kind": "compaction", "elements": 1000, "valid": 0.5, "bytes": 8, "kept": 500, "stable": true, "passes": 3,
+        "kind": "compaction", "elements": elements as u64, "valid": 0.5, "bytes": 8, "kept": 500, "stable": true, "passes": 3,
         "scratch_bytes": 0, "least_bytes": 1, "ms": ms, "wall_ms": ms, "ns_per_element": interval(&per_element), "failure": null,
     });
     lines(Key::default().with("integrator", method), method, at, body)
 }
 
 fn lines(key: Key, unit: &str, at: Sitting, body: serde_json::Value) -> [Line; 2] {
-    let hash = format!("{unit} {} {} {}", at.began, at.scene, at.triangle);
+    let hash = format!(
+        "{unit} {} {} {} {}",
+        at.began, at.scene, at.triangle, at.box_test
+    );
     let cell = json!({
         "kind": "cell", "unit": unit, "outcome": "done", "device": at.device, "run_began_unix_s": at.began, "lines": [hash],
     });
@@ -159,6 +176,10 @@ fn only_what_was_timed_in_the_same_rounds_is_paired() {
             ..HERE
         },
         Sitting {
+            box_test: "plain",
+            ..HERE
+        },
+        Sitting {
             triangle: "moeller-trumbore",
             ..HERE
         },
@@ -168,7 +189,10 @@ fn only_what_was_timed_in_the_same_rounds_is_paired() {
         },
     ];
     for other in others {
-        let body = RATIO.replace("\"slow\" }", "\"slow\", scene = \"*\", triangle = \"*\" }");
+        let body = RATIO.replace(
+            "\"slow\" }",
+            "\"slow\", scene = \"*\", triangle = \"*\", box_test = \"*\" }",
+        );
         let row = found(&pair(HERE, other), &body);
         assert!(width(&row) > 0.5, "{row:?}");
         assert_eq!(row.verdict, Verdict::Undecided, "{row:?}");
@@ -178,7 +202,7 @@ fn only_what_was_timed_in_the_same_rounds_is_paired() {
     assert!(width(&found(&pair(unsaid, unsaid), RATIO)) > 0.5);
     // A round that one of them lacks.
     let [slow, fast] = [drifted(A), drifted(B)];
-    let fewer = [timed("slow", HERE, &slow), timed("fast", HERE, &fast[1..])].concat();
+    let fewer = [timed("slow", HERE, &slow), timed("fast", HERE, &fast[..7])].concat();
     assert!(width(&found(&fewer, RATIO)) > 0.5);
 }
 
@@ -219,14 +243,14 @@ fn rates_are_paired_as_rates_with_the_number_of_rays_of_each_side() {
     );
     let methods = ["compaction:a", "compaction:b"];
     let compactions = [
-        compacted(methods[0], HERE, &drifted(A)),
-        compacted(methods[1], HERE, &drifted(B)),
+        compacted(methods[0], HERE, &drifted(A), 1000.0),
+        compacted(methods[1], HERE, &drifted(B), 2000.0),
     ]
     .concat();
-    let body = "figure = \"compaction-ns/v1\"\ncompare = \"ratio\"\nof = { integrator = \"compaction:a\" }\nover = { integrator = \"compaction:b\" }\nleast = 1.9\n";
+    let body = "figure = \"compaction-ns/v1\"\ncompare = \"ratio\"\nof = { integrator = \"compaction:a\" }\nover = { integrator = \"compaction:b\" }\nleast = 3.9\n";
     let row = found(&compactions, body);
     assert!(
-        (row.ours.expect("a ratio").value - 2.0).abs() < 0.02 && width(&row) < 0.03,
+        (row.ours.expect("a ratio").value - 4.0).abs() < 0.02 && width(&row) < 0.03,
         "{row:?}"
     );
 }
@@ -243,4 +267,15 @@ fn of_a_cell_that_was_measured_again_the_later_rounds_count() {
         timed("fast", HERE, &drifted(B)),
     ];
     assert!(width(&found(&lines.concat(), RATIO)) < 0.03);
+}
+
+#[test]
+fn a_time_per_sample_is_paired_as_such() {
+    let lines = [
+        sampled("slow", HERE, &drifted(A), 4),
+        sampled("fast", HERE, &drifted(B), 1),
+    ];
+    let body = RATIO.replace("least = 1.9", "most = 0.51");
+    let row = found(&lines.concat(), &body);
+    assert_eq!(row.verdict, Verdict::Supported, "{row:?}");
 }

@@ -3,7 +3,7 @@
 use raystone::config::Experiment;
 use raystone::config::expect::{Expect, Thesis};
 use raystone::measure::record::{Interval, Key};
-use raystone::report::values::Value;
+use raystone::report::values::{Reading, Value};
 use raystone::repro::SOURCES;
 use raystone::repro::claim::{Context, Row, judge};
 use raystone::repro::judge::Verdict;
@@ -226,4 +226,97 @@ fn a_place_that_a_short_run_leaves_out_is_tested_by_a_whole_one_alone() {
     };
     assert_eq!(said(true), Verdict::NotTestable);
     assert_eq!(said(false), Verdict::Supported);
+}
+
+#[test]
+fn what_a_place_says_goes_before_what_the_expectation_says() {
+    let bounds = RATIO.to_owned() + "least = 1.5\nat = [{ least = 2.5 }]\n";
+    assert_eq!(found(&bounds, &gpu()).verdict, Verdict::Contradicted);
+    let most = RATIO.to_owned() + "most = 1.5\nat = [{ most = 2.5 }]\n";
+    assert_eq!(found(&most, &gpu()).verdict, Verdict::Supported);
+    let of = "figure = \"nodes-per-ray/v1\"\ncompare = \"bound\"\nof = { accel = \"slow\" }\nmost = 15\nat = [{ of = { accel = \"fast\" } }]\n";
+    let row = found(of, &gpu());
+    assert_eq!(
+        (row.verdict, row.ours.map(|i| i.value)),
+        (Verdict::Supported, Some(10.0))
+    );
+    let over = RATIO.to_owned() + "least = 1.0\nat = [{ over = { accel = \"near\" } }]\n";
+    assert_eq!(found(&over, &gpu()).ours.map(|i| i.value), Some(2.0 / 1.05));
+}
+
+#[test]
+fn an_error_that_the_reference_does_not_resolve_leaves_it_open_and_a_word_is_no_number() {
+    let key = Key::default().with("accel", "a");
+    let of = |reading: Reading, figure: &str| {
+        let values = [Value::new(&key, figure, reading)];
+        let body = format!("figure = \"{figure}\"\ncompare = \"bound\"\nmost = 1.0\n");
+        judge(&expect(&body), &values, &gpu()).remove(0)
+    };
+    let below = of(Reading::Below(0.5), "rmse-unbiased/v1");
+    assert_eq!((below.verdict, below.ours), (Verdict::Undecided, None));
+    let word = of(Reading::Word("never"), "break-even/v1");
+    assert_eq!(
+        (word.verdict, &*word.reason),
+        (Verdict::NotTestable, "never")
+    );
+}
+
+#[test]
+fn every_step_of_an_order_counts_and_the_least_is_shown() {
+    let of = |names: [&str; 3]| {
+        let picks = names
+            .map(|name| format!("{{ accel = \"{name}\" }}"))
+            .join(", ");
+        let values = [("a", 1.0), ("b", 3.0), ("c", 4.5)]
+            .map(|(accel, ms)| value(accel, 8, "ms-per-spp/v1", ms, ms, ms));
+        let body = format!("figure = \"ms-per-spp/v1\"\ncompare = \"order\"\norder = [{picks}]\n");
+        let row = judge(&expect(&body), &values, &gpu()).remove(0);
+        (row.verdict, row.ours.expect("a step").value, row.reason)
+    };
+    let (verdict, step, reason) = of(["a", "b", "c"]);
+    assert_eq!((verdict, step), (Verdict::Supported, 1.5));
+    assert!(reason.starts_with("a 1.00 → b 3.00 → c 4.50"), "{reason}");
+    assert_eq!(of(["a", "c", "b"]).0, Verdict::Contradicted);
+    assert_eq!(of(["b", "a", "c"]).0, Verdict::Contradicted);
+}
+
+#[test]
+fn each_place_of_a_bound_has_its_own_samples_and_its_own_counts() {
+    let body = "figure = \"ms-per-spp/v1\"\ncompare = \"bound\"\nof = { accel = \"!near\" }\nmost = 9.0\nexplain = [\"nodes-per-ray/v1\"]\n";
+    let rows = judge(&expect(body), &values(), &gpu());
+    let found: Vec<_> = rows
+        .iter()
+        .map(|row| (row.x, row.counted.clone()))
+        .collect();
+    let nodes = |n: f64| vec![("nodes/ray".to_owned(), n)];
+    assert_eq!(found, [(Some(8.0), nodes(10.0)), (Some(8.0), nodes(30.0))]);
+}
+
+#[test]
+fn what_was_measured_once_is_undecided_where_it_is_close() {
+    let once = [("a", 100.0), ("b", 130.0), ("c", 900.0)]
+        .map(|(accel, ms)| value(accel, 1, "build-ms/v1", ms, ms, ms));
+    let of = |accel: &str| {
+        let body = format!(
+            "figure = \"build-ms/v1\"\ncompare = \"ratio\"\nof = {{ accel = \"{accel}\" }}\nover = {{ accel = \"a\" }}\nleast = 1.0\n"
+        );
+        judge(&expect(&body), &once, &gpu()).remove(0).verdict
+    };
+    assert_eq!((of("b"), of("c")), (Verdict::Undecided, Verdict::Supported));
+}
+
+#[test]
+fn curves_of_two_structures_have_two_slopes() {
+    let mut both = values();
+    both.extend([8, 32, 128].map(|n| {
+        let y = 4.0 / f64::from(n);
+        value("b", n, "rmse-unbiased/v1", y, y, y)
+    }));
+    let body = "figure = \"rmse-unbiased/v1\"\ncompare = \"slope\"\nalong = \"spp\"\nmost = 0.0\n";
+    let rows = judge(&expect(body), &both, &gpu());
+    let slopes: Vec<f64> = rows
+        .iter()
+        .filter_map(|row| row.ours.map(|i| (100.0 * i.value).round()))
+        .collect();
+    assert_eq!(slopes, [-50.0, -100.0]);
 }
