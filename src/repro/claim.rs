@@ -330,18 +330,21 @@ impl<'e> Place<'e> {
         if !matches!(row.verdict, Verdict::NotTestable | Verdict::Faulty) {
             row.verdict = verdict;
         }
-        let named = picks.iter().zip(&numbers).map(|(pick, i)| {
-            let label = pick
-                .iter()
-                .filter(|(axis, _)| !self.expect.of.contains_key(*axis));
-            let label: Vec<&str> = label
-                .filter(|(axis, _)| *axis != "scene")
-                .map(|(_, p)| p.as_str())
-                .collect();
-            format!("{} {}", label.join(" "), format::number(i.value))
-        });
-        let named: Vec<String> = named.collect();
-        row.reason = format!("{} (least step shown)", named.join(" → "));
+        let named = picks
+            .iter()
+            .zip(chain)
+            .zip(&numbers)
+            .map(|((pick, value), i)| {
+                let own = |axis: &&String| !self.expect.of.contains_key(*axis) && *axis != "scene";
+                let labels = pick.keys().filter(own).map(|axis| value.key.label(axis));
+                let labels: Vec<&str> = labels.collect();
+                format!("{} {}", labels.join(" "), format::number(i.value))
+            });
+        let named = named.collect::<Vec<_>>().join(" → ");
+        row.reason = match row.verdict {
+            Verdict::NotTestable | Verdict::Faulty => format!("{}; {named}", row.reason),
+            _ => format!("{named} (least step shown)"),
+        };
         row
     }
 

@@ -1,6 +1,6 @@
 //! Tables in the layout of the originals for LaTeX (packages `booktabs` and `fontenc`): thesis and ours side by side.
 
-use super::page::{Grid, optional};
+use super::page::{Grid, optional, printed};
 use super::run::Reproduced;
 
 /// Every table that has columns.
@@ -34,7 +34,7 @@ fn tabular(table: &Reproduced, grid: &Grid) -> String {
             let ours = cell.and_then(|row| row.ours).map(|i| i.value);
             text += &format!(
                 " & {} & {}",
-                escape(&optional(thesis)),
+                escape(&printed(thesis)),
                 escape(&optional(ours))
             );
         }

@@ -5,6 +5,7 @@ use super::judge::{ONCE, ONCE_MS, Verdict};
 use super::run::Reproduced;
 use super::{NotCovered, plots};
 use crate::config::expect::Expect;
+use crate::measure::figure::{FIGURES, Figure};
 use crate::measure::record::Interval;
 use crate::report::document::{Banner, Block, Document, Section, Table, TableCell, Tone};
 use crate::report::format;
@@ -251,14 +252,24 @@ impl<'t> Grid<'t> {
     }
 }
 
-/// A number, or a dash.
+/// A number of ours, or a dash.
 pub fn optional(value: Option<f64>) -> String {
     value.map_or(format::ABSENT.to_owned(), format::number)
 }
 
+/// What a thesis prints, to its last digit, or a dash.
+pub fn printed(value: Option<f64>) -> String {
+    let text = |x: f64| match x.to_string() {
+        // What came of another unit may have digits that nobody printed.
+        long if long.len() > 9 => format::number(x),
+        text => text.replace('-', "−"),
+    };
+    value.map_or(format::ABSENT.to_owned(), text)
+}
+
 fn original(table: &Reproduced) -> Option<Table> {
     let grid = Grid::new(table)?;
-    let mut shown = Table::new("As the thesis prints it: its number, then ours", &[""]);
+    let mut shown = Table::new("As the thesis prints it: its number, then ours", &["row"]);
     for column in &grid.columns {
         shown.add_column(*column);
     }
@@ -267,7 +278,7 @@ fn original(table: &Reproduced) -> Option<Table> {
             None => TableCell::from(format::ABSENT),
             Some(row) => {
                 let ours = optional(row.ours.map(|ours| ours.value));
-                TableCell::from(format!("{} | {ours}", optional(row.thesis)))
+                TableCell::from(format!("{} | {ours}", printed(row.thesis)))
             }
         });
         let name = TableCell::from(*name);
@@ -294,7 +305,7 @@ fn claim(table: &Reproduced, index: usize, expect: &Expect) -> Vec<Block> {
         blocks.push(Block::Paragraph(expect.reading.clone()));
     }
     let columns = ["place", "thesis", "ours", ":verdict", ":why", ":counted"];
-    let mut shown = Table::new(format!("{}, {}", expect.figure, how(expect)), &columns);
+    let mut shown = Table::new(how(expect), &columns);
     for row in &table.claims[index] {
         let place = [row.row.as_str(), row.column.as_str()];
         let place: Vec<&str> = place.into_iter().filter(|s| !s.is_empty()).collect();
@@ -302,7 +313,7 @@ fn claim(table: &Reproduced, index: usize, expect: &Expect) -> Vec<Block> {
         let counted = counted.map(|(title, value)| format!("{title} {}", format::number(*value)));
         shown.rows.push(vec![
             place.join(", ").into(),
-            optional(row.thesis).into(),
+            printed(row.thesis).into(),
             row.ours.map_or(format::ABSENT.to_owned(), interval).into(),
             verdict_cell(row.verdict),
             row.reason.as_str().into(),
@@ -313,14 +324,18 @@ fn claim(table: &Reproduced, index: usize, expect: &Expect) -> Vec<Block> {
     blocks
 }
 
-fn how(expect: &Expect) -> &'static str {
+/// What is compared, with the unit where it has one.
+fn how(expect: &Expect) -> String {
     use crate::config::expect::Compare;
+    let figure = FIGURES.iter().find(|figure| figure.id == expect.figure);
+    let with_unit = figure.map_or_else(|| expect.figure.clone(), Figure::heading);
+    let title = figure.map_or(expect.figure.as_str(), |figure| &figure.title);
     match expect.compare {
-        Compare::Shown => "shown",
-        Compare::Bound => "the value itself",
-        Compare::Ratio => "a ratio",
-        Compare::Order => "the least ratio of neighbours in the order",
-        Compare::Slope => "the exponent",
+        Compare::Shown => format!("{with_unit}: shown"),
+        Compare::Bound => with_unit,
+        Compare::Ratio => format!("{title}: a ratio"),
+        Compare::Order => format!("{title}: the least ratio of neighbours in the order"),
+        Compare::Slope => format!("{title}: the exponent"),
     }
 }
 

@@ -105,7 +105,10 @@ fn bars_of(table: &Reproduced, expect: &Expect, rows: &[Row]) -> Option<Illustra
     let name = format!("{}-{}", table.name, expect.id);
     Some(Illustration::new(
         name,
-        format!("{}: ours.", expect.says),
+        format!(
+            "{}: ours; the thesis's numbers are in the table above.",
+            expect.says
+        ),
         drawing,
     ))
 }
@@ -113,6 +116,8 @@ fn bars_of(table: &Reproduced, expect: &Expect, rows: &[Row]) -> Option<Illustra
 /// Bars of ours, by what stands before the dot of a row.
 fn bars(rows: &[Row]) -> Vec<(String, Vec<Bar>)> {
     let mut groups: Vec<(String, Vec<Bar>)> = Vec::new();
+    // A colour stands for one label, whichever bars a group lacks.
+    let mut labels: Vec<&str> = Vec::new();
     for row in rows.iter().filter(|row| row.ours.is_some()) {
         let (group, label) = row.row.split_once(" · ").unwrap_or(("", &row.row));
         let bars = match groups.iter().position(|(name, _)| name == group) {
@@ -123,9 +128,14 @@ fn bars(rows: &[Row]) -> Vec<(String, Vec<Bar>)> {
                 &mut groups[last].1
             }
         };
+        let look = labels.iter().position(|known| *known == label);
+        let look = look.unwrap_or_else(|| {
+            labels.push(label);
+            labels.len() - 1
+        });
         bars.push(Bar {
             label: label.to_owned(),
-            look: bars.len(),
+            look,
             rate: row.ours,
             instead: String::new(),
         });
@@ -175,8 +185,14 @@ mod tests {
         let mut rows = table.claims[0].clone();
         rows[0].row = "Box · BVH".to_owned();
         rows[1].row = "Box · Grid".to_owned();
+        rows.push(row(1.0, 3.0, 4.0));
+        rows[2].row = "Hall · Grid".to_owned();
         let groups = bars(&rows);
-        assert_eq!((groups.len(), &*groups[0].0), (1, "Box"));
+        assert_eq!(
+            (groups.len(), &*groups[0].0, &*groups[1].0),
+            (2, "Box", "Hall")
+        );
+        assert_eq!(groups[1].1[0].look, groups[0].1[1].look);
         let found = groups[0]
             .1
             .iter()

@@ -363,11 +363,11 @@ fn the_page_begins_with_counts_and_shows_the_theses_number_before_ours() {
         "| Box of 2001 | 1,234 | cornell-box | 34 |",
         "| Ball of 2001 | 5,678 | displaced-sphere | 70,001 | Round, too. |",
         "| Gone | 99 | – |",
-        "| 5 % | 11.0 \\| 5.00 | 3.50 \\| 2.00 |",
+        "| 5 % | 11 \\| 5.00 | 3.5 \\| 2.00 |",
         "| made | H3 | A BVH takes fewer bytes, by a clock | not testable here | 2 places: times of a software adapter say nothing of a GPU |",
-        "| ball | 22.0 \\| 7.00 | – |",
-        "| gone | 33.0 \\| – | – |",
-        "| 5 %, nodes | 3.50 | 2.00 | **supported** | agrees: ≥ 1.5 |",
+        "| ball | 22 \\| 7.00 | – |",
+        "| gone | 33 \\| – | – |",
+        "| 5 %, nodes | 3.5 | 2.00 | **supported** | agrees: ≥ 1.5 |",
     ] {
         assert!(text.contains(part), "{part} in\n{text}");
     }
@@ -399,6 +399,8 @@ fn the_page_begins_with_counts_and_shows_the_theses_number_before_ours() {
         high: 3.0,
     };
     assert_eq!(page::interval(i), "2.00 [1.00, 3.00]");
+    assert_eq!(page::printed(Some(10.96)), "10.96");
+    assert_eq!(page::printed(Some(0.1 + 0.2)), "0.300");
     let html = html::page(&document).expect("a page");
     assert!(html.contains("5 % of A &amp; B_c") && !html.contains("A & B_c"));
     let quick = Settings {
@@ -429,8 +431,8 @@ fn latex_has_a_pair_of_columns_for_each_with_names_that_it_can_read() {
         "\\begin{tabular}{lrrrr}",
         " & \\multicolumn{2}{c}{A \\& B} & \\multicolumn{2}{c}{nodes} \\\\",
         " & thesis & ours & thesis & ours \\\\",
-        "5 \\% & 11.0 & 5.00 & 3.50 & 2.00 \\\\",
-        "gone & 33.0 & --",
+        "5 \\% & 11 & 5.00 & 3.5 & 2.00 \\\\",
+        "gone & 33 & --",
         "\\label{tab:made}",
     ] {
         assert!(text.contains(part), "{part} in\n{text}");

@@ -95,7 +95,9 @@ fn times_of_a_software_adapter_are_shown_and_not_judged() {
     let anywhere = found(&format!("{RATIO}least = 1.5"), &software());
     assert_eq!(anywhere.verdict, Verdict::Supported);
     let order = "figure = \"ms-per-spp/v1\"\ncompare = \"order\"\ndevice = \"gpu\"\norder = [{ accel = \"fast\" }, { accel = \"slow\" }]\n";
-    assert_eq!(found(order, &software()).verdict, Verdict::NotTestable);
+    let row = found(order, &software());
+    assert_eq!(row.verdict, Verdict::NotTestable);
+    assert!(row.reason.contains("software") && row.reason.contains("fast 1.00 → slow 2.00"));
 }
 
 #[test]
