@@ -52,11 +52,12 @@ pub fn timed(accel: &str, at: Sitting, ms: &[f64]) -> [Line; 2] {
 }
 
 fn sampled(accel: &str, at: Sitting, ms: &[f64], spp: u32) -> [Line; 2] {
-    let rates: Vec<f64> = ms.iter().map(|ms| 3e3 / ms * 1e-3).collect();
+    let rays = f64::from(500 * spp + 2000);
+    let rates: Vec<f64> = ms.iter().map(|ms| rays / ms * 1e-3).collect();
     let body = json!({
         "kind": "time", "resolution": [8, 8], "spp": spp, "ms": ms, "wall_ms": ms,
         "ms_per_spp": interval(&ms.iter().map(|ms| ms / f64::from(spp)).collect::<Vec<_>>()),
-        "rays": { "primary": 1000, "shadow": 2000, "skipped": 500 }, "mrays_s": interval(&rates),
+        "rays": { "primary": 500 * spp, "shadow": 2000, "skipped": 500 }, "mrays_s": interval(&rates),
         "image_hash": "x", "image_equal": true, "failure": null,
     });
     let key = Key::default().with("scene", at.scene).with("accel", accel);
@@ -278,4 +279,11 @@ fn a_time_per_sample_is_paired_as_such() {
     let body = RATIO.replace("least = 1.9", "most = 0.51");
     let row = found(&lines.concat(), &body);
     assert_eq!(row.verdict, Verdict::Supported, "{row:?}");
+    // 4,000 rays in twice the time that 2,500 take.
+    let rate = RATIO.replace("ms-per-spp", "cell-mrays-per-s");
+    let row = found(&lines.concat(), &rate);
+    assert!(
+        (row.ours.expect("a ratio").value - 0.8).abs() < 0.01,
+        "{row:?}"
+    );
 }
