@@ -8,7 +8,7 @@ use raystone::report::data::RunData;
 use raystone::report::document::{Block, Document, Tone};
 use raystone::report::{html, markdown, sections};
 use raystone::repro::judge::Verdict;
-use raystone::repro::run::{Reproduced, Settings, is_done, prepare, recorded};
+use raystone::repro::run::{Placed, Reproduced, Settings, is_done, prepare, recorded};
 use raystone::repro::{NotCovered, Source, latex, page};
 use raystone::run::Registries;
 use serde_json::{Value, json};
@@ -236,7 +236,7 @@ fn records_are_judged_and_a_clock_speaks_on_a_device_alone() {
         "5 supported, 2 contradicted, 1 not testable here"
     );
     // What stands for which scene, with its own triangles.
-    let scenes: Vec<(String, Option<(String, Option<usize>)>)> = (software.scenes.iter())
+    let scenes: Vec<(String, Option<Placed>)> = (software.scenes.iter())
         .map(|(s, ours)| (s.original.clone(), ours.clone().ok()))
         .collect();
     let there =
