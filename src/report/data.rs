@@ -144,7 +144,7 @@ pub const SAMPLER_AXES: [&str; 8] = [
 ];
 
 /// The key of a line; a structure that ran without the driver's checks has another label.
-fn competitor(line: &Line) -> Key {
+pub fn competitor(line: &Line) -> Key {
     let accel = line.key.label(axis::ACCEL);
     match line.ran.unchecked && !accel.is_empty() {
         true => (line.key.clone()).with(axis::ACCEL, format!("{accel} (unchecked)")),

@@ -1,6 +1,7 @@
 //! An expectation against what a run found: a row for each place where it speaks.
 
 use super::judge::{Bounds, Verdict, factor, ratio, slope, spread};
+use super::rounds::Rounds;
 use super::select::{fits, merged, partner, select, words};
 use crate::config::expect::{At, Compare, Expect, Pick, Speaks};
 use crate::measure::record::{Interval, Key};
@@ -18,6 +19,8 @@ pub struct Context {
     pub scenes: Vec<(String, Result<String, String>)>,
     /// What was left out or failed: the cell in words, and why.
     pub absent: Vec<(Key, String)>,
+    /// What is known round by round.
+    pub rounds: Rounds,
 }
 
 /// One place of a claim.
@@ -265,10 +268,16 @@ impl<'e> Place<'e> {
         upper.into_iter().map(pair).collect()
     }
 
+    /// A ratio with its interval: of times of the same rounds by the ratios of each, else as of independent parts.
+    fn ratio(&self, a: &Value, b: &Value) -> Option<Interval> {
+        let paired = self.context.rounds.ratio(a, b);
+        paired.or_else(|| Some(ratio(known(a)?, known(b)?)))
+    }
+
     fn ratios(&self, values: &[Value], figure: &str) -> Result<Vec<Row>, (Pick, String)> {
         let row = |[a, b]: &[&Value; 2]| match (known(a), known(b)) {
-            (Some(x), Some(y)) => {
-                let mut row = self.judged(ratio(x, y), "", &a.key);
+            (Some(_), Some(_)) => {
+                let mut row = self.judged(self.ratio(a, b)?, "", &a.key);
                 row.counted = self.counted(values, |figure| {
                     let pairs = self.pairs(values, figure).ok()?;
                     let same = pairs.iter().find(|[c, _]| agrees(&c.key, &a.key))?;
@@ -309,7 +318,8 @@ impl<'e> Place<'e> {
             return row;
         }
         let numbers: Vec<Interval> = chain.iter().filter_map(|value| known(value)).collect();
-        let steps: Vec<Interval> = numbers.windows(2).map(|w| ratio(w[1], w[0])).collect();
+        let steps = chain.windows(2).filter_map(|w| self.ratio(w[1], w[0]));
+        let steps: Vec<Interval> = steps.collect();
         let ascends = Bounds::new(Some(1.0), None);
         let verdict = Verdict::of_all(steps.iter().map(|step| ascends.judge(*step)));
         let least = steps.into_iter().min_by(|a, b| a.value.total_cmp(&b.value));
@@ -320,18 +330,21 @@ impl<'e> Place<'e> {
         if !matches!(row.verdict, Verdict::NotTestable | Verdict::Faulty) {
             row.verdict = verdict;
         }
-        let named = picks.iter().zip(&numbers).map(|(pick, i)| {
-            let label = pick
-                .iter()
-                .filter(|(axis, _)| !self.expect.of.contains_key(*axis));
-            let label: Vec<&str> = label
-                .filter(|(axis, _)| *axis != "scene")
-                .map(|(_, p)| p.as_str())
-                .collect();
-            format!("{} {}", label.join(" "), format::number(i.value))
-        });
-        let named: Vec<String> = named.collect();
-        row.reason = format!("{} (least step shown)", named.join(" → "));
+        let named = picks
+            .iter()
+            .zip(chain)
+            .zip(&numbers)
+            .map(|((pick, value), i)| {
+                let own = |axis: &&String| !self.expect.of.contains_key(*axis) && *axis != "scene";
+                let labels = pick.keys().filter(own).map(|axis| value.key.label(axis));
+                let labels: Vec<&str> = labels.collect();
+                format!("{} {}", labels.join(" "), format::number(i.value))
+            });
+        let named = named.collect::<Vec<_>>().join(" → ");
+        row.reason = match row.verdict {
+            Verdict::NotTestable | Verdict::Faulty => format!("{}; {named}", row.reason),
+            _ => format!("{named} (least step shown)"),
+        };
         row
     }
 

@@ -2,8 +2,8 @@
 //!
 //! The interval of a ratio or of a fitted exponent is that of the *method of variance estimates recovery* on
 //! logarithms (Zou & Donner 2008; Donner & Zou 2012): each side's own 95 % interval, asymmetric as it is, gives its
-//! part of the spread, and the parts add in squares. It takes both sides for independent; where they were measured
-//! in the same interleaved rounds their errors agree in part, and the interval is wider than it need be.
+//! part of the spread, and the parts add in squares. It takes both sides for independent; ratios of what was timed in the
+//! same rounds are those of [`super::rounds`].
 
 use crate::measure::figure::{Figure, Spread};
 use crate::measure::record::Interval;
@@ -210,6 +210,9 @@ mod tests {
         assert_eq!(between.judge(i(1.03, 1.04, 1.05)), Verdict::Contradicted);
         assert_eq!(between.judge(i(0.9, 1.0, 1.1)), Verdict::Undecided);
         assert_eq!(between.judge(i(f64::NAN, 1.0, 1.1)), Verdict::Undecided);
+        let at_most = Bounds::new(None, Some(2.0));
+        let words = [at_least, at_most, between, Bounds::new(None, None)].map(Bounds::words);
+        assert_eq!(words, ["≥ 1", "≤ 2", "0.975 … 1.025", "anything"]);
     }
 
     #[test]
@@ -257,6 +260,9 @@ mod tests {
     fn units_convert_within_their_kind() {
         assert_eq!(factor("s", "ms"), Some(1000.0));
         assert_eq!(factor("%", ""), Some(0.01));
+        assert_eq!(factor("ns", "ms"), Some(1e-6));
+        assert_eq!(factor("KiB", "bytes"), Some(1024.0));
+        assert_eq!(factor("Mrays/s", "rays/s"), Some(1e6));
         assert_eq!(factor("ms", "Mrays/s"), None);
         assert_eq!(factor("furlongs", "furlongs"), Some(1.0));
     }

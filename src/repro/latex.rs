@@ -1,6 +1,6 @@
 //! Tables in the layout of the originals for LaTeX (packages `booktabs` and `fontenc`): thesis and ours side by side.
 
-use super::page::{Grid, optional};
+use super::page::{Grid, optional, printed};
 use super::run::Reproduced;
 
 /// Every table that has columns.
@@ -34,7 +34,7 @@ fn tabular(table: &Reproduced, grid: &Grid) -> String {
             let ours = cell.and_then(|row| row.ours).map(|i| i.value);
             text += &format!(
                 " & {} & {}",
-                escape(&optional(thesis)),
+                escape(&printed(thesis)),
                 escape(&optional(ours))
             );
         }
@@ -70,6 +70,10 @@ mod tests {
     #[test]
     fn what_latex_reads_as_commands_is_shown() {
         assert_eq!(super::escape("5 % of a_b & c"), "5 \\% of a\\_b \\& c");
+        assert_eq!(
+            super::escape("≥ ≤ – √×μ"),
+            "$\\geq$ $\\leq$ -- $\\surd$$\\times$$\\mu$"
+        );
         assert_eq!(super::escape("\\x·y"), "\\textbackslash{}x$\\cdot$y");
     }
 }

@@ -9,6 +9,7 @@ pub mod judge;
 pub mod latex;
 pub mod page;
 mod plots;
+pub mod rounds;
 pub mod run;
 pub mod scenes;
 pub mod select;
@@ -37,15 +38,17 @@ macro_rules! sources {
 }
 
 /// All experiments, in the order of the theses.
-pub static SOURCES: [Source; 15] = sources![
+pub static SOURCES: [Source; 17] = sources![
     "nilsson-table-5-2",
     "nilsson-table-5-3",
     "nilsson-table-5-4",
     "dufay-table-2-2",
     "dufay-tables-3-2-to-3-5",
+    "dufay-h3b-path-depth",
     "dufay-h15-shadow-rays",
     "dufay-table-4-1",
     "dufay-table-4-2",
+    "dufay-h16-kd-tree",
     "dufay-table-5-1",
     "dufay-figs-5-3-and-5-4",
     "dufay-fig-5-14",

@@ -5,6 +5,7 @@ use super::judge::{ONCE, ONCE_MS, Verdict};
 use super::run::Reproduced;
 use super::{NotCovered, plots};
 use crate::config::expect::Expect;
+use crate::measure::figure::{FIGURES, Figure};
 use crate::measure::record::Interval;
 use crate::report::document::{Banner, Block, Document, Section, Table, TableCell, Tone};
 use crate::report::format;
@@ -69,8 +70,9 @@ fn summary(tables: &[Reproduced]) -> Section {
     let mut section = Section::new("claims", "Verdicts");
     section.blocks.push(Block::Paragraph(format!(
         "Claims: {}. A claim about several places is contradicted by one of them, and supported where all that can be tested \
-         support it. Absolute times are shown, never judged. Intervals are of 95 %; those of ratios and slopes combine the \
-         intervals of their parts on logarithms (Zou & Donner 2008). What was measured once is taken to be within a factor of \
+         support it. Absolute times are shown, never judged. Intervals are of 95 %; those of ratios of what was timed in the same \
+         rounds are taken round by round, those of other ratios and of slopes combine the intervals of their parts on \
+         logarithms (Zou & Donner 2008). What was measured once is taken to be within a factor of \
          {ONCE}, and a time to within {ONCE_MS} ms besides. A contradicted claim is a finding.",
         tally(tables)
     )));
@@ -137,7 +139,16 @@ fn places(rows: &[Row]) -> String {
             ];
             let said = all.into_iter().filter(|v| count(*v) > 0);
             let said: Vec<String> = said.map(|v| format!("{} {}", count(v), v.word())).collect();
-            said.join(", ")
+            // Where nothing could be tested, the reason of most places.
+            let reasons = rows.iter().map(|row| row.reason.as_str());
+            let times = |reason: &str| rows.iter().filter(|row| row.reason == reason).count();
+            let reason = reasons
+                .max_by_key(|reason| times(reason))
+                .unwrap_or_default();
+            match count(Verdict::NotTestable) == rows.len() {
+                true => format!("{} places: {reason}", rows.len()),
+                false => said.join(", "),
+            }
         }
     }
 }
@@ -156,11 +167,9 @@ pub fn interval(i: Interval) -> String {
 }
 
 fn section(table: &Reproduced) -> Section {
-    let mut section = Section::new(
-        table.name,
-        format!("{}: {}", table.name, table.thesis.title),
-    );
+    let mut section = Section::new(table.name, table.name);
     let blocks = &mut section.blocks;
+    blocks.push(Block::Heading(table.thesis.title.clone()));
     if let Some(environment) = &table.environment {
         let place = format::where_and_when(environment, table.started);
         blocks.push(Block::Paragraph(place));
@@ -243,14 +252,24 @@ impl<'t> Grid<'t> {
     }
 }
 
-/// A number, or a dash.
+/// A number of ours, or a dash.
 pub fn optional(value: Option<f64>) -> String {
     value.map_or(format::ABSENT.to_owned(), format::number)
 }
 
+/// What a thesis prints, to its last digit, or a dash.
+pub fn printed(value: Option<f64>) -> String {
+    let text = |x: f64| match x.to_string() {
+        // What came of another unit may have digits that nobody printed.
+        long if long.len() > 9 => format::number(x),
+        text => text.replace('-', "−"),
+    };
+    value.map_or(format::ABSENT.to_owned(), text)
+}
+
 fn original(table: &Reproduced) -> Option<Table> {
     let grid = Grid::new(table)?;
-    let mut shown = Table::new("As the thesis prints it: its number, then ours", &[""]);
+    let mut shown = Table::new("As the thesis prints it: its number, then ours", &["row"]);
     for column in &grid.columns {
         shown.add_column(*column);
     }
@@ -259,7 +278,7 @@ fn original(table: &Reproduced) -> Option<Table> {
             None => TableCell::from(format::ABSENT),
             Some(row) => {
                 let ours = optional(row.ours.map(|ours| ours.value));
-                TableCell::from(format!("{} | {ours}", optional(row.thesis)))
+                TableCell::from(format!("{} | {ours}", printed(row.thesis)))
             }
         });
         let name = TableCell::from(*name);
@@ -286,7 +305,7 @@ fn claim(table: &Reproduced, index: usize, expect: &Expect) -> Vec<Block> {
         blocks.push(Block::Paragraph(expect.reading.clone()));
     }
     let columns = ["place", "thesis", "ours", ":verdict", ":why", ":counted"];
-    let mut shown = Table::new(format!("{}, {}", expect.figure, how(expect)), &columns);
+    let mut shown = Table::new(how(expect), &columns);
     for row in &table.claims[index] {
         let place = [row.row.as_str(), row.column.as_str()];
         let place: Vec<&str> = place.into_iter().filter(|s| !s.is_empty()).collect();
@@ -294,7 +313,7 @@ fn claim(table: &Reproduced, index: usize, expect: &Expect) -> Vec<Block> {
         let counted = counted.map(|(title, value)| format!("{title} {}", format::number(*value)));
         shown.rows.push(vec![
             place.join(", ").into(),
-            optional(row.thesis).into(),
+            printed(row.thesis).into(),
             row.ours.map_or(format::ABSENT.to_owned(), interval).into(),
             verdict_cell(row.verdict),
             row.reason.as_str().into(),
@@ -305,14 +324,18 @@ fn claim(table: &Reproduced, index: usize, expect: &Expect) -> Vec<Block> {
     blocks
 }
 
-fn how(expect: &Expect) -> &'static str {
+/// What is compared, with the unit where it has one.
+fn how(expect: &Expect) -> String {
     use crate::config::expect::Compare;
+    let figure = FIGURES.iter().find(|figure| figure.id == expect.figure);
+    let with_unit = figure.map_or_else(|| expect.figure.clone(), Figure::heading);
+    let title = figure.map_or(expect.figure.as_str(), |figure| &figure.title);
     match expect.compare {
-        Compare::Shown => "shown",
-        Compare::Bound => "the value itself",
-        Compare::Ratio => "a ratio",
-        Compare::Order => "the least ratio of neighbours in the order",
-        Compare::Slope => "the exponent",
+        Compare::Shown => format!("{with_unit}: shown"),
+        Compare::Bound => with_unit,
+        Compare::Ratio => format!("{title}: a ratio"),
+        Compare::Order => format!("{title}: the least ratio of neighbours in the order"),
+        Compare::Slope => format!("{title}: the exponent"),
     }
 }
 

@@ -6,14 +6,8 @@ use crate::config::expect::Expect;
 use crate::measure::figure::FIGURES;
 use crate::measure::record::Interval;
 use crate::report::document::{Block, Illustration};
-use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Guide, Ticks};
+use crate::report::plot::curves::{Curve, CurvePlot, CurvePoint, Ticks};
 use crate::report::plot::rates::{Bar, RatePlot};
-
-/// Exponents of the thesis's fits `factor / √N`, by table.
-const FITS: [(&str, &str, f64); 2] = [
-    ("dufay-fig-5-14", "Dufay: 2.5/√N", 2.5),
-    ("dufay-fig-5-15", "Dufay: 1.5/√N", 1.5),
-];
 
 /// All plots of a table.
 pub fn of(table: &Reproduced) -> Option<Block> {
@@ -38,6 +32,14 @@ fn is_ratio(expect: &Expect) -> bool {
 
 /// Every series of a figure over samples or points; those of the thesis are dashed.
 fn curves(table: &Reproduced, figure: &str) -> Option<Illustration> {
+    let stem = figure.split('/').next().unwrap_or(figure);
+    curve_plot(table, figure).figure(
+        format!("{}-{stem}", table.name),
+        "Ours with 95 % intervals; dashed: the thesis's numbers, or exact values.",
+    )
+}
+
+fn curve_plot(table: &Reproduced, figure: &str) -> CurvePlot {
     let mut plot = CurvePlot {
         x_title: "N".to_owned(),
         x_ticks: Ticks::PowersOfTwo,
@@ -70,15 +72,7 @@ fn curves(table: &Reproduced, figure: &str) -> Option<Illustration> {
         }
     }
     plot.curves.retain(|curve| !curve.points.is_empty());
-    let fits = FITS.iter().filter(|(name, _, _)| *name == table.name);
-    plot.guides = fits
-        .map(|(_, label, k)| Guide::new(*label, *k, -0.5))
-        .collect();
-    let stem = figure.split('/').next().unwrap_or(figure);
-    plot.figure(
-        format!("{}-{stem}", table.name),
-        "Ours with 95 % intervals; dashed: the thesis's numbers, or exact values.",
-    )
+    plot
 }
 
 fn by_column(rows: &[Row]) -> Vec<(&str, Vec<&Row>)> {
@@ -100,7 +94,30 @@ fn points(rows: &[&Row], of: impl Fn(&Row) -> Option<Interval>) -> Vec<CurvePoin
 }
 
 fn bars_of(table: &Reproduced, expect: &Expect, rows: &[Row]) -> Option<Illustration> {
+    let software = table.environment.as_ref().is_none_or(|e| e.software);
+    let clock = if software {
+        "software adapter"
+    } else {
+        "device"
+    };
+    let groups = bars(rows);
+    let drawing = RatePlot { clock, groups }.draw()?;
+    let name = format!("{}-{}", table.name, expect.id);
+    Some(Illustration::new(
+        name,
+        format!(
+            "{}: ours; the thesis's numbers are in the table above.",
+            expect.says
+        ),
+        drawing,
+    ))
+}
+
+/// Bars of ours, by what stands before the dot of a row.
+fn bars(rows: &[Row]) -> Vec<(String, Vec<Bar>)> {
     let mut groups: Vec<(String, Vec<Bar>)> = Vec::new();
+    // A colour stands for one label, whichever bars a group lacks.
+    let mut labels: Vec<&str> = Vec::new();
     for row in rows.iter().filter(|row| row.ours.is_some()) {
         let (group, label) = row.row.split_once(" · ").unwrap_or(("", &row.row));
         let bars = match groups.iter().position(|(name, _)| name == group) {
@@ -111,24 +128,85 @@ fn bars_of(table: &Reproduced, expect: &Expect, rows: &[Row]) -> Option<Illustra
                 &mut groups[last].1
             }
         };
+        let look = labels.iter().position(|known| *known == label);
+        let look = look.unwrap_or_else(|| {
+            labels.push(label);
+            labels.len() - 1
+        });
         bars.push(Bar {
             label: label.to_owned(),
-            look: bars.len(),
+            look,
             rate: row.ours,
             instead: String::new(),
         });
     }
-    let software = table.environment.as_ref().is_none_or(|e| e.software);
-    let clock = if software {
-        "software adapter"
-    } else {
-        "device"
-    };
-    let drawing = RatePlot { clock, groups }.draw()?;
-    let name = format!("{}-{}", table.name, expect.id);
-    Some(Illustration::new(
-        name,
-        format!("{}: ours.", expect.says),
-        drawing,
-    ))
+    groups
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::expect::Thesis;
+    use crate::repro::judge::Verdict;
+
+    const TEXT: &str = "[thesis]\ntitle = \"t\"\nsource = \"s\"\n[[expect]]\nid = \"a\"\nsays = \"b\"\nfigure = \"rmse-unbiased/v1\"\ncompare = \"shown\"\n";
+
+    #[test]
+    fn a_curve_of_ours_is_solid_and_one_of_the_thesis_dashed_each_over_its_samples() {
+        let row = |x: f64, ours: f64, thesis: f64| Row {
+            row: x.to_string(),
+            column: "Halton".to_owned(),
+            thesis: Some(thesis),
+            ours: Some(Interval::exact(ours)),
+            x: Some(x),
+            verdict: Verdict::Shown,
+            reason: String::new(),
+            counted: Vec::new(),
+        };
+        let table = Reproduced {
+            name: "made",
+            thesis: Thesis::parse(TEXT, "x").expect("sound").expect("a thesis"),
+            environment: None,
+            started: 0,
+            quick: false,
+            changes: Vec::new(),
+            scenes: Vec::new(),
+            claims: vec![vec![row(16.0, 0.5, 0.25), row(8.0, 1.0, 0.75)]],
+        };
+        let plot = curve_plot(&table, "rmse-unbiased/v1");
+        let found = plot.curves.iter().map(|c| {
+            let points: Vec<_> = c.points.iter().map(|p| (p.x, p.y)).collect();
+            (c.label.as_str(), c.exact, points)
+        });
+        let ours = ("Halton, ours", false, vec![(8.0, 1.0), (16.0, 0.5)]);
+        let thesis = ("Halton, thesis", true, vec![(8.0, 0.75), (16.0, 0.25)]);
+        assert_eq!(found.collect::<Vec<_>>(), [ours, thesis]);
+        assert!(of(&table).is_some());
+        let mut rows = table.claims[0].clone();
+        rows[0].row = "Box · BVH".to_owned();
+        rows[1].row = "Box · Grid".to_owned();
+        rows.push(row(1.0, 3.0, 4.0));
+        rows[2].row = "Hall · Grid".to_owned();
+        let groups = bars(&rows);
+        assert_eq!(
+            (groups.len(), &*groups[0].0, &*groups[1].0),
+            (2, "Box", "Hall")
+        );
+        assert_eq!(groups[1].1[0].look, groups[0].1[1].look);
+        let found = groups[0]
+            .1
+            .iter()
+            .map(|bar| (&*bar.label, bar.rate.map(|i| i.value)));
+        let ours = [("BVH", Some(0.5)), ("Grid", Some(1.0))];
+        assert_eq!(found.collect::<Vec<_>>(), ours);
+        // What is a ratio is no curve.
+        let ratio = TEXT.replace(
+            "\"shown\"",
+            "\"ratio\"\nleast = 1.0\nof = { spp = \"1\" }\nover = { spp = \"2\" }",
+        );
+        let thesis = Thesis::parse(&ratio, "x")
+            .expect("sound")
+            .expect("a thesis");
+        assert!(of(&Reproduced { thesis, ..table }).is_none());
+    }
 }

@@ -3,6 +3,7 @@
 use super::Source;
 use super::claim::{Context, Row, judge};
 use super::judge::Verdict;
+use super::rounds::Rounds;
 use super::scenes::{IN_FILES, is_model, name_of, what_to_get};
 use crate::config::expect::{Compare, Substitute, Thesis, same_experiment};
 use crate::config::{ConfigError, Experiment, Pattern, Plan};
@@ -240,6 +241,7 @@ fn judged(
             .map(|(s, ours)| (s.original.clone(), ours.clone().map(|ours| pattern(&ours))))
             .collect(),
         absent: lines.iter().filter_map(absent).collect(),
+        rounds: Rounds::new(&lines),
     };
     let values = values(&data);
     let claims = prepared.thesis.expects.iter();
@@ -250,9 +252,8 @@ fn judged(
         let mut scenes = data.scenes.iter();
         let scene = scenes.find(|scene| wanted.fits_text(scene.name));
         let count = scene.and_then(|scene| Some(scene.record?.triangles));
-        // A pattern is shown as what it chose.
-        let chosen = scene.filter(|_| name_of(&ours) != ours);
-        (chosen.map_or(ours, |scene| scene.name.to_owned()), count)
+        // A pattern is shown as what it chose, a path as the name of its file.
+        (scene.map_or(ours, |scene| scene.name.to_owned()), count)
     };
     let scenes = prepared.scenes.into_iter();
     let scenes = scenes.map(|(substitute, ours)| (substitute, ours.map(placed)));

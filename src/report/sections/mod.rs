@@ -26,7 +26,8 @@ pub mod verdict;
 use super::data::{RunData, SceneGroup};
 use super::document::*;
 use super::{format, terms, values};
-use crate::measure::record::{Interval, KernelFolder};
+use crate::config::expect::Thesis;
+use crate::measure::record::{Interval, KernelFolder, RunRecord};
 use crate::measure::statistics::LEAST_FOR_MEDIAN;
 use cells::Cells;
 use std::path::Path;
@@ -90,6 +91,7 @@ fn banners(data: &RunData, warnings: &[String]) -> Vec<Banner> {
     banners.extend(busy(data).map(|text| note(&text)));
     banners.extend(loaded(data).into_iter().map(|text| note(&text)));
     banners.extend(sittings(data).map(|text| note(&text)));
+    banners.extend(data.run.and_then(plain_thesis).map(|text| note(&text)));
     let lenient = data.run.is_some_and(|run| run.lenient);
     let told = "The run was told to end with exit code 0 whatever fails (--lenient).";
     banners.extend(lenient.then(|| note(told)));
@@ -169,6 +171,19 @@ fn sittings(data: &RunData) -> Option<String> {
             data.sittings.len(),
             format::utc(*first),
             format::utc(*last)
+        )
+    })
+}
+
+/// That an experiment of a thesis ran on other scenes than those that stand for the thesis's.
+fn plain_thesis(run: &RunRecord) -> Option<String> {
+    let thesis = Thesis::parse(&run.experiment_text, &run.experiment).ok()??;
+    let is_plain = !run.experiment_text.contains("# --set axes.scene=");
+    (is_plain && !thesis.substitutes.is_empty()).then(|| {
+        format!(
+            "This run of \"{}\" took the scenes of the file's own axis. `raystone repro {}` takes those that stand for the \
+             thesis's, and holds what it finds against its numbers and claims.",
+            thesis.title, run.name
         )
     })
 }

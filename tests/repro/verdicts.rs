@@ -1,0 +1,324 @@
+//! Verdicts, on values made by hand: planted faults are seen.
+
+use raystone::config::Experiment;
+use raystone::config::expect::{Expect, Thesis};
+use raystone::measure::record::{Interval, Key};
+use raystone::report::values::{Reading, Value};
+use raystone::repro::SOURCES;
+use raystone::repro::claim::{Context, Row, judge};
+use raystone::repro::judge::Verdict;
+use raystone::run::Registries;
+
+fn value(accel: &str, n: u32, figure: &str, low: f64, at: f64, high: f64) -> Value<'static> {
+    let key = Key::default().with("scene", "box").with("accel", accel);
+    let key = key.with("spp", n);
+    Value::new(
+        &key,
+        figure,
+        Interval {
+            value: at,
+            low,
+            high,
+        },
+    )
+}
+
+fn values() -> Vec<Value<'static>> {
+    vec![
+        value("fast", 8, "ms-per-spp/v1", 0.9, 1.0, 1.1),
+        value("slow", 8, "ms-per-spp/v1", 1.8, 2.0, 2.2),
+        value("near", 8, "ms-per-spp/v1", 0.8, 1.05, 1.3),
+        value("slow", 8, "nodes-per-ray/v1", 30.0, 30.0, 30.0),
+        value("fast", 8, "nodes-per-ray/v1", 10.0, 10.0, 10.0),
+        value("a", 8, "rmse-unbiased/v1", 0.79, 0.8, 0.81),
+        value("a", 32, "rmse-unbiased/v1", 0.39, 0.4, 0.41),
+        value("a", 128, "rmse-unbiased/v1", 0.19, 0.2, 0.21),
+    ]
+}
+
+pub fn expect(body: &str) -> Expect {
+    let head = "[thesis]\ntitle = \"t\"\nsource = \"s\"\n[[expect]]\nid = \"x\"\nsays = \"y\"\n";
+    let thesis = Thesis::parse(&format!("{head}{body}"), "test.toml");
+    thesis.expect("sound").expect("a thesis").expects.remove(0)
+}
+
+fn gpu() -> Context {
+    Context::default()
+}
+
+fn software() -> Context {
+    Context {
+        software: true,
+        ..Context::default()
+    }
+}
+
+fn found(body: &str, context: &Context) -> Row {
+    let mut rows = judge(&expect(body), &values(), context);
+    assert_eq!(rows.len(), 1, "{rows:?}");
+    rows.remove(0)
+}
+
+const RATIO: &str = "figure = \"ms-per-spp/v1\"\ncompare = \"ratio\"\nof = { accel = \"slow\" }\nover = { accel = \"fast\" }\n";
+
+#[test]
+fn a_ratio_upside_down_is_seen_and_its_interval_counts() {
+    let at = |body: String| found(&body, &gpu()).verdict;
+    assert_eq!(at(format!("{RATIO}least = 1.5")), Verdict::Supported);
+    assert_eq!(at(format!("{RATIO}most = 1.0")), Verdict::Contradicted);
+    // 2.0 is above 1.9, its interval is not.
+    assert_eq!(at(format!("{RATIO}least = 1.9")), Verdict::Undecided);
+    let upside_down = RATIO
+        .replace("slow", "_")
+        .replace("fast", "slow")
+        .replace('_', "fast");
+    assert_eq!(
+        at(format!("{upside_down}least = 1.5")),
+        Verdict::Contradicted
+    );
+    let row = found(
+        &format!("{RATIO}least = 1.5\nexplain = [\"nodes-per-ray/v1\"]"),
+        &gpu(),
+    );
+    assert_eq!(row.ours.map(|i| i.value), Some(2.0));
+    assert_eq!(row.counted, [("nodes/ray".to_owned(), 3.0)]);
+}
+
+#[test]
+fn times_of_a_software_adapter_are_shown_and_not_judged() {
+    let row = found(
+        &format!("{RATIO}least = 1.5\ndevice = \"gpu\""),
+        &software(),
+    );
+    assert_eq!(row.verdict, Verdict::NotTestable);
+    assert!(row.ours.is_some() && row.reason.contains("software"));
+    let anywhere = found(&format!("{RATIO}least = 1.5"), &software());
+    assert_eq!(anywhere.verdict, Verdict::Supported);
+    let order = "figure = \"ms-per-spp/v1\"\ncompare = \"order\"\ndevice = \"gpu\"\norder = [{ accel = \"fast\" }, { accel = \"slow\" }]\n";
+    let row = found(order, &software());
+    assert_eq!(row.verdict, Verdict::NotTestable);
+    assert!(row.reason.contains("software") && row.reason.contains("fast 1.00 → slow 2.00"));
+}
+
+#[test]
+fn an_order_reversed_is_seen() {
+    let order = |names: [&str; 2]| {
+        let picks = names
+            .map(|name| format!("{{ accel = \"{name}\" }}"))
+            .join(", ");
+        let body = format!("figure = \"ms-per-spp/v1\"\ncompare = \"order\"\norder = [{picks}]\n");
+        found(&body, &gpu()).verdict
+    };
+    assert_eq!(order(["fast", "slow"]), Verdict::Supported);
+    assert_eq!(order(["slow", "fast"]), Verdict::Contradicted);
+    assert_eq!(order(["fast", "near"]), Verdict::Undecided);
+}
+
+#[test]
+fn a_slope_is_judged_against_the_thesis() {
+    let body = |thesis: f64| {
+        format!(
+            "figure = \"rmse-unbiased/v1\"\ncompare = \"slope\"\nalong = \"spp\"\noff_by = 0.1\nat = [{{ thesis = {thesis:?} }}]\n"
+        )
+    };
+    assert_eq!(found(&body(-0.5), &gpu()).verdict, Verdict::Supported);
+    assert_eq!(found(&body(0.5), &gpu()).verdict, Verdict::Contradicted);
+    assert_eq!(found(&body(-0.6), &gpu()).verdict, Verdict::Undecided);
+}
+
+#[test]
+fn a_thesis_in_another_unit_is_converted_and_one_that_measures_something_else_is_a_fault() {
+    let body = |unit: &str, thesis: &str| {
+        format!(
+            "figure = \"ms-per-spp/v1\"\ncompare = \"bound\"\nof = {{ accel = \"slow\" }}\nwithin = 1.2\nunit = \"{unit}\"\nat = [{{ thesis = {thesis} }}]\n"
+        )
+    };
+    let seconds = found(&body("s", "0.002"), &gpu());
+    assert_eq!(
+        (seconds.verdict, seconds.thesis),
+        (Verdict::Supported, Some(2.0))
+    );
+    assert_eq!(
+        found(&body("ms", "0.002"), &gpu()).verdict,
+        Verdict::Contradicted
+    );
+    assert_eq!(
+        found(&body("Mrays/s", "2.0"), &gpu()).verdict,
+        Verdict::Faulty
+    );
+}
+
+#[test]
+fn an_expectation_that_selects_nothing_is_a_fault_unless_it_was_left_out_for_a_reason() {
+    let body = RATIO.replace("\"fast\"", "\"fst\"") + "least = 1.0";
+    let row = found(&body, &gpu());
+    assert_eq!(row.verdict, Verdict::Faulty);
+    assert!(row.reason.contains("accel = fst"), "{}", row.reason);
+    let context = Context {
+        absent: vec![(
+            Key::default().with("accel", "fst"),
+            "it was too big".to_owned(),
+        )],
+        ..Context::default()
+    };
+    let row = found(&body, &context);
+    assert_eq!(
+        (row.verdict, row.reason.as_str()),
+        (Verdict::NotTestable, "it was too big")
+    );
+    let two = "figure = \"rmse-unbiased/v1\"\ncompare = \"ratio\"\nof = { spp = \"8\" }\nover = { spp = \"*\" }\nleast = 1.0";
+    let row = found(two, &gpu());
+    assert_eq!(row.verdict, Verdict::Faulty);
+    assert!(row.reason.contains("name the axis"), "{}", row.reason);
+}
+
+#[test]
+fn a_missing_scene_is_told_and_the_rest_is_judged() {
+    let head = "[thesis]\ntitle = \"t\"\nsource = \"s\"\n[[substitute]]\noriginal = \"There\"\n[[substitute]]\noriginal = \"Gone\"\n[[expect]]\nid = \"x\"\nsays = \"y\"\n";
+    let body =
+        format!("{head}{RATIO}least = 1.0\nat = [{{ on = \"There\" }}, {{ on = \"Gone\" }}]\n");
+    let thesis = Thesis::parse(&body, "test.toml")
+        .expect("sound")
+        .expect("a thesis");
+    let context = Context {
+        scenes: vec![
+            ("There".to_owned(), Ok("box".to_owned())),
+            ("Gone".to_owned(), Err("get it from there".to_owned())),
+        ],
+        ..Context::default()
+    };
+    let rows = judge(&thesis.expects[0], &values(), &context);
+    let verdicts: Vec<_> = rows
+        .iter()
+        .map(|row| (row.verdict, row.row.as_str()))
+        .collect();
+    assert_eq!(
+        verdicts,
+        [
+            (Verdict::Supported, "There"),
+            (Verdict::NotTestable, "Gone")
+        ]
+    );
+    assert_eq!(rows[1].reason, "get it from there");
+}
+
+#[test]
+fn a_plain_run_passes_over_what_is_expected_but_tells_a_fault_in_it() {
+    let registries = Registries::default();
+    let text = SOURCES[0].text;
+    let parse = |text: &str| Experiment::parse(text, "x.toml", &[], &registries.catalogue());
+    assert!(parse(text).is_ok());
+    let faulty = text.replace("compare = \"ratio\"", "compere = \"ratio\"");
+    let error = parse(&faulty).expect_err("a fault").to_string();
+    assert!(
+        error.contains("`compere`") && error.contains("`compare`"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_place_that_a_short_run_leaves_out_is_tested_by_a_whole_one_alone() {
+    let at = "least = 1.0\nat = [{ row = \"large\", full_only = true }]\n";
+    let said = |quick| {
+        let context = Context {
+            quick,
+            ..Context::default()
+        };
+        found(&(RATIO.to_owned() + at), &context).verdict
+    };
+    assert_eq!(said(true), Verdict::NotTestable);
+    assert_eq!(said(false), Verdict::Supported);
+}
+
+#[test]
+fn what_a_place_says_goes_before_what_the_expectation_says() {
+    let bounds = RATIO.to_owned() + "least = 1.5\nat = [{ least = 2.5 }]\n";
+    assert_eq!(found(&bounds, &gpu()).verdict, Verdict::Contradicted);
+    let most = RATIO.to_owned() + "most = 1.5\nat = [{ most = 2.5 }]\n";
+    assert_eq!(found(&most, &gpu()).verdict, Verdict::Supported);
+    let of = "figure = \"nodes-per-ray/v1\"\ncompare = \"bound\"\nof = { accel = \"slow\" }\nmost = 15\nat = [{ of = { accel = \"fast\" } }]\n";
+    let row = found(of, &gpu());
+    assert_eq!(
+        (row.verdict, row.ours.map(|i| i.value)),
+        (Verdict::Supported, Some(10.0))
+    );
+    let over = RATIO.to_owned() + "least = 1.0\nat = [{ over = { accel = \"near\" } }]\n";
+    assert_eq!(found(&over, &gpu()).ours.map(|i| i.value), Some(2.0 / 1.05));
+}
+
+#[test]
+fn an_error_that_the_reference_does_not_resolve_leaves_it_open_and_a_word_is_no_number() {
+    let key = Key::default().with("accel", "a");
+    let of = |reading: Reading, figure: &str| {
+        let values = [Value::new(&key, figure, reading)];
+        let body = format!("figure = \"{figure}\"\ncompare = \"bound\"\nmost = 1.0\n");
+        judge(&expect(&body), &values, &gpu()).remove(0)
+    };
+    let below = of(Reading::Below(0.5), "rmse-unbiased/v1");
+    assert_eq!((below.verdict, below.ours), (Verdict::Undecided, None));
+    let word = of(Reading::Word("never"), "break-even/v1");
+    assert_eq!(
+        (word.verdict, &*word.reason),
+        (Verdict::NotTestable, "never")
+    );
+}
+
+#[test]
+fn every_step_of_an_order_counts_and_the_least_is_shown() {
+    let of = |names: [&str; 3]| {
+        let picks = names
+            .map(|name| format!("{{ accel = \"{name}\" }}"))
+            .join(", ");
+        let values = [("a", 1.0), ("b", 3.0), ("c", 4.5)]
+            .map(|(accel, ms)| value(accel, 8, "ms-per-spp/v1", ms, ms, ms));
+        let body = format!("figure = \"ms-per-spp/v1\"\ncompare = \"order\"\norder = [{picks}]\n");
+        let row = judge(&expect(&body), &values, &gpu()).remove(0);
+        (row.verdict, row.ours.expect("a step").value, row.reason)
+    };
+    let (verdict, step, reason) = of(["a", "b", "c"]);
+    assert_eq!((verdict, step), (Verdict::Supported, 1.5));
+    assert!(reason.starts_with("a 1.00 → b 3.00 → c 4.50"), "{reason}");
+    assert_eq!(of(["a", "c", "b"]).0, Verdict::Contradicted);
+    assert_eq!(of(["b", "a", "c"]).0, Verdict::Contradicted);
+}
+
+#[test]
+fn each_place_of_a_bound_has_its_own_samples_and_its_own_counts() {
+    let body = "figure = \"ms-per-spp/v1\"\ncompare = \"bound\"\nof = { accel = \"!near\" }\nmost = 9.0\nexplain = [\"nodes-per-ray/v1\"]\n";
+    let rows = judge(&expect(body), &values(), &gpu());
+    let found: Vec<_> = rows
+        .iter()
+        .map(|row| (row.x, row.counted.clone()))
+        .collect();
+    let nodes = |n: f64| vec![("nodes/ray".to_owned(), n)];
+    assert_eq!(found, [(Some(8.0), nodes(10.0)), (Some(8.0), nodes(30.0))]);
+}
+
+#[test]
+fn what_was_measured_once_is_undecided_where_it_is_close() {
+    let once = [("a", 100.0), ("b", 130.0), ("c", 900.0)]
+        .map(|(accel, ms)| value(accel, 1, "build-ms/v1", ms, ms, ms));
+    let of = |accel: &str| {
+        let body = format!(
+            "figure = \"build-ms/v1\"\ncompare = \"ratio\"\nof = {{ accel = \"{accel}\" }}\nover = {{ accel = \"a\" }}\nleast = 1.0\n"
+        );
+        judge(&expect(&body), &once, &gpu()).remove(0).verdict
+    };
+    assert_eq!((of("b"), of("c")), (Verdict::Undecided, Verdict::Supported));
+}
+
+#[test]
+fn curves_of_two_structures_have_two_slopes() {
+    let mut both = values();
+    both.extend([8, 32, 128].map(|n| {
+        let y = 4.0 / f64::from(n);
+        value("b", n, "rmse-unbiased/v1", y, y, y)
+    }));
+    let body = "figure = \"rmse-unbiased/v1\"\ncompare = \"slope\"\nalong = \"spp\"\nmost = 0.0\n";
+    let rows = judge(&expect(body), &both, &gpu());
+    let slopes: Vec<f64> = rows
+        .iter()
+        .filter_map(|row| row.ours.map(|i| (100.0 * i.value).round()))
+        .collect();
+    assert_eq!(slopes, [-50.0, -100.0]);
+}
