@@ -375,7 +375,7 @@ fn records_that_may_not_be_read_are_named() {
     let made = Made::default().lines();
     let runs = pair(&made, &made);
     let file = runs.path("candidate/records.jsonl");
-    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0)).expect("permissions");
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o000)).expect("permissions");
     match std::fs::read(&file) {
         Ok(_) => eprintln!("SKIPPED: root may read all files"),
         Err(_) => assert!(
