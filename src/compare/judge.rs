@@ -375,16 +375,6 @@ impl TimeRatio {
         })
     }
 
-    /// The ratio with its 95 % interval, by what the rounds say of its noise.
-    pub fn interval(&self) -> Interval {
-        let Interval { value, low, high } = student(self.log, self.rounds, 0.0, "").change;
-        Interval {
-            value: value.exp(),
-            low: low.exp(),
-            high: high.exp(),
-        }
-    }
-
     /// The difference of a figure, given the noise of what did not change; without it that of the rounds. Rounds of both
     /// together also have to pass the permutation test.
     pub fn measured(&self, figure: &Figure, noise: Option<Spread>, margin: f64) -> Measured {

@@ -1,8 +1,8 @@
 //! Figures round by round, where records keep the times: cells that were timed in the same rounds share what the machine
 //! did in them, and their ratio is known better than either of them.
 
-use crate::compare::judge::TimeRatio;
 use crate::integrator::{RAY_COUNT_CLASSES, TRACED_CLASSES};
+use crate::measure::comparison::LogFigure;
 use crate::measure::record::{Body, CellRecord, Interval, Key, Line, axis};
 use crate::report::data::competitor;
 use crate::report::format;
@@ -101,6 +101,6 @@ impl Rounds {
             return None;
         }
         let ratios: Vec<f64> = x.values.iter().zip(&y.values).map(|(x, y)| x / y).collect();
-        Some(TimeRatio::of_rounds(&ratios, "adapter time")?.interval())
+        Some(LogFigure::of_times(&ratios)?.interval())
     }
 }

@@ -2,6 +2,8 @@
 //! was timed in the same rounds is paired.
 
 use super::verdicts::expect;
+use raystone::compare::judge::TimeRatio;
+use raystone::measure::figure::figure;
 use raystone::measure::record::{Interval, Key, Line, Ran};
 use raystone::report::data::RunData;
 use raystone::report::values::values;
@@ -154,12 +156,13 @@ fn a_drift_that_both_share_is_none_of_the_ratios_noise() {
     assert_eq!(row.verdict, Verdict::Supported);
     // The interval is that of the estimator of comparisons.
     let ratios: Vec<f64> = A.iter().zip(B).map(|(a, b)| a / b).collect();
-    let paired = raystone::compare::judge::TimeRatio::of_rounds(&ratios, "").expect("rounds");
-    let (ours, theirs) = (row.ours.expect("a ratio"), paired.interval());
+    let paired = TimeRatio::of_rounds(&ratios, "").expect("rounds");
+    let theirs = paired.measured(figure("ms-per-spp/v1"), None, 0.0).change;
+    let ours = row.ours.expect("a ratio");
     for (a, b) in [
-        (ours.low, theirs.low),
-        (ours.value, theirs.value),
-        (ours.high, theirs.high),
+        (ours.low, 1.0 + theirs.low),
+        (ours.value, 1.0 + theirs.value),
+        (ours.high, 1.0 + theirs.high),
     ] {
         assert!((a / b - 1.0).abs() < 1e-9, "{ours:?} {theirs:?}");
     }
