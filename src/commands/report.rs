@@ -4,7 +4,7 @@ use super::output::{OutputArguments, print, print_json, warn};
 use anyhow::Result;
 use clap::Args;
 use raystone::export::{checks_json, values_json};
-use raystone::measure::record::{PARTIAL, RECORDS_FILE, STRESS_FILE, read_records};
+use raystone::measure::record::{PARTIAL, STRESS_FILE, read_records, records_file};
 use raystone::report::data::RunData;
 use raystone::report::sections::belief::checks;
 use raystone::report::values::values;
@@ -27,7 +27,7 @@ pub struct Report {
 impl Report {
     pub fn execute(self) -> Result<ExitCode> {
         let is_suite = self.dir.join(STRESS_FILE).exists();
-        if is_suite && !self.dir.join(RECORDS_FILE).exists() {
+        if is_suite && !records_file(&self.dir).exists() {
             let records = read(&self.dir)?;
             let page = write_stress_page(&self.dir, &records)?;
             match self.output.json {
@@ -37,7 +37,7 @@ impl Report {
             return Ok(ExitCode::SUCCESS);
         }
         let partial = self.dir.join(PARTIAL);
-        let is_partial = !self.dir.join(RECORDS_FILE).exists() && partial.is_dir();
+        let is_partial = !records_file(&self.dir).exists() && partial.is_dir();
         let dir = if is_partial { &partial } else { &self.dir };
         let paths = write_report(dir)?;
         for warning in &paths.warnings {

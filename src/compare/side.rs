@@ -63,7 +63,7 @@ impl Side {
     /// There is none, or it holds something else than records.
     pub fn read(path: &Path) -> Result<Self, SideError> {
         let file = if path.is_dir() {
-            path.join(RECORDS_FILE)
+            records_file(path)
         } else {
             path.to_owned()
         };
@@ -75,7 +75,12 @@ impl Side {
         }
         let records = read_lines(&file, SCHEMA)?;
         let mut notes = records.warnings;
-        notes.extend(old_lines(&file));
+        if records.old > 0 {
+            let (old, all) = (records.old, records.lines.len());
+            notes.push(format!(
+                "{old} of {all} lines are of an older schema and were read as {SCHEMA}"
+            ));
+        }
         Ok(Self::new(path.display(), records.lines, notes))
     }
 
@@ -215,24 +220,6 @@ fn is_of_kernels(body: &Body) -> bool {
             | Body::Kernels(_)
             | Body::Cell(_)
     )
-}
-
-/// A word on lines of an older version, which are read as the present one.
-fn old_lines(file: &Path) -> Option<String> {
-    let bytes = std::fs::read(file).ok()?;
-    let rows = bytes
-        .split(|byte| *byte == b'\n')
-        .filter(|row| !row.is_empty());
-    let wanted = format!("\"{SCHEMA}\"");
-    let is_old = |row: &&[u8]| {
-        let start = String::from_utf8_lossy(&row[..row.len().min(64)]).into_owned();
-        start.contains("\"schema\"") && !start.contains(&wanted)
-    };
-    let (all, old) = rows.fold((0, 0), |(all, old), row| {
-        (all + 1, old + usize::from(is_old(&row)))
-    });
-    (old > 0)
-        .then(|| format!("{old} of {all} lines are of an older schema and were read as {SCHEMA}"))
 }
 
 /// What of two environments makes their times no measure of a change: name, and both values.

@@ -9,7 +9,7 @@ use crate::config::expect::{Compare, Substitute, Thesis, same_experiment};
 use crate::config::{ConfigError, Experiment, Pattern, Plan};
 use crate::gpu::Environment;
 use crate::measure::record::{
-    Body, Key, Line, PARTIAL, RECORDS_FILE, RecordError, RunRecord, read_records,
+    Body, Key, Line, PARTIAL, RecordError, RunRecord, read_records, records_file,
 };
 use crate::report::data::RunData;
 use crate::report::{ReportError, values::values, write_report};
@@ -218,7 +218,7 @@ fn is_of(folder: &Path, text: &str) -> bool {
 
 /// Whether a folder holds the whole records of this experiment.
 pub fn is_done(out: &Path, text: &str) -> bool {
-    if !out.join(RECORDS_FILE).is_file() || !is_of(out, text) {
+    if !records_file(out).is_file() || !is_of(out, text) {
         return false;
     }
     let finished = |line: &Line| matches!(line.body, Body::Finished(_));

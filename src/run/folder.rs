@@ -10,7 +10,7 @@ use super::RunError;
 use crate::atomic::write_atomic;
 use crate::measure::record::{
     Body, InterruptedRecord, Line, PARTIAL, RECORDS_FILE, RecordError, STRESS_FILE, read_records,
-    text_of,
+    records_file, text_of,
 };
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read as _, Seek as _, Write as _};
@@ -124,7 +124,7 @@ impl Folder {
         let is_left_over = meta(&partial).is_ok_and(|folder| folder.is_dir())
             && meta(&left_over).is_ok_and(|file| file.is_file() && file.len() > 0);
         let records = out.join(RECORDS_FILE);
-        let results = [records.clone(), out.join(STRESS_FILE)];
+        let results = [records_file(out), out.join(STRESS_FILE)];
         let results = results.into_iter().filter(|path| is_there(path));
         let replaces = matches!(existing, Existing::Replace | Existing::Resume);
         if !replaces && let Some(found) = results.chain(is_left_over.then_some(left_over)).next() {
@@ -432,7 +432,7 @@ fn promote_images(out: &Path) -> io::Result<()> {
 fn earlier_lines(out: &Path) -> Result<Vec<Line>, RunError> {
     let mut lines = Vec::new();
     for folder in [out.to_owned(), out.join(PARTIAL)] {
-        let path = folder.join(RECORDS_FILE);
+        let path = records_file(&folder);
         if fs::symlink_metadata(&path).is_ok_and(|file| file.is_file() && file.len() > 0) {
             let records = read_records(&folder);
             let fault = |error: RecordError| RunError::Input(format!("cannot resume: {error}"));

@@ -6,8 +6,8 @@ use super::resume::Earlier;
 use super::{Estimate, Registries, RunError, RunOptions};
 use crate::config::{ConfigError, Experiment, Plan, Shard, Unit, shards};
 use crate::measure::record::{
-    CellRecord, Inputs, InterruptedRecord, KernelSetRecord, Kind as _, Line, Outcome, RECORDS_FILE,
-    RecordError, RunRecord, read_records,
+    CellRecord, Inputs, InterruptedRecord, KernelSetRecord, Kind as _, Line, Outcome, RecordError,
+    RunRecord, read_records, records_file,
 };
 use crate::scene::{self, LoadOptions};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -82,7 +82,7 @@ impl Inventory {
     /// Records that cannot be read, without a first line, or of an experiment that this program does not know.
     pub fn read(dir: &Path, registries: &Registries) -> Result<Self, RunError> {
         let partial = dir.join(crate::measure::record::PARTIAL);
-        let is_partial = !dir.join(RECORDS_FILE).exists() && partial.is_dir();
+        let is_partial = !records_file(dir).exists() && partial.is_dir();
         let dir = if is_partial { &partial } else { dir };
         let fault = |error: RecordError| RunError::Input(error.to_string());
         let records = read_records(dir).map_err(fault)?;
@@ -93,7 +93,7 @@ impl Inventory {
         let run = runs.next_back().cloned().ok_or_else(|| {
             RunError::Input(format!(
                 "{} does not say of what experiment it is: its first line is missing",
-                dir.join(RECORDS_FILE).display()
+                records_file(dir).display()
             ))
         })?;
         let (experiment, plan) = planned(&run, registries)

@@ -11,7 +11,7 @@ use crate::atomic::write_atomic;
 use crate::config::Unit;
 use crate::measure::record::{
     Body, CellRecord, FinishedRecord, InterruptedRecord, KernelSetRecord, Kind as _, Line, Outcome,
-    RECORDS_FILE, RunRecord, SkippedRecord, read_records, text_of,
+    RunRecord, SkippedRecord, read_records, records_file, text_of,
 };
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -442,7 +442,7 @@ fn write(
     pictures: &BTreeMap<String, PathBuf>,
     merged: &mut Merged,
 ) -> Result<(), RunError> {
-    let records = out.join(RECORDS_FILE);
+    let records = records_file(out);
     let failed = |path: &Path, error: std::io::Error| {
         input(format!("cannot write {}: {error}", path.display()))
     };

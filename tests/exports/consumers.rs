@@ -1,6 +1,8 @@
 //! The tools that read exports, where they are installed. `RAYSTONE_PYTHON` names a Python that has their packages:
-//! `pip install junitparser jsonschema numpy`.
+//! `pip install junitparser jsonschema numpy scipy`.
 
+use serde_json::Value;
+use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
@@ -84,11 +86,58 @@ pub fn records(schema: &str, lines: &str) {
     with_module("jsonschema", RECORDS, &format!("{schema}\n{lines}"));
 }
 
+/// Google Benchmark's own comparison, where Debian's package `libbenchmark-tools` puts it.
+const GBENCH: &str = "/usr/share/benchmark/compare.py";
+
+/// The file beside itself: all names are found on both sides with all their repetitions, and nothing differs.
+fn google_benchmark(file: &str) {
+    let imports = ["-c", "import scipy"];
+    let has_scipy = answer(&python(), &imports, "").is_some_and(|(fine, _)| fine);
+    if !has_scipy || !std::path::Path::new(GBENCH).is_file() {
+        return eprintln!(
+            "SKIPPED: {GBENCH} is not installed, or {} has no scipy",
+            python()
+        );
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [input, output] = ["in.json", "out.json"].map(|name| folder.path().join(name));
+    std::fs::write(&input, file).expect("a writable folder");
+    let [input, output] = [&input, &output].map(|path| path.to_str().expect("UTF-8"));
+    let arguments = [GBENCH, "--dump_to_json", output, "benchmarks", input, input];
+    let (fine, words) = answer(&python(), &arguments, "").expect("Python");
+    assert!(fine, "{words}");
+    let json = |text: &str| serde_json::from_str::<Value>(text).expect("JSON");
+    let found = json(&std::fs::read_to_string(output).expect("what it found"));
+    let mut repetitions = BTreeMap::<&str, usize>::new();
+    for of_one in found.as_array().expect("families") {
+        let measured = of_one["measurements"].as_array().expect("measurements");
+        assert!(
+            measured.iter().all(|m| m["time"] == 0.0 && m["cpu"] == 0.0),
+            "{of_one}"
+        );
+        if of_one["run_type"] == "iteration" {
+            *repetitions
+                .entry(of_one["name"].as_str().expect("a name"))
+                .or_default() += measured.len();
+        }
+    }
+    let given = json(file);
+    let given = given["benchmarks"].as_array().expect("benchmarks").iter();
+    let mut wanted = BTreeMap::<&str, usize>::new();
+    for one in given {
+        *wanted
+            .entry(one["name"].as_str().expect("a name"))
+            .or_default() += 1;
+    }
+    assert_eq!(repetitions, wanted);
+}
+
 /// Every consumer.
 pub fn all(export: &dyn Fn(&str) -> String) {
     with_module("junitparser", JUNIT, &export("junit"));
     with_module("numpy", HYPERFINE, &export("hyperfine"));
     with_module("csv", CSV, &export("csv"));
+    google_benchmark(&export("google-benchmark"));
     latex(&export("latex"));
 }
 

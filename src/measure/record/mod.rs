@@ -25,7 +25,8 @@ pub use key::{Key, axis};
 pub use paths::PathsRecord;
 pub use peer::{PeerRecord, PeerTiming};
 pub use read::{
-    PARTIAL, RECORDS_FILE, RecordError, Records, STRESS_FILE, read_lines, read_records, text_of,
+    PARTIAL, RECORDS_FILE, RecordError, Records, STRESS_FILE, read_lines, read_records,
+    records_file, text_of,
 };
 pub use run::*;
 pub use stream::*;

@@ -4,10 +4,17 @@ use super::old::{OLD_SCHEMA, renewed};
 use super::{Line, SCHEMA};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
 /// Name of the records in a run's folder.
 pub const RECORDS_FILE: &str = "records.jsonl";
+
+/// Name of records that were packed by gzip, as results are kept that many people fetch.
+const PACKED_FILE: &str = "records.jsonl.gz";
+
+/// The first bytes of what gzip packed (RFC 1952).
+const GZIP: [u8; 2] = [0x1f, 0x8b];
 
 /// Name of the records in the folder of the stress suite.
 pub const STRESS_FILE: &str = "stress.jsonl";
@@ -23,6 +30,8 @@ pub struct Records<B = super::Body> {
     pub lines: Vec<Line<B>>,
     /// What was left out while reading, in words.
     pub warnings: Vec<String>,
+    /// How many lines are of the version before.
+    pub old: usize,
 }
 
 /// Why records cannot be read.
@@ -75,16 +84,38 @@ struct Tag {
     schema: String,
 }
 
+/// The file with the records of a run's folder: packed ones stand for those that are not there.
+pub fn records_file(dir: &Path) -> PathBuf {
+    let plain = dir.join(RECORDS_FILE);
+    let packed = dir.join(PACKED_FILE);
+    let is_there = |path: &Path| std::fs::symlink_metadata(path).is_ok();
+    match !is_there(&plain) && is_there(&packed) {
+        true => packed,
+        false => plain,
+    }
+}
+
 /// Reads the records of a run in `dir`: see [`read_lines`].
 ///
 /// # Errors
 /// As there.
 pub fn read_records(dir: &Path) -> Result<Records, RecordError> {
-    read_lines(&dir.join(RECORDS_FILE), SCHEMA)
+    read_lines(&records_file(dir), SCHEMA)
 }
 
-/// Reads a file of records of this schema, those of a run also if they are of the version before. A last line without its
-/// newline that does not parse is what a crash leaves: it is left out with a warning.
+/// The bytes of a file, unpacked where gzip packed it. Bytes, because a crash can cut a line inside a character.
+fn unpacked(path: &Path) -> io::Result<Vec<u8>> {
+    let bytes = std::fs::read(path)?;
+    if !bytes.starts_with(&GZIP) {
+        return Ok(bytes);
+    }
+    let mut text = Vec::new();
+    flate2::read::MultiGzDecoder::new(&*bytes).read_to_end(&mut text)?;
+    Ok(text)
+}
+
+/// Reads a file of records of this schema, packed by gzip or not, those of a run also if they are of the version before. A
+/// last line without its newline that does not parse is what a crash leaves: it is left out with a warning.
 ///
 /// # Errors
 /// A missing or empty file, a line of another schema, or a broken line elsewhere.
@@ -92,14 +123,14 @@ pub fn read_lines<B: DeserializeOwned>(
     path: &Path,
     wanted: &'static str,
 ) -> Result<Records<B>, RecordError> {
-    // Bytes, because a crash can cut a line inside a character.
-    let bytes = std::fs::read(path).map_err(|source| RecordError::Read {
+    let bytes = unpacked(path).map_err(|source| RecordError::Read {
         path: path.into(),
         source,
     })?;
     let mut records = Records {
         lines: Vec::new(),
         warnings: Vec::new(),
+        old: 0,
     };
     let whole = bytes.is_empty() || bytes.ends_with(b"\n");
     let mut rows = bytes.split(|&byte| byte == b'\n').enumerate().peekable();
@@ -111,6 +142,7 @@ pub fn read_lines<B: DeserializeOwned>(
         let line = index + 1;
         let parsed = match serde_json::from_slice::<Tag>(row) {
             Ok(tag) if tag.schema == OLD_SCHEMA => {
+                records.old += 1;
                 serde_json::from_slice(row).and_then(|old| serde_json::from_value(renewed(old)))
             }
             Ok(Tag { schema: found }) if found != wanted => {
@@ -188,6 +220,28 @@ mod tests {
             read(&text),
             Err(RecordError::Parse { line: 2, .. })
         ));
+    }
+
+    #[test]
+    fn packed_records_stand_for_those_that_are_not_there() {
+        use std::io::Write as _;
+        let dir = tempfile::tempdir().unwrap();
+        let packed = |text: &str| {
+            let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+            out.write_all(text.as_bytes()).unwrap();
+            out.finish().unwrap()
+        };
+        let write = |name, bytes: &[u8]| std::fs::write(dir.path().join(name), bytes).unwrap();
+        // Two parts, as of two packed files put together.
+        let both = [packed(&format!("{GOOD}\n")), packed(&format!("{GOOD}\n"))].concat();
+        write(PACKED_FILE, &both);
+        assert_eq!(read_records(dir.path()).unwrap().lines.len(), 2);
+        write(PACKED_FILE, &both[..both.len() - 9]);
+        let cut = read_records(dir.path()).unwrap_err();
+        assert!(matches!(cut, RecordError::Read { .. }), "{cut}");
+        assert!(cut.to_string().contains(PACKED_FILE), "{cut}");
+        write(RECORDS_FILE, format!("{GOOD}\n").as_bytes());
+        assert_eq!(read_records(dir.path()).unwrap().lines.len(), 1);
     }
 
     #[test]
