@@ -71,7 +71,16 @@ fn curve_plot(table: &Reproduced, figure: &str) -> CurvePlot {
             }
         }
     }
-    plot.curves.retain(|curve| !curve.points.is_empty());
+    let mut drawn: Vec<Curve> = Vec::new();
+    for curve in plot.curves {
+        // Several claims may be about the same values.
+        let is_new = |known: &Curve| known.exact != curve.exact || known.points != curve.points;
+        let is_curve = curve.points.iter().any(|p| p.x != curve.points[0].x);
+        if is_curve && drawn.iter().all(is_new) {
+            drawn.push(curve);
+        }
+    }
+    plot.curves = drawn;
     plot
 }
 
@@ -151,9 +160,12 @@ mod tests {
 
     const TEXT: &str = "[thesis]\ntitle = \"t\"\nsource = \"s\"\n[[expect]]\nid = \"a\"\nsays = \"b\"\nfigure = \"rmse-unbiased/v1\"\ncompare = \"shown\"\n";
 
-    #[test]
-    fn a_curve_of_ours_is_solid_and_one_of_the_thesis_dashed_each_over_its_samples() {
-        let row = |x: f64, ours: f64, thesis: f64| Row {
+    fn parsed(text: &str) -> Thesis {
+        Thesis::parse(text, "x").expect("sound").expect("a thesis")
+    }
+
+    fn row(x: f64, ours: f64, thesis: f64) -> Row {
+        Row {
             row: x.to_string(),
             column: "Halton".to_owned(),
             thesis: Some(thesis),
@@ -162,18 +174,27 @@ mod tests {
             verdict: Verdict::Shown,
             reason: String::new(),
             counted: Vec::new(),
-        };
-        let table = Reproduced {
+        }
+    }
+
+    fn table(text: &str, claims: Vec<Vec<Row>>) -> Reproduced {
+        Reproduced {
             name: "made",
-            thesis: Thesis::parse(TEXT, "x").expect("sound").expect("a thesis"),
+            thesis: parsed(text),
             environment: None,
             started: 0,
             quick: false,
             changes: Vec::new(),
             scenes: Vec::new(),
-            claims: vec![vec![row(16.0, 0.5, 0.25), row(8.0, 1.0, 0.75)]],
-        };
-        let plot = curve_plot(&table, "rmse-unbiased/v1");
+            claims,
+        }
+    }
+
+    #[test]
+    fn a_curve_of_ours_is_solid_and_one_of_the_thesis_dashed_each_over_its_samples() {
+        let rows = vec![row(16.0, 0.5, 0.25), row(8.0, 1.0, 0.75)];
+        let one = table(TEXT, vec![rows.clone()]);
+        let plot = curve_plot(&one, "rmse-unbiased/v1");
         let found = plot.curves.iter().map(|c| {
             let points: Vec<_> = c.points.iter().map(|p| (p.x, p.y)).collect();
             (c.label.as_str(), c.exact, points)
@@ -181,12 +202,42 @@ mod tests {
         let ours = ("Halton, ours", false, vec![(8.0, 1.0), (16.0, 0.5)]);
         let thesis = ("Halton, thesis", true, vec![(8.0, 0.75), (16.0, 0.25)]);
         assert_eq!(found.collect::<Vec<_>>(), [ours, thesis]);
-        assert!(of(&table).is_some());
-        let mut rows = table.claims[0].clone();
-        rows[0].row = "Box · BVH".to_owned();
-        rows[1].row = "Box · Grid".to_owned();
-        rows.push(row(1.0, 3.0, 4.0));
-        rows[2].row = "Hall · Grid".to_owned();
+        assert!(of(&one).is_some());
+        // What is a ratio is no curve.
+        let ratio = TEXT.replace(
+            "\"shown\"",
+            "\"ratio\"\nleast = 1.0\nof = { spp = \"1\" }\nover = { spp = \"2\" }",
+        );
+        assert!(of(&table(&ratio, vec![rows])).is_none());
+    }
+
+    #[test]
+    fn values_are_drawn_once_and_those_of_one_number_of_samples_are_no_curve() {
+        let rows = vec![row(16.0, 0.5, 0.25), row(8.0, 1.0, 0.75)];
+        let (head, claim) = TEXT.split_once("[[expect]]").expect("a claim");
+        let again = claim.replace("\"a\"", "\"c\"");
+        let twice = format!("{head}[[expect]]{claim}[[expect]]{again}");
+        let mut both = table(&twice, vec![rows.clone(), rows]);
+        assert_eq!(curve_plot(&both, "rmse-unbiased/v1").curves.len(), 2);
+        both.claims[1][0].ours = Some(Interval::exact(0.125));
+        assert_eq!(curve_plot(&both, "rmse-unbiased/v1").curves.len(), 3);
+        let rows = vec![row(64.0, 0.5, 0.25), row(64.0, 1.0, 0.75)];
+        assert!(of(&table(TEXT, vec![rows])).is_none());
+    }
+
+    #[test]
+    fn bars_stand_in_groups_and_a_colour_means_one_label() {
+        let mut rows = [
+            row(16.0, 0.5, 0.25),
+            row(8.0, 1.0, 0.75),
+            row(1.0, 3.0, 4.0),
+        ];
+        for (row, name) in rows
+            .iter_mut()
+            .zip(["Box · BVH", "Box · Grid", "Hall · Grid"])
+        {
+            row.row = name.to_owned();
+        }
         let groups = bars(&rows);
         assert_eq!(
             (groups.len(), &*groups[0].0, &*groups[1].0),
@@ -199,14 +250,5 @@ mod tests {
             .map(|bar| (&*bar.label, bar.rate.map(|i| i.value)));
         let ours = [("BVH", Some(0.5)), ("Grid", Some(1.0))];
         assert_eq!(found.collect::<Vec<_>>(), ours);
-        // What is a ratio is no curve.
-        let ratio = TEXT.replace(
-            "\"shown\"",
-            "\"ratio\"\nleast = 1.0\nof = { spp = \"1\" }\nover = { spp = \"2\" }",
-        );
-        let thesis = Thesis::parse(&ratio, "x")
-            .expect("sound")
-            .expect("a thesis");
-        assert!(of(&Reproduced { thesis, ..table }).is_none());
     }
 }

@@ -104,12 +104,13 @@ impl CurvePlot {
         Some(Illustration::new(name, caption, self.draw()?))
     }
 
-    /// The picture; `None` when no curve has a point with positive coordinates.
+    /// The picture; `None` of fewer than two points with positive coordinates: one is told by the tables.
     pub fn draw(&self) -> Option<Drawing> {
         let points = || {
             let points = self.curves.iter().flat_map(|curve| &curve.points);
             points.filter(|p| drawable(p, self.x_ticks))
         };
+        points().nth(1)?;
         let xs = points().map(|p| p.x);
         let x = match self.x_ticks {
             Ticks::PowersOfTwo => Axis::log2(xs, &self.x_title)?,
@@ -275,8 +276,12 @@ mod tests {
         for text in ["samples per pixel", "relMSE", "sobol", "2.5/√N", "1", "2"] {
             assert!(drawing.texts().contains(&text), "{text}");
         }
-        assert!(plot(vec![at(4.0, 0.5)]).draw().is_some());
-        assert!(plot(vec![at(4.0, 0.0)]).draw().is_none());
+        // One point is no plot, be it of one curve; two of different curves are.
+        assert!(plot(vec![at(4.0, 0.5), at(8.0, 0.0)]).draw().is_none());
+        let mut two = plot(vec![at(4.0, 0.5)]);
+        assert!(two.draw().is_none());
+        two.curves.push(two.curves[0].clone());
+        assert!(two.draw().is_some());
         assert!(plot(vec![]).draw().is_none());
     }
 }
