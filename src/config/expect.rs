@@ -70,7 +70,7 @@ pub enum Compare {
     Bound,
     /// The value over another one against bounds.
     Ratio,
-    /// Values of several selections ascend in the order given.
+    /// Values of several selections, or their ratios to others, ascend in the order given.
     Order,
     /// The exponent of a power law along an axis against bounds.
     Slope,
@@ -108,7 +108,7 @@ pub struct Expect {
     /// What is compared.
     #[serde(default)]
     pub of: Pick,
-    /// What it is divided by.
+    /// What it is divided by; of an order, what each of its parts is divided by.
     #[serde(default)]
     pub over: Pick,
     /// Selections whose values should ascend.

@@ -291,42 +291,71 @@ impl<'e> Place<'e> {
         Ok(self.pairs(values, figure)?.iter().filter_map(row).collect())
     }
 
-    /// The least ratio of a selection to the one before it: at least 1 where they ascend.
+    /// The picks of an order, with what all of them share.
+    fn steps(&self, shared: &Pick, more: &Pick) -> Vec<Pick> {
+        let shared = merged(shared, more);
+        let order = self.expect.order.iter();
+        order.map(|pick| self.pick(&shared, pick)).collect()
+    }
+
+    /// The least ratio of a selection to the one before it: at least 1 where they ascend. With `over` it is what each
+    /// gains over another one that should ascend.
     fn orders(&self, values: &[Value]) -> Result<Vec<Row>, (Pick, String)> {
-        let picks: Vec<Pick> = (self.expect.order.iter())
-            .map(|pick| self.pick(&merged(&self.expect.of, &self.at.of), pick))
-            .collect();
+        let picks = self.steps(&self.expect.of, &self.at.of);
+        let lower = match self.expect.over.is_empty() && self.at.over.is_empty() {
+            true => Vec::new(),
+            false => self.steps(&self.expect.over, &self.at.over),
+        };
+        let all: Vec<&Pick> = picks.iter().chain(&lower).collect();
         let figure = &self.expect.figure;
-        let chosen: Vec<_> = (picks.iter())
-            .map(|pick| self.chosen(values, figure, pick))
-            .collect::<Result<_, _>>()?;
-        let all: Vec<&Pick> = picks.iter().collect();
+        let chosen = |picks: &[Pick]| {
+            let chosen = picks.iter().map(|pick| self.chosen(values, figure, pick));
+            chosen.collect::<Result<Vec<_>, _>>()
+        };
+        let (upper, under) = (chosen(&picks)?, chosen(&lower)?);
+        let alike = |to: &Value, others: &[_], pick: &Pick| {
+            partner(to, others, &all).map_err(|problem| (pick.clone(), problem))
+        };
         let mut rows = Vec::new();
-        for first in &chosen[0] {
-            let mut chain = vec![*first];
-            for (others, pick) in chosen.iter().zip(&picks).skip(1) {
-                let next = partner(first, others, &all);
-                chain.push(next.map_err(|problem| (pick.clone(), problem))?);
+        for first in &upper[0] {
+            let mut chain = vec![Gain::of(first)];
+            for (others, pick) in upper.iter().zip(&picks).skip(1) {
+                chain.push(Gain::of(alike(first, others, pick)?));
+            }
+            for ((gain, others), pick) in chain.iter_mut().zip(&under).zip(&lower) {
+                gain.over = Some(alike(first, others, pick)?);
             }
             rows.push(self.ordered(&chain, &picks));
         }
         Ok(rows)
     }
 
-    fn ordered(&self, chain: &[&Value], picks: &[Pick]) -> Row {
-        if let Some(row) = chain.iter().find_map(|value| self.unread(value)) {
+    /// The number of a part of an order.
+    fn gained(&self, gain: &Gain) -> Option<Interval> {
+        match gain.over {
+            None => known(gain.value),
+            Some(over) => self.ratio(gain.value, over),
+        }
+    }
+
+    fn ordered(&self, chain: &[Gain], picks: &[Pick]) -> Row {
+        let mut values = chain.iter().flat_map(|gain| [Some(gain.value), gain.over]);
+        if let Some(row) = values.find_map(|value| self.unread(value?)) {
             return row;
         }
-        let numbers: Vec<Interval> = chain.iter().filter_map(|value| known(value)).collect();
-        let steps = chain.windows(2).filter_map(|w| self.ratio(w[1], w[0]));
-        let steps: Vec<Interval> = steps.collect();
+        let numbers: Vec<Interval> = chain.iter().filter_map(|gain| self.gained(gain)).collect();
+        let step = |pair: &[Gain]| match pair[0].over {
+            None => self.ratio(pair[1].value, pair[0].value),
+            Some(_) => Some(ratio(self.gained(&pair[1])?, self.gained(&pair[0])?)),
+        };
+        let steps: Vec<Interval> = chain.windows(2).filter_map(step).collect();
         let ascends = Bounds::new(Some(1.0), None);
         let verdict = Verdict::of_all(steps.iter().map(|step| ascends.judge(*step)));
         let least = steps.into_iter().min_by(|a, b| a.value.total_cmp(&b.value));
         let Some(least) = least else {
             return self.row(None, Verdict::Faulty, "an order of one".to_owned());
         };
-        let mut row = self.judged(least, "", &chain[0].key);
+        let mut row = self.judged(least, "", &chain[0].value.key);
         if !matches!(row.verdict, Verdict::NotTestable | Verdict::Faulty) {
             row.verdict = verdict;
         }
@@ -334,7 +363,7 @@ impl<'e> Place<'e> {
             .iter()
             .zip(chain)
             .zip(&numbers)
-            .map(|((pick, value), i)| {
+            .map(|((pick, Gain { value, .. }), i)| {
                 let own = |axis: &&String| !self.expect.of.contains_key(*axis) && *axis != "scene";
                 let labels = pick.keys().filter(own).map(|axis| value.key.label(axis));
                 let labels: Vec<&str> = labels.collect();
@@ -376,6 +405,19 @@ impl<'e> Place<'e> {
             ),
         };
         Ok(groups.iter().map(row).collect())
+    }
+}
+
+/// A value, and what it is divided by where that is what is compared.
+#[derive(Clone, Copy)]
+struct Gain<'v, 'a> {
+    value: &'v Value<'a>,
+    over: Option<&'v Value<'a>>,
+}
+
+impl<'v, 'a> Gain<'v, 'a> {
+    fn of(value: &'v Value<'a>) -> Self {
+        Self { value, over: None }
     }
 }
 

@@ -282,6 +282,64 @@ fn every_step_of_an_order_counts_and_the_least_is_shown() {
     assert_eq!(of(["b", "a", "c"]).0, Verdict::Contradicted);
 }
 
+/// Gains of `slow` over `fast` at two sizes: 1.2 and 3, while the times of both fall.
+fn gains() -> Vec<Value<'static>> {
+    let at = |accel, n, ms| value(accel, n, "ms-per-spp/v1", 0.95 * ms, ms, 1.05 * ms);
+    vec![
+        at("slow", 8, 12.0),
+        at("fast", 8, 10.0),
+        at("slow", 32, 3.0),
+        at("fast", 32, 1.0),
+    ]
+}
+
+const RISES: &str = "figure = \"ms-per-spp/v1\"\ncompare = \"order\"\nof = { accel = \"slow\" }\nover = { accel = \"fast\" }\norder = [{ spp = \"8\" }, { spp = \"32\" }]\n";
+
+#[test]
+fn an_order_of_gains_is_one_of_ratios_and_not_of_the_values_above() {
+    let verdict = |body: &str, values: &[Value]| judge(&expect(body), values, &gpu()).remove(0);
+    let row = verdict(RISES, &gains());
+    assert_eq!(row.verdict, Verdict::Supported, "{row:?}");
+    let ours = row.ours.expect("a step");
+    assert!((ours.value - 2.5).abs() < 1e-12, "{row:?}");
+    // Four parts of 5 % each.
+    assert!(
+        (ours.high / ours.value).ln() < 0.12 && (ours.high / ours.value).ln() > 0.09,
+        "{ours:?}"
+    );
+    assert!(row.reason.starts_with("8 1.20 → 32 3.00"), "{row:?}");
+    // The values themselves fall.
+    let values_alone = RISES.replace("over = { accel = \"fast\" }\n", "");
+    assert_eq!(
+        verdict(&values_alone, &gains()).verdict,
+        Verdict::Contradicted
+    );
+    let falls = RISES.replace(
+        "[{ spp = \"8\" }, { spp = \"32\" }]",
+        "[{ spp = \"32\" }, { spp = \"8\" }]",
+    );
+    assert_eq!(verdict(&falls, &gains()).verdict, Verdict::Contradicted);
+    // A place may name the other side as well.
+    let of_places = RISES.replace(
+        "over = { accel = \"fast\" }\n",
+        "at = [{ over = { accel = \"fast\" } }]\n",
+    );
+    assert_eq!(verdict(&of_places, &gains()).verdict, Verdict::Supported);
+    // Parts that differ by less than their noise.
+    let mut close = gains();
+    close[2] = value("slow", 32, "ms-per-spp/v1", 1.1, 1.22, 1.3);
+    assert_eq!(verdict(RISES, &close).verdict, Verdict::Undecided);
+    // The other side is missing, or no number.
+    assert_eq!(verdict(RISES, &gains()[..3]).verdict, Verdict::Faulty);
+    let mut word = gains();
+    word[3].reading = Reading::Word("never");
+    let row = verdict(RISES, &word);
+    assert_eq!(
+        (row.verdict, row.reason.as_str()),
+        (Verdict::NotTestable, "never")
+    );
+}
+
 #[test]
 fn each_place_of_a_bound_has_its_own_samples_and_its_own_counts() {
     let body = "figure = \"ms-per-spp/v1\"\ncompare = \"bound\"\nof = { accel = \"!near\" }\nmost = 9.0\nexplain = [\"nodes-per-ray/v1\"]\n";
