@@ -21,7 +21,7 @@ pub mod trace;
 
 pub use cache::{Cache, CacheShape};
 pub use memory::{Fetch, Memory};
-pub use model::{Machine, Pass, Warp, run};
+pub use model::{Machine, Pass, Warp, run, run_groups, together};
 pub use organisation::Organisation;
 pub use paths::{RayClass, Rays, View, groups_of};
 pub use sets::of_rays;

@@ -87,27 +87,37 @@ impl Queue {
     }
 }
 
-/// What a machine makes of groups of warps.
+/// What a machine makes of groups of warps, all together.
 pub fn run(machine: &Machine, groups: &[Vec<Warp>]) -> Tallies {
+    together(&run_groups(machine, groups))
+}
+
+/// The sums of the tallies of groups.
+pub fn together(groups: &[Tallies]) -> Tallies {
+    let mut all = Tallies::new();
+    for (class, tally) in groups.iter().flatten() {
+        *all.entry(*class).or_default() += *tally;
+    }
+    all
+}
+
+/// What a machine makes of each of these groups of warps while it runs all of them.
+pub fn run_groups(machine: &Machine, groups: &[Vec<Warp>]) -> Vec<Tallies> {
     let queue = |warp: &Warp| Queue::new(warp, machine);
     let of_group = |warps: &Vec<Warp>| warps.par_iter().map(queue).collect::<Vec<_>>();
     let queues: Vec<_> = groups.par_iter().map(of_group).collect();
-    let mut all = Tallies::new();
-    let mut groups: Vec<(Cache, VecDeque<Queue>)> = Vec::new();
+    let mut groups: Vec<(Cache, VecDeque<Queue>, Tallies)> = Vec::new();
     for of_group in queues {
         let (queues, tallies): (VecDeque<_>, Vec<_>) = of_group.into_iter().unzip();
-        for (class, tally) in tallies.into_iter().flatten() {
-            *all.entry(class).or_default() += tally;
-        }
-        groups.push((Cache::new(machine.l1), queues));
+        groups.push((Cache::new(machine.l1), queues, together(&tallies)));
     }
     let mut l2 = Cache::new(machine.l2);
-    while groups.iter().any(|(_, warps)| !warps.is_empty()) {
-        for (l1, warps) in &mut groups {
+    while groups.iter().any(|(_, warps, _)| !warps.is_empty()) {
+        for (l1, warps, tallies) in &mut groups {
             let Some((warp, (class, issue))) = next(warps) else {
                 continue;
             };
-            let tally = all.entry(class).or_default();
+            let tally = tallies.entry(class).or_default();
             tally.issues += 1;
             tally.active += u64::from(issue.active);
             tally.lanes += warp.lanes;
@@ -121,7 +131,7 @@ pub fn run(machine: &Machine, groups: &[Vec<Warp>]) -> Tallies {
             warps.push_back(warp);
         }
     }
-    all
+    groups.into_iter().map(|(_, _, tallies)| tallies).collect()
 }
 
 /// The next warp of a group with what it issues; warps that are done are dropped on the way.
@@ -288,6 +298,15 @@ mod tests {
                 t.values().map(|t| t.l1_hits).sum::<u64>()
             };
             assert!(l1_hits(&tallies) < l1_hits(&boundless));
+            // Each group has what its own warps issue, and together they are all.
+            let of_groups = run_groups(&machine(128, [16, 40]), &groups);
+            assert_eq!(together(&of_groups), tallies);
+            for (tally, warps) in of_groups.iter().zip(&groups) {
+                let passes = warps.iter().flat_map(|w| &w.passes);
+                let own = passes.flat_map(|p| p.lanes.iter().flatten());
+                let steps: usize = own.map(|t| t.steps.len()).sum();
+                assert_eq!(tally.values().map(|t| t.active).sum::<u64>(), steps as u64);
+            }
             // Lanes that change places change nothing: a step is what they do together.
             let mut turned = groups.clone();
             let lanes = turned.iter_mut().flatten().flat_map(|w| &mut w.passes);

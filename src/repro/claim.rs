@@ -268,10 +268,26 @@ impl<'e> Place<'e> {
         upper.into_iter().map(pair).collect()
     }
 
-    /// A ratio with its interval: of times of the same rounds by the ratios of each, else as of independent parts.
+    /// A ratio with its interval: of what is known part by part (times of the same rounds) by these, else as of
+    /// independent figures.
     fn ratio(&self, a: &Value, b: &Value) -> Option<Interval> {
-        let paired = self.context.rounds.ratio(a, b);
+        let paired = self.context.rounds.product(&[(a, 1.0), (b, -1.0)]);
         paired.or_else(|| Some(ratio(known(a)?, known(b)?)))
+    }
+
+    /// The ratio of two gains.
+    fn growth(&self, after: &Gain, before: &Gain) -> Option<Interval> {
+        let (Some(over), Some(under)) = (after.over, before.over) else {
+            return self.ratio(after.value, before.value);
+        };
+        let terms = [
+            (after.value, 1.0),
+            (over, -1.0),
+            (before.value, -1.0),
+            (under, 1.0),
+        ];
+        let paired = self.context.rounds.product(&terms);
+        paired.or_else(|| Some(ratio(self.gained(after)?, self.gained(before)?)))
     }
 
     fn ratios(&self, values: &[Value], figure: &str) -> Result<Vec<Row>, (Pick, String)> {
@@ -344,11 +360,9 @@ impl<'e> Place<'e> {
             return row;
         }
         let numbers: Vec<Interval> = chain.iter().filter_map(|gain| self.gained(gain)).collect();
-        let step = |pair: &[Gain]| match pair[0].over {
-            None => self.ratio(pair[1].value, pair[0].value),
-            Some(_) => Some(ratio(self.gained(&pair[1])?, self.gained(&pair[0])?)),
-        };
-        let steps: Vec<Interval> = chain.windows(2).filter_map(step).collect();
+        let steps = chain.windows(2);
+        let steps = steps.filter_map(|pair| self.growth(&pair[1], &pair[0]));
+        let steps: Vec<Interval> = steps.collect();
         let ascends = Bounds::new(Some(1.0), None);
         let verdict = Verdict::of_all(steps.iter().map(|step| ascends.judge(*step)));
         let least = steps.into_iter().min_by(|a, b| a.value.total_cmp(&b.value));

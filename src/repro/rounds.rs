@@ -1,16 +1,16 @@
-//! Figures round by round, where records keep the times: cells that were timed in the same rounds share what the machine
-//! did in them, and their ratio is known better than either of them.
+//! Figures part by part, where records keep the parts. Cells that were timed in the same rounds share what the machine did
+//! in them, and samplers whose rays were followed from the same pixels share these: a ratio is known better than its sides.
 
 use crate::integrator::{RAY_COUNT_CLASSES, TRACED_CLASSES};
 use crate::measure::comparison::LogFigure;
-use crate::measure::record::{Body, CellRecord, Interval, Key, Line, axis};
+use crate::measure::record::{Body, CellRecord, CoherenceRecord, Interval, Key, Line, axis};
 use crate::report::data::competitor;
 use crate::report::format;
-use crate::report::values::Value;
+use crate::report::values::{ALL_RAYS, Value};
 use std::collections::BTreeMap;
 
-/// What cells have in common that were timed in the same rounds: one process timed them, on one scene with one
-/// triangle test and box test, all structures in turns or all full cells or all compactions.
+/// What figures have in common whose parts belong together. Times: one process took them, on one scene with one triangle
+/// test and box test, all structures in turns or all full cells or all compactions.
 #[derive(Debug, Clone, PartialEq)]
 struct Sitting {
     kind: &'static str,
@@ -19,14 +19,22 @@ struct Sitting {
     device: String,
 }
 
-/// A figure in each of its rounds.
+/// What a figure is made of.
+#[derive(Debug, Clone, PartialEq)]
+enum Parts {
+    /// The figure in each round.
+    Rounds(Vec<f64>),
+    /// Numerator and denominator in each group of pixels: the figure is the quotient of their sums.
+    Groups(Vec<[f64; 2]>),
+}
+
 #[derive(Debug, Clone)]
 struct Series {
     sitting: Sitting,
-    values: Vec<f64>,
+    parts: Parts,
 }
 
-/// The figures of a run that are known round by round.
+/// The figures of a run that are known part by part.
 #[derive(Debug, Clone, Default)]
 pub struct Rounds {
     of: BTreeMap<(String, String), Series>,
@@ -43,30 +51,33 @@ impl Rounds {
         let by_line = cells.flat_map(|cell| cell.lines.iter().map(move |hash| (&**hash, cell)));
         let by_line: BTreeMap<&str, &CellRecord> = by_line.collect();
         for line in lines {
+            if let Body::Coherence(record) = &line.body {
+                rounds.add_groups(line, record);
+            }
             // Records of older programs do not say when they were taken: their rounds may be those of several runs.
             let cell = by_line.get(&*line.hash).filter(|c| c.run_began_unix_s > 0);
             if let Some(cell) = cell {
-                rounds.add(line, cell);
+                rounds.add_times(line, cell);
             }
         }
         rounds
     }
 
-    fn add(&mut self, line: &Line, cell: &CellRecord) {
+    fn put(&mut self, key: &Key, figure: &str, sitting: Sitting, parts: Parts) {
+        let series = Series { sitting, parts };
+        self.of.insert((key.to_string(), figure.to_owned()), series);
+    }
+
+    fn add_times(&mut self, line: &Line, cell: &CellRecord) {
         let key = competitor(line);
-        let world = [axis::SCENE, axis::TRIANGLE, axis::BOX_TEST];
-        let sitting = |kind| Sitting {
-            kind,
-            world: world.map(|axis| key.label(axis).to_owned()),
-            began_unix_s: cell.run_began_unix_s,
-            device: cell.inputs.device.clone(),
-        };
         let mut put = |key: &Key, figure: &str, kind, values: Vec<f64>| {
-            let series = Series {
-                sitting: sitting(kind),
-                values,
+            let sitting = Sitting {
+                kind,
+                world: world(key),
+                began_unix_s: cell.run_began_unix_s,
+                device: cell.inputs.device.clone(),
             };
-            self.of.insert((key.to_string(), figure.to_owned()), series);
+            self.put(key, figure, sitting, Parts::Rounds(values));
         };
         let each = |ms: &[f64], of: &dyn Fn(f64) -> f64| ms.iter().map(|ms| of(*ms)).collect();
         match &line.body {
@@ -93,14 +104,107 @@ impl Rounds {
         }
     }
 
-    /// `a / b` with its interval, by the estimator of comparisons; `None` unless both were timed in the same rounds.
-    pub fn ratio(&self, a: &Value, b: &Value) -> Option<Interval> {
-        let series = |v: &Value| self.of.get(&(v.key.to_string(), v.figure.id.to_string()));
-        let (x, y) = (series(a)?, series(b)?);
-        if x.sitting != y.sitting || x.values.len() != y.values.len() {
+    /// Predicted cycles per ray. They are counted, and so the same in every run.
+    fn add_groups(&mut self, line: &Line, record: &CoherenceRecord) {
+        for at in &record.at {
+            let key =
+                (competitor(line).with(axis::SPP, at.spp)).with(axis::SUBJECT, &at.organisation);
+            let mut all: Vec<[f64; 2]> = Vec::new();
+            let classes = at.classes.iter().zip(&at.groups);
+            let mut put = |class: &str, groups: Vec<[f64; 2]>| {
+                let sitting = Sitting {
+                    kind: "groups of warps",
+                    world: world(&key),
+                    began_unix_s: 0,
+                    device: String::new(),
+                };
+                let key = key.clone().with(axis::RAYS, class);
+                self.put(&key, "cycles-per-ray/v1", sitting, Parts::Groups(groups));
+            };
+            for ((class, _), groups) in classes {
+                let quotient = |[rays, cycles]: &[u64; 2]| [*cycles as f64, *rays as f64];
+                let groups: Vec<[f64; 2]> = groups.iter().map(quotient).collect();
+                all.resize(groups.len(), [0.0; 2]);
+                for (sum, group) in all.iter_mut().zip(&groups) {
+                    *sum = [sum[0] + group[0], sum[1] + group[1]];
+                }
+                put(class, groups);
+            }
+            if !all.is_empty() {
+                put(ALL_RAYS, all);
+            }
+        }
+    }
+
+    /// `Π vᵉ` of values with their exponents, with its interval; `None` unless all are known by parts that belong together.
+    pub fn product(&self, terms: &[(&Value, f64)]) -> Option<Interval> {
+        let series = |(v, exponent): &(&Value, f64)| {
+            let known = self.of.get(&(v.key.to_string(), v.figure.id.to_string()));
+            known.map(|series| (series, *exponent))
+        };
+        let terms: Vec<(&Series, f64)> = terms.iter().map(series).collect::<Option<_>>()?;
+        let sitting = &terms.first()?.0.sitting;
+        if terms.iter().any(|(series, _)| series.sitting != *sitting) {
             return None;
         }
-        let ratios: Vec<f64> = x.values.iter().zip(&y.values).map(|(x, y)| x / y).collect();
-        Some(LogFigure::of_times(&ratios)?.interval())
+        let (mut rounds, mut groups) = (Vec::new(), Vec::new());
+        for (series, exponent) in &terms {
+            match &series.parts {
+                Parts::Rounds(values) => rounds.push((&**values, *exponent)),
+                Parts::Groups(sums) => groups.push((&**sums, *exponent)),
+            }
+        }
+        match groups.is_empty() {
+            true => of_rounds(&rounds),
+            false => of_groups(&groups),
+        }
     }
+}
+
+fn world(key: &Key) -> [String; 3] {
+    [axis::SCENE, axis::TRIANGLE, axis::BOX_TEST].map(|axis| key.label(axis).to_owned())
+}
+
+/// As many of each, which there are.
+fn length<T>(terms: &[(&[T], f64)]) -> Option<usize> {
+    let count = terms.first()?.0.len();
+    terms
+        .iter()
+        .all(|(parts, _)| parts.len() == count)
+        .then_some(count)
+}
+
+/// By the estimator of comparisons, on what each round says.
+fn of_rounds(terms: &[(&[f64], f64)]) -> Option<Interval> {
+    let at = |round: usize| {
+        terms
+            .iter()
+            .map(|(x, e)| e * x[round].ln())
+            .sum::<f64>()
+            .exp()
+    };
+    let products: Vec<f64> = (0..length(terms)?).map(at).collect();
+    Some(LogFigure::of_times(&products)?.interval())
+}
+
+/// By the jackknife over groups. Where one group alone has such rays, or there is one, nothing is known of others.
+fn of_groups(terms: &[(&[[f64; 2]], f64)]) -> Option<Interval> {
+    let count = length(terms)?;
+    let without = |left_out: usize| {
+        let log = |(groups, exponent): &(&[[f64; 2]], f64)| {
+            let kept = groups.iter().enumerate().filter(|(i, _)| *i != left_out);
+            let [sum, of] = kept.fold([0.0; 2], |sum, (_, g)| [sum[0] + g[0], sum[1] + g[1]]);
+            exponent * (sum / of).ln()
+        };
+        terms.iter().map(log).sum::<f64>()
+    };
+    let log = without(count);
+    let parts: Vec<f64> = (0..count).map(without).collect();
+    let known = (count > 1).then(|| LogFigure::new(log, &[parts], Vec::new()));
+    let unknown = Interval {
+        value: log.exp(),
+        low: 0.0,
+        high: f64::INFINITY,
+    };
+    Some(known.flatten().map_or(unknown, |figure| figure.interval()))
 }

@@ -7,13 +7,13 @@ use super::structures::Gated;
 use super::world::World;
 use crate::accel::{BuildLog, CpuTwin};
 use crate::coherence::{
-    Machine, Memory, Organisation, RayClass, Rays, View, groups_of, of_rays, run as run_model,
+    Machine, Memory, Organisation, RayClass, Rays, View, groups_of, of_rays, run_groups, together,
 };
 use crate::config::{Axis, Cell, Coherence, UnitKind, unit_name};
 use crate::measure::path_oracle::{self, PathOracle};
 use crate::measure::rays::RaySet;
 use crate::measure::record::{
-    Body, ClassCoherence, CoherenceAt, CoherenceRecord, Key, Line, Outcome, Ran,
+    Body, ClassCoherence, CoherenceAt, CoherenceRecord, Key, Line, Outcome, Ran, Tallies,
 };
 use std::collections::BTreeMap;
 
@@ -215,16 +215,25 @@ fn modelled(
         let groups = rays.through(twin, memory)?;
         for organisation in Organisation::ALL {
             let warps = groups.iter().map(|warps| organisation.of(warps.clone()));
-            let tallies = run_model(&machine, &warps.collect::<Vec<_>>());
-            let classes = tallies.into_iter();
-            at.push(CoherenceAt {
+            let of_groups = run_groups(&machine, &warps.collect::<Vec<_>>());
+            let mut known = CoherenceAt {
                 spp: *spp,
                 organisation: organisation.name().to_owned(),
                 paths: rays.paths,
-                classes: classes
-                    .map(|(class, tally)| (RayClass::of_word(class).to_string(), tally))
-                    .collect(),
-            });
+                classes: Vec::new(),
+                groups: Vec::new(),
+            };
+            for (class, tally) in together(&of_groups) {
+                let of_group = |group: &Tallies| {
+                    let tally = group.get(&class).copied().unwrap_or_default();
+                    [tally.rays, tally.cost()]
+                };
+                known.groups.push(of_groups.iter().map(of_group).collect());
+                known
+                    .classes
+                    .push((RayClass::of_word(class).to_string(), tally));
+            }
+            at.push(known);
         }
     }
     Ok(at)

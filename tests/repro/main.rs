@@ -1,6 +1,7 @@
 //! Tables of theses: every file is sound, every claim of the digests is covered or said not to be, transcribed numbers
 //! stand in the digests, and verdicts see planted faults.
 
+mod groups;
 mod numbers;
 mod pages;
 mod printed;

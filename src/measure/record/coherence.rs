@@ -27,6 +27,10 @@ pub struct CoherenceAt {
     pub paths: u64,
     /// Counts by class of rays (`primary`, `shadow 0`, `bounce 1`, …), in the order in which they are traced.
     pub classes: Vec<(String, Tally)>,
+    /// For each class, rays and predicted cycles of each group of warps. Groups are a sample of the image: how far they
+    /// differ tells how far others may. Older records have none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub groups: Vec<Vec<[u64; 2]>>,
 }
 
 impl CoherenceRecord {
