@@ -1,13 +1,13 @@
 //! The coherence of rays that follow each other in a buffer, as tracers take them: a lane, a ray.
 
 use super::trace::trace_of;
-use super::{Machine, Memory, Pass, Warp, run};
+use super::{Machine, Memory, Pass, Warp, run_groups};
 use crate::accel::{CpuTwin, Query, Ray};
 use crate::config::Coherence;
-use crate::measure::record::Tally;
+use crate::measure::record::Tallies;
 use rayon::prelude::*;
 
-/// What the machine of `settings` makes of some groups of these rays, spread over them: each is
+/// What the machine of `settings` makes of each of some groups of these rays (their class is 0), spread over them: each is
 /// [`Coherence::warps`] warps one after the other. The last warp may have lanes without a ray.
 ///
 /// # Errors
@@ -17,7 +17,7 @@ pub fn of_rays(
     query: Query,
     (twin, memory): (&dyn CpuTwin, &Memory),
     settings: &Coherence,
-) -> Result<Tally, String> {
+) -> Result<Vec<Tallies>, String> {
     let lanes = (settings.warp[0] * settings.warp[1]) as usize;
     let warp = |rays: &[Ray]| -> Result<Warp, String> {
         let traces = rays
@@ -37,8 +37,7 @@ pub fn of_rays(
         of_group.map(warp).collect::<Result<Vec<_>, _>>()
     });
     let groups = groups.collect::<Result<Vec<_>, _>>()?;
-    let tallies = run(&Machine::new(settings), &groups);
-    Ok(tallies.into_values().next().unwrap_or_default())
+    Ok(run_groups(&Machine::new(settings), &groups))
 }
 
 /// The first warp of each group, of so many warps in all: groups side by side where they hold all, else evenly spread.

@@ -3,7 +3,9 @@
 
 use crate::integrator::{RAY_COUNT_CLASSES, TRACED_CLASSES};
 use crate::measure::comparison::LogFigure;
-use crate::measure::record::{Body, CellRecord, CoherenceRecord, Interval, Key, Line, axis};
+use crate::measure::record::{
+    Body, CellRecord, ClassCoherence, CoherenceRecord, Interval, Key, Line, axis,
+};
 use crate::report::data::competitor;
 use crate::report::format;
 use crate::report::values::{ALL_RAYS, Value};
@@ -51,8 +53,13 @@ impl Rounds {
         let by_line = cells.flat_map(|cell| cell.lines.iter().map(move |hash| (&**hash, cell)));
         let by_line: BTreeMap<&str, &CellRecord> = by_line.collect();
         for line in lines {
-            if let Body::Coherence(record) = &line.body {
-                rounds.add_groups(line, record);
+            match &line.body {
+                Body::Coherence(record) => rounds.add_paths(line, record),
+                Body::Structure(record) => {
+                    let coherence = record.coherence.iter();
+                    coherence.for_each(|c| rounds.add_recorded(line, c));
+                }
+                _ => {}
             }
             // Records of older programs do not say when they were taken: their rounds may be those of several runs.
             let cell = by_line.get(&*line.hash).filter(|c| c.run_began_unix_s > 0);
@@ -104,35 +111,47 @@ impl Rounds {
         }
     }
 
-    /// Predicted cycles per ray. They are counted, and so the same in every run.
-    fn add_groups(&mut self, line: &Line, record: &CoherenceRecord) {
+    /// Predicted cycles. They are counted, and so the same in every run.
+    fn put_groups(&mut self, key: &Key, figure: &str, parts: Vec<[f64; 2]>) {
+        let sitting = Sitting {
+            kind: "groups of warps",
+            world: world(key),
+            began_unix_s: 0,
+            device: String::new(),
+        };
+        self.put(key, figure, sitting, Parts::Groups(parts));
+    }
+
+    /// Of the paths of a full cell, by class of rays and together.
+    fn add_paths(&mut self, line: &Line, record: &CoherenceRecord) {
         for at in &record.at {
-            let key =
-                (competitor(line).with(axis::SPP, at.spp)).with(axis::SUBJECT, &at.organisation);
-            let mut all: Vec<[f64; 2]> = Vec::new();
-            let classes = at.classes.iter().zip(&at.groups);
-            let mut put = |class: &str, groups: Vec<[f64; 2]>| {
-                let sitting = Sitting {
-                    kind: "groups of warps",
-                    world: world(&key),
-                    began_unix_s: 0,
-                    device: String::new(),
-                };
-                let key = key.clone().with(axis::RAYS, class);
-                self.put(&key, "cycles-per-ray/v1", sitting, Parts::Groups(groups));
+            // What is traced first are the primary rays: one for each path.
+            let Some(primary) = at.groups.first() else {
+                continue;
             };
-            for ((class, _), groups) in classes {
-                let quotient = |[rays, cycles]: &[u64; 2]| [*cycles as f64, *rays as f64];
-                let groups: Vec<[f64; 2]> = groups.iter().map(quotient).collect();
-                all.resize(groups.len(), [0.0; 2]);
-                for (sum, group) in all.iter_mut().zip(&groups) {
-                    *sum = [sum[0] + group[0], sum[1] + group[1]];
+            let key = competitor(line).with(axis::SPP, at.spp);
+            let key = key.with(axis::SUBJECT, &at.organisation);
+            let mut all = vec![[0.0; 2]; primary.len()];
+            for ((class, _), groups) in at.classes.iter().zip(&at.groups) {
+                let parts = parts(groups);
+                for (sum, [cycles, rays]) in all.iter_mut().zip(&parts) {
+                    *sum = [sum[0] + cycles, sum[1] + rays];
                 }
-                put(class, groups);
+                self.put_groups(&key.clone().with(axis::RAYS, class), PER_RAY, parts);
             }
-            if !all.is_empty() {
-                put(ALL_RAYS, all);
-            }
+            let key = key.with(axis::RAYS, ALL_RAYS);
+            let of_paths = all.iter().zip(primary);
+            let of_paths = of_paths.map(|([cycles, _], [paths, _])| [*cycles, *paths as f64]);
+            self.put_groups(&key, PER_PATH, of_paths.collect());
+            self.put_groups(&key, PER_RAY, all);
+        }
+    }
+
+    /// Of recorded rays, class by class.
+    fn add_recorded(&mut self, line: &Line, coherence: &ClassCoherence) {
+        for ((class, _), groups) in coherence.classes.iter().zip(&coherence.groups) {
+            let key = competitor(line).with(axis::RAYS, format::ray_class(*class));
+            self.put_groups(&key, PER_RAY, parts(groups));
         }
     }
 
@@ -159,6 +178,16 @@ impl Rounds {
             false => of_groups(&groups),
         }
     }
+}
+
+/// Figures of the coherence model.
+const PER_RAY: &str = "cycles-per-ray/v1";
+const PER_PATH: &str = "cycles-per-path/v1";
+
+/// Cycles over rays of each group.
+fn parts(groups: &[[u64; 2]]) -> Vec<[f64; 2]> {
+    let of_one = |[rays, cycles]: &[u64; 2]| [*cycles as f64, *rays as f64];
+    groups.iter().map(of_one).collect()
 }
 
 fn world(key: &Key) -> [String; 3] {

@@ -13,7 +13,7 @@ use crate::config::{Axis, Cell, Coherence, UnitKind, unit_name};
 use crate::measure::path_oracle::{self, PathOracle};
 use crate::measure::rays::RaySet;
 use crate::measure::record::{
-    Body, ClassCoherence, CoherenceAt, CoherenceRecord, Key, Line, Outcome, Ran, Tallies,
+    Body, ClassCoherence, CoherenceAt, CoherenceRecord, Key, Line, Outcome, Ran, by_group,
 };
 use std::collections::BTreeMap;
 
@@ -122,17 +122,18 @@ pub(super) fn of_recorded_rays(
 ) -> Result<ClassCoherence, String> {
     let sets = &world.judge.of(structure.traced.space).sets;
     with_twin(session, world, structure, |session, twin, memory| {
-        let timed = sets.iter().filter(|set| set.is_timed());
-        let of_set = |set: &RaySet| {
-            let tally = of_rays(&set.rays, set.query(), (twin, memory), settings)?;
-            Ok::<_, String>((set.class, tally))
-        };
-        let classes = session
-            .clock
-            .time("coherence", || timed.map(of_set).collect::<Result<_, _>>())?;
+        let timed: Vec<&RaySet> = sets.iter().filter(|set| set.is_timed()).collect();
+        let of_set = |set: &&RaySet| of_rays(&set.rays, set.query(), (twin, memory), settings);
+        let all = || timed.iter().map(of_set).collect::<Result<Vec<_>, _>>();
+        let all = session.clock.time("coherence", all)?;
+        let total = |groups: &Vec<_>| together(groups).into_values().next();
+        let classes = timed.iter().zip(&all);
         Ok(ClassCoherence {
             settings: settings.clone(),
-            classes,
+            classes: classes
+                .map(|(set, groups)| (set.class, total(groups).unwrap_or_default()))
+                .collect(),
+            groups: all.iter().map(|groups| by_group(groups, 0)).collect(),
         })
     })
 }
@@ -224,11 +225,7 @@ fn modelled(
                 groups: Vec::new(),
             };
             for (class, tally) in together(&of_groups) {
-                let of_group = |group: &Tallies| {
-                    let tally = group.get(&class).copied().unwrap_or_default();
-                    [tally.rays, tally.cost()]
-                };
-                known.groups.push(of_groups.iter().map(of_group).collect());
+                known.groups.push(by_group(&of_groups, class));
                 known
                     .classes
                     .push((RayClass::of_word(class).to_string(), tally));

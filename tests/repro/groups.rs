@@ -144,6 +144,23 @@ fn a_gain_that_grows_is_judged_by_what_groups_say_of_all_four_figures() {
 }
 
 #[test]
+fn cycles_of_a_path_and_of_recorded_rays_have_the_noise_of_groups_too() {
+    let lines = [
+        at_16("shift", cycles(1e5, MIXED)),
+        at_16("jitter", cycles(1e5, SAME)),
+    ];
+    let of_ray = ours(&found(&lines, &ratio("least = 1.0")));
+    let of_path = ratio("least = 1.0").replace("cycles-per-ray", "cycles-per-path");
+    let of_path = ours(&found(&lines, &of_path));
+    // Here each path is one ray.
+    assert!(
+        (of_path.low / of_ray.low - 1.0).abs() < 1e-9,
+        "{of_path:?} {of_ray:?}"
+    );
+    assert!(of_ray.low < 0.95 * of_ray.value);
+}
+
+#[test]
 fn one_group_says_nothing_of_others_and_older_records_have_none() {
     let one = |name: &str, per_ray: f64| at_16(name, cycles(per_ray, SAME)[..1].to_vec());
     let row = found(

@@ -33,6 +33,15 @@ pub struct CoherenceAt {
     pub groups: Vec<Vec<[u64; 2]>>,
 }
 
+/// Rays and predicted cycles of a class in each group of warps.
+pub fn by_group(groups: &[Tallies], class: u32) -> Vec<[u64; 2]> {
+    let of_group = |group: &Tallies| {
+        let tally = group.get(&class).copied().unwrap_or_default();
+        [tally.rays, tally.cost()]
+    };
+    groups.iter().map(of_group).collect()
+}
+
 impl CoherenceRecord {
     /// What is predicted of what was timed.
     pub fn timed(&self, organisation: &str) -> Option<&CoherenceAt> {

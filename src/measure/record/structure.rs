@@ -156,6 +156,9 @@ pub struct ClassCoherence {
     pub settings: Coherence,
     /// Counts by class.
     pub classes: Vec<(RayClass, Tally)>,
+    /// For each class, rays and predicted cycles of each group of warps, as in [`super::CoherenceAt::groups`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub groups: Vec<Vec<[u64; 2]>>,
 }
 
 /// A structure on a scene.
