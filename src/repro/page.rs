@@ -71,7 +71,8 @@ fn summary(tables: &[Reproduced]) -> Section {
     section.blocks.push(Block::Paragraph(format!(
         "Claims: {}. A claim about several places is contradicted by one of them, and supported where all that can be tested \
          support it. Absolute times are shown, never judged. Intervals are of 95 %; those of ratios of what was timed in the same \
-         rounds are taken round by round, those of other ratios and of slopes combine the intervals of their parts on \
+         rounds are taken round by round, those of predicted cycles group by group of the pixels that were followed; those of \
+         other ratios and of slopes combine the intervals of their parts on \
          logarithms (Zou & Donner 2008). What was measured once is taken to be within a factor of \
          {ONCE}, and a time to within {ONCE_MS} ms besides. A contradicted claim is a finding.",
         tally(tables)
