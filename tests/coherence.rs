@@ -6,7 +6,7 @@ mod support;
 use raystone::accel::{Query, Ray, TriangleSoup};
 use raystone::coherence::{
     Kind, Machine, Memory, Organisation, RayClass, Rays, Trace, View, groups_of, of_rays,
-    run as run_model, trace_of,
+    run as run_model, together, trace_of,
 };
 use raystone::config::{Coherence, Rule};
 use raystone::integrator::{ConfiguredIntegrator, IntegratorRegistry};
@@ -387,7 +387,8 @@ fn rays_of_a_buffer_go_in_warps_as_they_follow_each_other() {
             (&*twin, &memory),
             &settings(groups, warps),
         );
-        found.expect("a tally")
+        let of_all = together(&found.expect("tallies of groups"));
+        of_all.into_values().next().unwrap_or_default()
     };
     // Every ray once, whatever the groups; the last of three warps is not full.
     let all = tally(&rays[..80], 9, 1);
@@ -445,6 +446,16 @@ fn a_run_records_coherence_twice_the_same_and_the_report_shows_it() {
                 ["primary", "shadow 0", "bounce 1", "shadow 1", "bounce 2"]
             );
             assert_eq!((at.paths, at.classes[0].1.rays), (128, 128));
+            // What groups have adds up to the class, and no group has all of it.
+            for ((_, tally), groups) in at.classes.iter().zip(&at.groups) {
+                let sum = |i: usize| groups.iter().map(|g| g[i]).sum::<u64>();
+                assert_eq!([sum(0), sum(1)], [tally.rays, tally.cost()]);
+            }
+            assert_eq!(at.groups.len(), at.classes.len());
+            assert_eq!(
+                at.groups[0].iter().map(|g| g[0]).collect::<Vec<_>>(),
+                [64, 64]
+            );
         }
         // The same rays through all structures.
         let rays = |r: &CoherenceRecord| r.at.iter().map(|at| at.all().rays).collect::<Vec<_>>();
@@ -486,7 +497,14 @@ fn check_recorded_rays(lines: &[raystone::measure::record::Line]) {
     let structures: Vec<_> = all_of::<StructureRecord>(lines).collect();
     assert_eq!(structures.len(), 3);
     for structure in structures {
-        let classes = &structure.coherence.as_ref().expect("a model").classes;
+        let coherence = structure.coherence.as_ref().expect("a model");
+        let classes = &coherence.classes;
+        assert_eq!(coherence.groups.len(), classes.len());
+        for ((_, tally), groups) in classes.iter().zip(&coherence.groups) {
+            let sum = |i: usize| groups.iter().map(|g| g[i]).sum::<u64>();
+            assert_eq!([sum(0), sum(1)], [tally.rays, tally.cost()]);
+            assert_eq!(groups.len(), 2);
+        }
         assert_eq!(classes.len(), structure.timings.len());
         assert_eq!(classes.len(), 8);
         for ((class, tally), timing) in classes.iter().zip(&structure.timings) {

@@ -8,9 +8,10 @@ mod printed;
 mod rounds;
 mod verdicts;
 
-use raystone::config::expect::{Pick, Thesis};
+use raystone::config::expect::{Expect, Pick, Thesis};
 use raystone::config::{Axis, Pattern};
 use raystone::measure::figure::FIGURES;
+use raystone::measure::statistics::LEAST_FOR_MEDIAN;
 use raystone::params::Variant;
 use raystone::repro::run::{Prepared, Settings, prepare};
 use raystone::repro::{SOURCES, chosen, not_covered, scenes};
@@ -64,6 +65,16 @@ fn every_file_is_embedded_and_is_a_sound_experiment_whole_and_quick() {
             let prepared = prepare(source, &settings, &registries);
             let prepared = prepared.unwrap_or_else(|e| panic!("{}: {e}", source.name));
             assert_eq!(prepared.experiment.name, source.name);
+            // A figure that there is only with so many rounds.
+            let needs_rounds = |e: &Expect| e.figure == "against-single-kernel/v1";
+            if prepared.thesis.expects.iter().any(needs_rounds) {
+                let rounds = prepared.experiment.timing.rounds as usize;
+                assert!(
+                    rounds >= LEAST_FOR_MEDIAN,
+                    "{}, quick: {quick}",
+                    source.name
+                );
+            }
             // Without models a whole run says what to get; a short one needs none.
             for (substitute, ours) in &prepared.scenes {
                 if let (Err(reason), false) = (ours, quick) {
