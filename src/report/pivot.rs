@@ -16,7 +16,7 @@ pub const FIGURES_ALONE: Part<'static> = &|_| String::new();
 /// The rows of a table, and the columns that stand before the figures.
 pub struct Rows<'a> {
     by: &'a [&'a str],
-    heads: &'a [&'a str],
+    heads: Vec<&'a str>,
     rows: Vec<(Key, Vec<TableCell>)>,
 }
 
@@ -27,20 +27,28 @@ impl<'a> Rows<'a> {
         heads: &'a [&'a str],
         rows: impl IntoIterator<Item = (Key, Vec<TableCell>)>,
     ) -> Self {
-        let rows = rows.into_iter().collect();
-        Self { by, heads, rows }
+        Self {
+            by,
+            heads: heads.to_vec(),
+            rows: rows.into_iter().collect(),
+        }
     }
 
-    /// A row for each combination of labels in the values, in their order.
+    /// A row for each combination of labels in the values, in their order. An axis without any label has no column.
     pub fn of_labels(by: &'a [&'a str], heads: &'a [&'a str], values: &[Value]) -> Self {
+        let is_used = |axis: &str| values.iter().any(|v| !v.key.label(axis).is_empty());
+        let used: Vec<bool> = by.iter().map(|axis| is_used(axis)).collect();
         let mut rows: Vec<(Key, Vec<TableCell>)> = Vec::new();
         let mut known = HashSet::new();
         for Value { key, .. } in values {
             let labels = key.labels_on(by);
             if known.insert(labels.clone()) {
-                rows.push((key.clone(), labels.into_iter().map(Into::into).collect()));
+                let shown = labels.into_iter().zip(&used).filter(|(_, used)| **used);
+                rows.push((key.clone(), shown.map(|(label, _)| label.into()).collect()));
             }
         }
+        let heads = heads.iter().zip(&used).filter(|(_, used)| **used);
+        let heads = heads.map(|(head, _)| *head).collect();
         Self { by, heads, rows }
     }
 
@@ -73,7 +81,7 @@ impl<'a> Rows<'a> {
         if columns.is_empty() && self.heads.len() < 2 {
             return Table::default();
         }
-        let mut table = Table::new(caption, self.heads);
+        let mut table = Table::new(caption, &self.heads);
         for (value, part) in &columns {
             let shared = columns.iter().filter(|(_, other)| other == part).count() > 1;
             table.add_column(match (part.is_empty(), shared) {
@@ -129,5 +137,18 @@ mod tests {
         let (heads, _) = table(&["mrays-per-s/v1", "nodes-per-ray/v1"]);
         assert_eq!(heads, ["structure", "x", "speed, y", "nodes/ray, y"]);
         assert!(table(&["epo/v1"]).1.is_empty());
+        // No value has a label on the axis of kernels.
+        let by = [axis::KERNELS, axis::ACCEL];
+        let rows = Rows::of_labels(&by, &["kernels", "structure"], &values);
+        let table = rows.table(&values, "t", &["nodes-per-ray/v1"], FIGURES_ALONE);
+        let heads = table.columns.iter().map(|c| c.title.clone());
+        assert_eq!(heads.collect::<Vec<_>>(), ["structure", "nodes/ray"]);
+        assert_eq!(
+            table.rows[1]
+                .iter()
+                .map(TableCell::flat)
+                .collect::<Vec<_>>(),
+            ["b", "9.00"]
+        );
     }
 }
