@@ -58,7 +58,7 @@ impl Browser {
                 "--window-size=1500,1000",
             ])
             .args([
-                "--virtual-time-budget=30000",
+                "--virtual-time-budget=300000",
                 "--enable-logging=stderr",
                 "--dump-dom",
             ])

@@ -53,7 +53,7 @@
       box.scrollIntoView();
       (box.previousElementSibling ?? box).scrollIntoView();
       // It wakes when a frame shows it, and frames come late on a busy machine: each turn asks for one.
-      for (let i = 0; i < 400 && !box.querySelector("canvas"); i++) {
+      for (let i = 0; i < 4000 && !box.querySelector("canvas"); i++) {
         scrollBy(0, i % 2 ? 1 : -1);
         await Promise.race([new Promise(requestAnimationFrame), wait(50)]);
       }
