@@ -175,7 +175,7 @@ impl Rounds {
         }
         match groups.is_empty() {
             true => of_rounds(&rounds),
-            false => of_groups(&groups),
+            false => Some(of_groups(&groups)),
         }
     }
 }
@@ -216,9 +216,9 @@ fn of_rounds(terms: &[(&[f64], f64)]) -> Option<Interval> {
     Some(LogFigure::of_times(&products)?.interval())
 }
 
-/// By the jackknife over groups. Where one group alone has such rays, or there is one, nothing is known of others.
-fn of_groups(terms: &[(&[[f64; 2]], f64)]) -> Option<Interval> {
-    let count = length(terms)?;
+/// By the jackknife over groups. Where one group alone has such rays, or there is one, or the sides were followed in
+/// different numbers of groups, nothing is known of others.
+fn of_groups(terms: &[(&[[f64; 2]], f64)]) -> Interval {
     let without = |left_out: usize| {
         let log = |(groups, exponent): &(&[[f64; 2]], f64)| {
             let kept = groups.iter().enumerate().filter(|(i, _)| *i != left_out);
@@ -227,13 +227,14 @@ fn of_groups(terms: &[(&[[f64; 2]], f64)]) -> Option<Interval> {
         };
         terms.iter().map(log).sum::<f64>()
     };
-    let log = without(count);
-    let parts: Vec<f64> = (0..count).map(without).collect();
-    let known = (count > 1).then(|| LogFigure::new(log, &[parts], Vec::new()));
+    let log = without(usize::MAX);
+    let count = length(terms).filter(|count| *count > 1);
+    let parts = count.map(|count| (0..count).map(without).collect::<Vec<f64>>());
+    let known = parts.and_then(|parts| LogFigure::new(log, &[parts], Vec::new()));
     let unknown = Interval {
         value: log.exp(),
         low: 0.0,
         high: f64::INFINITY,
     };
-    Some(known.flatten().map_or(unknown, |figure| figure.interval()))
+    known.map_or(unknown, |figure| figure.interval())
 }

@@ -168,6 +168,13 @@ fn one_group_says_nothing_of_others_and_older_records_have_none() {
         &ratio("least = 1.0"),
     );
     assert_eq!(row.verdict, Verdict::Undecided, "{row:?}");
+    // Nor is a ratio certain whose sides were followed in different numbers of groups.
+    let fewer = [
+        at_16("shift", cycles(2e5, SAME)),
+        at_16("jitter", cycles(1e5, SAME)[..5].to_vec()),
+    ];
+    let row = found(&fewer, &ratio("least = 1.0"));
+    assert_eq!(row.verdict, Verdict::Undecided, "{row:?}");
     // Without groups in the records it is a counted figure like others.
     let strip = |line: Line| {
         let mut json = serde_json::to_value(&line).expect("JSON");
