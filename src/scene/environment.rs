@@ -8,7 +8,7 @@ use std::fmt;
 use std::path::Path;
 
 /// Radiance in all directions, bilinear between the centres of texels, linear RGB. Row 0 is the zenith, +y; column
-/// c has its centre in the direction (−sin φ sin θ, cos θ, −cos φ sin θ), φ = 2π (c + 0.5)/width.
+/// c has its centre in the direction (sin φ sin θ, cos θ, −cos φ sin θ), φ = 2π (c + 0.5)/width: columns grow to the right of who looks at the map from inside.
 #[derive(Clone, PartialEq)]
 pub struct EnvironmentMap {
     /// The file.

@@ -180,8 +180,8 @@ const FAULTS: &[(&str, &str, &str, Seen)] = &[
     ("environment", "fract(x)", "0.5 * fract(x)", Environment),
     (
         "environment",
-        "atan2(-d.x, -d.z)",
         "atan2(d.x, -d.z)",
+        "atan2(-d.x, -d.z)",
         Environment,
     ),
     (
@@ -314,4 +314,15 @@ fn every_planted_fault_is_seen() {
         FAULTS.len() > 40 && missed.is_empty(),
         "not seen: {missed:#?}"
     );
+}
+
+#[test]
+fn a_map_that_rays_and_samples_mirror_alike_is_seen() {
+    let mirrored = [
+        ("atan2(d.x, -d.z)", "atan2(-d.x, -d.z)"),
+        ("sin(around) * sine, 1.0", "-sin(around) * sine, 1.0"),
+    ];
+    let gpu = probing(kernels_with("shading/light/environment", &mirrored));
+    let found = environment::fault_of_directions(&gpu);
+    assert!(found.is_some_and(|text| text.starts_with("[1] turned by 0")));
 }

@@ -85,7 +85,7 @@ impl Map {
     /// Column and row of a direction, as they run over the map.
     fn place(&self, d: DVec3) -> [f64; 2] {
         let [width, height] = self.size();
-        let around = ((-d.x).atan2(-d.z) - self.turn).rem_euclid(TAU);
+        let around = (d.x.atan2(-d.z) + self.turn).rem_euclid(TAU);
         let down = d.x.hypot(d.z).atan2(d.y);
         [around / TAU * width, down / PI * height]
     }
@@ -131,8 +131,8 @@ impl Map {
         let edge = |row: usize| (PI * row as f64 / height).cos();
         let cos = edge(row) + v * (edge(row + 1) - edge(row));
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
-        let around = TAU * (column as f64 + along) / width + self.turn;
-        let direction = DVec3::new(-around.sin() * sin, cos, -around.cos() * sin);
+        let around = TAU * (column as f64 + along) / width - self.turn;
+        let direction = DVec3::new(around.sin() * sin, cos, -around.cos() * sin);
         let direction = rounding.direction(direction);
         let density = self.density_of(column, row);
         let sample = LightSample {
