@@ -20,6 +20,7 @@ const OTHER_FILE: &[(&str, &str)] = &[
     ("accel/object_list", "src/accel/instancing/object_list.rs"),
     ("accel/wide", "src/accel/wide/quantise.rs"),
     ("accel/kd_tree", "src/accel/kd_tree/mod.rs"),
+    ("shading/light/units", "src/integrator/units.rs"),
     ("accel/octree", "src/accel/octree/mod.rs"),
     ("sampling/sampler", "src/sampling/mod.rs"),
 ];
@@ -314,6 +315,11 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
         "accel/wide/octants",
         "NOTHING",
         "the twin has empty leaves there",
+    ),
+    (
+        "shading/light/units",
+        "unit_number",
+        "the host chooses nothing",
     ),
     (
         "accel/instance",

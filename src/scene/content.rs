@@ -1,5 +1,6 @@
 //! Questions asked of a loaded scene: extent, size in bytes, emitters, content hash.
 
+use super::texture::texel_room;
 use super::{
     Bounds, EnvironmentMap, InstanceError, Light, LightList, SceneData, SceneError, Transform,
     normals,
@@ -51,12 +52,17 @@ impl SceneData {
         Ok(())
     }
 
-    /// The scene lit by an environment map, in the place of a constant radiance or the sky of scenes without a light.
+    /// The scene lit by an environment map, in the place of a constant radiance or the sky of scenes without a light; reduced until the
+    /// tables of the scene fit into so many bytes.
     ///
     /// # Errors
     /// The map cannot be read.
-    pub(super) fn under(mut self, file: &Path) -> Result<Self, SceneError> {
+    pub(super) fn under(mut self, file: &Path, table_bytes: u64) -> Result<Self, SceneError> {
         let map = EnvironmentMap::read(file, &mut self.report.warnings)?;
+        let mapped = self.uvs.len().max(self.normals.len());
+        let texels: usize = self.textures.iter().map(|t| t.texels.len()).sum();
+        let room = texel_room(table_bytes, mapped).saturating_sub(texels as u64);
+        let map = map.within(4 * room, &mut self.report.warnings);
         if let Some(sky) = self.daylight.take() {
             let note = sky.note();
             self.report.warnings.retain(|line| *line != note);

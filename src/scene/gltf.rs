@@ -106,8 +106,7 @@ fn build(
     builder.report.warnings.append(&mut palette.warnings);
     let textures = decode_all(
         &palette.images,
-        options.max_texture_size,
-        builder.len(),
+        options.texture_limits(builder.len()),
         &mut palette.materials,
         &mut builder.report,
     );

@@ -33,6 +33,7 @@ mod nori;
 mod normals;
 mod obj;
 mod ply;
+mod reduce;
 mod text;
 mod texture;
 mod texture_use;
@@ -145,9 +146,23 @@ pub struct LoadOptions {
     pub textures: bool,
     /// Largest width and height of a texture, texels; larger ones are reduced, with a warning.
     pub max_texture_size: u32,
+    /// Bytes that the tables of the scene may have: what the adapter binds as one buffer. Textures and maps are reduced until they
+    /// fit, with a warning.
+    pub table_bytes: u64,
     /// Whether a glTF model may name files outside its folder, and an OBJ model absolute paths: a model
     /// from elsewhere could read any file of this machine.
     pub allow_outside: bool,
+}
+
+/// What every adapter binds as one storage buffer, bytes (WebGPU's `maxStorageBufferBindingSize`).
+pub const LEAST_BINDING: u64 = 128 << 20;
+
+impl LoadOptions {
+    /// The greatest size of a texture beside so many triangles, and words for all of them.
+    fn texture_limits(&self, triangles: usize) -> [u64; 2] {
+        let room = texture::texel_room(self.table_bytes, triangles);
+        [self.max_texture_size.into(), room]
+    }
 }
 
 impl Default for LoadOptions {
@@ -155,6 +170,7 @@ impl Default for LoadOptions {
         Self {
             textures: true,
             max_texture_size: 1024,
+            table_bytes: LEAST_BINDING,
             allow_outside: false,
         }
     }
@@ -202,7 +218,9 @@ pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Scene
         scene = hung_lamps::hang(scene, lamps as u32);
     }
     match common.0.get(ENVIRONMENT) {
-        Some(ParamValue::Name(file)) if !file.is_empty() => scene.under(Path::new(file)),
+        Some(ParamValue::Name(file)) if !file.is_empty() => {
+            scene.under(Path::new(file), options.table_bytes)
+        }
         _ => Ok(scene),
     }
 }

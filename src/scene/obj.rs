@@ -95,8 +95,7 @@ fn build(
     }
     let textures = decode_all(
         &textures,
-        options.max_texture_size,
-        builder.len(),
+        options.texture_limits(builder.len()),
         &mut materials,
         &mut builder.report,
     );

@@ -67,8 +67,8 @@ pub const MUTANTS: &[Mutant] = &[
         "lights of the tree are chosen less often than they are weighted for",
         text(
             "shading/light/tree",
-            "return TreeChoice(links.z, probability, rest);",
-            "return TreeChoice(links.z, 1.01 * probability, rest);",
+            "return TreeChoice(links.y, units);",
+            "return TreeChoice(links.y, units + units / 100u);",
         ),
     ),
     fault(
