@@ -12,6 +12,7 @@ use super::{
     decode_normal, obj, ply,
 };
 use crate::geometry::Camera;
+use crate::text::plain_text;
 use glam::{DMat3, DMat4, DVec3, DVec4, Vec2, Vec3};
 use roxmltree::{Document, Node};
 use std::path::Path;
@@ -36,9 +37,10 @@ pub(super) fn load(
 ) -> Result<SceneData, SceneError> {
     let bytes = error::read(path)?;
     guarded(path, || {
-        let text = std::str::from_utf8(&bytes);
-        let text = text.map_err(|_| SceneError::malformed(path, "", "it is not UTF-8 text"))?;
-        let document = Document::parse(text).map_err(|e| {
+        let text = plain_text(bytes).map_err(|e| {
+            SceneError::malformed(path, format!("line {}", e.line), "it is not UTF-8 text")
+        })?;
+        let document = Document::parse(&text).map_err(|e| {
             SceneError::malformed(path, format!("line {}", e.pos().row), e.to_string())
         })?;
         let root = document.root_element();
