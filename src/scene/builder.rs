@@ -59,6 +59,8 @@ pub(super) struct SceneBuilder {
     pub assembly: Assembly,
     /// The first instance that could not be placed.
     misplaced: Option<InstanceError>,
+    /// Why there can be no scene, found while it was built.
+    pub refused: Option<SceneError>,
     pub report: LoadReport,
 }
 
@@ -200,9 +202,12 @@ impl SceneBuilder {
     /// is no camera, and hashes the scene.
     ///
     /// # Errors
-    /// [`SceneError::NoTriangles`], [`SceneError::TooLarge`], [`SceneError::Instance`], and
+    /// What `refused` says, [`SceneError::NoTriangles`], [`SceneError::TooLarge`], [`SceneError::Instance`], and
     /// [`SceneError::Camera`] if the scene brings a camera that sees nothing.
     pub fn finish(mut self, name: &str, mut look: Look) -> Result<SceneData, SceneError> {
+        if let Some(error) = self.refused {
+            return Err(error);
+        }
         if let Some(source) = self.misplaced {
             return Err(SceneError::Instance {
                 name: name.to_owned(),
