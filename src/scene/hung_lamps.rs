@@ -1,6 +1,6 @@
 //! Lamps that are hung into any scene, so that the number of its lights can be varied.
 
-use super::{GEOMETRIC, Material, SceneData};
+use super::{GEOMETRIC, Material, SceneData, WHITE};
 use crate::geometry::Triangle;
 use crate::random::Pcg32;
 use glam::{Vec2, Vec3};
@@ -40,6 +40,9 @@ pub(super) fn hang(mut scene: SceneData, lamps: u32) -> SceneData {
     }
     if !scene.normals.is_empty() {
         scene.normals.resize(count, [GEOMETRIC; 3]);
+    }
+    if !scene.colors.is_empty() {
+        scene.colors.resize(count, [WHITE; 3]);
     }
     scene.assembly = None;
     if let Some(sky) = scene.daylight.take() {

@@ -131,6 +131,14 @@ impl Reader<'_> {
         };
         let to_world = mirror.unwrap_or(DMat4::IDENTITY) * self.to_world(node)?;
         let material = self.material(node, file)?;
+        let sky = mesh.daylight.as_ref().map(|sky| sky.note());
+        let told = mesh.report.warnings.iter();
+        for line in told.filter(|line| Some(*line) != sky.as_ref()) {
+            self.warn(node, &format!("`{file}`: {line}"));
+        }
+        if !mesh.colors.is_empty() {
+            self.warn(node, &format!("`{file}` has colours of vertices, left out"));
+        }
         let id = self.look.materials.len() as u32;
         self.look.materials.push(material);
         self.builder.reserve(mesh.triangles.len());

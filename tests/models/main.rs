@@ -5,6 +5,7 @@ mod gltf;
 mod obj;
 mod ply;
 mod real;
+mod said;
 mod text;
 
 use glam::{DVec3, Vec2, Vec3};
