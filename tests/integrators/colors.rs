@@ -80,14 +80,11 @@ fn a_red_square_is_red_and_half_way_is_the_mean() {
         );
         for (at, pixel) in (0..).zip(&pixels) {
             let along = ((at % SIZE) as f32 + 0.5) / SIZE as f32;
-            for k in 0..3 {
-                let expected = left[k] + along * (right[k] - left[k]);
+            for ((a, b), found) in left.iter().zip(&right).zip(pixel) {
+                let expected = a + along * (b - a);
                 // Samples are spread over a pixel.
-                let error = (pixel[k] - expected).abs();
-                assert!(
-                    error < 0.012,
-                    "{name} {at}: {pixel:?}, not {expected} of {k}"
-                );
+                let error = (found - expected).abs();
+                assert!(error < 0.012, "{name} {at}: {pixel:?}, not {expected}");
             }
         }
     }

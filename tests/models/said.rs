@@ -74,10 +74,7 @@ fn first_colours_of_gltf_are_linear_and_the_same_in_every_type() {
         let kind = if alpha { "VEC4" } else { "VEC3" };
         let bytes: Vec<u8> = all(alpha, 255.0).iter().map(|x| *x as u8).collect();
         // Three bytes a vertex stand four apart.
-        let bytes = match alpha {
-            true => Some(bytes),
-            false => None,
-        };
+        let bytes = alpha.then_some(bytes);
         let words: Vec<u16> = all(true, 65_535.0).iter().map(|x| *x as u16).collect();
         let words: Vec<u8> = words.iter().flat_map(|x| x.to_le_bytes()).collect();
         let singles: Vec<f32> = all(alpha, 1.0).iter().map(|x| *x as f32).collect();
