@@ -283,6 +283,7 @@ const NO_TWIN: &[(&str, &str)] = &[
         "judged in src/stress/numerics/mappings.rs",
     ),
     ("shading/lights", "the table of lights; judged by images"),
+    ("shading/colors", "judged in f64 by single paths"),
     ("shading/light/sky", "judged by images, not by a twin"),
     ("shading/light/choice", "judged by tests/lights"),
     ("shading/light/delta", "judged by tests/lights"),

@@ -13,7 +13,7 @@ use glam::Vec3;
 /// What a scene makes kernels carry; absent features are not in the kernel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SceneFeatures {
-    /// Textures and normals.
+    /// Textures, normals and colours of vertices.
     pub surfaces: SurfaceFeatures,
     /// There are lights that can be sampled.
     pub lights: bool,
@@ -29,7 +29,7 @@ pub struct SceneFeatures {
     pub daylight: bool,
     /// Which of [`MATERIAL_KINDS`] some material is of.
     pub materials: [bool; MATERIAL_KINDS.len()],
-    /// Textures of the materials of each kind, and normals.
+    /// Textures of the materials of each kind, normals and colours of vertices.
     pub kinds: [SurfaceFeatures; MATERIAL_KINDS.len()],
     /// Instances add to the error of points.
     pub transforms: bool,
@@ -55,6 +55,7 @@ pub(super) const FEATURE_GROUPS: [(&str, &[&str]); 7] = [
             "metallic_roughness_textures",
             "emission_textures",
             "texture_transforms",
+            "vertex_colors",
         ],
     ),
     ("normals", &["normals", "normal_maps"]),
@@ -137,6 +138,8 @@ pub struct SceneBuffers {
     pub first_uv: u32,
     /// Where normals begin in `shading_tables`, in words.
     pub first_normal: u32,
+    /// Where colours of vertices begin in `shading_tables`, in words.
+    pub first_color: u32,
     /// Length of the diagonal of the scene's box, scene units.
     pub diagonal: f64,
     /// Corners of that box.
@@ -183,6 +186,7 @@ impl SceneBuffers {
             lights,
             first_uv: tables.places.first_uv,
             first_normal: tables.places.first_normal,
+            first_color: tables.places.first_color,
             diagonal: f64::from(2.0 * scene.bounds().radius()),
             bounds: [scene.bounds().min, scene.bounds().max].map(|corner| corner.to_array()),
         })

@@ -4,7 +4,8 @@
 use super::mesh::Mesh;
 use super::trial_scenes::{TrialScene, camera, depth};
 use crate::scene::{
-    Daylight, GEOMETRIC, Material, SceneData, SceneError, Texture, TextureUse, Wrap, encode_normal,
+    Daylight, GEOMETRIC, Material, SceneData, SceneError, Texture, TextureUse, WHITE, Wrap,
+    encode_color, encode_normal,
 };
 use glam::{Mat2, Vec2, Vec3, vec2, vec3};
 
@@ -99,7 +100,7 @@ fn mapped() -> Result<SceneData, SceneError> {
     Ok(scene)
 }
 
-/// A room without a lamp: the sky is seen by what leaves it, and through what is far.
+/// A room without a lamp, with colours of vertices: the sky is seen by what leaves it, and through what is far.
 fn under_the_sky() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(1.3, 1.5, 2.2), vec3(0.0, 0.5, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("under-the-sky", camera, vec3(0.9, 1.1, 0.8))?;
@@ -109,6 +110,14 @@ fn under_the_sky() -> Result<SceneData, SceneError> {
     mesh.plain([vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::X, 2.0 * Vec3::Y], floor);
     mesh.block(vec3(-0.5, 0.0, -0.4), vec3(0.7, 0.8, 0.6), block);
     let mut scene = mesh.done(Vec::new());
+    // The floor and the wall have vertices of unequal colours.
+    let color = |k: usize| {
+        let part = |step: usize| ((k * step) % 7) as f32 / 7.0;
+        encode_color(vec3(part(3), part(5), 1.0 - part(2)))
+    };
+    let corners = |t: usize| [color(3 * t), color(3 * t + 1), color(3 * t + 2)];
+    scene.colors = vec![[WHITE; 3]; scene.triangles.len()];
+    (0..4).for_each(|triangle| scene.colors[triangle] = corners(triangle));
     scene.daylight = Some(Daylight {
         reach: 1.2,
         ..Daylight::default()

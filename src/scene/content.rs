@@ -83,11 +83,12 @@ impl SceneData {
         Ok(self)
     }
 
-    /// Bytes of the scene's arrays: triangles, texture coordinates, material indices, texels.
+    /// Bytes of the scene's arrays: triangles, texture coordinates, normals, colours, material indices, texels.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.triangles[..])
             + size_of_val(&self.uvs[..])
             + size_of_val(&self.normals[..])
+            + size_of_val(&self.colors[..])
             + size_of_val(&self.material_ids[..])
             + self
                 .textures
@@ -114,7 +115,7 @@ impl SceneData {
             .collect()
     }
 
-    /// BLAKE3 (hex) of vertices, texture coordinates, materials, textures, camera and environment.
+    /// BLAKE3 (hex) of vertices, texture coordinates, normals and colours of vertices, materials, textures, camera and environment.
     /// Names are not part of it. Every list is preceded by its length, so that no two scenes share
     /// their bytes.
     pub(super) fn content_hash(&self) -> String {
@@ -152,6 +153,11 @@ impl SceneData {
         }
         if !self.normals.is_empty() {
             hash.bytes(bytemuck::cast_slice::<[u32; 3], u8>(&self.normals));
+        }
+        if !self.colors.is_empty() {
+            let words = self.colors.as_flattened().as_flattened();
+            hash.bytes(b"colors of vertices");
+            hash.bytes(bytemuck::cast_slice::<u32, u8>(words));
         }
         for texture in &self.textures {
             hash.bytes(bytemuck::cast_slice(&[texture.width, texture.height]));
@@ -205,7 +211,7 @@ mod tests {
     fn the_hash_sees_every_part_of_the_scene() {
         let scene = load_default("cornell-box");
         type Change = fn(&mut crate::scene::SceneData);
-        let changes: [(&str, Change); 14] = [
+        let changes: [(&str, Change); 15] = [
             ("vertex", |s| s.triangles[3].vertices[1].x += 1e-3),
             ("material id", |s| s.material_ids[0] = 1),
             ("reflectance", |s| s.materials[0].base_color.y += 1e-3),
@@ -220,6 +226,7 @@ mod tests {
                 });
             }),
             ("normal", |s| s.normals.push([1, 2, 3])),
+            ("color", |s| s.colors.push([[1, 2]; 3])),
             ("texture", |s| {
                 s.materials[0].normal_texture = Some(TextureUse::plain(0));
             }),

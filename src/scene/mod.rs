@@ -7,6 +7,7 @@
 mod builder;
 pub mod builtin;
 mod camera;
+mod colors;
 mod content;
 mod copies;
 mod daylight;
@@ -18,9 +19,11 @@ mod gltf;
 mod gltf_accessor;
 mod gltf_container;
 mod gltf_files;
+mod gltf_instancing;
 mod gltf_lights;
 mod gltf_material;
 mod gltf_texture;
+mod gltf_unread;
 mod hung_lamps;
 mod ies;
 mod instances;
@@ -32,7 +35,9 @@ mod mtl_texture;
 mod nori;
 mod normals;
 mod obj;
+mod obj_statements;
 mod ply;
+mod polygon;
 mod reduce;
 mod text;
 mod texture;
@@ -41,6 +46,7 @@ mod texture_use;
 pub use builder::{DEFAULT_ALBEDO, MAX_COORDINATE};
 pub use builtin::builtin_scenes;
 pub use camera::Bounds;
+pub use colors::{WHITE, decode_color, encode_color};
 pub use daylight::Daylight;
 pub use environment::EnvironmentMap;
 pub use error::SceneError;
@@ -103,7 +109,7 @@ impl LoadReport {
 
 /// A loaded scene: flat world-space triangles and what shading needs.
 ///
-/// `triangles`, `uvs`, `normals` and `material_ids` are parallel; `uvs` is empty when no material is textured.
+/// `triangles`, `uvs`, `normals`, `colors` and `material_ids` are parallel; `uvs` is empty when no material is textured.
 #[derive(Debug, Clone)]
 pub struct SceneData {
     /// Name as the user typed it.
@@ -114,6 +120,8 @@ pub struct SceneData {
     pub uvs: Vec<[Vec2; 3]>,
     /// Normals of the corners, as [`encode_normal`] has them; empty where all are those of the triangles.
     pub normals: Vec<[u32; 3]>,
+    /// Colours of the corners, as [`encode_color`] has them, by which the base colour is multiplied; empty where all are white.
+    pub colors: Vec<[[u32; 2]; 3]>,
     /// Index into `materials` for each triangle.
     pub material_ids: Vec<u32>,
     /// Materials; never empty.
@@ -304,21 +312,16 @@ pub fn check_model(path: &Path) -> Result<(), SceneError> {
     let mut start = Vec::new();
     let read = error::open(path)?.take(MODEL_START).read_to_end(&mut start);
     read.map_err(SceneError::unreadable(path))?;
-    let json = || {
-        let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start);
-        text.trim_ascii_start().starts_with(b"{")
-    };
-    let xml = || {
-        let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start);
-        text.trim_ascii_start().starts_with(b"<")
-    };
+    let text = crate::text::plain_text_or_latin1(start.clone());
+    let json = || text.trim_ascii_start().starts_with('{');
+    let xml = || text.trim_ascii_start().starts_with('<');
     let (begins_well, expected) = match extension(path).as_str() {
-        "obj" => (!start.contains(&0), "it is not text"),
+        "obj" => (!text.contains('\0'), "it is not text"),
         "gltf" | "glb" => (
             start.starts_with(b"glTF") || json(),
             "it begins neither with `glTF` nor with `{`",
         ),
-        "ply" => (start.starts_with(b"ply"), "it does not begin with `ply`"),
+        "ply" => (text.starts_with("ply"), "it does not begin with `ply`"),
         "xml" => (xml(), "it does not begin with `<`"),
         _ => {
             let path = path.to_owned();

@@ -12,6 +12,7 @@ use super::{
     decode_normal, obj, ply,
 };
 use crate::geometry::Camera;
+use crate::text::plain_text;
 use glam::{DMat3, DMat4, DVec3, DVec4, Vec2, Vec3};
 use roxmltree::{Document, Node};
 use std::path::Path;
@@ -36,9 +37,10 @@ pub(super) fn load(
 ) -> Result<SceneData, SceneError> {
     let bytes = error::read(path)?;
     guarded(path, || {
-        let text = std::str::from_utf8(&bytes);
-        let text = text.map_err(|_| SceneError::malformed(path, "", "it is not UTF-8 text"))?;
-        let document = Document::parse(text).map_err(|e| {
+        let text = plain_text(bytes).map_err(|e| {
+            SceneError::malformed(path, format!("line {}", e.line), "it is not UTF-8 text")
+        })?;
+        let document = Document::parse(&text).map_err(|e| {
             SceneError::malformed(path, format!("line {}", e.pos().row), e.to_string())
         })?;
         let root = document.root_element();
@@ -129,6 +131,14 @@ impl Reader<'_> {
         };
         let to_world = mirror.unwrap_or(DMat4::IDENTITY) * self.to_world(node)?;
         let material = self.material(node, file)?;
+        let sky = mesh.daylight.as_ref().map(|sky| sky.note());
+        let told = mesh.report.warnings.iter();
+        for line in told.filter(|line| Some(*line) != sky.as_ref()) {
+            self.warn(node, &format!("`{file}`: {line}"));
+        }
+        if !mesh.colors.is_empty() {
+            self.warn(node, &format!("`{file}` has colours of vertices, left out"));
+        }
         let id = self.look.materials.len() as u32;
         self.look.materials.push(material);
         self.builder.reserve(mesh.triangles.len());

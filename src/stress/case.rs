@@ -200,6 +200,7 @@ impl Maker {
 /// The scene as a loader would hand it over, without what only shading needs.
 pub fn scene(triangles: Mesh, assembly: Option<Assembly>) -> SceneData {
     SceneData {
+        colors: Vec::new(),
         name: "stress".into(),
         material_ids: vec![0; triangles.len()],
         triangles,

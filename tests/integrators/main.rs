@@ -3,6 +3,7 @@
 
 mod bits;
 mod blocks;
+mod colors;
 mod estimators;
 
 mod furnace;

@@ -5,6 +5,7 @@ mod gltf;
 mod obj;
 mod ply;
 mod real;
+mod said;
 mod reduced;
 mod text;
 

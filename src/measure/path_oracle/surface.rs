@@ -3,7 +3,7 @@
 use super::PathOracle;
 use super::hits::{Hit, Segment};
 use super::rounding::Rounding;
-use crate::scene::{Material, decode_normal};
+use crate::scene::{Material, decode_color, decode_normal};
 use glam::DVec3;
 
 /// Roundings of a point between the numbers of the file and a ray that leaves it. A kernel's bound is eight of the point and
@@ -27,7 +27,7 @@ pub(super) struct Surface<'a> {
     /// 1 where the corners turn counter-clockwise seen from there, -1 where not.
     pub side: f64,
     pub material: &'a Material,
-    /// Base colour, with the texture.
+    /// Base colour, with the texture and the colours of vertices.
     pub base: DVec3,
     /// What metalness and roughness are multiplied by.
     pub varied: [f64; 2],
@@ -98,6 +98,7 @@ impl PathOracle<'_> {
         let uv = self.textures.coordinates(hit.triangle, weights);
         let [colours, varied, bent, shining] = material.texture_uses();
         let base = material.base_color.as_dvec3() * self.textures.colour(colours, uv);
+        let base = base * self.vertex_color(hit.triangle, weights);
         let varied = self.textures.numbers(varied, uv);
         let emission = material.emission.as_dvec3() * self.textures.colour(shining, uv);
         let geometric = side * outward;
@@ -131,6 +132,15 @@ impl PathOracle<'_> {
             },
             offset: OFFSET * reach,
         }
+    }
+
+    /// Between the colours of the corners; white where they have none.
+    fn vertex_color(&self, triangle: u32, [u, v]: [f64; 2]) -> DVec3 {
+        let Some(words) = self.scene.colors.get(triangle as usize) else {
+            return DVec3::ONE;
+        };
+        let [a, b, c] = words.map(decode_color);
+        a * (1.0 - u - v) + b * u + c * v
     }
 
     /// Between the normals of the corners; that of the triangle, `outward`, where they have none.

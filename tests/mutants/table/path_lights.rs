@@ -117,6 +117,15 @@ pub const MUTANTS: &[Mutant] = &[
         ),
     ),
     fault(
+        "colours-of-corners-exchanged",
+        "the colour of a vertex has the weight of another",
+        text(
+            "shading/colors",
+            "+ hit.u * corner_color(at + 2u)",
+            "+ hit.u * corner_color(at + 4u)",
+        ),
+    ),
+    fault(
         "hits-moved-twice",
         "the offset of a ray is added to its hit, and not taken out",
         text(
