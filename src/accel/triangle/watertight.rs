@@ -8,8 +8,9 @@
 //! holds the ray, some triangle accepts it, and the paper's second test in double precision, which WGSL
 //! has not got, is not needed: without it a ray on an edge may meet both triangles.
 //!
-//! The distance is an average of those of the vertices, so that it stays between them. Of a triangle that
-//! is edge-on the weights are nothing but rounding, and would place the hit anywhere in its box: it is
+//! The distance is not the paper's average of those of the vertices, which errs by the length over the height
+//! of a thin triangle, but that of the point of the plane that is abreast of the ray ([`slid`]). Of a triangle
+//! that is edge-on the weights are nothing but rounding, and would place the hit anywhere in its box: it is
 //! no hit. A closed mesh has others there.
 
 use super::{APART, Meeting, TRIANGLE_PAD, TriangleRecord, TriangleTest};
@@ -91,6 +92,46 @@ pub fn products([a, b, c]: [[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
     )
 }
 
+/// The least denominator: of edges that are shorter, squares underflow.
+const SMALLEST_SQUARE: f32 = f32::MIN_POSITIVE;
+
+/// Weights u and v of a point in the plane of a triangle of sheared vertices, moved along the longer of
+/// two edges until the point lies abreast of the ray, and behind them the point's z.
+///
+/// Weights err by the rounding of products of edges over the area: of a thin triangle by its length over
+/// its height. Whatever they are, the point lies in the plane, and beside the ray almost along the
+/// triangle's length alone, since across it there are only so many heights. So a step along a long edge
+/// brings the point to the ray, but for rounding of the vertices, and does not leave the plane. Of two
+/// edges the longer one has half of the greatest length at least. No normal is made: that of a thin
+/// triangle with three long edges is a difference of large products.
+pub(super) fn slid([a, b, c]: [[f32; 3]; 3], u: f32, v: f32) -> [f32; 3] {
+    let ab = [0, 1, 2].map(|i| b[i] - a[i]);
+    let ac = [0, 1, 2].map(|i| c[i] - a[i]);
+    let x = a[0] + u * ab[0] + v * ac[0];
+    let y = a[1] + u * ab[1] + v * ac[1];
+    let first = ab[0] * ab[0] + ab[1] * ab[1];
+    let second = ac[0] * ac[0] + ac[1] * ac[1];
+    let along = if first >= second { ab } else { ac };
+    let part = (x * along[0] + y * along[1]) / first.max(second).max(SMALLEST_SQUARE);
+    let (u, v) = match first >= second {
+        true => (u - part, v),
+        false => (u, v - part),
+    };
+    [u, v, a[2] + u * ab[2] + v * ac[2]]
+}
+
+/// Distance to the plane of a triangle, from the weights that a test has found.
+pub(super) fn slid_distance(
+    triangle: &TriangleRecord,
+    ray: &Ray,
+    inverse: &[f32; 3],
+    u: f32,
+    v: f32,
+) -> f32 {
+    let s = shear(ray, inverse);
+    slid(triangle.vertices().map(|v| sheared(&s, v)), u, v)[2] * s.scale
+}
+
 /// S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", 2013.
 pub struct Watertight;
 
@@ -124,11 +165,17 @@ impl TriangleTest for Watertight {
         }
         let w = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
         let area = area_of(w, p, q);
+        if area.is_nan() || area <= 0.0 {
+            return APART;
+        }
+        let [u, v, z] = slid([a, b, c], w[1] / area, w[2] / area);
+        let u = u.max(0.0).min(1.0);
+        let v = v.max(0.0).min(1.0 - u);
         Meeting {
             area,
-            t: (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * s.scale / area,
-            u: w[1],
-            v: w[2],
+            t: z * s.scale,
+            u: u * area,
+            v: v * area,
         }
     }
 
@@ -139,8 +186,23 @@ impl TriangleTest for Watertight {
         inverse: &[f32; 3],
         found: &Meeting,
     ) -> [f32; 3] {
-        residual(triangle, ray, inverse, found.area)
+        let apart = slide(triangle, ray, inverse, found.area);
+        let rounding = residual(triangle, ray, inverse, found.area);
+        [0, 1, 2].map(|i| rounding[i] + apart[i])
     }
+}
+
+/// How far the point that is abreast of the ray lies from the one that the weights stand for, over the
+/// direction.
+fn slide(triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3], area: f32) -> [f32; 3] {
+    let s = shear(ray, inverse);
+    let [a, b, c] = triangle.vertices().map(|v| sheared(&s, v));
+    let u = (c[1] * a[0] - c[0] * a[1]).abs() / area;
+    let v = (a[1] * b[0] - a[0] * b[1]).abs() / area;
+    let [slid_u, slid_v, _] = slid([a, b, c], u, v);
+    let [v0, v1, v2] = triangle.vertices();
+    let moved = |i: usize| (slid_u - u) * (v1[i] - v0[i]) + (slid_v - v) * (v2[i] - v0[i]);
+    [0, 1, 2].map(|i| moved(i).abs() * inverse[i].abs())
 }
 
 /// Error of x and y of the point that the weights stand for, and what it makes of the distance.
