@@ -53,6 +53,8 @@ pub(super) struct SceneBuilder {
     uvs: Vec<[Vec2; 3]>,
     /// Empty until a triangle has normals that are not its own.
     normals: Vec<[u32; 3]>,
+    /// Empty until a triangle is mirrored.
+    mirrored: Vec<bool>,
     material_ids: Vec<u32>,
     keep_uvs: bool,
     /// Objects and instances; given up if they do not account for every triangle.
@@ -128,6 +130,13 @@ impl SceneBuilder {
         }
     }
 
+    /// Says that a transform has mirrored the triangles from number `first` on: their fronts are the sides from which their corners
+    /// turn clockwise.
+    pub fn mirror_from(&mut self, first: usize) {
+        self.mirrored.resize(first, false);
+        self.mirrored.resize(self.triangles.len(), true);
+    }
+
     /// Adds an object to the assembly. It is numbered by the order of addition.
     pub fn add_object(&mut self, triangles: Vec<Triangle>) {
         if let Err(error) = self.assembly.add_object(triangles) {
@@ -162,10 +171,14 @@ impl SceneBuilder {
     ) {
         match self.assembly.place(object, to_world) {
             Ok(instance) => {
+                let first = self.len();
                 let copy: Vec<Triangle> = self.assembly.copy(&instance).collect();
                 for (id, triangle) in copy.iter().enumerate() {
                     let uvs = uvs.get(id).copied().unwrap_or_default();
                     self.push_corners(triangle.vertices, uvs, None, material(id));
+                }
+                if to_world.is_mirrored() {
+                    self.mirror_from(first);
                 }
             }
             Err(error) => {
@@ -238,11 +251,15 @@ impl SceneBuilder {
         mask::settle(&mut look.materials, &look.textures);
         let textured = !look.textures.is_empty();
         let assembly = self.take_assembly();
+        if !self.mirrored.is_empty() {
+            self.mirrored.resize(self.triangles.len(), false);
+        }
         let mut scene = SceneData {
             name: name.to_owned(),
             triangles: self.triangles,
             uvs: if textured { self.uvs } else { Vec::new() },
             normals: self.normals,
+            mirrored: self.mirrored,
             material_ids: self.material_ids,
             materials: look.materials,
             textures: look.textures,

@@ -41,6 +41,9 @@ pub(super) fn hang(mut scene: SceneData, lamps: u32) -> SceneData {
     if !scene.normals.is_empty() {
         scene.normals.resize(count, [GEOMETRIC; 3]);
     }
+    if !scene.mirrored.is_empty() {
+        scene.mirrored.resize(count, false);
+    }
     scene.assembly = None;
     if let Some(sky) = scene.daylight.take() {
         let note = sky.note();

@@ -102,7 +102,7 @@ impl LoadReport {
 
 /// A loaded scene: flat world-space triangles and what shading needs.
 ///
-/// `triangles`, `uvs`, `normals` and `material_ids` are parallel; `uvs` is empty when no material is textured.
+/// `triangles`, `uvs`, `normals`, `mirrored` and `material_ids` are parallel; `uvs` is empty when no material is textured.
 #[derive(Debug, Clone)]
 pub struct SceneData {
     /// Name as the user typed it.
@@ -113,6 +113,9 @@ pub struct SceneData {
     pub uvs: Vec<[Vec2; 3]>,
     /// Normals of the corners, as [`encode_normal`] has them; empty where all are those of the triangles.
     pub normals: Vec<[u32; 3]>,
+    /// Of which triangles the front is the side from which the corners turn clockwise, because a transform has mirrored them:
+    /// copies of an object keep the order of its corners, on which u and v of hits depend. Empty if none is.
+    pub mirrored: Vec<bool>,
     /// Index into `materials` for each triangle.
     pub material_ids: Vec<u32>,
     /// Materials; never empty.

@@ -205,6 +205,7 @@ pub fn scene(triangles: Mesh, assembly: Option<Assembly>) -> SceneData {
         triangles,
         uvs: Vec::new(),
         normals: Vec::new(),
+        mirrored: Vec::new(),
         materials: vec![Material::diffuse("grey", Vec3::splat(0.5))],
         textures: Vec::new(),
         assembly,

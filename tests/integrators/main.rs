@@ -8,6 +8,7 @@ mod estimators;
 mod furnace;
 mod model;
 mod ray_counts;
+mod sides;
 #[path = "../support/mod.rs"]
 mod support;
 
