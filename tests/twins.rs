@@ -296,6 +296,7 @@ const NO_TWIN: &[(&str, &str)] = &[
     ("shading/light/table", "the layout of lights"),
     ("shading/material", "judged by images, not by a twin"),
     ("shading/normals", "judged in f64 by tests/materials"),
+    ("shading/sides", "judged by images, not by a twin"),
     ("shading/surface", "judged by images, not by a twin"),
     ("shading/texture", "judged by images, not by a twin"),
 ];

@@ -259,7 +259,7 @@ fn light_bounds(scene: &SceneData, listed: &ListedLight) -> Option<LightBounds> 
     };
     let place = match listed.source {
         Source::Triangle(id) => {
-            let [a, b, c] = scene.triangles[id as usize].vertices;
+            let [a, b, c] = scene.outward(id as usize);
             return Some(flat(&[a, b, c], (b - a).cross(c - a), id));
         }
         Source::Parallelogram(of) => {

@@ -75,7 +75,7 @@ parameters! {
         Choice = "choice",
         /// What rays that leave the scene find.
         Background = "background",
-        /// The error that instances add to points.
+        /// The error that instances add to points, and which triangles are mirrored.
         Transforms = "transforms",
         /// All of these: the full kernel.
         All = "all",

@@ -86,10 +86,11 @@ pub(super) struct Places {
     pub first_uv: u32,
     pub first_normal: u32,
     pub first_color: u32,
+    pub first_mirrored: u32,
 }
 
 /// Appends, in this order: places of textures, three `vec4` each; six words of texture coordinates a triangle; three of normals;
-/// six of colours; texels. Tells the materials where the places of their textures are, in `vec4`.
+/// six of colours; a bit whether it is mirrored; texels. Tells the materials where the places of their textures are, in `vec4`.
 ///
 /// A place: first texel, in words, width, height, and how it wraps (in v times 4, in u); the matrix by columns; what is added, and the scale of
 /// normals.
@@ -118,7 +119,8 @@ pub(super) fn append(
         false => 0,
     };
     let corners = 6 * scene.uvs.len() + 3 * scene.normals.len() + 6 * scene.colors.len();
-    words.reserve_exact(corners + texels + 3);
+    let mirrored = scene.mirrored.len().div_ceil(32);
+    words.reserve_exact(corners + mirrored + texels + 3);
     if features.textures {
         let uvs = scene.uvs.iter().flatten();
         words.extend(uvs.flat_map(|uv| [uv.x.to_bits(), uv.y.to_bits()]));
@@ -131,6 +133,11 @@ pub(super) fn append(
     if features.vertex_colors {
         words.extend_from_slice(scene.colors.as_flattened().as_flattened());
     }
+    let first_mirrored = place_of(!scene.mirrored.is_empty(), words);
+    words.extend(scene.mirrored.chunks(32).map(|bits| {
+        let set = (0..).zip(bits).map(|(place, bit)| u32::from(*bit) << place);
+        set.sum::<u32>()
+    }));
     if features.textures {
         // Those of masks alone are with the triangles.
         let shown = (0_u32..).zip(&scene.textures);
@@ -146,6 +153,7 @@ pub(super) fn append(
         first_uv,
         first_normal,
         first_color,
+        first_mirrored,
     }
 }
 

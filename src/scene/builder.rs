@@ -55,6 +55,8 @@ pub(super) struct SceneBuilder {
     normals: Vec<[u32; 3]>,
     /// Empty until a vertex has a colour that is not white.
     colors: Vec<[[u32; 2]; 3]>,
+    /// Empty until a triangle is mirrored.
+    mirrored: Vec<bool>,
     material_ids: Vec<u32>,
     keep_uvs: bool,
     /// Objects and instances; given up if they do not account for every triangle.
@@ -149,6 +151,13 @@ impl SceneBuilder {
         }
     }
 
+    /// Says that a transform has mirrored the triangles from number `first` on: their fronts are the sides from which their corners
+    /// turn clockwise.
+    pub fn mirror_from(&mut self, first: usize) {
+        self.mirrored.resize(first, false);
+        self.mirrored.resize(self.triangles.len(), true);
+    }
+
     /// Adds an object to the assembly. It is numbered by the order of addition.
     pub fn add_object(&mut self, triangles: Vec<Triangle>) {
         if let Err(error) = self.assembly.add_object(triangles) {
@@ -184,12 +193,16 @@ impl SceneBuilder {
     ) {
         match self.assembly.place(object, to_world) {
             Ok(instance) => {
+                let first = self.len();
                 let copy: Vec<Triangle> = self.assembly.copy(&instance).collect();
                 for (id, triangle) in copy.iter().enumerate() {
                     let uvs = uvs.get(id).copied().unwrap_or_default();
                     let colors = colors.get(id).map(|c| c.map(|w| decode_color(w).as_vec3()));
                     let vertices = triangle.vertices;
                     self.push_colored(vertices, uvs, None, colors, material(id));
+                }
+                if to_world.is_mirrored() {
+                    self.mirror_from(first);
                 }
             }
             Err(error) => {
@@ -265,12 +278,16 @@ impl SceneBuilder {
         mask::settle(&mut look.materials, &look.textures);
         let textured = !look.textures.is_empty();
         let assembly = self.take_assembly();
+        if !self.mirrored.is_empty() {
+            self.mirrored.resize(self.triangles.len(), false);
+        }
         let mut scene = SceneData {
             name: name.to_owned(),
             triangles: self.triangles,
             uvs: if textured { self.uvs } else { Vec::new() },
             normals: self.normals,
             colors: self.colors,
+            mirrored: self.mirrored,
             material_ids: self.material_ids,
             materials: look.materials,
             textures: look.textures,

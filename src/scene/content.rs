@@ -36,6 +36,7 @@ impl SceneData {
         };
         let assembly = self.assembly.as_mut().ok_or(missing)?;
         let before = assembly.instances().get(instance).map(|i| i.to_world);
+        let turns = before.is_some_and(|from| from.is_mirrored() != to_world.is_mirrored());
         assembly.move_to(instance, to_world)?;
         let moved = &assembly.instances()[instance];
         let first = moved.first as usize;
@@ -47,6 +48,12 @@ impl SceneData {
         let corners = self.normals.iter_mut().skip(first).take(count);
         for (words, from) in corners.zip(std::iter::repeat(before).flatten()) {
             *words = normals::moved(*words, &from, &to_world);
+        }
+        if turns {
+            self.mirrored.resize(self.triangles.len(), false);
+            for mirrored in &mut self.mirrored[first..first + count] {
+                *mirrored = !*mirrored;
+            }
         }
         self.hash = self.content_hash();
         Ok(())
@@ -83,12 +90,47 @@ impl SceneData {
         Ok(self)
     }
 
-    /// Bytes of the scene's arrays: triangles, texture coordinates, normals, colours, material indices, texels.
+    /// Whether the front of a triangle is the side from which its corners turn clockwise.
+    pub fn is_mirrored(&self, triangle: usize) -> bool {
+        self.mirrored.get(triangle).copied().unwrap_or(false)
+    }
+
+    /// The corners of a triangle in the order in which they turn counter-clockwise seen from its front.
+    pub fn outward(&self, triangle: usize) -> [Vec3; 3] {
+        let [a, b, c] = self.triangles[triangle].vertices;
+        match self.is_mirrored(triangle) {
+            true => [a, c, b],
+            false => [a, b, c],
+        }
+    }
+
+    /// The scene with all corners in that order. What was mirrored is no copy of an object any more.
+    #[must_use]
+    pub(super) fn turned_outward(mut self) -> Self {
+        let mirrored = std::mem::take(&mut self.mirrored);
+        for (id, _) in mirrored.iter().enumerate().filter(|(_, is_so)| **is_so) {
+            self.triangles[id].vertices.swap(1, 2);
+            if let Some(uvs) = self.uvs.get_mut(id) {
+                uvs.swap(1, 2);
+            }
+            if let Some(normals) = self.normals.get_mut(id) {
+                normals.swap(1, 2);
+            }
+            if let Some(colors) = self.colors.get_mut(id) {
+                colors.swap(1, 2);
+            }
+            self.assembly = None;
+        }
+        self
+    }
+
+    /// Bytes of the scene's arrays: triangles, what corners and triangles carry, material indices, texels.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.triangles[..])
             + size_of_val(&self.uvs[..])
             + size_of_val(&self.normals[..])
             + size_of_val(&self.colors[..])
+            + size_of_val(&self.mirrored[..])
             + size_of_val(&self.material_ids[..])
             + self
                 .textures
@@ -158,6 +200,9 @@ impl SceneData {
             let words = self.colors.as_flattened().as_flattened();
             hash.bytes(b"colors of vertices");
             hash.bytes(bytemuck::cast_slice::<u32, u8>(words));
+        }
+        if !self.mirrored.is_empty() {
+            hash.bytes(bytemuck::cast_slice(&self.mirrored));
         }
         for texture in &self.textures {
             hash.bytes(bytemuck::cast_slice(&[texture.width, texture.height]));

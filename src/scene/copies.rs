@@ -26,6 +26,7 @@ pub(super) fn with_at_most(mut scene: SceneData, most: usize) -> Result<SceneDat
     if scene.triangles.len() <= most {
         return Ok(scene);
     }
+    scene = scene.turned_outward();
     let (mut fits, mut too_fine) = (0, FINEST + 1);
     let mut kept = Vec::new();
     while too_fine - fits > 1 {
@@ -117,6 +118,7 @@ pub(super) fn on_a_plane(scene: SceneData, copies: usize) -> Result<SceneData, S
             most: MOST_TRIANGLES / copies,
         });
     }
+    let scene = scene.turned_outward();
     let bounds = scene.bounds();
     let size = bounds.max - bounds.min;
     let height = size.y.max(0.01 * bounds.radius());

@@ -305,6 +305,9 @@ impl<'a> Geometry<'a> {
                 SceneError::malformed(self.path, place, problem)
             })?;
         }
+        if Transform::from_matrix(world).is_mirrored() {
+            self.builder.mirror_from(before);
+        }
         if self.builder.len() > before {
             self.place(node, mesh.index(), own, world, before);
         }

@@ -44,6 +44,9 @@ pub(super) fn hang(mut scene: SceneData, lamps: u32) -> SceneData {
     if !scene.colors.is_empty() {
         scene.colors.resize(count, [WHITE; 3]);
     }
+    if !scene.mirrored.is_empty() {
+        scene.mirrored.resize(count, false);
+    }
     scene.assembly = None;
     if let Some(sky) = scene.daylight.take() {
         let note = sky.note();

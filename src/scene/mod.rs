@@ -109,7 +109,7 @@ impl LoadReport {
 
 /// A loaded scene: flat world-space triangles and what shading needs.
 ///
-/// `triangles`, `uvs`, `normals`, `colors` and `material_ids` are parallel; `uvs` is empty when no material is textured.
+/// `triangles`, `uvs`, `normals`, `colors`, `mirrored` and `material_ids` are parallel; `uvs` is empty when no material is textured.
 #[derive(Debug, Clone)]
 pub struct SceneData {
     /// Name as the user typed it.
@@ -122,6 +122,9 @@ pub struct SceneData {
     pub normals: Vec<[u32; 3]>,
     /// Colours of the corners, as [`encode_color`] has them, by which the base colour is multiplied; empty where all are white.
     pub colors: Vec<[[u32; 2]; 3]>,
+    /// Of which triangles the front is the side from which the corners turn clockwise, because a transform has mirrored them:
+    /// copies of an object keep the order of its corners, on which u and v of hits depend. Empty if none is.
+    pub mirrored: Vec<bool>,
     /// Index into `materials` for each triangle.
     pub material_ids: Vec<u32>,
     /// Materials; never empty.

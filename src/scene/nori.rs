@@ -142,6 +142,8 @@ impl Reader<'_> {
         let id = self.look.materials.len() as u32;
         self.look.materials.push(material);
         self.builder.reserve(mesh.triangles.len());
+        // A reflection turns corners, whether it is the camera's or the mesh's own; emitters and glass tell their sides by them.
+        let mirrored = to_world.determinant() < 0.0;
         let of_normals = DMat3::from_mat4(to_world).inverse().transpose();
         let normals = |index: usize| -> Option<[Vec3; 3]> {
             let words = mesh.normals.get(index)?.map(decode_normal);
@@ -151,10 +153,9 @@ impl Reader<'_> {
         for (index, triangle) in mesh.triangles.iter().enumerate() {
             let moved = |v: Vec3| to_world.transform_point3(v.as_dvec3()).as_vec3();
             let [a, b, c] = triangle.vertices.map(moved);
-            // A reflection turns corners; emitters and glass tell their sides by them.
-            let turn = |[a, b, c]: [Vec3; 3]| match mirror {
-                Some(_) => [a, c, b],
-                None => [a, b, c],
+            let turn = |[a, b, c]: [Vec3; 3]| match mirrored {
+                true => [a, c, b],
+                false => [a, b, c],
             };
             let normals = normals(index).map(turn);
             let uvs = [Vec2::ZERO; 3];

@@ -206,6 +206,7 @@ pub fn scene(triangles: Mesh, assembly: Option<Assembly>) -> SceneData {
         triangles,
         uvs: Vec::new(),
         normals: Vec::new(),
+        mirrored: Vec::new(),
         materials: vec![Material::diffuse("grey", Vec3::splat(0.5))],
         textures: Vec::new(),
         assembly,

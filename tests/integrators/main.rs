@@ -9,6 +9,7 @@ mod estimators;
 mod furnace;
 mod model;
 mod ray_counts;
+mod sides;
 #[path = "../support/mod.rs"]
 mod support;
 

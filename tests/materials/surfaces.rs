@@ -186,6 +186,7 @@ fn frame(library: &KernelLibrary, buffers: &SceneBuffers) -> UniformValues {
         .u32("first_uv", buffers.first_uv)
         .u32("first_normal", buffers.first_normal)
         .u32("first_color", buffers.first_color)
+        .u32("first_mirrored", buffers.first_mirrored)
 }
 
 fn linear(c: f64) -> f64 {

@@ -24,7 +24,7 @@ pub(super) struct Surface<'a> {
     pub geometric: DVec3,
     /// Unit shading normal on that side.
     pub normal: DVec3,
-    /// 1 where the corners turn counter-clockwise seen from there, -1 where not.
+    /// 1 where that is the front of the triangle, -1 where not.
     pub side: f64,
     pub material: &'a Material,
     /// Base colour, with the texture and the colours of vertices.
@@ -86,7 +86,11 @@ impl PathOracle<'_> {
         // The rounding of a thin triangle's normal is that of its edges against its height.
         let thinness = e1.length() * e2.length() / area.length();
         let outward = rounding.point(area.normalize(), DVec3::splat(thinness));
-        let outward = outward.normalize();
+        let front = match self.scene.is_mirrored(hit.triangle as usize) {
+            true => -1.0,
+            false => 1.0,
+        };
+        let outward = front * outward.normalize();
         let out = -segment.direction;
         let side = match outward.dot(out) > 0.0 {
             true => 1.0,

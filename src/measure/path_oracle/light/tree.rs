@@ -51,7 +51,7 @@ impl Bounds {
         };
         let id = match source {
             Source::Triangle(id) => {
-                let [a, b, c] = scene.triangles[id as usize].vertices.map(|v| v.as_dvec3());
+                let [a, b, c] = scene.outward(id as usize).map(|v| v.as_dvec3());
                 return Some(flat(&[a, b, c], (b - a).cross(c - a), id));
             }
             Source::Parallelogram(of) => {
