@@ -184,7 +184,7 @@ impl<'a> Work<'a> {
                 &of_runs
             };
             let own = finding.is_control.then_some(ratio.log);
-            let spread = drift.of(&place(finding), ratio.rounds.variance, own);
+            let spread = drift.of(&place(finding, ratio.clock), ratio.rounds.variance, own);
             let measured = ratio.measured(&finding.figure, spread, margin);
             let grew = direction(&finding.figure, measured.change.value) == Verdict::Worse;
             finding.looks_worse =
@@ -208,7 +208,11 @@ impl<'a> Work<'a> {
         let mut drift = Drift::default();
         for open in self.findings.iter().filter(|open| open.finding.is_control) {
             if let Some(ratio) = ratio(open).filter(|ratio| ratio.clock != IN_TURNS) {
-                drift.add(place(&open.finding), ratio.log, ratio.rounds.variance);
+                drift.add(
+                    place(&open.finding, ratio.clock),
+                    ratio.log,
+                    ratio.rounds.variance,
+                );
             }
         }
         drift
@@ -304,10 +308,11 @@ fn exact_change(old: &Evidence, new: &Evidence) -> Option<f64> {
     }
 }
 
-fn place(finding: &Finding) -> Place {
+fn place(finding: &Finding, clock: &'static str) -> Place {
     Place {
         figure: finding.figure.title.to_string(),
         scene: finding.key.label(axis::SCENE).to_owned(),
+        clock,
     }
 }
 
