@@ -131,7 +131,11 @@ impl BuildLog {
         }
         if !is_timed {
             let names = played.runs.iter().map(|(name, _)| name.as_str());
-            self.note(&names.collect::<Vec<_>>().join(" + "), played.wall_ms());
+            let mut phase = names.collect::<Vec<_>>().join(" + ");
+            if played.elapsed().backwards {
+                phase += " (wall clock: that of the device ran backwards)";
+            }
+            self.note(&phase, played.wall_ms());
         }
         Ok(played)
     }

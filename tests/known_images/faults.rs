@@ -237,8 +237,8 @@ const OTHERS: [Fault; 38] = [
     fault(
         "shading/light/ies",
         &[(
-            "horizontal = atan2(d.y, d.x);",
-            "horizontal = atan2(d.x, d.y);",
+            "horizontal = angle_of(d.y, d.x);",
+            "horizontal = angle_of(d.x, d.y);",
         )],
         "far and measured lights",
     ),

@@ -180,8 +180,8 @@ const FAULTS: &[(&str, &str, &str, Seen)] = &[
     ("environment", "fract(x)", "0.5 * fract(x)", Environment),
     (
         "environment",
-        "atan2(d.x, -d.z)",
-        "atan2(-d.x, -d.z)",
+        "angle_of(d.x, -d.z)",
+        "angle_of(-d.x, -d.z)",
         Environment,
     ),
     (
@@ -235,7 +235,7 @@ const FAULTS: &[(&str, &str, &str, Seen)] = &[
     ),
     (
         "ies",
-        "vertical = atan2(d.y, d.z);",
+        "vertical = angle_of(d.y, d.z);",
         "vertical = atan2(d.y, length(d.xz));",
         Flux,
     ),

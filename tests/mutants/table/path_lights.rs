@@ -49,8 +49,8 @@ pub const MUTANTS: &[Mutant] = &[
         "the angles of type B are those about another axis",
         text(
             "shading/light/ies",
-            "vertical = atan2(d.y, d.z);",
-            "vertical = atan2(d.x, d.z);",
+            "vertical = angle_of(d.y, d.z);",
+            "vertical = angle_of(d.x, d.z);",
         ),
     ),
     fault(

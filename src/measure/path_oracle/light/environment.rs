@@ -93,7 +93,11 @@ impl Map {
     /// Column and row of a direction, as they run over the map.
     fn place(&self, d: DVec3) -> [f64; 2] {
         let [width, height] = self.size();
-        let around = (d.x.atan2(-d.z) + self.turn).rem_euclid(TAU);
+        // The poles of the map have no azimuth: there its first column begins, however it is turned.
+        let around = match d.x == 0.0 && d.z == 0.0 {
+            true => 0.0,
+            false => (d.x.atan2(-d.z) + self.turn).rem_euclid(TAU),
+        };
         let down = d.x.hypot(d.z).atan2(d.y);
         [around / TAU * width, down / PI * height]
     }
