@@ -59,7 +59,7 @@ mod tests {
             let units = shared_out(&weights);
             let table = alias_table(&units);
             let size = UNITS as usize / table.len();
-            let mut found = vec![0; table.len()];
+            let mut found = vec![0_u32; table.len()];
             for value in 0..UNITS as usize {
                 let (part, place) = (value / size, value % size);
                 let own = place < table[part].threshold as usize;

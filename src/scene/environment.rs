@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn an_even_map_has_weights_of_its_solid_angle_and_large_ones_are_halved() {
+    fn an_even_map_has_weights_of_its_solid_angle() {
         let mut warnings = Vec::new();
         let size = [5, 4];
         let map =
