@@ -4,6 +4,7 @@
 mod bits;
 mod blocks;
 mod estimators;
+mod facets;
 
 mod furnace;
 mod model;
