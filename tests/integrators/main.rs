@@ -5,6 +5,7 @@ mod bits;
 mod blocks;
 mod colors;
 mod estimators;
+mod facets;
 
 mod furnace;
 mod model;
