@@ -93,7 +93,7 @@ pub fn products([a, b, c]: [[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
 }
 
 /// The least denominator: of edges that are shorter, squares underflow.
-const SMALLEST_SQUARE: f32 = f32::MIN_POSITIVE;
+const SMALLEST_SQUARE: f32 = 1.175_494_4e-38;
 
 /// Weights u and v of a point in the plane of a triangle of sheared vertices, moved along the longer of
 /// two edges until the point lies abreast of the ray, and behind them the point's z.
