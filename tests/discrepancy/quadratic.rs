@@ -130,7 +130,7 @@ fn sums_are_right_to_twelve_digits_against_whole_numbers() {
     let mut random = Pcg32::new(11);
     let mut first = |dim: usize, count: usize, bits: u32| {
         // Scrambled a little, so that the coordinates have all of their bits.
-        let sobol = sobol_in(dim, count.next_power_of_two());
+        let sobol = sobol_in(dim, count.next_power_of_two() as u32);
         let l = f64::from(1_u32 << bits);
         let cut = |x: &f64| {
             ((x * l).floor() + random.uniform() * l / 4096.0)

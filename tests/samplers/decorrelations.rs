@@ -392,7 +392,8 @@ fn random_samplers() -> Vec<Sampler> {
 #[test]
 fn no_seed_draws_a_shifted_run_of_another_over_pixels_dimensions_or_samples() {
     // With hash(pixel + hash(seed)), 3.4 of these pairs of seeds would share a run of pixels by expectation.
-    let seeds = (0..1800_u32).chain((0..900).map(|i| (1 << 31) + 0x9e37_79b9_u32.wrapping_mul(i)));
+    let seeds =
+        (0..1800_u32).chain((0..900_u32).map(|i| (1 << 31) + 0x9e37_79b9_u32.wrapping_mul(i)));
     for sampler in random_samplers() {
         let run = |seed| {
             let word = |pixel| {
@@ -452,7 +453,7 @@ fn no_seed_draws_a_shifted_run_of_another_over_pixels_dimensions_or_samples() {
 #[test]
 fn seeds_that_differ_in_their_last_bit_draw_different_numbers() {
     for sampler in random_samplers() {
-        for k in (0..4000_u32).chain((0..4000).map(|i| i.wrapping_mul(0x85eb_ca6b) >> 1)) {
+        for k in (0..4000_u32).chain((0..4000_u32).map(|i| i.wrapping_mul(0x85eb_ca6b) >> 1)) {
             let words = |seed| {
                 (0..3).map(move |pixel| Coordinate {
                     pixel,

@@ -190,7 +190,7 @@ fn direction_numbers_are_those_of_joe_and_kuo() {
     }
 }
 
-/// The radical inverse in lowest weights first, as a whole number over a power of the base, cut to a fraction of 2³².
+/// The radical inverse as a whole number over a power of the base, cut to a fraction of 2³².
 fn exact_inverse(n: u32, base: u32, digits: &[u32]) -> u32 {
     let (mut mirrored, mut power, mut rest) = (0_u128, 1_u128, n);
     while rest > 0 {
