@@ -5,8 +5,8 @@ mod gltf;
 mod obj;
 mod ply;
 mod real;
-mod said;
 mod reduced;
+mod said;
 mod text;
 
 use glam::{DVec3, Vec2, Vec3};

@@ -122,6 +122,7 @@ pub fn plain_scene(name: String, triangles: Vec<Triangle>) -> SceneData {
         uvs: Vec::new(),
         normals: Vec::new(),
         mirrored: Vec::new(),
+        colors: Vec::new(),
         materials: vec![Material::diffuse("grey", Vec3::splat(0.5))],
         textures: Vec::new(),
         assembly: None,
