@@ -206,7 +206,7 @@ mod tests {
                     let sense = if turns > 0.0 { 1 } else { -1 };
                     for k in 0..900_u16 {
                         let at = [
-                            0.101 * f32::from(k % 30),
+                            0.101 * f32::from(k % 30) + 0.0059,
                             0.101 * f32::from(k / 30) - 0.0137,
                         ];
                         let expected = sense * i32::from(is_inside(&corners, at));

@@ -84,7 +84,7 @@ fn independent() -> Sampler {
 /// Trial scenes of these places, in five tests for their time.
 fn judge_trials(places: std::ops::Range<usize>) {
     let scenes = trial_scenes().expect("scenes");
-    assert_eq!(scenes.len(), 13);
+    assert_eq!(scenes.len(), 14);
     for trial in &scenes[places] {
         for (name, changes) in &trial.trials {
             let what = integrator_variant(name, changes);
@@ -117,7 +117,7 @@ fn single_paths_of_placed_textures_skies_and_panes_are_those_of_the_oracle() {
 
 #[test]
 fn single_paths_of_thin_triangles_are_those_of_the_oracle() {
-    judge_trials(12..13);
+    judge_trials(13..14);
 }
 
 #[test]
