@@ -171,7 +171,7 @@ fn has_colors(vertex: &ElementDef) -> bool {
             matches!(kind, PropertyType::Scalar(UChar | UShort | Float | Double))
         })
     };
-    COLORS.iter().any(|names| names.iter().all(|n| is_read(&n)))
+    COLORS.iter().any(|names| names.iter().all(&is_read))
 }
 
 /// What an element says that is not read.

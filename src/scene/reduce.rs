@@ -137,7 +137,13 @@ mod tests {
     const NOTHING: [u8; 4] = [0; 4];
 
     fn checker(size: u32, [a, b]: [[u8; 4]; 2]) -> Vec<[u8; 4]> {
-        let texel = |k: u32| if (k % size + k / size) % 2 == 0 { a } else { b };
+        let texel = |k: u32| {
+            if (k % size + k / size).is_multiple_of(2) {
+                a
+            } else {
+                b
+            }
+        };
         (0..size * size).map(texel).collect()
     }
 

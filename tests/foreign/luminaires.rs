@@ -108,13 +108,15 @@ fn compare(image: &Image, of: impl Fn(f64, f64) -> f64) -> [f64; 2] {
     [(total[0] / total[1] - 1.0).abs(), worst]
 }
 
+/// A name, the horizontal angles of the file, and the angle that stands for each.
+type Kind = (&'static str, Vec<f64>, fn(f64) -> f64);
+
 #[test]
 fn a_luminaire_casts_what_its_file_says_around_every_kind_of_symmetry() {
     let steps = |from: i32, to: i32| -> Vec<f64> {
         (from / 30..=to / 30).map(|k| f64::from(30 * k)).collect()
     };
-    // The angle of the file that stands for each.
-    let kinds: [(&str, Vec<f64>, fn(f64) -> f64); 5] = [
+    let kinds: [Kind; 5] = [
         ("about the axis", vec![0.0], |_| 0.0),
         ("four quadrants", steps(0, 90), |h| {
             let half = h.min(360.0 - h);

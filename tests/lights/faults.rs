@@ -314,7 +314,7 @@ fn every_planted_fault_is_seen() {
 #[test]
 fn a_map_that_rays_and_samples_mirror_alike_is_seen() {
     let mirrored = [
-        ("atan2(d.x, -d.z)", "atan2(-d.x, -d.z)"),
+        ("angle_of(d.x, -d.z)", "angle_of(-d.x, -d.z)"),
         ("sin(around) * sine, 1.0", "-sin(around) * sine, 1.0"),
     ];
     let gpu = probing(kernels_with("shading/light/environment", &mirrored));

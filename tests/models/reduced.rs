@@ -112,7 +112,7 @@ fn textures_and_maps_are_as_large_as_the_adapter_binds() {
     let width = |bytes| {
         let mut scene = variant("single-triangle");
         let name = ParamValue::Name(map.display().to_string());
-        scene.params.0.insert("environment".to_owned().into(), name);
+        scene.params.0.insert("environment".to_owned(), name);
         let options = LoadOptions {
             table_bytes: bytes,
             ..LoadOptions::default()
