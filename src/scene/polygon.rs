@@ -43,15 +43,11 @@ pub(super) fn triangulate(corners: &[Vec3], mut triangle: impl FnMut([usize; 3])
 /// The unit normal of the side from which the corners turn counter-clockwise (M. Newell), that of the largest triangle of the fan
 /// where both sides weigh the same; nothing if all triangles are flat.
 fn normal(corners: &[DVec3]) -> Option<DVec3> {
-    let parts: Vec<DVec3> = fan_areas(corners).collect();
-    let largest = parts.iter().copied().fold(DVec3::ZERO, |a, b| {
-        if b.length_squared() > a.length_squared() {
-            b
-        } else {
-            a
-        }
-    });
-    let sum: DVec3 = parts.iter().sum();
+    let (sum, largest) =
+        fan_areas(corners).fold((DVec3::ZERO, DVec3::ZERO), |(sum, largest), area| {
+            let is_larger = area.length_squared() > largest.length_squared();
+            (sum + area, if is_larger { area } else { largest })
+        });
     let is_clear = sum.length() > FLAT * largest.length();
     let normal = if is_clear { sum } else { largest };
     normal.try_normalize()

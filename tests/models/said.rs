@@ -354,9 +354,14 @@ fn concave_polygons_are_what_they_are_and_crossing_ones_are_named() {
     )
     .unwrap();
     assert_eq!((area(&scene), scene.triangles.len()), (3.0, 4));
+    // Between the corners of a square the second face takes both diagonals.
+    let square = ply.replace(
+        "0 0 0\n2 1 0\n0 2 0\n0.5 1 0\n",
+        "0 0 0\n2 0 0\n2 2 0\n0 2 0\n",
+    );
     let crossing = load_files(
         "a.ply",
-        &[("a.ply", format!("{ply}4 0 1 3 2\n").as_bytes())],
+        &[("a.ply", format!("{square}4 0 2 1 3\n").as_bytes())],
     );
     let told_of = told(&crossing.unwrap());
     assert!(

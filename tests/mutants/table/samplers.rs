@@ -110,8 +110,8 @@ pub const MUTANTS: &[Mutant] = &[
         "all pairs of dimensions visit their strata in the same order",
         text(
             "sampling/jittered",
-            "(s.dimension >> 1u) + (pixel_number(s) ^ PAIR_KEY)",
-            "pixel_number(s) ^ PAIR_KEY",
+            "keyed_hash(pixel_number(s) ^ PAIR_KEY, s.dimension >> 1u)",
+            "keyed_hash(pixel_number(s) ^ PAIR_KEY, 0u)",
         ),
         sampler("jittered", &[], "none"),
         Check::Stream,
