@@ -136,7 +136,7 @@ impl Odd {
 }
 
 /// Adds the triangles of a polygon; whether it crosses itself.
-fn push_face(builder: &mut SceneBuilder, corners: &[Vertex], is_colored: bool) -> bool {
+fn push_face(builder: &mut SceneBuilder, corners: &[&Vertex], is_colored: bool) -> bool {
     let places: Vec<Vec3> = corners.iter().map(|c| c.position).collect();
     let light = |k: usize| {
         let shown = corners[k].color.clamp(Vec3::ZERO, Vec3::ONE);
@@ -443,10 +443,10 @@ impl PropertyAccess for Face {
 }
 
 impl Face {
-    fn corners(&self, vertices: &[Vertex]) -> Result<Vec<Vertex>, String> {
+    fn corners<'a>(&self, vertices: &'a [Vertex]) -> Result<Vec<&'a Vertex>, String> {
         let position = |index: i64| {
             let vertex = usize::try_from(index).ok().and_then(|i| vertices.get(i));
-            vertex.copied().ok_or_else(|| {
+            vertex.ok_or_else(|| {
                 format!(
                     "the face refers to vertex {index}, but {} are defined before it",
                     vertices.len()

@@ -17,20 +17,19 @@ pub(super) fn triangulate(corners: &[Vec3], mut triangle: impl FnMut([usize; 3])
         fan.for_each(triangle);
         return false;
     }
-    let corners: Vec<DVec3> = corners.iter().map(|c| c.as_dvec3()).collect();
-    let Some(normal) = normal(&corners) else {
+    let Some(normal) = normal(corners) else {
         fan.for_each(triangle);
         return false;
     };
-    if fan_covers(&corners, normal) {
+    if fan_covers(corners, normal) {
         fan.for_each(triangle);
         return false;
     }
     let across = normal.any_orthonormal_vector();
     let up = normal.cross(across);
-    let first = corners[0];
-    let flat = |c: &DVec3| DVec2::new((*c - first).dot(across), (*c - first).dot(up));
-    let flat: Vec<DVec2> = corners.iter().map(flat).collect();
+    let first = corners[0].as_dvec3();
+    let flat = |c: DVec3| DVec2::new((c - first).dot(across), (c - first).dot(up));
+    let flat: Vec<DVec2> = corners.iter().map(|c| flat(c.as_dvec3())).collect();
     let crosses = crosses(&flat);
     let ears = if crosses { Vec::new() } else { ears(&flat) };
     match ears.is_empty() {
@@ -42,7 +41,7 @@ pub(super) fn triangulate(corners: &[Vec3], mut triangle: impl FnMut([usize; 3])
 
 /// The unit normal of the side from which the corners turn counter-clockwise (M. Newell), that of the largest triangle of the fan
 /// where both sides weigh the same; nothing if all triangles are flat.
-fn normal(corners: &[DVec3]) -> Option<DVec3> {
+fn normal(corners: &[Vec3]) -> Option<DVec3> {
     let (sum, largest) =
         fan_areas(corners).fold((DVec3::ZERO, DVec3::ZERO), |(sum, largest), area| {
             let is_larger = area.length_squared() > largest.length_squared();
@@ -53,26 +52,27 @@ fn normal(corners: &[DVec3]) -> Option<DVec3> {
     normal.try_normalize()
 }
 
-/// Twice the areas of the triangles of the fan, as vectors.
-fn fan_areas(corners: &[DVec3]) -> impl Iterator<Item = DVec3> + '_ {
-    let first = corners[0];
+/// The two sides from the first corner of each triangle of the fan.
+fn fan_sides(corners: &[Vec3]) -> impl Iterator<Item = [DVec3; 2]> + '_ {
+    let first = corners[0].as_dvec3();
     let pairs = corners[1..].windows(2);
-    pairs.map(move |pair| (pair[0] - first).cross(pair[1] - first))
+    pairs.map(move |pair| [pair[0], pair[1]].map(|c| c.as_dvec3() - first))
+}
+
+/// Twice the areas of these triangles, as vectors.
+fn fan_areas(corners: &[Vec3]) -> impl Iterator<Item = DVec3> + '_ {
+    fan_sides(corners).map(|[a, b]| a.cross(b))
 }
 
 /// Whether no triangle of the fan lies the wrong way round, and all are sectors of one turn: then they do not overlap.
-fn fan_covers(corners: &[DVec3], normal: DVec3) -> bool {
-    let areas: Vec<f64> = fan_areas(corners).map(|area| area.dot(normal)).collect();
-    let largest = areas.iter().copied().fold(0.0, f64::max);
-    if areas.iter().any(|area| *area < -FLAT * largest) {
+fn fan_covers(corners: &[Vec3], normal: DVec3) -> bool {
+    let areas = || fan_areas(corners).map(|area| area.dot(normal));
+    let largest = areas().fold(0.0, f64::max);
+    if areas().any(|area| area < -FLAT * largest) {
         return false;
     }
-    let pairs = corners[1..].windows(2).zip(&areas);
-    let angles = pairs.map(|(pair, area)| {
-        let along = (pair[0] - corners[0]).dot(pair[1] - corners[0]);
-        area.max(0.0).atan2(along)
-    });
-    angles.sum::<f64>() < TAU - ANGLE
+    let angle = |[a, b]: [DVec3; 2]| a.cross(b).dot(normal).max(0.0).atan2(a.dot(b));
+    fan_sides(corners).map(angle).sum::<f64>() < TAU - ANGLE
 }
 
 /// Whether two sides cross, as opposed to touch or lie in each other, which is how polygons are given holes.
