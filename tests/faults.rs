@@ -18,7 +18,7 @@ fn a_ray_along_a_face_of_a_box_that_hits_what_lies_behind_it_is_seen() {
             .expect("a test"),
         ..Intersection::default()
     };
-    let allowed = "all(outside <= allowance(triangle, ray, inverse, found))";
+    let allowed = "all(outside <= allowance(triangle, ray, inverse, found) + pad)";
     let [sound, faulty] = [allowed, "true"].map(|to| {
         let gpu = open(kernels_with("accel/triangle", &[(allowed, to)]));
         let wrong = |seed| {

@@ -168,15 +168,14 @@ pub trait TriangleTest: Send + Sync {
             return;
         }
         let (near, far) = slabs(&triangle.bounds(), ray, *inverse);
-        let near = near.map(|x| x - x.abs() * TRIANGLE_PAD);
-        let far = far.map(|x| x + x.abs() * TRIANGLE_PAD);
-        let enter = near[0].max(near[1]).max(near[2]);
-        let exit = far[0].min(far[1]).min(far[2]);
+        let enter = padded(near[0].max(near[1]).max(near[2]), -TRIANGLE_PAD);
+        let exit = padded(far[0].min(far[1]).min(far[2]), TRIANGLE_PAD);
         let t = found.t.max(enter).min(exit);
         let mut repaired = enter <= exit;
         if t != found.t {
             let allowed = self.allowance(triangle, ray, inverse, &found);
-            let within = |a: usize| (near[a] - found.t).max(found.t - far[a]) <= allowed[a];
+            let pad = found.t.abs() * TRIANGLE_PAD;
+            let within = |a: usize| (near[a] - found.t).max(found.t - far[a]) <= allowed[a] + pad;
             repaired = repaired && within(0) && within(1) && within(2);
         }
         let nearer = t < hit.t || (t == hit.t && triangle.id < hit.triangle);
@@ -234,6 +233,12 @@ pub const APART: Meeting = Meeting {
     u: 0.0,
     v: 0.0,
 };
+
+/// A bound of the distance moved by a share of itself. Rounding keeps its order, so that the nearest of padded bounds is
+/// the padded nearest one.
+fn padded(t: f32, share: f32) -> f32 {
+    t + t.abs() * share
+}
 
 /// Whether a ray runs in the plane of a triangle, but for what raising its direction
 /// ([`super::ray::raised`]) has tilted it: from an origin in the triangle it would meet it at 0.

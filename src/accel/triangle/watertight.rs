@@ -9,7 +9,7 @@
 //! has not got, is not needed: without it a ray on an edge may meet both triangles.
 //!
 //! The distance is not the paper's average of those of the vertices, which errs by the length over the height
-//! of a thin triangle, but that of the point of the plane that is abreast of the ray ([`slid`]). Of a triangle
+//! of a thin triangle, but that of the point of the plane that is abreast of the ray ([`step_along`]). Of a triangle
 //! that is edge-on the weights are nothing but rounding, and would place the hit anywhere in its box: it is
 //! no hit. A closed mesh has others there.
 
@@ -97,8 +97,17 @@ const SMALLEST_SQUARE: f32 = 1.175_494_4e-38;
 /// Smaller steps, as parts of an edge, are what rounding makes of any triangle: a quarter of what the offset leaves room for.
 const NEGLIGIBLE: f32 = 2.384_185_8e-7;
 
-/// Weights times the area of a point in the plane of a triangle of sheared vertices, moved along the longer of two
-/// edges until the point lies abreast of the ray.
+/// A step along an edge, times the area.
+struct Step {
+    /// Whether it is the edge to the second vertex, not that to the third one.
+    is_first: bool,
+    /// Part of the edge.
+    size: f32,
+    /// How far it leads along the ray.
+    z: f32,
+}
+
+/// The step along the longer of two edges of a triangle of sheared vertices that brings the point of the weights abreast of the ray.
 ///
 /// Weights err by the rounding of products of edges over the area: of a thin triangle by its length over
 /// its height. Whatever they are, the point lies in the plane, and beside the ray almost along the
@@ -106,22 +115,24 @@ const NEGLIGIBLE: f32 = 2.384_185_8e-7;
 /// brings the point to the ray, but for rounding of the vertices, and does not leave the plane. Of two
 /// edges the longer one has half of the greatest length at least. No normal is made: that of a thin
 /// triangle with three long edges is a difference of large products.
-fn slid([a, b, c]: [[f32; 3]; 3], w: [f32; 3], area: f32) -> [f32; 3] {
+fn step_along([a, b, c]: [[f32; 3]; 3], w: [f32; 3], area: f32) -> Step {
     let x = w[0] * a[0] + w[1] * b[0] + w[2] * c[0];
     let y = w[0] * a[1] + w[1] * b[1] + w[2] * c[1];
-    let ab = [0, 1].map(|i| b[i] - a[i]);
-    let ac = [0, 1].map(|i| c[i] - a[i]);
+    let ab = [0, 1, 2].map(|i| b[i] - a[i]);
+    let ac = [0, 1, 2].map(|i| c[i] - a[i]);
     let first = ab[0] * ab[0] + ab[1] * ab[1];
     let second = ac[0] * ac[0] + ac[1] * ac[1];
-    let along = if first >= second { ab } else { ac };
+    let is_first = first >= second;
+    let along = if is_first { ab } else { ac };
     let part = (x * along[0] + y * along[1]) / first.max(second).max(SMALLEST_SQUARE);
-    let step = match part.abs() > area * NEGLIGIBLE {
+    let size = match part.abs() > area * NEGLIGIBLE {
         true => part,
         false => 0.0,
     };
-    match first >= second {
-        true => [w[0] + step, w[1] - step, w[2]],
-        false => [w[0] + step, w[1], w[2] - step],
+    Step {
+        is_first,
+        size,
+        z: size * along[2],
     }
 }
 
@@ -158,18 +169,16 @@ impl TriangleTest for Watertight {
         }
         let w = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
         let area = area_of(w, p, q);
-        let point = slid([a, b, c], w, area);
-        let clamp = |x: f32| x.max(0.0).min(area);
-        let u = clamp(point[1]);
-        Meeting {
-            area,
-            t: (point[0] * a[2] + point[1] * b[2] + point[2] * c[2]) * s.scale / area,
-            u,
-            v: match point[0] < 0.0 {
-                true => area - u,
-                false => clamp(point[2]),
-            },
-        }
+        let step = step_along([a, b, c], w, area);
+        let t = (w[0] * a[2] + w[1] * b[2] + w[2] * c[2] - step.z) * s.scale / area;
+        // Not past an end, for what is interpolated.
+        let from = if step.is_first { w[1] } else { w[2] };
+        let back = step.size.min(from).max(-w[0]);
+        let [u, v] = match step.is_first {
+            true => [w[1] - back, w[2]],
+            false => [w[1], w[2] - back],
+        };
+        Meeting { area, t, u, v }
     }
 
     fn allowance(
@@ -179,33 +188,19 @@ impl TriangleTest for Watertight {
         inverse: &[f32; 3],
         found: &Meeting,
     ) -> [f32; 3] {
-        let apart = slide(triangle, ray, inverse, found.area);
-        let rounding = residual(triangle, ray, inverse, found.area);
-        [0, 1, 2].map(|i| rounding[i] + apart[i])
+        residual(triangle, ray, inverse, found.area)
     }
 }
 
-/// How far the point that is abreast of the ray lies from the one that the weights stand for, over the
-/// direction.
-fn slide(triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3], area: f32) -> [f32; 3] {
-    let s = shear(ray, inverse);
-    let vertices = triangle.vertices().map(|v| sheared(&s, v));
-    let (p, q) = products(vertices);
-    let w = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
-    let point = slid(vertices, w, area);
-    let moved = [1, 2].map(|i| (point[i] - w[i]) / area);
-    let [v0, v1, v2] = triangle.vertices();
-    let along = |i: usize| moved[0] * (v1[i] - v0[i]) + moved[1] * (v2[i] - v0[i]);
-    [0, 1, 2].map(|i| along(i).abs() * inverse[i].abs())
-}
-
-/// Error of x and y of the point that the weights stand for, and what it makes of the distance.
+/// How far the distance may lie outside the slab of each axis.
 ///
 /// The point Σ wᵢ·vᵢ lies in the bounds. The ray passes it by the residual Σ wᵢ·v′ᵢ of the sheared
 /// vertices, which is 0 but for rounding: of the weights (three units of the products, times x or y of
 /// the vertex) and of the vertices (a unit of the difference, up to seven of what is taken off by the
 /// shear where division errs by 2.5 ulp). Divided by the direction, that is how far the distance may lie
-/// outside the slab. [`TRIANGLE_PAD`] is eight units.
+/// outside the slab. Where the point was moved abreast of the ray, the distance is off its average by
+/// what the weights' errors make of z. Weights are no larger than the terms that they are differences of, so
+/// that moments of the terms, twice, bound all of it. [`TRIANGLE_PAD`] is eight units.
 pub(super) fn residual(
     triangle: &TriangleRecord,
     ray: &Ray,
@@ -216,15 +211,10 @@ pub(super) fn residual(
     let vertices = triangle.vertices().map(|v| sheared(&s, v));
     let (p, q) = products(vertices);
     let [a, b, c] = vertices.map(|v| v.map(f32::abs));
-    let w = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
     let terms = [0, 1, 2].map(|i| p[i].abs() + q[i].abs());
-    let slope = [s.x.abs(), s.y.abs(), 0.0];
-    let weights = |i: usize| terms[0] * a[i] + terms[1] * b[i] + terms[2] * c[i];
-    let place = |v: [f32; 3], i: usize| v[i] + 2.0 * slope[i] * v[2];
-    let places = |i: usize| w[0] * place(a, i) + w[1] * place(b, i) + w[2] * place(c, i);
-    let across = |i: usize| (weights(i) + places(i)) / area * TRIANGLE_PAD;
-    // Along the ray the distance is an average: its own rounding alone counts.
-    let along = places(2) / area * TRIANGLE_PAD;
-    let errors = turned_back([across(0), across(1), along], s.axis);
-    [0, 1, 2].map(|i| errors[i] * inverse[i].abs())
+    let moment = |i: usize| terms[0] * a[i] + terms[1] * b[i] + terms[2] * c[i];
+    let along = moment(2) * s.scale.abs();
+    let [ix, iy, _] = turned(inverse.map(f32::abs), s.axis);
+    let errors = [moment(0) * ix + along, moment(1) * iy + along, along];
+    turned_back(errors, s.axis).map(|error| error * (2.0 * TRIANGLE_PAD / area))
 }
