@@ -2,6 +2,9 @@
 //! a sweep on a Slurm of two nodes.
 #![cfg(unix)]
 
+#[path = "support/needs.rs"]
+mod needs;
+
 use std::fs;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
@@ -196,7 +199,7 @@ fn a_sweep_on_slurm_outlives_a_node_and_equals_a_run_on_one_machine() {
     println!("{told}");
     if output.status.code() == Some(SKIPPED) {
         assert!(told.contains("skipped"), "{told}");
-        return;
+        return needs::skip("slurm", told);
     }
     let printed = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{printed}\n{told}");
@@ -242,4 +245,17 @@ fn an_element_of_an_array_runs_its_shard_of_all_with_whole_options() {
     ] {
         assert!(printed.contains(word), "{word} is not in {printed}");
     }
+}
+
+#[test]
+fn what_is_required_is_not_skipped() {
+    let refused = |required, need| needs::refusal(required, need, &"it is not there").unwrap_err();
+    assert_eq!(needs::refusal("", "slurm", &"it is not there"), Ok(()));
+    assert_eq!(
+        needs::refusal("files chromium", "slurm", &"it is not there"),
+        Ok(())
+    );
+    assert!(refused("files slurm", "slurm").contains("names slurm"));
+    assert!(refused("slum", "files").contains("`slum`"));
+    assert!(refused("", "slum").contains("`slum`"));
 }

@@ -1,5 +1,8 @@
 //! Linear images of other renderers are read as their own library reads them.
 
+#[path = "support/needs.rs"]
+mod needs;
+
 use raystone::image::{Image, read_linear};
 use std::path::{Path, PathBuf};
 
@@ -73,7 +76,7 @@ const KNOWN: &[Known] = &[
 fn scenes() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
     if !folder.exists() {
-        println!("skipped: {} is not there", folder.display());
+        needs::skip("files", format!("{} is not there", folder.display()));
     }
     Some(folder).filter(|folder| folder.exists())
 }

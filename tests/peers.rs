@@ -35,7 +35,7 @@ fn answers(peer: &dyn Peer, subject: &Subject) -> Option<Vec<Vec<Hit>>> {
     let built = match peer.build(gpu(), &subject.stage.soup) {
         Ok(built) => built,
         Err(reason) => {
-            println!("skipped: {}: {reason}", peer.name());
+            support::needs::skip("embree", format!("{}: {reason}", peer.name()));
             return None;
         }
     };

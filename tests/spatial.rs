@@ -367,7 +367,7 @@ fn real_scenes_are_seen_as_the_judge_sees_them() {
     for model in models {
         let path = format!("{folder}/{model}");
         if !std::path::Path::new(&path).exists() {
-            println!("skipped: {path} is not there");
+            support::needs::skip("files", format!("{path} is not there"));
             continue;
         }
         seen += 1;

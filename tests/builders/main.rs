@@ -70,7 +70,7 @@ fn build(soup: &TriangleSoup, params: &Params) -> Tree {
 fn model(path: &str) -> Option<TriangleSoup> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
     if !path.exists() {
-        println!("skipped: {} is not there", path.display());
+        support::needs::skip("files", format!("{} is not there", path.display()));
         return None;
     }
     let name = path.display().to_string();

@@ -106,7 +106,7 @@ fn wide_nodes_of_built_in_scenes_and_of_sponza_equal_those_of_the_host_twin() {
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(SPONZA);
     if !path.exists() {
-        return println!("skipped: {} is not there", path.display());
+        return crate::support::needs::skip("files", format!("{} is not there", path.display()));
     }
     let soup = TriangleSoup::new(&support::from_file(&path));
     check("sponza", &soup, &[]);

@@ -154,7 +154,7 @@ fn trees_of_built_in_scenes_equal_the_host_twin_to_the_bit() {
 fn the_tree_of_sponza_equals_the_host_twin_to_the_bit() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(SPONZA);
     if !path.exists() {
-        println!("skipped: {} is not there", path.display());
+        support::needs::skip("files", format!("{} is not there", path.display()));
         return;
     }
     if is_exact(gpu()) {

@@ -1,6 +1,9 @@
 //! Measures of point sets against published values and their definitions; `raystone discrepancy` as a
 //! user meets it, and SciPy's opinion of the same points.
 
+#[path = "../support/needs.rs"]
+mod needs;
+
 mod bounds;
 mod nets;
 mod quadratic;
@@ -12,7 +15,6 @@ use raystone::discrepancy::{Budget, Measure, PointSet, Quadratic, quadratic};
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
 /// The program with these arguments and this text on its standard input.
@@ -182,29 +184,17 @@ for line in sys.stdin:
     print(*(repr(float(v)) for v in found))
 ";
 
-/// A Python with SciPy, installed below the target folder; or why there is none.
-fn python_with_scipy() -> Result<PathBuf, String> {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("scipy");
-    let python = folder.join("bin/python");
-    let run = |command: &mut Command| match command.output() {
-        Ok(output) if output.status.success() => Ok(()),
+/// A Python with SciPy: `$RAYSTONE_PYTHON`, else the one on the path; or why there is none.
+fn python_with_scipy() -> Result<String, String> {
+    let python = std::env::var("RAYSTONE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let found = Command::new(&python)
+        .args(["-c", "import scipy.stats"])
+        .output();
+    match found {
+        Ok(output) if output.status.success() => Ok(python),
         Ok(output) => Err(String::from_utf8_lossy(&output.stderr).into_owned()),
-        Err(error) => Err(error.to_string()),
-    };
-    if run(Command::new(&python).args(["-c", "import scipy.stats"])).is_err() {
-        run(Command::new("python3").args(["-m", "venv"]).arg(&folder))?;
-        run(Command::new(&python).args([
-            // Where no registry answers, the test is skipped soon.
-            "-m",
-            "pip",
-            "install",
-            "-q",
-            "--timeout=10",
-            "--retries=1",
-            "scipy",
-        ]))?;
+        Err(error) => Err(format!("{python}: {error}")),
     }
-    Ok(python)
 }
 
 #[test]
@@ -212,7 +202,7 @@ fn mean_square_discrepancies_agree_with_scipy() {
     let python = match python_with_scipy() {
         Ok(python) => python,
         Err(reason) => {
-            println!("skipped: no SciPy here: {reason}");
+            needs::skip("scipy", reason);
             return;
         }
     };

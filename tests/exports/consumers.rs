@@ -1,6 +1,7 @@
 //! The tools that read exports, where they are installed. `RAYSTONE_PYTHON` names a Python that has their packages:
 //! `pip install junitparser jsonschema numpy scipy`.
 
+use crate::needs;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -35,7 +36,7 @@ fn answer(program: &str, arguments: &[&str], input: &str) -> Option<(bool, Strin
 /// A shell that takes the completions and knows raystone then.
 pub fn shell(shell: &str, arguments: &[&str], script: &str) {
     match answer(shell, arguments, script) {
-        None => eprintln!("SKIPPED: {shell} is not installed"),
+        None => needs::skip("shells", format!("{shell} is not installed")),
         Some((fine, words)) => assert!(fine && words.contains("raystone"), "{shell}: {words}"),
     }
 }
@@ -45,7 +46,7 @@ fn with_module(module: &str, code: &str, input: &str) {
     let import = format!("import {module}");
     match answer(&python(), &["-c", &import], "") {
         Some((true, _)) => {}
-        _ => return eprintln!("SKIPPED: {} has no module {module}", python()),
+        _ => return needs::skip("python-modules", format!("{} has no {module}", python())),
     }
     let code = format!("import sys, json\n{import}\n{code}");
     let (fine, words) = answer(&python(), &["-c", &code], input).expect("Python");
@@ -144,7 +145,7 @@ pub fn all(export: &dyn Fn(&str) -> String) {
 /// The tables in a document of their own.
 fn latex(tables: &str) {
     if answer("pdflatex", &["--version"], "").is_none() {
-        return eprintln!("SKIPPED: pdflatex is not installed");
+        return needs::skip("pdflatex", "pdflatex is not installed");
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
     let document = format!(

@@ -1,6 +1,9 @@
 //! Exports of a real run: each format is held against its own shape, and read by its own consumer where that is
 //! installed; a hostile name is shown and never run; records that are cut or of another version are named.
 
+#[path = "../support/needs.rs"]
+mod needs;
+
 mod consumers;
 mod damaged;
 mod validator;

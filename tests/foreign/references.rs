@@ -25,7 +25,7 @@ fn below(path: &str) -> Option<PathBuf> {
         .join(path);
     let there = path.exists();
     if !there {
-        println!("skipped: {} is not there", path.display());
+        crate::support::needs::skip("files", format!("{} is not there", path.display()));
     }
     there.then_some(path)
 }

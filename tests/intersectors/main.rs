@@ -332,7 +332,7 @@ fn what_tests_cost_in_a_whole_traversal() {
             label: name.to_owned(),
         };
         let Ok(scene) = scene::load(&variant, &LoadOptions::default()) else {
-            println!("skipped: {} is not there", path.display());
+            support::needs::skip("files", format!("{} is not there", path.display()));
             continue;
         };
         let camera = scene.view(1.0);

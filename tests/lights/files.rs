@@ -22,7 +22,10 @@ fn photometry() -> Vec<PathBuf> {
     let mut files: Vec<PathBuf> = found.unwrap_or_default();
     files.sort();
     if files.is_empty() {
-        println!("SKIPPED: no photometric files in {}", folder.display());
+        crate::support::needs::skip(
+            "files",
+            format!("no photometric files in {}", folder.display()),
+        );
     }
     files
 }

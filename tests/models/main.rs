@@ -1,6 +1,9 @@
 //! Whole loads of small files written here, sound and damaged, and of real models where they are
 //! at hand.
 
+#[path = "../support/needs.rs"]
+mod needs;
+
 mod gltf;
 mod obj;
 mod ply;

@@ -8,7 +8,7 @@ fn real_scene(file: &str) -> Option<PathBuf> {
         .join("../shared/scenes")
         .join(file);
     if !path.exists() {
-        println!("skipped: {} is absent", path.display());
+        needs::skip("files", format!("{} is not there", path.display()));
         return None;
     }
     Some(path)

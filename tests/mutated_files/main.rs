@@ -5,6 +5,9 @@
 //! The files are seeds of the fuzz targets (`fuzz/corpus`), changed by [`mutation`] from fixed
 //! seeds. There is no reader of IES files yet, so there is none here.
 
+#[path = "../support/needs.rs"]
+mod needs;
+
 mod dense;
 #[path = "../fuzz_entry/mod.rs"]
 mod fuzz_entry;
@@ -50,7 +53,10 @@ fn bound(target: &str) -> MemoryBound {
 fn seeds(target: &str) -> Vec<(String, Vec<u8>)> {
     let fuzz = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz");
     if !fuzz.exists() {
-        println!("skipped: {} is not part of a package", fuzz.display());
+        needs::skip(
+            "fuzz",
+            format!("{} is not part of a package", fuzz.display()),
+        );
         return Vec::new();
     }
     let folder = fuzz.join("corpus").join(target);
@@ -222,7 +228,10 @@ fn every_target_has_a_fuzz_target_and_ten_thousand_files_are_read() {
     assert!(FILES * TARGETS.len() >= 10_000);
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/fuzz_targets");
     if !folder.exists() {
-        println!("skipped: {} is not part of a package", folder.display());
+        needs::skip(
+            "fuzz",
+            format!("{} is not part of a package", folder.display()),
+        );
         return;
     }
     let mut found: Vec<String> = std::fs::read_dir(&folder)

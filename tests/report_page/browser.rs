@@ -1,5 +1,6 @@
 //! Chromium without a window: a page in a frame of some width, with a script that looks at it.
 
+use crate::needs;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -32,7 +33,7 @@ impl Browser {
         };
         let found = named.into_iter().chain(names).find(runs);
         if found.is_none() {
-            println!("skipped: no Chromium on the path, nor in $CHROMIUM");
+            needs::skip("chromium", "there is none on the path, nor in $CHROMIUM");
         }
         found.map(|program| Self {
             program,
@@ -207,7 +208,7 @@ fn axe() -> Option<String> {
                 .ok()
         });
         if !unpacked.is_some_and(|status| status.success()) {
-            println!("skipped: npm does not give {AXE}");
+            needs::skip("npm", format!("it does not give {AXE}"));
             return None;
         }
     }

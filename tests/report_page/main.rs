@@ -3,6 +3,9 @@
 //!
 //! Skipped aloud where there is no Chromium; the rules of axe-core where npm cannot fetch it.
 
+#[path = "../support/needs.rs"]
+mod needs;
+
 mod browser;
 #[path = "../../src/report/tests/fixture.rs"]
 #[allow(dead_code)] // The library's own tests use more of it.
@@ -91,7 +94,7 @@ fn check_common(seen: &Seen, what: &str) {
     );
     assert!(seen.number("canvasRight") <= 0.5, "{what}");
     match seen.value("axe") {
-        None => println!("skipped: no axe-core"),
+        None => needs::skip("npm", "there is no axe-core"),
         Some(found) => assert_eq!(found.to_string(), "[]", "{what}"),
     }
 }

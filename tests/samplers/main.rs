@@ -28,7 +28,7 @@ fn shared_table(name: &str) -> Option<PathBuf> {
         .join("../shared/tables")
         .join(name);
     if !path.exists() {
-        println!("skipped: {} is not there", path.display());
+        support::needs::skip("files", format!("{} is not there", path.display()));
     }
     Some(path).filter(|path| path.exists())
 }

@@ -3,6 +3,7 @@
 #![allow(dead_code, unused_imports)] // Every test program uses its own part of this.
 
 mod hits;
+pub mod needs;
 pub mod scenes;
 
 pub use hits::*;
@@ -42,10 +43,8 @@ pub fn open(kernels: KernelLibrary) -> Gpu {
 pub fn is_exact(gpu: &Gpu) -> bool {
     let probe = probe_arithmetic(gpu).expect("the probe runs");
     if !probe.is_exact() {
-        println!(
-            "skipped: {} fuses or rounds differently ({probe:?})",
-            gpu.info.name
-        );
+        let why = format!("{} fuses or rounds differently ({probe:?})", gpu.info.name);
+        needs::skip("exact-adapter", why);
     }
     probe.is_exact()
 }

@@ -1,0 +1,55 @@
+//! What tests need that not every machine has: a test that goes without says so, and fails where the need is
+//! in `RAYSTONE_REQUIRE`.
+
+use std::fmt::Display;
+
+/// What may be missing, by the words that `RAYSTONE_REQUIRE` takes, separated by blanks.
+const KNOWN: [&str; 13] = [
+    // Adapter: one that computes as the host does; the very driver of the table of image hashes.
+    "exact-adapter",
+    "known-driver",
+    // Files beside the project: scenes, tables and digests. Of a package: the folder `fuzz`.
+    "files",
+    "fuzz",
+    // Programs.
+    "chromium",
+    "npm",
+    "slurm",
+    "shells",
+    "pdflatex",
+    "embree",
+    "mitsuba",
+    // Modules of Python.
+    "scipy",
+    "python-modules",
+];
+
+/// Says that a test, or a part of it, is left out for want of something.
+///
+/// # Panics
+/// If it is required, or if a word is none of [`KNOWN`].
+pub fn skip(need: &str, why: impl Display) {
+    let required = std::env::var("RAYSTONE_REQUIRE").unwrap_or_default();
+    if let Err(fault) = refusal(&required, need, &why) {
+        panic!("{fault}");
+    }
+    println!("skipped for want of {need}: {why}");
+}
+
+/// Why a test that has not what it needs may not be skipped.
+///
+/// # Errors
+/// The need is required, or a word is none of [`KNOWN`].
+pub fn refusal(required: &str, need: &str, why: &dyn Display) -> Result<(), String> {
+    for word in required.split_whitespace().chain([need]) {
+        if !KNOWN.contains(&word) {
+            return Err(format!(
+                "RAYSTONE_REQUIRE: nothing is called `{word}`; known: {KNOWN:?}"
+            ));
+        }
+    }
+    match required.split_whitespace().any(|word| word == need) {
+        true => Err(format!("RAYSTONE_REQUIRE names {need}, but {why}")),
+        false => Ok(()),
+    }
+}
