@@ -19,6 +19,10 @@ use std::process::{Command, Stdio};
 /// So many rounds at least: with fewer no permutation test passes a correction for some dozens of cells.
 pub const LEAST_ROUNDS: u32 = 21;
 
+/// So often every timed kernel of either side is compiled, in turns over the rounds: the same text compiled twice differs by some
+/// percent on drivers that compile for the processor, by where its code comes to lie.
+pub const COMPILATIONS: usize = 4;
+
 /// Why nothing was measured again.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfirmError {
@@ -64,7 +68,11 @@ pub fn measure_kernels(
     if let Some(cells) = cells {
         restrict(&mut plan, cells);
     }
-    let summary = run(&experiment, &plan, registries, options)?;
+    let options = RunOptions {
+        compilations: COMPILATIONS,
+        ..options.clone()
+    };
+    let summary = run(&experiment, &plan, registries, &options)?;
     let side = Side::read(&summary.out)?;
     let axis = &experiment.axes[Axis::Kernels];
     let label = |folder: &str| {
@@ -182,7 +190,7 @@ fn ratios([a, b]: &[Side; 2]) -> Confirmed {
     let theirs: BTreeMap<_, Taken> = taken(b).into_iter().map(|t| (t.identity(), t)).collect();
     let pairs = taken(a).into_iter().filter_map(|old| {
         let new = theirs.get(&old.identity())?;
-        let ratio = TimeRatio::new(&old.evidence, &new.evidence, true)?;
+        let ratio = TimeRatio::new(&old.evidence, &new.evidence, true, a.compilations())?;
         Some((old.identity(), ratio))
     });
     pairs.collect()

@@ -6,7 +6,7 @@ use crate::measure::comparison::LogFigure;
 use crate::measure::figure::{Better, Figure, Shown};
 use crate::measure::hypothesis::{capped_t_test, student_t_quantile, student_t_two_sided};
 use crate::measure::record::Interval;
-use crate::measure::statistics::{Spread, mean};
+use crate::measure::statistics::{Spread, mean, median, variance};
 
 /// What a comparison says of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
@@ -319,11 +319,13 @@ pub struct TimeRatio {
     pub by_round: Vec<f64>,
     /// By which clock, in words.
     pub clock: &'static str,
+    /// What the compilations of both sides, which took the rounds in turns, say of its noise.
+    pub compilations: Option<Spread>,
 }
 
 impl TimeRatio {
     /// Of the times of two cells. Rounds are paired if both were measured in the same ones.
-    pub fn new(a: &Evidence, b: &Evidence, in_rounds: bool) -> Option<Self> {
+    pub fn new(a: &Evidence, b: &Evidence, in_rounds: bool, compilations: usize) -> Option<Self> {
         let (
             Evidence::Times {
                 adapter: a,
@@ -346,10 +348,11 @@ impl TimeRatio {
             ),
         };
         match in_rounds && a.len() == b.len() {
-            true => Self::of_rounds(
-                &a.iter().zip(b).map(|(a, b)| b / a).collect::<Vec<_>>(),
-                clock,
-            ),
+            true => {
+                let ratios: Vec<f64> = a.iter().zip(b).map(|(a, b)| b / a).collect();
+                let ratio = Self::of_rounds(&ratios, clock)?;
+                Some(ratio.of_compilations(compilations))
+            }
             false => Self::of_samples(LogFigure::of_times(a)?, LogFigure::of_times(b)?, clock),
         }
     }
@@ -362,7 +365,27 @@ impl TimeRatio {
             log: figure.log,
             rounds: Spread::together(&figure.own),
             clock,
+            compilations: None,
         })
+    }
+
+    /// With the noise of so many compilations of each side: round r was of the compilations r modulo their number, and the rounds
+    /// of one pair of them share what these two have by chance.
+    fn of_compilations(mut self, count: usize) -> Self {
+        let of = |k: usize| {
+            let rounds = self.by_round.iter().skip(k).step_by(count.max(1));
+            median(&rounds.copied().collect::<Vec<_>>())
+        };
+        let pairs: Option<Vec<f64>> = (0..count).map(of).collect();
+        let spread = |pairs: Vec<f64>| {
+            let count = pairs.len() as f64;
+            Some(Spread {
+                variance: variance(&pairs)? / count,
+                freedom: count - 1.0,
+            })
+        };
+        self.compilations = pairs.and_then(spread);
+        self
     }
 
     fn of_samples(a: LogFigure, b: LogFigure, clock: &'static str) -> Option<Self> {
@@ -372,6 +395,7 @@ impl TimeRatio {
             rounds: Spread::together(&[a.own, b.own].concat()),
             by_round: Vec::new(),
             clock,
+            compilations: None,
         })
     }
 

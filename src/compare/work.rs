@@ -22,6 +22,8 @@ pub(super) struct Open {
 pub(super) struct Work<'a> {
     options: &'a Options,
     in_rounds: bool,
+    /// How often each side was compiled.
+    compilations: usize,
     /// Why times are not compared.
     refused: Option<String>,
     same_place: bool,
@@ -54,6 +56,7 @@ impl<'a> Work<'a> {
         Self {
             options,
             in_rounds: base.in_rounds && candidate.in_rounds,
+            compilations: base.compilations(),
             same_place: refused.is_none(),
             other_seeds: seeds.is_some(),
             refused,
@@ -122,7 +125,12 @@ impl<'a> Work<'a> {
         // Two lines of times contradict nothing: `contradictions` passes them over.
         let other = other_work(old, new).or_else(|| other_seeds(old, new));
         let comparable = is_time && !is_copy && other.is_none();
-        let ratio = TimeRatio::new(&old.evidence, &new.evidence, self.in_rounds);
+        let ratio = TimeRatio::new(
+            &old.evidence,
+            &new.evidence,
+            self.in_rounds,
+            self.compilations,
+        );
         let (verdict, why, measured) = match outcome {
             Outcome::Known(verdict, why) => (verdict, why, None),
             Outcome::Tested(measured) => {
@@ -201,7 +209,7 @@ impl<'a> Work<'a> {
                 &of_runs
             };
             let own = finding.is_control.then_some(ratio.log);
-            let spread = drift.of(&place(finding, ratio.clock), ratio.rounds.variance, own);
+            let spread = drift.of_cell(&place(finding, ratio.clock), ratio.rounds.variance, own);
             let measured = ratio.measured(&finding.figure, spread, margin);
             let grew = direction(&finding.figure, measured.change.value) == Verdict::Worse;
             finding.looks_worse =
@@ -223,6 +231,12 @@ impl<'a> Work<'a> {
     /// How far the controls moved that this is known of.
     fn drift<'o>(&'o self, ratio: impl Fn(&'o Open) -> Option<&'o TimeRatio>) -> Drift {
         let mut drift = Drift::default();
+        for open in self.findings.iter().filter(|open| open.finding.is_time) {
+            let known = ratio(open).and_then(|ratio| Some((ratio.clock, ratio.compilations?)));
+            if let Some((clock, spread)) = known {
+                drift.add_compilations(place(&open.finding, clock), spread);
+            }
+        }
         for open in self.findings.iter().filter(|open| open.finding.is_control) {
             if let Some(ratio) = ratio(open).filter(|ratio| ratio.clock != IN_TURNS) {
                 drift.add(
@@ -286,7 +300,8 @@ fn decide(finding: &mut Finding, rejected: bool) {
         return;
     };
     let within = change.low > -margin && change.high < margin;
-    let counts = rejected && change.value.abs() >= margin;
+    // More than chance, and it may be as large as what counts.
+    let counts = rejected && !within;
     finding.verdict = match (finding.is_control, counts) {
         (false, true) => direction(&finding.figure, change.value),
         (false, false) if within => Verdict::Same,
