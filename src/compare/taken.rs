@@ -117,8 +117,17 @@ const OF_ONE_SEED: [&str; 12] = [
     "image/v1",
 ];
 
-/// Whether a figure is of rays or pictures of the seed of the run alone. Errors are known seed by seed, and structures know none.
+/// Fewer degrees of freedom say too little of the spread of means over seeds to compare those of other seeds.
+const FEWEST_FREE: f64 = 7.0;
+
+/// Whether a figure is of rays or pictures of the seed of the run alone, or of few seeds. Errors are known seed by seed, and
+/// structures know none.
 fn is_of_one_seed(taken: &Taken) -> bool {
+    if let Evidence::Summary(_, freedom) = taken.evidence
+        && freedom < FEWEST_FREE
+    {
+        return true;
+    }
     let of_seeds = matches!(
         taken.evidence,
         Evidence::Seeds { .. } | Evidence::Summary(..)

@@ -12,6 +12,10 @@ use crate::measure::record::{FinishedRecord, RunRecord, all_of, axis};
 use crate::report::format;
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Measured with the shipped `ci.toml`: a renamed variable raised an alarm in 5 of 10 runs, an edit without effect in 3 of 12.
+const COMPILATIONS: &str = "times of kernels that were compiled anew moved by 3 to 6 % where nothing but a name had changed, and \
+                            controls, which share one compiled kernel, do not show that: a smaller change of time may be none";
+
 /// A finding on its way to a verdict.
 pub(super) struct Open {
     pub finding: Finding,
@@ -177,6 +181,16 @@ impl<'a> Work<'a> {
                 Verdict::Worse,
                 "another image from the same seeds: if that is meant, say --new-images".into(),
             ),
+        }
+    }
+
+    /// Says what times of changed kernels hold that controls do not: cells of equal text share one compiled kernel.
+    pub fn warn_of_compilations(&mut self) {
+        let is_alarm = |f: &Finding| {
+            f.is_time && !f.is_control && matches!(f.verdict, Verdict::Worse | Verdict::Better)
+        };
+        if self.in_rounds && self.findings.iter().any(|open| is_alarm(&open.finding)) {
+            self.notes.push(COMPILATIONS.into());
         }
     }
 

@@ -34,6 +34,7 @@ pub mod stream;
 pub mod timing;
 mod trial_lights;
 pub mod trial_scenes;
+mod trial_slivers;
 mod trial_surfaces;
 pub mod words;
 

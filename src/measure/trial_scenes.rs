@@ -23,6 +23,7 @@ pub struct TrialScene {
 }
 
 pub use super::trial_lights::trials_of;
+pub use super::trial_slivers::sheets;
 
 /// All of them.
 ///
@@ -101,6 +102,7 @@ pub fn trial_scenes() -> Result<Vec<TrialScene>, SceneError> {
     ];
     scenes.extend(super::trial_lights::scenes()?);
     scenes.extend(super::trial_surfaces::scenes()?);
+    scenes.extend(super::trial_slivers::scenes()?);
     Ok(scenes)
 }
 

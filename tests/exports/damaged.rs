@@ -255,7 +255,10 @@ fn what_is_missing_or_nothing_is_not_compared() {
     // Called otherwise, as by a program to come.
     for (kind, at) in [
         ("structure", "/body/timings/0/counters"),
-        ("error", "/body/errors/0/metrics/mae~1v1"),
+        (
+            "error",
+            "/body/errors/0/metrics/relmse-unbiased~1eps=1e-2~1v1",
+        ),
         ("time", "/body/ms_per_spp"),
     ] {
         let (verdict, open) = said(&with(kind, at, None)).expect("records");

@@ -81,10 +81,10 @@ fn independent() -> Sampler {
     sampler_of("pixel-hash", "none", 100_000)
 }
 
-/// Trial scenes of these places, in four tests for their time.
+/// Trial scenes of these places, in five tests for their time.
 fn judge_trials(places: std::ops::Range<usize>) {
     let scenes = trial_scenes().expect("scenes");
-    assert_eq!(scenes.len(), 12);
+    assert_eq!(scenes.len(), 14);
     for trial in &scenes[places] {
         for (name, changes) in &trial.trials {
             let what = integrator_variant(name, changes);
@@ -112,7 +112,12 @@ fn single_paths_of_maps_luminaires_and_many_lamps_are_those_of_the_oracle() {
 
 #[test]
 fn single_paths_of_placed_textures_skies_and_panes_are_those_of_the_oracle() {
-    judge_trials(9..12);
+    judge_trials(9..13);
+}
+
+#[test]
+fn single_paths_of_thin_triangles_are_those_of_the_oracle() {
+    judge_trials(13..14);
 }
 
 #[test]

@@ -8,8 +8,9 @@
 //! holds the ray, some triangle accepts it, and the paper's second test in double precision, which WGSL
 //! has not got, is not needed: without it a ray on an edge may meet both triangles.
 //!
-//! The distance is an average of those of the vertices, so that it stays between them. Of a triangle that
-//! is edge-on the weights are nothing but rounding, and would place the hit anywhere in its box: it is
+//! The distance is not the paper's average of those of the vertices, which errs by the length over the height
+//! of a thin triangle, but that of the point of the plane that is abreast of the ray ([`slid`]). Of a triangle
+//! that is edge-on the weights are nothing but rounding, and would place the hit anywhere in its box: it is
 //! no hit. A closed mesh has others there.
 
 use super::{APART, Meeting, TRIANGLE_PAD, TriangleRecord, TriangleTest};
@@ -91,6 +92,39 @@ pub fn products([a, b, c]: [[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
     )
 }
 
+/// The least denominator: of edges that are shorter, squares underflow.
+const SMALLEST_SQUARE: f32 = 1.175_494_4e-38;
+/// Smaller steps, as parts of an edge, are what rounding makes of any triangle: a quarter of what the offset leaves room for.
+const NEGLIGIBLE: f32 = 2.384_185_8e-7;
+
+/// Weights times the area of a point in the plane of a triangle of sheared vertices, moved along the longer of two
+/// edges until the point lies abreast of the ray.
+///
+/// Weights err by the rounding of products of edges over the area: of a thin triangle by its length over
+/// its height. Whatever they are, the point lies in the plane, and beside the ray almost along the
+/// triangle's length alone, since across it there are only so many heights. So a step along a long edge
+/// brings the point to the ray, but for rounding of the vertices, and does not leave the plane. Of two
+/// edges the longer one has half of the greatest length at least. No normal is made: that of a thin
+/// triangle with three long edges is a difference of large products.
+fn slid([a, b, c]: [[f32; 3]; 3], w: [f32; 3], area: f32) -> [f32; 3] {
+    let x = w[0] * a[0] + w[1] * b[0] + w[2] * c[0];
+    let y = w[0] * a[1] + w[1] * b[1] + w[2] * c[1];
+    let ab = [0, 1].map(|i| b[i] - a[i]);
+    let ac = [0, 1].map(|i| c[i] - a[i]);
+    let first = ab[0] * ab[0] + ab[1] * ab[1];
+    let second = ac[0] * ac[0] + ac[1] * ac[1];
+    let along = if first >= second { ab } else { ac };
+    let part = (x * along[0] + y * along[1]) / first.max(second).max(SMALLEST_SQUARE);
+    let step = match part.abs() > area * NEGLIGIBLE {
+        true => part,
+        false => 0.0,
+    };
+    match first >= second {
+        true => [w[0] + step, w[1] - step, w[2]],
+        false => [w[0] + step, w[1], w[2] - step],
+    }
+}
+
 /// S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", 2013.
 pub struct Watertight;
 
@@ -124,11 +158,17 @@ impl TriangleTest for Watertight {
         }
         let w = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
         let area = area_of(w, p, q);
+        let point = slid([a, b, c], w, area);
+        let clamp = |x: f32| x.max(0.0).min(area);
+        let u = clamp(point[1]);
         Meeting {
             area,
-            t: (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) * s.scale / area,
-            u: w[1],
-            v: w[2],
+            t: (point[0] * a[2] + point[1] * b[2] + point[2] * c[2]) * s.scale / area,
+            u,
+            v: match point[0] < 0.0 {
+                true => area - u,
+                false => clamp(point[2]),
+            },
         }
     }
 
@@ -139,8 +179,24 @@ impl TriangleTest for Watertight {
         inverse: &[f32; 3],
         found: &Meeting,
     ) -> [f32; 3] {
-        residual(triangle, ray, inverse, found.area)
+        let apart = slide(triangle, ray, inverse, found.area);
+        let rounding = residual(triangle, ray, inverse, found.area);
+        [0, 1, 2].map(|i| rounding[i] + apart[i])
     }
+}
+
+/// How far the point that is abreast of the ray lies from the one that the weights stand for, over the
+/// direction.
+fn slide(triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3], area: f32) -> [f32; 3] {
+    let s = shear(ray, inverse);
+    let vertices = triangle.vertices().map(|v| sheared(&s, v));
+    let (p, q) = products(vertices);
+    let w = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
+    let point = slid(vertices, w, area);
+    let moved = [1, 2].map(|i| (point[i] - w[i]) / area);
+    let [v0, v1, v2] = triangle.vertices();
+    let along = |i: usize| moved[0] * (v1[i] - v0[i]) + moved[1] * (v2[i] - v0[i]);
+    [0, 1, 2].map(|i| along(i).abs() * inverse[i].abs())
 }
 
 /// Error of x and y of the point that the weights stand for, and what it makes of the distance.
