@@ -16,12 +16,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// So many rounds at least: with fewer no permutation test passes a correction for some dozens of cells.
-pub const LEAST_ROUNDS: u32 = 21;
+/// So many rounds at least, nine of each compilation: by them a slowdown of 5 % is found on a busy machine (docs/compare.md).
+/// With fewer than 21 no permutation test passes a correction for some dozens of cells.
+pub const LEAST_ROUNDS: u32 = 63;
 
-/// So often every timed kernel of either side is compiled, in turns over the rounds: the same text compiled twice differs by some
-/// percent on drivers that compile for the processor, by where its code comes to lie.
-pub const COMPILATIONS: usize = 4;
+/// So often every timed kernel of either side is compiled, in turns over the rounds. Of some hundred compilations of equal text one
+/// or two took a third longer in all their rounds (Mesa 25, LLVM 15), by where their code came to lie: one of seven moves no median.
+pub const COMPILATIONS: usize = 7;
 
 /// Why nothing was measured again.
 #[derive(Debug, thiserror::Error)]

@@ -15,8 +15,8 @@ pub const LEAST_CONTROLS: usize = 3;
 /// So many degrees of freedom at most: deviations have heavier tails than the normal distribution.
 const MOST_FREEDOM: f64 = 8.0;
 
-/// The same where compilations of many cells know it together.
-const MOST_FREEDOM_OF_COMPILATIONS: f64 = 30.0;
+/// The same where both sides were measured in the same rounds, which share what is heaviest.
+const MOST_FREEDOM_IN_ROUNDS: f64 = 20.0;
 
 /// Where a time belongs to.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,46 +39,26 @@ struct Control {
     rounds: f64,
 }
 
-/// How far controls moved, and what compilations of one text differ by.
+/// How far controls moved.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Drift {
     controls: Vec<Control>,
-    compilations: Vec<(Place, Spread)>,
+    /// Whether both sides were measured in the same rounds of one process.
+    in_rounds: bool,
 }
 
 impl Drift {
+    /// Of two sides that were measured in the same rounds of one process, or apart.
+    pub fn new(in_rounds: bool) -> Self {
+        Self {
+            controls: Vec::new(),
+            in_rounds,
+        }
+    }
+
     /// One more control: the logarithm of its ratio, and the variance that its rounds say it has.
     pub fn add(&mut self, place: Place, log: f64, rounds: f64) {
         self.controls.push(Control { place, log, rounds });
-    }
-
-    /// One more cell, control or not, each side of which was compiled several times.
-    pub fn add_compilations(&mut self, place: Place, spread: Spread) {
-        self.compilations.push((place, spread));
-    }
-
-    /// What compilations make of the ratio of a figure: the mean over all its cells, which know it together. Code that differs in
-    /// nothing but its place in memory may take some percent more or less in all rounds.
-    fn of_compilations(&self, place: &Place) -> Option<Spread> {
-        let alike =
-            |(of, _): &&(Place, Spread)| (&of.figure, of.clock) == (&place.figure, place.clock);
-        let spreads = self.compilations.iter().filter(alike);
-        let (mut sum, mut freedom) = (0.0, 0.0);
-        for (_, spread) in spreads {
-            sum += spread.variance * spread.freedom;
-            freedom += spread.freedom;
-        }
-        (freedom > 0.0).then(|| Spread {
-            variance: sum / freedom,
-            freedom: freedom.min(MOST_FREEDOM_OF_COMPILATIONS),
-        })
-    }
-
-    /// All noise of a cell: that of controls or that of compilations, whichever is larger.
-    pub fn of_cell(&self, place: &Place, rounds: f64, itself: Option<f64>) -> Option<Spread> {
-        let known = [self.of(place, rounds, itself), self.of_compilations(place)];
-        let known = known.into_iter().flatten();
-        known.max_by(|a, b| a.variance.total_cmp(&b.variance))
     }
 
     /// All noise of a cell whose own rounds have this variance: from the controls of its figure in its rounds, or in all
@@ -94,7 +74,11 @@ impl Drift {
         }
         let near = alike.iter().copied();
         let near: Vec<&Control> = near.filter(|c| c.place.scene == place.scene).collect();
-        let (near, all) = (spread(&near, rounds), spread(&alike, rounds));
+        let most = match self.in_rounds {
+            true => MOST_FREEDOM_IN_ROUNDS,
+            false => MOST_FREEDOM,
+        };
+        let (near, all) = (spread(&near, rounds, most), spread(&alike, rounds, most));
         let variance = |s: &Option<Spread>| s.map_or(-1.0, |s| s.variance);
         match variance(&near) >= variance(&all) {
             true => near,
@@ -132,12 +116,12 @@ impl Drift {
 }
 
 /// The mean square of the logarithms, and what these rounds have beyond those of controls.
-fn spread(controls: &[&Control], own_rounds: f64) -> Option<Spread> {
+fn spread(controls: &[&Control], own_rounds: f64, most_freedom: f64) -> Option<Spread> {
     let count = controls.len() as f64;
     let square = controls.iter().map(|c| c.log * c.log).sum::<f64>() / count;
     let rounds = controls.iter().map(|c| c.rounds).sum::<f64>() / count;
     (controls.len() >= LEAST_CONTROLS).then(|| Spread {
         variance: square + (own_rounds - rounds).max(0.0),
-        freedom: count.min(MOST_FREEDOM),
+        freedom: count.min(most_freedom),
     })
 }

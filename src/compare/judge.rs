@@ -319,12 +319,11 @@ pub struct TimeRatio {
     pub by_round: Vec<f64>,
     /// By which clock, in words.
     pub clock: &'static str,
-    /// What the compilations of both sides, which took the rounds in turns, say of its noise.
-    pub compilations: Option<Spread>,
 }
 
 impl TimeRatio {
-    /// Of the times of two cells. Rounds are paired if both were measured in the same ones.
+    /// Of the times of two cells. Rounds are paired if both were measured in the same ones, in which so many compilations of each
+    /// side took turns.
     pub fn new(a: &Evidence, b: &Evidence, in_rounds: bool, compilations: usize) -> Option<Self> {
         let (
             Evidence::Times {
@@ -365,26 +364,26 @@ impl TimeRatio {
             log: figure.log,
             rounds: Spread::together(&figure.own),
             clock,
-            compilations: None,
         })
     }
 
-    /// With the noise of so many compilations of each side: round r was of the compilations r modulo their number, and the rounds
-    /// of one pair of them share what these two have by chance.
+    /// Where each side was compiled so often, and round r is of compilation r modulo that: rounds of one compilation share what its
+    /// code has by chance, so that as many compilations, not rounds, may be all that is known of the noise.
     fn of_compilations(mut self, count: usize) -> Self {
         let of = |k: usize| {
             let rounds = self.by_round.iter().skip(k).step_by(count.max(1));
             median(&rounds.copied().collect::<Vec<_>>())
         };
-        let pairs: Option<Vec<f64>> = (0..count).map(of).collect();
-        let spread = |pairs: Vec<f64>| {
-            let count = pairs.len() as f64;
-            Some(Spread {
-                variance: variance(&pairs)? / count,
-                freedom: count - 1.0,
-            })
-        };
-        self.compilations = pairs.and_then(spread);
+        let medians: Option<Vec<f64>> = (0..count).map(of).collect();
+        if let Some(variance) = medians.and_then(|medians| variance(&medians)) {
+            let variance = variance / count as f64;
+            if variance > self.rounds.variance {
+                self.rounds = Spread {
+                    variance,
+                    freedom: count as f64 - 1.0,
+                };
+            }
+        }
         self
     }
 
@@ -395,7 +394,6 @@ impl TimeRatio {
             rounds: Spread::together(&[a.own, b.own].concat()),
             by_round: Vec::new(),
             clock,
-            compilations: None,
         })
     }
 

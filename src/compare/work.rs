@@ -12,9 +12,10 @@ use crate::measure::record::{FinishedRecord, RunRecord, all_of, axis};
 use crate::report::format;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Measured with the shipped `ci.toml`: a renamed variable raised an alarm in 5 of 10 runs, an edit without effect in 3 of 12.
-const COMPILATIONS: &str = "times of kernels that were compiled anew moved by 3 to 6 % where nothing but a name had changed, and \
-                            controls, which share one compiled kernel, do not show that: a smaller change of time may be none";
+/// Said of a run that was not made to compare its kernels.
+const COMPILED_ONCE: &str = "each kernel was compiled once, and those of equal text together: what one compilation has over another by \
+                             chance looks like a change of time, and controls do not show it; raystone compare --kernels compiles \
+                             several times";
 
 /// A finding on its way to a verdict.
 pub(super) struct Open {
@@ -184,21 +185,22 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Says what times of changed kernels hold that controls do not: cells of equal text share one compiled kernel.
+    /// Says what times of changed kernels hold that controls do not, where kernels were compiled but once.
     pub fn warn_of_compilations(&mut self) {
         let is_alarm = |f: &Finding| {
             f.is_time && !f.is_control && matches!(f.verdict, Verdict::Worse | Verdict::Better)
         };
-        if self.in_rounds && self.findings.iter().any(|open| is_alarm(&open.finding)) {
-            self.notes.push(COMPILATIONS.into());
+        let once = self.in_rounds && self.compilations == 1;
+        if once && self.findings.iter().any(|open| is_alarm(&open.finding)) {
+            self.notes.push(COMPILED_ONCE.into());
         }
     }
 
     /// Measures the ratios of times against the drift of controls.
     pub fn measure_times(&mut self, confirmed: &Confirmed) {
         self.controls_did_the_same_work();
-        let of_runs = self.drift(|open| open.ratio.as_ref());
-        let of_confirmed = self.drift(|open| confirmed.get(&open.identity));
+        let of_runs = self.drift(self.in_rounds, |open| open.ratio.as_ref());
+        let of_confirmed = self.drift(true, |open| confirmed.get(&open.identity));
         if self.refused.is_none() {
             self.notes.extend(of_runs.words());
         }
@@ -223,7 +225,7 @@ impl<'a> Work<'a> {
                 &of_runs
             };
             let own = finding.is_control.then_some(ratio.log);
-            let spread = drift.of_cell(&place(finding, ratio.clock), ratio.rounds.variance, own);
+            let spread = drift.of(&place(finding, ratio.clock), ratio.rounds.variance, own);
             let measured = ratio.measured(&finding.figure, spread, margin);
             let grew = direction(&finding.figure, measured.change.value) == Verdict::Worse;
             finding.looks_worse =
@@ -243,14 +245,12 @@ impl<'a> Work<'a> {
     }
 
     /// How far the controls moved that this is known of.
-    fn drift<'o>(&'o self, ratio: impl Fn(&'o Open) -> Option<&'o TimeRatio>) -> Drift {
-        let mut drift = Drift::default();
-        for open in self.findings.iter().filter(|open| open.finding.is_time) {
-            let known = ratio(open).and_then(|ratio| Some((ratio.clock, ratio.compilations?)));
-            if let Some((clock, spread)) = known {
-                drift.add_compilations(place(&open.finding, clock), spread);
-            }
-        }
+    fn drift<'o>(
+        &'o self,
+        in_rounds: bool,
+        ratio: impl Fn(&'o Open) -> Option<&'o TimeRatio>,
+    ) -> Drift {
+        let mut drift = Drift::new(in_rounds);
         for open in self.findings.iter().filter(|open| open.finding.is_control) {
             if let Some(ratio) = ratio(open).filter(|ratio| ratio.clock != IN_TURNS) {
                 drift.add(
@@ -314,8 +314,7 @@ fn decide(finding: &mut Finding, rejected: bool) {
         return;
     };
     let within = change.low > -margin && change.high < margin;
-    // More than chance, and it may be as large as what counts.
-    let counts = rejected && !within;
+    let counts = rejected && change.value.abs() >= margin;
     finding.verdict = match (finding.is_control, counts) {
         (false, true) => direction(&finding.figure, change.value),
         (false, false) if within => Verdict::Same,

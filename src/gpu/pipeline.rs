@@ -286,6 +286,11 @@ impl Gpu {
 }
 
 impl Pipeline {
+    /// How often it was compiled so far: see [`Gpu::compiled_apart`].
+    pub fn compilations(&self) -> usize {
+        1 + self.again.lock().map_or(0, |again| again.len())
+    }
+
     /// Milliseconds that the first use of this kernel cost: composition, the driver's front end, and a
     /// dispatch of no workgroups, in which Mesa's `llvmpipe` does all its compiling (for a path tracer a
     /// second there, a tenth of one before). `None` until then; no other time contains it.
