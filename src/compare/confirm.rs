@@ -16,9 +16,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// So many rounds at least, nine of each compilation: by them a slowdown of 5 % is found on a busy machine (docs/compare.md).
+/// So many rounds at least, fifteen of each compilation: by them a slowdown of 2 % is found on a busy machine (docs/compare.md).
 /// With fewer than 21 no permutation test passes a correction for some dozens of cells.
-pub const LEAST_ROUNDS: u32 = 63;
+pub const LEAST_ROUNDS: u32 = 105;
 
 /// So often every timed kernel of either side is compiled, in turns over the rounds. Of some hundred compilations of equal text one
 /// or two took a third longer in all their rounds (Mesa 25, LLVM 15), by where their code came to lie: one of seven moves no median.

@@ -156,6 +156,8 @@ fn a_faster_structure_is_better_and_not_worse() {
         let slower = |structure| if structure == 8 { 0.8 } else { 1.0 };
         let [base, candidate] = one_run(i, slower, 0.0, 1 + i as usize % 2);
         let found = compared(&base, &candidate);
+        let caution = |note: &String| note.contains("where its data lies");
+        assert!(found.notes.iter().any(caution), "{:?}", found.notes);
         let caution = |note: &String| note.contains("was compiled once");
         assert_eq!(
             found.notes.iter().any(caution),
