@@ -13,8 +13,8 @@ use crate::report::format;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Measured with the shipped `ci.toml` (docs/compare.md): compilations take turns in the rounds, the data of a cell does not.
-const PLACES: &str = "a cell may be some percent faster or slower than its twin in all rounds of a process, by where its data lies: of some \
-                      550 cells of equal work one moved by 8 % and one by 4 %; measure again in another process what is called better or worse";
+const PLACES: &str = "a cell may be some percent slower than its twin in all rounds of a process, perhaps by where its data lies (one of some 500 \
+                      cells of equal work: 4 %), and lines in another order may compile to other code (9 % and more): another process tells the first";
 
 /// Said of a run that was not made to compare its kernels.
 const COMPILED_ONCE: &str = "each kernel was compiled once, and those of equal text together: what one compilation has over another by \
