@@ -220,3 +220,44 @@ fn more_runs_than_timestamps_are_played_in_parts_and_all_of_them() {
         );
     }
 }
+
+#[test]
+fn kernels_that_are_compared_are_compiled_apart_and_in_turns() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/recordings/kernels");
+    let library = || {
+        KernelLibrary::default()
+            .with_folder(&folder)
+            .expect("kernels")
+    };
+    // The same texts under another name: a library of its own.
+    let other = tempfile::tempdir().expect("a folder");
+    std::fs::write(other.path().join("beside.wesl"), "const BESIDE = 1u;").expect("a file");
+    let other = library().with_folder(other.path()).expect("kernels");
+    let add = |gpu: &Gpu| {
+        gpu.pipeline(&Composition::new("test/add"), true)
+            .expect("a kernel")
+    };
+    let once = open(library());
+    let shared = [add(&once), add(&once.with_kernels(other.clone()))];
+    assert!(Arc::ptr_eq(&shared[0], &shared[1]));
+    let base = open(library()).compiled_apart(3);
+    let candidate = base.with_kernels(other);
+    let kernels = [add(&base), add(&candidate)];
+    assert!(!Arc::ptr_eq(&kernels[0], &kernels[1]));
+    assert_eq!(kernels[0].kernel.wgsl, kernels[1].kernel.wgsl);
+    let player = Player::new(&base);
+    let words = Storage::scratch("words", BYTES);
+    for round in 0..7 {
+        base.take_turn(round);
+        let mut recording = Recording::new();
+        recording
+            .clear(&words)
+            .run("add", &kernels[0], &adding(3, &words), [4, 1, 1])
+            .download("words", &words);
+        let played = player.play(&recording).expect("it plays");
+        let words: Vec<u32> = played.download("words").expect("words");
+        assert_eq!(words, [3; WORDS as usize], "round {round}");
+        assert_eq!(kernels[0].compilations(), 3.min(round + 1));
+    }
+    assert_eq!(kernels[1].compilations(), 1);
+}

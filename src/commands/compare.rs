@@ -43,7 +43,7 @@ pub struct Compare {
     /// Folder for the records of --kernels [default: a temporary one]
     #[arg(long, value_name = "DIR", requires = "kernels")]
     out: Option<PathBuf>,
-    /// Rounds of --kernels, and of both programs in turns [default: 21, and 8]
+    /// Rounds of --kernels, and of both programs in turns [default: 105, and 8]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1000))]
     rounds: Option<u32>,
     /// Program that measured the base: what looks slower is run with it and with this one in turns

@@ -16,8 +16,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// So many rounds at least: with fewer no permutation test passes a correction for some dozens of cells.
-pub const LEAST_ROUNDS: u32 = 21;
+/// So many rounds at least, fifteen of each compilation: by them a slowdown of 2 % is found on a busy machine (docs/compare.md).
+/// With fewer than 21 no permutation test passes a correction for some dozens of cells.
+pub const LEAST_ROUNDS: u32 = 105;
+
+/// So often every timed kernel of either side is compiled, in turns over the rounds. Of some hundred compilations of equal text one
+/// or two took a third longer in all their rounds (Mesa 25, LLVM 15), by where their code came to lie: one of seven moves no median.
+pub const COMPILATIONS: usize = 7;
 
 /// Why nothing was measured again.
 #[derive(Debug, thiserror::Error)]
@@ -64,7 +69,11 @@ pub fn measure_kernels(
     if let Some(cells) = cells {
         restrict(&mut plan, cells);
     }
-    let summary = run(&experiment, &plan, registries, options)?;
+    let options = RunOptions {
+        compilations: COMPILATIONS,
+        ..options.clone()
+    };
+    let summary = run(&experiment, &plan, registries, &options)?;
     let side = Side::read(&summary.out)?;
     let axis = &experiment.axes[Axis::Kernels];
     let label = |folder: &str| {
@@ -182,7 +191,7 @@ fn ratios([a, b]: &[Side; 2]) -> Confirmed {
     let theirs: BTreeMap<_, Taken> = taken(b).into_iter().map(|t| (t.identity(), t)).collect();
     let pairs = taken(a).into_iter().filter_map(|old| {
         let new = theirs.get(&old.identity())?;
-        let ratio = TimeRatio::new(&old.evidence, &new.evidence, true)?;
+        let ratio = TimeRatio::new(&old.evidence, &new.evidence, true, a.compilations())?;
         Some((old.identity(), ratio))
     });
     pairs.collect()

@@ -15,6 +15,9 @@ pub const LEAST_CONTROLS: usize = 3;
 /// So many degrees of freedom at most: deviations have heavier tails than the normal distribution.
 const MOST_FREEDOM: f64 = 8.0;
 
+/// The same where both sides were measured in the same rounds, which share what is heaviest.
+const MOST_FREEDOM_IN_ROUNDS: f64 = 20.0;
+
 /// Where a time belongs to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
@@ -40,9 +43,19 @@ struct Control {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Drift {
     controls: Vec<Control>,
+    /// Whether both sides were measured in the same rounds of one process.
+    in_rounds: bool,
 }
 
 impl Drift {
+    /// Of two sides that were measured in the same rounds of one process, or apart.
+    pub fn new(in_rounds: bool) -> Self {
+        Self {
+            controls: Vec::new(),
+            in_rounds,
+        }
+    }
+
     /// One more control: the logarithm of its ratio, and the variance that its rounds say it has.
     pub fn add(&mut self, place: Place, log: f64, rounds: f64) {
         self.controls.push(Control { place, log, rounds });
@@ -61,7 +74,11 @@ impl Drift {
         }
         let near = alike.iter().copied();
         let near: Vec<&Control> = near.filter(|c| c.place.scene == place.scene).collect();
-        let (near, all) = (spread(&near, rounds), spread(&alike, rounds));
+        let most = match self.in_rounds {
+            true => MOST_FREEDOM_IN_ROUNDS,
+            false => MOST_FREEDOM,
+        };
+        let (near, all) = (spread(&near, rounds, most), spread(&alike, rounds, most));
         let variance = |s: &Option<Spread>| s.map_or(-1.0, |s| s.variance);
         match variance(&near) >= variance(&all) {
             true => near,
@@ -99,12 +116,12 @@ impl Drift {
 }
 
 /// The mean square of the logarithms, and what these rounds have beyond those of controls.
-fn spread(controls: &[&Control], own_rounds: f64) -> Option<Spread> {
+fn spread(controls: &[&Control], own_rounds: f64, most_freedom: f64) -> Option<Spread> {
     let count = controls.len() as f64;
     let square = controls.iter().map(|c| c.log * c.log).sum::<f64>() / count;
     let rounds = controls.iter().map(|c| c.rounds).sum::<f64>() / count;
     (controls.len() >= LEAST_CONTROLS).then(|| Spread {
         variance: square + (own_rounds - rounds).max(0.0),
-        freedom: count.min(MOST_FREEDOM),
+        freedom: count.min(most_freedom),
     })
 }

@@ -6,7 +6,7 @@ use crate::measure::comparison::LogFigure;
 use crate::measure::figure::{Better, Figure, Shown};
 use crate::measure::hypothesis::{capped_t_test, student_t_quantile, student_t_two_sided};
 use crate::measure::record::Interval;
-use crate::measure::statistics::{Spread, mean};
+use crate::measure::statistics::{Spread, mean, median, variance};
 
 /// What a comparison says of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
@@ -322,8 +322,9 @@ pub struct TimeRatio {
 }
 
 impl TimeRatio {
-    /// Of the times of two cells. Rounds are paired if both were measured in the same ones.
-    pub fn new(a: &Evidence, b: &Evidence, in_rounds: bool) -> Option<Self> {
+    /// Of the times of two cells. Rounds are paired if both were measured in the same ones, in which so many compilations of each
+    /// side took turns.
+    pub fn new(a: &Evidence, b: &Evidence, in_rounds: bool, compilations: usize) -> Option<Self> {
         let (
             Evidence::Times {
                 adapter: a,
@@ -346,10 +347,11 @@ impl TimeRatio {
             ),
         };
         match in_rounds && a.len() == b.len() {
-            true => Self::of_rounds(
-                &a.iter().zip(b).map(|(a, b)| b / a).collect::<Vec<_>>(),
-                clock,
-            ),
+            true => {
+                let ratios: Vec<f64> = a.iter().zip(b).map(|(a, b)| b / a).collect();
+                let ratio = Self::of_rounds(&ratios, clock)?;
+                Some(ratio.of_compilations(compilations))
+            }
             false => Self::of_samples(LogFigure::of_times(a)?, LogFigure::of_times(b)?, clock),
         }
     }
@@ -363,6 +365,26 @@ impl TimeRatio {
             rounds: Spread::together(&figure.own),
             clock,
         })
+    }
+
+    /// Where each side was compiled so often, and round r is of compilation r modulo that: rounds of one compilation share what its
+    /// code has by chance, so that as many compilations, not rounds, may be all that is known of the noise.
+    fn of_compilations(mut self, count: usize) -> Self {
+        let of = |k: usize| {
+            let rounds = self.by_round.iter().skip(k).step_by(count.max(1));
+            median(&rounds.copied().collect::<Vec<_>>())
+        };
+        let medians: Option<Vec<f64>> = (0..count).map(of).collect();
+        if let Some(variance) = medians.and_then(|medians| variance(&medians)) {
+            let variance = variance / count as f64;
+            if variance > self.rounds.variance {
+                self.rounds = Spread {
+                    variance,
+                    freedom: count as f64 - 1.0,
+                };
+            }
+        }
+        self
     }
 
     fn of_samples(a: LogFigure, b: LogFigure, clock: &'static str) -> Option<Self> {

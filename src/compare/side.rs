@@ -98,6 +98,12 @@ impl Side {
         }
     }
 
+    /// How often every timed kernel was compiled.
+    pub fn compilations(&self) -> usize {
+        let runs = all_of::<RunRecord>(&self.lines).map(|run| run.body.compilations);
+        runs.min().unwrap_or(1)
+    }
+
     /// Where it was measured; several where runs were merged.
     pub fn environments(&self) -> impl Iterator<Item = &Environment> {
         all_of::<RunRecord>(&self.lines).map(|run| &run.body.environment)

@@ -12,9 +12,14 @@ use crate::measure::record::{FinishedRecord, RunRecord, all_of, axis};
 use crate::report::format;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Measured with the shipped `ci.toml`: a renamed variable raised an alarm in 5 of 10 runs, an edit without effect in 3 of 12.
-const COMPILATIONS: &str = "times of kernels that were compiled anew moved by 3 to 6 % where nothing but a name had changed, and \
-                            controls, which share one compiled kernel, do not show that: a smaller change of time may be none";
+/// Measured with the shipped `ci.toml` (docs/compare.md): compilations take turns in the rounds, the data of a cell does not.
+const PLACES: &str = "a cell may be some percent slower than its twin in all rounds of a process, perhaps by where its data lies (one of some 500 \
+                      cells of equal work: 4 %), and lines in another order may compile to other code (9 % and more): another process tells the first";
+
+/// Said of a run that was not made to compare its kernels.
+const COMPILED_ONCE: &str = "each kernel was compiled once, and those of equal text together: what one compilation has over another by \
+                             chance looks like a change of time, and controls do not show it; raystone compare --kernels compiles \
+                             several times";
 
 /// A finding on its way to a verdict.
 pub(super) struct Open {
@@ -26,6 +31,8 @@ pub(super) struct Open {
 pub(super) struct Work<'a> {
     options: &'a Options,
     in_rounds: bool,
+    /// How often each side was compiled.
+    compilations: usize,
     /// Why times are not compared.
     refused: Option<String>,
     same_place: bool,
@@ -58,6 +65,7 @@ impl<'a> Work<'a> {
         Self {
             options,
             in_rounds: base.in_rounds && candidate.in_rounds,
+            compilations: base.compilations(),
             same_place: refused.is_none(),
             other_seeds: seeds.is_some(),
             refused,
@@ -126,7 +134,12 @@ impl<'a> Work<'a> {
         // Two lines of times contradict nothing: `contradictions` passes them over.
         let other = other_work(old, new).or_else(|| other_seeds(old, new));
         let comparable = is_time && !is_copy && other.is_none();
-        let ratio = TimeRatio::new(&old.evidence, &new.evidence, self.in_rounds);
+        let ratio = TimeRatio::new(
+            &old.evidence,
+            &new.evidence,
+            self.in_rounds,
+            self.compilations,
+        );
         let (verdict, why, measured) = match outcome {
             Outcome::Known(verdict, why) => (verdict, why, None),
             Outcome::Tested(measured) => {
@@ -176,21 +189,25 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Says what times of changed kernels hold that controls do not: cells of equal text share one compiled kernel.
+    /// Says what times of changed kernels hold that rounds and controls do not show.
     pub fn warn_of_compilations(&mut self) {
         let is_alarm = |f: &Finding| {
             f.is_time && !f.is_control && matches!(f.verdict, Verdict::Worse | Verdict::Better)
         };
-        if self.in_rounds && self.findings.iter().any(|open| is_alarm(&open.finding)) {
-            self.notes.push(COMPILATIONS.into());
+        if !self.in_rounds || !self.findings.iter().any(|open| is_alarm(&open.finding)) {
+            return;
+        }
+        self.notes.push(PLACES.into());
+        if self.compilations == 1 {
+            self.notes.push(COMPILED_ONCE.into());
         }
     }
 
     /// Measures the ratios of times against the drift of controls.
     pub fn measure_times(&mut self, confirmed: &Confirmed) {
         self.controls_did_the_same_work();
-        let of_runs = self.drift(|open| open.ratio.as_ref());
-        let of_confirmed = self.drift(|open| confirmed.get(&open.identity));
+        let of_runs = self.drift(self.in_rounds, |open| open.ratio.as_ref());
+        let of_confirmed = self.drift(true, |open| confirmed.get(&open.identity));
         if self.refused.is_none() {
             self.notes.extend(of_runs.words());
         }
@@ -235,8 +252,12 @@ impl<'a> Work<'a> {
     }
 
     /// How far the controls moved that this is known of.
-    fn drift<'o>(&'o self, ratio: impl Fn(&'o Open) -> Option<&'o TimeRatio>) -> Drift {
-        let mut drift = Drift::default();
+    fn drift<'o>(
+        &'o self,
+        in_rounds: bool,
+        ratio: impl Fn(&'o Open) -> Option<&'o TimeRatio>,
+    ) -> Drift {
+        let mut drift = Drift::new(in_rounds);
         for open in self.findings.iter().filter(|open| open.finding.is_control) {
             if let Some(ratio) = ratio(open).filter(|ratio| ratio.clock != IN_TURNS) {
                 drift.add(

@@ -4,6 +4,7 @@ use super::GpuError;
 use super::compose::KernelLibrary;
 use super::pipeline::PipelineCache;
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 /// Which adapter to use.
@@ -62,6 +63,9 @@ pub struct Gpu {
     pub(super) pipelines: Arc<Mutex<PipelineCache>>,
     /// See [`Gpu::take_modules`].
     pub(super) used: Arc<Mutex<BTreeMap<String, String>>>,
+    /// See [`Gpu::compiled_apart`].
+    compilations: usize,
+    turn: Arc<AtomicUsize>,
     lost: Arc<Mutex<Option<String>>>,
 }
 
@@ -260,6 +264,8 @@ pub fn open(choice: &AdapterChoice, kernels: KernelLibrary) -> Result<Gpu, GpuEr
         kernels,
         pipelines: Arc::default(),
         used: Arc::default(),
+        compilations: 1,
+        turn: Arc::default(),
         lost,
     };
     gpu.loop_limit = super::probe::probe_loops(&gpu)?;
@@ -275,6 +281,31 @@ impl Gpu {
             kernels,
             ..self.clone()
         }
+    }
+
+    /// The same device that compiles every kernel so many times, and each library of kernels for itself also where texts are equal:
+    /// what one compilation of a text has by chance over another is then part of what is measured.
+    #[must_use]
+    pub fn compiled_apart(&self, compilations: usize) -> Self {
+        Self {
+            compilations: compilations.max(1),
+            ..self.clone()
+        }
+    }
+
+    /// How often it compiles every kernel.
+    pub fn compilations(&self) -> usize {
+        self.compilations
+    }
+
+    /// Takes the compilation whose turn it is in this round, for all that is played on this device from now on.
+    pub fn take_turn(&self, round: usize) {
+        self.turn.store(round, Ordering::Relaxed);
+    }
+
+    /// Which compilation is played, from 0.
+    pub(super) fn turn(&self) -> usize {
+        self.turn.load(Ordering::Relaxed) % self.compilations
     }
 
     /// Another device on the same adapter with these features of wgpu, which may be experimental.

@@ -4,7 +4,7 @@ use super::GpuError;
 use super::adapter::Gpu;
 use super::compose::{ComposedKernel, Composition};
 use std::collections::{BTreeMap, HashMap};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
 /// Edge of a workgroup of pixels where no other shape was chosen, invocations.
@@ -41,7 +41,10 @@ pub(super) struct Binding {
 /// A compute pipeline with what it binds.
 pub struct Pipeline {
     /// The kernel.
-    pub kernel: ComposedKernel,
+    pub kernel: Arc<ComposedKernel>,
+    runtime_checks: bool,
+    /// Further compilations of the same text, from the second on.
+    again: Mutex<BTreeMap<usize, Arc<Pipeline>>>,
     pub(super) compute: wgpu::ComputePipeline,
     pub(super) layouts: Vec<wgpu::BindGroupLayout>,
     pub(super) bindings: Vec<Binding>,
@@ -124,15 +127,33 @@ impl Gpu {
         let start = Instant::now();
         let kernel = self.kernels.compose(&key.0)?;
         self.note_modules(&kernel);
-        let pipeline = match known(&|_, pipeline| pipeline.kernel.wgsl == kernel.wgsl) {
+        let is_it = |pipeline: &Pipeline| pipeline.kernel.wgsl == kernel.wgsl;
+        let shared = self.compilations() == 1;
+        let pipeline = match known(&|_, pipeline| shared && is_it(pipeline)) {
             Some(pipeline) => pipeline,
-            None => Arc::new(self.compile(kernel, runtime_checks, start)?),
+            None => Arc::new(self.compile(Arc::new(kernel), runtime_checks, start)?),
         };
         if let Ok(mut cache) = self.pipelines.lock() {
             let known = cache.entry(key).or_default();
             known.insert(library.to_owned(), Arc::clone(&pipeline));
         }
         Ok(pipeline)
+    }
+
+    /// The compilation of a kernel whose turn it is. Drivers give each a place in memory of its own.
+    pub(super) fn in_turn(&self, first: &Arc<Pipeline>) -> Result<Arc<Pipeline>, GpuError> {
+        let turn = self.turn();
+        if turn == 0 {
+            return Ok(Arc::clone(first));
+        }
+        let mut again = first.again.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = again.get(&turn) {
+            return Ok(Arc::clone(known));
+        }
+        let kernel = Arc::clone(&first.kernel);
+        let made = Arc::new(self.compile(kernel, first.runtime_checks, Instant::now())?);
+        again.insert(turn, Arc::clone(&made));
+        Ok(made)
     }
 
     /// Notes what a kernel was made of.
@@ -156,7 +177,7 @@ impl Gpu {
 
     fn compile(
         &self,
-        kernel: ComposedKernel,
+        kernel: Arc<ComposedKernel>,
         runtime_checks: bool,
         start: Instant,
     ) -> Result<Pipeline, GpuError> {
@@ -166,7 +187,7 @@ impl Gpu {
         let limit = u64::from(self.limits.max_storage_buffers_per_shader_stage);
         if needed > limit {
             return Err(GpuError::TooManyBuffers {
-                kernel: kernel.composition.entry,
+                kernel: kernel.composition.entry.clone(),
                 needed,
                 limit,
             });
@@ -197,6 +218,8 @@ impl Gpu {
         Ok(Pipeline {
             layouts: layouts.collect(),
             kernel,
+            runtime_checks,
+            again: Mutex::default(),
             compute,
             bindings,
             made_ms: start.elapsed().as_secs_f64() * 1e3,
@@ -263,6 +286,11 @@ impl Gpu {
 }
 
 impl Pipeline {
+    /// How often it was compiled so far: see [`Gpu::compiled_apart`].
+    pub fn compilations(&self) -> usize {
+        1 + self.again.lock().map_or(0, |again| again.len())
+    }
+
     /// Milliseconds that the first use of this kernel cost: composition, the driver's front end, and a
     /// dispatch of no workgroups, in which Mesa's `llvmpipe` does all its compiling (for a path tracer a
     /// second there, a tenth of one before). `None` until then; no other time contains it.

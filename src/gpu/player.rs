@@ -79,7 +79,12 @@ impl Player {
             .gpu
             .device
             .push_error_scope(wgpu::ErrorFilter::Validation);
-        let played = kept.play(&self.gpu, recording);
+        let played = match self.gpu.turn() {
+            0 => kept.play(&self.gpu, recording),
+            _ => recording
+                .in_turn(&self.gpu)
+                .and_then(|recording| kept.play(&self.gpu, &recording)),
+        };
         let complaint = pollster::block_on(scope.pop());
         let played = match (played, complaint) {
             (Err(lost @ GpuError::Lost(_)), _) => Err(lost),

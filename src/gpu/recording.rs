@@ -138,6 +138,17 @@ impl Recording {
         })
     }
 
+    /// The same steps with the compilations of their kernels whose turn it is.
+    pub(super) fn in_turn(&self, gpu: &Gpu) -> Result<Self, GpuError> {
+        let mut recording = self.clone();
+        for step in &mut recording.steps {
+            if let Step::Run(run) = step {
+                run.pipeline = gpu.in_turn(&run.pipeline)?;
+            }
+        }
+        Ok(recording)
+    }
+
     /// The same steps in recordings of at most so many runs.
     pub(super) fn parts(&self, most: usize) -> Vec<Self> {
         let (mut parts, mut part, mut runs) = (Vec::new(), Self::new(), 0);

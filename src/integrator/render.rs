@@ -428,6 +428,11 @@ impl<'a> Renderer<'a> {
         Ok(())
     }
 
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        self.gpu
+    }
+
     /// Time of all slices since the last reset.
     pub fn spent(&self) -> Elapsed {
         self.spent.get()

@@ -4,7 +4,7 @@
 use super::record::Interval;
 use super::statistics::{median, median_interval};
 use crate::config::Timing;
-use crate::gpu::{Elapsed, GpuError};
+use crate::gpu::{Elapsed, Gpu, GpuError};
 use crate::random::Pcg32;
 use std::cell::{Cell, OnceCell};
 use std::time::Instant;
@@ -19,11 +19,20 @@ pub trait Measured {
     /// # Errors
     /// It failed; it is not measured again.
     fn measure(&self) -> Result<Elapsed, GpuError>;
+
+    /// The device whose compilations of kernels take turns, round by round: see [`Gpu::compiled_apart`].
+    fn device(&self) -> Option<&Gpu> {
+        None
+    }
 }
 
 impl<M: Measured + ?Sized> Measured for &M {
     fn measure(&self) -> Result<Elapsed, GpuError> {
         (**self).measure()
+    }
+
+    fn device(&self) -> Option<&Gpu> {
+        (**self).device()
     }
 }
 
@@ -87,7 +96,7 @@ pub fn interleave<M: Measured>(
     }
     let mut random = Pcg32::new(seed);
     let mut order: Vec<usize> = (0..measured.len()).collect();
-    for _ in 0..timing.rounds {
+    for round in 0..timing.rounds as usize {
         for i in (1..order.len()).rev() {
             order.swap(i, random.below(i + 1));
         }
@@ -95,6 +104,7 @@ pub fn interleave<M: Measured>(
             let Ok(samples) = &mut results[index] else {
                 continue;
             };
+            take_turn(&measured[index], round);
             match turn(&measured[index]) {
                 Ok(elapsed) => {
                     samples.ms.push(elapsed.ms());
@@ -107,7 +117,14 @@ pub fn interleave<M: Measured>(
             tick();
         }
     }
+    measured.iter().for_each(|item| take_turn(item, 0));
     Ok(results)
+}
+
+fn take_turn(measured: &impl Measured, round: usize) {
+    if let Some(gpu) = measured.device() {
+        gpu.take_turn(round);
+    }
 }
 
 /// So often a turn is taken in which a clock runs backwards.
@@ -128,7 +145,11 @@ fn turn(measured: &impl Measured) -> Result<Elapsed, GpuError> {
 /// Runs until two runs in a row agree, for at least `min_warmup_ms` and at most `max_warmup_ms`. The
 /// first run does not count: it includes the driver's compiler.
 fn warm_up(measured: &impl Measured, timing: &Timing) -> Result<(), GpuError> {
-    measured.measure()?;
+    // Each compilation is made before it is timed.
+    for compilation in (0..measured.device().map_or(1, Gpu::compilations)).rev() {
+        take_turn(measured, compilation);
+        measured.measure()?;
+    }
     let start = Instant::now();
     let mut last = turn(measured)?.ms();
     loop {

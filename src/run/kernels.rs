@@ -97,6 +97,7 @@ impl Device {
     /// Opens the adapter of the options.
     pub fn open(options: &RunOptions, kernels: &Kernels) -> Result<Self, RunError> {
         let gpu = gpu::open(&options.adapter, kernels.embedded.clone())?;
+        let gpu = gpu.compiled_apart(options.compilations);
         let views = kernels.folders.iter();
         let views =
             views.map(|(kernels, library)| (kernels.clone(), gpu.with_kernels(library.clone())));

@@ -95,6 +95,8 @@ pub struct RunOptions {
     pub lenient: bool,
     /// Destroys the device when the turn of this cell comes: for tests of the recovery.
     pub lose_device_at: Option<String>,
+    /// How often every timed kernel is compiled, in turns over the rounds; 0 and 1: once. See [`crate::gpu::Gpu::compiled_apart`].
+    pub compilations: usize,
     /// What to take the adapter's arithmetic for, instead of probing it: for tests of what depends on it.
     pub arithmetic: Option<ArithmeticProbe>,
 }

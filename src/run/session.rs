@@ -429,6 +429,7 @@ impl<'a> Session<'a> {
             shard: self.options.shard.map(|shard| shard.to_string()),
             figures: self.registries.figures.rows().cloned().collect(),
             lenient: self.options.lenient,
+            compilations: self.options.compilations.max(1),
         };
         self.write(&Line::about_all(Body::Run(record)))?;
         for skipped in &self.plan.skipped {

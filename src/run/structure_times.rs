@@ -32,6 +32,10 @@ impl Measured for Timed<'_> {
         self.watch.note(self.batch.digest()?);
         Ok(elapsed)
     }
+
+    fn device(&self) -> Option<&Gpu> {
+        Some(self.batch.gpu())
+    }
 }
 
 impl Timed<'_> {

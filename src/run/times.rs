@@ -10,7 +10,7 @@ use super::world::World;
 use super::{Fault, RunError};
 use crate::accel::Space;
 use crate::config::{Axis, Cell};
-use crate::gpu::{Elapsed, GpuError, slow_slice};
+use crate::gpu::{Elapsed, Gpu, GpuError, slow_slice};
 use crate::integrator::{RAY_COUNT_CLASSES, Renderer, TRACED_CLASSES};
 use crate::measure::record::{Body, Key, Line, Outcome, Ran, TimeRecord};
 use crate::measure::statistics::{median, median_interval};
@@ -42,6 +42,10 @@ impl Measured for Timed<'_> {
         let pixels = self.renderer.image()?.pixels;
         self.watch.note(blake3::hash(bytemuck::cast_slice(&pixels)));
         Ok(elapsed)
+    }
+
+    fn device(&self) -> Option<&Gpu> {
+        Some(self.renderer.gpu())
     }
 }
 

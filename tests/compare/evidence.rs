@@ -117,7 +117,7 @@ fn times_are_by_the_processors_where_both_sides_have_them() {
         adapter: vec![adapter; 4],
         processors: processors.to_vec(),
     };
-    let ratio = |a: &Evidence, b: &Evidence| TimeRatio::new(a, b, false).expect("a ratio");
+    let ratio = |a: &Evidence, b: &Evidence| TimeRatio::new(a, b, false, 1).expect("a ratio");
     let calm = times(2.0, &[1.0; 4]);
     let noisy = times(3.0, &[1.9, 2.0, 2.0, 2.2]);
     let both = ratio(&calm, &noisy);

@@ -276,9 +276,30 @@ fn rounds_of_one_process_are_compared_round_by_round() {
             .into(),
         processors: Vec::new(),
     };
-    let ratio = |in_rounds| TimeRatio::new(&times(1.0), &times(1.05), in_rounds).expect("a ratio");
+    let ratio =
+        |in_rounds| TimeRatio::new(&times(1.0), &times(1.05), in_rounds, 1).expect("a ratio");
     let (together, apart) = (ratio(true).rounds.variance, ratio(false).rounds.variance);
     assert!(together < 1e-20 && apart > 1e-3, "{together} {apart}");
+}
+
+/// Three compilations of a side, each alike in its rounds: three numbers are known, not 21.
+#[test]
+fn rounds_of_one_compilation_are_one_observation() {
+    let times = |of: [f64; 3]| Evidence::Times {
+        adapter: (0..21).map(|r| of[r % 3]).collect(),
+        processors: Vec::new(),
+    };
+    let (base, candidate) = (times([1.0; 3]), times([1.1f64, 1.0, 1.0 / 1.1]));
+    let ratio = TimeRatio::new(&base, &candidate, true, 3).expect("a ratio");
+    // Logarithms x, 0 and -x have the variance x², their mean a third of it.
+    let wanted = 1.1f64.ln().powi(2) / 3.0;
+    assert!((ratio.rounds.variance - wanted).abs() < 1e-12, "{ratio:?}");
+    assert_eq!(ratio.rounds.freedom, 2.0);
+    let alone = TimeRatio::new(&base, &candidate, true, 1).expect("a ratio");
+    assert!(alone.rounds.variance < 0.5 * wanted, "{alone:?}");
+    // What no run writes.
+    let many = TimeRatio::new(&base, &candidate, true, usize::MAX).expect("a ratio");
+    assert_eq!(many.rounds, alone.rounds);
 }
 
 #[test]

@@ -17,6 +17,8 @@ pub struct Noise {
     pub round: f64,
     /// Share of rounds that take half as long again.
     pub interrupted: f64,
+    /// Of a compilation, with heavy tails: all its rounds alike.
+    pub compilation: f64,
 }
 
 /// As two runs of one program differed on a shared machine of two cores, in time of the processors.
@@ -25,6 +27,7 @@ pub const SHARED: Noise = Noise {
     cell: 0.03,
     round: 0.03,
     interrupted: 0.1,
+    compilation: 0.0,
 };
 /// As on a machine of its own.
 pub const QUIET: Noise = Noise {
@@ -32,6 +35,7 @@ pub const QUIET: Noise = Noise {
     cell: 0.003,
     round: 0.01,
     interrupted: 0.01,
+    compilation: 0.0,
 };
 
 /// What a made-up run is of.
@@ -48,6 +52,8 @@ pub struct Made {
     pub seed: u64,
     /// Seed of what is alike on both sides of one process: rounds share its noise.
     pub machine: u64,
+    /// How often each kernel is compiled, in turns over the rounds.
+    pub compilations: usize,
     /// Whether kernels of the second half are other ones.
     pub candidate: bool,
     /// Time of structures over what it would be.
@@ -67,6 +73,7 @@ impl Default for Made {
             noise: SHARED,
             seed: 1,
             machine: 1,
+            compilations: 1,
             candidate: false,
             slower: |_| 1.0,
             worse: |_| 1.0,
@@ -128,6 +135,7 @@ impl Made {
         let run = json!({
             "kind": "run", "name": "made", "experiment": "made.toml", "experiment_text": "", "started_unix_s": 0,
             "environment": environment(), "renders_full_product": 1, "renders_planned": 1,
+            "compilations": self.compilations,
         });
         let scene = json!({
             "kind": "scene", "triangles": 100, "bounds_min": [0, 0, 0], "bounds_max": [1, 1, 1], "load_ms": 1.0,
@@ -165,10 +173,16 @@ impl Made {
         let Noise { cell, round, .. } = self.noise;
         let base = 1.0 + structure as f64 + 0.3 * class as f64;
         let own = cell * random.heavy();
+        let compiled: Vec<f64> = match self.noise.compilation {
+            0.0 => vec![0.0; self.compilations],
+            spread => (0..self.compilations)
+                .map(|_| spread * random.heavy())
+                .collect(),
+        };
         let mut before = 0.0;
         // What all threads of the machine suffer in a round.
         let mut machine = Random::new(self.machine);
-        let time = |_: usize| {
+        let time = |i: usize| {
             before = 0.5 * before + 0.75f64.sqrt() * random.normal();
             let spike = if random.unit() < self.noise.interrupted {
                 1.5f64.ln()
@@ -176,7 +190,8 @@ impl Made {
                 0.0
             };
             let shared = round * machine.normal();
-            base * (self.slower)(structure) * (hour + own + round * before + spike + shared).exp()
+            let chance = own + compiled[i % self.compilations] + round * before;
+            base * (self.slower)(structure) * (hour + chance + spike + shared).exp()
         };
         (0..self.rounds).map(time).collect()
     }

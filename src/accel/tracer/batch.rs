@@ -66,6 +66,11 @@ impl Tracer {
 }
 
 impl RayBatch {
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.tracer.gpu
+    }
+
     /// What traces.
     pub fn tracer(&self) -> &Tracer {
         &self.tracer

@@ -66,6 +66,17 @@ pub struct RunRecord {
     /// Whether the run was to end with exit code 0 whatever fails.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub lenient: bool,
+    /// How often every timed kernel was compiled: the rounds took the compilations in turns.
+    #[serde(default = "once", skip_serializing_if = "is_once")]
+    pub compilations: usize,
+}
+
+fn once() -> usize {
+    1
+}
+
+fn is_once(compilations: &usize) -> bool {
+    *compilations == 1
 }
 
 impl RunRecord {
