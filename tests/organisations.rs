@@ -231,7 +231,7 @@ fn fault_on(
     match rendered(&gpu, &stage, &traced, what, by) {
         Ok((images, _)) if images != expected.0 => Some("other pixels".to_owned()),
         Ok((_, rays)) => (rays != expected.1).then(|| "other rays".to_owned()),
-        Err(error) => Some(error.to_string()),
+        Err(error) => shows(&format!("{error:?}")).then(|| error.to_string()),
     }
 }
 

@@ -214,7 +214,10 @@ fn what_cannot_be_rasterised_is_refused_with_the_reason() {
 /// Whether rasterised paths with this fault in a kernel are told from traced ones, on some scene.
 fn is_seen((module, from, to): (&str, &str, &str)) -> bool {
     let gpu = open(kernels_with(module, &[(from, to)]));
-    let shows = |stage: &Stage| difference(stage).map_or(true, |d| d.is_too_great());
+    let shows = |stage: &Stage| match difference(stage) {
+        Ok(difference) => difference.is_too_great(),
+        Err(error) => support::shows(&format!("{error:?}")),
+    };
     stages(&gpu).iter().any(|(_, stage)| shows(stage))
 }
 

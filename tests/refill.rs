@@ -100,7 +100,7 @@ fn is_seen(subject: &(TriangleSoup, Vec<Ray>), fault: (&str, &str, &str)) -> boo
                 !plain.0.iter().zip(&found.0).all(same)
                     || (&plain.1, &plain.2, &plain.3) != (&found.1, &found.2, &found.3)
             }
-            Err(_) => true,
+            Err(caught) => support::panic_shows(&*caught),
         }
     })
 }

@@ -273,7 +273,8 @@ fn rays_show(size: &str, (module, from, to): (&str, &str, &str), refill: &str) -
     };
     match catch_unwind(AssertUnwindSafe(found)) {
         Ok(Ok(found)) => !same(&expected.expect("answers"), &found),
-        _ => true,
+        Ok(Err(error)) => shows(&format!("{error:?}")),
+        Err(caught) => panic_shows(&*caught),
     }
 }
 
@@ -290,7 +291,10 @@ fn pixels_show(
     let stage = Stage::builtin(&crooked, "cornell-box", &[]);
     let traced = stage.traced(&crooked, structure("cwbvh"));
     let found = pixels(&stage, &in_groups(&crooked, &traced, shape), what, by);
-    found.map_or(true, |found| found != expected)
+    match found {
+        Ok(found) => found != expected,
+        Err(error) => shows(&format!("{error:?}")),
+    }
 }
 
 #[test]

@@ -383,7 +383,7 @@ fn faults_in_the_passes_are_seen() {
             let host = build(soup, settings).expect("a tree");
             match on_device(&gpu, soup, settings) {
                 Ok(device) => difference(&host, &device).is_some(),
-                Err(_) => true,
+                Err(error) => support::shows(&format!("{error:?}")),
             }
         };
         let seen = |s: &Settings| soups.iter().any(|soup| differs(soup, s));

@@ -116,6 +116,23 @@ pub fn kernels_with(module: &str, changes: &[(&str, &str)]) -> KernelLibrary {
     library.with_folder(folder.path()).expect("the kernels")
 }
 
+/// Whether an error, by its `Debug` text, or the words of a panic are what a planted fault does at work: the error word, samples that
+/// are not taken, a device that is lost or does not end. A kernel that does not compile shows nothing.
+pub fn shows(said: &str) -> bool {
+    ["Kernels(", "Samples", "LoopsCut", "Timeout", "Lost("]
+        .iter()
+        .any(|word| said.contains(word))
+}
+
+/// The same of what `catch_unwind` has caught.
+pub fn panic_shows(caught: &(dyn std::any::Any + Send)) -> bool {
+    let text = caught.downcast_ref::<String>().map(String::as_str);
+    shows(
+        text.or_else(|| caught.downcast_ref::<&str>().copied())
+            .unwrap_or_default(),
+    )
+}
+
 /// The entry `name` with some parameters changed from their defaults.
 pub fn variant(entries: &[Entry], name: &str, changes: &[(&str, ParamValue)]) -> Variant {
     let found = entries.iter().find(|e| e.name == name);
