@@ -1,5 +1,6 @@
 //! The gate of integrators: kernels agree with the oracle for images path by path, and planted faults do not.
 
+mod real;
 #[path = "../support/mod.rs"]
 mod support;
 
@@ -9,7 +10,7 @@ use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer};
 use raystone::measure::image_gate::{Pixels, answers, judge, sums};
 use raystone::measure::path_oracle::{Estimator, PathOracle, View};
 use raystone::measure::record::{Body, PathsRecord, Verdict};
-use raystone::measure::trial_scenes::trial_scenes;
+use raystone::measure::trial_scenes::{layers, trial_scenes};
 use raystone::params::{ParamValue, Variant};
 use raystone::run::Registries;
 use raystone::sampling::Sampler;
@@ -37,6 +38,18 @@ fn tried(
     sampler: &Sampler,
     samples: &[u32],
 ) -> Result<PathsRecord, GpuError> {
+    judged_by(gpu, scene, scene, what, sampler, samples)
+}
+
+/// The same by the oracle of the scene that is expected.
+fn judged_by(
+    gpu: &Gpu,
+    scene: &SceneData,
+    expected: &SceneData,
+    what: &Variant,
+    sampler: &Sampler,
+    samples: &[u32],
+) -> Result<PathsRecord, GpuError> {
     let stage = Stage::new(gpu, scene.clone());
     let traced = stage.traced(gpu, structure("bvh"));
     let integrator = IntegratorRegistry::default().configured(what);
@@ -57,7 +70,7 @@ fn tried(
         seed: 70_003,
     };
     let answers = answers(&renderer, &pixels)?;
-    let oracle = PathOracle::new(&stage.scene).expect("known materials");
+    let oracle = PathOracle::new(expected).expect("known materials");
     let view = View {
         estimator: Estimator::of(&integrator).expect("a known integrator"),
         camera: stage.camera,
@@ -84,7 +97,7 @@ fn independent() -> Sampler {
 /// Trial scenes of these places, in five tests for their time.
 fn judge_trials(places: std::ops::Range<usize>) {
     let scenes = trial_scenes().expect("scenes");
-    assert_eq!(scenes.len(), 13);
+    assert_eq!(scenes.len(), 14);
     for trial in &scenes[places] {
         for (name, changes) in &trial.trials {
             let what = integrator_variant(name, changes);
@@ -116,8 +129,57 @@ fn single_paths_of_placed_textures_skies_and_panes_are_those_of_the_oracle() {
 }
 
 #[test]
-fn single_paths_of_thin_triangles_are_those_of_the_oracle() {
-    judge_trials(12..13);
+fn single_paths_of_layers_and_thin_triangles_are_those_of_the_oracle() {
+    judge_trials(12..14);
+}
+
+/// The verdict of one scene's oracle on another scene's paths, of a kernel with this change.
+fn of_another(rendered: &SceneData, expected: &SceneData, change: &[(&str, &str)]) -> PathsRecord {
+    let gpu = open(kernels_with("integrator/path", change));
+    judged_by(&gpu, rendered, expected, &path(3), &independent(), &[0, 3]).expect("images")
+}
+
+#[test]
+fn surfaces_within_rounding_are_told_apart_from_faults() {
+    let [coincident, apart] = [0.0, 2e-3].map(|apart| layers(apart).expect("a built-in scene"));
+    let right = of_another(&coincident, &coincident, &[]);
+    assert_eq!(right.fault, None);
+    assert!(right.surfaces > right.paths / 20, "{right:?}");
+    assert!(
+        right.layered > right.paths / 2 && right.surfaces <= right.layered,
+        "{right:?}"
+    );
+    // Layers that rounding cannot exchange; and a fault of half a percent in ones that it can.
+    assert_eq!(of_another(&apart, &apart, &[]).surfaces, 0);
+    assert!(of_another(&coincident, &apart, &[]).wrong > 0);
+    let weight = "throughput *= next.weight;";
+    let faulty = [(weight, "throughput *= 1.005 * next.weight;")];
+    assert!(of_another(&coincident, &coincident, &faulty).wrong > 0);
+}
+
+#[test]
+fn a_scene_without_light_is_right_if_it_is_black() {
+    let dark = || {
+        let mut scene = layers(2e-3).expect("a built-in scene");
+        scene.environment = glam::Vec3::ZERO;
+        scene
+            .materials
+            .iter_mut()
+            .for_each(|m| m.emission = glam::Vec3::ZERO);
+        scene
+    };
+    let record = of_another(&dark(), &dark(), &[]);
+    assert_eq!(
+        (record.fault.as_deref(), record.wrong),
+        (None, 0),
+        "{record:?}"
+    );
+    assert_eq!(record.verdict(), Verdict::Pass);
+    let glowing = [(
+        "var result = vec3<f32>(0.0);",
+        "var result = vec3<f32>(0.0, 1e-9, 0.0);",
+    )];
+    assert!(of_another(&dark(), &dark(), &glowing).wrong > 0);
 }
 
 #[test]
