@@ -1,4 +1,74 @@
-//! Texts that all parts deal in: content hashes, and the known name nearest to a misspelt one.
+//! Texts that all parts deal in: what files of text hold, content hashes, and the known name nearest to a misspelt one.
+
+/// Bytes that are no text in UTF-8.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NotUtf8 {
+    /// The first line with such bytes, from 1.
+    pub line: usize,
+}
+
+/// The text of a file as any editor may have written it, in UTF-8 without a byte order mark and with `\n` at the end of lines.
+/// UTF-16 is told by its byte order mark; lines may end in `\r\n` or in `\r` alone, and DOS's end of file (Ctrl-Z) may
+/// stand behind the last one.
+///
+/// # Errors
+/// Bytes that are no UTF-8, with their line.
+pub fn plain_text(bytes: Vec<u8>) -> Result<String, NotUtf8> {
+    String::from_utf8(plain_bytes(bytes)).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let ends = before.iter().filter(|byte| **byte == b'\n');
+        NotUtf8 {
+            line: 1 + ends.count(),
+        }
+    })
+}
+
+/// The same for formats older than UTF-8: what is none counts as Latin-1, byte by byte, so that different names stay so.
+pub fn plain_text_or_latin1(bytes: Vec<u8>) -> String {
+    String::from_utf8(plain_bytes(bytes)).unwrap_or_else(|error| {
+        let mut text = String::with_capacity(error.as_bytes().len());
+        for chunk in error.as_bytes().utf8_chunks() {
+            text.push_str(chunk.valid());
+            text.extend(chunk.invalid().iter().map(|byte| char::from(*byte)));
+        }
+        text
+    })
+}
+
+/// What [`plain_text`] does, for bytes that may be no UTF-8.
+fn plain_bytes(mut bytes: Vec<u8>) -> Vec<u8> {
+    let utf_16 = |from: fn([u8; 2]) -> u16| {
+        let units = bytes[2..].as_chunks::<2>().0.iter().map(|pair| from(*pair));
+        let letters = char::decode_utf16(units);
+        let letters = letters.map(|letter| letter.unwrap_or(char::REPLACEMENT_CHARACTER));
+        letters.collect::<String>().into_bytes()
+    };
+    match bytes[..] {
+        [0xff, 0xfe, ..] => bytes = utf_16(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => bytes = utf_16(u16::from_be_bytes),
+        [0xef, 0xbb, 0xbf, ..] => drop(bytes.drain(..3)),
+        _ => {}
+    }
+    if bytes.last() == Some(&DOS_END) {
+        bytes.pop();
+    }
+    if bytes.contains(&b'\r') {
+        let mut before = 0;
+        // What is left is no longer than what was there.
+        bytes.retain_mut(|byte| {
+            let is_second = before == b'\r' && *byte == b'\n';
+            before = *byte;
+            if *byte == b'\r' {
+                *byte = b'\n';
+            }
+            !is_second
+        });
+    }
+    bytes
+}
+
+/// Ctrl-Z, the end of texts of CP/M and DOS.
+const DOS_END: u8 = 0x1a;
 
 /// Hash of named parts as 64 hexadecimal digits (BLAKE3).
 ///
@@ -49,6 +119,31 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn marks_line_ends_and_codings_are_all_one_text() {
+        let utf_16 = |text: &str, bytes: fn(u16) -> [u8; 2]| {
+            let units = std::iter::once(0xfeff).chain(text.encode_utf16());
+            units.flat_map(bytes).collect::<Vec<u8>>()
+        };
+        let expected = "a 1\n\u{e9}\u{1f600} 2\n\n3";
+        let crlf = expected.replace('\n', "\r\n");
+        for given in [
+            expected.as_bytes().to_vec(),
+            format!("\u{feff}{crlf}\u{1a}").into_bytes(),
+            expected.replace('\n', "\r").into_bytes(),
+            "a 1\r\n\u{e9}\u{1f600} 2\n\r3".as_bytes().to_vec(),
+            utf_16(expected, u16::to_le_bytes),
+            utf_16(&crlf, u16::to_be_bytes),
+        ] {
+            assert_eq!(plain_text(given.clone()).as_deref(), Ok(expected));
+            assert_eq!(plain_text_or_latin1(given), expected);
+        }
+        assert_eq!(plain_text(Vec::new()).as_deref(), Ok(""));
+        let latin1 = b"a\rb \xfc\xe9\r\n".to_vec();
+        assert_eq!(plain_text(latin1.clone()), Err(NotUtf8 { line: 2 }));
+        assert_eq!(plain_text_or_latin1(latin1), "a\nb \u{fc}\u{e9}\n");
+    }
 
     #[test]
     fn nearest_prefers_a_transposition_and_finds_a_part_of_a_name() {

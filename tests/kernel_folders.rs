@@ -307,7 +307,7 @@ fn files_that_no_kernel_could_be_made_with_are_refused_before_anything_runs() {
         (
             "by its bytes",
             "accel/bvh/stack.wesl",
-            b"\xff\xfe".as_slice(),
+            b"fn \xff".as_slice(),
             "UTF-8",
         ),
         (

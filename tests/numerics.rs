@@ -73,8 +73,8 @@ fn a_planted_fault_in_each_kernel_raises_an_alarm() {
         ),
         (
             "sampling/radical_inverse",
-            "rest % base",
-            "(rest % base) % 7u",
+            "rest %= weight;",
+            "rest = (rest % weight) % 7u;",
             "Halton words that differ",
         ),
         (

@@ -20,6 +20,7 @@ const OTHER_FILE: &[(&str, &str)] = &[
     ("accel/object_list", "src/accel/instancing/object_list.rs"),
     ("accel/wide", "src/accel/wide/quantise.rs"),
     ("accel/kd_tree", "src/accel/kd_tree/mod.rs"),
+    ("shading/light/units", "src/integrator/units.rs"),
     ("accel/octree", "src/accel/octree/mod.rs"),
     ("sampling/sampler", "src/sampling/mod.rs"),
 ];
@@ -282,6 +283,7 @@ const NO_TWIN: &[(&str, &str)] = &[
         "judged in src/stress/numerics/mappings.rs",
     ),
     ("shading/lights", "the table of lights; judged by images"),
+    ("shading/colors", "judged in f64 by single paths"),
     ("shading/light/sky", "judged by images, not by a twin"),
     ("shading/light/choice", "judged by tests/lights"),
     ("shading/light/delta", "judged by tests/lights"),
@@ -294,6 +296,7 @@ const NO_TWIN: &[(&str, &str)] = &[
     ("shading/light/table", "the layout of lights"),
     ("shading/material", "judged by images, not by a twin"),
     ("shading/normals", "judged in f64 by tests/materials"),
+    ("shading/sides", "judged by images, not by a twin"),
     ("shading/surface", "judged by images, not by a twin"),
     ("shading/texture", "judged by images, not by a twin"),
 ];
@@ -314,6 +317,11 @@ const KERNEL_ONLY: &[(&str, &str, &str)] = &[
         "accel/wide/octants",
         "NOTHING",
         "the twin has empty leaves there",
+    ),
+    (
+        "shading/light/units",
+        "unit_number",
+        "the host chooses nothing",
     ),
     (
         "accel/instance",

@@ -58,7 +58,7 @@ impl Polygon {
     }
 
     /// Leaves the part where `sign · (x − border)` is not negative.
-    fn cut(&mut self, axis: usize, border: f64, sign: f64) {
+    pub fn cut(&mut self, axis: usize, border: f64, sign: f64) {
         let before = *self;
         self.count = 0;
         let mut push = |corner| {
@@ -79,7 +79,11 @@ impl Polygon {
             }
             if (from < 0.0) != (to < 0.0) {
                 let along = from / (from - to);
-                let mut crossing: [f64; 3] = std::array::from_fn(|i| a[i] + (b[i] - a[i]) * along);
+                // Between both ends, whatever the rounding: what was cut before stays cut.
+                let mut crossing: [f64; 3] = std::array::from_fn(|i| {
+                    let place = a[i] + (b[i] - a[i]) * along;
+                    place.max(a[i].min(b[i])).min(a[i].max(b[i]))
+                });
                 crossing[axis] = border;
                 push(crossing);
             }

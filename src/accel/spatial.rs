@@ -162,18 +162,28 @@ pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// Box of the part of a triangle within `cell` grown by `margin`, itself grown by `margin`; `None` if
-/// there is no such part.
+/// Box of the part of a triangle within `cell` grown by `margin`, itself grown by `margin` and rounded
+/// outwards; `None` if there is no such part.
 pub(super) fn clip(record: &TriangleRecord, cell: &Bounds, margin: f64) -> Option<Bounds> {
     let part = Polygon::new(record).clipped(cell, margin);
     let around = |all: Bounds, corner: &[f64; 3]| {
         all.union(&Bounds {
-            min: corner.map(|c| (c - margin) as f32),
-            max: corner.map(|c| (c + margin) as f32),
+            min: corner.map(|c| rounded_down(c - margin)),
+            max: corner.map(|c| -rounded_down(-(c + margin))),
         })
     };
     let bounds = part.corners().iter().fold(Bounds::EMPTY, around);
     (!part.corners().is_empty()).then_some(bounds)
+}
+
+/// The greatest f32 that is not above `x`.
+fn rounded_down(x: f64) -> f32 {
+    let nearest = x as f32;
+    if f64::from(nearest) > x {
+        nearest.next_down()
+    } else {
+        nearest
+    }
 }
 
 #[cfg(test)]
@@ -208,5 +218,144 @@ mod tests {
         // In eighths, so that nothing is rounded.
         let grown = clip(corner, &cell([2.125, 2.0, -1.0], [3.0, 3.0, 1.0]), 0.5);
         assert_eq!(grown, Some(cell([1.125, 1.0, -0.5], [3.0, 2.875, 0.5])));
+    }
+
+    /// A fraction, its denominator positive.
+    #[derive(Clone, Copy)]
+    struct Ratio(i128, i128);
+
+    impl Ratio {
+        fn new(above: i128, below: i128) -> Self {
+            Self(above * below.signum(), below.abs())
+        }
+
+        fn is_above(self, other: f64) -> bool {
+            // No fraction of this test lies between a number and the multiple of 2⁻⁸⁰ below it.
+            self.0 << 80 > (other * 2.0_f64.powi(80)).floor() as i128 * self.1
+        }
+    }
+
+    /// Least and greatest coordinate on `axis` of what a triangle and a box share, exactly: those of the corners
+    /// of the triangle in the box, of its edges in faces of the box, and of edges of the box in the triangle.
+    fn shared(corners: [[i128; 3]; 3], cell: [[i128; 3]; 2], axis: usize) -> Vec<Ratio> {
+        let mut found = Vec::new();
+        // Points over a common denominator.
+        let mut push = |point: [i128; 3], below: i128| {
+            let (sign, below) = (below.signum(), below.abs());
+            let inside = (0..3)
+                .all(|a| (cell[0][a] * below..=cell[1][a] * below).contains(&(sign * point[a])));
+            if inside {
+                found.push(Ratio::new(sign * point[axis], below));
+            }
+        };
+        corners.iter().for_each(|c| push(*c, 1));
+        for i in 0..3 {
+            let (p, q) = (corners[i], corners[(i + 1) % 3]);
+            for (a, face) in (0..3).flat_map(|a| [(a, cell[0][a]), (a, cell[1][a])]) {
+                let (along, below) = (face - p[a], q[a] - p[a]);
+                if below != 0 && (0..=below.abs()).contains(&(along * below.signum())) {
+                    push(
+                        [0, 1, 2].map(|b| p[b] * below + (q[b] - p[b]) * along),
+                        below,
+                    );
+                }
+            }
+        }
+        let [p, q, r] = corners;
+        for a in 0..3 {
+            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+            for (y, z) in [0, 1, 2, 3].map(|k| (cell[k & 1][b], cell[k >> 1][c])) {
+                // Weights of the corners where the edge meets the plane, seen along the edge.
+                let twice =
+                    |s: [i128; 3], t: [i128; 3]| (s[b] - y) * (t[c] - z) - (s[c] - z) * (t[b] - y);
+                let weights = [twice(q, r), twice(r, p), twice(p, q)];
+                let below: i128 = weights.iter().sum();
+                if below != 0 && weights.iter().all(|w| w * below.signum() >= 0) {
+                    let mut point = [0; 3];
+                    (point[b], point[c]) = (y * below, z * below);
+                    point[a] = weights[0] * p[a] + weights[1] * q[a] + weights[2] * r[a];
+                    push(point, below);
+                }
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn clipped_bounds_are_those_of_exact_arithmetic_rounded_outwards() {
+        let mut random = crate::random::Pcg32::new(3);
+        let mut at = |range: usize| random.below(range) as i128 - 40;
+        let (mut cut, mut missed, mut touches) = (0, 0, 0);
+        for _ in 0..4000 {
+            let corners = [0; 3].map(|_| [0; 3].map(|_| at(81)));
+            let ends = [0; 3].map(|_| [at(81), at(81)]);
+            let side = |k: usize| ends.map(|[s, t]| [s.min(t), s.max(t)][k]);
+            let cell = [side(0), side(1)];
+            let as_f32 = |v: [i128; 3]| v.map(|x| x as f32);
+            let triangle = record(0, corners.map(as_f32));
+            let exact = Bounds {
+                min: as_f32(cell[0]),
+                max: as_f32(cell[1]),
+            };
+            let found = clip(&triangle, &exact, 0.0);
+            let points = [0, 1, 2].map(|axis| shared(corners, cell, axis));
+            let wide = clip(&triangle, &exact, 1e-6);
+            assert_eq!(
+                wide.is_some(),
+                !points[0].is_empty(),
+                "{corners:?} in {cell:?}"
+            );
+            let (Some(found), Some(wide)) = (found, wide) else {
+                missed += 1;
+                touches += usize::from(wide.is_some());
+                continue;
+            };
+            cut += usize::from(found != triangle.bounds());
+            for (axis, points) in points.iter().enumerate() {
+                // No exact point outside by more than the rounding of f64, and one within the next f32.
+                let within =
+                    |[low, high]: [f64; 2]| move |p: &Ratio| p.is_above(low) && !p.is_above(high);
+                let around = |x: f32| {
+                    [
+                        f64::from(x.next_down()) - 1e-13,
+                        f64::from(x.next_up()) + 1e-13,
+                    ]
+                };
+                let (low, high) = (found.min[axis], found.max[axis]);
+                let ends = [f64::from(low) - 1e-13, f64::from(high) + 1e-13];
+                assert!(points.iter().all(within(ends)), "{corners:?} in {cell:?}");
+                assert!(
+                    points.iter().any(within(around(low)))
+                        && points.iter().any(within(around(high)))
+                );
+                // With a margin, strictly none.
+                let ends = [wide.min[axis], wide.max[axis]].map(f64::from);
+                assert!(points.iter().all(within(ends)), "{corners:?} in {cell:?}");
+            }
+        }
+        assert!(
+            cut > 1000 && missed > 500 && touches < 20,
+            "{cut} {missed} {touches}"
+        );
+    }
+
+    #[test]
+    fn bounds_are_rounded_outwards() {
+        // A third and two thirds of 1, between f32s.
+        let thin = record(0, [[0.0, 0.0, 0.0], [3.0, 1.0, 0.0], [3.0, 1.0, 1.0]]);
+        let part = clip(&thin, &cell([1.0, 0.0, 0.0], [2.0, 1.0, 1.0]), 0.0).expect("a part");
+        for (found, exact, is_min) in [
+            (part.min[1], 1.0 / 3.0, true),
+            (part.max[1], 2.0 / 3.0, false),
+            (part.max[2], 2.0 / 3.0, false),
+        ] {
+            let (found, exact): (f64, f64) = (f64::from(found), exact);
+            let outside = if is_min { exact - found } else { found - exact };
+            assert!((0.0..6e-8).contains(&outside), "{found} for {exact}");
+        }
+        assert_eq!(
+            (rounded_down(0.1), rounded_down(0.25)),
+            (0.1_f32.next_down(), 0.25)
+        );
     }
 }

@@ -2,6 +2,7 @@
 
 use super::AccelError;
 use crate::gpu::{Gpu, Played, Player, Recording};
+use crate::scene::LEAST_BINDING;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Instant;
@@ -65,6 +66,8 @@ pub struct BuildLog {
     /// What was timed so far.
     pub phases: Vec<Phase>,
     player: Option<Arc<Player>>,
+    /// Bytes of the largest array, if others than the device says.
+    binding: Option<u64>,
 }
 
 impl BuildLog {
@@ -73,7 +76,24 @@ impl BuildLog {
         Self {
             phases: Vec::new(),
             player: Some(Arc::new(Player::new(gpu))),
+            binding: None,
         }
+    }
+
+    /// The log of a build for an adapter that binds arrays of so many bytes at most.
+    #[must_use]
+    pub fn binding(self, bytes: u64) -> Self {
+        Self {
+            binding: Some(bytes),
+            ..self
+        }
+    }
+
+    /// Words that an array may have: what the adapter binds, or every adapter where there is none.
+    pub fn most_words(&self) -> u64 {
+        let limits = self.gpu().map(|gpu| &gpu.limits);
+        let bound = limits.map(|l| l.max_storage_buffer_binding_size.min(l.max_buffer_size));
+        self.binding.or(bound).unwrap_or(LEAST_BINDING) / 4
     }
 
     /// A log without phases for parts that are built side by side, on the same device.
@@ -82,6 +102,7 @@ impl BuildLog {
         Self {
             phases: Vec::new(),
             player: self.player.clone(),
+            binding: self.binding,
         }
     }
 
@@ -110,7 +131,11 @@ impl BuildLog {
         }
         if !is_timed {
             let names = played.runs.iter().map(|(name, _)| name.as_str());
-            self.note(&names.collect::<Vec<_>>().join(" + "), played.wall_ms());
+            let mut phase = names.collect::<Vec<_>>().join(" + ");
+            if played.elapsed().backwards {
+                phase += " (wall clock: that of the device ran backwards)";
+            }
+            self.note(&phase, played.wall_ms());
         }
         Ok(played)
     }

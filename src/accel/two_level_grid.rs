@@ -7,7 +7,7 @@
 //! then finds its place in the next one.
 
 use super::grid::lists::{Lists, PartLists, check_lists, check_starts, in_runs};
-use super::grid::{Cut, Grid, GridBox, areas, check_words, clamped, finest, first_axis, outside};
+use super::grid::{Cut, Grid, GridBox, areas, clamped, finest, first_axis, most_words, outside};
 use super::structure::prelude::*;
 use super::watch;
 use rayon::prelude::*;
@@ -42,7 +42,10 @@ impl Structure for TwoLevelGrid {
         let resolution = grid_box.resolution(soup.records.len(), options.lambda1, 4096);
         let grid = Grid::new(&grid_box, resolution);
         let top = Lists::new(Self::NAME, &grid, soup, true, log)?;
-        let built = log.phase("parts", || cut(grid, soup, &top, options.lambda2))?;
+        let built = {
+            let most = most_words(log);
+            log.phase("parts", || cut(grid, soup, &top, options.lambda2, most))?
+        };
         Ok(Box::new(built))
     }
 }
@@ -66,7 +69,13 @@ struct Run {
     references: Vec<u32>,
 }
 
-fn cut(grid: Grid, soup: &TriangleSoup, top: &Lists, lambda: f64) -> Result<Built, AccelError> {
+fn cut(
+    grid: Grid,
+    soup: &TriangleSoup,
+    top: &Lists,
+    lambda: f64,
+    most: u64,
+) -> Result<Built, AccelError> {
     let tops = grid.cells() as usize;
     let areas = areas(soup);
     let resolutions = |cell: usize| {
@@ -77,7 +86,11 @@ fn cut(grid: Grid, soup: &TriangleSoup, top: &Lists, lambda: f64) -> Result<Buil
     let occupied = |cell: &usize| !top.of(*cell).is_empty();
     let all = (0..tops).into_par_iter().filter(occupied);
     let needed: u64 = all.map(all_parts).sum();
-    check_words("cells of a two-level-grid", 2 * tops as u64 + needed + 1)?;
+    AccelError::check_limit(
+        "cells of a two-level-grid",
+        2 * tops as u64 + needed + 1,
+        most,
+    )?;
 
     let cut_run = |cells: std::ops::Range<usize>| {
         let mut run = Run::default();
@@ -102,8 +115,8 @@ fn cut(grid: Grid, soup: &TriangleSoup, top: &Lists, lambda: f64) -> Result<Buil
         run
     };
     let runs = in_runs(tops, cut_run);
-    let references = runs.iter().map(|r| r.references.len() as u64).sum();
-    check_words("references of a two-level-grid", references)?;
+    let references: u64 = runs.iter().map(|r| r.references.len() as u64).sum();
+    AccelError::check_limit("references of a two-level-grid", references, most)?;
     Ok(Built::join(
         grid,
         &runs,

@@ -14,7 +14,7 @@ use super::grid::{Grid, GridBox, check_words, clamped, distance, first_axis, out
 use super::structure::prelude::*;
 use rayon::prelude::*;
 
-/// Bits of a cell's word that hold the begin of its list; the others hold the distance.
+/// Bits of a cell's word that hold the begin of its list where the others hold the distance.
 const START_BITS: u32 = 25;
 const START_MASK: u32 = 0x01ff_ffff;
 
@@ -52,12 +52,18 @@ impl Structure for UniformGrid {
         let grid = Grid::new(&grid_box, resolution);
         let exact = options.exact_overlap;
         let Lists { starts, references } = Lists::new(Self::NAME, &grid, soup, exact, log)?;
-        check_words("cells of a uniform-grid", starts.len() as u64)?;
+        check_words("cells of a uniform-grid", starts.len() as u64, log)?;
+        let skip = options.skip == Skip::Chebyshev;
+        if skip {
+            let what =
+                "references of a uniform-grid with distances, which leave 25 bits to a place";
+            AccelError::check_limit(what, references.len() as u64, START_MASK)?;
+        }
         let mut built = Built {
             grid,
             cells: starts,
             references,
-            skip: options.skip == Skip::Chebyshev,
+            skip,
         };
         if built.skip {
             log.phase("distances", || built.add_distances());
@@ -85,7 +91,8 @@ impl Built {
     }
 
     fn start(&self, cell: usize) -> usize {
-        (self.cells[cell] & START_MASK) as usize
+        let mask = if self.skip { START_MASK } else { u32::MAX };
+        (self.cells[cell] & mask) as usize
     }
 
     /// Steps to the nearest list where distances are kept, at least 1.

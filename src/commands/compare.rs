@@ -13,6 +13,7 @@ use raystone::compare::side::Side;
 use raystone::compare::{Comparison, Confirmed, Finding, Options, compare_sides, show};
 use raystone::gpu::AdapterChoice;
 use raystone::run::{Existing, Registries, RunOptions};
+use raystone::text::plain_text;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -166,11 +167,11 @@ impl Compare {
     ) -> Result<[Side; 2]> {
         let (text, name) = match file {
             Some(path) => {
-                let text = std::fs::read_to_string(path);
-                (
-                    text.with_context(|| format!("cannot read {}", path.display()))?,
-                    path.display().to_string(),
-                )
+                let name = path.display().to_string();
+                let bytes = std::fs::read(path).with_context(|| format!("cannot read {name}"))?;
+                let text = plain_text(bytes);
+                let text = text.map_err(|e| anyhow!("{name}:{}: it is not UTF-8 text", e.line))?;
+                (text, name)
             }
             None => (SMALL.0.to_owned(), SMALL.1.to_owned()),
         };

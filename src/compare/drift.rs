@@ -22,6 +22,8 @@ pub struct Place {
     pub figure: String,
     /// Times of one scene are taken in the same rounds.
     pub scene: String,
+    /// By which clock: what one clock makes of noise, another does not.
+    pub clock: &'static str,
 }
 
 /// A cell with equal kernels and equal work on both sides.
@@ -50,7 +52,8 @@ impl Drift {
     /// rounds, whichever moved more. `None` where there are too few. A control leaves itself out.
     pub fn of(&self, place: &Place, rounds: f64, itself: Option<f64>) -> Option<Spread> {
         let alike = self.controls.iter();
-        let alike = alike.filter(|c| c.place.figure == place.figure);
+        let of_it = |c: &&Control| (&c.place.figure, c.place.clock) == (&place.figure, place.clock);
+        let alike = alike.filter(of_it);
         let mut alike: Vec<&Control> = alike.collect();
         let is_itself = |c: &&Control| c.place == *place && Some(c.log) == itself;
         if let Some(at) = alike.iter().position(is_itself) {
@@ -68,13 +71,18 @@ impl Drift {
 
     /// In words, figure by figure: how far they moved.
     pub fn words(&self) -> Vec<String> {
-        let names = self.controls.iter().map(|c| &*c.place.figure);
-        let names: std::collections::BTreeSet<&str> = names.collect();
-        names.into_iter().map(|name| self.words_of(name)).collect()
+        let places = self.controls.iter().map(|c| &c.place);
+        let places: std::collections::BTreeSet<(&str, &str)> =
+            places.map(|place| (&*place.figure, place.clock)).collect();
+        let words = places
+            .iter()
+            .map(|(figure, clock)| self.words_of(figure, clock));
+        words.collect()
     }
 
-    fn words_of(&self, figure: &str) -> String {
-        let of_it = self.controls.iter().filter(|c| c.place.figure == figure);
+    fn words_of(&self, figure: &str, clock: &str) -> String {
+        let of_it = self.controls.iter();
+        let of_it = of_it.filter(|c| (&*c.place.figure, c.place.clock) == (figure, clock));
         let logs: Vec<f64> = of_it.map(|c| c.log).collect();
         let least = logs.iter().copied().fold(f64::INFINITY, f64::min);
         let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -61,6 +61,9 @@ fn of_cell(time: &Measured<TimeRecord>) -> Vec<Taken> {
     all
 }
 
+/// Id of the verdict on bias.
+pub const BIAS: &str = "bias/v1";
+
 /// Id of the fact that an image is: a hash, which may be meant to change.
 pub const IMAGE: &str = "image/v1";
 
@@ -98,13 +101,7 @@ fn of_images(sampler: &MeasuredSampler) -> Vec<Taken> {
     }
     all.extend(sampler.bias.as_ref().map(|bias| {
         let fails = bias.verdict == BiasVerdict::Biased && !bias.by_design;
-        fact(
-            &sampler.key,
-            "bias/v1",
-            "bias",
-            &bias.verdict.to_string(),
-            fails,
-        )
+        fact(&sampler.key, BIAS, "bias", &bias.verdict.to_string(), fails)
     }));
     all
 }
@@ -124,6 +121,7 @@ pub fn fact(key: &Key, id: &'static str, title: &'static str, text: &str, fails:
             fails,
         },
         work: String::new(),
+        seed: None,
         kernel: String::new(),
     }
 }

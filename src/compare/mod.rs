@@ -139,6 +139,7 @@ pub fn compare_sides(
     work.find(base, candidate);
     work.measure_times(confirmed);
     let tests = work.decide();
+    work.warn_of_compilations();
     let Work {
         mut findings,
         mut notes,

@@ -222,6 +222,14 @@ fn is_of_kernels(body: &Body) -> bool {
     )
 }
 
+/// By which clock the times of a run were taken.
+fn clock(environment: &Environment) -> &'static str {
+    match environment.timestamps {
+        true => "timestamps of the device",
+        false => "the wall",
+    }
+}
+
 /// What of two environments makes their times no measure of a change: name, and both values.
 pub fn differences(a: &Environment, b: &Environment) -> Vec<(&'static str, String, String)> {
     let texts = |e: &Environment| {
@@ -235,6 +243,7 @@ pub fn differences(a: &Environment, b: &Environment) -> Vec<(&'static str, Strin
             ("system", e.os.clone()),
             ("processor", e.cpu.clone()),
             ("processor threads", e.cpu_threads.to_string()),
+            ("clock", clock(e).to_owned()),
         ]
     };
     let pairs = texts(a).into_iter().zip(texts(b));

@@ -1,7 +1,7 @@
 //! What a side says, figure by figure, with the evidence behind it: raw samples where the records keep them.
 
 use super::Identity;
-use super::facts::{fact, facts};
+use super::facts::{BIAS, fact, facts};
 use super::side::Side;
 use crate::measure::figure::{Figure, Spread};
 use crate::measure::record::*;
@@ -58,6 +58,8 @@ pub struct Taken {
     pub evidence: Evidence,
     /// What must be the same for two values to be of the same work.
     pub work: String,
+    /// `run.seed`, where it is of rays, pictures or tests of that seed alone: with another it is another sample of the same.
+    pub seed: Option<i64>,
     /// Hash of the kernels that ran; empty where none is recorded.
     pub kernel: String,
 }
@@ -97,6 +99,42 @@ const DERIVED: [&str; 24] = [
     "loop-ns/v1",
     "rays/v1",
 ];
+
+/// Figures of cells that the seed of the run changes, beside those of its rays: what is counted in one picture of that seed, or
+/// timed of it.
+const OF_ONE_SEED: [&str; 12] = [
+    "ms-per-spp/v1",
+    "ray-query-share/v1",
+    "primary-other-triangle/v1",
+    "primary-other-value/v1",
+    "primary-mean-difference/v1",
+    "primary-rms-difference/v1",
+    "compaction-ns/v1",
+    "frame-judged/v1",
+    "frame-nodes-ratio/v1",
+    "neighbour-angle/v1",
+    "coverage/v1",
+    "image/v1",
+];
+
+/// Fewer degrees of freedom say too little of the spread of means over seeds to compare those of other seeds.
+const FEWEST_FREE: f64 = 7.0;
+
+/// Whether a figure is of rays or pictures of the seed of the run alone, or of few seeds. Errors are known seed by seed, and
+/// structures know none.
+fn is_of_one_seed(taken: &Taken) -> bool {
+    if let Evidence::Summary(_, freedom) = taken.evidence
+        && freedom < FEWEST_FREE
+    {
+        return true;
+    }
+    let of_seeds = matches!(
+        taken.evidence,
+        Evidence::Seeds { .. } | Evidence::Summary(..)
+    );
+    let of_rays = !taken.key.label(axis::RAYS).is_empty();
+    !of_seeds && (of_rays || OF_ONE_SEED.contains(&&*taken.figure.id))
+}
 
 /// A check of the run that failed.
 const CHECK: &str = "check/v1";
@@ -169,6 +207,11 @@ fn is_like(a: &Evidence, b: &Evidence) -> bool {
     }
 }
 
+/// Whether it is a test's verdict, which other seeds may turn.
+fn is_a_chance(taken: &Taken) -> bool {
+    [CHECK, BIAS].contains(&&*taken.figure.id)
+}
+
 fn of_lines(lines: &[Line]) -> Vec<Taken> {
     let data = RunData::new(lines);
     let raw = raw(&data);
@@ -184,6 +227,13 @@ fn of_lines(lines: &[Line]) -> Vec<Taken> {
         let key = Key::default().with(axis::SUBJECT, title);
         fact(&key, CHECK, "check of the run", detail, true)
     }));
+    let seed = data.run.and_then(RunRecord::seed);
+    for taken in all
+        .iter_mut()
+        .filter(|t| is_of_one_seed(t) || is_a_chance(t))
+    {
+        taken.seed = seed;
+    }
     all
 }
 
@@ -211,6 +261,7 @@ fn of_value(data: &RunData, raw: &Raw, value: &Value) -> Option<Taken> {
             Spread::Mean | Spread::Jackknife => of_means(data, value, number),
         },
         work: scene_hash(data, &value.key),
+        seed: None,
         kernel: String::new(),
     };
     let (cell, id) = own.identity();
@@ -284,6 +335,7 @@ fn sample(key: &Key, id: &str, evidence: Evidence, work: String, kernel: &str) -
         shown: String::new(),
         evidence,
         work,
+        seed: None,
         kernel: kernel.to_owned(),
     }
 }

@@ -8,6 +8,7 @@ use super::{Catalogue, ConfigError, parse};
 use crate::geometry::Camera;
 use crate::params::Variant;
 use crate::sampling::hash::pcg_hash;
+use crate::text::plain_text;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -308,17 +309,14 @@ impl Experiment {
             source,
         })?;
         let file = path.display().to_string();
-        let text = std::str::from_utf8(&bytes).map_err(|error| ConfigError::Syntax {
+        let text = plain_text(bytes).map_err(|error| ConfigError::Syntax {
             at: Place::File {
                 file: file.as_str().into(),
-                line: 1 + bytes[..error.valid_up_to()]
-                    .iter()
-                    .filter(|b| **b == b'\n')
-                    .count(),
+                line: error.line,
             },
             message: "it is not UTF-8 text".to_owned(),
         })?;
-        Self::parse(text, &file, overrides, catalogue)
+        Self::parse(&text, &file, overrides, catalogue)
     }
 
     /// The same as [`Experiment::load`] for a text; `file` is what messages call it.

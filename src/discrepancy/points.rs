@@ -1,6 +1,7 @@
 //! A set of points in the unit cube, and how it is read from text.
 
 use super::DiscrepancyError;
+use crate::text::plain_text;
 
 /// N points in `[0, 1]^d`, N ≥ 1, d ≥ 1. Repeated points count as often as they are there.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +48,10 @@ impl PointSet {
     /// [`DiscrepancyError::Line`] names the first line that is not a point of as many coordinates as
     /// those before it, all in `[0, 1]`; [`DiscrepancyError::Empty`] if there is no point.
     pub fn parse(text: &str) -> Result<Self, DiscrepancyError> {
+        Self::from_bytes(text.as_bytes())
+    }
+
+    fn from_lines(text: &str) -> Result<Self, DiscrepancyError> {
         let mut dim = 0;
         let mut coordinates = Vec::new();
         for (index, content) in text.lines().enumerate() {
@@ -76,19 +81,16 @@ impl PointSet {
         Self::new(dim, coordinates)
     }
 
-    /// The same as [`PointSet::parse`] for the bytes of a file.
+    /// The same as [`PointSet::parse`] for the bytes of a file: [any kind](plain_text) of text.
     ///
     /// # Errors
     /// As [`PointSet::parse`], and the first line that is not UTF-8.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, DiscrepancyError> {
-        let text = std::str::from_utf8(bytes).map_err(|error| {
-            let before = &bytes[..error.valid_up_to()];
-            DiscrepancyError::Line {
-                line: 1 + before.iter().filter(|byte| **byte == b'\n').count(),
-                reason: "it is not UTF-8 text".to_owned(),
-            }
+        let text = plain_text(bytes.to_vec()).map_err(|error| DiscrepancyError::Line {
+            line: error.line,
+            reason: "it is not UTF-8 text".to_owned(),
         })?;
-        Self::parse(text)
+        Self::from_lines(&text)
     }
 
     /// Number of points.
@@ -140,9 +142,9 @@ impl PointSet {
     }
 }
 
+/// Other white space may be meant as the end of a line, and joined lines are points of more coordinates: such a word is no number.
 fn words(line: &str) -> impl Iterator<Item = &str> {
-    let is_gap = |c: char| c.is_whitespace() || c == ',';
-    line.split(is_gap).filter(|word| !word.is_empty())
+    line.split([' ', '\t', ',']).filter(|word| !word.is_empty())
 }
 
 fn coordinate(word: &str) -> Result<f64, String> {
@@ -163,6 +165,30 @@ mod tests {
         let points = PointSet::parse(text).unwrap();
         let expected = PointSet::from_points(&[[0.25, 0.5], [1.0, 0.0], [0.125, 0.001]]);
         assert_eq!(Ok(points), expected);
+    }
+
+    #[test]
+    fn lines_end_in_any_way_and_never_run_together() {
+        let expected = PointSet::from_points(&[[0.25, 0.5], [1.0, 0.0]]);
+        let text = "# x y\n0.25 0.5\n1 0\n";
+        for end in ["\r", "\r\n", "\n\r"] {
+            let other = format!("\u{feff}{}", text.replace('\n', end));
+            assert_eq!(PointSet::parse(&other), expected, "{end:?}");
+        }
+        let wide: Vec<u8> = (std::iter::once(0xfeff).chain(text.encode_utf16()))
+            .flat_map(u16::to_le_bytes)
+            .collect();
+        assert_eq!(PointSet::from_bytes(&wide), expected);
+        // What is neither a gap nor the end of a line must not join two points.
+        for odd in ["\u{b}", "\u{c}", "\u{85}", "\u{2028}", "\u{2029}", ";"] {
+            let joined = format!("0.25 0.5{odd}1 0\n");
+            let found = PointSet::parse(&joined);
+            let is_refused = matches!(found, Err(DiscrepancyError::Line { line: 1, .. }));
+            assert!(is_refused, "{odd:?}: {found:?}");
+        }
+        let ragged = PointSet::parse("0.1 0.2\r0.3\r");
+        let is_second = matches!(ragged, Err(DiscrepancyError::Line { line: 2, .. }));
+        assert!(is_second, "{ragged:?}");
     }
 
     #[test]

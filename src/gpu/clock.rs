@@ -1,5 +1,6 @@
 //! What a piece of work took, by three clocks.
 
+use super::GpuError;
 use std::time::Instant;
 
 /// How long something took.
@@ -12,6 +13,8 @@ pub struct Elapsed {
     /// Milliseconds that the processors spent on this process meanwhile, all threads together: on a software adapter what the
     /// work costs, whatever else the machine does. `None` where there is no such clock.
     pub cpu_ms: Option<f64>,
+    /// Whether a clock ran backwards meanwhile, as those of some drivers and virtual machines do: then this is no measurement.
+    pub backwards: bool,
 }
 
 impl Elapsed {
@@ -21,6 +24,18 @@ impl Elapsed {
             gpu_ms: gpu.then_some(0.0),
             wall_ms: 0.0,
             cpu_ms: cpu_ms().map(|_| 0.0),
+            backwards: false,
+        }
+    }
+
+    /// The same, if it is a measurement. A time by another clock would stand among those of this one.
+    ///
+    /// # Errors
+    /// A clock ran backwards.
+    pub fn measured(self) -> Result<Self, GpuError> {
+        match self.backwards {
+            true => Err(GpuError::Clock),
+            false => Ok(self),
         }
     }
 
@@ -36,6 +51,7 @@ impl std::ops::AddAssign for Elapsed {
         self.gpu_ms = add(self.gpu_ms, other.gpu_ms);
         self.cpu_ms = add(self.cpu_ms, other.cpu_ms);
         self.wall_ms += other.wall_ms;
+        self.backwards |= other.backwards;
     }
 }
 
@@ -55,10 +71,12 @@ impl Stopwatch {
 
     /// What has passed since.
     pub fn elapsed(&self) -> Elapsed {
+        let cpu_ms = cpu_ms().zip(self.cpu_ms).map(|(now, then)| now - then);
         Elapsed {
             gpu_ms: None,
             wall_ms: self.start.elapsed().as_secs_f64() * 1e3,
-            cpu_ms: cpu_ms().zip(self.cpu_ms).map(|(now, then)| now - then),
+            cpu_ms,
+            backwards: cpu_ms.is_some_and(|ms| ms < 0.0),
         }
     }
 }
@@ -94,5 +112,12 @@ mod tests {
         let mut sum = Elapsed::nothing(false);
         sum += worked;
         assert_eq!(sum, worked);
+        assert_eq!(sum.measured().ok(), Some(worked));
+        // A part without a time leaves none of the sum.
+        sum += Elapsed {
+            backwards: true,
+            ..worked
+        };
+        assert!(matches!(sum.measured(), Err(GpuError::Clock)));
     }
 }

@@ -7,7 +7,7 @@
 use super::GpuError;
 use super::diagnose;
 use super::pipeline::WORKGROUP_EDGE;
-use crate::text::{cell_hash, nearest};
+use crate::text::{cell_hash, nearest, plain_text};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -271,7 +271,11 @@ fn collect(
             let levels = levels.ok_or_else(|| fault(&path, &"too deep a kernel folder"))?;
             collect(&path, levels, found)?;
         } else if extension == "wesl" {
-            let text = std::fs::read_to_string(&path).map_err(|e| fault(&path, &e))?;
+            let bytes = std::fs::read(&path).map_err(|e| fault(&path, &e))?;
+            let text = plain_text(bytes).map_err(|e| {
+                let problem = format!("line {} is not UTF-8 text", e.line);
+                fault(&path, &problem)
+            })?;
             found.insert(path, text);
         } else if ["wesl", "wgsl"].contains(&extension.to_lowercase().as_str()) {
             return Err(fault(&path, &"kernels end in `.wesl`; rename or remove it"));

@@ -167,6 +167,11 @@ pub enum GpuError {
     /// Validation or out-of-memory error from the driver.
     #[error("the driver refused: {0}")]
     Driver(String),
+    /// A clock went back while something was measured.
+    #[error(
+        "a clock of the device or of the processors ran backwards in every try, so that there is no time: update the driver, or measure on another machine"
+    )]
+    Clock,
     /// The device is gone.
     #[error("the device was lost: {0}")]
     Lost(String),

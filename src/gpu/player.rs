@@ -145,19 +145,19 @@ impl Kept {
             buffer.map_async(wgpu::MapMode::Read, .., |_| {});
         }
         gpu.wait()?;
-        let host = watch.elapsed();
+        let mut host = watch.elapsed();
         let mut downloads = BTreeMap::new();
         for (name, buffer) in staged {
             downloads.insert(name, take(&buffer)?);
         }
         let ticks = clock_buffer.map(|buffer| take(&buffer)).transpose()?;
         let ticks: Option<Vec<u64>> = ticks.map(|bytes| bytemuck::pod_collect_to_vec(&bytes));
-        let ms = |place: usize| {
-            let ticks = ticks.as_ref()?;
-            // A negative span is a driver fault, not a measurement.
-            let span = ticks[2 * place + 1].checked_sub(ticks[2 * place])?;
-            Some(span as f64 * f64::from(clock?) * 1e-6)
-        };
+        // Two timestamps for each run.
+        let (spans, _) = ticks.as_deref().unwrap_or_default().as_chunks();
+        let spans = spans.iter().take(runs.len());
+        let spans: Vec<Option<f64>> = spans.map(|span| span_ms(*span, clock)).collect();
+        host.backwards |= ticks.is_some() && spans.contains(&None);
+        let ms = |place: usize| spans.get(place).copied().flatten();
         for (place, run) in runs.iter().enumerate() {
             if let Some(words) = downloads.remove(&staged_groups(place)) {
                 let [x, y, z, ..] = bytemuck::pod_collect_to_vec::<_, u32>(&words)[..] else {
@@ -470,6 +470,11 @@ fn first_dispatch(gpu: &Gpu, run: &Run, groups: &[wgpu::BindGroup]) -> Result<f6
     gpu.queue.submit([encoder.finish()]);
     gpu.wait()?;
     Ok(start.elapsed().as_secs_f64() * 1e3)
+}
+
+/// Milliseconds from the first timestamp to the second; `None` where there is no clock, or where it ran backwards.
+fn span_ms([from, to]: [u64; 2], period_ns: Option<f32>) -> Option<f64> {
+    Some(to.checked_sub(from)? as f64 * f64::from(period_ns?) * 1e-6)
 }
 
 /// What a mapped buffer holds; it is unmapped after that.

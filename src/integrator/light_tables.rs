@@ -4,6 +4,7 @@
 use super::environment_tables::environment_rows;
 use super::light_tree::{LightBounds, TreeNode, light_tree, tree_rows};
 use super::tables::emits_in_front;
+use super::units::{shared_out, unit_share};
 use crate::gpu::UniformValues;
 use crate::scene::{
     IesProfile, LIGHT_KINDS, Light, LightList, ListedLight, Photometry, SceneData, Source,
@@ -44,7 +45,8 @@ fn row(v: Vec3, w: f32) -> [u32; 4] {
 impl LightTables {
     /// The tables of the lights of `list`.
     pub fn of(scene: &SceneData, list: &LightList) -> Self {
-        let total: f64 = list.lights.iter().map(|light| light.power).sum();
+        let powers: Vec<f64> = list.lights.iter().map(|light| light.power).collect();
+        let shares = shared_out(&powers);
         let mut tables = Self {
             lights: list.lights.len() as u32,
             one_sided: scene.materials.iter().any(emits_in_front),
@@ -53,9 +55,9 @@ impl LightTables {
         let mut owners = Vec::new();
         let mut extras = Vec::new();
         let mut bounds = Vec::new();
-        let mut below = 0.0;
-        for (number, light) in (0..).zip(&list.lights) {
-            below += light.power;
+        let mut below = 0;
+        for ((number, light), share) in (0..).zip(&list.lights).zip(shares) {
+            below += share;
             let kind = light.kind(scene).number();
             let link = match light.source {
                 Source::Triangle(id) => {
@@ -74,10 +76,8 @@ impl LightTables {
                     link as u32
                 }
             };
-            let part = |x: f64| ((x / total) as f32).to_bits();
-            tables
-                .rows
-                .push([kind, link, part(below), part(light.power)]);
+            let [upto, own] = [below, share].map(|units| unit_share(units).to_bits());
+            tables.rows.push([kind, link, upto, own]);
             tables.rows.extend(own_rows(scene, light));
             tables.kinds[kind as usize] = true;
             bounds.extend(light_bounds(scene, light));
@@ -259,7 +259,7 @@ fn light_bounds(scene: &SceneData, listed: &ListedLight) -> Option<LightBounds> 
     };
     let place = match listed.source {
         Source::Triangle(id) => {
-            let [a, b, c] = scene.triangles[id as usize].vertices;
+            let [a, b, c] = scene.outward(id as usize);
             return Some(flat(&[a, b, c], (b - a).cross(c - a), id));
         }
         Source::Parallelogram(of) => {

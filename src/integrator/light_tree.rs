@@ -97,6 +97,8 @@ pub(crate) struct TreeNode {
     pub parent: u32,
     /// The light of a leaf.
     pub light: u32,
+    /// How many lights it holds.
+    pub(super) count: u32,
 }
 
 /// Number of the root: children begin at even numbers, and the other child of a node is its number with the last bit
@@ -105,7 +107,8 @@ pub(super) const ROOT: usize = 1;
 /// Places at which a cluster may be cut along an axis.
 const BUCKETS: usize = 12;
 
-/// The nodes of a tree over lights, number 0 being none; and the leaf of each light.
+/// The nodes of a tree over lights, number 0 being none; and the leaf of each light. All nodes below a left child have lower numbers
+/// than those below the right one, which kernels find the way to a leaf by.
 pub(super) fn light_tree(lights: &[LightBounds]) -> (Vec<TreeNode>, Vec<u32>) {
     let Some(first) = lights.first() else {
         return (Vec::new(), Vec::new());
@@ -115,6 +118,7 @@ pub(super) fn light_tree(lights: &[LightBounds]) -> (Vec<TreeNode>, Vec<u32>) {
         child: 0,
         parent: 0,
         light: 0,
+        count: 0,
     };
     let mut nodes = vec![none; 2];
     let mut leaves = vec![0; lights.len()];
@@ -123,6 +127,7 @@ pub(super) fn light_tree(lights: &[LightBounds]) -> (Vec<TreeNode>, Vec<u32>) {
         let of = |light: &u32| lights[*light as usize];
         let all = members.iter().map(of).reduce(|a, b| a.union(&b));
         nodes[node].bounds = all.unwrap_or(*first);
+        nodes[node].count = members.len() as u32;
         if let [light] = members[..] {
             nodes[node].light = light;
             leaves[light as usize] = node as u32;
@@ -189,7 +194,8 @@ fn cut(lights: &[LightBounds], mut members: Vec<u32>) -> [Vec<u32>; 2] {
 /// Added to the angle of emission, so that rounding in kernels leaves no light out, radians.
 const SLACK: f64 = 0.01;
 
-/// Rows of `shading_tables`: four `vec4` a node, then for each light its leaf. Boxes are rounded outwards.
+/// Rows of `shading_tables`: four `vec4` a node, the last of which holds child, leaf's light, number of lights and whether some
+/// shine to both sides; then for each light its leaf. Boxes are rounded outwards.
 pub(super) fn tree_rows(lights: &[LightBounds]) -> Vec<[u32; 4]> {
     let (nodes, leaves) = light_tree(lights);
     let vector =
@@ -208,8 +214,8 @@ pub(super) fn tree_rows(lights: &[LightBounds]) -> Vec<[u32; 4]> {
             [x, y, z, (spread.cos() as f32).to_bits()],
             [
                 node.child,
-                node.parent,
                 node.light,
+                node.count,
                 u32::from(bounds.both_sides),
             ],
         ]);
@@ -265,6 +271,12 @@ mod tests {
                     assert!(bounds.spread >= own.spread && bounds.both_sides >= own.both_sides);
                     let parent = nodes[node].parent as usize;
                     assert!(node == ROOT || nodes[parent].child as usize == node & !1);
+                    let right = (node | 1).min(nodes.len() - 1);
+                    let after = nodes[right].child as usize;
+                    // Where kernels look for the leaf of a light.
+                    let found_left = *leaf as usize == node & !1
+                        || (*leaf as usize != right && (after == 0 || (*leaf as usize) < after));
+                    assert!(node == ROOT || found_left == (node & 1 == 0));
                     node = parent;
                 }
             }

@@ -20,6 +20,7 @@ mod slice;
 mod stage;
 mod surface_tables;
 mod tables;
+mod units;
 mod visibility;
 
 pub use crate::accel::Traced;

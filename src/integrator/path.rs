@@ -6,7 +6,7 @@ use super::tables::FEATURE_GROUPS;
 use super::{Integrator, IntegratorFacts};
 use crate::parameters;
 use crate::params::{Choice as _, ParameterSchema, Parameters as _, Params};
-use crate::sampling::dimensions::{self, LIGHT_POINT, PIXEL, ROULETTE};
+use crate::sampling::dimensions::{self, LIGHT_CHOICE, LIGHT_POINT, PIXEL, ROULETTE};
 
 parameters! {
     /// How directions of the material and samples of lights are joined.
@@ -75,7 +75,7 @@ parameters! {
         Choice = "choice",
         /// What rays that leave the scene find.
         Background = "background",
-        /// The error that instances add to points.
+        /// The error that instances add to points, and which triangles are mirrored.
         Transforms = "transforms",
         /// All of these: the full kernel.
         All = "all",
@@ -139,9 +139,12 @@ impl PathParameters {
             let first = dimensions::at_bounce(bounce, LIGHT_POINT);
             first..dimensions::at_bounce(bounce, ROULETTE)
         };
+        let choice = |bounce| dimensions::at_bounce(bounce, LIGHT_CHOICE);
         let mut undrawn: Vec<u32> = (0..self.max_depth).filter_map(roulette).collect();
         if self.strategy == Strategy::Bsdf {
             undrawn.extend((0..self.max_depth).flat_map(light));
+        } else if self.lights == Lights::All {
+            undrawn.extend((0..self.max_depth).map(choice));
         }
         if self.primary != Primary::Traced {
             undrawn.extend([PIXEL, PIXEL + 1]);

@@ -418,7 +418,8 @@ impl<'a> Renderer<'a> {
         let elapsed = played.elapsed();
         let mut stages = self.stages.borrow_mut();
         for (stage, ms) in played.runs {
-            *stages.entry(stage).or_default() += ms.unwrap_or_default();
+            let Some(ms) = ms else { continue };
+            *stages.entry(stage).or_default() += ms;
         }
         self.slices.learn(items, elapsed);
         let mut spent = self.spent.get();
@@ -438,7 +439,7 @@ impl<'a> Renderer<'a> {
     }
 
     /// GPU milliseconds of each stage since the last reset, summed over its runs: [`RAY_QUERIES`](super::RAY_QUERIES) and those of the
-    /// organisation. Zeros without timestamps.
+    /// organisation. None without timestamps.
     pub fn stages(&self) -> BTreeMap<String, f64> {
         self.stages.borrow().clone()
     }

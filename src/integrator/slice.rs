@@ -39,6 +39,8 @@ pub(super) fn job_uniform(job: &RenderJob, scene: &SceneBuffers) -> UniformValue
         .u32("height", height)
         .u32("first_uv", scene.first_uv)
         .u32("first_normal", scene.first_normal)
+        .u32("first_color", scene.first_color)
+        .u32("first_mirrored", scene.first_mirrored)
         .f32("ao_radius", ao_radius as f32)
         .f32("transform_scale", scene.transform_error.scale)
         .f32("transform_shift", scene.transform_error.shift)

@@ -1,4 +1,5 @@
-//! What `shading_tables` holds of surfaces besides the numbers of materials: places of textures, texture coordinates, normals, texels.
+//! What `shading_tables` holds of surfaces besides the numbers of materials: places of textures, texture coordinates, normals,
+//! colours of vertices, texels.
 
 use crate::scene::{Material, SceneData, TextureUse, Wrap};
 
@@ -22,6 +23,8 @@ pub struct SurfaceFeatures {
     pub texture_transforms: bool,
     /// Some vertex has a normal that is not its triangle's.
     pub normals: bool,
+    /// Some vertex has a colour.
+    pub vertex_colors: bool,
 }
 
 impl SurfaceFeatures {
@@ -41,11 +44,12 @@ impl SurfaceFeatures {
             emission_textures: some(3),
             texture_transforms: all.any(|used| !used.is_plain()),
             normals: scene.normals.len() == scene.triangles.len(),
+            vertex_colors: scene.colors.len() == scene.triangles.len(),
         }
     }
 
     /// Feature names as kernels write them, with whether they are on.
-    pub(super) fn flags(&self) -> [(&'static str, bool); 6] {
+    pub(super) fn flags(&self) -> [(&'static str, bool); 7] {
         [
             ("textures", self.textures),
             (
@@ -56,6 +60,7 @@ impl SurfaceFeatures {
             ("emission_textures", self.emission_textures),
             ("texture_transforms", self.texture_transforms),
             ("normals", self.normals),
+            ("vertex_colors", self.vertex_colors),
         ]
     }
 
@@ -67,6 +72,7 @@ impl SurfaceFeatures {
             "metallic_roughness_textures",
             "normal_maps",
             "normals",
+            "vertex_colors",
         ];
         let unneeded = move |(name, on): &(&str, bool)| !on && of_one_surface.contains(name);
         let flags = self.flags().into_iter();
@@ -79,10 +85,12 @@ impl SurfaceFeatures {
 pub(super) struct Places {
     pub first_uv: u32,
     pub first_normal: u32,
+    pub first_color: u32,
+    pub first_mirrored: u32,
 }
 
 /// Appends, in this order: places of textures, three `vec4` each; six words of texture coordinates a triangle; three of normals;
-/// texels. Tells the materials where the places of their textures are, in `vec4`.
+/// six of colours; a bit whether it is mirrored; texels. Tells the materials where the places of their textures are, in `vec4`.
 ///
 /// A place: first texel, in words, width, height, and how it wraps (in v times 4, in u); the matrix by columns; what is added, and the scale of
 /// normals.
@@ -110,7 +118,9 @@ pub(super) fn append(
         true => scene.textures.iter().map(|t| t.texels.len()).sum(),
         false => 0,
     };
-    words.reserve_exact(6 * scene.uvs.len() + 3 * scene.normals.len() + texels + 3);
+    let corners = 6 * scene.uvs.len() + 3 * scene.normals.len() + 6 * scene.colors.len();
+    let mirrored = scene.mirrored.len().div_ceil(32);
+    words.reserve_exact(corners + mirrored + texels + 3);
     if features.textures {
         let uvs = scene.uvs.iter().flatten();
         words.extend(uvs.flat_map(|uv| [uv.x.to_bits(), uv.y.to_bits()]));
@@ -119,6 +129,15 @@ pub(super) fn append(
     if features.normals {
         words.extend_from_slice(scene.normals.as_flattened());
     }
+    let first_color = place_of(features.vertex_colors, words);
+    if features.vertex_colors {
+        words.extend_from_slice(scene.colors.as_flattened().as_flattened());
+    }
+    let first_mirrored = place_of(!scene.mirrored.is_empty(), words);
+    words.extend(scene.mirrored.chunks(32).map(|bits| {
+        let set = (0..).zip(bits).map(|(place, bit)| u32::from(*bit) << place);
+        set.sum::<u32>()
+    }));
     if features.textures {
         // Those of masks alone are with the triangles.
         let shown = (0_u32..).zip(&scene.textures);
@@ -133,6 +152,8 @@ pub(super) fn append(
     Places {
         first_uv,
         first_normal,
+        first_color,
+        first_mirrored,
     }
 }
 

@@ -13,7 +13,7 @@ use glam::Vec3;
 /// What a scene makes kernels carry; absent features are not in the kernel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SceneFeatures {
-    /// Textures and normals.
+    /// Textures, normals and colours of vertices.
     pub surfaces: SurfaceFeatures,
     /// There are lights that can be sampled.
     pub lights: bool,
@@ -29,10 +29,12 @@ pub struct SceneFeatures {
     pub daylight: bool,
     /// Which of [`MATERIAL_KINDS`] some material is of.
     pub materials: [bool; MATERIAL_KINDS.len()],
-    /// Textures of the materials of each kind, and normals.
+    /// Textures of the materials of each kind, normals and colours of vertices.
     pub kinds: [SurfaceFeatures; MATERIAL_KINDS.len()],
     /// Instances add to the error of points.
     pub transforms: bool,
+    /// Some triangle is mirrored, so that its corners turn the other way round.
+    pub mirrored: bool,
 }
 
 /// What a feature belongs to: the groups in which kernels can be made to carry what a scene does not need.
@@ -55,6 +57,7 @@ pub(super) const FEATURE_GROUPS: [(&str, &[&str]); 7] = [
             "metallic_roughness_textures",
             "emission_textures",
             "texture_transforms",
+            "vertex_colors",
         ],
     ),
     ("normals", &["normals", "normal_maps"]),
@@ -75,7 +78,7 @@ pub(super) const FEATURE_GROUPS: [(&str, &[&str]); 7] = [
     ),
     ("choice", &["many_lights"]),
     ("background", &["background", "daylight", "environment_map"]),
-    ("transforms", &["transforms"]),
+    ("transforms", &["transforms", "mirrored_triangles"]),
 ];
 
 impl SceneFeatures {
@@ -93,6 +96,7 @@ impl SceneFeatures {
             ("background", self.background),
             ("daylight", self.daylight),
             ("transforms", self.transforms),
+            ("mirrored_triangles", self.mirrored),
         ]);
         flags.extend(LightTables::flags(&self.light_kinds));
         flags.extend(self.surfaces.flags());
@@ -137,6 +141,10 @@ pub struct SceneBuffers {
     pub first_uv: u32,
     /// Where normals begin in `shading_tables`, in words.
     pub first_normal: u32,
+    /// Where colours of vertices begin in `shading_tables`, in words.
+    pub first_color: u32,
+    /// Where the bits of mirrored triangles begin in `shading_tables`, in words.
+    pub first_mirrored: u32,
     /// Length of the diagonal of the scene's box, scene units.
     pub diagonal: f64,
     /// Corners of that box.
@@ -177,12 +185,15 @@ impl SceneBuffers {
                     .map(|kind| scene.materials.iter().any(|m| m.kind == kind)),
                 kinds: MATERIAL_KINDS.map(|kind| SurfaceFeatures::of(scene, |m| m.kind == kind)),
                 transforms: transform_error.scale != 0.0 || transform_error.shift != 0.0,
+                mirrored: scene.mirrored.contains(&true),
             },
             environment: scene.environment.to_array(),
             daylight: scene.daylight.unwrap_or_default(),
             lights,
             first_uv: tables.places.first_uv,
             first_normal: tables.places.first_normal,
+            first_color: tables.places.first_color,
+            first_mirrored: tables.places.first_mirrored,
             diagonal: f64::from(2.0 * scene.bounds().radius()),
             bounds: [scene.bounds().min, scene.bounds().max].map(|corner| corner.to_array()),
         })

@@ -62,8 +62,11 @@ impl LogFigure {
 
     /// Of times of the same work: the mean of their logarithms without the least and the greatest fifth, which
     /// single interruptions do not move. Its variance is that of the winsorised sample (Tukey and McLaughlin 1963,
-    /// Yuen 1974). `None` below two samples that would be left, and for samples that are not positive.
+    /// Yuen 1974). `None` below two samples that would be left, and for samples that are not all positive and finite.
     pub fn of_times(times: &[f64]) -> Option<Self> {
+        if !times.iter().all(|time| *time > 0.0 && time.is_finite()) {
+            return None;
+        }
         let mut logs: Vec<f64> = times.iter().map(|time| time.ln()).collect();
         logs.sort_unstable_by(f64::total_cmp);
         let cut = (TRIMMED * logs.len() as f64) as usize;

@@ -43,7 +43,7 @@ impl Loop<'_> {
         let pipeline = self.gpu.pipeline(kernel, true)?;
         let mut recording = Recording::new();
         recording.run("cost", &pipeline, &bindings, groups_for(PIXELS));
-        Ok(self.gpu.play(&recording)?.elapsed().ms())
+        Ok(self.gpu.play(&recording)?.elapsed().measured()?.ms())
     }
 }
 

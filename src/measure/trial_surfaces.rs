@@ -4,7 +4,8 @@
 use super::mesh::Mesh;
 use super::trial_scenes::{TrialScene, camera, depth};
 use crate::scene::{
-    Daylight, GEOMETRIC, Material, SceneData, SceneError, Texture, TextureUse, Wrap, encode_normal,
+    Daylight, GEOMETRIC, Material, SceneData, SceneError, Texture, TextureUse, WHITE, Wrap,
+    encode_color, encode_normal,
 };
 use glam::{Mat2, Vec2, Vec3, vec2, vec3};
 
@@ -25,6 +26,7 @@ pub(super) fn scenes() -> Result<Vec<TrialScene>, SceneError> {
             scene: layers(0.0)?,
             trials: vec![("path", vec![depth(3)]), ("primary", vec![])],
         },
+        trial(mirrored()?, &[depth(7)]),
     ])
 }
 
@@ -131,7 +133,7 @@ fn mapped() -> Result<SceneData, SceneError> {
     Ok(scene)
 }
 
-/// A room without a lamp: the sky is seen by what leaves it, and through what is far.
+/// A room without a lamp, with colours of vertices: the sky is seen by what leaves it, and through what is far.
 fn under_the_sky() -> Result<SceneData, SceneError> {
     let camera = camera(vec3(1.3, 1.5, 2.2), vec3(0.0, 0.5, 0.0), Vec3::Y);
     let mut mesh = Mesh::new("under-the-sky", camera, vec3(0.9, 1.1, 0.8))?;
@@ -141,10 +143,69 @@ fn under_the_sky() -> Result<SceneData, SceneError> {
     mesh.plain([vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::X, 2.0 * Vec3::Y], floor);
     mesh.block(vec3(-0.5, 0.0, -0.4), vec3(0.7, 0.8, 0.6), block);
     let mut scene = mesh.done(Vec::new());
+    // The floor and the wall have vertices of unequal colours.
+    let color = |k: usize| {
+        let part = |step: usize| ((k * step) % 7) as f32 / 7.0;
+        encode_color(vec3(part(3), part(5), 1.0 - part(2)))
+    };
+    let corners = |t: usize| [color(3 * t), color(3 * t + 1), color(3 * t + 2)];
+    scene.colors = vec![[WHITE; 3]; scene.triangles.len()];
+    (0..4).for_each(|triangle| scene.colors[triangle] = corners(triangle));
     scene.daylight = Some(Daylight {
         reach: 1.2,
         ..Daylight::default()
     });
+    Ok(scene)
+}
+
+/// Mirrored lamps that shine from their front, and balls with vertex normals: of glass, mirrored, a mirror, and a glossy one.
+fn mirrored() -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(0.3, 1.6, 3.1), vec3(0.0, 0.6, 0.0), Vec3::Y);
+    let mut mesh = Mesh::new("mirrored", camera, vec3(0.3, 0.4, 0.5))?;
+    let [floor, lamp, glass, mirror, metal, phong] = [
+        Material::diffuse("floor", vec3(0.7, 0.6, 0.5)),
+        Material::diffuse("lamp", Vec3::splat(0.3)).emitting_from_front(vec3(8.0, 7.0, 6.0)),
+        Material::dielectric("glass", vec3(0.9, 1.0, 0.95), 1.5),
+        Material::mirror("mirror", vec3(0.9, 0.8, 0.9)),
+        Material::principled("metal", vec3(0.9, 0.7, 0.5), 0.8, 0.35, 0.04),
+        Material::phong("phong", vec3(0.2, 0.3, 0.4), vec3(0.4, 0.4, 0.3), 20.0),
+    ]
+    .map(|m| mesh.material(m));
+    mesh.plain([vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::Z, 4.0 * Vec3::X], floor);
+    let upper = mesh.scene.triangles.len();
+    mesh.plain([vec3(-1.2, 2.3, -0.6), 0.8 * Vec3::Z, 0.7 * Vec3::X], lamp);
+    let corners = [
+        vec3(0.4, 2.2, -0.5),
+        vec3(0.6, 2.1, 0.4),
+        vec3(1.2, 2.3, -0.4),
+    ];
+    mesh.triangle(corners, [Vec2::ZERO; 3], lamp);
+    let mut balls = vec![mesh.scene.triangles.len()];
+    let places = [
+        (vec3(-0.8, 0.45, 0.4), glass),
+        (vec3(0.2, 0.55, -0.3), mirror),
+        (vec3(0.95, 0.4, 0.5), metal),
+        (vec3(0.1, 0.25, 0.9), phong),
+    ];
+    for (centre, material) in places {
+        mesh.ball(centre, centre.y - 0.02, material);
+        balls.push(mesh.scene.triangles.len());
+    }
+    let mut scene = mesh.done(Vec::new());
+    scene.mirrored = (0..scene.triangles.len())
+        .map(|id| (upper..balls[1]).contains(&id))
+        .collect();
+    scene.normals = vec![[GEOMETRIC; 3]; scene.triangles.len()];
+    for (ball, (centre, _)) in balls.windows(2).zip(places) {
+        for id in ball[0]..ball[1] {
+            // What is mirrored turns the other way.
+            if scene.mirrored[id] {
+                scene.triangles[id].vertices.swap(1, 2);
+            }
+            let corners = scene.triangles[id].vertices;
+            scene.normals[id] = corners.map(|v| encode_normal((v - centre).normalize()));
+        }
+    }
     Ok(scene)
 }
 

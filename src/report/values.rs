@@ -68,6 +68,15 @@ impl Value<'static> {
 }
 
 impl Value<'_> {
+    /// Whether what is known is a number, with ends that are numbers.
+    fn is_a_number(&self) -> bool {
+        match self.reading {
+            Reading::Known(i) => [i.value, i.low, i.high].iter().all(|x| x.is_finite()),
+            Reading::Below(bound) => bound.is_finite(),
+            Reading::Word(_) => true,
+        }
+    }
+
     /// Whether the reference is too noisy for it.
     pub fn is_unresolved(&self) -> bool {
         matches!(self.reading, Reading::Below(_))
@@ -106,6 +115,8 @@ pub fn values<'a>(data: &RunData<'a>) -> Vec<Value<'a>> {
     values.extend(data.streams.iter().flat_map(|s| of_stream(s)));
     values.extend(data.costs.iter().flat_map(|c| of_cost(c)));
     values.extend(compactions::values(data));
+    // What a damaged record makes of a division is no figure.
+    values.retain(Value::is_a_number);
     values
 }
 

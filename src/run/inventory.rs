@@ -3,13 +3,14 @@
 use super::inputs::{Current, MadeOf, differing};
 use super::kernels::Kernels;
 use super::resume::Earlier;
+use super::world::load_options;
 use super::{Estimate, Registries, RunError, RunOptions};
 use crate::config::{ConfigError, Experiment, Plan, Shard, Unit, shards};
 use crate::measure::record::{
     CellRecord, Inputs, InterruptedRecord, KernelSetRecord, Kind as _, Line, Outcome, RecordError,
     RunRecord, read_records, records_file,
 };
-use crate::scene::{self, LoadOptions};
+use crate::scene;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
@@ -178,10 +179,7 @@ impl Inventory {
         let mut current = Current::new(&self.experiment, file, &kernels);
         current.scenes = HashMap::new();
         if let Some(scene) = state.unit.cell.get(crate::config::Axis::Scene) {
-            let load = LoadOptions {
-                allow_outside: options.allow_outside,
-                ..LoadOptions::default()
-            };
+            let load = load_options(options, self.earlier.table_bytes());
             let loaded = scene::load(scene, &load);
             let hash = loaded.map(|s| s.hash).map_err(|e| e.to_string());
             current.scenes.insert(scene.label.clone(), hash);

@@ -53,14 +53,14 @@ use crate::image::FileFormat;
 use crate::measure::record::{GateVerdict, PathsRecord};
 pub use crate::measure::words::dump_stream;
 use crate::params::Variant;
-use crate::scene::{self, LoadOptions};
+use crate::scene;
 use inputs::Current;
 use kernels::Device;
 use session::Session;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use thiserror::Error;
-use world::{Absent, Loaded, World};
+use world::{Absent, Loaded, World, load_options};
 
 /// What an experiment does not say.
 #[derive(Debug, Clone, Default)]
@@ -232,7 +232,7 @@ pub fn run(
     let file = session.reference_file.as_ref().map(|file| &*file.hash);
     let mut current = Current::new(experiment, file.unwrap_or_default(), &kernels);
     if !earlier.is_empty() {
-        current.scenes = scene_hashes(plan, options);
+        current.scenes = scene_hashes(plan, options, earlier.table_bytes());
         let kept = earlier.kept(&session.units, &current);
         if session.open_beside(&kept) == 0 {
             session.abandon();
@@ -273,12 +273,13 @@ fn reason(error: &RunError) -> String {
     }
 }
 
-/// The content of each scene as it is now.
-fn scene_hashes(plan: &Plan, options: &RunOptions) -> HashMap<String, Result<String, String>> {
-    let load = LoadOptions {
-        allow_outside: options.allow_outside,
-        ..LoadOptions::default()
-    };
+/// The content of each scene as it is now, for an adapter that binds so many bytes.
+fn scene_hashes(
+    plan: &Plan,
+    options: &RunOptions,
+    table_bytes: u64,
+) -> HashMap<String, Result<String, String>> {
+    let load = load_options(options, table_bytes);
     let hash = |scene: &Variant| {
         let loaded = scene::load(scene, &load);
         let hash = loaded.map(|s| s.hash).map_err(|e| e.to_string());
@@ -326,7 +327,7 @@ fn run_scene(session: &mut Session, device: &Device, variant: &Variant) -> Resul
     if session.is_done(&failed) || !session.open_units().any(is_on) {
         return Ok(());
     }
-    let loaded = match Loaded::new(session, variant) {
+    let loaded = match Loaded::new(session, &device.gpu, variant) {
         Ok(loaded) => loaded,
         Err(fault) => {
             session.bad_input = true;
@@ -411,7 +412,7 @@ pub fn render_references(
     let (mut rendered, mut failures) = (0, Vec::new());
     let mut part = 0;
     for scene in &plan.scenes {
-        let loaded = match Loaded::new(&mut session, scene) {
+        let loaded = match Loaded::new(&mut session, &device.gpu, scene) {
             Ok(loaded) => loaded,
             Err(fault) => {
                 failures.push(format!("{scene}: {}", fault.of_cell()?));
@@ -477,7 +478,7 @@ pub fn verify(
     session.judges_trials = trials;
     let mut verified = Vec::new();
     for scene in &plan.scenes {
-        let loaded = match Loaded::new(&mut session, scene) {
+        let loaded = match Loaded::new(&mut session, &device.gpu, scene) {
             Ok(loaded) => Ok(loaded),
             Err(fault) => Err(fault.of_cell()?),
         };

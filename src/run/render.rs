@@ -4,6 +4,7 @@
 use super::images::{Estimator, attributes};
 use super::kernels::{Device, Kernels};
 use super::session::Session;
+use super::world::{load_options, table_bytes};
 use super::{Registries, RunError, RunOptions};
 use crate::accel::{AccelError, TriangleSoup};
 use crate::config::{Axis, Experiment, Plan};
@@ -13,7 +14,7 @@ use crate::integrator::{
     InOrder, Order, PartRenderer, Renderer, Stage, StageError, TRACED_CLASSES, Traced,
 };
 use crate::params::Variant;
-use crate::scene::{self, LoadOptions, LoadReport};
+use crate::scene::{self, LoadReport};
 use indicatif::ProgressStyle;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -86,16 +87,13 @@ pub fn render(
     let session = Session::unrecorded(experiment, plan, registries, options);
     let (scene, accel) = (&cell[Axis::Scene], &cell[Axis::Accel]);
     session.say(format!("{scene}: loading"));
-    let load = LoadOptions {
-        allow_outside: options.allow_outside,
-        ..LoadOptions::default()
-    };
+    let device = Device::open(options, &kernels)?;
+    let load = load_options(options, table_bytes(&device.gpu.limits));
     let scene_data = scene::load(scene, &load).map_err(input)?;
     // That of the experiment, of the scene, or one that frames the scene.
     let own = || scene_data.view(experiment.aspect());
     let camera = experiment.camera.unwrap_or_else(own);
     camera.validate().map_err(input)?;
-    let device = Device::open(options, &kernels)?;
     let gpu = device.of(&cell[Axis::Kernels])?;
     let tests = registries.intersection(cell).map_err(RunError::Input)?;
     let kept = tests.kept_by(&probe_arithmetic(gpu)?);

@@ -3,6 +3,7 @@
 use super::inputs::Current;
 use crate::config::Unit;
 use crate::measure::record::{Body, CellRecord, KernelSetRecord, Kind as _, Line, Outcome};
+use crate::scene::LEAST_BINDING;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// The lines that an earlier run left.
@@ -47,6 +48,17 @@ impl Earlier {
             .iter()
             .filter_map(|line| KernelSetRecord::of(&line.body));
         sets.map(|set| (set.id.as_str(), set)).collect()
+    }
+
+    /// Bytes that the adapter of the last run binds, which decide how much of textures and maps is left.
+    pub fn table_bytes(&self) -> u64 {
+        let limits = self.lines.iter().rev().find_map(|line| match &line.body {
+            Body::Run(run) => Some(&run.environment.limits),
+            _ => None,
+        });
+        let limit = |name| limits.and_then(|limits| limits.get(name)).copied();
+        let binding = limit("max_storage_buffer_binding_size").unwrap_or(LEAST_BINDING);
+        limit("max_buffer_size").map_or(binding, |buffer| buffer.min(binding))
     }
 
     /// Every line.

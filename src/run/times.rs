@@ -37,7 +37,7 @@ impl Measured for Timed<'_> {
         self.renderer.reset()?;
         self.renderer.add_samples(0, self.spp, self.seed)?;
         self.renderer.check()?;
-        let elapsed = self.renderer.spent();
+        let elapsed = self.renderer.spent().measured()?;
         self.stages.borrow_mut().push(self.renderer.stages());
         let pixels = self.renderer.image()?.pixels;
         self.watch.note(blake3::hash(bytemuck::cast_slice(&pixels)));

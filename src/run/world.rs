@@ -2,7 +2,7 @@
 
 use super::kernels::Device;
 use super::session::Session;
-use super::{Fault, RunError};
+use super::{Fault, RunError, RunOptions};
 use crate::config::{Axis, Cell};
 use crate::geometry::Camera;
 use crate::gpu::{ArithmeticProbe, Gpu};
@@ -62,15 +62,27 @@ impl From<String> for Absent {
     }
 }
 
+/// Bytes that an adapter binds for the tables of a scene.
+pub(super) fn table_bytes(limits: &wgpu::Limits) -> u64 {
+    let binding = limits.max_storage_buffer_binding_size;
+    binding.min(limits.max_buffer_size)
+}
+
+/// How scenes are loaded for an adapter that binds so many bytes.
+pub(super) fn load_options(options: &RunOptions, table_bytes: u64) -> LoadOptions {
+    LoadOptions {
+        allow_outside: options.allow_outside,
+        table_bytes,
+        ..LoadOptions::default()
+    }
+}
+
 impl Loaded {
-    /// Loads a scene and records it.
-    pub fn new(session: &mut Session, variant: &Variant) -> Result<Self, Fault> {
+    /// Loads a scene for a device and records it.
+    pub fn new(session: &mut Session, gpu: &Gpu, variant: &Variant) -> Result<Self, Fault> {
         session.say(format!("{variant}: loading"));
         let start = Instant::now();
-        let options = LoadOptions {
-            allow_outside: session.options.allow_outside,
-            ..LoadOptions::default()
-        };
+        let options = load_options(session.options, table_bytes(&gpu.limits));
         let loaded = session
             .clock
             .time("load", || scene::load(variant, &options));

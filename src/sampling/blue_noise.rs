@@ -11,7 +11,7 @@
 //!
 //! Words: the image's width, then the mask or points, ranking and scrambling, four bytes per word.
 
-use super::hash::pcg_hash;
+use super::hash::{keyed_hash, pcg_hash};
 use super::{Coordinate, Decorrelation, Demand, Partner, SamplerTable, void_and_cluster};
 use crate::parameters;
 use std::path::Path;
@@ -44,7 +44,7 @@ impl BlueNoise {
 /// Where the pixel lies in a tile that repeats every `size` pixels and is moved at random by `key`.
 fn tile_index(table: &SamplerTable, at: Coordinate, size: u32, key: u32) -> u32 {
     let width = table.decorrelation_word(0);
-    let shift = pcg_hash(key.wrapping_add(pcg_hash(at.seed)));
+    let shift = keyed_hash(pcg_hash(at.seed), key);
     let x = (at.pixel % width).wrapping_add(shift & 0xffff) % size;
     let y = (at.pixel / width).wrapping_add(shift >> 16) % size;
     y * size + x

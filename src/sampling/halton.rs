@@ -6,7 +6,7 @@
 //! permutation begins, then the permutations. All of them keep 0, so that an expansion ends.
 
 use super::primes::{faure_permutation, primes, random_permutation};
-use super::radical_inverse::radical_inverse;
+use super::radical_inverse::{first_weight, prepend_digit, radical_inverse};
 use super::{Coordinate, Demand, Facts, SamplerTable, Sequence};
 use crate::parameters;
 
@@ -39,11 +39,11 @@ parameters! {
 /// The radical inverse whose digits d are replaced by the words `first + d`.
 fn permuted_inverse(table: &SamplerTable, n: u32, base: u32, first: u32) -> u32 {
     let mut rest = n;
-    let mut weight = u32::MAX / base;
+    let mut weight = first_weight(n, base);
     let mut x = 0;
-    while rest > 0 {
-        x += table.sequence_word(first + rest % base) * weight;
-        rest /= base;
+    while weight > 0 {
+        x = prepend_digit(table.sequence_word(first + rest / weight), x, base);
+        rest %= weight;
         weight /= base;
     }
     x

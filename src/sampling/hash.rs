@@ -22,17 +22,36 @@ pub fn wang_hash(x: u32) -> u32 {
     s ^ (s >> 15)
 }
 
+/// Weyl's: the golden ratio's fraction, odd.
+const STRIDE_FACTOR: u32 = 0x9e37_79b1;
+
+/// Place x of the progression that begins at `key`, with an odd stride of the key's own.
+///
+/// Were the stride the same for all keys (`key + x`), the numbers of one seed would be those of another, moved by
+/// the difference of the keys: of 30 seeds over 1920 × 1080 pixels two would share a run in 35 % of all cases. Two
+/// progressions with different strides meet in single places only. Equal ones belong to keys k, k′ with
+/// `k · STRIDE_FACTOR` equal but for the last bit: one partner for each key, whose run lies 2³² places away at random.
+pub(super) fn strided(key: u32, x: u32) -> u32 {
+    let stride = key.wrapping_mul(STRIDE_FACTOR) | 1;
+    key.wrapping_add(x.wrapping_mul(stride))
+}
+
+/// A random number of key and x, for each key a permutation of all x; `key` has to be well mixed.
+pub fn keyed_hash(key: u32, x: u32) -> u32 {
+    pcg_hash(strided(key, x))
+}
+
 /// A random number of the pixel, the same for all its samples.
 pub fn pixel_number(at: Coordinate) -> u32 {
-    pcg_hash(at.pixel.wrapping_add(pcg_hash(at.seed)))
+    keyed_hash(pcg_hash(at.seed), at.pixel)
 }
 
 /// A random number of the pixel and dimension, the same for all samples.
 pub fn dimension_number(at: Coordinate) -> u32 {
-    pcg_hash(at.dimension.wrapping_add(pixel_number(at)))
+    keyed_hash(pixel_number(at), at.dimension)
 }
 
 /// A random number of the pixel, dimension and sample.
 pub fn sample_number(at: Coordinate) -> u32 {
-    pcg_hash(at.sample.wrapping_add(dimension_number(at)))
+    keyed_hash(dimension_number(at), at.sample)
 }

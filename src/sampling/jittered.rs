@@ -12,7 +12,7 @@
 //! Words, for a and then for b: the number, the quotient and the remainder of 2³² over it.
 
 use super::fixed_point::mul_high;
-use super::hash::{pcg_hash, pixel_number, sample_number};
+use super::hash::{keyed_hash, pixel_number, sample_number};
 use super::{Coordinate, Demand, Facts, SamplerTable, Seeded, Seeding, Sequence};
 use crate::parameters;
 
@@ -112,8 +112,8 @@ impl Sequence for Jittered {
     fn sequence(&self, table: &SamplerTable, at: Coordinate) -> u32 {
         let columns = table.sequence_word(0);
         let strata = columns * table.sequence_word(3);
-        let pair = (at.dimension >> 1).wrapping_add(pixel_number(at) ^ PAIR_KEY);
-        let stratum = permuted(at.sample % strata, strata, pcg_hash(pair));
+        let key = keyed_hash(pixel_number(at) ^ PAIR_KEY, at.dimension >> 1);
+        let stratum = permuted(at.sample % strata, strata, key);
         let (i, place) = match at.dimension & 1 {
             0 => (stratum % columns, 0),
             _ => (stratum / columns, 3),

@@ -1,7 +1,7 @@
 //! `pixel-hash`: independent random numbers by hashing pixel, sample, dimension and seed. Twin of
 //! `kernels/sampling/pixel_hash.wesl`.
 
-use super::hash::{pcg_hash, wang_hash};
+use super::hash::{pcg_hash, strided, wang_hash};
 use super::trig_hash::trig_hash;
 use super::{Coordinate, Facts, SamplerTable, Seeded, Seeding, Sequence};
 use crate::parameters;
@@ -58,10 +58,7 @@ impl Sequence for PixelHash {
             Hash::Wang => wang_hash,
             Hash::Pcg => pcg_hash,
         };
-        let pixel = hash(at.pixel.wrapping_add(hash(at.seed)));
-        hash(
-            at.dimension
-                .wrapping_add(hash(at.sample.wrapping_add(pixel))),
-        )
+        let pixel = hash(strided(hash(at.seed), at.pixel));
+        hash(strided(hash(strided(pixel, at.sample)), at.dimension))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     Assembly, Daylight, Framing, GEOMETRIC, InstanceError, Light, LightList, LoadReport, Material,
-    SceneData, SceneError, Texture, Transform, mask, normals,
+    SceneData, SceneError, Texture, Transform, WHITE, decode_color, encode_color, mask, normals,
 };
 use crate::geometry::{Camera, Triangle};
 use glam::{Vec2, Vec3};
@@ -53,12 +53,18 @@ pub(super) struct SceneBuilder {
     uvs: Vec<[Vec2; 3]>,
     /// Empty until a triangle has normals that are not its own.
     normals: Vec<[u32; 3]>,
+    /// Empty until a vertex has a colour that is not white.
+    colors: Vec<[[u32; 2]; 3]>,
+    /// Empty until a triangle is mirrored.
+    mirrored: Vec<bool>,
     material_ids: Vec<u32>,
     keep_uvs: bool,
     /// Objects and instances; given up if they do not account for every triangle.
     pub assembly: Assembly,
     /// The first instance that could not be placed.
     misplaced: Option<InstanceError>,
+    /// Why there can be no scene, found while it was built.
+    pub refused: Option<SceneError>,
     pub report: LoadReport,
 }
 
@@ -94,6 +100,18 @@ impl SceneBuilder {
         normals: Option<[Vec3; 3]>,
         material: u32,
     ) {
+        self.push_colored(vertices, uvs, normals, None, material);
+    }
+
+    /// The same with perhaps linear colours, which multiply the base colour.
+    pub fn push_colored(
+        &mut self,
+        vertices: [Vec3; 3],
+        uvs: [Vec2; 3],
+        normals: Option<[Vec3; 3]>,
+        colors: Option<[Vec3; 3]>,
+        material: u32,
+    ) {
         if !vertices.iter().all(|v| v.is_finite()) {
             self.report.dropped_non_finite += 1;
             return;
@@ -105,6 +123,11 @@ impl SceneBuilder {
         if !self.normals.is_empty() || words != [GEOMETRIC; 3] {
             self.normals.resize(self.triangles.len(), [GEOMETRIC; 3]);
             self.normals.push(words);
+        }
+        let words = colors.map_or([WHITE; 3], |c| c.map(encode_color));
+        if !self.colors.is_empty() || words != [WHITE; 3] {
+            self.colors.resize(self.triangles.len(), [WHITE; 3]);
+            self.colors.push(words);
         }
         self.triangles.push(triangle);
         self.material_ids.push(material);
@@ -128,6 +151,13 @@ impl SceneBuilder {
         }
     }
 
+    /// Says that a transform has mirrored the triangles from number `first` on: their fronts are the sides from which their corners
+    /// turn clockwise.
+    pub fn mirror_from(&mut self, first: usize) {
+        self.mirrored.resize(first, false);
+        self.mirrored.resize(self.triangles.len(), true);
+    }
+
     /// Adds an object to the assembly. It is numbered by the order of addition.
     pub fn add_object(&mut self, triangles: Vec<Triangle>) {
         if let Err(error) = self.assembly.add_object(triangles) {
@@ -149,23 +179,30 @@ impl SceneBuilder {
         material: u32,
         uvs: &[[Vec2; 3]],
     ) {
-        self.place_looking(object, to_world, |_| material, uvs);
+        self.place_looking(object, to_world, |_| material, uvs, &[]);
     }
 
-    /// The same with a material of each of its triangles.
+    /// The same with a material of each of its triangles, and colours of their vertices.
     pub fn place_looking(
         &mut self,
         object: u32,
         to_world: Transform,
         material: impl Fn(usize) -> u32,
         uvs: &[[Vec2; 3]],
+        colors: &[[[u32; 2]; 3]],
     ) {
         match self.assembly.place(object, to_world) {
             Ok(instance) => {
+                let first = self.len();
                 let copy: Vec<Triangle> = self.assembly.copy(&instance).collect();
                 for (id, triangle) in copy.iter().enumerate() {
                     let uvs = uvs.get(id).copied().unwrap_or_default();
-                    self.push_corners(triangle.vertices, uvs, None, material(id));
+                    let colors = colors.get(id).map(|c| c.map(|w| decode_color(w).as_vec3()));
+                    let vertices = triangle.vertices;
+                    self.push_colored(vertices, uvs, None, colors, material(id));
+                }
+                if to_world.is_mirrored() {
+                    self.mirror_from(first);
                 }
             }
             Err(error) => {
@@ -200,9 +237,12 @@ impl SceneBuilder {
     /// is no camera, and hashes the scene.
     ///
     /// # Errors
-    /// [`SceneError::NoTriangles`], [`SceneError::TooLarge`], [`SceneError::Instance`], and
+    /// What `refused` says, [`SceneError::NoTriangles`], [`SceneError::TooLarge`], [`SceneError::Instance`], and
     /// [`SceneError::Camera`] if the scene brings a camera that sees nothing.
     pub fn finish(mut self, name: &str, mut look: Look) -> Result<SceneData, SceneError> {
+        if let Some(error) = self.refused {
+            return Err(error);
+        }
         if let Some(source) = self.misplaced {
             return Err(SceneError::Instance {
                 name: name.to_owned(),
@@ -238,11 +278,16 @@ impl SceneBuilder {
         mask::settle(&mut look.materials, &look.textures);
         let textured = !look.textures.is_empty();
         let assembly = self.take_assembly();
+        if !self.mirrored.is_empty() {
+            self.mirrored.resize(self.triangles.len(), false);
+        }
         let mut scene = SceneData {
             name: name.to_owned(),
             triangles: self.triangles,
             uvs: if textured { self.uvs } else { Vec::new() },
             normals: self.normals,
+            colors: self.colors,
+            mirrored: self.mirrored,
             material_ids: self.material_ids,
             materials: look.materials,
             textures: look.textures,

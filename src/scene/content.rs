@@ -1,5 +1,6 @@
 //! Questions asked of a loaded scene: extent, size in bytes, emitters, content hash.
 
+use super::texture::texel_room;
 use super::{
     Bounds, EnvironmentMap, InstanceError, Light, LightList, SceneData, SceneError, Transform,
     normals,
@@ -35,6 +36,7 @@ impl SceneData {
         };
         let assembly = self.assembly.as_mut().ok_or(missing)?;
         let before = assembly.instances().get(instance).map(|i| i.to_world);
+        let turns = before.is_some_and(|from| from.is_mirrored() != to_world.is_mirrored());
         assembly.move_to(instance, to_world)?;
         let moved = &assembly.instances()[instance];
         let first = moved.first as usize;
@@ -47,16 +49,27 @@ impl SceneData {
         for (words, from) in corners.zip(std::iter::repeat(before).flatten()) {
             *words = normals::moved(*words, &from, &to_world);
         }
+        if turns {
+            self.mirrored.resize(self.triangles.len(), false);
+            for mirrored in &mut self.mirrored[first..first + count] {
+                *mirrored = !*mirrored;
+            }
+        }
         self.hash = self.content_hash();
         Ok(())
     }
 
-    /// The scene lit by an environment map, in the place of a constant radiance or the sky of scenes without a light.
+    /// The scene lit by an environment map, in the place of a constant radiance or the sky of scenes without a light; reduced until the
+    /// tables of the scene fit into so many bytes.
     ///
     /// # Errors
     /// The map cannot be read.
-    pub(super) fn under(mut self, file: &Path) -> Result<Self, SceneError> {
+    pub(super) fn under(mut self, file: &Path, table_bytes: u64) -> Result<Self, SceneError> {
         let map = EnvironmentMap::read(file, &mut self.report.warnings)?;
+        let mapped = self.uvs.len().max(self.normals.len());
+        let texels: usize = self.textures.iter().map(|t| t.texels.len()).sum();
+        let room = texel_room(table_bytes, mapped).saturating_sub(texels as u64);
+        let map = map.within(4 * room, &mut self.report.warnings);
         if let Some(sky) = self.daylight.take() {
             let note = sky.note();
             self.report.warnings.retain(|line| *line != note);
@@ -77,11 +90,47 @@ impl SceneData {
         Ok(self)
     }
 
-    /// Bytes of the scene's arrays: triangles, texture coordinates, material indices, texels.
+    /// Whether the front of a triangle is the side from which its corners turn clockwise.
+    pub fn is_mirrored(&self, triangle: usize) -> bool {
+        self.mirrored.get(triangle).copied().unwrap_or(false)
+    }
+
+    /// The corners of a triangle in the order in which they turn counter-clockwise seen from its front.
+    pub fn outward(&self, triangle: usize) -> [Vec3; 3] {
+        let [a, b, c] = self.triangles[triangle].vertices;
+        match self.is_mirrored(triangle) {
+            true => [a, c, b],
+            false => [a, b, c],
+        }
+    }
+
+    /// The scene with all corners in that order. What was mirrored is no copy of an object any more.
+    #[must_use]
+    pub(super) fn turned_outward(mut self) -> Self {
+        let mirrored = std::mem::take(&mut self.mirrored);
+        for (id, _) in mirrored.iter().enumerate().filter(|(_, is_so)| **is_so) {
+            self.triangles[id].vertices.swap(1, 2);
+            if let Some(uvs) = self.uvs.get_mut(id) {
+                uvs.swap(1, 2);
+            }
+            if let Some(normals) = self.normals.get_mut(id) {
+                normals.swap(1, 2);
+            }
+            if let Some(colors) = self.colors.get_mut(id) {
+                colors.swap(1, 2);
+            }
+            self.assembly = None;
+        }
+        self
+    }
+
+    /// Bytes of the scene's arrays: triangles, what corners and triangles carry, material indices, texels.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.triangles[..])
             + size_of_val(&self.uvs[..])
             + size_of_val(&self.normals[..])
+            + size_of_val(&self.colors[..])
+            + size_of_val(&self.mirrored[..])
             + size_of_val(&self.material_ids[..])
             + self
                 .textures
@@ -108,7 +157,7 @@ impl SceneData {
             .collect()
     }
 
-    /// BLAKE3 (hex) of vertices, texture coordinates, materials, textures, camera and environment.
+    /// BLAKE3 (hex) of vertices, texture coordinates, normals and colours of vertices, materials, textures, camera and environment.
     /// Names are not part of it. Every list is preceded by its length, so that no two scenes share
     /// their bytes.
     pub(super) fn content_hash(&self) -> String {
@@ -146,6 +195,14 @@ impl SceneData {
         }
         if !self.normals.is_empty() {
             hash.bytes(bytemuck::cast_slice::<[u32; 3], u8>(&self.normals));
+        }
+        if !self.colors.is_empty() {
+            let words = self.colors.as_flattened().as_flattened();
+            hash.bytes(b"colors of vertices");
+            hash.bytes(bytemuck::cast_slice::<u32, u8>(words));
+        }
+        if !self.mirrored.is_empty() {
+            hash.bytes(bytemuck::cast_slice(&self.mirrored));
         }
         for texture in &self.textures {
             hash.bytes(bytemuck::cast_slice(&[texture.width, texture.height]));
@@ -199,7 +256,7 @@ mod tests {
     fn the_hash_sees_every_part_of_the_scene() {
         let scene = load_default("cornell-box");
         type Change = fn(&mut crate::scene::SceneData);
-        let changes: [(&str, Change); 14] = [
+        let changes: [(&str, Change); 15] = [
             ("vertex", |s| s.triangles[3].vertices[1].x += 1e-3),
             ("material id", |s| s.material_ids[0] = 1),
             ("reflectance", |s| s.materials[0].base_color.y += 1e-3),
@@ -214,6 +271,7 @@ mod tests {
                 });
             }),
             ("normal", |s| s.normals.push([1, 2, 3])),
+            ("color", |s| s.colors.push([[1, 2]; 3])),
             ("texture", |s| {
                 s.materials[0].normal_texture = Some(TextureUse::plain(0));
             }),

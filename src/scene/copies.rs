@@ -17,8 +17,8 @@ const ABOVE: f32 = 1e-3;
 const FINEST: u32 = 1 << 16;
 
 /// The scene with at most so many triangles (vertex clustering: J. Rossignac, P. Borrel, "Multi-resolution 3D
-/// approximations for rendering complex scenes", 1993, with the mean of the vertices of a cell). Texture coordinates and
-/// normals of vertices are lost. One that has no more stays as it is.
+/// approximations for rendering complex scenes", 1993, with the mean of the vertices of a cell). Texture coordinates,
+/// normals and colours of vertices are lost. One that has no more stays as it is.
 ///
 /// # Errors
 /// [`SceneError::NoTriangles`] if so few cannot be had.
@@ -26,6 +26,7 @@ pub(super) fn with_at_most(mut scene: SceneData, most: usize) -> Result<SceneDat
     if scene.triangles.len() <= most {
         return Ok(scene);
     }
+    scene = scene.turned_outward();
     let (mut fits, mut too_fine) = (0, FINEST + 1);
     let mut kept = Vec::new();
     while too_fine - fits > 1 {
@@ -40,7 +41,8 @@ pub(super) fn with_at_most(mut scene: SceneData, most: usize) -> Result<SceneDat
         material.texture_uses_mut().for_each(|used| *used = None);
         material.mask = None;
     }
-    let lost = !scene.textures.is_empty() || !scene.normals.is_empty();
+    let of_vertices = !scene.normals.is_empty() || !scene.colors.is_empty();
+    let lost = !scene.textures.is_empty() || of_vertices;
     let mut builder = SceneBuilder::new(false, kept.len());
     for (triangle, material) in kept {
         builder.push(triangle.vertices, material);
@@ -53,7 +55,7 @@ pub(super) fn with_at_most(mut scene: SceneData, most: usize) -> Result<SceneDat
         ..look
     };
     let and_lost = if lost {
-        ", without textures and normals of vertices"
+        ", without textures and normals and colours of vertices"
     } else {
         ""
     };
@@ -116,6 +118,7 @@ pub(super) fn on_a_plane(scene: SceneData, copies: usize) -> Result<SceneData, S
             most: MOST_TRIANGLES / copies,
         });
     }
+    let scene = scene.turned_outward();
     let bounds = scene.bounds();
     let size = bounds.max - bounds.min;
     let height = size.y.max(0.01 * bounds.radius());
@@ -151,7 +154,7 @@ pub(super) fn on_a_plane(scene: SceneData, copies: usize) -> Result<SceneData, S
             Vec3::new(place(index % row), 0.0, place(index / row)),
         );
         let material = |triangle: usize| scene.material_ids[triangle];
-        builder.place_looking(0, to_world, material, &scene.uvs);
+        builder.place_looking(0, to_world, material, &scene.uvs, &scene.colors);
     }
     let plane = scene.materials.len() as u32;
     builder.place(1, Transform::IDENTITY, plane);
@@ -209,7 +212,7 @@ fn taken_apart(
 mod tests {
     use super::*;
     use crate::params::ParamValue;
-    use crate::scene::builtin::tests::{load_default, load_with};
+    use crate::scene::builtin::tests::{load_default, load_unlit, load_with};
     use crate::scene::{Bounds, load, named};
     use glam::Vec2;
 
@@ -313,10 +316,9 @@ mod tests {
 
     #[test]
     fn a_scene_without_a_light_has_one_sky_however_often_it_is_built_again() {
-        let missing = ("file", ParamValue::Name("none.ies".to_owned()));
-        let scene = load_with("luminaire", &[missing, ("copies", ParamValue::Integer(3))]);
+        let scene = load_unlit(&[("copies", ParamValue::Integer(3))]);
         assert!(scene.daylight.is_some());
-        assert_eq!(scene.report.warnings.len(), 2, "{:?}", scene.report);
+        assert_eq!(scene.report.warnings.len(), 1, "{:?}", scene.report);
         assert_eq!(scene.environment, Vec3::ONE);
     }
 

@@ -2,13 +2,14 @@
 
 use super::SceneError;
 use super::light::luminance;
+use super::reduce::area_means;
 use glam::Vec3;
 use std::f64::consts::PI;
 use std::fmt;
 use std::path::Path;
 
 /// Radiance in all directions, bilinear between the centres of texels, linear RGB. Row 0 is the zenith, +y; column
-/// c has its centre in the direction (−sin φ sin θ, cos θ, −cos φ sin θ), φ = 2π (c + 0.5)/width.
+/// c has its centre in the direction (sin φ sin θ, cos θ, −cos φ sin θ), φ = 2π (c + 0.5)/width: columns grow to the right of who looks at the map from inside.
 #[derive(Clone, PartialEq)]
 pub struct EnvironmentMap {
     /// The file.
@@ -29,9 +30,6 @@ impl fmt::Debug for EnvironmentMap {
         write!(f, "EnvironmentMap({width} × {height}, {hash})")
     }
 }
-
-/// Texels around that a map may have; larger ones are halved. In kernels each takes 24 bytes.
-const MOST_WIDTH: u32 = 2048;
 
 impl EnvironmentMap {
     /// Reads a linear image of any format that [`crate::image::read_linear`] knows. Texels that are negative, infinite or NaN are taken as 0, with a warning.
@@ -80,44 +78,39 @@ impl EnvironmentMap {
                 "{name}: {broken} of {all} texels are negative, infinite or NaN in some colour, which is taken as 0"
             ));
         }
-        let mut map = Self {
+        Ok(Self {
             name: name.to_owned(),
             width,
             height,
             texels,
-        };
-        if map.width > MOST_WIDTH {
-            warnings.push(format!(
-                "{name}: reduced from {width} × {height} to at most {MOST_WIDTH} texels around"
-            ));
-            while map.width > MOST_WIDTH {
-                map = map.halved();
-            }
-        }
-        Ok(map)
+        })
     }
 
-    /// Means of 2 × 2 texels; of an odd number the last is left alone.
-    fn halved(&self) -> Self {
-        let [width, height] = [self.width.div_ceil(2), self.height.div_ceil(2)];
-        let mean = |x: u32, y: u32| {
-            let columns = 2 * x..(2 * x + 2).min(self.width);
-            let rows = 2 * y..(2 * y + 2).min(self.height);
-            let count = (columns.len() * rows.len()) as f32;
-            let texels = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
-            texels.map(|(x, y)| self.texel(x, y)).sum::<Vec3>() / count
-        };
-        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    /// The map with so many halvings of both sides that its tables have at most so many bytes, with a warning if there are any.
+    /// Texels count by their solid angle.
+    #[must_use]
+    pub fn within(self, bytes: u64, warnings: &mut Vec<String>) -> Self {
+        let from = [self.width, self.height];
+        let mut to = from;
+        while table_bytes(to) > bytes && to != [1, 1] {
+            to = to.map(|n| n.div_ceil(2));
+        }
+        if to == from {
+            return self;
+        }
+        let [[width, height], [columns, rows]] = [from, to];
+        warnings.push(format!(
+            "{}: reduced from {width} × {height} to {columns} × {rows} texels, so that its tables fit into {bytes} bytes",
+            self.name
+        ));
+        let texel = |at: usize| self.texels[at].extend(0.0);
+        let means = area_means(from, to, texel, |row| self.solid_angle(row) as f32);
         Self {
             name: self.name.clone(),
-            width,
-            height,
-            texels: places.map(|(x, y)| mean(x, y)).collect(),
+            width: columns,
+            height: rows,
+            texels: means.into_iter().map(|mean| mean.truncate()).collect(),
         }
-    }
-
-    fn texel(&self, x: u32, y: u32) -> Vec3 {
-        self.texels[(y * self.width + x) as usize]
     }
 
     /// Solid angle of a texel of this row, steradian.
@@ -146,6 +139,12 @@ impl EnvironmentMap {
     }
 }
 
+/// Bytes of a map of this size in `shading_tables`: a `vec4` a texel, and the parts of alias tables, which are powers of two.
+fn table_bytes([width, height]: [u32; 2]) -> u64 {
+    let [w, h] = [width, height].map(u64::from);
+    16 + 16 * w * h + 8 * (h.next_power_of_two() + h * w.next_power_of_two())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -167,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn an_even_map_has_weights_of_its_solid_angle_and_large_ones_are_halved() {
+    fn an_even_map_has_weights_of_its_solid_angle() {
         let mut warnings = Vec::new();
         let size = [5, 4];
         let map =
@@ -178,9 +177,32 @@ mod tests {
             "{sum}"
         );
         assert!(warnings.is_empty());
-        let texels: Vec<Vec3> = (0..4098 * 2).map(|k| Vec3::splat((k % 2) as f32)).collect();
-        let map = EnvironmentMap::new("x", [4098, 2], texels, &mut warnings).expect("a map");
-        assert_eq!((map.width, map.height, warnings.len()), (1025, 1, 1));
-        assert!(map.texels.iter().all(|t| (t.x - 0.5).abs() < 1e-6));
+    }
+
+    #[test]
+    fn maps_are_halved_until_they_fit_and_keep_their_light() {
+        let mut warnings = Vec::new();
+        // Bright at the pole, where texels are small.
+        let texel = |k: usize| Vec3::splat([9.0, 1.0, 0.0, 4.0][k / 8] + (k % 2) as f32);
+        let texels = (0..32).map(texel).collect();
+        let map = EnvironmentMap::new("x", [8, 4], texels, &mut warnings).expect("a map");
+        let light = |map: &EnvironmentMap| -> f64 {
+            let texels = map.texels.iter().enumerate();
+            texels
+                .map(|(k, t)| f64::from(t.x) * map.solid_angle(k as u32 / map.width))
+                .sum()
+        };
+        let before = light(&map);
+        assert_eq!(table_bytes([8, 4]), 16 + 512 + 8 * (4 + 32));
+        let same = map.clone().within(table_bytes([8, 4]), &mut warnings);
+        assert!(same == map && warnings.is_empty());
+        let half = map.clone().within(table_bytes([8, 4]) - 1, &mut warnings);
+        assert_eq!(([half.width, half.height], warnings.len()), ([4, 2], 1));
+        assert!((light(&half) / before - 1.0).abs() < 1e-6);
+        let least = map.within(0, &mut warnings);
+        assert!(least.texels.len() == 1 && (light(&least) / before - 1.0).abs() < 1e-6);
+        // What software adapters bind holds what it held before, and not twice that.
+        let all = crate::scene::LEAST_BINDING - (8 << 20);
+        assert!(table_bytes([2048, 1024]) <= all && table_bytes([4096, 2048]) > all);
     }
 }

@@ -95,6 +95,9 @@ pub enum SceneError {
         /// Most triangles of one of so many.
         most: usize,
     },
+    /// The photometric file of a luminaire.
+    #[error(transparent)]
+    Photometry(#[from] super::IesError),
     /// A parameter that the built-in scene does not have, or a value that it does not allow.
     #[error(transparent)]
     Parameter(#[from] ParamError),

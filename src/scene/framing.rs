@@ -10,6 +10,7 @@ use glam::{DVec3, Vec3, Vec3A};
 use obvhs::bvh2::Bvh2;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use obvhs::ray::{Ray, RayHit};
+use std::borrow::Cow;
 
 /// Vertical field of view outside, degrees.
 const OUTSIDE_FOV: f32 = 35.0;
@@ -84,7 +85,14 @@ impl Framing {
         if bounds.is_empty() {
             return Self::default();
         }
-        let stage = UnitScene::new(&scene.triangles, &bounds);
+        // Which surfaces turn their back decides whether it is a room.
+        let triangles: Cow<[Triangle]> = match scene.mirrored.is_empty() {
+            true => Cow::Borrowed(&scene.triangles),
+            false => (0..scene.triangles.len())
+                .map(|id| scene.outward(id).into())
+                .collect(),
+        };
+        let stage = UnitScene::new(&triangles, &bounds);
         let (up, place) = match stage.boxes_per_ray() <= MOST_BOXES {
             true => stage.place(says_y),
             false => (Vec3::Y, Self::default().place),

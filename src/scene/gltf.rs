@@ -3,18 +3,23 @@
 
 use super::builder::{Look, SceneBuilder};
 use super::error::{self, guarded};
-use super::gltf_accessor::{check_accessors, has_normals};
+use super::gltf_accessor::{check_accessors, has_colors, has_normals};
 use super::gltf_container;
 use super::gltf_files::Files;
+use super::gltf_instancing;
 use super::gltf_lights;
 use super::gltf_material;
+use super::gltf_unread::{Unread, of_document};
 use super::texture::decode_all;
-use super::{InstanceError, Light, LoadOptions, SceneData, SceneError, Transform};
+use super::{InstanceError, Light, LoadOptions, Material, SceneData, SceneError, Transform};
 use crate::geometry::{Camera, Triangle};
 use glam::{DMat3, Mat4, Vec2, Vec3};
 use gltf::mesh::Mode;
 use std::borrow::Cow;
 use std::path::Path;
+
+/// Most triangles of the listed instances of a node: all of them are stored, and a small file can list many.
+const MOST_TRIANGLES: usize = 100_000_000;
 
 /// Loads a glTF or GLB model: its default scene, with the first camera of it.
 ///
@@ -43,11 +48,15 @@ pub(super) fn load(
 /// compares their indices with what there is, so that is done here.
 fn parse(json: &[u8]) -> Result<gltf::Document, String> {
     let unchecked = gltf::Gltf::from_slice_without_validation(json).map_err(|e| e.to_string())?;
-    let root = unchecked.document.into_json();
+    let mut root = unchecked.document.into_json();
     let mut required = root.extensions_required.iter();
     if let Some(problem) = required.find_map(|name| compressed(name)) {
         return Err(problem);
     }
+    // The crate refuses what it does not know itself.
+    let of_nodes = gltf_instancing::OF_NODES;
+    root.extensions_required
+        .retain(|name| !of_nodes.contains(&name.as_str()));
     for (m, mesh) in root.meshes.iter().enumerate() {
         for (p, primitive) in mesh.primitives.iter().enumerate() {
             let mut accessors = primitive.attributes.values().map(|index| index.value());
@@ -91,9 +100,11 @@ fn build(
         camera: None,
         lights: Vec::new(),
         copies: Copies::new(document),
+        white: None,
         lines_or_points: 0,
         deformed: 0,
         unread_normals: 0,
+        unread: of_document(document),
     };
     geometry.read_scene(document)?;
     geometry.report_left_out();
@@ -101,13 +112,20 @@ fn build(
         mut builder,
         camera,
         lights,
+        white,
+        unread,
         ..
     } = geometry;
+    if white.is_some() {
+        let plain = Material::diffuse("default, coloured", Vec3::ONE);
+        palette.materials.push(plain);
+    }
+    let unread = unread.warnings(&palette.named);
+    builder.report.warnings.extend(unread);
     builder.report.warnings.append(&mut palette.warnings);
     let textures = decode_all(
         &palette.images,
-        options.max_texture_size,
-        builder.len(),
+        options.texture_limits(builder.len()),
         &mut palette.materials,
         &mut builder.report,
     );
@@ -162,9 +180,12 @@ struct Geometry<'a> {
     lights: Vec<Light>,
     /// `None` where no nodes share a mesh, or once a node could not be made an instance.
     copies: Option<Copies>,
+    /// The material of primitives that name none and have colours, once there is one.
+    white: Option<usize>,
     lines_or_points: usize,
     deformed: usize,
     unread_normals: usize,
+    unread: Unread,
 }
 
 /// Meshes that several nodes use become objects.
@@ -178,8 +199,12 @@ struct Copies {
 impl Copies {
     fn new(document: &gltf::Document) -> Option<Self> {
         let mut uses = vec![0; document.meshes().len()];
-        for mesh in document.nodes().filter_map(|node| node.mesh()) {
-            uses[mesh.index()] += 1;
+        for node in document.nodes() {
+            if let Some(mesh) = node.mesh() {
+                // Of listed instances there may be one, which is an instance all the same.
+                let listed = gltf_instancing::has_instances(&node);
+                uses[mesh.index()] += 1 + usize::from(listed);
+            }
         }
         let shared = uses.iter().any(|n| *n > 1);
         let objects = vec![None; uses.len()];
@@ -195,16 +220,21 @@ impl<'a> Geometry<'a> {
         let roots = scene.ok_or_else(|| SceneError::malformed(self.path, "", "it has no scene"))?;
         // An explicit stack and a mark per node: a cycle in a malformed file ends in an error.
         let mut visited = vec![false; document.nodes().len()];
-        let mut stack: Vec<_> = roots.nodes().map(|node| (node, Mat4::IDENTITY)).collect();
+        let roots = roots.nodes().map(|node| (node, Mat4::IDENTITY, true));
+        let mut stack: Vec<_> = roots.collect();
         stack.reverse();
-        while let Some((node, parent)) = stack.pop() {
+        while let Some((node, parent, shown)) = stack.pop() {
             if std::mem::replace(&mut visited[node.index()], true) {
                 return Err(self.error(&node, "it is reached twice, but nodes must form a tree"));
             }
             let world = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
-            self.read_node(&node, world)?;
+            let shown = shown && gltf_instancing::is_visible(&node);
+            self.read_camera_of(&node, world);
+            if shown {
+                self.read_node(&node, world, document)?;
+            }
             let first_child = stack.len();
-            stack.extend(node.children().map(|child| (child, world)));
+            stack.extend(node.children().map(|child| (child, world, shown)));
             stack[first_child..].reverse();
         }
         Ok(())
@@ -216,10 +246,19 @@ impl<'a> Geometry<'a> {
         SceneError::malformed(self.path, place, problem)
     }
 
-    fn read_node(&mut self, node: &gltf::Node<'a>, world: Mat4) -> Result<(), SceneError> {
+    /// A camera sees from a node that is not shown, too.
+    fn read_camera_of(&mut self, node: &gltf::Node<'a>, world: Mat4) {
         if let (None, Some(camera)) = (self.camera, node.camera()) {
             self.camera = self.read_camera(&camera, world);
         }
+    }
+
+    fn read_node(
+        &mut self,
+        node: &gltf::Node<'a>,
+        world: Mat4,
+        document: &'a gltf::Document,
+    ) -> Result<(), SceneError> {
         if let Some(light) = node.light() {
             self.lights.push(gltf_lights::read(&light, world));
         }
@@ -227,6 +266,31 @@ impl<'a> Geometry<'a> {
             return Ok(());
         };
         self.deformed += usize::from(node.skin().is_some());
+        let places = gltf_instancing::places(node, document, self.buffers);
+        let (places, others) = places.map_err(|problem| self.error(node, problem))?;
+        self.unread.attributes.extend(others);
+        for place in &places {
+            let before = self.builder.len();
+            self.read_mesh(node, &mesh, world * *place)?;
+            let each = self.builder.len() - before;
+            if each.saturating_mul(places.len()) > MOST_TRIANGLES {
+                let problem = format!(
+                    "its {} instances of {each} triangles are more than {MOST_TRIANGLES} triangles",
+                    places.len()
+                );
+                return Err(self.error(node, problem));
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the triangles of a mesh with this transform, and the node as an instance of it.
+    fn read_mesh(
+        &mut self,
+        node: &gltf::Node<'a>,
+        mesh: &gltf::Mesh<'a>,
+        world: Mat4,
+    ) -> Result<(), SceneError> {
         let before = self.builder.len();
         let mut own = Vec::new();
         for primitive in mesh.primitives() {
@@ -240,6 +304,9 @@ impl<'a> Geometry<'a> {
                 );
                 SceneError::malformed(self.path, place, problem)
             })?;
+        }
+        if Transform::from_matrix(world).is_mirrored() {
+            self.builder.mirror_from(before);
         }
         if self.builder.len() > before {
             self.place(node, mesh.index(), own, world, before);
@@ -333,8 +400,15 @@ impl<'a> Geometry<'a> {
         let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
         // The file's materials, then one for primitives that name none.
         let last = self.sets.len() - 1;
-        let material = primitive.material().index().unwrap_or(last);
-        let set = self.sets[material];
+        let colors = self.read_colors(primitive);
+        let material = match primitive.material().index() {
+            Some(index) => index,
+            // By the standard it is white; grey is for what has no colour at all.
+            None if !colors.is_empty() => *self.white.get_or_insert(last + 1),
+            None => last,
+        };
+        let set = self.sets.get(material).copied().flatten();
+        self.unread.see(primitive, set);
         check_accessors(primitive, buffers, set)?;
         let local: Vec<Vec3> = reader
             .read_positions()
@@ -366,13 +440,43 @@ impl<'a> Geometry<'a> {
             let vertices = corners.map(|i| positions[i as usize]);
             let normals = (!normals.is_empty()).then(|| corners.map(normal));
             let (uvs, material) = (corners.map(uv), material as u32);
-            self.builder.push_corners(vertices, uvs, normals, material);
+            let color = |i: u32| colors.get(i as usize).copied().unwrap_or(Vec3::ONE);
+            let colors = (!colors.is_empty()).then(|| corners.map(color));
+            self.builder
+                .push_colored(vertices, uvs, normals, colors, material);
             if is_shared {
                 let vertices = corners.map(|i| local[i as usize]);
                 own.push(Triangle { vertices });
             }
         });
         Ok(())
+    }
+
+    /// Linear colours, by which the base colour is multiplied; none where the file has none that can be read.
+    fn read_colors(&mut self, primitive: &gltf::Primitive<'a>) -> Vec<Vec3> {
+        match has_colors(primitive, self.buffers) {
+            None => return Vec::new(),
+            Some(false) => {
+                let name = "`COLOR_0`, whose values are no colours in their buffer";
+                self.unread.attributes.insert(name.to_owned());
+                return Vec::new();
+            }
+            Some(true) => {}
+        }
+        let buffers = self.buffers;
+        let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
+        let colors = reader.read_colors(0).map(|colors| colors.into_rgba_f32());
+        let colors: Vec<[f32; 4]> = colors.into_iter().flatten().collect();
+        if colors.iter().any(|[.., alpha]| *alpha < 1.0) {
+            let name = "alpha of `COLOR_0`".to_owned();
+            self.unread.attributes.insert(name);
+        }
+        if (colors.iter().flatten()).any(|x| !(0.0..=1.0).contains(x)) {
+            let name = "`COLOR_0` beyond 0 to 1".to_owned();
+            self.unread.attributes.insert(name);
+        }
+        let rgb = |[r, g, b, _]: &[f32; 4]| Vec3::new(*r, *g, *b);
+        colors.iter().map(rgb).collect()
     }
 
     /// Normals in world space; none where the file has none that can be read.

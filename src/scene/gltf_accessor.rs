@@ -48,8 +48,19 @@ pub(super) fn has_normals(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>]) 
     Some(is_known && check_data(&normals, buffers).is_ok())
 }
 
+/// Whether the first colours of the vertices of a primitive can be read, if it has any.
+pub(super) fn has_colors(primitive: &gltf::Primitive<'_>, buffers: &[Vec<u8>]) -> Option<bool> {
+    let colors = primitive.get(&Semantic::Colors(0))?;
+    let is_known = matches!(colors.dimensions(), Dimensions::Vec3 | Dimensions::Vec4)
+        && matches!(
+            colors.data_type(),
+            DataType::U8 | DataType::U16 | DataType::F32
+        );
+    Some(is_known && check_data(&colors, buffers).is_ok())
+}
+
 /// Checks that all elements of an accessor, and those that replace some of them, are there.
-fn check_data(accessor: &Accessor<'_>, buffers: &[Vec<u8>]) -> Result<(), String> {
+pub(super) fn check_data(accessor: &Accessor<'_>, buffers: &[Vec<u8>]) -> Result<(), String> {
     let (count, size) = (accessor.count(), accessor.size());
     let view = accessor.view().ok_or("have no buffer view")?;
     check_range(&view, accessor.offset(), count, size, buffers)?;

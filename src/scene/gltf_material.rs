@@ -37,6 +37,8 @@ pub(super) struct Palette<'a> {
     /// Images that some material uses; materials index into it.
     pub images: Vec<ImageSource<'a>>,
     pub warnings: Vec<String>,
+    /// Extensions that a warning names.
+    pub named: Vec<&'static str>,
 }
 
 /// Reads all materials; images are found here and decoded later.
@@ -71,6 +73,7 @@ pub(super) fn read<'a>(
     Palette {
         materials,
         sets,
+        named: named(document),
         images: images.used,
         warnings: told,
     }
@@ -196,6 +199,16 @@ fn convert(
     }
 }
 
+/// Extensions of surfaces that some material has and [`warnings`] names.
+fn named(document: &gltf::Document) -> Vec<&'static str> {
+    let has = |name: &&str| {
+        document
+            .materials()
+            .any(|m| m.extension_value(name).is_some())
+    };
+    EXTENSIONS.into_iter().filter(has).collect()
+}
+
 /// One warning per kind of appearance that is drawn otherwise than the file says.
 fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
     // The material as converted beside the one in the file; the last, default one is not in it.
@@ -222,6 +235,11 @@ fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
         let model = original.pbr_specular_glossiness();
         model.is_some_and(|model| model.specular_glossiness_texture().is_some())
     });
+    let tinted = of(&|_, original| {
+        let volume = original.volume();
+        volume.is_some_and(|volume| volume.attenuation_distance().is_finite())
+    });
+    let occluded = of(&|_, original| original.occlusion_texture().is_some());
     let extended = EXTENSIONS.iter().filter_map(|name| {
         let names = of(&|_, original| original.extension_value(name).is_some());
         approximation_warning(&format!("extended by {name}"), "if it were not", names)
@@ -231,6 +249,12 @@ fn warnings(document: &gltf::Document, materials: &[Material]) -> Vec<String> {
         approximation_warning("frosted glass", "clear glass", frosted),
         approximation_warning("blended by alpha", "if it were opaque", blended),
         approximation_warning("rough metal", "diffuse", metal),
+        approximation_warning("tinted by depth", "if it were not", tinted),
+        approximation_warning(
+            "darkened by an occlusion texture",
+            "if it were not",
+            occluded,
+        ),
         approximation_warning(
             "of varying gloss",
             "if the texture of it were white",

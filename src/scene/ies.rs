@@ -1,10 +1,11 @@
-//! Photometric files of luminaires: IES LM-63 of 1986, 1991, 1995 and 2002, photometry of the types A, B and C.
+//! Photometric files of luminaires: IES LM-63 of 1986, 1991, 1995, 2002 and 2019, photometry of the types A, B and C.
 
 mod flux;
 mod parse;
 
 pub use parse::IesError;
 
+use crate::text::plain_text_or_latin1;
 use std::path::Path;
 
 /// How the two angles of a file make a direction. Axes are those of the luminaire, see [`IesProfile`].
@@ -33,7 +34,7 @@ pub struct IesProfile {
     /// Ascending, degrees, all around (0 to 360 for type C, −90 to 90 for A and B); a single one where the luminaire
     /// is symmetric about its axis.
     pub horizontal: Vec<f32>,
-    /// Candela, the multipliers of the file in it: for each horizontal angle those of all vertical ones.
+    /// Candela, the factors of the file in it (of the candela and of the ballast, and of ballast and lamp until 1991): for each horizontal angle those of all vertical ones.
     pub candela: Vec<f32>,
     /// Lamps' rated luminous flux, lumens; `None` for absolute photometry.
     pub rated_lumens: Option<f64>,
@@ -55,6 +56,6 @@ impl IesProfile {
             source,
         })?;
         // Names of makers and luminaires come in all kinds of codings; what counts is ASCII.
-        Self::parse(&name, &String::from_utf8_lossy(&bytes))
+        Self::parse(&name, &plain_text_or_latin1(bytes))
     }
 }

@@ -81,6 +81,12 @@ impl Transform {
         Self::new([x, y, z], (-(inverse * translation)).as_vec3())
     }
 
+    /// Whether it mirrors, so that corners that turned counter-clockwise turn clockwise. Where it is so, the front of what it
+    /// places is the other side (glTF 2.0, 3.7.4). In f64, so that no small scale makes the determinant 0.
+    pub fn is_mirrored(&self) -> bool {
+        self.parts().0.determinant() < 0.0
+    }
+
     /// ‖A‖ · ‖A⁻¹‖ of the linear part, norms being greatest absolute row sums; 1 for the identity,
     /// at most 3 for a rotation, infinite or NaN if there is no inverse.
     pub fn condition(&self) -> f64 {

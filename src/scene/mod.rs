@@ -7,6 +7,7 @@
 mod builder;
 pub mod builtin;
 mod camera;
+mod colors;
 mod content;
 mod copies;
 mod daylight;
@@ -18,9 +19,11 @@ mod gltf;
 mod gltf_accessor;
 mod gltf_container;
 mod gltf_files;
+mod gltf_instancing;
 mod gltf_lights;
 mod gltf_material;
 mod gltf_texture;
+mod gltf_unread;
 mod hung_lamps;
 mod ies;
 mod instances;
@@ -32,7 +35,10 @@ mod mtl_texture;
 mod nori;
 mod normals;
 mod obj;
+mod obj_statements;
 mod ply;
+mod polygon;
+mod reduce;
 mod text;
 mod texture;
 mod texture_use;
@@ -40,6 +46,7 @@ mod texture_use;
 pub use builder::{DEFAULT_ALBEDO, MAX_COORDINATE};
 pub use builtin::builtin_scenes;
 pub use camera::Bounds;
+pub use colors::{WHITE, decode_color, encode_color};
 pub use daylight::Daylight;
 pub use environment::EnvironmentMap;
 pub use error::SceneError;
@@ -102,7 +109,7 @@ impl LoadReport {
 
 /// A loaded scene: flat world-space triangles and what shading needs.
 ///
-/// `triangles`, `uvs`, `normals` and `material_ids` are parallel; `uvs` is empty when no material is textured.
+/// `triangles`, `uvs`, `normals`, `colors`, `mirrored` and `material_ids` are parallel; `uvs` is empty when no material is textured.
 #[derive(Debug, Clone)]
 pub struct SceneData {
     /// Name as the user typed it.
@@ -113,6 +120,11 @@ pub struct SceneData {
     pub uvs: Vec<[Vec2; 3]>,
     /// Normals of the corners, as [`encode_normal`] has them; empty where all are those of the triangles.
     pub normals: Vec<[u32; 3]>,
+    /// Colours of the corners, as [`encode_color`] has them, by which the base colour is multiplied; empty where all are white.
+    pub colors: Vec<[[u32; 2]; 3]>,
+    /// Of which triangles the front is the side from which the corners turn clockwise, because a transform has mirrored them:
+    /// copies of an object keep the order of its corners, on which u and v of hits depend. Empty if none is.
+    pub mirrored: Vec<bool>,
     /// Index into `materials` for each triangle.
     pub material_ids: Vec<u32>,
     /// Materials; never empty.
@@ -145,9 +157,23 @@ pub struct LoadOptions {
     pub textures: bool,
     /// Largest width and height of a texture, texels; larger ones are reduced, with a warning.
     pub max_texture_size: u32,
+    /// Bytes that the tables of the scene may have: what the adapter binds as one buffer. Textures and maps are reduced until they
+    /// fit, with a warning.
+    pub table_bytes: u64,
     /// Whether a glTF model may name files outside its folder, and an OBJ model absolute paths: a model
     /// from elsewhere could read any file of this machine.
     pub allow_outside: bool,
+}
+
+/// What every adapter binds as one storage buffer, bytes (WebGPU's `maxStorageBufferBindingSize`).
+pub const LEAST_BINDING: u64 = 128 << 20;
+
+impl LoadOptions {
+    /// The greatest size of a texture beside so many triangles, and words for all of them.
+    fn texture_limits(&self, triangles: usize) -> [u64; 2] {
+        let room = texture::texel_room(self.table_bytes, triangles);
+        [self.max_texture_size.into(), room]
+    }
 }
 
 impl Default for LoadOptions {
@@ -155,6 +181,7 @@ impl Default for LoadOptions {
         Self {
             textures: true,
             max_texture_size: 1024,
+            table_bytes: LEAST_BINDING,
             allow_outside: false,
         }
     }
@@ -202,7 +229,9 @@ pub fn load(variant: &Variant, options: &LoadOptions) -> Result<SceneData, Scene
         scene = hung_lamps::hang(scene, lamps as u32);
     }
     match common.0.get(ENVIRONMENT) {
-        Some(ParamValue::Name(file)) if !file.is_empty() => scene.under(Path::new(file)),
+        Some(ParamValue::Name(file)) if !file.is_empty() => {
+            scene.under(Path::new(file), options.table_bytes)
+        }
         _ => Ok(scene),
     }
 }
@@ -286,21 +315,16 @@ pub fn check_model(path: &Path) -> Result<(), SceneError> {
     let mut start = Vec::new();
     let read = error::open(path)?.take(MODEL_START).read_to_end(&mut start);
     read.map_err(SceneError::unreadable(path))?;
-    let json = || {
-        let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start);
-        text.trim_ascii_start().starts_with(b"{")
-    };
-    let xml = || {
-        let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start);
-        text.trim_ascii_start().starts_with(b"<")
-    };
+    let text = crate::text::plain_text_or_latin1(start.clone());
+    let json = || text.trim_ascii_start().starts_with('{');
+    let xml = || text.trim_ascii_start().starts_with('<');
     let (begins_well, expected) = match extension(path).as_str() {
-        "obj" => (!start.contains(&0), "it is not text"),
+        "obj" => (!text.contains('\0'), "it is not text"),
         "gltf" | "glb" => (
             start.starts_with(b"glTF") || json(),
             "it begins neither with `glTF` nor with `{`",
         ),
-        "ply" => (start.starts_with(b"ply"), "it does not begin with `ply`"),
+        "ply" => (text.starts_with("ply"), "it does not begin with `ply`"),
         "xml" => (xml(), "it does not begin with `<`"),
         _ => {
             let path = path.to_owned();

@@ -4,6 +4,7 @@ use super::builder::DEFAULT_ALBEDO;
 use super::error::read_regular;
 use super::material::{Description, Format, emitted};
 use super::mtl_texture::{Statement, statement};
+use super::obj_statements::{unread_warning, without_comment};
 use super::text::normalised;
 use super::texture::{Encoded, ImageSource};
 use super::{
@@ -15,11 +16,8 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt::Display;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
-use tobj::{LoadError, MTLLoadResult};
 
-/// Gathers the materials of all `mtllib` statements while `tobj` reads the OBJ file.
-///
-/// `tobj` numbers materials in the order in which it reads them; `contents` follows that order.
+/// Gathers the materials of all `mtllib` statements while the OBJ file is read.
 pub(super) struct Library {
     folder: PathBuf,
     options: LoadOptions,
@@ -51,32 +49,58 @@ impl Library {
         }
     }
 
-    /// Loads one library for `tobj`. A missing or broken one is a warning.
-    pub fn load(&self, file: &Path) -> MTLLoadResult {
-        let path = self.folder.join(file.to_string_lossy().replace('\\', "/"));
+    /// Loads the libraries that a statement names: one whose name may have blanks in it, if there is such a file, or several. The
+    /// numbers of their materials by name. A missing or broken library is a warning.
+    pub fn load(&self, names: &str) -> Vec<(String, u32)> {
+        let cut = without_comment(names).trim();
+        let is_there = |name: &&str| self.folder.join(plain(name)).is_file();
+        match [names, cut].iter().find(|name| is_there(name)) {
+            Some(name) => self.load_one(name),
+            None => cut
+                .split_whitespace()
+                .flat_map(|name| self.load_one(name))
+                .collect(),
+        }
+    }
+
+    fn load_one(&self, name: &str) -> Vec<(String, u32)> {
+        let file = plain(name);
+        let path = self.folder.join(&file);
         if !self.loaded.borrow_mut().insert(path.clone()) {
-            return Ok(Default::default());
+            return Vec::new();
         }
         let mut contents = self.contents.borrow_mut();
         let unread = |error: &dyn Display| {
             let path = path.display();
             format!("material library {path}: {error}; its materials are drawn grey")
         };
-        let bytes = relative(file, &self.options).and_then(|()| read_regular(&path));
-        let bytes = bytes.map_err(|error| {
-            contents.warnings.push(unread(&error));
-            LoadError::OpenFileFailed
-        })?;
+        let bytes = relative(Path::new(&file), &self.options).and_then(|()| read_regular(&path));
+        let bytes = match bytes {
+            Ok(bytes) => bytes,
+            Err(error) => {
+                contents.warnings.push(unread(&error));
+                return Vec::new();
+            }
+        };
         let text = readable_lines(&normalised(bytes), &path, &mut contents.warnings);
-        let read = tobj::load_mtl_buf(&mut Cursor::new(text));
-        let (materials, names) = read.inspect_err(|error| contents.warnings.push(unread(error)))?;
+        let (materials, numbers) = match tobj::load_mtl_buf(&mut Cursor::new(text)) {
+            Ok(read) => read,
+            Err(error) => {
+                contents.warnings.push(unread(&error));
+                return Vec::new();
+            }
+        };
+        let before = contents.materials.len();
         for material in &materials {
             contents.add(material, &path, &self.options);
         }
-        Ok((materials, names))
+        let numbers = numbers.into_iter();
+        numbers
+            .map(|(name, k)| (name, (before + k) as u32))
+            .collect()
     }
 
-    /// All materials in `tobj`'s order, the textures they refer to, and one warning for all that
+    /// All materials in the order of the libraries, the textures they refer to, and one warning for all that
     /// is drawn otherwise than the file says.
     pub fn into_contents(self) -> Contents {
         let mut contents = self.contents.into_inner();
@@ -191,6 +215,11 @@ impl Contents {
     }
 }
 
+/// A path with `/` between folders.
+fn plain(name: &str) -> String {
+    name.replace('\\', "/")
+}
+
 /// Refuses an absolute path: it belongs to the machine that wrote the file. Relative ones may leave the
 /// folder, as textures in `../textures` do in many models.
 fn relative(file: &Path, options: &LoadOptions) -> std::io::Result<()> {
@@ -231,10 +260,22 @@ fn source(material: &tobj::Material) -> MaterialSource {
     }
 }
 
+/// Statements that are read, or that tell nothing (an empty line; the colour of ambient light, which paths bring), or named with
+/// the materials that have them.
+const READ: [&str; 25] = [
+    "", "newmtl", "Ka", "Kd", "Ks", "Ke", "Ns", "Ni", "d", "Tr", "Tf", "illum", "Pr", "Pm",
+    "map_Kd", "map_Ks", "map_Ke", "map_Ns", "map_ns", "map_NS", "map_d", "map_Bump", "map_bump",
+    "bump", "norm",
+];
+
+/// Kinds of statements that are taken note of: a file that is none has any number.
+const MOST_UNREAD: usize = 64;
+
 /// The text without the lines that would make `tobj` reject (or panic on) the whole library; a
 /// colour given as one number becomes three.
 fn readable_lines(text: &str, path: &Path, warnings: &mut Vec<String>) -> String {
     let mut out = String::with_capacity(text.len());
+    let mut unread: BTreeMap<String, usize> = BTreeMap::new();
     for (number, line) in (1..).zip(text.lines()) {
         let mut words = line.split('#').next().unwrap_or("").split_whitespace();
         let keyword = words.next().unwrap_or("");
@@ -254,6 +295,9 @@ fn readable_lines(text: &str, path: &Path, warnings: &mut Vec<String>) -> String
             "newmtl" | "bump" => argument.is_none(),
             _ => keyword.starts_with("map_") && argument.is_none(),
         };
+        if !READ.contains(&keyword) && unread.len() < MOST_UNREAD {
+            unread.entry(keyword.to_owned()).or_insert(number);
+        }
         if broken {
             warnings.push(format!(
                 "{}, line {number}: `{}` ignored: the value cannot be read",
@@ -265,6 +309,11 @@ fn readable_lines(text: &str, path: &Path, warnings: &mut Vec<String>) -> String
             out.push('\n');
         }
     }
+    let unread = unread
+        .iter()
+        .map(|(what, line)| format!("`{what}` (line {line})"));
+    let unread = unread_warning(unread);
+    warnings.extend(unread.map(|text| format!("{}: {text}", path.display())));
     out
 }
 

@@ -12,6 +12,7 @@ use super::{
     decode_normal, obj, ply,
 };
 use crate::geometry::Camera;
+use crate::text::plain_text;
 use glam::{DMat3, DMat4, DVec3, DVec4, Vec2, Vec3};
 use roxmltree::{Document, Node};
 use std::path::Path;
@@ -36,9 +37,10 @@ pub(super) fn load(
 ) -> Result<SceneData, SceneError> {
     let bytes = error::read(path)?;
     guarded(path, || {
-        let text = std::str::from_utf8(&bytes);
-        let text = text.map_err(|_| SceneError::malformed(path, "", "it is not UTF-8 text"))?;
-        let document = Document::parse(text).map_err(|e| {
+        let text = plain_text(bytes).map_err(|e| {
+            SceneError::malformed(path, format!("line {}", e.line), "it is not UTF-8 text")
+        })?;
+        let document = Document::parse(&text).map_err(|e| {
             SceneError::malformed(path, format!("line {}", e.pos().row), e.to_string())
         })?;
         let root = document.root_element();
@@ -129,9 +131,19 @@ impl Reader<'_> {
         };
         let to_world = mirror.unwrap_or(DMat4::IDENTITY) * self.to_world(node)?;
         let material = self.material(node, file)?;
+        let sky = mesh.daylight.as_ref().map(|sky| sky.note());
+        let told = mesh.report.warnings.iter();
+        for line in told.filter(|line| Some(*line) != sky.as_ref()) {
+            self.warn(node, &format!("`{file}`: {line}"));
+        }
+        if !mesh.colors.is_empty() {
+            self.warn(node, &format!("`{file}` has colours of vertices, left out"));
+        }
         let id = self.look.materials.len() as u32;
         self.look.materials.push(material);
         self.builder.reserve(mesh.triangles.len());
+        // A reflection turns corners, whether it is the camera's or the mesh's own; emitters and glass tell their sides by them.
+        let mirrored = to_world.determinant() < 0.0;
         let of_normals = DMat3::from_mat4(to_world).inverse().transpose();
         let normals = |index: usize| -> Option<[Vec3; 3]> {
             let words = mesh.normals.get(index)?.map(decode_normal);
@@ -141,10 +153,9 @@ impl Reader<'_> {
         for (index, triangle) in mesh.triangles.iter().enumerate() {
             let moved = |v: Vec3| to_world.transform_point3(v.as_dvec3()).as_vec3();
             let [a, b, c] = triangle.vertices.map(moved);
-            // A reflection turns corners; emitters and glass tell their sides by them.
-            let turn = |[a, b, c]: [Vec3; 3]| match mirror {
-                Some(_) => [a, c, b],
-                None => [a, b, c],
+            let turn = |[a, b, c]: [Vec3; 3]| match mirrored {
+                true => [a, c, b],
+                false => [a, b, c],
             };
             let normals = normals(index).map(turn);
             let uvs = [Vec2::ZERO; 3];

@@ -1,23 +1,18 @@
-//! Wavefront OBJ by `tobj`; materials are in [`super::mtl`].
+//! Wavefront OBJ; materials are in [`super::mtl`], statements in [`super::obj_statements`].
 
 use super::builder::{DEFAULT_ALBEDO, Look, SceneBuilder};
-use super::error::{self, guarded, panic_text};
+use super::colors::linear;
+use super::error::{self, guarded};
+use super::obj_statements::{Corner, Face, Statements};
+use super::polygon::triangulate;
 use super::text::normalised;
 use super::texture::decode_all;
 use super::{LoadOptions, Material, SceneData, SceneError, mtl};
 use glam::{Vec2, Vec3};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-/// Separate indices: no vertex is duplicated, and `tobj` keeps no map over index triples.
-const OPTIONS: tobj::LoadOptions = tobj::LoadOptions {
-    single_index: false,
-    triangulate: true,
-    ignore_points: true,
-    ignore_lines: true,
-};
-
-/// Loads an OBJ model: relative indices, polygons as fans, `v` of texture coordinates turned down.
+/// Loads an OBJ model: relative indices, polygons as triangles, `v` of texture coordinates turned down. Colours of vertices are
+/// those of a screen (sRGB), as Blender and three.js have them.
 ///
 /// # Errors
 /// [`SceneError`] with the line of the first broken statement.
@@ -30,201 +25,169 @@ pub(super) fn load(
     guarded(path, || {
         let text = normalised(bytes);
         let library = mtl::Library::new(path, options);
-        let models = read(&text, &library).map_err(|failure| {
-            let (place, problem) = match first_broken_line(&text) {
-                Some((line, problem)) => (format!("line {line}"), problem),
-                None => (String::new(), failure),
-            };
-            SceneError::malformed(path, place, problem)
-        })?;
-        let mut warnings = Vec::new();
-        warnings.extend(too_few_corners(&text));
-        warnings.extend(cut_off(&text));
+        let broken = |(line, problem): (u32, String)| {
+            SceneError::malformed(path, format!("line {line}"), problem)
+        };
+        let mut read = Statements::read(&text, &library).map_err(broken)?;
         drop(text);
-        build(name, options, models, library, warnings)
+        let mtl::Contents {
+            mut materials,
+            textures,
+            warnings,
+            ..
+        } = library.into_contents();
+        let mut builder = SceneBuilder::new(!textures.is_empty(), read.faces.len());
+        builder.report.warnings = std::mem::take(&mut read.warnings);
+        builder.report.warnings.extend(warnings);
+        let mut model = Model::new(read, builder, materials.len() as u32);
+        model.push_faces().map_err(broken)?;
+        model.tell();
+        materials.append(&mut model.without);
+        let mut builder = model.builder;
+        let textures = decode_all(
+            &textures,
+            options.texture_limits(builder.len()),
+            &mut materials,
+            &mut builder.report,
+        );
+        let look = Look {
+            materials,
+            textures,
+            ..Look::default()
+        };
+        builder.finish(name, look)
     })
 }
 
-/// The models, or what `tobj` says or panics with: it multiplies indices before it compares them with
-/// what there is.
-fn read(text: &str, library: &mtl::Library) -> Result<Vec<tobj::Model>, String> {
-    let load = || tobj::load_obj_buf(&mut text.as_bytes(), &OPTIONS, |file| library.load(file));
-    match catch_unwind(AssertUnwindSafe(load)) {
-        Ok(Ok((models, _))) => Ok(models),
-        Ok(Err(error)) => Err(error.to_string()),
-        Err(payload) => Err(panic_text(payload.as_ref())),
-    }
+/// Statements that become a scene.
+struct Model {
+    read: Statements,
+    builder: SceneBuilder,
+    /// Materials of the libraries.
+    known: u32,
+    /// Materials of faces without one: their numbers follow those of the libraries.
+    without: Vec<Material>,
+    grey: Option<u32>,
+    white: Option<u32>,
+    /// Triangles without a material, and the object of the first.
+    drawn_grey: (usize, Option<String>),
+    /// Polygons that cross themselves, and the line of the first.
+    crossing: (usize, u32),
+    /// Colours beyond 0 to 1, or no numbers.
+    odd_colors: usize,
 }
 
-fn build(
-    name: &str,
-    options: &LoadOptions,
-    models: Vec<tobj::Model>,
-    library: mtl::Library,
-    mut warnings: Vec<String>,
-) -> Result<SceneData, SceneError> {
-    let mtl::Contents {
-        mut materials,
-        textures,
-        warnings: of_materials,
-        ..
-    } = library.into_contents();
-    warnings.extend(of_materials);
-    let count = models.iter().map(|m| m.mesh.indices.len() / 3).sum();
-    let mut builder = SceneBuilder::new(!textures.is_empty(), count);
-    builder.report.warnings = warnings;
-    let default_id = materials.len() as u32;
-    let mut without_material = (0, None);
-    // By value: each model's arrays are freed as soon as they are copied.
-    for tobj::Model { mesh, name } in models {
-        let id = mesh.material_id.map_or(default_id, |id| id as u32);
-        if id == default_id && !mesh.indices.is_empty() {
-            without_material.0 += mesh.indices.len() / 3;
-            without_material.1.get_or_insert(name);
+impl Model {
+    fn new(read: Statements, builder: SceneBuilder, known: u32) -> Self {
+        Self {
+            read,
+            builder,
+            known,
+            without: Vec::new(),
+            grey: None,
+            white: None,
+            drawn_grey: (0, None),
+            crossing: (0, 0),
+            odd_colors: 0,
         }
-        push_mesh(&mut builder, &mesh, id);
     }
-    if let (triangles, Some(object)) = without_material {
-        materials.push(Material::diffuse("default", Vec3::splat(DEFAULT_ALBEDO)));
-        if default_id > 0 {
-            builder.report.warnings.push(format!(
+
+    /// Adds the triangles of all faces in the order of the file.
+    fn push_faces(&mut self) -> Result<(), (u32, String)> {
+        let faces = std::mem::take(&mut self.read.faces);
+        let mut first = 0;
+        for face in &faces {
+            let end = first + face.corners as usize;
+            self.read
+                .check(first..end)
+                .map_err(|problem| (face.line, problem))?;
+            self.push_face(face, first..end);
+            first = end;
+        }
+        Ok(())
+    }
+
+    fn push_face(&mut self, face: &Face, corners: std::ops::Range<usize>) {
+        let corners = &self.read.corners[corners];
+        let positions = &self.read.positions;
+        let places: Vec<Vec3> = corners.iter().map(|c| positions[c.vertex()]).collect();
+        let mut colors = Vec::new();
+        if !self.read.colors.is_empty() {
+            let colors_of = |c: &Corner| self.read.colors.get(c.vertex()).copied().flatten();
+            let given: Vec<Option<Vec3>> = corners.iter().map(colors_of).collect();
+            let is_odd = |c: &Vec3| !(c.min_element() >= 0.0 && c.max_element() <= 1.0);
+            self.odd_colors += usize::from(given.iter().flatten().any(is_odd));
+            if given.iter().any(Option::is_some) {
+                let light = |c: &Option<Vec3>| {
+                    let shown = c.unwrap_or(Vec3::ONE).clamp(Vec3::ZERO, Vec3::ONE);
+                    Vec3::from(shown.to_array().map(linear))
+                };
+                colors = given.iter().map(light).collect();
+            }
+        }
+        let material = match self.read.materials[face.material as usize] {
+            Some(id) => id,
+            None => {
+                let next = self.known + self.without.len() as u32;
+                let (id, albedo) = match colors.is_empty() {
+                    true => (&mut self.grey, DEFAULT_ALBEDO),
+                    false => (&mut self.white, 1.0),
+                };
+                *id.get_or_insert_with(|| {
+                    let default = Material::diffuse("default", Vec3::splat(albedo));
+                    self.without.push(default);
+                    next
+                })
+            }
+        };
+        if Some(material) == self.grey {
+            self.drawn_grey.0 += corners.len() - 2;
+            let object = || self.read.objects[face.object as usize].clone();
+            self.drawn_grey.1.get_or_insert_with(object);
+        }
+        let uv = |c: &Corner| {
+            let uv = c.uv().map(|i| self.read.uvs[i]);
+            uv.map_or(Vec2::ZERO, |uv| Vec2::new(uv.x, 1.0 - uv.y))
+        };
+        // A corner without a normal has that of the triangle.
+        let normal = |c: &Corner| c.normal().map_or(Vec3::ZERO, |i| self.read.normals[i]);
+        let has_normals = corners.iter().any(|c| c.normal().is_some());
+        let builder = &mut self.builder;
+        let crosses = triangulate(&places, |triangle| {
+            let of = triangle.map(|k| &corners[k]);
+            let normals = has_normals.then(|| of.map(normal));
+            let colors = (!colors.is_empty()).then(|| triangle.map(|k| colors[k]));
+            let vertices = triangle.map(|k| places[k]);
+            builder.push_colored(vertices, of.map(uv), normals, colors, material);
+        });
+        if crosses {
+            let (count, line) = self.crossing;
+            self.crossing = (count + 1, if count == 0 { face.line } else { line });
+        }
+    }
+
+    /// What is drawn otherwise than the file says.
+    fn tell(&mut self) {
+        let warnings = &mut self.builder.report.warnings;
+        let (count, line) = self.crossing;
+        if count > 0 {
+            warnings.push(format!(
+                "{count} polygons cross themselves, the first in line {line}: drawn as fans around their first corner"
+            ));
+        }
+        if self.odd_colors > 0 {
+            warnings.push(format!(
+                "{} faces have colours of vertices beyond 0 to 1, which are taken as 0 or 1",
+                self.odd_colors
+            ));
+        }
+        if let (triangles, Some(object)) = &self.drawn_grey
+            && self.known > 0
+        {
+            warnings.push(format!(
                 "{triangles} triangles (first object: `{object}`) use no material that a .mtl \
                  file defines; drawn grey"
             ));
         }
     }
-    let textures = decode_all(
-        &textures,
-        options.max_texture_size,
-        builder.len(),
-        &mut materials,
-        &mut builder.report,
-    );
-    let look = Look {
-        materials,
-        textures,
-        ..Look::default()
-    };
-    builder.finish(name, look)
-}
-
-fn push_mesh(builder: &mut SceneBuilder, mesh: &tobj::Mesh, material: u32) {
-    let position = |i: u32| Vec3::from_slice(&mesh.positions[3 * i as usize..]);
-    let uv = |i: u32| {
-        let [u, v] = [0, 1].map(|k| mesh.texcoords[2 * i as usize + k]);
-        Vec2::new(u, 1.0 - v)
-    };
-    let corners = mesh.indices.as_chunks::<3>().0;
-    let uv_corners = mesh.texcoord_indices.as_chunks::<3>().0;
-    let normal = |i: u32| Vec3::from_slice(&mesh.normals[3 * i as usize..]);
-    let normal_corners = mesh.normal_indices.as_chunks::<3>().0;
-    for (k, corner) in corners.iter().enumerate() {
-        let uvs = uv_corners.get(k).map_or([Vec2::ZERO; 3], |c| c.map(uv));
-        let normals = normal_corners.get(k).map(|c| c.map(normal));
-        builder.push_corners(corner.map(position), uvs, normals, material);
-    }
-}
-
-/// Faces that `tobj` takes for lines or points and leaves out.
-fn too_few_corners(text: &str) -> Option<String> {
-    let is_short = |(_, line): &(usize, &str)| {
-        let mut words = line.split_ascii_whitespace();
-        words.next() == Some("f") && words.take_while(|word| !word.starts_with('#')).count() < 3
-    };
-    let mut short = (1..).zip(text.lines()).filter(is_short);
-    let (first, _) = short.next()?;
-    let count = 1 + short.count();
-    Some(match count {
-        1 => format!("line {first}: a face with fewer than three corners, left out"),
-        _ => format!(
-            "{count} faces with fewer than three corners, left out; the first in line {first}"
-        ),
-    })
-}
-
-/// A file that ends within a statement lacks the end of its last line. A number that lacks its last
-/// digits is a number, so that is all there is to see.
-fn cut_off(text: &str) -> Option<String> {
-    let last = text.lines().next_back().filter(|_| !text.ends_with('\n'))?;
-    let keyword = last.split_ascii_whitespace().next()?;
-    ["v", "vt", "vn", "f"].contains(&keyword).then(|| {
-        let number = text.lines().count();
-        format!("line {number}, the last, has no line end: the file may be cut off there")
-    })
-}
-
-/// `tobj` tells what is wrong, not where: reads the statements again, only after a failure, and
-/// returns the number (from 1) of the first line that no reader can accept.
-fn first_broken_line(text: &str) -> Option<(usize, String)> {
-    // Numbers of `v`, `vt`, `vn` so far, and whether vertices have colours.
-    let mut counts = [0_i64; 3];
-    let mut colored = None;
-    for (number, line) in (1..).zip(text.lines()) {
-        let mut words = line.split_whitespace();
-        let keyword = words.next().unwrap_or("");
-        let problem = match keyword {
-            "v" | "vt" | "vn" => {
-                let kind = ["v", "vt", "vn"].iter().position(|k| *k == keyword)?;
-                counts[kind] += 1;
-                let has_color = words.clone().count() == 6;
-                let problem = vector_problem(keyword, words);
-                let mixed = keyword == "v" && *colored.get_or_insert(has_color) != has_color;
-                let mixed = mixed.then(|| "some vertices have a colour, others none".to_owned());
-                problem.or(mixed)
-            }
-            "f" | "l" => {
-                let problem = words
-                    .clone()
-                    .find_map(|corner| corner_problem(corner, &counts));
-                let bare = words
-                    .next()
-                    .is_none()
-                    .then(|| format!("`{keyword}` with no corners"));
-                problem.or(bare)
-            }
-            "usemtl" if words.next().is_none() => Some("`usemtl` with no name".to_owned()),
-            _ => None,
-        };
-        if let Some(problem) = problem {
-            return Some((number, problem));
-        }
-    }
-    None
-}
-
-fn vector_problem<'a>(keyword: &str, words: impl Iterator<Item = &'a str>) -> Option<String> {
-    let words: Vec<_> = words.collect();
-    let (least, allowed): (usize, &[usize]) = match keyword {
-        "v" => (3, &[3, 4, 6]),
-        "vt" => (2, &[]),
-        _ => (3, &[]),
-    };
-    if words.len() < least || !(allowed.is_empty() || allowed.contains(&words.len())) {
-        return Some(format!("`{keyword}` with {} numbers", words.len()));
-    }
-    let read = if keyword == "v" { words.len() } else { least };
-    if let Some(broken) = words[..read].iter().find(|w| w.parse::<f32>().is_err()) {
-        return Some(format!("`{broken}` is not a number"));
-    }
-    // The fourth number of a vertex divides the others.
-    let weight = words
-        .get(3)
-        .filter(|_| keyword == "v" && words.len() == 4)?;
-    (weight.parse() == Ok(0.0_f32)).then(|| "a vertex of weight 0".to_owned())
-}
-
-fn corner_problem(corner: &str, counts: &[i64; 3]) -> Option<String> {
-    const WHAT: [&str; 3] = ["vertex", "texture coordinate", "normal"];
-    for (k, index) in corner.split('/').enumerate().filter(|(_, i)| !i.is_empty()) {
-        let (Ok(value), Some(count)) = (index.parse::<i64>(), counts.get(k)) else {
-            return Some(format!("`{corner}` is not a face corner"));
-        };
-        if value == 0 || value > *count || value < -count {
-            return Some(format!(
-                "the face refers to {} {value}, but there are {count} before it",
-                WHAT[k]
-            ));
-        }
-    }
-    None
 }

@@ -2,18 +2,23 @@
 //! the scene's arrays.
 
 use super::builder::{DEFAULT_ALBEDO, Look, SceneBuilder};
+use super::colors::linear;
 use super::error::{guarded, open};
+use super::obj_statements::unread_warning;
+use super::polygon::triangulate;
 use super::{Material, SceneData, SceneError};
-use glam::Vec3;
+use crate::text::plain_text_or_latin1;
+use glam::{Vec2, Vec3};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
     ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyDef,
     PropertyType, ScalarType,
 };
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Cursor};
 use std::path::Path;
 
-/// Loads a PLY model. Polygons become fans; there are no materials, every surface is grey.
+/// Loads a PLY model. Polygons become triangles; there are no materials: every surface is grey, or has the colours of its vertices,
+/// which are those of a screen (sRGB) whatever their type, as MeshLab, Blender and three.js have them.
 ///
 /// # Errors
 /// [`SceneError`] naming the element that could not be read.
@@ -22,38 +27,46 @@ pub(super) fn load(path: &Path, name: &str) -> Result<SceneData, SceneError> {
     let bytes = file.metadata().map_or(0, |meta| meta.len());
     guarded(path, || {
         let source = BufReader::with_capacity(1 << 16, file);
-        let builder = read(path, bytes, source)?;
+        let (builder, is_colored) = read(path, bytes, source)?;
+        let albedo = if is_colored { 1.0 } else { DEFAULT_ALBEDO };
         let look = Look {
-            materials: vec![Material::diffuse("default", Vec3::splat(DEFAULT_ALBEDO))],
+            materials: vec![Material::diffuse("default", Vec3::splat(albedo))],
             ..Look::default()
         };
         builder.finish(name, look)
     })
 }
 
-fn read(path: &Path, bytes: u64, source: impl BufRead) -> Result<SceneBuilder, SceneError> {
-    let mut reader = Reader::new(source);
+/// The triangles, and whether vertices have colours.
+fn read(
+    path: &Path,
+    bytes: u64,
+    mut source: impl BufRead,
+) -> Result<(SceneBuilder, bool), SceneError> {
+    let text = header_text(&mut source).map_err(|p| SceneError::malformed(path, "header", p))?;
     let header = Parser::<Skipped>::new()
-        .read_header(&mut reader)
+        .read_header(&mut Reader::new(Cursor::new(text)))
         .map_err(|error| header_error(path, &error))?;
     let mut body = Body {
         path,
         encoding: header.encoding,
-        source: reader.into_inner(),
-        line: String::new(),
+        source,
+        line: Vec::new(),
     };
-    let mut vertices: Vec<Vec3> = Vec::new();
+    let mut vertices: Vec<Vertex> = Vec::new();
+    let mut is_colored = false;
     let mut builder = SceneBuilder::default();
-    let mut polygons_without_area = 0_usize;
+    let mut odd = Odd::default();
     for definition in header.elements.values() {
         check_element(path, definition, header.encoding, bytes)?;
     }
     for (name, definition) in &header.elements {
         match name.as_str() {
             "vertex" => {
+                is_colored = has_colors(definition);
                 vertices.reserve_exact(definition.count);
-                body.each(definition, |_, Vertex(position)| {
-                    vertices.push(position);
+                body.each(definition, |_, vertex| {
+                    vertices.push(vertex);
                     Ok(())
                 })?;
             }
@@ -63,23 +76,191 @@ fn read(path: &Path, bytes: u64, source: impl BufRead) -> Result<SceneBuilder, S
                     let corners = face.corners(&vertices).map_err(|problem| {
                         SceneError::malformed(path, format!("face {index}"), problem)
                     })?;
-                    polygons_without_area += usize::from(corners.len() < 3);
+                    odd.flat += usize::from(corners.len() < 3);
                     builder.reserve(corners.len().saturating_sub(2));
-                    for k in 2..corners.len() {
-                        builder.push([corners[0], corners[k - 1], corners[k]], 0);
-                    }
+                    odd.see(index, push_face(&mut builder, &corners, is_colored));
                     Ok(())
                 })?;
             }
             _ => body.each(definition, |_, Skipped| Ok(()))?,
         }
     }
-    if polygons_without_area > 0 {
-        builder.report.warnings.push(format!(
-            "{polygons_without_area} faces with fewer than three corners left out"
-        ));
+    let is_odd = |v: &Vertex| !(v.color.min_element() >= 0.0 && v.color.max_element() <= 1.0);
+    odd.colors = vertices.iter().filter(|v| is_colored && is_odd(v)).count();
+    let warnings = &mut builder.report.warnings;
+    odd.tell(warnings);
+    let unread = header.elements.values().flat_map(|e| unread(e, is_colored));
+    warnings.extend(unread_warning(unread));
+    Ok((builder, is_colored))
+}
+
+/// What of faces and vertices deserves a line.
+#[derive(Default)]
+struct Odd {
+    /// Faces with fewer than three corners.
+    flat: usize,
+    /// Polygons that cross themselves, and the first of them.
+    crossing: (usize, usize),
+    /// Vertices whose colour is beyond 0 to 1.
+    colors: usize,
+}
+
+impl Odd {
+    fn see(&mut self, face: usize, crosses: bool) {
+        if crosses {
+            let (count, first) = self.crossing;
+            self.crossing = (count + 1, if count == 0 { face } else { first });
+        }
     }
-    Ok(builder)
+
+    fn tell(&self, warnings: &mut Vec<String>) {
+        if self.flat > 0 {
+            warnings.push(format!(
+                "{} faces with fewer than three corners left out",
+                self.flat
+            ));
+        }
+        let (count, first) = self.crossing;
+        if count > 0 {
+            warnings.push(format!(
+                "{count} polygons cross themselves, the first is face {first}: drawn as fans around their first corner"
+            ));
+        }
+        if self.colors > 0 {
+            warnings.push(format!(
+                "{} vertices have a colour beyond 0 to 1, which is taken as 0 or 1",
+                self.colors
+            ));
+        }
+    }
+}
+
+/// Adds the triangles of a polygon; whether it crosses itself.
+fn push_face(builder: &mut SceneBuilder, corners: &[&Vertex], is_colored: bool) -> bool {
+    let places: Vec<Vec3> = corners.iter().map(|c| c.position).collect();
+    let light = |k: usize| {
+        let shown = corners[k].color.clamp(Vec3::ZERO, Vec3::ONE);
+        Vec3::from(shown.to_array().map(linear))
+    };
+    triangulate(&places, |triangle| {
+        let colors = is_colored.then(|| triangle.map(light));
+        builder.push_colored(
+            triangle.map(|k| places[k]),
+            [Vec2::ZERO; 3],
+            None,
+            colors,
+            0,
+        );
+    })
+}
+
+/// Names of the components of a colour.
+const COLORS: [[&str; 3]; 3] = [
+    ["red", "green", "blue"],
+    ["r", "g", "b"],
+    ["diffuse_red", "diffuse_green", "diffuse_blue"],
+];
+
+/// Whether vertices have a colour that can be read.
+fn has_colors(vertex: &ElementDef) -> bool {
+    let is_read = |name: &&str| {
+        let property = vertex.properties.get(*name);
+        let kind = property.map(|p| &p.data_type);
+        kind.is_some_and(|kind| {
+            use ScalarType::{Double, Float, UChar, UShort};
+            matches!(kind, PropertyType::Scalar(UChar | UShort | Float | Double))
+        })
+    };
+    COLORS.iter().any(|names| names.iter().all(&is_read))
+}
+
+/// What an element says that is not read.
+fn unread(element: &ElementDef, is_colored: bool) -> Vec<String> {
+    let name = element.name.as_str();
+    if element.count == 0 {
+        return Vec::new();
+    }
+    let is_read = |property: &&String| match name {
+        "vertex" => {
+            let is_color = COLORS.as_flattened().contains(&property.as_str());
+            ["x", "y", "z"].contains(&property.as_str()) || (is_colored && is_color)
+        }
+        _ => FACE_LISTS.contains(&property.as_str()),
+    };
+    match name {
+        "vertex" | "face" => {
+            let others = element.properties.keys().filter(|p| !is_read(p));
+            others.map(|p| format!("`{p}` of `{name}`")).collect()
+        }
+        _ => vec![format!("the element `{name}`")],
+    }
+}
+
+/// The header as plain text, in which lines may end in any way; what follows is left in the source.
+fn header_text(source: &mut impl BufRead) -> Result<Vec<u8>, String> {
+    let mut text = Vec::new();
+    let mut line = Vec::new();
+    let mut pairs = true;
+    loop {
+        let end = read_line(source, &mut line, pairs).map_err(|e| e.to_string())?;
+        if text.is_empty() {
+            if line.starts_with(b"\xff\xfe") || line.starts_with(b"\xfe\xff") {
+                return Err("it is UTF-16 text; save it as UTF-8".to_owned());
+            }
+            // Behind a header whose lines end in \r alone, \n is the first byte of the data.
+            pairs = end != LineEnd::Return;
+        }
+        let plain = plain_text_or_latin1(std::mem::take(&mut line));
+        text.extend(plain.as_bytes());
+        if end == LineEnd::None {
+            return Ok(text);
+        }
+        text.push(b'\n');
+        if plain.trim() == "end_header" {
+            return Ok(text);
+        }
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum LineEnd {
+    /// The file ends.
+    None,
+    /// `\r`.
+    Return,
+    /// `\n` or `\r\n`.
+    Other,
+}
+
+/// Appends a line without its end, which may be `\n`, `\r`, or with `pairs` both.
+fn read_line(
+    source: &mut impl BufRead,
+    line: &mut Vec<u8>,
+    pairs: bool,
+) -> std::io::Result<LineEnd> {
+    loop {
+        let bytes = source.fill_buf()?;
+        if bytes.is_empty() {
+            return Ok(LineEnd::None);
+        }
+        let Some(end) = bytes.iter().position(|b| matches!(b, b'\n' | b'\r')) else {
+            let all = bytes.len();
+            line.extend_from_slice(bytes);
+            source.consume(all);
+            continue;
+        };
+        line.extend_from_slice(&bytes[..end]);
+        let is_return = bytes[end] == b'\r';
+        source.consume(end + 1);
+        let is_pair = is_return && pairs && source.fill_buf()?.first() == Some(&b'\n');
+        if is_pair {
+            source.consume(1);
+        }
+        return Ok(match is_return && !is_pair {
+            true => LineEnd::Return,
+            false => LineEnd::Other,
+        });
+    }
 }
 
 fn header_error(path: &Path, error: &ParseError) -> SceneError {
@@ -140,7 +321,7 @@ struct Body<'a, S> {
     path: &'a Path,
     encoding: Encoding,
     source: S,
-    line: String,
+    line: Vec<u8>,
 }
 
 impl<S: BufRead> Body<'_, S> {
@@ -170,9 +351,14 @@ impl<S: BufRead> Body<'_, S> {
         let element = match self.encoding {
             Encoding::Ascii => {
                 self.line.clear();
-                match source.read_line(&mut self.line) {
-                    Ok(0) => return Err("the file ends here".to_owned()),
-                    Ok(_) => parser.read_ascii_element(&self.line, definition),
+                match read_line(source, &mut self.line, true) {
+                    Ok(LineEnd::None) if self.line.is_empty() => {
+                        return Err("the file ends here".to_owned());
+                    }
+                    Ok(_) => {
+                        let line = String::from_utf8_lossy(&self.line);
+                        parser.read_ascii_element(&line, definition)
+                    }
                     Err(error) => return Err(error.to_string()),
                 }
             }
@@ -186,19 +372,36 @@ impl<S: BufRead> Body<'_, S> {
     }
 }
 
-struct Vertex(Vec3);
+#[derive(Clone, Copy)]
+struct Vertex {
+    position: Vec3,
+    /// As shown on a screen, 0 to 1.
+    color: Vec3,
+}
 
 impl PropertyAccess for Vertex {
     fn new() -> Self {
-        Self(Vec3::NAN)
+        Self {
+            position: Vec3::NAN,
+            color: Vec3::ONE,
+        }
     }
 
     fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
         let component = match name {
-            "x" => &mut self.0.x,
-            "y" => &mut self.0.y,
-            "z" => &mut self.0.z,
-            _ => return PropertyAccessResult::Ignored,
+            "x" => &mut self.position.x,
+            "y" => &mut self.position.y,
+            "z" => &mut self.position.z,
+            _ => {
+                let mut of_color = COLORS
+                    .iter()
+                    .filter_map(|n| n.iter().position(|n| *n == name));
+                let Some((k, shade)) = of_color.next().zip(shade(&value)) else {
+                    return PropertyAccessResult::Ignored;
+                };
+                self.color[k] = shade;
+                return PropertyAccessResult::Set;
+            }
         };
         match value.to_f32_lossy() {
             Some(value) => *component = value,
@@ -206,6 +409,17 @@ impl PropertyAccess for Vertex {
         }
         PropertyAccessResult::Set
     }
+}
+
+/// A component of a colour, 0 to 1.
+fn shade(value: &Property) -> Option<f32> {
+    Some(match value {
+        Property::UChar(x) => f32::from(*x) / f32::from(u8::MAX),
+        Property::UShort(x) => f32::from(*x) / f32::from(u16::MAX),
+        Property::Float(x) => *x,
+        Property::Double(x) => *x as f32,
+        _ => return None,
+    })
 }
 
 /// Both names of the list of corners are in use.
@@ -229,10 +443,10 @@ impl PropertyAccess for Face {
 }
 
 impl Face {
-    fn corners(&self, vertices: &[Vec3]) -> Result<Vec<Vec3>, String> {
+    fn corners<'a>(&self, vertices: &'a [Vertex]) -> Result<Vec<&'a Vertex>, String> {
         let position = |index: i64| {
             let vertex = usize::try_from(index).ok().and_then(|i| vertices.get(i));
-            vertex.copied().ok_or_else(|| {
+            vertex.ok_or_else(|| {
                 format!(
                     "the face refers to vertex {index}, but {} are defined before it",
                     vertices.len()

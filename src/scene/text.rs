@@ -1,31 +1,27 @@
-//! Text formats as the wild has them: a byte order mark, lines that end in `\r` alone or go on after a
-//! `\`, names in Latin-1.
+//! Texts of the formats of Wavefront: a line goes on after a `\`.
 
-/// Text in UTF-8 whose lines end in `\n` and that begins with no byte order mark. A line that ends in
+use crate::text::plain_text_or_latin1;
+
+/// The plain text of a file. A line that ends in
 /// `\`, unless it is a comment, goes on in the next; empty lines in place of the joined ones keep the
-/// numbers of all others. Bytes that are no UTF-8 become U+FFFD: they stand in names only.
-pub(super) fn normalised(mut bytes: Vec<u8>) -> String {
-    let mut from = if bytes.starts_with(b"\xef\xbb\xbf") {
-        3
-    } else {
-        0
-    };
+/// numbers of all others.
+pub(super) fn normalised(bytes: Vec<u8>) -> String {
+    let mut bytes = plain_text_or_latin1(bytes).into_bytes();
     // Writing never overtakes reading: what is written is at most as long as what was read.
-    let (mut to, mut line, mut joined) = (0, 0, 0);
+    let (mut from, mut to, mut line, mut joined) = (0, 0, 0, 0);
     while from < bytes.len() {
-        let length = line_end(&bytes, from);
         match bytes[from] {
-            b'\\' if line_end(&bytes, from + 1) > 0 && !is_comment(&bytes[line..to]) => {
+            b'\\' if bytes.get(from + 1) == Some(&b'\n') && !is_comment(&bytes[line..to]) => {
                 bytes[to] = b' ';
                 to += 1;
                 joined += 1;
-                from += 1 + line_end(&bytes, from + 1);
+                from += 2;
             }
-            _ if length > 0 => {
+            b'\n' => {
                 let end = to + 1 + joined;
                 bytes[to..end].fill(b'\n');
                 (to, line, joined) = (end, end, 0);
-                from += length;
+                from += 1;
             }
             byte => {
                 bytes[to] = byte;
@@ -35,17 +31,8 @@ pub(super) fn normalised(mut bytes: Vec<u8>) -> String {
         }
     }
     bytes.truncate(to);
-    String::from_utf8(bytes)
-        .unwrap_or_else(|error| String::from_utf8_lossy(error.as_bytes()).into_owned())
-}
-
-/// Bytes of the line end at `at`: 0 if there is none.
-fn line_end(bytes: &[u8], at: usize) -> usize {
-    match (bytes.get(at), bytes.get(at + 1)) {
-        (Some(b'\r'), Some(b'\n')) => 2,
-        (Some(b'\r' | b'\n'), _) => 1,
-        _ => 0,
-    }
+    // Whole letters were copied, and none was added but blanks and line ends.
+    String::from_utf8(bytes).unwrap_or_default()
 }
 
 fn is_comment(line: &[u8]) -> bool {
@@ -68,7 +55,7 @@ mod tests {
             (b"f 1 2 \\", "f 1 2 \\"),
             (b"f 1 2 \\\n", "f 1 2  "),
             (b"\\\n\\\n\\\n", "   "),
-            (b"usemtl M\xfcll\n", "usemtl M\u{fffd}ll\n"),
+            (b"usemtl M\xfcll\n", "usemtl M\u{fc}ll\n"),
             (b"", ""),
         ] {
             assert_eq!(normalised(given.to_vec()), expected);

@@ -1,9 +1,9 @@
 //! Decoding of textures, all of a scene in parallel.
 
 use super::error::read_regular;
+use super::reduce::{Texels, reduced};
 use super::{LoadReport, Material, Texture, TextureUse};
 use image::ImageReader;
-use image::imageops::FilterType;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::io::Cursor;
@@ -25,31 +25,38 @@ pub(super) struct ImageSource<'a> {
     pub encoded: Encoded<'a>,
 }
 
-/// Words that the tables of a scene may have: what software drivers bind, less 8 MiB for materials and lights.
-const MOST_WORDS: u64 = 30 << 20;
+/// Bytes of what an adapter binds that are left to materials and lights.
+const OTHER_BYTES: u64 = 8 << 20;
 /// Words of texture coordinates and normals of a triangle.
 const TRIANGLE_WORDS: u64 = 9;
 
-/// Decodes `sources` in parallel; images wider or higher than `max_size` are reduced, and all of them further until they fit beside
-/// `triangles` triangles into what an adapter binds.
+/// Words that textures may have beside those of so many triangles, in tables of so many bytes.
+pub(super) fn texel_room(table_bytes: u64, triangles: usize) -> u64 {
+    let words = table_bytes.saturating_sub(OTHER_BYTES) / 4;
+    words.saturating_sub(TRIANGLE_WORDS * triangles as u64)
+}
+
+/// Decodes `sources` in parallel; images wider or higher than `max_size` are reduced, and all of them further until they fit into
+/// `room` words. What materials use an image for says what it is reduced as.
 ///
 /// `materials` refer to `sources` on entry and to the returned list on exit. An image that cannot
 /// be decoded is a warning, and its materials keep their constant.
 pub(super) fn decode_all(
     sources: &[ImageSource<'_>],
-    max_size: u32,
-    triangles: usize,
+    [max_size, room]: [u64; 2],
     materials: &mut [Material],
     report: &mut LoadReport,
 ) -> Vec<Texture> {
     let read: Vec<_> = sources.par_iter().map(read).collect();
     let sizes = read.iter().flatten().map(|(_, size)| *size);
-    let room = MOST_WORDS.saturating_sub(TRIANGLE_WORDS * triangles as u64);
-    let max_size = fitting_size(&sizes.collect::<Vec<_>>(), max_size.max(1), room);
+    let max_size = u32::try_from(max_size.max(1)).unwrap_or(u32::MAX);
+    let max_size = fitting_size(&sizes.collect::<Vec<_>>(), max_size, room);
+    let kinds = kinds(sources.len(), materials);
     let decoded: Vec<_> = sources
         .par_iter()
         .zip(read)
-        .map(|(source, read)| decode(source, &read?.0, max_size))
+        .zip(kinds)
+        .map(|((source, read), kind)| decode(source, &read?.0, max_size, kind))
         .collect();
     let mut textures = Vec::new();
     let mut new_index = Vec::new();
@@ -87,6 +94,22 @@ pub(super) fn decode_all(
         });
     }
     textures
+}
+
+/// What the texels of each image stand for: colours where some material shows them, else normals, else numbers.
+fn kinds(count: usize, materials: &[Material]) -> Vec<Texels> {
+    let mut kinds = vec![Texels::Numbers; count];
+    for (slot, kind) in [
+        (2, Texels::Normals),
+        (0, Texels::Colours),
+        (3, Texels::Colours),
+    ] {
+        let used = materials.iter().filter_map(|m| m.texture_uses()[slot]);
+        for used in used {
+            kinds[used.texture as usize] = kind;
+        }
+    }
+    kinds
 }
 
 type Size = (u32, u32);
@@ -149,21 +172,26 @@ fn decode(
     source: &ImageSource<'_>,
     bytes: &[u8],
     max_size: u32,
+    kind: Texels,
 ) -> Result<(Texture, Option<Size>), String> {
     let image = image::load_from_memory(bytes).map_err(|e| e.to_string())?;
-    let size = (image.width(), image.height());
-    let larger = size.0 > max_size || size.1 > max_size;
-    let image = if larger {
-        image.resize(max_size, max_size, FilterType::Triangle)
-    } else {
-        image
-    };
     let image = image.into_rgba8();
+    let size = image.dimensions();
+    let texels = image.as_raw().as_chunks::<4>().0;
+    let larger = size.0.max(size.1) > max_size;
+    let scale = f64::from(max_size) / f64::from(size.0.max(size.1));
+    let to = match larger {
+        true => <[u32; 2]>::from(size).map(|n| ((f64::from(n) * scale).round() as u32).max(1)),
+        false => size.into(),
+    };
     let texture = Texture {
         name: source.name.clone(),
-        width: image.width(),
-        height: image.height(),
-        texels: image.as_raw().as_chunks::<4>().0.to_vec(),
+        width: to[0],
+        height: to[1],
+        texels: match larger {
+            true => reduced(texels, size.into(), to, kind),
+            false => texels.to_vec(),
+        },
     };
     Ok((texture, larger.then_some(size)))
 }

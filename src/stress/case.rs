@@ -200,11 +200,13 @@ impl Maker {
 /// The scene as a loader would hand it over, without what only shading needs.
 pub fn scene(triangles: Mesh, assembly: Option<Assembly>) -> SceneData {
     SceneData {
+        colors: Vec::new(),
         name: "stress".into(),
         material_ids: vec![0; triangles.len()],
         triangles,
         uvs: Vec::new(),
         normals: Vec::new(),
+        mirrored: Vec::new(),
         materials: vec![Material::diffuse("grey", Vec3::splat(0.5))],
         textures: Vec::new(),
         assembly,

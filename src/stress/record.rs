@@ -6,7 +6,7 @@ use super::tally::Errors;
 use crate::gpu::Environment;
 use crate::measure::figure::figure;
 use crate::measure::record::{
-    Key, Ran, RecordError, STRESS_FILE, SkippedRecord, Verdict, read_lines, text_of,
+    Key, Ran, RecordError, STRESS_FILE, SkippedRecord, Sound, Verdict, read_lines, text_of,
 };
 use crate::report::{ReportError, write_file};
 use serde::{Deserialize, Serialize};
@@ -47,6 +47,8 @@ pub enum Record {
         wall_s: f64,
     },
 }
+
+impl Sound for Record {}
 
 impl Record {
     /// What was found, in a line of which figures are told.

@@ -157,3 +157,31 @@ fn a_scene_that_cannot_be_loaded_ends_with_2_and_the_rest_goes_on() {
     assert!(records.contains(r#""kind":"structure""#) && records.contains(r#""passed":true"#));
     assert!(out.join("index.html").is_file());
 }
+
+#[test]
+fn a_lamp_or_an_environment_that_cannot_be_read_ends_with_2_and_its_place() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let short = folder.path().join("short.ies");
+    let lines =
+        "IESNA:LM-63-2002\nTILT=NONE\n1 1000 1 3 1 1 2 0 0 0\n1 1 40\n0 45 90\n0\n100 100\n";
+    std::fs::write(&short, lines).expect("a file");
+    let missing = folder.path().join("missing.ies");
+    let sky = folder.path().join("sky.hdr");
+    std::fs::write(&sky, "#?RADIANCE\n").expect("a file");
+    for (scene, key, file, place) in [
+        ("luminaire", "file", &short, "line 7"),
+        ("luminaire", "file", &missing, "check the path"),
+        ("white-furnace", "environment", &sky, "sky.hdr"),
+    ] {
+        let set = format!("scene.{scene}.{key}=\"{}\"", text(file));
+        let arguments = [
+            "render", "--spp", "1", "--size", "16x16", "--scene", scene, "--set", &set,
+        ];
+        let message = error(&run(&arguments), 2);
+        let name = text(file);
+        assert!(
+            message.contains(name) && message.contains(place),
+            "{message}"
+        );
+    }
+}

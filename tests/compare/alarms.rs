@@ -144,6 +144,8 @@ fn a_faster_structure_is_better_and_not_worse() {
     let of_pair = |i| {
         let [base, candidate] = one_run(i, |structure| if structure == 8 { 0.8 } else { 1.0 });
         let found = compared(&base, &candidate);
+        let caution = |note: &String| note.contains("compiled anew");
+        assert!(found.notes.iter().any(caution), "{:?}", found.notes);
         let of_it = said(&found, "mrays-per-s/v1");
         let of_it = of_it.filter(|f| f.key.label("accel") == "structure-8");
         of_it.map(|f| f.verdict).collect::<Vec<_>>()

@@ -158,6 +158,7 @@ fn drift_is_of_the_figure_and_its_own_cell_alone_is_left_out() {
     let place = |figure: &str, scene: &str| Place {
         figure: figure.into(),
         scene: scene.into(),
+        clock: "adapter time",
     };
     let mut drift = Drift::default();
     let small = [0.01, 0.01, 0.01].map(|log| ("a", log)).into_iter();

@@ -286,6 +286,7 @@ fn drift_is_that_of_the_scene_or_of_all_whichever_moved_more_and_leaves_the_cell
     let place = |scene: &str| Place {
         figure: "speed".into(),
         scene: scene.into(),
+        clock: "adapter time",
     };
     let with = |controls: &[(&str, f64)]| {
         let mut drift = Drift::default();

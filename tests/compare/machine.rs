@@ -97,6 +97,13 @@ fn every_part_of_the_place_counts() {
             },
         ),
         (
+            "clock",
+            Environment {
+                timestamps: true,
+                ..base.clone()
+            },
+        ),
+        (
             "processor threads",
             Environment {
                 cpu_threads: 3,

@@ -8,6 +8,7 @@ mod limits;
 mod machine;
 mod program;
 mod records;
+mod seeds;
 mod shown;
 
 use raystone::compare::judge::Verdict;

@@ -230,6 +230,20 @@ fn the_gate_passes_compressed_wide_trees_built_on_the_device() {
 }
 
 #[test]
+fn clusters_may_be_more_than_a_row_of_workgroups_has_lanes() {
+    // Rows of three workgroups instead of 65535, which is 4.2 million triangles.
+    let state = "accel/tree/parallel/device/state";
+    let rows = ("MOST_IN_A_ROW: u32 = 65535u", "MOST_IN_A_ROW: u32 = 3u");
+    let gpu = open(kernels_with(state, &[rows]));
+    let soup = clusters(&mut Pcg::new(13), 5000);
+    for settings in settings() {
+        let host = build(&soup, &settings).expect("a tree");
+        let device = on_device(&gpu, &soup, &settings).expect("a tree");
+        assert_eq!(difference(&host, &device), None, "{settings:?}");
+    }
+}
+
+#[test]
 fn passes_are_timed_by_name_with_the_transfer_apart() {
     let soup = lattice_soup(&mut Pcg::new(9), 3000, 20);
     let mut log = BuildLog::with_gpu(gpu());

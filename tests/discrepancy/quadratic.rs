@@ -73,33 +73,94 @@ fn known_sets_have_their_published_values() {
     );
 }
 
+/// The formulae of each measure as published, times 24 L² for coordinates k/L: `m`, h(x) and K(x, y). L2-star: Warnock
+/// 1972; centered and wrap-around: Hickernell 1998; mixture: Zhou, Fang & Ning 2013, eq. 17; average: the mean of
+/// L2-star's factors over x → 1 − x.
+fn whole_numbers(kind: Quadratic, l: i128, x: i128, y: i128) -> [i128; 3] {
+    let (z, zy, d) = ((2 * x - l).abs(), (2 * y - l).abs(), (x - y).abs());
+    // z is 2 L |x − ½|.
+    let [m, h, k] = match kind {
+        Quadratic::L2Star => [8 * l * l, 12 * (l * l - x * x), 24 * l * (l - x.max(y))],
+        Quadratic::Centered => [
+            26 * l * l,
+            24 * l * l + 6 * l * z - 3 * z * z,
+            24 * l * l + 6 * l * (z + zy) - 12 * l * d,
+        ],
+        Quadratic::WrapAround => [32 * l * l, 32 * l * l, 36 * l * l - 24 * d * (l - d)],
+        Quadratic::Mixture => [
+            38 * l * l,
+            // 24 L² (5/3 − z/4 − z²/4), in halves of z: 40 L² − 3 L z − 3/2 z².
+            (80 * l * l - 6 * l * z - 3 * z * z) / 2,
+            45 * l * l - 3 * l * (z + zy) - 18 * l * d + 12 * d * d,
+        ],
+        Quadratic::Average => [
+            8 * l * l,
+            6 * l * l + 12 * l * x - 12 * x * x,
+            12 * l * (l - d),
+        ],
+    };
+    [m, h, k]
+}
+
+/// The squared discrepancy by whole numbers modulo 2^128, which suffice where the result is far smaller.
+fn by_whole_numbers(kind: Quadratic, points: &PointSet, l: i128) -> f64 {
+    let whole: Vec<Vec<i128>> = points
+        .points()
+        .map(|p| p.iter().map(|x| (x * l as f64) as i128).collect())
+        .collect();
+    let (n, dim) = (points.len() as i128, points.dim());
+    let product = |p: &[i128], q: &[i128], which: usize| {
+        let factors = p
+            .iter()
+            .zip(q)
+            .map(|(&x, &y)| whole_numbers(kind, l, x, y)[which]);
+        factors.fold(1_i128, i128::wrapping_mul)
+    };
+    let mut sum = product(&whole[0], &whole[0], 0).wrapping_mul(n * n);
+    for p in &whole {
+        sum = sum.wrapping_sub(product(p, p, 1).wrapping_mul(2 * n));
+        let row = whole.iter().map(|q| product(p, q, 2));
+        sum = sum.wrapping_add(row.fold(0, i128::wrapping_add));
+    }
+    sum as f64 / (24.0 * (l * l) as f64).powi(dim as i32) / (n * n) as f64
+}
+
 #[test]
 fn sums_are_right_to_twelve_digits_against_whole_numbers() {
-    // In two dimensions, coordinates k/L make all sums whole numbers over powers of L.
-    let n: i128 = 4096;
-    let points = sobol_in(2, 4096);
-    let whole: Vec<[i128; 2]> = points
-        .points()
-        .map(|p| [0, 1].map(|d| (p[d] * 4096.0) as i128))
-        .collect();
-    let pairs = || whole.iter().flat_map(|p| whole.iter().map(move |q| (p, q)));
-    let factor = |f: &dyn Fn(i128, i128) -> i128| -> i128 {
-        pairs().map(|(p, q)| f(p[0], q[0]) * f(p[1], q[1])).sum()
+    let mut random = Pcg32::new(11);
+    let mut first = |dim: usize, count: usize, bits: u32| {
+        // Scrambled a little, so that the coordinates have all of their bits.
+        let sobol = sobol_in(dim, count.next_power_of_two() as u32);
+        let l = f64::from(1_u32 << bits);
+        let cut = |x: &f64| {
+            ((x * l).floor() + random.uniform() * l / 4096.0)
+                .floor()
+                .min(l - 1.0)
+                / l
+        };
+        let coordinates = sobol.points().take(count).flatten().map(cut).collect();
+        PointSet::new(dim, coordinates).unwrap()
     };
-    // L2-star: 9 n⁶ D² = n⁶ − (9/2) n Σ Π (n² − k²) + 9 n² Σ Σ Π (n − max).
-    let single: i128 = whole
-        .iter()
-        .map(|p| (n * n - p[0] * p[0]) * (n * n - p[1] * p[1]))
-        .sum();
-    let double = factor(&|a, b| n - a.max(b));
-    let l2 = 2 * n.pow(6) - 9 * n * single + 18 * n * n * double;
-    let expected = l2 as f64 / (18.0 * n.pow(6) as f64);
-    assert_relative(square(&points, Quadratic::L2Star), expected, 1e-12);
-    // Wrap-around: Π (3/2 − δ(1 − δ)) with δ = k/n is Π (3n² − 2k(n − k)) / (4 n⁴).
-    let double = factor(&|a, b| 3 * n * n - 2 * (a - b).abs() * (n - (a - b).abs()));
-    let wrap = 9 * double - 64 * n.pow(6);
-    let expected = wrap as f64 / (36.0 * n.pow(6) as f64);
-    assert_relative(square(&points, Quadratic::WrapAround), expected, 1e-12);
+    for (points, bits) in [
+        (sobol_in(2, 4096), 12),
+        (first(2, 4096, 12), 12),
+        (first(2, 4096, 24), 24),
+        // Weights 1/N² that are no powers of two.
+        (first(2, 3000, 24), 24),
+        (first(3, 1500, 14), 14),
+        (first(4, 1000, 10), 10),
+    ] {
+        for kind in ALL {
+            let expected = by_whole_numbers(kind, &points, 1 << bits);
+            let found = square(&points, kind);
+            println!(
+                "{kind:?}, {} points: {found:e}, {:e}",
+                points.len(),
+                found / expected - 1.0
+            );
+            assert_relative(found, expected, 1e-13);
+        }
+    }
 }
 
 /// L2-star as the integral that it is: over each rectangle between coordinates the count is constant.

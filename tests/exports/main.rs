@@ -2,6 +2,7 @@
 //! installed; a hostile name is shown and never run; records that are cut or of another version are named.
 
 mod consumers;
+mod damaged;
 mod validator;
 
 use raystone::export::{FORMATS, record_schema};

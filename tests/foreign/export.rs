@@ -243,7 +243,7 @@ fn lights_without_triangles_are_written_or_refused_by_name() {
 }
 
 #[test]
-fn every_other_row_of_a_written_map_is_one_of_the_scene_and_columns_run_backwards() {
+fn every_other_row_of_a_written_map_is_one_of_the_scene_and_columns_run_the_same_way() {
     let texels: Vec<Vec3> = (0..6).map(|k| Vec3::splat(k as f32)).collect();
     let map = EnvironmentMap::new("map", [3, 2], texels, &mut Vec::new()).unwrap();
     let mut scene = builtin("lamp", &[]);
@@ -257,13 +257,40 @@ fn every_other_row_of_a_written_map_is_one_of_the_scene_and_columns_run_backward
     let written = raystone::image::read_linear(&file).unwrap();
     let red: Vec<f32> = written.pixels.iter().map(|p| p[0]).collect();
     let rows = [
-        [2.0, 1.0, 0.0],
-        [2.0, 1.0, 0.0],
-        [3.5, 2.5, 1.5],
-        [5.0, 4.0, 3.0],
-        [5.0, 4.0, 3.0],
+        [0.0, 1.0, 2.0],
+        [0.0, 1.0, 2.0],
+        [1.5, 2.5, 3.5],
+        [3.0, 4.0, 5.0],
+        [3.0, 4.0, 5.0],
     ];
     assert_eq!(red, rows.concat());
+}
+
+#[test]
+fn a_written_map_shines_from_where_mitsuba_looks_it_up() {
+    // A quarter of the way across is +x, and a quarter turn about +y takes that to −z.
+    let texel = |k: usize| Vec3::splat(f32::from(u8::from(k % 6 == 1)));
+    let texels = (0..18).map(texel).collect();
+    let map = EnvironmentMap::new("map", [6, 3], texels, &mut Vec::new()).unwrap();
+    let mut scene = builtin("lamp", &[]);
+    scene.lights = vec![Light::Environment {
+        map: Arc::new(map),
+        scale: 1.0,
+        turn: std::f32::consts::FRAC_PI_2,
+    }];
+    let (folder, xml, _) = exported(&scene, false);
+    let angle = xml.split("<rotate y=\"1\" angle=\"").nth(1).unwrap();
+    let angle: f32 = angle.split('"').next().unwrap().parse().unwrap();
+    let file = folder.path().join("textures/environment.exr");
+    let written = raystone::image::read_linear(&file).unwrap();
+    // Mitsuba 3, `envmap`: u = atan2(x, −z)/2π of the direction in the emitter's axes, texel ⌊u · width⌋.
+    let seen = |direction: Vec3| {
+        let local = glam::Quat::from_rotation_y(-angle.to_radians()) * direction;
+        let u = (local.x.atan2(-local.z) / std::f32::consts::TAU).rem_euclid(1.0);
+        written.pixels[3 * 6 + (u * 6.0) as usize][0]
+    };
+    assert_eq!(seen(Vec3::NEG_Z), 1.0);
+    assert_eq!([Vec3::Z, Vec3::NEG_X].map(seen), [0.0; 2]);
 }
 
 const SKIPPED: i32 = 77;

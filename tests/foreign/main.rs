@@ -2,8 +2,10 @@
 //! figures of Mitsuba 3, Nori's scenes.
 
 mod agreement;
+mod cook_torrance;
 mod export;
 mod lights;
+mod luminaires;
 mod mitsuba;
 mod nori;
 mod radiosity;

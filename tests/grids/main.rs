@@ -387,6 +387,29 @@ fn a_grid_over_its_cap_says_so_with_both_numbers() {
 }
 
 #[test]
+fn a_grid_may_have_what_the_adapter_binds() {
+    let soup = slanted(&mut Pcg::new(34), 2000);
+    for kind in grids() {
+        let params = default_params(&kind.parameters());
+        let with = |bytes: u64| {
+            let mut log = BuildLog::default().binding(bytes);
+            kind.build(&soup, &params, &mut log)
+        };
+        let built = with(1 << 33).expect("more than every adapter binds");
+        let arrays = built.buffers().arrays;
+        let largest = arrays.iter().map(|array| array.words.len() as u64 * 4);
+        let largest = largest.max().expect("an array");
+        match with(largest / 2) {
+            Err(AccelError::Limit { needed, limit, .. }) => {
+                assert!(needed > limit && limit < largest / 8);
+            }
+            other => panic!("{}: {:?}", kind.name(), other.err()),
+        }
+        assert!(with(64 * largest).is_ok(), "{}", kind.name());
+    }
+}
+
+#[test]
 fn every_grid_tells_its_phases_and_counts_add_up() {
     let mut rng = Pcg::new(33);
     let soup = slanted(&mut rng, 2000);

@@ -97,7 +97,7 @@ fn independent() -> Sampler {
 /// Trial scenes of these places, in five tests for their time.
 fn judge_trials(places: std::ops::Range<usize>) {
     let scenes = trial_scenes().expect("scenes");
-    assert_eq!(scenes.len(), 14);
+    assert_eq!(scenes.len(), 15);
     for trial in &scenes[places] {
         for (name, changes) in &trial.trials {
             let what = integrator_variant(name, changes);
@@ -129,8 +129,8 @@ fn single_paths_of_placed_textures_skies_and_panes_are_those_of_the_oracle() {
 }
 
 #[test]
-fn single_paths_of_layers_and_thin_triangles_are_those_of_the_oracle() {
-    judge_trials(12..14);
+fn single_paths_of_layers_mirrored_balls_and_thin_triangles_are_those_of_the_oracle() {
+    judge_trials(12..15);
 }
 
 /// The verdict of one scene's oracle on another scene's paths, of a kernel with this change.

@@ -3,11 +3,14 @@
 
 mod bits;
 mod blocks;
+mod colors;
 mod estimators;
+mod facets;
 
 mod furnace;
 mod model;
 mod ray_counts;
+mod sides;
 #[path = "../support/mod.rs"]
 mod support;
 

@@ -143,8 +143,8 @@ const OTHERS: [Fault; 38] = [
     fault(
         PATH,
         &[(
-            "light_sample_of(k, number, surface, fract(point + r2_point(k)))",
-            "light_sample_of(k, number, surface, fract(point + r2_point(k)).xx)",
+            "light_sample_of(k, surface, r2_moved(point, k))",
+            "light_sample_of(k, surface, r2_moved(point, k).xx)",
         )],
         "unequal lamps, all",
     ),
@@ -184,22 +184,25 @@ const OTHERS: [Fault; 38] = [
     fault(
         "shading/light/choice",
         &[(
-            "return LightChoice(low, head.y,",
-            "return LightChoice(low, 1.0 / f32(frame.lights),",
+            "return LightChoice(low, bitcast<f32>(shading_row(frame.first_light + 4u * low).w));",
+            "return LightChoice(low, 1.0 / f32(frame.lights));",
         )],
         "unequal lamps",
     ),
     fault(
         "shading/light/choice",
         &[(
-            "let index = min(u32(place), frame.lights - 1u);\n    return LightChoice(index, 1.0",
-            "let index = min(u32(place), frame.lights - 1u);\n    return LightChoice(index, 1.01",
+            "return LightChoice(index, even_share(index));",
+            "return LightChoice(index, 1.01 * even_share(index));",
         )],
         "unequal lamps, chosen evenly",
     ),
     fault(
         "shading/light/tree",
-        &[("probability *= 1.0 - left;", "probability *= 1.01 - left;")],
+        &[(
+            "return TreeChoice(links.y, units);",
+            "return TreeChoice(links.y, units + units / 100u);",
+        )],
         "unequal lamps, by a tree",
     ),
     fault(
@@ -234,8 +237,8 @@ const OTHERS: [Fault; 38] = [
     fault(
         "shading/light/ies",
         &[(
-            "horizontal = atan2(d.y, d.x);",
-            "horizontal = atan2(d.x, d.y);",
+            "horizontal = angle_of(d.y, d.x);",
+            "horizontal = angle_of(d.x, d.y);",
         )],
         "far and measured lights",
     ),

@@ -21,7 +21,8 @@ pub struct Probe {
 }
 
 /// Kernels of this folder.
-pub const SOURCES: [(&str, &str); 2] = [
+pub const SOURCES: [(&str, &str); 3] = [
+    ("test/chosen", include_str!("kernels/chosen.wesl")),
     ("test/density", include_str!("kernels/density.wesl")),
     ("test/flux", include_str!("kernels/flux.wesl")),
 ];
@@ -44,6 +45,22 @@ pub static DENSITY: [Probe; 3] = [
     },
     Probe {
         kernel: "test/density",
+        feature: "light_tree",
+    },
+];
+
+/// What is chosen, by power, evenly and by a tree.
+pub static CHOSEN: [Probe; 3] = [
+    Probe {
+        kernel: "test/chosen",
+        feature: "",
+    },
+    Probe {
+        kernel: "test/chosen",
+        feature: "uniform_lights",
+    },
+    Probe {
+        kernel: "test/chosen",
         feature: "light_tree",
     },
 ];
@@ -88,6 +105,25 @@ pub fn probe(
     size: u32,
     [spp, seeds]: [u32; 2],
 ) -> Vec<[f64; 3]> {
+    let seeds: Vec<u32> = (1..=seeds).map(|seed| 40 * seed).collect();
+    let mut means = Vec::new();
+    images(gpu, scene, of, size, spp, &seeds, |pixels| {
+        let count = pixels.len() as f64;
+        means.push([0, 1, 2].map(|c| pixels.iter().map(|p| f64::from(p[c])).sum::<f64>() / count));
+    });
+    means
+}
+
+/// Hands out the pixels of images of `size` pixels, one for each seed.
+pub fn images(
+    gpu: &Gpu,
+    scene: SceneData,
+    of: &'static Probe,
+    size: u32,
+    spp: u32,
+    seeds: &[u32],
+    mut see: impl FnMut(&[[f32; 3]]),
+) {
     let stage = Stage::new(gpu, scene);
     let traced = stage.traced(gpu, structure("bvh"));
     let integrator = ConfiguredIntegrator::new(of, &Variant::default()).expect("no parameters");
@@ -102,16 +138,10 @@ pub fn probe(
     };
     let renderer = Renderer::new(gpu, &stage.buffers, &traced, &job, false);
     let renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
-    let one = |seed| {
-        let image = renderer
-            .render(&[spp], seed)
-            .expect("a render")
-            .remove(0)
-            .image;
-        let count = image.pixels.len() as f64;
-        [0, 1, 2].map(|c| image.pixels.iter().map(|p| f64::from(p[c])).sum::<f64>() / count)
-    };
-    (1..=seeds).map(|seed| one(40 * seed)).collect()
+    for seed in seeds {
+        let mut shots = renderer.render(&[spp], *seed).expect("a render");
+        see(&shots.remove(0).image.pixels);
+    }
 }
 
 /// A sky that is dark nowhere and bright in one place.

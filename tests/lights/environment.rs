@@ -7,8 +7,9 @@ use glam::Vec3;
 use raystone::gpu::Gpu;
 use raystone::image::{FileFormat, Image};
 use raystone::params::ParamValue;
-use raystone::scene::{Light, SceneData};
+use raystone::scene::{EnvironmentMap, Light, SceneData};
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
 /// Bilinear radiance of the map, written from its description.
 fn radiance(light: &Light, polar: f64, azimuth: f64) -> f64 {
@@ -16,8 +17,8 @@ fn radiance(light: &Light, polar: f64, azimuth: f64) -> f64 {
         panic!("no environment");
     };
     let (width, height) = (map.width as usize, map.height as usize);
-    // A turn by +a about y takes the azimuth φ, measured from −z towards −x, to φ + a.
-    let around = (azimuth - f64::from(*turn)).rem_euclid(TAU) / TAU * width as f64 - 0.5;
+    // A turn by +a about y takes the azimuth φ, measured from −z towards +x, to φ − a.
+    let around = (azimuth + f64::from(*turn)).rem_euclid(TAU) / TAU * width as f64 - 0.5;
     let down = (polar / PI * height as f64 - 0.5).clamp(0.0, height as f64 - 1.0);
     let column = around.floor();
     let left = column.rem_euclid(width as f64) as usize;
@@ -66,7 +67,7 @@ pub fn fault(gpu: &Gpu) -> Option<String> {
     for (polar, azimuth) in [(0.3_f64, 0.2_f64), (1.1, 2.0), (1.4, 4.4), (0.05, 6.0)] {
         let (sin, cos) = polar.sin_cos();
         let towards = Vec3::new(
-            (-azimuth.sin() * sin) as f32,
+            (azimuth.sin() * sin) as f32,
             cos as f32,
             (-azimuth.cos() * sin) as f32,
         );
@@ -123,4 +124,72 @@ fn a_scene_takes_a_map_from_a_file_and_tells_what_is_wrong_with_it() {
         16,
     );
     assert!(found.mean > 0.49 && found.mean < 1.01, "{found:?}");
+}
+
+/// A map of six columns, of which these are white and all others black, turned about +y.
+fn columns(white: &[usize], turn: f32) -> Light {
+    let texel = |k: usize| Vec3::splat(f32::from(u8::from(white.contains(&(k % 6)))));
+    let texels = (0..18).map(texel).collect();
+    let map = EnvironmentMap::new("columns", [6, 3], texels, &mut Vec::new());
+    Light::Environment {
+        map: Arc::new(map.expect("a map")),
+        scale: 1.0,
+        turn,
+    }
+}
+
+/// Where columns lie: a quarter of the way across a map is +x, half +z, three quarters −x (Mitsuba 3, `envmap`); a turn by
+/// a quarter takes +x to −z (the right hand about +y).
+const PLACES: [(&[usize], f32, Vec3); 5] = [
+    (&[1], 0.0, Vec3::X),
+    (&[2, 3], 0.0, Vec3::Z),
+    (&[4], 0.0, Vec3::NEG_X),
+    (&[5, 0], 0.0, Vec3::NEG_Z),
+    (&[1], std::f32::consts::FRAC_PI_2, Vec3::NEG_Z),
+];
+
+/// What is wrong with the directions of columns, as rays see and light samples find them.
+pub fn fault_of_directions(gpu: &Gpu) -> Option<String> {
+    for (white, turn, direction) in PLACES {
+        let mut scene = floor();
+        scene.lights = vec![columns(white, turn)];
+        for (towards, seen) in [(direction, 1.0), (-direction, 0.0)] {
+            let camera = raystone::geometry::Camera {
+                eye: Vec3::Y,
+                target: Vec3::Y + towards,
+                up: Vec3::Y,
+                vertical_fov_degrees: 0.01,
+            };
+            let found = estimate(gpu, &scene, camera, &path_with(1, &[]), 4).mean;
+            if (found - seen).abs() > 1e-3 {
+                return Some(format!(
+                    "{white:?} turned by {turn}: {found} at {towards}, not {seen}"
+                ));
+            }
+            // A wall that faces this way, lit by samples of the map alone.
+            let turn_up = glam::Quat::from_rotation_arc(Vec3::Y, towards);
+            let mut wall = scene.clone();
+            for triangle in &mut wall.triangles {
+                triangle.vertices = triangle.vertices.map(|v| turn_up * v);
+            }
+            let camera = raystone::geometry::Camera {
+                eye: 0.5 * towards + 0.1 * Vec3::Y,
+                target: Vec3::ZERO,
+                ..camera
+            };
+            let what = path_with(1, &[("strategy", "light")]);
+            let lit = estimate(gpu, &wall, camera, &what, 64).mean;
+            if (lit > 0.05) != (seen > 0.0) {
+                return Some(format!(
+                    "{white:?} turned by {turn}: a wall towards {towards} is lit by {lit}"
+                ));
+            }
+        }
+    }
+    None
+}
+
+#[test]
+fn columns_grow_to_the_right_from_behind_through_plus_x() {
+    assert_eq!(fault_of_directions(gpu()), None);
 }

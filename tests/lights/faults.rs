@@ -180,8 +180,8 @@ const FAULTS: &[(&str, &str, &str, Seen)] = &[
     ("environment", "fract(x)", "0.5 * fract(x)", Environment),
     (
         "environment",
-        "atan2(-d.x, -d.z)",
-        "atan2(d.x, -d.z)",
+        "angle_of(d.x, -d.z)",
+        "angle_of(-d.x, -d.z)",
         Environment,
     ),
     (
@@ -192,14 +192,14 @@ const FAULTS: &[(&str, &str, &str, Seen)] = &[
     ),
     (
         "environment",
-        "if (along < threshold)",
+        "if (place < own.x)",
         "if (true)",
         Density("environment"),
     ),
     (
         "environment",
-        "let drop = 2.0 * edge * edge + point.y",
-        "let drop = 2.0 * edge * edge + 0.8 * point.y",
+        "let drop = 2.0 * edge * edge + down.along",
+        "let drop = 2.0 * edge * edge + 0.8 * down.along",
         Environment,
     ),
     (
@@ -235,7 +235,7 @@ const FAULTS: &[(&str, &str, &str, Seen)] = &[
     ),
     (
         "ies",
-        "vertical = atan2(d.y, d.z);",
+        "vertical = angle_of(d.y, d.z);",
         "vertical = atan2(d.y, length(d.xz));",
         Flux,
     ),
@@ -247,8 +247,8 @@ const FAULTS: &[(&str, &str, &str, Seen)] = &[
     ),
     (
         "choice",
-        "return LightChoice(index, 1.0 / f32(frame.lights)",
-        "return LightChoice(index, 1.01 / f32(frame.lights)",
+        "return LightChoice(index, even_share(index))",
+        "return LightChoice(index, 1.01 * even_share(index))",
         Density("several spheres"),
     ),
     (
@@ -259,26 +259,21 @@ const FAULTS: &[(&str, &str, &str, Seen)] = &[
     ),
     (
         "choice",
-        "let part = 1.0 / f32(groups);",
-        "let part = 1.0;",
+        "return LightChoice(found.light, unit_share(found.units));",
+        "return LightChoice(found.light, unit_share(found.units) * 2.0);",
         Mean("tree", "one"),
     ),
     (
         "tree",
-        "probability *= 1.0 - left;",
-        "probability *= left;",
+        "units -= part;",
+        "units = part;",
         Density("several spheres"),
     ),
+    ("tree", "rest -= part;", "", Density("several spheres")),
     (
         "tree",
-        "rest = min(rest / left, 0.99999994);",
-        "",
-        Density("several spheres"),
-    ),
-    (
-        "tree",
-        "select(1.0 - left, left, (node & 1u) == 0u)",
-        "select(left, 1.0 - left, (node & 1u) == 0u)",
+        "select(units - part, part, is_left)",
+        "select(part, units - part, is_left)",
         Density("several spheres"),
     ),
     (
@@ -314,4 +309,15 @@ fn every_planted_fault_is_seen() {
         FAULTS.len() > 40 && missed.is_empty(),
         "not seen: {missed:#?}"
     );
+}
+
+#[test]
+fn a_map_that_rays_and_samples_mirror_alike_is_seen() {
+    let mirrored = [
+        ("angle_of(d.x, -d.z)", "angle_of(-d.x, -d.z)"),
+        ("sin(around) * sine, 1.0", "-sin(around) * sine, 1.0"),
+    ];
+    let gpu = probing(kernels_with("shading/light/environment", &mirrored));
+    let found = environment::fault_of_directions(&gpu);
+    assert!(found.is_some_and(|text| text.starts_with("[1] turned by 0")));
 }

@@ -1,6 +1,7 @@
 //! Lights against closed forms, their samples against their densities, and the ways of choosing them against each
 //! other; and whether planted faults are seen.
 
+mod chosen;
 mod closed;
 mod density;
 mod environment;

@@ -40,7 +40,7 @@ fn mixed() -> SceneData {
 
 fn image(gpu: &Gpu, scene: &SceneData, choice: &str, lights: &str) -> Estimate {
     let what = path_with(3, &[("light_choice", choice), ("lights", lights)]);
-    estimate(gpu, scene, scene.camera.expect("a camera"), &what, 96)
+    estimate(gpu, scene, scene.camera.expect("a camera"), &what, 384)
 }
 
 /// What is wrong with the mean of this choice, if something is.

@@ -5,6 +5,8 @@ mod gltf;
 mod obj;
 mod ply;
 mod real;
+mod reduced;
+mod said;
 mod text;
 
 use glam::{DVec3, Vec2, Vec3};

@@ -121,6 +121,8 @@ pub fn plain_scene(name: String, triangles: Vec<Triangle>) -> SceneData {
         triangles,
         uvs: Vec::new(),
         normals: Vec::new(),
+        mirrored: Vec::new(),
+        colors: Vec::new(),
         materials: vec![Material::diffuse("grey", Vec3::splat(0.5))],
         textures: Vec::new(),
         assembly: None,

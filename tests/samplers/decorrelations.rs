@@ -353,3 +353,116 @@ fn cranley_patterson_keeps_differences_and_shifts_each_pixel_and_dimension_on_it
         );
     }
 }
+
+/// How many pairs of neighbouring words, of runs of words that begin anew for each of `runs`, come up twice.
+fn repeated_pairs(runs: impl Iterator<Item = Vec<u32>>) -> usize {
+    let mut pairs: Vec<u64> = Vec::new();
+    for run in runs {
+        pairs.extend(
+            run.windows(2)
+                .map(|w| u64::from(w[0]) << 32 | u64::from(w[1])),
+        );
+    }
+    pairs.sort_unstable();
+    pairs.windows(2).filter(|w| w[0] == w[1]).count()
+}
+
+/// The samplers whose words are random to all of their 32 bits.
+fn random_samplers() -> Vec<Sampler> {
+    let demand = demand(64, 4);
+    let hash = |hash: &str| {
+        let changes = [("hash", name(hash))];
+        try_sampler(("pixel-hash", &changes), ("none", &[]), &demand).expect("a sampler")
+    };
+    let others = [
+        ("owen-sobol", "none"),
+        ("sobol", "owen-hash"),
+        ("sobol", "digital-shift"),
+        ("halton", "cranley-patterson"),
+        ("jittered", "none"),
+        ("sobol", "linear-scramble"),
+    ];
+    let others = others.map(|(sequence, scheme)| sampler(sequence, scheme, &demand));
+    [hash("pcg"), hash("wang")]
+        .into_iter()
+        .chain(others)
+        .collect()
+}
+
+#[test]
+fn no_seed_draws_a_shifted_run_of_another_over_pixels_dimensions_or_samples() {
+    // With hash(pixel + hash(seed)), 3.4 of these pairs of seeds would share a run of pixels by expectation.
+    let seeds =
+        (0..1800_u32).chain((0..900_u32).map(|i| (1 << 31) + 0x9e37_79b9_u32.wrapping_mul(i)));
+    for sampler in random_samplers() {
+        let run = |seed| {
+            let word = |pixel| {
+                sampler.sample_u32(Coordinate {
+                    pixel,
+                    seed,
+                    ..at(1, 1)
+                })
+            };
+            (0..2048).map(word).collect()
+        };
+        assert_eq!(
+            repeated_pairs(seeds.clone().map(run)),
+            0,
+            "{}",
+            sampler.label()
+        );
+    }
+    // Within one seed pixels are keys of their own: over their samples, and over their dimensions.
+    for sampler in &random_samplers()[..2] {
+        let pixels = || (0..1_u32 << 14).map(|pixel| 1 + pixel * 3);
+        let samples = |pixel| {
+            let word = |i| {
+                sampler.sample_u32(Coordinate {
+                    pixel,
+                    seed: 5,
+                    ..at(i, 1)
+                })
+            };
+            (0..128).map(word).collect()
+        };
+        assert_eq!(
+            repeated_pairs(pixels().map(samples)),
+            0,
+            "{}",
+            sampler.label()
+        );
+        let dimensions = |pixel| {
+            let word = |d| {
+                sampler.sample_u32(Coordinate {
+                    pixel,
+                    seed: 5,
+                    ..at(1, d)
+                })
+            };
+            (0..128).map(word).collect()
+        };
+        assert_eq!(
+            repeated_pairs(pixels().map(dimensions)),
+            0,
+            "{}",
+            sampler.label()
+        );
+    }
+}
+
+#[test]
+fn seeds_that_differ_in_their_last_bit_draw_different_numbers() {
+    for sampler in random_samplers() {
+        for k in (0..4000_u32).chain((0..4000_u32).map(|i| i.wrapping_mul(0x85eb_ca6b) >> 1)) {
+            let words = |seed| {
+                (0..3).map(move |pixel| Coordinate {
+                    pixel,
+                    seed,
+                    ..at(1, 1)
+                })
+            };
+            let draw = |seed| -> Vec<u32> { words(seed).map(|c| sampler.sample_u32(c)).collect() };
+            assert_ne!(draw(2 * k), draw(2 * k + 1), "{}: {k}", sampler.label());
+        }
+    }
+}

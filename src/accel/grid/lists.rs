@@ -6,7 +6,7 @@
 
 use super::super::{AccelError, TriangleSoup, triangle::TriangleRecord};
 use super::raster::Raster;
-use super::{Grid, MAX_WORDS, check_words};
+use super::{Grid, check_words, most_words};
 use crate::accel::BuildLog;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -14,8 +14,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Buckets of a sort; more would spill the write buffers, fewer the counters.
 const BUCKETS: u32 = 64;
-/// References are counted up to this number, which is too many by far.
-const ENOUGH: u64 = 16 * MAX_WORDS;
+/// References are counted up to so many times as many as there may be, which is too many by far.
+const ENOUGH: u64 = 16;
 /// References after which a run tells the others how many it found.
 const REPORT: u64 = 1 << 16;
 /// Fewest triangles of a run.
@@ -39,7 +39,7 @@ impl Lists {
     /// Lists all triangles of a scene; `exact` as in [`Raster::rows`]. Phases `insert` and `sort`.
     ///
     /// # Errors
-    /// More cells or references than [`MAX_WORDS`].
+    /// More cells or references than [`most_words`].
     pub fn new(
         name: &str,
         grid: &Grid,
@@ -47,15 +47,18 @@ impl Lists {
         exact: bool,
         log: &mut BuildLog,
     ) -> Result<Self, AccelError> {
-        check_words(&format!("cells of a {name}"), grid.cells())?;
+        check_words(&format!("cells of a {name}"), grid.cells(), log)?;
+        let most = most_words(log);
         let shift = bucket_shift(grid.cells() as u32);
-        let (runs, needed) = log.phase("insert", || insert(grid, &soup.records, exact, shift));
-        let more = if needed > ENOUGH {
+        let (runs, needed) = log.phase("insert", || {
+            insert(grid, &soup.records, exact, (shift, most))
+        });
+        let more = if needed > ENOUGH * most {
             "counted so far"
         } else {
             "in all"
         };
-        check_words(&format!("references of a {name}, {more}"), needed)?;
+        check_words(&format!("references of a {name}, {more}"), needed, log)?;
         Ok(log.phase("sort", || sort(grid.cells() as usize, shift, &runs)))
     }
 
@@ -71,9 +74,14 @@ fn bucket_shift(cells: u32) -> u32 {
     bits.saturating_sub(BUCKETS.ilog2())
 }
 
-/// Pairs of every run in the order of the triangles, and their number. Beyond [`MAX_WORDS`] they are
-/// only counted, and beyond [`ENOUGH`] no more.
-fn insert(grid: &Grid, records: &[TriangleRecord], exact: bool, shift: u32) -> (Vec<Pairs>, u64) {
+/// Pairs of every run in the order of the triangles, and their number. Beyond `most` they are only counted, and beyond [`ENOUGH`]
+/// times as many no more.
+fn insert(
+    grid: &Grid,
+    records: &[TriangleRecord],
+    exact: bool,
+    (shift, most): (u32, u64),
+) -> (Vec<Pairs>, u64) {
     let total = AtomicU64::new(0);
     let runs = 4 * rayon::current_num_threads();
     let run_length = records.len().div_ceil(runs).max(LEAST_RUN);
@@ -86,7 +94,7 @@ fn insert(grid: &Grid, records: &[TriangleRecord], exact: bool, shift: u32) -> (
         for triangle in run {
             raster.rows(grid, triangle, exact, |first, cells| {
                 count += u64::from(cells);
-                if so_far <= MAX_WORDS {
+                if so_far <= most {
                     for cell in first..first + cells {
                         pairs[(cell >> shift) as usize].push((cell, triangle.id));
                     }
@@ -96,7 +104,7 @@ fn insert(grid: &Grid, records: &[TriangleRecord], exact: bool, shift: u32) -> (
                 so_far = total.fetch_add(count, Ordering::Relaxed) + count;
                 count = 0;
             }
-            if so_far > ENOUGH {
+            if so_far > ENOUGH * most {
                 break;
             }
         }

@@ -15,19 +15,21 @@ use super::bounds::Bounds;
 use super::ray::Ray;
 use super::spatial::cross;
 use super::triangle::TriangleRecord;
-use super::{AccelError, TriangleSoup};
+use super::{AccelError, BuildLog, TriangleSoup};
 use crate::gpu::UniformValues;
 use rayon::prelude::*;
 
-/// Most words in an array: 128 MiB, what software adapters bind, less the sentinel.
-pub const MAX_WORDS: u64 = (128 << 20) / 4 - 1;
+/// Words that an array of a grid may have on the adapter of `log`, less the sentinel.
+pub fn most_words(log: &BuildLog) -> u64 {
+    log.most_words() - 1
+}
 
-/// [`AccelError::Limit`] if `needed` words are more than [`MAX_WORDS`].
+/// [`AccelError::Limit`] if `needed` words are more than [`most_words`].
 ///
 /// # Errors
 /// The limit with both numbers.
-pub fn check_words(what: &str, needed: u64) -> Result<(), AccelError> {
-    AccelError::check_limit(what, needed, MAX_WORDS)
+pub fn check_words(what: &str, needed: u64, log: &BuildLog) -> Result<(), AccelError> {
+    AccelError::check_limit(what, needed, most_words(log))
 }
 
 /// The box that a grid fills, and how exact positions in it are.

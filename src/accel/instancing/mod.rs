@@ -147,8 +147,14 @@ impl Base {
         log: &mut BuildLog,
     ) -> Result<Self, AccelError> {
         let view = View::of(soup);
+        // Rays come to an object from as far as instances are moved apart, in units of any scale: no margin
+        // around its clipped triangles would do.
+        let tree = TreeParameters {
+            spatial_clip: tree.spatial_clip && soup.placed.is_none(),
+            ..tree.clone()
+        };
         Ok(Self {
-            forest: Forest::build(&view.objects, tree, log)?,
+            forest: Forest::build(&view.objects, &tree, log)?,
             instances: view.instances.into_owned(),
         })
     }

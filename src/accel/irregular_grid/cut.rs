@@ -2,10 +2,10 @@
 //! triangles, and cells of one voxel; empty octants are one cell from the start.
 
 use super::super::grid::lists::{Lists, PartLists, in_runs};
-use super::super::grid::{Cut, Grid, GridBox, areas, check_words, finest};
+use super::super::grid::{Cut, Grid, GridBox, areas, finest, most_words};
 use super::super::{AccelError, TriangleSoup};
 use super::voxels::{Block, Entry, GridCell, Map};
-use super::{Options, Partition};
+use super::{MOST_PLACES, Options, Partition};
 use crate::accel::BuildLog;
 use rayon::prelude::*;
 
@@ -31,6 +31,7 @@ pub fn cut(
     let coarse = Grid::new(&grid_box, top);
     let fine = coarse.part([0; 3], top, top.map(|n| n << shift));
     let lists = Lists::new(name, &coarse, soup, true, log)?;
+    let most = most_words(log).min(MOST_PLACES);
     log.phase("build", || {
         let tops = coarse.cells() as usize;
         let areas = areas(soup);
@@ -40,7 +41,7 @@ pub fn cut(
             1u64 << (3 * parts_log(&fine, settings, shift, areas))
         };
         let needed: u64 = (0..tops).into_par_iter().map(voxels).sum();
-        check_words(&format!("voxels of an {name}"), needed)?;
+        AccelError::check_limit(format!("voxels of an {name}"), needed, most)?;
         let cut_run = |cells: std::ops::Range<usize>| {
             let mut run = Run {
                 fine: &fine,

@@ -18,13 +18,15 @@ mod voxels;
 
 use self::voxels::{GridCell, Map};
 use super::grid::lists::check_lists;
-use super::grid::{Grid, check_words, clamped, first_axis, outside};
+use super::grid::{Grid, check_words, clamped, first_axis, most_words, outside};
 use super::structure::prelude::*;
 use super::watch;
 use crate::gpu::UniformValues;
 
 /// Bits of an entry that hold the logarithm of its block's side; 0: the rest is a cell.
 const LOG_BITS: u32 = 2;
+/// Places that an entry can name.
+const MOST_PLACES: u64 = (1 << (32 - LOG_BITS)) - 1;
 const LOG_MASK: u32 = 3;
 /// Marks the last reference of a list.
 const LAST: u32 = 0x8000_0000;
@@ -66,11 +68,13 @@ impl Structure for IrregularGrid {
         check_words(
             "cells of an irregular-grid",
             4 * partition.cells.len() as u64,
+            log,
         )?;
         let arrays = log.phase("compress", || compress::compress(&partition));
-        check_words(
+        AccelError::check_limit(
             "map and references of an irregular-grid",
             arrays.words.len() as u64,
+            most_words(log).min(MOST_PLACES),
         )?;
         Ok(Box::new(Built {
             fine: partition.fine,

@@ -1,16 +1,22 @@
 //! What `validate()` of a structure over triangles checks.
 //!
-//! A triangle may stand in several leaves, none of which contains its box T (after spatial splits).
-//! The premise of the theorem in `docs/design.md` is then that the boxes of these leaves together
-//! *cover* T, and the proof goes on as follows. Let the triangle's hit at t be the final answer. On each
-//! axis a, the computed slab distances of T's sides bound an interval; let t_a be t clamped into it. The
-//! computed distance is monotone in the coordinate, so some coordinate y_a of T, or one as near as
-//! we like, has the distance t_a. The point y lies in T, hence in some box B of the finite cover,
-//! and by monotonicity n(B) ≤ max t_a ≤ max(t, n(T)) and f(B) ≥ min t_a ≥ min(t, f(T)). With
+//! A triangle may stand in several leaves, none of which contains its box T (after spatial splits). Each
+//! point of the triangle must then lie in one of their boxes.
+//!
+//! Where spatial splits cut boxes and not triangles (`spatial_clip = false`), these leaves together even
+//! *cover* T, and the theorem of `docs/design.md` holds for any ray. Let the triangle's hit at t be the
+//! final answer. On each axis a, the computed slab distances of T's sides bound an interval; let t_a be t
+//! clamped into it. The computed distance is monotone in the coordinate, so some coordinate y_a of T, or
+//! one as near as we like, has the distance t_a. The point y lies in T, hence in some box B of the finite
+//! cover, and by monotonicity n(B) ≤ max t_a ≤ max(t, n(T)) and f(B) ≥ min t_a ≥ min(t, f(T)). With
 //! t ≤ f(T)(1 + p) and n(T)(1 − p) ≤ t, the four inequalities of the theorem follow for B, and for
 //! every box around B. No pad is needed, and nothing is assumed about where in T the hit lies.
+//!
+//! Where triangles are clipped, the same follows if y lies within the margin of the triangle: it does
+//! unless the ray is almost in its plane (`src/accel/spatial.rs`).
 
 use crate::accel::bounds::Bounds;
+use crate::accel::polygon::Polygon;
 use crate::accel::triangle::TriangleRecord;
 use crate::accel::{AccelError, TriangleSoup};
 
@@ -18,7 +24,7 @@ use crate::accel::{AccelError, TriangleSoup};
 pub type Below = (usize, Bounds);
 
 /// Bookkeeping of `validate()`: every node reached once, and every triangle in a leaf that contains
-/// its box or in several that together cover it. More leaves than needed are a waste, which
+/// it or in several that together cover it. More leaves than needed are a waste, which
 /// `references` of the statistics shows, but no fault.
 pub struct Coverage<'a> {
     soup: &'a TriangleSoup,
@@ -129,9 +135,9 @@ impl<'a> Coverage<'a> {
                 continue;
             }
             let boxes: Vec<Bounds> = parts.iter().map(|(_, bounds)| *bounds).collect();
-            let own = self.soup.records[id as usize].bounds();
+            let own = Polygon::new(&self.soup.records[id as usize]);
             ensure!(
-                covers(&boxes, &own),
+                covers(&boxes, own),
                 "triangle {id} sticks out of its leaf's box, or its {} leaves do not cover it",
                 boxes.len()
             );
@@ -157,30 +163,33 @@ fn meet(a: &Bounds, b: &Bounds) -> bool {
     (0..3).all(|axis| a.min[axis] <= b.max[axis] && b.min[axis] <= a.max[axis])
 }
 
-/// Whether closed `boxes` together cover `whole`: what sticks out of the first that meets it must
-/// be covered by the others.
-fn covers(boxes: &[Bounds], whole: &Bounds) -> bool {
-    let Some(first) = boxes.iter().position(|b| meet(b, whole)) else {
+/// Whether closed `boxes` together cover `rest`: what sticks out of the first that reaches it must be
+/// covered by the others.
+fn covers(boxes: &[Bounds], mut rest: Polygon) -> bool {
+    let reaches = |b: &Bounds| {
+        (0..3).all(|axis| {
+            let at = |corner: &[f64; 3]| corner[axis];
+            let (low, high) = (f64::from(b.min[axis]), f64::from(b.max[axis]));
+            rest.corners().iter().map(at).any(|x| x <= high)
+                && rest.corners().iter().map(at).any(|x| x >= low)
+        })
+    };
+    let Some(first) = boxes.iter().position(reaches) else {
         return false;
     };
     let (cover, others) = (&boxes[first], &boxes[first + 1..]);
-    let mut rest = *whole;
     for axis in 0..3 {
-        if rest.min[axis] < cover.min[axis] {
-            let mut below = rest;
-            below.max[axis] = cover.min[axis];
-            if !covers(others, &below) {
-                return false;
+        for (border, sign) in [(cover.min[axis], 1.0), (cover.max[axis], -1.0)] {
+            let border = f64::from(border);
+            let is_outside = |corner: &[f64; 3]| (corner[axis] - border) * sign < 0.0;
+            if rest.corners().iter().any(is_outside) {
+                let mut outside = rest;
+                outside.cut(axis, border, -sign);
+                if !covers(others, outside) {
+                    return false;
+                }
+                rest.cut(axis, border, sign);
             }
-            rest.min[axis] = cover.min[axis];
-        }
-        if rest.max[axis] > cover.max[axis] {
-            let mut above = rest;
-            above.min[axis] = cover.max[axis];
-            if !covers(others, &above) {
-                return false;
-            }
-            rest.max[axis] = cover.max[axis];
         }
     }
     true
@@ -220,6 +229,18 @@ mod tests {
         assert!(check(&[low, moved, high_far]).is_err());
         assert!(check(&[low, high_near]).is_err());
         assert!(check(&[low, high_near, low]).is_err());
+    }
+
+    #[test]
+    fn leaves_need_not_hold_the_corners_of_the_box_that_the_triangle_misses() {
+        // Below x = 2 the triangle reaches from y = 0 to 2 and from z = 0 to 8, above it from y = 1 and to
+        // z = 4.
+        let low = slab([0.0; 3], [2.0, 2.0, 8.0]);
+        let high = |y: f32, z: f32| slab([2.0, y, 0.0], [4.0, 2.0, z]);
+        assert_eq!(check(&[low, high(1.0, 4.0)]), Ok(()));
+        assert_eq!(check(&[high(1.0, 4.0), low]), Ok(()));
+        assert!(check(&[low, high(1.0_f32.next_up(), 4.0)]).is_err());
+        assert!(check(&[low, high(1.0, 4.0_f32.next_down())]).is_err());
     }
 
     #[test]

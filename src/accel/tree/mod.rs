@@ -65,7 +65,7 @@ pub struct Tree {
     /// Nodes; empty for an empty scene.
     pub nodes: Vec<TreeNode>,
     /// Triangle indices, leaf by leaf in the order of the nodes. After spatial splits a triangle may
-    /// stand in several leaves, whose boxes cover its own only together.
+    /// stand in several leaves, whose boxes cover it only together.
     pub order: Vec<u32>,
     /// End-point overlap, where [`Tree::note_epo`] took it.
     pub epo: Option<f64>,
@@ -116,7 +116,7 @@ impl Tree {
                 Builder::Binned => binned::build(references, settings),
                 Builder::Sweep => sweep::build(&references, Axes::All, settings),
                 Builder::LongestAxisSweep => sweep::build(&references, Axes::Longest, settings),
-                Builder::Sbvh => sbvh::build(references, settings),
+                Builder::Sbvh => sbvh::build(references, soup, settings),
                 Builder::Ploc => ploc::build(&references, settings, false)?,
                 Builder::PlocReinsertion => ploc::build(&references, settings, true)?,
                 // Of the pair only the one on the host comes here.

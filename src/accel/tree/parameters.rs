@@ -39,6 +39,9 @@ parameters! {
         spatial_alpha: f32 = 1e-3, in 0.0..=1.0;
         /// bins on an axis for spatial splits (sbvh)
         spatial_bins: usize = 32, in 2..=256;
+        /// spatial splits cut triangles, as in the paper; without it the boxes of triangles, whose hits are
+        /// proved for any ray; objects with instances always (sbvh)
+        spatial_clip: bool = true;
         /// preset of obvhs (ploc, ploc-reinsertion)
         ploc_preset: Preset = Preset::Medium;
         /// Morton codes of 60 bits instead of 30 (host-*, device-*)

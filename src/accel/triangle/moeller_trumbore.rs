@@ -1,13 +1,8 @@
 //! Möller and Trumbore's test. Twin of `kernels/accel/triangle/moeller_trumbore.wesl`.
 //! Source: T. Möller, B. Trumbore, "Fast, minimum storage ray/triangle intersection", Journal of
 //! Graphics Tools 2(1), 1997; with the unnormalised normal and without a division before the accept.
-//!
-//! The paper's distance is that to a plane whose normal is a product of edges. Of a triangle with long edges
-//! that is thin, this product is a difference of large ones, and the plane is off by length over height: such
-//! triangles would meet the rays that leave them. So the distance is that of [`slid_distance`].
 
 use super::plane::plane_error;
-use super::watertight::slid_distance;
 use super::{APART, Meeting, TriangleRecord, TriangleTest};
 use crate::accel::ray::Ray;
 
@@ -27,7 +22,7 @@ impl TriangleTest for MoellerTrumbore {
         "accel/triangle/moeller_trumbore"
     }
 
-    fn meet(&self, triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> Meeting {
+    fn meet(&self, triangle: &TriangleRecord, ray: &Ray, _: &[f32; 3]) -> Meeting {
         let TriangleRecord { v0, v1, v2, .. } = triangle;
         let [dx, dy, dz] = ray.direction;
         let [e1x, e1y, e1z] = [0, 1, 2].map(|a| v0[a] - v1[a]);
@@ -48,9 +43,10 @@ impl TriangleTest for MoellerTrumbore {
         if !(area > 0.0 && u >= 0.0 && v >= 0.0 && u + v <= area) {
             return APART;
         }
+        let height = flip(nx * cx + ny * cy + nz * cz);
         Meeting {
             area,
-            t: slid_distance(triangle, ray, inverse, u / area, v / area),
+            t: height / area,
             u,
             v,
         }

@@ -10,8 +10,7 @@ use crate::accel::ray::Ray;
 pub const DISTANCE_PAD: f32 = 9.536_743e-7;
 
 /// Bound on the rounding error of a distance to the plane that was computed from differences of
-/// vertices, or from a point of the triangle: [`DISTANCE_PAD`] of whatever coordinate is the greatest, since
-/// a step along an edge mixes the axes.
+/// vertices, [`DISTANCE_PAD`].
 pub fn plane_error(triangle: &TriangleRecord, ray: &Ray, found: &Meeting) -> f32 {
     let TriangleRecord { v0, v1, v2, .. } = triangle;
     let [e1x, e1y, e1z] = [0, 1, 2].map(|a| v0[a] - v1[a]);
@@ -21,17 +20,9 @@ pub fn plane_error(triangle: &TriangleRecord, ray: &Ray, found: &Meeting) -> f32
     let ny = e1z * e2x - e1x * e2z;
     let nz = e1x * e2y - e1y * e2x;
     let det = nx * dx + ny * dy + nz * dz;
-    let (e1, e2) = ([e1x, e1y, e1z], [e2x, e2y, e2z]);
-    let apart = |a: usize| {
-        let ray = (v0[a] - ray.origin[a]).abs() + found.t.abs() * ray.direction[a].abs();
-        ray + e1[a].abs() + e2[a].abs()
-    };
-    let reach = apart(0).max(apart(1)).max(apart(2));
-    let terms = (e1y * e2z).abs()
-        + (e1z * e2y).abs()
-        + (e1z * e2x).abs()
-        + (e1x * e2z).abs()
-        + (e1x * e2y).abs()
-        + (e1y * e2x).abs();
-    terms * reach * DISTANCE_PAD / det.abs()
+    let reach = |a: usize| (v0[a] - ray.origin[a]).abs() + found.t.abs() * ray.direction[a].abs();
+    let terms = ((e1y * e2z).abs() + (e1z * e2y).abs()) * reach(0)
+        + ((e1z * e2x).abs() + (e1x * e2z).abs()) * reach(1)
+        + ((e1x * e2y).abs() + (e1y * e2x).abs()) * reach(2);
+    terms * DISTANCE_PAD / det.abs()
 }

@@ -1,12 +1,8 @@
 //! Plücker products with a tolerance. Twin of `kernels/accel/triangle/pluecker.wesl`.
 //! Source: the robust triangle test of Embree 4 (S. Woop and others, Intel), which follows
 //! R. Davidovič and others, "3D rasterization: a bridge between rasterization and ray casting", 2012.
-//!
-//! The distance is that of [`slid_distance`], and not to a plane whose normal is a product of two edges, for the
-//! reason that [`super::MoellerTrumbore`] has.
 
 use super::plane::plane_error;
-use super::watertight::slid_distance;
 use super::{APART, Meeting, TriangleRecord, TriangleTest};
 use crate::accel::ray::Ray;
 
@@ -19,6 +15,18 @@ fn triple(a: [f32; 3], b: [f32; 3], d: [f32; 3]) -> f32 {
     let y = a[2] * b[0] - a[0] * b[2];
     let z = a[0] * b[1] - a[1] * b[0];
     x * d[0] + y * d[1] + z * d[2]
+}
+
+/// A component of the normal from two pairs of edges, the one with the smaller products.
+fn normal(a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> [f32; 3] {
+    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
+        let (ab, bc) = (a[j] * b[i], b[j] * c[i]);
+        if ab.abs() < bc.abs() {
+            a[i] * b[j] - ab
+        } else {
+            b[i] * c[j] - bc
+        }
+    })
 }
 
 /// Plücker coordinates with Embree's tolerance.
@@ -37,7 +45,7 @@ impl TriangleTest for Pluecker {
         "accel/triangle/pluecker"
     }
 
-    fn meet(&self, triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3]) -> Meeting {
+    fn meet(&self, triangle: &TriangleRecord, ray: &Ray, _: &[f32; 3]) -> Meeting {
         let add = |a: [f32; 3], b: [f32; 3]| [0, 1, 2].map(|i| a[i] + b[i]);
         let subtract = |a: [f32; 3], b: [f32; 3]| [0, 1, 2].map(|i| a[i] - b[i]);
         let d = ray.direction;
@@ -49,17 +57,20 @@ impl TriangleTest for Pluecker {
         let sum = u + v + w;
         let area = sum.abs();
         let slack = TOLERANCE * area;
+        let n = normal(e0, e1, e2);
+        let det = n[0] * d[0] + n[1] * d[1] + n[2] * d[2];
         let inside = u.min(v).min(w) >= -slack || u.max(v).max(w) <= slack;
-        if !(inside && area > 0.0) {
+        if !(inside && area > 0.0 && det.abs() > 0.0) {
             return APART;
         }
         let flip = |x: f32| f32::from_bits(x.to_bits() ^ (sum.to_bits() & 0x8000_0000));
         let clamp = |x: f32, high: f32| x.max(0.0).min(high);
         let u = clamp(flip(u), area);
         let v = clamp(flip(v), area - u);
+        let height = n[0] * a[0] + n[1] * a[1] + n[2] * a[2];
         Meeting {
             area,
-            t: slid_distance(triangle, ray, inverse, u / area, v / area),
+            t: height / det,
             u,
             v,
         }

@@ -94,9 +94,11 @@ pub fn products([a, b, c]: [[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
 
 /// The least denominator: of edges that are shorter, squares underflow.
 const SMALLEST_SQUARE: f32 = 1.175_494_4e-38;
+/// Smaller steps, as parts of an edge, are what rounding makes of any triangle: a quarter of what the offset leaves room for.
+const NEGLIGIBLE: f32 = 2.384_185_8e-7;
 
-/// Weights u and v of a point in the plane of a triangle of sheared vertices, moved along the longer of
-/// two edges until the point lies abreast of the ray, and behind them the point's z.
+/// Weights times the area of a point in the plane of a triangle of sheared vertices, moved along the longer of two
+/// edges until the point lies abreast of the ray.
 ///
 /// Weights err by the rounding of products of edges over the area: of a thin triangle by its length over
 /// its height. Whatever they are, the point lies in the plane, and beside the ray almost along the
@@ -104,32 +106,23 @@ const SMALLEST_SQUARE: f32 = 1.175_494_4e-38;
 /// brings the point to the ray, but for rounding of the vertices, and does not leave the plane. Of two
 /// edges the longer one has half of the greatest length at least. No normal is made: that of a thin
 /// triangle with three long edges is a difference of large products.
-pub(super) fn slid([a, b, c]: [[f32; 3]; 3], u: f32, v: f32) -> [f32; 3] {
-    let ab = [0, 1, 2].map(|i| b[i] - a[i]);
-    let ac = [0, 1, 2].map(|i| c[i] - a[i]);
-    let x = a[0] + u * ab[0] + v * ac[0];
-    let y = a[1] + u * ab[1] + v * ac[1];
+fn slid([a, b, c]: [[f32; 3]; 3], w: [f32; 3], area: f32) -> [f32; 3] {
+    let x = w[0] * a[0] + w[1] * b[0] + w[2] * c[0];
+    let y = w[0] * a[1] + w[1] * b[1] + w[2] * c[1];
+    let ab = [0, 1].map(|i| b[i] - a[i]);
+    let ac = [0, 1].map(|i| c[i] - a[i]);
     let first = ab[0] * ab[0] + ab[1] * ab[1];
     let second = ac[0] * ac[0] + ac[1] * ac[1];
     let along = if first >= second { ab } else { ac };
     let part = (x * along[0] + y * along[1]) / first.max(second).max(SMALLEST_SQUARE);
-    let (u, v) = match first >= second {
-        true => (u - part, v),
-        false => (u, v - part),
+    let step = match part.abs() > area * NEGLIGIBLE {
+        true => part,
+        false => 0.0,
     };
-    [u, v, a[2] + u * ab[2] + v * ac[2]]
-}
-
-/// Distance to the plane of a triangle, from the weights that a test has found.
-pub(super) fn slid_distance(
-    triangle: &TriangleRecord,
-    ray: &Ray,
-    inverse: &[f32; 3],
-    u: f32,
-    v: f32,
-) -> f32 {
-    let s = shear(ray, inverse);
-    slid(triangle.vertices().map(|v| sheared(&s, v)), u, v)[2] * s.scale
+    match first >= second {
+        true => [w[0] + step, w[1] - step, w[2]],
+        false => [w[0] + step, w[1], w[2] - step],
+    }
 }
 
 /// S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", 2013.
@@ -165,17 +158,17 @@ impl TriangleTest for Watertight {
         }
         let w = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
         let area = area_of(w, p, q);
-        if area.is_nan() || area <= 0.0 {
-            return APART;
-        }
-        let [u, v, z] = slid([a, b, c], w[1] / area, w[2] / area);
-        let u = u.max(0.0).min(1.0);
-        let v = v.max(0.0).min(1.0 - u);
+        let point = slid([a, b, c], w, area);
+        let clamp = |x: f32| x.max(0.0).min(area);
+        let u = clamp(point[1]);
         Meeting {
             area,
-            t: z * s.scale,
-            u: u * area,
-            v: v * area,
+            t: (point[0] * a[2] + point[1] * b[2] + point[2] * c[2]) * s.scale / area,
+            u,
+            v: match point[0] < 0.0 {
+                true => area - u,
+                false => clamp(point[2]),
+            },
         }
     }
 
@@ -196,13 +189,14 @@ impl TriangleTest for Watertight {
 /// direction.
 fn slide(triangle: &TriangleRecord, ray: &Ray, inverse: &[f32; 3], area: f32) -> [f32; 3] {
     let s = shear(ray, inverse);
-    let [a, b, c] = triangle.vertices().map(|v| sheared(&s, v));
-    let u = (c[1] * a[0] - c[0] * a[1]).abs() / area;
-    let v = (a[1] * b[0] - a[0] * b[1]).abs() / area;
-    let [slid_u, slid_v, _] = slid([a, b, c], u, v);
+    let vertices = triangle.vertices().map(|v| sheared(&s, v));
+    let (p, q) = products(vertices);
+    let w = [0, 1, 2].map(|i| (p[i] - q[i]).abs());
+    let point = slid(vertices, w, area);
+    let moved = [1, 2].map(|i| (point[i] - w[i]) / area);
     let [v0, v1, v2] = triangle.vertices();
-    let moved = |i: usize| (slid_u - u) * (v1[i] - v0[i]) + (slid_v - v) * (v2[i] - v0[i]);
-    [0, 1, 2].map(|i| moved(i).abs() * inverse[i].abs())
+    let along = |i: usize| moved[0] * (v1[i] - v0[i]) + moved[1] * (v2[i] - v0[i]);
+    [0, 1, 2].map(|i| along(i).abs() * inverse[i].abs())
 }
 
 /// Error of x and y of the point that the weights stand for, and what it makes of the distance.

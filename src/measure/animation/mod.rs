@@ -254,7 +254,7 @@ impl Work<'_> {
 
 impl Measured for Timed<'_> {
     fn measure(&self) -> Result<Elapsed, GpuError> {
-        let elapsed = self.work.run()?;
+        let elapsed = self.work.run()?.measured()?;
         self.notes.borrow_mut().push(elapsed);
         Ok(elapsed)
     }

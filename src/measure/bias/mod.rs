@@ -14,14 +14,20 @@
 //!
 //! So a sampler without bias is called biased with at most the whole probability.
 //!
+//! What is hit seldom shows no noise where no replicate hit it, and differs from the reference all the same.
+//! Where replicates show less than [`LEAST_NOISE`] of the noise that the reference foretells, what it foretells counts
+//! (`careful_test`). Below [`replicates_needed`] nothing is said at all.
+//!
 //! The t-test supposes that means are about normal. Many samples per pixel make them so; at very
 //! few, fireflies skew them and very small p-values come up too often.
 
 mod weights;
 
 use super::hypothesis::{
-    WelchTest, benjamini_hochberg, capped_t_test, least_rate, t_test_effect, t_test_power,
+    WelchTest, benjamini_hochberg, capped_t_test, least_rate, student_t_two_sided, t_test_effect,
+    t_test_power,
 };
+use super::statistics::{mean, median, variance};
 use crate::image::{Image, ImageError, luminance};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -33,6 +39,9 @@ pub const EFFECT: f64 = 10.0;
 pub const POWER: f64 = 0.9;
 /// Of the whole level, the part that each of the three tests gets.
 const SHARE: f64 = 1.0 / 3.0;
+/// Of the noise that the reference foretells for a mean, the part of the variance below which replicates are not
+/// believed: of eight even replicates one tile in twenty has as little by chance.
+pub const LEAST_NOISE: f64 = 0.25;
 /// Most replicates that an experiment may have.
 const MOST_REPLICATES: u32 = 1024;
 
@@ -116,9 +125,8 @@ pub struct BiasCheck {
 /// `reference_parts` (other seeds, better another sampler family).
 ///
 /// Fewer than two images on a side, or NaN or infinite pixels, are [`BiasVerdict::NotTestable`], and so
-/// are fewer than [`replicates_needed`] in which no bias was found, unless there is no noise at all. A
-/// tile without any variance on both sides counts as p = 1 if the means agree to the rounding, else as
-/// p = 0.
+/// are fewer than [`replicates_needed`], unless no pixel has any noise on either side. Then, and only then, a
+/// tile counts as p = 1 if the means agree to the rounding, else as p = 0.
 ///
 /// # Errors
 /// [`ImageError::SizeMismatch`] if the images are not all of one size.
@@ -149,17 +157,17 @@ pub fn check_bias(
         check.verdict = BiasVerdict::NotTestable(reason);
         return Ok(check);
     }
-    let tests = |tile: u32| -> Vec<Option<WelchTest>> {
-        let theirs = tile_means(reference_parts, tile);
-        let pairs = tile_means(replicates, tile).into_iter().zip(theirs);
-        pairs.map(|(a, b)| test(&a, &b, options.rounding)).collect()
-    };
+    let noisy = has_noise(replicates) || has_noise(reference_parts);
+    let tiles = [replicates, reference_parts].map(|images| tile_means(images, options.tile));
+    let noisier = noisy.then(|| noise_ratio(&tiles));
+    let test = |a: &[f64], b: &[f64]| careful_test(a, b, options.rounding, noisier);
     let (width, height) = (replicates[0].width, replicates[0].height);
     let level = SHARE * options.alpha;
-    check.whole = tests(width.max(height))[0];
+    let whole = |images| tile_means(images, width.max(height)).concat();
+    check.whole = test(&whole(replicates), &whole(reference_parts));
     let [ours, theirs] = weights::weighted_means(replicates, reference_parts).unwrap_or_default();
-    check.weighted = test(&ours, &theirs, options.rounding);
-    let brightness = mean_size(&tile_means(reference_parts, width.max(height)).concat());
+    check.weighted = test(&ours, &theirs);
+    let brightness = mean_size(&whole(reference_parts));
     let relative = [
         (check.whole, brightness),
         (check.weighted, mean_size(&theirs)),
@@ -170,18 +178,21 @@ pub fn check_bias(
     check.detectable = least.reduce(f64::min).map(|least| least + options.rounding);
     // Both sides have two finite samples or more, so the tests exist.
     let p_value = |test: Option<WelchTest>| test.map_or(1.0, |test| test.p);
-    let p_values: Vec<f64> = tests(options.tile).into_iter().map(p_value).collect();
+    let [ours, theirs] = &tiles;
+    let pairs = ours.iter().zip(theirs);
+    let p_values: Vec<f64> = pairs.map(|(a, b)| p_value(test(a, b))).collect();
     count_tiles(&mut check, &p_values, width, options);
     let of_image = [check.whole, check.weighted].map(p_value);
     let biased = of_image.iter().any(|p| *p <= level) || !check.rejected.is_empty();
     let least = of_image.into_iter().fold(least_rate(&p_values), f64::min);
     check.p = (least / SHARE).min(1.0);
-    let means = tile_means(replicates, width.max(height)).concat();
-    let noisy = means.iter().any(|mean| *mean != means[0]);
     let needed = replicates_needed(options.alpha);
-    if biased {
-        check.verdict = BiasVerdict::Biased;
-    } else if noisy && (replicates.len() as u64) < u64::from(needed) {
+    if !noisy || replicates.len() as u64 >= u64::from(needed) {
+        if biased {
+            check.verdict = BiasVerdict::Biased;
+        }
+    } else {
+        (check.rejected, check.p) = (Vec::new(), 1.0);
         check.verdict = BiasVerdict::NotTestable(format!(
             "{} replicates, {needed} are needed to find a bias of {EFFECT} standard errors in {:.0} % \
              of all cases at this level ({:.1e})",
@@ -243,8 +254,54 @@ fn tile_means(images: &[Image], tile: u32) -> Vec<Vec<f64>> {
     means
 }
 
-fn test(ours: &[f64], theirs: &[f64], rounding: f64) -> Option<WelchTest> {
-    capped_t_test(ours, theirs, rounding * mean_size(theirs))
+/// Whether any pixel differs from one image to another.
+fn has_noise(images: &[Image]) -> bool {
+    images.iter().any(|image| image.pixels != images[0].pixels)
+}
+
+/// How much noisier a replicate is than a part of the reference, in variance: the median over tiles in which both have
+/// noise.
+fn noise_ratio([ours, theirs]: &[Vec<Vec<f64>>; 2]) -> f64 {
+    let ratio = |(a, b): (&Vec<f64>, &Vec<f64>)| Some(variance(a)? / variance(b)?);
+    let ratios = ours.iter().zip(theirs).filter_map(ratio);
+    let ratios: Vec<f64> = ratios.filter(|r| r.is_finite() && *r > 0.0).collect();
+    median(&ratios).unwrap_or(0.0)
+}
+
+/// The test of one mean. `noisier` is [`noise_ratio`], absent where no pixel has any noise: then the means are compared
+/// as they are.
+///
+/// Where replicates have less than [`LEAST_NOISE`] of the variance that the reference's times `noisier` foretells, they
+/// have not seen what makes the noise there, and the foretold one counts. And n replicates that are all alike (to the
+/// rounding) speak no louder than they would with the reference's mean as one more of them, which makes |t| = n.
+fn careful_test(
+    ours: &[f64],
+    theirs: &[f64],
+    rounding: f64,
+    noisier: Option<f64>,
+) -> Option<WelchTest> {
+    let margin = rounding * mean_size(theirs);
+    let found = capped_t_test(ours, theirs, margin)?;
+    let Some(noisier) = noisier.filter(|_| found.t != 0.0) else {
+        return Some(found);
+    };
+    let n = ours.len() as f64;
+    let (own, foretold) = (variance(ours)?, noisier * variance(theirs)?);
+    let missing = match own < LEAST_NOISE * foretold {
+        true => foretold - own,
+        false => 0.0,
+    };
+    let gap = (mean(ours)? - mean(theirs)?).abs() - margin;
+    let standard_error = (found.standard_error.powi(2) + missing / n).sqrt();
+    let alike = own.sqrt() <= margin;
+    let most = if alike { n } else { f64::INFINITY };
+    let size = (gap / standard_error).min(most);
+    Some(WelchTest {
+        t: size.copysign(found.t),
+        p: student_t_two_sided(size, found.degrees_of_freedom),
+        standard_error,
+        ..found
+    })
 }
 
 fn mean_size(values: &[f64]) -> f64 {

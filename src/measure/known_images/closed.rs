@@ -87,8 +87,8 @@ pub fn over_hemisphere(n: u32, f: impl Fn(DVec3) -> DVec3) -> DVec3 {
 /// Radiance of a map in the direction of these angles, written from its description: bilinear between the centres of texels.
 pub fn map_radiance(map: &EnvironmentMap, turn: f64, polar: f64, azimuth: f64) -> DVec3 {
     let (width, height) = (map.width as usize, map.height as usize);
-    // A turn by +a about y takes the azimuth φ, measured from −z towards −x, to φ + a.
-    let around = (azimuth - turn).rem_euclid(TAU) / TAU * width as f64 - 0.5;
+    // A turn by +a about y takes the azimuth φ, measured from −z towards +x, to φ − a.
+    let around = (azimuth + turn).rem_euclid(TAU) / TAU * width as f64 - 0.5;
     let down = (polar / PI * height as f64 - 0.5).clamp(0.0, height as f64 - 1.0);
     let column = around.floor();
     let left = column.rem_euclid(width as f64) as usize;

@@ -227,7 +227,7 @@ fn map(name: &'static str, trial: Trial) -> Result<KnownImage, SceneError> {
     let mut views = vec![View::new("floor", Vec3::ZERO, NEAR, floor)];
     for (polar, azimuth) in [(0.3_f64, 0.2_f64), (1.1, 2.0), (1.4, 4.4)] {
         let (sin, cos) = polar.sin_cos();
-        let direction = DVec3::new(-azimuth.sin() * sin, cos, -azimuth.cos() * sin).as_vec3();
+        let direction = DVec3::new(azimuth.sin() * sin, cos, -azimuth.cos() * sin).as_vec3();
         let seen = map_radiance(&map, turn, polar, azimuth);
         let eye = Vec3::Y;
         views.push(View::new("sky", eye + direction, -direction, seen));

@@ -387,7 +387,7 @@ impl PathOracle<'_> {
         let Some(light) = light.filter(|l| l.density.is_none_or(f64::is_finite)) else {
             return DVec3::ZERO;
         };
-        let reflected = bsdf.evaluate(light.direction, &mut walk.rounding);
+        let reflected = bsdf.reflect(light.direction, &mut walk.rounding);
         let Some(Reflected { value, density }) = reflected else {
             return DVec3::ZERO;
         };

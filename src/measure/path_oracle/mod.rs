@@ -252,7 +252,7 @@ impl<'a> PathOracle<'a> {
 /// are no part of it.
 pub fn scattered(material: &Material, out: DVec3, from: DVec3) -> DVec3 {
     let surface = Surface::flat(material, out);
-    let reflected = bsdf::of(&surface).evaluate(from, &mut Rounding::none());
+    let reflected = bsdf::of(&surface).reflect(from, &mut Rounding::none());
     reflected.map_or(DVec3::ZERO, |reflected| reflected.value)
 }
 

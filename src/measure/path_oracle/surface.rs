@@ -3,7 +3,7 @@
 use super::PathOracle;
 use super::hits::{Hit, Segment};
 use super::rounding::Rounding;
-use crate::scene::{Material, decode_normal};
+use crate::scene::{Material, decode_color, decode_normal};
 use glam::DVec3;
 
 /// Roundings of a point between the numbers of the file and a ray that leaves it. A kernel's bound is eight of the point and
@@ -24,10 +24,10 @@ pub(super) struct Surface<'a> {
     pub geometric: DVec3,
     /// Unit shading normal on that side.
     pub normal: DVec3,
-    /// 1 where the corners turn counter-clockwise seen from there, -1 where not.
+    /// 1 where that is the front of the triangle, -1 where not.
     pub side: f64,
     pub material: &'a Material,
-    /// Base colour, with the texture.
+    /// Base colour, with the texture and the colours of vertices.
     pub base: DVec3,
     /// What metalness and roughness are multiplied by.
     pub varied: [f64; 2],
@@ -86,7 +86,11 @@ impl PathOracle<'_> {
         // The rounding of a thin triangle's normal is that of its edges against its height.
         let thinness = e1.length() * e2.length() / area.length();
         let outward = rounding.point(area.normalize(), DVec3::splat(thinness));
-        let outward = outward.normalize();
+        let front = match self.scene.is_mirrored(hit.triangle as usize) {
+            true => -1.0,
+            false => 1.0,
+        };
+        let outward = front * outward.normalize();
         let out = -segment.direction;
         let side = match outward.dot(out) > 0.0 {
             true => 1.0,
@@ -98,6 +102,7 @@ impl PathOracle<'_> {
         let uv = self.textures.coordinates(hit.triangle, weights);
         let [colours, varied, bent, shining] = material.texture_uses();
         let base = material.base_color.as_dvec3() * self.textures.colour(colours, uv);
+        let base = base * self.vertex_color(hit.triangle, weights);
         let varied = self.textures.numbers(varied, uv);
         let emission = material.emission.as_dvec3() * self.textures.colour(shining, uv);
         let geometric = side * outward;
@@ -131,6 +136,15 @@ impl PathOracle<'_> {
             },
             offset: OFFSET * reach,
         }
+    }
+
+    /// Between the colours of the corners; white where they have none.
+    fn vertex_color(&self, triangle: u32, [u, v]: [f64; 2]) -> DVec3 {
+        let Some(words) = self.scene.colors.get(triangle as usize) else {
+            return DVec3::ONE;
+        };
+        let [a, b, c] = words.map(decode_color);
+        a * (1.0 - u - v) + b * u + c * v
     }
 
     /// Between the normals of the corners; that of the triangle, `outward`, where they have none.

@@ -13,6 +13,7 @@ mod paths;
 mod peer;
 mod read;
 mod run;
+mod sound;
 mod stream;
 mod structure;
 
@@ -29,6 +30,7 @@ pub use read::{
     records_file, text_of,
 };
 pub use run::*;
+pub use sound::Sound;
 pub use stream::*;
 pub use structure::*;
 

@@ -1,7 +1,7 @@
 //! Reading and writing files of records.
 
 use super::old::{OLD_SCHEMA, renewed};
-use super::{Line, SCHEMA};
+use super::{Line, SCHEMA, Sound};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::io::{self, Read as _};
@@ -76,6 +76,16 @@ pub enum RecordError {
         /// Why.
         source: serde_json::Error,
     },
+    /// A line says what no run writes.
+    #[error("{}:{line}: a damaged record: {what}; remove the line to read the rest", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What cannot be.
+        what: String,
+    },
 }
 
 /// Only the tag, so that a line of another version is told from a broken one.
@@ -118,8 +128,8 @@ fn unpacked(path: &Path) -> io::Result<Vec<u8>> {
 /// last line without its newline that does not parse is what a crash leaves: it is left out with a warning.
 ///
 /// # Errors
-/// A missing or empty file, a line of another schema, or a broken line elsewhere.
-pub fn read_lines<B: DeserializeOwned>(
+/// A missing or empty file, a line of another schema, a broken line elsewhere, or one that says what no run writes.
+pub fn read_lines<B: DeserializeOwned + Sound>(
     path: &Path,
     wanted: &'static str,
 ) -> Result<Records<B>, RecordError> {
@@ -161,13 +171,19 @@ pub fn read_lines<B: DeserializeOwned>(
             }
             _ => serde_json::from_slice(row),
         };
-        records
-            .lines
-            .push(parsed.map_err(|source| RecordError::Parse {
+        let parsed: Line<B> = parsed.map_err(|source| RecordError::Parse {
+            path: path.into(),
+            line,
+            source,
+        })?;
+        if let Some(what) = parsed.body.fault() {
+            return Err(RecordError::Damaged {
                 path: path.into(),
                 line,
-                source,
-            })?);
+                what,
+            });
+        }
+        records.lines.push(parsed);
     }
     match records.lines.is_empty() {
         true => Err(RecordError::NoRecords { path: path.into() }),

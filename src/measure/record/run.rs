@@ -68,6 +68,28 @@ pub struct RunRecord {
     pub lenient: bool,
 }
 
+impl RunRecord {
+    /// `run.seed` of the experiment, as it was run; `None` where its text says nothing that can be read.
+    pub fn seed(&self) -> Option<i64> {
+        const DEFAULT: i64 = 1;
+        let of_file: toml::Table = self.experiment_text.parse().ok()?;
+        let set = self.experiment_text.lines().rev();
+        let set = set.map_while(|line| line.strip_prefix("# --set "));
+        let laid_over = set.filter_map(|set| {
+            let (key, value) = set.split_once('=')?;
+            (key.trim() == "run.seed").then(|| value.trim().parse().ok())
+        });
+        // The last one counts.
+        if let Some(value) = laid_over.into_iter().next() {
+            return value;
+        }
+        match of_file.get("run").and_then(|run| run.get("seed")) {
+            Some(seed) => seed.as_integer(),
+            None => Some(DEFAULT),
+        }
+    }
+}
+
 /// A loaded scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct SceneRecord {

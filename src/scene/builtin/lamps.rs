@@ -145,7 +145,7 @@ impl BuiltinScene for LampScene {
 }
 
 impl Luminaire {
-    /// The profile of the file, or an even one.
+    /// The profile of the file, or an even one. Without that of the file there is no scene.
     fn profile(&self, builder: &mut SceneBuilder) -> Option<IesProfile> {
         let even = "TILT=NONE 1 -1 1 2 1 1 2 0 0 0 1 1 0 0 180 0 100 100";
         let profile = match self.file.is_empty() {
@@ -158,10 +158,7 @@ impl Luminaire {
                 Some(profile)
             }
             Err(error) => {
-                builder
-                    .report
-                    .warnings
-                    .push(format!("{error}; there is no luminaire"));
+                builder.refused = Some(error.into());
                 None
             }
         }
@@ -260,7 +257,7 @@ fn push_block(builder: &mut SceneBuilder, corner: Vec3, size: Vec3) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{load_default, load_with};
+    use super::super::tests::{load_default, load_with, try_load_with};
     use crate::params::ParamValue;
     use crate::scene::LightList;
 
@@ -288,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn a_luminaire_is_scaled_to_lumens_or_watts_and_a_missing_file_is_told() {
+    fn a_luminaire_is_scaled_to_lumens_or_watts_and_needs_its_file() {
         let power = |changes: &[(&str, ParamValue)]| {
             let scene = load_with("luminaire", changes);
             LightList::of(&scene)
@@ -305,16 +302,9 @@ mod tests {
         near(power(&[]), 400.0 * std::f64::consts::PI);
         near(power(&[("lumens", ParamValue::Number(70.0))]), 70.0);
         near(power(&[("watts", ParamValue::Number(2.0))]), 1366.0);
-        let scene = load_with(
-            "luminaire",
-            &[("file", ParamValue::Name("none.ies".to_owned()))],
-        );
-        assert!(
-            scene.report.warnings[0].contains("none.ies"),
-            "{:?}",
-            scene.report
-        );
-        assert!(scene.daylight.is_some());
+        let missing = ("file", ParamValue::Name("none.ies".to_owned()));
+        let error = try_load_with("luminaire", &[missing]).unwrap_err();
+        assert!(error.to_string().contains("none.ies"), "{error}");
     }
 
     #[test]

@@ -116,11 +116,36 @@ pub(super) fn hint(name: &str) -> String {
 pub(in crate::scene) mod tests {
     use super::*;
     use crate::params::{ParamRange, ParamValue};
-    use crate::scene::{LoadOptions, load};
+    use crate::scene::{LoadOptions, SceneError, load};
     use std::collections::{BTreeMap, HashMap};
 
     /// A built-in scene with some parameters changed from their defaults.
     pub fn load_with(name: &str, changes: &[(&str, ParamValue)]) -> SceneData {
+        try_load_with(name, changes).unwrap()
+    }
+
+    /// A model of one triangle, without any light, with these common parameters.
+    pub fn load_unlit(changes: &[(&str, ParamValue)]) -> SceneData {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("unlit.obj");
+        std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        let changes = changes
+            .iter()
+            .map(|(key, v)| ((*key).to_owned(), v.clone()));
+        let name = path.to_str().unwrap().to_owned();
+        let variant = Variant {
+            label: name.clone(),
+            name,
+            params: Params(changes.collect()),
+        };
+        load(&variant, &LoadOptions::default()).unwrap()
+    }
+
+    /// The same as [`load_with`] for a scene that may not be there.
+    pub fn try_load_with(
+        name: &str,
+        changes: &[(&str, ParamValue)],
+    ) -> Result<SceneData, SceneError> {
         let entries = builtin_scenes();
         let entry = entries.iter().find(|entry| entry.name == name).unwrap();
         let defaults = entry.schema.iter();
@@ -135,7 +160,7 @@ pub(in crate::scene) mod tests {
             params: Params(params),
             label: name.to_owned(),
         };
-        load(&variant, &LoadOptions::default()).unwrap()
+        load(&variant, &LoadOptions::default())
     }
 
     /// A built-in scene with its default parameters.

@@ -143,7 +143,7 @@ impl Export<'_> {
     }
 
     /// The same bilinear function: Mitsuba's rows go from pole to pole, ours have their centres half a row inside, so that every other
-    /// row of twice as many and one is one of ours. Its columns run the other way.
+    /// row of twice as many and one is one of ours. Columns run the same way.
     fn environment(
         &mut self,
         map: &EnvironmentMap,
@@ -151,7 +151,7 @@ impl Export<'_> {
         turn: f32,
     ) -> Result<(), ExportError> {
         let (width, height) = (map.width, 2 * map.height + 1);
-        let texel = |x: u32, y: u32| map.texels[(y * width + width - 1 - x) as usize];
+        let texel = |x: u32, y: u32| map.texels[(y * width + x) as usize];
         let between = |at: u32| {
             let (x, y) = (at % width, at / width);
             let [above, below] = [y.saturating_sub(1) / 2, (y / 2).min(map.height - 1)];

@@ -1,6 +1,5 @@
 //! Meshes as binary PLY.
 
-use crate::geometry::Triangle;
 use crate::scene::SceneData;
 use crate::scene::decode_normal;
 use glam::{Vec2, Vec3};
@@ -43,12 +42,11 @@ pub(super) fn ply(scene: &SceneData, id: u32, back: Option<f32>) -> Option<(Vec<
     )
     .into_bytes();
     for &index in &indices {
-        let corners = match back {
-            Some(gap) => turned(&scene.triangles[index], gap),
-            None => scene.triangles[index].vertices,
-        };
-        let order = if back.is_some() { [0, 2, 1] } else { [0, 1, 2] };
-        for (position, corner) in corners.into_iter().zip(order) {
+        let turns = back.is_some() != scene.is_mirrored(index);
+        let order = if turns { [0, 2, 1] } else { [0, 1, 2] };
+        let behind = back.map_or(Vec3::ZERO, |gap| -gap * front(scene, index));
+        for corner in order {
+            let position = scene.triangles[index].vertices[corner] + behind;
             push(&mut bytes, &position.to_array());
             if smooth {
                 let normal = normal(scene, index, corner);
@@ -69,8 +67,7 @@ pub(super) fn ply(scene: &SceneData, id: u32, back: Option<f32>) -> Option<(Vec<
 
 /// The normal at a corner, on the front of the triangle; that of the triangle where the file has none.
 fn normal(scene: &SceneData, index: usize, corner: usize) -> Vec3 {
-    let [a, b, c] = scene.triangles[index].vertices;
-    let face = (b - a).cross(c - a).normalize_or_zero();
+    let face = front(scene, index);
     let own = scene
         .normals
         .get(index)
@@ -83,8 +80,8 @@ fn push(bytes: &mut Vec<u8>, numbers: &[f32]) {
     bytes.extend(numbers.iter().flat_map(|v| v.to_le_bytes()));
 }
 
-fn turned(triangle: &Triangle, gap: f32) -> [Vec3; 3] {
-    let [a, b, c] = triangle.vertices;
-    let behind = -gap * (b - a).cross(c - a).normalize_or_zero();
-    [a, c, b].map(|v| v + behind)
+/// The normal of a triangle on its front.
+fn front(scene: &SceneData, index: usize) -> Vec3 {
+    let [a, b, c] = scene.outward(index);
+    (b - a).cross(c - a).normalize_or_zero()
 }

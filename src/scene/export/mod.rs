@@ -87,6 +87,10 @@ pub fn export_mitsuba(
     }
     export.xml += "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<scene version=\"3.0.0\">\n";
     export.view(scene, settings);
+    if !scene.colors.is_empty() {
+        let warning = "colours of vertices are left out: Mitsuba draws the base colours alone";
+        export.warnings.push(warning.to_owned());
+    }
     export.sky(scene)?;
     for id in 0..scene.materials.len() {
         export.material(scene, id)?;

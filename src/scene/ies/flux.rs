@@ -22,6 +22,15 @@ fn bracket(values: &[f32], x: f64) -> Option<(usize, f64)> {
     Some((low, ((x - a) / (b - a)).clamp(0.0, 1.0)))
 }
 
+/// The angle of (x, y) from the x axis; 0 where both are 0, whatever their signs: along the axis of a luminaire. Twin of
+/// `angle_of` in `kernels/shading/hemisphere.wesl`.
+fn angle_of(y: f64, x: f64) -> f64 {
+    match x == 0.0 && y == 0.0 {
+        true => 0.0,
+        false => y.atan2(x),
+    }
+}
+
 impl IesProfile {
     /// Candela in a direction in the axes of the luminaire, of length 1. Twin of `ies_candela` in
     /// `kernels/shading/light/ies.wesl`.
@@ -29,12 +38,12 @@ impl IesProfile {
         let [x, y, z] = direction.to_array();
         let (v, h) = match self.photometry {
             Photometry::C => {
-                let around = y.atan2(x);
+                let around = angle_of(y, x);
                 let turn = if around < 0.0 { around + TAU } else { around };
                 (x.hypot(y).atan2(z), turn)
             }
-            Photometry::B => (y.atan2(z), x.atan2(y.hypot(z))),
-            Photometry::A => (y.atan2(x.hypot(z)), x.atan2(z)),
+            Photometry::B => (angle_of(y, z), x.atan2(y.hypot(z))),
+            Photometry::A => (y.atan2(x.hypot(z)), angle_of(x, z)),
         };
         let (v, h) = (v.to_degrees(), h.to_degrees());
         let h = if self.horizontal.len() == 1 {

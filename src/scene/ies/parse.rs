@@ -119,16 +119,13 @@ impl IesProfile {
             problem,
         };
         let lines: Vec<&str> = text.lines().collect();
-        let tilt = lines
-            .iter()
-            .position(|line| line.trim_start().starts_with("TILT"));
-        let Some(tilt) = tilt else {
+        let Some((tilt, value)) = (0..)
+            .zip(&lines)
+            .find_map(|(k, line)| Some((k, tilt(line)?)))
+        else {
             let problem = "there is no line `TILT=`: this is no LM-63 file".to_owned();
             return Err(malformed(lines.len().max(1), problem));
         };
-        let value = lines[tilt]
-            .split_once('=')
-            .map_or("", |(_, value)| value.trim());
         let separators = |c: char| c.is_whitespace() || c == ',';
         let words = (tilt + 2..)
             .zip(&lines[tilt + 1..])
@@ -142,19 +139,55 @@ impl IesProfile {
             next: 0,
             last_line: lines.len(),
         };
-        match value {
+        match value.to_ascii_uppercase().as_str() {
             "NONE" => {}
             "INCLUDE" => skip_tilt(&mut numbers)?,
-            other => {
+            _ => {
                 let problem = format!(
-                    "TILT={other} names another file, which is not read; write TILT=NONE or include it"
+                    "TILT={value} names another file, which is not read; write TILT=NONE or include it"
                 );
                 return Err(malformed(tilt + 1, problem));
             }
         }
-        profile(file, &mut numbers)
+        profile(file, year(&lines[..tilt]), &mut numbers)
     }
 }
+
+/// The value of the line `TILT=`, which ends the labels; those of 1986 are free text.
+fn tilt(line: &str) -> Option<&str> {
+    let (name, value) = line.split_once('=')?;
+    let is_tilt = name.trim().eq_ignore_ascii_case("TILT");
+    is_tilt.then(|| value.trim())
+}
+
+/// The year of the standard that the first line names, as `IESNA91`, `IESNA:LM-63-2002` and `IES:LM-63-2019` do; that of the
+/// first, which has no such line, where it names none.
+fn year(labels: &[&str]) -> u32 {
+    const FIRST: u32 = 1986;
+    let first = labels.iter().find(|line| !line.trim().is_empty());
+    let first = first.map_or(String::new(), |line| line.trim().to_ascii_uppercase());
+    let behind = |mark: &str| first.split_once(mark).map(|(_, rest)| rest);
+    let digits = first.strip_prefix("IESNA").and_then(|rest| {
+        let is_short = rest.starts_with(|c: char| c.is_ascii_digit());
+        is_short.then_some(rest)
+    });
+    let Some(digits) = digits.or_else(|| behind("LM-63-")) else {
+        return FIRST;
+    };
+    let end = digits.find(|c: char| !c.is_ascii_digit());
+    match digits[..end.unwrap_or(digits.len())].parse() {
+        Ok(year @ 86..100) => 1900 + year,
+        Ok(year @ 0..86) => 2000 + year,
+        Ok(year) => year,
+        Err(_) => FIRST,
+    }
+}
+
+/// The first year in which the number between the ballast factor and the watts is no factor of ballast and lamp. LM-63-1995 and
+/// LM-63-2002 keep it for future use, and in LM-63-2019 it tells how the file was made (1.1 is a laboratory's).
+const NO_LAMP_FACTOR: u32 = 1995;
+/// The first year in which it says how the file was made.
+const GENERATION_TYPE: u32 = 2019;
 
 /// Factors for lamps that are tilted: a luminaire is shown as it was measured.
 fn skip_tilt(numbers: &mut Numbers) -> Result<(), IesError> {
@@ -165,7 +198,7 @@ fn skip_tilt(numbers: &mut Numbers) -> Result<(), IesError> {
     Ok(())
 }
 
-fn profile(file: &str, numbers: &mut Numbers) -> Result<IesProfile, IesError> {
+fn profile(file: &str, year: u32, numbers: &mut Numbers) -> Result<IesProfile, IesError> {
     let lamps = numbers.number("the number of lamps")?;
     let lumens = numbers.number("the lumens per lamp")?;
     let multiplier = numbers.number("the candela multiplier")?;
@@ -188,7 +221,8 @@ fn profile(file: &str, numbers: &mut Numbers) -> Result<IesProfile, IesError> {
         numbers.number(what)?;
     }
     let ballast = numbers.number("the ballast factor")?;
-    let ballast_lamp = numbers.number("the ballast-lamp factor")?;
+    let third = numbers.number("the number behind the ballast factor")?;
+    let ballast_lamp = if year < NO_LAMP_FACTOR { third } else { 1.0 };
     let factor = multiplier * ballast * ballast_lamp;
     if factor <= 0.0 {
         return Err(numbers.here(format!(
@@ -209,6 +243,17 @@ fn profile(file: &str, numbers: &mut Numbers) -> Result<IesProfile, IesError> {
             candela.push((f64::from(value) * factor) as f32);
         }
     }
+    let mut warnings = Vec::new();
+    if (NO_LAMP_FACTOR..GENERATION_TYPE).contains(&year) && third != 1.0 {
+        warnings.push(format!(
+            "{file}: the number behind the ballast factor is {third}; LM-63-{year} keeps it for future use, so it is not read"
+        ));
+    }
+    if let Some((line, word)) = numbers.words.get(numbers.next) {
+        warnings.push(format!(
+            "{file}, line {line}: `{word}` and what follows stands behind the last candela value and is not read"
+        ));
+    }
     let mut out = IesProfile {
         name: file.to_owned(),
         photometry,
@@ -217,7 +262,7 @@ fn profile(file: &str, numbers: &mut Numbers) -> Result<IesProfile, IesError> {
         candela,
         rated_lumens: (lumens > 0.0).then_some(lumens * lamps),
         input_watts,
-        warnings: Vec::new(),
+        warnings,
     };
     out.unfold()
         .map_err(|problem| numbers.error(last_angle, problem))?;
@@ -403,6 +448,54 @@ mod tests {
         let found = IesProfile::parse("x.ies", &text).expect("a profile");
         assert_eq!(found.horizontal, [-90.0, 0.0, 90.0]);
         assert_eq!((found.candela[0], found.input_watts), (2.0, 40.0));
+    }
+
+    #[test]
+    fn the_first_line_says_what_the_numbers_of_the_ballast_mean() {
+        // Candela multiplier 2, ballast factor 0.5, and 0.9 behind it; intensities of 100 straight down, 50 at 45 degrees.
+        let read = |labels: &str| {
+            let text = format!(
+                "{labels}TILT=NONE\n1 1000 2 3 1 1 2 0 0 0\n0.5 0.9 40\n0 45 90\n0\n100 50 0\n"
+            );
+            IesProfile::parse("x.ies", &text).expect("a profile")
+        };
+        for (labels, down) in [
+            // A factor of ballast and lamp until 1991: 100 · 2 · 0.5 · 0.9.
+            ("", 90.0),
+            ("own measurement 12\nTILTED DOWNLIGHT, WHITE\n", 90.0),
+            ("IESNA91\n[TEST] own\n", 90.0),
+            ("IESNA:LM-63-1986\n", 90.0),
+            ("iesna:lm-63-1991\n", 90.0),
+            // For future use, and since 2019 the way in which the file was made: 100 · 2 · 0.5.
+            ("IESNA:LM-63-1995\n[TEST] own\n", 100.0),
+            ("IESNA:LM-63-2002\n", 100.0),
+            ("\nIESNA:LM-63-02\n", 100.0),
+            ("IES:LM-63-2019\n", 100.0),
+            ("IES:LM-63-19 \n", 100.0),
+        ] {
+            let found = read(labels);
+            let at = |degrees: f64| {
+                let (sin, cos) = degrees.to_radians().sin_cos();
+                found.intensity(glam::DVec3::new(sin, 0.0, cos))
+            };
+            for (degrees, expected) in [(0.0, down), (22.5, 0.75 * down), (45.0, 0.5 * down)] {
+                let error = at(degrees) - expected;
+                assert!(error.abs() < 1e-4, "{labels:?} {degrees}: {}", at(degrees));
+            }
+            let is_named = labels.contains("1995") || labels.contains("02");
+            assert_eq!(found.warnings.len(), usize::from(is_named), "{labels:?}");
+        }
+    }
+
+    #[test]
+    fn only_tilt_ends_the_labels_and_what_is_left_over_is_named() {
+        let good = file("none", 1, "0 90", "5 1 1 5 2 2");
+        let odd = good.replacen("[TEST] none", "TILTED, 45 = steep\ntilt", 1);
+        let found = IesProfile::parse("x.ies", &odd.replacen("TILT=", " Tilt = ", 1));
+        assert_eq!(found.expect("a profile").warnings, [""; 0]);
+        let more = IesProfile::parse("x.ies", &format!("{good}7 8\n"));
+        let told = more.expect("a profile").warnings.join("; ");
+        assert!(told.contains("line 9") && told.contains("`7`"), "{told}");
     }
 
     #[test]

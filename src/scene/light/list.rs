@@ -156,18 +156,20 @@ impl LightList {
             if !shining[of] {
                 continue;
             }
-            let [a, b] = [next - 1, next].map(|id| scene.triangles.get(id));
+            let there = |id: &usize| *id < scene.triangles.len();
+            let outward = |id: usize| there(&id).then(|| Triangle::from(scene.outward(id)));
+            let [a, b] = [next - 1, next].map(outward);
             // A lamp with a texture or a mask is sampled by the triangle that has the texture coordinates.
             let lamp = &scene.materials[of];
             let plain = lamp.emission_texture.is_none() && lamp.mask.is_none();
             let pair = a.zip(b).filter(|_| plain && material(next) == Some(of));
-            let formed = pair.and_then(|(a, b)| Parallelogram::of(id, a, b));
+            let formed = pair.and_then(|(a, b)| Parallelogram::of(id, &a, &b));
             let (source, area) = match formed {
                 Some(formed) => {
                     next += 1;
                     (Source::Parallelogram(formed), formed.area())
                 }
-                None => (Source::Triangle(id), a.map_or(0.0, area)),
+                None => (Source::Triangle(id), a.as_ref().map_or(0.0, area)),
             };
             let sides = if scene.materials[of].emits_both_sides {
                 2.0

@@ -74,8 +74,8 @@ pub const MUTANTS: &[Mutant] = &[
         "neighbours by two draw the same",
         text(
             "sampling/hash",
-            "pcg_hash(s.pixel +",
-            "pcg_hash((s.pixel & 0xfffffffeu) +",
+            "pcg_hash(s.seed), s.pixel",
+            "pcg_hash(s.seed), s.pixel & 0xfffffffeu",
         ),
         HALTON,
         Check::Stream,
@@ -107,8 +107,8 @@ pub const MUTANTS: &[Mutant] = &[
         "pixels from 16384 on draw as the first ones",
         text(
             "sampling/pixel_hash",
-            "hash(s.pixel + ",
-            "hash((s.pixel & 0x3fffu) + ",
+            "strided(hash(s.seed), s.pixel)",
+            "strided(hash(s.seed), s.pixel & 0x3fffu)",
         ),
         HASH,
         Check::Stream,

@@ -49,8 +49,8 @@ pub const MUTANTS: &[Mutant] = &[
         "the angles of type B are those about another axis",
         text(
             "shading/light/ies",
-            "vertical = atan2(d.y, d.z);",
-            "vertical = atan2(d.x, d.z);",
+            "vertical = angle_of(d.y, d.z);",
+            "vertical = angle_of(d.x, d.z);",
         ),
     ),
     fault(
@@ -67,8 +67,8 @@ pub const MUTANTS: &[Mutant] = &[
         "lights of the tree are chosen less often than they are weighted for",
         text(
             "shading/light/tree",
-            "return TreeChoice(links.z, probability, rest);",
-            "return TreeChoice(links.z, 1.01 * probability, rest);",
+            "return TreeChoice(links.y, units);",
+            "return TreeChoice(links.y, units + units / 100u);",
         ),
     ),
     fault(
@@ -114,6 +114,15 @@ pub const MUTANTS: &[Mutant] = &[
             "shading/normals",
             "let bitangent = select(across, -across, dot(across, along_v) > 0.0);",
             "let bitangent = select(-across, across, dot(across, along_v) > 0.0);",
+        ),
+    ),
+    fault(
+        "colours-of-corners-exchanged",
+        "the colour of a vertex has the weight of another",
+        text(
+            "shading/colors",
+            "+ hit.u * corner_color(at + 2u)",
+            "+ hit.u * corner_color(at + 4u)",
         ),
     ),
     fault(

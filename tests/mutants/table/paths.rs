@@ -272,6 +272,20 @@ pub const MUTANTS: &[Mutant] = &[
         ),
     ),
     fault(
+        "mirrored-fronts-forgotten",
+        "mirrored triangles have the fronts of the others",
+        text("shading/sides", "& 1u) != 0u", "& 1u) == 2u"),
+    ),
+    fault(
+        "glossy-light-behind-lost",
+        "what a glossy surface reflects behind itself is lost",
+        text(
+            "shading/bsdf",
+            "if (!(other.pdf > 0.0)) { return own; }",
+            "if (other.pdf > 0.0) { return own; }",
+        ),
+    ),
+    fault(
         "shadow-of-the-offset",
         "rays start ten thousand times too far from their surface",
         text(

@@ -31,8 +31,8 @@ pub const MUTANTS: &[Mutant] = &[
         "both dimensions of a pair get the same shift",
         text(
             "sampling/hash",
-            "pcg_hash(s.dimension + pixel_number(s))",
-            "pcg_hash((s.dimension >> 1u) + pixel_number(s))",
+            "keyed_hash(pixel_number(s), s.dimension)",
+            "keyed_hash(pixel_number(s), s.dimension >> 1u)",
         ),
         HALTON,
         Check::Stream,
@@ -40,7 +40,7 @@ pub const MUTANTS: &[Mutant] = &[
     row(
         "seed-dropped",
         "all seeds draw the same",
-        text("sampling/hash", "s.pixel + pcg_hash(s.seed)", "s.pixel"),
+        text("sampling/hash", "pcg_hash(s.seed), s.pixel", "0u, s.pixel"),
         OWEN,
         Check::Stream,
     ),
@@ -110,8 +110,8 @@ pub const MUTANTS: &[Mutant] = &[
         "all pairs of dimensions visit their strata in the same order",
         text(
             "sampling/jittered",
-            "(s.dimension >> 1u) + (pixel_number(s) ^ PAIR_KEY)",
-            "pixel_number(s) ^ PAIR_KEY",
+            "keyed_hash(pixel_number(s) ^ PAIR_KEY, s.dimension >> 1u)",
+            "keyed_hash(pixel_number(s) ^ PAIR_KEY, 0u)",
         ),
         sampler("jittered", &[], "none"),
         Check::Stream,
@@ -172,8 +172,8 @@ pub const MUTANTS: &[Mutant] = &[
         "the jitter of each sample is that of the pixel",
         text(
             "sampling/hash",
-            "pcg_hash(s.sample + dimension_number(s))",
-            "pcg_hash(dimension_number(s))",
+            "keyed_hash(dimension_number(s), s.sample)",
+            "keyed_hash(dimension_number(s), 0u)",
         ),
         sampler("halton", &[], "cranley-patterson-micro-jitter"),
         Check::Stream,
@@ -216,8 +216,8 @@ pub const MUTANTS: &[Mutant] = &[
         "all pixels draw the same",
         text(
             "sampling/pixel_hash",
-            "hash(s.pixel + hash(s.seed))",
-            "hash(hash(s.seed))",
+            "strided(hash(s.seed), s.pixel)",
+            "strided(hash(s.seed), 0u)",
         ),
         HASH,
         Check::Stream,

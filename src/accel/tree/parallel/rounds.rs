@@ -3,7 +3,9 @@
 use super::device::{Passes, failed, play};
 use crate::accel::tree::parameters::SAH_DEPTH;
 use crate::accel::{AccelError, BuildLog};
-use crate::gpu::{Bindings, GpuError, Groups, Recording, Storage, UniformValues, groups_for};
+use crate::gpu::{
+    Bindings, GpuError, Groups, Recording, Storage, UniformValues, grid_of, groups_for,
+};
 
 /// Rounds in which clusters choose; behind these they are joined as they lie.
 pub(super) const FREE_ROUNDS: u32 = SAH_DEPTH;
@@ -34,11 +36,14 @@ impl<'a> Rounds<'a> {
         let mut state = [0; STATE_WORDS];
         state[CLUSTERS] = count;
         state[NODES] = count;
-        for groups in [SEARCH_GROUPS, TILE_GROUPS, TILE_GROUPS_BEFORE] {
-            state[groups..groups + 3].fill(1);
+        let tiles = grid_of(count.div_ceil(TILE));
+        for (place, groups) in [
+            (SEARCH_GROUPS, groups_for(count)),
+            (TILE_GROUPS, tiles),
+            (TILE_GROUPS_BEFORE, tiles),
+        ] {
+            state[place..place + 3].copy_from_slice(&groups);
         }
-        state[SEARCH_GROUPS] = groups_for(count).iter().product();
-        state[TILE_GROUPS] = count.div_ceil(TILE);
         let leaves: Vec<u32> = (0..count).collect();
         Ok(Self {
             passes,

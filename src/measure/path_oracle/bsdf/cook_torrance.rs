@@ -77,9 +77,13 @@ impl Bsdf for CookTorrance<'_> {
         bounce(self, direction, rounding)
     }
 
+    fn folded(&self) -> Option<&Surface<'_>> {
+        Some(self.surface)
+    }
+
     fn evaluate(&self, direction: DVec3, rounding: &mut Rounding) -> Option<Reflected> {
         let (o, n) = (self.surface.out, self.surface.normal);
-        if !is_above(self.surface, direction) {
+        if n.dot(direction) <= 0.0 {
             return None;
         }
         let h = (o + direction).normalize();

@@ -54,7 +54,8 @@ impl Bsdf for Dielectric<'_> {
             if is_thin { 2.0 * r / (1.0 + r) } else { r }
         });
         let Some((_, beyond)) = passed.filter(|_| u >= rounding.share(reflectance)) else {
-            let direction = rounding.direction(mirrored(surface.out, surface.normal));
+            let direction =
+                rounding.direction(kept(surface, mirrored(surface.out, surface.normal)));
             return Some(delta(direction, DVec3::ONE, 1.0));
         };
         if is_thin {
@@ -62,7 +63,7 @@ impl Bsdf for Dielectric<'_> {
         }
         let ratio = from / to;
         let refracted = -ratio * surface.out + (ratio * cos - beyond) * surface.normal;
-        let direction = rounding.direction(refracted.normalize());
+        let direction = rounding.direction(kept(surface, refracted.normalize()));
         let scale = ratio * ratio;
         Some(delta(direction, surface.base * scale, 1.0 / scale))
     }

@@ -6,9 +6,9 @@ pub(super) struct Mirror<'a>(pub &'a Surface<'a>);
 
 impl Bsdf for Mirror<'_> {
     fn sample(&self, _: [f64; 2], rounding: &mut Rounding) -> Option<Bounce> {
-        let direction = rounding.direction(mirrored(self.0.out, self.0.normal));
-        is_above(self.0, direction).then_some(Bounce {
-            direction,
+        let direction = kept(self.0, mirrored(self.0.out, self.0.normal));
+        Some(Bounce {
+            direction: rounding.direction(direction),
             weight: self.0.base,
             density: None,
             medium: 1.0,

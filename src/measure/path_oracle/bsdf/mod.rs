@@ -38,8 +38,28 @@ pub(super) struct Reflected {
 pub(super) trait Bsdf {
     /// Where the path goes on; `None` ends it.
     fn sample(&self, uv: [f64; 2], rounding: &mut Rounding) -> Option<Bounce>;
-    /// Value and density of a direction.
+    /// Value and density of a direction by the shading normal.
     fn evaluate(&self, direction: DVec3, rounding: &mut Rounding) -> Option<Reflected>;
+    /// The surface, if what it would reflect behind itself is mirrored at it.
+    fn folded(&self) -> Option<&Surface<'_>> {
+        None
+    }
+    /// Value and density of a direction.
+    fn reflect(&self, direction: DVec3, rounding: &mut Rounding) -> Option<Reflected> {
+        let Some(surface) = self.folded() else {
+            return self.evaluate(direction, rounding);
+        };
+        if direction.dot(surface.geometric) <= 0.0 {
+            return None;
+        }
+        let parts = [direction, across(surface, direction)];
+        let parts = parts.map(|part| self.evaluate(part, rounding));
+        let sum = |a: Reflected, b: Reflected| Reflected {
+            value: a.value + b.value,
+            density: a.density + b.density,
+        };
+        parts.into_iter().flatten().reduce(sum)
+    }
     /// Whether all lobes are delta: light samples are not taken then.
     fn is_delta(&self) -> bool {
         false
@@ -148,9 +168,23 @@ pub(super) fn diffuse_share(base: DVec3, specular: DVec3) -> f64 {
 /// The least n·o that is told apart from 0.
 pub(super) const LEAST_COSINE: f64 = 1e-7;
 
-/// Whether light that arrives from there is reflected at all.
+/// Whether light that arrives from there is reflected at all by a surface that is not [`Bsdf::folded`].
 pub(super) fn is_above(surface: &Surface, direction: DVec3) -> bool {
     direction.dot(surface.normal) > 0.0 && direction.dot(surface.geometric) > 0.0
+}
+
+/// The direction on the other side of the surface.
+fn across(surface: &Surface, direction: DVec3) -> DVec3 {
+    direction - surface.geometric * (2.0 * direction.dot(surface.geometric))
+}
+
+/// A direction of a delta lobe, mirrored at the surface where that and the shading normal have it on different sides.
+pub(super) fn kept(surface: &Surface, direction: DVec3) -> DVec3 {
+    let [meant, found] = [surface.normal, surface.geometric].map(|n| n.dot(direction) > 0.0);
+    match meant == found {
+        true => direction,
+        false => across(surface, direction),
+    }
 }
 
 /// The direction of a lobe with the weight of the whole material.
@@ -159,8 +193,13 @@ pub(super) fn bounce(
     direction: DVec3,
     rounding: &mut Rounding,
 ) -> Option<Bounce> {
+    let direction = match bsdf.folded() {
+        Some(surface) if surface.normal.dot(direction) <= 0.0 => return None,
+        Some(surface) => kept(surface, direction),
+        None => direction,
+    };
     let direction = rounding.direction(direction);
-    let Reflected { value, density } = bsdf.evaluate(direction, rounding)?;
+    let Reflected { value, density } = bsdf.reflect(direction, rounding)?;
     (density > 0.0).then(|| Bounce {
         direction,
         weight: value / density,

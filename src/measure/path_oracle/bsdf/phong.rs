@@ -42,13 +42,17 @@ impl Bsdf for Phong<'_> {
         bounce(self, direction, rounding)
     }
 
+    fn folded(&self) -> Option<&Surface<'_>> {
+        Some(self.surface)
+    }
+
     fn evaluate(&self, direction: DVec3, rounding: &mut Rounding) -> Option<Reflected> {
         let cosine = cosine_density(self.surface.normal, direction);
         let towards = rounding
             .number(direction.dot(self.mirror()))
             .clamp(0.0, 1.0);
         let lobe = (self.exponent + 1.0) / TAU * towards.powf(self.exponent);
-        is_above(self.surface, direction).then(|| Reflected {
+        (cosine > 0.0).then(|| Reflected {
             value: self.surface.base * cosine + self.specular * lobe,
             density: self.diffuse * cosine + (1.0 - self.diffuse) * lobe,
         })

@@ -1,10 +1,10 @@
 //! Radiance from all around by an equirectangular map.
 //!
-//! Which texel a number chooses depends on the order in which an alias table was made: the table is read as data. With
-//! what probability it chooses each texel is counted from it, so that a table that chooses by other weights than
+//! Which texel a number chooses depends on the order in which an alias table was made: the table is read as data, whole numbers as
+//! docs/shading.md has them. With what probability it chooses each texel is counted from it, so that a table that chooses by other weights than
 //! kernels divide by shows, as does a density that is none of the table.
 
-use super::LightSample;
+use super::{LightSample, UNITS};
 use crate::integrator::environment_aliases;
 use crate::measure::path_oracle::rounding::Rounding;
 use crate::scene::EnvironmentMap;
@@ -15,32 +15,39 @@ use std::sync::Arc;
 /// Distance of what has none.
 const FAR: f64 = 1e30;
 
-/// A choice by one number: threshold and alias of each entry, and with what probability each is chosen.
+/// A choice by one number: threshold and alias of each part, and with what probability each entry is chosen.
 struct Aliases {
-    entries: Vec<(f64, usize)>,
+    parts: Vec<(u32, usize)>,
+    /// Values of a number in each part.
+    size: u32,
     shares: Vec<f64>,
 }
 
 impl Aliases {
-    fn new(entries: Vec<(f64, usize)>) -> Self {
-        let mut shares: Vec<f64> = entries.iter().map(|(own, _)| *own).collect();
-        for (own, alias) in &entries {
-            shares[*alias] += 1.0 - own;
+    fn new(parts: Vec<(u32, usize)>) -> Self {
+        let size = (UNITS / parts.len() as f64) as u32;
+        let mut shares = vec![0.0; parts.len()];
+        for (part, (own, alias)) in parts.iter().enumerate() {
+            shares[part] += f64::from(*own) / UNITS;
+            shares[*alias] += f64::from(size - own) / UNITS;
         }
-        let count = entries.len() as f64;
-        shares.iter_mut().for_each(|share| *share /= count);
-        Self { entries, shares }
+        Self {
+            parts,
+            size,
+            shares,
+        }
     }
 
-    /// The entry of a number in [0, 1), and what is left of the number.
+    /// The entry of a number in [0, 1), and how far along what chose it the number lies.
     fn choose(&self, u: f64) -> (usize, f64) {
-        let place = u.clamp(0.0, 1.0) * self.entries.len() as f64;
-        let index = (place as usize).min(self.entries.len() - 1);
-        let along = (place - index as f64).min(1.0);
-        let (threshold, alias) = self.entries[index];
-        match along < threshold {
-            true => (index, along / threshold),
-            false => (alias, (along - threshold) / (1.0 - threshold)),
+        let value = (u * UNITS).clamp(0.0, UNITS - 1.0) as u32;
+        let part = (value / self.size) as usize;
+        let place = value % self.size;
+        let (own, alias) = self.parts[part];
+        let along = |place: u32, of: u32| (f64::from(place) + 0.5) / f64::from(of);
+        match place < own {
+            true => (part, along(place, own)),
+            false => (alias, along(place - own, self.size - own)),
         }
     }
 }
@@ -57,17 +64,18 @@ pub(super) struct Map {
 
 impl Map {
     pub fn new(map: &Arc<EnvironmentMap>, scale: f32, turn: f32) -> Self {
-        let entries: Vec<(f64, usize)> = (environment_aliases(map).into_iter())
-            .map(|(threshold, alias)| (threshold.into(), alias as usize))
+        let parts: Vec<(u32, usize)> = (environment_aliases(map).into_iter())
+            .map(|(threshold, alias)| (threshold, alias as usize))
             .collect();
-        let (rows, columns) = entries.split_at(map.height as usize);
-        let of_row = |row: &[(f64, usize)]| Aliases::new(row.to_vec());
+        let [width, height] = [map.width, map.height].map(|n| n.next_power_of_two() as usize);
+        let (rows, columns) = parts.split_at(height);
+        let of_row = |row: &[(u32, usize)]| Aliases::new(row.to_vec());
         Self {
             map: Arc::clone(map),
             scale: scale.into(),
             turn: turn.into(),
             rows: of_row(rows),
-            columns: columns.chunks(map.width as usize).map(of_row).collect(),
+            columns: columns.chunks(width).map(of_row).collect(),
         }
     }
 
@@ -85,7 +93,11 @@ impl Map {
     /// Column and row of a direction, as they run over the map.
     fn place(&self, d: DVec3) -> [f64; 2] {
         let [width, height] = self.size();
-        let around = ((-d.x).atan2(-d.z) - self.turn).rem_euclid(TAU);
+        // The poles of the map have no azimuth: there its first column begins, however it is turned.
+        let around = match d.x == 0.0 && d.z == 0.0 {
+            true => 0.0,
+            false => (d.x.atan2(-d.z) + self.turn).rem_euclid(TAU),
+        };
         let down = d.x.hypot(d.z).atan2(d.y);
         [around / TAU * width, down / PI * height]
     }
@@ -118,21 +130,20 @@ impl Map {
         self.rows.shares[row] * self.columns[row].shares[column] / self.solid_angle(row)
     }
 
-    /// A direction; `remainder` is what is left of the number that chose the light.
+    /// A direction: the second number chooses the row and the place along it, the first one the column.
     pub fn sample(
         &self,
-        remainder: f64,
         [u, v]: [f64; 2],
         rounding: &mut Rounding,
     ) -> (usize, Option<LightSample>) {
         let [width, height] = self.size();
-        let (row, _) = self.rows.choose(remainder);
+        let (row, down) = self.rows.choose(rounding.share(v));
         let (column, along) = self.columns[row].choose(rounding.share(u));
         let edge = |row: usize| (PI * row as f64 / height).cos();
-        let cos = edge(row) + v * (edge(row + 1) - edge(row));
+        let cos = edge(row) + down * (edge(row + 1) - edge(row));
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
-        let around = TAU * (column as f64 + along) / width + self.turn;
-        let direction = DVec3::new(-around.sin() * sin, cos, -around.cos() * sin);
+        let around = TAU * (column as f64 + along) / width - self.turn;
+        let direction = DVec3::new(around.sin() * sin, cos, -around.cos() * sin);
         let direction = rounding.direction(direction);
         let density = self.density_of(column, row);
         let sample = LightSample {

@@ -44,7 +44,10 @@ pub(super) fn sample(
     let to_light = rounding.point(point, point.abs() + x.abs() + y.abs()) - from;
     let distance = to_light.length();
     let direction = to_light / distance;
-    let away = x.cross(y).normalize().dot(direction);
+    // The edges of a parallelogram turn about its front, those of a triangle as the file has them.
+    let turns = matches!(source, Source::Triangle(_)) && scene.is_mirrored(id as usize);
+    let front = x.cross(y).normalize() * if turns { -1.0 } else { 1.0 };
+    let away = front.dot(direction);
     if away >= 0.0 && !material.emits_both_sides {
         return None;
     }

@@ -19,9 +19,9 @@ pub(super) fn candela(
     let DVec3 { x, y, z } = rounding.direction(turn.inverse() * travels);
     // Type C: (sin v cos h, sin v sin h, cos v); B: (sin h, cos h sin v, cos h cos v); A: (cos v sin h, sin v, cos v cos h).
     let (vertical, horizontal) = match profile.photometry {
-        Photometry::C => (z.clamp(-1.0, 1.0).acos(), y.atan2(x).rem_euclid(TAU)),
-        Photometry::B => (y.atan2(z), x.clamp(-1.0, 1.0).asin()),
-        Photometry::A => (y.clamp(-1.0, 1.0).asin(), x.atan2(z)),
+        Photometry::C => (z.clamp(-1.0, 1.0).acos(), angle(y, x).rem_euclid(TAU)),
+        Photometry::B => (angle(y, z), x.clamp(-1.0, 1.0).asin()),
+        Photometry::A => (y.clamp(-1.0, 1.0).asin(), angle(x, z)),
     };
     let row = weights(&profile.vertical, vertical.to_degrees());
     let column = match profile.horizontal.len() {
@@ -35,6 +35,14 @@ pub(super) fn candela(
     let measured = |h: usize, v: usize| f64::from(profile.candela[h * count + v]);
     let of_column = |h: usize| row.iter().map(|(v, w)| w * measured(h, *v)).sum::<f64>();
     column.iter().map(|(h, w)| w * of_column(*h)).sum()
+}
+
+/// The angle of (x, y); 0 at their origin, whatever the signs of the zeros.
+fn angle(y: f64, x: f64) -> f64 {
+    match x == 0.0 && y == 0.0 {
+        true => 0.0,
+        false => y.atan2(x),
+    }
 }
 
 /// The two values between which `x` lies, with their weights; nothing outside of all.

@@ -34,7 +34,8 @@ pub(super) enum Choice {
 /// What shines on a scene.
 pub(super) struct Lights {
     list: LightList,
-    power: f64,
+    /// Values below the end of each light where lights are chosen by power.
+    ends: Vec<f64>,
     /// The light of an emissive triangle.
     owners: BTreeMap<u32, usize>,
     /// The lights that rays meet though they have no triangles.
@@ -47,13 +48,14 @@ pub(super) struct Lights {
 /// Where a light is chosen: a point of a surface, and the normal of the triangle there on the viewer's side.
 pub(super) type Place = (DVec3, DVec3);
 
+/// Values that a number can have: those of a draw are multiples of the reciprocal.
+const UNITS: f64 = (1u32 << 24) as f64;
+
 /// A light that was chosen.
 pub(super) struct Chosen {
     pub light: usize,
     /// With what probability.
     pub share: f64,
-    /// What is left of the number.
-    pub remainder: f64,
 }
 
 /// A point of a light, as a surface sees it.
@@ -92,10 +94,9 @@ impl Lights {
                 },
             }
         }
-        let power = list.lights.iter().map(|light| light.power).sum();
         Self {
+            ends: ends(&list),
             list,
-            power,
             owners,
             spheres,
             map,
@@ -117,10 +118,32 @@ impl Lights {
         self.tree.get_or_init(|| tree::Tree::new(scene, &self.list))
     }
 
-    /// Groups that a tree chooses evenly from: each light without a place, and all others.
-    fn groups(&self, tree: &tree::Tree) -> usize {
-        self.list.lights.len() - tree.len() + usize::from(tree.len() > 0)
+    /// Values of each light without a place, and of the tree over all others.
+    fn groups(&self, tree: &tree::Tree) -> [f64; 2] {
+        let placeless = (self.list.lights.len() - tree.len()) as f64;
+        let each = ((UNITS - tree.len() as f64) / (placeless + 1.0)).floor();
+        [each, UNITS - placeless * each]
     }
+
+    /// The first value of a light where all are chosen evenly.
+    fn evenly(&self, light: usize) -> f64 {
+        let count = self.list.lights.len() as f64;
+        let (each, longer) = ((UNITS / count).floor(), UNITS % count);
+        light as f64 * each + longer.min(light as f64)
+    }
+}
+
+/// One value for each light, and the others by rounded sums of their powers.
+fn ends(list: &LightList) -> Vec<f64> {
+    let powers = || list.lights.iter().map(|light| light.power);
+    let all: f64 = powers().sum();
+    let spare = UNITS - list.lights.len() as f64;
+    let mut below = 0.0;
+    let end = |(place, power)| {
+        below += power;
+        place as f64 + 1.0 + (spare * (below / all)).round()
+    };
+    powers().enumerate().map(end).collect()
 }
 
 /// The point of the k-th light where all are sampled.
@@ -137,16 +160,21 @@ impl PathOracle<'_> {
     fn share(&self, light: usize, choice: Choice, at: Place, rounding: &mut Rounding) -> f64 {
         let lights = &self.lights;
         match choice {
-            Choice::Power => lights.list.lights[light].power / lights.power,
-            Choice::Uniform => 1.0 / lights.list.lights.len() as f64,
+            Choice::Power => {
+                let before = light.checked_sub(1).map_or(0.0, |other| lights.ends[other]);
+                (lights.ends[light] - before) / UNITS
+            }
             Choice::All => 1.0,
-            Choice::Tree => {
+            Choice::Tree if !lights.tree(self.scene).is_empty() => {
                 let tree = lights.tree(self.scene);
-                let group = 1.0 / lights.groups(tree) as f64;
+                let [each, all] = lights.groups(tree);
                 match light < tree.len() {
-                    true => group * tree.share(light, at, rounding),
-                    false => group,
+                    true => tree.values(light, all, at, rounding) / UNITS,
+                    false => each / UNITS,
                 }
+            }
+            Choice::Uniform | Choice::Tree => {
+                (lights.evenly(light + 1) - lights.evenly(light)) / UNITS
             }
         }
     }
@@ -160,42 +188,36 @@ impl PathOracle<'_> {
         rounding: &mut Rounding,
     ) -> Vec<Chosen> {
         let lights = self.lights.list.lights.len();
-        let chosen = |light, share, remainder| Chosen {
+        let chosen = |light| Chosen {
             light,
-            share,
-            remainder,
+            share: self.share(light, choice, at, &mut Rounding::none()),
         };
         if choice == Choice::All {
-            return (0..lights)
-                .map(|light| chosen(light, 1.0, number))
-                .collect();
+            return (0..lights).map(chosen).collect();
         }
-        let number = rounding.share(number).clamp(0.0, 1.0);
-        if choice == Choice::Tree {
-            let tree = self.lights.tree(self.scene);
-            let groups = self.lights.groups(tree);
-            let infinite = lights - tree.len();
-            let place = number * groups as f64;
-            let group = (place as usize).min(groups - 1);
-            let rest = place - group as f64;
-            let even = 1.0 / groups as f64;
-            if group < infinite {
-                return vec![chosen(tree.len() + group, even, rest)];
+        // Where a number is held against whole values, nothing is rounded.
+        let value = (number * UNITS).floor();
+        let last = lights - 1;
+        if choice == Choice::Power {
+            let light = self.lights.ends.partition_point(|end| *end <= value);
+            return vec![chosen(light.min(last))];
+        }
+        let tree = (choice == Choice::Tree).then(|| self.lights.tree(self.scene));
+        if let Some(tree) = tree.filter(|tree| !tree.is_empty()) {
+            let [each, all] = self.lights.groups(tree);
+            let placeless = (lights - tree.len()) as f64;
+            if value < placeless * each {
+                return vec![chosen(tree.len() + (value / each) as usize)];
             }
-            let found = tree.choose(rest, at, rounding);
-            let found = found.map(|(light, share, rest)| chosen(light, even * share, rest));
+            let found = tree.choose(value - placeless * each, all, at, rounding);
+            let found = found.map(|(light, values)| Chosen {
+                light,
+                share: values / UNITS,
+            });
             return found.into_iter().collect();
         }
-        let mut below = 0.0;
-        for light in 0..lights {
-            let share = self.share(light, choice, at, rounding);
-            below += share;
-            if number < below || light + 1 == lights {
-                let remainder = (number - (below - share)) / share;
-                return vec![chosen(light, share, remainder)];
-            }
-        }
-        Vec::new()
+        let light = (0..last).find(|light| value < self.lights.evenly(light + 1));
+        vec![chosen(light.unwrap_or(last))]
     }
 
     /// A point of a light, and which part of it that is, where lights have parts that are chosen.
@@ -214,7 +236,7 @@ impl PathOracle<'_> {
                 }
                 Light::Environment { .. } => {
                     let map = self.lights.map.as_ref();
-                    let found = map.map(|map| map.sample(chosen.remainder, point, rounding));
+                    let found = map.map(|map| map.sample(point, rounding));
                     return found.unwrap_or((0, None));
                 }
                 light => delta::sample(light, from, rounding),

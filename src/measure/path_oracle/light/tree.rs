@@ -51,7 +51,7 @@ impl Bounds {
         };
         let id = match source {
             Source::Triangle(id) => {
-                let [a, b, c] = scene.triangles[id as usize].vertices.map(|v| v.as_dvec3());
+                let [a, b, c] = scene.outward(id as usize).map(|v| v.as_dvec3());
                 return Some(flat(&[a, b, c], (b - a).cross(c - a), id));
             }
             Source::Parallelogram(of) => {
@@ -142,6 +142,8 @@ fn least_cone(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
 /// The lights that have a place, in a tree.
 pub(super) struct Tree {
     bounds: Vec<Bounds>,
+    /// How many lights lie under each node.
+    below: Vec<f64>,
     /// Left child of each node; none of a leaf.
     children: Vec<Option<usize>>,
     /// The light of each leaf.
@@ -172,6 +174,7 @@ impl Tree {
                 }
             }
         }
+        let counts = below.iter().map(|lights| lights.len() as f64).collect();
         let bounds = |lights: &mut Vec<usize>| {
             lights.sort_unstable();
             let all = lights.iter().map(|light| own[*light]);
@@ -184,6 +187,7 @@ impl Tree {
             .filter_map(|lights| bounds(lights).or(first));
         Self {
             bounds: bounds.collect(),
+            below: counts,
             children: (branches.iter())
                 .map(|branch| (branch.child > 0).then_some(branch.child as usize))
                 .collect(),
@@ -198,52 +202,74 @@ impl Tree {
         self.leaves.len()
     }
 
-    /// The part of a left child in the choice between it and the other; nothing if neither contributes.
-    fn part(&self, left: usize, at: DVec3, normal: DVec3, rounding: &mut Rounding) -> Option<f64> {
+    pub fn is_empty(&self) -> bool {
+        self.leaves.is_empty()
+    }
+
+    /// How many values of a node's its left child has: each light keeps one at least. Nothing if neither child contributes.
+    fn values_of_left(
+        &self,
+        left: usize,
+        values: f64,
+        (at, normal): (DVec3, DVec3),
+        rounding: &mut Rounding,
+    ) -> Option<f64> {
         let [a, b] = [left, left + 1].map(|node| self.bounds[node].importance(at, normal));
         let (a, b) = (rounding.number(a), rounding.number(b));
-        (a + b > 0.0).then(|| a / (a + b))
+        let [least, rest] = [left, left + 1].map(|node| self.below[node]);
+        match (a > 0.0, b > 0.0) {
+            (false, false) => None,
+            (false, true) => Some(0.0),
+            (true, false) => Some(values),
+            (true, true) => {
+                let part = rounding.share(a / (a + b)) * values;
+                Some(part.floor().clamp(least, values - rest))
+            }
+        }
     }
 
-    /// The light that a number chooses, with what probability, and what is left of the number.
+    /// The light that one of so many values chooses, and how many of them choose it.
     pub fn choose(
         &self,
-        mut number: f64,
-        (at, normal): (DVec3, DVec3),
+        mut value: f64,
+        all: f64,
+        at: (DVec3, DVec3),
         rounding: &mut Rounding,
-    ) -> Option<(usize, f64, f64)> {
-        let (mut node, mut share) = (ROOT, 1.0);
+    ) -> Option<(usize, f64)> {
+        let (mut node, mut values) = (ROOT, all);
         while let Some(left) = self.children[node] {
-            let part = self.part(left, at, normal, rounding)?;
-            number = rounding.share(number).clamp(0.0, 1.0);
-            (node, number, share) = match number < part {
-                true => (left, number / part, share * part),
-                false => (
-                    left + 1,
-                    (number - part) / (1.0 - part),
-                    share * (1.0 - part),
-                ),
+            let part = self.values_of_left(left, values, at, rounding)?;
+            (node, value, values) = match value < part {
+                true => (left, value, part),
+                false => (left + 1, value - part, values - part),
             };
         }
-        Some((self.lights[node], share, number))
+        Some((self.lights[node], values))
     }
 
-    /// With what probability [`Tree::choose`] finds a light.
-    pub fn share(
+    /// How many values [`Tree::choose`] gives a light.
+    pub fn values(
         &self,
         light: usize,
-        (at, normal): (DVec3, DVec3),
+        all: f64,
+        at: (DVec3, DVec3),
         rounding: &mut Rounding,
     ) -> f64 {
-        let (mut node, mut share) = (self.leaves[light], 1.0);
-        while node > ROOT {
-            let left = node & !1;
-            let Some(part) = self.part(left, at, normal, rounding) else {
+        let mut way = vec![self.leaves[light]];
+        while let Some(node) = way.last().filter(|node| **node > ROOT) {
+            way.push(self.parents[*node]);
+        }
+        let mut values = all;
+        for step in way.windows(2).rev() {
+            let left = step[0] & !1;
+            let Some(part) = self.values_of_left(left, values, at, rounding) else {
                 return 0.0;
             };
-            share *= if node == left { part } else { 1.0 - part };
-            node = self.parents[node];
+            values = if step[0] == left { part } else { values - part };
+            if values == 0.0 {
+                return 0.0;
+            }
         }
-        share
+        values
     }
 }

@@ -1,0 +1,109 @@
+//! What no run writes: negative times and counts, shares above one, rounds that lack one of their clocks. A record that says so
+//! was damaged, and no figure of it is one.
+
+use super::*;
+
+/// A body of a record, which can tell that it was damaged.
+pub trait Sound {
+    /// What in it cannot be, in words.
+    fn fault(&self) -> Option<String> {
+        None
+    }
+}
+
+impl Sound for Body {
+    fn fault(&self) -> Option<String> {
+        let mut faults = Vec::new();
+        match self {
+            Self::Structure(record) => of_structure(record, &mut faults),
+            Self::Time(record) => of_cell(record, &mut faults),
+            Self::Peer(record) => {
+                not_negative("build_ms", [&record.build_ms], &mut faults);
+                for timing in &record.timings {
+                    rounds(&timing.wall_ms, [&[], &timing.cpu_ms], &mut faults);
+                }
+            }
+            Self::Compaction(record) => rounds(&record.ms, [&record.wall_ms, &[]], &mut faults),
+            Self::Error(record) => record
+                .errors
+                .iter()
+                .for_each(|at| of_error(at, &mut faults)),
+            Self::Stream(record) => {
+                for at in &record.star {
+                    share("star", at.value.value, &mut faults);
+                }
+            }
+            _ => {}
+        }
+        faults.into_iter().next()
+    }
+}
+
+/// Metrics that are sums of squares or of magnitudes.
+const NOT_NEGATIVE: [&str; 5] = ["mae", "relmse-trimmed", "mse-luminance", "smape", "flip"];
+
+fn of_error(at: &ErrorAtSpp, faults: &mut Vec<String>) {
+    for (id, value) in &at.metrics {
+        let name = id.split('/').next().unwrap_or_default();
+        if NOT_NEGATIVE.contains(&name) {
+            not_negative(id, [value], faults);
+        }
+    }
+}
+
+fn of_structure(record: &StructureRecord, faults: &mut Vec<String>) {
+    let phases = record.build.iter().map(|phase| &phase.ms);
+    not_negative("build", phases.chain([&record.build_ms]), faults);
+    not_negative("update_ms", &record.update_ms, faults);
+    not_negative("sah_cost", &record.stats.sah_cost, faults);
+    for timing in &record.timings {
+        rounds(&timing.ms, [&timing.wall_ms, &timing.cpu_ms], faults);
+        not_negative("mrays_s", [&timing.mrays_s.value], faults);
+        share("hit_fraction", timing.hit_fraction, faults);
+        if let Some(work) = &timing.counters {
+            let counted = [&work.nodes, &work.box_tests, &work.triangle_tests];
+            not_negative("counters", counted, faults);
+        }
+    }
+}
+
+fn of_cell(record: &TimeRecord, faults: &mut Vec<String>) {
+    rounds(&record.ms, [&record.wall_ms, &record.cpu_ms], faults);
+    let figures = [&record.ms_per_spp, &record.mrays_s];
+    let figures = figures.into_iter().flatten();
+    not_negative("ms_per_spp and mrays_s", figures.map(|i| &i.value), faults);
+    not_negative("stages", record.stages.values(), faults);
+}
+
+/// Times by one clock, round by round, and the same by others, which have as many rounds or none.
+fn rounds(ms: &[f64], others: [&[f64]; 2], faults: &mut Vec<String>) {
+    for times in others.into_iter().chain([ms]) {
+        not_negative("a time", times, faults);
+    }
+    for other in others {
+        if !other.is_empty() && other.len() != ms.len() {
+            faults.push(format!(
+                "{} rounds by one clock and {} by another",
+                ms.len(),
+                other.len()
+            ));
+        }
+    }
+}
+
+fn not_negative<'a>(
+    what: &str,
+    values: impl IntoIterator<Item = &'a f64>,
+    faults: &mut Vec<String>,
+) {
+    let mut values = values.into_iter();
+    // Not a number is none of these either.
+    let bad = values.find(|x| !(**x >= 0.0 && x.is_finite()));
+    faults.extend(bad.map(|x| format!("{what} is {x}")));
+}
+
+fn share(what: &str, value: f64, faults: &mut Vec<String>) {
+    if !(0.0..=1.0).contains(&value) {
+        faults.push(format!("{what} is {value}, and no share"));
+    }
+}
