@@ -44,10 +44,10 @@ pub const FLIPS: f64 = 1e-3;
 pub const ILL_CONDITIONED: [f64; 3] = [0.02, 0.05, 0.6];
 /// Greatest median of the relative differences in the same cases; measured: 5 · 10⁻⁷, 4 · 10⁻⁶, 10⁻⁴.
 pub const MEDIAN: [f64; 3] = [2e-5, 2e-5, 1e-3];
-/// Times that each scale is played; twice as often for each surface of a path that has another one within rounding, up to so many
-/// surfaces.
+/// Times that each scale is played; twice as often for each surface of a path that has another one within rounding, and on as long as
+/// plays take branches that none took before (light that is passed on by many small facets), but never more often than [`MOST_TRIALS`].
 const TRIALS: u64 = 24;
-const MOST_LAYERS: usize = 5;
+const MOST_TRIALS: u64 = TRIALS << 5;
 /// By this factor a kernel may differ more than the worst of the played paths of its branch.
 const SPREAD: f64 = 3.0;
 /// A difference that the second of [`SCALES`] may excuse, too: several offsets add up on long paths in corners.
@@ -191,7 +191,7 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
     };
     record.fault = match first_wrong {
         Some((&i, _)) => {
-            let played = spread_of(oracle, view, &truth[i], answers[i].id, floor);
+            let played = spread_of(oracle, view, &answers[i], &truth[i], floor);
             Some(describe(&answers[i], &truth[i]) + &played)
         }
         None => out_of_bounds(&record, oracle.texturing()),
@@ -226,16 +226,23 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
     let mut near = TOLERANCE;
     let mut others: Vec<Path> = Vec::new();
     let off = difference(answer.radiance, truth.radiance, floor);
-    let trials = TRIALS << truth.layers.min(MOST_LAYERS);
+    let least = (TRIALS << truth.layers.min(8)).min(MOST_TRIALS);
     for (index, scale) in (0..).zip(SCALES) {
         // Many roundings would excuse anything of a path that keeps its branch.
         let is_excused = scale == SCALES[0] || off <= SLIGHT && scale == SCALES[1];
-        for trial in 0..trials {
-            let rounding = Rounding::played(scale, trials * index + trial);
+        let (mut trial, mut since_new) = (0, 0);
+        while since_new < least && trial < MOST_TRIALS {
+            let rounding = Rounding::played(scale, MOST_TRIALS * index + trial);
             let played = oracle.trace(view, answer.id, rounding);
-            match played.parting(truth) {
-                None => spread = spread.max(difference(played.radiance, truth.radiance, floor)),
-                Some(_) => others.push(played),
+            trial += 1;
+            since_new += 1;
+            if played.parting(truth).is_none() {
+                spread = spread.max(difference(played.radiance, truth.radiance, floor));
+            } else {
+                if others.iter().all(|other| other.parting(&played).is_some()) {
+                    since_new = 0;
+                }
+                others.push(played);
             }
             if off <= SPREAD * spread && is_excused {
                 return Class::IllConditioned;
@@ -255,13 +262,34 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
 }
 
 /// What the fewest roundings that are played make of a path, for people.
-fn spread_of(oracle: &PathOracle, view: &View, truth: &Path, id: PathId, floor: f64) -> String {
-    let plays = (0..TRIALS).map(|trial| oracle.trace(view, id, Rounding::played(SCALES[0], trial)));
+fn spread_of(
+    oracle: &PathOracle,
+    view: &View,
+    answer: &Answer,
+    truth: &Path,
+    floor: f64,
+) -> String {
+    let plays =
+        (0..TRIALS).map(|trial| oracle.trace(view, answer.id, Rounding::played(SCALES[0], trial)));
     let (same, others): (Vec<Path>, Vec<Path>) = plays.partition(|p| p.parting(truth).is_none());
     let off = |path: &Path| difference(path.radiance, truth.radiance, floor);
     let spread = same.iter().map(off).fold(0.0, f64::max);
+    let from_kernel = |path: &Path| difference(answer.radiance, path.radiance, floor);
+    let nearest = others
+        .iter()
+        .min_by(|a, b| from_kernel(a).total_cmp(&from_kernel(b)));
+    let nearest = nearest.map_or(String::new(), |path| {
+        let apart = spread_of_branches(&others, floor);
+        format!(
+            ", the nearest of which is {} and off by {:.1e} (up to {apart:.1e} within a branch)",
+            show(path.radiance),
+            from_kernel(path)
+        )
+    });
     let others = others.len();
-    format!("; rounding moves it by {spread:.1e}, {others} of {TRIALS} plays take other branches")
+    format!(
+        "; rounding moves it by {spread:.1e}, {others} of {TRIALS} plays take other branches{nearest}"
+    )
 }
 
 /// The greatest difference of a path from the first one of its branch.
@@ -281,8 +309,8 @@ fn most(paths: usize, share: f64) -> usize {
     (mean + 6.0 * mean.sqrt()).ceil() as usize + 1
 }
 
-/// What the numbers of a record say against it, when no single path does.
-fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
+/// What the numbers of a record say against it, when no single path does; `texturing` is that of the oracle.
+pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
     let [share, median] = [ILL_CONDITIONED, MEDIAN].map(|bounds| bounds[texturing]);
     let PathsRecord {
         paths,
@@ -313,7 +341,6 @@ fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
 
 /// Both answers, and the path, a line for each vertex.
 fn describe(answer: &Answer, truth: &Path) -> String {
-    let show = |c: DVec3| format!("({:.7e}, {:.7e}, {:.7e})", c.x, c.y, c.z);
     let mut text = format!(
         "{}: kernel {}, oracle {}",
         answer.id,
@@ -324,4 +351,8 @@ fn describe(answer: &Answer, truth: &Path) -> String {
         text += &format!("; vertex {number}: {vertex}");
     }
     text
+}
+
+fn show(c: DVec3) -> String {
+    format!("({:.7e}, {:.7e}, {:.7e})", c.x, c.y, c.z)
 }

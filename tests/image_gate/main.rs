@@ -7,7 +7,7 @@ mod support;
 use raystone::gpu::{Gpu, GpuError};
 use raystone::integrator::RayOffset;
 use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer};
-use raystone::measure::image_gate::{Pixels, answers, judge, sums};
+use raystone::measure::image_gate::{Pixels, answers, judge, out_of_bounds, sums};
 use raystone::measure::path_oracle::{Estimator, PathOracle, View};
 use raystone::measure::record::{Body, PathsRecord, Verdict};
 use raystone::measure::trial_scenes::{layers, trial_scenes};
@@ -136,7 +136,12 @@ fn single_paths_of_layers_mirrored_balls_and_thin_triangles_are_those_of_the_ora
 /// The verdict of one scene's oracle on another scene's paths, of a kernel with this change.
 fn of_another(rendered: &SceneData, expected: &SceneData, change: &[(&str, &str)]) -> PathsRecord {
     let gpu = open(kernels_with("integrator/path", change));
-    judged_by(&gpu, rendered, expected, &path(3), &independent(), &[0, 3]).expect("images")
+    let what = [
+        ("max_depth", ParamValue::Integer(3)),
+        ("roulette_depth", ParamValue::Integer(1)),
+    ];
+    let what = integrator_variant("path", &what);
+    judged_by(&gpu, rendered, expected, &what, &independent(), &[0, 3]).expect("images")
 }
 
 #[test]
@@ -155,6 +160,97 @@ fn surfaces_within_rounding_are_told_apart_from_faults() {
     let weight = "throughput *= next.weight;";
     let faulty = [(weight, "throughput *= 1.005 * next.weight;")];
     assert!(of_another(&coincident, &coincident, &faulty).wrong > 0);
+}
+
+#[test]
+fn faults_do_not_hide_in_edges_decisions_and_textures() {
+    let scene = layers(2e-3).expect("a built-in scene");
+    // A lamp half a thousandth of its width aside: only its edges, and the shadows of edges, are elsewhere.
+    let mut aside = scene.clone();
+    let lamp = scene.triangles.len() - 2;
+    for triangle in &mut aside.triangles[lamp..] {
+        triangle.vertices = triangle.vertices.map(|v| v + 5e-4 * glam::Vec3::X);
+    }
+    assert!(of_another(&aside, &scene, &[]).wrong > 0);
+    // One more in two hundred survives.
+    let fewer = [(
+        "sample_1d(sampler) >= survival",
+        "sample_1d(sampler) >= survival + 0.005",
+    )];
+    assert!(of_another(&scene, &scene, &fewer).wrong > 0);
+    // Textures a thousandth of their width aside.
+    let textured = trial_scenes().expect("scenes").swap_remove(4).scene;
+    let mut aside = textured.clone();
+    assert!(!aside.uvs.is_empty());
+    for corners in &mut aside.uvs {
+        *corners = corners.map(|uv| uv + glam::Vec2::splat(1e-3));
+    }
+    let record = of_another(&aside, &textured, &[]);
+    assert!(record.fault.is_some() && record.wrong > 0, "{record:?}");
+}
+
+#[test]
+fn each_kind_of_difference_has_a_bound() {
+    let paths = PathsRecord {
+        paths: 3952,
+        layered: 100,
+        ..PathsRecord::default()
+    };
+    let said = |record: &PathsRecord| out_of_bounds(record, 0).unwrap_or_default();
+    // 0.1 % and 2 % of 3952 paths, and six standard deviations.
+    for (few, many, part) in [
+        (
+            PathsRecord {
+                flips: 17,
+                edges: 10,
+                ..paths.clone()
+            },
+            PathsRecord {
+                flips: 18,
+                edges: 10,
+                ..paths.clone()
+            },
+            "take another branch",
+        ),
+        (
+            PathsRecord {
+                flips: 117,
+                surfaces: 117,
+                ..paths.clone()
+            },
+            PathsRecord {
+                flips: 118,
+                surfaces: 118,
+                ..paths.clone()
+            },
+            "100 have one within rounding",
+        ),
+        (
+            PathsRecord {
+                ill_conditioned: 134,
+                ..paths.clone()
+            },
+            PathsRecord {
+                ill_conditioned: 135,
+                ..paths.clone()
+            },
+            "are ill-conditioned",
+        ),
+        (
+            PathsRecord {
+                median: 2e-5,
+                ..paths.clone()
+            },
+            PathsRecord {
+                median: 2.1e-5,
+                ..paths
+            },
+            "half of the paths",
+        ),
+    ] {
+        assert_eq!(said(&few), "");
+        assert!(said(&many).contains(part), "{}", said(&many));
+    }
 }
 
 #[test]

@@ -279,7 +279,7 @@ impl PathOracle<'_> {
             ..surface.leave(direction, &mut walk.rounding)
         };
         walk.note_ray(CountedRays::Ao, 0, &free);
-        let blocked = self.hits.blocked(&free);
+        let blocked = self.hits.blocked(&free, &mut walk.rounding);
         walk.decide_blocked(blocked);
         DVec3::splat(if blocked == Blocked::No { 1.0 } else { 0.0 })
     }

@@ -44,6 +44,14 @@ pub(super) struct Hit {
     pub weights: [f64; 2],
 }
 
+impl Hit {
+    /// The least of the weights of the corners: how far the hit is from an edge.
+    fn margin(&self) -> f64 {
+        let [u, v] = self.weights;
+        u.min(v).min(1.0 - u - v)
+    }
+}
+
 /// What lies on a segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Blocked {
@@ -121,11 +129,17 @@ impl<'a> Hits<'a> {
         let mut end = f64::INFINITY;
         self.visit(segment, |hit| {
             let blur = self.blur(&hit, segment);
-            end = end.min(hit.distance + 2.0 * blur.within(MOST_ROUNDINGS));
+            // What is behind a triangle counts where a kernel may miss it.
+            if hit.margin() > blur.of_weights * MOST_ROUNDINGS * EPSILON {
+                end = end.min(hit.distance + 2.0 * blur.within(MOST_ROUNDINGS));
+            }
             found.push((hit, blur));
             // The end as f32, rounded away by more than rounding.
             (end * (1.0 + 1e-6)) as f32
         });
+        // In an order that groups do not decide.
+        found.sort_by_key(|(hit, _)| hit.triangle);
+        found.retain(|(hit, blur)| rounding.holds(hit.margin(), blur.of_weights));
         let before = |a: &Hit, b: &Hit| match (a.distance - b.distance).abs() <= EQUAL * b.distance
         {
             true => a.triangle < b.triangle,
@@ -140,8 +154,6 @@ impl<'a> Hits<'a> {
             hit.triangle != first.0.triangle && hit.distance - first.0.distance <= room(blur)
         };
         let is_layered = found.iter().any(is_layer);
-        // In an order that groups do not decide.
-        found.sort_by_key(|(hit, _)| hit.triangle);
         let is_played = rounding.is_played();
         let played = found.iter().map(|(hit, blur)| {
             (
@@ -166,12 +178,15 @@ impl<'a> Hits<'a> {
             .vertices
             .map(|v| v.as_dvec3());
         let (e1, e2) = (b - a, c - a);
-        let normal = e1.cross(e2).normalize_or_zero();
+        let area = e1.cross(e2);
+        let normal = area.normalize_or_zero();
         let terms = segment.origin.abs() + a.abs() + e1.abs() + e2.abs();
+        let longest = e1.length().max(e2.length());
         let cosine = normal.dot(segment.direction).abs();
         Blur {
             of_rounding: normal.abs().dot(terms) / cosine.max(1e-12),
-            most: e1.length().max(e2.length()),
+            most: longest,
+            of_weights: Rounding::of_weights(terms.max_element() * longest, area.length()),
         }
     }
 
@@ -186,17 +201,18 @@ impl<'a> Hits<'a> {
     }
 
     /// Whether anything lies on a segment, and whether that is a layer of the surface that it leaves and nothing else.
-    pub fn blocked(&self, segment: &Segment) -> Blocked {
+    pub fn blocked(&self, segment: &Segment, rounding: &mut Rounding) -> Blocked {
         let (mut by_layer, mut by_other) = (false, false);
-        self.visit(segment, |hit| match self.is_at_start(&hit, segment) {
-            true => {
+        self.visit(segment, |hit| {
+            if !rounding.holds(hit.margin(), self.blur(&hit, segment).of_weights) {
+                return f32::INFINITY;
+            }
+            if self.is_at_start(&hit, segment) {
                 by_layer = true;
-                f32::INFINITY
+                return f32::INFINITY;
             }
-            false => {
-                by_other = true;
-                f32::NEG_INFINITY
-            }
+            by_other = true;
+            f32::NEG_INFINITY
         });
         match (by_layer, by_other) {
             (_, true) => Blocked::Yes,
@@ -250,6 +266,8 @@ struct Blur {
     of_rounding: f64,
     /// A hit stays on its triangle.
     most: f64,
+    /// Of the weights of its corners, over the same relative error.
+    of_weights: f64,
 }
 
 impl Blur {

@@ -295,7 +295,7 @@ impl PathOracle<'_> {
             return Blocked::Yes;
         }
         walk.note_ray(CountedRays::Shadow, light, shadow);
-        self.hits.blocked(shadow)
+        self.hits.blocked(shadow, &mut walk.rounding)
     }
 
     /// What comes along a ray that leaves the scene. A map takes the place of the sky.
