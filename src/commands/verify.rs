@@ -272,7 +272,9 @@ fn paths_table(judged: &[&(Cell, PathsRecord)]) -> String {
         ":verdict",
         "paths",
         "wrong",
-        "flips",
+        "other surfaces",
+        "edges",
+        "decisions",
         "ill-conditioned",
         "median",
     ];
@@ -288,7 +290,9 @@ fn paths_table(judged: &[&(Cell, PathsRecord)]) -> String {
         let numbers = [
             record.paths,
             record.wrong,
-            record.flips,
+            record.surfaces,
+            record.edges,
+            record.flips.saturating_sub(record.surfaces + record.edges),
             record.ill_conditioned,
         ];
         let mut row: Vec<TableCell> = vec![

@@ -7,17 +7,20 @@
 //! * it is *ill-conditioned*: it differs by more, but by no more than `SPREAD` times what the same path does when a few
 //!   roundings of f32 are played in f64 ([`Rounding`]), all its decisions being the same: texture coordinates on long triangles,
 //!   grazing light;
-//! * it is a *flip*: with as many roundings the oracle decides otherwise somewhere (an edge, an occluder, a random number against a
-//!   probability) and then gives the kernel's answer. That decision had a margin below [`MOST_ROUNDINGS`] roundings;
+//! * it is a *flip*: with as many roundings the oracle decides otherwise somewhere and then gives the kernel's answer. That decision
+//!   had a margin below [`MOST_ROUNDINGS`] roundings. By what is decided otherwise first, it is of one of three kinds: *another surface*
+//!   that lies within rounding of the first (walls of two layers), *an edge* of what is met or in the way, or anything else, such as a
+//!   random number against a probability;
 //! * else it is *wrong*: a fault of the kernels, or of the oracle.
 //!
 //! Means of some samples that are summed in one dispatch are compared with those of single samples ([`sums`]).
 //!
-//! One wrong path fails. So do more flips than [`FLIPS`] of the paths beyond chance, or more ill-conditioned ones than
+//! One wrong path fails. So do more flips than [`FLIPS`] of the paths beyond chance, not counting other surfaces, of which there may be as
+//! many as paths meet surfaces with another one within rounding, or more ill-conditioned ones than
 //! [`ILL_CONDITIONED`] and a median difference above [`MEDIAN`], which no single path shows. Texture coordinates that repeat often have
 //! few digits left within a texel, so that the last two have bounds of their own where textures are.
 
-use super::path_oracle::{Path, PathId, PathOracle, Rounding, View};
+use super::path_oracle::{Parting, Path, PathId, PathOracle, Rounding, View};
 use super::record::PathsRecord;
 use crate::gpu::GpuError;
 use crate::integrator::Renderer;
@@ -41,8 +44,10 @@ pub const FLIPS: f64 = 1e-3;
 pub const ILL_CONDITIONED: [f64; 3] = [0.02, 0.05, 0.6];
 /// Greatest median of the relative differences in the same cases; measured: 5 · 10⁻⁷, 4 · 10⁻⁶, 10⁻⁴.
 pub const MEDIAN: [f64; 3] = [2e-5, 2e-5, 1e-3];
-/// Times that each scale is played.
+/// Times that each scale is played; twice as often for each surface of a path that has another one within rounding, and on as long as
+/// plays take branches that none took before (light that is passed on by many small facets), but never more often than [`MOST_TRIALS`].
 const TRIALS: u64 = 24;
+const MOST_TRIALS: u64 = TRIALS << 5;
 /// By this factor a kernel may differ more than the worst of the played paths of its branch.
 const SPREAD: f64 = 3.0;
 /// A difference that the second of [`SCALES`] may excuse, too: several offsets add up on long paths in corners.
@@ -66,7 +71,7 @@ pub struct Answer {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Class {
     IllConditioned,
-    Flip,
+    Flip(Parting),
     Wrong,
 }
 
@@ -172,7 +177,13 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
     let mut record = PathsRecord {
         paths: answers.len(),
         ill_conditioned: of(Class::IllConditioned),
-        flips: of(Class::Flip),
+        flips: [Parting::Surfaces, Parting::Edge, Parting::Decision]
+            .map(|parting| of(Class::Flip(parting)))
+            .iter()
+            .sum(),
+        surfaces: of(Class::Flip(Parting::Surfaces)),
+        edges: of(Class::Flip(Parting::Edge)),
+        layered: truth.iter().filter(|path| path.layers > 0).count(),
         wrong: of(Class::Wrong),
         median: median(&truth, &differences, floor),
         worst: agreeing.copied().fold(0.0, f64::max),
@@ -180,7 +191,7 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
     };
     record.fault = match first_wrong {
         Some((&i, _)) => {
-            let played = spread_of(oracle, view, &truth[i], answers[i].id, floor);
+            let played = spread_of(oracle, view, &answers[i], &truth[i], floor);
             Some(describe(&answers[i], &truth[i]) + &played)
         }
         None => out_of_bounds(&record, oracle.texturing()),
@@ -190,9 +201,10 @@ pub fn judge(oracle: &PathOracle, view: &View, answers: &[Answer]) -> PathsRecor
 
 /// The greatest difference of a channel, relative to the oracle's, or to the floor.
 fn difference(kernel: DVec3, oracle: DVec3, floor: f64) -> f64 {
-    let relative = (kernel - oracle).abs() / oracle.abs().max(DVec3::splat(floor));
-    // Unlike `max_element`, this keeps NaN.
-    let [r, g, b] = relative.to_array();
+    let off = (kernel - oracle).abs();
+    let relative = off / oracle.abs().max(DVec3::splat(floor));
+    // Where nothing shines the floor is 0, too, and equal is equal. Unlike `max_element`, what follows keeps NaN.
+    let [r, g, b] = DVec3::select(off.cmpeq(DVec3::ZERO), DVec3::ZERO, relative).to_array();
     match r.is_nan() || g.is_nan() || b.is_nan() {
         true => f64::NAN,
         false => r.max(g).max(b),
@@ -214,15 +226,23 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
     let mut near = TOLERANCE;
     let mut others: Vec<Path> = Vec::new();
     let off = difference(answer.radiance, truth.radiance, floor);
+    let least = (TRIALS << truth.layers.min(8)).min(MOST_TRIALS);
     for (index, scale) in (0..).zip(SCALES) {
         // Many roundings would excuse anything of a path that keeps its branch.
         let is_excused = scale == SCALES[0] || off <= SLIGHT && scale == SCALES[1];
-        for trial in 0..TRIALS {
-            let rounding = Rounding::played(scale, TRIALS * index + trial);
+        let (mut trial, mut since_new) = (0, 0);
+        while since_new < least && trial < MOST_TRIALS {
+            let rounding = Rounding::played(scale, MOST_TRIALS * index + trial);
             let played = oracle.trace(view, answer.id, rounding);
-            match played.branch == truth.branch {
-                true => spread = spread.max(difference(played.radiance, truth.radiance, floor)),
-                false => others.push(played),
+            trial += 1;
+            since_new += 1;
+            if played.parting(truth).is_none() {
+                spread = spread.max(difference(played.radiance, truth.radiance, floor));
+            } else {
+                if others.iter().all(|other| other.parting(&played).is_some()) {
+                    since_new = 0;
+                }
+                others.push(played);
             }
             if off <= SPREAD * spread && is_excused {
                 return Class::IllConditioned;
@@ -233,27 +253,49 @@ fn classify(oracle: &PathOracle, view: &View, answer: &Answer, truth: &Path, flo
             near = TOLERANCE + SPREAD * spread.max(spread_of_branches(&others, floor));
         }
         let explains = |other: &Path| difference(answer.radiance, other.radiance, floor) <= near;
-        if others.iter().any(explains) {
-            return Class::Flip;
+        let parting = others.iter().filter(|other| explains(other));
+        if let Some(parting) = parting.filter_map(|other| other.parting(truth)).min() {
+            return Class::Flip(parting);
         }
     }
     Class::Wrong
 }
 
 /// What the fewest roundings that are played make of a path, for people.
-fn spread_of(oracle: &PathOracle, view: &View, truth: &Path, id: PathId, floor: f64) -> String {
-    let plays = (0..TRIALS).map(|trial| oracle.trace(view, id, Rounding::played(SCALES[0], trial)));
-    let (same, others): (Vec<Path>, Vec<Path>) = plays.partition(|p| p.branch == truth.branch);
+fn spread_of(
+    oracle: &PathOracle,
+    view: &View,
+    answer: &Answer,
+    truth: &Path,
+    floor: f64,
+) -> String {
+    let plays =
+        (0..TRIALS).map(|trial| oracle.trace(view, answer.id, Rounding::played(SCALES[0], trial)));
+    let (same, others): (Vec<Path>, Vec<Path>) = plays.partition(|p| p.parting(truth).is_none());
     let off = |path: &Path| difference(path.radiance, truth.radiance, floor);
     let spread = same.iter().map(off).fold(0.0, f64::max);
+    let from_kernel = |path: &Path| difference(answer.radiance, path.radiance, floor);
+    let nearest = others
+        .iter()
+        .min_by(|a, b| from_kernel(a).total_cmp(&from_kernel(b)));
+    let nearest = nearest.map_or(String::new(), |path| {
+        let apart = spread_of_branches(&others, floor);
+        format!(
+            ", the nearest of which is {} and off by {:.1e} (up to {apart:.1e} within a branch)",
+            show(path.radiance),
+            from_kernel(path)
+        )
+    });
     let others = others.len();
-    format!("; rounding moves it by {spread:.1e}, {others} of {TRIALS} plays take other branches")
+    format!(
+        "; rounding moves it by {spread:.1e}, {others} of {TRIALS} plays take other branches{nearest}"
+    )
 }
 
 /// The greatest difference of a path from the first one of its branch.
 fn spread_of_branches(paths: &[Path], floor: f64) -> f64 {
     let from_first = |path: &Path| {
-        let first = paths.iter().find(|first| first.branch == path.branch);
+        let first = paths.iter().find(|first| first.parting(path).is_none());
         first.map_or(0.0, |first| {
             difference(path.radiance, first.radiance, floor)
         })
@@ -267,12 +309,14 @@ fn most(paths: usize, share: f64) -> usize {
     (mean + 6.0 * mean.sqrt()).ceil() as usize + 1
 }
 
-/// What the numbers of a record say against it, when no single path does.
-fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
+/// What the numbers of a record say against it, when no single path does; `texturing` is that of the oracle.
+pub fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
     let [share, median] = [ILL_CONDITIONED, MEDIAN].map(|bounds| bounds[texturing]);
     let PathsRecord {
         paths,
         flips,
+        surfaces,
+        layered,
         ill_conditioned,
         ..
     } = *record;
@@ -283,7 +327,12 @@ fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
         })
     };
     let off = record.median > median;
-    over("take another branch", flips, FLIPS)
+    let strange = surfaces > layered + most(paths, FLIPS);
+    let strange = strange.then(|| {
+        format!("{surfaces} of {paths} paths meet another surface, but {layered} have one within rounding")
+    });
+    over("take another branch", flips - surfaces, FLIPS)
+        .or(strange)
         .or_else(|| over("are ill-conditioned", ill_conditioned, share))
         .or_else(|| {
             off.then(|| format!("half of the paths differ by {:.1e} or more", record.median))
@@ -292,7 +341,6 @@ fn out_of_bounds(record: &PathsRecord, texturing: usize) -> Option<String> {
 
 /// Both answers, and the path, a line for each vertex.
 fn describe(answer: &Answer, truth: &Path) -> String {
-    let show = |c: DVec3| format!("({:.7e}, {:.7e}, {:.7e})", c.x, c.y, c.z);
     let mut text = format!(
         "{}: kernel {}, oracle {}",
         answer.id,
@@ -303,4 +351,8 @@ fn describe(answer: &Answer, truth: &Path) -> String {
         text += &format!("; vertex {number}: {vertex}");
     }
     text
+}
+
+fn show(c: DVec3) -> String {
+    format!("({:.7e}, {:.7e}, {:.7e})", c.x, c.y, c.z)
 }

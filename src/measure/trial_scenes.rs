@@ -24,6 +24,7 @@ pub struct TrialScene {
 
 pub use super::trial_lights::trials_of;
 pub use super::trial_slivers::sheets;
+pub use super::trial_surfaces::layers;
 
 /// All of them.
 ///

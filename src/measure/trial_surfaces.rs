@@ -22,8 +22,40 @@ pub(super) fn scenes() -> Result<Vec<TrialScene>, SceneError> {
         },
         trial(under_the_sky()?, &[depth(5)]),
         trial(close_pane()?, &[depth(3)]),
+        TrialScene {
+            scene: layers(0.0)?,
+            trials: vec![("path", vec![depth(3)]), ("primary", vec![])],
+        },
         trial(mirrored()?, &[depth(7)]),
     ])
+}
+
+/// A floor and a wall of two coloured layers each, in one plane but for the rounding of their corners, or so far apart, scene
+/// units: which one is met is up to the last bit.
+///
+/// # Errors
+/// A built-in scene is missing.
+pub fn layers(apart: f32) -> Result<SceneData, SceneError> {
+    let camera = camera(vec3(1.1, 1.6, 2.9), vec3(0.0, 0.3, 0.0), Vec3::Y);
+    let mut mesh = Mesh::new("layers", camera, vec3(0.5, 0.6, 0.7))?;
+    let [red, blue] = [vec3(0.8, 0.2, 0.1), vec3(0.1, 0.3, 0.9)]
+        .map(|colour| mesh.material(Material::diffuse("layer", colour)));
+    let lamp = Material::diffuse("lamp", Vec3::splat(0.3)).emitting(vec3(5.0, 4.0, 3.0));
+    let lamp = mesh.material(lamp);
+    let turn = glam::Quat::from_euler(glam::EulerRot::XYZ, 0.21, 0.37, -0.13);
+    for [corner, along, across] in [
+        [vec3(-2.0, 0.0, -2.0), 4.0 * Vec3::Z, 4.0 * Vec3::X],
+        [vec3(-2.0, 0.0, -1.3), 4.0 * Vec3::X, 3.0 * Vec3::Y],
+    ] {
+        let [corner, along, across] = [corner, along, across].map(|v| turn * v);
+        let below = corner - apart * along.cross(across).normalize();
+        mesh.plain([corner, along, across], red);
+        // From another corner and of another size, so that no coordinate is the same.
+        let other = below - 0.013 * along - 0.021 * across;
+        mesh.plain([other, 1.037 * along, 1.041 * across], blue);
+    }
+    mesh.plain([vec3(-0.5, 2.4, -0.4), 1.0 * Vec3::X, 0.8 * Vec3::Z], lamp);
+    Ok(mesh.done(Vec::new()))
 }
 
 fn texture(name: &str, [width, height]: [u32; 2], texel: impl Fn(u32) -> [u32; 3]) -> Texture {

@@ -1,15 +1,16 @@
 //! The gate of integrators: kernels agree with the oracle for images path by path, and planted faults do not.
 
+mod real;
 #[path = "../support/mod.rs"]
 mod support;
 
 use raystone::gpu::{Gpu, GpuError};
 use raystone::integrator::RayOffset;
 use raystone::integrator::{IntegratorRegistry, RenderJob, Renderer};
-use raystone::measure::image_gate::{Pixels, answers, judge, sums};
+use raystone::measure::image_gate::{Pixels, answers, judge, out_of_bounds, sums};
 use raystone::measure::path_oracle::{Estimator, PathOracle, View};
 use raystone::measure::record::{Body, PathsRecord, Verdict};
-use raystone::measure::trial_scenes::trial_scenes;
+use raystone::measure::trial_scenes::{layers, trial_scenes};
 use raystone::params::{ParamValue, Variant};
 use raystone::run::Registries;
 use raystone::sampling::Sampler;
@@ -37,6 +38,18 @@ fn tried(
     sampler: &Sampler,
     samples: &[u32],
 ) -> Result<PathsRecord, GpuError> {
+    judged_by(gpu, scene, scene, what, sampler, samples)
+}
+
+/// The same by the oracle of the scene that is expected.
+fn judged_by(
+    gpu: &Gpu,
+    scene: &SceneData,
+    expected: &SceneData,
+    what: &Variant,
+    sampler: &Sampler,
+    samples: &[u32],
+) -> Result<PathsRecord, GpuError> {
     let stage = Stage::new(gpu, scene.clone());
     let traced = stage.traced(gpu, structure("bvh"));
     let integrator = IntegratorRegistry::default().configured(what);
@@ -57,7 +70,7 @@ fn tried(
         seed: 70_003,
     };
     let answers = answers(&renderer, &pixels)?;
-    let oracle = PathOracle::new(&stage.scene).expect("known materials");
+    let oracle = PathOracle::new(expected).expect("known materials");
     let view = View {
         estimator: Estimator::of(&integrator).expect("a known integrator"),
         camera: stage.camera,
@@ -84,7 +97,7 @@ fn independent() -> Sampler {
 /// Trial scenes of these places, in five tests for their time.
 fn judge_trials(places: std::ops::Range<usize>) {
     let scenes = trial_scenes().expect("scenes");
-    assert_eq!(scenes.len(), 14);
+    assert_eq!(scenes.len(), 15);
     for trial in &scenes[places] {
         for (name, changes) in &trial.trials {
             let what = integrator_variant(name, changes);
@@ -112,12 +125,163 @@ fn single_paths_of_maps_luminaires_and_many_lamps_are_those_of_the_oracle() {
 
 #[test]
 fn single_paths_of_placed_textures_skies_and_panes_are_those_of_the_oracle() {
-    judge_trials(9..13);
+    judge_trials(9..12);
 }
 
 #[test]
-fn single_paths_of_thin_triangles_are_those_of_the_oracle() {
-    judge_trials(13..14);
+fn single_paths_of_layers_mirrored_balls_and_thin_triangles_are_those_of_the_oracle() {
+    judge_trials(12..15);
+}
+
+/// The verdict of one scene's oracle on another scene's paths, of a kernel with this change.
+fn of_another(rendered: &SceneData, expected: &SceneData, change: &[(&str, &str)]) -> PathsRecord {
+    let gpu = open(kernels_with("integrator/path", change));
+    let what = [
+        ("max_depth", ParamValue::Integer(3)),
+        ("roulette_depth", ParamValue::Integer(1)),
+    ];
+    let what = integrator_variant("path", &what);
+    judged_by(&gpu, rendered, expected, &what, &independent(), &[0, 3]).expect("images")
+}
+
+#[test]
+fn surfaces_within_rounding_are_told_apart_from_faults() {
+    let [coincident, apart] = [0.0, 2e-3].map(|apart| layers(apart).expect("a built-in scene"));
+    let right = of_another(&coincident, &coincident, &[]);
+    assert_eq!(right.fault, None);
+    assert!(right.surfaces > right.paths / 20, "{right:?}");
+    assert!(
+        right.layered > right.paths / 2 && right.surfaces <= right.layered,
+        "{right:?}"
+    );
+    // Layers that rounding cannot exchange; and a fault of half a percent in ones that it can.
+    assert_eq!(of_another(&apart, &apart, &[]).surfaces, 0);
+    assert!(of_another(&coincident, &apart, &[]).wrong > 0);
+    let weight = "throughput *= next.weight;";
+    let faulty = [(weight, "throughput *= 1.005 * next.weight;")];
+    assert!(of_another(&coincident, &coincident, &faulty).wrong > 0);
+}
+
+#[test]
+fn faults_do_not_hide_in_edges_decisions_and_textures() {
+    let scene = layers(2e-3).expect("a built-in scene");
+    // A lamp aside: what camera rays see of it is the same but for its edges.
+    let room = builtin("cornell-box", &[]);
+    let mut aside = room.clone();
+    let shines = |id: &u32| room.materials[*id as usize].emission != glam::Vec3::ZERO;
+    let bounds = room.bounds();
+    let by = 0.03 * (bounds.max - bounds.min) * glam::Vec3::X;
+    let lamp = aside.triangles.iter_mut().zip(&room.material_ids);
+    for (triangle, _) in lamp.filter(|(_, id)| shines(id)) {
+        triangle.vertices = triangle.vertices.map(|v| v + by);
+    }
+    let what = integrator_variant("primary", &[]);
+    let record = judged_by(gpu(), &aside, &room, &what, &independent(), &[0, 3]);
+    let record = record.expect("images");
+    assert!((1..100).contains(&record.wrong), "{record:?}");
+    // One more in thirty ends.
+    let survives = "sample_1d(sampler) >= survival";
+    let fewer = [(survives, "sample_1d(sampler) >= survival - 0.03")];
+    let record = of_another(&scene, &scene, &fewer);
+    assert!((1..100).contains(&record.wrong), "{record:?}");
+    // Textures a thousandth of their width aside.
+    let textured = trial_scenes().expect("scenes").swap_remove(4).scene;
+    let mut aside = textured.clone();
+    assert!(!aside.uvs.is_empty());
+    for corners in &mut aside.uvs {
+        *corners = corners.map(|uv| uv + glam::Vec2::splat(1e-3));
+    }
+    let record = of_another(&aside, &textured, &[]);
+    assert!(record.fault.is_some() && record.wrong > 0, "{record:?}");
+}
+
+#[test]
+fn each_kind_of_difference_has_a_bound() {
+    let paths = PathsRecord {
+        paths: 3952,
+        layered: 100,
+        ..PathsRecord::default()
+    };
+    let said = |record: &PathsRecord| out_of_bounds(record, 0).unwrap_or_default();
+    // 0.1 % and 2 % of 3952 paths, and six standard deviations.
+    for (few, many, part) in [
+        (
+            PathsRecord {
+                flips: 17,
+                edges: 10,
+                ..paths.clone()
+            },
+            PathsRecord {
+                flips: 18,
+                edges: 10,
+                ..paths.clone()
+            },
+            "take another branch",
+        ),
+        (
+            PathsRecord {
+                flips: 117,
+                surfaces: 117,
+                ..paths.clone()
+            },
+            PathsRecord {
+                flips: 118,
+                surfaces: 118,
+                ..paths.clone()
+            },
+            "100 have one within rounding",
+        ),
+        (
+            PathsRecord {
+                ill_conditioned: 134,
+                ..paths.clone()
+            },
+            PathsRecord {
+                ill_conditioned: 135,
+                ..paths.clone()
+            },
+            "are ill-conditioned",
+        ),
+        (
+            PathsRecord {
+                median: 2e-5,
+                ..paths.clone()
+            },
+            PathsRecord {
+                median: 2.1e-5,
+                ..paths
+            },
+            "half of the paths",
+        ),
+    ] {
+        assert_eq!(said(&few), "");
+        assert!(said(&many).contains(part), "{}", said(&many));
+    }
+}
+
+#[test]
+fn a_scene_without_light_is_right_if_it_is_black() {
+    let dark = || {
+        let mut scene = layers(2e-3).expect("a built-in scene");
+        scene.environment = glam::Vec3::ZERO;
+        scene
+            .materials
+            .iter_mut()
+            .for_each(|m| m.emission = glam::Vec3::ZERO);
+        scene
+    };
+    let record = of_another(&dark(), &dark(), &[]);
+    assert_eq!(
+        (record.fault.as_deref(), record.wrong),
+        (None, 0),
+        "{record:?}"
+    );
+    assert_eq!(record.verdict(), Verdict::Pass);
+    let glowing = [(
+        "var result = vec3<f32>(0.0);",
+        "var result = vec3<f32>(0.0, 1e-9, 0.0);",
+    )];
+    assert!(of_another(&dark(), &dark(), &glowing).wrong > 0);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! What a sample is: primary visibility, ambient occlusion, path tracing.
 
 use super::bsdf::{self, Bounce, Bsdf, Reflected};
-use super::hits::{SHORT, Segment};
+use super::hits::{Blocked, SHORT, Segment};
 use super::light::{Choice, Chosen, moved};
 use super::surface::Surface;
 use super::{PathOracle, Vertex, Walk};
@@ -244,9 +244,9 @@ impl PathOracle<'_> {
             false => CountedRays::Bounce,
         };
         walk.note_ray(class, 0, &seen);
-        let hit = self.hits.nearest(&seen);
-        walk.decide(hit.map_or(u64::MAX, |hit| hit.triangle.into()));
-        let hit = self.hits.unmoved(hit?, &seen);
+        let met = self.hits.nearest(&seen, &mut walk.rounding);
+        walk.decide_met(met.as_ref());
+        let hit = self.hits.unmoved(met?.hit, &seen);
         let surface = self.surface(ray, &hit, &mut walk.rounding);
         walk.vertices.push(Vertex {
             position: surface.position,
@@ -279,9 +279,9 @@ impl PathOracle<'_> {
             ..surface.leave(direction, &mut walk.rounding)
         };
         walk.note_ray(CountedRays::Ao, 0, &free);
-        let blocked = self.hits.blocked(&free);
-        walk.decide(blocked.into());
-        DVec3::splat(if blocked { 0.0 } else { 1.0 })
+        let blocked = self.hits.blocked(&free, &mut walk.rounding);
+        walk.decide_blocked(blocked);
+        DVec3::splat(if blocked == Blocked::No { 1.0 } else { 0.0 })
     }
 
     fn path(&self, walk: &mut Walk, ray: Segment, rules: &PathRules) -> DVec3 {
@@ -402,8 +402,8 @@ impl PathOracle<'_> {
             ..left
         };
         let blocked = self.shadowed(walk, &shadow, chosen.light);
-        walk.decide(blocked.into());
-        if blocked {
+        walk.decide_blocked(blocked);
+        if blocked != Blocked::No {
             return DVec3::ZERO;
         }
         let weight = match light.density {

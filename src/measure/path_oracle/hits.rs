@@ -1,5 +1,6 @@
 //! Nearest hits in f64, over all triangles whose group is near the ray.
 
+use super::rounding::{EPSILON, Rounding};
 use crate::geometry::Triangle;
 use crate::measure::holes::SceneHoles;
 use crate::oracle::{Groups, Line};
@@ -18,6 +19,12 @@ const EDGE: f64 = 1e-12;
 /// Distances that differ by less, relative, are equal: the lowest triangle counts.
 const EQUAL: f64 = 1e-12;
 
+/// Surfaces whose distances differ by less than this many roundings of f32 are layers: a kernel may meet either first.
+const LAYERED: f64 = 16.0;
+
+/// As far as rounding is ever played.
+const MOST_ROUNDINGS: f64 = 64.0;
+
 /// Beyond this f32 distances are open-ended.
 const FAR: f64 = 1e30;
 
@@ -35,6 +42,32 @@ pub(super) struct Hit {
     pub triangle: u32,
     pub distance: f64,
     pub weights: [f64; 2],
+}
+
+impl Hit {
+    /// The least of the weights of the corners: how far the hit is from an edge.
+    fn margin(&self) -> f64 {
+        let [u, v] = self.weights;
+        u.min(v).min(1.0 - u - v)
+    }
+}
+
+/// What lies on a segment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Blocked {
+    No,
+    /// A layer of the surface that it leaves, which a kernel may have passed.
+    ByLayer,
+    Yes,
+}
+
+/// The nearest hit, as rounding has it.
+pub(super) struct Nearest {
+    pub hit: Hit,
+    /// Whether rounding alone made it the nearest.
+    pub is_swapped: bool,
+    /// Whether another surface is as near but for [`LAYERED`] roundings.
+    pub is_layered: bool,
 }
 
 /// A ray with a unit direction; what it does not see again.
@@ -91,25 +124,70 @@ impl<'a> Hits<'a> {
     }
 
     /// The nearest hit of a segment.
-    pub fn nearest(&self, segment: &Segment) -> Option<Hit> {
-        let mut best: Option<Hit> = None;
+    pub fn nearest(&self, segment: &Segment, rounding: &mut Rounding) -> Option<Nearest> {
+        let mut found: Vec<(Hit, Blur)> = Vec::new();
+        let mut end = f64::INFINITY;
         self.visit(segment, |hit| {
-            let is_better = best.is_none_or(|known| {
-                let apart = hit.distance - known.distance;
-                let tie = apart.abs() <= EQUAL * known.distance;
-                if tie {
-                    hit.triangle < known.triangle
-                } else {
-                    apart < 0.0
-                }
-            });
-            if is_better {
-                best = Some(hit);
+            let blur = self.blur(&hit, segment);
+            // What is behind a triangle counts where a kernel may miss it.
+            if hit.margin() > blur.of_weights * MOST_ROUNDINGS * EPSILON {
+                end = end.min(hit.distance + 2.0 * blur.within(MOST_ROUNDINGS));
             }
+            found.push((hit, blur));
             // The end as f32, rounded away by more than rounding.
-            best.map_or(f32::INFINITY, |b| (b.distance * (1.0 + 1e-6)) as f32)
+            (end * (1.0 + 1e-6)) as f32
         });
-        best
+        // In an order that groups do not decide.
+        found.sort_by_key(|(hit, _)| hit.triangle);
+        found.retain(|(hit, blur)| rounding.holds(hit.margin(), blur.of_weights));
+        let before = |a: &Hit, b: &Hit| match (a.distance - b.distance).abs() <= EQUAL * b.distance
+        {
+            true => a.triangle < b.triangle,
+            false => a.distance < b.distance,
+        };
+        let first = found
+            .iter()
+            .copied()
+            .reduce(|a, b| if before(&b.0, &a.0) { b } else { a })?;
+        let room = |blur: &Blur| blur.within(LAYERED) + first.1.within(LAYERED);
+        let is_layer = |(hit, blur): &(Hit, Blur)| {
+            hit.triangle != first.0.triangle && hit.distance - first.0.distance <= room(blur)
+        };
+        let is_layered = found.iter().any(is_layer);
+        let is_played = rounding.is_played();
+        let played = found.iter().map(|(hit, blur)| {
+            (
+                *hit,
+                rounding.distance(hit.distance, blur.of_rounding, blur.most),
+            )
+        });
+        let met = match is_played {
+            true => played.reduce(|a, b| if b.1 < a.1 { b } else { a })?.0,
+            false => first.0,
+        };
+        Some(Nearest {
+            hit: met,
+            is_swapped: met.triangle != first.0.triangle || self.is_at_start(&met, segment),
+            is_layered: is_layered || self.is_at_start(&first.0, segment),
+        })
+    }
+
+    /// How far the distance of a hit may be off.
+    fn blur(&self, hit: &Hit, segment: &Segment) -> Blur {
+        let [a, b, c] = self.triangles[hit.triangle as usize]
+            .vertices
+            .map(|v| v.as_dvec3());
+        let (e1, e2) = (b - a, c - a);
+        let area = e1.cross(e2);
+        let normal = area.normalize_or_zero();
+        let terms = segment.origin.abs() + a.abs() + e1.abs() + e2.abs();
+        let longest = e1.length().max(e2.length());
+        let cosine = normal.dot(segment.direction).abs();
+        Blur {
+            of_rounding: normal.abs().dot(terms) / cosine.max(1e-12),
+            most: longest,
+            of_weights: Rounding::of_weights(terms.max_element() * longest, area.length()),
+        }
     }
 
     /// A hit as it is from the point that the ray leaves; as it is found, where the line from there passes the triangle.
@@ -122,14 +200,30 @@ impl<'a> Hits<'a> {
         meet(triangle, hit.triangle, &from_there).unwrap_or(hit)
     }
 
-    /// Whether anything lies on a segment.
-    pub fn blocked(&self, segment: &Segment) -> bool {
-        let mut found = false;
-        self.visit(segment, |_| {
-            found = true;
+    /// Whether anything lies on a segment, and whether that is a layer of the surface that it leaves and nothing else.
+    pub fn blocked(&self, segment: &Segment, rounding: &mut Rounding) -> Blocked {
+        let (mut by_layer, mut by_other) = (false, false);
+        self.visit(segment, |hit| {
+            if !rounding.holds(hit.margin(), self.blur(&hit, segment).of_weights) {
+                return f32::INFINITY;
+            }
+            if self.is_at_start(&hit, segment) {
+                by_layer = true;
+                return f32::INFINITY;
+            }
+            by_other = true;
             f32::NEG_INFINITY
         });
-        found
+        match (by_layer, by_other) {
+            (_, true) => Blocked::Yes,
+            (true, false) => Blocked::ByLayer,
+            (false, false) => Blocked::No,
+        }
+    }
+
+    /// Whether a hit is on a layer of the surface that a segment leaves.
+    fn is_at_start(&self, hit: &Hit, segment: &Segment) -> bool {
+        segment.from.is_some() && hit.distance <= self.blur(hit, segment).within(LAYERED)
     }
 
     /// Whether there is no surface at a point of a triangle.
@@ -162,6 +256,23 @@ impl<'a> Hits<'a> {
             }
             end
         });
+    }
+}
+
+/// The error of a distance, scene units.
+#[derive(Debug, Clone, Copy)]
+struct Blur {
+    /// Over the relative error of the coordinates that it is made of.
+    of_rounding: f64,
+    /// A hit stays on its triangle.
+    most: f64,
+    /// Of the weights of its corners, over the same relative error.
+    of_weights: f64,
+}
+
+impl Blur {
+    fn within(&self, roundings: f64) -> f64 {
+        (self.of_rounding * roundings * EPSILON).min(self.most)
     }
 }
 

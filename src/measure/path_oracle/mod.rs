@@ -29,7 +29,7 @@ use crate::sampling::{Coordinate, Sampler, to_unit};
 use crate::scene::{Material, SceneData};
 use camera::Lens;
 use glam::DVec3;
-use hits::{Hits, Segment};
+use hits::{Blocked, Hits, Nearest, Segment};
 use light::{Choice, Lights};
 use std::fmt;
 use surface::Surface;
@@ -114,9 +114,69 @@ pub struct Path {
     pub vertices: Vec<Vertex>,
     /// All that is traced for it.
     pub rays: Vec<PathRay>,
-    /// A hash of all decisions: triangles, lobes, lights, what was occluded, where it ended. Paths of one
-    /// branch differ by rounding only.
-    pub branch: u64,
+    /// All decisions: triangles, lobes, lights, what was occluded, where it ended. Paths of one branch differ by rounding
+    /// only.
+    pub branch: Vec<Decision>,
+    /// Of its surfaces those that have another one within rounding.
+    pub layers: usize,
+}
+
+/// A decision of a path, and what it depends on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Decision {
+    /// Which triangle was met.
+    Met(u64),
+    /// The same, where rounding alone put it before another.
+    MetBefore(u64),
+    /// Whether something is in the way.
+    Blocked(bool),
+    /// A layer of the surface that the ray leaves is in the way, within rounding.
+    BlockedByLayer,
+    /// A number against a probability, a side, a place in a table.
+    Other(u64),
+}
+
+/// Why two paths take other branches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Parting {
+    /// They met surfaces that lie within rounding of each other.
+    Surfaces,
+    /// One passed an edge.
+    Edge,
+    /// Anything else.
+    Decision,
+}
+
+impl Decision {
+    /// What was decided, whatever made it so.
+    fn outcome(self) -> (u8, u64) {
+        match self {
+            Self::Met(triangle) | Self::MetBefore(triangle) => (0, triangle),
+            Self::Blocked(is) => (1, is.into()),
+            Self::BlockedByLayer => (1, 1),
+            Self::Other(what) => (2, what),
+        }
+    }
+}
+
+impl Path {
+    /// Where this path and another one part first, if they do.
+    pub fn parting(&self, other: &Self) -> Option<Parting> {
+        let longest = self.branch.len().max(other.branch.len());
+        let at = |path: &Self, i: usize| path.branch.get(i).copied();
+        let part = (0..longest).map(|i| (at(self, i), at(other, i)));
+        let part = part
+            .into_iter()
+            .find(|(a, b)| a.map(Decision::outcome) != b.map(Decision::outcome));
+        let by_layer = |of: Option<Decision>| {
+            matches!(of, Some(Decision::MetBefore(_) | Decision::BlockedByLayer))
+        };
+        part.map(|pair| match pair {
+            (a, b) if by_layer(a) || by_layer(b) => Parting::Surfaces,
+            (Some(Decision::Met(_) | Decision::Blocked(_)), _) => Parting::Edge,
+            _ => Parting::Decision,
+        })
+    }
 }
 
 /// A scene as the oracle sees it.
@@ -174,7 +234,8 @@ impl<'a> PathOracle<'a> {
             rounding,
             vertices: Vec::new(),
             rays: Vec::new(),
-            branch: 0xcbf2_9ce4_8422_2325,
+            branch: Vec::new(),
+            layers: 0,
         };
         let radiance = self.estimate(&mut walk);
         Path {
@@ -182,6 +243,7 @@ impl<'a> PathOracle<'a> {
             vertices: walk.vertices,
             rays: walk.rays,
             branch: walk.branch,
+            layers: walk.layers,
         }
     }
 }
@@ -206,7 +268,8 @@ struct Walk<'a> {
     rounding: Rounding,
     vertices: Vec<Vertex>,
     rays: Vec<PathRay>,
-    branch: u64,
+    branch: Vec<Decision>,
+    layers: usize,
 }
 
 impl Walk<'_> {
@@ -247,9 +310,28 @@ impl Walk<'_> {
         [self.draw(dimension), self.draw(dimension + 1)]
     }
 
-    /// Notes a decision (FNV-1a).
+    /// Notes a decision.
     fn decide(&mut self, what: u64) {
-        self.branch = (self.branch ^ what).wrapping_mul(0x0100_0000_01b3);
+        self.branch.push(Decision::Other(what));
+    }
+
+    /// Notes whether something is in the way.
+    fn decide_blocked(&mut self, blocked: Blocked) {
+        self.branch.push(match blocked {
+            Blocked::ByLayer => Decision::BlockedByLayer,
+            _ => Decision::Blocked(blocked == Blocked::Yes),
+        });
+        self.layers += usize::from(blocked == Blocked::ByLayer);
+    }
+
+    /// Notes what a ray has met.
+    fn decide_met(&mut self, met: Option<&Nearest>) {
+        let triangle = met.map_or(u64::MAX, |met| met.hit.triangle.into());
+        self.branch.push(match met {
+            Some(met) if met.is_swapped => Decision::MetBefore(triangle),
+            _ => Decision::Met(triangle),
+        });
+        self.layers += usize::from(met.is_some_and(|met| met.is_layered));
     }
 
     fn lens(&self) -> Lens {

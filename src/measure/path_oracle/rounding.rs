@@ -11,7 +11,7 @@ use crate::random::Pcg32;
 use glam::{DVec2, DVec3};
 
 /// Half an ulp of 1 in f32.
-const EPSILON: f64 = 1.0 / (1u32 << 24) as f64;
+pub(super) const EPSILON: f64 = 1.0 / (1u32 << 24) as f64;
 
 /// Roundings of a direction of unit length that was made of sines, cosines and roots, per component. Libraries of
 /// devices may be off by this much in these functions.
@@ -20,11 +20,16 @@ const DIRECTION: f64 = 4.0;
 /// Stream of the numbers that move points in masks.
 const MASKS: u64 = 2;
 
+/// Stream of the numbers that move hits.
+const HITS: u64 = 3;
+
 /// Moves quantities by roundings of f32, or leaves them as they are.
 pub struct Rounding {
     random: Option<Pcg32>,
     /// What moves points in masks: other numbers stay the same without masks.
     texels: Option<Pcg32>,
+    /// What moves hits: distances, and edges.
+    hits: Option<Pcg32>,
     /// By how many roundings.
     scale: f64,
 }
@@ -35,6 +40,7 @@ impl Rounding {
         Self {
             random: None,
             texels: None,
+            hits: None,
             scale: 0.0,
         }
     }
@@ -44,8 +50,14 @@ impl Rounding {
         Self {
             random: Some(Pcg32::new(trial)),
             texels: Some(Pcg32::with_stream(trial, MASKS)),
+            hits: Some(Pcg32::with_stream(trial, HITS)),
             scale: roundings * EPSILON,
         }
+    }
+
+    /// Whether anything is moved.
+    pub fn is_played(&self) -> bool {
+        self.random.is_some()
     }
 
     fn signed(&mut self) -> f64 {
@@ -60,6 +72,24 @@ impl Rounding {
     /// A number in [0, 1], by a fraction of 1.
     pub fn share(&mut self, x: f64) -> f64 {
         x + self.signed()
+    }
+
+    /// The error of the weight of a corner with one rounding of 1: that of 1, or of `terms` over `area` if that is more, of the
+    /// greatest product that it is a sum of and what that is divided by.
+    pub fn of_weights(terms: f64, area: f64) -> f64 {
+        (terms / area).clamp(1.0, 1.0 / EPSILON)
+    }
+
+    /// The weight of a corner with such an error.
+    pub fn weight(&mut self, w: f64, error: f64) -> f64 {
+        w + self.signed() * error
+    }
+
+    /// Whether a triangle holds a hit whose least weight is this one: of each triangle by itself, so that a ray may slip through
+    /// between two of them, as triangle tests that are not watertight let it.
+    pub fn holds(&mut self, margin: f64, error: f64) -> bool {
+        let signed = (self.hits.as_mut()).map_or(0.0, Pcg32::signed);
+        margin.max(0.0) + signed * self.scale * error >= 0.0
     }
 
     /// A colour, each component by itself.
@@ -89,6 +119,13 @@ impl Rounding {
     pub fn texel(&mut self) -> DVec2 {
         let mut signed = || (self.texels.as_mut()).map_or(0.0, Pcg32::signed);
         PLACED * DVec2::new(signed(), signed())
+    }
+
+    /// The distance of a hit that errs by `error` with one rounding, and by `most` at most: of each triangle by itself, so that of
+    /// two surfaces that lie closer together either may be nearer.
+    pub fn distance(&mut self, distance: f64, error: f64, most: f64) -> f64 {
+        let signed = (self.hits.as_mut()).map_or(0.0, Pcg32::signed);
+        distance + signed * (self.scale * error).min(most)
     }
 
     /// How far a ray may start off its surface, where rays start at most `offset` off by one rounding.

@@ -98,7 +98,13 @@ impl PathOracle<'_> {
         };
         let id = self.scene.material_ids[hit.triangle as usize];
         let material = &self.scene.materials[id as usize];
-        let weights = hit.weights.map(|w| rounding.share(w));
+        // The weights of a triangle that is thin, or small where coordinates are large, err by that of the point against its height.
+        let farthest = (terms + segment.origin.abs()).max_element();
+        let [u, v] = hit.weights;
+        let weights = [(u, e2), (v, e1)].map(|(w, across)| {
+            let error = Rounding::of_weights(farthest * across.length(), area.length());
+            rounding.weight(w, error)
+        });
         let uv = self.textures.coordinates(hit.triangle, weights);
         let [colours, varied, bent, shining] = material.texture_uses();
         let base = material.base_color.as_dvec3() * self.textures.colour(colours, uv);

@@ -12,6 +12,15 @@ pub struct PathsRecord {
     pub ill_conditioned: usize,
     /// Paths that decide otherwise within rounding of a boundary.
     pub flips: usize,
+    /// Of those the ones that meet another surface which lies within rounding of the first.
+    #[serde(default)]
+    pub surfaces: usize,
+    /// Of those the ones that pass an edge of what is met or in the way.
+    #[serde(default)]
+    pub edges: usize,
+    /// Paths that meet a surface with another one within rounding, whatever they make of it.
+    #[serde(default)]
+    pub layered: usize,
     /// Paths that differ, not to be explained by rounding.
     pub wrong: usize,
     /// Median relative difference of the paths that found light.
@@ -41,6 +50,9 @@ impl PathsRecord {
             paths: self.paths + other.paths,
             ill_conditioned: self.ill_conditioned + other.ill_conditioned,
             flips: self.flips + other.flips,
+            surfaces: self.surfaces + other.surfaces,
+            edges: self.edges + other.edges,
+            layered: self.layered + other.layered,
             wrong: self.wrong + other.wrong,
             median: self.median.max(other.median),
             worst: self.worst.max(other.worst),

@@ -8,7 +8,7 @@ mod sky;
 mod sphere;
 mod tree;
 
-use super::hits::Segment;
+use super::hits::{Blocked, Segment};
 use super::rounding::Rounding;
 use super::surface::Surface;
 use super::{PathOracle, Walk};
@@ -288,14 +288,14 @@ impl PathOracle<'_> {
     }
 
     /// Whether anything lies on the way to a light.
-    pub(super) fn shadowed(&self, walk: &mut Walk, shadow: &Segment, light: usize) -> bool {
+    pub(super) fn shadowed(&self, walk: &mut Walk, shadow: &Segment, light: usize) -> Blocked {
         let balls = self.lights.spheres.iter();
         let mut others = balls.filter(|(place, _)| *place != light);
         if others.any(|(_, ball)| ball.meet(shadow).is_some_and(|d| d < shadow.length)) {
-            return true;
+            return Blocked::Yes;
         }
         walk.note_ray(CountedRays::Shadow, light, shadow);
-        self.hits.blocked(shadow)
+        self.hits.blocked(shadow, &mut walk.rounding)
     }
 
     /// What comes along a ray that leaves the scene. A map takes the place of the sky.
