@@ -241,7 +241,7 @@ type Raw = BTreeMap<Identity, Taken>;
 
 fn of_value(data: &RunData, raw: &Raw, value: &Value) -> Option<Taken> {
     let number = match value.reading {
-        Reading::Known(interval) => interval,
+        Reading::Known(interval) | Reading::HeavyTailed(interval) => interval,
         Reading::Below(bound) => Interval {
             value: bound,
             low: 0.0,
@@ -268,7 +268,10 @@ fn of_value(data: &RunData, raw: &Raw, value: &Value) -> Option<Taken> {
     // Counters are of the rays that were timed.
     let of_rays = raw.get(&(cell.clone(), "mrays-per-s/v1".into()));
     let sampled = raw.get(&(cell, id));
-    if let Some(sampled) = sampled {
+    // Seeds that have missed the pixel that decides agree with each other by that: with one degree of freedom, what differs is undecided.
+    if value.is_heavy_tailed() {
+        own.evidence = Evidence::Summary(number, 1.0);
+    } else if let Some(sampled) = sampled {
         own.evidence = sampled.evidence.clone();
     }
     if let Some(sampled) = sampled.or(of_rays) {

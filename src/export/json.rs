@@ -2,6 +2,7 @@
 
 use super::{Exported, Source, pretty};
 use crate::report::document::Check;
+use crate::report::samplers::HEAVY_TAILED;
 use crate::report::values::{Reading, Value};
 use serde_json::{Map, Value as Json, json};
 
@@ -36,6 +37,10 @@ fn value_json(value: &Value) -> Json {
     });
     let known = match value.reading {
         Reading::Known(i) => vec![("value", i.value), ("low", i.low), ("high", i.high)],
+        Reading::HeavyTailed(i) => {
+            object["doubt"] = json!(format!("its interval is not to be trusted: {HEAVY_TAILED}"));
+            vec![("value", i.value), ("low", i.low), ("high", i.high)]
+        }
         Reading::Below(bound) => vec![("below", bound)],
         Reading::Word(word) => {
             object["word"] = json!(word);

@@ -192,8 +192,14 @@ fn numbers<'v, 'a>(
                     bounds: has_width.then_some(bounds),
                 });
             }
+            // A point without the bounds that are not to be trusted.
+            Reading::HeavyTailed(i) if i.value.is_finite() => numbers.push(Number {
+                value,
+                at: i.value,
+                bounds: None,
+            }),
             Reading::Below(_) => below += 1,
-            Reading::Known(_) | Reading::Word(_) => words += 1,
+            Reading::Known(_) | Reading::HeavyTailed(_) | Reading::Word(_) => words += 1,
         }
     }
     let told = [

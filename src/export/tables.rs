@@ -63,9 +63,9 @@ fn table(values: &[Value]) -> Table {
     let heads: Vec<String> = by.iter().map(|axis| format!(":{axis}")).collect();
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
     let figure = &values[0].figure;
-    let known = values
-        .iter()
-        .any(|v| matches!(v.reading, Reading::Known(i) if i.low < i.high));
+    let known = values.iter().any(
+        |v| matches!(v.reading, Reading::Known(i) | Reading::HeavyTailed(i) if i.low < i.high),
+    );
     let spread = if known { figure.spread.words() } else { "" };
     let shared = values[0].key.only(&shared).to_string();
     let parts = [figure.heading(), shared, spread.to_owned()];

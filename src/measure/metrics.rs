@@ -199,7 +199,7 @@ pub const METRICS: &[Metric] = &[
     Metric::mean("mse-unbiased/v1", "mean (v − A)(v − B): free of the reference's own noise, may be negative",
         |s| (s.value - s.half_a) * (s.value - s.half_b)).unbiased(),
     Metric::mean("relmse-unbiased/eps=1e-2/v1", "mean (v − A)(v − B) / (((A + B) / 2)² + 0.01), may be negative",
-        |s| (s.value - s.half_a) * (s.value - s.half_b) / s.relative_scale()).unbiased(),
+        Sample::unbiased_relative_error).unbiased(),
     Metric::mean("mse-red/v1", "mse of the red channel", |s| s.squared_error_of(0)),
     Metric::mean("mse-green/v1", "mse of the green channel", |s| s.squared_error_of(1)),
     Metric::mean("mse-blue/v1", "mse of the blue channel", |s| s.squared_error_of(2)),
@@ -270,6 +270,11 @@ impl Sample {
     /// (v − r)².
     fn squared_error(&self) -> f64 {
         (self.value - self.reference).powi(2)
+    }
+
+    /// (v − A)(v − B) / (r² + ε).
+    pub(super) fn unbiased_relative_error(&self) -> f64 {
+        (self.value - self.half_a) * (self.value - self.half_b) / self.relative_scale()
     }
 
     /// What has the channel's mean squared error as its mean over all channels.

@@ -10,6 +10,7 @@ pub mod flip;
 pub mod gate;
 pub mod growth;
 pub mod hard_rays;
+pub mod heavy_tails;
 mod holes;
 pub mod hypothesis;
 pub mod image_gate;

@@ -2,7 +2,7 @@
 //! of the reference.
 
 use super::comparison::LogFigure;
-use super::record::ErrorRecord;
+use super::record::{ErrorRecord, Tail};
 use super::statistics::mean;
 
 /// Error records of one sampler, one for each replicate.
@@ -24,6 +24,12 @@ impl Replicates<'_> {
     /// Whether anything is known of their spread.
     pub fn have_spread(self) -> bool {
         self.0.len() > 1
+    }
+
+    /// What single pixels do to their mean relMSE.
+    pub fn tail(self, spp: u32) -> Option<Tail> {
+        let last = self.0.iter().max_by_key(|r| r.replicate)?;
+        last.errors.iter().find(|error| error.spp == spp)?.tail
     }
 
     /// Whether each has the metric of this id at this number of samples.

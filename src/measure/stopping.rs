@@ -9,6 +9,7 @@
 //! of it; where it is met by a hair, it is too small by at most about the half width of that interval.
 
 use super::comparison::LogFigure;
+use super::heavy_tails::is_heavy;
 use super::record::ErrorRecord;
 use super::replicates::Replicates;
 use crate::config::StopRule;
@@ -23,7 +24,7 @@ pub fn is_met(rule: &StopRule, error: &LogFigure, looks: usize) -> bool {
 }
 
 /// Whether the mean error of these replicates at `spp` is. That of a single one never is: of its spread nothing is
-/// known; nor is an error that the reference does not resolve.
+/// known; nor is an error that the reference does not resolve, or one whose interval is not to be trusted.
 pub fn is_met_by(rule: &StopRule, replicates: &[&ErrorRecord], spp: u32, looks: usize) -> bool {
     let all = Replicates(replicates);
     let errors = replicates.iter().flat_map(|r| &r.errors);
@@ -35,5 +36,9 @@ pub fn is_met_by(rule: &StopRule, replicates: &[&ErrorRecord], spp: u32, looks: 
         return false;
     };
     let error = all.log_figure(id, |without| Some(all.mean(id, spp, without)?.ln()));
-    error.is_some_and(|error| is_met(rule, &error, looks))
+    let trusted = |error: &LogFigure| {
+        let tail = all.tail(spp);
+        !tail.is_some_and(|tail| is_heavy(tail, error.interval()))
+    };
+    error.is_some_and(|error| is_met(rule, &error, looks) && trusted(&error))
 }

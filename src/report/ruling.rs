@@ -45,7 +45,10 @@ pub fn judge(mut contenders: Vec<Contender>, better: Better) -> Ruling {
     let measured = contenders.len();
     contenders.retain(|c| c.log.is_some());
     if contenders.is_empty() && measured > 0 {
-        return Ruling::Withheld("too few measurements to know their spread".into());
+        return Ruling::Withheld(
+            "too few measurements to know their spread, or intervals that are not to be trusted"
+                .into(),
+        );
     }
     contenders.sort_by(|a, b| {
         let by_value = a.figure.value.total_cmp(&b.figure.value);

@@ -5,6 +5,7 @@ use super::format;
 use crate::measure::bias::BiasVerdict;
 use crate::measure::comparison::LogFigure;
 use crate::measure::figure::figure;
+use crate::measure::heavy_tails::is_heavy;
 use crate::measure::record::{BiasRecord, ErrorRecord, Interval, Key, SpectrumRecord, TimeRecord};
 use crate::measure::replicates::{Replicates, Without};
 use crate::measure::statistics::{
@@ -15,6 +16,10 @@ use std::sync::OnceLock;
 
 /// What an error is that its reference is too noisy for: its estimate is not clearly above 0.
 pub const UNRESOLVED: &str = "below what the reference can resolve";
+
+/// What an interval is that a single pixel decides over.
+pub const HEAVY_TAILED: &str =
+    "a single pixel, of which the replicates may have missed what is bright, decides over it";
 
 /// The part of the least measured error that the reference's own may be.
 pub const REFERENCE_SHARE: f64 = 0.01;
@@ -128,6 +133,9 @@ pub struct MeanError {
     /// Whether the estimate is clearly above 0 for the noise of this reference. Otherwise only the upper
     /// end says something.
     pub resolved: bool,
+    /// Whether the interval is not to be trusted, since a single pixel decides over it: see [`crate::measure::heavy_tails`]. Never said of
+    /// roots of the MSE, in which dark pixels count for little.
+    pub heavy_tailed: bool,
 }
 
 impl<'a> MeasuredSampler<'a> {
@@ -139,9 +147,17 @@ impl<'a> MeasuredSampler<'a> {
     }
 
     /// Whether it may be compared with others: from one image nothing is known of the spread, not even
-    /// of a deterministic sampler, which is lucky or not in this one scene.
+    /// of a deterministic sampler, which is lucky or not in this one scene. Nor is a spread known that a pixel decides over which
+    /// replicates seldom hit.
     pub fn is_ranked(&self) -> bool {
-        self.all().have_spread()
+        self.all().have_spread() && !self.is_heavy_tailed()
+    }
+
+    /// Whether a single pixel decides over the interval of its relMSE at the most samples, so that neither this interval nor what
+    /// follows from it is to be trusted.
+    pub fn is_heavy_tailed(&self) -> bool {
+        let means = self.mean_errors(Metric::RelMse);
+        means.last().is_some_and(|mean| mean.heavy_tailed)
     }
 
     /// Why it may not win, however small its error.
@@ -202,13 +218,17 @@ impl<'a> MeasuredSampler<'a> {
             let value = estimate(Without::Nothing)?;
             let by_reference = jackknife_interval(value, &self.all().of_reference(id, estimate)?)?;
             let exact = by_reference.low == by_reference.high;
+            let error = metric.shown(positive_interval(
+                value,
+                &self.all().sources(id, estimate)?,
+            )?);
+            let tail = self.all().tail(spp).filter(|_| self.all().have_spread());
             Some(MeanError {
                 spp,
-                error: metric.shown(positive_interval(
-                    value,
-                    &self.all().sources(id, estimate)?,
-                )?),
+                error,
                 resolved: by_reference.low > 0.0 || exact && value >= 0.0,
+                heavy_tailed: metric == Metric::RelMse
+                    && tail.is_some_and(|tail| is_heavy(tail, error)),
             })
         };
         spps.into_iter().filter_map(mean_at).collect()

@@ -34,6 +34,7 @@ fn records(noise: f64, part_noise: f64, replicates: u32, g: &mut Pcg32) -> Vec<E
             spp,
             metrics: report.metrics,
             without_part: report.without_part,
+            tail: None,
             partial_net: false,
         }
     };

@@ -3,7 +3,7 @@
 use super::data::{RunData, SceneGroup, View};
 use super::document::TableCell;
 use super::format;
-use super::samplers::Metric;
+use super::samplers::{HEAVY_TAILED, Metric};
 use super::sections::{
     animation, compactions, kernels, organisations, peers, trade_off, verdict::Race,
 };
@@ -28,10 +28,23 @@ pub struct Value<'a> {
 pub enum Reading {
     /// The value, with an interval that has no width where none is known.
     Known(Interval),
+    /// The value, with an interval that is not to be trusted: one pixel decides over it, see
+    /// [`crate::measure::heavy_tails`].
+    HeavyTailed(Interval),
     /// Only that it is below this: the reference resolves no more.
     Below(f64),
     /// No number, for the reason that the word says.
     Word(&'static str),
+}
+
+impl Reading {
+    /// The value with its interval, and whether that is not to be trusted.
+    pub fn of(interval: Interval, heavy_tailed: bool) -> Self {
+        match heavy_tailed {
+            true => Self::HeavyTailed(interval),
+            false => Self::Known(interval),
+        }
+    }
 }
 
 impl From<Interval> for Reading {
@@ -71,7 +84,9 @@ impl Value<'_> {
     /// Whether what is known is a number, with ends that are numbers.
     fn is_a_number(&self) -> bool {
         match self.reading {
-            Reading::Known(i) => [i.value, i.low, i.high].iter().all(|x| x.is_finite()),
+            Reading::Known(i) | Reading::HeavyTailed(i) => {
+                [i.value, i.low, i.high].iter().all(|x| x.is_finite())
+            }
             Reading::Below(bound) => bound.is_finite(),
             Reading::Word(_) => true,
         }
@@ -82,12 +97,21 @@ impl Value<'_> {
         matches!(self.reading, Reading::Below(_))
     }
 
+    /// Whether its interval is not to be trusted.
+    pub fn is_heavy_tailed(&self) -> bool {
+        matches!(self.reading, Reading::HeavyTailed(_))
+    }
+
     /// The value as a table shows it.
     pub fn cell(&self) -> TableCell {
         let text = |value| format::figure(&self.figure, value);
         match self.reading {
             Reading::Word(word) => word.into(),
             Reading::Below(bound) => format!("<{}", text(bound)).into(),
+            Reading::HeavyTailed(i) => TableCell::with_detail(
+                format!("{} ‡", text(i.value)),
+                format!("[{}, {}], not to be trusted", text(i.low), text(i.high)),
+            ),
             Reading::Known(i) if i.low < i.high => TableCell::with_detail(
                 text(i.value),
                 format!("[{}, {}]", text(i.low), text(i.high)),
@@ -229,14 +253,15 @@ pub fn of_view(scene: &SceneGroup, view: &View) -> Vec<Value<'static>> {
         for metric in [Metric::RelMse, Metric::Rmse] {
             for mean in sampler.mean_errors(metric) {
                 let reading = match mean.resolved {
-                    true => Reading::Known(mean.error),
+                    true => Reading::of(mean.error, mean.heavy_tailed),
                     false => Reading::Below(mean.error.high.max(0.0)),
                 };
                 let key = key.clone().with(axis::SPP, mean.spp);
                 values.push(Value::new(&key, metric.figure(), reading));
             }
-            let slope = (metric.slope_figure(), sampler.slope(metric));
-            values.extend(Value::known(key, [slope]));
+            let heavy = metric == Metric::RelMse && sampler.is_heavy_tailed();
+            let slope = sampler.slope(metric).map(|slope| Reading::of(slope, heavy));
+            values.extend(Value::known(key, [(metric.slope_figure(), slope)]));
         }
         if let Some(spp) = sampler.highest_spp() {
             let key = key.clone().with(axis::SPP, spp);
@@ -454,12 +479,18 @@ pub fn csv(values: &[Value]) -> String {
     } in values
     {
         let numbers = match reading {
-            Reading::Known(i) => [i.value, i.low, i.high].map(|x| x.to_string()),
+            Reading::Known(i) | Reading::HeavyTailed(i) => {
+                [i.value, i.low, i.high].map(|x| x.to_string())
+            }
             Reading::Below(bound) => [String::new(), String::new(), bound.to_string()],
             Reading::Word(_) => Default::default(),
         };
         let spread = match reading {
             Reading::Word(word) => (*word).to_owned(),
+            Reading::HeavyTailed(_) => format!(
+                "{}, not to be trusted: {HEAVY_TAILED}",
+                figure.spread.words()
+            ),
             _ => figure.spread.words().to_owned(),
         };
         let labels = axes.iter().map(|axis| no_formula(key.label(axis)));

@@ -6,6 +6,7 @@ use super::select::{fits, merged, partner, select, words};
 use crate::config::expect::{At, Compare, Expect, Pick, Speaks};
 use crate::measure::record::{Interval, Key};
 use crate::report::format;
+use crate::report::samplers::HEAVY_TAILED;
 use crate::report::values::{Reading, Value};
 
 /// What is known of a run beside its values.
@@ -215,6 +216,10 @@ impl<'e> Place<'e> {
     fn unread(&self, value: &Value) -> Option<Row> {
         let row = match value.reading {
             Reading::Known(_) => return None,
+            Reading::HeavyTailed(i) => {
+                let reason = format!("its interval is not to be trusted: {HEAVY_TAILED}");
+                self.row(Some(i), Verdict::Undecided, reason)
+            }
             Reading::Below(bound) => {
                 let reason = format!("below {bound:.3e}, which the reference resolves");
                 self.row(None, Verdict::Undecided, reason)

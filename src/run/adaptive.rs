@@ -63,7 +63,7 @@ pub(super) fn by_tile(
                 spp: mean,
                 image: image.clone(),
             };
-            add_error(session, cell, yardstick, record, &snapshot)?;
+            add_error(session, cell, yardstick, record, &snapshot, None)?;
             check_finite(record)?;
         }
     }

@@ -13,6 +13,7 @@ use crate::gpu::GpuError;
 use crate::image::{Image, Picture, tone_map, viridis};
 use crate::integrator::{Renderer, Snapshot, rounding_bound};
 use crate::measure::bias::{BiasOptions, BiasVerdict, check_bias};
+use crate::measure::heavy_tails::PixelErrors;
 use crate::measure::metrics::{error_map, measure};
 use crate::measure::record::{
     BiasRecord, Body, ErrorAtSpp, ErrorRecord, Key, Line, Outcome, Ran, SpectrumRecord,
@@ -22,6 +23,7 @@ use crate::measure::spectrum::{
 };
 use crate::measure::statistics::mean_interval;
 use crate::measure::stopping::is_met_by;
+use std::collections::BTreeMap;
 
 /// Relative error per pixel at the top of the colour scale of error maps.
 const ERROR_MAP_FULL_SCALE: f32 = 1.0;
@@ -262,6 +264,7 @@ fn all_samples(
     line: &impl Fn(Body) -> Line,
 ) -> Result<Replicates, Fault> {
     let mut images = Vec::new();
+    let mut pixels: BTreeMap<u32, PixelErrors> = BTreeMap::new();
     for (replicate, seed) in replicates(session, cell) {
         let mut snapshots = Vec::new();
         for pass in passes {
@@ -271,7 +274,16 @@ fn all_samples(
         }
         let mut record = blank_record(session, cell, (replicate, seed));
         for snapshot in &snapshots {
-            add_error(session, cell, yardstick, &mut record, snapshot)?;
+            let pixels = pixels.entry(snapshot.spp);
+            let pixels = pixels.or_insert_with(|| PixelErrors::new(&yardstick.reference));
+            add_error(
+                session,
+                cell,
+                yardstick,
+                &mut record,
+                snapshot,
+                Some(pixels),
+            )?;
         }
         let last = snapshots.last().ok_or("nothing was rendered".to_owned())?;
         draw(session, cell, yardstick, &mut record, last)?;
@@ -305,12 +317,20 @@ fn until_met(
     let mut records: Vec<ErrorRecord> = seeds.iter().map(blank).collect();
     let mut last: Vec<Snapshot> = Vec::new();
     for &(pass, spp) in &steps {
+        let mut pixels = PixelErrors::new(&yardstick.reference);
         for (index, record) in records.iter_mut().enumerate() {
             let before = last.get(index).filter(|_| pass.spps.len() > 1);
             let further = || further_samples(pass, before, spp, record.seed);
             let snapshot = session.clock.time("gpu", further);
             let snapshot = snapshot.map_err(|e| e.to_string())?;
-            add_error(session, cell, yardstick, record, &snapshot)?;
+            add_error(
+                session,
+                cell,
+                yardstick,
+                record,
+                &snapshot,
+                Some(&mut pixels),
+            )?;
             check_finite(record)?;
             match last.get_mut(index) {
                 Some(place) => *place = snapshot,
@@ -417,24 +437,35 @@ pub(super) fn blank_record(
     }
 }
 
-/// Adds what is measured of the next image of a replicate.
+/// Adds what is measured of the next image of a replicate; `pixels` are those of the replicates before it at the same number of
+/// samples, the same in all pixels.
 pub(super) fn add_error(
     session: &Session,
     cell: &Cell,
     yardstick: &Yardstick,
     record: &mut ErrorRecord,
     snapshot: &Snapshot,
+    pixels: Option<&mut PixelErrors>,
 ) -> Result<(), String> {
     let facts = session.registries.samplers.facts(&cell[Axis::Sequence]);
     let base_2 = facts.is_ok_and(|facts| facts.base_2);
     let report = measure(&snapshot.image, &yardstick.reference).map_err(|e| e.to_string())?;
     record.non_finite_pixels = record.non_finite_pixels.max(report.non_finite_pixels);
+    let tail = match pixels {
+        Some(pixels) => {
+            let added = pixels.add(&snapshot.image, &yardstick.reference);
+            added.map_err(|e| e.to_string())?;
+            pixels.tail(&yardstick.reference, snapshot.spp, yardstick.part_spp)
+        }
+        None => None,
+    };
     record.image_hash = image_hash(&snapshot.image);
     record.errors.push(ErrorAtSpp {
         partial_net: base_2 && !snapshot.spp.is_power_of_two(),
         spp: snapshot.spp,
         metrics: report.metrics,
         without_part: report.without_part,
+        tail,
     });
     Ok(())
 }

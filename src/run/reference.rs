@@ -24,6 +24,8 @@ const EVALUATION: f64 = 32.0 * f32::EPSILON as f64;
 /// The reference of one integrator and the exposure of all its pictures.
 pub(super) struct Yardstick {
     pub reference: Reference,
+    /// Samples per pixel of each of its parts; 0 where they are not rendered.
+    pub part_spp: u32,
     /// How far rounding alone may move it, relative.
     pub rounding: f64,
     pub exposure: f32,
@@ -319,6 +321,7 @@ fn finish_reference(
     );
     session.compared("reference", &labels, reference.image(), &about)?;
     line.body.image = image.unwrap_or_default();
+    let part_spp = line.body.spp / REFERENCE_PARTS;
     let done = format!("reference {}: done", labels.join(", "));
     session.note_kernels(&done);
     let sampler = format!("{}, {} spp", line.body.sampler, line.body.spp);
@@ -330,6 +333,7 @@ fn finish_reference(
     Ok(Yardstick {
         line: hash,
         name: done,
+        part_spp,
         reference,
         rounding,
         exposure,

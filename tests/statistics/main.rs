@@ -2,5 +2,6 @@
 
 mod bias;
 mod comparisons;
+mod heavy_tails;
 mod hypotheses;
 mod intervals;

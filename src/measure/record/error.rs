@@ -47,9 +47,24 @@ pub struct ErrorAtSpp {
     /// first half first: the reference's share in the metric's uncertainty.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub without_part: BTreeMap<String, Vec<f64>>,
+    /// What single pixels do to the mean relMSE of the replicates up to this one. Unknown in old records, and for references
+    /// without parts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tail: Option<Tail>,
     /// Whether the points come from a net in base 2 of which so many samples are no whole one.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub partial_net: bool,
+}
+
+/// What single pixels do to a mean relMSE, by the variance between the reference's parts: see
+/// [`crate::measure::heavy_tails`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Tail {
+    /// The greatest share that one pixel has in the error that is to be expected.
+    pub greatest_share: f64,
+    /// The greatest error that is to be expected of a pixel in which all replicates are darker than the reference, less what they
+    /// show of it, as part of the relMSE of the image.
+    pub missed: f64,
 }
 
 /// Error of one replicate.

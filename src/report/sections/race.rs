@@ -8,7 +8,7 @@ use crate::report::data::View;
 use crate::report::format;
 use crate::report::ruling::{Contender, Ruling};
 use crate::report::samplers::{MeanError, MeasuredSampler, Metric, log_time, place_on};
-use crate::report::values::Value;
+use crate::report::values::{Reading, Value};
 
 /// Samplers at equal time, under the fastest structure.
 pub struct Race<'a> {
@@ -145,7 +145,7 @@ impl<'a> Race<'a> {
             };
             let mut add = |what: String, id: &str, figure: Option<LogFigure>| {
                 let key = time.key.clone().with(axis::SUBJECT, what);
-                let figure = figure.map(|figure| figure.interval());
+                let figure = figure.map(|f| Reading::of(f.interval(), sampler.is_heavy_tailed()));
                 values.extend(Value::known(&key, [(id, figure)]));
             };
             let resolved = |spp: &u32| runner.curve.iter().any(|at| at.0 == *spp);

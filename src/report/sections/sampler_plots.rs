@@ -2,6 +2,7 @@
 
 use crate::measure::bias::BiasVerdict;
 use crate::measure::comparison::{Place, places};
+use crate::measure::record::Interval;
 use crate::report::data::{RunData, View};
 use crate::report::document::Illustration;
 use crate::report::format;
@@ -78,7 +79,13 @@ fn curve(
 ) -> Option<Curve> {
     let means = sampler.mean_errors(metric);
     let resolved = means.iter().filter(|mean| mean.resolved);
-    let point = |mean: &MeanError| CurvePoint::new(f64::from(mean.spp) * x_per_spp, &mean.error);
+    let point = |mean: &MeanError| {
+        let error = match mean.heavy_tailed {
+            true => Interval::exact(mean.error.value),
+            false => mean.error,
+        };
+        CurvePoint::new(f64::from(mean.spp) * x_per_spp, &error)
+    };
     let points: Vec<CurvePoint> = resolved.map(point).collect();
     (!points.is_empty()).then(|| Curve {
         label,

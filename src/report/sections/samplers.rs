@@ -15,7 +15,7 @@ use crate::report::data::{RunData, SAMPLER_ROW, SceneGroup, View, is_valid_time}
 use crate::report::document::*;
 use crate::report::pivot::{FIGURES_ALONE, Rows};
 use crate::report::plot::pareto::letter;
-use crate::report::samplers::{FURTHER_METRICS, MeasuredSampler, Metric, UNRESOLVED};
+use crate::report::samplers::{FURTHER_METRICS, HEAVY_TAILED, MeasuredSampler, Metric, UNRESOLVED};
 use crate::report::values::{Value, number, of_view};
 use crate::report::{format, pictures};
 use std::path::Path;
@@ -118,7 +118,7 @@ pub fn error_table(view: &View, values: &[Value], metric: Metric) -> Table {
     let errors = errors.flat_map(|replicate| &replicate.errors);
     let partial: Vec<u32> = errors.filter(|e| e.partial_net).map(|e| e.spp).collect();
     let caption = format!(
-        "{} with {}: mean [95 % interval] at each spp; metric {}{id}{}{}",
+        "{} with {}: mean [95 % interval] at each spp; metric {}{id}{}{}{}",
         metric.name(),
         view.name,
         match metric {
@@ -127,6 +127,10 @@ pub fn error_table(view: &View, values: &[Value], metric: Metric) -> Table {
         },
         match values.iter().any(Value::is_unresolved) {
             true => format!("; <: {UNRESOLVED}"),
+            false => String::new(),
+        },
+        match values.iter().any(Value::is_heavy_tailed) {
+            true => format!("; ‡: an interval not to be trusted: {HEAVY_TAILED}"),
             false => String::new(),
         },
         match partial.is_empty() {
