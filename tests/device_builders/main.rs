@@ -383,7 +383,8 @@ fn faults_in_the_passes_are_seen() {
             let host = build(soup, settings).expect("a tree");
             match on_device(&gpu, soup, settings) {
                 Ok(device) => difference(&host, &device).is_some(),
-                Err(error) => support::shows(&format!("{error:?}")),
+                // Faults may end the build with an error, but not by a kernel that does not compile.
+                Err(error) => !error.contains(".wesl"),
             }
         };
         let seen = |s: &Settings| soups.iter().any(|soup| differs(soup, s));
