@@ -182,4 +182,6 @@ fn what_goes_wrong_between_two_rays_is_seen() {
         &subject,
         (KERNEL, "// A workgroup has", "// Any workgroup has")
     ));
+    let no_kernel = (KERNEL, "return is_ray(next);", "return is_none(next);");
+    assert!(!is_seen(&subject, no_kernel), "it does not compile");
 }

@@ -17,6 +17,7 @@ fn params(changes: &[(&str, &str)]) -> Params {
     for (name, value) in changes {
         let value = match out.0.get(*name) {
             Some(ParamValue::Integer(_)) => ParamValue::Integer(value.parse().expect("a number")),
+            Some(ParamValue::Flag(_)) => ParamValue::Flag(value.parse().expect("true or false")),
             Some(_) => ParamValue::Name((*value).to_owned()),
             None => panic!("bvh has no parameter {name}"),
         };
@@ -307,16 +308,17 @@ fn combinations_that_make_no_sense_are_refused_with_the_reason() {
     }
 }
 
-/// Triangles whose Morton codes of 60 bits have one bit each, and 64 with none: a radix tree of them parts one from the rest at
-/// every bit, and then halves those that are alike.
+/// Triangles whose Morton codes of 60 bits begin with another bit each, and 2¹⁷ with none: a radix tree of them parts one
+/// from the rest at a bit, and in the end halves those that are alike.
 fn deep_scene() -> TriangleSoup {
     let single = (0..60).map(|bit| {
         let mut at = glam::Vec3::ZERO;
-        at[bit % 3] = 0.5_f32.powi(bit as i32 / 3 + 1);
+        // Well within its cell, however places are rounded.
+        at[bit % 3] = 1.2 * 0.5_f32.powi(bit as i32 / 3 + 1);
         at
     });
     let corners = single
-        .chain([glam::Vec3::ZERO; 64])
+        .chain(std::iter::repeat_n(glam::Vec3::ZERO, 1 << 17))
         .chain([glam::Vec3::ONE]);
     scenes::soup(corners.map(|at| [at; 3]))
 }

@@ -301,6 +301,8 @@ fn glossy() -> Result<SceneData, SceneError> {
         // Rough enough for half of the angles to be masked.
         cook(Masking::Smith, Fresnel::Schlick, 0.6),
         cook(Masking::VCavities, Fresnel::Exact, 0.7),
+        // A hemisphere about the mirror direction, which ends at a step.
+        phong(0.0),
     ];
     for (place, material) in balls.into_iter().enumerate() {
         let material = mesh.material(material);

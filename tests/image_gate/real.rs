@@ -115,7 +115,7 @@ fn no_path_on_a_real_scene_differs_without_a_reason() {
     for name in scenes {
         let path = folder.join(name);
         if !path.exists() {
-            println!("skipped: {} is not there", path.display());
+            needs::skip("files", format!("{} is not there", path.display()));
             continue;
         }
         let scene = Arc::new(from_file(&path));

@@ -48,10 +48,12 @@ impl Bsdf for Phong<'_> {
 
     fn evaluate(&self, direction: DVec3, rounding: &mut Rounding) -> Option<Reflected> {
         let cosine = cosine_density(self.surface.normal, direction);
-        let towards = rounding
-            .number(direction.dot(self.mirror()))
-            .clamp(0.0, 1.0);
-        let lobe = (self.exponent + 1.0) / TAU * towards.powf(self.exponent);
+        let towards = rounding.number(direction.dot(self.mirror())).min(1.0);
+        // Behind the plane across the mirror direction there is nothing, also where 0⁰ is 1: exponent 0 is a hemisphere.
+        let lobe = match towards > 0.0 {
+            true => (self.exponent + 1.0) / TAU * towards.powf(self.exponent),
+            false => 0.0,
+        };
         (cosine > 0.0).then(|| Reflected {
             value: self.surface.base * cosine + self.specular * lobe,
             density: self.diffuse * cosine + (1.0 - self.diffuse) * lobe,
