@@ -29,6 +29,8 @@ pub struct PixelErrors {
     /// Whether one of the replicates is as bright as the reference there, or brighter.
     reached: Vec<bool>,
     replicates: u32,
+    /// Variance between the reference's parts of each pixel, summed over channels, over r² + 0.01; none without parts.
+    of_parts: Vec<f64>,
 }
 
 impl PixelErrors {
@@ -39,6 +41,12 @@ impl PixelErrors {
             sums: vec![0.0; pixels],
             reached: vec![false; pixels],
             replicates: 0,
+            of_parts: match reference.parts().len() {
+                0 | 1 => Vec::new(),
+                _ => (0..pixels)
+                    .map(|i| reference.relative_variance_of_parts(i))
+                    .collect(),
+            },
         }
     }
 
@@ -59,21 +67,21 @@ impl PixelErrors {
         Ok(())
     }
 
-    /// What single pixels do to the mean at `spp` samples per pixel, by a reference whose parts have `part_spp` each.
+    /// What single pixels do to the mean at `spp` samples per pixel, where the reference's parts have `part_spp` each.
     ///
     /// A pixel is expected to have the variance that independent samples would have, σ² / spp, with σ² / `part_spp` between the parts. A
     /// sampler may be better than that, and replicates that lie on both sides of the reference show it: then what they show
     /// counts, if it is less. Where all are darker than the reference, they may have missed what is bright, and show nothing.
     ///
     /// `None` without parts, without replicates, and where no error is expected.
-    pub fn tail(&self, reference: &Reference, spp: u32, part_spp: u32) -> Option<Tail> {
-        if reference.parts().len() < 2 || self.replicates == 0 || part_spp == 0 {
+    pub fn tail(&self, spp: u32, part_spp: u32) -> Option<Tail> {
+        if self.of_parts.is_empty() || self.replicates == 0 || part_spp == 0 {
             return None;
         }
         let factor = f64::from(part_spp) / f64::from(spp);
         let (mut greatest, mut all, mut missed) = (0.0_f64, 0.0, 0.0_f64);
-        for (i, sum) in self.sums.iter().enumerate() {
-            let foretold = factor * reference.relative_variance_of_parts(i);
+        for (i, (sum, of_parts)) in self.sums.iter().zip(&self.of_parts).enumerate() {
+            let foretold = factor * of_parts;
             let seen = (sum / f64::from(self.replicates)).max(0.0);
             let expected = if self.reached[i] {
                 foretold.min(seen)

@@ -20,7 +20,7 @@
 //! [`ILL_CONDITIONED`] and a median difference above [`MEDIAN`], which no single path shows. Texture coordinates that repeat often have
 //! few digits left within a texel, so that the last two have bounds of their own where textures are.
 
-use super::path_oracle::{Parting, Path, PathId, PathOracle, Rounding, View};
+use super::path_oracle::{MOST_ROUNDINGS, Parting, Path, PathId, PathOracle, Rounding, View};
 use super::record::PathsRecord;
 use crate::gpu::GpuError;
 use crate::integrator::Renderer;
@@ -34,8 +34,6 @@ pub const TOLERANCE: f64 = 1e-4;
 pub const FLOOR: f64 = 1e-3;
 /// Roundings of f32 that are played, in this order.
 pub const SCALES: [f64; 3] = [4.0, 16.0, MOST_ROUNDINGS];
-/// The margin below which a decision may come out otherwise, in roundings of f32.
-pub const MOST_ROUNDINGS: f64 = 64.0;
 /// Part of the paths that may be flips.
 pub const FLIPS: f64 = 1e-3;
 /// Part of the paths that may be ill-conditioned: where nothing is textured, where a map shines, and where surfaces have textures. Measured

@@ -455,7 +455,7 @@ pub(super) fn add_error(
         Some(pixels) => {
             let added = pixels.add(&snapshot.image, &yardstick.reference);
             added.map_err(|e| e.to_string())?;
-            pixels.tail(&yardstick.reference, snapshot.spp, yardstick.part_spp)
+            pixels.tail(snapshot.spp, yardstick.part_spp)
         }
         None => None,
     };

@@ -51,12 +51,26 @@ fn judged_by(
     samples: &[u32],
 ) -> Result<PathsRecord, GpuError> {
     let stage = Stage::new(gpu, scene.clone());
-    let traced = stage.traced(gpu, structure("bvh"));
+    judged_on(gpu, &stage, expected, what, sampler, samples)
+}
+
+/// The same on a stage with the triangle test of its own.
+fn judged_on(
+    gpu: &Gpu,
+    stage: &raystone::integrator::Stage,
+    expected: &SceneData,
+    what: &Variant,
+    sampler: &Sampler,
+    samples: &[u32],
+) -> Result<PathsRecord, GpuError> {
+    let traced = stage.structure(&Default::default(), "bvh");
+    let traced = traced.expect("a structure");
+    let camera = stage.scene.view(1.0);
     let integrator = IntegratorRegistry::default().configured(what);
     let integrator = integrator.unwrap_or_else(|e| panic!("{e}"));
     let job = RenderJob {
         size: SIZE,
-        camera: stage.camera,
+        camera,
         sampler,
         integrator: &integrator,
         offset: RayOffset::default(),
@@ -73,7 +87,7 @@ fn judged_by(
     let oracle = PathOracle::new(expected).expect("known materials");
     let view = View {
         estimator: Estimator::of(&integrator).expect("a known integrator"),
-        camera: stage.camera,
+        camera,
         size: SIZE,
         sampler,
     };
@@ -82,7 +96,7 @@ fn judged_by(
     record.fault = record.fault.or(sums(&renderer, &pixels)?);
     println!(
         "{} {}: {:?} {record:?}",
-        scene.name,
+        stage.scene.name,
         what.name,
         start.elapsed()
     );

@@ -3,12 +3,9 @@
 //! a part of names those that have it; without it a few small ones with the default test.
 
 use crate::support::*;
-use crate::{SIZE, independent};
+use crate::{independent, judged_on};
 use raystone::accel::{Intersection, TriangleRegistry};
-use raystone::integrator::{IntegratorRegistry, RayOffset, RenderJob, Renderer, Stage};
-use raystone::measure::image_gate::{Pixels, answers, judge};
-use raystone::measure::path_oracle::{Estimator, PathOracle, View};
-use raystone::measure::record::PathsRecord;
+use raystone::integrator::Stage;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -126,7 +123,9 @@ fn no_path_on_a_real_scene_differs_without_a_reason() {
             };
             let stage = Stage::new(gpu(), scene.clone(), tests).expect("fits");
             for integrator in ["primary", "ao", "path"] {
-                let record = judged(&stage, integrator);
+                let what = integrator_variant(integrator, &[]);
+                let record = judged_on(gpu(), &stage, &scene, &what, &independent(), &SAMPLES);
+                let record = record.expect("images");
                 println!("{name}, {}, {integrator}: {record:?}", triangle.name());
                 let fault = record.fault.map(|f| format!("{name}, {integrator}: {f}"));
                 faults.extend(fault);
@@ -134,40 +133,4 @@ fn no_path_on_a_real_scene_differs_without_a_reason() {
         }
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
-}
-
-fn judged(stage: &Stage, integrator: &str) -> PathsRecord {
-    let what = integrator_variant(integrator, &[]);
-    let integrator = IntegratorRegistry::default().configured(&what);
-    let integrator = integrator.unwrap_or_else(|e| panic!("{e}"));
-    let traced = stage.structure(&Default::default(), "bvh");
-    let traced = traced.expect("a structure");
-    let (camera, sampler) = (stage.scene.view(1.0), independent());
-    let job = RenderJob {
-        size: SIZE,
-        camera,
-        sampler: &sampler,
-        integrator: &integrator,
-        offset: RayOffset::default(),
-        runtime_checks: true,
-    };
-    let renderer = Renderer::new(gpu(), &stage.buffers, &traced, &job, false);
-    let pixels = Pixels {
-        size: SIZE,
-        every: 1,
-        samples: SAMPLES.to_vec(),
-        seed: 70_003,
-    };
-    let answers = answers(&renderer.expect("compiles"), &pixels).expect("images");
-    let oracle = match PathOracle::new(&stage.scene) {
-        Ok(oracle) => oracle,
-        Err(reason) => return PathsRecord::not_judged(reason),
-    };
-    let view = View {
-        estimator: Estimator::of(&integrator).expect("a known integrator"),
-        camera,
-        size: SIZE,
-        sampler: &sampler,
-    };
-    judge(&oracle, &view, &answers)
 }

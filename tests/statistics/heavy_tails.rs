@@ -94,7 +94,7 @@ fn counts(lamp: f64, replicates: u32, trials: usize) -> Counts {
                     spp: SPP,
                     metrics: report.metrics,
                     without_part: report.without_part,
-                    tail: errors.tail(&reference, SPP, PART_SPP),
+                    tail: errors.tail(SPP, PART_SPP),
                     partial_net: false,
                 }],
                 stop: None,

@@ -1,6 +1,6 @@
 //! Nearest hits in f64, over all triangles whose group is near the ray.
 
-use super::rounding::{EPSILON, Rounding};
+use super::rounding::{EPSILON, MOST_ROUNDINGS, Rounding};
 use crate::geometry::Triangle;
 use crate::measure::holes::SceneHoles;
 use crate::oracle::{Groups, Line};
@@ -21,9 +21,6 @@ const EQUAL: f64 = 1e-12;
 
 /// Surfaces whose distances differ by less than this many roundings of f32 are layers: a kernel may meet either first.
 const LAYERED: f64 = 16.0;
-
-/// As far as rounding is ever played.
-const MOST_ROUNDINGS: f64 = 64.0;
 
 /// Beyond this f32 distances are open-ended.
 const FAR: f64 = 1e30;

@@ -21,7 +21,7 @@ mod texture;
 
 pub use estimator::Estimator;
 pub use hits::SHORT;
-pub use rounding::Rounding;
+pub use rounding::{MOST_ROUNDINGS, Rounding};
 
 use crate::geometry::Camera;
 use crate::integrator::CountedRays;

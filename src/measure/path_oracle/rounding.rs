@@ -13,6 +13,9 @@ use glam::{DVec2, DVec3};
 /// Half an ulp of 1 in f32.
 pub(super) const EPSILON: f64 = 1.0 / (1u32 << 24) as f64;
 
+/// The margin below which a decision may come out otherwise, in roundings of f32: as far as they are ever played.
+pub const MOST_ROUNDINGS: f64 = 64.0;
+
 /// Roundings of a direction of unit length that was made of sines, cosines and roots, per component. Libraries of
 /// devices may be off by this much in these functions.
 const DIRECTION: f64 = 4.0;
