@@ -68,7 +68,7 @@ pub fn param_variants(schema: &ParameterSchema) -> Vec<Params> {
                 .to_vec(),
             (ParamRange::Flag, _) => [false, true].map(ParamValue::Flag).to_vec(),
             (ParamRange::Choice(names), _) => {
-                // What is built on a device has tests/device_builders.
+                // What is built on a device has tests/device/device_builders.
                 let names = names.iter().filter(|n| !n.starts_with("device-"));
                 names.map(|n| ParamValue::Name((*n).to_owned())).collect()
             }

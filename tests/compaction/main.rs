@@ -1,8 +1,0 @@
-//! Stream compaction, and the scans that it is made of.
-
-mod faults;
-mod methods;
-mod runs;
-mod scan;
-#[path = "../support/mod.rs"]
-mod support;

@@ -1,0 +1,22 @@
+//! How a device is used: kernels, recordings, passes, organisations of kernels, and what users add of all these.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod adding_a_figure;
+mod adding_a_structure;
+mod adding_a_triangle_test;
+mod adding_an_integrator;
+mod compaction;
+mod device_builders;
+mod kernel_folders;
+mod kernels;
+mod orders;
+mod organisations;
+mod pipelines;
+mod recordings;
+mod refill;
+mod sorting;
+mod specialisation;
+mod storage_buffers;
+mod workgroups;

@@ -1,0 +1,179 @@
+//! What is wrong does not pass: faults in the structure, in its kernel, and in the judge.
+
+use super::faulty::{SHORT_STACK, WRONG_INDEX, WRONG_INDEX_ROPED};
+use super::{judge, verdict, wrong};
+use crate::support::*;
+use raystone::accel::{NO_HIT, Ray, TriangleSoup, brute_force_hits};
+use raystone::gpu::KERNEL_ERRORS;
+use raystone::measure::gate::Judge;
+use raystone::measure::record::{GateVerdict, RayClass};
+use raystone::params::ParamValue;
+use raystone::scene::SceneData;
+
+const RAYS: u32 = 4096;
+
+fn cornell() -> Stage {
+    Stage::builtin(gpu(), "cornell-box", &[])
+}
+
+/// The ray of a text like `ray ox oy oz dx dy dz t_min t_max | …`.
+fn parse_ray(text: &str) -> Ray {
+    let ray = text.split(" | ").next();
+    let ray = ray.and_then(|t| t.strip_prefix("ray "));
+    ray.expect("a ray").parse().expect("eight numbers")
+}
+
+/// The first wrong ray says what the judge said; traced again, every triangle says the same.
+fn check_replay(verdict: &GateVerdict, soup: &TriangleSoup) {
+    let told = verdict.classes.iter().filter(|c| c.first_wrong.is_some());
+    assert!(told.clone().count() > 0, "{verdict:?}");
+    for class in told {
+        let text = class.first_wrong.as_deref().expect("a text");
+        let hit = brute_force_hits(soup, &[parse_ray(text)])[0];
+        let expected = format!("| judge {hit}");
+        assert!(text.contains(&expected), "{text}: no `{expected}`");
+    }
+    for class in &verdict.classes {
+        assert_eq!(class.wrong > 0, class.first_wrong.is_some(), "{class:?}");
+    }
+}
+
+/// Rays whose nearest hit is `triangle`.
+fn hits_of(judge: &Judge, triangle: u32) -> usize {
+    let truth = judge.sets.iter().flat_map(|set| &set.truth);
+    truth.filter(|hit| hit.triangle == triangle).count()
+}
+
+#[test]
+fn one_triangle_index_changed_in_a_leaf_is_wrong_on_exactly_the_rays_that_hit_it() {
+    if !is_exact(gpu()) {
+        return;
+    }
+    let stage = cornell();
+    let judge = judge(&stage, RAYS);
+    let expected = hits_of(&judge, 0);
+    assert!(expected > 0);
+    for kind in [&WRONG_INDEX, &WRONG_INDEX_ROPED] {
+        let verdict = verdict(gpu(), &stage, kind, &judge);
+        assert!(!verdict.passed);
+        assert_eq!(wrong(&verdict), expected, "{}", kind.name);
+        check_replay(&verdict, &stage.soup);
+    }
+}
+
+#[test]
+fn a_kernel_that_drops_the_far_child_is_wrong() {
+    let gpu = open(kernels_with(
+        "accel/bvh/pairs",
+        &[("if (far_enter < MISSED &&", "if (far_enter < 0.0 &&")],
+    ));
+    let stage = Stage::builtin(&gpu, "cornell-box", &[]);
+    let judge = judge(&stage, RAYS);
+    let faulty = verdict(&gpu, &stage, structure("bvh"), &judge);
+    assert!(!faulty.passed && wrong(&faulty) > 0, "{faulty:?}");
+    assert!(faulty.kernel_errors.is_empty(), "{faulty:?}");
+    check_replay(&faulty, &stage.soup);
+    // The other structures do not use that kernel.
+    let other = verdict(&gpu, &stage, structure("roped-bvh"), &judge);
+    assert!(other.passed, "{other:?}");
+}
+
+/// `scene` with a second copy of every triangle behind the first ones.
+fn doubled(mut scene: SceneData) -> SceneData {
+    scene.triangles.extend_from_within(..);
+    scene.material_ids.extend_from_within(..);
+    scene
+}
+
+#[test]
+fn a_kernel_that_ignores_ties_is_wrong_on_every_hit_of_a_scene_made_of_ties() {
+    let nearer = "t < (*hit).t || (t == (*hit).t && triangle.v0.w < (*hit).triangle)";
+    let scene = || doubled(builtin("cornell-box", &[]));
+    let right = Stage::new(gpu(), scene());
+    let judge = judge(&right, RAYS);
+    let hits: usize = judge
+        .sets
+        .iter()
+        .map(|set| {
+            set.truth
+                .iter()
+                .filter(|hit| hit.triangle != NO_HIT)
+                .count()
+        })
+        .sum();
+    assert!(hits > 0);
+    assert!(verdict(gpu(), &right, structure("brute-force"), &judge).passed);
+
+    // Brute force sees the copies last: the last of equals wins every time.
+    let last_wins = open(kernels_with("accel/triangle", &[(nearer, "t <= (*hit).t")]));
+    let stage = Stage::new(&last_wins, scene());
+    let faulty = verdict(&last_wins, &stage, structure("brute-force"), &judge);
+    assert!(!faulty.passed);
+    assert_eq!(wrong(&faulty), hits);
+    check_replay(&faulty, &stage.soup);
+
+    // The first of equals wins: right where triangles come in order, and only there.
+    let first_wins = open(kernels_with("accel/triangle", &[(nearer, "t < (*hit).t")]));
+    let stage = Stage::new(&first_wins, scene());
+    let in_order = verdict(&first_wins, &stage, structure("brute-force"), &judge);
+    // Hard rays that end exactly at a hit lose it.
+    for class in &in_order.classes {
+        let is_hard = class.class == RayClass::Hard;
+        assert_eq!(class.wrong > 0, is_hard, "{in_order:?}");
+    }
+    let faulty = verdict(&first_wins, &stage, structure("bvh"), &judge);
+    assert!(!faulty.passed && wrong(&faulty) > 0, "{faulty:?}");
+    check_replay(&faulty, &stage.soup);
+}
+
+#[test]
+fn a_blown_step_fuse_and_a_stack_overflow_are_named() {
+    let [(_, fuse), (_, overflow), ..] = KERNEL_ERRORS;
+    let impatient = open(kernels_with(
+        "accel/bvh/roped",
+        &[(
+            "step < limits.step_fuse",
+            "step < min(limits.step_fuse, 3u)",
+        )],
+    ));
+    let sphere = [("triangles", ParamValue::Integer(500))];
+    let stage = Stage::builtin(&impatient, "displaced-sphere", &sphere);
+    let judge = judge(&stage, RAYS);
+    let faulty = verdict(&impatient, &stage, structure("roped-bvh"), &judge);
+    assert!(!faulty.passed);
+    assert_eq!(faulty.kernel_errors, [fuse]);
+
+    let stage = Stage::builtin(gpu(), "displaced-sphere", &sphere);
+    let faulty = verdict(gpu(), &stage, &SHORT_STACK, &judge);
+    assert!(!faulty.passed && wrong(&faulty) > 0);
+    assert_eq!(faulty.kernel_errors, [overflow]);
+    let right = verdict(gpu(), &stage, structure("bvh"), &judge);
+    assert!(right.passed && right.kernel_errors.is_empty());
+}
+
+#[test]
+fn a_structure_does_not_pass_before_a_judge_that_is_itself_wrong() {
+    let stage = cornell();
+    let sound = judge(&stage, 1024);
+    assert!(sound.is_sound() && sound.first_wrong.is_none());
+
+    // The judge believes in a floor elsewhere; structures built on the same belief agree with it.
+    let mut misled = cornell();
+    for record in &mut misled.soup.records[..2] {
+        record.v0[1] += 50.0;
+    }
+    let wrong_judge = judge(&misled, 1024);
+    assert!(!wrong_judge.is_sound() && wrong_judge.oracle.wrong > 0);
+    let text = wrong_judge.first_wrong.as_deref().expect("a ray");
+    assert!(text.contains("f64:"), "{text}");
+    parse_ray(text);
+    let buffers = raystone::integrator::SceneBuffers::upload(gpu(), &misled.scene, &misled.soup);
+    misled.buffers = buffers.expect("buffers that fit");
+    let agreed = verdict(gpu(), &misled, structure("bvh"), &wrong_judge);
+    assert_eq!(wrong(&agreed), 0, "{agreed:?}");
+    assert!(!agreed.passed);
+
+    let mut contradicted = sound;
+    contradicted.brute_force.wrong = 1;
+    assert!(!verdict(gpu(), &stage, structure("bvh"), &contradicted).passed);
+}

@@ -1,0 +1,22 @@
+//! What rays hit: structures, their builders and traversals, triangle tests, the gate.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod animation;
+mod builders;
+mod coherence;
+mod cracks;
+mod faults;
+mod gate;
+mod grids;
+mod instances;
+mod intersectors;
+mod peers;
+mod real_scenes;
+mod shadow_rays;
+mod slivers;
+mod spatial;
+mod structures;
+mod traversals;
+mod wide;

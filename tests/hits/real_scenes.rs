@@ -1,0 +1,107 @@
+//! Every registered structure on real models, judged as a run judges it. With RAYSTONE_REAL_RAYS
+//! every model of the list is taken, with that many rays in each of the five classes (200,000 make a
+//! million rays a model); without it three models with a few thousand rays.
+
+use crate::support;
+use crate::support::*;
+use raystone::accel::AccelKind;
+use raystone::integrator::Traced;
+use raystone::measure::gate::{Checks, Judge};
+use std::path::{Path, PathBuf};
+
+/// Models below `../shared/scenes`; the first ones are always taken.
+const MODELS: [&str; 12] = [
+    "utah-teapot/teapot.obj",
+    "cornell-box/CornellBox-Water.obj",
+    "sponza-crytek/sponza.obj",
+    "stanford-dragon/dragon_100k.obj",
+    "stanford-bunny/stanford-bunny.obj",
+    "sponza-dabrovic/sponza_dabrovic.obj",
+    "country-kitchen/kitchen.glb",
+    "fireplace-room/fireplace_room.glb",
+    "dream-apartment/dream_apartment.glb",
+    "nefertiti/nefertiti.obj",
+    "glass-caustics/caustics.obj",
+    "lego-bulldozer/lego.glb",
+];
+const ALWAYS: usize = 3;
+const FEW_RAYS: u32 = 4096;
+/// Brute force takes a minute with more ray–triangle tests than this on two cores.
+const MOST_TESTS: u64 = 2_000_000_000;
+
+fn rays_by_flag() -> Option<u32> {
+    let text = std::env::var("RAYSTONE_REAL_RAYS").ok()?;
+    Some(text.parse().expect("RAYSTONE_REAL_RAYS is a number"))
+}
+
+fn models() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
+    let taken = if rays_by_flag().is_some() {
+        MODELS.len()
+    } else {
+        ALWAYS
+    };
+    MODELS[..taken].iter().map(|m| folder.join(m)).collect()
+}
+
+/// What is wrong with a structure on this stage, if anything.
+fn fault(stage: &Stage, kind: &dyn AccelKind, judge: &Judge) -> Option<String> {
+    let built = match stage.build(kind) {
+        Ok(built) => built,
+        Err(error @ raystone::accel::AccelError::Limit { .. }) => {
+            println!("skipped: {}: {error}", kind.name());
+            return None;
+        }
+        Err(error) => return Some(error.to_string()),
+    };
+    if let Err(error) = built.validate(&stage.soup) {
+        return Some(error.to_string());
+    }
+    let traced = match Traced::upload(gpu(), &*built) {
+        Ok(traced) => traced,
+        Err(error) => {
+            println!("skipped: {}: {error}", kind.name());
+            return None;
+        }
+    };
+    match stage.verdict(gpu(), &traced, judge) {
+        Ok(verdict) if verdict.passed => None,
+        Ok(verdict) => Some(format!("{verdict:?}")),
+        Err(error) => Some(error.to_string()),
+    }
+}
+
+#[test]
+fn every_structure_passes_the_gate_on_real_models() {
+    let mut faults = Vec::new();
+    for path in models() {
+        if !path.exists() {
+            support::needs::skip("files", format!("{} is not there", path.display()));
+            continue;
+        }
+        let stage = Stage::new(gpu(), from_file(&path));
+        let rays = rays_by_flag().unwrap_or(FEW_RAYS);
+        let judge = stage.judge(Checks::Repeated, [rays, 500_000_000, 512]);
+        assert!(
+            judge.is_sound(),
+            "{}: {:?}",
+            path.display(),
+            judge.first_wrong
+        );
+        for kind in structures() {
+            let tests = 5 * u64::from(rays) * stage.scene.triangles.len() as u64;
+            if kind.name() == "brute-force" && tests > MOST_TESTS {
+                continue;
+            }
+            let found = fault(&stage, kind, &judge);
+            println!(
+                "{}: {}: {}",
+                path.display(),
+                kind.name(),
+                found.as_deref().unwrap_or("passed")
+            );
+            faults.extend(found.map(|f| format!("{}: {}: {f}", path.display(), kind.name())));
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}

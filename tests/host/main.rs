@@ -1,0 +1,19 @@
+//! What needs no device: parsers, plans, records, statistics, comparisons, exact judges.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod compare;
+mod declared_parameters;
+mod discrepancy;
+mod experiments;
+mod kernel_errors;
+mod linear_images;
+mod models;
+mod oracle;
+mod parameters;
+mod records;
+mod repro;
+mod statistics;
+mod triangle;
+mod twins;

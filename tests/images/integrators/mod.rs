@@ -1,0 +1,16 @@
+//! The integrators against images that are known: furnaces, mirrors, textures, open and closed
+//! scenes; and against themselves: seeds, slices, structures, with and without direct light.
+
+mod bits;
+mod blocks;
+mod colors;
+mod estimators;
+mod facets;
+
+mod furnace;
+mod model;
+mod ray_counts;
+mod sides;
+
+/// Bounces where nothing else is asked for: tests that agree on it share their kernels.
+const MAX_DEPTH: i64 = 6;

@@ -1,0 +1,18 @@
+//! What is rendered: samplers, materials, lights, integrators, and the judges of images.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod adaptive;
+mod dielectric;
+mod foreign;
+mod image_gate;
+mod integrators;
+mod known_images;
+mod lights;
+mod masks;
+mod materials;
+mod primary_visibility;
+mod sampler_images;
+mod sampler_measures;
+mod samplers;

@@ -1,0 +1,244 @@
+//! Alpha masks: closest and any hit of every structure and triangle test where surfaces are cut out, the gate with planted faults,
+//! estimators under a masked lamp, and an answer that is known without any of them.
+
+use crate::support::*;
+use raystone::accel::{AccelRegistry, Intersection, NO_HIT, Ray, TriangleRegistry, TriangleSoup};
+use raystone::gpu::Gpu;
+use raystone::measure::gate::{Checks, Judge};
+use raystone::measure::record::GateVerdict;
+use raystone::params::{ParamValue, Variant};
+use raystone::scene::SceneData;
+
+const STRUCTURES: usize = 12;
+
+fn few_plants() -> SceneData {
+    builtin("foliage", &[("plants", ParamValue::Integer(9))])
+}
+
+fn judge(stage: &Stage) -> Judge {
+    stage.judge(Checks::Repeated, [2048, 4_000_000, 1024])
+}
+
+fn wrong(verdict: &GateVerdict) -> usize {
+    verdict.classes.iter().map(|class| class.wrong).sum()
+}
+
+/// Rays down from above, so that masks decide what they hit.
+fn rays_down(count: usize) -> Vec<Ray> {
+    let mut rng = Pcg::new(3);
+    let ray = |_| Ray {
+        origin: [2.0 * rng.signed(), 3.0, 2.0 * rng.signed()],
+        t_min: 0.0,
+        direction: [0.4 * rng.signed(), -1.0, 0.8 * rng.signed()],
+        t_max: 100.0,
+    };
+    (0..count).map(ray).collect()
+}
+
+#[test]
+fn every_structure_answers_as_brute_force_does_where_surfaces_are_cut_out() {
+    let gpu = gpu();
+    let scene = few_plants();
+    let rays = rays_down(4000);
+    let soup = TriangleSoup::new(&scene);
+    let whole = TriangleSoup {
+        masks: None,
+        ..soup.clone()
+    };
+    let expected = brute_force(&soup, &rays);
+    let ignored = brute_force(&whole, &rays);
+    let changed = differences(&expected, &ignored).len();
+    assert!(changed > 400, "masks change {changed} of 4000 rays");
+    // Instances that are moved round otherwise: they have a judge of their own in the gate.
+    let flat = TriangleSoup {
+        placed: None,
+        ..soup
+    };
+    let kinds: Vec<_> = AccelRegistry::default().iter().collect();
+    assert_eq!(kinds.len(), STRUCTURES);
+    for kind in kinds {
+        let built = build(kind, &flat, &default_params(&kind.parameters()));
+        let closest = trace(gpu, &*built, &flat, &rays, &[]).hits;
+        assert_same_hits(kind.name(), &rays, &expected, &closest);
+        let any = trace(gpu, &*built, &flat, &rays, &["any"]).found();
+        let blocked: Vec<bool> = expected.iter().map(|h| h.triangle != NO_HIT).collect();
+        assert_eq!(any, blocked, "any hit of {}", kind.name());
+    }
+}
+
+#[test]
+fn every_triangle_test_has_the_same_masks() {
+    let gpu = gpu();
+    let scene = few_plants();
+    let rays = rays_down(2000);
+    let tests: Vec<_> = TriangleRegistry::default().iter().collect();
+    assert_eq!(tests.len(), 5);
+    for triangle in tests {
+        let tests = Intersection {
+            triangle,
+            ..Default::default()
+        };
+        let flat = TriangleSoup {
+            placed: None,
+            ..TriangleSoup::new(&scene)
+        };
+        let soup = flat.intersecting(tests);
+        let expected = brute_force(&soup, &rays);
+        let kind = structure("bvh");
+        let built = build(kind, &soup, &default_params(&kind.parameters()));
+        let closest = trace(gpu, &*built, &soup, &rays, &[]).hits;
+        assert_same_hits(triangle.name(), &rays, &expected, &closest);
+    }
+}
+
+#[test]
+fn the_gate_passes_what_is_right() {
+    let gpu = gpu();
+    let stage = Stage::new(gpu, few_plants());
+    let judge = judge(&stage);
+    for name in ["bvh", "cwbvh", "object-list", "meta-bvh"] {
+        let verdict = stage.verdict(gpu, &stage.traced(gpu, structure(name)), &judge);
+        let verdict = verdict.expect("a verdict");
+        assert!(verdict.passed, "{name}: {verdict:?}");
+        let oracle = &verdict.oracle;
+        // What rounding leaves open is near the outlines of holes.
+        assert!(
+            oracle.ambiguous - oracle.hard_ambiguous < oracle.rays / 50,
+            "{oracle:?}"
+        );
+    }
+    let unsound = judge.first_wrong.as_deref();
+    assert_eq!(unsound, None);
+}
+
+/// Faults, each with the structure whose gate must be red.
+const FAULTS: [(&str, &str, &str, &str, &str); 10] = [
+    (
+        "masks ignored in any hit",
+        "accel/triangle",
+        "@if(alpha_masks) if (is_cut_out",
+        "@if(alpha_masks && !any) if (is_cut_out",
+        "bvh",
+    ),
+    (
+        "cutoff inverted",
+        "accel/mask",
+        "lower * fy < image.w;",
+        "lower * fy >= image.w;",
+        "bvh",
+    ),
+    (
+        "corners exchanged",
+        "accel/mask",
+        "part_of(a.z, second) + part_of(bitcast<i32>(b.x), third)",
+        "part_of(a.z, third) + part_of(bitcast<i32>(b.x), second)",
+        "bvh",
+    ),
+    (
+        "mirrored images repeat",
+        "accel/mask",
+        "return bitcast<u32>(min(there, 2 * size - 1 - there));",
+        "return bitcast<u32>(there % size);",
+        "bvh",
+    ),
+    (
+        "clamped images repeat",
+        "accel/mask",
+        "if (wrap == CLAMPED) {",
+        "if (wrap == 7u) {",
+        "bvh",
+    ),
+    (
+        "the nearest texel decides",
+        "accel/mask",
+        "let fx = bitcast<u32>(x & 255);",
+        "let fx = 0u;",
+        "bvh",
+    ),
+    (
+        "half a texel off",
+        "accel/mask",
+        "let column = x >> 8u;",
+        "let column = (x + 128) >> 8u;",
+        "bvh",
+    ),
+    (
+        "holes shorten rays",
+        "accel/triangle",
+        "found.v) / found.area)) { return; }",
+        "found.v) / found.area)) { (*hit).t = t; return; }",
+        "bvh",
+    ),
+    (
+        "texels in another order",
+        "accel/mask",
+        "(word >> (8u * (at & 3u)))",
+        "(word >> (8u * (3u - (at & 3u))))",
+        "cwbvh",
+    ),
+    (
+        "instances read the words of the triangle before",
+        "accel/instance",
+        "record.v0.w += first_id;",
+        "record.v0.w += first_id;\n        if (record.v1.w > 2147483648u) { record.v1.w -= 2u; }",
+        "object-list",
+    ),
+];
+
+#[test]
+fn planted_faults_turn_the_gate_red() {
+    let right = Stage::new(gpu(), few_plants());
+    let judge = judge(&right);
+    assert!(judge.is_sound(), "{:?}", judge.first_wrong);
+    for (what, module, from, to, name) in FAULTS {
+        let gpu = open(kernels_with(module, &[(from, to)]));
+        let stage = Stage::new(&gpu, few_plants());
+        let verdict = stage.verdict(&gpu, &stage.traced(&gpu, structure(name)), &judge);
+        let verdict = verdict.expect("a verdict");
+        assert!(
+            !verdict.passed && wrong(&verdict) > 0,
+            "{what}: {verdict:?}"
+        );
+    }
+}
+
+/// Mean radiance of an image of `foliage` with few plants.
+fn light_of(gpu: &Gpu, strategy: &str, spp: u32) -> Estimate {
+    let stage = Stage::new(gpu, few_plants());
+    let traced = stage.traced(gpu, structure("bvh"));
+    let what: Variant = integrator_variant(
+        "path",
+        &[
+            ("max_depth", ParamValue::Integer(2)),
+            ("strategy", ParamValue::Name(strategy.to_owned())),
+        ],
+    );
+    let sampler = sampler("pixel-hash", "none");
+    let renderer = stage.renderer(gpu, &traced, &sampler, &what, [24, 24], false);
+    Estimate::of(&replicate_means(&renderer, spp, 16))
+}
+
+#[test]
+fn all_strategies_find_the_same_light_of_a_lamp_that_is_cut_out() {
+    let both = light_of(gpu(), "mis-balance", 128);
+    for (strategy, spp) in [("bsdf", 256), ("light", 128)] {
+        let ours = light_of(gpu(), strategy, spp);
+        let difference = ours.minus(&both);
+        assert!(
+            difference.agrees_with(0.0),
+            "{strategy}: {ours:?}, not {both:?}"
+        );
+        assert!(
+            difference.error < 0.015 * both.mean,
+            "{difference:?} proves too little"
+        );
+    }
+    // A light sample that shines where there is no lamp.
+    let fault = ("if (is_cut_out(record, u, v)) { return dark(); }", "");
+    let faulty = open(kernels_with(
+        "shading/light/flat",
+        &[(&format!("    @if(alpha_masks) {}\n", fault.0), fault.1)],
+    ));
+    let ours = light_of(&faulty, "light", 128);
+    assert!(!ours.minus(&both).agrees_with(0.0), "{ours:?} and {both:?}");
+}

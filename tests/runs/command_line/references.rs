@@ -1,0 +1,215 @@
+//! `raystone run --reference` and `--images`: foreign references, and linear images of a run.
+
+use super::{error, output, program, text};
+use crate::support::small_with;
+use raystone::image::{Image, read_linear};
+use raystone::measure::record::{
+    BiasRecord, Body, ErrorRecord, Line, Recorded, ReferenceRecord, all_of, read_records,
+};
+use std::path::{Path, PathBuf};
+
+/// Primary rays by a sampler with few samples.
+fn experiment() -> String {
+    small_with(&[
+        "run.replicates = 3",
+        "run.resolution = [24, 16]",
+        "run.spp = [1, 3, 4]",
+        "axes.sequence = [\"sobol\"]",
+        "axes.decorrelation = [\"cranley-patterson\"]",
+        "axes.integrator = [\"primary\"]",
+        "reference.spp = 64",
+        "gate.rays = 256",
+    ])
+}
+
+/// Runs the experiment in a folder; the records.
+fn run(folder: &Path, name: &str, more: &[&str]) -> (i32, String, Vec<Line>) {
+    let file = folder.join("trial.toml");
+    std::fs::write(&file, experiment()).expect("a writable folder");
+    let out = folder.join(name);
+    let arguments = ["run", text(&file), "-q", "--out", text(&out)];
+    let ended = output(program(&arguments).args(more));
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    let lines = read_records(&out).map(|records| records.lines);
+    (
+        ended.status.code().unwrap_or(-1),
+        said,
+        lines.unwrap_or_default(),
+    )
+}
+
+/// The linear image whose name begins like this.
+fn linear(out: &Path, beginning: &str, ending: &str) -> PathBuf {
+    let files = std::fs::read_dir(out.join("images")).expect("a folder of images");
+    let mut files = files.map(|file| file.expect("an entry").path());
+    let is_it = |path: &PathBuf| {
+        let name = path
+            .file_name()
+            .and_then(|name| name.to_str())
+            .unwrap_or_default();
+        name.starts_with(beginning) && name.ends_with(ending)
+    };
+    files
+        .find(is_it)
+        .unwrap_or_else(|| panic!("no {beginning}….{ending}"))
+}
+
+fn errors(lines: &[Line]) -> Vec<Recorded<'_, ErrorRecord>> {
+    all_of(lines).collect()
+}
+
+#[test]
+fn a_run_writes_linear_images_and_takes_one_as_the_reference_of_another() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    // 1 says that the reference is too noisy to rank by, which it may be.
+    let (code, said, first) = run(folder.path(), "a", &["--images", "exr"]);
+    assert!([0, 1].contains(&code), "{said}");
+    let images: Vec<Image> = ["reference-", "image-", "mean-", "variance-"]
+        .map(|name| linear(&folder.path().join("a"), name, "exr"))
+        .iter()
+        .map(|path| read_linear(path).expect("an image"))
+        .collect();
+    assert!(
+        images
+            .iter()
+            .all(|image| (image.width, image.height) == (24, 16))
+    );
+    // What was recorded of the first replicate and of all is in the images.
+    let measured = errors(&first);
+    let hash = blake3::hash(bytemuck::cast_slice(&images[1].pixels)).to_hex();
+    assert_eq!(measured[0].image_hash, hash.as_str());
+    assert!(images[3].pixels.iter().flatten().any(|v| *v > 0.0));
+
+    // The mean of a run as the reference of the next: errors of its replicates are those of the variance.
+    let mean = linear(&folder.path().join("a"), "mean-", "exr");
+    let (code, said, second) = run(folder.path(), "b", &["--reference", text(&mean)]);
+    assert_eq!(code, 0, "{said}");
+    let reference: Vec<Recorded<ReferenceRecord>> = all_of(&second).collect();
+    assert_eq!(reference.len(), 1);
+    assert_eq!(reference[0].file.as_deref(), Some(text(&mean)));
+    assert_eq!((reference[0].mse, reference[0].spp), (None, 0));
+    let last = |e: &Recorded<ErrorRecord>| e.errors.last().expect("an error").metrics.clone();
+    let mse: Vec<f64> = errors(&second).iter().map(|e| last(e)["mse/v1"]).collect();
+    assert_eq!(mse.len(), 3);
+    let found = mse.iter().sum::<f64>() / 2.0;
+    let expected = images[3].mean();
+    assert!((found / expected - 1.0).abs() < 1e-4, "{found} {expected}");
+    for error in errors(&second) {
+        assert!(error.errors.iter().map(|e| e.spp).eq([1, 3, 4]));
+        assert!(last(&error).keys().all(|id| !id.contains("unbiased")));
+    }
+    // One image says nothing about a bias.
+    let bias: Vec<Recorded<BiasRecord>> = all_of(&second).collect();
+    assert!(
+        bias.iter()
+            .all(|b| format!("{:?}", b.verdict).contains("NotTestable"))
+    );
+    // Another image is another cell.
+    let hashes = |lines: &[Line]| -> Vec<String> {
+        let errors = lines
+            .iter()
+            .filter(|line| matches!(line.body, Body::Error(_)));
+        errors.map(|line| line.hash.clone()).collect()
+    };
+    assert_eq!(hashes(&first).len(), 3);
+    assert_ne!(hashes(&first), hashes(&second));
+}
+
+#[test]
+fn a_check_that_fails_is_the_exit_code_unless_the_run_is_lenient_which_its_page_says() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    // As few samples as a reference may have are too few for the errors.
+    let noisy = ["--no-cache", "--set", "reference.spp=8"];
+    let page = |name: &str| {
+        let page = folder.path().join(name).join("index.html");
+        std::fs::read_to_string(page).expect("a page")
+    };
+    let (code, said, _) = run(folder.path(), "strict", &noisy);
+    assert_eq!(code, 1, "{said}");
+    assert!(said.contains("failed: Reference noise"), "{said}");
+    assert!(page("strict").contains("no winner: ") && !page("strict").contains("--lenient"));
+    let (code, said, _) = run(
+        folder.path(),
+        "lenient",
+        &[&noisy[..], &["--lenient"]].concat(),
+    );
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("failed: Reference noise"), "{said}");
+    assert!(page("lenient").contains("no winner: ") && page("lenient").contains("--lenient"));
+}
+
+#[test]
+fn a_reference_that_does_not_fit_ends_with_2_before_anything_is_measured() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let wrong = folder.path().join("wrong.pfm");
+    std::fs::write(&wrong, [&b"PF\n1 2\n-1\n"[..], &[0; 24]].concat()).expect("an image");
+    for (file, pieces) in [
+        (text(&wrong), &["1×2", "24×16", "run.resolution"][..]),
+        ("no/such.exr", &["no/such.exr"]),
+        ("reference.jpg", &[".exr, .hdr, .pfm, .npy"]),
+    ] {
+        let (code, said, lines) = run(folder.path(), "c", &["--reference", file]);
+        assert!(code == 2 && lines.is_empty(), "{said}");
+        for piece in pieces {
+            assert!(said.contains(piece), "no {piece} in {said}");
+        }
+    }
+    let file = folder.path().join("trial.toml");
+    let unknown = output(&mut program(&["run", text(&file), "--images", "jpg"]));
+    assert!(error(&unknown, 2).contains("exr, hdr, pfm, npy"));
+    let two = ["run", text(&file), "--reference", text(&wrong), "--set"];
+    let two = output(program(&two).arg("axes.scene=cornell-box,furnace-box"));
+    assert!(error(&two, 2).contains("reference.file"));
+}
+
+/// The reference of a run that keeps references in `cache`: whether it was there, and the errors against it.
+fn with_cache(folder: &Path, cache: &Path, name: &str, more: &[&str]) -> (bool, Vec<ErrorRecord>) {
+    let file = folder.join("trial.toml");
+    std::fs::write(&file, experiment()).expect("a writable folder");
+    let out = folder.join(name);
+    let arguments = ["run", text(&file), "-q", "--out", text(&out)];
+    // So few samples are too noisy a reference, which is told by the code 1.
+    output(program(&arguments).args(more).env("RAYSTONE_CACHE", cache));
+    let lines = read_records(&out).expect("records").lines;
+    let references: Vec<Recorded<ReferenceRecord>> = all_of(&lines).collect();
+    let errors = all_of(&lines).map(|r: Recorded<ErrorRecord>| r.body.clone());
+    (references[0].cached, errors.collect())
+}
+
+#[test]
+fn a_reference_is_rendered_once_for_all_runs_that_it_serves() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let cache = folder.path().join("cache");
+    let run = |name: &str, more: &[&str]| with_cache(folder.path(), &cache, name, more);
+    let (cached, rendered) = run("first", &[]);
+    assert!(!cached);
+    assert_eq!(run("again", &[]), (true, rendered.clone()));
+    assert_eq!(run("without", &["--no-cache"]), (false, rendered.clone()));
+    // Edited kernels and other samplers are measured against the same; whatever it is made of makes another.
+    let kernels = folder.path().join("kernels");
+    std::fs::create_dir_all(kernels.join("accel")).expect("a writable folder");
+    let edited = std::fs::read_to_string("kernels/accel/leaf.wesl").expect("a kernel");
+    std::fs::write(kernels.join("accel/leaf.wesl"), edited + "// Edited.\n").expect("a file");
+    assert!(run("edited", &["--kernels", text(&kernels)]).0);
+    assert!(run("sampler", &["--set", r#"axes.sequence=["halton"]"#]).0);
+    for other in [
+        "reference.spp=72",
+        "reference.seed=9",
+        "run.resolution=[16, 24]",
+        r#"axes.scene=["lamp"]"#,
+    ] {
+        assert!(!run(other, &["--set", other]).0, "{other}");
+    }
+    for kept in std::fs::read_dir(cache.join("references")).expect("a folder") {
+        let path = kept.expect("an entry").path();
+        let mut bytes = std::fs::read(&path).expect("a readable file");
+        bytes[5] ^= 1;
+        std::fs::write(&path, bytes).expect("a writable file");
+    }
+    assert_eq!(run("damaged", &[]), (false, rendered.clone()));
+    assert_eq!(run("mended", &[]), (true, rendered));
+    // A cache that cannot be written is told, and the run goes on.
+    std::fs::write(folder.path().join("file"), "").expect("a writable folder");
+    let unusable = with_cache(folder.path(), &folder.path().join("file"), "unusable", &[]);
+    assert!(!unusable.0);
+}
