@@ -123,7 +123,7 @@ fn all_organisations_make_the_image_of_the_single_kernel_to_the_bit() {
         let traced = stage.traced(gpu(), structure("bvh"));
         let single = organisation("single-kernel", &[]);
         let expected = rendered(gpu(), &stage, &traced, &path(5), &single).expect("an image");
-        for by in all() {
+        for by in in_turn("organisations", all()) {
             let found = rendered(gpu(), &stage, &traced, &path(5), &by);
             let found = found.unwrap_or_else(|e| panic!("{by:?}: {e}"));
             assert!(
@@ -255,7 +255,7 @@ fn planted_faults_are_seen() {
     let several = organisation("multi-kernel", &[]);
     let again = organisation("regeneration", &[]);
     let mut unseen = Vec::new();
-    for (by, module, from, to) in [
+    let faults = [
         // A queue one short; a workgroup of it lost; a path lost, or begun twice.
         (
             &queues,
@@ -368,7 +368,8 @@ fn planted_faults_are_seen() {
             "values[place] = place;",
             "values[place] = place / 2u;",
         ),
-    ] {
+    ];
+    for (by, module, from, to) in in_turn("faults of organisations", faults) {
         let found = fault(by, &format!("organisation/{module}"), from, to);
         println!("{module}: {from}: {found:?}");
         if found.is_none() {

@@ -1,6 +1,6 @@
 //! Recordings: steps in order, one submission, times per step, nothing made twice, limits.
 
-use crate::support::open;
+use crate::support::{alone, open};
 use raystone::gpu::{
     Bindings, Composition, Gpu, GpuError, Groups, KernelLibrary, Pipeline, Player, Recording,
     Storage, UniformValues,
@@ -165,7 +165,7 @@ fn a_missing_binding_is_named_and_the_player_goes_on() {
 
 #[test]
 fn the_first_use_of_a_kernel_is_told_on_its_own() {
-    let own = open(KernelLibrary::default());
+    let own = alone(KernelLibrary::default());
     let kernel = Composition::new("common/loops").feature("loops_cut", true);
     let pipeline = own.pipeline(&kernel, false).expect("it compiles");
     assert_eq!(pipeline.cold_ms(), None);
@@ -235,10 +235,10 @@ fn kernels_that_are_compared_are_compiled_apart_and_in_turns() {
         gpu.pipeline(&Composition::new("test/add"), true)
             .expect("a kernel")
     };
-    let once = open(library());
+    let once = alone(library());
     let shared = [add(&once), add(&once.with_kernels(other.clone()))];
     assert!(Arc::ptr_eq(&shared[0], &shared[1]));
-    let base = open(library()).compiled_apart(3);
+    let base = alone(library()).compiled_apart(3);
     let candidate = base.with_kernels(other);
     let kernels = [add(&base), add(&candidate)];
     assert!(!Arc::ptr_eq(&kernels[0], &kernels[1]));

@@ -3,7 +3,7 @@
 
 use crate::support;
 use crate::support::{
-    Pcg, assert_same_hits, build, default_params, is_exact, kernels_with, open, scenes,
+    Pcg, assert_same_hits, build, default_params, in_turn, is_exact, kernels_with, open, scenes,
 };
 use raystone::accel::{AccelKind, AccelRegistry, Counters, Hit, Ray, TriangleSoup};
 use raystone::gpu::Gpu;
@@ -66,7 +66,7 @@ fn what_is_found_and_counted_does_not_depend_on_it() {
     }
     for rays in [1, 64, 65, 2048, 5003] {
         let subject = subject(rays);
-        for name in REFILLED {
+        for name in in_turn("structures that are refilled", REFILLED) {
             let plain = answers(support::gpu(), name, &subject, ("none", 64));
             for rays_per_lane in [2, 3, 64] {
                 let what = format!("{name}, {rays} rays, at most {rays_per_lane} a lane");
@@ -174,6 +174,7 @@ fn what_goes_wrong_between_two_rays_is_seen() {
     ] {
         faults.push(("accel/bvh/stack", left_over, "\n"));
     }
+    let faults = in_turn("faults between two rays of an invocation", faults);
     let unseen: Vec<_> = faults
         .iter()
         .filter(|fault| !is_seen(&subject, **fault))

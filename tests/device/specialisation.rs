@@ -128,7 +128,7 @@ fn the_full_kernel_gives_the_image_of_the_specialised_one_on_every_scene() {
         return;
     }
     let mut wrong = Vec::new();
-    for scene in scenes() {
+    for scene in in_turn("scenes of full kernels", scenes()) {
         let stage = Stage::new(gpu(), scene);
         wrong.extend(differing(&stage, &Vec::new(), &["all"]));
     }
@@ -149,7 +149,7 @@ fn each_group_alone_changes_no_image_with_any_estimator() {
         vec![word("lights", "all")],
     ];
     let under_map = Stage::new(gpu(), under_a_map(false));
-    for changes in &estimators {
+    for changes in in_turn("estimators of full kernels", &estimators) {
         wrong.extend(differing(&stage, changes, &["choice", "all"]));
         wrong.extend(differing(&under_map, changes, &["all"]));
     }

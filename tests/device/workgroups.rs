@@ -55,7 +55,7 @@ fn same(a: &[Vec<Hit>; 2], b: &[Vec<Hit>; 2]) -> bool {
 #[test]
 fn every_structure_finds_the_same_in_workgroups_of_every_size() {
     let (stage, rays) = subject(gpu());
-    for kind in structures() {
+    for kind in in_turn("structures in other workgroups", structures()) {
         let traced = stage.traced(gpu(), kind);
         let expected = answers(&stage, &traced, &rays).expect("answers");
         assert!(expected[0].iter().any(|hit| hit.triangle != u32::MAX));
@@ -160,7 +160,7 @@ fn images_are_the_same_in_workgroups_of_every_shape() {
     let traced = stage.traced(gpu(), structure("cwbvh"));
     for (what, by) in organised() {
         let expected = pixels(&stage, &traced, &what, &by).expect("an image");
-        for shape in &Workgroup::ALL {
+        for shape in in_turn("shapes of workgroups", &Workgroup::ALL) {
             let other = in_groups(gpu(), &traced, shape.name);
             let found = pixels(&stage, &other, &what, &by);
             let found = found.unwrap_or_else(|e| panic!("{by:?} × {}: {e}", shape.name));
@@ -171,7 +171,7 @@ fn images_are_the_same_in_workgroups_of_every_shape() {
 
 #[test]
 fn a_workgroup_beyond_the_adapter_is_refused_with_both_numbers() {
-    let mut small = open(raystone::gpu::KernelLibrary::default());
+    let mut small = alone(raystone::gpu::KernelLibrary::default());
     small.limits.max_compute_invocations_per_workgroup = 128;
     small.limits.max_compute_workgroup_size_x = 100;
     let (stage, rays) = subject(&small);
@@ -299,7 +299,7 @@ fn pixels_show(
 fn what_goes_wrong_with_the_size_of_workgroups_is_seen() {
     const RAYS: &str = "integrator/trace_rays";
     let mut unseen = Vec::new();
-    for (size, fault, refill) in [
+    let of_rays = [
         // The last group that is not full is dropped.
         (
             "128",
@@ -341,14 +341,15 @@ fn what_goes_wrong_with_the_size_of_workgroups_is_seen() {
             ),
             "always",
         ),
-    ] {
+    ];
+    for (size, fault, refill) in in_turn("faults of workgroups of rays", of_rays) {
         if !rays_show(size, fault, refill) {
             unseen.push(format!("{size}: {fault:?}"));
         }
     }
     let cases = organised();
     let [single, again, several, queues] = [0, 2, 3, 4].map(|place| &cases[place]);
-    for (shape, module, from, to, case) in [
+    let of_pixels = [
         // Rows and columns exchanged, in the kernel and of the pixel.
         (
             "32",
@@ -414,7 +415,8 @@ fn what_goes_wrong_with_the_size_of_workgroups_is_seen() {
             "@workgroup_size(16)",
             several,
         ),
-    ] {
+    ];
+    for (shape, module, from, to, case) in in_turn("faults of workgroups of pixels", of_pixels) {
         if !pixels_show(shape, (module, from, to), case) {
             unseen.push(format!("{shape}: {module}: {to}"));
         }

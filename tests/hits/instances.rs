@@ -328,7 +328,7 @@ fn the_gate_judges_each_structure_in_its_space_and_sees_the_difference() {
         ];
         assert!(ambiguous * 4 < rays, "{oracle:?}");
     }
-    for kind in support::structures() {
+    for kind in support::in_turn("structures at the gate of instances", support::structures()) {
         let verdict = stage.verdict(gpu, &stage.traced(gpu, kind), &judge);
         let verdict = verdict.unwrap_or_else(|e| panic!("{}: {e}", kind.name()));
         assert!(verdict.passed, "{}: {verdict:?}", kind.name());

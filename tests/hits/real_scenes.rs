@@ -1,6 +1,6 @@
-//! Every registered structure on real models, judged as a run judges it. With RAYSTONE_REAL_RAYS
-//! every model of the list is taken, with that many rays in each of the five classes (200,000 make a
-//! million rays a model); without it three models with a few thousand rays.
+//! Registered structures on real models, judged as a run judges it. With RAYSTONE_REAL_RAYS every
+//! model of the list is taken, with that many rays in each of the five classes (200,000 make a
+//! million rays a model), and in a full run with a few thousand; else one of three models.
 
 use crate::support;
 use crate::support::*;
@@ -9,7 +9,7 @@ use raystone::integrator::Traced;
 use raystone::measure::gate::{Checks, Judge};
 use std::path::{Path, PathBuf};
 
-/// Models below `../shared/scenes`; the first ones are always taken.
+/// Models below `../shared/scenes`; a run that is not full takes one of the first ones.
 const MODELS: [&str; 12] = [
     "utah-teapot/teapot.obj",
     "cornell-box/CornellBox-Water.obj",
@@ -24,7 +24,7 @@ const MODELS: [&str; 12] = [
     "glass-caustics/caustics.obj",
     "lego-bulldozer/lego.glb",
 ];
-const ALWAYS: usize = 3;
+const SMALL_ONES: usize = 3;
 const FEW_RAYS: u32 = 4096;
 /// Brute force takes a minute with more ray–triangle tests than this on two cores.
 const MOST_TESTS: u64 = 2_000_000_000;
@@ -36,12 +36,11 @@ fn rays_by_flag() -> Option<u32> {
 
 fn models() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
-    let taken = if rays_by_flag().is_some() {
-        MODELS.len()
-    } else {
-        ALWAYS
+    let taken = match rays_by_flag().is_some() || is_full() {
+        true => MODELS.to_vec(),
+        false => in_turn("real models", MODELS[..SMALL_ONES].iter().copied()),
     };
-    MODELS[..taken].iter().map(|m| folder.join(m)).collect()
+    taken.iter().map(|m| folder.join(m)).collect()
 }
 
 /// What is wrong with a structure on this stage, if anything.
@@ -88,7 +87,7 @@ fn every_structure_passes_the_gate_on_real_models() {
             path.display(),
             judge.first_wrong
         );
-        for kind in structures() {
+        for kind in in_turn("structures on real models", structures()) {
             let tests = 5 * u64::from(rays) * stage.scene.triangles.len() as u64;
             if kind.name() == "brute-force" && tests > MOST_TESTS {
                 continue;

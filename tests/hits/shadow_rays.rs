@@ -110,7 +110,7 @@ fn segments_of_one_light_stay_in_order() {
 fn every_structure_answers_them_as_the_judge_does() {
     let stage = many_lights(8);
     let judge = judge(&stage);
-    for kind in support::structures() {
+    for kind in support::in_turn("structures and shadow rays", support::structures()) {
         let traced = stage.traced(support::gpu(), kind);
         let verdict = stage.verdict(support::gpu(), &traced, &judge);
         let verdict = verdict.unwrap_or_else(|e| panic!("{}: {e}", kind.name()));

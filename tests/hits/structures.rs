@@ -4,7 +4,8 @@
 use crate::support;
 use crate::support::scenes::{self, Case};
 use crate::support::{
-    Pcg, assert_same_hits, brute_force, build, default_params, param_variants, trace,
+    Pcg, assert_same_hits, brute_force, build, default_params, in_turn, param_variants, so_many,
+    trace,
 };
 
 use rayon::prelude::*;
@@ -89,7 +90,7 @@ fn check_kernel(
     }
 }
 
-/// The defaults of a structure, and one set of parameters for each other kernel that it can choose.
+/// The defaults of a structure, and one set of parameters for each other kernel that it can choose whose turn it is.
 fn kernel_variants(kind: &dyn AccelKind) -> Vec<Params> {
     let soup = scenes::lattice_soup(&mut Pcg::new(2), 40, 5);
     let mut kernels = Vec::new();
@@ -102,14 +103,16 @@ fn kernel_variants(kind: &dyn AccelKind) -> Vec<Params> {
         kernels.push(kernel);
         is_new
     });
+    let others = out.split_off(1);
+    out.extend(in_turn("other kernels of a structure", others));
     out
 }
 
-/// How many random scenes: RAYSTONE_FUZZ_SCENES, or 10,000.
+/// How many random scenes: RAYSTONE_FUZZ_SCENES, or 2,000, and 100,000 in a full run.
 fn fuzz_scenes() -> u64 {
     let set = std::env::var("RAYSTONE_FUZZ_SCENES").ok();
     let parse = |text: String| text.parse().expect("RAYSTONE_FUZZ_SCENES is a number");
-    set.map_or(10_000, parse)
+    set.map_or_else(|| so_many("random lattice scenes", 2_000, 100_000), parse)
 }
 
 /// Hard scenes with rays of all sorts, and what brute force answers.
@@ -197,7 +200,8 @@ fn twins_equal_brute_force_from_far_outside_the_scene() {
 fn twins_equal_brute_force_on_hard_scenes_with_every_parameter() {
     for (case, rays, expected) in hard_cases(5, 300) {
         for kind in kinds() {
-            for params in param_variants(&kind.parameters()) {
+            let variants = param_variants(&kind.parameters());
+            for params in in_turn("parameters of a twin", variants) {
                 check_twin(case.name, kind, &params, &case.soup, &rays, &expected);
             }
         }
@@ -331,7 +335,7 @@ fn validation_refuses_structures_that_were_built_for_other_triangles() {
 fn builds_do_not_depend_on_the_number_of_threads() {
     let mut rng = Pcg::new(21);
     let soup = scenes::lattice_soup(&mut rng, 30_000, 64);
-    for kind in kinds() {
+    for kind in in_turn("structures built by threads", kinds()) {
         let params = default_params(&kind.parameters());
         let words = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new()

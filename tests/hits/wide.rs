@@ -76,7 +76,7 @@ fn triangles_in_a_texture_are_not_bound_by_the_limit_of_buffers() {
     let scene = raystone::scene::load(&variant, &Default::default()).expect("a scene");
     let soup = TriangleSoup::new(&scene);
     let rays = scenes::aimed_rays(&mut Pcg::new(4), &soup, 1000);
-    let mut gpu = support::open(raystone::gpu::KernelLibrary::default());
+    let mut gpu = support::alone(raystone::gpu::KernelLibrary::default());
     if !support::is_exact(&gpu) {
         return;
     }

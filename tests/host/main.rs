@@ -15,5 +15,6 @@ mod parameters;
 mod records;
 mod repro;
 mod statistics;
+mod tiers;
 mod triangle;
 mod twins;

@@ -56,7 +56,7 @@ fn every_structure_answers_as_brute_force_does_where_surfaces_are_cut_out() {
     };
     let kinds: Vec<_> = AccelRegistry::default().iter().collect();
     assert_eq!(kinds.len(), STRUCTURES);
-    for kind in kinds {
+    for kind in in_turn("structures with masks", kinds) {
         let built = build(kind, &flat, &default_params(&kind.parameters()));
         let closest = trace(gpu, &*built, &flat, &rays, &[]).hits;
         assert_same_hits(kind.name(), &rays, &expected, &closest);
@@ -73,7 +73,7 @@ fn every_triangle_test_has_the_same_masks() {
     let rays = rays_down(2000);
     let tests: Vec<_> = TriangleRegistry::default().iter().collect();
     assert_eq!(tests.len(), 5);
-    for triangle in tests {
+    for triangle in in_turn("triangle tests with masks", tests) {
         let tests = Intersection {
             triangle,
             ..Default::default()
@@ -190,7 +190,7 @@ fn planted_faults_turn_the_gate_red() {
     let right = Stage::new(gpu(), few_plants());
     let judge = judge(&right);
     assert!(judge.is_sound(), "{:?}", judge.first_wrong);
-    for (what, module, from, to, name) in FAULTS {
+    for (what, module, from, to, name) in in_turn("faults of masks", FAULTS) {
         let gpu = open(kernels_with(module, &[(from, to)]));
         let stage = Stage::new(&gpu, few_plants());
         let verdict = stage.verdict(&gpu, &stage.traced(&gpu, structure(name)), &judge);

@@ -200,7 +200,7 @@ fn what_cannot_be_rasterised_is_refused_with_the_reason() {
         assert_eq!(error.contains("primary = raster"), is_refused, "{error}");
     }
     let wide = begun_by("raster");
-    let mut small = open(KernelLibrary::default());
+    let mut small = alone(KernelLibrary::default());
     small.limits.max_texture_dimension_2d = 64;
     let stage = Stage::builtin(&small, "cornell-box", &[]);
     let text = said(&stage, "bvh");
@@ -279,7 +279,8 @@ fn planted_faults_are_seen() {
             "    return Hit(hit.t, hit.triangle, hit.v, hit.u);\n",
         ),
     ];
-    let unseen: Vec<_> = faults.iter().filter(|fault| !is_seen(**fault)).collect();
+    let mut unseen = in_turn("faults of rasterised paths", faults);
+    unseen.retain(|fault| !is_seen(*fault));
     assert!(unseen.is_empty(), "not seen: {unseen:#?}");
     assert!(!is_seen((
         READ,

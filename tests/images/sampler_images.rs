@@ -105,7 +105,7 @@ fn no_structured_sampler_is_worse_than_hashing() {
             let view = View::new(gpu, stage, what);
             let random = view.error(gpu, ("pixel-hash", "none"));
             println!("{}: pixel-hash {random:.3e}", view.what);
-            for pair in SAMPLERS {
+            for pair in in_turn("samplers against hashing", SAMPLERS) {
                 let ratio = view.error(gpu, pair) / random;
                 println!("{}: {pair:?} {ratio:.3} of pixel-hash", view.what);
                 if ratio > MARGIN {

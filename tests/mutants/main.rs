@@ -11,6 +11,9 @@ mod report;
 mod soups;
 mod subject;
 mod table;
+#[path = "../support/tier.rs"]
+#[allow(dead_code)] // Other programs use the rest of it.
+mod tier;
 mod world;
 
 use checks::Check;
@@ -24,25 +27,8 @@ use std::path::PathBuf;
 use subject::Subject;
 use table::mutants;
 
-/// One fault of each kind, cheap ones.
-const SUBSET: [&str; 16] = [
-    "tie-broken-the-other-way",
-    "last-triangle-forgotten",
-    "child-dropped-by-the-builder",
-    "near-and-far-swapped-in-order-only",
-    "rope-reversed",
-    "wrong-octant-in-the-group",
-    "quantisation-rounded-inwards-4",
-    "dda-exits-early",
-    "kd-near-and-far-swapped",
-    "octree-exits-early",
-    "last-instance-forgotten",
-    "world-not-restored",
-    "shift-reused-for-two-dimensions",
-    "pair-of-one-number",
-    "wrong-direction-number",
-    "pdf-forgotten",
-];
+/// One fault of so many is planted by an ordinary run of the tests.
+const PARTS: usize = 6;
 
 fn run(names: &[&str]) -> (Report, Vec<String>) {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -107,13 +93,22 @@ fn the_page_lists_every_fault_with_what_goes_wrong() {
 }
 
 #[test]
-fn a_fault_of_each_kind_is_seen_by_the_check_that_should_see_it_and_the_sound_ones_are_green() {
-    let (report, told) = run(&SUBSET);
+fn faults_are_seen_by_the_checks_that_should_see_them_and_the_sound_ones_are_green() {
+    if tier::is_full() {
+        // That is for `every_fault_of_the_table_is_seen_or_explained`.
+        return;
+    }
+    let all = mutants();
+    let names = tier::one_of(PARTS, "planted faults", all.iter().map(|m| m.name));
+    let (report, told) = run(&names);
     println!("{}", report.table());
-    assert_eq!(report.mutants.len(), SUBSET.len());
+    assert_eq!(report.mutants.len(), names.len());
     assert_eq!(
         BTreeSet::from_iter(told),
-        BTreeSet::from(SUBSET.map(str::to_owned))
+        names
+            .iter()
+            .map(|&name| name.to_owned())
+            .collect::<BTreeSet<_>>()
     );
     assert!(report.is_passed(), "{}", report.table());
     for outcome in &report.mutants {

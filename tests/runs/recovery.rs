@@ -327,7 +327,7 @@ fn without_the_adapter_the_records_of_an_earlier_run_are_kept() {
 
 #[test]
 fn a_scene_beyond_the_limit_of_a_binding_is_refused_with_both_numbers() {
-    let mut small = open(KernelLibrary::default());
+    let mut small = alone(KernelLibrary::default());
     let scene = builtin("cornell-box", &[]);
     let soup = raystone::accel::TriangleSoup::new(&scene);
     let needed = soup.records.len() as u64 * 48;

@@ -5,8 +5,10 @@
 mod hits;
 pub mod needs;
 pub mod scenes;
+pub mod tier;
 
 pub use hits::*;
+pub use tier::{in_turn, is_full, one_of, so_many};
 
 use raystone::accel::{
     AccelError, AccelKind, AccelRegistry, BuildLog, BuiltAccel, Intersection, Traced,
@@ -30,11 +32,17 @@ use std::sync::{Arc, OnceLock};
 /// The device that all tests of one program share, with the embedded kernels.
 pub fn gpu() -> &'static Gpu {
     static GPU: OnceLock<Gpu> = OnceLock::new();
-    GPU.get_or_init(|| open(KernelLibrary::default()))
+    GPU.get_or_init(|| alone(KernelLibrary::default()))
 }
 
-/// A device of its own, with other kernels.
+/// The shared device with other kernels; what composes to the same text is not compiled again.
 pub fn open(kernels: KernelLibrary) -> Gpu {
+    gpu().with_kernels(kernels)
+}
+
+/// A device of its own: for tests that change its limits, look at what opening it or compiling for it does, or plant what may
+/// lose it.
+pub fn alone(kernels: KernelLibrary) -> Gpu {
     raystone::gpu::open(&AdapterChoice::Best, kernels)
         .unwrap_or_else(|e| panic!("no adapter: run scripts/install-driver ({e})"))
 }

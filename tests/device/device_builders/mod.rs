@@ -6,7 +6,9 @@ mod soups;
 
 use crate::support;
 use crate::support::scenes::{self, lattice_soup};
-use crate::support::{Pcg, Stage, default_params, gpu, is_exact, kernels_with, open, structures};
+use crate::support::{
+    Pcg, Stage, default_params, gpu, in_turn, is_exact, kernels_with, open, structures,
+};
 use raystone::accel::bounds::Bounds;
 use raystone::accel::tree::parallel::{LEAF, LinkedTree, Method, Settings, build, device};
 use raystone::accel::tree::{NodeKind, Tree, TreeParameters};
@@ -375,7 +377,7 @@ fn faults_in_the_passes_are_seen() {
         clusters(&mut Pcg::new(11), 3000),
         lattice_soup(&mut Pcg::new(12), 3000, 4),
     ];
-    for (module, what, from, to) in faults {
+    for (module, what, from, to) in in_turn("faults of device builders", faults) {
         let module = format!("accel/tree/parallel/{module}");
         let gpu = open(kernels_with(&module, &[(from, to)]));
         let differs = |soup: &TriangleSoup, settings: &Settings| {

@@ -109,7 +109,7 @@ fn a_kernel_for_each_kind_of_material_makes_the_image_of_the_single_kernel_to_th
         let traced = stage.traced(gpu(), structure("bvh"));
         let single = organisation("single-kernel", &[]);
         let expected = rendered(gpu(), &stage, &traced, &path(5), &single).expect("an image");
-        for by in ways() {
+        for by in in_turn("organisations by kinds", ways()) {
             let found = rendered(gpu(), &stage, &traced, &path(5), &by);
             let found = found.unwrap_or_else(|e| panic!("{by:?}: {e}"));
             let name = &stage.scene.name;
@@ -231,7 +231,7 @@ fn planted_faults_are_seen() {
         // Sums of all queues are kept.
         (&by, "organisation/plan", "atomicStore(&counts[QUEUED], 0u);", ""),
     ];
-    for (by, module, from, to) in faults {
+    for (by, module, from, to) in in_turn("faults of organisations by kinds", faults) {
         let found = fault_on(all_kinds(), &path(4), by, (module, from, to));
         println!("{module}: {to}: {found:?}");
         if found.is_none() {

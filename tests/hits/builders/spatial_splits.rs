@@ -127,7 +127,8 @@ fn structures_over_clipped_triangles_pass_the_gate() {
         let stage = Stage::builtin(gpu, scene, changes);
         let judge = stage.judge(Checks::Repeated, [2_048, 4_000_000, 256]);
         assert!(judge.is_sound(), "{:?}", judge.first_wrong);
-        for name in ["bvh", "roped-bvh", "bvh4", "cwbvh", "meta-bvh"] {
+        let names = ["bvh", "roped-bvh", "bvh4", "cwbvh", "meta-bvh"];
+        for name in support::in_turn("structures over clipped triangles", names) {
             let kind = support::structure(name);
             let mut params = default_params(&kind.parameters());
             let set = [

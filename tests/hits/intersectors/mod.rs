@@ -4,7 +4,7 @@
 mod closed;
 
 use crate::support;
-use crate::support::{Pcg, assert_same_hits, build, default_params, scenes};
+use crate::support::{Pcg, assert_same_hits, build, default_params, in_turn, scenes};
 use closed::{ORDINARY, inner_rays, sphere};
 use glam::Vec3;
 use raystone::accel::triangle::{
@@ -226,7 +226,8 @@ fn every_structure_equals_brute_force_with_every_test() {
             &expected,
             &raystone::accel::brute_force_hits(&soup, &rays),
         );
-        for kind in AccelRegistry::default().iter() {
+        let kinds = AccelRegistry::default();
+        for kind in in_turn("structures with every triangle test", kinds.iter()) {
             let what = format!("{} with {}", kind.name(), triangle.name());
             let built = build(kind, &soup, &default_params(&kind.parameters()));
             if let Some(twin) = built.cpu_twin(&soup) {
@@ -260,7 +261,8 @@ fn less_padded_boxes_are_another_kernel_and_the_twins_follow() {
             ..Default::default()
         };
         let soup = scenes::soup(triangles.iter().copied()).intersecting(tests);
-        for kind in AccelRegistry::default().iter() {
+        let kinds = AccelRegistry::default();
+        for kind in in_turn("structures with every box test", kinds.iter()) {
             // 0 · ∞ is no number that WGSL promises anything about.
             if !box_test.finite {
                 continue;

@@ -111,7 +111,7 @@ fn judge_trials(places: std::ops::Range<usize>) {
     let scenes = trial_scenes().expect("scenes");
     assert_eq!(scenes.len(), 15);
     for trial in &scenes[places] {
-        for (name, changes) in &trial.trials {
+        for (name, changes) in in_turn("integrators path by path", &trial.trials) {
             let what = integrator_variant(name, changes);
             let record = verdict(gpu(), &trial.scene, &what, &independent(), &[0, 3, 70_000]);
             assert_eq!(record.fault, None, "{} {name}", trial.scene.name);

@@ -1,6 +1,6 @@
 //! Single paths on real scenes: none differs from the oracle's without a kind of rounding that explains it.
-//! With RAYSTONE_REAL_PATHS=/ every scene of the list is taken with every triangle test, which takes some minutes in release; with
-//! a part of names those that have it; without it a few small ones with the default test.
+//! With RAYSTONE_REAL_PATHS=/, and in a full run, every scene of the list is taken with every triangle test, which takes some minutes
+//! in release; with a part of names those that have it; else one of a few small ones with the default test.
 
 use super::{independent, judged_on};
 use crate::support::*;
@@ -9,7 +9,7 @@ use raystone::integrator::Stage;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Below `../shared/scenes`; the first ones are always taken.
+/// Below `../shared/scenes`; a run that is not full takes one of the first ones.
 const SCENES: [&str; 79] = [
     "cornell-box/CornellBox-Water.obj",
     "cornell-box/CornellBox-Original.obj",
@@ -91,12 +91,13 @@ const SCENES: [&str; 79] = [
     "veach-mis/veach_mats.xml",
     "water-caustic/front.ply",
 ];
-const ALWAYS: usize = 4;
+const SMALL_ONES: usize = 4;
 const SAMPLES: [u32; 4] = [0, 1, 23, 63];
 
 #[test]
 fn no_path_on_a_real_scene_differs_without_a_reason() {
     let asked = std::env::var("RAYSTONE_REAL_PATHS").ok();
+    let asked = asked.or_else(|| is_full().then(|| "/".to_owned()));
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/scenes");
     let registry = TriangleRegistry::default();
     let tests: Vec<_> = match asked {
@@ -105,7 +106,11 @@ fn no_path_on_a_real_scene_differs_without_a_reason() {
     };
     let scenes: Vec<_> = match &asked {
         Some(part) => SCENES.iter().filter(|name| name.contains(part)).collect(),
-        None => SCENES[..ALWAYS].iter().collect(),
+        None => one_of(
+            SMALL_ONES,
+            "real scenes path by path",
+            &SCENES[..SMALL_ONES],
+        ),
     };
     assert!(!scenes.is_empty(), "no scene has {asked:?} in its name");
     let mut faults = Vec::new();

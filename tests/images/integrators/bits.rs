@@ -20,7 +20,7 @@ fn last(renderer: &Renderer, spps: &[u32], seed: u32) -> Vec<[u32; 3]> {
 fn a_seed_gives_the_same_bits_again_and_another_seed_gives_others() {
     let stage = Stage::builtin(gpu(), "furnace-box", &[]);
     let traced = stage.traced(gpu(), structure("bvh"));
-    for sampler in samplers(2) {
+    for sampler in in_turn("samplers of a seed", samplers(2)) {
         let what = path(MAX_DEPTH);
         let renderer = stage.renderer(gpu(), &traced, &sampler, &what, [16, 16], false);
         let first = last(&renderer, &[2], 7);
@@ -85,7 +85,7 @@ fn the_images_at_powers_of_two_are_those_of_renders_of_their_own() {
     assert!(kept[0] != kept[1] && kept[1] != kept[2]);
 }
 
-/// The image of every structure, by name.
+/// The image of `bvh` and of the structures whose turn it is, by name.
 fn images(stage: &Stage, what: &Variant) -> Vec<(&'static str, Vec<[u32; 3]>)> {
     let sampler = sampler("pixel-hash", "none");
     let image = |kind: &'static dyn raystone::accel::AccelKind| {
@@ -93,7 +93,15 @@ fn images(stage: &Stage, what: &Variant) -> Vec<(&'static str, Vec<[u32; 3]>)> {
         let renderer = stage.renderer(gpu(), &traced, &sampler, what, [16, 16], false);
         (kind.name(), last(&renderer, &[4], 9))
     };
-    structures().into_iter().map(image).collect()
+    let kinds = structures().into_iter();
+    let others = in_turn(
+        "structures of an image",
+        kinds.filter(|kind| kind.name() != "bvh"),
+    );
+    std::iter::once(structure("bvh"))
+        .chain(others)
+        .map(image)
+        .collect()
 }
 
 #[test]

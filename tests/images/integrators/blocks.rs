@@ -141,7 +141,7 @@ fn an_image_too_large_for_one_buffer_is_summed_in_bands() {
     let whole = with_renderer(gpu(), [200, 100], |renderer| {
         bits(&renderer.render(&[3], 5).expect("a render")[0].image)
     });
-    let mut small = open(KernelLibrary::default());
+    let mut small = alone(KernelLibrary::default());
     // 40 rows of 200 pixels; what the scene needs is smaller.
     small.limits.max_storage_buffer_binding_size = 128 << 10;
     with_renderer(&small, [200, 100], |renderer| {
@@ -153,7 +153,7 @@ fn an_image_too_large_for_one_buffer_is_summed_in_bands() {
 #[test]
 fn a_driver_that_ends_loops_is_seen_and_what_it_cuts_is_refused() {
     // As if the closing loop of every kernel had been cut.
-    let cut = open(kernels_with(
+    let cut = alone(kernels_with(
         "common/errors",
         &[("turns != wanted", "turns == wanted")],
     ));

@@ -43,17 +43,21 @@ fn all_strategies_and_roulettes_have_one_mean() {
     let exact = chosen(Strategy::MisBalance, Roulette::Never, 0.0);
     let exact = estimate(gpu(), &exact, 256);
     let mut largest = 0.0f64;
-    for &strategy in Strategy::ALL {
-        for &roulette in Roulette::ALL {
-            let ours = estimate(gpu(), &chosen(strategy, roulette, 0.0), spp(strategy));
-            let difference = ours.minus(&exact);
-            let what = format!("{} and {}", strategy.name(), roulette.name());
-            assert!(
-                difference.agrees_with(0.0),
-                "{what}: {ours:?}, not {exact:?}"
-            );
-            largest = largest.max(difference.error / exact.mean);
-        }
+    let roulettes = |&strategy| {
+        Roulette::ALL
+            .iter()
+            .map(move |&roulette| (strategy, roulette))
+    };
+    let all = Strategy::ALL.iter().flat_map(roulettes);
+    for (strategy, roulette) in in_turn("strategies and roulettes", all) {
+        let ours = estimate(gpu(), &chosen(strategy, roulette, 0.0), spp(strategy));
+        let difference = ours.minus(&exact);
+        let what = format!("{} and {}", strategy.name(), roulette.name());
+        assert!(
+            difference.agrees_with(0.0),
+            "{what}: {ours:?}, not {exact:?}"
+        );
+        largest = largest.max(difference.error / exact.mean);
     }
     assert!(largest < 0.015, "{largest}: proves too little");
 }
@@ -88,7 +92,7 @@ fn a_fault_in_a_heuristic_or_a_roulette_moves_the_mean() {
     ];
     let exact = chosen(Strategy::MisBalance, Roulette::Never, 0.0);
     let exact = estimate(gpu(), &exact, 256);
-    for (strategy, roulette, right, wrong) in faults {
+    for (strategy, roulette, right, wrong) in in_turn("faults of estimators", faults) {
         let faulty = open(kernels_with("integrator/path", &[(right, wrong)]));
         let found = estimate(&faulty, &chosen(strategy, roulette, 0.0), spp(strategy));
         let difference = found.minus(&exact);

@@ -114,7 +114,7 @@ fn smooth_and_flat(size: [u32; 2], material: Material) -> [SceneData; 2] {
 #[test]
 fn smooth_balls_of_few_facets_reflect_all_light() {
     for size in [[12, 6], [20, 10]] {
-        for (name, material) in shiny() {
+        for (name, material) in in_turn("materials of few facets", shiny()) {
             let [smooth, flat] = smooth_and_flat(size, material);
             let [least, mean, most] = seen(gpu(), smooth, DEPTH, 64);
             let what = format!("{size:?} {name}: {least} {mean} {most}");

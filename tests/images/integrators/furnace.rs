@@ -81,7 +81,8 @@ fn the_furnace_box_has_the_radiance_of_its_bounces_with_every_sampler() {
         // One depth for the others: a software driver takes seconds for each kernel.
         let (random, fixed) = (samplers(RANDOM_SPP), samplers(FIXED_SPP));
         let random = random.iter().filter(|s| is_unbiased(s));
-        for sampler in random.chain(fixed.iter().filter(|s| !is_unbiased(s))) {
+        let all = random.chain(fixed.iter().filter(|s| !is_unbiased(s)));
+        for sampler in in_turn("samplers of the furnace", all) {
             check(gpu(), &stage, sampler, albedo, MAX_DEPTH);
         }
     }
@@ -101,7 +102,7 @@ fn every_pixel_of_the_white_furnace_is_one_and_none_is_where_the_sphere_is_grey(
         let errors = image.pixels.iter().flatten().map(|v| (v - 1.0).abs());
         errors.fold(0.0, f32::max)
     };
-    for kind in structures() {
+    for kind in in_turn("structures of the white furnace", structures()) {
         let error = largest_error(&white, kind.name());
         assert!(error < 1e-5, "{}: {error}", kind.name());
     }
@@ -182,7 +183,7 @@ fn a_ball_of_glass_in_the_white_furnace_cannot_be_seen() {
 
 #[test]
 fn faults_of_glass_show_in_the_white_furnace() {
-    for (file, from, to, expected) in [
+    let faults = [
         // Without the refraction of radiance, glass is as bright inside as outside.
         (
             "shading/bsdf/dielectric",
@@ -202,7 +203,8 @@ fn faults_of_glass_show_in_the_white_furnace() {
             "select(surface.normal, surface.normal",
             "outside",
         ),
-    ] {
+    ];
+    for (file, from, to, expected) in in_turn("faults of glass", faults) {
         let gpu = open(kernels_with(file, &[(from, to)]));
         let fault = glass_fault(&gpu).unwrap_or_default();
         assert_eq!(fault, expected, "`{to}` for `{from}`");

@@ -2,6 +2,7 @@
 
 mod faults;
 
+use crate::support::in_turn;
 use raystone::measure::known_images::Seen;
 use raystone::run::{Registries, RunOptions, verify_images};
 use std::path::Path;
@@ -32,7 +33,7 @@ fn a_few_images_are_as_they_are_known() {
         "furnace, two bounces",
         "textures",
     ];
-    for view in seen(None, &names) {
+    for view in seen(None, &in_turn("known images", names)) {
         println!("{view:?}");
         assert_eq!(view.fault, None, "{}", view.name);
     }
