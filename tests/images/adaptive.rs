@@ -104,6 +104,10 @@ fn tiles_end_on_their_own_without_bias_and_the_target_is_met() {
     assert!((9..128).contains(&spp), "{adaptive:?}");
     assert!(error < target, "{error} of {target}");
     assert_eq!(adaptive[0], uniform[0], "the first stage is even");
+    // A run more, of the longest here.
+    if !is_full() {
+        return;
+    }
     let (again, _) = run(&text);
     let hashes = |all: &[ErrorRecord]| all.iter().map(|r| r.image_hash.clone()).collect::<Vec<_>>();
     assert_eq!(

@@ -1,6 +1,6 @@
 //! Every registered method against the host, at all sizes where something ends.
 
-use crate::support::gpu;
+use crate::support::{gpu, in_turn};
 use raystone::compaction::{Compaction, CompactionRegistry, Passes, Stays, Stream};
 use raystone::gpu::{Gpu, Groups, Player, Recording, Storage};
 use raystone::measure::compaction::{Bench, Inputs, stream};
@@ -85,7 +85,7 @@ pub fn drawn(count: u32, valid: f64, method: &dyn Compaction) -> Vec<u32> {
 
 #[test]
 fn every_method_compacts_at_all_sizes_where_something_ends() {
-    for (name, method) in methods(gpu()) {
+    for (name, method) in in_turn("methods of compaction", methods(gpu())) {
         for count in [0, 1, 15, 16, 17, 63, 64, 65, 255, 257, 1023, 1025] {
             for valid in [0.0, 0.3, 1.0] {
                 let flags = drawn(count, valid, &*method);
@@ -98,7 +98,7 @@ fn every_method_compacts_at_all_sizes_where_something_ends() {
 
 #[test]
 fn every_method_compacts_elements_of_all_sizes() {
-    for (name, method) in methods(gpu()) {
+    for (name, method) in in_turn("methods of compaction", methods(gpu())) {
         for bytes in [12, 16, 64] {
             let flags = drawn(1000, 0.6, &*method);
             let fault = fault(gpu(), &method, &flags, bytes, [1000, 1000]);
@@ -131,7 +131,7 @@ const PAST_A_ROW: [&str; 3] = [
 /// Three levels of sums, and more workgroups than lie in a row.
 #[test]
 fn every_method_compacts_streams_of_several_levels() {
-    for (name, method) in methods(gpu()) {
+    for (name, method) in in_turn("methods of compaction", methods(gpu())) {
         for count in [(1 << 17) + 77, 65_536 * 64 + 1] {
             if count > 1 << 18 && !PAST_A_ROW.contains(&&*name) {
                 continue;

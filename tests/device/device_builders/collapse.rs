@@ -63,7 +63,8 @@ fn wide_nodes_equal_those_of_the_host_twin_to_the_bit() {
     for case in degenerate_cases() {
         check(case.name, &case.soup, &[]);
     }
-    for count in [0, 1, 2, 3, 4, 5, 8, 9, 33, 64, 65, 513, 4097] {
+    let counts = [0, 1, 2, 3, 4, 5, 8, 9, 33, 64, 65, 513, 4097];
+    for count in in_turn("sizes of wide trees", counts) {
         check("lattice", &lattice_soup(&mut random, count, 30), &[]);
         check("clusters", &clusters(&mut random, count), &[]);
         check("equal positions", &equal_positions(count), &[]);
@@ -98,7 +99,7 @@ fn wide_nodes_of_built_in_scenes_and_of_sponza_equal_those_of_the_host_twin() {
     if !is_exact(gpu()) {
         return;
     }
-    for entry in builtin_scenes() {
+    for entry in in_turn("built-in scenes of wide trees", builtin_scenes()) {
         let scene = support::builtin(&entry.name, &[]);
         if scene.triangles.len() < 30_000 {
             check(&entry.name, &TriangleSoup::new(&scene), &[]);

@@ -98,9 +98,10 @@ fn trees_equal_the_host_twin_to_the_bit() {
     for case in scenes::degenerate_cases() {
         check(case.name, &case.soup);
     }
-    for count in [
+    let counts = [
         1, 2, 3, 7, 8, 9, 63, 64, 65, 511, 512, 513, 4095, 4096, 4097,
-    ] {
+    ];
+    for count in in_turn("sizes of trees", counts) {
         check("lattice", &lattice_soup(&mut random, count, 30));
         check("clusters", &clusters(&mut random, count));
         check("equal positions", &equal_positions(count));
@@ -143,7 +144,7 @@ fn trees_of_built_in_scenes_equal_the_host_twin_to_the_bit() {
     }
     let entries = builtin_scenes();
     assert!(entries.len() > 5);
-    for entry in entries {
+    for entry in in_turn("built-in scenes of trees", entries) {
         let scene = support::builtin(&entry.name, &[]);
         if scene.triangles.len() < 200_000 {
             check(&entry.name, &TriangleSoup::new(&scene));

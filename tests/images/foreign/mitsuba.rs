@@ -3,7 +3,7 @@
 
 use super::agreement::Moments;
 use super::{replicates, replicates_by};
-use crate::support::{builtin, sampler_of};
+use crate::support::{builtin, in_turn, sampler_of};
 use raystone::image::luminance;
 use raystone::scene::SceneData;
 
@@ -107,7 +107,7 @@ const TILE: u32 = 8;
 fn all_samplers_make_the_image_of_mitsuba() {
     const SPP: u32 = 16;
     let theirs = stored().tiled(EDGE as usize, TILE as usize);
-    for (sequence, decorrelation) in SAMPLERS {
+    for (sequence, decorrelation) in in_turn("samplers against Mitsuba", SAMPLERS) {
         let sampler = sampler_of(sequence, decorrelation, SPP);
         let scene = builtin("cornell-box", &[]);
         let images = replicates_by(&sampler, scene, 6, [EDGE; 2], SPP, 8);

@@ -295,7 +295,7 @@ fn every_planted_fault_is_seen() {
         ));
         let found = match seen {
             Irradiance(lamp, strategy) => irradiance::fault(&gpu, lamp, strategy),
-            Density(scene) => density::fault(&gpu, Some(scene)),
+            Density(scene) => density::fault(&gpu, scene),
             Environment => environment::fault(&gpu),
             Flux => files::fault(&gpu),
             Mean(choice, lights) => means::fault(&gpu, choice, lights, &right),

@@ -59,10 +59,10 @@ pub fn right() -> Estimate {
 #[test]
 fn every_choice_of_lights_has_the_same_mean() {
     let right = right();
-    for choice in ["power", "uniform", "tree"] {
-        for lights in ["one", "all"] {
-            assert_eq!(fault(gpu(), choice, lights, &right), None);
-        }
+    let choices = ["power", "uniform", "tree"].into_iter();
+    let all = choices.flat_map(|choice| ["one", "all"].map(|lights| (choice, lights)));
+    for (choice, lights) in in_turn("choices of lights", all) {
+        assert_eq!(fault(gpu(), choice, lights, &right), None);
     }
 }
 
