@@ -39,7 +39,9 @@ fn commit() -> Option<usize> {
 pub fn places(list: &str, count: usize, parts: usize, turn: usize) -> Vec<usize> {
     let parts = parts.min(count).max(1);
     let begin = list.bytes().map(usize::from).sum::<usize>() + turn % parts;
-    (0..count).filter(|at| (at + begin) % parts == 0).collect()
+    (0..count)
+        .filter(|at| (at + begin).is_multiple_of(parts))
+        .collect()
 }
 
 /// A third of `all`, or all of it: see the head of this module.
