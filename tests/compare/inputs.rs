@@ -409,5 +409,10 @@ fn a_run_of_other_kernels_alone_is_compared_cell_by_cell() {
     let named = |line: &Line| !line.key.label("kernels").is_empty();
     assert!(!idea.lines.iter().any(named) && !idea.in_rounds);
     let found = compared(&base.side().alone(), &idea);
+    assert!(
+        found.findings.len() > 20,
+        "{} findings",
+        found.findings.len()
+    );
     assert_eq!(found.findings.len(), found.count(Verdict::Same));
 }

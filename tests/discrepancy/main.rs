@@ -1,6 +1,8 @@
 //! Measures of point sets against published values and their definitions; `raystone discrepancy` as a
 //! user meets it, and SciPy's opinion of the same points.
 
+#[path = "../support/cpu.rs"]
+mod cpu;
 #[path = "../support/needs.rs"]
 mod needs;
 
